@@ -1,5 +1,5 @@
-//! Where a filter starts: from rest, or in motion with the course that satellites show. From a given pose it is
-//! [`Start::at`].
+//! Initialises a filter from rest, or in motion from the course over ground that satellite navigation reports. [`Start::at`]
+//! initialises it from a given pose.
 //!
 //! P. D. Groves, "Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems", 2nd edition, 2013, section 5.6.
 
@@ -45,11 +45,11 @@ params! {
     }
 }
 
-/// Gathers samples until a filter can start.
+/// Gathers samples until a filter can be initialised.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Alignment {
     params: AlignmentParams,
-    /// Of the samples gathered.
+    /// Statistics of the samples gathered so far.
     count: f64,
     first_ns: Option<i64>,
     last_ns: i64,
@@ -58,17 +58,17 @@ pub struct Alignment {
 }
 
 impl Alignment {
-    /// One without a sample.
+    /// Creates an alignment without samples.
     pub fn new(params: AlignmentParams) -> Self {
         let (rotation, force) = (Moments::default(), Moments::default());
         Self { params, count: 0.0, first_ns: None, last_ns: i64::MIN, rotation, force }
     }
 
-    /// Takes a sample. One that shows motion begins a new rest.
+    /// Adds a sample. A sample that shows motion restarts the rest interval.
     ///
     /// # Errors
     ///
-    /// [`Refusal`] if a value is not finite, or time does not increase. Nothing has changed then.
+    /// Returns a [`Refusal`] if a value is not finite or time does not increase. The alignment is then unchanged.
     pub fn add(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
         let ImuMean { time_ns, angular_velocity, specific_force } = sample;
         if !angular_velocity.iter().chain(specific_force.iter()).all(|x| x.abs() < 1e6) {
@@ -87,19 +87,18 @@ impl Alignment {
         Ok(())
     }
 
-    /// For how long the body has been at rest, s.
+    /// How long the body has been at rest, s.
     pub fn rest_s(&self) -> f64 {
         self.first_ns.map_or(0.0, |first_ns| self.last_ns.saturating_sub(first_ns) as f64 * 1e-9)
     }
 
-    /// A start from rest: tilt from gravity, the bias of the gyroscope from what it reads.
+    /// Initialises from rest: the tilt from gravity, the gyroscope bias from its mean reading.
     ///
-    /// `position` (m) and `heading` (rad, of the body's x axis, from east counter-clockwise) come with their standard
-    /// deviations.
+    /// `position` (m) and `heading` (rad, of the body's x axis, from east counter-clockwise) come with their standard deviations.
     ///
     /// # Errors
     ///
-    /// [`Refusal::NotObservable`] if rest has not lasted long enough, or the body's x axis is vertical.
+    /// Returns [`Refusal::NotObservable`] if the rest has not lasted long enough or the body's x axis is vertical.
     pub fn at_rest(&self, position: (Vector3<f64>, f64), heading: (f64, f64)) -> Result<Start, Refusal> {
         let AlignmentParams { rest_time, largest_bias, accelerometer_bias, gravity, .. } = self.params;
         if self.rest_s() < rest_time || self.rotation.mean.norm() > largest_bias {
@@ -111,7 +110,7 @@ impl Alignment {
         let bias = sqrt(self.rotation.largest_variance(self.count)) / sqrt(self.count);
         Ok(Start {
             gyroscope_bias: self.rotation.mean,
-            // Of noise that is not white over the whole of it, no less than a part is known.
+            // Non-white noise does not average out, so the bias is never known better than this.
             gyroscope_bias_deviation: bias.max(1e-4),
             accelerometer_bias_deviation: accelerometer_bias,
             rotation_covariance: rotation_covariance(tilt, heading.1),
@@ -119,14 +118,14 @@ impl Alignment {
         })
     }
 
-    /// A start in motion: tilt from the last specific force, heading from the course.
+    /// Initialises in motion: the tilt from the last specific force, the heading from the course.
     ///
-    /// `position` (m) and `velocity` (m/s) in the world come with their standard deviations; `forward` is the direction in
-    /// which the body travels, in the body, and `slip` how far it may differ from that, rad.
+    /// `position` (m) and `velocity` (m/s) in the world come with their standard deviations. `forward` is the direction of travel
+    /// in the body frame, and `slip` is how far the course may deviate from it, rad.
     ///
     /// # Errors
     ///
-    /// [`Refusal::NotObservable`] without a sample, in free fall, or if the velocity is less than five of its standard
+    /// Returns [`Refusal::NotObservable`] without a sample, in free fall, or if the velocity is less than five of its standard
     /// deviations.
     pub fn in_motion(
         &self,
@@ -137,7 +136,7 @@ impl Alignment {
     ) -> Result<Start, Refusal> {
         let AlignmentParams { accelerometer_bias, acceleration, gravity, largest_bias, .. } = self.params;
         let speed = velocity.0.xy().norm();
-        // Nor if it is not a number.
+        // Also rejects NaN.
         if self.first_ns.is_none() || speed.is_nan() || speed <= 5.0 * velocity.1 {
             return Err(Refusal::NotObservable);
         }
@@ -167,7 +166,7 @@ impl Alignment {
         self
     }
 
-    /// Levelled, with the horizontal part of `forward`, of the body, at `heading`.
+    /// The level attitude in which the horizontal part of `forward`, a body vector, points at `heading`.
     fn orientation(&self, forward: &Vector3<f64>, heading: f64) -> Result<UnitQuaternion<f64>, Refusal> {
         let level = initial_orientation(&self.force.mean, None).map_err(|_| Refusal::NotObservable)?;
         let ahead = level * forward;
@@ -179,7 +178,7 @@ impl Alignment {
     }
 }
 
-/// World axes: tilt about the horizontal ones, heading about the vertical.
+/// Covariance in world axes: tilt about the horizontal axes, heading about the vertical axis.
 fn rotation_covariance(tilt: f64, heading: f64) -> Matrix3<f64> {
     Matrix3::from_diagonal(&Vector3::new(tilt * tilt, tilt * tilt, heading * heading))
 }

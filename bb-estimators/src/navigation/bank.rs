@@ -1,10 +1,10 @@
-//! Several filters that differ by their parameters, weighed by how well each expected what was measured.
+//! Several filters with different parameters, weighted by how well each predicts the measurements.
 //!
 //! A static multiple-model estimator: D. T. Magill, "Optimal adaptive estimation of sampled stochastic processes", IEEE
-//! Transactions on Automatic Control 10(4), 1965; Y. Bar-Shalom, X. R. Li, T. Kirubarajan, "Estimation with Applications
-//! to Tracking and Navigation", 2001, section 11.6.2. It answers what nobody knows of a robot beforehand: whether the noise
-//! on the IMU's data sheet is all that there is on this vehicle, or whether the scale of a visual odometry drifts. Filters
-//! that have become implausible are dropped, so that in the long run it costs about as much as one.
+//! Transactions on Automatic Control 10(4), 1965; Y. Bar-Shalom, X. R. Li, T. Kirubarajan, "Estimation with Applications to
+//! Tracking and Navigation", 2001, section 11.6.2. It resolves unknowns about a robot, such as whether the IMU's data sheet
+//! covers all the noise on this vehicle, or whether the scale of a visual odometry drifts. Implausible filters are dropped, so in
+//! the long run a bank costs about as much as one filter.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -16,23 +16,23 @@ use super::refusal::Refusal;
 use super::state::{Estimate, States};
 use super::stream::Stream;
 
-/// A filter whose log likelihood is this far below that of the best is dropped: odds of 1 to 10¹¹.
+/// A filter is dropped if its log likelihood is this far below that of the best filter: odds of 1 to 10¹¹.
 const IMPLAUSIBLE: f64 = 25.0;
 
 /// Up to `M` filters of one type.
 ///
-/// Each sensor has `M` [`Stream`]s, one a filter: they may differ, too, in
-/// [`variance_factor`](super::StreamParams::variance_factor) above all.
+/// Each sensor has `M` [`Stream`]s, one per filter. Streams may differ too, above all in
+/// [`variance_factor`](super::StreamParams::variance_factor).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bank<S: States, const N: usize, const M: usize> {
     filters: [Eskf<S, N>; M],
-    /// Logarithm of the weights, the largest 0.
+    /// Logarithms of the weights; the largest is 0.
     log_weights: [f64; M],
     alive: [bool; M],
 }
 
 impl<S: States, const N: usize, const M: usize> Bank<S, N, M> {
-    /// A bank of filters, each with how plausible it is beforehand: positive, of any sum.
+    /// Creates a bank of filters with prior weights, which are positive and need not sum to 1.
     pub fn new(filters: [(Eskf<S, N>, f64); M]) -> Self {
         let log_weights = filters.map(|(_, prior)| ln(prior.max(f64::MIN_POSITIVE)));
         let mut bank = Self { filters: filters.map(|(filter, _)| filter), log_weights, alive: [true; M] };
@@ -44,29 +44,29 @@ impl<S: States, const N: usize, const M: usize> Bank<S, N, M> {
     ///
     /// # Errors
     ///
-    /// As one of them.
+    /// Returns the error of any filter that fails.
     pub fn start(&mut self, start: &Start) -> Result<(), Refusal> {
         self.filters.iter_mut().try_for_each(|filter| filter.start(start))
     }
 
-    /// Moves all filters over one sample of the IMU; see [`Eskf::propagate`].
+    /// Propagates all filters over one IMU sample; see [`Eskf::propagate`].
     ///
     /// # Errors
     ///
-    /// As one of them: they agree about samples.
+    /// The same as [`Eskf::propagate`]; all filters agree on whether a sample is valid.
     pub fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
         let mut alive = self.filters.iter_mut().zip(&self.alive).filter(|(_, alive)| **alive);
         alive.try_for_each(|(filter, _)| filter.propagate(sample))
     }
 
-    /// Corrects all filters by a measurement, and weighs them by it; see [`Eskf::update`].
+    /// Updates all filters with a measurement and reweights them by its likelihood; see [`Eskf::update`].
     ///
-    /// The gate is that of all together: what one filter accepts, all fuse, and it counts against those that did not
-    /// expect it. What none accepts says nothing about which is right.
+    /// The filters share a gate: if one filter accepts a measurement, all fuse it, and it counts against the filters that did not
+    /// expect it. A measurement that every filter rejects does not change the weights.
     ///
     /// # Errors
     ///
-    /// As the most plausible filter. Others may have taken it.
+    /// Returns the error of the most plausible filter. Other filters may have fused the measurement.
     pub fn update<X: Measurement<D>, const D: usize>(
         &mut self,
         streams: &mut [Stream; M],
@@ -99,7 +99,7 @@ impl<S: States, const N: usize, const M: usize> Bank<S, N, M> {
         alive.for_each(|(filter, _)| filter.set_keyframe(id));
     }
 
-    /// The mean of the filters and its covariance, `N × N`, which holds how much they differ. None before the start.
+    /// The mean of the filters and its covariance, `N × N`, which includes the spread between them. `None` before the start.
     pub fn estimate(&self) -> Option<(Estimate<N>, SMatrix<f64, N, N>)> {
         let reference = *self.filters.get(self.best())?.estimate()?;
         let weights = self.weights();
@@ -117,7 +117,7 @@ impl<S: States, const N: usize, const M: usize> Bank<S, N, M> {
         Some((reference.corrected::<S>(&mean), covariance))
     }
 
-    /// How plausible each filter is; the sum is 1, and filters that were dropped have 0.
+    /// The weight of each filter; the weights sum to 1, and dropped filters have 0.
     pub fn weights(&self) -> [f64; M] {
         let mut weights = [0.0; M];
         for i in (0..M).filter(|i| self.alive[*i]) {
@@ -127,13 +127,13 @@ impl<S: States, const N: usize, const M: usize> Bank<S, N, M> {
         weights.map(|weight| weight / sum)
     }
 
-    /// The place of the most plausible filter.
+    /// The index of the most plausible filter.
     pub fn best(&self) -> usize {
         let alive = (0..M).filter(|i| self.alive[*i]);
         alive.max_by(|a, b| self.log_weights[*a].total_cmp(&self.log_weights[*b])).unwrap_or(0)
     }
 
-    /// The filters, those that were dropped included, as they were then.
+    /// The filters, including dropped ones in their state when they were dropped.
     pub fn filters(&self) -> &[Eskf<S, N>; M] {
         &self.filters
     }

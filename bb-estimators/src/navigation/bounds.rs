@@ -1,29 +1,30 @@
-//! How large numbers are that say anything.
+//! Upper bounds on meaningful values.
 
-/// The largest variance of a position or a velocity that says anything: 10,000 km, or as much a second.
+/// The largest meaningful variance of a position or velocity: the square of 10,000 km, or of 10,000 km/s.
 pub(in crate::navigation) const MOST_VARIANCE: f64 = 1e14;
 
-/// The largest variance of a rotation error, rad²: a hundred turns are as good as one.
+/// The largest meaningful variance of a rotation error, rad²: beyond a hundred turns the rotation is unknown anyway.
 pub(in crate::navigation) const MOST_ROTATION: f64 = 4e5;
 
-/// No position or velocity of anything on the Earth has a larger component, m or m/s.
+/// The largest component of a position or velocity of anything on the Earth, m or m/s.
 const FARTHEST: f64 = 1e9;
 
-/// Whether something on the Earth may be at such a position, or have such a velocity, m or m/s. Not if it is not a number.
+/// Whether a position (m) or velocity (m/s) is possible for something on the Earth. `false` for NaN.
 pub(in crate::navigation) fn is_on_earth<'a>(components: impl IntoIterator<Item = &'a f64>) -> bool {
     is_within(components, FARTHEST)
 }
 
-/// Whether no component is larger, whatever its sign. Not if one is not a number.
+/// Whether no component exceeds the bound in magnitude. `false` if one is NaN.
 pub(in crate::navigation) fn is_within<'a>(components: impl IntoIterator<Item = &'a f64>, most: f64) -> bool {
     components.into_iter().all(|x| x.abs() <= most)
 }
 
-/// What a sample adds to a variance at least, relatively: far above rounding, which is 1e-16 of the largest term of each sum.
+/// The smallest relative amount that a sample adds to a variance: far above rounding, which is 1e-16 of the largest term of each
+/// sum.
 const REST: f64 = 1e-13;
 
-/// The process noise of a variance, or what rounding may have taken from that if it is more: a position that is known to
-/// nanometres is soon one of a velocity that is not known at all, and of what they share nothing else would be left.
+/// The process noise of a variance, or the amount that rounding may have removed from it, if that is larger. A position known to
+/// nanometres soon depends on a velocity that is not known at all; without this floor, only their shared error would remain.
 #[inline]
 pub(in crate::navigation) fn above_rounding(noise: f64, variance: f64) -> f64 {
     let least = REST * variance;

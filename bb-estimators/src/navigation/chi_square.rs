@@ -1,8 +1,8 @@
-//! The χ² distribution, whose quantiles are the limits of gates.
+//! The χ² distribution, whose quantiles are the gate thresholds.
 
 use crate::navigation::math::{exp, sqrt};
 
-/// Probability that a sum of `dimension` squared standard normal numbers exceeds `x`.
+/// Probability that the sum of the squares of `dimension` standard normal numbers exceeds `x`.
 ///
 /// By the recurrence `Q(k + 2, x) = Q(k, x) + (x/2)^(k/2) exp(-x/2) / Γ(k/2 + 1)`; M. Abramowitz, I. Stegun, "Handbook of
 /// Mathematical Functions", 1964, 26.4.8.
@@ -27,8 +27,8 @@ pub fn exceedance(dimension: usize, x: f64) -> f64 {
     sum
 }
 
-/// The `x` that is exceeded with this probability: the limit of a gate that refuses as large a part of good
-/// measurements. Infinite for a probability of 0, 0 for one of 1.
+/// The `x` that is exceeded with the given probability: the threshold of a gate that rejects this fraction of good measurements.
+/// Infinite for a probability of 0, and 0 for a probability of 1.
 pub fn limit(dimension: usize, probability: f64) -> f64 {
     if probability.is_nan() || probability <= 0.0 {
         return f64::INFINITY;

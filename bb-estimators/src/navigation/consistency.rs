@@ -1,4 +1,4 @@
-//! Whether a filter errs as much as it says: NIS, whiteness of innovations, NEES.
+//! Consistency of a filter's errors with its covariance: NIS, whiteness of innovations, NEES.
 //!
 //! Y. Bar-Shalom, X. R. Li, T. Kirubarajan, "Estimation with Applications to Tracking and Navigation", 2001,
 //! section 5.4.
@@ -8,7 +8,7 @@ use nalgebra::{SMatrix, SVector};
 use crate::navigation::fused::Fused;
 use crate::navigation::math::sqrt;
 
-/// Statistics of one sensor's innovations.
+/// Innovation statistics of one sensor.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Consistency {
     count: u64,
@@ -32,33 +32,33 @@ impl Consistency {
         self.previous = Some(fused.whitened);
     }
 
-    /// How many measurements were fused.
+    /// The number of measurements fused.
     pub fn count(&self) -> u64 {
         self.count
     }
 
-    /// Normalised innovation squared over the dimension, on average: 1 if the filter is consistent, more if it is too
-    /// sure. None before the first measurement.
+    /// Mean normalised innovation squared, divided by the dimension: 1 if the filter is consistent, larger if it is
+    /// overconfident. `None` before the first measurement.
     pub fn mean_nis(&self) -> Option<f64> {
         (self.dimensions > 0).then(|| self.nis / self.dimensions as f64)
     }
 
-    /// Correlation of the first component of one innovation with that of the next: 0 if innovations are white, up to 2/√n
-    /// by chance. None before the second measurement.
+    /// Correlation between the first components of successive innovations: 0 if innovations are white, up to 2/√n by chance.
+    /// `None` before the second measurement.
     pub fn correlation(&self) -> Option<f64> {
         (self.count > 1 && self.squares > 0.0).then(|| self.products / self.squares)
     }
 
-    /// The limits that [`mean_nis`](Self::mean_nis) of a consistent filter keeps, all but about 5 % of the time.
+    /// The bounds within which the [`mean_nis`](Self::mean_nis) of a consistent filter stays about 95 % of the time.
     pub fn nis_bounds(&self) -> (f64, f64) {
-        // The variance of χ² of n is 2 n.
+        // The variance of χ² with n degrees of freedom is 2 n.
         let spread = 1.96 * sqrt(2.0 / (self.dimensions.max(1)) as f64);
         ((1.0 - spread).max(0.0), 1.0 + spread)
     }
 }
 
-/// Normalised estimation error squared, `eᵀ P⁻¹ e`: its mean is `D` if the filter is consistent. None if `P` is not
-/// positive definite.
+/// Normalised estimation error squared, `eᵀ P⁻¹ e`: its mean is `D` if the filter is consistent. `None` if `P` is not positive
+/// definite.
 pub fn nees<const D: usize>(error: &SVector<f64, D>, covariance: &SMatrix<f64, D, D>) -> Option<f64> {
     let decomposed = nalgebra::linalg::Cholesky::new(*covariance)?;
     Some(error.dot(&decomposed.solve(error)))

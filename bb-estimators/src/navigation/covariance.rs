@@ -1,4 +1,4 @@
-//! The covariance of the errors: symmetric to the last bit, and kept positive definite.
+//! The error covariance: exactly symmetric, and kept positive definite.
 
 #![allow(clippy::needless_range_loop, reason = "the indices are those of the equations")]
 
@@ -7,31 +7,31 @@ use nalgebra::{Matrix2, Matrix3, SMatrix, SVector};
 use super::layout::Layout;
 use super::math::{ln, sqrt};
 
-/// One update never takes more than this ratio of variance out of a direction: what rounding adds, 1e-16 of what was
-/// there, stays far below what is left.
+/// The smallest ratio of the variance in a direction that one update may leave. The rounding error, 1e-16 of the variance
+/// before, stays far below the variance after.
 const LEAST_NOISE: f64 = 1e-10;
 
-/// Nor do several leave less than this ratio of the variances of what they see: of a sum or a difference that is known that much
-/// better than its terms, rounding would take the rest.
+/// The smallest ratio that several updates may leave of the variances of the measured terms. If a sum or difference is known even
+/// better relative to its terms, rounding would consume the rest.
 const LEAST_REST: f64 = 1e-13;
 
-/// Where an update leaves less than this ratio of a variance, rounding may take the rest: the covariance is checked at once.
+/// If an update leaves less than this ratio of a variance, rounding may consume the rest, and the covariance is checked at once.
 const RISKY: f64 = 1e-8;
 
-/// Updates between two checks by a Cholesky decomposition.
+/// Number of updates between two checks by a Cholesky decomposition.
 const CHECK_EVERY: u32 = 1024;
 
-/// What a check wants the smallest eigenvalue of the correlations to be: above rounding, and below what a sample adds.
+/// The smallest eigenvalue of the correlations that a check accepts: above rounding, and below the noise that a sample adds.
 const LEAST: f64 = 1e-14;
 
-/// What a variance is raised by, relatively, where a check fails.
+/// The relative amount by which variances are raised when a check fails.
 const REPAIR: f64 = 1e-12;
 
-/// Rounding of a covariance that was computed, as a part of the variances.
+/// Rounding error of a computed covariance, relative to the variances.
 const ROUNDING: f64 = 1e-9;
 
-/// Whether a covariance is one: symmetric, and positive semi-definite up to rounding. One of zeros is, which is that of what is
-/// known exactly.
+/// Whether a matrix is a covariance: symmetric, and positive semi-definite up to rounding. The zero matrix, which describes
+/// exactly known errors, is valid.
 #[allow(clippy::neg_cmp_op_on_partial_ord, reason = "what is not a number is refused")]
 #[inline]
 pub(in crate::navigation) fn is_covariance<const D: usize>(noise: &SMatrix<f64, D, D>) -> bool {
@@ -40,7 +40,7 @@ pub(in crate::navigation) fn is_covariance<const D: usize>(noise: &SMatrix<f64, 
     for i in 0..D {
         let least = ROUNDING * noise[(i, i)];
         for j in 0..i {
-            // Nor if it is not a number.
+            // Also rejects NaN.
             let largest = ROUNDING * (noise[(i, i)] * noise[(j, j)]);
             let apart = noise[(i, j)] - noise[(j, i)];
             if !(apart * apart <= largest) {
@@ -68,7 +68,7 @@ pub(in crate::navigation) fn is_covariance<const D: usize>(noise: &SMatrix<f64, 
     true
 }
 
-/// Covariance of `N` errors, in the square of their units.
+/// Covariance of `N` errors, in the squares of their units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::navigation) struct Covariance<const N: usize> {
     matrix: SMatrix<f64, N, N>,
@@ -76,16 +76,16 @@ pub(in crate::navigation) struct Covariance<const N: usize> {
     repairs: u64,
 }
 
-/// An innovation, decomposed.
+/// A decomposed innovation.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::navigation) struct Innovation<const D: usize, const N: usize> {
     /// `L⁻¹ H P`, with `L Lᵀ = H P Hᵀ + R`.
     gain: [[f64; N]; D],
-    /// `L⁻¹` times the residual: standard normal where model and measurement agree.
+    /// `L⁻¹` times the residual: standard normal if model and measurement agree.
     pub(in crate::navigation) whitened: [f64; D],
     /// `det S` to the power of -½.
     density: f64,
-    /// It leaves next to nothing of a variance.
+    /// Whether the update leaves next to nothing of a variance.
     is_risky: bool,
 }
 
@@ -95,7 +95,7 @@ impl<const D: usize, const N: usize> Innovation<D, N> {
         self.whitened.iter().map(|x| x * x).sum()
     }
 
-    /// The mean of the errors, given the residual.
+    /// The conditional mean of the errors, given the residual.
     #[inline]
     pub(in crate::navigation) fn mean(&self) -> SVector<f64, N> {
         let mut mean = SVector::<f64, N>::zeros();
@@ -127,7 +127,7 @@ impl<const N: usize> Covariance<N> {
         self.repairs
     }
 
-    /// Rows, which are columns too.
+    /// The rows of the matrix, which are also its columns.
     #[inline]
     pub(in crate::navigation) fn rows_mut(&mut self) -> &mut [[f64; N]; N] {
         &mut self.matrix.data.0
@@ -138,7 +138,7 @@ impl<const N: usize> Covariance<N> {
         &self.matrix.data.0
     }
 
-    /// Forgets a state and its correlations.
+    /// Resets a state and its correlations.
     pub(in crate::navigation) fn forget(&mut self, state: usize, variance: f64) {
         let p = self.rows_mut();
         p[state] = [0.0; N];
@@ -179,7 +179,7 @@ impl<const N: usize> Covariance<N> {
         }
     }
 
-    /// First-order Gauss–Markov step of one state: factor, then noise.
+    /// First-order Gauss–Markov step of one state: scales by the factor, then adds the noise.
     #[inline]
     pub(in crate::navigation) fn decay(&mut self, state: usize, factor: f64, variance: f64) {
         let p = self.rows_mut();
@@ -189,12 +189,12 @@ impl<const N: usize> Covariance<N> {
         for row in p.iter_mut() {
             row[state] *= factor;
         }
-        // Both passes met the diagonal.
+        // Both passes scaled the diagonal.
         p[state][state] += variance;
     }
 
-    /// Multiplies the covariance of the states of a block, and cuts their correlations with all others: what is known of those
-    /// says nothing of these any more, nor the other way round.
+    /// Scales the covariance of a block of states and zeroes its correlations with all other states, so that neither carries
+    /// information about the other.
     pub(in crate::navigation) fn raise(&mut self, layout: &Layout<N>, block: u8, factor: f64) {
         let blocks = &layout.blocks;
         for i in 0..N {
@@ -209,7 +209,7 @@ impl<const N: usize> Covariance<N> {
         self.bound(layout);
     }
 
-    /// Keeps variances below limits that are as good as unknown, so that no number overflows.
+    /// Clamps variances to bounds that amount to unknown, so that no number overflows.
     #[inline]
     pub(in crate::navigation) fn bound(&mut self, layout: &Layout<N>) {
         if self.is_lost(layout) {
@@ -228,7 +228,7 @@ impl<const N: usize> Covariance<N> {
             let variance = self.matrix[(i, i)];
             if variance > *limit {
                 self.decay(i, sqrt(limit / variance), 0.0);
-                // Rounding must not leave it above.
+                // Rounding must not leave it above the bound.
                 self.rows_mut()[i][i] = *limit;
             }
         }
@@ -255,7 +255,7 @@ impl<const N: usize> Covariance<N> {
                 row[first + i] = block[(i, 0)] * old[0] + block[(i, 1)] * old[1] + block[(i, 2)] * old[2];
             }
         }
-        // The two orders of summation round differently.
+        // The two summation orders round differently.
         for i in 0..3 {
             for j in 0..N {
                 p[j][first + i] = p[first + i][j];
@@ -263,7 +263,7 @@ impl<const N: usize> Covariance<N> {
         }
     }
 
-    /// `H P`, row by row. Zeros of the Jacobian, which is most of it, cost nothing.
+    /// Computes `H P` row by row. Zeros, which make up most of the Jacobian, are skipped.
     #[inline]
     pub(in crate::navigation) fn project<const D: usize>(&self, jacobian: &[[f64; N]; D]) -> [[f64; N]; D] {
         let p = self.rows();
@@ -280,7 +280,7 @@ impl<const N: usize> Covariance<N> {
         product
     }
 
-    /// Decomposes `S = H P Hᵀ + R`; none if it is not positive definite.
+    /// Decomposes `S = H P Hᵀ + R`; `None` if it is not positive definite.
     #[inline]
     pub(in crate::navigation) fn innovation<const D: usize>(
         &self,
@@ -326,7 +326,7 @@ impl<const N: usize> Covariance<N> {
                     below[0][k] -= factor * above[j][k];
                 }
             }
-            // Nor if it is not a number. The reciprocal of the diagonal is what the rest needs.
+            // Also rejects NaN. The remaining steps use the reciprocal of the diagonal.
             if !(lower[i][i] > 0.0 && lower[i][i].is_finite()) {
                 return None;
             }
@@ -341,14 +341,14 @@ impl<const N: usize> Covariance<N> {
         Some(Innovation { gain, whitened, density, is_risky })
     }
 
-    /// `P ← P - Wᵀ W`, the update in the order of the decomposition, one scalar after the other.
+    /// `P ← P - Wᵀ W`: the update in the order of the decomposition, one scalar at a time.
     #[inline]
     pub(in crate::navigation) fn update<const D: usize>(&mut self, innovation: &Innovation<D, N>) {
         let p = self.rows_mut();
         for gain in &innovation.gain {
             for i in 0..N {
                 let factor = gain[i];
-                // Both halves: the same product, so they round alike.
+                // Both halves use the same product, so they round alike.
                 for j in 0..N {
                     p[i][j] -= factor * gain[j];
                 }
@@ -360,7 +360,7 @@ impl<const N: usize> Covariance<N> {
         }
     }
 
-    /// Checks the matrix if that is due, once all that belongs to an update is done.
+    /// Checks the matrix if a check is due, once the update is complete.
     #[inline]
     pub(in crate::navigation) fn settle(&mut self, layout: &Layout<N>) {
         if self.updates >= CHECK_EVERY || self.is_lost(layout) {
@@ -373,11 +373,11 @@ impl<const N: usize> Covariance<N> {
         self.is_regular(0.0)
     }
 
-    /// Whether no eigenvalue of the correlations is smaller: whether a Cholesky decomposition exists of what is left once that part
-    /// is taken off each variance.
+    /// Whether every eigenvalue of the correlations is at least this large: whether a Cholesky decomposition exists after this
+    /// fraction of each variance is subtracted.
     ///
-    /// The factors alone do not tell: of three positions whose sum is known, and a fourth state that is that sum, each leaves a
-    /// small part of the one before, and the smallest eigenvalue is the product.
+    /// The pivots alone are not enough. With three positions whose sum is known and a fourth state equal to that sum, each pivot
+    /// is a small fraction of the previous one, and the smallest eigenvalue is their product.
     fn is_regular(&self, margin: f64) -> bool {
         let mut lower = self.matrix;
         for i in 0..N {
@@ -392,7 +392,7 @@ impl<const N: usize> Covariance<N> {
             for k in 0..i {
                 pivot -= lower[(i, k)] * lower[(i, k)];
             }
-            // Nor if it is not a number.
+            // Also rejects NaN.
             if !(pivot > 0.0 && pivot.is_finite()) {
                 return false;
             }
@@ -409,12 +409,12 @@ impl<const N: usize> Covariance<N> {
         while !self.is_regular(LEAST) {
             self.repairs += 1;
             if fraction > 1.0 {
-                // All but the variances is rounding.
+                // Only the variances are more than rounding here.
                 self.matrix = SMatrix::from_diagonal(&self.matrix.diagonal());
             }
             for i in 0..N {
                 let row = self.matrix.row(i);
-                // What a state shares with others is no more than its own variance, were it not for rounding.
+                // A covariance is at most the state's own variance, except for rounding.
                 let shared = (0..N).filter(|j| *j != i && self.matrix[(*j, *j)] > 0.0);
                 let shared = shared.map(|j| row[j] * row[j] / self.matrix[(j, j)]);
                 let least = shared.fold(f64::MIN_POSITIVE, f64::max);

@@ -5,22 +5,22 @@
 //!
 //! # States
 //!
-//! Errors are what truth is more than the estimate. Position and velocity are those of the IMU, in the world; the
-//! rotation error is one of the world, `R_true = exp(θ) R`; biases are in the body. Then nothing of the filter depends on
-//! how the sensor is mounted, nor on the world's heading or origin, and between two samples no error has a transition of its
-//! own: see `propagation.rs`, which has the equations. [`Optional`](super::Optional) states follow, by type.
+//! An error is the truth minus the estimate. Position and velocity are those of the IMU, in the world. The rotation error is in
+//! the world frame, `R_true = exp(θ) R`; biases are in the body frame. The filter is therefore independent of the sensor's
+//! mounting and of the world's heading and origin, and the rotation error has no transition of its own between samples. See
+//! `propagation.rs` for the equations. [`Optional`](super::Optional) states follow, by type.
 //!
 //! # Update
 //!
-//! A measurement of several numbers is decomposed once, `H P Hᵀ + R = L Lᵀ`, for its normalised innovation squared and for
-//! the update `P - Wᵀ W` with `W = L⁻¹ H P`, which is that of one scalar after the other. The covariance is symmetric to
-//! the last bit.
+//! A measurement with several components is decomposed once, `H P Hᵀ + R = L Lᵀ`. The decomposition serves both the normalised
+//! innovation squared and the update `P - Wᵀ W` with `W = L⁻¹ H P`, which equals a sequence of scalar updates. The covariance is
+//! exactly symmetric.
 //!
-//! Two bounds keep rounding from breaking it. The noise of a scalar is taken as at least 1e-10 of its predicted variance, and as
-//! 1e-13 of the variances that its terms have by themselves. A Cholesky decomposition checks the covariance every 1024 updates,
-//! and at once after an update that leaves less than 1e-8 of a variance, after a gap, and while the filter is lost (a position
-//! known to 100 km). [`Eskf::repairs`] counts what it found. Variances are bounded, see `layout.rs`, and a correction by more than
-//! anything on the Earth can be off is refused as [`Refusal::OutOfRange`](super::Refusal).
+//! Two bounds limit the effect of rounding. The noise of a scalar is at least 1e-10 of its predicted variance, and at least 1e-13
+//! of the variances of its individual terms. A Cholesky decomposition checks the covariance every 1024 updates. It also checks
+//! after an update that leaves less than 1e-8 of a variance, after a gap, and while the filter is lost (a position known to 100
+//! km). [`Eskf::repairs`] counts the repairs. Variances are bounded, see `layout.rs`. A correction larger than any possible error
+//! on the Earth is rejected as [`Refusal::OutOfRange`](super::Refusal).
 
 mod elsewhere;
 mod filter;

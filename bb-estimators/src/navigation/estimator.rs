@@ -60,9 +60,9 @@ use std::marker::PhantomData;
 /// }
 /// ```
 ///
-/// `S` are its optional [states](States), and `N` is [`States::DIMENSION`]. Inputs and states that belong together are declared
-/// together: without `Optional::Keyframe` there are no relative poses, without `Optional::BarometerBias` no pressures, and a state
-/// needs the input that tells it. With `Optional::WheelScale`, wheels are taken not to move sideways.
+/// `S` lists its optional [states](States), and `N` is [`States::DIMENSION`]. Related inputs and states are declared together:
+/// relative poses require `Optional::Keyframe`, pressures require `Optional::BarometerBias`, and a state needs the input that
+/// makes it observable. With `Optional::WheelScale`, wheels are assumed not to move sideways.
 ///
 /// ```
 /// # fn main() {}
@@ -94,7 +94,7 @@ use std::marker::PhantomData;
 /// }
 /// ```
 ///
-/// Another number, a state that is listed twice, and a scale of relative poses without their keyframe do not compile:
+/// A wrong dimension, a state listed twice, and a scale of relative poses without their keyframe do not compile:
 ///
 /// ```compile_fail
 /// use bb_core::prelude::*;
@@ -150,27 +150,28 @@ use std::marker::PhantomData;
 /// }
 /// ```
 ///
-/// The world is a local tangent frame, x east, y north, z up. Its origin is where the first fix was that the next agreed with; without
-/// satellites, where the filter started. It starts once the IMU has been at rest for a second, with the heading of the options, or,
-/// with `heading_from_course`, once three fixes show in which direction the robot travels. Until then it emits nothing.
+/// The world is a local tangent frame: x east, y north, z up. Its origin is the first fix that the next fix confirmed or, without
+/// satellite navigation, the position where the filter started. The filter starts after the IMU has been at rest for a second,
+/// with the heading of the options. With `heading_from_course`, it starts once three fixes show the direction of travel. Until
+/// then it emits nothing.
 ///
-/// Fixes, or poses, that are refused although they agree among each other, and are more than those that the filter rests on, show
-/// that it is wrong: its position is set to theirs, and `resets` in its status counts that.
+/// The filter may reject fixes or poses that agree with each other and outnumber the measurements that support its estimate. In
+/// that case the filter is wrong: its position is reset to theirs, and `resets` in its status is incremented.
 ///
-/// Measurements are fused at the time of their stamps, up to a second late. A gate for each sensor refuses what does not fit; what
-/// it has refused is in the status. The health of the estimator says when the position was dead-reckoned for too long, is less
-/// certain than the options allow, or does not agree with what is measured.
+/// Measurements are fused at the time of their stamps, up to a second late. A gate per sensor rejects outliers, and the status
+/// reports the rejections. The health of the estimator reports a position dead-reckoned for too long, an uncertainty above the
+/// limit in the options, and disagreement with the measurements.
 #[derive(Debug)]
 pub struct EskfEstimator<O = Odometry, S: States = Navigation, const N: usize = NAVIGATION> {
     options: NavigationOptions,
     mounting: Mounting,
     phase: Phase,
-    /// Samples of the IMU.
+    /// IMU samples.
     refused_in_a_row: u32,
     types: PhantomData<fn(S) -> O>,
 }
 
-/// So many samples of the IMU that are refused in a row are no estimate.
+/// After this many rejected IMU samples in a row, there is no estimate.
 pub(super) const MOST_REFUSED: u32 = 50;
 
 #[derive(Debug)]

@@ -1,21 +1,20 @@
-//! What an update did.
+//! The outcome of an update.
 
-/// What an update did.
+/// The outcome of an update.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fused {
     /// Normalised innovation squared: its mean is [`dimension`](Self::dimension) if the filter is consistent.
     pub nis: f64,
     /// The dimension of the measurement.
     pub dimension: usize,
-    /// The weight that it had, 1 unless [`StreamParams::robust`](super::StreamParams::robust) took it down.
+    /// The weight of the measurement: 1 unless [`StreamParams::robust`](super::StreamParams::robust) reduced it.
     pub weight: f64,
-    /// The normalised innovation squared in parts of its mean, which the covariance was raised by before, about; 1 unless the gate
-    /// had run out of patience.
+    /// The normalised innovation squared relative to its mean, which is about the factor by which the covariance was raised
+    /// beforehand. 1 unless the gate's patience had run out.
     pub raised: f64,
-    /// What the gate lets pass, all but when it was overruled.
+    /// The threshold of the gate, which holds unless the gate was overridden.
     pub limit: f64,
-    /// Logarithm of the likelihood of the innovation, but for the constant that depends on the dimension alone: to compare
-    /// models.
+    /// Log likelihood of the innovation, up to a constant that depends only on the dimension; for model comparison.
     pub log_likelihood: f64,
     /// The first component of the whitened innovation.
     pub(crate) whitened: f64,

@@ -1,4 +1,4 @@
-//! How a linearised measurement is weighed, for every filter alike.
+//! Fusion of a linearised measurement, shared by all filters.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -9,23 +9,24 @@ use super::measurement::Linearised;
 use super::refusal::Refusal;
 use super::stream::{Gate, Stream, Verdict};
 
-/// Blocks that are raised for one measurement, and rounds until it fits, which two numbers or more need.
+/// The number of blocks raised for one measurement and of rounds until it fits; measurements with several components need more
+/// than one.
 const ROUNDS: usize = 12;
 
-/// The normalised innovation squared of what fits, in parts of its mean.
+/// The largest normalised innovation squared of a measurement that fits, relative to its mean.
 const FITS: f64 = 1.01;
 
-/// A measurement that the gate has let pass, with what it does to the errors.
+/// A measurement that the gate has accepted, with its effect on the errors.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Weighed<const D: usize, const N: usize> {
     pub(super) innovation: Innovation<D, N>,
     nis: f64,
     verdict: Verdict,
-    /// The covariance before it was raised to fit the measurement, if it was.
+    /// The covariance before it was raised to fit the measurement, if it was raised.
     before: Option<Covariance<N>>,
 }
 
-/// The model with the noise that its stream takes it to have.
+/// The model with the noise assigned by its stream.
 #[inline]
 pub(super) fn prepared<const D: usize, const N: usize>(
     mut model: Linearised<D, N>,
@@ -45,7 +46,7 @@ pub(super) fn prepared<const D: usize, const N: usize>(
     Ok(model)
 }
 
-/// The innovation of a model, decomposed.
+/// The decomposed innovation of a model.
 #[inline]
 pub(super) fn innovation<const D: usize, const N: usize>(
     covariance: &Covariance<N>,
@@ -57,12 +58,12 @@ pub(super) fn innovation<const D: usize, const N: usize>(
 }
 
 impl<const D: usize, const N: usize> Weighed<D, N> {
-    /// Asks the gate of `stream`. If that has run out of patience, the covariance of what is wrong is raised until the measurement
-    /// fits.
+    /// Applies the gate of `stream`. If its patience has run out, the covariance of the inconsistent block is raised until the
+    /// measurement fits.
     ///
     /// # Errors
     ///
-    /// [`Refusal::Gate`], [`Refusal::NonFinite`] and [`Refusal::Noise`]; the covariance is then as it was.
+    /// Returns [`Refusal::Gate`], [`Refusal::NonFinite`] or [`Refusal::Noise`]. The covariance is then unchanged.
     #[inline]
     pub(super) fn new(
         covariance: &mut Covariance<N>,
@@ -96,14 +97,14 @@ impl<const D: usize, const N: usize> Weighed<D, N> {
         Ok(weighed)
     }
 
-    /// Takes back what was done to the covariance.
+    /// Restores the covariance.
     pub(super) fn undo(&self, covariance: &mut Covariance<N>) {
         if let Some(before) = self.before {
             *covariance = before;
         }
     }
 
-    /// What the update did.
+    /// The outcome of the update.
     #[inline]
     pub(super) fn fused(&self) -> Fused {
         let Verdict { weight, raised, limit, log_likelihood } = self.verdict;
@@ -112,13 +113,13 @@ impl<const D: usize, const N: usize> Weighed<D, N> {
     }
 }
 
-/// The innovation of a measurement that the filter is taken to be wrong about, with the covariance raised until it fits; none if
-/// nothing that it sees explains it.
+/// The innovation of a measurement that overrides its gate, with the covariance raised until it fits; `None` if no observed error
+/// explains it.
 ///
-/// With the residual r of covariance `S = H P Hᵀ + R`, block b of the errors has the part `uᵀ H_b P_bb H_bᵀ u` of the normalised
-/// innovation squared, `uᵀ S u` with `u = S⁻¹ r`, whatever the axes and units. The block with the largest part is the one that is
-/// wrong: its covariance is raised until the normalised innovation squared is what it is on average, and its correlations are
-/// cut. All else stays as well known as it was.
+/// With the residual r of covariance `S = H P Hᵀ + R`, block b of the errors contributes `uᵀ H_b P_bb H_bᵀ u` to the normalised
+/// innovation squared, `uᵀ S u` with `u = S⁻¹ r`, independently of axes and units. The block with the largest contribution is
+/// taken to be wrong. Its covariance is raised until the normalised innovation squared equals its mean, and its correlations are
+/// set to zero. All other blocks keep their covariance.
 #[cold]
 fn fitted<const D: usize, const N: usize>(
     covariance: &mut Covariance<N>,

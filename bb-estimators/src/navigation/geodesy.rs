@@ -1,7 +1,7 @@
 //! Positions on the Earth, and the local frames that filters work in.
 //!
-//! The conversions of WGS 84 are those of the crate `geoconv`: closed forms, by B. R. Bowring, "Transformation from spatial to
-//! geographical coordinates", Survey Review 23(181), 1976. There and back they agree to 0.1 mm up to 50 km above the ellipsoid.
+//! The WGS 84 conversions are those of the crate `geoconv`: closed forms, by B. R. Bowring, "Transformation from spatial to
+//! geographical coordinates", Survey Review 23(181), 1976. A round trip agrees to 0.1 mm up to 50 km above the ellipsoid.
 
 use geoconv::{CoordinateSystem, Enu, Lle, Meters, Radians, Wgs84, Xyz};
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
@@ -15,23 +15,23 @@ pub struct Geodetic {
     pub latitude: f64,
     /// Positive to the east, rad.
     pub longitude: f64,
-    /// Above the ellipsoid, m; not above the sea.
+    /// Height above the ellipsoid, m; not above sea level.
     pub height: f64,
 }
 
 impl Geodetic {
-    /// From degrees and metres.
+    /// Creates a position from degrees and metres.
     pub fn from_degrees(latitude: f64, longitude: f64, height: f64) -> Self {
         Self { latitude: latitude.to_radians(), longitude: longitude.to_radians(), height }
     }
 
-    /// In the frame that is fixed to the Earth, m: x through Greenwich on the equator, z through the north pole.
+    /// Coordinates in the Earth-fixed frame, m: x through Greenwich on the equator, z through the north pole.
     pub fn earth_centred(&self) -> Vector3<f64> {
         let Xyz { x, y, z } = Wgs84::lle_to_xyz(&self.lle());
         Vector3::new(x.as_float(), y.as_float(), z.as_float())
     }
 
-    /// The position with these coordinates in the frame that is fixed to the Earth, m.
+    /// The position with these coordinates in the Earth-fixed frame, m.
     pub fn from_earth_centred(position: &Vector3<f64>) -> Self {
         let metres = |x: f64| Meters::new(x);
         Self::of(&Wgs84::xyz_to_lle(&Xyz { x: metres(position.x), y: metres(position.y), z: metres(position.z) }))
@@ -52,8 +52,8 @@ impl Geodetic {
 
 /// A local tangent frame: x east, y north, z up at its origin.
 ///
-/// Its axes are straight: 10 km away the ground lies 8 m below its xy plane, and down is no longer -z by 1.6 mrad. A filter
-/// whose world it is moves on to a new one in time, see [`Eskf::move_world`](super::Eskf::move_world).
+/// Its axes are straight: 10 km away, the ground is 8 m below its xy plane and the vertical is tilted by 1.6 mrad. A filter
+/// should move to a new frame before that; see [`Eskf::move_world`](super::Eskf::move_world).
 ///
 /// ```
 /// use bb_estimators::navigation::{Geodetic, LocalFrame};
@@ -69,30 +69,30 @@ pub struct LocalFrame {
 }
 
 impl LocalFrame {
-    /// The frame with that origin.
+    /// Creates the frame with the given origin.
     pub fn new(origin: Geodetic) -> Self {
         Self { origin }
     }
 
-    /// Where its origin is.
+    /// The origin of the frame.
     pub fn origin(&self) -> &Geodetic {
         &self.origin
     }
 
-    /// A position in it, m.
+    /// Converts a geodetic position to frame coordinates, m.
     pub fn position(&self, position: &Geodetic) -> Vector3<f64> {
         let Enu { east, north, up } = Wgs84::lle_to_enu(&self.origin.lle(), &position.lle());
         Vector3::new(east.as_float(), north.as_float(), up.as_float())
     }
 
-    /// The position on the Earth of one in it, m.
+    /// Converts frame coordinates, m, to a geodetic position.
     pub fn geodetic(&self, position: &Vector3<f64>) -> Geodetic {
         let metres = |x: f64| Meters::new(x);
         let enu = Enu { east: metres(position.x), north: metres(position.y), up: metres(position.z) };
         Geodetic::of(&Wgs84::enu_to_lle(&self.origin.lle(), &enu))
     }
 
-    /// Takes coordinates in this frame to `other`.
+    /// The transformation from this frame to `other`.
     pub fn other_from_self(&self, other: &Self) -> Isometry3<f64> {
         let rotation = other.earth_from_self().inverse() * self.earth_from_self();
         let between = self.origin.earth_centred() - other.origin.earth_centred();
@@ -100,7 +100,7 @@ impl LocalFrame {
         Isometry3::from_parts(Translation3::from(translation), UnitQuaternion::from_rotation_matrix(&rotation))
     }
 
-    /// Takes vectors of this frame to the one that is fixed to the Earth.
+    /// The rotation from this frame to the Earth-fixed frame.
     fn earth_from_self(&self) -> Rotation3<f64> {
         let (sin_latitude, cos_latitude) = (sin(self.origin.latitude), cos(self.origin.latitude));
         let (sin_longitude, cos_longitude) = (sin(self.origin.longitude), cos(self.origin.longitude));
@@ -155,7 +155,7 @@ mod tests {
         }
     }
 
-    /// Where the semi-axes of the ellipsoid end.
+    /// Points at the ends of the ellipsoid's semi-axes.
     #[test]
     fn known_places() {
         let pole = Geodetic::from_degrees(90.0, 0.0, 0.0).earth_centred();

@@ -1,9 +1,9 @@
-//! Measurements that come late or out of order, fused at their own time.
+//! Fuses late and out-of-order measurements at their own time.
 //!
-//! A bounded history of samples, measurements and states of the filter: a measurement from the past takes the filter back
-//! to the last state before it, and everything after it is done again. What comes out is what would have, had all arrived in the
-//! order of their stamps, to the last bit; T. D. Larsen et al., "Incorporation of time delayed measurements in a
-//! discrete-time Kalman filter", CDC 1998, compare it with methods that are cheaper and approximate.
+//! A bounded history of samples, measurements and filter states. A measurement from the past rewinds the filter to the last state
+//! before it, and everything after that is replayed. The result is bit-for-bit the same as if all had arrived in the order of
+//! their stamps. T. D. Larsen et al., "Incorporation of time delayed measurements in a discrete-time Kalman filter", CDC 1998,
+//! compare this with cheaper, approximate methods.
 
 use super::eskf::ImuMean;
 use super::fused::Fused;
@@ -15,7 +15,7 @@ mod tests;
 
 use ring::Ring;
 
-/// A filter with its streams, as one value that can be stored and run again.
+/// A filter with its streams, as one value that can be stored and replayed.
 ///
 /// ```
 /// use bb_estimators::navigation::{Eskf, Fused, GnssPosition, ImuMean, Refusal, Replayed, Stream};
@@ -41,76 +41,75 @@ use ring::Ring;
 /// }
 /// ```
 pub trait Replayed: Clone {
-    /// What corrects it: an enum, where there are several sensors.
+    /// The type of its measurements: an enum if there are several sensors.
     type Measurement: Copy;
 
-    /// The time that it has reached; none before its start.
+    /// The current time of the filter; `None` before its start.
     fn time_ns(&self) -> Option<i64>;
 
-    /// Moves it over one sample of the IMU.
+    /// Propagates the filter over one IMU sample.
     ///
     /// # Errors
     ///
-    /// Why the sample is refused; it is then as it was.
+    /// Returns the reason why the sample is rejected. The filter is then unchanged.
     fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal>;
 
-    /// Corrects it by a measurement of its present time.
+    /// Corrects the filter with a measurement at its current time.
     ///
     /// # Errors
     ///
-    /// Why the measurement is refused; it is then as it was.
+    /// Returns the reason why the measurement is rejected. The filter is then unchanged.
     fn update(&mut self, measurement: &Self::Measurement) -> Result<Fused, Refusal>;
 }
 
-/// What became of a measurement.
+/// The outcome of adding a measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Placed {
     /// It was fused.
     Fused(Fused),
-    /// It is newer than the last sample of the IMU, and waits for the next.
+    /// It is newer than the last IMU sample and waits for the next.
     Waits,
 }
 
-/// A filter with the last `SAMPLES` samples, `MEASUREMENTS` measurements, and `STATES` states of itself, evenly between the
-/// samples.
+/// A filter with its last `SAMPLES` samples, `MEASUREMENTS` measurements, and `STATES` states, spread evenly between the samples.
 ///
-/// They are on the heap with the feature `std`, allocated when the history is made, and within it without.
+/// With the feature `std`, these are on the heap, allocated when the history is created; without it, they are stored inline.
 ///
-/// It reaches back by about `SAMPLES` samples. More states cost memory and save time: a late measurement costs its own delay, and
+/// The history covers about `SAMPLES` samples. More states cost memory and save time: a late measurement costs its own delay plus
 /// half the time between two states.
 #[derive(Clone, Debug)]
 pub struct History<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES: usize> {
     now: F,
     samples: Ring<ImuMean, SAMPLES>,
     measurements: Ring<(i64, F::Measurement), MEASUREMENTS>,
-    /// With the number of samples since the one before.
+    /// Each with the number of samples since the previous one.
     states: Ring<F, STATES>,
     since_state: usize,
     longest_lead_ns: i64,
     counts: Arrivals,
 }
 
-/// How measurements arrived.
+/// Counts of late and rejected measurements.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Arrivals {
-    /// After the last sample that they belong before.
+    /// Arrived after the sample that follows their stamp.
     pub late: u64,
-    /// Older than the history, and refused.
+    /// Older than the history, and rejected.
     pub too_old: u64,
-    /// Stamped in the future, and refused: clocks that differ.
+    /// Stamped in the future, and rejected: the clocks disagree.
     pub in_the_future: u64,
-    /// The longest delay of those that were fused, ns.
+    /// The longest delay of a fused measurement, ns.
     pub longest_delay_ns: i64,
 }
 
 impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES: usize>
     History<F, SAMPLES, MEASUREMENTS, STATES>
 {
-    /// The history of a filter that has started. A measurement may be up to `longest_lead_ns` ahead of the last sample.
+    /// Creates the history of a filter that has started. A measurement may be up to `longest_lead_ns` ahead of the last sample.
     ///
     /// # Errors
     ///
-    /// [`Refusal::NotStarted`].
+    /// Returns [`Refusal::NotStarted`].
     pub fn new(started: F, longest_lead_ns: i64) -> Result<Self, Refusal> {
         const {
             assert!(STATES >= 1 && SAMPLES >= STATES, "a history needs a state, and a sample for each");
@@ -132,11 +131,11 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
         })
     }
 
-    /// Goes on with a filter that has begun elsewhere: what was measured before is forgotten. Nothing is allocated.
+    /// Continues with a filter that was started elsewhere. Earlier measurements are discarded. Does not allocate.
     ///
     /// # Errors
     ///
-    /// [`Refusal::NotStarted`]; the history is then as it was.
+    /// Returns [`Refusal::NotStarted`]. The history is then unchanged.
     pub fn restart(&mut self, started: F) -> Result<(), Refusal> {
         if started.time_ns().is_none() {
             return Err(Refusal::NotStarted);
@@ -155,18 +154,18 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
         &self.now
     }
 
-    /// How measurements arrived.
+    /// Counts of late and rejected measurements.
     pub fn arrivals(&self) -> &Arrivals {
         &self.counts
     }
 
-    /// Moves on by one sample of the IMU, and fuses what waited for it.
+    /// Advances by one IMU sample and fuses the measurements that waited for it.
     ///
     /// # Errors
     ///
-    /// As [`Replayed::propagate`]; nothing has changed then.
+    /// The same as [`Replayed::propagate`]. The history is then unchanged.
     pub fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
-        // A sample that is refused must not have fused anything before.
+        // A rejected sample must not have fused any measurement.
         let mut alone = self.now.clone();
         alone.propagate(sample)?;
         if self.has_measurements_until(sample.time_ns) {
@@ -183,7 +182,7 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
     ///
     /// # Errors
     ///
-    /// [`Refusal::TooOld`], [`Refusal::InTheFuture`], or as [`Replayed::update`].
+    /// Returns [`Refusal::TooOld`], [`Refusal::InTheFuture`], or an error of [`Replayed::update`].
     pub fn update(&mut self, time_ns: i64, measurement: &F::Measurement) -> Result<Placed, Refusal> {
         let now_ns = self.now.time_ns().ok_or(Refusal::NotStarted)?;
         let is_ahead = time_ns > now_ns;
@@ -196,7 +195,7 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
             self.insert(time_ns, measurement);
             return Ok(Placed::Waits);
         }
-        // The last state that is not after it: what that holds is not newer.
+        // The last state that is not after the measurement: the measurements in that state are not newer.
         let is_before = |state: &F| state.time_ns().is_some_and(|state_ns| state_ns <= time_ns);
         let found = self.states.rposition(is_before);
         let Some((index, state)) = found.and_then(|index| Some((index, self.states.get(index)?.clone()))) else {
@@ -232,8 +231,8 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
         self.measurements.iter().any(|(at, _)| (now_ns.saturating_add(1)..=time_ns).contains(at))
     }
 
-    /// Makes room for a measurement: the oldest leaves, and with it the states that do not hold it yet. `false` if all
-    /// still wait for a sample.
+    /// Makes room for a measurement: removes the oldest, and with it the states that do not include it yet. Returns `false` if
+    /// all still wait for a sample.
     fn make_room(&mut self, now_ns: i64) -> bool {
         if self.measurements.len() < MEASUREMENTS {
             return true;
@@ -253,14 +252,14 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
         true
     }
 
-    /// Puts a measurement after those that are not newer; its place.
+    /// Inserts a measurement after those that are not newer, and returns its index.
     fn insert(&mut self, time_ns: i64, measurement: &F::Measurement) -> usize {
         let place = self.measurements.iter().filter(|(at, _)| *at <= time_ns).count();
         self.measurements.insert(place, (time_ns, *measurement));
         place
     }
 
-    /// Moves `now` over one sample, with the measurements in it; the result of the one at `place`.
+    /// Advances `now` over one sample with the measurements in it, and returns the result of the one at `place`.
     fn advance(&mut self, sample: &ImuMean, place: Option<usize>) -> Option<Result<Fused, Refusal>> {
         let mut result = None;
         let from = self.now.time_ns().unwrap_or(i64::MAX);
@@ -269,7 +268,7 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
                 continue;
             }
             if self.now.time_ns() != Some(*time_ns) {
-                // The sample is a mean: each part of it is the same.
+                // The sample is a mean, so each part of it is the same.
                 let part = ImuMean { time_ns: *time_ns, ..*sample };
                 let _ = self.now.propagate(&part);
             }
@@ -284,7 +283,7 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
         result
     }
 
-    /// Keeps the state if it is time to, and forgets what is older than the oldest state.
+    /// Stores the state if one is due, and discards data older than the oldest state.
     fn keep_state(&mut self) {
         self.since_state += 1;
         if self.since_state < SAMPLES / STATES {

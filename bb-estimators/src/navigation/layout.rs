@@ -1,4 +1,4 @@
-//! What the errors of a filter are, beside their order.
+//! Properties of a filter's errors besides their order.
 
 use super::bounds::{MOST_ROTATION, MOST_VARIANCE};
 use super::state::{
@@ -6,28 +6,28 @@ use super::state::{
 };
 use crate::attitude::{MAX_ANGULAR_VELOCITY, MAX_SPECIFIC_FORCE};
 
-/// A variance above this part of the largest is that of a filter that is lost, whose covariance rounding may break.
+/// A filter with a variance above this fraction of the largest is lost, and rounding may break its covariance.
 const LOST: f64 = 1e-4;
 
-/// No correction is larger than so many of the largest deviations.
+/// A correction is at most this many times the largest deviation.
 const MOST_DEVIATIONS: f64 = 100.0;
 
-/// Which errors are one quantity, and the largest variance of each that says anything.
+/// Groups the errors by quantity, with the largest meaningful variance of each.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::navigation) struct Layout<const N: usize> {
-    /// Errors with the same number are one quantity, or refer to it.
+    /// Errors with the same number belong to one quantity or refer to it.
     pub(in crate::navigation) blocks: [u8; N],
-    /// In the square of the errors' units.
+    /// In the squares of the errors' units.
     pub(in crate::navigation) largest: [f64; N],
-    /// Above it the filter is lost.
+    /// Above this variance the filter is lost.
     pub(in crate::navigation) lost: [f64; N],
 }
 
 impl<const N: usize> Layout<N> {
-    /// Of errors that are all one quantity, and known.
+    /// A layout in which all errors form one quantity that is known.
     pub(in crate::navigation) const EMPTY: Self = Self { blocks: [0; N], largest: [0.0; N], lost: [0.0; N] };
 
-    /// That of an [`Eskf`](super::Eskf). A keyframe and the bias of a barometer refer to the pose.
+    /// The layout of an [`Eskf`](super::Eskf). The keyframe and the barometer's bias refer to the pose.
     pub(in crate::navigation) const fn of<S: States>() -> Self {
         let mut layout = Self::EMPTY;
         layout.set((POSITION, 3), 0, MOST_VARIANCE);
@@ -40,7 +40,7 @@ impl<const N: usize> Layout<N> {
         while i < S::OPTIONAL.len() {
             let state = S::OPTIONAL[i];
             let range = (first, state.dimension());
-            // A hundred of the largest deviation that its parameter accepts.
+            // A hundred times the largest deviation that its parameter accepts.
             match state {
                 Optional::Keyframe => {
                     layout.set((first, 3), 0, MOST_VARIANCE);
@@ -70,7 +70,7 @@ impl<const N: usize> Layout<N> {
         }
     }
 
-    /// Whether a filter may be off by so much at all. Not if it is not a number.
+    /// Whether a filter can be wrong by this correction. `false` for NaN.
     #[inline]
     pub(in crate::navigation) fn admits(&self, error: &nalgebra::SVector<f64, N>) -> bool {
         let most = MOST_DEVIATIONS * MOST_DEVIATIONS;

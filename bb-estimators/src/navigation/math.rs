@@ -2,11 +2,11 @@
 
 use nalgebra::{ComplexField, Matrix3, Quaternion, RealField, Unit, UnitQuaternion, Vector3};
 
-/// Below this squared angle, rad², the coefficients of the group are series.
+/// Below this squared angle, rad², the coefficients of the rotation group are computed from series.
 const SERIES: f64 = 0.04;
 
 pub(crate) fn sqrt(x: f64) -> f64 {
-    // Fully qualified: the method of `f64` needs the standard library.
+    // Fully qualified, because the method of `f64` needs the standard library.
     ComplexField::sqrt(x)
 }
 
@@ -30,7 +30,7 @@ pub(crate) fn atan2(y: f64, x: f64) -> f64 {
     RealField::atan2(y, x)
 }
 
-/// An angle within ±π, rad.
+/// Wraps an angle to ±π, rad.
 pub(crate) fn wrapped(angle: f64) -> f64 {
     let (sin, cos) = ComplexField::sin_cos(angle);
     atan2(sin, cos)
@@ -57,26 +57,26 @@ pub(crate) fn rotation(vector: &Vector3<f64>) -> UnitQuaternion<f64> {
     Unit::new_unchecked(Quaternion::new(cos, scale * vector.x, scale * vector.y, scale * vector.z))
 }
 
-/// The rotation vector of a unit quaternion, rad, of norm at most π: both signs of a quaternion have the same.
+/// The rotation vector of a unit quaternion, rad, of norm at most π. Both signs of a quaternion give the same vector.
 pub(crate) fn rotation_vector(q: &UnitQuaternion<f64>) -> Vector3<f64> {
     let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
     let vector = Vector3::new(q.i, q.j, q.k) * sign;
     let sin = vector.norm();
     let cos = q.w * sign;
     if sin < 1e-6 {
-        // 2 atan(s/c) / s to the third order.
+        // 2 atan(s/c) / s to third order.
         return vector * (2.0 / cos * (1.0 - sin * sin / (3.0 * cos * cos)));
     }
     vector * (2.0 * atan2(sin, cos) / sin)
 }
 
-/// `quaternion` with its norm, which is 1 but for rounding, brought back to 1: one step of Newton's method.
+/// Normalises a `quaternion` whose norm is 1 except for rounding, with one Newton step.
 pub(crate) fn renormalised(q: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
     let scale = 1.5 - 0.5 * q.as_ref().norm_squared();
     Unit::new_unchecked(q.into_inner() * scale)
 }
 
-/// A quaternion that a user calls a rotation, of norm 1; none if it is no rotation.
+/// Normalises a rotation supplied by the user; `None` if it is not a rotation.
 pub(crate) fn unit(q: &UnitQuaternion<f64>) -> Option<UnitQuaternion<f64>> {
     (0.5..2.0).contains(&q.norm()).then(|| Unit::new_normalize(q.into_inner()))
 }
@@ -168,7 +168,7 @@ mod tests {
         for angle in [0.0, 1e-6, 0.05, 0.1999, 0.2001, 1.5, 4.0] {
             let vector = AXIS * angle;
             let integrals = Integrals::new(&vector);
-            // Gauss–Legendre nodes would do with fewer; the midpoint rule needs no table.
+            // Gauss–Legendre quadrature would need fewer nodes; the midpoint rule needs no table.
             let steps = 20_000;
             let (mut once, mut twice) = (Vector3::zeros(), Vector3::zeros());
             for i in 0..steps {

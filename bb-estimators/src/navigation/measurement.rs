@@ -1,6 +1,6 @@
-//! What sensors measure, each as a residual, a Jacobian and a noise.
+//! Measurement models, each with a residual, a Jacobian and a noise covariance.
 //!
-//! A measurement is a value of a type of its own that implements [`Measurement`]; so are those of users:
+//! Each kind of measurement is a type that implements [`Measurement`]. You can add your own:
 //!
 //! ```
 //! use bb_estimators::navigation::{Estimate, Linearised, Measurement, POSITION, Refusal, States};
@@ -50,13 +50,14 @@ use nalgebra::{Matrix3, SMatrix, Vector3};
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{Estimate, States};
 
-/// A measurement of `D` numbers.
+/// A measurement with `D` components.
 pub trait Measurement<const D: usize> {
-    /// Compares with what the estimate makes expect.
+    /// Compares the measurement with the prediction from the estimate.
     ///
     /// # Errors
     ///
-    /// Why it cannot be: [`Refusal::NotObservable`] where it says nothing, [`Refusal::NoKeyframe`].
+    /// Returns the reason why this is impossible: [`Refusal::NotObservable`] if the measurement carries no information in this
+    /// state, or [`Refusal::NoKeyframe`].
     fn linearise<S: States, const N: usize>(
         &self,
         at: &Estimate<N>,
@@ -64,12 +65,12 @@ pub trait Measurement<const D: usize> {
     ) -> Result<(), Refusal>;
 }
 
-/// A measurement, linearised at an estimate: `residual = H error + noise`. All zero to begin with.
+/// A measurement linearised at an estimate: `residual = H error + noise`. All zero initially.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Linearised<const D: usize, const N: usize> {
-    /// What was measured less what was expected.
+    /// The measured value minus the predicted value.
     pub residual: [f64; D],
-    /// H, row by row: what the residual grows by with each error. Columns are those of the error vector.
+    /// H, row by row: the derivative of the residual with respect to each error. Columns are those of the error vector.
     pub jacobian: [[f64; N]; D],
     /// Covariance of the noise.
     pub noise: SMatrix<f64, D, D>,
@@ -80,7 +81,7 @@ impl<const D: usize, const N: usize> Linearised<D, N> {
         Self { residual: [0.0; D], jacobian: [[0.0; N]; D], noise: SMatrix::zeros() }
     }
 
-    /// Sets the derivative of one component by three errors from `error` on.
+    /// Sets the derivative of one component with respect to three errors, from `error` on.
     #[inline]
     pub fn set_row(&mut self, row: usize, error: usize, derivative: &Vector3<f64>) {
         for k in 0..3 {
@@ -88,7 +89,7 @@ impl<const D: usize, const N: usize> Linearised<D, N> {
         }
     }
 
-    /// Sets the derivative of three components, from `row` on, by three errors from `error` on.
+    /// Sets the derivative of three components, from `row` on, with respect to three errors, from `error` on.
     #[inline]
     pub fn set_block(&mut self, row: usize, error: usize, derivative: &Matrix3<f64>) {
         for i in 0..3 {
@@ -98,7 +99,7 @@ impl<const D: usize, const N: usize> Linearised<D, N> {
         }
     }
 
-    /// Sets the derivative of three components, from `row` on, by one error.
+    /// Sets the derivative of three components, from `row` on, with respect to one error.
     #[inline]
     pub fn set_column(&mut self, row: usize, error: usize, derivative: &Vector3<f64>) {
         for i in 0..3 {
@@ -121,7 +122,7 @@ impl<const D: usize, const N: usize> Linearised<D, N> {
     }
 }
 
-/// Covariance of noise that is alike along all axes.
+/// Covariance of isotropic noise.
 #[inline]
 pub(in crate::navigation) fn isotropic(deviation: f64) -> Matrix3<f64> {
     Matrix3::identity() * (deviation * deviation)

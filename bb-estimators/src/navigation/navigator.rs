@@ -1,4 +1,4 @@
-//! A bank of filters for a robot of which only the data sheets are known: what `bb eval navigation` runs.
+//! A filter bank for a robot whose only known characteristics are its data sheets; `bb eval navigation` runs it.
 
 use nalgebra::SMatrix;
 
@@ -11,19 +11,19 @@ use super::state::{Estimate, Optional, States};
 use super::stream::{Stream, StreamParams};
 use crate::attitude::ParamsError;
 
-/// How many filters the bank has room for.
+/// The capacity of the bank, in filters.
 const FILTERS: usize = 36;
 
-/// What the white noise of the gyroscope may be of that on its data sheet: vibration, scale errors, a mounting that bends.
+/// Factors on the data sheet's gyroscope white noise, to cover vibration, scale errors and a mounting that bends.
 const GYROSCOPE: [f64; 4] = [1.0, 3.0, 10.0, 30.0];
 
-/// The same of the accelerometer.
+/// The same for the accelerometer.
 const ACCELEROMETER: [f64; 3] = [1.0, 3.0, 10.0];
 
-/// What the variance of positions from satellites may be of what the receiver says: some are cautious.
+/// Factors on the receiver's stated variance of satellite positions: some receivers are conservative.
 const GNSS: [f64; 3] = [1.0, 0.25, 0.0625];
 
-/// How much less plausible it is beforehand, for each thing that differs from what the data sheets say.
+/// Factor on the prior weight for each deviation from the data sheets.
 const DEPARTURE: f64 = 0.1;
 
 /// States of the [`Navigator`]: those of navigation, a keyframe, and the scale of relative poses.
@@ -37,18 +37,18 @@ impl States for Navigated {
 /// The number of errors of [`Navigated`].
 pub const NAVIGATED: usize = Navigated::DIMENSION;
 
-/// What there is besides the IMU, which decides what the filters of the bank differ in.
+/// The sensors besides the IMU, which determine how the filters of the bank differ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Aiding {
-    /// Positions from satellites, and perhaps poses.
+    /// Satellite positions, and optionally poses.
     Gnss,
-    /// Relative poses, and perhaps poses and positions from satellites.
+    /// Relative poses, and optionally poses and satellite positions.
     RelativePoses,
 }
 
-/// Position, velocity and attitude from an IMU, positions, poses and relative poses, without tuning: a [`Bank`] of filters
-/// whose noise is that of the data sheets, and multiples of it, and whose relative poses have a scale of 1, and one that
-/// drifts as [`EskfParams::relative_scale`] says.
+/// Position, velocity and attitude from an IMU, positions, poses and relative poses, without tuning. It is a [`Bank`] of filters
+/// whose noise is that of the data sheets and multiples of it. The scale of their relative poses is either 1 or drifts according
+/// to [`EskfParams::relative_scale`].
 #[derive(Clone, Debug)]
 pub struct Navigator {
     bank: Bank<Navigated, NAVIGATED, FILTERS>,
@@ -58,7 +58,7 @@ pub struct Navigator {
     velocities: [Stream; FILTERS],
 }
 
-/// One filter of the bank: what it multiplies, and whether the scale drifts.
+/// One filter of the bank: its noise factors, and whether the scale drifts.
 #[derive(Clone, Copy, Debug)]
 struct Hypothesis {
     gyroscope: f64,
@@ -68,15 +68,15 @@ struct Hypothesis {
 }
 
 impl Navigator {
-    /// Makes one that has not started. The densities of `params` are those of data sheets.
+    /// Creates a navigator that has not started. The densities in `params` are those of data sheets.
     ///
     /// # Errors
     ///
-    /// The first parameter outside its accepted range, by name.
+    /// Returns the name of the first parameter outside its accepted range.
     pub fn new(params: EskfParams, aiding: Aiding) -> Result<Self, ParamsError> {
         let plain = Eskf::new(params)?;
         let mut filters = [(plain, 0.0); FILTERS];
-        // Positions are not gated: a filter that is too sure must not refuse what shows that it is.
+        // Positions are not gated: an overconfident filter must not reject the evidence against it.
         let open = StreamParams { gate: 0.0, ..StreamParams::default() };
         let mut gnss = [Stream::new(open); FILTERS];
         for (i, slot) in filters.iter_mut().enumerate() {
@@ -88,11 +88,11 @@ impl Navigator {
         Ok(Self { bank: Bank::new(filters), gnss, poses: gated, relative: gated, velocities: gated })
     }
 
-    /// One filter with these parameters, in place of a bank, for those who have tuned it.
+    /// Creates a navigator with a single, tuned filter instead of a bank.
     ///
     /// # Errors
     ///
-    /// The first parameter outside its accepted range, by name.
+    /// Returns the name of the first parameter outside its accepted range.
     pub fn single(params: EskfParams) -> Result<Self, ParamsError> {
         let mut filters = [(Eskf::new(params)?, 0.0); FILTERS];
         filters[0].1 = 1.0;
@@ -105,7 +105,7 @@ impl Navigator {
     ///
     /// # Errors
     ///
-    /// As there.
+    /// The same as [`Eskf::start`].
     pub fn start(&mut self, start: &Start) -> Result<(), Refusal> {
         self.bank.start(start)
     }
@@ -114,43 +114,43 @@ impl Navigator {
     ///
     /// # Errors
     ///
-    /// As there.
+    /// The same as [`Eskf::propagate`].
     pub fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
         self.bank.propagate(sample)
     }
 
-    /// A position from satellites; see [`Bank::update`].
+    /// Fuses a satellite position; see [`Bank::update`].
     ///
     /// # Errors
     ///
-    /// As there.
+    /// The same as [`Bank::update`].
     pub fn gnss_position(&mut self, measurement: &GnssPosition) -> Result<Fused, Refusal> {
         self.bank.update(&mut self.gnss, measurement)
     }
 
-    /// A pose in the world; see [`Bank::update`].
+    /// Fuses a pose in the world; see [`Bank::update`].
     ///
     /// # Errors
     ///
-    /// As there.
+    /// The same as [`Bank::update`].
     pub fn absolute_pose(&mut self, measurement: &AbsolutePose) -> Result<Fused, Refusal> {
         self.bank.update(&mut self.poses, measurement)
     }
 
-    /// A pose relative to the keyframe; see [`Bank::update`].
+    /// Fuses a pose relative to the keyframe; see [`Bank::update`].
     ///
     /// # Errors
     ///
-    /// As there.
+    /// The same as [`Bank::update`].
     pub fn relative_pose(&mut self, measurement: &RelativePose) -> Result<Fused, Refusal> {
         self.bank.update(&mut self.relative, measurement)
     }
 
-    /// The velocity of the body, from wheels; see [`Bank::update`].
+    /// Fuses the velocity of the body, from wheels; see [`Bank::update`].
     ///
     /// # Errors
     ///
-    /// As there.
+    /// The same as [`Bank::update`].
     pub fn body_velocity(&mut self, measurement: &BodyVelocity) -> Result<Fused, Refusal> {
         self.bank.update(&mut self.velocities, measurement)
     }
@@ -171,13 +171,13 @@ impl Navigator {
         [&self.gnss[best], &self.poses[best], &self.relative[best], &self.velocities[best]]
     }
 
-    /// The parameters of the most plausible filter, which are what the bank has learnt, and how plausible it is.
+    /// The parameters of the most plausible filter, which the bank has learnt, and its weight.
     pub fn learnt(&self) -> (Learnt, f64) {
         let best = self.bank.best();
         (self.hypothesis(best), self.bank.weights()[best])
     }
 
-    /// How plausible the filter with these parameters is; 0 if there is none, or it was dropped.
+    /// The weight of the filter with these parameters; 0 if there is no such filter or it was dropped.
     pub fn plausibility(&self, learnt: &Learnt) -> f64 {
         let weights = self.bank.weights();
         let found = (0..FILTERS).filter(|i| weights[*i] > 0.0).find(|i| self.hypothesis(*i) == *learnt);
@@ -190,17 +190,17 @@ impl Navigator {
     }
 }
 
-/// What a bank has found, for another estimator of the same robot.
+/// The findings of a bank, for use by another estimator of the same robot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Learnt {
     /// The parameters of the most plausible filter.
     pub sensors: EskfParams,
-    /// What it multiplies the variance of positions from satellites by.
+    /// The filter's factor on the variance of satellite positions.
     pub gnss_variance_factor: f64,
 }
 
 impl Hypothesis {
-    /// The filter of this number, if there is one.
+    /// The filter with this index, if it exists.
     fn number(i: usize, aiding: Aiding) -> Option<Self> {
         let gyroscope = GYROSCOPE[i % GYROSCOPE.len()];
         let i = i / GYROSCOPE.len();
@@ -213,7 +213,7 @@ impl Hypothesis {
         }
     }
 
-    /// How plausible it is before anything was measured; of any sum.
+    /// The prior weight of the filter; weights need not sum to 1.
     fn prior(self) -> f64 {
         let departs = [self.gyroscope != 1.0, self.accelerometer != 1.0, self.gnss != 1.0, self.scale];
         departs.into_iter().filter(|departs| *departs).map(|_| DEPARTURE).product()

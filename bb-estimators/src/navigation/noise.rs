@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// Gaussian noise that is the same in every run.
+/// Deterministic Gaussian noise, the same in every run.
 pub(super) struct Noise(ChaCha8Rng);
 
 impl Noise {
@@ -13,7 +13,7 @@ impl Noise {
         Self(ChaCha8Rng::seed_from_u64(seed))
     }
 
-    /// Of unit variance.
+    /// A sample of unit variance.
     pub(super) fn next(&mut self) -> f64 {
         StandardNormal.sample(&mut self.0)
     }

@@ -1,24 +1,24 @@
 //! An extended Kalman filter for robots that drive on a plane.
 //!
-//! Position, heading and velocity from a gyroscope and wheels, corrected by satellites, headings and poses; the bias of the
-//! gyroscope and the scale of the wheels are estimated with them. It is a quarter of the work of [`Eskf`](super::Eskf), needs no
-//! accelerometer, and starts while the robot moves. What it cannot do is a slope: the world is flat, and the body upright.
+//! Estimates position, heading and velocity from a gyroscope and wheels, corrected by satellite navigation, headings and poses.
+//! It also estimates the gyroscope bias and the wheel scale. It needs a quarter of the work of [`Eskf`](super::Eskf) and no
+//! accelerometer, and it starts while the robot moves. It cannot handle slopes: the world is flat, and the body upright.
 //!
 //! S. Thrun, W. Burgard, D. Fox, "Probabilistic Robotics", 2005, section 5.3 (motion on an arc); P. D. Groves, "Principles of GNSS,
 //! Inertial, and Multisensor Integrated Navigation Systems", 2nd edition, 2013, chapter 3 and section 16.3.
 //!
 //! # States
 //!
-//! | index | what | unit |
+//! | index | quantity | unit |
 //! |---|---|---|
 //! | [`POSITION`], 2 | of the body's origin, in the world: x east, y north | m |
 //! | [`HEADING`] | of the body's x axis, from the world's counter-clockwise | rad |
 //! | [`VELOCITY`], 2 | of the body's origin, in the body: x forward, y left | m/s |
-//! | [`GYROSCOPE_BIAS`] | what the gyroscope reads more than the yaw rate | rad/s |
+//! | [`GYROSCOPE_BIAS`] | reading of the gyroscope minus the yaw rate | rad/s |
 //! | [`WHEEL_SCALE`] | scale of the wheels' velocity, less 1 | |
 //!
-//! Errors are what truth is more than the estimate. Wheels correct the filter, they do not drive it: they may slip, stall or come
-//! late, and their scale is known no better than the pressure of a tyre.
+//! An error is the truth minus the estimate. Wheels correct the filter rather than drive it: they may slip, stall or report late,
+//! and their scale is known no better than the tyre pressure.
 //!
 //! ```
 //! use bb_estimators::navigation::planar::{PlanarEkf, PlanarParams, PlanarPosition, PlanarStart, WheelVelocity};

@@ -1,36 +1,36 @@
-//! Why a sample or a measurement is not taken.
+//! Reasons for rejecting a sample or a measurement.
 
 use core::error::Error;
 use core::fmt;
 
-/// Why a filter refused a sample or a measurement; it is as it was before.
+/// The reason why a filter rejected a sample or a measurement. The filter is unchanged.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Refusal {
     /// The filter has not started.
     NotStarted,
-    /// A value is NaN or infinite, or an orientation is no rotation.
+    /// A value is NaN or infinite, or an orientation is not a rotation.
     NonFinite,
-    /// A value is larger than any sensor's.
+    /// A value is larger than any sensor could produce.
     OutOfRange,
-    /// Time stands still or runs back.
+    /// Time did not increase.
     TimeNotIncreasing {
         /// The time of the filter.
         previous_ns: i64,
-        /// The stamp that was refused.
+        /// The rejected stamp.
         time_ns: i64,
     },
-    /// Nothing was measured for longer than can be bridged.
+    /// No sample arrived for longer than can be bridged.
     Gap {
-        /// How long.
+        /// The length of the gap.
         seconds: f64,
     },
     /// The covariance of a measurement is not positive definite.
     Noise,
-    /// The gate: what was measured and what was expected are too far apart.
+    /// Rejected by the gate: the measurement is too far from its prediction.
     Gate {
         /// Normalised innovation squared.
         nis: f64,
-        /// What the gate lets pass.
+        /// The threshold of the gate.
         limit: f64,
     },
     /// A relative pose refers to a keyframe that the filter does not hold.
@@ -38,26 +38,26 @@ pub enum Refusal {
         /// The keyframe it names.
         id: u64,
     },
-    /// A keyframe has as many factors as it takes.
+    /// A keyframe has reached its maximum number of factors.
     Full {
         /// The keyframe.
         id: u64,
     },
-    /// The keyframe has seen this landmark already.
+    /// The keyframe has already observed this landmark.
     Repeated {
         /// The landmark.
         landmark: u64,
     },
-    /// The measurement says nothing in this state: the heading of a body that points up, say.
+    /// The measurement carries no information in this state, such as the heading of a body that points up.
     NotObservable,
-    /// Older than the history reaches.
+    /// The measurement is older than the history.
     TooOld {
-        /// The stamp that was refused.
+        /// The rejected stamp.
         time_ns: i64,
     },
-    /// Stamped after the newest sample of the IMU by more than a clock may be off.
+    /// The stamp is further ahead of the newest IMU sample than the clocks may differ.
     InTheFuture {
-        /// The stamp that was refused.
+        /// The rejected stamp.
         time_ns: i64,
     },
 }

@@ -1,35 +1,34 @@
 //! A fixed-lag smoother for position, velocity and attitude.
 //!
-//! It holds the last keyframes, and what was measured at and between them, as a problem of least squares: measurements of the
-//! last seconds can be linearised again, may arrive late, and correct earlier keyframes too.
+//! It holds the last keyframes, with the measurements at and between them, as a least-squares problem. Measurements of the last
+//! seconds can be relinearised, may arrive late, and also correct earlier keyframes.
 //!
 //! # Window
 //!
-//! Errors and states are those of the [filter](super::eskf), so that every [`Measurement`](super::Measurement) is a
-//! [`Factor`] here; optional states change from one keyframe to the next as the parameters say. The IMU between two
-//! keyframes is one factor ([`Preintegration`]). Factors concern one keyframe, or one and the one before; types of your
-//! own implement the trait.
+//! Errors and states are those of the [filter](super::eskf), so every [`Measurement`](super::Measurement) is a [`Factor`] here.
+//! Optional states change from one keyframe to the next according to the parameters. The IMU between two keyframes is one factor
+//! ([`Preintegration`]). A factor concerns one keyframe, or a keyframe and the one before it. Your own types can implement the
+//! trait.
 //!
 //! # Solution
 //!
-//! The Gauss–Newton method. The window is a chain, and is eliminated in the order of time, so that a new keyframe costs
-//! the elimination of the last two, whatever the window holds, and the covariance of the newest is its own pivot; see
-//! `elimination.rs`. What arrives late is eliminated from its keyframe on. A keyframe is linearised again where it is off by
-//! more than [`SmootherParams::relinearise_rotation`]. The oldest leaves nothing but what it had said of the next, which stays
-//! linearised where it was from then on: a direction that nothing observes, heading without a compass for one, then stays
-//! unobserved.
+//! The Gauss–Newton method. The window is a chain and is eliminated in time order. A new keyframe therefore costs the elimination
+//! of the last two, regardless of the window's length, and the covariance of the newest is its own pivot; see `elimination.rs`. A
+//! late measurement restarts the elimination at its keyframe. A keyframe is relinearised when its correction exceeds
+//! [`SmootherParams::relinearise_rotation`]. The oldest keyframe is marginalised to a prior on the next one, whose linearisation
+//! point is then fixed. An unobservable direction, such as heading without a compass, thus stays unobservable.
 //!
 //! # Landmarks
 //!
-//! [`FixedLagSmoother::set_camera`] gives it a camera, and [`FixedLagSmoother::observe`] points that it sees. Each is eliminated
-//! when it is added, which ties all keyframes that saw it; these ties go along the elimination of the chain, see
-//! `coupling.rs` and `landmark.rs`. When its first keyframe leaves, what it says of the others stays as a prior on them, and they
-//! keep their linearisation points.
+//! [`FixedLagSmoother::set_camera`] sets a camera, and [`FixedLagSmoother::observe`] adds points that it observes. Each landmark
+//! is eliminated when it is added, which couples all keyframes that observed it. These couplings are carried along the
+//! elimination of the chain; see `coupling.rs` and `landmark.rs`. When a landmark's first keyframe is marginalised, its
+//! information remains as a prior on the other keyframes, which keep their linearisation points.
 //!
 //! # Robustness
 //!
-//! Nothing is inverted that may be singular, and no system is refused as indeterminate: what is not known has a variance that
-//! says so.
+//! No possibly singular matrix is inverted, and no system is rejected as indeterminate: an unknown state has a correspondingly
+//! large variance.
 
 #[cfg(feature = "autodiff")]
 mod automatic;

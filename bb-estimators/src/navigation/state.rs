@@ -1,4 +1,4 @@
-//! What is estimated: the states and where each begins, and an estimate of them.
+//! The estimated states, their positions in the error vector, and the estimate.
 
 mod estimate;
 mod states;

@@ -1,9 +1,9 @@
 //! Position, velocity and attitude of a flight without satellite navigation.
 //!
-//! [`StateEstimator`] takes samples of the flight controller's IMU, relative poses of a camera, poses from satellite images,
-//! and, while it can be trusted, the flight controller's receiver of satellite navigation. One of two strategies does the
-//! work, which the configuration chooses: the fixed-lag smoother (feature `smoother`, the default), or the error-state Kalman
-//! filter (feature `eskf`). Either can be built without the other.
+//! [`StateEstimator`] takes samples of the flight controller's IMU, relative poses from a camera and poses from satellite images.
+//! While it can be trusted, the flight controller's satellite receiver is used too. The configuration selects one of two
+//! strategies: the fixed-lag smoother (feature `smoother`, the default) or the error-state Kalman filter (feature `eskf`). Either
+//! can be built without the other.
 //!
 //! ```
 //! # #[cfg(feature = "std")]
@@ -39,21 +39,21 @@
 //!
 //! # One writer, one queue
 //!
-//! All inputs pass through one queue in the order of their stamps; what arrives late, up to
-//! [`lateness`](StateEstimatorParams::lateness), is put in its place and what follows is computed again. The result is that
-//! of inputs that arrive in order, to the last bit (`tests/order.rs`). What is older is refused and counted.
+//! All inputs pass through one queue in the order of their stamps. An input that is late by at most
+//! [`lateness`](StateEstimatorParams::lateness) is inserted in order, and everything after it is recomputed. The result is
+//! bit-for-bit the same as for inputs that arrive in order (`tests/order.rs`). Older inputs are rejected and counted.
 //!
 //! # Errors
 //!
-//! *Degraded*: the input is not in the estimate, or was taken in with the covariance raised; there is an estimate.
-//! *Fatal*: there is none for this tick; the input that broke it is left out from then on. Each success and each failure is an
-//! [`Event`], with its reason. Without an estimate for three seconds there is exactly one event that says so, and one when
-//! there is one again.
+//! *Degraded*: the input was left out of the estimate, or was fused with the covariance raised; there is an estimate. *Fatal*:
+//! there is no estimate for this tick; the input that caused the failure is excluded from then on. Each success and each failure
+//! is an [`Event`], with its reason. After three seconds without an estimate, exactly one event reports this, and one more
+//! reports when an estimate is available again.
 //!
 //! # Conventions
 //!
-//! As in [`navigation`](super). Positions are WGS 84, orientations and covariances in the tangent frame at the position. The
-//! world of the strategies moves on where the robot is more than 5 km from its origin.
+//! As in [`navigation`](super). Positions are WGS 84; orientations and covariances are in the tangent frame at the position. The
+//! strategies move to a new world when the robot is more than 5 km from the origin of the current one.
 
 mod agreement;
 mod clock;

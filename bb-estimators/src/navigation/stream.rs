@@ -1,4 +1,4 @@
-//! What a filter keeps of each sensor: its gate, how it is weighed, and how consistent it was.
+//! Per-sensor state of a filter: gate, weighting, and consistency statistics.
 
 use crate::navigation::chi_square::limit;
 use crate::navigation::consistency::Consistency;
@@ -7,10 +7,10 @@ use crate::navigation::math::sqrt;
 use crate::navigation::refusal::Refusal;
 use crate::params::params;
 
-/// The largest dimension of a measurement whose limits are kept.
+/// The largest measurement dimension whose gate thresholds are cached.
 const DIMENSIONS: usize = 7;
 
-/// The most that a misfit is told to be.
+/// The upper bound on the reported misfit.
 const MOST_RAISED: f64 = 1e6;
 
 params! {
@@ -45,12 +45,12 @@ params! {
     }
 }
 
-/// How often a sensor's measurements were taken, and how often refused for which reason.
+/// Counts of a sensor's measurements, fused and rejected by reason.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Fused with their full weight.
     pub fused: u64,
-    /// Fused with less.
+    /// Fused with reduced weight.
     pub weighed_down: u64,
     /// [`Refusal::Gate`].
     pub gate: u64,
@@ -62,18 +62,18 @@ pub struct Counts {
     pub late: u64,
     /// [`Refusal::InTheFuture`].
     pub future: u64,
-    /// Fused although the gate was against it, after [`StreamParams::patience`]; among those fused.
+    /// Fused after [`StreamParams::patience`] overrode the gate; included in those fused.
     pub recoveries: u64,
-    /// Refused by the gate since the last one that was fused.
+    /// Rejected by the gate since the last fused measurement.
     pub gate_in_a_row: u64,
 }
 
-/// Whether the gate decides.
+/// Whether the gate is applied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Gate {
-    /// It refuses what is too far off.
+    /// Measurements that are too far off are rejected.
     Closed,
-    /// It lets everything pass.
+    /// All measurements pass.
     Open,
 }
 
@@ -86,7 +86,7 @@ pub(crate) struct Verdict {
     pub(crate) log_likelihood: f64,
 }
 
-/// One sensor, as a filter knows it.
+/// The state that a filter keeps for one sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stream {
     params: StreamParams,
@@ -104,7 +104,7 @@ impl Default for Stream {
 }
 
 impl Stream {
-    /// A sensor without a measurement.
+    /// Creates the stream of a sensor without measurements.
     pub fn new(params: StreamParams) -> Self {
         Self {
             params,
@@ -116,46 +116,46 @@ impl Stream {
         }
     }
 
-    /// How it judges.
+    /// The parameters of the stream.
     pub fn params(&self) -> &StreamParams {
         &self.params
     }
 
-    /// Changes [`StreamParams::variance_factor`], for those who have learnt it elsewhere.
+    /// Changes [`StreamParams::variance_factor`], for a value learnt elsewhere.
     pub fn set_variance_factor(&mut self, factor: f64) {
         if factor > 0.0 && factor.is_finite() {
             self.params.variance_factor = factor;
         }
     }
 
-    /// What became of its measurements.
+    /// Counts of its measurements, by outcome.
     pub fn counts(&self) -> &Counts {
         &self.counts
     }
 
-    /// How consistent those were that the gate let pass.
+    /// Consistency of the measurements that the gate accepted.
     pub fn consistency(&self) -> &Consistency {
         &self.consistency
     }
 
-    /// What its variance is multiplied by, from [`StreamParams::variance_factor`] and [`StreamParams::adaptation`].
+    /// The current factor on its variance, from [`StreamParams::variance_factor`] and [`StreamParams::adaptation`].
     pub fn noise_factor(&self) -> f64 {
         self.noise_factor * self.params.variance_factor
     }
 
-    /// Changes [`StreamParams::patience`], for those who know whether what was refused agrees.
+    /// Changes [`StreamParams::patience`], for callers that know whether the rejected measurements agree.
     #[cfg(any(feature = "smoother", feature = "eskf"))]
     pub(crate) fn set_patience(&mut self, patience: u32) {
         self.params.patience = patience;
     }
 
-    /// Forgets that measurements were refused in a row: the filter is elsewhere now.
+    /// Resets the count of successive rejections, because the filter was relocated.
     #[cfg(any(feature = "runtime", feature = "smoother", feature = "eskf"))]
     pub(crate) fn forgive(&mut self) {
         self.counts.gate_in_a_row = 0;
     }
 
-    /// How a measurement is fused, or that it is refused.
+    /// Decides how a measurement is fused, or rejects it.
     #[inline]
     pub(crate) fn weigh(
         &self,
@@ -195,7 +195,7 @@ impl Stream {
                 }
                 self.counts.gate_in_a_row = 0;
                 if fused.raised > 1.0 {
-                    // What did not fit says nothing about those that do.
+                    // A measurement that did not fit carries no information about the noise of those that do.
                     self.counts.recoveries += 1;
                     return;
                 }

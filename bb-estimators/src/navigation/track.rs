@@ -1,4 +1,4 @@
-//! Which positions agree among each other: those that a filter may start at, and those that show that it is wrong.
+//! Finds positions that agree with each other: a filter may start at them, or they show that it is wrong.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -7,35 +7,35 @@ use super::math::{cos, sin, sqrt};
 #[cfg(test)]
 mod tests;
 
-/// So many positions that agree are no coincidence: two define a straight line, the third is on it.
+/// The number of agreeing positions that rules out coincidence: two define a straight line, and the third is on it.
 pub const CONFIRMED: u32 = 3;
 
-/// Standard deviations that two positions may differ by.
+/// The largest difference between two positions, in standard deviations.
 const SIGMAS: f64 = 5.0;
 
-/// What few robots do, m/s, and none, m/s².
+/// A speed that few robots exceed, m/s, and an acceleration that none exceeds, m/s².
 const FASTEST: f64 = 150.0;
 const STRONGEST: f64 = 10.0;
 
-/// Positions that are farther apart in time tell nothing of each other where nothing else is said, ns.
+/// Default for the longest time between two positions that can be compared, ns.
 const LONGEST_NS: i64 = 60_000_000_000;
 
-/// The time between two positions that show a velocity, ns. A car turns into the next street within more.
+/// The time between two positions that determine a velocity, ns. In a longer time, a car may turn into the next street.
 const BASELINE_NS: core::ops::RangeInclusive<i64> = 500_000_000..=5_000_000_000;
 
-/// A velocity that is so many times its standard deviation shows a course.
+/// A velocity determines a course if it exceeds this many of its standard deviations.
 pub(in crate::navigation) const CLEARLY: f64 = 5.0;
 
 /// A measured position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackPoint {
-    /// When, ns.
+    /// Time of the measurement, ns.
     pub time_ns: i64,
-    /// In the world, m.
+    /// Position in the world, m.
     pub position: Vector3<f64>,
-    /// m².
+    /// Covariance of the position, m².
     pub covariance: Matrix3<f64>,
-    /// How far the robot has turned about up since any moment, rad, as a gyroscope says; the same for all where nothing does.
+    /// Accumulated yaw of the robot since any fixed time, rad, from a gyroscope; the same for all points without one.
     pub yaw: f64,
 }
 
@@ -46,8 +46,8 @@ impl TrackPoint {
     }
 }
 
-/// Positions one after the other, as a robot may have measured them on its way: each is where the two before lead to, up to their
-/// noise and an acceleration of 1 g. One that is not begins a new track.
+/// A sequence of positions that a robot may have measured on its way. Each agrees with the extrapolation of the two before, up to
+/// their noise and an acceleration of 1 g. A position that does not agree starts a new track.
 ///
 /// ```
 /// use bb_estimators::navigation::{CONFIRMED, Track, TrackPoint};
@@ -65,31 +65,32 @@ impl TrackPoint {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Track {
-    /// No robot is faster, m/s.
+    /// The largest speed of the robot, m/s.
     fastest: f64,
-    /// Positions that are farther apart in time tell nothing of each other, ns.
+    /// The longest time between two positions that can be compared, ns.
     longest_ns: i64,
     count: u32,
     newest: Option<TrackPoint>,
     before: Option<TrackPoint>,
-    /// The other end of the velocity.
+    /// The other end of the baseline for the velocity.
     older: Option<TrackPoint>,
 }
 
 impl Default for Track {
-    /// Of a robot that is slower than 150 m/s; positions more than a minute apart do not agree.
+    /// Creates a track for a robot slower than 150 m/s; positions more than a minute apart do not agree.
     fn default() -> Self {
         Self::with(FASTEST, LONGEST_NS)
     }
 }
 
 impl Track {
-    /// Of a robot that is slower than `fastest`, m/s; positions more than `longest_ns` apart do not agree.
+    /// Creates a track for a robot slower than `fastest`, m/s; positions more than `longest_ns` apart do not agree.
     pub fn with(fastest: f64, longest_ns: i64) -> Self {
         Self { fastest, longest_ns, count: 0, newest: None, before: None, older: None }
     }
 
-    /// Adds a position; `false` if it does not agree with those before, and begins a new track. One that is not newer is left out.
+    /// Adds a position. Returns `false` and starts a new track if the position does not agree with the previous ones. A position
+    /// that is not newer is ignored.
     pub fn add(&mut self, point: TrackPoint) -> bool {
         let Some(newest) = self.newest else {
             self.begin(point);
@@ -138,11 +139,11 @@ impl Track {
         };
         let horizontal = (covariance[(0, 0)] + covariance[(1, 1)]) / 2.0;
         let is_near = |distance: f64, variance: f64| distance <= SIGMAS * sqrt(variance.max(0.0)) + slack;
-        // Nor if it is not a number.
+        // Also rejects NaN.
         is_near(off.xy().norm(), horizontal) && is_near(off.z.abs(), covariance[(2, 2)])
     }
 
-    /// How many positions agree, the newest among them.
+    /// The number of positions that agree, including the newest.
     pub fn count(&self) -> u32 {
         self.count
     }
@@ -152,8 +153,9 @@ impl Track {
         self.newest.as_ref()
     }
 
-    /// The velocity in the world with its standard deviation, m/s, which grows with the turn on the way: between the last two positions if those show it
-    /// clearly, else over the last seconds. None of positions less than 0.5 s or more than 5 s apart.
+    /// The velocity in the world with its standard deviation, m/s, which grows with the turn on the way. It is taken between the
+    /// last two positions if they determine it clearly, and otherwise over the last seconds. `None` if the positions are less
+    /// than 0.5 s or more than 5 s apart.
     pub fn velocity(&self) -> Option<(Vector3<f64>, f64)> {
         let is_clear = |(velocity, deviation): &(Vector3<f64>, f64)| velocity.xy().norm() > CLEARLY * deviation;
         self.since(self.before).filter(is_clear).or_else(|| self.since(self.older))
@@ -169,7 +171,8 @@ impl Track {
         let (one, other) = (newest.deviation(), older.deviation());
         let noise = sqrt(one * one + other * other) / seconds;
         let mean = (newest.position - older.position) / seconds;
-        // On an arc the chord lags by half of the turn, and is shorter; where on the way it turned is not known.
+        // On an arc, the chord lags by half of the turn and is shorter than the path. Where on the path the robot turned is
+        // unknown.
         let turn = newest.yaw - older.yaw;
         let half = turn.clamp(-1.5, 1.5) / 2.0;
         let longer = if half.abs() < 1e-3 { 1.0 } else { half / sin(half) };

@@ -1,4 +1,4 @@
-//! Starts from rest and in motion.
+//! Tests of initialisation from rest and in motion.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use proptest::prelude::*;
@@ -9,7 +9,7 @@ use crate::navigation::{Eskf, EskfParams, GnssPosition, ImuMean, Refusal, Stream
 const G: f64 = 9.80665;
 
 fn at_rest(i: i64, world_from_body: &UnitQuaternion<f64>, bias: Vector3<f64>) -> ImuMean {
-    // Noise that is the same in every run.
+    // Deterministic noise, the same in every run.
     let noise = Vector3::new((i as f64 * 12.9).sin(), (i as f64 * 78.2).sin(), (i as f64 * 37.7).sin());
     ImuMean {
         time_ns: i * 10_000_000,
@@ -50,7 +50,7 @@ fn motion_begins_a_new_rest() {
     assert_eq!(alignment.rest_s(), 0.0);
     let origin = (Vector3::zeros(), 1.0);
     assert_eq!(alignment.at_rest(origin, (0.0, 0.1)), Err(Refusal::NotObservable));
-    // A steady turn is not a bias.
+    // A steady turn must not be taken for a bias.
     let mut turning = Alignment::new(AlignmentParams::default());
     for i in 0..150 {
         turning.add(&at_rest(i, &level, Vector3::new(0.0, 0.0, 0.5))).unwrap();
@@ -73,7 +73,7 @@ fn bad_samples_change_nothing() {
     assert_eq!(refused, Err(Refusal::NotObservable));
 }
 
-/// A car on a circle starts from its course and finds its attitude, on any heading.
+/// A car on a circle is initialised from its course and finds its attitude on any heading.
 #[test]
 fn a_start_in_motion_converges() {
     let (speed, rate) = (10.0, 0.2);

@@ -1,4 +1,4 @@
-//! Which filter a bank comes to believe.
+//! Tests which filter a bank comes to favour.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -18,7 +18,7 @@ impl States for Odometry {
 
 const N: usize = Odometry::DIMENSION;
 
-/// A minute of straight flight at 20 m/s with odometry at 10 Hz, whose scale is off, and a fix a second.
+/// A minute of straight flight at 20 m/s, with 10 Hz odometry whose scale is wrong and one fix per second.
 fn fly(scale: f64) -> (Bank<Odometry, N, 2>, [[Stream; 2]; 2]) {
     let filter = |deviation: f64| {
         let relative_scale = GaussMarkov::new(deviation, 20.0);

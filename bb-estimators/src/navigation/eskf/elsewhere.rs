@@ -1,4 +1,4 @@
-//! What changes where the filter is, or what it refers to, without a measurement.
+//! Changes of the filter's position or frame of reference without a measurement.
 
 use nalgebra::{Isometry3, Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 
@@ -11,19 +11,18 @@ use crate::navigation::state::{
     Estimate, Keyframe, NAVIGATION, Optional, POSITION, ROTATION, States, VELOCITY, offset,
 };
 
-/// What a keyframe differs from the pose that it copies by, as a part of the variance: 3 µm where a pose is known to a
-/// metre.
+/// Relative difference in variance between a keyframe and the pose that it copies: 3 µm where a pose is known to a metre.
 const COPY: f64 = 1e-11;
 
 impl<S: States, const N: usize> Eskf<S, N> {
-    /// Starts afresh from what another estimator of the same robot estimates, with the correlations of all that both estimate:
-    /// a prediction beside it, or another noise. Optional states that the other has not are zero, with the deviations of the
-    /// parameters.
+    /// Restarts from the estimate of another estimator of the same robot, with the correlations of all states that both estimate.
+    /// The other may be a parallel prediction or use different noise. Optional states that the other lacks are set to zero, with
+    /// the deviations of the parameters.
     ///
     /// # Errors
     ///
-    /// [`Refusal::NonFinite`] if a value is not finite, [`Refusal::OutOfRange`] if it is absurdly large, [`Refusal::Noise`] if the covariance is not positive definite. The
-    /// filter is then as it was.
+    /// Returns [`Refusal::NonFinite`] if a value is not finite, [`Refusal::OutOfRange`] if it is absurdly large, and
+    /// [`Refusal::Noise`] if the covariance is not positive definite. The filter is then unchanged.
     pub fn adopt<T: States, const M: usize>(
         &mut self,
         other: &Estimate<M>,
@@ -42,7 +41,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
             keyframe: None,
             optional: SVector::zeros(),
         };
-        // Where each error is in the other's; none if it has it not.
+        // Index of each error in the other filter; `None` if the other lacks it.
         let mut places: [Option<usize>; N] = core::array::from_fn(|i| (i < NAVIGATION).then_some(i));
         for state in S::OPTIONAL.iter().filter(|state| **state != Optional::Keyframe) {
             let (Some(first), Some(theirs)) = (offset::<S>(*state), offset::<T>(*state)) else { continue };
@@ -79,14 +78,14 @@ impl<S: States, const N: usize> Eskf<S, N> {
         Ok(())
     }
 
-    /// Moves the filter to where it was found to be, m, after it was wrong: position and, if given, velocity (m/s) and
-    /// orientation, each with its covariance in axes of the world. What is known of the rest stays, uncorrelated with what is
-    /// new; the keyframe and the barometer's bias, which refer to where it was, are forgotten. It counts as a reset.
+    /// Relocates a filter that was wrong, m: sets the position and, if given, the velocity (m/s) and the orientation, each with
+    /// its covariance in world axes. The other states keep their covariance but are uncorrelated with the new ones. The keyframe
+    /// and the barometer's bias, which refer to the old position, are reset. The call counts as a reset.
     ///
     /// # Errors
     ///
-    /// [`Refusal::NonFinite`] if a value is not finite, [`Refusal::OutOfRange`] if it is absurdly large, [`Refusal::Noise`] if a covariance is not positive definite. The filter
-    /// is then as it was.
+    /// Returns [`Refusal::NonFinite`] if a value is not finite, [`Refusal::OutOfRange`] if it is absurdly large, and
+    /// [`Refusal::Noise`] if a covariance is not positive definite. The filter is then unchanged.
     pub fn relocate(
         &mut self,
         position: (Vector3<f64>, Matrix3<f64>),
@@ -134,13 +133,12 @@ impl<S: States, const N: usize> Eskf<S, N> {
         Ok(())
     }
 
-    /// Makes the present pose the keyframe that relative poses refer to. A filter without [`Optional::Keyframe`] ignores
-    /// it.
+    /// Makes the current pose the keyframe for relative poses. A filter without [`Optional::Keyframe`] ignores the call.
     pub fn set_keyframe(&mut self, id: u64) {
         let (Some(estimate), Some(first)) = (&mut self.estimate, offset::<S>(Optional::Keyframe)) else { return };
         let (position, world_from_body) = (estimate.position, estimate.world_from_body);
         estimate.keyframe = Some(Keyframe { id, position, world_from_body });
-        // Far above rounding, far below what any sensor resolves. It keeps the covariance regular.
+        // Far above rounding and far below any sensor's resolution. It keeps the covariance regular.
         let variances = self.covariance.matrix().diagonal();
         let differs = |first: usize| COPY * variances.fixed_rows::<3>(first).max();
         let (position, rotation) = (differs(POSITION), differs(ROTATION));
@@ -150,12 +148,13 @@ impl<S: States, const N: usize> Eskf<S, N> {
         }
     }
 
-    /// Moves the filter to another world, a local frame nearer by: `new_from_old` takes coordinates of the present one there.
+    /// Moves the filter to another world, such as a closer local frame. `new_from_old` transforms coordinates from the current
+    /// world to the new one.
     ///
     /// # Errors
     ///
-    /// [`Refusal::NonFinite`] if that has a component that is not finite, or its rotation is none, [`Refusal::OutOfRange`] if it
-    /// is absurdly far. The filter is then as it was.
+    /// Returns [`Refusal::NonFinite`] if a component is not finite or the rotation is invalid, and [`Refusal::OutOfRange`] if the
+    /// new world is absurdly far away. The filter is then unchanged.
     pub fn move_world(&mut self, new_from_old: &Isometry3<f64>) -> Result<(), Refusal> {
         let Some(estimate) = &mut self.estimate else { return Ok(()) };
         let translation = &new_from_old.translation.vector;
@@ -172,7 +171,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
             keyframe.position = new_from_old.transform_point(&keyframe.position.into()).coords;
             keyframe.world_from_body = rotation * keyframe.world_from_body;
         }
-        // Errors are in the world's axes.
+        // Errors are in world axes.
         let rotation = rotation.to_rotation_matrix().into_inner();
         for first in [POSITION, VELOCITY, ROTATION] {
             self.covariance.transform(first, &rotation);
@@ -185,11 +184,11 @@ impl<S: States, const N: usize> Eskf<S, N> {
         Ok(())
     }
 
-    /// Adds to the variance of an error, for those who know of something that the model does not.
+    /// Adds to the variance of an error, to account for effects that the model does not cover.
     ///
     /// # Errors
     ///
-    /// [`Refusal::Noise`] if the variance is not one, or there is no such error.
+    /// Returns [`Refusal::Noise`] if the value is not a valid variance or the error does not exist.
     pub fn inflate(&mut self, error: usize, variance: f64) -> Result<(), Refusal> {
         if error >= N || !(0.0..1e18).contains(&variance) {
             return Err(Refusal::Noise);

@@ -1,4 +1,4 @@
-//! The filter: samples of the IMU move it, measurements correct it.
+//! The filter: IMU samples propagate it, and measurements correct it.
 
 use nalgebra::{Matrix6, SMatrix, SVector, Vector3};
 
@@ -21,13 +21,14 @@ use crate::navigation::stream::{Gate, Stream};
 use crate::navigation::upkeep::{Upkeep, upkeep_methods};
 use crate::params::Params as _;
 
-/// A correction of the rotation below this squared angle, rad², leaves the covariance as it is: to rounding, the same.
+/// A rotation correction below this squared angle, rad², leaves the covariance unchanged up to rounding.
 const RESET: f64 = 1e-12;
 
-/// A larger correction, rad, is transferred as one by so much: first order says nothing there, and by a whole turn Γ1 is singular.
+/// A larger rotation correction, rad, is clamped to this angle for the reset: the first order is invalid there, and at a whole
+/// turn Γ1 is singular.
 const LARGEST_RESET: f64 = 1.0;
 
-/// An error-state Kalman filter with the optional states `S` and `N` errors in all; see the [module](super).
+/// An error-state Kalman filter with the optional states `S` and `N` errors in total; see the [module](super).
 ///
 /// ```
 /// use bb_estimators::navigation::{Eskf, EskfParams, GnssPosition, ImuMean, Navigation, Start, Stream};
@@ -59,11 +60,11 @@ pub struct Eskf<S: States = Navigation, const N: usize = NAVIGATION> {
 impl<S: States, const N: usize> Eskf<S, N> {
     pub(super) const LAYOUT: Layout<N> = Layout::of::<S>();
 
-    /// Makes a filter that has not started.
+    /// Creates a filter that has not started.
     ///
     /// # Errors
     ///
-    /// The first parameter outside its accepted range, by name.
+    /// Returns the name of the first parameter outside its accepted range.
     pub fn new(params: EskfParams) -> Result<Self, ParamsError> {
         const {
             assert!(N == S::DIMENSION, "the second parameter of `Eskf` must be `DIMENSION` of the first");
@@ -76,18 +77,17 @@ impl<S: States, const N: usize> Eskf<S, N> {
         Ok(Self { params, densities, estimate: None, covariance, upkeep: Upkeep::default(), states })
     }
 
-    /// The parameters that the filter was made with.
+    /// The parameters that the filter was created with.
     pub fn params(&self) -> &EskfParams {
         &self.params
     }
 
-    /// Starts, or starts afresh; optional states are zero, with the deviations of the parameters.
+    /// Starts or restarts the filter. Optional states are set to zero, with the deviations of the parameters.
     ///
     /// # Errors
     ///
-    /// [`Refusal::NonFinite`] if a value is not finite or the orientation no rotation, [`Refusal::OutOfRange`] if it is absurdly
-    /// large, [`Refusal::Noise`] if a covariance is
-    /// not positive definite. The filter is then as it was.
+    /// Returns [`Refusal::NonFinite`] if a value is not finite or the orientation is not a rotation, [`Refusal::OutOfRange`] if a
+    /// value is absurdly large, and [`Refusal::Noise`] if a covariance is not positive definite. The filter is then unchanged.
     pub fn start(&mut self, start: &Start) -> Result<(), Refusal> {
         let (estimate, mut covariance) = start.state::<S, N>(&self.params)?;
         covariance.bound(&Self::LAYOUT);
@@ -97,15 +97,15 @@ impl<S: States, const N: usize> Eskf<S, N> {
         Ok(())
     }
 
-    /// Moves the filter over one sample of the IMU.
+    /// Propagates the filter over one IMU sample.
     ///
-    /// A sample that covers more than [`EskfParams::longest_sample`] is a gap: the body is taken to keep velocity and
-    /// attitude, up to the noise that the parameters give a gap.
+    /// A sample that covers more than [`EskfParams::longest_sample`] is a gap: the body is assumed to keep its velocity and
+    /// attitude, up to the gap noise in the parameters.
     ///
     /// # Errors
     ///
-    /// [`Refusal`] if the filter has not started, a value is not finite or absurdly large, time stands still or runs
-    /// back, or the gap is longer than a minute. The filter is then as it was.
+    /// Returns a [`Refusal`] if the filter has not started, a value is not finite or absurdly large, time does not increase, or
+    /// the gap is longer than a minute. The filter is then unchanged.
     pub fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
         let estimate = self.estimate.as_mut().ok_or(Refusal::NotStarted)?;
         sample.check()?;
@@ -124,7 +124,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
         Ok(())
     }
 
-    /// Optional states wander.
+    /// Propagates the optional states.
     #[inline]
     fn decay(&mut self, dt: f64) {
         let Some(estimate) = &mut self.estimate else { return };
@@ -142,14 +142,14 @@ impl<S: States, const N: usize> Eskf<S, N> {
         }
     }
 
-    /// Nothing was measured for `dt` seconds.
+    /// Propagates over `dt` seconds without a measurement.
     #[cold]
     fn bridge(&mut self, time_ns: i64, dt: f64) -> Result<(), Refusal> {
         let Some(estimate) = &mut self.estimate else { return Err(Refusal::NotStarted) };
         if dt > LONGEST_GAP_S {
             return Err(Refusal::Gap { seconds: dt });
         }
-        // What holds the body up, so that it does not fall.
+        // The specific force that balances gravity, so that the body does not fall.
         let up = Vector3::new(0.0, 0.0, self.params.gravity);
         estimate.time_ns = time_ns;
         estimate.angular_velocity = Vector3::zeros();
@@ -163,13 +163,14 @@ impl<S: States, const N: usize> Eskf<S, N> {
         Ok(())
     }
 
-    /// Corrects the filter by a measurement that was taken at its present time.
+    /// Corrects the filter with a measurement taken at its current time.
     ///
-    /// `stream` is that of the sensor: its gate decides, and its counts and statistics tell of it.
+    /// `stream` belongs to the sensor: its gate accepts or rejects the measurement, and it keeps the sensor's counts and
+    /// statistics.
     ///
     /// # Errors
     ///
-    /// [`Refusal`], which the stream has counted; the filter is then as it was.
+    /// Returns a [`Refusal`], which the stream has counted. The filter is then unchanged.
     pub fn update<M: Measurement<D>, const D: usize>(
         &mut self,
         stream: &mut Stream,
@@ -180,7 +181,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
         result
     }
 
-    /// [`update`](Self::update) whatever the gate says.
+    /// Like [`update`](Self::update), but bypasses the gate.
     pub(crate) fn update_ungated<M: Measurement<D>, const D: usize>(
         &mut self,
         stream: &mut Stream,
@@ -191,7 +192,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
         result
     }
 
-    /// Whether the gate of `stream` would let a measurement pass.
+    /// Whether the gate of `stream` would accept a measurement.
     pub(crate) fn accepts<M: Measurement<D>, const D: usize>(&self, stream: &Stream, measurement: &M) -> bool {
         let model = self.linearised(stream, measurement);
         let innovation = model.and_then(|model| innovation(&self.covariance, &model));
@@ -239,7 +240,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
         prepared(model, stream)
     }
 
-    /// Whether a measurement sees a horizontal position in the world, and not one relative to the keyframe.
+    /// Whether a measurement observes a horizontal position in the world, rather than one relative to the keyframe.
     fn fixes_position<const D: usize>(model: &Linearised<D, N>) -> bool {
         let keyframe = offset::<S>(Optional::Keyframe);
         model.jacobian.iter().any(|row| {
@@ -248,7 +249,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
         })
     }
 
-    /// The errors are about the corrected rotation from now on: `exp(θ) exp(-θ̂) ≈ exp(Γ1(θ̂) (θ - θ̂))`.
+    /// Resets the errors to the corrected rotation: `exp(θ) exp(-θ̂) ≈ exp(Γ1(θ̂) (θ - θ̂))`.
     fn reset_rotation(&mut self, index: usize, error: &SVector<f64, N>) {
         let mut correction = error.fixed_rows::<3>(index).into_owned();
         let squared = correction.norm_squared();
@@ -261,17 +262,17 @@ impl<S: States, const N: usize> Eskf<S, N> {
         }
     }
 
-    /// What is estimated, at the end of the last sample; none before the start.
+    /// The estimate at the end of the last sample; `None` before the start.
     pub fn estimate(&self) -> Option<&Estimate<N>> {
         self.estimate.as_ref()
     }
 
-    /// The estimate moved on to `time_ns` with the last angular velocity and specific force, for an output between
-    /// samples. The filter stays as it is.
+    /// The estimate extrapolated to `time_ns` with the last angular velocity and specific force, for an output between samples.
+    /// The filter is unchanged.
     ///
     /// # Errors
     ///
-    /// [`Refusal`] if the filter has not started, or the time is before its own or more than a sample after it.
+    /// Returns a [`Refusal`] if the filter has not started, or if the time is before its own or more than a sample after it.
     pub fn predicted(&self, time_ns: i64) -> Result<Estimate<N>, Refusal> {
         let mut estimate = self.estimate.ok_or(Refusal::NotStarted)?;
         if time_ns == estimate.time_ns {
@@ -291,7 +292,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
     }
 
     /// Covariance of all errors, `N × N`, in the order of the constants [`POSITION`] to
-    /// [`GYROSCOPE_BIAS`](crate::navigation::GYROSCOPE_BIAS) and then of the optional states. Symmetric to the last bit.
+    /// [`GYROSCOPE_BIAS`](crate::navigation::GYROSCOPE_BIAS) and then of the optional states. Exactly symmetric.
     pub fn covariance(&self) -> &SMatrix<f64, N, N> {
         self.covariance.matrix()
     }

@@ -1,10 +1,9 @@
-//! What the sensors and the optional states are like.
+//! Parameters of the sensors and of the optional states.
 
 use crate::navigation::state::Optional;
 use crate::params::{Field, Kind, Value};
 
-/// Adds what is known of the IMU and of gravity, which is set of the filter and of the estimator alike, to a struct of
-/// parameters.
+/// Adds the parameters of the IMU and of gravity, which the filter and the estimator share, to a parameter struct.
 macro_rules! imu_params {
     ($(#[$meta:meta])* pub struct $name:ident { $($rest:tt)* }) => {
         $crate::params::params! {
@@ -123,7 +122,7 @@ pub struct ImuDensities {
     pub gyroscope_bias: f64,
 }
 
-/// A first-order Gauss–Markov process: a state that wanders, but not away.
+/// A first-order Gauss–Markov process: a state that varies but stays bounded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GaussMarkov {
     /// Standard deviation, at the start and in the long run, in the state's unit.
@@ -133,12 +132,12 @@ pub struct GaussMarkov {
 }
 
 impl GaussMarkov {
-    /// A constant that is not known.
+    /// An unknown constant.
     pub const fn constant(deviation: f64) -> Self {
         Self { deviation, time_s: f64::INFINITY }
     }
 
-    /// A state that wanders within `deviation` over `time_s`.
+    /// A state that varies within `deviation` over `time_s`.
     pub const fn new(deviation: f64, time_s: f64) -> Self {
         Self { deviation, time_s }
     }
@@ -171,7 +170,7 @@ impl EskfParams {
         }
     }
 
-    /// The noise while nothing is measured.
+    /// The noise during a gap.
     pub(in crate::navigation) fn gap_densities(&self) -> ImuDensities {
         let square = |x: f64| x * x;
         let densities = self.densities();
@@ -182,7 +181,7 @@ impl EskfParams {
         }
     }
 
-    /// The process of an optional state; none for a keyframe, which is what it was.
+    /// The process of an optional state; `None` for a keyframe, which does not change.
     pub(in crate::navigation) fn process(&self, state: Optional) -> Option<GaussMarkov> {
         match state {
             Optional::Keyframe => None,
@@ -195,10 +194,10 @@ impl EskfParams {
         }
     }
 
-    /// The variance of a component of an optional state at the start.
+    /// The initial variance of a component of an optional state.
     pub(in crate::navigation) fn variance(&self, state: Optional) -> f64 {
         let variance = self.process(state).map_or(1.0, |process| process.deviation * process.deviation);
-        // 0 would make the matrix singular; the state is known all the same.
+        // A variance of 0 would make the matrix singular; this value still amounts to a known state.
         variance.max(1e-24)
     }
 }

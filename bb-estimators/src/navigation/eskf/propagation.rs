@@ -7,15 +7,15 @@
 //! * `v⁺ = v + R Γ1 f dt + g dt`
 //! * `p⁺ = p + v dt + R Γ2 f dt² + ½ g dt²`
 //!
-//! The rotation error is one of the world, `R_true = exp(θ) R`, so it has no transition of its own, and with
-//! `ω_true = ω - δb_g`, `f_true = f - δb_a`:
+//! The rotation error is in the world frame, `R_true = exp(θ) R`, so it has no transition of its own. With `ω_true = ω - δb_g`,
+//! `f_true = f - δb_a`:
 //!
 //! * `θ⁺ = θ - R Γ1 dt δb_g`
 //! * `δv⁺ = δv - [R Γ1 f dt]× θ - R Γ1 dt δb_a - R ∂(Γ1 f)/∂φ dt² δb_g`
 //! * `δp⁺ = δp + δv dt - [R Γ2 f dt²]× θ - R Γ2 dt² δb_a - R ∂(Γ2 f)/∂φ dt³ δb_g`
 //!
-//! J. Solà, "Quaternion kinematics for the error-state Kalman filter", arXiv 1711.02508, 2017, section 7, with global
-//! angular errors. The transition is the identity but for blocks above the diagonal; nothing else is multiplied.
+//! J. Solà, "Quaternion kinematics for the error-state Kalman filter", arXiv 1711.02508, 2017, section 7, with global angular
+//! errors. The transition is the identity except for blocks above the diagonal; only these are multiplied.
 
 #![allow(clippy::needless_range_loop, reason = "the indices are those of the equations")]
 
@@ -30,24 +30,24 @@ use crate::navigation::state::{
     ACCELEROMETER_BIAS, Estimate, GYROSCOPE_BIAS, NAVIGATION, POSITION, ROTATION, VELOCITY,
 };
 
-/// The errors from [`ROTATION`] on that position and velocity integrate: rotation and both biases.
+/// The errors from [`ROTATION`] on that are integrated into position and velocity: rotation and both biases.
 pub(in crate::navigation) const SOURCES: usize = NAVIGATION - ROTATION;
 
-/// What a sample does to the errors: the blocks of the transition that are neither zero nor the identity.
+/// The effect of a sample on the errors: the blocks of the transition that are neither zero nor the identity.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::navigation) struct Transition {
-    /// Of the position error by the velocity error, s.
+    /// Derivative of the position error with respect to the velocity error, s.
     pub(in crate::navigation) dt: f64,
-    /// Of the position error by rotation error and biases, row by row.
+    /// Derivative of the position error with respect to the rotation error and the biases, row by row.
     pub(in crate::navigation) position: [[f64; SOURCES]; 3],
-    /// Of the velocity error by the same.
+    /// Derivative of the velocity error with respect to the same errors.
     pub(in crate::navigation) velocity: [[f64; SOURCES]; 3],
-    /// Of the rotation error by the gyroscope's bias.
+    /// Derivative of the rotation error with respect to the gyroscope's bias.
     pub(in crate::navigation) rotation: [[f64; 3]; 3],
 }
 
 impl Transition {
-    /// Moves the estimate over `dt` seconds; angular velocity and specific force are those it holds.
+    /// Propagates the estimate over `dt` seconds with the angular velocity and specific force that it holds.
     #[inline]
     pub(super) fn advance<const N: usize>(estimate: &mut Estimate<N>, dt: f64, gravity: f64) -> Self {
         let force = estimate.specific_force;
@@ -81,7 +81,7 @@ impl Transition {
     /// `P ← Φ P Φᵀ + Q`.
     #[inline]
     pub(in crate::navigation) fn apply<const N: usize>(&self, p: &mut [[f64; N]; N], densities: &ImuDensities) {
-        // Φ P: what a row takes from are rows below it, which are not yet changed. Only columns that are read or kept.
+        // Φ P: each row reads only rows below it, which have not changed yet. Only columns that are read or kept are computed.
         for i in 0..3 {
             let mut row = p[POSITION + i];
             for j in 0..N {
@@ -115,7 +115,7 @@ impl Transition {
             }
             p[ROTATION + i] = row;
         }
-        // (Φ P) Φᵀ: of the columns only the first nine change, and of these the upper triangle is computed.
+        // (Φ P) Φᵀ: only the first nine columns change, and only their upper triangle is computed.
         for i in 0..3 {
             let mut row = p[POSITION + i];
             for j in i..3 {
@@ -157,8 +157,8 @@ impl Transition {
         }
     }
 
-    /// White noise of density q on a derivative: `q [dt³/3, dt²/2; dt²/2, dt]` on position and velocity. At least what rounding
-    /// may have taken.
+    /// White noise of density q on a derivative: `q [dt³/3, dt²/2; dt²/2, dt]` on position and velocity. At least the amount that
+    /// rounding may have removed.
     #[inline]
     fn add_noise<const N: usize>(&self, p: &mut [[f64; N]; N], densities: &ImuDensities) {
         let dt = self.dt;

@@ -1,17 +1,17 @@
-//! What an IMU measures from one instant to the next.
+//! IMU samples: means over an interval.
 
 use nalgebra::Vector3;
 
 use crate::attitude::{MAX_ANGULAR_VELOCITY, MAX_SPECIFIC_FORCE};
 use crate::navigation::refusal::Refusal;
 
-/// The longest gap that is bridged at all, s: a body may be anywhere after it.
+/// The longest gap that is bridged at all, s: the position is unknown after a longer one.
 pub(in crate::navigation) const LONGEST_GAP_S: f64 = 60.0;
 
-/// One sample of the IMU, body axes.
+/// One IMU sample, body axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImuMean {
-    /// The end of the interval, nanoseconds since any fixed moment. It begins where the last one ended.
+    /// The end of the interval, nanoseconds since any fixed epoch. The interval begins at the end of the previous one.
     pub time_ns: i64,
     /// Mean angular velocity over the interval, rad/s.
     pub angular_velocity: Vector3<f64>,
@@ -20,9 +20,9 @@ pub struct ImuMean {
 }
 
 impl ImuMean {
-    /// Whether it may have been measured.
+    /// Whether a sensor could have measured these values.
     pub(in crate::navigation) fn check(&self) -> Result<(), Refusal> {
-        // Within its limit is no NaN.
+        // The range check also rejects NaN.
         let within = |vector: &Vector3<f64>, limit: f64| vector.iter().all(|x| (-limit..=limit).contains(x));
         if within(&self.angular_velocity, MAX_ANGULAR_VELOCITY) && within(&self.specific_force, MAX_SPECIFIC_FORCE)
         {
@@ -34,7 +34,7 @@ impl ImuMean {
     }
 }
 
-/// From one stamp to a later one, s.
+/// The time from one stamp to a later one, s.
 pub(in crate::navigation) fn seconds_between(previous_ns: i64, time_ns: i64) -> Result<f64, Refusal> {
     if time_ns <= previous_ns {
         return Err(Refusal::TimeNotIncreasing { previous_ns, time_ns });

@@ -1,4 +1,4 @@
-//! Where a filter starts.
+//! Initial state of a filter.
 
 use nalgebra::{Matrix3, SVector, UnitQuaternion, Vector3};
 
@@ -10,20 +10,20 @@ use crate::navigation::state::{
     ACCELEROMETER_BIAS, Estimate, GYROSCOPE_BIAS, POSITION, ROTATION, States, VELOCITY, offset,
 };
 
-/// What is known when a filter starts.
+/// The state and uncertainty that a filter starts with.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Start {
-    /// When, nanoseconds since any fixed moment.
+    /// Time of the start, nanoseconds since any fixed epoch.
     pub time_ns: i64,
     /// Position in the world, m.
     pub position: Vector3<f64>,
     /// Velocity in the world, m/s.
     pub velocity: Vector3<f64>,
-    /// Takes body coordinates to the world.
+    /// Rotates body coordinates to world coordinates.
     pub world_from_body: UnitQuaternion<f64>,
-    /// Of the accelerometer, body axes, m/s².
+    /// Bias of the accelerometer, body axes, m/s².
     pub accelerometer_bias: Vector3<f64>,
-    /// Of the gyroscope, body axes, rad/s.
+    /// Bias of the gyroscope, body axes, rad/s.
     pub gyroscope_bias: Vector3<f64>,
     /// Covariance of the position, m².
     pub position_covariance: Matrix3<f64>,
@@ -38,8 +38,8 @@ pub struct Start {
 }
 
 impl Start {
-    /// A pose that is known up to standard deviations that are alike along all axes, m, m/s, rad. Biases are zero up to
-    /// 0.2 m/s² and 0.02 rad/s.
+    /// Creates a start from a pose and velocity with isotropic standard deviations, m, m/s, rad. Biases are zero, with standard
+    /// deviations of 0.2 m/s² and 0.02 rad/s.
     pub fn at(
         time_ns: i64,
         position: (Vector3<f64>, f64),
@@ -62,7 +62,7 @@ impl Start {
         }
     }
 
-    /// The state and the covariance that it says.
+    /// The corresponding state and covariance.
     pub(super) fn state<S: States, const N: usize>(
         &self,
         params: &EskfParams,
@@ -106,7 +106,7 @@ impl Start {
         Ok((estimate, covariance))
     }
 
-    /// The state and the information that it says: the inverse of the covariance.
+    /// The corresponding state and information matrix, the inverse of the covariance.
     #[cfg(feature = "smoother")]
     pub(in crate::navigation) fn information<S: States, const N: usize>(
         &self,

@@ -15,7 +15,7 @@ use super::params::EskfParams;
 use super::{Eskf, ImuMean, Start};
 use crate::navigation::state::{Estimate, Optional, States};
 
-/// Everything that there is.
+/// All optional states.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct All;
 
@@ -31,7 +31,7 @@ impl States for All {
     ];
 }
 
-/// Wheels that wear, and an antenna on a mast.
+/// Wheels that wear and an antenna on a mast.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Rover;
 
@@ -105,13 +105,13 @@ fn estimate() -> impl Strategy<Value = Estimate<ALL>> {
                 |i, _| if i < crate::navigation::NAVIGATION { 0.0 } else { optional[i % 32] },
             ),
         };
-        // A keyframe has no values of its own there.
+        // The keyframe has no values of its own in this vector.
         estimate = estimate.corrected::<All>(&SVector::zeros());
         estimate
     })
 }
 
-/// A filter that is level at rest at the origin, and not very sure of it.
+/// A level filter at rest at the origin with a moderate uncertainty.
 fn started<S: States, const N: usize>() -> Eskf<S, N> {
     let mut filter = Eskf::new(EskfParams::default()).unwrap();
     let start = Start::at(0, (Vector3::zeros(), 2.0), (Vector3::zeros(), 0.5), (UnitQuaternion::identity(), 0.1));
@@ -119,7 +119,7 @@ fn started<S: States, const N: usize>() -> Eskf<S, N> {
     filter
 }
 
-/// A flight that turns and accelerates, sample by sample at 100 Hz.
+/// A flight with turns and accelerations, sampled at 100 Hz.
 fn sample(i: i64) -> ImuMean {
     let t = i as f64 * 0.01;
     ImuMean {

@@ -1,16 +1,16 @@
-//! A queue of bounded length, which allocates at most when it is made.
+//! A bounded queue that allocates only when it is created.
 
 #[cfg(feature = "std")]
 use std::boxed::Box;
 
-/// Where there is a heap they are there from the beginning: hundreds of kilobytes are too much for the stack of a thread, which
-/// without optimisation holds a copy for each function that they go through.
+/// With a heap, the values are allocated there from the beginning. Hundreds of kilobytes are too much for a thread's stack, which
+/// in a build without optimisation holds a copy for each function they pass through.
 #[cfg(feature = "std")]
 type Slots<T, const N: usize> = Box<[Option<T>]>;
 #[cfg(not(feature = "std"))]
 type Slots<T, const N: usize> = [Option<T>; N];
 
-/// Up to `N` values, the oldest first.
+/// Up to `N` values, oldest first.
 #[derive(Clone, Debug)]
 pub(super) struct Ring<T, const N: usize> {
     slots: Slots<T, N>,
@@ -55,7 +55,7 @@ impl<T, const N: usize> Ring<T, N> {
         (0..self.len).rev().find(|index| self.get(*index).is_some_and(&is))
     }
 
-    /// Adds the newest; the oldest leaves if there is no room.
+    /// Appends a value; the oldest is removed if there is no room.
     pub(super) fn push(&mut self, value: T) {
         if self.len == N {
             self.pop_front();
@@ -74,7 +74,7 @@ impl<T, const N: usize> Ring<T, N> {
         value
     }
 
-    /// Puts a value before the one at `index`. If there is no room the newest leaves.
+    /// Inserts a value before the one at `index`. If there is no room, the newest is removed.
     pub(super) fn insert(&mut self, index: usize, value: T) {
         if index >= N {
             return;
@@ -86,7 +86,7 @@ impl<T, const N: usize> Ring<T, N> {
         }
     }
 
-    /// Keeps the oldest `len`.
+    /// Keeps only the oldest `len` values.
     pub(super) fn truncate(&mut self, len: usize) {
         while self.len > len {
             self.len -= 1;

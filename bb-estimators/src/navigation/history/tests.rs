@@ -1,4 +1,4 @@
-//! Whatever the order of arrival, the result is that of the order of the stamps.
+//! The result is that of the order of the stamps, regardless of the order of arrival.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use proptest::prelude::*;
@@ -61,7 +61,7 @@ fn sample(i: i64) -> ImuMean {
     }
 }
 
-/// With a few that the gate refuses.
+/// Includes a few measurements that the gate rejects.
 fn sensed(kind: bool, value: f64) -> Sensed {
     let value = Vector3::new(value, -value, 0.5 * value);
     match kind {
@@ -70,7 +70,7 @@ fn sensed(kind: bool, value: f64) -> Sensed {
     }
 }
 
-/// Two seconds; each measurement arrives when the sample of its arrival has.
+/// Two seconds; each measurement arrives with the sample of its arrival time.
 fn fly(mut arrivals: Vec<(i64, i64, Sensed)>) -> Long {
     arrivals.sort_by_key(|(arrival, _, _)| *arrival);
     let mut history = Long::new(drone(), SAMPLE_NS).unwrap();
@@ -95,7 +95,7 @@ proptest! {
         measured in proptest::collection::vec((1..199 * SAMPLE_NS, 0..80_i64, any::<bool>(), -3.0..3.0), 1..40),
     ) {
         let mut measured = measured;
-        // Two at one instant are taken as they come.
+        // Two measurements with the same stamp are fused in the order of arrival.
         measured.sort_by_key(|(time_ns, ..)| *time_ns);
         measured.dedup_by_key(|(time_ns, ..)| *time_ns);
         let arrives = |delay: i64, (time_ns, kind, value): (i64, bool, f64)| {
@@ -124,7 +124,7 @@ fn at_the_time_of_a_sample_it_is_the_filter_alone() {
             arrivals.push((200, i * SAMPLE_NS, sensed(i % 40 == 0, 0.1)));
         }
     }
-    // All at the end is too late for the first second.
+    // If all arrive at the end, the first second is too late.
     let kept = arrivals.split_off(arrivals.len() / 2 + 1);
     let in_time = arrivals.into_iter().map(|(_, time_ns, measured)| (time_ns / SAMPLE_NS + 3, time_ns, measured));
     let history = fly(in_time.chain(kept).collect());

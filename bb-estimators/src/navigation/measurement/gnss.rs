@@ -1,4 +1,4 @@
-//! Satellite navigation: position and velocity of an antenna, heading of two.
+//! Satellite navigation: position and velocity of an antenna, heading of an antenna pair.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -12,14 +12,14 @@ const LEAST_HORIZONTAL: f64 = 1e-3;
 
 /// Position of an antenna in the world.
 ///
-/// With the antenna at `l` in the body: `p + R l`, less the way `(v + R (ω × l)) d` of its delay d.
+/// With the antenna at `l` in the body: `p + R l`, less the distance `(v + R (ω × l)) d` travelled during its delay d.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GnssPosition {
-    /// Of the antenna, in the world, m.
+    /// Position of the antenna in the world, m.
     pub position: Vector3<f64>,
     /// Covariance in the world, m².
     pub covariance: Matrix3<f64>,
-    /// Where the antenna is in the body, m; [`Optional::GnssLeverArm`] adds what is wrong about it.
+    /// Lever arm of the antenna in the body, m; [`Optional::GnssLeverArm`] adds its estimated error.
     pub lever_arm: Vector3<f64>,
 }
 
@@ -63,11 +63,11 @@ impl Measurement<3> for GnssPosition {
 /// Velocity of an antenna in the world: `v + R (ω × l)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GnssVelocity {
-    /// Of the antenna, in the world, m/s.
+    /// Velocity of the antenna in the world, m/s.
     pub velocity: Vector3<f64>,
     /// Covariance in the world, m²/s².
     pub covariance: Matrix3<f64>,
-    /// Where the antenna is in the body, m; [`Optional::GnssLeverArm`] adds what is wrong about it.
+    /// Lever arm of the antenna in the body, m; [`Optional::GnssLeverArm`] adds its estimated error.
     pub lever_arm: Vector3<f64>,
 }
 
@@ -103,11 +103,11 @@ impl Measurement<3> for GnssVelocity {
 /// Heading of the line from one antenna to another.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GnssHeading {
-    /// From the world's x axis, east, counter-clockwise, rad; any number of turns.
+    /// Heading from the world's x axis, east, counter-clockwise, rad; any number of turns.
     pub heading: f64,
     /// Standard deviation, rad.
     pub deviation: f64,
-    /// From the first antenna to the second, in the body, of any length but 0.
+    /// Vector from the first antenna to the second, in the body, of any non-zero length.
     pub baseline: Vector3<f64>,
 }
 
@@ -122,13 +122,13 @@ impl Measurement<1> for GnssHeading {
         let (heading, gradient) = heading_of(&direction).ok_or(Refusal::NotObservable)?;
         model.residual[0] = wrapped(self.heading - heading);
         model.noise[(0, 0)] = self.deviation * self.deviation;
-        // Of θ × w, turned about the world.
+        // The rotation error θ changes the world vector w by θ × w.
         model.set_row(0, ROTATION, &direction.cross(&gradient));
         Ok(())
     }
 }
 
-/// The heading of a vector of the world, rad, and its derivative by that vector; none if it is vertical.
+/// The heading of a world vector, rad, and its derivative with respect to that vector; `None` if the vector is vertical.
 pub(super) fn heading_of(vector: &Vector3<f64>) -> Option<(f64, Vector3<f64>)> {
     let squared = vector.x * vector.x + vector.y * vector.y;
     if squared <= LEAST_HORIZONTAL * LEAST_HORIZONTAL * vector.norm_squared() {

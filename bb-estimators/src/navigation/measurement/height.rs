@@ -1,4 +1,4 @@
-//! Height: known, or from air pressure.
+//! Height: known directly, or derived from air pressure.
 
 use super::{Linearised, Measurement};
 use crate::navigation::refusal::Refusal;
@@ -13,10 +13,10 @@ pub struct Height {
     pub deviation: f64,
 }
 
-/// Height by air pressure: that in the world, and [`Optional::BarometerBias`] more.
+/// Height derived from air pressure: the height in the world plus [`Optional::BarometerBias`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BarometricHeight {
-    /// The z coordinate in the world and the bias, m.
+    /// The z coordinate in the world plus the bias, m.
     pub height: f64,
     /// Standard deviation, m.
     pub deviation: f64,

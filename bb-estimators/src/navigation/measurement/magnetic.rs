@@ -1,4 +1,4 @@
-//! The magnetic field: all of it, or its heading alone.
+//! The magnetic field: the full vector, or only its heading.
 
 use nalgebra::Vector3;
 
@@ -8,23 +8,23 @@ use crate::navigation::math::{skew, wrapped};
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{Estimate, Optional, ROTATION, States, offset};
 
-/// The magnetic field where it is known in the world: `Rᵀ m + h`, with the hard iron h.
+/// The magnetic field, if it is known in the world: `Rᵀ m + h`, with the hard iron h.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MagneticField {
-    /// As measured, body axes, T.
+    /// Measured field, body axes, T.
     pub field: Vector3<f64>,
-    /// In the world, T.
+    /// Known field in the world, T.
     pub reference: Vector3<f64>,
     /// Standard deviation of a component, T.
     pub deviation: f64,
 }
 
-/// The heading of the magnetic field, which says nothing about tilt by itself.
+/// The heading of the magnetic field, which by itself carries no information about tilt.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MagneticHeading {
-    /// As measured, body axes, T.
+    /// Measured field, body axes, T.
     pub field: Vector3<f64>,
-    /// Magnetic north from true north, east positive, rad.
+    /// Declination: magnetic north from true north, east positive, rad.
     pub declination: f64,
     /// Standard deviation of the heading, rad.
     pub deviation: f64,
@@ -38,7 +38,7 @@ impl Measurement<3> for MagneticField {
     ) -> Result<(), Refusal> {
         let rotation = at.rotation();
         let field = self.field - at.vector::<S>(Optional::HardIron);
-        // In the world, where R (m - h) turns by θ × m and the noise, alike along all axes, is the same.
+        // In the world, R (m - h) rotates by θ × m, and the isotropic noise is unchanged.
         model.set_residual(0, &(rotation * field - self.reference));
         model.set_noise(0, &isotropic(self.deviation));
         model.set_block(0, ROTATION, &skew(&self.reference));

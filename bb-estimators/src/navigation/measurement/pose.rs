@@ -10,9 +10,9 @@ use crate::navigation::state::{Estimate, POSITION, ROTATION, States};
 /// Position and orientation of the body in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AbsolutePose {
-    /// Of the body's origin, in the world, m.
+    /// Position of the body's origin in the world, m.
     pub position: Vector3<f64>,
-    /// Takes body coordinates to the world.
+    /// Rotates body coordinates to world coordinates.
     pub world_from_body: UnitQuaternion<f64>,
     /// Covariance of the position, in the world, m².
     pub position_covariance: Matrix3<f64>,
@@ -21,7 +21,7 @@ pub struct AbsolutePose {
 }
 
 impl AbsolutePose {
-    /// A pose with noise that is alike along all axes: standard deviations in m and rad.
+    /// A pose with isotropic noise: standard deviations in m and rad.
     pub fn new(position: (Vector3<f64>, f64), world_from_body: (UnitQuaternion<f64>, f64)) -> Self {
         Self {
             position: position.0,

@@ -10,24 +10,24 @@ use crate::navigation::state::{Estimate, Optional, POSITION, ROTATION, States, o
 /// The pose of the body in the frame of a keyframe, which the filter holds as [`Optional::Keyframe`]:
 /// `translation = (1 + s) R_kᵀ (p - p_k)`, `keyframe_from_body = R_kᵀ R`, with [`Optional::RelativeScale`] s.
 ///
-/// With keyframe and present pose both in the error vector, their common error cancels: no information is counted twice,
-/// and heading and position in the world stay as unknown as they are.
+/// Both the keyframe and the current pose are in the error vector, so their common error cancels. No information is counted
+/// twice, and the uncertainty of heading and position in the world is preserved.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RelativePose {
-    /// The keyframe, as [`Eskf::set_keyframe`](crate::navigation::Eskf::set_keyframe) was told.
+    /// The keyframe, as passed to [`Eskf::set_keyframe`](crate::navigation::Eskf::set_keyframe).
     pub keyframe: u64,
-    /// Of the body's origin, in the keyframe's axes, m.
+    /// Position of the body's origin, in the keyframe's axes, m.
     pub translation: Vector3<f64>,
-    /// Takes body coordinates to the keyframe's.
+    /// Rotates body coordinates to keyframe coordinates.
     pub keyframe_from_body: UnitQuaternion<f64>,
-    /// Covariance of the translation, body axes of now, m².
+    /// Covariance of the translation, current body axes, m².
     pub translation_covariance: Matrix3<f64>,
-    /// Covariance of the rotation vector of the error, body axes of now, rad².
+    /// Covariance of the rotation vector of the error, current body axes, rad².
     pub rotation_covariance: Matrix3<f64>,
 }
 
 impl RelativePose {
-    /// A relative pose with noise that is alike along all axes: standard deviations in m and rad.
+    /// A relative pose with isotropic noise: standard deviations in m and rad.
     pub fn new(
         keyframe: u64,
         translation: (Vector3<f64>, f64),
@@ -57,7 +57,7 @@ impl Measurement<6> for RelativePose {
         let rotation = at.rotation();
         let to_world = |covariance: &Matrix3<f64>| rotation * covariance * rotation.transpose();
 
-        // In the world's axes, in which the Jacobians of all rotation errors are the simplest.
+        // In world axes, where the Jacobians of all rotation errors are simplest.
         model.set_residual(0, &(keyframe.world_from_body * self.translation - way * scale));
         model.set_noise(0, &to_world(&self.translation_covariance));
         model.set_block(0, POSITION, &(Matrix3::identity() * scale));

@@ -1,4 +1,4 @@
-//! What a body at rest shows.
+//! Measurements of a body at rest.
 
 use nalgebra::Matrix3;
 

@@ -1,4 +1,4 @@
-//! Velocity in the body: wheels, what they cannot do, and sensors that see the ground.
+//! Velocity in the body: wheels, their kinematic constraints, and sensors that observe the ground.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
@@ -10,45 +10,45 @@ use crate::navigation::state::{Estimate, GYROSCOPE_BIAS, Optional, ROTATION, Sta
 /// Velocity of a point of the body, in the axes of a sensor: `Mᵀ (Rᵀ v + ω × l)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BodyVelocity {
-    /// In the sensor's axes, m/s.
+    /// Velocity in the sensor's axes, m/s.
     pub velocity: Vector3<f64>,
     /// Standard deviation of a component, m/s.
     pub deviation: f64,
-    /// Takes sensor coordinates to the body, M.
+    /// Rotates sensor coordinates to body coordinates, M.
     pub body_from_sensor: UnitQuaternion<f64>,
-    /// Where the sensor is in the body, m.
+    /// Position of the sensor in the body, m.
     pub lever_arm: Vector3<f64>,
 }
 
-/// Speed of a wheel, or of an axle's middle, along a direction of the body: `(1 + s) eᵀ (Rᵀ v + ω × l)`, with
+/// Speed of a wheel, or of the middle of an axle, along a direction of the body: `(1 + s) eᵀ (Rᵀ v + ω × l)`, with
 /// [`Optional::WheelScale`] s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WheelSpeed {
-    /// Forward positive, m/s.
+    /// Speed, forward positive, m/s.
     pub speed: f64,
     /// Standard deviation, m/s.
     pub deviation: f64,
     /// Direction of travel, a unit vector in the body.
     pub forward: Vector3<f64>,
-    /// Where the wheel meets the ground, in the body, m.
+    /// Contact point of the wheel, in the body, m.
     pub lever_arm: Vector3<f64>,
 }
 
-/// A wheel moves neither sideways nor off the ground: where it meets the ground, two components of the body's velocity
-/// are zero.
+/// The non-holonomic constraint: a wheel moves neither sideways nor off the ground, so two velocity components at its contact
+/// point are zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NonHolonomic {
     /// Standard deviation of the sideways velocity, m/s.
     pub lateral: f64,
     /// Standard deviation of the vertical velocity, m/s.
     pub vertical: f64,
-    /// Takes vehicle coordinates, x forward, y left, z up, to the body.
+    /// Rotates vehicle coordinates, x forward, y left, z up, to body coordinates.
     pub body_from_vehicle: UnitQuaternion<f64>,
-    /// Where an axle that is not steered meets the ground, in the body, m.
+    /// Contact point of an axle that is not steered, in the body, m.
     pub lever_arm: Vector3<f64>,
 }
 
-/// `eᵀ (Rᵀ v + ω × l)` with its derivatives by velocity, rotation and the gyroscope's bias.
+/// `eᵀ (Rᵀ v + ω × l)` with its derivatives with respect to velocity, rotation and gyroscope bias.
 struct Along {
     speed: f64,
     velocity: Vector3<f64>,
@@ -80,7 +80,7 @@ impl Measurement<3> for BodyVelocity {
         at: &Estimate<N>,
         model: &mut Linearised<3, N>,
     ) -> Result<(), Refusal> {
-        // In the world, in which the noise, alike along all axes, is the same.
+        // In the world, the isotropic noise is unchanged.
         let rotation = at.rotation();
         let swing = rotation * at.angular_velocity.cross(&self.lever_arm);
         let measured = rotation * (self.body_from_sensor * self.velocity);

@@ -1,4 +1,4 @@
-//! The nominal state, and where each of its errors is in the error vector.
+//! The nominal state, and the index of each of its errors in the error vector.
 
 use nalgebra::{Matrix2, SVector, Vector2};
 
@@ -17,27 +17,27 @@ pub const WHEEL_SCALE: usize = 6;
 /// The number of states.
 pub const STATES: usize = 7;
 
-/// What a planar filter estimates, at one instant.
+/// The state that a planar filter estimates, at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlanarEstimate {
-    /// The instant, nanoseconds since any fixed moment.
+    /// The instant, nanoseconds since any fixed epoch.
     pub time_ns: i64,
-    /// Of the body's origin, in the world, m.
+    /// Position of the body's origin in the world, m.
     pub position: Vector2<f64>,
-    /// Of the body's x axis, from the world's x axis counter-clockwise, within ±π rad.
+    /// Heading of the body's x axis, from the world's x axis counter-clockwise, within ±π rad.
     pub heading: f64,
-    /// Of the body's origin, in the body, x forward, y left, m/s.
+    /// Velocity of the body's origin, in the body, x forward, y left, m/s.
     pub velocity: Vector2<f64>,
-    /// What the gyroscope reads more than the yaw rate, rad/s.
+    /// Bias of the gyroscope: its reading minus the yaw rate, rad/s.
     pub gyroscope_bias: f64,
     /// Scale of the wheels' velocity, less 1: `measured = (1 + s) true`.
     pub wheel_scale: f64,
-    /// Over the last sample, bias removed, rad/s.
+    /// Yaw rate over the last sample, bias removed, rad/s.
     pub yaw_rate: f64,
 }
 
 impl PlanarEstimate {
-    /// Takes vectors of the body to the world.
+    /// Rotates body vectors to world vectors.
     pub fn world_from_body(&self) -> Matrix2<f64> {
         let (sin, cos) = (sin(self.heading), cos(self.heading));
         Matrix2::new(cos, -sin, sin, cos)
@@ -61,7 +61,7 @@ impl PlanarEstimate {
         }
     }
 
-    /// The error that takes this estimate to `other`: `self.corrected(&self.error_to(&other))` is `other`, but for its stamp
+    /// The error that takes this estimate to `other`: `self.corrected(&self.error_to(&other))` is `other`, except for its stamp
     /// and yaw rate.
     pub fn error_to(&self, other: &Self) -> SVector<f64, STATES> {
         let mut error = SVector::<f64, STATES>::zeros();
@@ -81,7 +81,7 @@ impl PlanarEstimate {
     }
 }
 
-/// A vector turned by a quarter, counter-clockwise: what it grows by with an angle.
+/// A vector rotated by 90° counter-clockwise: its derivative with respect to its angle.
 pub(super) fn left(vector: &Vector2<f64>) -> Vector2<f64> {
     Vector2::new(-vector.y, vector.x)
 }

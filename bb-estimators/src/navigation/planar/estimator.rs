@@ -22,8 +22,8 @@ use bb_core::payload::Odometry;
 use bb_core::{Context, Estimator, Fault, Reply};
 use std::marker::PhantomData;
 
-/// Position, heading and velocity of the link where it is declared, of a robot that drives on a plane: from an IMU and any of wheels,
-/// satellite navigation, poses and orientations in the world. It emits [`Odometry`] with every sample of the IMU, or
+/// Position, heading and velocity of the link where it is declared, for a robot that drives on a plane. It uses an IMU and any of
+/// wheels, satellite navigation, poses and orientations in the world. It emits [`Odometry`] with every IMU sample, or
 /// [`PlanarOutputs`].
 ///
 /// ```
@@ -50,18 +50,19 @@ use std::marker::PhantomData;
 /// }
 /// ```
 ///
-/// The world is a local tangent frame, x east, y north, with its origin at the first fix; without satellites, where the link was at
-/// the start. It starts with the first sample, or the second fix that agrees if there are satellites, in motion or at rest: with the heading of the
-/// options, of an orientation, or, with `heading_from_course`, of the course that fixes show.
+/// The world is a local tangent frame: x east, y north. Its origin is the first fix or, without satellite navigation, the link's
+/// position at the start. The filter starts with the first sample or, with satellite navigation, with the second fix that agrees
+/// with the first. The robot may be in motion or at rest. The initial heading comes from the options, from an orientation or,
+/// with `heading_from_course`, from the course of the fixes.
 ///
-/// Measurements are fused at the time of their stamps, up to a second late. A gate for each sensor refuses what does not fit. The
-/// health is that of [`EskfEstimator`](crate::navigation::EskfEstimator).
+/// Measurements are fused at the time of their stamps, up to a second late. A gate per sensor rejects outliers. The health is
+/// that of [`EskfEstimator`](crate::navigation::EskfEstimator).
 #[derive(Debug)]
 pub struct PlanarEstimator<O = Odometry> {
     options: PlanarOptions,
     mounting: Mounting,
     phase: Phase,
-    /// Samples of the IMU.
+    /// IMU samples.
     refused_in_a_row: u32,
     output: PhantomData<fn() -> O>,
 }

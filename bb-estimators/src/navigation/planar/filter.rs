@@ -1,4 +1,4 @@
-//! The filter: samples of the gyroscope move it, measurements correct it.
+//! The filter: gyroscope samples propagate it, and measurements correct it.
 
 use nalgebra::{Matrix2, Matrix3, SMatrix, Vector2};
 
@@ -26,26 +26,26 @@ const LAYOUT: Layout<STATES> = {
     layout.set((HEADING, 1), 1, MOST_ROTATION);
     layout.set((VELOCITY, 2), 2, MOST_VARIANCE);
     layout.set((GYROSCOPE_BIAS, 1), 3, MAX_ANGULAR_VELOCITY * MAX_ANGULAR_VELOCITY);
-    // A hundred of the largest deviation that its parameter accepts.
+    // A hundred times the largest deviation that its parameter accepts.
     layout.set((WHEEL_SCALE, 1), 4, 1e4);
     layout
 };
 
-/// A variance that is taken as known, where 0 would make the matrix singular.
+/// A variance that amounts to a known state, where 0 would make the matrix singular.
 const KNOWN: f64 = 1e-24;
 
-/// What is known when a filter starts.
+/// The state and uncertainty that a filter starts with.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlanarStart {
-    /// When, nanoseconds since any fixed moment.
+    /// Time of the start, nanoseconds since any fixed epoch.
     pub time_ns: i64,
-    /// Of the body's origin, in the world, m.
+    /// Position of the body's origin in the world, m.
     pub position: Vector2<f64>,
-    /// Of the body's x axis, from the world's counter-clockwise, rad; any number of turns.
+    /// Heading of the body's x axis, from the world's x axis counter-clockwise, rad; any number of turns.
     pub heading: f64,
-    /// Of the body's origin, in the body, m/s.
+    /// Velocity of the body's origin, in the body, m/s.
     pub velocity: Vector2<f64>,
-    /// Of the gyroscope, rad/s.
+    /// Bias of the gyroscope, rad/s.
     pub gyroscope_bias: f64,
     /// Covariance of the position, m².
     pub position_covariance: Matrix2<f64>,
@@ -58,8 +58,8 @@ pub struct PlanarStart {
 }
 
 impl PlanarStart {
-    /// A pose and a velocity in the body that are known up to standard deviations, m, rad, m/s. The gyroscope's bias is zero up
-    /// to 0.02 rad/s.
+    /// Creates a start from a pose and a body velocity with standard deviations, m, rad, m/s. The gyroscope's bias is zero, with
+    /// a standard deviation of 0.02 rad/s.
     pub fn at(
         time_ns: i64,
         position: (Vector2<f64>, f64),
@@ -123,27 +123,27 @@ pub struct PlanarEkf {
 }
 
 impl PlanarEkf {
-    /// Makes a filter that has not started.
+    /// Creates a filter that has not started.
     ///
     /// # Errors
     ///
-    /// The first parameter outside its accepted range, by name.
+    /// Returns the name of the first parameter outside its accepted range.
     pub fn new(params: PlanarParams) -> Result<Self, ParamsError> {
         params.check()?;
         Ok(Self { params, estimate: None, covariance: Covariance::new(), upkeep: Upkeep::default() })
     }
 
-    /// The parameters that the filter was made with.
+    /// The parameters that the filter was created with.
     pub fn params(&self) -> &PlanarParams {
         &self.params
     }
 
-    /// Starts, or starts afresh.
+    /// Starts or restarts the filter.
     ///
     /// # Errors
     ///
-    /// [`Refusal::NonFinite`] if a value is not finite, [`Refusal::OutOfRange`] if it is absurdly large, [`Refusal::Noise`] if a covariance is not positive definite. The filter
-    /// is then as it was.
+    /// Returns [`Refusal::NonFinite`] if a value is not finite, [`Refusal::OutOfRange`] if it is absurdly large, and
+    /// [`Refusal::Noise`] if a covariance is not positive definite. The filter is then unchanged.
     pub fn start(&mut self, start: &PlanarStart) -> Result<(), Refusal> {
         let (estimate, mut covariance) = start.state(&self.params)?;
         covariance.bound(&LAYOUT);
@@ -153,15 +153,15 @@ impl PlanarEkf {
         Ok(())
     }
 
-    /// Moves the filter over one sample; of its angular velocity, in axes of the body, the rotation about z counts.
+    /// Propagates the filter over one sample. Uses only the z component of its angular velocity, in body axes.
     ///
-    /// A sample that covers more than [`PlanarParams::longest_sample`] is a gap: the robot is taken to go straight on, up to
-    /// the noise that the parameters give a gap.
+    /// A sample that covers more than [`PlanarParams::longest_sample`] is a gap: the robot is assumed to continue straight on, up
+    /// to the gap noise in the parameters.
     ///
     /// # Errors
     ///
-    /// [`Refusal`] if the filter has not started, a value is not finite or absurdly large, time stands still or runs
-    /// back, or the gap is longer than a minute. The filter is then as it was.
+    /// Returns a [`Refusal`] if the filter has not started, a value is not finite or absurdly large, time does not increase, or
+    /// the gap is longer than a minute. The filter is then unchanged.
     pub fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
         let estimate = self.estimate.as_mut().ok_or(Refusal::NotStarted)?;
         sample.check()?;
@@ -191,13 +191,14 @@ impl PlanarEkf {
         Ok(())
     }
 
-    /// Corrects the filter by a measurement that was taken at its present time.
+    /// Corrects the filter with a measurement taken at its current time.
     ///
-    /// `stream` is that of the sensor: its gate decides, and its counts and statistics tell of it.
+    /// `stream` belongs to the sensor: its gate accepts or rejects the measurement, and it keeps the sensor's counts and
+    /// statistics.
     ///
     /// # Errors
     ///
-    /// [`Refusal`], which the stream has counted; the filter is then as it was.
+    /// Returns a [`Refusal`], which the stream has counted. The filter is then unchanged.
     pub fn update<M: PlanarMeasurement<D>, const D: usize>(
         &mut self,
         stream: &mut Stream,
@@ -233,14 +234,14 @@ impl PlanarEkf {
         Ok(weighed.fused())
     }
 
-    /// Moves the filter to where it was found to be, m, after it was wrong: position and, if given, velocity (in the world, m/s)
-    /// and heading (rad), each with its covariance. What is known of the rest stays, uncorrelated with what is new. It counts as
-    /// a reset.
+    /// Relocates a filter that was wrong, m: sets the position and, if given, the velocity (in the world, m/s) and the heading
+    /// (rad), each with its covariance. The other states keep their covariance but are uncorrelated with the new ones. The call
+    /// counts as a reset.
     ///
     /// # Errors
     ///
-    /// [`Refusal::NonFinite`] if a value is not finite, [`Refusal::OutOfRange`] if it is absurdly large, [`Refusal::Noise`] if a covariance is not positive definite. The filter
-    /// is then as it was.
+    /// Returns [`Refusal::NonFinite`] if a value is not finite, [`Refusal::OutOfRange`] if it is absurdly large, and
+    /// [`Refusal::Noise`] if a covariance is not positive definite. The filter is then unchanged.
     pub fn relocate(
         &mut self,
         position: (Vector2<f64>, Matrix2<f64>),
@@ -278,16 +279,16 @@ impl PlanarEkf {
         Ok(())
     }
 
-    /// What is estimated, at the end of the last sample; none before the start.
+    /// The estimate at the end of the last sample; `None` before the start.
     pub fn estimate(&self) -> Option<&PlanarEstimate> {
         self.estimate.as_ref()
     }
 
-    /// The estimate moved on to `time_ns` with the last yaw rate, for an output between samples. The filter stays as it is.
+    /// The estimate extrapolated to `time_ns` with the last yaw rate, for an output between samples. The filter is unchanged.
     ///
     /// # Errors
     ///
-    /// [`Refusal`] if the filter has not started, or the time is before its own or more than a sample after it.
+    /// Returns a [`Refusal`] if the filter has not started, or if the time is before its own or more than a sample after it.
     pub fn predicted(&self, time_ns: i64) -> Result<PlanarEstimate, Refusal> {
         let mut estimate = self.estimate.ok_or(Refusal::NotStarted)?;
         if time_ns == estimate.time_ns {
@@ -302,7 +303,7 @@ impl PlanarEkf {
         Ok(estimate)
     }
 
-    /// Covariance of all errors, in the order of the [states](super). Symmetric to the last bit.
+    /// Covariance of all errors, in the order of the [states](super). Exactly symmetric.
     pub fn covariance(&self) -> &SMatrix<f64, STATES, STATES> {
         self.covariance.matrix()
     }

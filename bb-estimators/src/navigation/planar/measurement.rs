@@ -1,4 +1,4 @@
-//! What sensors measure of a robot on a plane, each as a residual, a Jacobian and a noise.
+//! Measurement models for a robot on a plane, each with a residual, a Jacobian and a noise covariance.
 
 use nalgebra::{Matrix2, Matrix3, Vector2};
 
@@ -7,7 +7,7 @@ use crate::navigation::math::wrapped;
 use crate::navigation::measurement::Linearised;
 use crate::navigation::refusal::Refusal;
 
-/// A measurement of `D` numbers; users add their own as with [`Measurement`](crate::navigation::Measurement).
+/// A measurement with `D` components. You can add your own, as with [`Measurement`](crate::navigation::Measurement).
 ///
 /// ```
 /// use bb_estimators::navigation::planar::{HEADING, PlanarEstimate, PlanarMeasurement, STATES};
@@ -29,49 +29,50 @@ use crate::navigation::refusal::Refusal;
 /// }
 /// ```
 pub trait PlanarMeasurement<const D: usize> {
-    /// Compares with what the estimate makes expect.
+    /// Compares the measurement with the prediction from the estimate.
     ///
     /// # Errors
     ///
-    /// Why it cannot be: [`Refusal::NotObservable`] where it says nothing.
+    /// Returns the reason why this is impossible: [`Refusal::NotObservable`] if the measurement carries no information in this
+    /// state.
     fn linearise(&self, at: &PlanarEstimate, model: &mut Linearised<D, STATES>) -> Result<(), Refusal>;
 }
 
 /// Position of a point of the body in the world: `p + R l`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlanarPosition {
-    /// In the world, m.
+    /// Position in the world, m.
     pub position: Vector2<f64>,
     /// Covariance in the world, m².
     pub covariance: Matrix2<f64>,
-    /// Where the point is in the body, m: that of an antenna.
+    /// Lever arm of the point in the body, m, such as that of an antenna.
     pub lever_arm: Vector2<f64>,
 }
 
-/// Velocity that wheels have counted, at a point of the body: `(1 + s) (v + ω × l)`.
+/// Velocity from wheel odometry, at a point of the body: `(1 + s) (v + ω × l)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WheelVelocity {
-    /// In the body, x forward, y left, m/s.
+    /// Velocity in the body, x forward, y left, m/s.
     pub velocity: Vector2<f64>,
     /// Covariance in the body, m²/s².
     pub covariance: Matrix2<f64>,
-    /// Where the wheels' velocity is that of, in the body, m: between wheels that are not steered.
+    /// The point, in the body, that the velocity refers to, m: between wheels that are not steered.
     pub lever_arm: Vector2<f64>,
 }
 
-/// The yaw rate that wheels have counted, or that of a robot at rest: it shows the gyroscope's bias.
+/// Yaw rate from wheel odometry, or of a robot at rest. It makes the gyroscope's bias observable.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct YawRate {
-    /// Counter-clockwise, rad/s.
+    /// Yaw rate, counter-clockwise, rad/s.
     pub rate: f64,
     /// Standard deviation, the gyroscope's noise in one sample included, rad/s.
     pub deviation: f64,
 }
 
-/// Heading of the body's x axis: of a compass, two antennas, or an attitude filter.
+/// Heading of the body's x axis, from a compass, two antennas, or an attitude filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlanarHeading {
-    /// From the world's x axis, east, counter-clockwise, rad; any number of turns.
+    /// Heading from the world's x axis, east, counter-clockwise, rad; any number of turns.
     pub heading: f64,
     /// Standard deviation, rad.
     pub deviation: f64,
@@ -80,23 +81,23 @@ pub struct PlanarHeading {
 /// Position and heading of the body, from a map or a tracking system.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlanarPose {
-    /// Of the body's origin, in the world, m.
+    /// Position of the body's origin in the world, m.
     pub position: Vector2<f64>,
-    /// Of the body's x axis, from the world's x axis counter-clockwise, rad; any number of turns.
+    /// Heading of the body's x axis, from the world's x axis counter-clockwise, rad; any number of turns.
     pub heading: f64,
     /// Covariance: position in the world, m², then heading, rad².
     pub covariance: Matrix3<f64>,
 }
 
 impl PlanarPosition {
-    /// A position with noise that is alike along both axes, standard deviation in m, of the body's origin.
+    /// A position of the body's origin with isotropic noise, standard deviation in m.
     pub fn new(position: Vector2<f64>, deviation: f64) -> Self {
         Self { position, covariance: isotropic(deviation), lever_arm: Vector2::zeros() }
     }
 }
 
 impl WheelVelocity {
-    /// A velocity of the body's origin with noise that is alike along both axes, standard deviation in m/s.
+    /// A velocity of the body's origin with isotropic noise, standard deviation in m/s.
     pub fn new(velocity: Vector2<f64>, deviation: f64) -> Self {
         Self { velocity, covariance: isotropic(deviation), lever_arm: Vector2::zeros() }
     }

@@ -1,4 +1,4 @@
-//! What the sensors and the robot are like.
+//! Parameters of the sensors and the robot.
 
 use crate::navigation::eskf::GaussMarkov;
 use crate::params::params;
@@ -79,7 +79,7 @@ impl PlanarParams {
         }
     }
 
-    /// The noise while nothing is measured.
+    /// The noise during a gap.
     pub(super) fn gap_densities(&self) -> Densities {
         let densities = self.densities();
         let square = |x: f64| x * x;

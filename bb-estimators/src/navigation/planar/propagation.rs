@@ -1,11 +1,11 @@
-//! One sample of the gyroscope: an arc, exact while the velocity in the body and the yaw rate are constant.
+//! Propagation over one gyroscope sample: an arc, exact while the velocity in the body and the yaw rate are constant.
 //!
 //! With `R` from body to world at the start of the sample, ω constant over it, φ = ω dt and `V(φ) = ∫₀¹ R(s φ) ds`:
 //!
 //! * `p⁺ = p + d`, with `d = R V v dt`
 //! * `ψ⁺ = ψ + φ`
 //!
-//! and for the errors, with `ω_true = ω - δb` and `J` the turn by a quarter:
+//! and for the errors, with `ω_true = ω - δb` and `J` the rotation by 90°:
 //!
 //! * `δp⁺ = δp + J d δψ + R V dt δv - R ∂V/∂φ v dt² δb`
 //! * `δψ⁺ = δψ - dt δb`
@@ -23,24 +23,24 @@ use super::params::Densities;
 use crate::navigation::bounds::above_rounding;
 use crate::navigation::math::{cos, sin, wrapped};
 
-/// Below this angle, rad, the integral over an arc is a series.
+/// Below this angle, rad, the integral over an arc is computed from a series.
 const SERIES: f64 = 1e-2;
 
-/// The errors from [`HEADING`] on that the position integrates: heading, velocity and the gyroscope's bias.
+/// The errors from [`HEADING`] on that are integrated into the position: heading, velocity and gyroscope bias.
 const SOURCES: usize = GYROSCOPE_BIAS + 1 - HEADING;
 
-/// What a sample does to the errors: the blocks of the transition that are neither zero nor the identity.
+/// The effect of a sample on the errors: the blocks of the transition that are neither zero nor the identity.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Transition {
-    /// Of the position error by heading, velocity and bias, row by row; its first column is J d.
+    /// Derivative of the position error with respect to heading, velocity and bias, row by row; its first column is J d.
     position: [[f64; SOURCES]; 2],
-    /// R in the middle of the sample, where noise comes in on average.
+    /// R in the middle of the sample, where noise enters on average.
     rotation: Matrix2<f64>,
     dt: f64,
 }
 
 impl Transition {
-    /// Moves the estimate over `dt` seconds with the yaw rate that it holds.
+    /// Propagates the estimate over `dt` seconds with the yaw rate that it holds.
     #[inline]
     pub(super) fn advance(estimate: &mut PlanarEstimate, dt: f64) -> Self {
         let turn = estimate.yaw_rate * dt;
@@ -60,10 +60,10 @@ impl Transition {
         Self { position: [row(0), row(1)], rotation, dt }
     }
 
-    /// `P ← Φ P Φᵀ + Q`, symmetric to the last bit.
+    /// `P ← Φ P Φᵀ + Q`, exactly symmetric.
     #[inline]
     pub(super) fn apply(&self, p: &mut [[f64; STATES]; STATES], densities: &Densities) {
-        // Φ P: what a row takes from are rows below it, which are not yet changed.
+        // Φ P: each row reads only rows below it, which have not changed yet.
         for i in 0..2 {
             for (k, factor) in self.position[i].iter().enumerate() {
                 for j in 0..STATES {
@@ -74,7 +74,7 @@ impl Transition {
         for j in 0..STATES {
             p[HEADING][j] -= self.dt * p[GYROSCOPE_BIAS][j];
         }
-        // (Φ P) Φᵀ: of the columns only the first three change.
+        // (Φ P) Φᵀ: only the first three columns change.
         for row in p.iter_mut() {
             for i in 0..2 {
                 for (k, factor) in self.position[i].iter().enumerate() {
@@ -91,13 +91,13 @@ impl Transition {
         }
     }
 
-    /// White noise of density q on a derivative: `q [dt³/3, dt²/2; dt²/2, dt]` on what integrates it. The upper triangle alone. At
-    /// least what rounding may have taken.
+    /// White noise of density q on a derivative: `q [dt³/3, dt²/2; dt²/2, dt]` on its integral, upper triangle only. At least the
+    /// amount that rounding may have removed.
     #[inline]
     fn add_noise(&self, p: &mut [[f64; STATES]; STATES], densities: &Densities) {
         let dt = self.dt;
         let acceleration = densities.acceleration.map(|density| density * dt);
-        // The heading errs by half of it on average over the sample, and so does the way.
+        // Over the sample, the mean heading error is half of the final one, and so is its effect on the displacement.
         let heading = densities.gyroscope * dt;
         let sideways = Vector2::new(self.position[0][0], self.position[1][0]);
         let (forward, left) = (self.rotation.column(0), self.rotation.column(1));
@@ -131,7 +131,7 @@ impl Transition {
     }
 }
 
-/// `V(φ) = ∫₀¹ R(s φ) ds` and its derivative by φ.
+/// `V(φ) = ∫₀¹ R(s φ) ds` and its derivative with respect to φ.
 fn arc(turn: f64) -> (Matrix2<f64>, Matrix2<f64>) {
     let s = turn * turn;
     let [along, across, along_turn, across_turn] = if turn.abs() < SERIES {

@@ -29,14 +29,14 @@ fn estimate() -> impl Strategy<Value = PlanarEstimate> {
     )
 }
 
-/// A filter at rest at the origin, and not very sure of it.
+/// A filter at rest at the origin with a moderate uncertainty.
 fn started() -> PlanarEkf {
     let mut filter = PlanarEkf::new(PlanarParams::default()).unwrap();
     filter.start(&PlanarStart::at(0, (Vector2::zeros(), 2.0), (0.3, 0.1), (Vector2::zeros(), 0.5))).unwrap();
     filter
 }
 
-/// A drive that turns to and fro, sample by sample at 100 Hz.
+/// A drive with turns in both directions, sampled at 100 Hz.
 fn sample(i: i64) -> ImuMean {
     let t = i as f64 * 0.01;
     ImuMean {

@@ -1,4 +1,4 @@
-//! The nominal state, which the errors are errors of.
+//! The nominal state to which the errors refer.
 
 use nalgebra::{Matrix3, SVector, UnitQuaternion, Vector3};
 
@@ -9,51 +9,51 @@ use crate::attitude::{MAX_ANGULAR_VELOCITY, MAX_SPECIFIC_FORCE};
 use crate::navigation::bounds::{is_on_earth, is_within};
 use crate::navigation::math::{renormalised, rotation, rotation_vector};
 
-/// Pose at an earlier time that relative poses refer to.
+/// Pose at an earlier time, to which relative poses refer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Keyframe {
-    /// What the user calls it.
+    /// Identifier chosen by the user.
     pub id: u64,
-    /// In the world, m.
+    /// Position in the world, m.
     pub position: Vector3<f64>,
-    /// Takes body coordinates to the world.
+    /// Rotates body coordinates to world coordinates.
     pub world_from_body: UnitQuaternion<f64>,
 }
 
-/// What a filter estimates, at one instant.
+/// The state that a filter estimates, at one instant.
 ///
 /// The world is a local tangent frame, x east, y north, z up; gravity points along -z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate<const N: usize> {
-    /// The instant, nanoseconds since any fixed moment.
+    /// The instant, nanoseconds since any fixed epoch.
     pub time_ns: i64,
-    /// Of the body's origin, the IMU, in the world, m.
+    /// Position of the body's origin, the IMU, in the world, m.
     pub position: Vector3<f64>,
-    /// Of the same, in the world, m/s.
+    /// Velocity of the body's origin in the world, m/s.
     pub velocity: Vector3<f64>,
-    /// Takes body coordinates to the world.
+    /// Rotates body coordinates to world coordinates.
     pub world_from_body: UnitQuaternion<f64>,
-    /// What the accelerometer reads more than the specific force, body axes, m/s².
+    /// Bias of the accelerometer: its reading minus the specific force, body axes, m/s².
     pub accelerometer_bias: Vector3<f64>,
-    /// What the gyroscope reads more than the angular velocity, body axes, rad/s.
+    /// Bias of the gyroscope: its reading minus the angular velocity, body axes, rad/s.
     pub gyroscope_bias: Vector3<f64>,
     /// Angular velocity over the last sample, bias removed, body axes, rad/s.
     pub angular_velocity: Vector3<f64>,
     /// Specific force over the last sample, bias removed, body axes, m/s².
     pub specific_force: Vector3<f64>,
-    /// The keyframe, if one was set and the filter keeps one.
+    /// The keyframe, if one was set and the filter supports keyframes.
     pub keyframe: Option<Keyframe>,
-    /// Optional states at their places in the error vector.
+    /// Optional states, at their indices in the error vector.
     pub(in crate::navigation) optional: SVector<f64, N>,
 }
 
 impl<const N: usize> Estimate<N> {
-    /// An optional state of one number; 0 if the filter `S` does not estimate it, which is its nominal value.
+    /// An optional scalar state; 0, its nominal value, if the filter `S` does not estimate it.
     pub fn scalar<S: States>(&self, state: Optional) -> f64 {
         offset::<S>(state).map_or(0.0, |index| self.optional[index])
     }
 
-    /// An optional state of three numbers; zero if the filter `S` does not estimate it.
+    /// An optional vector state of three numbers; zero if the filter `S` does not estimate it.
     pub fn vector<S: States>(&self, state: Optional) -> Vector3<f64> {
         offset::<S>(state).map_or(Vector3::zeros(), |index| self.optional.fixed_rows::<3>(index).into_owned())
     }
@@ -90,8 +90,8 @@ impl<const N: usize> Estimate<N> {
         corrected
     }
 
-    /// The error that takes this estimate to `other`: `self.corrected(&self.error_to(&other))` is `other`, but for stamps
-    /// and the last sample of the IMU.
+    /// The error that takes this estimate to `other`: `self.corrected(&self.error_to(&other))` is `other`, except for stamps and
+    /// the last IMU sample.
     pub fn error_to<S: States>(&self, other: &Self) -> SVector<f64, N> {
         let mut error = other.optional - self.optional;
         let mut set = |index: usize, part: Vector3<f64>| error.fixed_rows_mut::<3>(index).copy_from(&part);
@@ -110,7 +110,7 @@ impl<const N: usize> Estimate<N> {
         error
     }
 
-    /// At rest at the origin, for a place that is filled later.
+    /// An estimate at rest at the origin, as a placeholder to be filled later.
     #[cfg(feature = "smoother")]
     pub(in crate::navigation) fn unknown() -> Self {
         let zero = Vector3::zeros();
@@ -128,14 +128,14 @@ impl<const N: usize> Estimate<N> {
         }
     }
 
-    /// Whether a filter may begin here: no component is absurdly large, or not a number.
+    /// Whether a filter may start here: no component is absurdly large or NaN.
     pub(in crate::navigation) fn is_plausible(&self) -> bool {
         is_on_earth(self.position.iter().chain(&self.velocity))
             && is_within(&self.accelerometer_bias, MAX_SPECIFIC_FORCE)
             && is_within(&self.gyroscope_bias, MAX_ANGULAR_VELOCITY)
     }
 
-    /// Whether every component is a number.
+    /// Whether no component is NaN.
     pub(in crate::navigation) fn is_finite(&self) -> bool {
         let vectors = [&self.position, &self.velocity, &self.accelerometer_bias, &self.gyroscope_bias];
         vectors.iter().all(|vector| vector.iter().all(|x| x.is_finite()))

@@ -1,4 +1,4 @@
-//! Which errors a filter estimates, and where each is in the error vector.
+//! The errors that a filter estimates, and their indices in the error vector.
 
 use core::fmt::Debug;
 
@@ -12,7 +12,7 @@ pub const ROTATION: usize = 6;
 pub const ACCELEROMETER_BIAS: usize = 9;
 /// Error of the gyroscope's bias, body axes, rad/s.
 pub const GYROSCOPE_BIAS: usize = 12;
-/// The number of states that every filter has; optional ones follow.
+/// The number of states in every filter; optional states follow.
 pub const NAVIGATION: usize = 15;
 
 /// An optional state, or a group of them.
@@ -32,12 +32,12 @@ pub enum Optional {
     WheelScale,
     /// Magnetic field of the body itself, in the body, T.
     HardIron,
-    /// What the barometric height reads more than the height in the world, m.
+    /// Bias of the barometric height: its reading minus the height in the world, m.
     BarometerBias,
 }
 
 impl Optional {
-    /// How many numbers it is.
+    /// The dimension of the state.
     pub const fn dimension(self) -> usize {
         match self {
             Self::Keyframe => 6,
@@ -51,8 +51,8 @@ impl Optional {
     }
 }
 
-/// The optional states of a filter, as a type, so that the compiler knows the size of every matrix and leaves out what a
-/// filter has not.
+/// The optional states of a filter, as a type. The compiler thus knows the size of every matrix and omits states that a filter
+/// lacks.
 ///
 /// ```
 /// use bb_estimators::navigation::{Eskf, Optional, States};
@@ -69,14 +69,14 @@ impl Optional {
 /// assert_eq!(Rover::DIMENSION, 19);
 /// ```
 pub trait States: Copy + Debug + PartialEq {
-    /// In the order of the error vector, each at most once.
+    /// The optional states in the order of the error vector, each at most once.
     const OPTIONAL: &'static [Optional];
 
-    /// The number of errors that are estimated: the second parameter of [`Eskf`](crate::navigation::Eskf).
+    /// The number of estimated errors: the second parameter of [`Eskf`](crate::navigation::Eskf).
     const DIMENSION: usize = NAVIGATION + dimension(Self::OPTIONAL);
 }
 
-/// Navigation states alone.
+/// Navigation states only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Navigation;
 
@@ -84,7 +84,7 @@ impl States for Navigation {
     const OPTIONAL: &'static [Optional] = &[];
 }
 
-/// Navigation states and the scale of wheels, which depends on the pressure of the tyres.
+/// Navigation states and the wheel scale, which depends on the tyre pressure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Wheeled;
 
@@ -92,7 +92,7 @@ impl States for Wheeled {
     const OPTIONAL: &'static [Optional] = &[Optional::WheelScale];
 }
 
-/// Where the errors of an optional state begin, if the filter estimates it.
+/// The index of an optional state's first error, if the filter estimates the state.
 pub const fn offset<S: States>(state: Optional) -> Option<usize> {
     let mut index = NAVIGATION;
     let mut i = 0;

@@ -6,7 +6,7 @@ fn point(time_s: f64, position: Vector3<f64>) -> TrackPoint {
 }
 
 proptest! {
-    /// Of a robot that speeds up, brakes and turns by up to half a g, with the noise that is told.
+    /// The track of a robot that accelerates, brakes and turns by up to half a g, with the stated noise.
     #[test]
     fn what_a_robot_measures_on_its_way_agrees(
         period_s in 0.05..10.0,
@@ -17,7 +17,7 @@ proptest! {
         let mut track = Track::default();
         for (i, noise) in noise.chunks_exact(3).enumerate() {
             let time_s = i as f64 * period_s;
-            // It brakes before it is too fast.
+            // The robot brakes before it becomes too fast.
             let swing = f64::sin(0.2 * time_s) * acceleration / 0.04;
             let position = Vector3::new(velocity * time_s, swing, 0.0) + 0.5 * Vector3::from_column_slice(noise);
             prop_assert!(track.add(point(time_s, position)), "{i}");
@@ -25,7 +25,7 @@ proptest! {
         prop_assert_eq!(track.count(), 20);
     }
 
-    /// Kilometres away, to any side, up or down, at any time.
+    /// An offset of kilometres, in any direction, at any time.
     #[test]
     fn what_is_far_off_does_not(
         far in 10_000.0..1e7_f64,
@@ -41,20 +41,20 @@ proptest! {
         }
         prop_assert!(!track.add(point(at as f64 * period_s, off)));
         prop_assert_eq!(track.count(), 1);
-        // Nor do those that are right agree with it.
+        // The correct positions do not agree with it either.
         prop_assert!(!track.add(point((at + 1) as f64 * period_s, Vector3::zeros())));
         prop_assert!(track.add(point((at + 2) as f64 * period_s, Vector3::zeros())));
     }
 }
 
-/// Of a robot that turns at a steady rate the velocity is that of now; of one that has turned by 60° on the way nothing is clear.
+/// At a steady turn rate, the velocity is the current one. After a turn of 60° on the way, no velocity is clear.
 #[test]
 fn the_velocity_on_an_arc_is_that_at_its_end() {
     for (rate, is_clear) in [(0.0, true), (0.25, true), (-0.4, true), (1.1, false)] {
         let mut track = Track::default();
         for i in 0..3 {
             let (time_s, yaw) = (f64::from(i), rate * f64::from(i));
-            // On a circle about (0, 8 / rate), counter-clockwise where the rate is positive.
+            // On a circle about (0, 8 / rate), counter-clockwise if the rate is positive.
             let on_arc = || Vector3::new(yaw.sin(), 1.0 - yaw.cos(), 0.0) * (8.0 / rate);
             let position = if rate == 0.0 { Vector3::x() * 8.0 * time_s } else { on_arc() };
             track.add(TrackPoint { yaw, covariance: Matrix3::identity() * 1e-4, ..point(time_s, position) });

@@ -1,4 +1,4 @@
-//! A filter that goes on from what another estimates.
+//! Tests of a filter that continues from another estimator's estimate.
 
 use super::super::*;
 use crate::navigation::Refusal;
@@ -8,7 +8,7 @@ use crate::navigation::state::{NAVIGATION, Navigation, Optional, States, offset}
 use crate::navigation::stream::Stream;
 use nalgebra::{SMatrix, UnitQuaternion, Vector3};
 
-/// In another order than [`Fewer`], and with states that it has not.
+/// In a different order than [`Fewer`], and with states that it lacks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct More;
 
@@ -26,7 +26,7 @@ impl States for Fewer {
 const MORE: usize = More::DIMENSION;
 const FEWER: usize = Fewer::DIMENSION;
 
-/// One that has flown for five seconds, so that all is correlated.
+/// A filter that has flown for five seconds, so that all errors are correlated.
 fn flown() -> Eskf<More, MORE> {
     let mut filter = Eskf::<More, MORE>::new(EskfParams::default()).unwrap();
     let mut noise = Noise::new(5);
@@ -52,7 +52,7 @@ fn flown() -> Eskf<More, MORE> {
     filter
 }
 
-/// Where an error of one filter is in another; none if it has it not.
+/// The index of one filter's error in another; `None` if the other lacks it.
 fn place<S: States, T: States>(error: usize) -> Option<usize> {
     if error < NAVIGATION {
         return Some(error);

@@ -1,4 +1,4 @@
-//! Bad and extreme input: each case broke the covariance, or moved what it says nothing about, before it was met.
+//! Bad and extreme input. Each case once broke the covariance, or moved a state that the input carries no information about.
 
 use nalgebra::{Isometry3, Matrix3, SMatrix, Translation3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
@@ -21,7 +21,7 @@ fn open() -> Stream {
     Stream::new(StreamParams { gate: 0.0, ..StreamParams::default() })
 }
 
-/// By a whole turn, the Jacobian of the reset is singular.
+/// At a whole turn, the Jacobian of the reset is singular.
 #[test]
 fn a_correction_by_whole_turns_keeps_the_covariance_regular() {
     for turns in [1.0, 2.0, 3.0] {
@@ -29,7 +29,7 @@ fn a_correction_by_whole_turns_keeps_the_covariance_regular() {
         for i in 1..100 {
             filter.propagate(&sample(i)).unwrap();
         }
-        // Chosen so that the correction about up is that.
+        // Chosen so that the correction about the vertical is this many whole turns.
         let variance = filter.covariance()[(ROTATION + 2, ROTATION + 2)];
         let residual = core::f64::consts::TAU * turns * (variance + Turned::VARIANCE) / variance;
         filter.update(&mut open(), &Turned(residual)).unwrap();
@@ -39,7 +39,7 @@ fn a_correction_by_whole_turns_keeps_the_covariance_regular() {
     }
 }
 
-/// A rotation error that is measured as it is.
+/// A direct measurement of the rotation error.
 #[derive(Clone, Copy, Debug)]
 struct Turned(f64);
 
@@ -75,7 +75,7 @@ fn a_noise_that_is_no_covariance_is_refused() {
         assert_eq!(filter, before);
     }
     assert_eq!(stream.counts().invalid, 4);
-    // What is known exactly, and what is known in one direction alone, is a covariance.
+    // A covariance may describe exact knowledge, or knowledge along one direction only.
     let flat = Matrix3::new(1.0, 1.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0);
     for covariance in [Matrix3::zeros(), flat] {
         let fix = GnssPosition { covariance, ..GnssPosition::new(Vector3::zeros(), 1.0, 1.0) };
@@ -110,7 +110,7 @@ fn what_is_nowhere_on_the_earth_is_refused() {
     assert_eq!(filter, before);
 }
 
-/// A wheel whose scale is known, and forgets at once that it is.
+/// A wheel whose scale is known but forgotten at once.
 #[test]
 fn a_state_without_deviation_keeps_the_covariance_regular() {
     let params = EskfParams { wheel_scale: GaussMarkov::new(0.0, 1e-3), ..EskfParams::default() };
@@ -123,7 +123,7 @@ fn a_state_without_deviation_keeps_the_covariance_regular() {
     }
 }
 
-/// The sum of the height and the barometer's bias, far better than both.
+/// The sum of the height and the barometer's bias, known far better than either.
 #[test]
 fn what_is_measured_exactly_again_and_again_keeps_the_covariance_regular() {
     let mut filter: Eskf<All, ALL> = started();
@@ -134,7 +134,7 @@ fn what_is_measured_exactly_again_and_again_keeps_the_covariance_regular() {
     }
 }
 
-/// After one sample all that the position is, is the keyframe's and the way at that velocity.
+/// After one sample, the position depends only on the keyframe's position and the distance travelled at that velocity.
 #[test]
 fn an_unknown_velocity_after_an_exact_fix_keeps_the_covariance_regular() {
     for (exact, unknown) in [(1e-8, 10.0), (1e-8, 1e3), (1e-7, 1e5), (1e-12, 10.0)] {
@@ -150,8 +150,8 @@ fn an_unknown_velocity_after_an_exact_fix_keeps_the_covariance_regular() {
     }
 }
 
-/// The height and the barometer's bias are known together, the horizontal position to 60 km: about other axes all positions are, and
-/// the bias is known by a sum of them alone. That is kept as far as rounding lets it, and no farther.
+/// The height and the barometer's bias are known together, and the horizontal position to 60 km. About other axes, all positions
+/// are uncertain to 60 km, and the bias is known only through a sum of them. This knowledge is kept as far as rounding allows.
 #[test]
 fn a_world_that_tilts_keeps_the_covariance_regular() {
     for tilt in [0.3, 1.0, 2.5] {
@@ -178,7 +178,8 @@ fn a_world_that_tilts_keeps_the_covariance_regular() {
     }
 }
 
-/// Fixes that jump: the position is raised and moved; what they say nothing about stays as it is, to the last bit.
+/// Fixes that jump: the position's covariance is raised and the position moves. States that the fixes carry no information about
+/// stay bit-for-bit the same.
 #[test]
 fn a_filter_that_gives_way_changes_what_was_wrong_alone() {
     let mut filter: Plain = started();
@@ -208,13 +209,13 @@ fn a_filter_that_gives_way_changes_what_was_wrong_alone() {
                 assert_eq!(before.covariance()[(i, i)], filter.covariance()[(i, i)], "{jump}: {i}");
             }
         }
-        // The fix says where it is, as far as one update can: the noise is at least 1e-10 of the variance before.
+        // The fix determines the position as far as one update can: the noise is at least 1e-10 of the variance before.
         let most = 0.5_f64.max(1e-9 * jump * jump);
         assert!(filter.covariance()[(POSITION, POSITION)] < most, "{jump}");
     }
 }
 
-/// Numbers of all sizes, and what is none.
+/// Numbers of all magnitudes, and NaN.
 fn number() -> impl Strategy<Value = f64> {
     prop_oneof![
         12 => -3.0..3.0,
@@ -226,7 +227,7 @@ fn number() -> impl Strategy<Value = f64> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(16))]
 
-    /// No gate, exact sensors and absurd ones, samples of any length.
+    /// No gate, both exact and extremely noisy sensors, and samples of any length.
     #[test]
     fn nothing_breaks_the_covariance(
         steps in proptest::collection::vec((0..12_u8, proptest::collection::vec(number(), 12), 0..8_u8), 30..100),
@@ -273,7 +274,7 @@ proptest! {
             let covariance = filter.covariance();
             prop_assert!(covariance.iter().all(|x| x.is_finite()), "{:?}", result);
             prop_assert_eq!(covariance, &covariance.transpose());
-            // Up to rounding: of variances that differ by sixteen orders no smaller one is left.
+            // Up to rounding: of variances that differ by sixteen orders of magnitude, the smaller one is lost.
             let deviations = covariance.diagonal().map(f64::sqrt);
             let correlation = covariance.map_with_location(|i, j, x| x / (deviations[i] * deviations[j]));
             let least = correlation.symmetric_eigenvalues().min();

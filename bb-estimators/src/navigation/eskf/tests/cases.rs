@@ -1,4 +1,4 @@
-//! What the filter does in single cases.
+//! Behaviour of the filter in individual cases.
 
 use nalgebra::{Matrix3, SMatrix, UnitQuaternion, Vector3};
 
@@ -59,7 +59,7 @@ fn only_a_position_in_the_world_ends_dead_reckoning() {
             filter.update(&mut stream, &relative).unwrap();
             filter.update(&mut stream, &GnssVelocity::new(pose.velocity, 0.1, 0.1)).unwrap();
             filter.update(&mut stream, &Height { height: pose.position.z, deviation: 1.0 }).unwrap();
-            // What was not known at the start stays so.
+            // States that were unknown at the start remain unknown.
             let horizontal = filter.pose_covariance().fixed_view::<2, 2>(0, 0).trace();
             assert!(horizontal >= variance, "{horizontal} m², {variance} m² at the start");
         }
@@ -79,7 +79,7 @@ fn a_gap_grows_the_covariance_and_is_counted() {
     assert_eq!(filter.gaps(), 1);
     let (after, estimate) = (filter.pose_covariance(), filter.estimate().unwrap());
     assert!(after[(0, 0)] > 4.0 * before[(0, 0)] && after[(5, 5)] > 1.0, "{after}");
-    // At rest before, and so after.
+    // The body is at rest before and after the gap.
     assert!(estimate.position.norm() < 0.1, "{}", estimate.position);
 }
 
@@ -87,7 +87,7 @@ fn a_gap_grows_the_covariance_and_is_counted() {
 fn a_gate_that_refuses_all_gives_way() {
     let mut filter: Plain = started();
     let mut stream = Stream::default();
-    // Sure of where it is, and wrong.
+    // Confident about its position, but wrong.
     for _ in 0..100 {
         filter.update(&mut stream, &GnssPosition::new(Vector3::zeros(), 1.0, 1.0)).unwrap();
     }
@@ -159,14 +159,14 @@ fn the_noise_of_a_sensor_adapts() {
             specific_force: Vector3::new(0.0, 0.0, EskfParams::default().gravity),
         };
         filter.propagate(&rest).unwrap();
-        // Five times what it says.
+        // Five times the stated deviation.
         let noise = 5.0 * if i % 2 == 0 { 1.0 } else { -1.0 };
         filter.update(&mut stream, &GnssPosition::new(Vector3::repeat(noise), 1.0, 1.0)).unwrap();
     }
     assert!((15.0..40.0).contains(&stream.noise_factor()), "{}", stream.noise_factor());
 }
 
-/// Updates that take away nearly all variance, over and over; a long flight in the release build, see `docs`.
+/// Repeated updates that remove nearly all variance; a long flight in the release build, see `docs`.
 #[test]
 fn the_covariance_stays_positive_definite() {
     let mut filter: Eskf<All, ALL> = Eskf::new(EskfParams::default()).unwrap();
@@ -196,7 +196,7 @@ fn the_covariance_stays_positive_definite() {
     assert_eq!(covariance, &covariance.transpose());
 }
 
-/// Fixes of a millimetre and of a metre in turn.
+/// Fixes accurate to a millimetre and to a metre in turn.
 #[test]
 #[ignore = "takes three minutes in release: cargo test --release -p bb-estimators --lib -- --ignored hundred_million"]
 fn the_covariance_stays_positive_definite_through_a_hundred_million_updates() {

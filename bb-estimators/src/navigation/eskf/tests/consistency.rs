@@ -1,4 +1,5 @@
-//! With sensors that err exactly as the filter is told, its errors are as large as it says: of every configuration, over seeds.
+//! With sensors whose errors match the filter's noise model, its errors match its covariance: for every configuration, over
+//! seeds.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -16,14 +17,15 @@ use crate::navigation::{
 const DT: f64 = 0.01;
 const FLIGHTS: u32 = 100;
 
-/// The sensors, by the names of their streams.
+/// The sensors, named after their streams.
 const SENSORS: [&str; 7] =
     ["relative poses", "positions", "velocities", "headings", "wheels", "magnetic field", "air pressure"];
 
-/// Of the Earth, in the world.
+/// Magnetic field of the Earth, in the world.
 const FIELD: Vector3<f64> = Vector3::new(1e-6, 20e-6, -44e-6);
 
-/// How a flight of 30 s ended: the normalised error of all states but the keyframe, how many these are, and the sensors' streams.
+/// The result of a 30 s flight: the normalised error of all states except the keyframe, the number of these states, and the
+/// sensors' streams.
 struct Flown {
     nees: f64,
     dimension: usize,
@@ -46,7 +48,7 @@ fn params() -> EskfParams {
     }
 }
 
-/// What the optional states really are.
+/// The true values of the optional states.
 struct Hidden {
     state: Optional,
     process: GaussMarkov,
@@ -74,14 +76,14 @@ impl Hidden {
         self.index..self.index + self.state.dimension()
     }
 
-    /// Draws it at the start.
+    /// Draws the initial values.
     fn draw<const N: usize>(&self, truth: &mut Estimate<N>, noise: &mut Noise) {
         for i in self.indices() {
             truth.optional[i] = self.process.deviation * noise.next();
         }
     }
 
-    /// Moves it on by a sample.
+    /// Propagates the values over a sample.
     fn wander<const N: usize>(&self, truth: &mut Estimate<N>, noise: &mut Noise) {
         if self.process.time_s.is_finite() {
             let stays = exp(-DT / self.process.time_s);
@@ -106,7 +108,7 @@ fn fly<S: States, const N: usize>(seed: u64) -> Flown {
     };
     filter.start(&start).unwrap();
     filter.set_keyframe(0);
-    // The truth is off by what the filter is told.
+    // The truth deviates from the estimate according to the filter's initial covariance.
     let mut truth: Estimate<N> = *filter.estimate().unwrap();
     truth.position += noise.vector(1.0);
     truth.velocity += noise.vector(0.3);
@@ -179,7 +181,7 @@ fn fly<S: States, const N: usize>(seed: u64) -> Flown {
     let mut error = filter.estimate().unwrap().error_to::<S>(&truth);
     let mut covariance = *filter.covariance();
     let is_counted = |i: usize| i < NAVIGATION || hidden.iter().any(|state| state.indices().contains(&i));
-    // What does not count adds nothing.
+    // States that are not counted add nothing.
     for i in (0..N).filter(|i| !is_counted(*i)) {
         error[i] = 0.0;
         covariance.row_mut(i).fill(0.0);
@@ -202,7 +204,7 @@ fn fuse<S: States, const N: usize, X: Measurement<D>, const D: usize>(
 fn errors_are_as_large_as_the_filter_says<S: States, const N: usize>(sensors: usize) {
     let flights: Vec<_> = (0..FLIGHTS).map(|seed| fly::<S, N>(u64::from(seed) + 1)).collect();
     let mean = flights.iter().map(|flown| flown.nees).sum::<f64>() / f64::from(FLIGHTS);
-    // Three standard deviations of a mean of χ² of as many dimensions.
+    // Three standard deviations of a mean of χ² with the same number of dimensions.
     let dimension = flights[0].dimension as f64;
     let spread = 3.0 * (2.0 * dimension / f64::from(FLIGHTS)).sqrt();
     assert!((mean - dimension).abs() < spread, "NEES {mean}, not {dimension} ± {spread}");
@@ -216,7 +218,7 @@ fn errors_are_as_large_as_the_filter_says<S: States, const N: usize>(sensors: us
         let over = |of: &dyn Fn(&Flown) -> f64| flights.iter().map(of).sum::<f64>() / f64::from(FLIGHTS);
         let nis = over(&|flown| consistency(flown).mean_nis().unwrap());
         let correlation = over(&|flown| consistency(flown).correlation().unwrap());
-        // Four standard deviations of a mean of χ², and of a correlation, of as many innovations.
+        // Four standard deviations of a mean of χ², and of a correlation, over the same number of innovations.
         let innovations = consistency(&flights[0]).count() as f64 * f64::from(FLIGHTS);
         let of_one = consistency(&flights[0]).nis_bounds().1 - 1.0;
         let spread = 4.0 * of_one / 1.96 / f64::from(FLIGHTS).sqrt();
@@ -230,7 +232,7 @@ fn errors_are_as_large_as_the_filter_says<S: States, const N: usize>(sensors: us
     assert_eq!(used, sensors);
 }
 
-/// How many sensors a configuration has: those that all have, and those of its optional states.
+/// The number of sensors in a configuration: the common ones and those of its optional states.
 fn sensors<S: States>() -> usize {
     let of_states = [Optional::Keyframe, Optional::WheelScale, Optional::HardIron, Optional::BarometerBias];
     3 + of_states.into_iter().filter(|state| offset::<S>(*state).is_some()).count()

@@ -1,4 +1,4 @@
-//! Every measurement: no residual where it is exact, and the Jacobian that of numeric differentiation.
+//! For every measurement: the residual of an exact measurement is zero, and the Jacobian matches numeric differentiation.
 
 use nalgebra::{SVector, Vector3};
 use proptest::prelude::*;
@@ -11,7 +11,7 @@ use crate::navigation::measurement::{
 };
 use crate::navigation::state::{Estimate, Optional};
 
-/// `measurement` is exact at `truth`; nearby, its residual is that of the Jacobian.
+/// `measurement` is exact at `truth`; nearby, its residual matches the Jacobian.
 fn check<const D: usize>(measurement: &impl Measurement<D>, truth: &Estimate<ALL>) -> Result<(), TestCaseError> {
     let at = |estimate: &Estimate<ALL>| {
         let mut model = Linearised::<D, ALL>::new();
@@ -28,7 +28,7 @@ fn check<const D: usize>(measurement: &impl Measurement<D>, truth: &Estimate<ALL
             at(&truth.corrected::<All>(&error)).map(|model| SVector::<f64, D>::from(model.residual))
         });
         let (Ok(above), Ok(below)) = (above, below) else { continue };
-        // A residual is what is missing, so it falls with the estimate.
+        // The residual is measured minus predicted, so it falls as the estimate grows.
         let numeric = (below - above) / (2.0 * step);
         let analytic = SVector::<f64, D>::from_fn(|row, _| model.jacobian[row][state]);
         let difference = (numeric - analytic).amax();
@@ -59,7 +59,7 @@ proptest! {
         let heading = direction.y.atan2(direction.x) + 4.0 * core::f64::consts::PI;
         check(&GnssHeading { heading, deviation: 0.02, baseline }, &at)?;
         prop_assume!(field.xy().norm() > 5e-6);
-        // In units of its own size, so that numeric steps are small for all.
+        // Scaled to unit size, so that numeric steps are small for all measurements.
         let field = field * 1e5;
         let measured = at.world_from_body.inverse() * field + at.vector::<All>(Optional::HardIron);
         check(&MagneticField { field: measured, reference: field, deviation: 1.0 }, &at)?;

@@ -1,4 +1,4 @@
-//! What holds for a filter of every configuration, whatever comes.
+//! Laws that hold for a filter of every configuration and any input.
 
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
@@ -15,8 +15,8 @@ use crate::navigation::{
 
 type Law = Result<(), TestCaseError>;
 
-/// Two seconds with a fix, an anchor and what measures the optional states each half second; `turn` is of the world,
-/// `shift` of its origin, `mounting` takes the IMU's coordinates to those it would have had.
+/// Two seconds with a fix, an anchor and measurements of the optional states every half second. `turn` rotates the world, `shift`
+/// moves its origin, and `mounting` converts the IMU's coordinates to those of a different mounting.
 fn flight<S: States, const N: usize>(
     turn: UnitQuaternion<f64>,
     shift: Vector3<f64>,
@@ -85,7 +85,7 @@ fn the_world_does_not_matter<S: States, const N: usize>(heading: f64, shift: Vec
     Ok(())
 }
 
-/// A filter that is moved to another world is the one that was there all the time.
+/// A filter that is moved to another world equals one that was in that world from the start.
 fn a_filter_moves_to_another_world<S: States, const N: usize>(heading: f64, shift: Vector3<f64>) -> Law {
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), heading);
     let mut moved = flight_plain::<S, N>();
@@ -172,7 +172,7 @@ impl<S: States, const N: usize> Replayed for Fixed<S, N> {
     }
 }
 
-/// Fixes at the end of a sample each, which arrive so many samples later: to the last bit as in order.
+/// Fixes at sample ends that arrive this many samples late: the result equals that of arrival in order, bit for bit.
 fn late_and_out_of_order_is_as_in_order<S: States, const N: usize>(fixes: &[(i64, i64, f64)]) -> Law {
     const SAMPLES: i64 = 120;
     let fly = |delayed: i64| {

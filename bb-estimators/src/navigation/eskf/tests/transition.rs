@@ -1,4 +1,4 @@
-//! One sample of the IMU.
+//! Tests of the transition over one IMU sample.
 
 use nalgebra::{SMatrix, SVector};
 use proptest::prelude::*;
@@ -13,7 +13,7 @@ use crate::navigation::state::{ACCELEROMETER_BIAS, Estimate, GYROSCOPE_BIAS, POS
 const DENSITIES: ImuDensities =
     ImuDensities { accelerometer: 1e-4, gyroscope: 2e-6, accelerometer_bias: 3e-5, gyroscope_bias: 4e-8 };
 
-/// The error that takes `from` to `to`, of the navigation states.
+/// The error of the navigation states that takes `from` to `to`.
 fn error(from: &Estimate<ALL>, to: &Estimate<ALL>) -> SVector<f64, 15> {
     let mut error = SVector::<f64, 15>::zeros();
     let rotation = rotation_vector(&(to.world_from_body * from.world_from_body.inverse()));
@@ -41,7 +41,7 @@ proptest! {
             });
             let derivative = error(&moved[1], &moved[0]) / (2.0 * step);
             let difference = (derivative - transition.column(state)).amax();
-            // The third order in the turn is left out of the part of the gyroscope's bias.
+            // The block of the gyroscope's bias neglects the third order in the rotation.
             let left_out = start.specific_force.norm() * (start.angular_velocity.norm() * dt * dt).powi(2) / 8.0;
             prop_assert!(difference < 2e-7 + left_out, "state {} differs by {}", state, difference);
         }

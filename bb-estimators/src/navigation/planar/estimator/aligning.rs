@@ -1,4 +1,4 @@
-//! Before the filter starts.
+//! Initialisation, before the filter starts.
 
 use super::input::{Mounting, PlanarInputs, heading};
 use super::options::PlanarOptions;
@@ -11,22 +11,22 @@ use crate::navigation::track::CLEARLY;
 use nalgebra::{Matrix2, Rotation2, Vector2, Vector3};
 use std::f64::consts::PI;
 
-/// How long a start may take, ns, before that is reported.
+/// How long the initialisation may take before it is reported, ns.
 const LONGEST_NS: i64 = 10_000_000_000;
 
-/// Where the world begins without satellites is known by definition, m.
+/// Standard deviation of the start position without satellite navigation, where the origin is known by definition, m.
 const ORIGIN: f64 = 0.01;
 
-/// How fast a robot may be that starts without a word about it, m/s, standard deviation.
+/// Standard deviation of the initial velocity if no sensor reports it, m/s.
 const SPEED: f64 = 1.0;
 
-/// Gathers what a start needs.
+/// Gathers the data for a start.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Aligning {
     course: Course,
-    /// With its standard deviation, rad.
+    /// Heading with its standard deviation, rad.
     heading: Option<(f64, f64)>,
-    /// In the body, m/s.
+    /// Velocity in the body, m/s.
     velocity: Option<Vector2<f64>>,
     first_ns: Option<i64>,
     last_ns: i64,
@@ -36,17 +36,17 @@ pub(super) struct Aligning {
 type Moving = ((f64, f64), (Vector2<f64>, f64));
 
 impl Aligning {
-    /// `frame` is that of the world, if there is one already.
+    /// `frame` is the frame of the world, if it exists already.
     pub(super) fn new(frame: Option<LocalFrame>) -> Self {
         Self { course: Course::within(frame), heading: None, velocity: None, first_ns: None, last_ns: i64::MIN }
     }
 
-    /// Whether it has gone on for so long that somebody should be told.
+    /// Whether the initialisation has taken so long that it should be reported.
     pub(super) fn takes_too_long(&self) -> bool {
         self.first_ns.is_some_and(|first_ns| self.last_ns.saturating_sub(first_ns) > LONGEST_NS)
     }
 
-    /// Takes what has come; where the filter starts, once that is known.
+    /// Takes the inputs and returns the start of the filter, once it is known.
     pub(super) fn take(
         &mut self,
         sample: &ImuMean,
@@ -56,7 +56,7 @@ impl Aligning {
     ) -> Option<(PlanarStart, Option<LocalFrame>)> {
         self.first_ns = self.first_ns.or(Some(sample.time_ns));
         self.last_ns = self.last_ns.max(sample.time_ns);
-        // On a plane up is z, whatever the accelerometer says.
+        // On a plane, up is z, regardless of the accelerometer.
         self.course.turn(&ImuMean { specific_force: Vector3::z(), ..*sample });
         self.course.see(inputs.gnss, options.gnss_deviation);
         if let Some(orientation) = inputs.orientation {
@@ -71,7 +71,7 @@ impl Aligning {
             true => self.in_motion()?,
             false => (self.heading_of(options, mounting), (Vector2::zeros(), SPEED)),
         };
-        // Of the wheels, if there are any.
+        // The velocity of the wheels, if there are any.
         let velocity = match self.velocity.filter(|velocity| velocity.iter().all(|x| x.is_finite())) {
             Some(velocity) => (velocity, SPEED.min(0.1 + 0.1 * velocity.norm())),
             None => velocity,
@@ -79,7 +79,7 @@ impl Aligning {
         let start = PlanarStart::at(sample.time_ns, (Vector2::zeros(), ORIGIN), heading, velocity);
         let turn = Rotation2::new(heading.0);
         if !mounting.has_gnss() {
-            // The link begins at the origin.
+            // The link starts at the origin.
             let position = -(turn * mounting.body_from_link.translation.vector.xy());
             return Some((PlanarStart { position, ..start }, None));
         }
@@ -92,24 +92,24 @@ impl Aligning {
         Some((PlanarStart { position, position_covariance, ..start }, self.course.frame()))
     }
 
-    /// What the course of the fixes shows.
+    /// Heading and velocity from the course of the fixes.
     fn in_motion(&self) -> Option<Moving> {
         let (velocity, deviation) = self.course.velocity(self.last_ns)?;
         let speed = velocity.xy().norm();
-        // Nor if it is not a number.
+        // Also rejects NaN.
         if speed.is_nan() || speed <= CLEARLY * deviation {
             return None;
         }
-        // Wheels that turn backwards go against the course.
+        // If the wheels turn backwards, the heading is opposite to the course.
         let goes_back = self.velocity.is_some_and(|velocity| velocity.x < 0.0);
         let (turned, along) = if goes_back { (PI, -speed) } else { (0.0, speed) };
         let heading = (velocity.y.atan2(velocity.x) + turned, (deviation / speed).hypot(SLIP));
         Some((heading, (Vector2::new(along, 0.0), deviation)))
     }
 
-    /// Of the body, with its standard deviation: of an orientation, or of the options.
+    /// The body's heading with its standard deviation, from an orientation or from the options.
     fn heading_of(&self, options: &PlanarOptions, mounting: &Mounting) -> (f64, f64) {
-        // That of the options is the link's.
+        // The heading of the options is that of the link.
         let of_body = options.heading - heading(&mounting.body_from_link.rotation);
         self.heading.unwrap_or((of_body, options.heading_deviation))
     }

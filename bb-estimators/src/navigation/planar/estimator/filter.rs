@@ -1,4 +1,4 @@
-//! The filter with a stream for each sensor.
+//! The filter, with a stream for each sensor.
 
 use super::options::PlanarOptions;
 use crate::navigation::eskf::ImuMean;
@@ -25,7 +25,7 @@ pub(super) struct Filter {
     orientation: Stream,
 }
 
-/// A measurement of one of the sensors.
+/// A measurement from one of the sensors.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Measured {
     Gnss(PlanarPosition),
@@ -52,7 +52,7 @@ impl Filter {
         let mut ekf = PlanarEkf::new(options.params())?;
         ekf.start(start).map_err(|refusal| Fault::new(refusal.to_string()))?;
         let stream = Stream::new(StreamParams { patience: options.patience, ..StreamParams::default() });
-        // A filter that these refute is moved instead: see `refuted.rs`.
+        // A filter that fixes or poses refute is relocated instead: see `refuted.rs`.
         let position = Stream::new(StreamParams { patience: 0, ..StreamParams::default() });
         Ok(Self { ekf, gnss: position, odometry: stream, yaw_rate: stream, pose: position, orientation: stream })
     }
@@ -61,14 +61,14 @@ impl Filter {
         &self.ekf
     }
 
-    /// Standard deviation of the position, in the direction where it is least known, m.
+    /// Standard deviation of the position in its least certain direction, m.
     pub(super) fn deviation(&self) -> f64 {
         let covariance = self.ekf.covariance();
         let of = |i: usize, j: usize| covariance[(POSITION + i, POSITION + j)];
         largest_deviation(of(0, 0), of(0, 1), of(1, 1))
     }
 
-    /// Whether all that is emitted is a number, and no variance is negative.
+    /// Whether no emitted value is NaN and no variance is negative.
     pub(super) fn is_sound(&self) -> bool {
         let covariance = self.ekf.covariance();
         let variances =
@@ -80,18 +80,18 @@ impl Filter {
         variances && self.ekf.estimate().is_none_or(is_number)
     }
 
-    /// What became of the measurements: satellites, velocities and yaw rates of the odometry, poses, orientations.
+    /// Counts of the measurements: satellite fixes, odometry velocities and yaw rates, poses, orientations.
     pub(super) fn counts(&self) -> [&Counts; 5] {
         [&self.gnss, &self.odometry, &self.yaw_rate, &self.pose, &self.orientation].map(Stream::counts)
     }
 
-    /// What became of fixes, and of poses.
+    /// Counts of fixes and of poses.
     pub(super) fn positions(&self) -> [&Counts; 2] {
         [self.gnss.counts(), self.pose.counts()]
     }
 
-    /// Moves it to where the sensor of `found` was found to be: at `lever_arm` in the body, m, with that heading and its variance,
-    /// rad, if it is known.
+    /// Relocates the filter to the sensor position in `found`, with the sensor at `lever_arm` in the body, m. Uses the given
+    /// heading and its variance, rad, if it is known.
     pub(super) fn relocate(
         &mut self,
         found: &Found,
@@ -124,7 +124,7 @@ impl Filter {
         Ok(())
     }
 
-    /// What its health is judged by.
+    /// The inputs to the health assessment.
     pub(super) fn sight<'a>(&self, counts: &'a [&'a Counts]) -> Option<Sight<'a>> {
         Some(Sight {
             now_ns: self.time_ns()?,

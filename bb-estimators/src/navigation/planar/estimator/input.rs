@@ -1,4 +1,4 @@
-//! What the declared filter takes, and where its sensors are.
+//! Inputs of the declared filter, and the mounting of their sensors.
 
 use super::options::PlanarOptions;
 use crate::navigation::eskf::ImuMean;
@@ -9,25 +9,25 @@ use bb_core::payload::{GnssFix, Imu, Odometry, Orientation, Pose};
 use bb_core::{Context, Fault, Input, Inputs};
 use nalgebra::{Isometry3, Matrix2, Matrix3, UnitQuaternion, Vector2, Vector3};
 
-/// How far the z axis of a sensor of the plane may be from the link's, cosine.
+/// The largest angle between the z axes of a planar sensor and the link, as a cosine.
 const UPRIGHT: f64 = 0.999;
 
 /// The inputs of [`PlanarEstimator`](super::PlanarEstimator).
 #[derive(Clone, Copy, Debug, Inputs)]
 pub struct PlanarInputs<'a> {
-    /// The inertial sensor, mounted in any direction: the driver. Of it the yaw rate is used.
+    /// The inertial sensor, mounted in any direction: the driver. Only its yaw rate is used.
     pub imu: Input<'a, Imu>,
     /// Satellite navigation.
     pub gnss: Option<Input<'a, GnssFix>>,
-    /// Wheels: of an odometry, the velocity and the yaw rate are used.
+    /// Wheel odometry: its velocity and yaw rate are used.
     pub odometry: Option<Input<'a, Odometry>>,
     /// Poses in the world, from a map or a tracking system.
     pub pose: Option<Input<'a, Pose>>,
-    /// An orientation in the world, of a compass or an attitude filter: the heading is used.
+    /// An orientation in the world, from a compass or an attitude filter: the heading is used.
     pub orientation: Option<Input<'a, Orientation>>,
 }
 
-/// Where the sensors are.
+/// The mounting of the sensors.
 ///
 /// The body of the filter is the frame of the odometry, where wheels do not move sideways; without one, the link.
 #[derive(Clone, Copy, Debug)]
@@ -40,9 +40,9 @@ pub(super) struct Mounting {
 }
 
 impl Mounting {
-    /// As the robot declares them.
+    /// The mounting that the robot declares.
     pub(super) fn of(context: &Context) -> Result<Self, Fault> {
-        // Of inputs that the robot does not declare, there is none.
+        // Inputs that the robot does not declare have no mounting.
         let optional = |name: &str| context.frame_from_input(name).ok();
         let link_from_body = optional("odometry").unwrap_or_else(Isometry3::identity);
         if (link_from_body.rotation * Vector3::z()).z < UPRIGHT {
@@ -71,7 +71,7 @@ impl Mounting {
         self.has_gnss() || self.body_from_pose.is_some()
     }
 
-    /// The sample in the axes of the body.
+    /// The sample in body axes.
     pub(super) fn sample(&self, imu: &Stamped<Imu>) -> ImuMean {
         ImuMean {
             time_ns: imu.monotonic_time.as_nanos(),
@@ -80,18 +80,18 @@ impl Mounting {
         }
     }
 
-    /// The antenna in the body, m.
+    /// The antenna's position in the body, m.
     pub(super) fn antenna(&self) -> Vector2<f64> {
         self.antenna.unwrap_or_else(Vector2::zeros)
     }
 
-    /// A fix that is at `position` in the world.
+    /// Converts a fix at `position` in the world.
     pub(super) fn position(&self, position: &Vector3<f64>, covariance: &Matrix3<f64>) -> PlanarPosition {
         let covariance = covariance.fixed_view::<2, 2>(0, 0).into_owned();
         PlanarPosition { position: position.xy(), covariance, lever_arm: self.antenna() }
     }
 
-    /// The velocity and the yaw rate that wheels have counted.
+    /// The velocity and yaw rate from wheel odometry.
     pub(super) fn wheels(&self, odometry: &Odometry, options: &PlanarOptions) -> (WheelVelocity, YawRate) {
         let square = |x: f64| x * x;
         let known = |variance: f64| Some(variance).filter(|variance| *variance > 0.0);
@@ -112,7 +112,7 @@ impl Mounting {
         (velocity, YawRate { rate: odometry.twist.angular.z, deviation })
     }
 
-    /// A pose of its sensor, as one of the body.
+    /// Converts a pose of its sensor to a pose of the body.
     pub(super) fn pose(&self, pose: &Pose, options: &PlanarOptions) -> PlanarPose {
         let body_from_sensor = self.body_from_pose.unwrap_or_else(Isometry3::identity);
         let world_from_body = pose.world_from_body * body_from_sensor.rotation.inverse();
@@ -123,7 +123,7 @@ impl Mounting {
             Some(covariance) => (covariance.fixed_view::<2, 2>(0, 0).into_owned(), covariance[(5, 5)]),
             None => (Matrix2::identity() * square(options.pose_deviation), square(0.1 * options.pose_deviation)),
         };
-        // The body's origin is where the heading says: it errs with that.
+        // The heading determines the position of the body's origin, which therefore shares the heading's error.
         let by_heading = Vector2::new(arm.y, -arm.x);
         let mut covariance = Matrix3::zeros();
         let own = position + by_heading * by_heading.transpose() * of_heading;
@@ -134,7 +134,7 @@ impl Mounting {
         PlanarPose { position: pose.position.xy() - arm, heading, covariance }
     }
 
-    /// The heading of the body that an orientation of its sensor shows.
+    /// The heading of the body, from an orientation of its sensor.
     pub(super) fn heading(&self, orientation: &Orientation, options: &PlanarOptions) -> PlanarHeading {
         let world_from_body = orientation.world_from_body * self.body_from_orientation.inverse();
         let variance = orientation.covariance.map(|covariance| about_up(&orientation.world_from_body, &covariance));
@@ -150,7 +150,7 @@ pub(super) fn heading(world_from_body: &UnitQuaternion<f64>) -> f64 {
     ahead.y.atan2(ahead.x)
 }
 
-/// The variance about the vertical, of the covariance of a small rotation of the body, rad².
+/// The variance about the vertical, from the covariance of a small rotation of the body, rad².
 fn about_up(world_from_body: &UnitQuaternion<f64>, covariance: &Matrix3<f64>) -> f64 {
     let up = world_from_body.inverse() * Vector3::z();
     up.dot(&(covariance * up))

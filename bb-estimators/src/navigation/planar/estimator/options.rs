@@ -1,4 +1,4 @@
-//! What can be set of the declared filter.
+//! Options of the declared filter.
 
 use crate::navigation::eskf::GaussMarkov;
 use crate::navigation::planar::params::PlanarParams;

@@ -1,4 +1,4 @@
-//! What the declared filter emits.
+//! Outputs of the declared filter.
 
 use super::filter::Filter;
 use super::input::Mounting;
@@ -8,11 +8,11 @@ use bb_core::payload::{Odometry, Pose, Twist};
 use bb_core::{Outputs, Payload};
 use nalgebra::{Matrix6, SMatrix, UnitQuaternion, Vector2, Vector3};
 
-/// Variance of what is known by the plane, m², rad² and their squares a second: height, roll and pitch. Not 0, so that the
-/// covariance can be inverted.
+/// Variance of the components that the plane determines, m², rad² and their squares per second: height, roll and pitch. Not 0, so
+/// that the covariance can be inverted.
 const PLANE: f64 = 1e-6;
 
-/// An output that can be made of the filter after a sample.
+/// An output that can be made from the filter after a sample.
 #[diagnostic::on_unimplemented(
     message = "a planar filter cannot emit `{Self}`",
     label = "not an output of planar filters",
@@ -20,15 +20,15 @@ const PLANE: f64 = 1e-6;
 )]
 #[expect(private_interfaces, reason = "implemented here alone")]
 pub trait PlanarOutput: Outputs + Sized {
-    /// What there is to emit.
+    /// The values available for an output.
     #[doc(hidden)]
     fn of(filter: &Filter, mounting: &Mounting) -> Option<Self>;
 }
 
-/// What the filter knows beside the odometry.
+/// Filter state beyond the odometry.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Payload)]
 pub struct PlanarStatus {
-    /// What the gyroscope reads more than the yaw rate, rad/s.
+    /// Bias of the gyroscope: its reading minus the yaw rate, rad/s.
     pub gyroscope_bias: f64,
     /// Scale of the wheels' velocity, less 1: `measured = (1 + s) true`.
     pub wheel_scale: f64,
@@ -38,23 +38,23 @@ pub struct PlanarStatus {
     pub gyroscope_bias_deviation: f64,
     /// Standard deviation of the wheels' scale.
     pub wheel_scale_deviation: f64,
-    /// For how long the position has not been corrected by one in the world, s.
+    /// Time since the position was last corrected by a position in the world, s.
     pub dead_reckoning_s: f64,
-    /// Standard deviation of the position, in the direction where it is least known, m.
+    /// Standard deviation of the position in its least certain direction, m.
     pub horizontal_deviation: f64,
-    /// Fixes that were fused, and that were refused.
+    /// Counts of fixes that were fused and that were rejected.
     pub gnss: Verdicts,
-    /// The same for velocities of the odometry.
+    /// The same for odometry velocities.
     pub odometry: Verdicts,
-    /// The same for yaw rates of the odometry.
+    /// The same for odometry yaw rates.
     pub yaw_rate: Verdicts,
     /// The same for poses.
     pub pose: Verdicts,
     /// The same for orientations.
     pub orientation: Verdicts,
-    /// How often samples of the IMU were missing for longer than a sample may take.
+    /// How often IMU samples were missing for longer than a sample may take.
     pub gaps: u32,
-    /// How often the filter was wrong, and began again where fixes or poses agree.
+    /// How often the filter was wrong and was reset to where fixes or poses agree.
     pub resets: u32,
 }
 
@@ -63,7 +63,7 @@ pub struct PlanarStatus {
 pub struct PlanarOutputs {
     /// Pose in the world and motion of the link, with every sample.
     pub odometry: Option<Odometry>,
-    /// What else the filter knows, with every sample.
+    /// Further filter state, with every sample.
     pub status: Option<PlanarStatus>,
 }
 
@@ -71,7 +71,7 @@ pub struct PlanarOutputs {
 impl PlanarOutput for Odometry {
     fn of(filter: &Filter, mounting: &Mounting) -> Option<Self> {
         let estimate = filter.ekf().estimate()?;
-        // The link in the body.
+        // The link's pose in the body.
         let link = mounting.body_from_link;
         let in_body = link.translation.vector.xy();
         let world_from_body = estimate.world_from_body();
@@ -95,9 +95,9 @@ impl PlanarOutput for Odometry {
     }
 }
 
-/// Of the pose, with the link's origin at `arm` from the body's, in the world.
+/// Covariance of the pose, with the link's origin at `arm` from the body's, in the world.
 fn pose_covariance(covariance: &SMatrix<f64, STATES, STATES>, arm: &Vector2<f64>) -> Matrix6<f64> {
-    // x, y and yaw of the link by the errors of the filter.
+    // Derivatives of the link's x, y and yaw with respect to the filter's errors.
     let mut by_errors = SMatrix::<f64, 6, STATES>::zeros();
     let by_heading = left(arm);
     for i in 0..2 {
@@ -108,7 +108,7 @@ fn pose_covariance(covariance: &SMatrix<f64, STATES, STATES>, arm: &Vector2<f64>
     on_the_plane(&by_errors, covariance, [2, 3, 4])
 }
 
-/// Of the twist, with the link's origin at `link` in the body.
+/// Covariance of the twist, with the link's origin at `link` in the body.
 fn twist_covariance(
     covariance: &SMatrix<f64, STATES, STATES>,
     link_from_body: &UnitQuaternion<f64>,
@@ -127,7 +127,7 @@ fn twist_covariance(
     on_the_plane(&by_errors, covariance, [2, 3, 4])
 }
 
-/// `J P Jᵀ`, symmetric to the last bit, with the components that the plane tells.
+/// `J P Jᵀ`, exactly symmetric, with the components that the plane determines.
 fn on_the_plane(
     by_errors: &SMatrix<f64, 6, STATES>,
     covariance: &SMatrix<f64, STATES, STATES>,
@@ -162,7 +162,7 @@ impl PlanarOutput for PlanarOutputs {
             pose,
             orientation,
             gaps: ekf.gaps(),
-            // The start is the first.
+            // The start itself counts as the first reset.
             resets: ekf.resets().saturating_sub(1),
         };
         Some(Self { odometry: Some(Odometry::of(filter, mounting)?), status: Some(status) })

@@ -1,4 +1,4 @@
-//! The filter once it has started.
+//! The filter after its start.
 
 use super::PlanarOutput;
 use super::filter::{Filter, Measured};
@@ -17,7 +17,7 @@ use crate::navigation::track::TrackPoint;
 use bb_core::{Fault, Reply};
 use nalgebra::{Vector2, Vector3};
 
-/// Samples of the IMU that late measurements may be older than: 1.3 s at 400 Hz.
+/// Number of stored IMU samples, which limits how late a measurement may be: 1.3 s at 400 Hz.
 const SAMPLES: usize = 512;
 const MEASUREMENTS: usize = 128;
 const STATES: usize = 16;
@@ -29,20 +29,20 @@ const LONGEST_LEAD_NS: i64 = 500_000_000;
 #[derive(Debug)]
 pub(super) struct Running {
     past: Past,
-    /// The world on the Earth; none without satellites.
+    /// The world's frame on the Earth; `None` without satellite navigation.
     frame: Option<LocalFrame>,
-    /// So many fixes agreed with it that it did not begin at wrong ones.
+    /// Whether enough fixes agreed with the frame to rule out wrong fixes at its origin.
     is_confirmed: bool,
     watch: Watch,
-    /// Fixes, and poses.
+    /// State of the fixes, and of the poses, that contradict the filter.
     fixes: Refuted,
     poses: Refuted,
-    /// Of the last pose, with its variance, rad.
+    /// Heading of the last pose, with its variance, rad.
     heading: Option<(f64, f64)>,
 }
 
 impl Running {
-    /// A filter that has started.
+    /// Creates the state from a filter that has started.
     pub(super) fn new(
         options: &PlanarOptions,
         start: &PlanarStart,
@@ -56,12 +56,12 @@ impl Running {
         Ok(Box::new(Self { past, frame, is_confirmed: false, watch, fixes, poses, heading: None }))
     }
 
-    /// The world on the Earth; none without satellites.
+    /// The world's frame on the Earth; `None` without satellite navigation.
     pub(super) fn frame(&self) -> Option<LocalFrame> {
         self.frame
     }
 
-    /// Whether all that is emitted is a number, and no variance is negative.
+    /// Whether no emitted value is NaN and no variance is negative.
     pub(super) fn is_sound(&self) -> bool {
         self.past.now().is_sound()
     }
@@ -93,7 +93,7 @@ impl Running {
             let time_ns = pose.monotonic_time.as_nanos();
             let mut covariance = measured.covariance;
             self.heading = Some((measured.heading, covariance[(2, 2)]));
-            // Its third component is the heading's; the height does not matter here.
+            // Its third component belongs to the heading; the height does not matter here.
             covariance[(2, 2)] = 1.0;
             self.poses.see(TrackPoint { time_ns, position: measured.position.push(0.0), covariance, yaw: 0.0 });
             self.fuse(time_ns, Measured::Pose(measured));
@@ -111,7 +111,7 @@ impl Running {
         }
     }
 
-    /// If fixes or poses agree among each other and not with the filter, it is moved there.
+    /// Relocates the filter if fixes or poses agree with each other but not with it.
     fn go_where_positions_agree(&mut self, options: &PlanarOptions, mounting: &Mounting) -> Result<(), Refusal> {
         let now = self.past.now();
         let [of_fixes, of_poses] = now.positions();
@@ -120,7 +120,7 @@ impl Running {
             let here = now.ekf().estimate().map_or_else(Vector2::zeros, |estimate| estimate.position);
             self.is_confirmed |= self.fixes.confirms(of_fixes, options.patience);
             if (found.point.position.xy() - here).norm() > FARTHEST_JUMP && !self.is_confirmed {
-                // No robot has gone so far: neither did the world begin where it was taken to.
+                // No robot can have travelled this far, so the assumed origin of the world was wrong.
                 frame = frame.map(|frame| LocalFrame::new(frame.geodetic(&found.point.position)));
                 found.point.position = Vector3::zeros();
             }

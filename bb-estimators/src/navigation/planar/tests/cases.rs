@@ -1,4 +1,4 @@
-//! What the filter does in single cases.
+//! Behaviour of the filter in individual cases.
 
 use nalgebra::{Matrix2, Vector2, Vector3};
 
@@ -51,7 +51,7 @@ fn a_gap_grows_the_covariance_and_is_counted() {
     assert!(after[(0, 0)] > 4.0 * before[(0, 0)] && after[(2, 2)] > 1.0, "{after}");
 }
 
-/// After one sample all that the position is, is the way at that velocity.
+/// After one sample, the position depends only on the distance travelled at that velocity.
 #[test]
 fn an_unknown_velocity_after_an_exact_fix_keeps_the_covariance_regular() {
     for (exact, unknown) in [(1e-8, 10.0), (1e-8, 1e3), (1e-7, 1e5), (1e-12, 10.0)] {
@@ -71,7 +71,7 @@ fn an_unknown_velocity_after_an_exact_fix_keeps_the_covariance_regular() {
     }
 }
 
-/// What `robot_localization` takes for zero: a gyroscope with a bias, and wheels that are larger than they are said to be.
+/// Effects that `robot_localization` assumes to be zero: a gyroscope bias, and wheels larger than specified.
 #[test]
 fn the_bias_and_the_wheels_scale_are_found() {
     const BIAS: f64 = 0.01;
@@ -86,7 +86,7 @@ fn the_bias_and_the_wheels_scale_are_found() {
         let angular_velocity = Vector3::new(0.0, 0.0, rate + BIAS);
         filter.propagate(&ImuMean { angular_velocity, ..sample(i) }).unwrap();
         if i % 5 == 0 {
-            // The first wheels find a filter that believes to be at rest.
+            // The first wheel measurements meet a filter that assumes the robot is at rest.
             let _ = filter.update(&mut wheels, &WheelVelocity::new(Vector2::new(speed * (1.0 + SCALE), 0.0), 0.05));
         }
         if i % 20 == 0 {

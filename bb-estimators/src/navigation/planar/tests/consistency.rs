@@ -1,4 +1,4 @@
-//! With sensors that err exactly as the filter is told, its errors are as large as it says.
+//! With sensors whose errors match the filter's noise model, its errors match its covariance.
 
 use nalgebra::{SVector, Vector2, Vector3};
 
@@ -16,7 +16,7 @@ use crate::navigation::{ImuMean, Stream, StreamParams, nees};
 const DT: f64 = 0.01;
 const ANTENNA: Vector2<f64> = Vector2::new(-0.5, 0.3);
 
-/// How a drive of 40 s ended: the normalised error of all states, and the sensors' streams.
+/// The result of a 40 s drive: the normalised error of all states, and the sensors' streams.
 struct Driven {
     nees: f64,
     streams: [Stream; 4],
@@ -35,7 +35,7 @@ fn drive(seed: u64) -> Driven {
     let mut filter = PlanarEkf::new(params).unwrap();
     let velocity = Vector2::new(3.0, 0.0);
     filter.start(&PlanarStart::at(0, (Vector2::zeros(), 1.0), (1.0, 0.05), (velocity, 0.3))).unwrap();
-    // The truth is off by what the filter is told.
+    // The truth deviates from the estimate according to the filter's initial covariance.
     let mut truth: PlanarEstimate = *filter.estimate().unwrap();
     let pair = |noise: &mut Noise, deviation: f64| Vector2::new(noise.next(), noise.next()) * deviation;
     truth.position += pair(&mut noise, 1.0);
@@ -81,7 +81,7 @@ fn errors_are_as_large_as_the_filter_says() {
     const DRIVES: u32 = 200;
     let drives: Vec<_> = (0..DRIVES).map(|seed| drive(u64::from(seed) + 1)).collect();
     let mean = drives.iter().map(|driven| driven.nees).sum::<f64>() / f64::from(DRIVES);
-    // Three standard deviations of a mean of χ² of as many dimensions.
+    // Three standard deviations of a mean of χ² with the same number of dimensions.
     let dimension = STATES as f64;
     let spread = 3.0 * (2.0 * dimension / f64::from(DRIVES)).sqrt();
     assert!((mean - dimension).abs() < spread, "NEES {mean}, not {dimension} ± {spread}");

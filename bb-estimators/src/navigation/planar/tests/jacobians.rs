@@ -1,4 +1,4 @@
-//! Derivatives against differences.
+//! Analytic derivatives compared with finite differences.
 
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector};
 use proptest::prelude::*;
@@ -16,7 +16,7 @@ use crate::navigation::covariance::Covariance;
 
 const STEP: f64 = 1e-5;
 
-/// How `of` changes with each error, by central differences.
+/// The derivative of `of` with respect to each error, by central differences.
 fn derivative<const D: usize>(
     at: &PlanarEstimate,
     of: impl Fn(&PlanarEstimate) -> SVector<f64, D>,
@@ -33,7 +33,7 @@ fn derivative<const D: usize>(
     derivative
 }
 
-/// What is expected grows by the Jacobian, so that the residual shrinks by it.
+/// The residual is measured minus predicted, so its derivative is the negative Jacobian.
 fn check<const D: usize>(
     measurement: &impl PlanarMeasurement<D>,
     at: &PlanarEstimate,
@@ -104,7 +104,7 @@ proptest! {
         prop_assert!(at_once.error_to(&in_steps).amax() < 1e-10);
     }
 
-    /// Two halves of a sample add as much noise as the whole, to the order of the approximation.
+    /// Two halves of a sample add as much noise as the whole sample, to the order of the approximation.
     #[test]
     fn noise_does_not_depend_on_the_rate(at in estimate(), dt in 1e-3..0.02) {
         let densities = PlanarParams::default().densities();
@@ -122,7 +122,7 @@ proptest! {
         for i in 0..STATES {
             for j in 0..STATES {
                 let scale = (once[(i, i)] * once[(j, j)]).sqrt();
-                // The body turns by up to 0.06 rad over the sample, and noise forward is three times that to the side.
+                // The body rotates by up to 0.06 rad over the sample, and the forward noise is three times the sideways noise.
                 prop_assert!((once[(i, j)] - twice[(i, j)]).abs() < 0.05 * scale, "{i} {j} {once} {twice}");
             }
         }

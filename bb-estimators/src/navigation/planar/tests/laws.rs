@@ -1,4 +1,4 @@
-//! What holds for the filter, whatever comes.
+//! Laws that hold for the filter with any input.
 
 use core::f64::consts::{PI, TAU};
 
@@ -13,7 +13,7 @@ use super::{sample, started, vector};
 use crate::navigation::math::wrapped;
 use crate::navigation::{Fused, History, ImuMean, Refusal, Replayed, Stream, StreamParams};
 
-/// Three seconds with wheels, fixes, headings and poses; the world is turned and shifted.
+/// Three seconds with wheels, fixes, headings and poses, in a world that is rotated and shifted.
 fn drive(turn: f64, shift: Vector2<f64>) -> PlanarEkf {
     let rotation = Rotation2::new(turn);
     let to_world = |point: Vector2<f64>| rotation * point + shift;
@@ -110,7 +110,7 @@ proptest! {
         prop_assert_eq!(counts.fused + counts.gate + counts.invalid, updates);
     }
 
-    /// Fixes at the end of a sample each, which arrive so many samples later: to the last bit as in order.
+    /// Fixes at sample ends that arrive this many samples late: the result equals that of arrival in order, bit for bit.
     #[test]
     fn late_and_out_of_order_is_as_in_order(
         fixes in proptest::collection::btree_map(1..119_i64, (0..60_i64, -9.0..9.0), 1..30),
@@ -134,7 +134,7 @@ proptest! {
         prop_assert_eq!(drive(0), drive(1));
     }
 
-    /// Of measurements that are nearly exact and of others that say nearly nothing, in any order.
+    /// Nearly exact measurements and nearly uninformative ones, in any order.
     #[test]
     fn the_covariance_stays_positive_definite(
         steps in proptest::collection::vec((0..5_u8, -8.0..3.0), 100..400),
