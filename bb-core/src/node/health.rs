@@ -8,8 +8,8 @@
 //! | healthy, degraded | no run completed on a message of the driver for `lost_after` | lost | lost | `on_lost` |
 //! | lost | first run completed on a message of the driver | degraded, that completion counts if good | recovered | none |
 //!
-//! The watchdog, which waits for no user code, decides whether an estimator is lost. It tells the estimator by an entry of its
-//! island; a run completed before the estimator takes that entry is the first one after the loss.
+//! The watchdog, which waits for no user code, decides whether an estimator is lost. It notifies the estimator by an entry of its
+//! island. A run completed before the estimator takes that entry counts as the first one after the loss.
 
 use crate::event::{HealthReason, HealthState};
 
