@@ -7,22 +7,22 @@
 //!
 //! # A joint's state at a time
 //!
-//! | asked for | answer |
+//! | requested time | answer |
 //! |---|---|
-//! | between two states | interpolated: linearly, an angle without limits the short way, a floating joint's rotation along the great circle |
-//! | after the newest, by no more than a tolerance | predicted with the measured velocity; held where none is measured |
-//! | later than that | an error: how far in the future |
-//! | before the oldest that is kept | an error: how far out of the history |
-//! | no state has come | an error: unknown |
+//! | between two states | interpolated: linearly; an angle without limits, along the shorter arc; a floating joint's rotation, by slerp |
+//! | after the newest state, within a tolerance | predicted from the measured velocity; held if no velocity is measured |
+//! | after that tolerance | an error: how far in the future |
+//! | before the oldest state kept | an error: how far before the history |
+//! | any, before the first state has arrived | an error: unknown |
 //!
-//! A joint is never assumed to be at zero because its state is unknown. A joint that mimics another follows from that one. A state
-//! measured at the motor of a joint with a `transmission` is converted to the joint's: position / reduction + offset, velocity /
-//! reduction, effort · reduction, the first negative where it is `reversed`.
+//! A joint whose state is unknown is never assumed to be at zero. A joint that mimics another follows from that one. A state measured
+//! at the motor of a joint with a `transmission` is converted to the joint's: position / reduction + offset, velocity / reduction,
+//! effort · reduction. The reduction counts as negative where the transmission is `reversed`.
 //!
 //! The angle of a continuous joint may be reported within one turn or accumulated over turns. It is unwound to the turn nearest to
 //! the prediction from the last state and its velocity.
 //!
-//! # What is refused
+//! # Refused states
 //!
 //! A state is refused if it is not newer than the last state of its joint, holds a NaN or an infinity, or is more than a second
 //! ahead of the clock. It is also refused if its number of coordinates differs from the joint's or if it names an unknown joint.

@@ -9,7 +9,7 @@ use std::time::Duration;
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum LookupError {
-    /// No state of a joint between the frames has come yet.
+    /// No state of a joint between the frames has arrived yet.
     UnknownJoint {
         /// The joint.
         joint: &'static str,
@@ -40,7 +40,7 @@ pub enum LookupError {
 /// The same error, with the joint given by its number in the topology, as written to a journal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Payload)]
 pub enum Gap {
-    /// No state has come yet.
+    /// No state has arrived yet.
     Unknown {
         /// The joint.
         joint: usize,

@@ -40,7 +40,7 @@ pub(super) struct Place {
     link_from_frame: Isometry3<f64>,
 }
 
-/// The frame with that name: the frame of a link, or of a joint at rest. An unknown name is placed at the root.
+/// The frame with that name: the frame of a link, or of a joint at rest. Returns `None` for an unknown name.
 pub(super) fn place_of(topology: &Topology, name: &str) -> Option<Place> {
     if let Some(link) = topology.links.iter().find(|link| link.name == name) {
         return Some(Place { link: link.name, link_from_frame: Isometry3::identity() });

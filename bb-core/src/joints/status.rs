@@ -46,7 +46,7 @@ pub struct JointStatistics {
     pub joint: String,
     /// Whether the robot declares it.
     pub is_declared: bool,
-    /// States that were kept.
+    /// States accepted.
     pub states: u64,
     /// States of an unknown joint.
     pub unknown: u64,

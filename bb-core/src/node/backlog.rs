@@ -47,7 +47,7 @@ fn dropped_for<D>((input, delivery): (usize, D)) -> usize {
 mod tests {
     use super::*;
 
-    /// Panics when it is dropped.
+    /// Panics when dropped.
     struct Glass;
 
     impl Drop for Glass {

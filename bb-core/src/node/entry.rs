@@ -28,7 +28,7 @@ pub enum NodeEntry {
     Cast {
         /// The request.
         request: Request,
-        /// Handles it. `None` in a replay of a journal that does not contain the request.
+        /// Handles the request. `None` in a replay of a journal that does not contain the request.
         handle: Option<Box<dyn Any + Send>>,
     },
     /// The code of one of its outputs panicked while the output was passed on.
@@ -71,7 +71,7 @@ impl fmt::Debug for NodeEntry {
     }
 }
 
-/// What an estimator reports to the robot's control state.
+/// A report of an estimator to the robot's control state.
 #[derive(Clone, Debug)]
 pub(crate) enum Report {
     /// The health has changed.

@@ -40,7 +40,7 @@ pub(crate) trait Overseer: Guardian {
         is_made: bool,
         make: &mut dyn FnMut() -> Result<(), Failed>,
     ) -> Result<(), Failed>;
-    /// The component at `path` was left out: it has no disarm callbacks.
+    /// Records that the component at `path` was left out: it has no disarm callbacks.
     fn forget_hooks(&self, path: &'static str);
 }
 

@@ -1,18 +1,18 @@
 //! Estimators that always run together, with one ordered queue in front of them.
 //!
-//! Which estimators a message reaches is known at compile time, so `robot!` cuts the dataflow into islands: an estimator
-//! that is fed by one sensor alone, directly or through others, belongs to that sensor's island; one that several sensors
-//! feed, or that is declared `runs_on: worker`, begins an island of its own. Inside an island a message goes from estimator
-//! to estimator by plain calls on plain fields, without a lock, an atomic or a queue.
+//! The estimators that a message reaches are known at compile time, so `robot!` cuts the dataflow into islands. An estimator
+//! fed by only one sensor, directly or through others, belongs to that sensor's island. One fed by several sensors, or declared
+//! `runs_on: worker`, begins its own island. Inside an island a message passes from estimator to estimator by plain calls on
+//! plain fields, without a lock, an atomic or a queue.
 //!
 //! Everything that reaches an island enters here: messages, timers, options, requests, restarts, losses and the stop. A
-//! publisher that finds the island free and nothing waiting runs everything downstream; otherwise the entry waits in the
-//! inbox, for the thread that holds the island to process before it leaves. So there is a single writer, and every entry has
-//! its place in one order.
+//! publisher that finds the island free and no entry waiting runs everything downstream. Otherwise the entry waits in the
+//! inbox until the thread that holds the island processes it before leaving. There is thus a single writer, and all entries
+//! are totally ordered.
 //!
-//! No thread blocks on the island's own lock; it is only ever tried. Threads that need an island that is held (a caller that
-//! waits for an answer, a publisher that waits for room) wait on a condition variable with a timeout, so that an estimator that
-//! hangs blocks no other thread forever.
+//! No thread blocks on the island's own lock; threads only ever try it. A thread that needs a held island (a caller waiting for
+//! an answer, a publisher waiting for room) waits on a condition variable with a timeout. An estimator that hangs therefore
+//! blocks no other thread forever.
 
 mod any;
 mod inbox;
@@ -151,7 +151,7 @@ pub struct Island<S: IslandState> {
 pub struct Key {
     /// The publisher, as the island numbers them.
     pub entry: usize,
-    /// The line; 0 if there is none.
+    /// The line number; 0 without a line.
     pub line: u64,
 }
 
@@ -165,7 +165,7 @@ struct Keyed<M> {
 /// Why a call was not made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum CallError {
-    /// The calling thread is inside an island of the same robot, and would wait for itself.
+    /// The calling thread is inside an island of the same robot and would wait for itself.
     Inside,
     /// Another thread has held the island for too long.
     Busy,
@@ -278,7 +278,7 @@ impl<S: IslandState> Island<S> {
         run(&turn)
     }
 
-    /// Puts a message into the inbox and makes sure that a thread processes it.
+    /// Puts a message into the inbox and ensures that a thread processes it.
     #[cold]
     fn enqueue(&self, wiring: &S::Wiring, now: MonotonicTime, message: Keyed<S::Message>) {
         let mut inbox = self.inbox();

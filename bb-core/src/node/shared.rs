@@ -1,4 +1,4 @@
-//! The part of a running estimator that other threads may read while it runs.
+//! The part of a running estimator that other threads may access while it runs.
 
 use super::EstimatorStatistics;
 use super::counters::Counters;

@@ -131,13 +131,13 @@ impl<'a> Turn<'a> {
         self.answering.set(Some(estimator));
     }
 
-    /// A callback has emitted nothing.
+    /// Records that a callback has emitted nothing.
     #[inline]
     pub(super) fn no_emission(&self) {
         self.answering.set(None);
     }
 
-    /// A callback of `estimator` has emitted at one or more outputs. Callbacks of other estimators may run in between.
+    /// Records that a callback of `estimator` has emitted at one or more outputs. Callbacks of other estimators may run in between.
     #[inline]
     pub(super) fn begin_emission(&self, estimator: &'static EstimatorDeclaration) {
         if self.is_observed {

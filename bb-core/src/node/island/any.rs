@@ -23,7 +23,7 @@ pub trait AnyIsland<W> {
     fn declaration(&self) -> IslandDeclaration;
     /// The numbers of its estimators.
     fn estimators(&self) -> &'static [usize];
-    /// Does what may be due.
+    /// Does any work that is due.
     fn wake(&self, wiring: &W, now: MonotonicTime);
     /// Adds an entry for an estimator.
     fn post(&self, wiring: &W, now: MonotonicTime, estimator: usize, entry: NodeEntry);
