@@ -1,4 +1,4 @@
-//! Why there is no transform at a time.
+//! Errors of transform lookups.
 
 use crate::Payload;
 use crate::time::MonotonicTime;
@@ -9,38 +9,38 @@ use std::time::Duration;
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum LookupError {
-    /// No state of a joint between the frames has come yet.
+    /// No state of a joint between the frames has arrived yet.
     UnknownJoint {
         /// The joint.
         joint: &'static str,
     },
-    /// The history of a joint begins later.
+    /// The history of a joint begins later than the requested time.
     TooOld {
         /// The joint.
         joint: &'static str,
         /// How much later.
         by: Duration,
     },
-    /// The newest state of a joint is older than that.
+    /// The newest state of a joint is older than the requested time.
     InFuture {
         /// The joint.
         joint: &'static str,
         /// How much older.
         by: Duration,
     },
-    /// The robot has no frame of that name, and all frames that it has are connected. What tf2 calls a `LookupException`.
+    /// The robot has no frame of that name, and all frames that it has are connected. tf2 calls this a `LookupException`.
     UnknownFrame {
         /// The unknown frame or path.
         name: String,
-        /// The nearest that there is.
+        /// The nearest existing name.
         nearest: Option<String>,
     },
 }
 
-/// The same of a joint by its number in the topology, as it is written into a journal.
+/// The same error, with the joint given by its number in the topology, as written to a journal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Payload)]
 pub enum Gap {
-    /// No state has come yet.
+    /// No state has arrived yet.
     Unknown {
         /// The joint.
         joint: usize,
@@ -62,7 +62,7 @@ pub enum Gap {
 }
 
 impl Gap {
-    /// In words of the robot with these joints.
+    /// The error with the names of the robot's joints.
     pub(super) fn error(self, name: impl Fn(usize) -> &'static str) -> LookupError {
         let duration = |nanos: i64| Duration::from_nanos(nanos.unsigned_abs());
         match self {
@@ -73,7 +73,7 @@ impl Gap {
     }
 }
 
-/// Of one joint, which the caller knows.
+/// The same error for one joint, which the caller knows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Missing {
     Unknown,
@@ -90,12 +90,12 @@ impl Missing {
         }
     }
 
-    /// Asked for a time before the oldest state.
+    /// The requested time is before the oldest state.
     pub(super) fn before(oldest: i64, time: MonotonicTime) -> Self {
         Self::TooOld { nanos: oldest.saturating_sub(time.as_nanos()) }
     }
 
-    /// Asked for a time after the newest state.
+    /// The requested time is after the newest state.
     pub(super) fn after(newest: i64, time: MonotonicTime) -> Self {
         Self::InFuture { nanos: time.as_nanos().saturating_sub(newest) }
     }

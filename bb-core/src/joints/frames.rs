@@ -1,4 +1,4 @@
-//! From any frame to any other, at any time.
+//! Transforms between any two frames at any time.
 
 use super::error::LookupError;
 use super::route::{Latest, Place, Route, place_of};
@@ -8,7 +8,7 @@ use crate::time::{MonotonicTime, nanos_of};
 use nalgebra::Isometry3;
 use std::time::Duration;
 
-/// From a frame to another, prepared: fixed joints are multiplied out.
+/// A prepared transform from one frame to another: fixed joints are multiplied out.
 #[derive(Clone, Debug)]
 pub struct TransformHandle {
     joints: Joints,
@@ -16,11 +16,11 @@ pub struct TransformHandle {
 }
 
 impl Joints {
-    /// Prepares the transforms that take points from the frame `source` to the frame `target`: names of links or joints, or
-    /// paths of sensors, estimators and actuators, whose frames are meant then.
+    /// Prepares the transforms that take points from the frame `source` to the frame `target`. Each is the name of a link or joint,
+    /// or the path of a sensor, estimator or actuator, which denotes its frame.
     ///
     /// # Errors
-    /// [`LookupError::UnknownFrame`]: the robot has no frame of that name, with the nearest that it has.
+    /// [`LookupError::UnknownFrame`] if the robot has no frame of that name; it contains the nearest existing name.
     pub fn between(&self, target: &str, source: &str) -> Result<TransformHandle, LookupError> {
         let find = |name: &str| self.place(name).ok_or_else(|| self.unknown_frame(name));
         let (target, source) = (find(target)?, find(source)?);
@@ -29,10 +29,10 @@ impl Joints {
         Ok(TransformHandle { joints: self.clone(), route })
     }
 
-    /// `target_from_source` at a time: [`Self::between`] and [`TransformHandle::at`] at once, for those who ask rarely.
+    /// `target_from_source` at a time: [`Self::between`] and [`TransformHandle::at`] in one call, for infrequent lookups.
     ///
     /// # Errors
-    /// As for both.
+    /// As for [`Self::between`] and [`TransformHandle::at`].
     pub fn transform(
         &self,
         target: &str,
@@ -57,16 +57,15 @@ impl Joints {
 }
 
 impl TransformHandle {
-    /// `target_from_source` at a time, interpolated between the states of the joints; exactly at the newest state at the
-    /// latest.
+    /// `target_from_source` at a time up to the newest state, interpolated between the states of the joints.
     ///
     /// # Errors
-    /// A joint between is unknown, its history begins later, or its newest state is older.
+    /// A joint between the frames is unknown, its history begins later, or its newest state is older.
     pub fn at(&self, time: MonotonicTime) -> Result<Isometry3<f64>, LookupError> {
         self.within(time, 0)
     }
 
-    /// The same, predicted where the newest state of a joint is older by no more than `tolerance`.
+    /// As [`Self::at`], but predicted where the newest state of a joint is older by no more than `tolerance`.
     ///
     /// # Errors
     /// As for [`Self::at`].
@@ -79,18 +78,18 @@ impl TransformHandle {
         self.route.at(self.joints.states(), time, tolerance_nanos).map_err(|gap| self.joints.error(gap))
     }
 
-    /// `target_from_source` at the newest time for which all joints between are known.
+    /// `target_from_source` at the newest time for which all joints between the frames are known.
     ///
     /// # Errors
-    /// A joint between is unknown, or its history begins after the newest state of another.
+    /// A joint between the frames is unknown, or its history begins after the newest state of another.
     pub fn latest(&self) -> Result<Latest, LookupError> {
         let found = self.route.latest(self.joints.states());
         found.map_err(|gap| self.joints.error(gap))
     }
 
-    /// The same as [`Self::at`], after waiting for joints whose state at that time has not come yet, `timeout` at most. It
-    /// blocks the thread, so that commands, which share theirs, ask with [`Self::at`] and sleep in between. On virtual time
-    /// nothing comes meanwhile, and nothing is waited for.
+    /// As [`Self::at`], after waiting at most `timeout` for joints whose state at that time has not arrived yet. This blocks the
+    /// thread, so commands, which share theirs, should use [`Self::at`] and sleep between attempts. On virtual time no state
+    /// arrives in the meantime, so this does not wait.
     ///
     /// # Errors
     /// As for [`Self::at`].
@@ -100,7 +99,7 @@ impl TransformHandle {
         found.map_err(|gap| self.joints.error(gap))
     }
 
-    /// How many joints between the two move.
+    /// The number of moving joints between the frames.
     pub fn moving_joints(&self) -> usize {
         self.route.moving_joints()
     }

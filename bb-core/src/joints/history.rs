@@ -7,7 +7,7 @@ use crate::topology::JointKind;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
 
-/// States of one joint in a ring, by their stamps. It allocates when the first one comes.
+/// States of one joint in a ring buffer, ordered by their stamps. It allocates when the first state arrives.
 #[derive(Debug)]
 pub(super) struct History {
     kind: JointKind,
@@ -16,14 +16,14 @@ pub(super) struct History {
     capacity: usize,
     span_nanos: i64,
     times: Box<[i64]>,
-    /// Of each state its positions, then velocities, then efforts; NaN where a quantity is not measured.
+    /// For each state, its positions, then velocities, then efforts; NaN where a quantity is not measured.
     rows: Box<[f64]>,
-    /// Where the next state goes.
+    /// The slot for the next state.
     next: usize,
     length: usize,
 }
 
-/// A state. One that comes has empty slices where a quantity is not measured.
+/// A state. An incoming state has empty slices where a quantity is not measured.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct State<'a> {
     pub(super) time: MonotonicTime,
@@ -32,7 +32,8 @@ pub(super) struct State<'a> {
     pub(super) effort: &'a [f64],
 }
 
-/// How many turns a continuous joint may be from where it was told last, before its turns are counted from there.
+/// How many turns the expected angle of a continuous joint may be from the reported one. Beyond that, turns are counted from the
+/// reported angle.
 const MOST_TURNS: f64 = 1e5;
 
 impl History {
@@ -56,7 +57,7 @@ impl History {
         }
     }
 
-    /// Adds a state, or says why not.
+    /// Adds a state, or returns why it is refused.
     pub(super) fn add(&mut self, state: State<'_>) -> Result<(), JointRefusal> {
         let is_measured = |values: &[f64]| !values.is_empty();
         if state.position.len() != self.positions
@@ -102,7 +103,7 @@ impl History {
         }
         self.next = (index + 1) % self.capacity;
         self.length = (self.length + 1).min(self.capacity);
-        // The newest is kept, however old.
+        // The newest state is kept, however old.
         while self.length > 1 && time.saturating_sub(self.time(0)) > self.span_nanos {
             self.length -= 1;
         }
@@ -115,7 +116,7 @@ impl History {
         self.kind != JointKind::Floating || (1e-12..1e12).contains(&norm_squared())
     }
 
-    /// The angle of a continuous joint, in the turn that is nearest to where the last state leads.
+    /// The angle of a continuous joint, in the turn nearest to the prediction from the last state.
     fn unwound(&self, state: &State<'_>) -> Option<f64> {
         let told = *state.position.first()?;
         let last = self.length.checked_sub(1)?;
@@ -131,7 +132,8 @@ impl History {
         };
         let expected = before + velocity * state.time.seconds_since(MonotonicTime::from_nanos(self.time(last)));
         if (expected - told).abs() > MOST_TURNS * TAU || expected.is_nan() {
-            // An absurd velocity or stamp: turns are counted from here, or the angle would lose its digits for good.
+            // An absurd velocity or stamp: restart counting turns here, since the angle would otherwise lose its digits
+            // permanently.
             return Some(told);
         }
         Some(told + TAU * ((expected - told) / TAU).round())
@@ -141,7 +143,7 @@ impl History {
         self.positions + 2 * self.velocities
     }
 
-    /// The place in the ring of the state of that number, from the oldest.
+    /// The index in the ring of the state with that number, counted from the oldest.
     #[inline]
     fn place(&self, number: usize) -> usize {
         let place = self.next + self.capacity - self.length + number;
@@ -153,7 +155,7 @@ impl History {
         self.times.get(self.place(number)).copied().unwrap_or(i64::MIN)
     }
 
-    /// Positions, velocities, efforts.
+    /// Returns positions, velocities and efforts.
     #[inline]
     fn row(&self, number: usize) -> &[f64] {
         let (place, stride) = (self.place(number), self.stride());
@@ -166,7 +168,7 @@ impl History {
         self.length.checked_sub(1).map(|last| self.time(last))
     }
 
-    /// The newest state; NaN where a quantity was not measured.
+    /// The newest state, with NaN where a quantity was not measured.
     pub(super) fn newest_state(&self) -> Option<State<'_>> {
         let last = self.length.checked_sub(1)?;
         let (position, rest) = self.row(last).split_at_checked(self.positions)?;
@@ -207,7 +209,7 @@ impl History {
         Ok(())
     }
 
-    /// The states before and after a time that is before the newest. Most ask for what has just been.
+    /// The states before and after a time that is before the newest state. Most lookups ask for a recent time.
     #[inline]
     fn around(&self, asked: i64) -> Option<(usize, usize)> {
         let last = self.length.checked_sub(1)?;
@@ -215,14 +217,14 @@ impl History {
         if self.time(second) <= asked {
             return Some((second, last));
         }
-        // Most joints are measured at a rate, so that the place follows from the time.
+        // Most joints are measured at a fixed rate, so the index follows from the time.
         let (oldest, newest) = (self.time(0), self.time(second));
         let share = asked.saturating_sub(oldest) as f64 / newest.saturating_sub(oldest) as f64;
         let guess = (share * second as f64) as usize;
         if guess < second && self.time(guess) <= asked && asked < self.time(guess + 1) {
             return Some((guess, guess + 1));
         }
-        // The first one that is later.
+        // Search for the first state that is later.
         let (mut low, mut high) = (0, second);
         while low < high {
             let middle = usize::midpoint(low, high);
@@ -236,11 +238,11 @@ impl History {
     }
 }
 
-/// The most coordinates of a joint: the position and the quaternion of a floating one.
+/// The most coordinates of a joint: the position and the quaternion of a floating joint.
 const MOST: usize = 7;
 
-/// Moves a position on with its velocity, which is NaN if it is not measured. It is held where an absurd velocity leads beyond all
-/// numbers.
+/// Predicts a position from its velocity, which is NaN if not measured. The position is held where an absurd velocity would make it
+/// non-finite.
 fn predict(kind: JointKind, position: &mut [f64], velocity: &[f64], duration_s: f64) {
     if velocity.iter().any(|value| value.is_nan()) {
         return;
@@ -257,7 +259,7 @@ fn predict(kind: JointKind, position: &mut [f64], velocity: &[f64], duration_s: 
 fn follow(kind: JointKind, position: &mut [f64], velocity: &[f64], duration_s: f64) {
     match (kind, position, velocity) {
         (JointKind::Planar, [x, y, angle], [forward, left, rate]) => {
-            // Along the circle, in the axes at its middle: the error is of third order.
+            // Along the circle, with the axes at its midpoint: the error is of third order.
             let (sin, cos) = (*angle + 0.5 * rate * duration_s).sin_cos();
             *x += (cos * forward - sin * left) * duration_s;
             *y += (sin * forward + cos * left) * duration_s;
@@ -277,7 +279,7 @@ fn follow(kind: JointKind, position: &mut [f64], velocity: &[f64], duration_s: f
     }
 }
 
-/// From one position to the next.
+/// Interpolates between two positions.
 #[inline]
 fn interpolate(kind: JointKind, from: &[f64], to: &[f64], share: f64, position: &mut [f64]) {
     // The difference of two finite numbers may be infinite.

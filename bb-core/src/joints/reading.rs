@@ -1,9 +1,9 @@
-//! From what a message tells of a joint to the joint's state.
+//! Converts a joint reading in a message to the joint's state.
 
 use crate::message::{JointReading, JointSide};
 use crate::topology::Joint;
 
-/// Room for the numbers of a reading after its conversion.
+/// Buffer for the numbers of a converted reading.
 #[derive(Debug, Default)]
 pub(super) struct Converted {
     position: [f64; 1],
@@ -11,7 +11,7 @@ pub(super) struct Converted {
     effort: [f64; 1],
 }
 
-/// What was measured at the joint, at the joint: the transmission of `joint` is undone if it was measured at the motor.
+/// Returns the reading at the joint: the transmission of `joint` is undone if the reading was measured at the motor.
 pub(super) fn at_joint<'a>(
     joint: &Joint,
     reading: &JointReading<'a>,

@@ -1,4 +1,4 @@
-//! The joints between two frames, and what an estimator was told of them.
+//! The joints between two frames, and the transforms reported to an estimator.
 
 use super::error::Gap;
 use super::states::{SharedStates, States};
@@ -12,35 +12,35 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Coordinates of a route up to which asking allocates nothing.
+/// The most coordinates of a route that can be looked up without allocation.
 const FEW: usize = 32;
 
-/// From one frame to another.
+/// The route from one frame to another.
 #[derive(Clone, Debug)]
 pub(super) struct Route {
     chain: Chain,
-    /// The joints whose positions it depends on, and where these are.
+    /// The joints whose positions the route depends on, with their ranges of coordinates.
     joints: Box<[(usize, Range<usize>)]>,
     positions: usize,
 }
 
-/// The newest transform for which all joints between are known.
+/// The newest transform for which all joints between the frames are known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Latest {
     /// `target_from_source`.
     pub transform: Isometry3<f64>,
-    /// When; none if no joint between moves.
+    /// The time of the transform; `None` if no joint between the frames moves.
     pub time: Option<MonotonicTime>,
 }
 
-/// Where a frame is: fixed to a link.
+/// A frame fixed to a link.
 #[derive(Clone, Debug)]
 pub(super) struct Place {
     link: &'static str,
     link_from_frame: Isometry3<f64>,
 }
 
-/// The frame of that name: a link's, or that of a joint at rest. What is no frame at all is at the root.
+/// The frame with that name: the frame of a link, or of a joint at rest. Returns `None` for an unknown name.
 pub(super) fn place_of(topology: &Topology, name: &str) -> Option<Place> {
     if let Some(link) = topology.links.iter().find(|link| link.name == name) {
         return Some(Place { link: link.name, link_from_frame: Isometry3::identity() });
@@ -51,7 +51,7 @@ pub(super) fn place_of(topology: &Topology, name: &str) -> Option<Place> {
 }
 
 impl Route {
-    /// None if a link is not the robot's.
+    /// Returns `None` if a link does not belong to the robot.
     pub(super) fn new(
         topology: &Topology,
         kinematics: &Kinematics,
@@ -100,7 +100,7 @@ impl Route {
         self.with_positions(|positions| self.read(&states.lock(), time, tolerance_nanos, positions))
     }
 
-    /// The same, after waiting for states that have not come yet.
+    /// As above, after waiting for states that have not arrived yet.
     pub(super) fn waited_for(
         &self,
         states: &SharedStates,
@@ -152,16 +152,16 @@ impl Route {
     }
 }
 
-/// One input of an estimator, as far as its transform is concerned.
+/// The source and target frames of one input of an estimator.
 #[derive(Clone, Debug)]
 pub(crate) struct RouteOf {
     /// The number of the input.
     pub(crate) input: usize,
-    /// Where its messages are from.
+    /// The frame of its messages.
     pub(crate) source: Frame,
     /// The frame of the estimator.
     pub(crate) target: Frame,
-    /// How much older than a message the newest state of a joint may be; none: as declared for the robot.
+    /// How much older than a message the newest state of a joint may be; `None` means the value declared for the robot.
     pub(crate) tolerance_nanos: Option<i64>,
 }
 
@@ -200,30 +200,30 @@ impl Routes {
         Self(estimators.iter().map(|inputs| inputs.iter().filter_map(route).collect()).collect())
     }
 
-    /// Those of an estimator, by its number.
+    /// The routes of the estimator with that number.
     pub(crate) fn of(&self, estimator: usize) -> Arc<[InputRoute]> {
         self.0.get(estimator).cloned().unwrap_or_else(|| Arc::new([]))
     }
 
-    /// Whether one of these estimators has any.
+    /// Whether any of these estimators has a route.
     pub(crate) fn has_any(&self, estimators: &[usize]) -> bool {
         let has = |estimator: &usize| self.0.get(*estimator).is_some_and(|routes| !routes.is_empty());
         estimators.iter().any(has)
     }
 }
 
-/// Where an input was at a dispatch, as a journal holds it.
+/// The transform of an input at a dispatch, as stored in a journal.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 pub struct PlacedInput {
     /// The estimator.
     pub estimator: usize,
     /// The number of its input.
     pub input: usize,
-    /// What it was told.
+    /// The reported transform or gap.
     pub placement: Placement,
 }
 
-/// What an estimator was told of an input.
+/// The answer given to an estimator about one of its inputs.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 pub enum Placement {
     /// `frame_from_input`.
@@ -233,9 +233,9 @@ pub enum Placement {
         /// w, x, y, z.
         rotation: [f64; 4],
     },
-    /// It is not known.
+    /// The transform is unknown.
     Missing {
-        /// Why.
+        /// The reason.
         gap: Gap,
     },
 }
@@ -252,7 +252,7 @@ impl Placement {
         }
     }
 
-    /// The same, bit by bit.
+    /// The stored answer, bit by bit.
     pub(crate) fn found(&self) -> Result<Isometry3<f64>, Gap> {
         match *self {
             Self::At { translation, rotation: [w, x, y, z] } => Ok(Isometry3::from_parts(

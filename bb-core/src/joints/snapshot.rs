@@ -7,7 +7,7 @@ use crate::payload::JointSnapshot;
 use crate::time::MonotonicTime;
 use crate::topology::JointKind;
 
-/// A joint whose state is known and not stale. Quantities that are not measured are NaN.
+/// A joint whose state is known and not stale. Quantities not measured are NaN.
 struct Listed {
     name: &'static str,
     position: f64,
@@ -16,10 +16,10 @@ struct Listed {
 }
 
 impl Joints {
-    /// All joints with one degree of freedom whose state is known and not stale, at the newest time that is known of all of
-    /// them; none if there is no such joint. Velocities and efforts are those of the newest states.
+    /// All joints with one degree of freedom whose state is known and not stale, at the newest time for which all of them are
+    /// known. Returns `None` if there is no such joint. Velocities and efforts are from the newest states.
     pub fn snapshot(&self) -> Option<(MonotonicTime, JointSnapshot)> {
-        // Room is made before the lock is taken.
+        // Allocate before the lock is taken.
         let mut listed = Vec::with_capacity(self.topology().joints.len());
         let time = self.list(&self.states().lock(), &mut listed)?;
         let mut snapshot = JointSnapshot::default();
@@ -39,7 +39,7 @@ impl Joints {
         Some((time, snapshot))
     }
 
-    /// Lists the joints whose state at the newest time that is known of all of them is known; that time.
+    /// Lists the joints with a known state at the newest time that all fresh joints have reached; returns that time.
     fn list(&self, states: &States, listed: &mut Vec<Listed>) -> Option<MonotonicTime> {
         let now = self.clock().now();
         let topology = self.topology();
@@ -56,14 +56,14 @@ impl Joints {
         let time = fresh.clone().map(|(.., newest)| newest).min()?;
         for (number, name, (owner, multiplier, offset), history, _) in fresh {
             let mut position = [0.0];
-            // The history of one that has only begun does not reach back to the others.
+            // The history of a joint that has only just begun does not reach back to the others.
             if history.sample(time, 0, &mut position).is_err() {
                 continue;
             }
             let first = |values: &[f64]| values.first().copied().unwrap_or(f64::NAN);
             let newest = history.newest_state();
             let (velocity, effort) = newest.map_or((f64::NAN, f64::NAN), |State { velocity, effort, .. }| {
-                // The effort is its own if it mimics none.
+                // The effort is the joint's own if it mimics no other joint.
                 (multiplier * first(velocity), if owner == number { first(effort) } else { f64::NAN })
             });
             listed.push(Listed { name, position: multiplier * position[0] + offset, velocity, effort });

@@ -12,27 +12,27 @@ use std::time::{Duration, Instant};
 /// How far ahead of the clock a stamp may be.
 const MAX_SKEW_NANOS: i64 = 1_000_000_000;
 
-/// Unknown names of joints that are counted one by one.
+/// The most unknown joint names that are counted individually.
 const MOST_UNKNOWN: usize = 64;
 
-/// [`States`] that any thread may read and add to. The lock is held for as long as some numbers are copied, and no code of
-/// users runs meanwhile.
+/// [`States`] that any thread may read and add to. The lock is held only while a few numbers are copied, and no user code runs
+/// meanwhile.
 #[derive(Debug)]
 pub(super) struct SharedStates {
     states: Mutex<States>,
     arrived: Condvar,
-    /// Threads that wait for a state.
+    /// The number of threads waiting for a state.
     waiting: AtomicUsize,
 }
 
 #[derive(Debug)]
 pub(super) struct States {
-    /// Of each joint of the topology.
+    /// One entry for each joint of the topology.
     known: Box<[Known]>,
     unknown: Vec<(String, u64)>,
 }
 
-/// What is known and counted of one joint.
+/// The history and the counts of one joint.
 #[derive(Debug)]
 pub(super) struct Known {
     pub(super) history: History,
@@ -55,7 +55,7 @@ impl SharedStates {
         self.states.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Adds a state that has come at `now`; the reason if it is the first one that is refused for it.
+    /// Adds a state that arrived at `now`. Returns the reason if the state is the first to be refused for it.
     pub(super) fn add(&self, joint: usize, state: State<'_>, now: MonotonicTime) -> Option<JointRefusal> {
         let mut states = self.lock();
         let known = states.known.get_mut(joint)?;
@@ -68,7 +68,7 @@ impl SharedStates {
             Ok(()) => {
                 known.states += 1;
                 drop(states);
-                // A thread that waits counts itself while it holds the lock.
+                // A waiting thread counts itself while it holds the lock.
                 if self.waiting.load(Ordering::Relaxed) > 0 {
                     self.arrived.notify_all();
                 }
@@ -82,7 +82,7 @@ impl SharedStates {
         }
     }
 
-    /// Counts a state of what is no joint; whether it is the first one.
+    /// Counts a state of an unknown joint; returns whether it is the first one.
     pub(super) fn add_unknown(&self, name: &str) -> bool {
         let mut states = self.lock();
         if let Some((_, count)) = states.unknown.iter_mut().find(|(known, _)| known == name) {
@@ -96,7 +96,7 @@ impl SharedStates {
         has_room
     }
 
-    /// Asks `look` until it is answered, or no state can change that, or for as long as `timeout`.
+    /// Calls `look` until it succeeds, until no new state can change its answer, or until `timeout` expires.
     pub(super) fn wait<T>(
         &self,
         timeout: Duration,
@@ -124,7 +124,7 @@ impl States {
         &self.known
     }
 
-    /// Names of what is no joint, and how often they came.
+    /// Names of unknown joints, and how often they occurred.
     pub(super) fn unknown(&self) -> &[(String, u64)] {
         &self.unknown
     }
@@ -133,7 +133,7 @@ impl States {
         self.known.get(joint).map(|known| &known.history)
     }
 
-    /// The position of a joint at a time into `position`.
+    /// Writes the position of a joint at a time to `position`.
     #[inline]
     pub(super) fn sample(
         &self,

@@ -1,4 +1,4 @@
-//! What is known and counted of joints.
+//! Status and counters of joints.
 
 use crate::time::MonotonicTime;
 use std::fmt;
@@ -7,15 +7,15 @@ use std::fmt;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
 pub enum JointRefusal {
-    /// It was older than the last one of its joint.
+    /// The state was older than the last state of its joint.
     OutOfOrder,
-    /// It had the stamp of the last one of its joint.
+    /// The state had the same stamp as the last state of its joint.
     Duplicate,
-    /// It held a NaN or an infinity, or a rotation without direction.
+    /// The state held a NaN or an infinity, or a rotation without direction.
     NonFinite,
-    /// Its stamp was more than a second ahead of the clock.
+    /// The state's stamp was more than a second ahead of the clock.
     ClockSkew,
-    /// It had another number of coordinates than the joint has.
+    /// The number of coordinates differed from the joint's.
     OtherCoordinates,
 }
 
@@ -24,7 +24,7 @@ impl JointRefusal {
     pub const ALL: &'static [Self] =
         &[Self::OutOfOrder, Self::Duplicate, Self::NonFinite, Self::ClockSkew, Self::OtherCoordinates];
 
-    /// As people read it.
+    /// The human-readable name.
     pub const fn name(self) -> &'static str {
         match self {
             Self::OutOfOrder => "out of order",
@@ -38,15 +38,15 @@ impl JointRefusal {
 
 pub(super) const REFUSALS: usize = JointRefusal::ALL.len();
 
-/// What a joint has counted since the start.
+/// The counts of a joint since the start.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct JointStatistics {
-    /// Its name; what a message has called it, if there is no such joint.
+    /// Its name, or the name given in a message if there is no such joint.
     pub joint: String,
-    /// Whether the robot has it.
+    /// Whether the robot declares it.
     pub is_declared: bool,
-    /// States that were kept.
+    /// States accepted.
     pub states: u64,
     /// States of an unknown joint.
     pub unknown: u64,
@@ -74,20 +74,20 @@ impl fmt::Display for JointStatistics {
     }
 }
 
-/// What is known of a joint now.
+/// The current status of a joint.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct JointStatus {
     /// Its name.
     pub joint: &'static str,
-    /// The stamp of its newest state; none if nothing is known.
+    /// The stamp of its newest state; `None` if its state is unknown.
     pub time: Option<MonotonicTime>,
-    /// Whether that is older than [`JointSettings::stale_after`](super::JointSettings).
+    /// Whether that state is older than [`JointSettings::stale_after`](super::JointSettings).
     pub is_stale: bool,
-    /// Its position then, as many numbers as it has coordinates; empty if nothing is known.
+    /// Its position at that time, with one number for each coordinate; empty if its state is unknown.
     pub position: Vec<f64>,
-    /// Its velocity then; empty if it was not measured.
+    /// Its velocity at that time; empty if it was not measured.
     pub velocity: Vec<f64>,
-    /// Its effort then; empty if it was not measured.
+    /// Its effort at that time; empty if it was not measured.
     pub effort: Vec<f64>,
 }

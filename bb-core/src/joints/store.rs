@@ -1,4 +1,4 @@
-//! Where the states of joints are kept.
+//! Storage of joint states.
 
 use super::error::{Gap, LookupError};
 use super::history::State;
@@ -16,15 +16,15 @@ use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// How much is kept of joints, and for how long a state is good.
+/// How much joint history is kept, and for how long a state is valid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct JointSettings {
-    /// States older than that are forgotten: 10 s.
+    /// States older than this are dropped: 10 s.
     pub history: Duration,
-    /// So many states of a joint are kept at most: 1024, which is 10 s at 100 Hz.
+    /// The most states kept of a joint: 1024, which is 10 s at 100 Hz.
     pub states: usize,
-    /// A joint whose newest state is older than that is stale: 100 ms. An estimator with a shorter
-    /// `sync_tolerance` takes that instead.
+    /// A joint whose newest state is older than this is stale: 100 ms. An estimator with a shorter `sync_tolerance` uses that
+    /// instead.
     pub stale_after: Duration,
 }
 
@@ -34,9 +34,9 @@ impl Default for JointSettings {
     }
 }
 
-/// The states of a robot's joints, and its frames at any time. See the [module](super). Clones are the same.
+/// The states of a robot's joints, and its frames at any time. See the [module](super). Clones share the same state.
 ///
-/// [`Live::joints`](crate::Live::joints) and [`Bus::joints`](crate::Bus::joints) give it.
+/// It is returned by [`Live::joints`](crate::Live::joints) and [`Bus::joints`](crate::Bus::joints).
 #[derive(Clone)]
 pub struct Joints(Arc<Inner>);
 
@@ -54,7 +54,7 @@ struct Inner {
 }
 
 impl Joints {
-    /// Of a robot with these components, by path. `routes` are those of the inputs of its estimators.
+    /// Creates the store of a robot with these components, by path. `routes` are the routes of its estimators' inputs.
     pub(crate) fn new(
         topology: &'static Topology,
         settings: JointSettings,
@@ -73,7 +73,7 @@ impl Joints {
         Ok(Self(Arc::new(Inner { topology, kinematics, settings, clock, names, components, routes, states })))
     }
 
-    /// Of a robot without links.
+    /// Creates the store of a robot without links.
     #[cfg(all(test, loom))]
     pub(crate) fn of_none(clock: Clock) -> Self {
         const NONE: Topology = Topology { links: &[], joints: &[] };
@@ -81,11 +81,11 @@ impl Joints {
         joints.expect("nothing is wrong with no joints")
     }
 
-    /// Keeps what a message tells of joints.
+    /// Stores the joint readings of a message.
     #[inline]
     pub(crate) fn hear<T: Payload>(&self, message: &Stamped<T>, now: MonotonicTime) {
         if T::TELLS_JOINT_POSITION {
-            // The payload's code runs without the lock.
+            // The payload's code runs without holding the lock.
             message.payload.tell_joints(&mut |reading| self.keep(message.stamp(), &reading, now));
         }
     }
@@ -100,7 +100,7 @@ impl Joints {
         if joint.kind == JointKind::Fixed {
             return self.note_unknown(name);
         }
-        // It follows from the joint that it mimics.
+        // Its state follows from the joint that it mimics.
         if joint.mimic.is_some() {
             return;
         }
@@ -153,7 +153,7 @@ impl Joints {
         &self.0.routes
     }
 
-    /// In words.
+    /// The error with joint names.
     pub(crate) fn error(&self, gap: Gap) -> LookupError {
         gap.error(|number| self.0.topology.joints.get(number).map_or("?", |joint| joint.name))
     }
@@ -164,14 +164,14 @@ impl Joints {
         input.at(&self.0.states, time)
     }
 
-    /// What is known of the joint of that name or path, one that mimics another included; `None` if there is no such joint, or
-    /// it does not move.
+    /// The status of the joint with that name or path, including one that mimics another. Returns `None` if there is no such joint
+    /// or it does not move.
     pub fn status(&self, joint: &str) -> Option<JointStatus> {
         let number = *self.0.names.get(joint)?;
         self.status_of(&self.0.states.lock(), number)
     }
 
-    /// What is known of all joints that move, in the order of their declaration.
+    /// The status of all moving joints, in order of declaration.
     pub fn all(&self) -> Vec<JointStatus> {
         let states = self.0.states.lock();
         (0..self.0.topology.joints.len()).filter_map(|number| self.status_of(&states, number)).collect()
@@ -206,7 +206,7 @@ impl Joints {
         Some(status)
     }
 
-    /// What was counted: each moving joint of the robot, and unknown names in messages.
+    /// The counts of each moving joint of the robot and of unknown names in messages.
     pub fn statistics(&self) -> Vec<JointStatistics> {
         let states = self.0.states.lock();
         let joints = self.0.topology.joints.iter().zip(states.known());
@@ -229,11 +229,11 @@ impl Joints {
     }
 }
 
-/// Links and joints from the root: `base/pan`.
+/// The path of links and joints from the root: `base/pan`.
 fn joint_path(topology: &Topology, joint: &Joint) -> String {
     let mut names = vec![joint.name];
     let mut link = topology.links.get(joint.parent);
-    // A declared robot is a tree. The loop ends even if it is not.
+    // A declared robot is a tree. The loop terminates even if it is not.
     for _ in 0..=topology.links.len() {
         let Some(at) = link else { break };
         names.push(at.name);

@@ -1,4 +1,4 @@
-//! Random robots: a look-up by handle is what the kinematics of the whole robot give.
+//! Random robots: a lookup by handle agrees with the kinematics of the whole robot.
 
 use super::*;
 use crate::kinematics::{Frames, Kinematics};
@@ -24,7 +24,7 @@ impl JointPositions for Placed {
     }
 }
 
-/// Kind, parent, origin, axis, and the joint that it mimics, if it can.
+/// Kind, parent, origin, axis, and the joint that it mimics, if possible.
 type Drawn = (usize, prop::sample::Index, [f64; 6], [f64; 3], Option<(prop::sample::Index, f64, f64)>);
 
 fn topology(drawn: &[Drawn]) -> Topology {
@@ -110,7 +110,7 @@ proptest! {
         let found = joints.transform(target, source, MonotonicTime::ZERO).expect("all are known");
         let error = (found.to_homogeneous() - expected.to_homogeneous()).abs().max();
         prop_assert!(error < 1e-12, "{target} {source}: {found} {expected}");
-        // Messages for viewers lead there too.
+        // Messages for viewers give the same result.
         let told = topology.joints.iter().enumerate().map(|(number, _)| {
             let (owner, multiplier, offset) = topology.followed(number);
             let range = kinematics.joint(topology.joints[owner].name).expect("it has one").positions.clone();

@@ -1,4 +1,4 @@
-//! Which messages of an input are accepted.
+//! Decides which messages of an input are accepted.
 
 use super::DropReason;
 use crate::Payload;
@@ -20,13 +20,13 @@ impl Admission {
         Self { last: vec![never; inputs].into() }
     }
 
-    /// The time of the last message of an input that was accepted.
+    /// The time of the last accepted message of an input.
     #[inline]
     pub(super) fn last(&self, input: usize) -> Option<MonotonicTime> {
         self.last.get(input).copied().filter(|last| last.as_nanos() > i64::MIN)
     }
 
-    /// Accepts `message`, which arrived at `now`, or returns why not. Equal times are in order.
+    /// Accepts `message`, which arrived at `now`, or returns the reason for the drop. Equal times are in order.
     #[inline]
     pub(super) fn admit<T: Payload>(
         &mut self,

@@ -1,9 +1,9 @@
-//! Messages that wait for an estimator to be restarted.
+//! Messages that wait until an estimator is restarted.
 
 use crate::fault::discard;
 use std::collections::VecDeque;
 
-/// Deliveries in the order in which they came, each with the number of the input that it is for.
+/// Deliveries in order of arrival, each with the number of its input.
 pub(super) struct Backlog<D>(VecDeque<(usize, D)>);
 
 /// The capacity of an inbox.
@@ -19,7 +19,7 @@ impl<D> Backlog<D> {
         self.0.is_empty()
     }
 
-    /// Keeps a delivery; returns the input of the oldest one, if that had to make room.
+    /// Keeps a delivery. Returns the input of the oldest one if that was dropped to make room.
     pub(super) fn push(&mut self, input: usize, delivery: D) -> Option<usize> {
         let dropped = if self.0.len() == CAPACITY { self.0.pop_front() } else { None };
         self.0.push_back((input, delivery));
@@ -31,13 +31,13 @@ impl<D> Backlog<D> {
         self.0.pop_front().map(|(_, delivery)| delivery)
     }
 
-    /// Drops all; returns the input of each.
+    /// Drops all deliveries; returns the input of each.
     pub(super) fn clear(&mut self) -> impl Iterator<Item = usize> + '_ {
         self.0.drain(..).map(dropped_for)
     }
 }
 
-/// Drops a delivery, whose message may panic at that; returns the input that it was for.
+/// Drops a delivery, whose message may panic in `Drop`; returns its input.
 fn dropped_for<D>((input, delivery): (usize, D)) -> usize {
     discard(delivery);
     input
@@ -47,7 +47,7 @@ fn dropped_for<D>((input, delivery): (usize, D)) -> usize {
 mod tests {
     use super::*;
 
-    /// Panics when it is dropped.
+    /// Panics when dropped.
     struct Glass;
 
     impl Drop for Glass {

@@ -1,10 +1,10 @@
-//! A count that is read while it is written.
+//! A count that can be read while it is written.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A count with one writer at a time (the thread that holds its estimator) and any number of readers.
 ///
-/// A plain load and store instead of an atomic addition: the writers exclude each other already.
+/// A plain load and store suffice instead of an atomic addition: the writers already exclude each other.
 #[derive(Debug, Default)]
 pub(crate) struct Count(AtomicU64);
 

@@ -1,4 +1,4 @@
-//! What a running estimator counts.
+//! Counters of a running estimator.
 
 use super::count::Count;
 use super::latency::{Latency, LatencyStatistics};
@@ -12,7 +12,7 @@ use std::sync::{Mutex, PoisonError};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
 pub enum DropReason {
-    /// The driver arrived, and this input had not yet, or was too old.
+    /// The driver arrived, but this input had not yet arrived or was too old.
     SyncMiss,
     /// The message was older than the last one of its input.
     OutOfOrder,
@@ -20,11 +20,11 @@ pub enum DropReason {
     NonFinite,
     /// The message's stamp was more than a second ahead of the clock.
     ClockSkew,
-    /// The estimator does not run: it has stopped, or it waits for its restart and its backlog is full.
+    /// The estimator is not running: it has stopped, or it is waiting for its restart and its backlog is full.
     Stopped,
-    /// The estimator was busy, and its inbox full.
+    /// The estimator was busy and its inbox full.
     Overflow,
-    /// The driver arrived, and a joint between this input and the output was unknown or too old.
+    /// The driver arrived, but the state of a joint between this input and the output was unknown or too old.
     NoTransform,
 }
 
@@ -63,10 +63,10 @@ impl DropReason {
 pub(super) struct InputCounters {
     pub(super) received: Count,
     pub(super) dropped: [Count; REASONS],
-    /// Messages that did not fit in the inbox. Their publishers count them, while another thread may hold the estimator; they
-    /// are not among the other two.
+    /// Messages that did not fit in the inbox. Their publishers count them, while another thread may hold the estimator. They are
+    /// not included in the other two counters.
     overflowed: AtomicU64,
-    /// How old messages of the driver were when the callback that they led to returned, in nanoseconds.
+    /// The age of the driver's messages, in nanoseconds, when the callback they led to returned.
     pub(super) age: Option<Latency>,
 }
 
@@ -78,7 +78,7 @@ pub(crate) struct Counters {
     pub(super) diverged: Count,
     pub(super) restarts: Count,
     pub(super) transitions: Count,
-    /// How long callbacks took, in nanoseconds: all where a latency budget is declared, else every 64th run.
+    /// Durations of callbacks, in nanoseconds: all callbacks where a latency budget is declared, else every 64th run.
     pub(super) latency: Latency,
     pub(super) last_divergence: Mutex<Option<&'static str>>,
     /// See [`Self::set_last_drop`]; 0 if nothing was dropped.
@@ -102,7 +102,7 @@ impl Counters {
         }
     }
 
-    /// Stores a drop with the number of runs before it: runs, input and reason in one word, from the upper half.
+    /// Stores a drop with the number of preceding runs: runs, input and reason in one word, from the upper half.
     fn set_last_drop(&self, input: usize, reason: DropReason) {
         let runs = self.dispatched.get() << 32;
         let drop = (input as u64) << 8 | (reason as u64 + 1);
@@ -120,7 +120,7 @@ impl Counters {
         Some((input.name, *reason))
     }
 
-    /// Counts a message that did not fit in an inbox; on any thread.
+    /// Counts a message that did not fit in an inbox; called on any thread.
     pub(super) fn overflow(&self, input: usize) {
         if let Some(counters) = self.inputs.get(input) {
             counters.overflowed.fetch_add(1, Ordering::Relaxed);
@@ -166,7 +166,7 @@ impl Counters {
     }
 }
 
-/// What an estimator has counted since the start.
+/// The counts of an estimator since the start.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct EstimatorStatistics {
@@ -174,32 +174,32 @@ pub struct EstimatorStatistics {
     pub path: &'static str,
     /// By input, in the order of declaration.
     pub inputs: Vec<InputStatistics>,
-    /// How often it was called.
+    /// How many times it was called.
     pub dispatched: u64,
-    /// How often it emitted.
+    /// How many times it emitted.
     pub emitted: u64,
-    /// How often it reported that it has diverged.
+    /// How many times it reported that it has diverged.
     pub diverged: u64,
-    /// How often it was restarted.
+    /// How many times it was restarted.
     pub restarts: u64,
-    /// How often its health has changed.
+    /// How many times its health has changed.
     pub transitions: u64,
     /// Its health.
     pub health: HealthState,
-    /// How long its callbacks took: all where a `latency_budget` is declared, else every 64th run.
+    /// Durations of its callbacks: all callbacks where a `latency_budget` is declared, else every 64th run.
     pub latency: LatencyStatistics,
     /// The reason of its last divergence.
     pub last_divergence: Option<&'static str>,
-    /// The input and the reason of the last message or run that was dropped, if it has not run since. When an estimator is lost
-    /// although its driver publishes, this says why.
+    /// The input and the reason of the last dropped message or run, if the estimator has not run since. It explains why an
+    /// estimator is lost although its driver publishes.
     pub last_drop: Option<(&'static str, DropReason)>,
-    /// Why it does not run, if it does not.
+    /// Why it is not running, if so.
     pub stopped: Option<String>,
-    /// Why the last dispatch that lacked a transform was dropped: which joint, and how old its state was.
+    /// Why the last dispatch that lacked a transform was dropped: the joint concerned, and how old its state was.
     pub last_gap: Option<LookupError>,
 }
 
-/// What an input has counted since the start.
+/// The counts of an input since the start.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct InputStatistics {
@@ -209,14 +209,14 @@ pub struct InputStatistics {
     pub source: &'static str,
     /// Messages that arrived, including dropped ones.
     pub received: u64,
-    /// How old the driver's messages were, from their stamp to the return of the callback that they led to; measured as
-    /// [`EstimatorStatistics::latency`] is.
+    /// The age of the driver's messages, from their stamp to the return of the callback they led to. It is measured in the same way
+    /// as [`EstimatorStatistics::latency`].
     pub age: LatencyStatistics,
     dropped: [u64; REASONS],
 }
 
 impl InputStatistics {
-    /// How many were dropped for `reason`.
+    /// How many messages were dropped for `reason`.
     pub fn dropped(&self, reason: DropReason) -> u64 {
         self.dropped[reason as usize]
     }

@@ -1,4 +1,4 @@
-//! Attributes panics in the code of a payload to the estimator that emitted it: that code (`clone` for a subscriber, say) runs
+//! Attributes panics in the code of a payload to the estimator that emitted it. That code, such as `clone` for a subscriber, runs
 //! wherever the message is passed on.
 
 use super::Environment;
@@ -9,11 +9,11 @@ use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 thread_local! {
-    /// The estimator whose output's code panicked on this thread, until it is reported.
+    /// The estimator whose output's code panicked on this thread, until this is reported.
     static CULPRIT: Cell<Option<usize>> = const { Cell::new(None) };
 }
 
-/// A guard while an estimator's output is passed on. It does nothing unless that panics.
+/// A guard held while an estimator's output is passed on. It acts only on a panic.
 pub(crate) struct Emitting(usize);
 
 impl Emitting {
@@ -38,8 +38,8 @@ impl Drop for Emitting {
     }
 }
 
-/// Runs code that passes messages on. A panic in the code of an estimator's output is reported as that estimator's; any other
-/// failure is returned.
+/// Runs code that passes messages on. A panic in the code of an estimator's output is reported as a failure of that estimator; any
+/// other failure is returned.
 pub(crate) fn contained(environment: &Environment, run: impl FnOnce()) -> Result<(), Failed> {
     let done = caught(|| {
         run();
@@ -48,7 +48,7 @@ pub(crate) fn contained(environment: &Environment, run: impl FnOnce()) -> Result
     done.or_else(|failed| blame(environment, failed))
 }
 
-/// The same for a caller outside; any other panic is resumed.
+/// As [`contained`], for an outside caller; any other panic is resumed.
 pub(crate) fn contained_outside(environment: &Environment, run: impl FnOnce()) {
     let Err(panic) = catch_unwind(AssertUnwindSafe(run)) else { return };
     match take_culprit(environment) {
@@ -57,7 +57,7 @@ pub(crate) fn contained_outside(environment: &Environment, run: impl FnOnce()) {
     }
 }
 
-/// Reports a failure that was caught while messages were passed on, if it was an estimator's output, or returns it.
+/// Reports a failure caught while messages were passed on, if an estimator's output caused it; otherwise returns it.
 #[cold]
 pub(crate) fn blame(environment: &Environment, failed: Failed) -> Result<(), Failed> {
     match take_culprit(environment).filter(|_| failed.panicked) {
@@ -69,8 +69,8 @@ pub(crate) fn blame(environment: &Environment, failed: Failed) -> Result<(), Fai
     }
 }
 
-/// Passes a message that an estimator has emitted at `path` to those outside its island. A panic there does not prevent others from
-/// getting it.
+/// Passes a message emitted by an estimator at `path` to subscribers outside its island. A panic there does not prevent other
+/// subscribers from getting the message.
 #[cold]
 pub(super) fn handed_on(environment: &Environment, path: &'static str, hand_on: impl FnOnce()) {
     if let Err(fault) = guarded(hand_on) {
@@ -78,7 +78,7 @@ pub(super) fn handed_on(environment: &Environment, path: &'static str, hand_on: 
     }
 }
 
-/// Copies a message that was published at `path`, and charges its publisher if the payload's `Clone` panics.
+/// Copies a message published at `path`, and charges its publisher if the payload's `Clone` panics.
 pub(super) fn copied_of<T: Payload>(
     environment: &Environment,
     path: &'static str,
@@ -92,7 +92,7 @@ pub(super) fn copied_of<T: Payload>(
     copy
 }
 
-/// A message that was published at `path` was copied, and the payload's `Clone` panicked.
+/// Handles a panic in the payload's `Clone` while a message published at `path` was copied.
 #[cold]
 pub(super) fn copy_failed(environment: &Environment, path: &'static str, panic: Panic) {
     charge(environment, path, &of_panic(panic));
@@ -104,7 +104,7 @@ pub(super) fn emitter(environment: &Environment, path: &'static str) -> Option<u
     environment.nodes().iter().find(emits).map(SharedNode::number)
 }
 
-/// The publisher at `path` is charged with a panic in its payload's code: an estimator is restarted.
+/// Charges the publisher at `path` with a panic in its payload's code: an estimator is restarted.
 fn charge(environment: &Environment, path: &'static str, fault: &Fault) {
     match emitter(environment, path) {
         Some(estimator) => report(environment, estimator, fault),
@@ -116,10 +116,10 @@ fn take_culprit(environment: &Environment) -> Option<usize> {
     CULPRIT.take().filter(|number| *number < environment.nodes().len())
 }
 
-/// The estimator fails, in the order of all that reaches it.
+/// Fails the estimator through an ordered entry of its island.
 fn report(environment: &Environment, estimator: usize, fault: &Fault) {
     environment.overseer().output_failed(estimator, format!("its output {fault}"));
-    // Islands that were left by the unwinding have not looked at their inboxes.
+    // Islands left by unwinding have not checked their inboxes.
     let mut islands: Vec<_> = environment.nodes().iter().map(|node| node.declaration().island).collect();
     islands.dedup();
     islands.into_iter().for_each(|island| environment.schedule_drain(island));

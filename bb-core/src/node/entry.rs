@@ -1,4 +1,4 @@
-//! What reaches one estimator beside messages, and what it reports.
+//! Entries for one estimator other than messages, and the estimator's reports.
 
 use crate::declaration::ParameterValues;
 use crate::event::HealthTransition;
@@ -9,17 +9,17 @@ use std::fmt;
 
 /// An entry for one estimator of an island.
 pub enum NodeEntry {
-    /// It starts: timers that it asked for in `init` run from now.
+    /// The estimator starts: timers requested in `init` run from now.
     Start,
-    /// New values of parameters.
+    /// New parameter values.
     Options(ParameterValues),
-    /// A restart from above.
+    /// A restart requested by a supervisor.
     Restart,
-    /// Its supervisor gives it up.
+    /// The supervisor gives up the estimator.
     GiveUp,
-    /// It is lost.
+    /// The estimator is lost.
     Silence {
-        /// How often it has been lost, this time included.
+        /// How often the estimator has been lost, this time included.
         epoch: u32,
         /// When the watchdog saw the last run completed.
         last_run: MonotonicTime,
@@ -28,20 +28,20 @@ pub enum NodeEntry {
     Cast {
         /// The request.
         request: Request,
-        /// Handles it. `None` in a replay of a journal that does not contain the request.
+        /// Handles the request. `None` in a replay of a journal that does not contain the request.
         handle: Option<Box<dyn Any + Send>>,
     },
-    /// The code of one of its outputs has panicked where that was handed on.
+    /// The code of one of its outputs panicked while the output was passed on.
     OutputFailed {
         /// What happened.
         message: String,
     },
-    /// It stops.
+    /// The estimator stops.
     Retire,
 }
 
 impl NodeEntry {
-    /// Its line in a journal.
+    /// The entry's line in a journal.
     pub(super) fn line(&self, estimator: usize, island: usize) -> Event {
         match self {
             Self::Start => Event::Start { island },
@@ -71,16 +71,16 @@ impl fmt::Debug for NodeEntry {
     }
 }
 
-/// What an estimator reports to the robot's control state.
+/// A report of an estimator to the robot's control state.
 #[derive(Clone, Debug)]
 pub(crate) enum Report {
-    /// Its health has changed.
+    /// The health has changed.
     Health(HealthReport),
-    /// It has failed.
+    /// The estimator has failed.
     Failed {
         /// What happened.
         message: String,
-        /// It panicked, which counts against its supervisor's budget.
+        /// Whether it panicked, which counts against its supervisor's budget.
         panicked: bool,
     },
 }
@@ -89,6 +89,6 @@ pub(crate) enum Report {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct HealthReport {
     pub(crate) transition: HealthTransition,
-    /// How many losses the estimator knew of. A report from before its last loss is out of date.
+    /// How many losses the estimator knew of. A report from before the last loss is out of date.
     pub(crate) epoch: u32,
 }

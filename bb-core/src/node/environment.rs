@@ -1,4 +1,4 @@
-//! What the estimators, sensors and services of one run share.
+//! State shared by the estimators, sensors and services of one run.
 
 use super::entry::Report;
 use super::mark::{Mark, RobotMark};
@@ -21,43 +21,43 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Instant;
 
-/// The robot as its estimators see it: the control state takes note of what they report, without waiting for anything.
+/// The robot as its estimators see it: the control state records their reports without blocking.
 pub(crate) trait Overseer: Guardian {
     fn report(&self, estimator: usize, report: Report);
-    /// Code of an output of that estimator has panicked while the output was passed on: the estimator gets an entry.
+    /// Code of an output of that estimator panicked while the output was passed on: the estimator gets an entry.
     fn output_failed(&self, estimator: usize, message: String);
-    /// Code of a message of a sensor or a service has panicked in an island.
+    /// Code of a sensor's or a service's message panicked in an island.
     fn message_failed(&self, path: &'static str, message: String);
-    /// Registers that the options of the component at `path` are bound to these parameters. An estimator gets new values as
-    /// entries, other components through their inbox.
+    /// Registers that the options of the component at `path` are bound to these parameters. An estimator receives new values as
+    /// entries; other components receive them through their inbox.
     fn bind(&self, path: &'static str, parameters: &'static [usize], check: Check, target: BindTarget);
     fn parameters(&self) -> ParameterValues;
-    /// Runs `make`, which creates the component at `path`, or changes its options. The disarm callbacks that it registers
-    /// replace earlier ones.
+    /// Runs `make`, which creates the component at `path` or changes its options. The disarm callbacks registered by `make` replace
+    /// earlier ones.
     fn replacing_hooks(
         &self,
         path: &'static str,
         is_made: bool,
         make: &mut dyn FnMut() -> Result<(), Failed>,
     ) -> Result<(), Failed>;
-    /// The component at `path` was left out: it has no disarm callbacks.
+    /// Records that the component at `path` was left out: it has no disarm callbacks.
     fn forget_hooks(&self, path: &'static str);
 }
 
-/// Whether options would be valid with these parameters.
+/// Checks whether options would be valid with these parameters.
 pub(crate) type Check = Box<dyn Fn(&ParameterValues) -> Result<(), String> + Send + Sync>;
 
 /// The receiver of new values.
 pub(crate) enum BindTarget {
-    /// An estimator, by its number.
+    /// The estimator with that number.
     Estimator(usize),
-    /// A component with an inbox of its own.
+    /// A component with its own inbox.
     Other(Box<dyn Fn() + Send + Sync>),
-    /// Nobody: a command takes its options when it starts.
+    /// No receiver: a command takes its options when it starts.
     Nobody,
 }
 
-/// Drains the island of that number.
+/// Drains the island with that number.
 type Drain = Box<dyn Fn(&Environment, usize) + Send + Sync>;
 
 /// How a robot runs.
@@ -65,7 +65,7 @@ type Drain = Box<dyn Fn(&Environment, usize) + Send + Sync>;
 pub(crate) enum Mode {
     /// In real time, on many threads.
     Real,
-    /// On virtual time, on its caller's thread.
+    /// On virtual time, on the caller's thread.
     Virtual,
     /// From a journal.
     Replay,
@@ -78,7 +78,7 @@ pub(crate) struct Refusal {
     pub(crate) fault: Fault,
 }
 
-/// What the estimators, sensors and services of one run share. Clones are the same.
+/// State shared by the estimators, sensors and services of one run. Clones share the same state.
 #[derive(Clone)]
 pub struct Environment(Arc<Inner>);
 
@@ -101,7 +101,7 @@ struct Inner {
     mark: RobotMark,
     /// Drains an island, once the robot is wired.
     drain: OnceLock<Drain>,
-    /// Islands with entries that wait, on virtual time.
+    /// Islands with waiting entries, on virtual time.
     posted: Mutex<VecDeque<usize>>,
     refusal: Mutex<Option<Refusal>>,
     /// Facts about the components for the header of the journal.
@@ -115,7 +115,7 @@ struct Inner {
     retired: (Mutex<usize>, Condvar),
 }
 
-/// What a replay compares with the journal.
+/// State used by a replay and its comparison with the journal.
 #[derive(Debug, Default)]
 pub(crate) struct Comparison {
     /// Outputs of islands: publisher and checksum, in order.
@@ -123,12 +123,12 @@ pub(crate) struct Comparison {
     missing: Mutex<Option<Missing>>,
 }
 
-/// What an estimator asked for in a replay, and the journal does not have.
+/// A value that an estimator asked for in a replay but the journal does not have.
 #[derive(Clone, Debug)]
 pub(crate) struct Missing {
     /// Its path.
     pub(crate) estimator: &'static str,
-    /// Such as `how long its callback took`.
+    /// The missing value, such as `how long its callback took`.
     pub(crate) what: String,
 }
 
@@ -142,7 +142,7 @@ impl Comparison {
         lock(&self.outputs).get_mut(&island)?.pop_front()
     }
 
-    /// Keeps the first thing of a turn that is missing.
+    /// Keeps the first value missing in a turn.
     pub(super) fn miss(&self, missing: Missing) {
         lock(&self.missing).get_or_insert(missing);
     }
@@ -152,7 +152,7 @@ impl Comparison {
     }
 }
 
-/// What [`Environment::new`] takes.
+/// The arguments of [`Environment::new`].
 pub(crate) struct EnvironmentParts {
     pub(crate) mode: Mode,
     pub(crate) clock: Clock,
@@ -211,8 +211,8 @@ impl Environment {
         }))
     }
 
-    /// Makes a component of a robot that starts, unless another one has failed to start. A failure is stored. The error says
-    /// why the component does not run, and whether it was left out.
+    /// Makes a component of a robot that starts, unless another component has failed to start. A failure is stored. The error says
+    /// why the component does not run and whether it was left out.
     pub(crate) fn make<C>(
         &self,
         path: &'static str,
@@ -234,18 +234,18 @@ impl Environment {
         })
     }
 
-    /// Stores why the robot cannot start, unless another component has done so.
+    /// Stores why the robot cannot start, unless another component has already done so.
     pub(crate) fn refuse(&self, path: &'static str, fault: Fault) {
         lock(&self.0.refusal).get_or_insert(Refusal { path, fault });
     }
 
-    /// What prevented the robot from starting, if anything.
+    /// The reason why the robot could not start, if any.
     pub(crate) fn take_refusal(&self) -> Option<Refusal> {
         lock(&self.0.refusal).take()
     }
 
-    /// Notifies `target` of changes of the parameters that these options are bound to. A value that would make the options
-    /// invalid is refused.
+    /// Notifies `target` of changes to the parameters bound to these options. A value that would make the options invalid is
+    /// refused.
     pub(crate) fn bind<O: Options>(
         &self,
         path: &'static str,
@@ -282,13 +282,13 @@ impl Environment {
         lock(&self.0.declared_facts).iter().chain(&*lock(&self.0.facts)).cloned().collect()
     }
 
-    /// Says how an island is drained, once the robot is wired.
+    /// Sets the function that drains an island, once the robot is wired.
     pub(crate) fn set_drain(&self, drain: impl Fn(&Self, usize) + Send + Sync + 'static) {
-        // It is set once.
+        // This is set only once.
         let _ = self.0.drain.set(Box::new(drain));
     }
 
-    /// Schedules an island with a new entry to be drained, by the pool or by the loop of a simulation.
+    /// Schedules an island with a new entry to be drained by the pool or by the loop of a simulation.
     pub(crate) fn schedule_drain(&self, island: usize) {
         match self.0.mode {
             Mode::Real => {
@@ -306,7 +306,7 @@ impl Environment {
         }
     }
 
-    /// Drains the islands with entries that wait, on virtual time.
+    /// Drains the islands with waiting entries, on virtual time.
     pub(crate) fn drain_posted(&self) {
         loop {
             let island = lock(&self.0.posted).pop_front();
@@ -317,13 +317,13 @@ impl Environment {
         }
     }
 
-    /// The estimators of one more island have stopped.
+    /// Records that the estimators of one more island have stopped.
     pub(super) fn note_retired(&self) {
         *lock(&self.0.retired.0) += 1;
         self.0.retired.1.notify_all();
     }
 
-    /// Waits until the estimators of `count` islands have stopped, or until `deadline`.
+    /// Waits until the estimators of this many islands have stopped, or until `deadline`.
     pub(crate) fn wait_for_retired(&self, islands: usize, deadline: Instant) {
         let mut retired = lock(&self.0.retired.0);
         while *retired < islands {
@@ -338,7 +338,7 @@ impl Environment {
     pub(crate) fn node(&self, number: usize) -> SharedNode {
         match self.0.nodes.get(number) {
             Some(node) => node.clone(),
-            // Numbers and declarations come from one expansion.
+            // Numbers and declarations come from the same expansion.
             None => SharedNode::new(usize::MAX, &EstimatorDeclaration::NONE),
         }
     }
@@ -381,7 +381,7 @@ impl Environment {
         &self.0.joints
     }
 
-    /// Where messages come in.
+    /// The entry point for messages.
     #[inline]
     pub(crate) fn door(&self) -> &Door {
         &self.0.door
@@ -406,7 +406,7 @@ impl Environment {
         self.0.telemetry.as_ref()
     }
 
-    /// Whether individual messages are observed: by a journal, a handler of telemetry, or the comparison of a replay.
+    /// Whether individual messages are observed by a journal, a telemetry handler or the comparison of a replay.
     #[inline]
     pub(crate) fn is_observed(&self) -> bool {
         self.0.journal.is_some() || self.0.telemetry.is_some() || self.0.mode == Mode::Replay
@@ -420,8 +420,8 @@ impl Environment {
         self.0.replayed_line.store(line, Ordering::Relaxed);
     }
 
-    /// Passes a message of a sensor or a service to its subscribers, and writes it to the journal, if there is one. Returns the
-    /// number of the line, or 0.
+    /// Passes a message of a sensor or a service to its subscribers and writes it to the journal, if there is one. Returns the line
+    /// number, or 0.
     #[inline]
     pub fn publish<T: Payload>(
         &self,
@@ -433,7 +433,7 @@ impl Environment {
         self.0.joints.hear(message, now);
         match &self.0.journal {
             None if self.0.mode == Mode::Replay => {
-                // Islands get it whatever happens to the copies for those who listen now.
+                // Islands get the message even if copying it for current subscribers panics.
                 if let Err(fault) = guarded(|| topic.publish(message)) {
                     tracing::error!(%fault, "a recorded message failed where it was copied");
                 }
@@ -459,7 +459,7 @@ impl Environment {
         }
     }
 
-    /// Counts a message that did not fit in the inbox of an estimator's island.
+    /// Counts a message that did not fit in the inbox of the estimator's island.
     pub fn overflow(&self, estimator: usize, input: usize) {
         if let Some(node) = self.0.nodes.get(estimator) {
             node.overflow(input);

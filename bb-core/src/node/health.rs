@@ -8,8 +8,8 @@
 //! | healthy, degraded | no run completed on a message of the driver for `lost_after` | lost | lost | `on_lost` |
 //! | lost | first run completed on a message of the driver | degraded, that completion counts if good | recovered | none |
 //!
-//! The watchdog, which waits for no user code, decides whether an estimator is lost. It tells the estimator by an entry of its
-//! island; a run completed before the estimator takes that entry is the first one after the loss.
+//! The watchdog, which waits for no user code, decides whether an estimator is lost. It notifies the estimator by an entry of its
+//! island. A run completed before the estimator takes that entry counts as the first one after the loss.
 
 use crate::event::{HealthReason, HealthState};
 
@@ -18,7 +18,7 @@ use crate::event::{HealthReason, HealthState};
 pub(super) enum Event {
     /// A run in budget, synchronous and not diverged.
     Good,
-    /// Anything that degrades.
+    /// Any event that degrades the estimator.
     Bad(HealthReason),
     /// No run was completed on a message of the driver for `lost_after`.
     Silence,
@@ -26,7 +26,7 @@ pub(super) enum Event {
     Run,
 }
 
-/// The state, and how many good completions there were in a row.
+/// The state and the number of consecutive good completions.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Health {
     pub(super) state: HealthState,
@@ -34,7 +34,7 @@ pub(super) struct Health {
 }
 
 impl Health {
-    /// Takes an event; the new state and the reason, if it changes.
+    /// Takes an event; returns the new state and the reason if the state changes.
     pub(super) fn on(&mut self, event: Event, recover_after: u32) -> Option<(HealthState, HealthReason)> {
         use HealthState::{Degraded, Healthy, Lost};
         let (state, reason) = match (self.state, event) {
@@ -66,7 +66,7 @@ mod tests {
     use super::*;
     use HealthState::{Degraded, Healthy, Lost};
 
-    /// Every state with every event: what it becomes, and why.
+    /// Every state with every event: the next state and the reason.
     #[test]
     fn every_row_of_the_table() {
         let bad = Event::Bad(HealthReason::SyncMiss);

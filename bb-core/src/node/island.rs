@@ -1,18 +1,18 @@
 //! Estimators that always run together, with one ordered queue in front of them.
 //!
-//! Which estimators a message reaches is known at compile time, so `robot!` cuts the dataflow into islands: an estimator
-//! that is fed by one sensor alone, directly or through others, belongs to that sensor's island; one that several sensors
-//! feed, or that is declared `runs_on: worker`, begins an island of its own. Inside an island a message goes from estimator
-//! to estimator by plain calls on plain fields, without a lock, an atomic or a queue.
+//! The estimators that a message reaches are known at compile time, so `robot!` cuts the dataflow into islands. An estimator
+//! fed by only one sensor, directly or through others, belongs to that sensor's island. One fed by several sensors, or declared
+//! `runs_on: worker`, begins its own island. Inside an island a message passes from estimator to estimator by plain calls on
+//! plain fields, without a lock, an atomic or a queue.
 //!
 //! Everything that reaches an island enters here: messages, timers, options, requests, restarts, losses and the stop. A
-//! publisher that finds the island free and nothing waiting runs everything downstream; otherwise the entry waits in the
-//! inbox, for the thread that holds the island to process before it leaves. So there is a single writer, and every entry has
-//! its place in one order.
+//! publisher that finds the island free and no entry waiting runs everything downstream. Otherwise the entry waits in the
+//! inbox until the thread that holds the island processes it before leaving. There is thus a single writer, and all entries
+//! are totally ordered.
 //!
-//! No thread blocks on the island's own lock; it is only ever tried. Threads that need an island that is held (a caller that
-//! waits for an answer, a publisher that waits for room) wait on a condition variable with a timeout, so that an estimator that
-//! hangs blocks no other thread forever.
+//! No thread blocks on the island's own lock; threads only ever try it. A thread that needs a held island (a caller waiting for
+//! an answer, a publisher waiting for room) waits on a condition variable with a timeout. An estimator that hangs therefore
+//! blocks no other thread forever.
 
 mod any;
 mod inbox;
@@ -50,51 +50,51 @@ use std::sync::{
 };
 use std::sync::{PoisonError, TryLockError};
 
-/// What `robot!` implements for its wiring.
+/// Implemented by `robot!` for its wiring.
 pub trait IslandWiring {
-    /// What all islands share.
+    /// State shared by all islands.
     fn environment(&self) -> &Environment;
 }
 
-/// What `robot!` implements for each island. `Send` is required of the whole wiring; as a bound here it would be proven again
+/// Implemented by `robot!` for each island. `Send` is required of the whole wiring; as a bound here it would be proven again
 /// wherever an island is named.
 pub trait IslandState: Sized {
     /// The robot's wiring.
     type Wiring: IslandWiring;
-    /// The messages that may wait in the inbox: a variant for each publisher outside that feeds the island.
+    /// The messages that may wait in the inbox, with one variant for each outside publisher that feeds the island.
     type Message;
-    /// Messages that the inbox holds.
+    /// The number of messages that the inbox holds.
     const CAPACITY: usize = 1024;
     /// The island as declared.
     const DECLARATION: IslandDeclaration;
 
-    /// Where it is.
+    /// Finds the island in the wiring.
     fn find(wiring: &Self::Wiring) -> &Island<Self>;
     /// Runs everything downstream of a message.
     fn deliver(&mut self, wiring: &Self::Wiring, message: &Self::Message, turn: &Turn<'_>);
-    /// Does something with the estimator of that number; false if it cannot.
+    /// Performs an act on the estimator with that number; returns `false` if it cannot.
     fn act(&mut self, wiring: &Self::Wiring, estimator: usize, act: Act<'_, '_>) -> bool;
 
-    /// Does what is due: timers, ticks, restarts.
+    /// Does all that is due: timers, ticks, restarts.
     fn wake(&mut self, wiring: &Self::Wiring, turn: &Turn<'_>) {
         for estimator in Self::DECLARATION.estimators {
             self.act(wiring, *estimator, Act::Turn(turn));
         }
     }
 
-    /// Hands an entry to the estimator of that number.
+    /// Hands an entry to the estimator with that number.
     fn handle(&mut self, wiring: &Self::Wiring, estimator: usize, entry: NodeEntry, turn: &Turn<'_>) {
         self.act(wiring, estimator, Act::Handle(entry, turn));
     }
 
-    /// In a replay: makes its estimators.
+    /// In a replay: creates its estimators.
     fn begin_replay(&mut self, wiring: &Self::Wiring) {
         for estimator in Self::DECLARATION.estimators {
             self.act(wiring, *estimator, Act::BeginReplay);
         }
     }
 
-    /// In a replay: publishes what one of its estimators emitted in reply to a request that the journal does not hold; false
+    /// In a replay: publishes the output that an estimator emitted in reply to a request missing from the journal. Returns `false`
     /// if no estimator of this island has such a publisher.
     fn emit(&mut self, wiring: &Self::Wiring, message: &DynamicMessage, turn: &Turn<'_>) -> bool {
         Self::DECLARATION.estimators.iter().any(|estimator| self.act(wiring, *estimator, Act::Emit(message, turn)))
@@ -115,7 +115,7 @@ const LONGEST_WAIT: Duration = Duration::from_millis(500);
 /// How long a caller waits for an island.
 const LONGEST_CALL: Duration = Duration::from_secs(5);
 
-/// For what is not part of the model.
+/// The ordering for values that are not part of the model.
 const RELAXED: std::sync::atomic::Ordering = std::sync::atomic::Ordering::Relaxed;
 
 /// An island and the inbox in front of it.
@@ -126,62 +126,62 @@ pub struct Island<S: IslandState> {
     pending: AtomicUsize,
     /// Callers that wait for the island, and publishers that wait for room in its inbox.
     waiting: AtomicUsize,
-    /// A publisher has waited for room in vain. The holder is considered hung until it takes the next entry.
+    /// Whether a publisher has waited for room in vain. The holder is considered hung until it takes the next entry.
     hangs: AtomicBool,
-    /// Signals the worker that an entry has been added.
+    /// Signals to the worker that an entry has been added.
     arrived: Condvar,
-    /// Signals waiting threads that an entry was taken, or that the island is free.
+    /// Signals to waiting threads that an entry was taken or that the island is free.
     moved: Condvar,
-    /// Whether a worker serves it.
+    /// Whether a worker serves the island.
     served: AtomicBool,
-    /// Whether a journal says when its entries are processed.
+    /// Whether a journal determines when entries are processed.
     replayed: AtomicBool,
-    /// Number of entries processed, for the report of an island that hangs.
+    /// Number of entries processed, used to report an island that hangs.
     turns: AtomicU64,
     /// The estimator whose callback ran last.
     running: AtomicU32,
     /// The time of the last entry.
     entered_nanos: AtomicI64,
-    /// Its estimators have stopped.
+    /// Whether its estimators have stopped.
     has_retired: AtomicBool,
 }
 
-/// The key of a message: its publisher, and the number of its line in the journal, if there is one.
+/// The key of a message: its publisher and its line number in the journal, if there is one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Key {
     /// The publisher, as the island numbers them.
     pub entry: usize,
-    /// The line; 0 if there is none.
+    /// The line number; 0 without a line.
     pub line: u64,
 }
 
-/// A message that waits.
+/// A waiting message.
 struct Keyed<M> {
     key: Key,
-    /// None if it could not be copied: it keeps its place in the order, and is dropped when its turn comes.
+    /// `None` if the message could not be copied: it keeps its place in the order, and is dropped when its turn comes.
     message: Option<M>,
 }
 
 /// Why a call was not made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum CallError {
-    /// The calling thread is inside an island of the same robot, and would wait for itself.
+    /// The calling thread is inside an island of the same robot and would wait for itself.
     Inside,
     /// Another thread has held the island for too long.
     Busy,
 }
 
-/// What a thread found when it looked at an island.
+/// What a thread found when it checked whether an island is held.
 struct Looked {
     is_held: bool,
-    /// An entry waits that another thread may have left because of the look.
+    /// Whether an entry is waiting that another thread may have left because of this check.
     has_kept: bool,
 }
 
-/// Writes what a turn found out when it ends, also if it ends because the code of a message panicked.
+/// Writes a turn's findings to the journal when the turn ends, even if the code of a message panics.
 struct Ending<'a, 'b, S: IslandState> {
     turn: &'a Turn<'b>,
-    /// The number of its line.
+    /// The number of the turn's line.
     cause: u64,
     island: PhantomData<S>,
 }
@@ -200,7 +200,7 @@ impl<S: IslandState> Drop for Ending<'_, '_, S> {
 type Held<'a, S> = Within<MutexGuard<'a, S>>;
 
 impl<S: IslandState> Island<S> {
-    /// An island that is not running yet.
+    /// Creates an island that is not running yet.
     pub fn new(state: S) -> Self {
         Self {
             state: Mutex::new(state),
@@ -219,7 +219,7 @@ impl<S: IslandState> Island<S> {
         }
     }
 
-    /// Runs `direct` if the island is free and nothing waits; otherwise leaves `message` in the inbox.
+    /// Runs `direct` if the island is free and no entry is waiting; otherwise leaves `message` in the inbox.
     #[inline]
     pub fn enter(
         &self,
@@ -239,7 +239,7 @@ impl<S: IslandState> Island<S> {
         self.enqueue(wiring, now, Keyed { key, message: message() });
     }
 
-    /// Processes one entry: writes its line, runs it, and writes how long measured callbacks took.
+    /// Processes one entry: writes its line, runs it, and records how long measured callbacks took.
     #[inline]
     fn process<T>(
         &self,
@@ -255,7 +255,7 @@ impl<S: IslandState> Island<S> {
         self.process_line(wiring, now, Some((line, wall_offset_nanos)), run)
     }
 
-    /// The same for an entry whose line has been written already, with that offset of the wall clock.
+    /// As above, for an entry whose line has already been written with that offset of the wall clock.
     #[inline]
     fn process_line<T>(
         &self,
@@ -271,17 +271,18 @@ impl<S: IslandState> Island<S> {
         };
         let turn = Turn::new(environment, S::DECLARATION.number, now, wall_offset_nanos, &self.running);
         let _ending = line.map(|(cause, _)| Ending::<S> { turn: &turn, cause, island: PhantomData });
-        // One writer at a time: plain stores instead of atomic additions. These are for the report of a turn that hangs.
+        // Only one thread writes at a time, so plain stores suffice instead of atomic additions. They are for the report of a turn
+        // that hangs.
         self.entered_nanos.store(now.as_nanos(), RELAXED);
         self.turns.store(self.turns.load(RELAXED).wrapping_add(1), RELAXED);
         run(&turn)
     }
 
-    /// Puts a message into the inbox and makes sure that a thread processes it.
+    /// Puts a message into the inbox and ensures that a thread processes it.
     #[cold]
     fn enqueue(&self, wiring: &S::Wiring, now: MonotonicTime, message: Keyed<S::Message>) {
         let mut inbox = self.inbox();
-        // Allocated once, at the first message that has to wait.
+        // Allocated only once, when the first message has to wait.
         inbox.reserve(S::CAPACITY);
         if self.replayed.load(Ordering::Relaxed) {
             return inbox.push(now, message);
@@ -291,7 +292,7 @@ impl<S: IslandState> Island<S> {
             let may_have_room = self.wait_for_room(wiring);
             self.attend(wiring);
             inbox = self.inbox();
-            // Otherwise another publisher may have taken the last place.
+            // Otherwise another publisher may have taken the last slot.
             if !may_have_room {
                 break;
             }
@@ -324,15 +325,15 @@ impl<S: IslandState> Island<S> {
         if !in_time {
             self.hangs.store(true, Ordering::Relaxed);
         }
-        // Before this thread looks at the inbox: see `drain`.
+        // This must precede this thread's check of the inbox: see `drain`.
         self.waiting.fetch_sub(1, Ordering::SeqCst);
         in_time
     }
 
-    /// Waits until `holds`, at most for `longest`; returns whether it holds.
+    /// Waits until `holds` returns true, for at most `longest`; returns whether it did.
     #[cfg(not(loom))]
     fn wait(&self, longest: Duration, holds: impl Fn() -> bool) -> bool {
-        // A change just before this thread began to wait is not signalled: this bounds how long it goes unnoticed.
+        // A change just before this thread began to wait is not signalled: this bounds the time until it is noticed.
         const STEP: Duration = Duration::from_millis(1);
         let start = std::time::Instant::now();
         loop {
@@ -347,7 +348,7 @@ impl<S: IslandState> Island<S> {
         }
     }
 
-    /// A model has no time: other threads go on once.
+    /// A model has no time: other threads proceed once.
     #[cfg(loom)]
     fn wait(&self, _: Duration, holds: impl Fn() -> bool) -> bool {
         loom::thread::yield_now();
@@ -371,8 +372,8 @@ impl<S: IslandState> Island<S> {
         }
     }
 
-    /// After an entry was added: signals the worker, or drains the island here unless another thread holds it. That thread
-    /// looks at the inbox after it has released the island; the fences make sure that one of the two sees the other.
+    /// After an entry was added: signals the worker, or drains the island on this thread unless another thread holds it. That
+    /// thread checks the inbox after it has released the island. The fences ensure that one of the two threads sees the other.
     fn attend(&self, wiring: &S::Wiring) {
         fence(Ordering::SeqCst);
         if self.served.load(Ordering::Relaxed) {
@@ -384,7 +385,7 @@ impl<S: IslandState> Island<S> {
         }
     }
 
-    /// Releases the island, and processes what has been added to the inbox since.
+    /// Releases the island, then processes any entries added to the inbox since.
     #[inline]
     fn leave(&self, wiring: &S::Wiring, state: Held<'_, S>) {
         drop(state);
@@ -394,14 +395,14 @@ impl<S: IslandState> Island<S> {
         }
     }
 
-    /// Once it has processed as much as an inbox holds, this thread leaves the rest to the threads that wait: they look at the
-    /// inbox after their wait, and the fences make sure that one of the two sees the other.
+    /// After this thread has processed as many entries as an inbox holds, it leaves the rest to the waiting threads. They check the
+    /// inbox after their wait, and the fences ensure that one of the two threads sees the other.
     #[cold]
     fn drain(&self, wiring: &S::Wiring) {
         if self.replayed.load(Ordering::Relaxed) {
             return;
         }
-        // Entries of control come here without having been attended to: see `attend`.
+        // Control entries get here without a call to `attend`, hence the fence: see there.
         fence(Ordering::SeqCst);
         let mut processed = 0;
         while self.pending.load(Ordering::Relaxed) != 0 && !self.served.load(Ordering::Relaxed) {
@@ -429,14 +430,14 @@ impl<S: IslandState> Island<S> {
         processed >= S::CAPACITY && self.waiting.load(Ordering::Relaxed) != 0
     }
 
-    /// Takes the next entry and processes it; returns false if the inbox is empty.
+    /// Takes the next entry and processes it; returns `false` if the inbox is empty.
     fn process_next(&self, state: &mut S, wiring: &S::Wiring) -> bool {
         let environment = wiring.environment();
         let mut inbox = self.inbox();
         let Some(taken) = inbox.take() else { return false };
         self.pending.store(inbox.pending().0, Ordering::Relaxed);
         self.hangs.store(false, Ordering::Relaxed);
-        // Under the inbox's lock, so that the line of a message dropped at the same time comes after it.
+        // The inbox's lock is held here, so the line of a message dropped at the same time comes after this one.
         let (now, line) = match &taken {
             Taken::Retire(now) => (*now, Event::Retire { island: S::DECLARATION.number }),
             Taken::Entry(now, entry) => (*now, line_of::<S>(entry)),
@@ -460,7 +461,7 @@ impl<S: IslandState> Island<S> {
             Taken::Entry(_, Entry::Node(estimator, entry)) => state.handle(wiring, estimator, entry, turn),
         });
         if retires {
-            // Count and journal what still waits before the last report.
+            // Count and journal the remaining entries before the last report.
             let mut processed = 0;
             while processed < S::CAPACITY && self.process_next(state, wiring) {
                 processed += 1;
@@ -471,8 +472,7 @@ impl<S: IslandState> Island<S> {
         true
     }
 
-    /// Calls `call` once the island is free and all earlier entries have been processed, then processes what has been added
-    /// since.
+    /// Runs `call` once the island is free and all earlier entries have been processed. Then processes the entries added since.
     ///
     /// With a journal, `line` is written first.
     pub(crate) fn call<T>(
@@ -495,7 +495,7 @@ impl<S: IslandState> Island<S> {
         Ok(result)
     }
 
-    /// Takes the island once it is free, within `longest`.
+    /// Takes the island once it is free, waiting for at most `longest`.
     fn hold(&self, wiring: &S::Wiring, longest: Duration) -> Option<Held<'_, S>> {
         if let Some(state) = self.try_hold(wiring) {
             return Some(state);
@@ -517,14 +517,14 @@ impl<S: IslandState> Island<S> {
     fn try_hold(&self, wiring: &S::Wiring) -> Option<Held<'_, S>> {
         let state = match self.state.try_lock() {
             Ok(state) => state,
-            // A panic inside is a component's, and was caught and reported there.
+            // A panic inside belongs to a component, and was caught and reported there.
             Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
             Err(TryLockError::WouldBlock) => return None,
         };
         Some(Within::new(state, wiring.environment().mark()))
     }
 
-    /// Whether a thread holds it. The caller does not want to enter.
+    /// Whether a thread holds the island. The caller does not want to enter.
     fn is_held(&self, wiring: &S::Wiring) -> bool {
         let Looked { is_held, has_kept } = self.look();
         if has_kept {
@@ -533,23 +533,23 @@ impl<S: IslandState> Island<S> {
         is_held
     }
 
-    /// Tries the lock, and lets go at once. A thread that found it taken meanwhile has left its entry in the inbox for the one
-    /// that held it: someone else has to process it.
+    /// Tries the lock and releases it at once. A thread that found it taken meanwhile has left its entry in the inbox for the
+    /// holder, so another thread has to process that entry.
     fn look(&self) -> Looked {
         let tried = self.state.try_lock();
         let is_held = matches!(tried, Err(TryLockError::WouldBlock));
-        // Releasing a lock is not a step of the model. This is one, at which other threads find the lock taken.
+        // Releasing a lock is not a step of the model. This call is a step, at which other threads find the lock taken.
         #[cfg(loom)]
         self.pending.load(Ordering::Relaxed);
         drop(tried);
-        // As in `leave`: either this sees the entry, or that thread has found the lock free.
+        // As in `leave`: either this thread sees the entry, or the other thread has found the lock free.
         fence(Ordering::SeqCst);
         let has_kept =
             !is_held && self.pending.load(Ordering::Relaxed) != 0 && !self.served.load(Ordering::Relaxed);
         Looked { is_held, has_kept }
     }
 
-    /// Whether no thread holds it. The caller looks at the inbox afterwards: see [`Self::look`].
+    /// Whether no thread holds the island. The caller checks the inbox afterwards: see [`Self::look`].
     fn is_free(&self) -> bool {
         !matches!(self.state.try_lock(), Err(TryLockError::WouldBlock))
     }

@@ -1,13 +1,13 @@
-//! How long callbacks take, as a histogram that can be read while it is written.
+//! Callback durations, as a histogram that can be read while it is written.
 //!
-//! Buckets of an eighth of a power of two: a quantile is accurate within 12.5 %. Counting is a load and a store, since
-//! the thread that holds the estimator is the only writer; existing crates of histograms need a lock for that.
+//! Each bucket is an eighth of a power of two wide: a quantile is accurate within 12.5 %. Counting is a load and a store, since the
+//! thread that holds the estimator is the only writer; existing histogram crates need a lock for that.
 
 use super::count::Count;
 use std::fmt;
 use std::time::Duration;
 
-/// Buckets for each power of two.
+/// Buckets per power of two.
 const PARTS: usize = 8;
 /// Up to 2^40 ns: 18 minutes.
 const BUCKETS: usize = 40 * PARTS;
@@ -61,7 +61,7 @@ impl Latency {
     }
 }
 
-/// Below 8 ns each has its own; above, the three bits after the highest one choose among the parts of a power.
+/// Each value below 8 ns has its own bucket; above, the three bits after the highest one select among the parts of a power.
 fn bucket(nanos: u64) -> usize {
     if nanos < PARTS as u64 {
         return nanos as usize;
@@ -80,11 +80,11 @@ fn upper_end(bucket: usize) -> u64 {
     ((PARTS + part + 1) as u64) << (power - 3)
 }
 
-/// How long callbacks took. Quantiles are accurate within an eighth.
+/// Durations of callbacks. Quantiles are accurate within an eighth.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct LatencyStatistics {
-    /// How many were measured.
+    /// How many callbacks were measured.
     pub count: u64,
     /// The median.
     pub median: Duration,

@@ -2,8 +2,8 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// A robot's mark. The first 63 robots of a process that live at the same time have a bit each; those beyond share the last one
-/// and are told apart by their numbers.
+/// A robot's mark. The first 63 robots that live in a process at the same time have one bit each. Any further robots share the last
+/// bit and are told apart by their numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Mark {
     pub(super) bit: u64,
@@ -18,11 +18,11 @@ impl Mark {
     }
 }
 
-/// A robot owns its mark until this is dropped.
+/// Owns a robot's mark until dropped.
 #[derive(Debug)]
 pub(super) struct RobotMark(Mark);
 
-/// The bits that are taken. The shared one always is.
+/// The bits in use. The shared bit is always set.
 static TAKEN: AtomicU64 = AtomicU64::new(SHARED_BIT);
 const SHARED_BIT: u64 = 1 << 63;
 

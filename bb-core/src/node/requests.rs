@@ -1,4 +1,4 @@
-//! Requests to an estimator from outside the dataflow, and how a replay makes them again.
+//! Requests to an estimator from outside the dataflow, and how a replay repeats them.
 
 use crate::component::{Estimator, HandleCall, HandleCast, Reply};
 use crate::fault::Fault;
@@ -6,17 +6,17 @@ use crate::journal::RequestKind;
 use std::any::{Any, TypeId, type_name};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// A one-way request that waits.
+/// A one-way request waiting to be handled.
 pub(crate) type Cast<E> = Box<dyn FnOnce(&mut E) -> Result<Reply<<E as Estimator>::Output>, Fault> + Send>;
 
-/// Handles a request from its bytes, as a journal holds it.
+/// Handles a request from its bytes in a journal.
 pub(super) type Handle<E> = fn(&mut E, &[u8]) -> Result<Reply<<E as Estimator>::Output>, Fault>;
 
 /// How requests of one type are handled by one estimator; `handle` is a [`Handle`].
 struct Known {
     estimator: TypeId,
     kind: RequestKind,
-    /// The name of its type.
+    /// The name of the request type.
     name: &'static str,
     handle: Box<dyn Any + Send + Sync>,
 }
@@ -27,7 +27,7 @@ impl Known {
     }
 }
 
-/// The types of requests that this process has seen or registered; a replay looks them up by name.
+/// The request types that this process has seen or registered; a replay looks them up by name.
 static KNOWN: Mutex<Vec<Known>> = Mutex::new(Vec::new());
 
 /// Registers calls of type `Q` for replays.

@@ -1,4 +1,4 @@
-//! One running estimator: its inputs, its outputs, and what happens when it fails.
+//! One running estimator: its inputs, its outputs and its failures.
 
 mod placing;
 mod recovery;
@@ -38,32 +38,32 @@ pub struct Node<E: Estimator> {
     make_cache: fn() -> <E::Input as Inputs>::Cache,
     admission: Admission,
     backlog: Backlog<Deliver<E>>,
-    /// Where its inputs are, if some of them span moving joints.
+    /// The transforms of its inputs, if some of them span moving joints.
     placing: Placing,
     health: Health,
-    /// How many losses it knows of.
+    /// How many losses the estimator knows of.
     epoch: u32,
     /// Whether its last run was good.
     was_good: bool,
     timers: Timers,
-    /// When its island is woken for it, at the latest.
+    /// The latest time at which its island is woken for it.
     scheduled: Option<MonotonicTime>,
-    /// How often in a row it has continued its work.
+    /// How many times in a row it has continued its work.
     continued: u32,
-    /// The requests of its first `init`, until it starts.
+    /// The requests made in its first `init`, kept until it starts.
     requested: Vec<Request>,
-    /// The values of parameters that it got last.
+    /// The parameter values that it received last.
     parameters: ParameterValues,
 }
 
-/// Delivers a stored message to its estimator; returns the stamp of what it emitted, if anything.
+/// Delivers a stored message to its estimator; returns the stamp of the emitted output, if any.
 type Deliver<E> =
     Box<dyn FnOnce(&mut Node<E>, &Turn<'_>, &mut Option<<E as Estimator>::Output>) -> Option<Stamp> + Send>;
 
-/// How often in a row it may continue its work before it is considered stuck.
+/// How many times in a row an estimator may continue its work before it is considered stuck.
 const STUCK_AFTER: u32 = 1_000_000;
 
-/// What became of a message.
+/// The outcome of handling a message.
 enum Handled {
     Refused(DropReason),
     Stored,
@@ -72,13 +72,13 @@ enum Handled {
     Ran,
 }
 
-/// Where the parts of a reply go, one by one. Moving a reply as a whole from one result into the next costs more than all the
-/// rest of a hop.
+/// The destinations of the parts of a reply, which are moved one by one. Moving a whole reply from one result into the next costs
+/// more than the rest of a hop.
 struct Taken<'a, O> {
     emitted: &'a mut Option<O>,
     timers: &'a mut Timers,
     diverged: Option<&'static str>,
-    /// Whether something new is due.
+    /// Whether a new request was made.
     has_asked: bool,
 }
 
@@ -104,18 +104,17 @@ impl<'a, O> Taken<'a, O> {
 /// The result of [`Node::turn`].
 #[derive(Debug)]
 pub enum Next {
-    /// Nothing is due.
+    /// Nothing was due.
     Idle,
-    /// Something was due, and emitted nothing.
+    /// Something was due, but nothing was emitted.
     Quiet,
-    /// Something was due, and emitted.
+    /// Something was due, and an output was emitted.
     Emitted(Stamp),
 }
 
 impl<E: Estimator> Node<E> {
-    /// Creates the estimator; an error that prevents it from starting is stored in `environment`. `make_cache` creates the
-    /// slots of its inputs, and `binding` puts parameters into its options. In a replay it is created when the journal
-    /// begins.
+    /// Creates the estimator; an error that prevents it from starting is stored in `environment`. `make_cache` creates the slots of
+    /// its inputs, and `binding` puts parameters into its options. In a replay the estimator is created when the journal begins.
     pub fn new(
         number: usize,
         options: &E::Options,
@@ -156,8 +155,8 @@ impl<E: Estimator> Node<E> {
         node
     }
 
-    /// Takes a message of the declared input number `input`, which is the algorithm's field `F`. If it is the driver and no
-    /// required input is missing, the estimator runs. Returns the stamp of what it put into `emitted`, if anything.
+    /// Takes a message for the declared input number `input`, which is the algorithm's field `F`. If it is the driver and no
+    /// required input is missing, the estimator runs. Returns the stamp of the output put into `emitted`, if any.
     #[inline]
     pub fn receive<F: TakenAt<E::Input>>(
         &mut self,
@@ -177,7 +176,7 @@ impl<E: Estimator> Node<E> {
         None
     }
 
-    /// The same for a message that has been counted.
+    /// As above, for a message that has already been counted.
     #[inline]
     pub(super) fn take_in<F: TakenAt<E::Input>>(
         &mut self,
@@ -195,8 +194,8 @@ impl<E: Estimator> Node<E> {
         let budget = self.declaration.health.latency_budget_nanos;
         let mut begun = None;
         turn.enter(self.shared.number() as u32);
-        // All user code in one call: the payload's, the cache's clone and the estimator. After a panic the estimator is
-        // dropped, so that nothing sees a half-finished state.
+        // All user code runs in one call: the payload's code, the cache's clone and the estimator. After a panic the estimator is
+        // dropped, so nothing sees a half-finished state.
         let handled = caught(|| {
             if let Err(reason) = admission.admit(input, message, turn.now()) {
                 return Ok(Handled::Refused(reason));
@@ -276,16 +275,16 @@ impl<E: Estimator> Node<E> {
         }
     }
 
-    /// Whether it has asked to continue at once.
+    /// Whether the estimator has asked to continue at once.
     #[inline]
     pub fn is_unfinished(&self) -> bool {
         self.timers.continue_with.is_some()
     }
 
-    /// Does one thing that is due, if there is any.
+    /// Does one thing that is due, if any.
     pub fn turn(&mut self, turn: &Turn<'_>, emitted: &mut Option<E::Output>) -> Next {
         turn.timing().interrupt();
-        // An estimator that is woken schedules its next wake-up.
+        // An estimator that has been woken schedules its next wake-up.
         self.scheduled = None;
         if self.slot.restart_at().is_some_and(|at| at <= turn.now()) {
             self.restart(turn);
@@ -322,7 +321,7 @@ impl<E: Estimator> Node<E> {
         Next::Quiet
     }
 
-    /// Any callback but `handle_input`. It can degrade the estimator, but does not count towards its recovery.
+    /// Runs any callback other than `handle_input`. It can degrade the estimator, but does not count towards its recovery.
     fn run(
         &mut self,
         turn: &Turn<'_>,
@@ -408,8 +407,8 @@ impl<E: Estimator> Node<E> {
         }
     }
 
-    /// Measures a callback that has begun; returns a reason if it took longer than its budget. `driver` is the input that
-    /// it was called with, and the message's stamp.
+    /// Measures a callback that has begun; returns a reason if it exceeded its budget. `driver` is the input passed to the callback
+    /// and the message's stamp.
     fn measure(
         &mut self,
         begun: Begun,
@@ -443,7 +442,7 @@ impl<E: Estimator> Node<E> {
         (nanos > budget).then_some(HealthReason::LatencyOverrun)
     }
 
-    /// In a replay: the journal does not have what the estimator asks for.
+    /// In a replay: the journal does not have the value that the estimator asks for.
     #[cold]
     fn miss_in_journal<D: Default>(&self, what: String) -> D {
         self.environment.replayed().miss(Missing { estimator: self.declaration.path, what });
@@ -513,7 +512,7 @@ impl<E: Estimator> Node<E> {
         };
         let deliver: Deliver<E> =
             Box::new(move |node, turn, emitted| node.take_in::<F>(input, &message, turn, emitted));
-        // Dropping the oldest to make room is user code.
+        // Dropping the oldest message to make room runs user code.
         match caught(|| Ok(self.backlog.push(input, deliver))) {
             Ok(Some(oldest)) => self.shared.counters().drop(oldest, DropReason::Stopped),
             Ok(None) => {}

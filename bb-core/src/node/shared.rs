@@ -1,4 +1,4 @@
-//! The part of a running estimator that other threads may read while it runs.
+//! The part of a running estimator that other threads may access while it runs.
 
 use super::EstimatorStatistics;
 use super::counters::Counters;
@@ -10,7 +10,7 @@ use std::collections::VecDeque;
 use std::sync::atomic::{AtomicI64, AtomicU8, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Counters, health as published, and why it does not run. Clones are the same.
+/// Counters, published health, and why the estimator is not running. Clones share the same state.
 #[derive(Clone, Debug)]
 pub(crate) struct SharedNode(Arc<Inner>);
 
@@ -19,28 +19,28 @@ struct Inner {
     number: usize,
     declaration: &'static EstimatorDeclaration,
     counters: Counters,
-    /// Its health as the control state published it last.
+    /// The health last published by the control state.
     health: AtomicU8,
-    /// When the message of the last completed run arrived: for the watchdog.
+    /// When the message of the last completed run arrived, for the watchdog.
     last_run_nanos: AtomicI64,
     stopped: Mutex<Option<Stopped>>,
-    /// Why a dispatch was dropped for want of a transform the last time.
+    /// Why a dispatch was last dropped for lack of a transform.
     last_gap: Mutex<Option<LookupError>>,
-    /// One-way requests that wait.
+    /// The number of waiting one-way requests.
     casts: AtomicU32,
-    /// How long its callbacks are made to take on virtual time.
+    /// The simulated duration of its callbacks on virtual time.
     pretended_latency_nanos: AtomicI64,
-    /// How long they took, in a replay.
+    /// The recorded durations of its callbacks, in a replay.
     replayed_latencies: Mutex<VecDeque<i64>>,
-    /// Where its inputs were, in a replay.
+    /// The recorded transforms of its inputs, in a replay.
     replayed_placements: Mutex<VecDeque<PlacedInput>>,
 }
 
-/// Why it does not run.
+/// Why an estimator is not running.
 #[derive(Clone, Debug)]
 pub(crate) struct Stopped {
     pub(crate) reason: String,
-    /// It is not restarted.
+    /// Whether it is never restarted.
     pub(crate) for_good: bool,
 }
 
@@ -120,7 +120,7 @@ impl SharedNode {
         *lock(&self.0.last_gap) = Some(error);
     }
 
-    /// Takes one of `most` places for one-way requests; returns false if all are taken.
+    /// Reserves one of `most` slots for one-way requests; returns `false` if all are taken.
     pub(crate) fn begin_cast(&self, most: u32) -> bool {
         let taken = self
             .0
@@ -130,7 +130,7 @@ impl SharedNode {
     }
 
     pub(super) fn end_cast(&self) {
-        // In a replay nobody has taken a place.
+        // In a replay no slot has been taken.
         let _ = self.0.casts.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |casts| casts.checked_sub(1));
     }
 
@@ -138,7 +138,7 @@ impl SharedNode {
         self.0.pretended_latency_nanos.store(nanos, Ordering::Relaxed);
     }
 
-    /// A turn begins in a replay: what was known of earlier ones is over.
+    /// Begins a turn of a replay: recorded values of earlier turns are discarded.
     pub(crate) fn begin_replayed_turn(&self) {
         lock(&self.0.replayed_latencies).clear();
         lock(&self.0.replayed_placements).clear();
@@ -149,24 +149,24 @@ impl SharedNode {
         lock(&self.0.replayed_latencies).push_back(nanos);
     }
 
-    /// An input that it is about to ask for is there in a replay.
+    /// Sets the transform of an input that the estimator is about to ask for in a replay.
     pub(crate) fn replay_placement(&self, placed: PlacedInput) {
         lock(&self.0.replayed_placements).push_back(placed);
     }
 
-    /// Where the input of that number was, as the journal has it.
+    /// The transform of the input with that number, as recorded in the journal.
     pub(super) fn replayed_placement(&self, input: usize) -> Option<Placement> {
         let mut placements = lock(&self.0.replayed_placements);
         placements.front().filter(|placed| placed.input == input)?;
         placements.pop_front().map(|placed| placed.placement)
     }
 
-    /// How long the next measured callback took, as the journal has it.
+    /// The duration of the next measured callback, as recorded in the journal.
     pub(super) fn replayed_latency_nanos(&self) -> Option<i64> {
         lock(&self.0.replayed_latencies).pop_front()
     }
 
-    /// How long callbacks are made to take on virtual time.
+    /// The simulated duration of callbacks on virtual time.
     pub(super) fn pretended_latency_nanos(&self) -> i64 {
         self.0.pretended_latency_nanos.load(Ordering::Relaxed)
     }

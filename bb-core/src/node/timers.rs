@@ -1,10 +1,10 @@
-//! When something is due in one estimator.
+//! Timers and other pending work of one estimator.
 
 use crate::component::{Info, Request};
 use crate::time::MonotonicTime;
 use std::time::Duration;
 
-/// What an estimator has asked for.
+/// The requests made by an estimator.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Timers {
     pub(super) continue_with: Option<u32>,
@@ -13,11 +13,11 @@ pub(super) struct Timers {
     timers: Vec<(u32, MonotonicTime)>,
 }
 
-/// Timers that one estimator may have running; one more replaces the latest.
+/// The most timers that one estimator may have running; one more replaces the latest.
 const MAX_TIMERS: usize = 64;
 
-/// The shortest delay of a request. On virtual time, an estimator that asks for less again and again would stop the time from
-/// advancing.
+/// The shortest delay of a request. On virtual time, an estimator that repeatedly asked for a shorter delay would stop the time
+/// from advancing.
 const SHORTEST: Duration = Duration::from_micros(1);
 
 impl Timers {
@@ -40,7 +40,7 @@ impl Timers {
         }
     }
 
-    /// The estimator has handled something, which ends a timeout.
+    /// Records that the estimator has handled something, which ends a timeout.
     #[inline]
     pub(super) fn happened(&mut self) {
         self.timeout = None;
@@ -49,11 +49,11 @@ impl Timers {
     pub(super) fn next(&self) -> Option<MonotonicTime> {
         let timers = self.timers.iter().map(|(_, time)| *time);
         let all = timers.chain(self.timeout).chain(self.tick.map(|(_, time)| time));
-        // The last instant never comes.
+        // The last instant is never reached.
         all.min().filter(|time| *time < MonotonicTime::MAX)
     }
 
-    /// Takes what is due first, and the time at which it was due.
+    /// Takes the request that is due first, and the time at which it was due.
     pub(super) fn take(&mut self, now: MonotonicTime) -> Option<Info> {
         let due = self.next().filter(|due| *due <= now)?;
         if let Some(position) = self.timers.iter().position(|(_, time)| *time == due) {

@@ -1,15 +1,15 @@
-//! How long the callbacks of a turn take.
+//! Durations of the callbacks of a turn.
 
 use super::environment::{Environment, Mode};
 use crate::time::{MonotonicTime, Reading, Stopwatch};
 use std::cell::Cell;
 
-/// The reads of the clock and of the counter in one turn: the clock is read once, the counter once a callback, since the end of a
-/// callback is the beginning of the next unless something came between them.
+/// The reads of the clock and of the counter in one turn. The clock is read once and the counter once per callback, since the end
+/// of a callback is the beginning of the next unless something came between them.
 #[derive(Debug, Default)]
 pub(super) struct Timing {
     first: Cell<Option<First>>,
-    /// When the last measured callback ended, as long as nothing came after it.
+    /// When the last measured callback ended, as long as nothing has happened since.
     ended: Cell<Option<Begun>>,
 }
 
@@ -21,7 +21,7 @@ struct First {
     reading: Reading,
 }
 
-/// When a callback began that is to be measured.
+/// When a callback to be measured began.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Begun(Reading);
 
@@ -47,13 +47,13 @@ impl Timing {
         Begun(first.reading)
     }
 
-    /// Something happened that no callback is to be charged with.
+    /// Records an event whose time is charged to no callback.
     #[inline]
     pub(super) fn interrupt(&self) {
         self.ended.set(None);
     }
 
-    /// A callback ended. On virtual time it took `virtual_nanos`.
+    /// Ends the measurement of a callback. On virtual time the callback took `virtual_nanos`.
     #[inline]
     pub(super) fn end(
         &self,

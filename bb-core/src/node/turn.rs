@@ -13,25 +13,25 @@ use std::cell::{Cell, RefCell};
 use std::fmt;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// The processing of one entry: its time, measurements, and what goes to the journal.
+/// The processing of one entry: its time, its measurements, and its records for the journal.
 pub struct Turn<'a> {
     now: MonotonicTime,
     wall_offset_nanos: i64,
     environment: &'a Environment,
     island: usize,
     is_observed: bool,
-    /// The estimator whose callback runs or ran last, for the report of one that hangs.
+    /// The estimator whose callback runs or ran last, used to report one that hangs.
     running: &'a AtomicU32,
     timing: Timing,
     /// How long measured callbacks took, if there is a journal.
     measured: RefCell<Vec<Callback>>,
-    /// Where inputs across moving joints were, if there is a journal.
+    /// Transforms of inputs across moving joints, if there is a journal.
     placed: RefCell<Vec<PlacedInput>>,
-    /// The estimator whose callback runs now, if the journal does not contain the request that it answers.
+    /// The estimator whose callback runs now, if the request it answers is not in the journal.
     answering: Cell<Option<&'static EstimatorDeclaration>>,
-    /// The estimator whose outputs are such an answer.
+    /// The estimator whose outputs answer such a request.
     unrecorded: Cell<Option<&'static EstimatorDeclaration>>,
-    /// Whether the callback that ran last has emitted at one of its outputs already.
+    /// Whether the most recent callback has already emitted at one of its outputs.
     has_emitted: Cell<bool>,
 }
 
@@ -79,13 +79,13 @@ impl<'a> Turn<'a> {
         self.is_observed
     }
 
-    /// A callback of that estimator begins.
+    /// A callback of `estimator` begins.
     #[inline]
     pub(super) fn enter(&self, estimator: u32) {
         self.running.store(estimator, Ordering::Relaxed);
     }
 
-    /// Another island was entered in this turn: the callback that runs next is not charged with that.
+    /// Another island was entered in this turn: that time is not charged to the next callback.
     #[inline]
     pub fn left_for_another_island(&self) {
         self.timing.interrupt();
@@ -96,7 +96,7 @@ impl<'a> Turn<'a> {
         &self.timing
     }
 
-    /// Keeps how long a callback took, for the journal.
+    /// Records how long a callback took, for the journal.
     pub(super) fn keep(&self, estimator: usize, nanos: i64) {
         if self.environment.journal().is_some() {
             self.measured.borrow_mut().push(Callback { estimator, nanos });
@@ -107,7 +107,7 @@ impl<'a> Turn<'a> {
         self.measured.take()
     }
 
-    /// Keeps where an input was, for the journal.
+    /// Records where an input was, for the journal.
     pub(super) fn keep_placed(&self, placed: PlacedInput) {
         if self.environment.journal().is_some() {
             self.placed.borrow_mut().push(placed);
@@ -125,19 +125,19 @@ impl<'a> Turn<'a> {
         }
     }
 
-    /// The journal does not contain the request that `estimator` is about to answer, so its outputs are recorded instead. What
-    /// other estimators emit follows from these.
+    /// The request that `estimator` is about to answer is not in the journal, so its outputs are recorded instead. The outputs of
+    /// other estimators follow from these.
     pub(super) fn set_unrecorded(&self, estimator: &'static EstimatorDeclaration) {
         self.answering.set(Some(estimator));
     }
 
-    /// A callback has emitted nothing.
+    /// Records that a callback has emitted nothing.
     #[inline]
     pub(super) fn no_emission(&self) {
         self.answering.set(None);
     }
 
-    /// A callback of `estimator` has emitted at one or several outputs. Callbacks of other estimators may run in between.
+    /// Records that a callback of `estimator` has emitted at one or more outputs. Callbacks of other estimators may run in between.
     #[inline]
     pub(super) fn begin_emission(&self, estimator: &'static EstimatorDeclaration) {
         if self.is_observed {
@@ -150,11 +150,11 @@ impl<'a> Turn<'a> {
         }
     }
 
-    /// An estimator emits `message` at the publisher of that number.
+    /// An estimator emits `message` at the publisher with that number.
     #[inline]
     pub fn emit<T: Payload>(&self, publisher: usize, topic: &Topic<T>, message: &Stamped<T>) {
         if T::TELLS_JOINT_POSITION || self.is_observed || topic.is_listened_to() {
-            // Copies for others may take longer than the callback after them.
+            // Copies for other subscribers may take longer than the next callback.
             self.timing.interrupt();
             let path = topic.path();
             if T::TELLS_JOINT_POSITION {

@@ -1,4 +1,4 @@
-//! A running actuator: when it may move, and what happens when it fails.
+//! A running actuator: when it may move, and how its failures are handled.
 
 mod held;
 mod limits;
@@ -28,7 +28,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::task::{Wake, Waker};
 use std::time::{Duration, Instant};
 
-/// An actuator that asks to be updated at once, or in the past, is updated after this.
+/// The least delay before an actuator that asks to be updated at once, or in the past, is updated.
 const LEAST_PERIOD: Duration = Duration::from_micros(10);
 
 /// An actuator in the wiring.
@@ -42,9 +42,9 @@ struct Inner<A: Actuator> {
     environment: Environment,
     control: Control,
     topic: Topic<A::Command>,
-    /// Orders of its supervisor and changes of parameters.
+    /// Orders from its supervisor and parameter changes.
     orders: Mutex<Vec<Order>>,
-    /// When its code was entered.
+    /// The time at which its code was entered.
     occupied: Occupied,
     counts: Counts,
     reports: Reports,
@@ -55,14 +55,14 @@ struct Inner<A: Actuator> {
 
 struct State<A: Actuator> {
     slot: Slot<AsActuator<A>>,
-    /// It has failed, and could not be made safe then.
+    /// Whether it has failed and could not be made safe.
     is_unsafe: bool,
-    /// The command execution that sent the last command carried out.
+    /// The command execution that sent the last command to be carried out.
     moved_by: Permit,
-    /// The update time that the alarms currently hold.
+    /// The update time that is currently set as an alarm.
     alarm: Option<MonotonicTime>,
-    /// On virtual time: changes to report to the control state once the lock is released. Loggers, telemetry handlers
-    /// and subscribers hear of them on this thread and may disarm the robot, which takes the lock.
+    /// On virtual time: changes to report to the control state once the lock is released. Loggers, telemetry handlers and
+    /// subscribers receive them on this thread and may disarm the robot, which takes the lock.
     told: Vec<Told>,
 }
 
@@ -93,7 +93,7 @@ impl<A: Actuator> ActuatorNode<A> {
         let environment = assembly.environment.clone();
         let control = assembly.control.clone();
         let mut slot = Slot::new(Recipe::new(options, binding), environment.supervision());
-        // A replay does not move anything.
+        // A replay moves nothing.
         if environment.mode() != Mode::Replay {
             let parameters = control.parameters();
             let _ = environment.make(declaration.path, || {
@@ -122,15 +122,15 @@ impl<A: Actuator> ActuatorNode<A> {
                 told: Vec::new(),
             }),
         });
-        // In a replay as well: what is read from a file is decoded by the topic.
+        // Also in a replay: the topic decodes messages read from a file.
         if A::Command::COMMANDS_JOINT {
             inner.reports.announce(&inner.context, &*inner.host.0);
         }
-        // It may have work to do from the start.
+        // The actuator may have work to do from the start.
         if inner.environment.mode() != Mode::Replay {
             inner.alone(|_| ());
         }
-        // Weak, since the actuator owns the control state, which keeps these callbacks.
+        // Weak, since the actuator owns the control state, which stores these callbacks.
         let told = Arc::downgrade(&inner);
         let target = BindTarget::Other(Box::new(move || Inner::tell(&told, Order::Options)));
         assembly.environment.bind(declaration.path, options, binding, target);
@@ -150,12 +150,12 @@ impl<A: Actuator> ActuatorNode<A> {
         Self(inner)
     }
 
-    /// Where its commands are published.
+    /// The topic on which its commands are published.
     pub fn topic(&self) -> &Topic<A::Command> {
         &self.0.topic
     }
 
-    /// Carries out a command of an outside caller.
+    /// Carries out a command from an outside caller.
     ///
     /// # Errors
     /// See [`ActuatorError`].
@@ -183,7 +183,7 @@ impl<A: Actuator> Accepts<A::Command> for Inner<A> {
         let mut wakers = Wakers::default();
         self.alone(|state| {
             if state.moved_by.is_of_same(permit) {
-                // Disarming has stopped it already, and a failing actuator is made safe.
+                // Disarming has already stopped it, and a failing actuator is made safe.
                 let _ = self.carry_out(state, stop, &Permit::UNLIMITED, &mut wakers);
             }
         });
@@ -192,12 +192,12 @@ impl<A: Actuator> Accepts<A::Command> for Inner<A> {
 }
 
 impl<A: Actuator> Inner<A> {
-    /// Runs `run` while no other code of the actuator runs. Returns `None` if the caller is code of this actuator, or
-    /// of another one that it waits for: the call would wait for itself.
+    /// Calls `run` while no other code of the actuator runs. Returns `None` if the caller is code of this actuator, or of another
+    /// one that it waits for: the call would wait for itself.
     fn alone<T>(&self, run: impl FnOnce(&mut State<A>) -> T) -> Option<T> {
         let mut state = self.state.enter()?;
         let result = {
-            // Disarming would wait for this as well.
+            // Disarming would also wait for this.
             let _within = self.control.enter_actuator();
             run(&mut state)
         };
@@ -215,7 +215,7 @@ impl<A: Actuator> Inner<A> {
     fn schedule_update(&self, state: &mut State<A>) {
         let Some(actuator) = state.slot.running() else { return };
         let Some(due) = actuator.next_update() else { return };
-        // It must not keep virtual time from passing.
+        // An update must not prevent virtual time from advancing.
         let due = due.max(self.environment.clock().now() + LEAST_PERIOD);
         if state.alarm.is_none_or(|alarm| due < alarm) {
             state.alarm = Some(due);
@@ -246,7 +246,7 @@ impl<A: Actuator> Inner<A> {
         wakers: &mut Wakers,
     ) -> Result<(), ActuatorError> {
         self.obey(state);
-        // Under the lock that disarming takes as well: nothing moves after disarming has returned.
+        // This lock is also taken by disarming: nothing moves after disarming has returned.
         let safety = self.control.safety_now();
         if safety != Safety::Armed {
             return Err(ActuatorError::NotArmed(safety));
@@ -284,10 +284,10 @@ impl<A: Actuator> Inner<A> {
             let message = Recorded::Message(DynamicMessage::of(self.declaration.path, copy));
             journal.write(now, clock.wall_offset_nanos(), Event::Actuated { actuator: self.number, message });
         }
-        // Under the lock, in the order in which commands are carried out.
+        // Under the lock, so that messages keep the order in which commands are carried out.
         self.topic.publish_deferred(&message, wakers, &mut panic);
         if let Some(panic) = panic {
-            // It has moved: neither it nor its sender fails.
+            // The actuator has moved: neither it nor the sender fails.
             self.tell_control(state, Told::MessageFailed(format!("its message {}", of_panic(panic))));
         }
         Ok(())
@@ -298,7 +298,7 @@ impl<A: Actuator> Inner<A> {
         let Some(inner) = this.upgrade() else { return };
         let mut orders = lock(&inner.orders);
         if orders.contains(&order) {
-            // It waits for the actuator's code already.
+            // It already waits for the actuator's code.
             return;
         }
         orders.push(order);
@@ -344,7 +344,7 @@ impl<A: Actuator> Inner<A> {
         }
     }
 
-    /// Makes it safe, then creates it again.
+    /// Makes the actuator safe, then creates it again.
     fn remake(&self, state: &mut State<A>, now: MonotonicTime) {
         self.make_safe(state);
         self.make(state, now);
@@ -381,7 +381,7 @@ impl<A: Actuator> Inner<A> {
         }
     }
 
-    /// After a panic too: hardware that may still move is worse than a second panic, which is caught.
+    /// Makes the actuator safe, even after a panic: hardware that may still move is worse than a second panic, which is caught.
     fn make_safe(&self, state: &mut State<A>) {
         let Some(actuator) = state.slot.running() else { return };
         if let Err(failed) = caught(|| actuator.disarm()) {
@@ -433,7 +433,7 @@ impl<A: Actuator> Inner<A> {
     }
 }
 
-/// Its backoff is over, or it is to be updated.
+/// Runs when the actuator's backoff is over or an update is due.
 struct Due<A: Actuator>(Weak<Inner<A>>);
 
 impl<A: Actuator> Wake for Due<A> {
@@ -449,30 +449,30 @@ impl<A: Actuator> Wake for Due<A> {
     }
 }
 
-/// What all running actuators have in common.
+/// The common interface of all running actuators.
 pub trait AnyActuator {
     /// Its path.
     fn path(&self) -> &'static str;
-    /// The name of the type of its commands.
+    /// The name of its command type.
     fn command_name(&self) -> &'static str;
-    /// Where its commands are published.
+    /// The topic on which its commands are published.
     fn any_topic(&self) -> &dyn AnyTopic;
     /// An `Arc<dyn Accepts<T>>`, where `T` is the type of its commands.
     #[doc(hidden)]
     fn accepts(&self) -> Box<dyn Any>;
-    /// In a replay: publishes a command that it carried out; false if that is of another type.
+    /// In a replay: publishes a command that it carried out; returns `false` if the command has another type.
     #[doc(hidden)]
     fn replay(&self, message: &DynamicMessage) -> bool;
-    /// In a replay: makes the topic of its reports at `path`, if that is one of them.
+    /// In a replay: creates the topic of its reports at `path`, if `path` is one of them.
     #[doc(hidden)]
     fn announce(&self, path: &str);
-    /// Stops it once it is free; false if it is still busy after `timeout`.
+    /// Stops the actuator once it is free; returns `false` if it is still busy after `timeout`.
     #[doc(hidden)]
     fn terminate(&self, timeout: Duration) -> bool;
-    /// When its code was entered, if a thread is inside.
+    /// The time at which its code was entered, if a thread is inside.
     #[doc(hidden)]
     fn entered_at(&self) -> Option<MonotonicTime>;
-    /// What was counted.
+    /// The counts of the actuator.
     #[doc(hidden)]
     fn statistics(&self) -> ActuatorStatistics;
 }

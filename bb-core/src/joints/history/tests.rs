@@ -1,4 +1,4 @@
-//! Laws of one joint's history.
+//! Properties of one joint's history.
 
 use super::*;
 use proptest::prelude::*;
@@ -25,7 +25,7 @@ fn it_forgets_by_count_and_by_time() {
     }
     assert_eq!(sampled(&history, 6, 0), Ok(6.0));
     assert_eq!(sampled(&history, 5, 0), Err(Missing::TooOld { nanos: 1_000_000 }));
-    // Beyond the span all others are forgotten, and the last one is not.
+    // Beyond the span all states but the last one are dropped.
     history.add(state(1000, &[1.0], &[])).expect("it is newer");
     assert_eq!(sampled(&history, 9, 0), Err(Missing::TooOld { nanos: 991_000_000 }));
     assert_eq!((sampled(&history, 1000, 0), history.length), (Ok(1.0), 1));
@@ -75,8 +75,8 @@ fn coordinates_of_another_joint_are_refused() {
     assert_eq!(history.add(state(0, &[0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0], &[])), Ok(()));
 }
 
-/// A body that moves with a constant velocity in its own axes: a screw, which the interpolation and the prediction of floating
-/// and planar joints approximate to the second order.
+/// A body that moves with a constant velocity in its own axes: a screw motion, which the interpolation and the prediction of
+/// floating and planar joints approximate to second order.
 #[test]
 fn a_screw_is_followed_to_the_second_order() {
     let (speed, rate) = (1.0, 0.8);
@@ -111,14 +111,14 @@ fn a_screw_is_followed_to_the_second_order() {
         })
     };
     let (coarse, fine) = (error(0.1), error(0.05));
-    // Half the step: a quarter of the error of what is between, an eighth of what is beyond.
+    // With half the step, the interpolation error is a quarter and the prediction error an eighth.
     assert!((3.8..4.2).contains(&(coarse[0] / fine[0])), "{coarse:?} {fine:?}");
     assert!((7.0..9.0).contains(&(coarse[1] / fine[1])), "{coarse:?} {fine:?}");
     assert!(coarse[0] < 1.1e-3 && coarse[1] < 5e-5, "{coarse:?}");
 }
 
 proptest! {
-    /// Against the plain definition, over a list that is kept as a whole.
+    /// Compares with the plain definition, over a list that is kept in full.
     #[test]
     fn samples_are_those_of_the_list(
         steps in proptest::collection::vec((1..50_i64, -3.0..3.0_f64), 1..60),
@@ -153,10 +153,11 @@ proptest! {
         }
     }
 
-    /// A joint that turns on and on, told in one turn: between two states it is where it was, whatever turn it was told in.
+    /// A joint that keeps turning, reported within one turn: between two states it is at its true angle, whichever turn was
+    /// reported.
     #[test]
     fn turns_are_unwound(rate in -30.0..30.0_f64, start in -10.0..10.0_f64, told in 1..4_u32, is_measured: bool) {
-        // Without a velocity less than half a turn in a step can be told.
+        // Without a velocity, only steps of less than half a turn can be resolved.
         let rate = if is_measured { rate * 10.0 } else { rate };
         let truth = |millis: f64| start + rate * millis * 1e-3;
         let mut history = History::new(JointKind::Continuous, 64, i64::MAX);
@@ -177,7 +178,7 @@ proptest! {
     }
 }
 
-/// Any number, and often one at which sums and products overflow.
+/// Any number, often one at which sums and products overflow.
 fn extreme() -> impl Strategy<Value = f64> {
     prop_oneof![
         proptest::num::f64::NORMAL,
@@ -223,7 +224,7 @@ proptest! {
             let position = sampled(&history, millis, i64::MAX / 1_000_000).expect("all times are within the tolerance");
             prop_assert!(position.is_finite(), "{position}");
             let bound = states.iter().fold(0.0_f64, |bound, (position, _)| bound.max(position.abs()));
-            // Between two states it is between their positions.
+            // Between two states, the result is between their positions.
             prop_assert!(millis >= 100 * (states.len() as i64 - 1) || position.abs() <= bound * (1.0 + 1e-12));
         }
     }

@@ -1,4 +1,4 @@
-//! An island with its estimators erased: the interface of the runtime.
+//! A type-erased island: the interface used by the runtime.
 
 use super::{Key, NodeEntry};
 use crate::declaration::{IslandDeclaration, WorkerDeclaration};
@@ -17,50 +17,50 @@ use std::{
 /// Finds an island in a wiring.
 pub type IslandOf<W> = fn(&W) -> &dyn AnyIsland<W>;
 
-/// What all islands of a robot with the wiring `W` have in common.
+/// The common interface of all islands of a robot with the wiring `W`.
 pub trait AnyIsland<W> {
     /// The island as declared.
     fn declaration(&self) -> IslandDeclaration;
     /// The numbers of its estimators.
     fn estimators(&self) -> &'static [usize];
-    /// Something may be due.
+    /// Does any work that is due.
     fn wake(&self, wiring: &W, now: MonotonicTime);
     /// Adds an entry for an estimator.
     fn post(&self, wiring: &W, now: MonotonicTime, estimator: usize, entry: NodeEntry);
-    /// Has its estimators start.
+    /// Makes its estimators start.
     fn start(&self, wiring: &W, now: MonotonicTime);
-    /// Has its estimators stop, before anything else that waits.
+    /// Makes its estimators stop before any other waiting entry is processed.
     fn retire(&self, wiring: &W, now: MonotonicTime);
-    /// Processes what waits, unless another thread does.
+    /// Processes waiting entries, unless another thread does.
     fn drain(&self, wiring: &W);
     /// How its worker runs, if it has one.
     fn worker(&self) -> Option<WorkerDeclaration>;
-    /// Sets that a worker serves it, see [`Self::serve`].
+    /// Marks the island as served by a worker, see [`Self::serve`].
     fn give_to_worker(&self);
     /// Processes entries on the calling thread until its estimators have stopped.
     fn serve(&self, wiring: &W);
-    /// The number of entries processed, and the estimator whose callback ran last; `None` if no thread holds it.
+    /// The number of entries processed and the estimator whose callback ran last; `None` if no thread holds the island.
     fn busy(&self, wiring: &W) -> Option<(u64, usize)>;
     /// The time of the last entry.
     fn entered_at(&self) -> MonotonicTime;
-    /// Whether the calling thread is inside an island of this robot, and must not wait for one.
+    /// Whether the calling thread is inside an island of this robot, and thus must not wait for one.
     fn is_inside(&self, wiring: &W) -> bool;
     /// Whether its estimators have stopped.
     fn has_retired(&self) -> bool;
     /// Whether its inbox is empty and no thread holds it.
     fn is_idle(&self, wiring: &W) -> bool;
-    /// Sets that entries are processed only by [`Self::replay`].
+    /// Restricts processing of entries to [`Self::replay`].
     fn begin_replay(&self, wiring: &W);
-    /// Processes the entry that a journal names; returns false if none matches.
+    /// Processes the entry named by a journal; returns `false` if none matches.
     fn replay(&self, wiring: &W, now: MonotonicTime, entry: Replayed<'_>) -> bool;
 }
 
 /// An entry of an island in a journal.
 #[derive(Debug)]
 pub enum Replayed<'a> {
-    /// The first message of that key.
+    /// Deliver the first message with that key.
     Deliver(Key),
-    /// The first message of that key was dropped.
+    /// Drop the first message with that key.
     Drop(Key),
     /// Something was due.
     Wake,
@@ -70,7 +70,7 @@ pub enum Replayed<'a> {
     Retire,
     /// An entry for an estimator.
     Node(usize, NodeEntry),
-    /// What an estimator emitted in reply to a request that the journal does not hold.
+    /// The output that an estimator emitted in reply to a request missing from the journal.
     Emission(&'a DynamicMessage),
 }
 
@@ -123,7 +123,7 @@ impl<S: IslandState> AnyIsland<S::Wiring> for Island<S> {
             }
             let is_last = inbox.retires();
             drop(inbox);
-            // A caller may hold the island; it signals when it is done.
+            // A caller may hold the island; it signals when it has finished.
             let Some(mut state) = self.hold(wiring, Duration::MAX) else { continue };
             while self.process_next(&mut state, wiring) && self.waiting.load(Ordering::Relaxed) == 0 {}
             drop(state);
@@ -132,13 +132,13 @@ impl<S: IslandState> AnyIsland<S::Wiring> for Island<S> {
             }
             if self.waiting.load(Ordering::SeqCst) != 0 {
                 self.tell_waiting();
-                // A lock is not fair, and this thread would be faster than those that have to wake up first.
+                // A lock is not fair, and this thread would be faster than threads that must wake up first.
                 self.wait(Duration::from_millis(1), || self.waiting.load(Ordering::Relaxed) == 0);
             }
         }
         self.served.store(false, Ordering::SeqCst);
-        // A publisher that still saw the worker left its message to it: the fences make sure that one of the two sees the
-        // other. What came after the estimators had stopped is counted.
+        // A publisher that still saw the worker left its message to it: the fences ensure that one of the two sees the other.
+        // Messages that arrived after the estimators had stopped are counted.
         fence(Ordering::SeqCst);
         Self::drain(self, wiring);
     }
@@ -160,13 +160,13 @@ impl<S: IslandState> AnyIsland<S::Wiring> for Island<S> {
     }
 
     fn is_idle(&self, wiring: &S::Wiring) -> bool {
-        // In this order: a thread holds the island before it takes the last entry.
+        // The order matters: a thread holds the island before it takes the last entry.
         self.pending.load(Ordering::SeqCst) == 0 && !self.is_held(wiring)
     }
 
     fn begin_replay(&self, wiring: &S::Wiring) {
         self.replayed.store(true, Ordering::Relaxed);
-        // So that publishers never enter directly.
+        // This keeps publishers from entering directly.
         self.pending.store(usize::MAX, Ordering::Relaxed);
         if let Some(mut state) = self.try_hold(wiring) {
             state.begin_replay(wiring);

@@ -1,14 +1,14 @@
-//! What waits for an island that another thread holds.
+//! The entries that wait for an island held by another thread.
 
 use crate::declaration::ParameterValues;
 use crate::node::NodeEntry;
 use crate::time::MonotonicTime;
 use std::collections::VecDeque;
 
-/// An entry, and when it came.
+/// An entry with its time of arrival.
 pub(super) type Dated<M> = (MonotonicTime, Entry<M>);
 
-/// What can wait.
+/// An entry that can wait.
 pub(super) enum Entry<M> {
     /// A message.
     Message(M),
@@ -16,31 +16,31 @@ pub(super) enum Entry<M> {
     Wake,
     /// All estimators start.
     Start,
-    /// For the estimator of that number.
+    /// For the estimator with that number.
     Node(usize, NodeEntry),
 }
 
-/// Entries in the order in which they came.
+/// Entries in order of arrival.
 ///
-/// Messages are bounded by the island's capacity. All other entries are bounded by their kind: at most two wakes, one request
-/// to start, to be restarted, to be given up or to be lost per estimator, one panic of its outputs, the one-way requests that
-/// an estimator may have, and a few changes of options.
+/// Messages are bounded by the island's capacity. All other entries are bounded by their kind. There are at most two wakes. Each
+/// estimator has at most one start, one restart, one give-up, one loss and one panic of its outputs. It also has the one-way
+/// requests allowed for it and a few changes of options.
 pub(super) struct Inbox<M> {
     entries: VecDeque<Dated<M>>,
     messages: usize,
     wakes: u8,
-    /// The estimators stop before anything else that waits.
+    /// If set, the estimators stop before any other waiting entry is processed.
     retires: Option<MonotonicTime>,
 }
 
-/// The number of wakes that may wait. The first keeps its place, so that a flood of messages does not delay what is due. The second
-/// covers what becomes due meanwhile. For anything later, the island's agenda asks again.
+/// The number of wakes that may wait. The first keeps its place, so a flood of messages does not delay due work. The second covers
+/// work that becomes due meanwhile. For anything later, the island's agenda asks again.
 const MOST_WAKES: u8 = 2;
 
-/// Changes of options that wait for one estimator; the next one replaces the last of these.
+/// Changes of options that may wait for one estimator; the next one replaces the last of them.
 const MOST_OPTIONS: usize = 16;
 
-/// What an inbox holds, as one word: messages in the upper part, everything else in the lower.
+/// The contents of an inbox as one word: messages in the upper part, everything else in the lower part.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Pending(pub(super) usize);
 
@@ -59,7 +59,7 @@ impl<M> Inbox<M> {
         Self { entries: VecDeque::new(), messages: 0, wakes: 0, retires: None }
     }
 
-    /// Allocates room for its capacity.
+    /// Allocates room for the inbox's capacity.
     pub(super) fn reserve(&mut self, capacity: usize) {
         if self.entries.capacity() == 0 {
             self.entries.reserve_exact(capacity);
@@ -80,12 +80,12 @@ impl<M> Inbox<M> {
         self.entries.push_back((now, Entry::Message(message)));
     }
 
-    /// Takes the oldest message, which makes room for another.
+    /// Takes the oldest message to make room for another one.
     pub(super) fn pop_message(&mut self) -> Option<M> {
         self.take_message(|_| true)
     }
 
-    /// Takes the first message that `is_wanted`.
+    /// Takes the first message that matches `is_wanted`.
     pub(super) fn take_message(&mut self, is_wanted: impl Fn(&M) -> bool) -> Option<M> {
         let position = self.entries.iter().position(|(_, entry)| match entry {
             Entry::Message(message) => is_wanted(message),
@@ -165,7 +165,7 @@ impl<M> Inbox<M> {
     }
 }
 
-/// What is taken from an inbox.
+/// An entry taken from an inbox.
 pub(super) enum Taken<M> {
     Entry(MonotonicTime, Entry<M>),
     Retire(MonotonicTime),

@@ -1,4 +1,4 @@
-//! The robots whose islands a thread is inside. Code that runs there must not wait for an island of the same robot.
+//! The robots whose islands a thread is inside. Code running there must not wait for an island of the same robot.
 
 use crate::node::mark::Mark;
 use std::cell::{Cell, RefCell};
@@ -17,7 +17,7 @@ loom::thread_local! {
     static SHARING: RefCell<Vec<u64>> = RefCell::new(Vec::new());
 }
 
-/// A guard while the calling thread is inside an island of a robot.
+/// A guard held while the calling thread is inside an island of a robot.
 pub(super) struct Inside {
     before: u64,
     is_shared: bool,
@@ -58,13 +58,13 @@ fn share(mark: Mark) {
     SHARING.with(|sharing| sharing.borrow_mut().push(mark.number));
 }
 
-/// Of the island that was entered last: a thread leaves islands in the opposite order.
+/// For the island that was entered last: a thread leaves islands in reverse order.
 #[cold]
 fn cease_to_share() {
     SHARING.with(|sharing| sharing.borrow_mut().pop());
 }
 
-/// An island that the calling thread holds, by the guard `G`.
+/// An island that the calling thread holds through the guard `G`.
 pub(super) struct Within<G> {
     guard: G,
     _inside: Inside,

@@ -1,5 +1,5 @@
-//! An estimator in its island. The expansion of `robot!` says where it is and where its outputs go; the code that uses it is
-//! here, once for all estimators.
+//! An estimator in its island. The expansion of `robot!` provides its location and the destinations of its outputs. The code that
+//! uses them is here, once for all estimators.
 
 use super::{Island, IslandState, IslandWiring as _, Key};
 use crate::component::{Binding, EmittedAt, Estimator, Inputs, Outputs, TakenAt};
@@ -16,11 +16,11 @@ type InputOf<M> = <<M as Member>::Estimator as Estimator>::Input;
 type OutputOf<M> = <<M as Member>::Estimator as Estimator>::Output;
 type OptionsOf<M> = <<M as Member>::Estimator as Estimator>::Options;
 
-/// What `robot!` implements for each estimator.
+/// Implemented by `robot!` for each estimator.
 pub trait Member {
     /// Its island.
     type State: IslandState;
-    /// It.
+    /// The estimator's type.
     type Estimator: Estimator;
     /// Its number.
     const NUMBER: usize;
@@ -28,7 +28,7 @@ pub trait Member {
     /// Its node in the island.
     fn node(island: &mut Self::State) -> &mut Node<Self::Estimator>;
 
-    /// Publishes what it has emitted, output by output.
+    /// Publishes the emitted outputs, one by one.
     fn publish(
         wiring: &WiringOf<Self>,
         island: &mut Self::State,
@@ -37,18 +37,18 @@ pub trait Member {
         turn: &Turn<'_>,
     );
 
-    /// The slots of its inputs. One input alone is the driver's, whose message is not kept.
+    /// The slots of its inputs. A single input is the driver's, whose message is not kept.
     fn cache() -> <InputOf<Self> as Inputs>::Cache {
         Default::default()
     }
 
-    /// A function that emits a message at its output of that number alone; `None` if the payload's type differs.
+    /// A function that emits a message only at the output with that number; `None` if the payload's type differs.
     fn emitted(output: usize, message: &DynamicMessage) -> Option<OutputOf<Self>> {
         if output == 0 { alone::<<OutputOf<Self> as Outputs>::Only, _>(message) } else { None }
     }
 }
 
-/// Emits `message` alone at the output `F`. Nobody is charged if the payload's `Clone` panics: the message is a recorded one.
+/// Emits `message` alone at the output `F`. No publisher is charged if the payload's `Clone` panics: the message is a recorded one.
 pub fn alone<F: EmittedAt<O>, O>(message: &DynamicMessage) -> Option<O> {
     let mut panic = None;
     let copy = copied(message.downcast::<F::Payload>()?, &mut panic);
@@ -58,20 +58,20 @@ pub fn alone<F: EmittedAt<O>, O>(message: &DynamicMessage) -> Option<O> {
     copy.map(|message| F::alone(message.payload))
 }
 
-/// What an island does with one of its estimators, other than delivering messages.
+/// An operation of an island on one of its estimators, other than delivering messages.
 #[allow(missing_debug_implementations)]
 pub enum Act<'a, 'b> {
-    /// All that is due.
+    /// Do all that is due.
     Turn(&'a Turn<'b>),
-    /// It gets an entry.
+    /// Handle an entry.
     Handle(NodeEntry, &'a Turn<'b>),
-    /// In a replay: it is made.
+    /// In a replay: create the estimator.
     BeginReplay,
-    /// In a replay: it publishes what it emitted in reply to a request that the journal does not hold.
+    /// In a replay: publish the output emitted in reply to a request missing from the journal.
     Emit(&'a DynamicMessage, &'a Turn<'b>),
 }
 
-/// Makes an estimator.
+/// Creates an estimator.
 pub fn start<M: Member>(
     options: &OptionsOf<M>,
     binding: Binding<OptionsOf<M>>,
@@ -80,7 +80,7 @@ pub fn start<M: Member>(
     Node::new(M::NUMBER, options, binding, M::cache, environment)
 }
 
-/// Delivers a message to an estimator's input of that number, publishes what it emits, and lets it continue if it asks to.
+/// Delivers a message to the estimator's input with that number, publishes its outputs, and lets it continue if it asks to.
 #[inline]
 pub fn receive<M: Member, F: TakenAt<InputOf<M>>>(
     island: &mut M::State,
@@ -98,7 +98,7 @@ pub fn receive<M: Member, F: TakenAt<InputOf<M>>>(
     }
 }
 
-/// Publishes what an estimator has emitted; a panic in it is attributed to the output.
+/// Publishes an estimator's outputs; a panic in one is attributed to that output.
 #[inline]
 pub(crate) fn publish<M: Member>(
     wiring: &WiringOf<M>,
@@ -109,12 +109,12 @@ pub(crate) fn publish<M: Member>(
 ) {
     let emitting = Emitting::new(M::NUMBER);
     M::publish(wiring, island, emitted, stamp, turn);
-    // Other islands may have run, and the message was dropped: no callback that follows is charged with that.
+    // Other islands may have run, and the message was dropped: neither is charged to a later callback.
     turn.timing().interrupt();
     emitting.done();
 }
 
-/// Performs an act on an estimator; returns false if it cannot emit that message.
+/// Performs an act on an estimator; returns `false` if it cannot emit that message.
 #[cold]
 pub fn act<M: Member>(island: &mut M::State, wiring: &WiringOf<M>, act: Act<'_, '_>) -> bool {
     match act {
@@ -152,7 +152,7 @@ pub(crate) fn take_turn<M: Member>(island: &mut M::State, wiring: &WiringOf<M>, 
     }
 }
 
-/// Runs what an island does with a message, or keeps it for the thread that holds the island.
+/// Delivers a message to an island directly, or keeps it for the thread that holds the island.
 #[inline]
 pub fn enter<S: IslandState, T: Payload>(
     wiring: &S::Wiring,
@@ -166,8 +166,8 @@ pub fn enter<S: IslandState, T: Payload>(
     S::find(wiring).enter(wiring, now, key, direct, || copy_for::<S, T>(wiring, key.entry, message).map(keep));
 }
 
-/// A copy of a message for an island that another thread holds. An estimator whose payload's `Clone` panics is charged with it,
-/// and the turn that emitted the message goes on; a panic in the code of a sensor's or a service's message is resumed.
+/// Copies a message for an island that another thread holds. An estimator whose payload's `Clone` panics is charged with the panic,
+/// and the turn that emitted the message continues. A panic in the code of a sensor's or a service's message is resumed.
 #[cold]
 fn copy_for<S: IslandState, T: Payload>(
     wiring: &S::Wiring,
@@ -191,7 +191,7 @@ fn copy_for<S: IslandState, T: Payload>(
     copy
 }
 
-/// An island of a wiring, with its estimators erased.
+/// The type-erased form of an island of a wiring.
 pub fn island<S: IslandState + 'static>(wiring: &S::Wiring) -> &dyn AnyIsland<S::Wiring>
 where
     Island<S>: AnyIsland<S::Wiring>,
@@ -199,7 +199,7 @@ where
     S::find(wiring)
 }
 
-/// Publishes a recorded message of a sensor or a service; returns false if its payload has another type.
+/// Publishes a recorded message of a sensor or a service; returns `false` if its payload has another type.
 pub fn feed<W, T: Payload>(
     wiring: &W,
     message: &DynamicMessage,

@@ -1,8 +1,8 @@
-//! Every order in which threads can meet at an island, by a model checker: `RUSTFLAGS="--cfg loom"`.
+//! Checks every interleaving of threads at an island with a model checker: `RUSTFLAGS="--cfg loom"`.
 //!
-//! In each, every message is delivered or counted as dropped, the order of each publisher is kept, entries of control take
-//! effect, and nothing stays in the inbox. That one thread at a time is inside follows from the lock's type. (The checker's
-//! locks order more than real ones do: the comments at the fences say what the fences are for.)
+//! In each interleaving, every message is delivered or counted as dropped, the order of each publisher is kept, control entries
+//! take effect, and nothing remains in the inbox. The lock's type ensures that only one thread at a time is inside. (The checker's
+//! locks order more than real ones do: the comments at the fences explain their purpose.)
 
 use super::{Act, Island, IslandDeclaration, IslandState, IslandWiring, Key};
 use crate::component::{DisarmHook, Guardian};
@@ -19,10 +19,10 @@ use loom::sync::Arc;
 use loom::sync::atomic::{AtomicUsize, Ordering};
 use loom::thread;
 
-/// What was delivered. Its inbox holds `CAPACITY` messages.
+/// The messages delivered. Its inbox holds `CAPACITY` messages.
 #[derive(Default)]
 struct Seen<const CAPACITY: usize> {
-    /// The last number of each publisher.
+    /// The last number received from each publisher.
     last: [usize; 2],
     messages: usize,
     wakes: usize,
@@ -30,7 +30,7 @@ struct Seen<const CAPACITY: usize> {
     has_retired: bool,
 }
 
-/// A publisher, and the number of its message, from 1.
+/// A publisher and the number of its message, starting from 1.
 type Message = (usize, usize);
 
 const NOW: MonotonicTime = MonotonicTime::ZERO;
@@ -43,7 +43,7 @@ impl<const CAPACITY: usize> Seen<CAPACITY> {
     }
 }
 
-/// A robot without anything but the island.
+/// A robot with only the island.
 struct Wiring {
     environment: Environment,
     dropped: AtomicUsize,
@@ -55,7 +55,7 @@ impl IslandWiring for Wiring {
     }
 }
 
-/// Nothing is reported and nothing bound.
+/// An overseer that reports nothing and binds nothing.
 struct Nobody;
 
 impl Guardian for Nobody {
@@ -89,7 +89,7 @@ impl Overseer for Nobody {
     }
 }
 
-/// Virtual time: an entry of control is only noted, and the thread that posts it drains the island as the pool would.
+/// Virtual time: a control entry is only noted, and the thread that posts it drains the island as the pool would.
 fn environment() -> Environment {
     let parts = EnvironmentParts {
         mode: Mode::Virtual,
@@ -145,7 +145,7 @@ impl<const CAPACITY: usize> IslandState for Seen<CAPACITY> {
 
 const KEY: Key = Key { entry: 0, line: 0 };
 
-/// What a thread does.
+/// The code of a thread.
 type Thread<const CAPACITY: usize> = fn(&Island<Seen<CAPACITY>>, &Wiring);
 
 fn publish<const CAPACITY: usize>(island: &Island<Seen<CAPACITY>>, wiring: &Wiring, message: Message) {
@@ -157,7 +157,7 @@ fn publish_twice<const PUBLISHER: usize, const CAPACITY: usize>(island: &Island<
     publish(island, wiring, (PUBLISHER, 2));
 }
 
-/// Runs the threads in all orders, of those with that many preemptions at most.
+/// Runs the threads in all interleavings with at most that many preemptions.
 fn check<const CAPACITY: usize, const THREADS: usize>(
     preemptions: usize,
     threads: [Thread<CAPACITY>; THREADS],
@@ -189,7 +189,7 @@ fn all<const MESSAGES: usize, const CAPACITY: usize>(seen: &Seen<CAPACITY>, drop
     assert_eq!(seen.messages + dropped, MESSAGES, "something was lost uncounted");
 }
 
-/// An entry of control, drained as the pool would.
+/// Posts a control entry, drained as the pool would.
 fn post<const CAPACITY: usize>(
     island: &Island<Seen<CAPACITY>>,
     wiring: &Wiring,
@@ -225,14 +225,14 @@ fn a_publisher_and_what_is_due() {
 fn a_publisher_and_a_caller() {
     let calls: Thread<1> = |island, wiring| {
         let line = Event::Wake { island: 0 };
-        // In the model, a caller may tire of waiting before the publisher is done.
+        // In the model, a caller may stop waiting before the publisher is done.
         let _ = island.call(wiring, NOW, line, |_, _| ());
         publish(island, wiring, (1, 1));
     };
     check::<1, 2>(3, [publish_twice::<0, 1>, calls], all::<3, 1>);
 }
 
-/// Restarts are never lost, and never done more often than they are asked for.
+/// Restarts are never lost, and never performed more often than requested.
 #[test]
 fn two_publishers_and_a_restart() {
     let restarts: Thread<4> = |island, wiring| post(island, wiring, |inbox| inbox.post(NOW, 0, NodeEntry::Restart));
@@ -242,7 +242,7 @@ fn two_publishers_and_a_restart() {
     });
 }
 
-/// The end comes once, whatever else waits.
+/// The stop is processed once, whatever else waits.
 #[test]
 fn a_publisher_and_the_end() {
     let ends: Thread<4> = |island, wiring| post(island, wiring, |inbox| inbox.retire(NOW));
@@ -252,7 +252,7 @@ fn a_publisher_and_the_end() {
     });
 }
 
-/// A thread that looks whether the island is held, for the report of one that hangs, must not keep an entry in the inbox.
+/// A thread that checks whether the island is held, to report one that hangs, must not keep an entry in the inbox.
 #[test]
 fn a_publisher_what_is_due_and_a_look() {
     let looks: Thread<4> = |island, wiring| {

@@ -1,4 +1,4 @@
-//! Where the inputs of an estimator are, across moving joints, at the times of their messages.
+//! Transforms of an estimator's inputs across moving joints, at the times of their messages.
 
 use super::Node;
 use crate::component::{Estimator, InputTransform, InputTransforms};
@@ -15,7 +15,7 @@ use crate::time::MonotonicTime;
 use nalgebra::Isometry3;
 use std::sync::Arc;
 
-/// When an input was measured, and where it was then.
+/// When an input was measured, and its transform at that time.
 type PlacedAt = (MonotonicTime, Isometry3<f64>);
 
 /// The transforms of an estimator's inputs.
@@ -23,23 +23,23 @@ pub(super) struct Placing {
     declaration: &'static EstimatorDeclaration,
     shared: SharedNode,
     routes: Arc<[InputRoute]>,
-    /// The last lookup of each route that succeeded: the message of an input without a tolerance may be older than the history
-    /// of the joints.
+    /// The last successful lookup of each route. The message of an input without a tolerance may be older than the history of the
+    /// joints.
     placed: Box<[Option<PlacedAt>]>,
     inputs: Box<[InputTransform]>,
 }
 
-/// Why there is no dispatch.
+/// Why a dispatch is dropped.
 #[derive(Debug)]
 pub(super) enum Unplaced {
-    /// Nothing is known of where a required input is.
+    /// The transform of a required input is unknown.
     Gap {
         /// The number of the input.
         input: usize,
-        /// Why.
+        /// The reason.
         error: LookupError,
     },
-    /// The journal that is replayed does not have where an input was.
+    /// The journal being replayed does not contain the transform of an input.
     Missing,
 }
 
@@ -58,7 +58,8 @@ impl Placing {
         Self { declaration, shared: environment.node(number), routes, placed, inputs: inputs.collect() }
     }
 
-    /// Finds where the inputs are at a dispatch by a message of the driver. `admission` knows when the others were measured.
+    /// Finds the transforms of the inputs for a dispatch on a message of the driver. `admission` knows when the other inputs were
+    /// measured.
     pub(super) fn place(
         &mut self,
         driver_time: MonotonicTime,
@@ -72,7 +73,7 @@ impl Placing {
                 continue;
             };
             let time = if declared.driver { Some(driver_time) } else { admission.last(route.input) };
-            // An input that is missing or too old is not placed. If it is required, the dispatch is dropped for that reason.
+            // An input that is missing or too old has no transform. If it is required, the dispatch is dropped for that reason.
             let Some(time) = time.filter(|time| !declared.is_too_old(driver_time.nanos_since(*time))) else {
                 input.set_absent();
                 continue;
@@ -96,7 +97,7 @@ impl Placing {
     }
 }
 
-/// Looks it up; in a replay, takes what the journal has, and never asks the store: its history may be another one.
+/// Looks up a transform. A replay takes the transform from the journal and never asks the store, whose history may differ.
 fn find(
     shared: &SharedNode,
     route: &InputRoute,

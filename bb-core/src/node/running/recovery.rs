@@ -14,7 +14,7 @@ use crate::node::{DropReason, Report};
 use crate::time::MonotonicTime;
 
 impl<E: Estimator> Node<E> {
-    /// Creates it for the first time. A failure that prevents the robot from starting is stored in the environment.
+    /// Creates the estimator for the first time. A failure that prevents the robot from starting is stored in the environment.
     pub(super) fn make_first(&mut self, now: MonotonicTime) {
         let context = self.context(now);
         self.shared.set_last_run(now);
@@ -34,7 +34,7 @@ impl<E: Estimator> Node<E> {
         }
     }
 
-    /// It starts; one that was left out is not healthy.
+    /// Starts the estimator; one that was left out is not healthy.
     pub(super) fn begin(&mut self, turn: &Turn<'_>) {
         self.shared.set_last_run(turn.now());
         if !self.slot.is_running() {
@@ -65,7 +65,7 @@ impl<E: Estimator> Node<E> {
         self.environment.overseer().report(self.shared.number(), report);
     }
 
-    /// Its backoff is over, or it is restarted from above.
+    /// Restarts the estimator when its backoff is over or its supervisor requests it.
     pub(super) fn restart(&mut self, turn: &Turn<'_>) {
         let context = self.context(turn.now());
         let (slot, parameters) = (&mut self.slot, &self.parameters);
@@ -77,14 +77,14 @@ impl<E: Estimator> Node<E> {
         }
     }
 
-    /// Its supervisor restarts it, though it has not failed.
+    /// Restarts the estimator at its supervisor's request, though it has not failed.
     pub(super) fn restart_from_above(&mut self, turn: &Turn<'_>) {
         if self.slot.restart(turn.now()) {
             self.judge(Event::Bad(HealthReason::Restarted), self.declaration.path, turn.now());
         }
     }
 
-    /// New values of parameters.
+    /// Applies new parameter values.
     pub(super) fn change_options(&mut self, turn: &Turn<'_>) {
         let context = self.context(turn.now());
         let (slot, parameters) = (&mut self.slot, &self.parameters);
@@ -120,14 +120,14 @@ impl<E: Estimator> Node<E> {
         self.schedule();
     }
 
-    /// It stops for good: waiting messages are counted as dropped.
+    /// Counts waiting messages as dropped when the estimator stops for good.
     pub(super) fn drop_backlog(&mut self) {
         let counters = self.shared.counters();
         self.backlog.clear().for_each(|input| counters.drop(input, DropReason::Stopped));
     }
 }
 
-/// Runs `make`; the disarm callbacks that it registers replace earlier ones.
+/// Runs `make`; the disarm callbacks registered by `make` replace earlier ones.
 fn replacing_hooks<T>(
     environment: &Environment,
     path: &'static str,

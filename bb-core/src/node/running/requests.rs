@@ -1,4 +1,4 @@
-//! Entries for an estimator beside messages.
+//! Entries for an estimator other than messages.
 
 use super::{Next, Node, Turn};
 use crate::component::RequestCodec;
@@ -12,7 +12,7 @@ use crate::node::requests::{Cast, find};
 use std::any::Any;
 
 impl<E: Estimator> Node<E> {
-    /// Handles an entry. What becomes due is left to [`Self::turn`].
+    /// Handles an entry. Anything that becomes due is left to [`Self::turn`].
     pub fn handle(&mut self, entry: NodeEntry, turn: &Turn<'_>, emitted: &mut Option<E::Output>) -> Next {
         match entry {
             NodeEntry::Start => self.begin(turn),
@@ -32,7 +32,7 @@ impl<E: Estimator> Node<E> {
             }
             NodeEntry::Silence { epoch, last_run } => {
                 self.epoch = epoch;
-                // The control state has published it.
+                // The control state has already published it.
                 let _ = self.health.on(HealthEvent::Silence, self.declaration.health.recover_after);
                 if self.shared.last_run() > last_run {
                     let source = self.declaration.driver().map_or(self.declaration.path, |driver| driver.source);
@@ -89,17 +89,17 @@ impl<E: Estimator> Node<E> {
         Some(Box::new(move |estimator| handle(estimator, &bytes)))
     }
 
-    /// The number of its declared output of that path.
+    /// The number of the declared output at that path.
     pub(crate) fn output_at(&self, path: &str) -> Option<usize> {
         self.declaration.outputs.iter().position(|output| *output == path)
     }
 
-    /// In a replay: creates it when the journal begins.
+    /// In a replay: creates the estimator when the journal begins.
     pub fn begin_replay(&mut self) {
         self.make_first(self.environment.clock().now());
     }
 
-    /// Answers a request; returns the stamp of what it put into `emitted`, if anything.
+    /// Answers a request; returns the stamp of the output put into `emitted`, if any.
     pub(crate) fn call<Q>(
         &mut self,
         request: Q,

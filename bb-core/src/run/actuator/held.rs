@@ -1,10 +1,10 @@
-//! Which actuators the calling thread is inside, and which it waits for: their code must not wait for itself, not
-//! even through another actuator.
+//! Tracks which actuators the calling thread is inside and which one it waits for. Their code must not wait for itself, not even
+//! through another actuator.
 //!
-//! A thread that is inside one actuator and finds another one taken registers its wait, under one lock. It then looks
-//! for a cycle: whether the thread inside the other waits for an actuator whose thread waits for … an actuator that
-//! this thread is inside. Each thread of such a cycle has entered its actuator before it registers its wait, so the
-//! last one sees the whole cycle and gets an error instead of waiting. Without a cycle, no thread gets an error.
+//! A thread that is inside one actuator and finds another one taken registers its wait, under one lock. It then looks for a cycle:
+//! whether the thread inside the other waits for an actuator whose thread waits for … an actuator that this thread is inside. Each
+//! thread of such a cycle has entered its actuator before it registers its wait. The last thread to register therefore sees the
+//! whole cycle and gets an error instead of waiting. Without a cycle, no thread gets an error.
 
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -12,30 +12,30 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
 
 thread_local! {
-    /// Actuators by their addresses.
+    /// The addresses of the actuators.
     static HELD: RefCell<Vec<usize>> = const { RefCell::new(Vec::new()) };
     static THIS: u64 = NEXT.fetch_add(1, Ordering::Relaxed);
 }
 
-/// The number of the next thread that enters an actuator.
+/// The number of the next thread to enter an actuator.
 static NEXT: AtomicU64 = AtomicU64::new(NOBODY + 1);
 const NOBODY: u64 = 0;
 
-/// The actuators that threads inside another actuator wait for.
+/// The actuators awaited by threads inside another actuator.
 static WAITING: Mutex<Option<HashMap<u64, Awaited>>> = Mutex::new(None);
 
-/// An awaited actuator, with the thread inside it. The pointer is not followed after the thread has ceased to wait.
+/// An awaited actuator, with the thread inside it. The pointer is not followed after the thread has stopped waiting.
 type Awaited = std::sync::Arc<AtomicU64>;
 
-/// An actuator's state, which one thread at a time may enter.
+/// An actuator's state, which only one thread at a time may enter.
 pub(super) struct Guarded<S> {
     state: Mutex<S>,
     inside: Awaited,
 }
 
-/// The calling thread is inside an actuator until this is dropped.
+/// Keeps the calling thread inside an actuator until dropped.
 pub(super) struct Held<'a, S> {
-    // Declared before the lock: before it is released, nobody is inside any more.
+    // Declared before the lock: the thread leaves before the lock is released.
     _left: Left<'a>,
     state: MutexGuard<'a, S>,
 }
@@ -63,7 +63,7 @@ impl<S> Guarded<S> {
         Some(self.held(state))
     }
 
-    /// The same without waiting.
+    /// As [`Self::enter`], without waiting.
     pub(super) fn try_enter(&self) -> Option<Held<'_, S>> {
         match self.state.try_lock() {
             Ok(state) => Some(self.held(state)),
@@ -85,7 +85,7 @@ impl<S> Guarded<S> {
             let mut waiting = WAITING.lock().unwrap_or_else(PoisonError::into_inner);
             let waiting = waiting.get_or_insert_default();
             let mut inside = self.inside.load(Ordering::SeqCst);
-            // A thread that has just got the actuator it waited for is inside it.
+            // A thread that has just acquired the actuator it waited for is inside it.
             while let Some(awaited) = waiting.get(&inside).filter(|_| inside != this) {
                 let next = awaited.load(Ordering::SeqCst);
                 if next == inside {
@@ -136,8 +136,8 @@ mod tests {
     use super::*;
     use std::sync::Barrier;
 
-    /// Each of the threads enters one of the actuators and then, while the others are inside theirs, the next one.
-    /// Returns how many were told that they would wait for themselves.
+    /// Each thread enters one of the actuators and then, while the others are inside theirs, the next one. Returns how many threads
+    /// got an error because they would wait for themselves.
     fn circle(guarded: &[Guarded<()>]) -> usize {
         let barrier = Barrier::new(guarded.len());
         std::thread::scope(|scope| {

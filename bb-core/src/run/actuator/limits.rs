@@ -1,4 +1,4 @@
-//! Holds an actuator's commands to the limits of its joint, and counts how often it did.
+//! Enforces the limits of an actuator's joint on its commands, and counts how often this happens.
 
 use crate::component::ActuatorContext;
 use crate::joints::Joints;
@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 const QUANTITIES: usize = LimitedQuantity::ALL.len();
 
-/// The counts of one actuator.
+/// The counters of one actuator.
 #[derive(Debug, Default)]
 pub(super) struct Counts {
     commands: AtomicU64,
@@ -16,25 +16,25 @@ pub(super) struct Counts {
     refused: [AtomicU64; QUANTITIES],
 }
 
-/// Counts of an actuator since the start.
+/// The counts of an actuator since the start.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct ActuatorStatistics {
     /// Its path.
     pub path: &'static str,
-    /// Commands that it carried out.
+    /// Commands carried out.
     pub commands: u64,
     limited: [u64; QUANTITIES],
     refused: [u64; QUANTITIES],
 }
 
 impl ActuatorStatistics {
-    /// How many commands exceeded the joint's limit of that quantity, and were clamped to it.
+    /// How many commands exceeded the joint's limit of that quantity and were clamped to it.
     pub fn limited(&self, quantity: LimitedQuantity) -> u64 {
         self.limited[quantity as usize]
     }
 
-    /// How many commands were refused because they led beyond the joint's limit of that quantity.
+    /// How many commands were refused because they would exceed the joint's limit of that quantity.
     pub fn refused(&self, quantity: LimitedQuantity) -> u64 {
         self.refused[quantity as usize]
     }
@@ -91,7 +91,7 @@ impl Counts {
     }
 }
 
-/// The declared limits of the joint, and its position.
+/// The declared limits of the joint and its position.
 fn bounds(context: &ActuatorContext, joints: &Joints) -> JointBounds {
     let bounds = JointBounds { joint: context.joint(), ..JointBounds::NONE };
     let Some(limit) = context.topology().joint(context.joint()).and_then(|joint| joint.limit) else {

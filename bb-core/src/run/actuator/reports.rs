@@ -1,4 +1,4 @@
-//! Publishes an actuator's reports of its motions, at `begin_motion` and `end_motion` below its path.
+//! Publishes an actuator's reports of its motions at `begin_motion` and `end_motion` below its path.
 
 use crate::component::{ActuatorContext, Host, MotionReport};
 use crate::journal::{Event, Recorded};
@@ -8,7 +8,7 @@ use crate::payload::{BeginMotion, EndMotion};
 use crate::pubsub::{AnyTopic as _, DynamicMessage, Topic, Wakers};
 use std::sync::{Arc, OnceLock};
 
-/// The topics are created with the first report, or at the start for an actuator of standard commands, so that
+/// The topics are created with the first report. For an actuator of standard commands they are created at the start, so that
 /// subscriptions find them.
 #[derive(Debug, Default)]
 pub(super) struct Reports {
@@ -17,12 +17,12 @@ pub(super) struct Reports {
 }
 
 impl Reports {
-    /// Makes the topics.
+    /// Creates the topics.
     pub(super) fn announce(&self, context: &ActuatorContext, host: &dyn Host) {
         let _ = (self.begin(context, host), self.end(context, host));
     }
 
-    /// Makes the topic at `path`, if it is one of these.
+    /// Creates the topic at `path`, if it is one of them.
     pub(super) fn announce_at(&self, path: &str, context: &ActuatorContext, host: &dyn Host) {
         match path.strip_prefix(context.path()) {
             Some("/begin_motion") => drop(self.begin(context, host)),
@@ -31,7 +31,7 @@ impl Reports {
         }
     }
 
-    /// Publishes what the actuator has reported, in its order. The caller holds the actuator's lock; `wakers` are for after.
+    /// Publishes the actuator's reports in order. The caller holds the actuator's lock; `wakers` run after it is released.
     pub(super) fn publish(
         &self,
         context: &ActuatorContext,
@@ -97,6 +97,6 @@ fn publish<T: Payload>(
         let offset = environment.clock().wall_offset_nanos();
         journal.write(message.monotonic_time, offset, Event::Own { path, message: recorded });
     }
-    // Payloads of this crate, whose `clone` does not panic.
+    // These payloads belong to this crate, and their `clone` does not panic.
     topic.publish_deferred(message, wakers, &mut None);
 }
