@@ -55,9 +55,8 @@ fn estimator_declaration(verified: &Verified<'_>, islands: &Islands, id: Estimat
     let (path, frame) = (path_text(&estimator.path), robot.frame_name(mount));
     let island = islands.of[id];
     let supervisor = supervisor(robot, mount);
-    // The full declaration, for the runtime.
-    let Timing { sync_tolerance_s, latency_budget_s, lost_after_s, recover_after } = estimator.timing;
-    let health = health(&estimator.health, latency_budget_s, lost_after_s, recover_after);
+    let sync_tolerance_s = estimator.timing.sync_tolerance_s;
+    let health = health(&estimator.health, estimator.timing);
     let worker = worker(robot, id);
     let nested = match estimator.home {
         Home::Sensor(sensor) => Some(nested_input(robot, &robot.sensors[sensor])),
@@ -132,13 +131,10 @@ fn service_declaration(service: &Service) -> TokenStream {
     })
 }
 
-fn health(
-    health: &Health,
-    latency_budget_s: Option<f64>,
-    lost_after_s: Option<f64>,
-    recover_after: u32,
-) -> TokenStream {
-    let is_declared = latency_budget_s.is_some() || lost_after_s.is_some() || recover_after != 1;
+fn health(health: &Health, timing: Timing) -> TokenStream {
+    // In full: a setting that is not expanded does not compile.
+    let Timing { sync_tolerance_s, latency_budget_s, lost_after_s, recover_after } = timing;
+    let is_declared = timing != Timing { sync_tolerance_s, ..Timing::DEFAULT };
     if !is_declared && health.on_degraded.or(health.on_lost).or(health.on_recovered).is_none() {
         return quote!(__private::HealthDeclaration::NONE);
     }

@@ -8,7 +8,7 @@
 //! ```
 
 use proc_macro2::{Ident, TokenStream};
-use quote::{format_ident, quote};
+use quote::{ToTokens, format_ident, quote};
 use syn::Token;
 
 type Mut = Token![mut];
@@ -23,10 +23,23 @@ pub(super) struct Field {
     pub(super) value: TokenStream,
 }
 
-/// `g3.sensor_base_imu`: the path of the field number `position`.
-pub(super) fn path(position: usize, name: &Ident) -> TokenStream {
-    let group = group_name(position / SIZE);
-    quote!(#group.#name)
+/// `g3.sensor_base_imu`: the path of a field.
+pub(super) struct Path {
+    group: Ident,
+    name: Ident,
+}
+
+/// The path of the field number `position`.
+pub(super) fn path(position: usize, name: &Ident) -> Path {
+    Path { group: group_name(position / SIZE), name: name.clone() }
+}
+
+impl ToTokens for Path {
+    fn to_tokens(&self, tokens: &mut TokenStream) {
+        self.group.to_tokens(tokens);
+        <Token![.]>::default().to_tokens(tokens);
+        self.name.to_tokens(tokens);
+    }
 }
 
 /// The structs, and the functions `make` that create them from `parameters`, called with `arguments`.
@@ -42,13 +55,14 @@ pub(super) fn structs(
     for (number, fields) in fields.chunks(SIZE).enumerate() {
         let (field, group, function) =
             (group_name(number), format_ident!("{name}{number}"), format_ident!("{make}{number}"));
-        let types = fields.iter().map(|Field { name, kind, .. }| quote!(#name: #kind,));
-        let values = fields.iter().map(|Field { name, value, .. }| quote!(#name: #value,));
+        let names: Vec<_> = fields.iter().map(|field| &field.name).collect();
+        let types = fields.iter().map(|field| &field.kind);
+        let values = fields.iter().map(|field| &field.value);
         groups.extend(quote! {
-            pub struct #group { #(#types)* }
+            pub struct #group { #(#names: #types,)* }
 
             fn #function(#parameters) -> #group {
-                #group { #(#values)* }
+                #group { #(#names: #values,)* }
             }
         });
         declared.extend(quote!(#field: #group,));
@@ -78,13 +92,13 @@ pub(super) fn by_number(
     for (number, fields) in fields.chunks(SIZE).enumerate() {
         let (field, group, function) =
             (group_name(number), format_ident!("{name}{number}"), format_ident!("{function}{number}"));
-        let fields = fields
-            .iter()
-            .enumerate()
-            .map(|(number, Field { name, .. })| quote!(#number => __private::Some(& #mutability group.#name),));
+        let (numbers, names) = (0..fields.len(), fields.iter().map(|field| &field.name));
         groups.extend(quote! {
             fn #function(group: & #mutability #group, number: usize) -> __private::Option<& #mutability #object> {
-                match number { #(#fields)* _ => __private::None }
+                match number {
+                    #(#numbers => __private::Some(& #mutability group.#names),)*
+                    _ => __private::None
+                }
             }
         });
         arms.extend(quote!(#number => #function(& #mutability whole.#field, number % #SIZE),));

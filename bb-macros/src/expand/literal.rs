@@ -30,6 +30,10 @@ pub(super) fn nanos(seconds: f64) -> i64 {
 
 /// An identifier used only by the expansion.
 pub(super) fn ident(text: &str) -> Ident {
+    // Parsing takes long, and no keyword is longer than `continue`.
+    if text.len() > "continue".len() {
+        return Ident::new(text, Span::call_site());
+    }
     match syn::parse_str::<Ident>(text) {
         Ok(ident) => ident,
         // A keyword, written with `r#`.

@@ -9,8 +9,8 @@ use super::part::Part;
 use crate::diagnostics::Place;
 use crate::model::{PublisherId, Robot, Table};
 use proc_macro2::{Ident, Span};
-use quote::format_ident;
-use std::collections::HashSet;
+use quote::{ToTokens as _, format_ident};
+use std::collections::{HashMap, HashSet};
 
 /// The names of a robot's parts and publishers.
 #[derive(Debug)]
@@ -29,6 +29,10 @@ pub(super) struct PartNames {
     pub(super) alias: Ident,
     /// `__Rover_2_11__given__sensor_base_imu`: its type as the user wrote it.
     pub(super) given: Ident,
+    /// `__Rover_2_11__probed__sensor_base_imu`: how the type implements its trait, of the first part with this type.
+    pub(super) probed: Ident,
+    /// The number of that part.
+    pub(super) first: usize,
     /// `__Rover_2_11__member__sensor_base_imu_tilt`: an estimator in its island.
     pub(super) member: Ident,
     /// `__Rover_2_11__exported__sensor_base_imu_tilt`: the same, for the robot's module.
@@ -52,10 +56,21 @@ impl Naming {
         let call_site = Span::call_site();
         let prefix = prefix(robot_name);
         let item = |kind: &str, name: &Ident, span: Span| format_ident!("{prefix}__{kind}{name}", span = span);
-        let parts = Part::all(robot).map(|part| {
+        let mut probed = HashMap::new();
+        let parts = Part::all(robot).enumerate().map(|(number, part)| {
             let name = fresh(part.path(robot), &mut taken_by_parts);
-            let span = Place::of(&part.component(robot).kind).start.resolved_at(call_site);
+            let kind = &part.component(robot).kind;
+            let span = Place::of(kind).start.resolved_at(call_site);
+            let own = item("probed__", &name, call_site);
+            let tokens = kind.to_token_stream().to_string();
+            let (first, probed) = match tokens.contains('$') {
+                // `$crate` of two macros may be two crates.
+                true => (number, own),
+                false => probed.entry((std::mem::discriminant(&part), tokens)).or_insert((number, own)).clone(),
+            };
             PartNames {
+                probed,
+                first,
                 alias: item("", &name, span),
                 given: item("given__", &name, span),
                 member: item("member__", &name, call_site),
@@ -70,6 +85,11 @@ impl Naming {
             PublisherNames { payload: item("payload__", &name, call_site), name }
         });
         Self { parts, publishers }
+    }
+
+    /// The names of the part at that position.
+    pub(super) fn of_number(&self, position: usize) -> &PartNames {
+        &self.parts[position]
     }
 
     pub(super) fn part(&self, robot: &Robot, part: Part) -> &PartNames {

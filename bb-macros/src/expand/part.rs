@@ -53,13 +53,15 @@ impl Part {
     }
 
     /// The trait that its type implements, and the constant of `bb_core::stub::Probe` that tells whether it does.
-    pub(super) fn contract(self) -> (TokenStream, TokenStream) {
+    pub(super) fn contract(self) -> (TokenStream, [TokenStream; 2]) {
         match self {
-            Self::Sensor(_) => (quote!(::bb_core::Sensor), quote!(IS_SENSOR)),
-            Self::Estimator(_) => (quote!(::bb_core::Estimator), quote!(IS_ESTIMATOR)),
-            Self::Actuator(_) => (quote!(::bb_core::Actuator), quote!(IS_ACTUATOR)),
-            Self::Service(_) => (quote!(::bb_core::Service), quote!(IS_SERVICE)),
-            Self::Command(_) => (quote!(::bb_core::Command), quote!(IS_COMMAND)),
+            Self::Sensor(_) => (quote!(::bb_core::Sensor), [quote!(IS_SENSOR), quote!(IMPLEMENTS_SENSOR)]),
+            Self::Estimator(_) => {
+                (quote!(::bb_core::Estimator), [quote!(IS_ESTIMATOR), quote!(IMPLEMENTS_ESTIMATOR)])
+            }
+            Self::Actuator(_) => (quote!(::bb_core::Actuator), [quote!(IS_ACTUATOR), quote!(IMPLEMENTS_ACTUATOR)]),
+            Self::Service(_) => (quote!(::bb_core::Service), [quote!(IS_SERVICE), quote!(IMPLEMENTS_SERVICE)]),
+            Self::Command(_) => (quote!(::bb_core::Command), [quote!(IS_COMMAND), quote!(IMPLEMENTS_COMMAND)]),
         }
     }
 

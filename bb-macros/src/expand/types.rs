@@ -11,8 +11,7 @@ use crate::model::{EstimatorId, From, Id as _, PublisherId, Robot, SensorId};
 use crate::parse::Component;
 use proc_macro2::{Ident, Span, TokenStream};
 use quote::{ToTokens, format_ident, quote, quote_spanned};
-use std::collections::HashMap;
-use std::collections::hash_map::Entry;
+use syn::Token;
 
 /// `type __Rover_2_11__sensor_base_imu = Bmi270;`, if it is a sensor, otherwise `Unknown`; as the user wrote it,
 /// `__Rover_2_11__given__sensor_base_imu`; and the payload of each estimator's output,
@@ -22,28 +21,23 @@ use std::collections::hash_map::Entry;
 /// options are those of the type as written there.
 pub(super) fn aliases(types: &Types<'_>) -> TokenStream {
     let (robot, name) = (types.robot, types.name);
-    let mut probed = HashMap::new();
-    let parts = Part::all(robot).map(|part| {
+    let parts = Part::all(robot).enumerate().map(|(number, part)| {
         let kind = &part.component(robot).kind;
-        let PartNames { alias, given, .. } = types.names(part);
-        let (_, is_known) = part.contract();
-        let same = match probed.entry((is_known.to_string(), kind.to_token_stream().to_string())) {
-            // `$crate` of two macros may be two crates.
-            Entry::Occupied(first) if !first.key().1.contains('$') => Some(*first.get()),
-            Entry::Occupied(_) => None,
-            Entry::Vacant(new) => {
-                new.insert(alias);
-                None
-            }
-        };
-        let known = match same {
-            Some(first) => without_span(first).into_token_stream(),
-            None => quote!(<#given as ::bb_core::__private::Known<{
-                use ::bb_core::__private::NotProbed as _;
-                <::bb_core::__private::Probe<#given>>::#is_known
-            }>>::Type),
-        };
-        [(without_span(given), quote!(#kind)), (without_span(alias), known)]
+        let PartNames { alias, given, probed, first, .. } = types.names(part);
+        let mut aliases = vec![(without_span(given), quote!(#kind))];
+        if *first == number {
+            let (_, [is_known, implements]) = part.contract();
+            let implemented = quote!(::bb_core::__private::Probed<#given, {
+                use ::bb_core::__private::{NotProbed as _, Probe};
+                ::bb_core::__private::implemented(<Probe<#given>>::#is_known, <Probe<#given>>::#implements)
+            }>);
+            aliases.push((probed.clone(), implemented));
+            aliases.push((without_span(alias), quote!(<#probed as ::bb_core::__private::Known>::Type)));
+        } else {
+            let first = &types.naming.of_number(*first).alias;
+            aliases.push((without_span(alias), without_span(first).into_token_stream()));
+        }
+        aliases
     });
     let outputs = robot.publishers.ids().filter_map(|id| match types.from(id) {
         From::Estimator(estimator, output) => {
@@ -58,7 +52,6 @@ pub(super) fn aliases(types: &Types<'_>) -> TokenStream {
     let aliases = parts.flatten().chain(outputs).chain([marker]).map(|(alias, kind)| {
         quote! {
             #[doc(hidden)]
-            #[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
             pub type #alias = #kind;
         }
     });
@@ -75,7 +68,6 @@ pub(super) fn members(types: &Types<'_>) -> TokenStream {
             #[allow(non_camel_case_types, dead_code)]
             enum #members {}
             #[doc(hidden)]
-            #[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
             pub type #aliases = #members;
         )*
     }
@@ -139,20 +131,41 @@ pub(super) struct Types<'a> {
     robot: &'a Robot,
     naming: &'a Naming,
     name: &'a Ident,
-    /// `super::super::`, up to the robot's module, which imports these names.
-    above: TokenStream,
-    is_in_module: bool,
+    /// How many modules below: the robot's own, which imports these names, is the first.
+    depth: usize,
+}
+
+/// `super::super::__Rover_2_11__sensor_base_imu`: a name from a number of modules below.
+///
+/// It writes its tokens where it is named. As a `TokenStream` it would be copied there, which took 10 % of the macro's time.
+#[derive(Clone)]
+pub(super) struct Named {
+    above: usize,
+    name: Ident,
+}
+
+impl ToTokens for Named {
+    fn to_tokens(&self, tokens: &mut TokenStream) {
+        for _ in 0..self.above {
+            <Token![super]>::default().to_tokens(tokens);
+            <Token![::]>::default().to_tokens(tokens);
+        }
+        self.name.to_tokens(tokens);
+    }
 }
 
 impl<'a> Types<'a> {
     pub(super) fn new(robot: &'a Robot, naming: &'a Naming, name: &'a Ident, depth: usize) -> Self {
-        let above = (1..depth).map(|_| quote!(super::)).collect();
-        Self { robot, naming, name, above, is_in_module: depth > 0 }
+        Self { robot, naming, name, depth }
     }
 
     /// The same, named from `depth` modules below.
     pub(super) fn below(&self, depth: usize) -> Self {
         Self::new(self.robot, self.naming, self.name, depth)
+    }
+
+    fn named(&self, name: &Ident) -> Named {
+        Named { above: self.depth.saturating_sub(1), name: name.clone() }
     }
 
     /// The name of a part.
@@ -170,20 +183,19 @@ impl<'a> Types<'a> {
     }
 
     /// The place of a part's options in `__Options`.
-    pub(super) fn options_place(&self, part: Part) -> TokenStream {
+    pub(super) fn options_place(&self, part: Part) -> group::Path {
         group::path(part.position(self.robot), self.name_of(part))
     }
 
     /// The place of a publisher's topic in `__Topics`.
-    pub(super) fn topic_place(&self, id: PublisherId) -> TokenStream {
+    pub(super) fn topic_place(&self, id: PublisherId) -> group::Path {
         group::path(id.number(), self.publisher(id))
     }
 
     /// The marker of an estimator in its island.
-    pub(super) fn member(&self, id: EstimatorId) -> TokenStream {
-        let (above, names) = (&self.above, self.names(Part::Estimator(id)));
-        let member = if self.is_in_module { &names.exported } else { &names.member };
-        quote!(#above #member)
+    pub(super) fn member(&self, id: EstimatorId) -> Named {
+        let names = self.names(Part::Estimator(id));
+        self.named(if self.depth > 0 { &names.exported } else { &names.member })
     }
 
     pub(super) fn model(&self) -> &'a Robot {
@@ -197,37 +209,34 @@ impl<'a> Types<'a> {
 
     /// The robot's type.
     pub(super) fn robot(&self) -> TokenStream {
-        let above = &self.above;
-        let name = if self.is_in_module { ident(ROBOT).into_token_stream() } else { robot_type(self.name) };
-        quote!(#above #name)
+        if self.depth > 0 { self.named(&ident(ROBOT)).into_token_stream() } else { robot_type(self.name) }
     }
 
     /// The type of a part, at the span of the user's type.
-    pub(super) fn part(&self, part: Part) -> TokenStream {
-        let (above, alias) = (&self.above, &self.names(part).alias);
-        quote!(#above #alias)
+    pub(super) fn part(&self, part: Part) -> Named {
+        self.named(&self.names(part).alias)
     }
 
-    pub(super) fn sensor(&self, id: SensorId) -> TokenStream {
+    pub(super) fn sensor(&self, id: SensorId) -> Named {
         self.part(Part::Sensor(id))
     }
 
-    pub(super) fn estimator(&self, id: EstimatorId) -> TokenStream {
+    pub(super) fn estimator(&self, id: EstimatorId) -> Named {
         self.part(Part::Estimator(id))
     }
 
     /// The type of a part's options.
     pub(super) fn options(&self, part: Part) -> TokenStream {
-        self.options_of(part, self.part(part))
+        self.options_of(part, &self.part(part).into_token_stream())
     }
 
     /// The same for the type as the user wrote it.
     pub(super) fn given_options(&self, part: Part) -> TokenStream {
-        let (above, given) = (&self.above, &self.names(part).given);
-        self.options_of(part, quote!(#above #given))
+        let (probed, span) = (self.named(&self.names(part).probed), self.span(part));
+        self.options_of(part, &quote_spanned!(span=> <#probed as __private::Known>::Given))
     }
 
-    fn options_of(&self, part: Part, kind: TokenStream) -> TokenStream {
+    fn options_of(&self, part: Part, kind: &TokenStream) -> TokenStream {
         let (contract, _) = part.contract();
         quote_spanned!(self.span(part)=> <#kind as #contract>::Options)
     }
@@ -248,9 +257,9 @@ impl<'a> Types<'a> {
             From::Sensor(id) => self.output(Part::Sensor(id)),
             From::Service(id) => self.output(Part::Service(id)),
             From::Estimator(id, _) => {
-                let (above, mut alias) = (&self.above, self.naming.publisher(publisher).payload.clone());
+                let mut alias = self.naming.publisher(publisher).payload.clone();
                 alias.set_span(self.span(Part::Estimator(id)));
-                quote!(#above #alias)
+                self.named(&alias).into_token_stream()
             }
         }
     }

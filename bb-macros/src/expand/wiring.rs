@@ -405,9 +405,11 @@ impl<'a> Wiring<'a> {
             if let __private::Some(payload) =
                 <#field as __private::EmittedAt<_>>::take(emitted)
             {
-                let message = &stamp.message(payload);
+                let emission = stamp.message(payload);
+                let message = &emission;
                 turn.emit(#publisher, &wiring.topics.#topic, message);
                 #(#calls)*
+                turn.release(&wiring.topics.#topic, emission);
             }
         }
     }

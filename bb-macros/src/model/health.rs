@@ -32,9 +32,12 @@ pub(crate) struct Worker {
 }
 
 impl Timing {
+    /// Without any setting.
+    pub(crate) const DEFAULT: Self =
+        Self { sync_tolerance_s: None, latency_budget_s: None, lost_after_s: None, recover_after: 1 };
+
     pub(super) fn of(settings: &Settings<EstimatorSetting>) -> Self {
-        let mut timing =
-            Self { sync_tolerance_s: None, latency_budget_s: None, lost_after_s: None, recover_after: 1 };
+        let mut timing = Self::DEFAULT;
         for (setting, quantity) in settings.each() {
             let value = quantity.value;
             match setting {

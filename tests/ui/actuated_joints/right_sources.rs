@@ -25,6 +25,7 @@ robot! {
     }
 }
 
-fn main() {
+#[test]
+fn compiles() {
     let _ = Gripper::builder().subscribe(gripper::sensor::base::left::encoder);
 }

@@ -12,6 +12,7 @@ robot! {
     link base { sensor imu: Bmi270(bus = "i2c-1") { estimator tilt: Tilt(); } }
 }
 
-fn main() {
+#[test]
+fn compiles() {
     let _ = Rover::builder().subscribe(rover::sensor::base::imu::tilt);
 }

@@ -25,7 +25,8 @@ robot! {
     }
 }
 
-fn main() {
+#[test]
+fn compiles() {
     let builder = Rover::builder();
     let _ = builder.subscribe(rover::nav::orientation);
     let _ = builder.subscribe(rover::estimator::base::second);

@@ -13,6 +13,7 @@ robot! {
     link base { sensor field: Magnetometer(); }
 }
 
-fn main() {
+#[test]
+fn compiles() {
     let _ = Rover::builder().subscribe(rover::sensor::base::field);
 }

@@ -55,6 +55,7 @@ robot! {
     }
 }
 
-fn main() {
+#[test]
+fn compiles() {
     Rover::builder().simulate().expect("it starts");
 }

@@ -13,7 +13,8 @@ robot! {
     }
 }
 
-fn main() {
+#[test]
+fn compiles() {
     let builder = Rover::builder();
     let _ = builder.subscribe(rover::estimator::base::a::velocity);
     let _ = builder.subscribe(rover::estimator::base::b::velocity);

@@ -14,7 +14,8 @@ impl Rover {
     }
 }
 
-fn main() {
+#[test]
+fn compiles() {
     let _ = Rover::new();
     let builder = Rover::builder();
     let _ = builder.subscribe(rover::sensor::base::imu);

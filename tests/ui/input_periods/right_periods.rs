@@ -25,6 +25,7 @@ robot! {
     }
 }
 
-fn main() {
+#[test]
+fn compiles() {
     let _ = Rover::builder().subscribe(rover::estimator::base::often);
 }

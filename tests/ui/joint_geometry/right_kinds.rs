@@ -15,7 +15,8 @@ robot! {
     }
 }
 
-fn main() {
+#[test]
+fn compiles() {
     assert_eq!(Rover::TOPOLOGY.joints.len(), 6);
     let _ = Rover::builder().subscribe(rover::sensor::base::fly::f::imu);
 }

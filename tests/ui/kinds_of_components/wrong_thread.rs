@@ -1,4 +1,4 @@
-//! An estimator that cannot cross threads: reported where it implements the trait and where it is declared.
+//! Components that cannot cross threads: each is reported where it implements the trait, and nowhere else.
 
 use bb_core::prelude::*;
 use std::rc::Rc;
@@ -22,11 +22,37 @@ impl Estimator for Filter {
     }
 }
 
+#[derive(Clone, Debug, Options)]
+pub struct CameraOptions {
+    #[option(required)]
+    pub device: u32,
+}
+
+#[derive(Debug)]
+struct Camera {
+    _shared: Rc<u8>,
+}
+
+impl Sensor for Camera {
+    type Options = CameraOptions;
+    type Output = Image;
+
+    fn init(_: CameraOptions, _: &SensorContext) -> Result<Self, Fault> {
+        Ok(Self { _shared: Rc::new(1) })
+    }
+
+    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Image>, Fault> {
+        Ok(Reading::finished())
+    }
+}
+
 robot! {
     robot Rover;
 
     link base {
         sensor imu: External<Imu>() { estimator tilt: Filter(); }
+        sensor left: Camera(device = 1) { rate: 10 Hz; }
+        sensor right: Camera(device = 2) { rate: 10 Hz; }
         estimator lean: Mean() { input tilt: sensor::base::imu::tilt; }
     }
 }

@@ -12,6 +12,7 @@ robot! {
     }
 }
 
-fn main() {
+#[test]
+fn compiles() {
     assert!(Case::TOPOLOGY.links[0].inertial.is_some());
 }

@@ -16,6 +16,7 @@ robot! {
     }
 }
 
-fn main() {
+#[test]
+fn compiles() {
     assert!(Gripper::to_urdf().contains("mimic"));
 }

@@ -39,6 +39,7 @@ robot! {
     }
 }
 
-fn main() {
+#[test]
+fn compiles() {
     let _ = Rover::builder().subscribe(rover::estimator::base::far);
 }

@@ -16,6 +16,7 @@ robot! {
     }
 }
 
-fn main() {
+#[test]
+fn compiles() {
     let _ = Rover::builder().subscribe(rover::estimator::base::heading);
 }

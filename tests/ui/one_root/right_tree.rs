@@ -12,6 +12,7 @@ robot! {
     }
 }
 
-fn main() {
+#[test]
+fn compiles() {
     let _ = Rover::builder().subscribe(rover::sensor::base::mount::mast::tip::camera::imu);
 }

@@ -14,7 +14,8 @@ robot! {
     }
 }
 
-fn main() {
+#[test]
+fn compiles() {
     let mut builder = Rover::builder();
     assert_eq!(builder.options(rover::sensor::base::imu).bus, "i2c-1");
     assert_eq!(builder.options(rover::sensor::base::imu::tilt).time_constant, 0.5);

@@ -17,6 +17,7 @@ robot! {
     }
 }
 
-fn main() {
+#[test]
+fn compiles() {
     let _ = Rover::builder().subscribe(rover::sensor::base::imu);
 }

@@ -17,6 +17,7 @@ robot! {
     }
 }
 
-fn main() {
+#[test]
+fn compiles() {
     let _: Subscription<Orientation> = Rover::builder().subscribe(rover::estimator::base::heading);
 }

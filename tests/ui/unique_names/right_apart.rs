@@ -12,7 +12,8 @@ robot! {
     }
 }
 
-fn main() {
+#[test]
+fn compiles() {
     let builder = Rover::builder();
     let _ = builder.subscribe(rover::sensor::imu);
     let _ = builder.subscribe(rover::sensor::base::imu);

@@ -32,7 +32,8 @@ robot! {
     link base { sensor imu: External<Imu>(); }
 }
 
-fn main() {
+#[test]
+fn compiles() {
     assert!(Arm == Arm);
     let _ = (Arm::builder(), arm::sensor::base::imu);
     let _ = (inner::Arm::builder(), inner::arm::sensor::base::imu::tilt);

@@ -20,143 +20,175 @@ impl __Rover_2_11::Rover {
     }
 }
 #[doc(hidden)]
-#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
 pub type __Rover_2_11__given__sensor_battery = Ina219;
 #[doc(hidden)]
-#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
-pub type __Rover_2_11__sensor_battery = <__Rover_2_11__given__sensor_battery as ::bb_core::__private::Known<
+pub type __Rover_2_11__probed__sensor_battery = ::bb_core::__private::Probed<
+    __Rover_2_11__given__sensor_battery,
     {
-        use ::bb_core::__private::NotProbed as _;
-        <::bb_core::__private::Probe<__Rover_2_11__given__sensor_battery>>::IS_SENSOR
+        use ::bb_core::__private::{NotProbed as _, Probe};
+        ::bb_core::__private::implemented(
+            <Probe<__Rover_2_11__given__sensor_battery>>::IS_SENSOR,
+            <Probe<__Rover_2_11__given__sensor_battery>>::IMPLEMENTS_SENSOR,
+        )
     },
->>::Type;
+>;
 #[doc(hidden)]
-#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__sensor_battery = <__Rover_2_11__probed__sensor_battery as ::bb_core::__private::Known>::Type;
+#[doc(hidden)]
 pub type __Rover_2_11__given__sensor_base_imu = Bmi270;
 #[doc(hidden)]
-#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
-pub type __Rover_2_11__sensor_base_imu = <__Rover_2_11__given__sensor_base_imu as ::bb_core::__private::Known<
+pub type __Rover_2_11__probed__sensor_base_imu = ::bb_core::__private::Probed<
+    __Rover_2_11__given__sensor_base_imu,
     {
-        use ::bb_core::__private::NotProbed as _;
-        <::bb_core::__private::Probe<__Rover_2_11__given__sensor_base_imu>>::IS_SENSOR
+        use ::bb_core::__private::{NotProbed as _, Probe};
+        ::bb_core::__private::implemented(
+            <Probe<__Rover_2_11__given__sensor_base_imu>>::IS_SENSOR,
+            <Probe<__Rover_2_11__given__sensor_base_imu>>::IMPLEMENTS_SENSOR,
+        )
     },
->>::Type;
+>;
 #[doc(hidden)]
-#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__sensor_base_imu = <__Rover_2_11__probed__sensor_base_imu as ::bb_core::__private::Known>::Type;
+#[doc(hidden)]
 pub type __Rover_2_11__given__sensor_base_pan_encoder = Encoder;
 #[doc(hidden)]
-#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
-pub type __Rover_2_11__sensor_base_pan_encoder = <__Rover_2_11__given__sensor_base_pan_encoder as ::bb_core::__private::Known<
+pub type __Rover_2_11__probed__sensor_base_pan_encoder = ::bb_core::__private::Probed<
+    __Rover_2_11__given__sensor_base_pan_encoder,
     {
-        use ::bb_core::__private::NotProbed as _;
-        <::bb_core::__private::Probe<
-            __Rover_2_11__given__sensor_base_pan_encoder,
-        >>::IS_SENSOR
+        use ::bb_core::__private::{NotProbed as _, Probe};
+        ::bb_core::__private::implemented(
+            <Probe<__Rover_2_11__given__sensor_base_pan_encoder>>::IS_SENSOR,
+            <Probe<__Rover_2_11__given__sensor_base_pan_encoder>>::IMPLEMENTS_SENSOR,
+        )
     },
->>::Type;
+>;
 #[doc(hidden)]
-#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__sensor_base_pan_encoder = <__Rover_2_11__probed__sensor_base_pan_encoder as ::bb_core::__private::Known>::Type;
+#[doc(hidden)]
 pub type __Rover_2_11__given__sensor_base_imu_tilt = Madgwick;
 #[doc(hidden)]
-#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
-pub type __Rover_2_11__sensor_base_imu_tilt = <__Rover_2_11__given__sensor_base_imu_tilt as ::bb_core::__private::Known<
+pub type __Rover_2_11__probed__sensor_base_imu_tilt = ::bb_core::__private::Probed<
+    __Rover_2_11__given__sensor_base_imu_tilt,
     {
-        use ::bb_core::__private::NotProbed as _;
-        <::bb_core::__private::Probe<
-            __Rover_2_11__given__sensor_base_imu_tilt,
-        >>::IS_ESTIMATOR
+        use ::bb_core::__private::{NotProbed as _, Probe};
+        ::bb_core::__private::implemented(
+            <Probe<__Rover_2_11__given__sensor_base_imu_tilt>>::IS_ESTIMATOR,
+            <Probe<__Rover_2_11__given__sensor_base_imu_tilt>>::IMPLEMENTS_ESTIMATOR,
+        )
     },
->>::Type;
+>;
 #[doc(hidden)]
-#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__sensor_base_imu_tilt = <__Rover_2_11__probed__sensor_base_imu_tilt as ::bb_core::__private::Known>::Type;
+#[doc(hidden)]
 pub type __Rover_2_11__given__estimator_base_pose = Eskf;
 #[doc(hidden)]
-#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
-pub type __Rover_2_11__estimator_base_pose = <__Rover_2_11__given__estimator_base_pose as ::bb_core::__private::Known<
+pub type __Rover_2_11__probed__estimator_base_pose = ::bb_core::__private::Probed<
+    __Rover_2_11__given__estimator_base_pose,
     {
-        use ::bb_core::__private::NotProbed as _;
-        <::bb_core::__private::Probe<
-            __Rover_2_11__given__estimator_base_pose,
-        >>::IS_ESTIMATOR
+        use ::bb_core::__private::{NotProbed as _, Probe};
+        ::bb_core::__private::implemented(
+            <Probe<__Rover_2_11__given__estimator_base_pose>>::IS_ESTIMATOR,
+            <Probe<__Rover_2_11__given__estimator_base_pose>>::IMPLEMENTS_ESTIMATOR,
+        )
     },
->>::Type;
+>;
 #[doc(hidden)]
-#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__estimator_base_pose = <__Rover_2_11__probed__estimator_base_pose as ::bb_core::__private::Known>::Type;
+#[doc(hidden)]
 pub type __Rover_2_11__given__actuator_base_pan_servo = Dynamixel;
 #[doc(hidden)]
-#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
-pub type __Rover_2_11__actuator_base_pan_servo = <__Rover_2_11__given__actuator_base_pan_servo as ::bb_core::__private::Known<
+pub type __Rover_2_11__probed__actuator_base_pan_servo = ::bb_core::__private::Probed<
+    __Rover_2_11__given__actuator_base_pan_servo,
     {
-        use ::bb_core::__private::NotProbed as _;
-        <::bb_core::__private::Probe<
-            __Rover_2_11__given__actuator_base_pan_servo,
-        >>::IS_ACTUATOR
+        use ::bb_core::__private::{NotProbed as _, Probe};
+        ::bb_core::__private::implemented(
+            <Probe<__Rover_2_11__given__actuator_base_pan_servo>>::IS_ACTUATOR,
+            <Probe<__Rover_2_11__given__actuator_base_pan_servo>>::IMPLEMENTS_ACTUATOR,
+        )
     },
->>::Type;
+>;
 #[doc(hidden)]
-#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__actuator_base_pan_servo = <__Rover_2_11__probed__actuator_base_pan_servo as ::bb_core::__private::Known>::Type;
+#[doc(hidden)]
 pub type __Rover_2_11__given__controller_stability = Stability;
 #[doc(hidden)]
-#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
-pub type __Rover_2_11__controller_stability = <__Rover_2_11__given__controller_stability as ::bb_core::__private::Known<
+pub type __Rover_2_11__probed__controller_stability = ::bb_core::__private::Probed<
+    __Rover_2_11__given__controller_stability,
     {
-        use ::bb_core::__private::NotProbed as _;
-        <::bb_core::__private::Probe<
-            __Rover_2_11__given__controller_stability,
-        >>::IS_SERVICE
+        use ::bb_core::__private::{NotProbed as _, Probe};
+        ::bb_core::__private::implemented(
+            <Probe<__Rover_2_11__given__controller_stability>>::IS_SERVICE,
+            <Probe<__Rover_2_11__given__controller_stability>>::IMPLEMENTS_SERVICE,
+        )
     },
->>::Type;
+>;
 #[doc(hidden)]
-#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__controller_stability = <__Rover_2_11__probed__controller_stability as ::bb_core::__private::Known>::Type;
+#[doc(hidden)]
 pub type __Rover_2_11__given__bridge_ros = RosBridge;
 #[doc(hidden)]
-#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
-pub type __Rover_2_11__bridge_ros = <__Rover_2_11__given__bridge_ros as ::bb_core::__private::Known<
+pub type __Rover_2_11__probed__bridge_ros = ::bb_core::__private::Probed<
+    __Rover_2_11__given__bridge_ros,
     {
-        use ::bb_core::__private::NotProbed as _;
-        <::bb_core::__private::Probe<__Rover_2_11__given__bridge_ros>>::IS_SERVICE
+        use ::bb_core::__private::{NotProbed as _, Probe};
+        ::bb_core::__private::implemented(
+            <Probe<__Rover_2_11__given__bridge_ros>>::IS_SERVICE,
+            <Probe<__Rover_2_11__given__bridge_ros>>::IMPLEMENTS_SERVICE,
+        )
     },
->>::Type;
+>;
 #[doc(hidden)]
-#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__bridge_ros = <__Rover_2_11__probed__bridge_ros as ::bb_core::__private::Known>::Type;
+#[doc(hidden)]
 pub type __Rover_2_11__given__command_arm = Arm;
 #[doc(hidden)]
-#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
-pub type __Rover_2_11__command_arm = <__Rover_2_11__given__command_arm as ::bb_core::__private::Known<
+pub type __Rover_2_11__probed__command_arm = ::bb_core::__private::Probed<
+    __Rover_2_11__given__command_arm,
     {
-        use ::bb_core::__private::NotProbed as _;
-        <::bb_core::__private::Probe<__Rover_2_11__given__command_arm>>::IS_COMMAND
+        use ::bb_core::__private::{NotProbed as _, Probe};
+        ::bb_core::__private::implemented(
+            <Probe<__Rover_2_11__given__command_arm>>::IS_COMMAND,
+            <Probe<__Rover_2_11__given__command_arm>>::IMPLEMENTS_COMMAND,
+        )
     },
->>::Type;
+>;
 #[doc(hidden)]
-#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__command_arm = <__Rover_2_11__probed__command_arm as ::bb_core::__private::Known>::Type;
+#[doc(hidden)]
 pub type __Rover_2_11__given__command_move_to = MoveTo;
 #[doc(hidden)]
-#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
-pub type __Rover_2_11__command_move_to = <__Rover_2_11__given__command_move_to as ::bb_core::__private::Known<
+pub type __Rover_2_11__probed__command_move_to = ::bb_core::__private::Probed<
+    __Rover_2_11__given__command_move_to,
     {
-        use ::bb_core::__private::NotProbed as _;
-        <::bb_core::__private::Probe<__Rover_2_11__given__command_move_to>>::IS_COMMAND
+        use ::bb_core::__private::{NotProbed as _, Probe};
+        ::bb_core::__private::implemented(
+            <Probe<__Rover_2_11__given__command_move_to>>::IS_COMMAND,
+            <Probe<__Rover_2_11__given__command_move_to>>::IMPLEMENTS_COMMAND,
+        )
     },
->>::Type;
+>;
 #[doc(hidden)]
-#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__command_move_to = <__Rover_2_11__probed__command_move_to as ::bb_core::__private::Known>::Type;
+#[doc(hidden)]
 pub type __Rover_2_11__given__command_stop = Stop;
 #[doc(hidden)]
-#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
-pub type __Rover_2_11__command_stop = <__Rover_2_11__given__command_stop as ::bb_core::__private::Known<
+pub type __Rover_2_11__probed__command_stop = ::bb_core::__private::Probed<
+    __Rover_2_11__given__command_stop,
     {
-        use ::bb_core::__private::NotProbed as _;
-        <::bb_core::__private::Probe<__Rover_2_11__given__command_stop>>::IS_COMMAND
+        use ::bb_core::__private::{NotProbed as _, Probe};
+        ::bb_core::__private::implemented(
+            <Probe<__Rover_2_11__given__command_stop>>::IS_COMMAND,
+            <Probe<__Rover_2_11__given__command_stop>>::IMPLEMENTS_COMMAND,
+        )
     },
->>::Type;
+>;
 #[doc(hidden)]
-#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
+pub type __Rover_2_11__command_stop = <__Rover_2_11__probed__command_stop as ::bb_core::__private::Known>::Type;
+#[doc(hidden)]
 pub type __Rover_2_11__payload__sensor_base_imu_tilt = <<<__Rover_2_11__sensor_base_imu_tilt as ::bb_core::Estimator>::Output as ::bb_core::Outputs>::Only as ::bb_core::__private::EmittedAt<
     <__Rover_2_11__sensor_base_imu_tilt as ::bb_core::Estimator>::Output,
 >>::Payload;
 #[doc(hidden)]
-#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
 pub type __Rover_2_11__payload__estimator_base_pose_pose = <::bb_core::__private::At<
     {
         ::bb_core::__private::find_output::<
@@ -167,7 +199,6 @@ pub type __Rover_2_11__payload__estimator_base_pose_pose = <::bb_core::__private
     <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Output,
 >>::Payload;
 #[doc(hidden)]
-#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
 pub type __Rover_2_11__payload__nav_velocity = <::bb_core::__private::At<
     {
         ::bb_core::__private::find_output::<
@@ -178,17 +209,14 @@ pub type __Rover_2_11__payload__nav_velocity = <::bb_core::__private::At<
     <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Output,
 >>::Payload;
 #[doc(hidden)]
-#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
 pub type __Rover_2_11_must_be_declared_outside_of_functions = __Rover_2_11::Rover;
 #[allow(non_camel_case_types, dead_code)]
 enum __Rover_2_11__member__sensor_base_imu_tilt {}
 #[doc(hidden)]
-#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
 pub type __Rover_2_11__exported__sensor_base_imu_tilt = __Rover_2_11__member__sensor_base_imu_tilt;
 #[allow(non_camel_case_types, dead_code)]
 enum __Rover_2_11__member__estimator_base_pose {}
 #[doc(hidden)]
-#[allow(non_camel_case_types, dead_code, private_interfaces, unreachable_pub)]
 pub type __Rover_2_11__exported__estimator_base_pose = __Rover_2_11__member__estimator_base_pose;
 #[allow(clippy::all, non_snake_case, unused_variables)]
 const _: () = {
@@ -574,25 +602,25 @@ const _: () = {
     fn __declared_options0() -> __Options0 {
         __Options0 {
             sensor_battery: __private::as_known(
-                <<__Rover_2_11__given__sensor_battery as ::bb_core::Sensor>::Options as ::bb_core::Options>::defaults(),
+                <<<__Rover_2_11__probed__sensor_battery as __private::Known>::Given as ::bb_core::Sensor>::Options as ::bb_core::Options>::defaults(),
             ),
             sensor_base_imu: __declared_sensor_base_imu(),
             sensor_base_pan_encoder: __declared_sensor_base_pan_encoder(),
             sensor_base_imu_tilt: __declared_sensor_base_imu_tilt(),
             estimator_base_pose: __private::as_known(
-                <<__Rover_2_11__given__estimator_base_pose as ::bb_core::Estimator>::Options as ::bb_core::Options>::defaults(),
+                <<<__Rover_2_11__probed__estimator_base_pose as __private::Known>::Given as ::bb_core::Estimator>::Options as ::bb_core::Options>::defaults(),
             ),
             actuator_base_pan_servo: __declared_actuator_base_pan_servo(),
             controller_stability: __private::as_known(
-                <<__Rover_2_11__given__controller_stability as ::bb_core::Service>::Options as ::bb_core::Options>::defaults(),
+                <<<__Rover_2_11__probed__controller_stability as __private::Known>::Given as ::bb_core::Service>::Options as ::bb_core::Options>::defaults(),
             ),
             bridge_ros: __declared_bridge_ros(),
             command_arm: __private::as_known(
-                <<__Rover_2_11__given__command_arm as ::bb_core::Command>::Options as ::bb_core::Options>::defaults(),
+                <<<__Rover_2_11__probed__command_arm as __private::Known>::Given as ::bb_core::Command>::Options as ::bb_core::Options>::defaults(),
             ),
             command_move_to: __declared_command_move_to(),
             command_stop: __private::as_known(
-                <<__Rover_2_11__given__command_stop as ::bb_core::Command>::Options as ::bb_core::Options>::defaults(),
+                <<<__Rover_2_11__probed__command_stop as __private::Known>::Given as ::bb_core::Command>::Options as ::bb_core::Options>::defaults(),
             ),
         }
     }
@@ -625,31 +653,31 @@ const _: () = {
         }
     }
     fn __declared_sensor_base_imu() -> <__Rover_2_11__sensor_base_imu as ::bb_core::Sensor>::Options {
-        let mut __options: <__Rover_2_11__given__sensor_base_imu as ::bb_core::Sensor>::Options = ::bb_core::Options::defaults();
+        let mut __options: <<__Rover_2_11__probed__sensor_base_imu as __private::Known>::Given as ::bb_core::Sensor>::Options = ::bb_core::Options::defaults();
         __options.bus = ::bb_core::__private::FromText::from_text("i2c-1");
         __private::as_known(__options)
     }
     fn __declared_sensor_base_pan_encoder() -> <__Rover_2_11__sensor_base_pan_encoder as ::bb_core::Sensor>::Options {
-        let mut __options: <__Rover_2_11__given__sensor_base_pan_encoder as ::bb_core::Sensor>::Options = ::bb_core::Options::defaults();
+        let mut __options: <<__Rover_2_11__probed__sensor_base_pan_encoder as __private::Known>::Given as ::bb_core::Sensor>::Options = ::bb_core::Options::defaults();
         __options.id = 3;
         __private::as_known(__options)
     }
     fn __declared_sensor_base_imu_tilt() -> <__Rover_2_11__sensor_base_imu_tilt as ::bb_core::Estimator>::Options {
-        let __options: <__Rover_2_11__given__sensor_base_imu_tilt as ::bb_core::Estimator>::Options = ::bb_core::Options::defaults();
+        let __options: <<__Rover_2_11__probed__sensor_base_imu_tilt as __private::Known>::Given as ::bb_core::Estimator>::Options = ::bb_core::Options::defaults();
         __private::as_known(__options)
     }
     fn __declared_actuator_base_pan_servo() -> <__Rover_2_11__actuator_base_pan_servo as ::bb_core::Actuator>::Options {
-        let mut __options: <__Rover_2_11__given__actuator_base_pan_servo as ::bb_core::Actuator>::Options = ::bb_core::Options::defaults();
+        let mut __options: <<__Rover_2_11__probed__actuator_base_pan_servo as __private::Known>::Given as ::bb_core::Actuator>::Options = ::bb_core::Options::defaults();
         __options.id = 3;
         __private::as_known(__options)
     }
     fn __declared_bridge_ros() -> <__Rover_2_11__bridge_ros as ::bb_core::Service>::Options {
-        let mut __options: <__Rover_2_11__given__bridge_ros as ::bb_core::Service>::Options = ::bb_core::Options::defaults();
+        let mut __options: <<__Rover_2_11__probed__bridge_ros as __private::Known>::Given as ::bb_core::Service>::Options = ::bb_core::Options::defaults();
         __options.port = 1;
         __private::as_known(__options)
     }
     fn __declared_command_move_to() -> <__Rover_2_11__command_move_to as ::bb_core::Command>::Options {
-        let mut __options: <__Rover_2_11__given__command_move_to as ::bb_core::Command>::Options = ::bb_core::Options::defaults();
+        let mut __options: <<__Rover_2_11__probed__command_move_to as __private::Known>::Given as ::bb_core::Command>::Options = ::bb_core::Options::defaults();
         __options.speed = __private::FromQuantity::from_quantity(1f64);
         __private::as_known(__options)
     }
@@ -964,7 +992,8 @@ const _: () = {
             if let __private::Some(payload) = <<<__Rover_2_11__sensor_base_imu_tilt as ::bb_core::Estimator>::Output as ::bb_core::Outputs>::Only as __private::EmittedAt<
                 _,
             >>::take(emitted) {
-                let message = &stamp.message(payload);
+                let emission = stamp.message(payload);
+                let message = &emission;
                 turn.emit(4usize, &wiring.topics.g0.sensor_base_imu_tilt, message);
                 __private::enter::<
                     __Island_estimator_base_pose,
@@ -981,6 +1010,7 @@ const _: () = {
                     __Message_estimator_base_pose::sensor_base_imu_tilt__kept,
                 );
                 turn.left_for_another_island();
+                turn.release(&wiring.topics.g0.sensor_base_imu_tilt, emission);
             }
         }
     }
@@ -1041,8 +1071,10 @@ const _: () = {
                     >("pose")
                 },
             > as __private::EmittedAt<_>>::take(emitted) {
-                let message = &stamp.message(payload);
+                let emission = stamp.message(payload);
+                let message = &emission;
                 turn.emit(5usize, &wiring.topics.g0.estimator_base_pose_pose, message);
+                turn.release(&wiring.topics.g0.estimator_base_pose_pose, emission);
             }
             if let __private::Some(payload) = <::bb_core::__private::At<
                 {
@@ -1051,8 +1083,10 @@ const _: () = {
                     >("velocity")
                 },
             > as __private::EmittedAt<_>>::take(emitted) {
-                let message = &stamp.message(payload);
+                let emission = stamp.message(payload);
+                let message = &emission;
                 turn.emit(6usize, &wiring.topics.g0.nav_velocity, message);
+                turn.release(&wiring.topics.g0.nav_velocity, emission);
             }
         }
         fn cache() -> <<__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Input as ::bb_core::Inputs>::Cache {
