@@ -5,14 +5,14 @@ use crate::params::params;
 params! {
     /// The tuning of [`ComplementaryFilter`](super::ComplementaryFilter).
     pub struct ComplementaryParams {
-        /// How soon the tilt follows the accelerometer.
+        /// Time constant with which the tilt follows the accelerometer.
         ///
         /// Small: accelerations tilt the estimate; 0 follows the accelerometer at once. Large: a gyroscope bias tilts it
         /// by bias times this constant, and a wrong start takes that long to go.
         ///
         /// Source: the accelerometer's time constant of VQF (Laidig and Seel, 2023).
         tilt_time_constant: f64 = 3.0, in 0.0..=1e6, unit "s";
-        /// How soon the heading follows the magnetometer.
+        /// Time constant with which the heading follows the magnetometer.
         ///
         /// Small: magnetic disturbances turn the estimate; 0 follows the magnetometer at once. Large: a gyroscope bias
         /// turns it by bias times this constant, and a wrong start takes that long to go.

@@ -42,19 +42,19 @@ params! {
         ///
         /// Source: the library's `recoveryTriggerPeriod`.
         recovery_time: f64 = 5.0, in 0.0..=1e6, unit "s";
-        /// Whether the gyroscope's offset is found at rest.
+        /// Whether the gyroscope's offset is estimated at rest.
         ///
         /// Off: an offset tilts the estimate by offset over gain. On: slow rotation for a long time is mistaken for one.
         ///
         /// Source: the library's offset correction, to be used along with the filter.
         offset_correction: bool = true;
-        /// The greatest angular velocity, less the offset so far, that counts as rest.
+        /// The largest angular velocity, minus the current offset, that counts as rest.
         ///
         /// Small: a larger offset is never found. Large: slow rotation is mistaken for an offset.
         ///
         /// Source: the library's.
         rest_angular_velocity: f64 = 3.0 * DEGREE, in 0.0..=1000.0, shown "3°/s", unit "rad/s";
-        /// How long the rotation must be that slow to count as rest.
+        /// How long the rotation must be this slow to count as rest.
         ///
         /// Small: a pause is mistaken for rest. Large: short rests are not used.
         ///

@@ -13,6 +13,9 @@ use crate::attitude::initial::MIN_HORIZONTAL_FRACTION;
 /// norm. Source: VQF's `magNormTh` of 0.1 and `magDipTh` of 10° in one.
 const SAME: f64 = 0.1;
 
+/// A field further from the reference than this many times that, squared, is that of iron and says nothing about a drift.
+const NEARBY: f64 = 4.0;
+
 /// Time constant of the mean over a field that may become the reference, s. VQF's `magCurrentTau` is 0.05 s, with an
 /// additional wait of 20 s; here, mean and wait are one.
 const CANDIDATE_TIME_CONSTANT_S: f64 = 5.0;
@@ -23,8 +26,9 @@ const REFERENCE_TIME_CONSTANT_S: f64 = 20.0;
 /// The shortest time before a new field is accepted, s.
 const LEAST_EVIDENCE_S: f64 = 1.0;
 
-/// A new field is accepted after this many times the duration of the reference.
-const EVIDENCE_RATIO: f64 = 2.0;
+/// A new field is accepted after this many times the duration of the reference: neither is known to be the undisturbed
+/// one, so the longer one is.
+const EVIDENCE_RATIO: f64 = 1.0;
 
 /// A new field that lasts this long is accepted in any case, s.
 const MOST_EVIDENCE_S: f64 = 40.0;
@@ -37,6 +41,12 @@ const TRUST_TIME_CONSTANT_S: f64 = 10.0;
 
 /// A heading that contradicts an undisturbed field for this long, s, is wrong.
 const CONTRADICTION_S: f64 = 10.0;
+
+/// Changes of the field over more than this time, s, are a drift: that of a candidate.
+const SLOW_S: f64 = CANDIDATE_TIME_CONSTANT_S;
+
+/// How soon the size of a drift is forgotten, s: longer than the drifts that the heading follows take.
+const DRIFT_TIME_CONSTANT_S: f64 = 60.0;
 
 /// A larger deviation from the reference, as a multiple of it, makes no difference.
 const LARGEST: f64 = 10.0;
@@ -53,6 +63,42 @@ pub(super) enum Verdict<T> {
     HeadingUnknown,
 }
 
+/// How the field drifts more slowly than a body passes a disturbance.
+///
+/// The heading follows such a drift, and its variance as computed from disturbances of a second does not include it. As
+/// with these, the component that turns the heading is assumed to be as large as the two visible ones are on average.
+#[derive(Clone, Debug, PartialEq)]
+struct Drift<T> {
+    slow: Plane<T>,
+    mean: Plane<T>,
+    /// Squared distance between the two: the largest of late.
+    squared: T,
+    duration: T,
+}
+
+impl<T: Real> Drift<T> {
+    fn new(field: Plane<T>) -> Self {
+        Self { slow: field, mean: field, squared: T::ZERO, duration: T::ZERO }
+    }
+
+    /// Adds the field of a window of `dt` seconds.
+    fn add(&mut self, dt: T, field: Plane<T>) {
+        self.duration += dt;
+        approach(&mut self.slow, field, dt / self.duration.min(T::of(SLOW_S)));
+        // Until a first mean exists, the start is not part of a drift: the tilt may still be wrong.
+        let gain = if self.duration < T::of(SLOW_S) { T::ONE } else { dt / self.duration };
+        approach(&mut self.mean, self.slow, gain);
+        let squared = distance(self.slow, self.mean);
+        let fade = (dt / T::of(DRIFT_TIME_CONSTANT_S)).min(T::ONE);
+        self.squared = (self.squared + (squared - self.squared) * fade).max(squared);
+    }
+
+    /// Variance of one component.
+    fn variance(&self) -> T {
+        T::HALF * self.squared
+    }
+}
+
 /// The reference, and the field that may become the next one.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct FieldReference<T> {
@@ -64,6 +110,7 @@ pub(super) struct FieldReference<T> {
     /// Squared size of the disturbance: the largest recent one.
     disturbance: T,
     contradicted_s: T,
+    drift: Drift<T>,
 }
 
 impl<T: Real> FieldReference<T> {
@@ -76,6 +123,7 @@ impl<T: Real> FieldReference<T> {
             candidate_s: T::ZERO,
             disturbance: T::ZERO,
             contradicted_s: T::ZERO,
+            drift: Drift::new(field),
         }
     }
 
@@ -92,6 +140,12 @@ impl<T: Real> FieldReference<T> {
     /// Whether a field in the world has the norm and dip of the reference, up to a fraction of its norm.
     pub(super) fn is_like(&self, field: &Vector3<T>, part: T) -> bool {
         distance(in_plane(field), self.reference) < (part * self.norm()) * (part * self.norm())
+    }
+
+    /// Variance of the heading by the field's drift, rad².
+    pub(super) fn drift_variance(&self) -> T {
+        let horizontal = self.horizontal();
+        self.drift.variance() / (self.squared_norm() * horizontal * horizontal)
     }
 
     fn norm(&self) -> T {
@@ -140,6 +194,10 @@ impl<T: Real> FieldReference<T> {
             self.candidate_s = self.candidate_s.min(T::of(LEAST_EVIDENCE_S));
         }
 
+        // Iron nearby is no drift: the filter does not follow it.
+        if distance(field, self.reference) < T::of(NEARBY) * same {
+            self.drift.add(dt, field);
+        }
         let undisturbed = distance(field, self.reference) < same;
         if undisturbed {
             self.seen_s = (self.seen_s + dt).min(T::of(MOST_EVIDENCE_S));

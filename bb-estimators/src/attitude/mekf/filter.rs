@@ -9,7 +9,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use super::INITIAL_TILT;
 use super::errors::Errors;
 use super::field::FieldReference;
-use super::iron::HardIron;
+use super::iron::{Adoption, HardIron};
 use super::measurement::Measurements;
 use super::params::MekfParams;
 use super::rest::Rest;
@@ -49,6 +49,8 @@ pub struct MekfFilter<T: Real = f64> {
     rest: Rest<T>,
     field: Option<FieldReference<T>>,
     iron: HardIron<T>,
+    /// Shown by the last window; takes effect with the next sample, since the end of a window is work enough.
+    adoption: Option<Adoption<T>>,
     last_field: Vector3<T>,
     squared_acceleration: T,
     vertical: Vertical<T>,
@@ -72,6 +74,7 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
             rest: Rest::new(&Vector3::zeros(), &Vector3::zeros()),
             field: None,
             iron: HardIron::new(params.magnetometer_latency),
+            adoption: None,
             last_field: Vector3::zeros(),
             squared_acceleration: T::ZERO,
             vertical: Vertical::new(false),
@@ -89,9 +92,13 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
             self.restart(sample);
             return Ok(());
         };
+        let previous = match self.adoption.take() {
+            Some(adoption) => self.adopt(step.world_from_body, &adoption),
+            None => step.world_from_body,
+        };
         let measured = &sample.angular_velocity;
         let rate = measured - self.bias - self.calibration * measured;
-        let mut orientation = turn(&step.world_from_body, &(rate * step.dt_s));
+        let mut orientation = turn(&previous, &(rate * step.dt_s));
 
         let bias_deviation = self.errors.variance(BIAS).max(T::ZERO).sqrt();
         self.rest.add(step.dt_s, measured, &sample.specific_force, &self.bias, bias_deviation);
@@ -145,11 +152,12 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
     }
 
     /// At the end of the last window, at most 0.1 s ago. Without a magnetometer, the heading's own variance is 0: it
-    /// is right by definition at the start, and its drift since then is included.
+    /// is right by definition at the start, and its drift since then is included. With one, the variance of the heading
+    /// includes an unknown offset of the magnetometer and, as far as norm and dip show it, a slow drift of the field.
     fn orientation_uncertainty(&self) -> Option<Matrix3<T>> {
         self.state.world_from_body()?;
         let mut in_world = self.errors.block(ROTATION);
-        in_world[(2, 2)] += self.iron.heading_variance();
+        in_world[(2, 2)] += self.field_heading_variance();
         Some(self.rotation.transpose() * in_world * self.rotation)
     }
 
@@ -165,7 +173,7 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
     /// Up to a standard deviation of 10°. An unknown offset of the magnetometer is part of it: a sensor that has not
     /// turned since the start has no heading to be trusted.
     fn is_heading_trusted(&self) -> Option<bool> {
-        let variance = self.errors.variance(ROTATION + 2) + self.iron.heading_variance();
+        let variance = self.errors.variance(ROTATION + 2) + self.field_heading_variance();
         let is_trusted = self.heading_known && variance < T::of(TRUSTED_HEADING * TRUSTED_HEADING);
         self.params.magnetometer.then_some(is_trusted)
     }

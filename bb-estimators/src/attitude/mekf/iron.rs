@@ -4,10 +4,12 @@
 //! the field, which is fixed in the world, by how well an offset explains the fields of several orientations; see
 //! `sums.rs`.
 
+mod judgement;
 mod sums;
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
+pub(super) use judgement::Adoption;
 pub(super) use sums::FieldMeans;
 use sums::{Fit, Lag, PRIOR_OFFSET, Sums};
 
@@ -29,63 +31,11 @@ const MISS: f64 = 0.07;
 /// Averaging time of that error, s.
 const MISS_S: f64 = 0.3;
 
-/// An offset is adopted if the cost falls by this multiple of its noise: probability e⁻¹⁵ by chance.
-const EVIDENCE: f64 = 30.0;
-
-/// And by this fraction of itself.
-const EVIDENCE_PART: f64 = 0.5;
-
-/// An offset that implies another field than before needs more evidence by this factor. Disturbances are fixed in the
-/// world; while they last, an offset may explain them as well, through errors that are not noise.
-const OTHER_FIELD: f64 = 20.0;
-
-/// Returning to an offset that was long in use needs less evidence.
-const RETURN: f64 = 1.0 / 3.0;
-
-/// The time it must have been in use, s.
+/// An offset that was in use for this long, s, is one to return to.
 const HOME_S: f64 = 20.0;
-
-/// The root mean square error of an acceptable fit, as a fraction of the norm.
-const GOOD_FIT: f64 = 0.1;
-
-/// The error of a fit that is good enough to need no other.
-const BAD_FIT: f64 = 0.03;
-
-/// The shortest time for a fit, s.
-const LEAST_S: f64 = 0.5;
-
-/// A reference seen for this long, s, is used to check whether an offset agrees with it.
-const REFERENCE_S: f64 = 5.0;
-
-/// The field of a fit may differ from the reference by this fraction of the norm.
-const SAME_FIELD: f64 = 0.12;
-
-/// A fit is an improvement if the variance of the offset is less than this fraction of the adopted one's.
-const IMPROVEMENT: f64 = 0.9;
-
-/// The heading of a field seen for this many times as long as the previous one replaces it, as in `field.rs`.
-const OUTLASTS: f64 = 2.0;
-
-/// And for at least this long, s.
-const OUTLASTS_S: f64 = 1.0;
 
 /// A heading known up to this standard deviation, rad, is worth turning to.
 const KNOWN_HEADING: f64 = 0.1;
-
-/// The newly adopted offset and field.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Adoption<T> {
-    /// The field in the world.
-    pub(super) field: Vector3<T>,
-    /// Variance of its direction about the vertical, rad².
-    pub(super) variance: T,
-    /// Whether this fit contains everything known about the heading.
-    pub(super) is_heading: bool,
-    /// Whether the field differs from the reference.
-    pub(super) is_other_field: bool,
-    /// The duration of the fit, s.
-    pub(super) duration: T,
-}
 
 /// The offset, the lag, and the sums from which they are estimated.
 #[derive(Clone, Debug, PartialEq)]
@@ -113,6 +63,9 @@ pub(super) struct HardIron<T> {
     is_doubted: bool,
     home: Vector3<T>,
     held_s: T,
+    /// Variance of the heading due to the uncertain offset when the sums restarted, as far as the field has not
+    /// corrected the heading since, rad².
+    unknown_heading: T,
 }
 
 impl<T: Real> HardIron<T> {
@@ -136,6 +89,7 @@ impl<T: Real> HardIron<T> {
             is_doubted: false,
             home: Vector3::zeros(),
             held_s: T::ZERO,
+            unknown_heading: T::ZERO,
         }
     }
 
@@ -163,6 +117,19 @@ impl<T: Real> HardIron<T> {
         self.is_heading = is_heading;
         self.is_doubted = false;
         self.held_s = T::ZERO;
+        if is_heading {
+            self.unknown_heading = T::ZERO;
+        }
+    }
+
+    /// A measurement of the heading corrects this fraction of its error.
+    pub(super) fn correct_heading(&mut self, fraction: T) {
+        self.unknown_heading *= (T::ONE - fraction) * (T::ONE - fraction);
+    }
+
+    /// The mean field in the world without the offset, if there was a field since the sums began.
+    pub(super) fn mean_field(&self) -> Option<Vector3<T>> {
+        self.sums.mean_field(&self.offset)
     }
 
     /// Rotates the world by a small rotation.
@@ -174,6 +141,13 @@ impl<T: Real> HardIron<T> {
     pub(super) fn turn(&mut self, rotation: &UnitQuaternion<T>) {
         self.sums.turn(rotation);
         self.fit = None;
+    }
+
+    /// Rotates the world by any rotation, to the heading that the sums show.
+    pub(super) fn level(&mut self, rotation: &UnitQuaternion<T>) {
+        self.turn(rotation);
+        self.is_heading = true;
+        self.unknown_heading = T::ZERO;
     }
 
     /// Covariance of the uncertainty of the offset that disturbs the heading: an offset of zero is trusted until
@@ -196,11 +170,12 @@ impl<T: Real> HardIron<T> {
         }
     }
 
-    /// The variance of the heading due to the uncertain offset, rad², while the field is the only source of heading.
+    /// The variance of the heading due to the uncertain offset, rad²: that of the field while it is the only source of
+    /// heading, and what is left of it later.
     pub(super) fn heading_variance(&self) -> T {
         match &self.fit {
             Some(fit) if self.is_heading => fit.heading_variance(),
-            _ => T::ZERO,
+            _ => self.unknown_heading,
         }
     }
 
@@ -216,7 +191,7 @@ impl<T: Real> HardIron<T> {
             self.unit = means.field.norm();
         }
         if self.misses(dt, means) {
-            self.begin(false);
+            self.begin_anew();
             self.is_doubted = true;
         }
         self.held_s += dt;
@@ -235,14 +210,26 @@ impl<T: Real> HardIron<T> {
         let norm = fit.field.norm();
         if !(norm + fit.noise + fit.offset_trace()).is_finite() {
             // Absurd samples overflowed the sums.
-            self.begin(false);
+            self.begin_anew();
             return None;
         }
         self.fit = Some(fit);
+        if !self.is_heading && self.unknown_heading > T::of(KNOWN_HEADING * KNOWN_HEADING) {
+            // By these sums alone, the heading is off by no more than this.
+            let field = fit.field_of(&self.offset, self.lag.mean);
+            let angle = field.x.atan2(field.y);
+            self.unknown_heading = self.unknown_heading.min(angle * angle + fit.heading_variance());
+        }
         if norm > T::of(0.1) * means.field.norm() {
             self.unit = norm;
         }
         self.judge(&fit, reference)
+    }
+
+    /// Begins again, with what is known of the heading.
+    fn begin_anew(&mut self) {
+        self.unknown_heading = self.heading_variance();
+        self.begin(false);
     }
 
     /// Whether the fit predicts neither this window's field nor the previous ones.
@@ -256,63 +243,5 @@ impl<T: Real> HardIron<T> {
         self.miss += (excess - self.miss) * (dt / T::of(MISS_S)).min(T::ONE);
         let most = T::of(MISS) * self.unit;
         self.miss > most * most
-    }
-
-    /// Whether the fit is to be adopted.
-    fn judge(&mut self, fit: &Fit<T>, reference: Option<&FieldReference<T>>) -> Option<Adoption<T>> {
-        let (mut cost, mut lag) = fit.cost_of(&self.offset, self.lag_before);
-        let least = fit.least_cost();
-        let norm = fit.field.norm();
-        let within = |cost: T, part: f64| fit.mean_square(cost) < (T::of(part) * norm) * (T::of(part) * norm);
-        let is_good = self.sums.duration > T::of(LEAST_S) && within(least, GOOD_FIT);
-        let is_evident = |cost: T, less: T, factor: f64| {
-            let gain = cost - less;
-            gain > T::of(EVIDENCE * factor) * fit.noise
-                && gain > T::of(EVIDENCE_PART) * cost
-                && !within(cost, BAD_FIT)
-        };
-        let is_other_field = !self.is_heading
-            && reference.is_some_and(|reference| {
-                reference.seen_s() > T::of(REFERENCE_S) && !reference.is_like(&fit.field, T::of(SAME_FIELD))
-            });
-        let factor = if is_other_field { OTHER_FIELD } else { 1.0 };
-        let mut adopted = None;
-        if self.home != self.offset {
-            let (at_home, lag_at_home) = fit.cost_of(&self.home, self.lag_before);
-            if is_good && within(at_home, GOOD_FIT) && is_evident(cost, at_home, RETURN * factor) {
-                (cost, lag) = (at_home, lag_at_home);
-                adopted = Some(self.home);
-            }
-        }
-        let trace = fit.offset_trace();
-        let improves = self.adopted.is_some_and(|before| trace < T::of(IMPROVEMENT) * before);
-        if is_good && (improves || is_evident(cost, least, factor)) {
-            lag = fit.lag;
-            adopted = Some(fit.offset);
-        }
-        self.lag = Lag { mean: lag, variance: fit.covariance[(3, 3)] };
-        let outlasts = !self.is_heading
-            && is_good
-            && self.seen_s > T::of(OUTLASTS_S) + T::of(OUTLASTS) * self.heading_s
-            && fit.heading_variance() < T::of(KNOWN_HEADING * KNOWN_HEADING);
-        if outlasts {
-            self.is_heading = true;
-        } else if adopted.is_none() {
-            return None;
-        }
-        if let Some(offset) = adopted {
-            self.offset = offset;
-            self.adopted = Some(trace);
-            if !improves {
-                self.held_s = T::ZERO;
-            }
-        }
-        Some(Adoption {
-            field: fit.field_of(&self.offset, lag),
-            variance: fit.heading_variance(),
-            is_heading: self.is_heading,
-            is_other_field,
-            duration: self.sums.duration,
-        })
     }
 }

@@ -11,8 +11,8 @@ params! {
         ///
         /// Source: data sheets of MEMS gyroscopes, 0.003–0.03°/s/√Hz.
         gyroscope_noise: f64 = 1.7e-4, in 0.0..=1.0, shown "0.01°/s/√Hz", plain "rad/s/√Hz";
-        /// What the gyroscope's error grows by with the angular velocity, beyond scale and misalignment: nonlinearity,
-        /// its sensitivity to acceleration, and the sampling of a rate that changes.
+        /// Growth of the gyroscope's error with the angular velocity, beyond scale and misalignment: nonlinearity,
+        /// sensitivity to acceleration, and the sampling of a changing rate.
         ///
         /// Small: trusts the calibration that it finds, which must then be constant. Large: fast rotation is forgotten
         /// like noise.
@@ -38,22 +38,22 @@ params! {
         ///
         /// Source: factory calibration of MEMS gyroscopes, 0.1–1 %.
         calibration_error: f64 = 0.004, in 0.0..=0.5;
-        /// The velocity of slow motion, horizontally. It stays bounded, so accelerations have no mean.
+        /// Horizontal velocity in slow motion. It is bounded, so accelerations average to zero.
         ///
         /// Small: tilt follows the accelerometer soon, and accelerations with it. Large: tilt follows the gyroscope for
         /// long.
         ///
         /// Source: a hand that moves slowly.
         velocity: f64 = 0.2, in 1e-3..=1e3, unit "m/s";
-        /// What the velocity grows by with the acceleration seen of late: velocity over acceleration, how long one
-        /// acceleration lasts.
+        /// Growth of that velocity with recent acceleration: velocity over acceleration, the duration of one
+        /// acceleration.
         ///
         /// Small: the same trust in the accelerometer however fast the motion. Large: in fast motion tilt is the
         /// gyroscope's.
         ///
         /// Source: motion by hand at 1 to 2 Hz.
         acceleration_time: f64 = 0.1, in 0.0..=100.0, unit "s";
-        /// How much the accelerometer may lag the gyroscope, standard deviation. The lag is estimated; it may be
+        /// Lag of the accelerometer behind the gyroscope, standard deviation. The lag is estimated and may be
         /// negative.
         ///
         /// 0: takes them as simultaneous. Large: accelerations are mistaken for a lag.
@@ -68,13 +68,13 @@ params! {
         ///
         /// Source: sensors sample fast and give out means, or low-pass to that effect.
         force_is_mean: bool = true;
-        /// How much the magnetometer may lag the gyroscope, standard deviation. The lag is estimated.
+        /// Lag of the magnetometer behind the gyroscope, standard deviation. The lag is estimated.
         ///
         /// 0: takes them as simultaneous, and fast rotation turns the heading. Large: found sooner, less sure.
         ///
         /// Source: a magnetometer's period at 100 Hz.
         magnetometer_latency: f64 = 0.01, in 0.0..=1.0, unit "s";
-        /// The field's disturbance where it seems undisturbed, as a fraction of its norm.
+        /// Remaining disturbance of a field that seems undisturbed, as a fraction of its norm.
         ///
         /// Small: heading follows the field soon, disturbed or not. Large: heading is the gyroscope's for long.
         ///

@@ -1,5 +1,8 @@
 //! Tests of the Kalman filter alone; the laws of all filters are also checked here for it.
 
+mod start;
+mod trust;
+
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::{MekfFilter, MekfParams};
@@ -140,27 +143,6 @@ fn a_magnet_on_the_body_is_recognised() {
 }
 
 #[test]
-fn a_start_in_motion_is_levelled_within_two_seconds() {
-    for magnetometer in [true, false] {
-        for start in 0..20 {
-            let (mut world, mut filter) = (World::new(), filter(magnetometer));
-            for _ in 0..37 * start {
-                world.sample(true);
-            }
-            // A hand that throws: for a tenth of a second the specific force points anywhere.
-            for i in 0..10 {
-                let sample = world.sample(true);
-                let push = Vector3::new(12.0, -9.0, 4.0) * (f64::from(i) * 0.63).cos();
-                filter.update(&ImuSample { specific_force: sample.specific_force + push, ..sample }).unwrap();
-            }
-            world.run(&mut filter, 3, true);
-            let error = world.error_of(&filter);
-            assert!(error.inclination < 8.0, "start {start}: {error:?}");
-        }
-    }
-}
-
-#[test]
 fn a_new_field_that_lasts_is_believed() {
     let (mut world, mut filter) = (World::new(), filter(true));
     world.run(&mut filter, 30, true);
@@ -218,47 +200,6 @@ fn an_offset_is_found_and_its_heading_with_it() {
             assert!(deviation < 5e-6, "{deviation}");
             assert_eq!(filter.is_heading_trusted(), Some(true));
         }
-    }
-}
-
-#[test]
-fn headings_are_within_two_sigma_whatever_the_offset() {
-    let (mut told, mut within) = (0, 0);
-    for case in 0..24 {
-        let (mut world, mut filter) = (World::new(), filter(true));
-        let angle = f64::from(case);
-        world.truth = UnitQuaternion::from_euler_angles((1.7 * angle).sin(), (2.3 * angle).sin(), angle);
-        world.magnet = world.truth * Vector3::new((3.1 * angle).sin(), angle.cos(), (5.3 * angle).sin()) * 20e-6;
-        for second in 0..40 {
-            world.run(&mut filter, 1, second > 3);
-            let turned = filter.world_from_body().unwrap().to_rotation_matrix();
-            let in_world = turned * filter.orientation_uncertainty().unwrap() * turned.transpose();
-            told += 1;
-            within += i32::from(world.error_of(&filter).heading <= 2.0 * in_world[(2, 2)].sqrt().to_degrees());
-        }
-    }
-    assert!(f64::from(within) >= 0.95 * f64::from(told), "{within} of {told}");
-}
-
-#[test]
-fn any_start_is_recovered_from() {
-    // Free fall for half a second, fast rotation at once, any orientation, and a magnet that is taken off later.
-    for case in 0..24 {
-        let (mut world, mut filter) = (World::new(), filter(true));
-        let angle = f64::from(case);
-        world.truth = UnitQuaternion::from_euler_angles(2.0 * angle, 1.3 * angle, angle);
-        world.i = i64::from(case) * 53;
-        world.magnet = Vector3::new((3.1 * angle).sin(), angle.cos(), (5.3 * angle).sin()) * 25e-6;
-        for _ in 0..if case % 2 == 0 { 50 } else { 0 } {
-            let sample = world.sample(true);
-            filter.update(&ImuSample { specific_force: Vector3::zeros(), ..sample }).unwrap();
-        }
-        world.run(&mut filter, 30, true);
-        assert!(world.error_of(&filter).total < 3.0, "case {case}: {:?}", world.error_of(&filter));
-        world.magnet = Vector3::zeros();
-        world.run(&mut filter, 30, true);
-        assert!(world.error_of(&filter).total < 3.0, "case {case}, magnet off: {:?}", world.error_of(&filter));
-        assert!(filter.magnetometer_offset().norm() < 2e-6, "{}", filter.magnetometer_offset());
     }
 }
 

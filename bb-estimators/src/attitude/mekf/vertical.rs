@@ -20,8 +20,15 @@ const LEAST_START_S: f64 = 0.05;
 /// How much the velocity may have changed since a start, m/s: a hand that shakes a sensor.
 const START_VELOCITY: f64 = 1.4;
 
-/// The largest slope that leaves a start unchanged, rad: the deviation of the first sample's tilt.
-const MAX_START_SLOPE: f64 = INITIAL_TILT;
+/// The mean of a start that leans by less leaves it unchanged, rad: levelling costs what the errors have learnt since.
+const MAX_START_SLOPE: f64 = 0.1;
+
+/// A mean of less than this fraction of gravity shows no vertical: free fall.
+const FREE_FALL: f64 = 0.5;
+
+/// The same at a start. Since the first sample has no claim to be better than the mean of all, it takes less: rounding
+/// and noise.
+const FREE_FALL_AT_START: f64 = 0.1;
 
 /// The tilt contradicted by the mean specific force.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,15 +70,16 @@ impl<T: Real> Vertical<T> {
         if is_complete {
             *self = Self::new(false);
         }
-        if sum.norm() <= T::HALF * weight {
-            // Free fall shows no vertical.
+        let least = if was_start { FREE_FALL_AT_START } else { FREE_FALL };
+        if sum.norm() <= T::of(least) * weight {
             return None;
         }
         let leans = |slope: T| sum.x.hypot(sum.y) > slope * sum.z;
         if was_start {
-            let deviation = (T::of(START_VELOCITY) / weight).min(T::of(MAX_START_SLOPE));
+            let deviation = (T::of(START_VELOCITY) / weight).min(T::of(INITIAL_TILT));
             let believed = self.duration > T::of(LEAST_START_S) || is_complete;
-            return (believed && leans(deviation)).then_some(Contradiction::Start(sum, deviation));
+            let most = deviation.min(T::of(MAX_START_SLOPE));
+            return (believed && leans(most)).then_some(Contradiction::Start(sum, deviation));
         }
         (is_complete && leans(T::of(MAX_SLOPE))).then_some(Contradiction::Tilt(sum))
     }
@@ -84,5 +92,34 @@ impl<T: Real> Vertical<T> {
     /// The world was levelled by the mean, so the mean is the vertical from now on.
     pub(super) fn levelled(&mut self) {
         self.sum = Vector3::new(T::ZERO, T::ZERO, self.sum.norm());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a start shows whose specific force is this for a time, s.
+    fn start(force: Vector3<f64>, time_s: f64) -> Option<Contradiction<f64>> {
+        let mut vertical = Vertical::new(true);
+        let window_s = 0.02;
+        let windows = (time_s / window_s).round() as i32;
+        (0..windows).filter_map(|_| vertical.add(window_s, &UnitQuaternion::identity(), &(force * window_s))).last()
+    }
+
+    #[test]
+    fn a_start_follows_the_mean_of_all_its_samples() {
+        for (lean, levels) in [(0.05_f64, false), (0.15, true), (0.5, true), (2.0, true)] {
+            let up = Vector3::new(lean.sin(), 0.0, lean.cos());
+            for part in [0.3, 1.0, 2.0] {
+                let shown = start(up * GRAVITY * part, 0.2);
+                assert_eq!(
+                    matches!(shown, Some(Contradiction::Start(..))),
+                    levels,
+                    "{lean} rad, {part} g: {shown:?}"
+                );
+            }
+            assert_eq!(start(up * GRAVITY * 0.05, 0.2), None, "free fall");
+        }
     }
 }

@@ -6,13 +6,13 @@ use crate::params::params;
 params! {
     /// The tuning of [`VqfFilter`](super::VqfFilter).
     pub struct VqfParams {
-        /// How soon the inclination follows the low-passed specific force.
+        /// Time constant with which the inclination follows the low-passed specific force.
         ///
         /// Small: accelerations tilt the estimate. Large: gyroscope drift tilts it for a long time.
         ///
         /// Source: the paper's `tauAcc`.
         tilt_time_constant: f64 = 3.0, in 1e-3..=1e6, unit "s";
-        /// How soon the heading follows an undisturbed field.
+        /// Time constant with which the heading follows an undisturbed field.
         ///
         /// Small: magnetic disturbances turn the estimate. Large: gyroscope drift turns it for a long time, and so does
         /// a wrong start.
@@ -38,20 +38,20 @@ params! {
         ///
         /// Source: the paper's `biasSigmaInit`.
         initial_bias: f64 = 0.5 * DEGREE, in 0.0..=1.0, shown "0.5°/s", unit "rad/s";
-        /// How long it takes what is known of the bias to fade to a standard deviation of 0.1°/s.
+        /// Time in which the bias estimate's standard deviation grows to 0.1°/s.
         ///
         /// Small: follows a bias that changes, with more noise. Large: steady, and slow to follow.
         ///
         /// Source: the paper's `biasForgettingTime`.
         bias_forgetting_time: f64 = 100.0, in 1e-3..=1e9, unit "s";
-        /// The greatest bias there is, and the greatest angular velocity that may count as rest.
+        /// The largest possible bias, and the largest angular velocity that may count as rest.
         ///
         /// Small: a larger bias is never found, and then there is no rest. Large: slow steady rotation is mistaken for
         /// rest.
         ///
         /// Source: the paper's `biasClip`.
         largest_bias: f64 = 2.0 * DEGREE, in 0.0..=10.0, shown "2°/s", unit "rad/s";
-        /// Standard deviation that the bias has after long motion.
+        /// Standard deviation of the bias after long motion.
         ///
         /// Small: the bias follows motion closely, with its errors. Large: it follows slowly.
         ///
@@ -64,13 +64,13 @@ params! {
         ///
         /// Source: the paper's `biasVerticalForgettingFactor`.
         vertical_forgetting_factor: f64 = 1e-4, in 0.0..=1.0;
-        /// Standard deviation that the bias has after long rest.
+        /// Standard deviation of the bias after long rest.
         ///
         /// Small: the bias follows rest closely, with its errors. Large: it follows slowly.
         ///
         /// Source: the paper's `biasSigmaRest`.
         rest_bias_deviation: f64 = 0.03 * DEGREE, in 1e-06..=10.0, shown "0.03°/s", unit "rad/s";
-        /// How long the sensor must not move to be at rest.
+        /// How long the sensor must be still to count as at rest.
         ///
         /// Small: a pause is mistaken for rest. Large: short rests are not used.
         ///
@@ -82,19 +82,19 @@ params! {
         ///
         /// Source: the paper's `restFilterTau`.
         rest_time_constant: f64 = 0.5, in 1e-3..=1e6, unit "s";
-        /// How far the angular velocity may be from its low-passed value at rest.
+        /// Largest deviation of the angular velocity from its low-passed value at rest.
         ///
         /// Small: noise hides rest. Large: slow motion is mistaken for rest.
         ///
         /// Source: the paper's `restThGyr`.
         rest_angular_velocity: f64 = 2.0 * DEGREE, in 0.0..=1000.0, shown "2°/s", unit "rad/s";
-        /// How far the specific force may be from its low-passed value at rest.
+        /// Largest deviation of the specific force from its low-passed value at rest.
         ///
         /// Small: noise hides rest. Large: slow motion is mistaken for rest.
         ///
         /// Source: the paper's `restThAcc`.
         rest_specific_force: f64 = 0.5, in 0.0..=1e6, unit "m/s^2";
-        /// Whether a disturbed field counts for less.
+        /// Whether a disturbed field has less weight.
         ///
         /// Off: the heading follows any field. On: it follows fields like the reference, others late and slowly.
         ///
@@ -106,7 +106,7 @@ params! {
         ///
         /// Source: the paper's `magCurrentTau`.
         field_time_constant: f64 = 0.05, in 1e-3..=1e6, unit "s";
-        /// How soon the reference follows an undisturbed field.
+        /// Time constant with which the reference follows an undisturbed field.
         ///
         /// Small: the reference follows a field that becomes disturbed slowly. Large: it stays as it was first seen.
         ///
@@ -124,20 +124,20 @@ params! {
         ///
         /// Source: the paper's `magDipTh`.
         field_dip_tolerance: f64 = 10.0 * DEGREE, in 0.0..=4.0, shown "10°", unit "rad";
-        /// How long another field has to stay the same, in motion, to become the reference.
+        /// How long a new field must stay constant in motion to become the reference.
         ///
         /// Small: a disturbance becomes the reference. Large: in a new place the heading is the gyroscope's for long.
         ///
         /// Source: the paper's `magNewTime`.
         new_field_time: f64 = 20.0, in 0.0..=1e6, unit "s";
-        /// As `new_field_time`, for the first reference.
+        /// The same as `new_field_time`, for the first reference.
         ///
         /// Small: a disturbance becomes the reference. Large: there is no reference for a long time, and all fields count as
         /// disturbed.
         ///
         /// Source: the paper's `magNewFirstTime`.
         first_field_time: f64 = 5.0, in 0.0..=1e6, unit "s";
-        /// The least low-passed angular velocity that counts as motion for a new reference.
+        /// The smallest low-passed angular velocity that counts as motion for a new reference.
         ///
         /// Small: the field near a magnet becomes the reference. Large: only fast motion counts.
         ///
@@ -149,7 +149,7 @@ params! {
         ///
         /// Source: the paper's `magMinUndisturbedTime`.
         undisturbed_time: f64 = 0.5, in 0.0..=1e6, unit "s";
-        /// How long a disturbed field counts for nothing.
+        /// How long a disturbed field is ignored.
         ///
         /// Small: long disturbances turn the heading. Large: the heading is the gyroscope's for long.
         ///

@@ -48,11 +48,18 @@ impl<T: Real> MekfFilter<T> {
         let across = rotation.tr_mul(&Vector3::new(field.y, -field.x, T::ZERO)) / squared.max(least).sqrt();
         let unknown = across.dot(&(self.iron.covariance() * across)) / reference.squared_norm();
         let disturbed = T::TWO * T::of(FIELD_TIME_S) * (usual + disturbance + unknown) / (horizontal * horizontal);
-        Heading {
-            angle,
-            slope: reference.vertical() / horizontal,
-            variance: disturbed / dt + rate * rate * self.iron.lag_variance(),
-        }
+        let slope = reference.vertical() / horizontal;
+        let variance = disturbed / dt + rate * rate * self.iron.lag_variance();
+        let known = self.errors.variance(ROTATION + 2);
+        self.iron.correct_heading(known / (known + variance));
+        Heading { angle, slope, variance }
+    }
+
+    /// Variance of the heading beyond that of the error state, rad²: the errors that its measurements have in common, by
+    /// the offset and by a drift of the field.
+    pub(super) fn field_heading_variance(&self) -> T {
+        let drift = self.field.as_ref().map_or(T::ZERO, FieldReference::drift_variance);
+        self.iron.heading_variance() + drift
     }
 
     /// Adopts an offset shown by the field, and the heading if the fields are its only source.

@@ -47,6 +47,7 @@ impl<T: Real> MekfFilter<T> {
         self.measurements = Measurements::none();
         self.vertical = Vertical::new(false);
         self.iron.begin(true);
+        self.adoption = None;
     }
 
     /// Resets the uncertainty of the sensor errors to that at the start.
@@ -59,7 +60,7 @@ impl<T: Real> MekfFilter<T> {
     }
 
     /// The body accelerated at the start: levels it by the mean specific force since, known up to `deviation`, rad.
-    /// The heading is that of the last field; the sensor errors are kept.
+    /// The heading is that of the mean field since; the sensor errors and the field's sums are kept.
     #[cold]
     pub(super) fn level_start(
         &mut self,
@@ -67,19 +68,23 @@ impl<T: Real> MekfFilter<T> {
         up: &Vector3<T>,
         deviation: T,
     ) -> UnitQuaternion<T> {
-        let mut orientation = turn_upright(&orientation, up);
-        if self.params.magnetometer
-            && let Some(field) = self.last_field.try_normalize(T::ZERO)
-            && let Some(error) = heading_error(&(orientation * field))
+        let mut turned = turn_upright(&orientation, up);
+        let level = turned * orientation.inverse();
+        let last = || self.params.magnetometer.then(|| orientation * self.last_field);
+        if let Some(field) = self.iron.mean_field().or_else(last)
+            && let Some(direction) = (level * field).try_normalize(T::ZERO)
+            && let Some(error) = heading_error(&direction)
         {
-            orientation = turn_heading(&orientation, error);
+            turned = turn_heading(&turned, error);
             self.field = None;
         }
-        let vertical = self.vertical.clone();
-        self.begin(&orientation, deviation, T::of(INITIAL_HEADING));
+        let (vertical, iron) = (self.vertical.clone(), self.iron.clone());
+        self.begin(&turned, deviation, T::of(INITIAL_HEADING));
+        self.iron = iron;
+        self.iron.level(&(turned * orientation.inverse()));
         self.vertical = vertical;
         self.vertical.levelled();
-        orientation
+        turned
     }
 
     /// The tilt contradicts the mean specific force: restarts it, and the heading with the next field.

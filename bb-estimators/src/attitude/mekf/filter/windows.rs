@@ -64,14 +64,11 @@ impl<T: Real> MekfFilter<T> {
         }
         self.iron.correct(&correction);
         let fields = window.mean_field(&correction);
-        let adoption = fields
+        self.adoption = fields
             .as_ref()
             .and_then(|fields| self.iron.observe(dt, fields, self.rest.is_detected(), self.field.as_ref()));
         self.measure(dt, fields.as_ref(), &force);
-        match adoption {
-            Some(adoption) => self.adopt(orientation, &adoption),
-            None => orientation,
-        }
+        orientation
     }
 
     /// Moves the mean errors into the estimates; returns the rotation.

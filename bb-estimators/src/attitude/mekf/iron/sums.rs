@@ -108,6 +108,11 @@ impl<T: Real> Sums<T> {
         self.rate_times_field = self.rate_times_field * keep + rate.dot(field) * dt;
     }
 
+    /// The mean of the fields less an offset, in the world; `None` without data.
+    pub(super) fn mean_field(&self, offset: &Vector3<T>) -> Option<Vector3<T>> {
+        (self.duration > T::ZERO).then(|| (self.field - self.rotation * offset) / self.duration)
+    }
+
     /// Turns the world.
     pub(super) fn turn(&mut self, correction: &UnitQuaternion<T>) {
         self.rotation = correction.to_rotation_matrix() * self.rotation;
@@ -179,6 +184,14 @@ impl<T: Real> Fit<T> {
     /// The trace of the offset's covariance.
     pub(super) fn offset_trace(&self) -> T {
         self.covariance[(0, 0)] + self.covariance[(1, 1)] + self.covariance[(2, 2)]
+    }
+
+    /// How much the data tells about the offset: the logarithm of the ratio of its prior and its own volume, squared.
+    pub(super) fn offset_information(&self, unit: T) -> T {
+        let prior = T::of(PRIOR_OFFSET) * unit;
+        let relative = self.covariance.fixed_view::<3, 3>(0, 0) / (prior * prior);
+        // The prior is scaled by the noise of the fit, so that little data may seem to say less than nothing.
+        (-relative.determinant().ln()).max(T::ZERO)
     }
 
     /// The field in the world with an offset and a lag.

@@ -1,0 +1,86 @@
+//! What the filter says about its heading: its deviation, and whether to trust it.
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+use super::{World, filter};
+use crate::attitude::AttitudeFilter;
+use crate::attitude::laws::FIELD;
+use crate::attitude::mekf::MekfFilter;
+
+/// Standard deviation of the heading, degrees.
+fn deviation(filter: &MekfFilter) -> f64 {
+    let rotation = filter.world_from_body().unwrap().to_rotation_matrix();
+    let in_world = rotation * filter.orientation_uncertainty().unwrap() * rotation.transpose();
+    in_world[(2, 2)].sqrt().to_degrees()
+}
+
+#[test]
+fn headings_are_within_two_sigma_whatever_the_offset() {
+    let (mut told, mut within) = (0, 0);
+    for case in 0..24 {
+        let (mut world, mut filter) = (World::new(), filter(true));
+        let angle = f64::from(case);
+        world.truth = UnitQuaternion::from_euler_angles((1.7 * angle).sin(), (2.3 * angle).sin(), angle);
+        world.magnet = world.truth * Vector3::new((3.1 * angle).sin(), angle.cos(), (5.3 * angle).sin()) * 20e-6;
+        for second in 0..40 {
+            world.run(&mut filter, 1, second > 3);
+            told += 1;
+            within += i32::from(world.error_of(&filter).heading <= 2.0 * deviation(&filter));
+        }
+    }
+    assert!(f64::from(within) >= 0.95 * f64::from(told), "{within} of {told}");
+}
+
+#[test]
+fn headings_are_within_two_sigma_while_the_field_drifts() {
+    let (mut told, mut within) = (0, 0);
+    for case in 0..24 {
+        let (mut world, mut filter) = (World::new(), filter(true));
+        let angle = f64::from(case) * 2.4;
+        let (sin, cos) = angle.sin_cos();
+        // Evenly over the sphere.
+        let height = (f64::from(case) + 0.5) / 12.0 - 1.0;
+        let around = (1.0 - height * height).sqrt();
+        let drift = Vector3::new(around * cos, around * sin, height) * 6e-6;
+        world.truth = UnitQuaternion::from_euler_angles(sin, 0.5 * cos, angle);
+        let period_s = 60.0 + 2.5 * f64::from(case);
+        for second in 0..120 {
+            world.field = FIELD + drift * (std::f64::consts::TAU * f64::from(second) / period_s).sin();
+            world.run(&mut filter, 1, second > 3);
+            told += 1;
+            within += i32::from(world.error_of(&filter).heading <= 2.0 * deviation(&filter));
+        }
+    }
+    // A drift across the field is hardly visible: without it in the deviation, three quarters are within.
+    assert!(f64::from(within) >= 0.92 * f64::from(told), "{within} of {told}");
+}
+
+/// The filter does not follow the field of iron that it passes, so it need not doubt its heading for long.
+#[test]
+fn passing_iron_is_forgotten_soon() {
+    let (mut world, mut filter) = (World::new(), filter(true));
+    world.run(&mut filter, 60, true);
+    assert_eq!(filter.is_heading_trusted(), Some(true));
+    world.field = FIELD + Vector3::new(4e-5, 0.0, 0.0);
+    world.run(&mut filter, 2, true);
+    world.field = FIELD;
+    world.run(&mut filter, 10, true);
+    assert_eq!(filter.is_heading_trusted(), Some(true), "{}", deviation(&filter));
+}
+
+/// What is not known of the heading, since an offset of the magnetometer would not show, stays unknown when the field
+/// changes.
+#[test]
+fn another_field_tells_nothing_about_the_heading() {
+    let (mut world, mut filter) = (World::new(), filter(true));
+    world.run(&mut filter, 20, false);
+    let before = deviation(&filter);
+    assert!(before > 30.0, "{before}");
+    world.field = FIELD + Vector3::new(8e-6, 3e-6, 5e-6);
+    world.run(&mut filter, 3, false);
+    let after = deviation(&filter);
+    assert!(after > 0.8 * before, "{before} to {after}");
+    assert_eq!(filter.is_heading_trusted(), Some(false));
+    world.run(&mut filter, 30, true);
+    assert_eq!(filter.is_heading_trusted(), Some(true), "{}", deviation(&filter));
+}
