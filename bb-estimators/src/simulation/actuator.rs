@@ -11,13 +11,16 @@ use std::sync::Arc;
 use std::time::Duration;
 
 /// A motor that moves its joint in the [`SimulatedWorld`] within the joint's `limit` and `dynamics`, an inertia and
-/// an acceleration, at most at the declared velocity and effort.
+/// an acceleration, at most at the declared velocity and effort. Its servo compensates for gravity, friction and the
+/// motion of other joints as far as its effort suffices; what is commanded as an effort is applied as it is.
 ///
 /// It takes all standard commands; as `SimulatedActuator<VelocityCommand>` it takes the place of a driver that takes only some. It
 /// reports its motions: a position or a trajectory ends when the joint rests at the target (`Reached`), a velocity at the end of the
-/// joint's range (`Limit`); either ends when something else is commanded (`Replaced`), when it has come to rest after
+/// joint's range (`Limit`); each ends when something else is commanded (`Replaced`), when it has come to rest after
 /// `Hold`, `Stop`, a velocity of zero or a disarming (`Stopped`), or when something holds it for `stall_after` (`Stalled`, or `Limit` at the end of
-/// its range). An effort is no motion, and is given until something else is commanded, also against what holds the joint.
+/// its range). An effort is applied until something else is commanded, also against an obstacle: its motion has no target, as that of
+/// a velocity on a joint without an end of its range. Velocities that follow each other are one motion, whose changes are reported as
+/// further beginnings; so are efforts.
 pub struct SimulatedActuator<C = ActuatorCommand> {
     options: SimulatedActuatorOptions,
     context: ActuatorContext,
@@ -34,7 +37,8 @@ pub struct SimulatedActuator<C = ActuatorCommand> {
 /// Options of [`SimulatedActuator`].
 #[derive(Clone, Debug, PartialEq, Options)]
 pub struct SimulatedActuatorOptions {
-    /// Moment of inertia or mass of all that the joint moves, kg·m² or kg. Default: 0.1.
+    /// Moment of inertia or mass of the motor, seen from the joint, and of all that the joint moves and no link declares as
+    /// its `inertial`, kg·m² or kg. Default: 0.1.
     #[option(default = 0.1, range = 1e-9..=1e9)]
     pub inertia: f64,
     /// Largest acceleration that its servo asks for, rad/s² or m/s². Default: 10.
@@ -43,8 +47,8 @@ pub struct SimulatedActuatorOptions {
     /// Largest velocity of a joint that declares none, rad/s or m/s. Default: 10.
     #[option(default = 10.0, range = 1e-6..=1e6)]
     pub velocity: f64,
-    /// Position at the start, rad or m; brought back to the joint's limits. Default: 0.
-    #[option(default = 0.0)]
+    /// Position at the start, rad or m; clamped to the joint's limits. Default: 0.
+    #[option(default = 0.0, range = -1e9..=1e9)]
     pub initial: f64,
     /// How long the joint may be held before that is reported; with 0, at the next look. Unit: s. Default: 200 ms.
     #[option(default = Duration::from_millis(200))]
@@ -96,13 +100,24 @@ impl<C: Payload + Into<ActuatorCommand>> Actuator for SimulatedActuator<C> {
     fn handle_command(&mut self, command: &Stamped<C>) -> Result<(), Fault> {
         let now = command.monotonic_time;
         let goal = self.goal(command.payload.clone().into(), now)?;
-        let (state, _) = self.world.motor(self.joint, now);
-        if !matches!(goal, Goal::Hold | Goal::Stop) {
+        let (state, current) = self.world.motor(self.joint, now);
+        let is_motion = !matches!(goal, Goal::Hold | Goal::Stop | Goal::Free);
+        // The velocities or efforts that a controller streams are one motion.
+        let goes_on = self.is_reported
+            && matches!(
+                (&current, &goal),
+                (Goal::Velocity(_), Goal::Velocity(_)) | (Goal::Effort(_), Goal::Effort(_))
+            );
+        if is_motion && !goes_on {
             self.end(&state, MotionEnd::Replaced);
+        }
+        if is_motion && !(goes_on && goal == current) {
             self.begin(&goal, &state, now);
         }
-        // An effort presses for as long as it is asked for: there is nothing to end.
-        self.next = (!matches!(goal, Goal::Effort(_))).then(|| now + self.options.period);
+        // An effort is applied until something else is commanded, so nothing needs to be checked. A stream of commands does not
+        // postpone the check.
+        let next = now + self.options.period;
+        self.next = (!matches!(goal, Goal::Effort(_))).then(|| self.next.map_or(next, |pending| pending.min(next)));
         self.world.set_goal(self.joint, goal, now);
         Ok(())
     }
@@ -145,6 +160,8 @@ impl<C> SimulatedActuator<C> {
             // A velocity of zero leads nowhere: it is no motion with a target.
             ActuatorCommand::Velocity(command) if command.velocity == 0.0 => Goal::Hold,
             ActuatorCommand::Velocity(command) => Goal::Velocity(command.velocity),
+            // The joint is left to itself.
+            ActuatorCommand::Effort(command) if command.effort == 0.0 => Goal::Free,
             ActuatorCommand::Effort(command) => Goal::Effort(command.effort),
             ActuatorCommand::Trajectory(trajectory) => {
                 Goal::Path { start: now, path: Arc::new(JointPath::of(&trajectory, self.context.joint())?) }
@@ -154,33 +171,37 @@ impl<C> SimulatedActuator<C> {
         })
     }
 
-    /// Reports the beginning of a motion, if it has a target.
+    /// Reports the beginning of a motion.
     fn begin(&mut self, goal: &Goal, state: &PlantState, now: MonotonicTime) {
         let point = state.point;
         let arrival = |duration_s: f64| Some(now + Duration::try_from_secs_f64(duration_s).ok()?);
-        let (target, speed, expected_arrival) = match goal {
+        let (target, velocity, speed, expected_arrival) = match goal {
             Goal::Position { target, speed } => {
                 let pace = Pace::Speed(speed.min(self.drivetrain.velocity));
                 let acceleration = Some(self.drivetrain.acceleration);
                 let profile = Profile::new(Easing::Trapezoidal, point.position, *target, pace, acceleration);
                 // A joint that already moves takes a different time.
                 let arrival = if point.velocity == 0.0 { arrival(profile.duration_s()) } else { None };
-                (*target, profile.speed(), arrival)
+                (Some(*target), None, Some(profile.speed()), arrival)
             }
-            Goal::Path { path, .. } => (path.target(), path.speed(), arrival(path.duration_s())),
+            Goal::Path { path, .. } => (Some(path.target()), None, Some(path.speed()), arrival(path.duration_s())),
             Goal::Velocity(velocity) => {
-                let end = if *velocity < 0.0 { self.drivetrain.lower } else { self.drivetrain.upper };
-                (end, velocity.abs().min(self.drivetrain.velocity), None)
+                let most = self.drivetrain.velocity;
+                let velocity = velocity.clamp(-most, most);
+                let end = if velocity < 0.0 { self.drivetrain.lower } else { self.drivetrain.upper };
+                (Some(end).filter(|end| end.is_finite()), Some(velocity), Some(velocity.abs()), None)
             }
-            Goal::Free | Goal::Effort(_) | Goal::Hold | Goal::Stop => return,
+            Goal::Effort(_) => (None, None, None, None),
+            Goal::Free | Goal::Hold | Goal::Stop => return,
         };
-        if target.is_finite() {
-            let speed = Some(speed);
-            let motion =
-                BeginMotion { initial_position: point.position, target_position: target, speed, expected_arrival };
-            self.context.begin_motion(motion);
-            self.is_reported = true;
-        }
+        self.context.begin_motion(BeginMotion {
+            initial_position: point.position,
+            target_position: target,
+            velocity,
+            speed,
+            expected_arrival,
+        });
+        self.is_reported = true;
     }
 
     fn end(&mut self, state: &PlantState, end: MotionEnd) {
@@ -203,7 +224,9 @@ impl<C> SimulatedActuator<C> {
             Goal::Velocity(velocity) if rests && *velocity > 0.0 && is_at(self.drivetrain.upper) => {
                 return Some(MotionEnd::Limit);
             }
-            Goal::Hold | Goal::Stop | Goal::Free if rests => return Some(MotionEnd::Stopped),
+            Goal::Hold | Goal::Stop if rests => return Some(MotionEnd::Stopped),
+            // It has come to rest, or is left to itself; its load may move it again.
+            Goal::Free => return Some(MotionEnd::Stopped),
             _ => {}
         }
         let held_s = state.stalled_s;

@@ -1,31 +1,20 @@
 //! A simulated IMU on any link of a robot whose joints move.
 
+use super::probe::Probe;
 use super::random::{hash, normal};
-use super::{GRAVITY, SimulatedWorld};
-use bb_core::kinematics::{Frames, Kinematics, LinkId};
 use bb_core::payload::Imu;
 use bb_core::{Fault, MonotonicTime, Options, Reading, Sensor, SensorContext};
 use nalgebra::Vector3;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
-use std::fmt;
-use std::ops::Range;
-use std::sync::Arc;
 
-/// A gyroscope and an accelerometer on a link in the [`SimulatedWorld`]. They measure the angular velocity of the
-/// link and its specific force, from position, velocity and acceleration of the joints between it and the root, which
-/// is at rest with its z axis up.
+/// A gyroscope and an accelerometer on a link in the [`SimulatedWorld`](super::SimulatedWorld). They measure the angular
+/// velocity of the link and its specific force, from position, velocity and acceleration of the joints between it and the root,
+/// and of the root itself.
+#[derive(Debug)]
 pub struct SimulatedLinkImu {
     options: SimulatedLinkImuOptions,
-    path: &'static str,
-    world: Arc<SimulatedWorld>,
-    frames: Frames,
-    link: LinkId,
-    /// The joint of the topology for each coordinate.
-    coordinates: Vec<(usize, Range<usize>, Range<usize>)>,
-    positions: Vec<f64>,
-    velocities: Vec<f64>,
-    accelerations: Vec<f64>,
+    probe: Probe,
     gyroscope_bias: Vector3<f64>,
     accelerometer_bias: Vector3<f64>,
     random: ChaCha8Rng,
@@ -57,68 +46,25 @@ impl Sensor for SimulatedLinkImu {
     type Output = Imu;
 
     fn init(options: SimulatedLinkImuOptions, context: &SensorContext) -> Result<Self, Fault> {
-        let topology = context.topology();
-        let world = context.shared(|| SimulatedWorld::new(topology));
-        world.check_plugged(context.path())?;
-        let kinematics = Kinematics::new(topology)?;
-        let link = kinematics.link(context.frame().name());
-        let link = link.ok_or_else(|| Fault::permanent("it is mounted on a link; declare it in one"))?;
-        let mut coordinates = Vec::new();
-        for (number, joint) in topology.joints.iter().enumerate() {
-            let Some(own) = kinematics.joint(joint.name) else { continue };
-            // A joint that mimics another has that joint's.
-            if joint.mimic.is_none() && own.positions.len() == 1 {
-                coordinates.push((number, own.positions.clone(), own.velocities.clone()));
-            }
-        }
+        let probe = Probe::new(context)?;
         let mut random = ChaCha8Rng::seed_from_u64(options.seed ^ hash(context.path()));
         let gyroscope_bias = options.gyroscope_bias * normal(&mut random);
         let accelerometer_bias = options.accelerometer_bias * normal(&mut random);
-        Ok(Self {
-            path: context.path(),
-            world,
-            link,
-            coordinates,
-            positions: kinematics.neutral(),
-            velocities: vec![0.0; kinematics.velocities()],
-            accelerations: vec![0.0; kinematics.velocities()],
-            frames: Frames::new(kinematics),
-            gyroscope_bias,
-            accelerometer_bias,
-            random,
-            previous: None,
-            options,
-        })
+        Ok(Self { options, probe, gyroscope_bias, accelerometer_bias, random, previous: None })
     }
 
     fn read(&mut self, now: MonotonicTime) -> Result<Reading<Imu>, Fault> {
-        self.world.check_plugged(self.path)?;
-        for (joint, positions, velocities) in &self.coordinates {
-            let point = self.world.joint_at(*joint, now).point;
-            self.positions.get_mut(positions.clone()).into_iter().flatten().for_each(|at| *at = point.position);
-            self.velocities.get_mut(velocities.clone()).into_iter().flatten().for_each(|at| *at = point.velocity);
-            let accelerations = self.accelerations.get_mut(velocities.clone());
-            accelerations.into_iter().flatten().for_each(|at| *at = point.acceleration);
-        }
-        self.frames.update_motion(&self.positions, &self.velocities, &self.accelerations)?;
-        let motion = self.frames.motion(self.link)?;
-        let link_from_root = self.frames.root_from_link(self.link)?.rotation.inverse();
+        let (world_from_link, motion) = self.probe.read(now)?;
         // The first sample has no predecessor: its noise is that of a short interval.
         let step_s = self.previous.map_or(5e-3, |previous| now.seconds_since(previous)).max(1e-6);
         self.previous = Some(now);
         let per_root_hz = 1.0 / step_s.sqrt();
         let gyroscope_noise = self.options.gyroscope_noise * per_root_hz * normal(&mut self.random);
         let accelerometer_noise = self.options.accelerometer_noise * per_root_hz * normal(&mut self.random);
-        let specific_force = motion.acceleration + link_from_root * Vector3::new(0.0, 0.0, GRAVITY);
+        let specific_force = motion.acceleration - world_from_link.rotation.inverse() * self.probe.world.gravity();
         Ok(Reading::now(Imu::new(
             motion.angular_velocity + self.gyroscope_bias + gyroscope_noise,
             specific_force + self.accelerometer_bias + accelerometer_noise,
         )))
-    }
-}
-
-impl fmt::Debug for SimulatedLinkImu {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("SimulatedLinkImu").field("path", &self.path).finish_non_exhaustive()
     }
 }

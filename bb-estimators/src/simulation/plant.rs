@@ -2,6 +2,7 @@
 
 use crate::motion::{JointPath, JointPoint};
 use bb_core::MonotonicTime;
+use std::mem::discriminant;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -18,7 +19,7 @@ pub(super) struct Drivetrain {
     pub(super) effort: f64,
     /// Largest acceleration that the servo asks for.
     pub(super) acceleration: f64,
-    /// Inertia of everything that the joint moves.
+    /// Inertia of the motor, and of all that the joint moves as far as no link declares it.
     pub(super) inertia: f64,
     /// Viscous friction.
     pub(super) damping: f64,
@@ -55,9 +56,25 @@ pub(super) struct PlantState {
     pub(super) stalled_s: f64,
 }
 
+/// What the links, as far as they declare their inertia, do to a joint during a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Load {
+    /// Their inertia about the joint, added to that of the motor.
+    pub(super) inertia: f64,
+    /// The effort that balances gravity, velocities and the accelerations of other joints.
+    pub(super) effort: f64,
+}
+
 /// The step of the integration. Within one the acceleration is constant.
-const STEP: Duration = Duration::from_millis(1);
-const STEP_S: f64 = 1e-3;
+pub(super) const STEP: Duration = Duration::from_millis(1);
+pub(super) const STEP_S: f64 = 1e-3;
+const STEP_NANOS: i64 = 1_000_000;
+
+/// The time of the last step before `now` that a joint takes which has been at `time`.
+pub(super) fn last_step(time: MonotonicTime, now: MonotonicTime) -> MonotonicTime {
+    let left_nanos = now.nanos_since(time).max(0);
+    time.plus_nanos(left_nanos - left_nanos % STEP_NANOS)
+}
 
 /// A slower joint counts as at rest, rad/s or m/s.
 const AT_REST: f64 = 1e-12;
@@ -70,6 +87,11 @@ const TRACKING: f64 = 50.0;
 pub(super) struct Plant {
     pub(super) drivetrain: Drivetrain,
     pub(super) goal: Goal,
+    /// During the present step.
+    pub(super) load: Load,
+    /// During the step before. The servo plans with it: with the present one, which depends on what the servo does, the search
+    /// for it might not converge.
+    planned: Load,
     /// The range that obstacles leave free.
     free: (f64, f64),
     time: MonotonicTime,
@@ -84,6 +106,8 @@ impl Plant {
         Self {
             drivetrain,
             goal: Goal::Free,
+            load: Load::default(),
+            planned: Load::default(),
             free: (f64::NEG_INFINITY, f64::INFINITY),
             time,
             state: PlantState { point, ..PlantState::default() },
@@ -94,35 +118,94 @@ impl Plant {
     /// The state at `now`; for a time before the latest one, the latest state. Reading the state does not change how
     /// it moves.
     pub(super) fn at(&mut self, now: MonotonicTime) -> PlantState {
-        while self.time + STEP <= now {
-            self.state = self.after(STEP_S);
-            self.time = self.time + STEP;
-            self.settle();
-        }
+        self.advance(now, u64::MAX);
         self.after(now.seconds_since(self.time).max(0.0))
+    }
+
+    /// Integrates up to the last whole step before `now`, at most `most` steps. Returns whether it got there. The steps of a
+    /// joint whose state no longer changes are skipped.
+    pub(super) fn advance(&mut self, now: MonotonicTime, most: u64) -> bool {
+        for _ in 0..most {
+            if self.time + STEP > now {
+                return true;
+            }
+            let next = self.after(STEP_S);
+            let is_constant = next == self.state;
+            self.state = next;
+            self.time = self.time + STEP;
+            let has_settled = self.settle();
+            // Only a trajectory depends on the time.
+            if is_constant && !has_settled && !matches!(self.goal, Goal::Path { .. }) {
+                self.time = last_step(self.time, now);
+            }
+        }
+        self.time + STEP > now
+    }
+
+    /// Begins a step at `now`. Returns whether it is as the last one: without other loads, so are all that follow.
+    pub(super) fn begin_step(&mut self, now: MonotonicTime) -> bool {
+        let before = (self.state, self.planned, self.hold_at, discriminant(&self.goal));
+        self.state = self.at(now);
+        self.planned = self.load;
+        self.time = self.time.max(now);
+        // Commands to other joints may end every step before it is whole.
+        self.settle();
+        before == (self.state, self.planned, self.hold_at, discriminant(&self.goal))
+            && !matches!(self.goal, Goal::Path { .. })
+    }
+
+    /// Continues at a later time with the same state.
+    pub(super) fn skip_to(&mut self, time: MonotonicTime) {
+        self.time = self.time.max(time);
     }
 
     /// Leaves it free between two positions from `now` on.
     pub(super) fn obstruct(&mut self, lower: f64, upper: f64, now: MonotonicTime) {
-        self.state = self.at(now);
-        self.time = self.time.max(now);
+        self.begin_step(now);
         self.free = (lower, upper);
     }
 
     /// Gives it a goal from `now` on.
     pub(super) fn set(&mut self, goal: Goal, now: MonotonicTime) {
-        self.state = self.at(now);
-        self.time = self.time.max(now);
-        self.state.stalled_s = 0.0;
+        self.begin_step(now);
+        if goal != self.goal {
+            // The same command once more does not free a joint that something holds.
+            self.state.stalled_s = 0.0;
+        }
         self.hold_at = None;
         self.goal = goal;
+    }
+
+    /// Whether the load is that of the step before.
+    pub(super) fn is_loaded_as_before(&self) -> bool {
+        self.load == self.planned
+    }
+
+    /// The state at the beginning of the present step.
+    pub(super) fn state(&self) -> &PlantState {
+        &self.state
+    }
+
+    /// The mean acceleration over the present step, impacts included.
+    pub(super) fn mean_acceleration(&self) -> f64 {
+        (self.after(STEP_S).point.velocity - self.state.point.velocity) / STEP_S
+    }
+
+    /// The inertia that the motor accelerates.
+    fn inertia(&self) -> f64 {
+        self.drivetrain.inertia + self.load.inertia
+    }
+
+    /// Whether motor and friction can hold it against its load.
+    fn can_hold(&self) -> bool {
+        self.planned.effort.abs() <= self.drivetrain.effort + self.drivetrain.friction
     }
 
     /// The largest deceleration that the motor can always reach.
     fn deceleration(&self) -> f64 {
         let Drivetrain { acceleration, effort, friction, inertia, .. } = self.drivetrain;
-        // A motor that cannot overcome the friction does not move at all.
-        let most = (effort - friction) / inertia;
+        // A motor that cannot overcome the friction and its load does not move as it should at all.
+        let most = (effort - friction - self.planned.effort.abs()) / (inertia + self.planned.inertia);
         if most > 0.0 { acceleration.min(most) } else { acceleration }
     }
 
@@ -186,40 +269,45 @@ impl Plant {
         if step_s <= 0.0 {
             return self.state;
         }
-        let Drivetrain { inertia, effort: most, acceleration, damping, friction, .. } = self.drivetrain;
+        let Drivetrain { effort: most, acceleration, damping, friction, .. } = self.drivetrain;
+        let (inertia, load) = (self.inertia(), self.load.effort);
         let JointPoint { position, velocity, .. } = self.state.point;
         let rest_at = match &self.goal {
             Goal::Position { target, .. } => Some(*target),
             Goal::Hold | Goal::Stop => self.hold_at,
             _ => None,
         };
-        if let Some(target) = rest_at.filter(|target| self.is_at(*target)) {
+        if let Some(target) = rest_at.filter(|target| self.can_hold() && self.is_at(*target)) {
             return self.to_rest(target, step_s);
         }
+        // What is left of an effort after load and friction; at rest, friction acts against where it is pushed.
         let drag = |effort: f64, towards: f64| {
             let along = if velocity == 0.0 { towards } else { velocity };
-            if along == 0.0 { effort } else { effort - damping * velocity - friction * along.signum() }
+            let left = effort - load;
+            if along == 0.0 { left } else { left - damping * velocity - friction * along.signum() }
         };
         // Backward Euler: the friction is that of the velocity after the step, or a light joint would swing ever further.
-        let pushed = |effort: f64, towards: f64| drag(effort, towards) / (inertia + damping * STEP_S);
+        let pushed = |effort: f64| drag(effort, effort - load) / (inertia + damping * STEP_S);
         let (effort, mut accelerated) = match self.wanted() {
             Ok(wanted) => {
                 let asked = ((wanted - velocity) / STEP_S).clamp(-acceleration, acceleration);
-                // The servo compensates for the known friction, as far as the motor can.
-                let needed = inertia * asked - drag(0.0, asked);
+                // The servo compensates for the known friction and load, as far as the motor can.
+                // That of the velocity in the middle of the step.
+                let needed = inertia * asked - drag(0.0, asked) + damping * asked * STEP_S / 2.0;
                 let effort = needed.clamp(-most, most);
-                let accelerated = if effort == needed { asked } else { pushed(effort, effort) };
+                let accelerated = if effort == needed { asked } else { pushed(effort) };
                 (effort, accelerated)
             }
-            Err(effort) => (effort.clamp(-most, most), pushed(effort.clamp(-most, most), effort)),
+            Err(effort) => (effort.clamp(-most, most), pushed(effort.clamp(-most, most))),
         };
         // Dry friction holds a joint at rest, and stops a moving one; it never reverses it.
-        let is_held = velocity == 0.0 && effort.abs() <= friction;
+        let is_stuck = (effort - load).abs() <= friction;
+        let is_held = velocity == 0.0 && is_stuck;
         if is_held {
             accelerated = 0.0;
         }
         let turns = velocity != 0.0 && (velocity + accelerated * STEP_S) * velocity < 0.0;
-        if turns && (effort.abs() <= friction || self.wanted() == Ok(0.0)) {
+        if turns && (is_stuck || self.wanted() == Ok(0.0)) {
             accelerated = -velocity / STEP_S;
         }
         let stalled_s = match velocity == 0.0 && effort.abs() >= most && accelerated == 0.0 {
@@ -240,7 +328,8 @@ impl Plant {
     fn to_rest(&self, target: f64, step_s: f64) -> PlantState {
         let JointPoint { position, velocity, .. } = self.state.point;
         let acceleration = -velocity / STEP_S;
-        let point = match step_s >= STEP_S {
+        // A step that is cut short, too, may be the last.
+        let point = match step_s >= STEP_S || (velocity + acceleration * step_s).abs() < AT_REST {
             true => JointPoint { position: target, velocity: 0.0, acceleration },
             false => JointPoint {
                 position: position + velocity * step_s + acceleration * step_s * step_s / 2.0,
@@ -248,7 +337,8 @@ impl Plant {
                 acceleration,
             },
         };
-        PlantState { point, effort: self.drivetrain.inertia * acceleration, stalled_s: 0.0 }
+        let (needed, most) = (self.inertia() * acceleration + self.load.effort, self.drivetrain.effort);
+        PlantState { point, effort: needed.clamp(-most, most), stalled_s: 0.0 }
     }
 
     /// The state at an end of the range or at an obstacle, if it would be beyond.
@@ -262,15 +352,15 @@ impl Plant {
         let before = self.state.point.position;
         // It stays where it is pushed against; an obstacle does not move it.
         let position = position.clamp(lower.min(before), upper.max(before));
-        let pushes = state.effort.abs() > self.drivetrain.friction || velocity != 0.0;
+        let pushes = (state.effort - self.load.effort).abs() > self.drivetrain.friction || velocity != 0.0;
         let stalled_s =
             if pushes && self.state.point.velocity == 0.0 { self.state.stalled_s + step_s } else { 0.0 };
         let point = JointPoint { position, ..JointPoint::default() };
         PlantState { point, stalled_s, ..state }
     }
 
-    /// The successor of a goal whose end is reached.
-    fn settle(&mut self) {
+    /// The successor of a goal whose end is reached. Returns whether anything has changed.
+    fn settle(&mut self) -> bool {
         let point = self.state.point;
         match &self.goal {
             Goal::Hold if self.hold_at.is_none() && point.velocity == 0.0 => self.hold_at = Some(point.position),
@@ -278,8 +368,9 @@ impl Plant {
             Goal::Path { start, path } if self.time.seconds_since(*start) >= path.duration_s() => {
                 self.goal = Goal::Position { target: path.target(), speed: self.drivetrain.velocity };
             }
-            _ => {}
+            _ => return false,
         }
+        true
     }
 }
 

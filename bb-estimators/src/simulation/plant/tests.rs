@@ -222,3 +222,34 @@ fn a_light_joint_in_thick_oil_comes_to_the_velocity_of_its_effort() {
     plant.set(Goal::Free, at(200));
     assert!(plant.at(at(400)).point.velocity.abs() < 1e-9);
 }
+
+#[test]
+fn a_joint_at_rest_catches_up_at_once() {
+    let hour = at(3_600_000);
+    for goal in
+        [Goal::Free, Goal::Hold, Goal::Stop, Goal::Position { target: 0.5, speed: 1.0 }, Goal::Velocity(1.0)]
+    {
+        let mut plant = Plant::new(PLAIN, 0.1, at(0));
+        plant.set(goal.clone(), at(0));
+        assert!(plant.advance(hour, 5000), "{goal:?}: it rests after less than 5 s");
+        assert_eq!(plant.time, hour);
+        assert_eq!(plant.at(at(3_600_000)).point.velocity, 0.0);
+    }
+    // One that moves needs its steps, as many as it may take at a time.
+    let mut plant = Plant::new(Drivetrain { upper: f64::INFINITY, ..PLAIN }, 0.1, at(0));
+    plant.set(Goal::Velocity(1.0), at(0));
+    assert!(!plant.advance(at(10_000), 9_999));
+    assert!(plant.advance(at(10_000), 1));
+}
+
+#[test]
+fn the_same_command_again_does_not_free_a_joint_that_is_held() {
+    let mut plant = Plant::new(PLAIN, 0.0, at(0));
+    plant.obstruct(-0.1, 0.1, at(0));
+    for millis in 0..1000 {
+        plant.set(Goal::Velocity(1.0), at(millis));
+    }
+    assert!(plant.at(at(1000)).stalled_s > 0.5);
+    plant.set(Goal::Velocity(-1.0), at(1000));
+    assert_eq!(plant.at(at(1000)).stalled_s, 0.0);
+}

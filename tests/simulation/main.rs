@@ -1,0 +1,4 @@
+//! Robots in a simulated world: what their sensors measure, and what estimators make of it.
+
+mod arm;
+mod drive;
