@@ -51,7 +51,9 @@ pub use attitude::{Attitude, ImuAndMagnetometer};
 #[cfg(feature = "runtime")]
 pub use calibration::Calibrated;
 #[cfg(feature = "simulation")]
-pub use simulation::{SimulatedActuator, SimulatedEncoder, SimulatedImu, SimulatedLinkImu};
+pub use simulation::{
+    SimulatedActuator, SimulatedEncoder, SimulatedGnss, SimulatedImu, SimulatedLinkImu, SimulatedWheels,
+};
 
 /// The error-state Kalman filter of position, velocity and attitude as an estimator: it emits `O`, and estimates the optional states
 /// `S`, `N` states in all.

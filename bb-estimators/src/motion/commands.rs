@@ -2,6 +2,7 @@
 
 use super::{JointMotionLimits, JointPoint, plan};
 use bb_core::component::ActuatorLink;
+use bb_core::joints::JointStatus;
 use bb_core::payload::{ActuatorCommand, EndMotion, JointTrajectory, MotionEnd};
 use bb_core::pubsub::Select;
 use bb_core::{
@@ -16,9 +17,9 @@ use std::time::Duration;
 
 /// Moves joints through positions, and comes to rest at the last of them; all joints arrive together.
 ///
-/// The trajectory is [planned](plan) from where the joints are, and each actuator, which takes [`ActuatorCommand`], follows its part of it. It
+/// The trajectory is [planned](plan) from the measured state of the joints, which may be moving, and each actuator, which takes [`ActuatorCommand`], follows its part of it. It
 /// publishes a [`MotionProgress`] ten times a second at `progress` below its path. It succeeds when all actuators have
-/// reported that they have reached their target. If one reports anything else, those that it still moves are told to hold, and it
+/// reported that they have reached their target. If one reports anything else, the joints that it still moves are commanded to hold, and it
 /// fails with the reason. If it is cancelled or times out, its actuators come to rest and hold.
 #[derive(Debug)]
 pub struct MoveJoints;
@@ -91,6 +92,9 @@ const PROGRESS_PERIOD: Duration = Duration::from_millis(100);
 /// Between two points of a trajectory.
 const POINT_PERIOD: Duration = Duration::from_millis(10);
 
+/// The relative rounding error of a position at a limit.
+const ROUNDING: f64 = 1e-9;
+
 impl MoveJoints {
     /// The command's motion, for other commands: moves `joints` through `points`.
     ///
@@ -104,35 +108,48 @@ impl MoveJoints {
         options: &MoveJointsOptions,
     ) -> Result<(), Fault> {
         let bus = context.bus();
-        let trajectory = planned(&bus, joints, points, options)?;
+        let trajectory = planned(&bus, joints, points, options, context.now())?;
         let mut motion = Motion::new(&bus, joints, context.now())?;
         let duration = trajectory.points.last().map_or(Duration::ZERO, |last| last.time_from_start);
         let progress = bus.publisher::<MotionProgress>(&format!("command/{}/progress", context.name()))?;
         motion.start(&trajectory)?;
         let deadline = motion.start + duration + options.patience;
+        let mut next_progress = motion.start;
         loop {
-            let report = next_within(&mut motion.reports, context, PROGRESS_PERIOD).await;
-            if let Some(end) = report.as_ref().and_then(|report| report.downcast::<EndMotion>()) {
-                motion.note(end)?;
-            }
             let now = context.now();
-            progress.publish(motion.progress(now, duration));
-            if motion.has_reached() {
+            let has_reached = motion.has_reached();
+            if has_reached || now >= next_progress {
+                progress.publish(motion.progress(now, duration));
+                next_progress = now + PROGRESS_PERIOD;
+            }
+            if has_reached {
                 return Ok(());
             }
             if now >= deadline {
                 return Err(motion.fail("the joints have not arrived in time".to_owned()));
             }
+            let wait = next_progress.min(deadline).duration_since(now);
+            match next_within(&mut motion.reports, context, wait).await {
+                Event::Report(report) => {
+                    if let Some(end) = report.downcast::<EndMotion>() {
+                        motion.note(end)?;
+                    }
+                }
+                Event::Timeout => {}
+                // Nothing will be reported any more.
+                Event::Closed => return Err(motion.fail("the robot has stopped".to_owned())),
+            }
         }
     }
 }
 
-/// The trajectory from the current positions.
+/// The trajectory from the current states.
 fn planned(
     bus: &Bus,
     joints: &[String],
     points: &[Vec<f64>],
     options: &MoveJointsOptions,
+    now: MonotonicTime,
 ) -> Result<JointTrajectory, Fault> {
     let known = bus.joints();
     let mut from = Vec::with_capacity(joints.len());
@@ -140,20 +157,48 @@ fn planned(
     for name in joints {
         let joint = bus.topology().joint(name).ok_or_else(|| Fault::new(format!("there is no joint `{name}`")))?;
         let state = known.status(name).filter(|status| !status.is_stale);
-        let position = state.as_ref().and_then(|state| state.position.first().copied());
-        let position =
-            position.ok_or_else(|| Fault::new(format!("the position of the joint `{name}` is not known")))?;
-        // A joint measured just beyond its limit may move back; the solver refuses a start outside.
+        let start = state.as_ref().and_then(|state| start_of(state, now));
+        let start = start.ok_or_else(|| Fault::new(format!("the position of the joint `{name}` is not known")))?;
         let mut limit = JointMotionLimits::of(joint, f64::INFINITY, options.acceleration, options.jerk);
         if !limit.velocity.is_finite() {
             return Err(Fault::new(format!("the joint `{name}` declares no limit of its velocity")));
         }
+        // A joint measured just beyond its limit may move back; the solver refuses a start outside.
+        from.push(JointPoint {
+            position: start.position.clamp(limit.lower, limit.upper),
+            velocity: start.velocity.clamp(-limit.velocity, limit.velocity),
+            acceleration: start.acceleration.clamp(-limit.acceleration, limit.acceleration),
+        });
         limit.velocity *= options.speed;
-        from.push(JointPoint { position: position.clamp(limit.lower, limit.upper), ..JointPoint::default() });
         limits.push(limit);
     }
     let names: Arc<[String]> = joints.into();
+    // A joint at its limit whose measured motion leads out of it, if only by noise, cannot go on with that motion.
+    let is_within = |at: f64, limit: &JointMotionLimits| {
+        let tolerance = |bound: f64| ROUNDING * bound.abs().max(1.0);
+        at >= limit.lower - tolerance(limit.lower) && at <= limit.upper + tolerance(limit.upper)
+    };
+    let stays = |trajectory: &JointTrajectory| {
+        let mut points = trajectory.points.iter();
+        points.all(|point| point.positions.iter().zip(&limits).all(|(at, limit)| is_within(*at, limit)))
+    };
+    let moving = plan(&names, &from, points, &limits, POINT_PERIOD);
+    if let Ok(trajectory) = moving
+        && stays(&trajectory)
+    {
+        return Ok(trajectory);
+    }
+    from.iter_mut().for_each(|start| *start = JointPoint { position: start.position, ..JointPoint::default() });
     Ok(plan(&names, &from, points, &limits, POINT_PERIOD)?)
+}
+
+/// The position of a joint now, and its measured velocity and acceleration; zero where they are not measured.
+fn start_of(state: &JointStatus, now: MonotonicTime) -> Option<JointPoint> {
+    let position = state.position.first().copied()?;
+    let velocity = state.velocity.first().copied().unwrap_or(0.0);
+    let acceleration = state.acceleration.first().copied().unwrap_or(0.0);
+    let age_s = state.time.map_or(0.0, |time| now.seconds_since(time)).max(0.0);
+    Some(JointPoint { position: position + velocity * age_s, velocity, acceleration })
 }
 
 /// Joints that move.
@@ -181,7 +226,7 @@ impl Motion {
 
     fn start(&mut self, trajectory: &JointTrajectory) -> Result<(), Fault> {
         for index in 0..self.links.len() {
-            // What a joint reports before it is told is the end of another motion.
+            // An end reported before the joint gets its command belongs to another motion.
             self.note_ends_of_first(index)?;
             let sent = self.links[index].send(trajectory.clone().into());
             sent.map_err(|error| self.fail(error.to_string()))?;
@@ -189,13 +234,13 @@ impl Motion {
         self.note_ends_of_first(self.links.len())
     }
 
-    /// Notes what the first `count` joints, which have been told, have reported; the others' is of no concern. What they replaced has
-    /// ended with that, anything else is an end of this motion.
+    /// Handles the reports of the first `count` joints, which have got their commands. `Replaced` is the end of an earlier motion;
+    /// any other end belongs to this one.
     fn note_ends_of_first(&mut self, count: usize) -> Result<(), Fault> {
         let reports: Vec<_> = self.reports.drain().collect();
         for end in reports.iter().filter_map(|report| report.downcast::<EndMotion>()) {
-            let is_told = self.joints[..count].iter().any(|joint| joint == end.frame.name());
-            if is_told && end.end != MotionEnd::Replaced {
+            let is_commanded = self.joints[..count].iter().any(|joint| joint == end.frame.name());
+            if is_commanded && end.end != MotionEnd::Replaced {
                 self.note(end)?;
             }
         }
@@ -220,7 +265,7 @@ impl Motion {
         Err(self.fail(reason))
     }
 
-    /// The fault, after all joints were told to hold but those that somebody else moves by now.
+    /// Commands all joints to hold, except those that have got another command since, and returns the fault.
     fn fail(&self, reason: String) -> Fault {
         self.links.iter().for_each(ActuatorLink::stop);
         Fault::new(reason)
@@ -242,17 +287,20 @@ impl Motion {
     }
 }
 
+enum Event {
+    Report(DynamicMessage),
+    Timeout,
+    /// The robot has stopped.
+    Closed,
+}
+
 /// The next report, if one comes within `timeout`.
-async fn next_within(
-    reports: &mut DynamicSubscription,
-    context: &CommandContext,
-    timeout: Duration,
-) -> Option<DynamicMessage> {
+async fn next_within(reports: &mut DynamicSubscription, context: &CommandContext, timeout: Duration) -> Event {
     let mut report = pin!(reports.recv_async());
     let mut alarm = pin!(context.sleep(timeout));
     std::future::poll_fn(|task| match report.as_mut().poll(task) {
-        Poll::Ready(report) => Poll::Ready(report),
-        Poll::Pending => alarm.as_mut().poll(task).map(|()| None),
+        Poll::Ready(report) => Poll::Ready(report.map_or(Event::Closed, Event::Report)),
+        Poll::Pending => alarm.as_mut().poll(task).map(|()| Event::Timeout),
     })
     .await
 }

@@ -20,9 +20,9 @@ pub enum Drive {
 /// `actuator`.
 ///
 /// Gains and setpoint are options, to be bound to parameters: `PidController(kp = param::gains::kp, …)`. A new gain
-/// takes effect with the next step; what is integrated is kept. While the robot is not armed, or the measurement is older than `stale_after`, it
-/// commands nothing and forgets what it has integrated. When it ceases to command, it tells the actuator once to hold: the joint does
-/// not go on with the last velocity or effort.
+/// takes effect with the next step; the integral is kept. While the robot is not armed, or the measurement is older than `stale_after`, it
+/// commands nothing and resets its integral. When it stops commanding, it commands the actuator once to hold, so that the joint does
+/// not continue with the last velocity or effort.
 #[derive(Debug)]
 pub struct PidController {
     options: PidControllerOptions,
@@ -31,7 +31,7 @@ pub struct PidController {
     actuator: ActuatorLink<ActuatorCommand>,
     latest: Option<(MonotonicTime, f64)>,
     last_step: Option<MonotonicTime>,
-    /// Whether the actuator does what it was told here.
+    /// Whether the actuator carries out a command of this controller.
     is_driving: bool,
 }
 
@@ -88,7 +88,7 @@ pub struct PidState {
     pub integral: f64,
     /// The derivative term.
     pub derivative: f64,
-    /// The commanded value.
+    /// The commanded value, within the limits of the joint.
     pub output: f64,
 }
 
@@ -123,6 +123,9 @@ impl Service for PidController {
 
     fn update(&mut self, now: MonotonicTime) -> Result<Reading<PidState>, Fault> {
         if let Some(state) = self.measurement.try_recv() {
+            // The sensor has its own rate: the derivative is that between its measurements.
+            let interval_s = self.latest.map_or(0.0, |(last, _)| state.monotonic_time.seconds_since(last));
+            self.pid.measured(state.position, interval_s);
             self.latest = Some((state.monotonic_time, state.position));
         }
         let fresh = self.latest.filter(|(time, _)| now.duration_since(*time) <= self.options.stale_after);
@@ -130,13 +133,20 @@ impl Service for PidController {
         // The first step has no step before it.
         let step_s = self.last_step.map_or(0.0, |last| now.seconds_since(last));
         self.last_step = Some(now);
-        let terms = self.pid.update(self.options.setpoint, measurement, step_s);
+        let terms = self.pid.step(self.options.setpoint, measurement, step_s);
         let command = match self.options.drive {
             Drive::Velocity => VelocityCommand { velocity: terms.output, effort: None }.into(),
             Drive::Effort => EffortCommand { effort: terms.output }.into(),
         };
-        if sent(self.actuator.send(command))? {
+        if let Some(applied) = sent(self.actuator.apply(command))? {
             self.is_driving = true;
+            // The limits of the joint also limit the integral.
+            let applied = match applied {
+                ActuatorCommand::Velocity(command) => command.velocity,
+                ActuatorCommand::Effort(command) => command.effort,
+                _ => terms.output,
+            };
+            let terms = self.pid.limited(terms, applied, step_s);
             return Ok(Reading::now(PidState {
                 setpoint: self.options.setpoint,
                 measurement,
@@ -170,7 +180,7 @@ impl PidController {
         Ok(Reading::nothing())
     }
 
-    /// Ends what it has commanded. An actuator that does not take that was made safe already.
+    /// Ends its own commands. An actuator that refuses this has been made safe already.
     fn hold(&mut self) -> Result<(), Fault> {
         if std::mem::take(&mut self.is_driving) {
             sent(self.actuator.send(ActuatorCommand::Hold))?;
@@ -179,18 +189,18 @@ impl PidController {
     }
 }
 
-/// Whether a command was carried out. A robot that is not armed, or an actuator that has failed and is restarted, is not a
+/// What was carried out, if anything was. A robot that is not armed, or an actuator that has failed and is restarted, is not a
 /// fault of the controller.
-fn sent(result: Result<(), ActuatorError>) -> Result<bool, Fault> {
+fn sent<T>(result: Result<T, ActuatorError>) -> Result<Option<T>, Fault> {
     match result {
-        Ok(()) => Ok(true),
-        Err(ActuatorError::NotArmed(_) | ActuatorError::Stopped | ActuatorError::Failed(_)) => Ok(false),
+        Ok(applied) => Ok(Some(applied)),
+        Err(ActuatorError::NotArmed(_) | ActuatorError::Stopped | ActuatorError::Failed(_)) => Ok(None),
         Err(error) => Err(error.into()),
     }
 }
 
-/// Switches an actuator between two velocities by the position of a joint, with hysteresis: a float that starts a pump,
-/// say. It commands with each measurement, and publishes when it has switched.
+/// Switches an actuator between two velocities by the position of a joint, with hysteresis, such as a float that
+/// starts a pump. It commands with each measurement, and publishes when it has switched.
 #[derive(Debug)]
 pub struct ThresholdController {
     options: ThresholdControllerOptions,
@@ -264,7 +274,7 @@ impl Service for ThresholdController {
         let velocity = if is_on { self.options.on_velocity } else { self.options.off_velocity };
         // Each time: a joint that was disarmed since, or whose actuator was restarted, rests.
         let is_sent = sent(self.actuator.send(VelocityCommand { velocity, effort: None }.into()))?;
-        if !is_sent || self.commanded == Some(is_on) {
+        if is_sent.is_none() || self.commanded == Some(is_on) {
             return Ok(Reading::nothing());
         }
         self.commanded = Some(is_on);

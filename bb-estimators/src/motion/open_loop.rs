@@ -1,6 +1,6 @@
 //! The position of an unmeasured joint, from its actuator's reports.
 
-use super::{Easing, Pace, Profile};
+use super::{Easing, JointPoint, Pace, Profile};
 use bb_core::payload::{BeginMotion, EndMotion, JointState};
 use bb_core::pubsub::Select;
 use bb_core::{
@@ -13,7 +13,8 @@ use bb_core::{
 /// Declare it in the joint, as `sensor position: OpenLoopPosition(easing = Easing::SCurve) { rate: 50 Hz; }`. It
 /// publishes a [`JointState`] at the time of its reading, so the joint counts as having a source of its position.
 /// Until the actuator has reported a motion, the position is that of the option `initial`; without it, the position
-/// is unknown, and nothing is published.
+/// is unknown, and nothing is published. The position is also unknown while the actuator applies an effort, until it reports a
+/// position again.
 #[derive(Debug)]
 pub struct OpenLoopPosition {
     options: OpenLoopOptions,
@@ -39,7 +40,15 @@ pub struct OpenLoopOptions {
 #[derive(Clone, Copy, Debug)]
 struct Current {
     start: MonotonicTime,
-    profile: Profile,
+    course: Course,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Course {
+    /// To a target.
+    To(Profile),
+    /// At a velocity, until another motion begins or this one ends.
+    At { initial: f64, velocity: f64 },
 }
 
 impl Sensor for OpenLoopPosition {
@@ -65,7 +74,7 @@ impl Sensor for OpenLoopPosition {
             self.follow(&report);
         }
         let Some(current) = &self.current else { return Ok(Reading::nothing()) };
-        let point = current.profile.at(now.seconds_since(current.start));
+        let point = current.at(now);
         Ok(Reading::now(JointState { position: point.position, velocity: Some(point.velocity), effort: None }))
     }
 }
@@ -73,7 +82,7 @@ impl Sensor for OpenLoopPosition {
 impl OpenLoopPosition {
     fn follow(&mut self, report: &DynamicMessage) {
         if let Some(begin) = report.downcast::<BeginMotion>() {
-            self.current = Some(Current::of(begin, begin.monotonic_time, &self.options));
+            self.current = Current::of(begin, begin.monotonic_time, &self.options);
         } else if let Some(end) = report.downcast::<EndMotion>() {
             self.current = Some(Current::at_rest(end.position, end.monotonic_time));
         }
@@ -81,26 +90,40 @@ impl OpenLoopPosition {
 }
 
 impl Current {
-    /// A known arrival time is better than a speed: it includes acceleration and deceleration.
-    fn of(begin: &BeginMotion, start: MonotonicTime, options: &OpenLoopOptions) -> Self {
+    /// A known arrival time is better than a speed: it includes acceleration and deceleration. Returns `None` if the position is
+    /// unknown from now on, since an effort does not determine it.
+    fn of(begin: &BeginMotion, start: MonotonicTime, options: &OpenLoopOptions) -> Option<Self> {
+        let Some(target) = begin.target_position else {
+            let velocity = begin.velocity?;
+            return Some(Self { start, course: Course::At { initial: begin.initial_position, velocity } });
+        };
         let duration = begin.expected_arrival.map(|arrival| Pace::Duration(arrival.seconds_since(start)));
-        // With a speed of zero it never arrives, which no profile says.
+        // With a speed of zero it never arrives, and there is no such profile.
         let speed = begin.speed.filter(|speed| *speed != 0.0).map(|speed| Pace::Speed(speed.abs()));
         let profile = match duration.or(speed) {
-            Some(pace) => {
-                let (initial, target) = (begin.initial_position, begin.target_position);
-                Profile::new(options.easing, initial, target, pace, options.acceleration)
-            }
+            Some(pace) => Profile::new(options.easing, begin.initial_position, target, pace, options.acceleration),
             // Its speed is unknown: it arrives when it reports so.
             None => {
                 Profile::new(options.easing, begin.initial_position, begin.initial_position, Pace::Speed(1.0), None)
             }
         };
-        Self { start, profile }
+        Some(Self { start, course: Course::To(profile) })
     }
 
     fn at_rest(position: f64, start: MonotonicTime) -> Self {
-        Self { start, profile: Profile::new(Easing::Linear, position, position, Pace::Speed(1.0), None) }
+        let profile = Profile::new(Easing::Linear, position, position, Pace::Speed(1.0), None);
+        Self { start, course: Course::To(profile) }
+    }
+
+    fn at(&self, now: MonotonicTime) -> JointPoint {
+        let time_s = now.seconds_since(self.start);
+        match &self.course {
+            Course::To(profile) => profile.at(time_s),
+            Course::At { initial, velocity } => {
+                let position = initial + velocity * time_s.max(0.0);
+                JointPoint { position, velocity: *velocity, acceleration: 0.0 }
+            }
+        }
     }
 }
 
@@ -112,15 +135,33 @@ mod tests {
     fn a_motion_without_a_speed_stays_where_it_begins() {
         let begin = |speed| BeginMotion {
             initial_position: 0.2,
-            target_position: 1.0,
+            target_position: Some(1.0),
+            velocity: None,
             speed: Some(speed),
             expected_arrival: None,
         };
         let after = |speed| {
             let current = Current::of(&begin(speed), MonotonicTime::ZERO, &OpenLoopOptions::defaults());
-            current.profile.at(0.1).position
+            current.map(|current| current.at(MonotonicTime::from_nanos(100_000_000)).position)
         };
-        assert_eq!([after(0.0), after(-0.0)], [0.2, 0.2]);
-        assert!(after(1.0) > 0.2 && after(1.0) < 1.0, "{}", after(1.0));
+        assert_eq!([after(0.0), after(-0.0)], [Some(0.2), Some(0.2)]);
+        assert!(after(1.0) > Some(0.2) && after(1.0) < Some(1.0), "{:?}", after(1.0));
+    }
+
+    #[test]
+    fn a_motion_without_a_target_goes_on_at_its_velocity() {
+        let begin = |velocity| BeginMotion {
+            initial_position: 0.2,
+            target_position: None,
+            velocity,
+            speed: None,
+            expected_arrival: None,
+        };
+        let after = |velocity| {
+            let current = Current::of(&begin(velocity), MonotonicTime::ZERO, &OpenLoopOptions::defaults());
+            current.map(|current| current.at(MonotonicTime::from_nanos(2_000_000_000)).position)
+        };
+        assert_eq!(after(Some(-0.5)), Some(-0.8));
+        assert_eq!(after(None), None, "an effort does not determine it");
     }
 }

@@ -68,30 +68,56 @@ impl Pid {
 
     /// The output for a measurement, `step_s` after the last one. A step that is not positive, and values that are
     /// not finite, do not change the state: the output is then that of the proportional and the kept terms.
+    ///
+    /// A controller that runs faster or slower than its sensor calls [`measured`](Self::measured) with each measurement and
+    /// [`step`](Self::step) at its own rate instead.
     pub fn update(&mut self, setpoint: f64, measurement: f64, step_s: f64) -> PidTerms {
+        if setpoint.is_finite() {
+            self.measured(measurement, step_s);
+        }
+        self.step(setpoint, measurement, step_s)
+    }
+
+    /// Takes a measurement for the derivative, `interval_s` after the last one. An interval that is not positive, and values
+    /// that are not finite, do not change the state.
+    pub fn measured(&mut self, measurement: f64, interval_s: f64) {
+        let is_interval = interval_s > 0.0 && (measurement + interval_s).is_finite();
+        if is_interval && let Some(last) = self.measurement.replace(measurement) {
+            let filter_s = self.params.derivative_filter_s;
+            // The low pass in its exact form for a rate that is constant during the interval.
+            let share = if filter_s > 0.0 { 1.0 - (-interval_s / filter_s).exp() } else { 1.0 };
+            self.rate += share * ((measurement - last) / interval_s - self.rate);
+        }
+    }
+
+    /// The output `step_s` after the last step; `measurement` is the latest one. The same holds as for
+    /// [`update`](Self::update).
+    pub fn step(&mut self, setpoint: f64, measurement: f64, step_s: f64) -> PidTerms {
         let params = &self.params;
         let is_step = step_s > 0.0 && (setpoint + measurement + step_s).is_finite();
         let error = setpoint - measurement;
-        if is_step && let Some(last) = self.measurement.replace(measurement) {
-            // The low pass in its exact form for a rate that is constant during the step.
-            let share = match params.derivative_filter_s > 0.0 {
-                true => 1.0 - (-step_s / params.derivative_filter_s).exp(),
-                false => 1.0,
-            };
-            self.rate += share * ((measurement - last) / step_s - self.rate);
-        }
         let proportional = params.proportional * error;
         let derivative = -params.derivative * self.rate;
         if is_step {
             self.integral += params.integral * error * step_s;
             let unlimited = proportional + self.integral + derivative;
             let beyond = unlimited - params.limit(unlimited);
-            let share = if params.tracking_s > 0.0 { (step_s / params.tracking_s).min(1.0) } else { 1.0 };
-            self.integral -= share * params.windup(beyond, self.integral);
+            self.integral -= params.windup(beyond, self.integral, step_s);
         }
         let output = params.limit(proportional + self.integral + derivative);
         let output = if output.is_finite() { output } else { params.limit(0.0) };
         PidTerms { error, proportional, integral: self.integral, derivative, output }
+    }
+
+    /// Feeds back that `applied` was carried out instead of the output of the last [`step`](Self::step), of `step_s`: the
+    /// integral is reduced as at a limit of the controller's own. Returns the terms with the reduced integral and the applied
+    /// output.
+    pub fn limited(&mut self, terms: PidTerms, applied: f64, step_s: f64) -> PidTerms {
+        let beyond = terms.output - applied;
+        if step_s > 0.0 && beyond.is_finite() {
+            self.integral -= self.params.windup(beyond, self.integral, step_s);
+        }
+        PidTerms { integral: self.integral, output: applied, ..terms }
     }
 }
 
@@ -100,10 +126,13 @@ impl PidParams {
         output.max(self.minimum).min(self.maximum)
     }
 
-    /// How much of the excess over the limit is attributed to the integral: never more than its value, so that a
-    /// proportional term that saturates alone does not wind it up in the other direction.
-    fn windup(&self, beyond: f64, integral: f64) -> f64 {
-        if beyond * integral > 0.0 { beyond.abs().min(integral.abs()).copysign(integral) } else { 0.0 }
+    /// By how much a step reduces the integral for the excess over the limit. At most the integral's value is attributed to it,
+    /// so that a proportional term that saturates alone does not wind it up in the other direction.
+    fn windup(&self, beyond: f64, integral: f64, step_s: f64) -> f64 {
+        let share = if self.tracking_s > 0.0 { (step_s / self.tracking_s).min(1.0) } else { 1.0 };
+        let excess =
+            if beyond * integral > 0.0 { beyond.abs().min(integral.abs()).copysign(integral) } else { 0.0 };
+        share * excess
     }
 }
 

@@ -22,23 +22,23 @@ params! {
         ///
         /// Small: starts soon. Large: the bias of the gyroscope is better known.
         rest_time: f64 = 1.0, in 0.0..=1e6, unit "s";
-        /// The most that the angular velocity varies at rest, standard deviation of a component.
+        /// Largest variation of the angular velocity at rest, standard deviation of a component.
         ///
         /// Small: noise is taken for motion. Large: motion is taken for rest.
         ///
         /// Source: MEMS gyroscopes at 100 Hz have 0.002 rad/s.
         rest_rotation: f64 = 0.01, in 0.0..=1e3, unit "rad/s";
-        /// The most that the specific force varies at rest, standard deviation of a component.
+        /// Largest variation of the specific force at rest, standard deviation of a component.
         ///
         /// Small: noise is taken for motion. Large: motion is taken for rest.
         ///
         /// Source: MEMS accelerometers at 100 Hz have 0.02 m/s².
         rest_force: f64 = 0.1, in 0.0..=1e6, unit "m/s^2";
-        /// The largest bias of the gyroscope: a steady rotation that is faster is no bias.
+        /// The largest bias of the gyroscope: a faster steady rotation is not a bias.
         largest_bias: f64 = 0.1, in 0.0..=1e3, unit "rad/s";
         /// Standard deviation of the accelerometer's bias.
         accelerometer_bias: f64 = 0.1, in 0.0..=1e3, unit "m/s^2";
-        /// Horizontal acceleration while in motion, which tilts what the accelerometer shows.
+        /// Horizontal acceleration in motion, which tilts the measured specific force.
         acceleration: f64 = 1.0, in 0.0..=1e3, unit "m/s^2";
         /// Gravity where the robot is.
         gravity: f64 = 9.80665, in 1.0..=30.0, unit "m/s^2";

@@ -16,6 +16,9 @@ const ROUNDS: usize = 12;
 /// The largest normalised innovation squared of a measurement that fits, relative to its mean.
 const FITS: f64 = 1.01;
 
+/// The largest normalised innovation squared, relative to its mean, that the motion explains: ten deviations a dimension.
+const COMMON: f64 = 100.0;
+
 /// A measurement that the gate has accepted, with its effect on the errors.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Weighed<const D: usize, const N: usize> {
@@ -58,8 +61,8 @@ pub(super) fn innovation<const D: usize, const N: usize>(
 }
 
 impl<const D: usize, const N: usize> Weighed<D, N> {
-    /// Applies the gate of `stream`. If its patience has run out, the covariance of the inconsistent block is raised until the
-    /// measurement fits.
+    /// Applies the gate of `stream`. If its patience has run out, the covariance is raised until the measurement fits.
+    /// `sees_position` tells whether a measurement observes the position in the world.
     ///
     /// # Errors
     ///
@@ -71,6 +74,7 @@ impl<const D: usize, const N: usize> Weighed<D, N> {
         model: &Linearised<D, N>,
         gate: Gate,
         layout: &Layout<N>,
+        sees_position: impl Fn(&Linearised<D, N>) -> bool,
     ) -> Result<Self, Refusal> {
         let plain = innovation(covariance, model)?;
         let nis = plain.nis();
@@ -86,7 +90,7 @@ impl<const D: usize, const N: usize> Weighed<D, N> {
         }
         if verdict.raised > 1.0 {
             weighed.before = Some(*covariance);
-            match fitted(covariance, model, layout) {
+            match fitted(covariance, stream, model, layout, sees_position) {
                 Some(fitted) => weighed.innovation = fitted,
                 None => {
                     weighed.undo(covariance);
@@ -106,29 +110,88 @@ impl<const D: usize, const N: usize> Weighed<D, N> {
 
     /// The outcome of the update.
     #[inline]
-    pub(super) fn fused(&self) -> Fused {
+    pub(super) fn fused(&self, model: &Linearised<D, N>) -> Fused {
         let Verdict { weight, raised, limit, log_likelihood } = self.verdict;
         let whitened = self.innovation.whitened.first().copied().unwrap_or(0.0);
-        Fused { nis: self.nis, dimension: D, weight, raised, limit, log_likelihood, whitened }
+        let misfit = if self.before.is_some() { misfit(model) } else { [0.0; 3] };
+        Fused { nis: self.nis, dimension: D, weight, raised, limit, log_likelihood, whitened, misfit }
     }
+}
+
+/// The first components of a residual.
+#[cold]
+#[inline(never)]
+fn misfit<const D: usize, const N: usize>(model: &Linearised<D, N>) -> [f64; 3] {
+    core::array::from_fn(|i| model.residual.get(i).copied().unwrap_or(0.0))
 }
 
 /// The innovation of a measurement that overrides its gate, with the covariance raised until it fits; `None` if no observed error
 /// explains it.
 ///
+/// Two explanations compete. Either the motion differed from the prediction because its noise was assumed too small, or one quantity
+/// has jumped. A misfit of up to [`COMMON`] counts as the first: position and velocity are raised together and keep their
+/// correlations, so that the correction of the position also goes to the velocity that led it away. A larger one counts as the
+/// second. If the first measurements after a jump are off in the same direction, it was no jump, and position and velocity are raised
+/// regardless of the factor. A measurement that does not see the position does not raise it.
+#[cold]
+#[inline(never)]
+fn fitted<const D: usize, const N: usize>(
+    covariance: &mut Covariance<N>,
+    stream: &Stream,
+    model: &Linearised<D, N>,
+    layout: &Layout<N>,
+    sees_position: impl Fn(&Linearised<D, N>) -> bool,
+) -> Option<Innovation<D, N>> {
+    let before = *covariance;
+    // What does not see the position must not make it uncertain.
+    let most = match (sees_position(model), stream.goes_on(&misfit(model))) {
+        (false, _) => 0.0,
+        (true, false) => COMMON,
+        (true, true) => f64::INFINITY,
+    };
+    fitted_by_motion(covariance, model, layout, most).or_else(|| {
+        *covariance = before;
+        fitted_by_one(covariance, model, layout)
+    })
+}
+
+/// Raises position and velocity until the measurement fits; `None` if its normalised innovation squared is more than `most` times
+/// its mean.
+fn fitted_by_motion<const D: usize, const N: usize>(
+    covariance: &mut Covariance<N>,
+    model: &Linearised<D, N>,
+    layout: &Layout<N>,
+    most: f64,
+) -> Option<Innovation<D, N>> {
+    for round in 0..ROUNDS {
+        let fitted = raised(covariance, model).ok()?;
+        let misfit = fitted.nis() / D as f64;
+        if misfit <= FITS {
+            return Some(fitted);
+        }
+        if misfit.is_nan() || round == 0 && misfit > most {
+            return None;
+        }
+        // The noise of the measurement is not multiplied: one round is not enough.
+        covariance.scale_motion(layout, misfit);
+    }
+    None
+}
+
+/// Raises the covariance of the errors that explain the misfit best.
+///
 /// With the residual r of covariance `S = H P Hᵀ + R`, block b of the errors contributes `uᵀ H_b P_bb H_bᵀ u` to the normalised
 /// innovation squared, `uᵀ S u` with `u = S⁻¹ r`, independently of axes and units. The block with the largest contribution is
 /// taken to be wrong. Its covariance is raised until the normalised innovation squared equals its mean, and its correlations are
 /// set to zero. All other blocks keep their covariance.
-#[cold]
-fn fitted<const D: usize, const N: usize>(
+fn fitted_by_one<const D: usize, const N: usize>(
     covariance: &mut Covariance<N>,
     model: &Linearised<D, N>,
     layout: &Layout<N>,
 ) -> Option<Innovation<D, N>> {
     let jacobian = SMatrix::<f64, D, N>::from_fn(|i, j| model.jacobian[i][j]);
     for _ in 0..ROUNDS {
-        let plain = innovation(covariance, model).ok()?;
+        let plain = raised(covariance, model).ok()?;
         let nis = plain.nis();
         let mean = D as f64;
         if nis <= FITS * mean {
@@ -150,5 +213,15 @@ fn fitted<const D: usize, const N: usize>(
         }
         covariance.raise(layout, u8::try_from(block).ok()?, factor);
     }
-    innovation(covariance, model).ok()
+    raised(covariance, model).ok()
+}
+
+/// The innovation once more, apart from the update that every measurement takes.
+#[cold]
+#[inline(never)]
+fn raised<const D: usize, const N: usize>(
+    covariance: &Covariance<N>,
+    model: &Linearised<D, N>,
+) -> Result<Innovation<D, N>, Refusal> {
+    innovation(covariance, model)
 }

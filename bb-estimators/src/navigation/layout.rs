@@ -17,6 +17,8 @@ const MOST_DEVIATIONS: f64 = 100.0;
 pub(in crate::navigation) struct Layout<const N: usize> {
     /// Errors with the same number belong to one quantity or refer to it.
     pub(in crate::navigation) blocks: [u8; N],
+    /// The blocks of position and velocity.
+    pub(in crate::navigation) motion: [u8; 2],
     /// In the squares of the errors' units.
     pub(in crate::navigation) largest: [f64; N],
     /// Above this variance the filter is lost.
@@ -25,11 +27,13 @@ pub(in crate::navigation) struct Layout<const N: usize> {
 
 impl<const N: usize> Layout<N> {
     /// A layout in which all errors form one quantity that is known.
-    pub(in crate::navigation) const EMPTY: Self = Self { blocks: [0; N], largest: [0.0; N], lost: [0.0; N] };
+    pub(in crate::navigation) const EMPTY: Self =
+        Self { blocks: [0; N], motion: [0; 2], largest: [0.0; N], lost: [0.0; N] };
 
     /// The layout of an [`Eskf`](super::Eskf). The keyframe and the barometer's bias refer to the pose.
     pub(in crate::navigation) const fn of<S: States>() -> Self {
         let mut layout = Self::EMPTY;
+        layout.motion = [0, 1];
         layout.set((POSITION, 3), 0, MOST_VARIANCE);
         layout.set((VELOCITY, 3), 1, MOST_VARIANCE);
         layout.set((ROTATION, 3), 2, MOST_ROTATION);

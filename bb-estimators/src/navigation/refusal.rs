@@ -38,6 +38,12 @@ pub enum Refusal {
         /// The keyframe it names.
         id: u64,
     },
+    /// A relative pose refers to a keyframe that is held, but is not the one directly before its own: split it into poses between
+    /// neighbours, or insert no keyframes in between.
+    NotAdjacent {
+        /// The keyframe it names.
+        id: u64,
+    },
     /// A keyframe has reached its maximum number of factors.
     Full {
         /// The keyframe.
@@ -77,6 +83,7 @@ impl fmt::Display for Refusal {
                 write!(f, "normalised innovation squared is {nis:.1}, beyond the gate of {limit:.1}")
             }
             Self::NoKeyframe { id } => write!(f, "keyframe {id} is not held"),
+            Self::NotAdjacent { id } => write!(f, "keyframe {id} is not the one directly before"),
             Self::Full { id } => write!(f, "keyframe {id} has as many factors as it takes"),
             Self::Repeated { landmark } => write!(f, "the keyframe has seen landmark {landmark} already"),
             Self::NotObservable => f.write_str("the measurement says nothing in this state"),

@@ -22,8 +22,9 @@
 //!
 //! [`FixedLagSmoother::set_camera`] sets a camera, and [`FixedLagSmoother::observe`] adds points that it observes. Each landmark
 //! is eliminated when it is added, which couples all keyframes that observed it. These couplings are carried along the
-//! elimination of the chain; see `coupling.rs` and `landmark.rs`. When a landmark's first keyframe is marginalised, its
-//! information remains as a prior on the other keyframes, which keep their linearisation points.
+//! elimination of the chain; see `coupling.rs` and `landmark.rs`. A landmark that is still tracked when its first keyframe is
+//! marginalised becomes an unknown of its own and keeps its linearisation point; see `coupling/points.rs`. The information of a lost
+//! one remains as a prior on the other keyframes, which keep their linearisation points.
 //!
 //! # Robustness
 //!
@@ -43,6 +44,8 @@ mod factor;
 mod filter;
 #[cfg(feature = "smoother")]
 mod fusion;
+#[cfg(feature = "smoother")]
+mod judging;
 mod kernel;
 #[cfg(feature = "smoother")]
 mod keyframe;

@@ -16,31 +16,32 @@ const MOST_RAISED: f64 = 1e6;
 params! {
     /// How the measurements of one sensor are judged.
     pub struct StreamParams {
-        /// What the variance of every measurement is multiplied by.
+        /// Factor on the variance of every measurement.
         variance_factor: f64 = 1.0, in 1e-12..=1e12;
-        /// Part of good measurements that the gate refuses; 0 for no gate.
+        /// Fraction of valid measurements that the gate rejects; 0 disables the gate.
         ///
-        /// Small: lets more outliers pass. Large: refuses what a filter that is off needs.
+        /// Small: lets more outliers pass. Large: rejects measurements that would correct a wrong estimate.
         gate: f64 = 1e-4, in 0.0..=1.0;
-        /// How many measurements in a row the gate refuses before it takes the filter to be wrong, not the sensor: the next
-        /// is fused with the covariance raised to fit it; 0 for never.
+        /// How many consecutive measurements the gate rejects before the filter counts as wrong, and not the sensor. The
+        /// next one is fused with the covariance raised to fit it. 0: never.
         ///
-        /// What explains the difference best is raised alone, the position for a fix, and loses its correlations; all else stays
-        /// as it is. A filter that should move only where several positions agree is better [moved](super::Eskf::relocate).
+        /// In `Eskf` and `PlanarEkf`, a position that is off by up to ten deviations a dimension raises position and velocity
+        /// together. Of a larger difference, what explains it best, the position for a fix, is raised alone and loses its
+        /// correlations; all else stays as it is. If the next ones are off in the same direction, position and velocity are raised. A filter that should move only where several positions agree is better [moved](super::Eskf::relocate).
         ///
         /// Small: a few outliers in a row move the filter. Large: a filter that is off stays so for long.
         patience: u32 = 3;
-        /// Part of good measurements that are weighed down as outliers are, by Huber's function of their Mahalanobis
-        /// distance; 0 for none.
+        /// Fraction of valid measurements whose weight is reduced like that of outliers, by Huber's function of their
+        /// Mahalanobis distance. 0: none.
         ///
         /// Small: the weights of a least-squares filter. Large: closer to a median.
         robust: f64 = 0.0, in 0.0..=1.0;
-        /// How fast the noise of the sensor adapts to its innovations: the change of its variance, per measurement; 0 for
-        /// never.
+        /// How fast the noise of the sensor adapts to its innovations: the relative change of its variance per
+        /// measurement. 0: never.
         ///
         /// Small: the noise is as given. Large: follows each innovation.
         adaptation: f64 = 0.0, in 0.0..=1.0;
-        /// The most that the adapted variance is of the given one.
+        /// Largest ratio of the adapted variance to the given one.
         most_adaptation: f64 = 100.0, in 1.0..=1e12;
     }
 }
@@ -56,7 +57,8 @@ pub struct Counts {
     pub gate: u64,
     /// [`Refusal::NonFinite`], [`Refusal::OutOfRange`] and [`Refusal::Noise`].
     pub invalid: u64,
-    /// [`Refusal::NoKeyframe`], [`Refusal::Full`], [`Refusal::Repeated`], [`Refusal::NotObservable`] and [`Refusal::NotStarted`].
+    /// [`Refusal::NoKeyframe`], [`Refusal::NotAdjacent`], [`Refusal::Full`], [`Refusal::Repeated`], [`Refusal::NotObservable`] and
+    /// [`Refusal::NotStarted`].
     pub not_applicable: u64,
     /// [`Refusal::TooOld`], [`Refusal::TimeNotIncreasing`] and [`Refusal::Gap`].
     pub late: u64,
@@ -94,6 +96,10 @@ pub struct Stream {
     huber: [f64; DIMENSIONS],
     noise_factor: f64,
     counts: Counts,
+    /// Fused since the last recovery.
+    fused_since_recovery: u64,
+    /// The residual of the last recovery.
+    recovered: [f64; 3],
     consistency: Consistency,
 }
 
@@ -112,6 +118,8 @@ impl Stream {
             huber: core::array::from_fn(|dimension| limit(dimension, params.robust)),
             noise_factor: 1.0,
             counts: Counts::default(),
+            fused_since_recovery: 0,
+            recovered: [0.0; 3],
             consistency: Consistency::default(),
         }
     }
@@ -153,6 +161,14 @@ impl Stream {
     #[cfg(any(feature = "runtime", feature = "smoother", feature = "eskf"))]
     pub(crate) fn forgive(&mut self) {
         self.counts.gate_in_a_row = 0;
+        self.recovered = [0.0; 3];
+    }
+
+    /// Whether a misfit goes on in the direction of the last one, and too few have fitted since to call that a recovery. Outliers
+    /// that end are off in the other direction.
+    pub(crate) fn goes_on(&self, misfit: &[f64; 3]) -> bool {
+        let along: f64 = self.recovered.iter().zip(misfit).map(|(before, now)| before * now).sum();
+        self.fused_since_recovery < u64::from(self.params.patience) && along > 0.0
     }
 
     /// Decides how a measurement is fused, or rejects it.
@@ -197,8 +213,11 @@ impl Stream {
                 if fused.raised > 1.0 {
                     // A measurement that did not fit carries no information about the noise of those that do.
                     self.counts.recoveries += 1;
+                    self.fused_since_recovery = 0;
+                    self.recovered = fused.misfit;
                     return;
                 }
+                self.fused_since_recovery += 1;
                 self.noise_factor = adapt(self.noise_factor, fused.nis / fused.dimension as f64);
                 self.consistency.add(fused);
             }
@@ -209,6 +228,7 @@ impl Stream {
             Err(Refusal::NonFinite | Refusal::OutOfRange | Refusal::Noise) => self.counts.invalid += 1,
             Err(
                 Refusal::NoKeyframe { .. }
+                | Refusal::NotAdjacent { .. }
                 | Refusal::Full { .. }
                 | Refusal::Repeated { .. }
                 | Refusal::NotObservable

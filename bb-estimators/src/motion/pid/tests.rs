@@ -107,3 +107,39 @@ proptest! {
         prop_assert_eq!(pid, kept);
     }
 }
+
+/// The runtime clamps to the limits of the joint, which the controller does not know.
+#[test]
+fn an_output_that_is_limited_elsewhere_does_not_wind_it_up() {
+    let unlimited = PidParams { minimum: f64::NEG_INFINITY, maximum: f64::INFINITY, proportional: 0.5, ..PARAMS };
+    let (mut pid, mut own) =
+        (Pid::new(unlimited), Pid::new(PidParams { minimum: -2.0, maximum: 2.0, ..unlimited }));
+    for _ in 0..6000 {
+        let terms = pid.update(11.0, 1.0, 0.01);
+        let limited = pid.limited(terms, terms.output.clamp(-2.0, 2.0), 0.01);
+        assert_eq!(limited.output, 2.0);
+        // As if the limit were its own.
+        assert_eq!(limited, own.update(11.0, 1.0, 0.01));
+    }
+    let turned = pid.update(0.0, 1.0, 0.01);
+    assert!(turned.output < 0.0, "{turned:?}");
+}
+
+/// A sensor at 50 Hz, and a controller at any rate.
+#[test]
+fn the_derivative_does_not_depend_on_the_rate_of_the_controller() {
+    for steps in [1, 4, 20] {
+        let params = PidParams { derivative_filter_s: 0.05, derivative: 1.0, ..PARAMS };
+        let (mut pid, mut last) = (Pid::new(params), PidTerms::default());
+        for sample in 0..50 {
+            let measurement = 0.06 * f64::from(sample);
+            pid.measured(measurement, 0.02);
+            for _ in 0..steps {
+                last = pid.step(0.0, measurement, 0.02 / f64::from(steps));
+                let most = 3.0 * (1.0 + 1e-12);
+                assert!((-most..=0.0).contains(&last.derivative), "{steps} steps: {last:?}");
+            }
+        }
+        assert!((last.derivative + 3.0).abs() < 1e-6, "{steps} steps: {last:?}");
+    }
+}

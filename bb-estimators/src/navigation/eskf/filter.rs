@@ -107,10 +107,16 @@ impl<S: States, const N: usize> Eskf<S, N> {
     /// Returns a [`Refusal`] if the filter has not started, a value is not finite or absurdly large, time does not increase, or
     /// the gap is longer than a minute. The filter is then unchanged.
     pub fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
+        self.propagate_part(sample, false)
+    }
+
+    /// The same over a part of a sample. A part of a gap is a gap, however short it is.
+    #[inline]
+    pub(in crate::navigation) fn propagate_part(&mut self, sample: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
         let estimate = self.estimate.as_mut().ok_or(Refusal::NotStarted)?;
         sample.check()?;
         let dt = seconds_between(estimate.time_ns, sample.time_ns)?;
-        if dt > self.params.longest_sample {
+        if is_gap || dt > self.params.longest_sample {
             self.bridge(sample.time_ns, dt)?;
             return Ok(());
         }
@@ -208,7 +214,8 @@ impl<S: States, const N: usize> Eskf<S, N> {
         gate: Gate,
     ) -> Result<Fused, Refusal> {
         let model = self.linearised(stream, measurement)?;
-        let weighed = Weighed::new(&mut self.covariance, stream, &model, gate, &Self::LAYOUT)?;
+        let weighed =
+            Weighed::new(&mut self.covariance, stream, &model, gate, &Self::LAYOUT, Self::fixes_position)?;
         let error = weighed.innovation.mean();
         if !Self::LAYOUT.admits(&error) {
             weighed.undo(&mut self.covariance);
@@ -225,7 +232,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
             self.reset_rotation(index + 3, &error);
         }
         self.covariance.settle(&Self::LAYOUT);
-        Ok(weighed.fused())
+        Ok(weighed.fused(&model))
     }
 
     #[inline]

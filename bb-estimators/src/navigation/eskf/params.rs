@@ -51,7 +51,7 @@ pub(crate) use imu_params;
 imu_params! {
     /// The tuning of [`Eskf`](super::Eskf).
     pub struct EskfParams {
-        /// The longest time that one sample of the IMU is taken to describe. What is longer is a gap.
+        /// The longest interval that one sample of the IMU covers; a longer one is a gap.
         ///
         /// Small: a late sample counts as a gap, and the covariance grows by much. Large: a lost sample is bridged as if
         /// its successor had been measured all the time.
@@ -70,39 +70,39 @@ imu_params! {
         ///
         /// Source: a body that turns by 1 rad/s for about a second.
         gap_rotation: f64 = 1.0, in 0.0..=1e3, plain "rad/s/√Hz";
-        /// How far the scale of relative poses is from 1, [`Optional::RelativeScale`].
+        /// Deviation of the scale of relative poses from 1, [`Optional::RelativeScale`].
         ///
-        /// Small: takes the scale as known. Large: relative translations say less about the velocity.
+        /// Small: trusts the scale. Large: relative translations contribute less to the velocity.
         ///
         /// Source: drift of monocular visual-inertial odometry, 1–2 %.
         relative_scale: GaussMarkov = GaussMarkov::new(0.02, 20.0), deviation 0.0..=1.0, shown "0.02 for 20 s";
-        /// How far the GNSS antenna is from where it is said to be, [`Optional::GnssLeverArm`].
+        /// Error of the GNSS antenna's declared position, [`Optional::GnssLeverArm`].
         ///
-        /// Small: takes the mounting as measured. Large: needs rotation to be found.
+        /// Small: trusts the declared position. Large: needs rotation to become observable.
         ///
         /// Source: a tape measure.
         gnss_lever_arm: GaussMarkov = GaussMarkov::constant(0.1), deviation 0.0..=100.0, shown "0.1 for ever", of "m";
-        /// How late GNSS measurements are, beyond their stamps, [`Optional::GnssDelay`].
+        /// Delay of GNSS measurements beyond their stamps, [`Optional::GnssDelay`].
         ///
-        /// Small: takes the stamps as they are. Large: needs acceleration to be found.
+        /// Small: trusts the stamps. Large: needs acceleration to become observable.
         ///
         /// Source: receivers that stamp at the end of a 10 Hz period.
         gnss_delay: GaussMarkov = GaussMarkov::constant(0.1), deviation 0.0..=10.0, shown "0.1 for ever", of "s";
-        /// How far the scale of the wheel speed is from 1, [`Optional::WheelScale`].
+        /// Deviation of the scale of the wheel speed from 1, [`Optional::WheelScale`].
         ///
-        /// Small: takes the wheel's radius as known. Large: needs another source of speed to be found.
+        /// Small: trusts the wheel's radius. Large: needs another source of speed to become observable.
         ///
         /// Source: wear and pressure of a tyre.
         wheel_scale: GaussMarkov = GaussMarkov::new(0.03, 1000.0), deviation 0.0..=1.0, shown "0.03 for 1000 s";
         /// Magnetic field of the body itself, [`Optional::HardIron`].
         ///
-        /// Small: takes the magnetometer as calibrated. Large: needs rotation to be found.
+        /// Small: trusts the calibration of the magnetometer. Large: needs rotation to become observable.
         ///
         /// Source: a tenth of the earth's field.
         hard_iron: GaussMarkov = GaussMarkov::new(5e-6, 1000.0), deviation 0.0..=1.0, shown "5e-6 for 1000 s", of "T";
-        /// How far the barometric height is off, [`Optional::BarometerBias`].
+        /// Error of the barometric height, [`Optional::BarometerBias`].
         ///
-        /// Small: takes the pressure at the origin as known. Large: needs another source of height.
+        /// Small: trusts the pressure at the origin. Large: needs another source of height.
         ///
         /// Source: weather, a hectopascal an hour.
         barometer_bias: GaussMarkov = GaussMarkov::new(10.0, 3600.0), deviation 0.0..=1e4, shown "10 for 3600 s", of "m";

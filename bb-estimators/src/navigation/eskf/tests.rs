@@ -6,6 +6,7 @@ mod cases;
 mod consistency;
 mod jacobians;
 mod laws;
+mod patience;
 mod transition;
 
 use nalgebra::{SVector, UnitQuaternion, Vector3};

@@ -10,7 +10,7 @@ use bb_core::Payload;
 use bb_core::payload::{Odometry, Pose, Twist};
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
-/// Status of the filter beside its odometry.
+/// Status of the filter, published with its odometry.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Payload)]
 pub struct NavigationStatus {
     /// Accelerometer bias: the reading minus the specific force, axes of the link, m/s².

@@ -22,6 +22,7 @@ use crate::params::Params as _;
 
 const LAYOUT: Layout<STATES> = {
     let mut layout = Layout::EMPTY;
+    layout.motion = [0, 2];
     layout.set((POSITION, 2), 0, MOST_VARIANCE);
     layout.set((HEADING, 1), 1, MOST_ROTATION);
     layout.set((VELOCITY, 2), 2, MOST_VARIANCE);
@@ -33,6 +34,11 @@ const LAYOUT: Layout<STATES> = {
 
 /// A variance that amounts to a known state, where 0 would make the matrix singular.
 const KNOWN: f64 = 1e-24;
+
+/// Whether a measurement observes the position.
+fn sees_position<const D: usize>(model: &Linearised<D, STATES>) -> bool {
+    model.jacobian.iter().any(|row| row[POSITION] != 0.0 || row[POSITION + 1] != 0.0)
+}
 
 /// The state and uncertainty that a filter starts with.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -218,7 +224,7 @@ impl PlanarEkf {
         let mut model = Linearised::new();
         measurement.linearise(estimate, &mut model)?;
         let model = prepared(model, stream)?;
-        let weighed = Weighed::new(&mut self.covariance, stream, &model, Gate::Closed, &LAYOUT)?;
+        let weighed = Weighed::new(&mut self.covariance, stream, &model, Gate::Closed, &LAYOUT, sees_position)?;
         let error = weighed.innovation.mean();
         if !LAYOUT.admits(&error) {
             weighed.undo(&mut self.covariance);
@@ -227,11 +233,10 @@ impl PlanarEkf {
         *estimate = estimate.corrected(&error);
         self.covariance.update(&weighed.innovation);
         self.covariance.settle(&LAYOUT);
-        let sees_position = |row: &[f64; STATES]| row[POSITION] != 0.0 || row[POSITION + 1] != 0.0;
-        if model.jacobian.iter().any(sees_position) {
+        if sees_position(&model) {
             self.upkeep.fixed_ns = estimate.time_ns;
         }
-        Ok(weighed.fused())
+        Ok(weighed.fused(&model))
     }
 
     /// Relocates a filter that was wrong, m: sets the position and, if given, the velocity (in the world, m/s) and the heading

@@ -20,23 +20,23 @@ params! {
         gyroscope_bias_walk: f64 = 2e-5, in 0.0..=1.0, plain "rad/s²/√Hz";
         /// Acceleration along the body's x axis, as white noise.
         ///
-        /// Small: smooths the wheels. Large: the velocity is what the wheels said last.
+        /// Small: smooths the wheels. Large: the velocity follows the latest reading of the wheels.
         ///
         /// Source: a rover that changes its speed by 1 m/s within a second.
         forward_acceleration: f64 = 1.0, in 1e-6..=1e4, plain "m/s²/√Hz";
         /// Acceleration along the body's y axis, as white noise.
         ///
-        /// Small: takes the robot not to slide. Large: a slide ends up in the velocity, not in the position.
+        /// Small: assumes that the robot does not slide. Large: attributes a slide to the velocity instead of the position.
         ///
         /// Source: wheels that are turned slightly while they roll.
         lateral_acceleration: f64 = 0.3, in 1e-6..=1e4, plain "m/s²/√Hz";
-        /// How far the scale of the wheels is from 1.
+        /// Deviation of the scale of the wheels from 1.
         ///
-        /// Small: takes the wheel's radius as known. Large: without fixes the distance is uncertain sooner.
+        /// Small: trusts the wheel's radius. Large: without fixes the distance becomes uncertain sooner.
         ///
         /// Source: wear and pressure of a tyre.
         wheel_scale: GaussMarkov = GaussMarkov::new(0.02, 1000.0), deviation 0.0..=1.0, shown "0.02 for 1000 s";
-        /// The longest time that one sample of the gyroscope is taken to describe. What is longer is a gap.
+        /// The longest interval that one sample of the gyroscope covers; a longer one is a gap.
         ///
         /// Small: a late sample counts as a gap, and the covariance grows by much. Large: a lost sample is bridged as if
         /// its successor had been measured all the time.

@@ -10,6 +10,10 @@
 //!
 //! in addition to the terms of the chain alone. Q is not inverted here either. Marginalising the oldest keyframe leaves
 //! the same terms.
+//!
+//! Λ has an envelope: the rows of a pose end where the last landmark does that it, or a pose before it, shares with
+//! later ones. Elimination fills in nothing beyond. Eliminating K keyframes with tracks of T thus costs `K T²`, not `K³`, and
+//! `checkpoint.rs` keeps what the keyframes before all current tracks leave.
 
 #![allow(clippy::needless_range_loop, reason = "the indices are those of the equations")]
 
@@ -17,8 +21,18 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::elimination::Carried;
+use super::link::Information;
 use super::matrix::Square;
 use crate::navigation::state::{POSITION, ROTATION};
+use checkpoint::Checkpoint;
+use kernels::{add_all, add_one, set, subtract_at, subtract_column};
+use points::Points;
+
+mod checkpoint;
+mod kernels;
+mod points;
+
+pub(super) use points::Seen;
 
 /// The number of error components of a pose.
 pub(super) const POSE: usize = 6;
@@ -62,12 +76,23 @@ pub(super) struct Coupling<const N: usize> {
     reduced_vector: Vec<f64>,
     /// C of each keyframe when it is eliminated.
     ties: Vec<f64>,
+    /// The serial number of the pose at which the ties of each keyframe end.
+    ends: Vec<u64>,
+    /// The index of the pose at which the rows of each pose end; it never decreases. Λ and the front are zero beyond.
+    reach: Vec<usize>,
+    /// The first pose whose information has changed since the last elimination.
+    changed: usize,
+    checkpoint: Checkpoint,
     /// Products with C.
     product: Vec<f64>,
+    /// Landmarks that are unknowns of their own.
+    points: Points<N>,
+    /// What their elimination leaves on the oldest keyframe.
+    oldest: Information<N>,
 }
 
 impl<const N: usize> Coupling<N> {
-    pub(super) fn new(slots: usize) -> Self {
+    pub(super) fn new(slots: usize, points: usize) -> Self {
         let stride = POSE * slots;
         Self {
             slots,
@@ -80,7 +105,13 @@ impl<const N: usize> Coupling<N> {
             reduced: vec![0.0; stride * stride],
             reduced_vector: vec![0.0; stride],
             ties: vec![0.0; slots * N * stride],
+            ends: vec![0; slots],
+            reach: (1..=slots).collect(),
+            changed: usize::MAX,
+            checkpoint: Checkpoint::new(slots, N),
             product: vec![0.0; N * stride],
+            points: Points::new(points, slots),
+            oldest: Information::none(),
         }
     }
 
@@ -92,9 +123,12 @@ impl<const N: usize> Coupling<N> {
     pub(super) fn clear(&mut self) {
         self.first = 0;
         self.idle = None;
+        self.changed = usize::MAX;
+        self.checkpoint.forget();
         for values in [&mut self.matrix, &mut self.vector, &mut self.front, &mut self.ties] {
             values.fill(0.0);
         }
+        self.points.clear();
     }
 
     /// Appends a keyframe to `len` others; it has no ties yet.
@@ -102,26 +136,54 @@ impl<const N: usize> Coupling<N> {
         let Some(idle) = self.idle else { return };
         // By then every tied keyframe has left.
         self.idle = (idle < 2 * self.slots).then_some(idle + 1);
-        let stride = self.stride;
-        for index in 0..len {
-            let (slot, column) = (self.slot(index), POSE * (len - 1 - index));
-            let block = &mut self.ties[slot * N * stride..(slot + 1) * N * stride];
-            for row in block.chunks_exact_mut(stride) {
-                row[column..column + POSE].fill(0.0);
-            }
+        let last = len - 1;
+        self.reach[len] = self.reach[last].max(len + 1);
+        let (slot, stride) = (self.slot(last), self.stride);
+        for row in self.ties[slot * N * stride..(slot + 1) * N * stride].chunks_exact_mut(stride) {
+            row[..POSE].fill(0.0);
         }
-        for row in self.front.chunks_exact_mut(stride) {
-            row[POSE * (len - 1)..POSE * len].fill(0.0);
+        self.ends[slot] = self.first + len as u64 + 1;
+        self.checkpoint.append(self.first + len as u64);
+        self.append_to_points(len);
+    }
+
+    /// The first pose whose information has changed since the last elimination.
+    pub(super) fn changed(&self) -> usize {
+        self.changed
+    }
+
+    /// Restores this after a change of form that left the information what it was.
+    pub(super) fn set_changed(&mut self, changed: usize) {
+        self.changed = changed;
+    }
+
+    /// The information that couples these poses changes.
+    fn touch(&mut self, from: usize, to: usize) {
+        if self.idle.is_none() {
+            self.checkpoint.forget();
+            self.reach.iter_mut().enumerate().for_each(|(i, reach)| *reach = i + 1);
         }
+        self.idle = Some(0);
+        self.changed = self.changed.min(from);
+        self.checkpoint.forget_after(self.first + from as u64);
+        self.reach[from..].iter_mut().take_while(|reach| **reach < to).for_each(|reach| *reach = to);
+    }
+
+    /// The index of the pose at which the ties of a keyframe end in an elimination of `len`. It includes the next keyframe.
+    fn end(&self, index: usize, len: usize) -> usize {
+        // Landmarks that are unknowns of their own couple all keyframes.
+        if self.points() > 0 { len } else { self.reach[index].max(index + 2).min(len) }
     }
 
     fn slot(&self, index: usize) -> usize {
         ((self.first + index as u64) % self.slots as u64) as usize
     }
 
-    fn ties(&self, index: usize) -> &[f64] {
+    /// The ties of a keyframe, and how many columns they have.
+    fn ties(&self, index: usize) -> (&[f64], usize) {
         let slot = self.slot(index);
-        &self.ties[slot * N * self.stride..(slot + 1) * N * self.stride]
+        let poses = (self.ends[slot] - self.first) as usize - index - 1;
+        (&self.ties[slot * N * self.stride..(slot + 1) * N * self.stride], POSE * poses)
     }
 
     /// Adds rows to Λ and λ: `sign · rowsᵀ rows` and `sign · rowsᵀ residual`. The rows cover the poses `from` to `to`;
@@ -133,26 +195,32 @@ impl<const N: usize> Coupling<N> {
         residual: &[f64; R],
         sign: f64,
     ) {
-        self.idle = Some(0);
+        self.touch(from, to);
         let (low, high) = (POSE * from, POSE * to);
         for i in low..high {
-            let target = &mut self.matrix[i * self.stride + i..i * self.stride + high];
-            for row in 0..R {
-                let factor = sign * rows[row][i];
-                self.vector[i] += factor * residual[row];
-                add_one(target, factor, &rows[row][i..high]);
+            let factors: [f64; R] = core::array::from_fn(|row| sign * rows[row][i]);
+            let rows: [&[f64]; R] = core::array::from_fn(|row| &rows[row][i..high]);
+            let share: f64 = factors.iter().zip(residual).map(|(factor, residual)| factor * residual).sum();
+            self.vector[i] += share;
+            add_all(&mut self.matrix[i * self.stride + i..i * self.stride + high], &factors, &rows);
+            if let Some((row, vector)) = self.checkpoint.row(self.first, i) {
+                add_all(&mut row[..high - i], &factors, &rows);
+                *vector += share;
             }
         }
     }
 
     /// Adds information on one pose to Λ and λ.
     pub(super) fn add_pose(&mut self, index: usize, information: &PoseInformation, sign: f64) {
-        self.idle = Some(0);
+        self.touch(index, index + 1);
         for i in 0..POSE {
             let at = POSE * index + i;
+            let row = &information.matrix[i][i..];
             self.vector[at] += sign * information.vector[i];
-            for j in i..POSE {
-                self.matrix[at * self.stride + POSE * index + j] += sign * information.matrix[i][j];
+            add_one(&mut self.matrix[at * self.stride + at..][..row.len()], sign, row);
+            if let Some((target, vector)) = self.checkpoint.row(self.first, at) {
+                add_one(&mut target[..row.len()], sign, row);
+                *vector += sign * information.vector[i];
             }
         }
     }
@@ -162,28 +230,73 @@ impl<const N: usize> Coupling<N> {
         vec![0.0; self.stride]
     }
 
-    /// Begins the elimination of `len` keyframes.
-    pub(super) fn begin(&mut self, len: usize) {
-        let width = POSE * len;
-        for i in 0..width {
-            let part = i * self.stride + i..i * self.stride + width;
-            self.reduced[part.clone()].copy_from_slice(&self.matrix[part]);
+    /// Begins the elimination of `len` keyframes, after [`gather`](Self::gather), of which the first that changed is `dirty`.
+    /// Returns the index of the keyframe to begin with.
+    pub(super) fn begin(&mut self, dirty: usize, len: usize) -> usize {
+        if let Some(index) = self.resume(dirty, len) {
+            return index;
         }
-        self.reduced_vector[..width].copy_from_slice(&self.vector[..width]);
-        let start = self.slot(0) * N * self.stride;
-        self.ties[start..start + N * self.stride].copy_from_slice(&self.front);
+        for index in 0..len {
+            let end = POSE * self.end(index, len);
+            for i in POSE * index..POSE * (index + 1) {
+                let part = i * self.stride + i..i * self.stride + end;
+                self.reduced[part.clone()].copy_from_slice(&self.matrix[part]);
+            }
+        }
+        self.reduced_vector[..POSE * len].copy_from_slice(&self.vector[..POSE * len]);
+        let (start, width) = (self.slot(0) * N, POSE * (self.end(0, len) - 1));
+        for i in 0..N {
+            let target = (start + i) * self.stride;
+            self.ties[target..target + width].copy_from_slice(&self.front[i * self.stride..][..width]);
+        }
+        self.eliminate_points(len);
+        0
+    }
+
+    /// Whether anything has changed since the last elimination.
+    pub(super) fn is_changed(&self) -> bool {
+        self.changed != usize::MAX
+    }
+
+    /// Everything is eliminated.
+    pub(super) fn finish(&mut self) {
+        self.changed = usize::MAX;
+    }
+
+    /// Completes the ties of the oldest of `len` keyframes without an elimination of landmarks, and returns the
+    /// information on it.
+    pub(super) fn expose(&mut self, len: usize) -> Information<N> {
+        let mut known = Information::none();
+        let (slot, end) = (self.slot(0), self.end(0, len));
+        let start = slot * N * self.stride;
+        self.ends[slot] = self.first + end as u64;
+        for i in 0..N {
+            let part = i * self.stride..i * self.stride + POSE * (end - 1);
+            self.ties[start + part.start..start + part.end].copy_from_slice(&self.front[part]);
+        }
+        for i in 0..POSE {
+            known.vector[place(i)] = self.vector[i];
+            let row = &self.matrix[i * self.stride..(i + 1) * self.stride];
+            (i..POSE).for_each(|j| known.matrix[place(i)][place(j)] = row[j]);
+            let later = &row[POSE..POSE * end];
+            add_one(&mut self.ties[start + place(i) * self.stride..][..later.len()], 1.0, later);
+        }
+        known
     }
 
     /// The information left for a keyframe once those before it are eliminated; its ties are then complete.
-    pub(super) fn arrive(&mut self, index: usize, len: usize) -> PoseInformation {
-        let mut known = PoseInformation::none();
-        let (at, stride) = (POSE * index, self.stride);
-        let start = self.slot(index) * N * stride;
+    pub(super) fn arrive(&mut self, index: usize, len: usize) -> Information<N> {
+        let mut known = if index == 0 { self.oldest } else { Information::none() };
+        let (at, stride, end) = (POSE * index, self.stride, self.end(index, len));
+        let slot = self.slot(index);
+        self.ends[slot] = self.first + end as u64;
+        let start = slot * N * stride;
         for i in 0..POSE {
-            known.vector[i] = self.reduced_vector[at + i];
+            known.vector[place(i)] += self.reduced_vector[at + i];
             let row = &self.reduced[(at + i) * stride..(at + i + 1) * stride];
-            known.matrix[i][i..].copy_from_slice(&row[at + i..at + POSE]);
-            let later = &row[at + POSE..POSE * len];
+            // Places increase, so this is on and above the diagonal as well.
+            (i..POSE).for_each(|j| known.matrix[place(i)][place(j)] += row[at + j]);
+            let later = &row[at + POSE..POSE * end];
             let ties = &mut self.ties[start + place(i) * stride..][..later.len()];
             add_one(ties, 1.0, later);
         }
@@ -192,7 +305,7 @@ impl<const N: usize> Coupling<N> {
 
     /// Adds the ties between a keyframe and the pose of the next to the information on the next.
     pub(super) fn fold(&self, index: usize, carried: &Carried<N>, information: &mut Square<N>) {
-        let ties = self.ties(index);
+        let (ties, _) = self.ties(index);
         for i in 0..N {
             let mut row = [0.0; POSE];
             for k in 0..N {
@@ -211,10 +324,10 @@ impl<const N: usize> Coupling<N> {
 
     /// Eliminates a keyframe: updates Λ, λ and the ties of the next.
     pub(super) fn pass(&mut self, index: usize, len: usize, carried: &Carried<N>) {
-        let width = POSE * (len - 1 - index);
+        let (_, width) = self.ties(index);
         let stride = self.stride;
         let (slot, next) = (self.slot(index), self.slot(index + 1));
-        self.spread(slot, width, carried);
+        self.whiten_ties(slot, width, carried);
         let begin = POSE * (index + 1);
         for i in 0..width {
             let row = (begin + i) * stride + begin;
@@ -227,45 +340,59 @@ impl<const N: usize> Coupling<N> {
         let later = width - POSE;
         for i in 0..N {
             let target = &mut self.product[i * stride..i * stride + later];
-            target.fill(0.0);
-            combine::<N>(target, &carried.carry[i], &self.ties[slot * N * stride + POSE..], stride);
+            set(target, &carried.carry[i], &self.ties[slot * N * stride + POSE..], stride);
         }
+        let reached = POSE * (self.end(index + 1, len) - index - 2);
         for i in 0..N {
             let part = i * stride..i * stride + later;
             let start = next * N * stride + i * stride;
             self.ties[start..start + later].copy_from_slice(&self.product[part]);
+            self.ties[start + later..start + reached].fill(0.0);
         }
     }
 
     /// Marginalises the oldest of `len` keyframes.
     pub(super) fn leave(&mut self, len: usize, carried: &Carried<N>) {
-        let width = POSE * (len - 1);
         let stride = self.stride;
         let slot = self.slot(0);
-        self.spread(slot, width, carried);
+        let (_, width) = self.ties(0);
+        self.whiten_ties(slot, width, carried);
+        for index in 0..len - 1 {
+            let (end, next) = (POSE * self.reach[index + 1].min(len), POSE * (index + 1));
+            for i in POSE * index..next {
+                let (from, to) = ((i + POSE) * stride + POSE + i, i * stride + i);
+                self.matrix.copy_within(from..(i + POSE) * stride + end, to);
+                // The rows of the keyframe before may have been longer.
+                self.matrix[i * stride + end - POSE..i * stride + end].fill(0.0);
+            }
+        }
         for i in 0..width {
-            let (from, to) = ((i + POSE) * stride + POSE + i, i * stride + i);
-            self.matrix.copy_within(from..from + width - i, to);
-            let target = &mut self.matrix[to..to + width - i];
+            let target = &mut self.matrix[i * stride + i..i * stride + width];
             subtract_column::<N>(target, &self.product, stride, i);
         }
-        self.vector.copy_within(POSE..POSE + width, 0);
+        self.leave_points(len, carried);
+        self.vector.copy_within(POSE..POSE * len, 0);
         let ties = &self.ties[slot * N * stride..];
         subtract_at::<N>(&mut self.vector[..width], ties, stride, &carried.at);
         // Nothing is known yet of the keyframe that comes next.
-        for i in 0..width + POSE {
-            let start = i * stride + width;
-            self.matrix[start..start + POSE].fill(0.0);
+        let last = POSE * (len - 1);
+        for i in last..last + POSE {
+            self.matrix[i * stride + last..i * stride + last + POSE].fill(0.0);
         }
-        self.vector[width..width + POSE].fill(0.0);
+        self.vector[last..last + POSE].fill(0.0);
         let later = width - POSE;
         for i in 0..N {
-            let target = &mut self.front[i * stride..i * stride + later];
-            target.fill(0.0);
-            combine::<N>(target, &carried.carry[i], &self.ties[slot * N * stride + POSE..], stride);
-            self.front[i * stride + later..i * stride + width].fill(0.0);
+            let target = &mut self.front[i * stride..i * stride + width];
+            target[later..].fill(0.0);
+            set(&mut target[..later], &carried.carry[i], &self.ties[slot * N * stride + POSE..], stride);
         }
+        let reached = width / POSE + 1;
+        for index in 0..len - 1 {
+            self.reach[index] = self.reach[index + 1].max(reached).min(len) - 1;
+        }
+        self.changed = if self.is_changed() { self.changed.saturating_sub(1) } else { usize::MAX };
         self.first += 1;
+        self.checkpoint.forget_before(self.first);
     }
 
     /// The same if nothing is tied.
@@ -274,20 +401,20 @@ impl<const N: usize> Coupling<N> {
     }
 
     /// `Q'^½ C`.
-    fn spread(&mut self, slot: usize, width: usize, carried: &Carried<N>) {
+    fn whiten_ties(&mut self, slot: usize, width: usize, carried: &Carried<N>) {
         let stride = self.stride;
         for i in 0..N {
             let target = &mut self.product[i * stride..i * stride + width];
-            target.fill(0.0);
-            combine::<N>(target, &carried.spread[i], &self.ties[slot * N * stride..], stride);
+            // The root is a lower triangle.
+            set(target, &carried.noise_root[i][..=i], &self.ties[slot * N * stride..], stride);
         }
     }
 
     /// `C P`, with the corrections of the later keyframes.
     pub(super) fn pull<'a>(&self, index: usize, later: impl Iterator<Item = &'a [f64; N]>) -> [f64; N] {
-        let ties = self.ties(index);
+        let (ties, width) = self.ties(index);
         let mut pull = [0.0; N];
-        for (j, correction) in later.enumerate() {
+        for (j, correction) in later.take(width / POSE).enumerate() {
             for (i, sum) in pull.iter_mut().enumerate() {
                 let row = &ties[i * self.stride + POSE * j..][..POSE];
                 for (k, tie) in row.iter().enumerate() {
@@ -300,52 +427,8 @@ impl<const N: usize> Coupling<N> {
 
     /// Subtracts `Cᵀ x` from one vector for each later pose.
     pub(super) fn push(&self, index: usize, x: &[f64; N], later: &mut [f64]) {
-        subtract_at::<N>(later, self.ties(index), self.stride, x);
-    }
-}
-
-/// `target += factor · row`.
-#[inline]
-fn add_one(target: &mut [f64], factor: f64, row: &[f64]) {
-    for (target, value) in target.iter_mut().zip(row) {
-        *target += factor * value;
-    }
-}
-
-/// `target -= Σ rowᵢ xᵢ`, with the rows `stride` apart.
-fn subtract_at<const N: usize>(target: &mut [f64], rows: &[f64], stride: usize, x: &[f64; N]) {
-    let negative: [f64; N] = core::array::from_fn(|i| -x[i]);
-    combine::<N>(target, &negative, rows, stride);
-}
-
-/// `target -= Σ rowᵢ[column] rowᵢ[column..]`, with the rows `stride` apart.
-fn subtract_column<const N: usize>(target: &mut [f64], rows: &[f64], stride: usize, column: usize) {
-    let factors: [f64; N] = core::array::from_fn(|i| -rows[i * stride + column]);
-    combine::<N>(target, &factors, &rows[column..], stride);
-}
-
-/// `target += Σ factorᵢ rowᵢ`, with the rows `stride` apart. Eight rows at a time, since each pass loads and stores the target.
-#[inline]
-fn combine<const N: usize>(target: &mut [f64], factors: &[f64; N], rows: &[f64], stride: usize) {
-    let mut k = 0;
-    while k + 8 <= N {
-        eight(target, &factors[k..k + 8], core::array::from_fn(|i| &rows[(k + i) * stride..]));
-        k += 8;
-    }
-    while k < N {
-        add_one(target, factors[k], &rows[k * stride..]);
-        k += 1;
-    }
-}
-
-#[inline]
-fn eight(target: &mut [f64], f: &[f64], rows: [&[f64]; 8]) {
-    let len = target.len();
-    let [a, b, c, d, e, g, h, l] = rows.map(|row| &row[..len]);
-    let &[fa, fb, fc, fd, fe, fg, fh, fl] = f else { return };
-    for j in 0..len {
-        let first = (fa * a[j] + fb * b[j]) + (fc * c[j] + fd * d[j]);
-        let second = (fe * e[j] + fg * g[j]) + (fh * h[j] + fl * l[j]);
-        target[j] += first + second;
+        let (ties, width) = self.ties(index);
+        let width = width.min(later.len());
+        subtract_at::<N>(&mut later[..width], ties, self.stride, x);
     }
 }

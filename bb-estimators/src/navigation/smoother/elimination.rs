@@ -11,7 +11,9 @@
 #![allow(clippy::needless_range_loop, reason = "the indices are those of the equations")]
 
 use super::link::{Information, Link};
-use super::matrix::{Root, Square, add_gram, axpy, dot, mirror, times, transpose_times, transposed, zeros};
+use super::matrix::{
+    Root, Square, add_gram, axpy, dot, lower_root, mirror, times, transpose_times, transposed, zeros,
+};
 use super::rows::{MOST_ROWS, Rows};
 use crate::navigation::math::ln;
 
@@ -20,8 +22,8 @@ use crate::navigation::math::ln;
 pub(super) struct Carried<const N: usize> {
     /// `Gᵀ (I + M Q)⁻¹`, for the next keyframe.
     pub(super) carry: Square<N>,
-    /// A square root of Q': `spreadᵀ spread = Q'`.
-    pub(super) spread: Square<N>,
+    /// A square root of Q': `rootᵀ root = Q'`; a lower triangle.
+    pub(super) noise_root: Square<N>,
     /// `g + Q' (v - M g)`: the correction of this keyframe if that of the next were zero.
     pub(super) at: [f64; N],
 }
@@ -103,20 +105,20 @@ impl<const N: usize> Pivot<N> {
                 axpy(&mut carry[i], self.through[k][i], &lower[k]);
             }
         }
-        // Q' = Lᵀ (I + L M Lᵀ)⁻¹ L with Q = Lᵀ L: nothing cancels.
-        let noise = Root::of(&link.noise).upper;
+        // Q' = Lᵀ (I + L M Lᵀ)⁻¹ L with Q = Lᵀ L: nothing cancels. With a lower triangle L, its root is one as well.
+        let noise = lower_root(&link.noise);
         let weighted = self.root.times_rows(&transposed(&noise));
         let mut inner = identity;
         add_gram(&mut inner, &weighted);
-        let spread = Root::of(&inner).solve_transposed_rows(&noise);
+        let noise_root = Root::of(&inner).solve_transposed_rows(&noise);
         let mut rest = self.mean;
         for i in 0..N {
             rest[i] -= dot(&self.root.upper[i], &link.offset);
         }
         let rest = transpose_times(&self.root.upper, &rest);
         let mut at = link.offset;
-        axpy(&mut at, 1.0, &transpose_times(&spread, &times(&spread, &rest)));
-        Carried { carry, spread, at }
+        axpy(&mut at, 1.0, &transpose_times(&noise_root, &times(&noise_root, &rest)));
+        Carried { carry, noise_root, at }
     }
 
     /// The response of this keyframe and the next to the information vector `arrived`, with all others zero.

@@ -5,7 +5,7 @@ use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 use core::marker::PhantomData;
 
-use nalgebra::{SMatrix, SVector, Vector3};
+use nalgebra::{SMatrix, Vector3};
 
 use super::factor::{Factor, NavigationFactor};
 use super::keyframe::{Keyframe, Prior, Window, after};
@@ -16,8 +16,15 @@ use super::preintegration::Preintegration;
 use super::scratch::Scratch;
 use crate::attitude::ParamsError;
 use crate::navigation::eskf::{EskfParams, ImuMean, LONGEST_GAP_S, Start, seconds_between};
+use crate::navigation::math::unit;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{Estimate, NAVIGATION, Navigation, Optional, States, distinct, offset};
+
+/// The least variance with which a state is adopted.
+const LEAST_VARIANCE: f64 = 1e-24;
+
+/// The largest information that can be adopted, ten times that of the least variance.
+const MOST_INFORMATION: f64 = 1e25;
 
 /// Estimates position, velocity, attitude, biases and the optional states `S` at the last keyframes: `N` error
 /// components in all, with factors of type `F`. See the [module](super).
@@ -150,18 +157,20 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
     ///
     /// # Errors
     ///
-    /// [`Refusal::NonFinite`] and [`Refusal::Noise`], as for [`start`](Self::start).
+    /// [`Refusal::NonFinite`] if a value is not finite or the orientation is not a rotation; [`Refusal::OutOfRange`] if a
+    /// value is absurdly large; [`Refusal::Noise`] if the covariance is not positive definite. The smoother is then
+    /// unchanged.
     pub fn adopt<T: States, const M: usize>(
         &mut self,
         id: u64,
         estimate: &Estimate<M>,
         covariance: &SMatrix<f64, M, M>,
     ) -> Result<(), Refusal> {
-        let mut adopted = Estimate { optional: SVector::zeros(), ..Estimate::unknown() };
+        let world_from_body = unit(&estimate.world_from_body).ok_or(Refusal::NonFinite)?;
+        let mut adopted = Estimate { world_from_body, ..Estimate::unknown() };
         adopted.time_ns = estimate.time_ns;
         adopted.position = estimate.position;
         adopted.velocity = estimate.velocity;
-        adopted.world_from_body = estimate.world_from_body;
         adopted.accelerometer_bias = estimate.accelerometer_bias;
         adopted.gyroscope_bias = estimate.gyroscope_bias;
         adopted.angular_velocity = estimate.angular_velocity;
@@ -179,21 +188,30 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
             }
         }
         let covariance = SMatrix::<f64, N, N>::from_fn(|i, j| match (places[i], places[j]) {
-            (Some(row), Some(column)) => covariance[(row, column)],
-            (None, _) if i == j => variances[i].max(1e-24),
+            (Some(row), Some(column)) => 0.5 * (covariance[(row, column)] + covariance[(column, row)]),
+            (None, _) if i == j => variances[i].max(LEAST_VARIANCE),
             _ => 0.0,
         });
         if !adopted.is_finite() || !covariance.iter().all(|x| x.is_finite()) {
             return Err(Refusal::NonFinite);
         }
+        if !adopted.is_plausible() {
+            return Err(Refusal::OutOfRange);
+        }
+        let last = ImuMean {
+            time_ns: estimate.time_ns,
+            angular_velocity: estimate.angular_velocity + estimate.gyroscope_bias,
+            specific_force: estimate.specific_force + estimate.accelerometer_bias,
+        };
+        last.check()?;
         let information = nalgebra::linalg::Cholesky::new(covariance).ok_or(Refusal::Noise)?.inverse();
+        // A variance so small that its inverse overflows further on is no variance.
+        if !information.iter().all(|x| x.abs() < MOST_INFORMATION) {
+            return Err(Refusal::Noise);
+        }
         let information = Information { matrix: information.data.0, vector: [0.0; N] };
         self.spare.extend(self.window.drain(..));
-        let (angular_velocity, specific_force) = (
-            estimate.angular_velocity + estimate.gyroscope_bias,
-            estimate.specific_force + estimate.accelerometer_bias,
-        );
-        self.last = ImuMean { time_ns: estimate.time_ns, angular_velocity, specific_force };
+        self.last = last;
         self.begin(id, adopted, Prior { information, mean: Some(adopted) });
         Ok(())
     }
@@ -225,11 +243,16 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
     /// [`Refusal`] if the smoother has not started, a value is not finite or absurdly large, time does not increase, or
     /// the gap is longer than a minute. The smoother is then unchanged.
     pub fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
+        self.propagate_part(sample, false)
+    }
+
+    /// The same over a part of a sample. A part of a gap is a gap, however short it is.
+    pub(in crate::navigation) fn propagate_part(&mut self, sample: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
         let newest = self.window.back().ok_or(Refusal::NotStarted)?;
         sample.check()?;
         let dt = seconds_between(self.time_ns, sample.time_ns)?;
         let sensors = &self.params.sensors;
-        if dt <= sensors.longest_sample {
+        if dt <= sensors.longest_sample && !is_gap {
             self.motion.add(&sample.angular_velocity, &sample.specific_force, dt, &sensors.densities());
             self.last = *sample;
         } else if dt <= LONGEST_GAP_S {
@@ -276,7 +299,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         keyframe.linearise::<S>(self.window.back().map(|before| &**before), &self.params);
         if let Some(landmarks) = &mut self.landmarks {
             landmarks.coupling.append(self.window.len());
-            landmarks.judged = None;
+            landmarks.judging.forget();
         }
         self.window.push_back(keyframe);
         self.dirty = self.dirty.min(self.window.len() - 1);
@@ -307,15 +330,22 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
     /// Passes the information that landmarks hold about the oldest keyframe on to the other keyframes.
     fn release(&mut self) {
         let Some(landmarks) = &mut self.landmarks else { return };
-        let len = self.window.len();
-        if !landmarks.coupling.is_tied() {
-            landmarks.release(&mut self.window);
-            landmarks.coupling.leave_untied();
-            return;
-        }
+        let (len, changed) = (self.window.len(), landmarks.coupling.changed());
         landmarks.release(&mut self.window);
-        if let (Some(oldest), Some(next)) = (self.window.front(), self.window.get(1)) {
-            landmarks.coupling.leave(len, &oldest.pivot.carried(&next.link));
+        landmarks.coupling.set_changed(changed);
+        let window = self.window.make_contiguous();
+        if !landmarks.coupling.is_tied() {
+            landmarks.coupling.leave_untied();
+        } else if let [oldest, next, ..] = window {
+            // Not the pivot of the last elimination: landmarks were eliminated before it, but they stay.
+            let mut known = landmarks.coupling.expose(len);
+            known.add(&oldest.own);
+            oldest.pivot.take(&known);
+            next.incoming = oldest.pivot.eliminate(&next.link);
+            let carried = oldest.pivot.carried(&next.link);
+            landmarks.coupling.fold(0, &carried, &mut next.incoming.matrix);
+            landmarks.coupling.leave(len, &carried);
+            landmarks.settled();
         }
     }
 

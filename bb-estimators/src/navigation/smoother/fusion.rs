@@ -22,7 +22,8 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
     /// # Errors
     ///
     /// [`Refusal`], which the stream has counted; the smoother is then unchanged. [`Refusal::NoKeyframe`] if the
-    /// keyframe has left the window, or if a relative pose does not refer to the previous keyframe.
+    /// keyframe, or the one that a relative pose refers to, has left the window; [`Refusal::NotAdjacent`] if the latter is not the
+    /// previous keyframe.
     pub fn add(&mut self, stream: &mut Stream, id: u64, factor: impl Into<F>) -> Result<Fused, Refusal> {
         self.add_robust(stream, id, factor, Kernel::Squares)
     }
@@ -52,7 +53,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         // Ids increase, but not always by one.
         let index = self.window.iter().rposition(|keyframe| keyframe.id == id).ok_or(missing)?;
         if let Some(landmarks) = &mut self.landmarks {
-            landmarks.judged = None;
+            landmarks.judging.forget();
         }
         let trust = 1.0 / stream.noise_factor();
         let mut rows = Rows::new();
@@ -61,11 +62,17 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
             return Err(Refusal::Full { id });
         }
         let before = index.checked_sub(1).and_then(|before| self.window.get(before));
+        if let Some(id) = factor.previous()
+            && before.is_none_or(|before| before.id != id)
+        {
+            let is_held = self.window.iter().any(|keyframe| keyframe.id == id);
+            return Err(if is_held { Refusal::NotAdjacent { id } } else { Refusal::NoKeyframe { id } });
+        }
         keyframe.rows::<S>(&factor, before.map(|before| &**before), &mut rows)?;
         rows.weigh(trust);
         let (judged, dimension) = (self.judged(index, &rows, factor.previous().is_some()), rows.count);
         let judged = judged.ok_or(Refusal::NonFinite)?;
-        let Verdict { weight, raised, limit, log_likelihood } =
+        let Verdict { weight, raised, limit, log_likelihood, .. } =
             stream.weigh(judged.nis, dimension, judged.log_density, Gate::Closed)?;
         let mut index = index;
         if raised > 1.0 {
@@ -92,7 +99,16 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
             }
         }
         self.dirty = self.dirty.min(index);
-        Ok(Fused { nis: judged.nis, dimension, weight, raised, limit, log_likelihood, whitened: judged.whitened })
+        Ok(Fused {
+            nis: judged.nis,
+            dimension,
+            weight,
+            raised,
+            limit,
+            log_likelihood,
+            whitened: judged.whitened,
+            misfit: [0.0; 3],
+        })
     }
 
     /// Compares a factor with the current estimate. Only the correction of the newest keyframe is recomputed; the
@@ -138,7 +154,15 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
             }
             return newest;
         }
-        let Some(keyframe) = self.window.back() else { return newest };
+        self.collapse(factor);
+        0
+    }
+
+    /// Restarts the window at its newest keyframe with its covariance raised by this factor. The window must be solved.
+    #[cold]
+    pub(super) fn collapse(&mut self, factor: f64) {
+        let Some(keyframe) = self.window.back() else { return };
+        let newest = self.window.len() - 1;
         let (id, point) = (keyframe.id, keyframe.estimate::<S>());
         let mut information = keyframe.known();
         information.matrix.iter_mut().flatten().for_each(|x| *x /= factor);
@@ -149,6 +173,5 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         let time_ns = self.time_ns;
         self.begin(id, point, Prior { information, mean: Some(point) });
         (self.motion, self.time_ns) = (motion, time_ns);
-        0
     }
 }

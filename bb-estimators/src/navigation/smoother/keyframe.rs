@@ -6,7 +6,6 @@ use alloc::vec::Vec;
 
 use nalgebra::SVector;
 
-use super::coupling::{PoseInformation, place};
 use super::elimination::Pivot;
 use super::factor::Factor;
 use super::kernel::Kernel;
@@ -69,7 +68,7 @@ pub(super) struct Keyframe<F, const N: usize> {
     /// Information from the earlier keyframes.
     pub(super) incoming: Information<N>,
     /// Information from landmarks, besides the part that earlier keyframes carry.
-    pub(super) seen: PoseInformation,
+    pub(super) seen: Information<N>,
     /// Changes whenever the keyframe is relinearised.
     pub(super) version: u32,
     /// Whether a marginalised landmark is linearised about this keyframe's linearisation point.
@@ -91,7 +90,7 @@ impl<F, const N: usize> Keyframe<F, N> {
             own: Information::none(),
             link: Link::none(),
             incoming: Information::none(),
-            seen: PoseInformation::none(),
+            seen: Information::none(),
             version: 0,
             is_fixed: false,
             pivot: Pivot::none(),
@@ -110,7 +109,7 @@ impl<F, const N: usize> Keyframe<F, N> {
         self.is_robust = false;
         self.own = Information::none();
         self.incoming = Information::none();
-        self.seen = PoseInformation::none();
+        self.seen = Information::none();
         self.version = self.version.wrapping_add(1);
         self.is_fixed = false;
     }
@@ -119,13 +118,7 @@ impl<F, const N: usize> Keyframe<F, N> {
     pub(super) fn known(&self) -> Information<N> {
         let mut known = self.own;
         known.add(&self.incoming);
-        for (i, row) in self.seen.matrix.iter().enumerate() {
-            known.vector[place(i)] += self.seen.vector[i];
-            // The indices increase, so the result is on and above the diagonal as well.
-            for (j, value) in row.iter().enumerate().skip(i) {
-                known.matrix[place(i)][place(j)] += value;
-            }
-        }
+        known.add(&self.seen);
         known
     }
 

@@ -13,7 +13,7 @@ use alloc::vec::Vec;
 
 use nalgebra::{Matrix2x3, Matrix3, SMatrix, Vector2, Vector3};
 
-use super::coupling::{Coupling, POSE, PoseInformation, place};
+use super::coupling::{Coupling, POSE, PoseInformation, Seen};
 use super::keyframe::{Keyframe, Window};
 use crate::navigation::camera::{Camera, Undistorted, normalised};
 use crate::navigation::math::sqrt;
@@ -50,6 +50,10 @@ pub(super) struct Landmark {
     pub(super) is_used: bool,
     /// Whether observations may still be added. A lost landmark keeps its last observations.
     pub(super) is_open: bool,
+    /// Its number among the landmarks that are unknowns of their own, once its track has outlived the window.
+    pub(super) slot: Option<usize>,
+    /// The information about such a landmark apart from its observations here, conditioned on everything else.
+    pub(super) settled: Matrix3<f64>,
     /// The serial number of the keyframe that saw it last.
     pub(super) last: u64,
     pub(super) refused_in_a_row: u32,
@@ -68,6 +72,8 @@ impl Landmark {
             prior: None,
             is_used: false,
             is_open: false,
+            slot: None,
+            settled: Matrix3::zeros(),
             last: 0,
             refused_in_a_row: 0,
             sights: Vec::with_capacity(sights),
@@ -83,14 +89,21 @@ impl Landmark {
         self.prior = prior;
         self.is_used = prior.is_some();
         self.is_open = true;
+        self.slot = None;
+        self.last = 0;
         self.refused_in_a_row = 0;
         self.sights.clear();
         self.sum();
     }
 
-    /// B V⁻¹ Bᵀ for any B.
-    pub(super) fn spread(&self, jacobian: &Matrix2x3<f64>) -> SMatrix<f64, 2, 2> {
+    /// The covariance that its uncertainty gives an observation with the Jacobian B: `B V⁻¹ Bᵀ`.
+    pub(super) fn seen_covariance(&self, jacobian: &Matrix2x3<f64>) -> SMatrix<f64, 2, 2> {
         jacobian * self.inverse * jacobian.transpose()
+    }
+
+    /// The standard deviation of its position given the keyframes, m, as the root of the sum over the axes.
+    pub(super) fn deviation(&self) -> f64 {
+        sqrt(self.inverse.trace())
     }
 
     /// The share of the prior: `V⁻¹ Π`.
@@ -103,7 +116,9 @@ impl Landmark {
     pub(super) fn sum(&mut self) {
         let mut matrix = Matrix3::zeros();
         let mut vector = Vector3::zeros();
-        if let Some((mean, weight)) = self.prior {
+        if self.slot.is_some() {
+            matrix = self.settled;
+        } else if let Some((mean, weight)) = self.prior {
             matrix += Matrix3::from_diagonal_element(weight);
             vector += (mean - self.point) * weight;
         }
@@ -113,12 +128,17 @@ impl Landmark {
         }
         let inverse = matrix.cholesky().map(|root| root.inverse());
         let inverse = inverse.filter(|inverse| inverse.iter().all(|x| x.is_finite()));
-        self.is_used &= inverse.is_some();
+        // An unknown of its own is eliminated as such, not begun again.
+        if self.slot.is_some() {
+            self.is_open &= inverse.is_some();
+        } else {
+            self.is_used &= inverse.is_some();
+        }
         self.inverse = inverse.unwrap_or_else(Matrix3::zeros);
         self.mean = self.inverse * vector;
     }
 
-    /// The estimated offset from the linearisation point.
+    /// The estimated offset from the linearisation point, for a landmark that is not an unknown of its own.
     pub(super) fn correction<F, const N: usize>(&self, window: &Window<F, N>, first: u64) -> Vector3<f64> {
         let mut pull = Vector3::zeros();
         for sight in &self.sights {
@@ -169,7 +189,7 @@ impl Landmark {
             }
         }
         (from, to) = (from.min(index), to.max(index + 1));
-        let covariance = SMatrix::<f64, 2, 2>::identity() + self.spread(&jacobian);
+        let covariance = SMatrix::<f64, 2, 2>::identity() + self.seen_covariance(&jacobian);
         let Some(root) = covariance.cholesky().map(|root| root.l()) else { return };
         let divided = |rows: Matrix2x3<f64>| root.solve_lower_triangular(&rows).unwrap_or_else(Matrix2x3::zeros);
         let by_landmark = divided(jacobian * self.inverse);
@@ -245,6 +265,16 @@ impl Sight {
         self.arm.cross(&part(ROTATION)) - part(POSITION)
     }
 
+    /// As an observation of a landmark that is an unknown of its own.
+    pub(super) fn seen(&self) -> Seen {
+        let normal = self.normal();
+        let mut tie = [[0.0; POSE]; 3];
+        for (i, row) in tie.iter_mut().enumerate() {
+            self.write(&normal.row(i).transpose(), row);
+        }
+        Seen { normal, tie, vector: self.jacobian.transpose() * self.residual * self.weight }
+    }
+
     /// `share D`.
     fn write(&self, share: &Vector3<f64>, target: &mut [f64]) {
         let turned = share.cross(&self.arm);
@@ -255,7 +285,7 @@ impl Sight {
     }
 
     /// The information on its pose if the landmark stays at its linearisation point.
-    fn information(&self) -> PoseInformation {
+    pub(super) fn information(&self) -> PoseInformation {
         let mut information = PoseInformation::none();
         let mut rows = [[0.0; POSE]; 2];
         for (i, row) in rows.iter_mut().enumerate() {
@@ -270,9 +300,4 @@ impl Sight {
         }
         information
     }
-}
-
-/// Extracts the block of the pose from the covariance of a keyframe.
-pub(super) fn pose_block<const N: usize>(covariance: &[[f64; N]; N]) -> SMatrix<f64, POSE, POSE> {
-    SMatrix::from_fn(|i, j| covariance[place(i)][place(j)])
 }

@@ -172,6 +172,29 @@ impl<const N: usize> Root<N> {
     }
 }
 
+/// A lower triangle L with `Lᵀ L = M`, which is read on and above the diagonal. A direction in which M is zero gets a row of
+/// zeros.
+pub(super) fn lower_root<const N: usize>(matrix: &Square<N>) -> Square<N> {
+    let mut lower = *matrix;
+    mirror(&mut lower);
+    for k in (0..N).rev() {
+        let pivot = lower[k][k];
+        let (above, below) = lower.split_at_mut(k);
+        let row = &mut below[0];
+        row[k + 1..].fill(0.0);
+        if !(pivot > LEAST_PIVOT * matrix[k][k] && pivot.is_finite()) {
+            *row = [0.0; N];
+            continue;
+        }
+        let scale = 1.0 / sqrt(pivot);
+        row.iter_mut().for_each(|x| *x *= scale);
+        for i in 0..k {
+            axpy(&mut above[i], -row[i], row);
+        }
+    }
+    lower
+}
+
 /// Copies the upper half to the lower.
 pub(super) fn mirror<const N: usize>(matrix: &mut Square<N>) {
     for i in 0..N {

@@ -1,19 +1,18 @@
 //! Camera observations of landmarks: how they are gated and added to the window.
 
-use nalgebra::{Matrix2, Matrix2x3, Matrix3, SMatrix, Vector2, Vector3};
+use nalgebra::{Matrix2x3, Vector2, Vector3};
 
-use super::coupling::POSE;
 use super::factor::Factor;
 use super::filter::FixedLagSmoother;
-use super::landmark::{Landmark, Sight, pose_block};
-use super::landmarks::{Judging, Landmarks, projected};
+use super::landmark::Sight;
+use super::landmarks::Landmarks;
 use super::params::LandmarkParams;
 use crate::navigation::bounds::is_on_earth;
 use crate::navigation::camera::Camera;
 use crate::navigation::fused::Fused;
-use crate::navigation::math::{ln, sqrt};
+use crate::navigation::math::sqrt;
 use crate::navigation::refusal::Refusal;
-use crate::navigation::state::{ACCELEROMETER_BIAS, GYROSCOPE_BIAS, States, VELOCITY};
+use crate::navigation::state::States;
 use crate::navigation::stream::{Gate, Stream};
 use crate::params::ParamsError;
 
@@ -43,13 +42,15 @@ impl Observation {
 pub enum Sighted {
     /// The window uses it.
     Used(Fused),
-    /// The position of the landmark cannot be determined yet; the observation will be used once it can.
+    /// The position of the landmark is not determined yet. The observation is held, and is used once further ones determine
+    /// it, unless its keyframe leaves the window before, or their directions do not intersect.
     Waiting,
 }
 
 impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
     /// Sets the camera that sees landmarks. All memory for landmarks is allocated here; none is allocated later.
-    /// Earlier landmarks are dropped, along with their information on the window.
+    /// Earlier landmarks are dropped. If they tie keyframes to each other, the window restarts at its newest keyframe with
+    /// the estimate and covariance that it has with them.
     ///
     /// # Errors
     ///
@@ -61,8 +62,15 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
             let (min, max) = (f64::MIN_POSITIVE, f64::MAX);
             return Err(ParamsError { parameter: "camera", value: camera.focal_length.x, min, max, unit: "px" });
         }
-        self.landmarks = Some(Landmarks::new(camera, params, self.params.window));
-        self.window.iter_mut().for_each(|keyframe| keyframe.seen = super::coupling::PoseInformation::none());
+        let landmarks = Landmarks::new(camera, params, self.params.window);
+        if self.is_tied() {
+            // Without its ties, what landmarks say about each keyframe alone would be too much.
+            self.eliminate(self.window.len());
+            self.solve_all();
+            self.collapse(1.0);
+        }
+        self.landmarks = Some(landmarks);
+        self.window.iter_mut().for_each(|keyframe| keyframe.seen = super::link::Information::none());
         self.dirty = 0;
         Ok(())
     }
@@ -109,7 +117,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         }
         let position = self.window.iter().rposition(|keyframe| keyframe.id == id);
         let at = position.ok_or(Refusal::NoKeyframe { id })?;
-        let judging = self.judging(at, id)?;
+        self.prepare_judging(at, id)?;
         let (Some(landmarks), Some(keyframe)) = (&mut self.landmarks, self.window.get(at)) else {
             return Err(Refusal::NotStarted);
         };
@@ -130,9 +138,13 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         if !sight.linearise(&landmarks.camera, keyframe, &landmark.point) {
             return self.refuse(index, is_new, sight, Refusal::NotObservable);
         }
-        let off = landmark.correction(&self.window, landmarks.coupling.first) + sight.moved(&keyframe.correction);
+        let off = landmarks.correction(landmark, &self.window) + sight.moved(&keyframe.correction);
         let innovation = sight.residual - sight.jacobian * off;
-        let judged = judge(landmark, &sight, &innovation, &judging).ok_or(Refusal::NonFinite);
+        let since = landmark.nearest(serial).map(|nearest| (nearest - landmarks.coupling.first) as usize);
+        // One that nothing in the window saw is known from the keyframes before.
+        let since = since.or_else(|| landmark.slot.filter(|_| at > 0).map(|_| 0));
+        let judged = landmarks.judging.judge(landmark, &sight, &innovation, &self.window, since);
+        let judged = judged.ok_or(Refusal::NonFinite);
         let log_density = judged.map_or(0.0, |judged| judged.log_density);
         let verdict = judged.and_then(|judged| {
             let verdict = stream.weigh(judged.nis, 2, log_density, Gate::Closed)?;
@@ -151,7 +163,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         sight.residual *= sqrt(verdict.weight);
         sight.weight = landmarks.params.kernel.weight(judged.nis);
         landmarks.add::<F, S>(index, sight, &self.window);
-        self.dirty = 0;
+        self.dirty = self.dirty.min(landmarks.coupling.changed());
         Ok(Sighted::Used(Fused {
             nis: judged.nis,
             dimension: 2,
@@ -160,6 +172,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
             limit: verdict.limit,
             log_likelihood: verdict.log_likelihood,
             whitened: judged.whitened,
+            misfit: [0.0; 3],
         }))
     }
 
@@ -179,7 +192,8 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         // The id now denotes another landmark. The information of the old one stays.
         let id = landmark.id;
         landmark.is_open = false;
-        if landmark.sights.is_empty() {
+        // One that is an unknown of its own is eliminated when the next keyframe leaves.
+        if landmark.slot.is_none() && landmark.sights.is_empty() {
             landmarks.remove(index);
         }
         let index = landmarks.begin(id, None).ok_or(refusal)?;
@@ -195,7 +209,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         landmark.last = landmark.last.max(serial);
         landmark.insert(sight);
         match landmarks.triangulate::<F, S>(index, &self.window) {
-            Some(true) => self.dirty = 0,
+            Some(true) => self.dirty = self.dirty.min(landmarks.coupling.changed()),
             // The directions do not intersect: restart from the last one.
             Some(false) => {
                 if let Some(landmark) = landmarks.all.get_mut(index) {
@@ -208,37 +222,19 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         Ok(Sighted::Waiting)
     }
 
-    /// The covariance of a keyframe's pose before it sees its first landmark.
-    fn judging(&mut self, at: usize, id: u64) -> Result<Judging, Refusal> {
-        let known = self.landmarks.as_ref().and_then(|landmarks| landmarks.judged);
-        if let Some((_, judging)) = known.filter(|(judged, _)| *judged == id) {
-            return Ok(judging);
+    /// Makes sure that the covariances are those of this keyframe.
+    fn prepare_judging(&mut self, at: usize, id: u64) -> Result<(), Refusal> {
+        let is_known = self.landmarks.as_ref().is_some_and(|landmarks| landmarks.judging.is_of(id));
+        if is_known {
+            return Ok(());
         }
         self.eliminate(self.window.len());
         self.solve_all();
         let covariance = self.covariance_now(at).ok_or(Refusal::NotObservable)?;
-        let keyframe = self.window.get(at).ok_or(Refusal::NoKeyframe { id })?;
-        let mut step = SMatrix::zeros();
-        if at > 0 {
-            let seconds = keyframe.motion.seconds();
-            step = pose_block(&keyframe.link.noise);
-            // In the world's axes, like the pose.
-            let to_world = keyframe.point.rotation();
-            let block = |first: usize| Matrix3::from_fn(|i, j| covariance[first + i][first + j]);
-            let turned = |first: usize| to_world * block(first) * to_world.transpose();
-            let fallen = 0.5 * seconds * seconds;
-            let position = block(VELOCITY) * (seconds * seconds) + turned(ACCELEROMETER_BIAS) * (fallen * fallen);
-            let rotation = turned(GYROSCOPE_BIAS) * (seconds * seconds);
-            let mut sum = step.fixed_view_mut::<3, 3>(0, 0);
-            sum += position;
-            let mut sum = step.fixed_view_mut::<3, 3>(3, 3);
-            sum += rotation;
-        }
-        let judging = Judging { pose: pose_block(&covariance), step };
         if let Some(landmarks) = &mut self.landmarks {
-            landmarks.judged = Some((id, judging));
+            landmarks.judging.begin(id, at, &covariance);
         }
-        Ok(judging)
+        Ok(())
     }
 }
 
@@ -272,35 +268,4 @@ fn sighted(camera: &Camera, seen: &Observation, serial: u64, factor: f64) -> Res
         residual: Vector2::zeros(),
         arm: Vector3::zeros(),
     })
-}
-
-/// The gating quantities of an observation, before it is used.
-#[derive(Clone, Copy, Debug)]
-struct Judged {
-    nis: f64,
-    log_density: f64,
-    whitened: f64,
-}
-
-/// Compares an observation with the estimated position of the landmark.
-///
-/// The error that all keyframes have in common also moves the landmark, except for the part held by its prior. The
-/// remaining error is the noise of the last step.
-fn judge(landmark: &Landmark, sight: &Sight, innovation: &Vector2<f64>, judging: &Judging) -> Option<Judged> {
-    let jacobian = sight.jacobian;
-    let along = |share: Matrix2x3<f64>| {
-        let mut whole = SMatrix::<f64, 2, POSE>::zeros();
-        whole.fixed_columns_mut::<3>(0).copy_from(&-share);
-        whole.fixed_columns_mut::<3>(3).copy_from(&(share * sight.arm.cross_matrix()));
-        whole
-    };
-    let mut covariance = Matrix2::identity() + landmark.spread(&jacobian);
-    covariance += projected(&along(jacobian * landmark.held()), &judging.pose);
-    covariance += projected(&along(jacobian), &judging.step);
-    let root = covariance.cholesky()?.l();
-    let whitened = root.solve_lower_triangular(innovation)?;
-    let nis = whitened.norm_squared();
-    let noise = sight.seen.jacobian * sight.precision;
-    let density = ln(noise.determinant().abs()) - ln(root[(0, 0)] * root[(1, 1)]);
-    nis.is_finite().then_some(Judged { nis, log_density: density, whitened: whitened.x })
 }

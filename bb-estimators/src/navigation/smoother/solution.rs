@@ -32,18 +32,17 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
     pub(super) fn eliminate(&mut self, end: usize) -> usize {
         let len = self.window.len();
         let end = end.min(len);
-        let mut coupling = self.landmarks.as_mut().map(|landmarks| &mut landmarks.coupling);
-        coupling = coupling.filter(|coupling| coupling.is_tied());
-        // Intermediate landmark information is not stored, so every keyframe is eliminated again unless only the newest changed.
-        let end = if coupling.is_some() { len } else { end };
-        if coupling.is_some() && self.dirty + 1 < len {
-            self.dirty = 0;
+        let mut landmarks = self.landmarks.as_mut().filter(|landmarks| landmarks.coupling.is_tied());
+        // A keyframe passes its ties to all later ones.
+        let end = if landmarks.is_some() { len } else { end };
+        let mut first = self.dirty;
+        // If only the newest changed, and not by a landmark, nothing that others leave did.
+        let is_passing = landmarks.as_ref().is_some_and(|of| of.coupling.is_changed() || first + 1 < len);
+        if let Some(landmarks) = landmarks.as_mut().filter(|_| is_passing) {
+            landmarks.gather(len);
+            first = landmarks.coupling.begin(first, len);
         }
-        let first = self.dirty;
-        let is_full = first == 0;
-        if let Some(coupling) = coupling.as_mut().filter(|_| is_full) {
-            coupling.begin(len);
-        }
+        let mut coupling = landmarks.map(|landmarks| &mut landmarks.coupling);
         let window = self.window.make_contiguous();
         for index in first..end {
             let (before, after) = window.split_at_mut(index);
@@ -53,18 +52,24 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
                 if let Some(coupling) = &mut coupling {
                     let carried = before.pivot.carried(&keyframe.link);
                     coupling.fold(index - 1, &carried, &mut keyframe.incoming.matrix);
-                    if is_full {
+                    if is_passing && index > first {
                         coupling.pass(index - 1, len, &carried);
+                        coupling.save(index, len);
                     }
                 }
             }
-            if let Some(coupling) = coupling.as_mut().filter(|_| is_full) {
+            if let Some(coupling) = coupling.as_mut().filter(|_| is_passing) {
                 keyframe.seen = coupling.arrive(index, len);
             }
             keyframe.pivot.take(&keyframe.known());
         }
+        if let Some(coupling) = coupling {
+            coupling.finish();
+        }
         self.dirty = self.dirty.max(end);
-        self.exact_from = self.exact_from.max(first.min(self.window.len()));
+        if !is_passing {
+            self.exact_from = self.exact_from.max(first.min(self.window.len()));
+        }
         end.saturating_sub(first)
     }
 
@@ -102,6 +107,13 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
             newest.correction = newest.pivot.newest();
         }
         self.solve_back(self.window.len().saturating_sub(1), 0);
+        if let Some(landmarks) = &mut self.landmarks {
+            if landmarks.coupling.needs_points() {
+                landmarks.gather(self.window.len());
+                landmarks.coupling.factor_points();
+            }
+            landmarks.coupling.solve_points(self.window.iter().map(|keyframe| &keyframe.correction));
+        }
         self.exact_from = 0;
     }
 
@@ -150,7 +162,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         }
         let mut updated = Updated::default();
         if let Some(landmarks) = &mut self.landmarks {
-            landmarks.judged = None;
+            landmarks.judging.forget();
         }
         for iteration in 0..=self.params.iterations {
             let least = self.dirty;
@@ -193,9 +205,9 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
             }
             is_next = is_off;
         }
-        let landmarks = self.landmarks.as_mut();
-        if landmarks.is_some_and(|landmarks| landmarks.relinearise::<F, S>(&self.window) > 0) {
-            self.dirty = 0;
+        if let Some(landmarks) = &mut self.landmarks {
+            landmarks.relinearise::<F, S>(&self.window);
+            self.dirty = self.dirty.min(landmarks.coupling.changed());
         }
         moved
     }

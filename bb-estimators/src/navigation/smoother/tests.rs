@@ -6,6 +6,7 @@ mod automatic;
 #[cfg(feature = "std")]
 mod batch;
 mod cases;
+mod checkpoint;
 mod consistency;
 mod factors;
 mod flight;
@@ -16,3 +17,5 @@ mod laws;
 mod preintegration;
 mod scenery;
 mod sights;
+mod tracks;
+mod unfit_sights;

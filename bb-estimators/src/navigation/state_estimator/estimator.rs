@@ -375,7 +375,7 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
         let pose = if ahead_ns > 0 {
             // The motion is extrapolated with the newest sample.
             let mut ahead = *predictor;
-            ahead.propagate(&ImuMean { time_ns, ..*newest }).ok()?;
+            ahead.propagate(&ImuMean { time_ns, ..*newest }, false).ok()?;
             ahead.pose()
         } else {
             predictor.pose()

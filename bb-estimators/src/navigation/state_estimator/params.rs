@@ -78,14 +78,14 @@ params! {
         input_rate: f64 = 128.0, in 1.0..=10_000.0, unit "Hz";
         /// How far ahead of the newest sample of the IMU an input may be stamped.
         lead: f64 = 0.5, in 0.0..=10.0, unit "s";
-        /// Without camera frames, a keyframe is made after this time. A camera whose frames are farther apart is waited for, by up to
-        /// two thirds of a second more than this.
+        /// Without camera frames, a keyframe is made after this time. A camera whose frames are farther apart is waited for: for up
+        /// to one and a half times the time between its last two frames, and at most a second longer than this.
         keyframe_interval: f64 = 1.0, in 0.05..=10.0, unit "s";
         /// Estimates a second.
         output_rate: f64 = 5.0, in 0.1..=1000.0, unit "Hz";
         /// How long after the last sample of the IMU there is still an estimate.
         longest_prediction: f64 = 0.2, in 0.0..=1.0, unit "s";
-        /// How long there may be no estimate before the flight controller's own IMU has to do.
+        /// How long estimates may be missing before the flight controller's own IMU takes over.
         fallback_after: f64 = 3.0, in 0.1..=60.0, unit "s";
         /// An anchor older than this demotes to `visual_propagated`.
         anchor_age: f64 = 3.0, in 0.1..=600.0, unit "s";
@@ -103,7 +103,7 @@ params! {
         warm_inflation: f64 = 2.0, in 1.0..=100.0;
         /// Standard deviation of each component of the velocity at take-off.
         takeoff_velocity: f64 = 0.5, in 1e-3..=100.0, unit "m/s";
-        /// Heading of the body's x axis at take-off, from east counter-clockwise, where no attitude tells it.
+        /// Heading of the body's x axis at take-off, from east counter-clockwise, if no attitude provides it.
         takeoff_heading: f64 = 0.0, in -7.0..=7.0, unit "rad";
         /// How well that is known, standard deviation.
         takeoff_heading_deviation: f64 = 0.5, in 1e-6..=4.0, unit "rad";

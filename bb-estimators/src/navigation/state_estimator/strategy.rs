@@ -219,8 +219,8 @@ impl<F: ProvidedFactor> Strategy<F> {
     }
 
     /// Advances by one sample. Makes a keyframe if one is due.
-    pub(super) fn propagate(&mut self, sample: &ImuMean) -> Result<(), Failure> {
-        each!(self, strategy => strategy.propagate(sample))
+    pub(super) fn propagate(&mut self, sample: &ImuMean, is_gap: bool) -> Result<(), Failure> {
+        each!(self, strategy => strategy.propagate(sample, is_gap))
     }
 
     /// Makes the present state a keyframe: a camera has captured a frame.

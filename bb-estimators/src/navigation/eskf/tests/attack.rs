@@ -212,6 +212,10 @@ fn a_filter_that_gives_way_changes_what_was_wrong_alone() {
         // The fix determines the position as far as one update can: the noise is at least 1e-10 of the variance before.
         let most = 0.5_f64.max(1e-9 * jump * jump);
         assert!(filter.covariance()[(POSITION, POSITION)] < most, "{jump}");
+        // The next ones fit, so that it was a jump.
+        for _ in 0..3 {
+            filter.update(&mut stream, &far).unwrap();
+        }
     }
 }
 

@@ -4,8 +4,8 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::flight::{DT_NS, Drone, Flight, N, Smoother, linear, open, sample, sensors};
 use crate::navigation::{
-    AbsolutePose, Eskf, FixedLagSmoother, GnssPosition, ImuMean, Kernel, NAVIGATION, NavigationFactor, Refusal,
-    RelativePose, SmootherParams, Start, Stream,
+    AbsolutePose, Eskf, Estimate, FixedLagSmoother, GaussMarkov, GnssPosition, ImuMean, Kernel, NAVIGATION,
+    Navigation, NavigationFactor, Refusal, RelativePose, SmootherParams, Start, Stream,
 };
 
 type Plain = FixedLagSmoother;
@@ -64,7 +64,8 @@ fn refusals_are_named_and_counted() {
     let relative = |id| RelativePose::new(id, (Vector3::zeros(), 0.1), (level(), 0.1));
     assert_eq!(smoother.add(&mut stream, 1, fix), Err(Refusal::NoKeyframe { id: 1 }));
     assert_eq!(smoother.add(&mut stream, 2, relative(1)), Err(Refusal::NoKeyframe { id: 1 }));
-    assert_eq!(smoother.add(&mut stream, 4, relative(2)), Err(Refusal::NoKeyframe { id: 2 }));
+    assert_eq!(smoother.add(&mut stream, 4, relative(2)), Err(Refusal::NotAdjacent { id: 2 }));
+    assert_eq!(Refusal::NotAdjacent { id: 2 }.to_string(), "keyframe 2 is not the one directly before");
     let nan = GnssPosition::new(Vector3::new(f64::NAN, 0.0, 0.0), 1.0, 1.0);
     assert_eq!(smoother.add(&mut stream, 4, nan), Err(Refusal::NonFinite));
     let mut negative = fix;
@@ -242,6 +243,19 @@ fn between_keyframes_it_goes_on_with_the_imu() {
     assert!(((end.position - predicted.position) / 0.05 - mean).norm() < 0.1);
 }
 
+/// A scale with a deviation of zero is known, and no reason to refuse a filter that does not have it.
+#[test]
+fn a_warm_start_may_lack_a_state_that_is_known() {
+    let mut plain = Plain::new(SmootherParams::default()).unwrap();
+    let first = Flight::new(7, 40, 1.0).flown(linear(10));
+    plain.adopt::<Drone, N>(39, &first.estimate().unwrap(), &first.covariance().unwrap()).unwrap();
+    let mut params = linear(10);
+    params.sensors.relative_scale = GaussMarkov::new(0.0, 20.0);
+    let mut known = Smoother::new(params).unwrap();
+    let (estimate, covariance) = (plain.estimate().unwrap(), plain.covariance().unwrap());
+    assert_eq!(known.adopt::<Navigation, NAVIGATION>(39, &estimate, &covariance), Ok(()));
+}
+
 /// From a filter with other optional states, with all correlations.
 #[test]
 fn a_warm_start_has_what_the_filter_has() {
@@ -259,5 +273,37 @@ fn a_warm_start_has_what_the_filter_has() {
     plain.propagate(&sample(391)).unwrap();
     plain.add_keyframe(40).unwrap();
     assert_eq!(plain.adopt::<Drone, N>(41, &estimate, &-covariance), Err(Refusal::Noise));
+    let mut broken = covariance;
+    broken[(3, 4)] = f64::NAN;
+    assert_eq!(plain.adopt::<Drone, N>(41, &estimate, &broken), Err(Refusal::NonFinite));
+    // Positive definite only if half of it is read.
+    let mut skewed = covariance;
+    skewed[(0, 1)] += 3.0 * covariance[(0, 0)];
+    assert_eq!(plain.adopt::<Drone, N>(41, &estimate, &skewed), Err(Refusal::Noise));
+    assert_eq!(plain.adopt::<Drone, N>(41, &estimate, &(covariance * 1e-300)), Err(Refusal::Noise));
+    for (absurd, refusal) in [
+        (Estimate { position: Vector3::x() * f64::NAN, ..estimate }, Refusal::NonFinite),
+        (Estimate { position: Vector3::x() * 1e12, ..estimate }, Refusal::OutOfRange),
+        (Estimate { gyroscope_bias: Vector3::x() * 1e9, ..estimate }, Refusal::OutOfRange),
+        (Estimate { angular_velocity: Vector3::x() * f64::INFINITY, ..estimate }, Refusal::NonFinite),
+        (Estimate { specific_force: Vector3::x() * 1e200, ..estimate }, Refusal::OutOfRange),
+        (
+            Estimate {
+                world_from_body: UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(0.0, 0.0, 0.0, 0.0)),
+                ..estimate
+            },
+            Refusal::NonFinite,
+        ),
+    ] {
+        assert_eq!(plain.adopt::<Drone, N>(41, &absurd, &covariance), Err(refusal), "{absurd:?}");
+    }
     assert_eq!(plain.keyframes().collect::<Vec<_>>(), [39, 40], "it is as it was");
+    // Any time is a time.
+    for time_ns in [i64::MIN, -1, i64::MAX] {
+        plain.adopt::<Drone, N>(41, &Estimate { time_ns, ..estimate }, &covariance).unwrap();
+        let next = sample(392);
+        let gone = plain.propagate(&next);
+        assert_eq!(gone.is_ok(), time_ns == -1, "{gone:?}");
+        assert!(plain.predicted().unwrap().is_finite());
+    }
 }

@@ -21,6 +21,11 @@ pub(super) const N: usize = Drone::DIMENSION;
 
 pub(super) type Smoother = FixedLagSmoother<Drone, N>;
 
+/// The largest difference of two estimates, each component in its unit.
+pub(super) fn apart(a: &Estimate<N>, b: &Estimate<N>) -> f64 {
+    a.error_to::<Drone>(b).amax()
+}
+
 /// Number of samples between two keyframes, and their length.
 pub(super) const SAMPLES: i64 = 10;
 pub(super) const DT_NS: i64 = 10_000_000;
@@ -138,6 +143,27 @@ impl Flight {
             flight.truth.push(truth);
         }
         flight
+    }
+
+    /// The same flight in a world that is turned about its origin, and then moved.
+    pub(super) fn elsewhere(mut self, turn: &UnitQuaternion<f64>, origin: &Vector3<f64>) -> Self {
+        let place = |position: &Vector3<f64>| turn * position + origin;
+        let start = &mut self.start;
+        start.position = place(&start.position);
+        start.velocity = turn * start.velocity;
+        start.world_from_body = turn * start.world_from_body;
+        for factor in self.measured.iter_mut().flatten() {
+            match factor {
+                NavigationFactor::GnssPosition(fix) => fix.position = place(&fix.position),
+                NavigationFactor::GnssVelocity(fix) => fix.velocity = turn * fix.velocity,
+                NavigationFactor::AbsolutePose(pose) => {
+                    pose.position = place(&pose.position);
+                    pose.world_from_body = turn * pose.world_from_body;
+                }
+                _ => {}
+            }
+        }
+        self
     }
 
     /// Flies the whole flight, with an update at each keyframe.

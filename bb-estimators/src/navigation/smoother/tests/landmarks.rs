@@ -24,6 +24,10 @@ fn random(noise: &mut Noise) -> SMatrix<f64, N, N> {
     SMatrix::from_fn(|_, _| noise.next())
 }
 
+/// Two solutions may be apart by this part of the rounding of one number, times the condition of the system. The most found is
+/// 0.006, at a stored seed with a condition of 2e9.
+const ROUNDING: f64 = 0.02;
+
 /// A smoother with a random problem in its window, and the same problem as one dense system: keyframes first, then landmarks.
 struct Problem {
     smoother: Plain,
@@ -38,8 +42,12 @@ impl Problem {
         let params = SmootherParams { window: keyframes.max(2), ..SmootherParams::default() };
         let mut smoother = Plain::new(params).unwrap();
         let camera = Camera::pinhole((500.0, 500.0), (400.0, 300.0), (800.0, 600.0));
-        let of_landmarks = LandmarkParams { kernel: Kernel::Squares, landmarks, ..LandmarkParams::default() };
+        // Some have to be cut.
+        let persistent = (seed % 5) as usize;
+        let of_landmarks =
+            LandmarkParams { kernel: Kernel::Squares, landmarks, persistent, ..LandmarkParams::default() };
         smoother.set_camera(camera, of_landmarks).unwrap();
+        smoother.landmarks.as_mut().unwrap().known_within = f64::INFINITY;
         let level = (UnitQuaternion::identity(), 1.0);
         smoother.start(0, &Start::at(0, (Vector3::zeros(), 1.0), (Vector3::zeros(), 1.0), level)).unwrap();
         let size = keyframes * N + 3 * landmarks;
@@ -53,6 +61,18 @@ impl Problem {
         }
         problem.smoother.dirty = 0;
         problem
+    }
+
+    /// The covariance and the solution of the dense system, refined: its inverse alone loses digits to its condition. The last
+    /// number is how far apart two solutions in floating point may be, as a fraction.
+    fn batch(&self) -> (DMatrix<f64>, DVector<f64>, f64) {
+        let rough = self.matrix.clone().cholesky().unwrap().inverse();
+        let identity = DMatrix::identity(self.matrix.nrows(), self.matrix.ncols());
+        let covariance = &rough + &rough * (identity - &self.matrix * &rough);
+        let solution = &covariance * &self.vector;
+        let refined = &solution + &covariance * (&self.vector - &self.matrix * &solution);
+        let condition = self.matrix.norm() * covariance.norm();
+        (covariance, refined, 1e-9_f64.max(ROUNDING * f64::EPSILON * condition))
     }
 
     fn keyframe(&mut self, noise: &mut Noise, k: usize) {
@@ -108,6 +128,8 @@ impl Problem {
             self.matrix[(at + i, at + i)] += weight;
         }
         let landmark = &mut landmarks.all[index];
+        // Some are lost, some still tracked.
+        landmark.last = if noise.next() > 0.0 { 100 } else { 0 };
         let mut order: Vec<usize> = (0..self.keyframes).filter(|_| noise.next() > -0.5).collect();
         if noise.next() > 0.0 {
             order.reverse();
@@ -149,11 +171,11 @@ impl Problem {
     }
 }
 
-fn agrees(numbers: impl Iterator<Item = (f64, f64)>, what: &str) -> Result<(), TestCaseError> {
+fn agrees(numbers: impl Iterator<Item = (f64, f64)>, within: f64, what: &str) -> Result<(), TestCaseError> {
     let pairs: Vec<_> = numbers.collect();
     let scale = pairs.iter().map(|(_, batch)| batch.abs()).fold(0.0, f64::max);
     for (here, batch) in pairs {
-        prop_assert!((here - batch).abs() <= 1e-9 * scale, "{what}: {here}, not {batch} (of {scale})");
+        prop_assert!((here - batch).abs() <= within * scale, "{what}: {here}, not {batch} (of {scale})");
     }
     Ok(())
 }
@@ -162,8 +184,7 @@ fn agrees(numbers: impl Iterator<Item = (f64, f64)>, what: &str) -> Result<(), T
 fn compare(
     smoother: &mut Plain,
     left: usize,
-    covariance: &DMatrix<f64>,
-    solution: &DVector<f64>,
+    (covariance, solution, within): &(DMatrix<f64>, DVector<f64>, f64),
     keyframes: usize,
 ) -> Result<(), TestCaseError> {
     smoother.eliminate(usize::MAX);
@@ -171,16 +192,16 @@ fn compare(
     for index in 0..smoother.window.len() {
         let at = (index + left) * N;
         let mean = smoother.window[index].correction;
-        agrees((0..N).map(|i| (mean[i], solution[at + i])), "mean")?;
+        agrees((0..N).map(|i| (mean[i], solution[at + i])), *within, "mean")?;
         let known = smoother.covariance_now(index).unwrap();
         let entries = (0..N * N).map(|e| (e / N, e % N));
-        agrees(entries.map(|(i, j)| (known[i][j], covariance[(at + i, at + j)])), "covariance")?;
+        agrees(entries.map(|(i, j)| (known[i][j], covariance[(at + i, at + j)])), *within, "covariance")?;
     }
     let landmarks = smoother.landmarks.as_ref().unwrap();
-    for landmark in landmarks.all.iter().filter(|landmark| !landmark.sights.is_empty()) {
+    for landmark in landmarks.all.iter().filter(|landmark| landmark.slot.is_some() || !landmark.sights.is_empty()) {
         let at = keyframes * N + 3 * landmark.id as usize;
-        let correction = landmark.correction(&smoother.window, landmarks.coupling.first);
-        agrees((0..3).map(|i| (correction[i], solution[at + i])), "landmark")?;
+        let correction = landmarks.correction(landmark, &smoother.window);
+        agrees((0..3).map(|i| (correction[i], solution[at + i])), *within, "landmark")?;
     }
     Ok(())
 }
@@ -189,27 +210,34 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]
-    #[ignore = "differs from the batch at a stored seed: a landmark that is hardly determined"]
     fn it_is_the_batch(seed in any::<u64>(), keyframes in 1_usize..8, landmarks in 1_usize..9) {
         let mut problem = Problem::new(seed, keyframes, landmarks);
-        let covariance = problem.matrix.clone().cholesky().unwrap().inverse();
-        let solution = &covariance * &problem.vector;
-        compare(&mut problem.smoother, 0, &covariance, &solution, keyframes)?;
+        let batch = problem.batch();
+        compare(&mut problem.smoother, 0, &batch, keyframes)?;
     }
 
     /// Information that leaves the window is not lost: the remaining keyframes match the solution with all of them.
     #[test]
-    #[ignore = "differs from the batch at a stored seed: a landmark that is hardly determined"]
     fn marginalised_is_the_batch(seed in any::<u64>(), keyframes in 3_usize..8, landmarks in 1_usize..9) {
         let mut problem = Problem::new(seed, keyframes, landmarks);
-        let covariance = problem.matrix.clone().cholesky().unwrap().inverse();
-        let solution = &covariance * &problem.vector;
+        let batch = problem.batch();
+        compare(&mut problem.smoother, 0, &batch, keyframes)?;
         for left in 1..keyframes - 1 {
             problem.smoother.marginalise();
-            compare(&mut problem.smoother, left, &covariance, &solution, keyframes)?;
+            let found = |smoother: &Plain| {
+                let landmarks = smoother.landmarks.as_ref().unwrap();
+                let all = landmarks.all.iter().filter(|landmark| landmark.slot.is_some());
+                all.map(|landmark| landmarks.correction(landmark, &smoother.window)).collect::<Vec<_>>()
+            };
+            let before = found(&problem.smoother);
+            problem.smoother.solve_all();
+            for (before, after) in before.iter().zip(found(&problem.smoother)) {
+                prop_assert!((before - after).norm() <= 1e-9 * (1.0 + after.norm()), "{before} {after}");
+            }
+            compare(&mut problem.smoother, left, &batch, keyframes)?;
             // Also when everything is eliminated again.
             problem.smoother.dirty = 0;
-            compare(&mut problem.smoother, left, &covariance, &solution, keyframes)?;
+            compare(&mut problem.smoother, left, &batch, keyframes)?;
         }
     }
 
@@ -224,11 +252,10 @@ proptest! {
         problem.matrix[(4 * N + 2, 4 * N + 2)] += 1.0;
         problem.smoother.dirty = 4;
         prop_assert_eq!(problem.smoother.eliminate(usize::MAX), 1);
-        let covariance = problem.matrix.clone().cholesky().unwrap().inverse();
-        let solution = &covariance * &problem.vector;
+        let (_, solution, within) = problem.batch();
         problem.smoother.solve_all();
         let mean = problem.smoother.window[0].correction;
-        agrees((0..N).map(|i| (mean[i], solution[i])), "mean")?;
+        agrees((0..N).map(|i| (mean[i], solution[i])), within, "mean")?;
     }
 }
 

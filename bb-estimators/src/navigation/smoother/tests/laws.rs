@@ -3,15 +3,8 @@
 use nalgebra::{SMatrix, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
-use super::flight::{Drone, Flight, N, Smoother, converged, linear, open, sensors};
-use crate::navigation::{
-    AbsolutePose, Estimate, GnssPosition, GnssVelocity, NavigationFactor, RelativePose, SmootherParams,
-};
-
-/// The largest difference of two estimates, each component in its unit.
-fn apart(a: &Estimate<N>, b: &Estimate<N>) -> f64 {
-    a.error_to::<Drone>(b).amax()
-}
+use super::flight::{Flight, N, Smoother, apart, converged, linear, open, sensors};
+use crate::navigation::{AbsolutePose, GnssPosition, GnssVelocity, NavigationFactor, RelativePose, SmootherParams};
 
 /// The largest difference of two covariances, relative to the variances.
 fn differ(a: &SMatrix<f64, N, N>, b: &SMatrix<f64, N, N>) -> f64 {
@@ -98,22 +91,7 @@ proptest! {
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), heading);
         let origin = Vector3::new(x, y, -0.5 * x);
         let place = |position: &Vector3<f64>| turn * position + origin;
-        let mut other = Flight::new(seed, 30, 1.0);
-        let start = &mut other.start;
-        start.position = place(&start.position);
-        start.velocity = turn * start.velocity;
-        start.world_from_body = turn * start.world_from_body;
-        for factor in other.measured.iter_mut().flatten() {
-            match factor {
-                NavigationFactor::GnssPosition(fix) => fix.position = place(&fix.position),
-                NavigationFactor::GnssVelocity(fix) => fix.velocity = turn * fix.velocity,
-                NavigationFactor::AbsolutePose(pose) => {
-                    pose.position = place(&pose.position);
-                    pose.world_from_body = turn * pose.world_from_body;
-                }
-                _ => {}
-            }
-        }
+        let other = Flight::new(seed, 30, 1.0).elsewhere(&turn, &origin);
         // To convergence: relinearisation must not depend on the last bit of how far a keyframe moved.
         let params = converged(10);
         let (here, there) = (flight.flown(params).estimate().unwrap(), other.flown(params).estimate().unwrap());

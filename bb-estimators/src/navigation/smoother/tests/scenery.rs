@@ -84,6 +84,11 @@ impl Scenery {
     /// Flies the whole flight with landmarks, with an update at each keyframe.
     pub(super) fn flown(&self, flight: &Flight, mut smoother: Smoother, params: LandmarkParams) -> Smoother {
         smoother.set_camera(camera(), params).unwrap();
+        self.carried(flight, smoother)
+    }
+
+    /// The same, with a camera that is set already.
+    pub(super) fn carried(&self, flight: &Flight, mut smoother: Smoother) -> Smoother {
         smoother.start(0, &flight.start).unwrap();
         self.observe(&mut smoother, 0);
         for k in 1..flight.samples.len() {

@@ -65,12 +65,12 @@ impl EskfStrategy {
         self.past.extend(self.pose());
     }
 
-    pub(super) fn propagate(&mut self, sample: &ImuMean) -> Result<(), Failure> {
+    pub(super) fn propagate(&mut self, sample: &ImuMean, is_gap: bool) -> Result<(), Failure> {
         if self.is_next {
             self.is_next = false;
             self.filter.set_keyframe(id_of(self.cadence.camera_ns));
         }
-        self.filter.propagate(sample)?;
+        self.filter.propagate_part(sample, is_gap)?;
         if self.cadence.is_due(sample.time_ns) { self.keyframe() } else { Ok(()) }
     }
 

@@ -51,8 +51,12 @@ impl Predictor {
         each!(self, filter => filter.estimate().map_or(i64::MIN, |estimate| estimate.time_ns))
     }
 
-    pub(in crate::navigation::state_estimator) fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
-        each!(self, filter => filter.propagate(sample))
+    pub(in crate::navigation::state_estimator) fn propagate(
+        &mut self,
+        sample: &ImuMean,
+        is_gap: bool,
+    ) -> Result<(), Refusal> {
+        each!(self, filter => filter.propagate_part(sample, is_gap))
     }
 
     pub(in crate::navigation::state_estimator) fn pose(&self) -> Option<Pose> {

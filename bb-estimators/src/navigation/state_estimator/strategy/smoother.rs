@@ -88,8 +88,8 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
         Ok(())
     }
 
-    pub(super) fn propagate(&mut self, sample: &ImuMean) -> Result<(), Failure> {
-        self.smoother.propagate(sample)?;
+    pub(super) fn propagate(&mut self, sample: &ImuMean, is_gap: bool) -> Result<(), Failure> {
+        self.smoother.propagate_part(sample, is_gap)?;
         if self.cadence.is_due(sample.time_ns) { self.keyframe() } else { Ok(()) }
     }
 

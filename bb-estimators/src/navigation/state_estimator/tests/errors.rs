@@ -4,7 +4,7 @@ use super::flight::{SECOND, STEP};
 use super::*;
 use crate::navigation::smoother::{Factor, Rows};
 use crate::navigation::{Estimate, POSITION, Refusal, States};
-use nalgebra::{Matrix1, Vector3};
+use nalgebra::{Matrix1, Matrix6, Vector3};
 
 /// A provider that reports its position along x, with any value.
 #[derive(Clone, Copy, Debug)]
@@ -107,6 +107,37 @@ fn degraded_a_gap_of_the_imu_is_bridged() {
             }
         }
         assert!(kinds(estimator.sink(), "degraded").all(|event| event.level() == Level::Warn));
+    }
+}
+
+/// Frames of the camera that say nothing do not make a gap of the IMU shorter: its noise is no smaller if they divide it.
+#[test]
+fn a_gap_that_the_camera_divides_is_as_uncertain() {
+    let flight = Flight::new(4, 2);
+    for strategy in StrategyKind::ALL {
+        let [whole, divided] = [false, true].map(|with_frames| {
+            let mut estimator = started(&flight, *strategy);
+            for sent in &flight.sent(true, false, false) {
+                let is_missing = (2 * SECOND..5 * SECOND / 2).contains(&sent.time_ns());
+                match sent {
+                    Sent::Imu(_) if is_missing => {}
+                    // Once the camera is known, the smoother waits for its frames.
+                    Sent::Vio(vio) if vio.to_ns > 2 * SECOND => {
+                        if with_frames {
+                            let covariance = Matrix6::identity() * 1e8;
+                            ignore(estimator.add_vio(VioOutput { covariance, ..*vio }));
+                        }
+                    }
+                    sent => ignore(sent.to(&mut estimator)),
+                }
+            }
+            estimator.predicted(4 * SECOND).unwrap().covariance
+        });
+        for i in 0..6 {
+            let ratio = divided[(i, i)] / whole[(i, i)];
+            // Undivided, it is one step, in which the tilt does not turn gravity yet.
+            assert!((0.9..2.0).contains(&ratio), "{strategy:?}, {i}: {} and {}", whole[(i, i)], divided[(i, i)]);
+        }
     }
 }
 

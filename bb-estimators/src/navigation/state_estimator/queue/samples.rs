@@ -1,0 +1,181 @@
+//! Samples of the IMU: which are taken, where they are put, and which leave when there is no room.
+
+use super::{Queue, Sampled, Told};
+use crate::navigation::eskf::ImuMean;
+use crate::navigation::refusal::Refusal;
+use crate::navigation::state_estimator::clock::{Stamped, follows};
+use crate::navigation::state_estimator::engine::Condition;
+use crate::navigation::state_estimator::entry::{Entry, Key, Outcome};
+use crate::navigation::state_estimator::error::Reason;
+use crate::navigation::state_estimator::event::InputKind;
+use crate::navigation::state_estimator::factor::ProvidedFactor;
+use crate::navigation::state_estimator::params::{StateEstimatorConfig, ns};
+
+/// Longest time by which the engine may lag the IMU, ns.
+const LONGEST_TAIL_NS: i64 = 250_000_000;
+
+/// One over the fraction of the samples that is dropped at once when there is no room.
+const LEAVING: usize = 8;
+
+impl<F: ProvidedFactor> Queue<F> {
+    pub(super) fn place_sample(
+        &mut self,
+        sample: &ImuMean,
+        config: &StateEstimatorConfig,
+    ) -> Result<Sampled, Reason> {
+        sample.check()?;
+        let time_ns = sample.time_ns;
+        let Some(newest) = self.newest else { return self.place_first(sample, config) };
+        match self.clock.judge(time_ns, newest.time_ns, ns(config.params.lateness)) {
+            Stamped::Next => {}
+            Stamped::Late => return self.place_late_sample(sample, config),
+            Stamped::Ahead => return Err(Refusal::InTheFuture { time_ns }.into()),
+            Stamped::TooOld => return Err(Refusal::TooOld { time_ns }.into()),
+            Stamped::SetBack { for_ns } => {
+                self.set_back(sample, for_ns, newest.time_ns, config);
+                return Ok(Sampled::Bridged);
+            }
+        }
+        self.make_room(config);
+        self.newest = Some(*sample);
+        self.samples.push_back(*sample);
+        let is_gap = time_ns.saturating_sub(newest.time_ns) > ns(config.sensors.longest_sample);
+        if self.predictor.as_mut().is_some_and(|predictor| predictor.propagate(sample, is_gap).is_err()) {
+            self.predictor = None;
+        }
+        let waits = |entry: &Entry<F>| entry.key > self.engine.key() && entry.key.time_ns <= time_ns;
+        let behind_ns = self.engine.now_ns().map_or(i64::MAX, |now_ns| time_ns.saturating_sub(now_ns));
+        let is_running = self.engine.condition() == Condition::Running;
+        if !is_running || behind_ns > LONGEST_TAIL_NS {
+            self.settle(time_ns, config);
+        } else if let Some(last) = self.inputs.iter().rev().find(|entry| waits(entry)).map(|entry| entry.key) {
+            self.settle(last.time_ns, config);
+        }
+        Ok(if is_gap { Sampled::Bridged } else { Sampled::Taken })
+    }
+
+    /// The first sample sets the time, once another stamp agrees with its own. Two stamps are not enough to discard earlier
+    /// reports: that takes as many as a jump of the clock.
+    fn place_first(&mut self, sample: &ImuMean, config: &StateEstimatorConfig) -> Result<Sampled, Reason> {
+        let time_ns = sample.time_ns;
+        let before = self.first.take();
+        let is_believed = self.clock.doubt(time_ns).is_some() || self.inputs.is_empty();
+        if let Some(first) = before.filter(|first| is_believed && follows(time_ns, first.time_ns)) {
+            self.begin(&first, config);
+            return self.place_sample(sample, config);
+        }
+        if let Some(first) = before {
+            // Neither is known to be wrong, but the later one may still be confirmed.
+            let (key, refusal) = (Key::of_sample(first.time_ns), stranger(first.time_ns, time_ns));
+            let reason = self.count(refusal.into());
+            self.told.push(Told::Taken(key, InputKind::Imu, Outcome::Degraded(reason)));
+        }
+        if self.inputs.iter().any(|entry| self.is_near(entry.key.time_ns, time_ns, config)) {
+            self.begin(sample, config);
+            return Ok(Sampled::Taken);
+        }
+        self.first = Some(*sample);
+        Ok(Sampled::Waits)
+    }
+
+    fn begin(&mut self, sample: &ImuMean, config: &StateEstimatorConfig) {
+        self.newest = Some(*sample);
+        self.samples.push_back(*sample);
+        self.drop_strangers(sample.time_ns, config);
+        self.settle(sample.time_ns, config);
+    }
+
+    /// The clock of the IMU was set back: the engine continues on the new clock, without the past.
+    fn set_back(&mut self, sample: &ImuMean, for_ns: i64, newest_ns: i64, config: &StateEstimatorConfig) {
+        self.settle(newest_ns, config);
+        for entry in self.inputs.drain(..) {
+            if let (None, Some(kind)) = (entry.outcome, entry.payload.kind()) {
+                self.counts.too_old += 1;
+                let reason = Refusal::TooOld { time_ns: entry.key.time_ns }.into();
+                self.told.push(Told::Taken(entry.key, kind, Outcome::Degraded(reason)));
+            }
+        }
+        self.engine.set_clock_back(sample.time_ns, for_ns, config);
+        self.samples.clear();
+        self.copies.clear();
+        self.copies.push_back(self.engine.clone());
+        self.left_ns = i64::MIN;
+        self.counts.set_back += 1;
+        self.told.push(Told::SetBack(sample.time_ns, newest_ns.saturating_sub(sample.time_ns)));
+        self.newest = Some(*sample);
+        self.samples.push_back(*sample);
+        self.settle(sample.time_ns, config);
+    }
+
+    fn place_late_sample(&mut self, sample: &ImuMean, config: &StateEstimatorConfig) -> Result<Sampled, Reason> {
+        let time_ns = sample.time_ns;
+        if self.samples.binary_search_by_key(&time_ns, |other| other.time_ns).is_ok() {
+            return Err(Reason::Duplicate);
+        }
+        self.make_room(config);
+        if !self.reaches(Key::of_sample(time_ns)) {
+            return Err(Refusal::TooOld { time_ns }.into());
+        }
+        let index = self.samples.partition_point(|other| other.time_ns < time_ns);
+        self.samples.insert(index, *sample);
+        self.counts.late += 1;
+        let engine_ns = self.engine.now_ns().unwrap_or(i64::MIN);
+        if Key::of_sample(time_ns) < self.engine.key() {
+            self.run_again(Key::of_sample(time_ns), engine_ns, config);
+        } else {
+            self.predict(config);
+        }
+        Ok(Sampled::Taken)
+    }
+
+    /// If there is no room for another sample, drops the oldest. Those needed only for late inputs are dropped first, and such
+    /// inputs are then refused as too old.
+    fn make_room(&mut self, config: &StateEstimatorConfig) {
+        let most = self.rooms.samples;
+        if self.samples.len() < most {
+            return;
+        }
+        let newest_ns = self.newest.map_or(i64::MIN, |newest| newest.time_ns);
+        self.run(newest_ns, config);
+        let held = self.samples.len();
+        while self.samples.len() >= most && self.copies.len() > 1 {
+            self.copies.pop_front();
+            self.trim();
+        }
+        if self.samples.len() >= most {
+            self.copies.clear();
+            self.copies.push_back(self.engine.clone());
+            self.trim();
+        }
+        if self.samples.len() >= most {
+            // All remaining samples are later than the newest keyframe. The prediction has to bridge the dropped ones.
+            self.samples.drain(..(most / LEAVING).max(1));
+        }
+        self.predict(config);
+        let dropped = held.saturating_sub(self.samples.len()) as u64;
+        self.counts.dropped += dropped;
+        self.told.push(Told::Dropped(newest_ns, dropped));
+    }
+
+    /// Drops inputs that came before the IMU and do not match its time.
+    fn drop_strangers(&mut self, time_ns: i64, config: &StateEstimatorConfig) {
+        let mut index = 0;
+        while let Some(entry) = self.inputs.get(index) {
+            let (key, kind) = (entry.key, entry.payload.kind());
+            if self.is_near(key.time_ns, time_ns, config) {
+                index += 1;
+                continue;
+            }
+            self.inputs.remove(index);
+            if let Some(kind) = kind {
+                let reason = self.count(stranger(key.time_ns, time_ns).into());
+                self.told.push(Told::Taken(key, kind, Outcome::Degraded(reason)));
+            }
+        }
+    }
+}
+
+/// The refusal of an input whose time does not match that of a sample.
+fn stranger(time_ns: i64, sample_ns: i64) -> Refusal {
+    if time_ns < sample_ns { Refusal::TooOld { time_ns } } else { Refusal::InTheFuture { time_ns } }
+}
