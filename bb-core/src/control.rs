@@ -18,6 +18,7 @@ mod commands;
 mod effects;
 mod ending;
 mod execution;
+mod faults;
 mod hanging;
 mod health;
 mod hooks;
@@ -35,17 +36,17 @@ mod topics;
 
 pub use command::{CommandStatistics, Prepared};
 pub use execution::{CommandError, Execution};
+pub use faults::ReportedFault;
 pub(crate) use hanging::Hanging;
+pub(crate) use inside::{Awaited, InActuator, is_in_actuator, waits_for};
 pub(crate) use topics::SystemTopics;
 
 use crate::component::{Host, Permit};
 use crate::declaration::{
     CommandDeclaration, EstimatorDeclaration, ParameterDeclaration, ParameterValues, Supervisor,
 };
-use crate::event::{
-    CategoryDeclaration, ComponentFault, DisarmError, HealthState, HealthTransition, Safety, SafetyError,
-};
-use crate::journal::Journal;
+use crate::event::{CategoryDeclaration, DisarmError, HealthState, HealthTransition, Safety, SafetyError};
+use crate::journal::{Journal, ParameterEntry};
 use crate::lifecycle::Supervision;
 use crate::message::Origin;
 use crate::node::{BindTarget, Check, Mode, NodeEntry, Report, SharedNode};
@@ -58,6 +59,7 @@ use budgets::Budgets;
 use callback::Callback;
 use effects::Reporter;
 use execution::Slot;
+use faults::Faults;
 use hooks::Hooks;
 #[cfg(loom)]
 use loom::sync::{Condvar, Mutex as StateMutex, MutexGuard, atomic::AtomicU8};
@@ -137,7 +139,11 @@ struct Inner {
     islands: OnceLock<Box<dyn Islands>>,
     /// Weak, since the host has the control state.
     host: OnceLock<Weak<dyn Host>>,
+    /// Called with the parameters that are set, under the lock: in the order in which they are.
+    on_parameters: OnceLock<OnParameters>,
 }
+
+type OnParameters = Box<dyn Fn(&[ParameterEntry]) + Send + Sync>;
 
 /// The control state's part of a report.
 pub(crate) struct Summary {
@@ -145,7 +151,7 @@ pub(crate) struct Summary {
     pub(crate) state: &'static str,
     pub(crate) safety: Safety,
     /// The newest faults.
-    pub(crate) faults: Vec<ComponentFault>,
+    pub(crate) faults: Vec<ReportedFault>,
     pub(crate) all_faults: u64,
 }
 
@@ -282,16 +288,6 @@ struct Disarming {
     outcome: Arc<OnceLock<Result<(), DisarmError>>>,
     errors: Vec<SafetyError>,
 }
-
-/// The newest faults, and how many there were.
-#[derive(Default)]
-struct Faults {
-    newest: VecDeque<ComponentFault>,
-    count: u64,
-}
-
-/// The number of faults that are kept. Earlier ones are only counted.
-const KEPT_FAULTS: usize = 256;
 
 /// Does not keep the robot alive.
 #[derive(Clone)]

@@ -6,15 +6,18 @@ mod bound;
 mod builder;
 mod closing;
 mod describe;
+mod discovery;
 mod ending;
 mod error;
 mod handle;
 mod host;
 mod joints;
+mod keeper;
 mod live;
 mod machine;
 mod occupied;
 mod remains;
+mod replacing;
 mod replay;
 mod report;
 mod running;
@@ -26,7 +29,7 @@ mod timekeeper;
 pub(crate) mod visit;
 
 pub use crate::component::{ActuatorError, ActuatorLink, Bus};
-pub use crate::control::{CommandError, CommandStatistics, Execution};
+pub use crate::control::{CommandError, CommandStatistics, Execution, ReportedFault};
 pub use crate::event::ComponentFault;
 pub use crate::lifecycle::Supervision;
 pub use crate::node::{DropReason, EstimatorStatistics, InputStatistics, LatencyStatistics};
@@ -62,6 +65,7 @@ use crate::pubsub::{AnyTopic, DynamicMessage};
 use crate::time::MonotonicTime;
 use crate::topology::{GraphFormat, Topology};
 use builder::MadeByNew;
+use discovery::graphed;
 use settings::settings_schema;
 use std::sync::Arc;
 
@@ -79,7 +83,7 @@ pub trait Robot: Sized + Send + Sync + 'static {
     const ACTUATORS: &'static [ActuatorDeclaration];
     /// Its controllers and bridges, in the order of their declaration.
     const SERVICES: &'static [SensorDeclaration];
-    /// Its declared states, beside the built-in ones.
+    /// Its declared states, without the built-in ones.
     const STATES: &'static [&'static str];
     /// The categories of its commands.
     const CATEGORIES: &'static [CategoryDeclaration];
@@ -150,9 +154,11 @@ pub trait Robot: Sized + Send + Sync + 'static {
         Self::TOPOLOGY.to_urdf(Self::NAME)
     }
 
-    /// Its topology and dataflow as a picture, in Mermaid or DOT.
+    /// The robot as a picture, in Mermaid or DOT: links and joints; the dataflow from sensors through estimators; actuators with
+    /// the joints that they move; controllers and bridges; commands, and the estimators whose health starts them.
+    /// [`Bus::graph`] marks the components that were replaced in a run.
     fn graph(format: GraphFormat) -> String {
-        graph(format, Self::TOPOLOGY, Self::SENSORS, Self::ESTIMATORS)
+        graph(format, &graphed::<Self>(), &|_| false)
     }
 
     /// The JSON Schema (draft 2020-12) of its settings, see [`Builder::set`]: options and parameters in nested objects, as a

@@ -1,7 +1,8 @@
 //! Arming, disarming, and the causes of the safety state `error`.
 
 use super::callback::Reason;
-use super::inside;
+use super::hooks::Hooks;
+use super::inside::{self, Awaited};
 use super::machine::IDLE;
 use super::step::Step;
 use super::{Control, Disarming, Limit, Phase, State};
@@ -158,8 +159,10 @@ impl Control {
         disarming.errors.extend(error);
         if disarming.left.is_empty() {
             let errors = std::mem::take(&mut disarming.errors);
-            step.disarmed(errors);
+            return step.disarmed(errors);
         }
+        // A stop may wait for all callbacks but the one that has called it.
+        step.finish();
     }
 
     /// The time limit of the disarm callbacks has passed: those that have not returned are not safe.
@@ -168,8 +171,22 @@ impl Control {
         let Some(disarming) = step.state.disarming_of(generation) else { return };
         let late = std::mem::take(&mut disarming.left).into_iter();
         let mut errors = std::mem::take(&mut disarming.errors);
-        errors.extend(late.map(|(_, path)| late_at(path)));
+        let (robot, hooks) = (self.id(), &step.state.hooks);
+        errors.extend(late.map(|(number, path)| match is_caller_awaited(robot, hooks, number, path) {
+            true => own_code_at(path),
+            false => late_at(path),
+        }));
         step.disarmed(errors);
+    }
+
+    /// Whether that disarming is over, or all callbacks that have not returned wait for the calling thread.
+    pub(super) fn is_disarmed_but_for_caller(&self, state: &State, generation: u64) -> bool {
+        let Some(disarming) = state.disarming.as_ref().filter(|disarming| disarming.generation == generation)
+        else {
+            return true;
+        };
+        let mut left = disarming.left.iter();
+        left.all(|(number, path)| is_caller_awaited(self.id(), &state.hooks, *number, path))
     }
 
     /// The disarm callbacks have returned, or their time limit has passed.
@@ -203,6 +220,16 @@ impl Control {
         let gone = state.hooks.take_but_of(&lingering).into_iter();
         gone.map(|callback| (callback.path, callback)).collect()
     }
+}
+
+/// Whether a disarm callback waits for code of the calling thread.
+fn is_caller_awaited(robot: Awaited, hooks: &Hooks, number: u64, path: &'static str) -> bool {
+    inside::is_callback_waiting(robot, number, hooks.is_of_actuator(number).then_some(path))
+}
+
+/// The code of a component stops the robot, and its disarm callback waits for that code.
+fn own_code_at(path: &'static str) -> SafetyError {
+    SafetyError { path, message: "its own code stops the robot, and cannot wait for it to be disarmed".to_owned() }
 }
 
 /// The disarm callback of a component did not return.
@@ -295,7 +322,7 @@ impl Step<'_> {
         self.line(Event::Disarmed { errors: errors.clone() });
         self.control.0.limits.clear(Limit::Disarming(disarming.generation));
         let is_safe = errors.is_empty();
-        // Force ignores callbacks that fail, but not for a robot that nobody can disarm again.
+        // Force ignores callbacks that fail, except on a robot that is stopping and cannot be disarmed again.
         let is_forgiven = disarming.force && !self.state.is_stopping;
         let is_error = disarming.to_error || !(is_safe || is_forgiven);
         for error in &errors {

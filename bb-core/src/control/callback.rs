@@ -1,6 +1,6 @@
 //! One disarm callback: user code, on its own thread, and never on two at once.
 
-use super::inside;
+use super::inside::{self, Awaited};
 use super::{Control, Key};
 use crate::component::DisarmHook;
 use crate::event::SafetyError;
@@ -76,8 +76,8 @@ impl Callback {
         }
         runs.waiting.push(reason);
         if runs.waiting.len() > 1 {
-            // It hangs: reasons that nobody waits for any more must not pile up. They stay in the list while the
-            // control state is asked, since the run may end meanwhile.
+            // It hangs: reasons that no caller waits for any more must not pile up. They stay in the list while the
+            // control state is queried, since the run may end in the meantime.
             let waiting = runs.waiting.clone();
             drop(runs);
             let is_over = |reason: &Reason| !control.is_wanted(*reason, self.number);
@@ -118,8 +118,8 @@ impl Callback {
         }
     }
 
-    fn call(&self, robot: usize) -> Option<SafetyError> {
-        let failed = inside::callback(robot, || caught(|| (self.code)()).err())?;
+    fn call(&self, robot: Awaited) -> Option<SafetyError> {
+        let failed = inside::callback(robot, self.number, || caught(|| (self.code)()).err())?;
         Some(SafetyError { path: self.path, message: format!("disarming failed: {}", failed.fault) })
     }
 

@@ -6,13 +6,14 @@ use super::execution::CommandError;
 use super::execution::Slot;
 use super::inside;
 use super::task::{Task, Value};
-use super::{Control, KEPT_FAULTS, Key, Wired};
+use super::{Control, Key, Wired};
 use crate::event::{ComponentFault, HealthTransition, Refusal, Safety, SafetyError};
 use crate::fault::{discard, wake};
 use crate::node::Mode;
 use crate::pubsub::Wakers;
 use crate::schedule::Lane;
 use crate::telemetry::TelemetryEvent;
+use crate::time::MonotonicTime;
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -161,11 +162,6 @@ impl Control {
         all.into_iter().filter(|callback| !callback.start(self, Reason::Disarming(generation))).collect()
     }
 
-    /// Marks the calling thread as running an actuator's code, which disarming waits for, until the returned guard is dropped.
-    pub(crate) fn enter_actuator(&self) -> inside::InActuator {
-        inside::InActuator::new(self.id())
-    }
-
     /// On virtual time: runs the waiting disarm callbacks in order on the calling thread, and returns true if there
     /// were any. None of them runs inside code that it would wait for.
     pub(crate) fn run_pending_hooks(&self) -> bool {
@@ -181,13 +177,8 @@ impl Control {
         true
     }
 
-    pub(super) fn keep_fault(&self, fault: ComponentFault) {
-        let mut faults = lock(&self.0.faults);
-        faults.count += 1;
-        if faults.newest.len() == KEPT_FAULTS {
-            faults.newest.pop_front();
-        }
-        faults.newest.push_back(fault);
+    pub(super) fn keep_fault(&self, fault: ComponentFault, now: MonotonicTime) {
+        lock(&self.0.faults).add(fault, now);
     }
 
     fn start_writing_logs(&self) {
@@ -217,7 +208,7 @@ impl Control {
             };
             let skipped = std::mem::take(&mut reports.skipped);
             drop(reports);
-            // There is nobody to report a logger's panic to.
+            // A panic of the logger itself cannot be reported.
             let _ = crate::fault::guarded(|| {
                 if skipped > 0 {
                     tracing::warn!(skipped, "lines of this log were dropped: the logger blocked");

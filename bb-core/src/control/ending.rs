@@ -256,7 +256,7 @@ impl Step<'_> {
         self.publish_phase(command, id, phase, health);
         match result {
             Ok(Some(value)) => self.effects.results.push((slot, Ok(value))),
-            // In a replay there is no value, and nobody waits for it.
+            // A replay has no value, and no caller waits for one.
             Ok(None) => {}
             Err(error) => self.effects.results.push((slot, Err(error))),
         }

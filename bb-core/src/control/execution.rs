@@ -109,7 +109,7 @@ impl<T: 'static> Execution<T> {
         Self { slot, result: PhantomData }
     }
 
-    /// The result, if the command has ended and nobody has taken it yet.
+    /// The result, if the command has ended and the result has not been taken yet.
     pub fn try_result(&self) -> Option<Result<T, CommandError>> {
         let result = lock(&self.slot.state).result.take();
         result.map(typed)

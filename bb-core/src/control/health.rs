@@ -31,9 +31,10 @@ impl Overseer for Control {
     }
 
     fn message_failed(&self, path: &'static str, message: String) {
-        // In a replay, it is in the journal.
-        if self.0.mode != Mode::Replay {
-            self.note_fault(path, message);
+        match self.0.mode {
+            Mode::Real | Mode::Virtual => self.note_fault(path, message),
+            // The journal contains the faults of the run.
+            Mode::Replay => tracing::error!(path, message, "a recorded message failed where it was copied"),
         }
     }
 
@@ -112,9 +113,16 @@ impl Control {
     /// Records a fault that is not a component's failure, or a component that hangs. It is kept, published and
     /// logged, and has no other consequence.
     pub(crate) fn note_fault(&self, path: &'static str, message: String) {
+        self.note_fault_now(path, message);
+    }
+
+    /// As above; returns the time at which it is reported.
+    pub(crate) fn note_fault_now(&self, path: &'static str, message: String) -> MonotonicTime {
         let mut step = self.step();
+        let now = step.now;
         step.note_fault(path, message);
         step.finish();
+        now
     }
 
     /// Watches all estimators from now on.
@@ -166,7 +174,7 @@ impl Step<'_> {
         let HealthReport { transition, epoch } = report;
         let Some(health) = self.state.health.get_mut(estimator) else { return };
         if health.epoch != epoch {
-            // It was lost meanwhile and does not know yet: it reports again once it does.
+            // It was declared lost in the meantime, of which it has not been notified yet. It reports again afterwards.
             return;
         }
         let was_lost = health.state == HealthState::Lost;

@@ -98,6 +98,11 @@ impl Hooks {
         (new, old)
     }
 
+    /// Whether the callback with that number is the own one of an actuator.
+    pub(super) fn is_of_actuator(&self, number: u64) -> bool {
+        self.all.iter().any(|hook| hook.callback.number == number && hook.owner == Owner::Actuator)
+    }
+
     /// Whether callbacks of a failed `init` of the component at `path` have not returned.
     pub(super) fn hang(&self, path: &str) -> bool {
         let mut failed = self.all.iter().filter(|hook| hook.is_of(path) && hook.owner == Owner::FailedInit);

@@ -1,10 +1,11 @@
 //! Parameters: setting and validating them, and notifying components.
 
+use super::step::Step;
 use super::{Bound, Control};
 use crate::component::Permit;
 use crate::declaration::{ParameterError, ParameterValues};
 use crate::event::{ParameterChange, ParameterValue};
-use crate::journal::Event;
+use crate::journal::{Event, ParameterEntry};
 use crate::node::{BindTarget, Check, NodeEntry};
 use std::sync::Arc;
 
@@ -18,62 +19,92 @@ impl Control {
         self.parameters().all().get(number).cloned()
     }
 
-    pub(crate) fn set_parameter_at(
+    /// Sets parameters by path: see [`Self::set_parameters`].
+    pub(crate) fn set_parameters_at(
         &self,
-        path: &str,
-        value: ParameterValue,
+        changes: Vec<(String, ParameterValue)>,
         permit: &Permit,
     ) -> Result<(), ParameterError> {
-        if let Some(number) = self.0.declared.parameters.iter().position(|parameter| parameter.path == path) {
-            return self.set_parameter(number, value, permit);
-        }
-        let near = crate::message::nearest::nearest_path(
-            path,
-            self.0.declared.parameters.iter().map(|parameter| parameter.path),
-        );
-        let hint = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
-        Err(ParameterError { path: path.to_owned(), message: format!("no such parameter is declared{hint}") })
+        let changes: Result<Vec<_>, _> = changes
+            .into_iter()
+            .map(|(path, value)| Ok(ParameterEntry { parameter: self.parameter_number(&path)?, value }))
+            .collect();
+        self.set_parameters(changes?, permit)
     }
 
-    /// Sets a parameter, unless it or the options of a component bound to it would be out of range.
-    pub(crate) fn set_parameter(
+    /// The path of a parameter.
+    pub(crate) fn parameter_path(&self, number: usize) -> Option<&'static str> {
+        self.0.declared.parameters.get(number).map(|declared| declared.path)
+    }
+
+    fn parameter_number(&self, path: &str) -> Result<usize, ParameterError> {
+        let paths = self.0.declared.parameters.iter().map(|parameter| parameter.path);
+        paths.clone().position(|declared| declared == path).ok_or_else(|| {
+            let near = crate::message::nearest::nearest_path(path, paths);
+            let hint = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+            ParameterError { path: path.to_owned(), message: format!("no such parameter is declared{hint}") }
+        })
+    }
+
+    /// Sets parameters at once, in one entry: all of them, or none if one of them, or the options of a component bound to them,
+    /// would be out of range.
+    pub(crate) fn set_parameters(
         &self,
-        number: usize,
-        value: ParameterValue,
+        changes: Vec<ParameterEntry>,
         permit: &Permit,
     ) -> Result<(), ParameterError> {
-        let Some(declared) = self.0.declared.parameters.get(number) else { return Ok(()) };
-        declared.check(&value)?;
+        let Some(first) = changes.first() else { return Ok(()) };
+        let path_of = |number: usize| self.0.declared.parameters.get(number).map_or("?", |declared| declared.path);
+        let refuse = |path: &str, message: String| ParameterError { path: path.to_owned(), message };
+        let first_path = path_of(first.parameter);
+        for (index, change) in changes.iter().enumerate() {
+            let Some(declared) = self.0.declared.parameters.get(change.parameter) else { return Ok(()) };
+            declared.check(&change.value)?;
+            if changes[..index].iter().any(|other| other.parameter == change.parameter) {
+                return Err(refuse(declared.path, "it is set twice at once".to_owned()));
+            }
+        }
         if let Some(journal) = &self.0.journal {
             journal.wait_for_room();
         }
-        let refuse = |message: String| ParameterError { path: declared.path.to_owned(), message };
+        let is_bound_to_any =
+            |bound: &Bound| changes.iter().any(|change| bound.parameters.contains(&change.parameter));
         // Validation of options is user code, so it runs without the lock, and again if another parameter was set
         // meanwhile.
         loop {
             let (values, version, checks) = {
                 let state = self.lock();
-                let bound = state.bound.iter().filter(|component| component.parameters.contains(&number));
-                let checks: Vec<_> =
-                    bound.map(|component| (component.path, Arc::clone(&component.check))).collect();
+                let bound = state.bound.iter().filter(|component| is_bound_to_any(component));
+                let checks: Vec<_> = bound
+                    .map(|component| (component.path, component.parameters, Arc::clone(&component.check)))
+                    .collect();
                 (state.parameters.clone(), state.version, checks)
             };
-            let Some((values, from)) = values.with(number, value.clone()) else { return Ok(()) };
-            for (path, check) in &checks {
-                check(&values).map_err(|message| refuse(format!("{path} would refuse it: {message}")))?;
+            let before = values;
+            let values = before.with(changed(&changes));
+            for (path, bound_to, check) in &checks {
+                check(&values).map_err(|message| {
+                    // Of several that the component is bound to, the one that it also refuses alone.
+                    let mut bound = changes.iter().filter(|change| bound_to.contains(&change.parameter));
+                    let first = bound.clone().next();
+                    let refused =
+                        bound.find(|change| check(&before.with(changed(std::slice::from_ref(change)))).is_err());
+                    let parameter = refused.or(first).map_or(first_path, |change| path_of(change.parameter));
+                    refuse(parameter, format!("{path} would refuse it: {message}"))
+                })?;
             }
             let mut step = self.step();
             if !permit.is_valid() {
-                return Err(refuse("the command that sets it has ended or was cancelled".to_owned()));
+                let message = "the command that sets it has ended or was cancelled";
+                return Err(refuse(first_path, message.to_owned()));
             }
             if step.state.version != version {
                 continue;
             }
-            step.line(Event::Parameter { parameter: number, value: value.clone() });
+            step.line(Event::Parameters { changes: changes.clone() });
             step.state.version += 1;
-            step.state.parameters = values.clone();
             let mut estimators = Vec::new();
-            for component in step.state.bound.iter().filter(|component| component.parameters.contains(&number)) {
+            for component in step.state.bound.iter().filter(|component| is_bound_to_any(component)) {
                 match &component.target {
                     BindTarget::Estimator(estimator) => estimators.push(*estimator),
                     BindTarget::Other(tell) => tell(),
@@ -83,25 +114,27 @@ impl Control {
             for estimator in estimators {
                 step.post(estimator, NodeEntry::Options(values.clone()));
             }
-            if let Some(topic) = self.0.topics.parameters.get(number) {
-                step.publish(topic, ParameterChange { path: declared.path, from, to: value.clone() }, step.now);
+            if let Some(keep) = self.0.on_parameters.get() {
+                keep(&changes);
             }
+            step.change_parameters(values, changes);
             step.finish();
             return Ok(());
         }
     }
 
-    /// In a replay: a parameter was set. Components whose options are bound to it are notified by their own lines.
-    pub(crate) fn replay_parameter(&self, number: usize, value: ParameterValue) {
+    /// In a replay: parameters were set. Components whose options are bound to them are notified by their own lines.
+    pub(crate) fn replay_parameters(&self, changes: Vec<ParameterEntry>) {
         let mut step = self.step();
-        let Some((values, from)) = step.state.parameters.with(number, value.clone()) else { return };
-        step.state.parameters = values;
-        if let (Some(topic), Some(declared)) =
-            (self.0.topics.parameters.get(number), self.0.declared.parameters.get(number))
-        {
-            step.publish(topic, ParameterChange { path: declared.path, from, to: value }, step.now);
-        }
+        let values = step.state.parameters.with(changed(&changes));
+        step.change_parameters(values, changes);
         step.finish();
+    }
+
+    /// Calls `keep` with each set of parameters, under the lock of the control state: it must not block.
+    pub(crate) fn on_parameters(&self, keep: impl Fn(&[ParameterEntry]) + Send + Sync + 'static) {
+        // It is set once, before the robot runs.
+        let _ = self.0.on_parameters.set(Box::new(keep));
     }
 
     /// Records that the options of a component are bound to parameters.
@@ -130,4 +163,25 @@ impl Control {
             self.bind_to(command.path, bound, Arc::new(check), BindTarget::Nobody);
         }
     }
+}
+
+impl Step<'_> {
+    /// Changes the values, and publishes the changes.
+    fn change_parameters(&mut self, values: ParameterValues, changes: Vec<ParameterEntry>) {
+        let before = std::mem::replace(&mut self.state.parameters, values);
+        let control = self.control;
+        for ParameterEntry { parameter, value } in changes {
+            let (topics, declared) = (&control.0.topics.parameters, control.0.declared.parameters);
+            if let (Some(topic), Some(declared), Some(from)) =
+                (topics.get(parameter), declared.get(parameter), before.all().get(parameter))
+            {
+                let change = ParameterChange { path: declared.path, from: from.clone(), to: value };
+                self.publish(topic, change, self.now);
+            }
+        }
+    }
+}
+
+fn changed(changes: &[ParameterEntry]) -> impl Iterator<Item = (usize, &ParameterValue)> {
+    changes.iter().map(|change| (change.parameter, &change.value))
 }

@@ -16,7 +16,7 @@ use crate::node::Mode;
 use std::sync::Arc;
 
 impl Step<'_> {
-    /// Starts a command, or says why not.
+    /// Starts a command, or returns why it cannot be started.
     pub(super) fn start(
         &mut self,
         number: usize,

@@ -88,7 +88,7 @@ impl Step<'_> {
     /// Records and publishes a component's failure.
     pub(super) fn publish_fault(&mut self, path: &'static str, message: String) {
         let fault = ComponentFault { path, message };
-        self.control.keep_fault(fault.clone());
+        self.control.keep_fault(fault.clone(), self.now);
         self.effects.log(Log::Fault(fault.clone()));
         self.publish(&self.control.0.topics.fault, fault, self.now);
     }

@@ -36,18 +36,27 @@ impl Control {
         step.finish();
     }
 
+    /// Whether the calling thread runs code that the disarming of this robot waits for.
+    pub(crate) fn is_waiting_for_caller(&self) -> bool {
+        inside::is_waited_for(self.id())
+    }
+
     pub(crate) fn is_stopping(&self) -> bool {
         self.lock().is_stopping
     }
 
-    /// Waits until the disarm callbacks have returned or have timed out.
+    /// Waits until the disarm callbacks have returned or have timed out. Does not wait for those that wait
+    /// directly for the calling thread, that is for their own code or for the actuator that it is inside of: they cannot make their
+    /// hardware safe before that thread continues.
     pub(crate) fn wait_until_disarmed(&self) {
         if self.0.mode == Mode::Real {
             let generation = self.lock().generation;
             // If another robot's callback stops this one, the callbacks of this robot do not wait for that one.
             let _waits = inside::waits_for(self.id());
-            self.wait_until(DISARM_WITHIN + Duration::from_millis(500), |state| !state.is_disarming(generation));
-            // In case the timekeeper's thread is gone.
+            self.wait_until(DISARM_WITHIN + Duration::from_millis(500), |state| {
+                self.is_disarmed_but_for_caller(state, generation)
+            });
+            // For those, and in case the timekeeper's thread is gone.
             self.disarm_timeout(generation);
             self.0.stop.set();
         }

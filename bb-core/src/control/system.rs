@@ -7,8 +7,8 @@ use super::hooks::Hooks;
 use super::machine::Machine;
 use super::topics::SystemTopics;
 use super::{
-    ComponentOrder, Control, Health, Inner, Islands, Parts, State, StateGuard, StateMutex, Summary, Supervised,
-    WeakControl,
+    Awaited, ComponentOrder, Control, Health, Inner, Islands, Parts, State, StateGuard, StateMutex, Summary,
+    Supervised, WeakControl,
 };
 use crate::component::Host;
 use crate::declaration::{CommandDeclaration, Supervisor};
@@ -84,6 +84,7 @@ impl Control {
             stop: StopSignal::default(),
             islands: OnceLock::new(),
             host: OnceLock::new(),
+            on_parameters: OnceLock::new(),
         }));
         control.bind_commands();
         control
@@ -102,7 +103,7 @@ impl Control {
     }
 
     /// Distinguishes it from other robots.
-    pub(super) fn id(&self) -> usize {
+    pub(crate) fn id(&self) -> Awaited {
         Arc::as_ptr(&self.0).addr()
     }
 
@@ -191,7 +192,7 @@ impl Control {
     fn summary(&self, state: &State) -> Summary {
         let (faults, all_faults) = {
             let faults = self.0.faults.lock().unwrap_or_else(PoisonError::into_inner);
-            (faults.newest.iter().cloned().collect(), faults.count)
+            (faults.newest(), faults.count())
         };
         Summary {
             commands: state.statistics.clone(),

@@ -1,35 +1,36 @@
 //! A running actuator: when it may move, and how its failures are handled.
 
+mod any;
+mod commands;
 mod held;
 mod limits;
 mod reports;
+mod telling;
+mod updating;
 
+pub use self::any::AnyActuator;
 use self::held::{Guarded, Held};
 pub use self::limits::ActuatorStatistics;
 use self::limits::Counts;
 use self::reports::Reports;
+use self::telling::Told;
+use self::updating::Due;
 use super::occupied::Occupied;
 use super::source::Assembly;
 use crate::component::{Accepts, Actuator, ActuatorContext, ActuatorError, Binding, Permit};
 use crate::control::{ComponentOrder, Control};
 use crate::declaration::ActuatorDeclaration;
-use crate::event::Safety;
-use crate::fault::{Failed, Fault, caught, of_panic};
-use crate::journal::{Event, Recorded};
+use crate::fault::{Failed, Fault, caught};
 use crate::lifecycle::{AfterFault, AsActuator, HostHandle, Recipe, Slot};
-use crate::message::{Finite, Frame, Payload, Stamp, copied};
+use crate::message::Payload;
 use crate::node::{BindTarget, Environment, Mode};
-use crate::pubsub::{AnyTopic, DynamicMessage, Topic, Wakers};
+use crate::payload::MotionEnd;
+use crate::pubsub::{Topic, Wakers};
 use crate::schedule::Lane;
 use crate::time::MonotonicTime;
-use std::any::Any;
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
-use std::task::{Wake, Waker};
-use std::time::{Duration, Instant};
-
-/// The least delay before an actuator that asks to be updated at once, or in the past, is updated.
-const LEAST_PERIOD: Duration = Duration::from_micros(10);
+use std::task::Waker;
 
 /// An actuator in the wiring.
 pub struct ActuatorNode<A: Actuator>(Arc<Inner<A>>);
@@ -57,6 +58,8 @@ struct State<A: Actuator> {
     slot: Slot<AsActuator<A>>,
     /// Whether it has failed and could not be made safe.
     is_unsafe: bool,
+    /// Whether it was asked to carry out a command after it was last made safe.
+    may_move: bool,
     /// The command execution that sent the last command to be carried out.
     moved_by: Permit,
     /// The update time that is currently set as an alarm.
@@ -64,13 +67,6 @@ struct State<A: Actuator> {
     /// On virtual time: changes to report to the control state once the lock is released. Loggers, telemetry handlers and
     /// subscribers receive them on this thread and may disarm the robot, which takes the lock.
     told: Vec<Told>,
-}
-
-/// Changes to report to the control state.
-enum Told {
-    Failed { message: String, panicked: bool },
-    Unsafe(String),
-    MessageFailed(String),
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -101,6 +97,7 @@ impl<A: Actuator> ActuatorNode<A> {
                 made.map_err(|failed| failed.fault)
             });
         }
+        let robot = control.id();
         let inner = Arc::new_cyclic(|this| Inner {
             this: Weak::clone(this),
             number,
@@ -114,13 +111,18 @@ impl<A: Actuator> ActuatorNode<A> {
             counts: Counts::default(),
             reports: Reports::default(),
             host: assembly.host.clone(),
-            state: Guarded::new(State {
-                slot,
-                is_unsafe: false,
-                moved_by: Permit::UNLIMITED,
-                alarm: None,
-                told: Vec::new(),
-            }),
+            state: Guarded::new(
+                robot,
+                declaration.path,
+                State {
+                    slot,
+                    is_unsafe: false,
+                    may_move: false,
+                    moved_by: Permit::UNLIMITED,
+                    alarm: None,
+                    told: Vec::new(),
+                },
+            ),
         });
         // Also in a replay: the topic decodes messages read from a file.
         if A::Command::COMMANDS_JOINT {
@@ -160,34 +162,7 @@ impl<A: Actuator> ActuatorNode<A> {
     /// # Errors
     /// See [`ActuatorError`].
     pub fn send(&self, command: A::Command) -> Result<(), ActuatorError> {
-        self.0.accept(command, &Permit::UNLIMITED)
-    }
-}
-
-impl<A: Actuator> Accepts<A::Command> for Inner<A> {
-    fn accept(&self, command: A::Command, permit: &Permit) -> Result<(), ActuatorError> {
-        if !command.is_finite() {
-            return Err(ActuatorError::NonFinite);
-        }
-        if let Some(journal) = self.environment.journal() {
-            journal.wait_for_room();
-        }
-        let mut wakers = Wakers::default();
-        let done = self.alone(|state| self.carry_out(state, command, permit, &mut wakers));
-        wakers.run();
-        done.unwrap_or(Err(ActuatorError::Inside))
-    }
-
-    fn stop_motion_of(&self, permit: &Permit) {
-        let Some(stop) = A::Command::stop_command() else { return };
-        let mut wakers = Wakers::default();
-        self.alone(|state| {
-            if state.moved_by.is_of_same(permit) {
-                // Disarming has already stopped it, and a failing actuator is made safe.
-                let _ = self.carry_out(state, stop, &Permit::UNLIMITED, &mut wakers);
-            }
-        });
-        wakers.run();
+        self.0.accept(command, &Permit::UNLIMITED).map(drop)
     }
 }
 
@@ -196,101 +171,24 @@ impl<A: Actuator> Inner<A> {
     /// one that it waits for: the call would wait for itself.
     fn alone<T>(&self, run: impl FnOnce(&mut State<A>) -> T) -> Option<T> {
         let mut state = self.state.enter()?;
-        let result = {
-            // Disarming would also wait for this.
-            let _within = self.control.enter_actuator();
-            run(&mut state)
-        };
+        let result = run(&mut state);
+        self.leave(state);
+        Some(result)
+    }
+
+    /// Leaves its code: schedules its next update, and publishes and tells what has happened.
+    fn leave(&self, mut state: Held<'_, State<A>>) {
+        self.schedule_update(&mut state);
         let mut wakers = Wakers::default();
         self.reports.publish(&self.context, &*self.host.0, &self.environment, &mut wakers);
-        self.schedule_update(&mut state);
+        for error in self.reports.take_refusals() {
+            let component = self.declaration.path;
+            self.log(&mut state, move || tracing::warn!(component, error, "its motions are not published"));
+        }
         let told = std::mem::take(&mut state.told);
         drop(state);
         wakers.run();
         told.into_iter().for_each(|told| self.tell_now(told));
-        Some(result)
-    }
-
-    /// Schedules its next update.
-    fn schedule_update(&self, state: &mut State<A>) {
-        let Some(actuator) = state.slot.running() else { return };
-        let Some(due) = actuator.next_update() else { return };
-        // An update must not prevent virtual time from advancing.
-        let due = due.max(self.environment.clock().now() + LEAST_PERIOD);
-        if state.alarm.is_none_or(|alarm| due < alarm) {
-            state.alarm = Some(due);
-            self.control.wake_at(due, Waker::from(Arc::new(Due(Weak::clone(&self.this)))));
-        }
-    }
-
-    fn update_if_due(&self, state: &mut State<A>, now: MonotonicTime) {
-        state.alarm.take_if(|alarm| *alarm <= now);
-        let Some(actuator) = state.slot.running() else { return };
-        if actuator.next_update().is_none_or(|due| due > now) {
-            return;
-        }
-        let updated = {
-            let _entered = self.occupied.enter(self.environment.clock());
-            caught(|| actuator.update(now))
-        };
-        if let Err(failed) = updated {
-            self.fail(state, &failed, now);
-        }
-    }
-
-    fn carry_out(
-        &self,
-        state: &mut State<A>,
-        mut command: A::Command,
-        permit: &Permit,
-        wakers: &mut Wakers,
-    ) -> Result<(), ActuatorError> {
-        self.obey(state);
-        // This lock is also taken by disarming: nothing moves after disarming has returned.
-        let safety = self.control.safety_now();
-        if safety != Safety::Armed {
-            return Err(ActuatorError::NotArmed(safety));
-        }
-        if !permit.is_valid() {
-            return Err(ActuatorError::Cancelled);
-        }
-        let clock = self.environment.clock();
-        let now = clock.now();
-        self.restart_if_due(state, now);
-        let Some(actuator) = state.slot.running() else { return Err(ActuatorError::Stopped) };
-        self.counts.limit(&mut command, &self.context, self.environment.joints())?;
-        let stamp = Stamp {
-            monotonic_time: now,
-            wall_time: clock.wall_at(now),
-            frame: Frame::new(self.declaration.joint),
-            origin: self.environment.origin(),
-        };
-        let message = stamp.message(command);
-        let handled = {
-            let _entered = self.occupied.enter(clock);
-            caught(|| actuator.handle_command(&message))
-        };
-        if let Err(failed) = handled {
-            let text = failed.fault.to_string();
-            self.fail(state, &failed, now);
-            return Err(ActuatorError::Failed(text));
-        }
-        state.moved_by = permit.clone();
-        self.counts.carried_out();
-        let mut panic = None;
-        if let Some(journal) = self.environment.journal()
-            && let Some(copy) = copied(&message, &mut panic)
-        {
-            let message = Recorded::Message(DynamicMessage::of(self.declaration.path, copy));
-            journal.write(now, clock.wall_offset_nanos(), Event::Actuated { actuator: self.number, message });
-        }
-        // Under the lock, so that messages keep the order in which commands are carried out.
-        self.topic.publish_deferred(&message, wakers, &mut panic);
-        if let Some(panic) = panic {
-            // The actuator has moved: neither it nor the sender fails.
-            self.tell_control(state, Told::MessageFailed(format!("its message {}", of_panic(panic))));
-        }
-        Ok(())
     }
 
     /// Called by the control state, which must not wait for the actuator's code.
@@ -346,7 +244,10 @@ impl<A: Actuator> Inner<A> {
 
     /// Makes the actuator safe, then creates it again.
     fn remake(&self, state: &mut State<A>, now: MonotonicTime) {
+        let reason = "the actuator is restarted";
+        self.context.set_failing(reason);
         self.make_safe(state);
+        self.end_motion(MotionEnd::Failed(reason.to_owned()));
         self.make(state, now);
     }
 
@@ -359,19 +260,10 @@ impl<A: Actuator> Inner<A> {
         };
         match made {
             Ok(()) => {
-                // A logger may block, and disarming needs the lock held here.
-                let path = self.declaration.path;
-                self.log(move || tracing::info!(component = path, "restarted"));
+                self.log(state, move || tracing::info!(component = path, "restarted"));
                 state.is_unsafe = false;
             }
             Err(failed) => self.fail(state, &failed, now),
-        }
-    }
-
-    fn log(&self, write: impl FnOnce() + Send + 'static) {
-        match self.environment.mode() {
-            Mode::Real => self.environment.pool().submit(Lane::Wakers, write),
-            Mode::Virtual | Mode::Replay => write(),
         }
     }
 
@@ -382,8 +274,9 @@ impl<A: Actuator> Inner<A> {
     }
 
     /// Makes the actuator safe, even after a panic: hardware that may still move is worse than a second panic, which is caught.
-    fn make_safe(&self, state: &mut State<A>) {
+    pub(super) fn make_safe(&self, state: &mut State<A>) {
         let Some(actuator) = state.slot.running() else { return };
+        state.may_move = false;
         if let Err(failed) = caught(|| actuator.disarm()) {
             state.is_unsafe = true;
             let message = format!("it has failed and could not be made safe: {}", failed.fault);
@@ -391,38 +284,38 @@ impl<A: Actuator> Inner<A> {
         }
     }
 
-    fn tell_control(&self, state: &mut State<A>, told: Told) {
-        match self.environment.mode() {
-            Mode::Real => self.tell_now(told),
-            Mode::Virtual | Mode::Replay => state.told.push(told),
-        }
-    }
-
-    fn tell_now(&self, told: Told) {
-        let ActuatorDeclaration { path, supervisor, .. } = *self.declaration;
-        match told {
-            Told::Failed { message, panicked } => {
-                self.control.component_failed(path, supervisor, message, panicked)
-            }
-            Told::Unsafe(message) => self.control.note_hardware_error(path, message),
-            Told::MessageFailed(message) => self.control.note_fault(path, message),
-        }
-    }
-
     fn fail(&self, state: &mut State<A>, failed: &Failed, now: MonotonicTime) {
         let message = failed.fault.to_string();
-        self.tell_control(state, Told::Failed { message, panicked: failed.panicked });
+        self.context.set_failing(&message);
+        self.tell_control(state, Told::Failed { message: message.clone(), panicked: failed.panicked });
         self.make_safe(state);
-        if let AfterFault::RestartAt(at) = state.slot.fail(failed, now) {
+        let restart = state.slot.fail(failed, now);
+        self.end_motion(MotionEnd::Failed(message));
+        if let AfterFault::RestartAt(at) = restart {
             self.control.wake_at(at, Waker::from(Arc::new(Due(Weak::clone(&self.this)))));
         }
+    }
+
+    /// Reports the end of a motion that the actuator's code has left without an end.
+    fn end_motion(&self, end: MotionEnd) {
+        let newest = self.environment.joints().status(self.declaration.joint);
+        let newest = newest.and_then(|status| status.position.first().copied());
+        self.context.end_current_motion(end, |begin| newest.unwrap_or(begin.initial_position));
     }
 
     /// The disarm callback.
     fn disarm(&self) -> Result<(), Fault> {
         let disarmed = self.alone(|state| {
             if let Some(actuator) = state.slot.running() {
-                return actuator.disarm();
+                let disarmed = caught(|| actuator.disarm()).map_err(|failed| failed.fault);
+                state.may_move = false;
+                match &disarmed {
+                    Err(fault) => self.end_motion(MotionEnd::Failed(fault.to_string())),
+                    // Nothing but another command would have it report an end.
+                    Ok(()) if self.next_update(state).is_none() => self.end_motion(MotionEnd::Stopped),
+                    Ok(()) => {}
+                }
+                return disarmed;
             }
             if state.is_unsafe {
                 return Err(Fault::new("it has failed, could not be made safe then, and cannot be reached"));
@@ -433,113 +326,9 @@ impl<A: Actuator> Inner<A> {
     }
 }
 
-/// Runs when the actuator's backoff is over or an update is due.
-struct Due<A: Actuator>(Weak<Inner<A>>);
-
-impl<A: Actuator> Wake for Due<A> {
-    fn wake(self: Arc<Self>) {
-        if let Some(inner) = self.0.upgrade() {
-            inner.alone(|state| {
-                inner.obey(state);
-                let now = inner.environment.clock().now();
-                inner.restart_if_due(state, now);
-                inner.update_if_due(state, now);
-            });
-        }
-    }
-}
-
-/// The common interface of all running actuators.
-pub trait AnyActuator {
-    /// Its path.
-    fn path(&self) -> &'static str;
-    /// The name of its command type.
-    fn command_name(&self) -> &'static str;
-    /// The topic on which its commands are published.
-    fn any_topic(&self) -> &dyn AnyTopic;
-    /// An `Arc<dyn Accepts<T>>`, where `T` is the type of its commands.
-    #[doc(hidden)]
-    fn accepts(&self) -> Box<dyn Any>;
-    /// In a replay: publishes a command that it carried out; returns `false` if the command has another type.
-    #[doc(hidden)]
-    fn replay(&self, message: &DynamicMessage) -> bool;
-    /// In a replay: creates the topic of its reports at `path`, if `path` is one of them.
-    #[doc(hidden)]
-    fn announce(&self, path: &str);
-    /// Stops the actuator once it is free; returns `false` if it is still busy after `timeout`.
-    #[doc(hidden)]
-    fn terminate(&self, timeout: Duration) -> bool;
-    /// The time at which its code was entered, if a thread is inside.
-    #[doc(hidden)]
-    fn entered_at(&self) -> Option<MonotonicTime>;
-    /// The counts of the actuator.
-    #[doc(hidden)]
-    fn statistics(&self) -> ActuatorStatistics;
-}
-
-impl<A: Actuator> AnyActuator for ActuatorNode<A> {
-    fn path(&self) -> &'static str {
-        self.0.declaration.path
-    }
-
-    fn command_name(&self) -> &'static str {
-        A::Command::NAME
-    }
-
-    fn any_topic(&self) -> &dyn AnyTopic {
-        &self.0.topic
-    }
-
-    fn accepts(&self) -> Box<dyn Any> {
-        let accepts: Arc<dyn Accepts<A::Command>> = Arc::clone(&self.0) as _;
-        Box::new(accepts)
-    }
-
-    fn replay(&self, message: &DynamicMessage) -> bool {
-        message.downcast::<A::Command>().map(|message| self.0.topic.publish(message)).is_some()
-    }
-
-    fn announce(&self, path: &str) {
-        self.0.reports.announce_at(path, &self.0.context, &*self.0.host.0);
-    }
-
-    fn terminate(&self, timeout: Duration) -> bool {
-        let Some(mut state) = enter_within(&self.0.state, timeout) else { return false };
-        let fault = {
-            let _entered = self.0.occupied.enter(self.0.environment.clock());
-            state.slot.retire()
-        };
-        state.slot.stop();
-        drop(state);
-        if let Some(fault) = fault {
-            self.0.control.note_fault(self.0.declaration.path, fault.to_string());
-        }
-        true
-    }
-
-    fn entered_at(&self) -> Option<MonotonicTime> {
-        self.0.occupied.entered_at()
-    }
-
-    fn statistics(&self) -> ActuatorStatistics {
-        self.0.counts.statistics(self.0.declaration.path)
-    }
-}
-
 impl<A: Actuator> fmt::Debug for ActuatorNode<A> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("ActuatorNode").field("path", &self.0.declaration.path).finish_non_exhaustive()
-    }
-}
-
-fn enter_within<S>(state: &Guarded<S>, timeout: Duration) -> Option<Held<'_, S>> {
-    let start = Instant::now();
-    loop {
-        match state.try_enter() {
-            Some(held) => return Some(held),
-            None if start.elapsed() >= timeout => return None,
-            None => std::thread::sleep(Duration::from_millis(1)),
-        }
     }
 }
 

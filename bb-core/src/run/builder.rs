@@ -6,22 +6,22 @@ use super::describe::describe;
 use super::handle::{Configurable, ParameterHandle, Publisher};
 use super::host::{RobotHost, WiredIslands};
 use super::joints::known_joints;
+use super::keeper::{Keeper, Kept};
 use super::machine::Machine;
 use super::remains::Remains;
 use super::running::STOP_WITHIN;
 use super::source::Assembly;
 use super::{Replay, Robot, Running, Simulation, Source, StartError, Supervision};
-use crate::component::replacement::Replacement;
+use crate::component::replacement::{Replacement, Replacements};
 use crate::component::shared::SharedValues;
-use crate::component::{Actuator, Fault, Host, Sensor};
+use crate::component::{Fault, Host};
 use crate::control::{Control, Declared, Parts, SystemTopics};
 use crate::declaration::{ParameterError, ParameterType, ParameterValues};
 use crate::event::ParameterValue;
 use crate::fault::caught;
 use crate::joints::{JointSettings, Joints};
 use crate::journal::{Entry, Event, Journal, Sink};
-use crate::lifecycle::{HostHandle, replacement_of_actuator, replacement_of_sensor};
-use crate::message::nearest::nearest_path;
+use crate::lifecycle::HostHandle;
 use crate::message::{Origin, Stamp};
 use crate::node::{Environment, EnvironmentParts, Mode, SharedNode, contained};
 use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Payloads, Registry, Select, Subscription};
@@ -48,7 +48,8 @@ pub struct Builder<R: Robot> {
     joints: JointSettings,
     journal: Option<Sink>,
     telemetry: Telemetry,
-    replacements: HashMap<&'static str, Replacement>,
+    pub(super) replacements: HashMap<&'static str, Replacement>,
+    pub(super) kept: Option<Kept>,
     node: &'static str,
 }
 
@@ -69,6 +70,7 @@ impl<R: Robot> Builder<R> {
             journal: None,
             telemetry: Telemetry::default(),
             replacements: HashMap::new(),
+            kept: None,
             node: "local",
         }
     }
@@ -99,36 +101,6 @@ impl<R: Robot> Builder<R> {
             return Err(ParameterError { path: declared.path.to_owned(), message });
         }
         self.parameters = parameters;
-        Ok(())
-    }
-
-    /// Replaces the sensor at `path` with one of type `S`: a driver with a simulated sensor, or with one that plays
-    /// back a recording. The path, frame, rate and supervision stay, and components downstream do not notice. Options
-    /// that are declared, set or bound to parameters belong to the replaced driver and are not used. If the
-    /// replacement publishes another payload than the declared one, the robot does not start.
-    ///
-    /// # Errors
-    /// No sensor is at `path`; the error names the nearest one.
-    pub fn replace_sensor<S: Sensor>(&mut self, path: &str, options: S::Options) -> Result<(), Fault>
-    where
-        S::Options: Sync,
-    {
-        let sensors = R::SENSORS.iter().map(|declared| declared.path).filter(|path| path.starts_with("sensor/"));
-        let path = declared_path("sensor", path, sensors)?;
-        self.replacements.insert(path, replacement_of_sensor::<S>(options));
-        Ok(())
-    }
-
-    /// Replaces the actuator at `path`; `A` takes the same type of commands.
-    ///
-    /// # Errors
-    /// No actuator is at `path`; the error names the nearest one.
-    pub fn replace_actuator<A: Actuator>(&mut self, path: &str, options: A::Options) -> Result<(), Fault>
-    where
-        A::Options: Sync,
-    {
-        let path = declared_path("actuator", path, R::ACTUATORS.iter().map(|declared| declared.path))?;
-        self.replacements.insert(path, replacement_of_actuator::<A>(options));
         Ok(())
     }
 
@@ -225,24 +197,31 @@ impl<R: Robot> Builder<R> {
     }
 
     /// Dropping the result stops in order what has started.
-    fn assemble(self, clock: Clock, mode: Mode) -> Result<Assembled<R>, StartError> {
+    fn assemble(mut self, clock: Clock, mode: Mode) -> Result<Assembled<R>, StartError> {
+        let assembled = self.assembled(clock, mode);
+        // The declared options, whether the robot starts or not, and all else that it has not taken over.
+        drop(Remains::of(mode, Mutex::new(self)));
+        assembled
+    }
+
+    fn assembled(&mut self, clock: Clock, mode: Mode) -> Result<Assembled<R>, StartError> {
         // If the robot does not start: dropped after everything declared below.
         let mut _remains = None;
         let origin = Origin { robot: R::NAME, node: self.node };
-        let journal = self.journal.filter(|_| mode != Mode::Replay);
+        let journal = if mode == Mode::Replay { None } else { self.journal.take() };
         let wall_offset_nanos = clock.wall_offset_nanos();
         let journal = journal.map(|sink| Journal::new(sink, wall_offset_nanos));
-        let telemetry = (!self.telemetry.is_empty()).then_some(self.telemetry);
+        let telemetry = (!self.telemetry.is_empty()).then(|| std::mem::take(&mut self.telemetry));
         let nodes: Box<[SharedNode]> =
             R::ESTIMATORS.iter().enumerate().map(|(number, declared)| SharedNode::new(number, declared)).collect();
         let control = Control::new(Parts {
             declared: declared::<R>(),
             mode,
-            topics: self.system,
+            topics: Arc::clone(&self.system),
             clock: clock.clone(),
             origin,
             commands: R::commands(&self.options),
-            parameters: ParameterValues::new(self.parameters),
+            parameters: ParameterValues::new(std::mem::take(&mut self.parameters)),
             supervision: self.supervision,
             nodes: nodes.clone(),
             journal: journal.clone(),
@@ -261,9 +240,11 @@ impl<R: Robot> Builder<R> {
                 return Err(StartError::component(R::NAME, Fault::from(error)));
             }
         };
+        let replacements: Replacements = Arc::new(std::mem::take(&mut self.replacements));
         let parts = EnvironmentParts {
             mode,
             joints: joints.clone(),
+            replacements: Arc::clone(&replacements),
             origin,
             overseer: Arc::new(control.clone()),
             supervision: self.supervision,
@@ -282,7 +263,7 @@ impl<R: Robot> Builder<R> {
             door: environment.door().clone(),
             joints,
             shared: SharedValues::default(),
-            replacements: self.replacements,
+            replacements,
             wiring: Arc::clone(&place),
         });
         control.set_host(&host);
@@ -318,7 +299,8 @@ impl<R: Robot> Builder<R> {
             dropping.wait(Instant::now() + STOP_WITHIN);
             StartError::component(path, fault)
         };
-        let (topics, options) = (self.topics, &self.options);
+        let topics = std::mem::replace(&mut self.topics, R::topics());
+        let options = &self.options;
         let is_replay = mode == Mode::Replay;
         let wired = caught(|| {
             let wiring = Arc::new(R::wire(topics, options, &assembly));
@@ -329,7 +311,8 @@ impl<R: Robot> Builder<R> {
         });
         if let Some(refusal) = environment.take_refusal() {
             let error = abandon(refusal.path, refusal.fault);
-            _remains = Remains::of(mode, (wired.map(|(wiring, _)| wiring).ok(), environment, control.clone()));
+            let wired = wired.map(|(wiring, sources)| (wiring, Mutex::new(sources))).ok();
+            _remains = Remains::of(mode, (wired, environment, control.clone(), host));
             return Err(error);
         }
         // Each component's code is guarded separately, with its path. This is for anything else.
@@ -337,7 +320,7 @@ impl<R: Robot> Builder<R> {
             Ok(wired) => wired,
             Err(failed) => {
                 let error = abandon(R::NAME, failed.fault);
-                _remains = Remains::of(mode, (environment, control.clone()));
+                _remains = Remains::of(mode, (environment, control.clone(), host));
                 return Err(error);
             }
         };
@@ -349,7 +332,8 @@ impl<R: Robot> Builder<R> {
                 && let Err(error) = journal.start()
             {
                 let error = abandon("journal", Fault::from(error));
-                _remains = Remains::of(mode, (wiring, environment, control.clone()));
+                let wired = (wiring, Mutex::new(sources));
+                _remains = Remains::of(mode, (wired, environment, control.clone(), host));
                 return Err(error);
             }
         }
@@ -357,6 +341,17 @@ impl<R: Robot> Builder<R> {
             environment.add_declared_fact(fact);
         }
         let shared = sources.iter().map(|source| source.shared()).collect();
+        let kept = if is_replay { None } else { self.kept.take() };
+        let keeper = match kept.map(|kept| Keeper::start(kept, &control)) {
+            None => None,
+            Some(Ok(keeper)) => Some(keeper),
+            Some(Err(fault)) => {
+                let error = abandon(super::keeper::PATH, fault);
+                let wired = (wiring, Mutex::new(sources));
+                _remains = Remains::of(mode, (wired, environment, control.clone(), host));
+                return Err(error);
+            }
+        };
         let machine = Machine {
             wiring,
             environment,
@@ -365,23 +360,11 @@ impl<R: Robot> Builder<R> {
             sources: Mutex::new(shared),
             has_ended: AtomicBool::new(false),
             last_report: OnceLock::new(),
+            keeper: Mutex::new(keeper),
             remains: None,
         };
         Ok((machine, sources))
     }
-}
-
-/// The declared path that `path` names.
-fn declared_path(
-    kind: &str,
-    path: &str,
-    declared: impl Iterator<Item = &'static str> + Clone,
-) -> Result<&'static str, Fault> {
-    declared.clone().find(|other| *other == path).ok_or_else(|| {
-        let near = nearest_path(path, declared);
-        let hint = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
-        Fault::new(format!("no {kind} is at `{path}`{hint}"))
-    })
 }
 
 fn declared<R: Robot>() -> Declared {

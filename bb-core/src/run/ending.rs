@@ -10,15 +10,15 @@ use crate::journal::Journal;
 use crate::node::Replayed;
 use crate::pubsub::AnyTopic as _;
 use crate::schedule::Lane;
-use std::sync::Arc;
 use std::sync::atomic::Ordering;
+use std::sync::{Arc, PoisonError};
 use std::task::Waker;
 use std::time::{Duration, Instant};
 
 /// How long the journal's sink may take for the last lines.
 const HAND_OVER_WITHIN: Duration = Duration::from_secs(1);
 
-/// How long actuators have to stop, and how long the sink has for the last lines and components to drop their values,
+/// How long actuators have to stop, and how long parameters have to be stored, the sink has for the last lines and components to drop their values,
 /// no matter how much time has been used up before.
 const LEAST_TO_STOP: Duration = Duration::from_millis(100);
 const LEAST_TO_CLOSE: Duration = Duration::from_millis(200);
@@ -89,10 +89,14 @@ impl<R: Robot> Machine<R> {
         }
     }
 
-    /// Ends the journal after the last entry of the control state, tells subscribers that no more will come, drops
+    /// Stores the parameters, ends the journal after the last entry of the control state, ends the subscriptions, drops
     /// the values of disarm callbacks, and makes the last report. The journal's sink and these drops may take until
     /// `deadline`.
     pub(super) fn end(&self, deadline: Instant) {
+        let keeper = self.keeper.lock().unwrap_or_else(PoisonError::into_inner).take();
+        if let Some(keeper) = keeper {
+            keeper.finish(&self.control, deadline.max(Instant::now() + LEAST_TO_CLOSE));
+        }
         let summary = self.control.end(|summary| {
             if let Some(journal) = self.environment.journal() {
                 journal.close();

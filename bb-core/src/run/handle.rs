@@ -5,7 +5,8 @@ use crate::component::{Actuator, Command, Estimator, Sensor, Service};
 use crate::control::SystemTopics;
 use crate::declaration::ParameterType;
 use crate::event::{
-    CommandEvent, ComponentFault, HealthTransition, ParameterChange, SafetyError, SafetyTransition, StateTransition,
+    CommandEvent, ComponentFault, HealthTransition, ParameterChange, ParameterValue, SafetyError, SafetyTransition,
+    StateTransition,
 };
 use crate::journal::JournalLine;
 use crate::message::{Frame, Payload, Stamp, Stamped};
@@ -203,6 +204,11 @@ impl<R: Robot, C: Command> Configurable<R> for CommandHandle<R, C> {
 }
 
 impl<R: Robot, T: ParameterType> ParameterHandle<R, T> {
+    /// A new value for it, for [`Live::set_parameters`](crate::Live::set_parameters).
+    pub fn to(self, value: impl Into<T>) -> (&'static str, ParameterValue) {
+        (self.path, value.into().into_value())
+    }
+
     pub(super) fn number(self) -> usize {
         self.number
     }

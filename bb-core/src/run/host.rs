@@ -2,11 +2,12 @@
 
 use super::Robot;
 use super::actuator::AnyActuator;
-use crate::component::replacement::Replacement;
+use super::discovery::{discover, graphed};
+use crate::component::replacement::{Replacement, Replacements};
 use crate::component::shared::SharedValues;
-use crate::component::{CommandInfo, DisarmHook, DynamicExecution, Guardian, Host, Permit};
+use crate::component::{CommandInfo, Description, DisarmHook, DynamicExecution, Guardian, Host, Permit};
 use crate::control::{Control, Islands, Wired};
-use crate::declaration::ParameterError;
+use crate::declaration::{ParameterError, graph};
 use crate::event::{ArmError, DisarmError, ParameterValue, Safety};
 use crate::fault::Fault;
 use crate::joints::Joints;
@@ -16,9 +17,8 @@ use crate::node::{NodeEntry, Overseer};
 use crate::pubsub::{AnyTopic, DynamicMessage, PathChange, Registry};
 use crate::schedule::Door;
 use crate::time::{Clock, MonotonicTime};
-use crate::topology::Topology;
+use crate::topology::{GraphFormat, Topology};
 use std::any::Any;
-use std::collections::HashMap;
 use std::sync::{Arc, OnceLock, Weak};
 
 /// Weak, since components with a bus are part of the wiring.
@@ -28,13 +28,17 @@ pub(super) struct RobotHost<R: Robot> {
     pub(super) door: Door,
     pub(super) joints: Joints,
     pub(super) shared: SharedValues,
-    pub(super) replacements: HashMap<&'static str, Replacement>,
+    pub(super) replacements: Replacements,
     pub(super) wiring: Arc<OnceLock<Weak<R::Wiring>>>,
 }
 
 impl<R: Robot> RobotHost<R> {
     fn wiring(&self) -> Option<Arc<R::Wiring>> {
         self.wiring.get()?.upgrade()
+    }
+
+    fn is_replaced(&self, path: &str) -> bool {
+        self.replacements.contains_key(path)
     }
 
     /// Writes a line, if there is a journal.
@@ -105,8 +109,12 @@ impl<R: Robot> Host for RobotHost<R> {
         self.control.parameter_at(path)
     }
 
-    fn set_parameter(&self, path: &str, value: ParameterValue, permit: &Permit) -> Result<(), ParameterError> {
-        self.control.set_parameter_at(path, value, permit)
+    fn set_parameters(
+        &self,
+        changes: Vec<(String, ParameterValue)>,
+        permit: &Permit,
+    ) -> Result<(), ParameterError> {
+        self.control.set_parameters_at(changes, permit)
     }
 
     fn with_topics(&self, call: &mut dyn FnMut(&[&dyn AnyTopic])) {
@@ -168,6 +176,22 @@ impl<R: Robot> Host for RobotHost<R> {
 
     fn commands(&self) -> Vec<CommandInfo> {
         self.control.infos()
+    }
+
+    fn description(&self) -> Description {
+        let mut description = None;
+        self.with_topics(&mut |topics| {
+            let mut all = topics.to_vec();
+            let own = self.registry().topics();
+            all.extend(own.iter().map(|topic| topic.as_ref()));
+            let values = self.control.parameters();
+            description = Some(discover::<R>(&all, values.all(), self.commands(), &|path| self.is_replaced(path)));
+        });
+        description.unwrap_or_else(|| discover::<R>(&[], &[], Vec::new(), &|_| false))
+    }
+
+    fn graph(&self, format: GraphFormat) -> String {
+        graph(format, &graphed::<R>(), &|path| self.is_replaced(path))
     }
 
     fn start_command(&self, path: &str, arguments: &str, permit: &Permit) -> Result<DynamicExecution, Fault> {

@@ -1,5 +1,5 @@
-//! What the joint store knows of a robot: the frames of its components, and the estimator inputs that span moving
-//! joints.
+//! The part of a robot that the joint store needs: the frames of its components, and the estimator inputs that span
+//! moving joints.
 
 use super::Robot;
 use crate::declaration::EstimatorDeclaration;

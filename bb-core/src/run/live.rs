@@ -7,7 +7,7 @@ use super::{ActuatorError, Bus, Report, Robot, SensorHandle};
 use crate::component::{Actuator, Command, Fault, HandleCall, HandleCast, Permit, Sensor};
 use crate::control::Execution;
 use crate::declaration::{ParameterError, ParameterType};
-use crate::event::{ArmError, DisarmError, Refusal, Safety};
+use crate::event::{ArmError, DisarmError, ParameterValue, Refusal, Safety};
 use crate::joints::Joints;
 use crate::pubsub::{DynamicSubscription, Overflow, Payloads, Select, Subscription};
 use crate::time::{Clock, MonotonicTime};
@@ -47,7 +47,7 @@ impl<R: Robot> Live<R> {
         self.subscribe_with(publisher, Overflow::default())
     }
 
-    /// Subscribes from now on; `overflow` says what happens when the subscriber is slow.
+    /// Subscribes from now on; `overflow` determines what happens if the subscriber is slow.
     pub fn subscribe_with<P: Publisher<R>>(&self, publisher: P, overflow: Overflow) -> Subscription<P::Payload> {
         self.0.subscribe(publisher, overflow)
     }
@@ -93,7 +93,7 @@ impl<R: Robot> Live<R> {
     {
         self.settled(|machine| {
             machine.cast(estimator, request)?;
-            // On virtual time, nothing else would take it before the simulation goes on.
+            // On virtual time, nothing else would process it before the simulation continues.
             machine.environment.drain_posted();
             Ok(())
         })
@@ -138,6 +138,34 @@ impl<R: Robot> Live<R> {
         value: T,
     ) -> Result<(), ParameterError> {
         self.settled(|machine| machine.set_parameter(parameter, value))
+    }
+
+    /// Sets parameters all at once: no reader sees a mixture of new and old values. If one of the values
+    /// is not accepted, none is set. [`ParameterHandle::to`] checks the type of a value when it is compiled; a path may also be
+    /// written as text.
+    ///
+    /// ```
+    /// # use bb_core::prelude::*;
+    /// # robot! { robot Rig; parameters { gains { kp: f64 = 1.0, range: 0.0..=10.0; ki: f64 = 0.0; } } link base; }
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let rig = Rig::builder().simulate()?;
+    /// rig.set_parameters([rig::param::gains::kp.to(2.0), rig::param::gains::ki.to(0.5)])?;
+    /// // The first is out of range: the second is not set either.
+    /// assert!(rig.set_parameters([("param/gains/kp", 99.0.into()), ("param/gains/ki", 0.1.into())]).is_err());
+    /// assert_eq!((rig.parameter(rig::param::gains::kp), rig.parameter(rig::param::gains::ki)), (2.0, 0.5));
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// The first value that is not accepted: no such parameter, another type, out of its range, refused by a component that is
+    /// bound to it, or set twice.
+    pub fn set_parameters<P: Into<String>>(
+        &self,
+        values: impl IntoIterator<Item = (P, ParameterValue)>,
+    ) -> Result<(), ParameterError> {
+        let changes = values.into_iter().map(|(path, value)| (path.into(), value)).collect();
+        self.settled(|machine| machine.control.set_parameters_at(changes, &Permit::UNLIMITED))
     }
 
     /// The operational state: `disarmed`, `idle`, `executing`, or a declared one.

@@ -1,15 +1,16 @@
 //! What all kinds of run share: the wiring and the operations on it.
 
 use super::handle::{ActuatorHandle, CommandHandle, ParameterHandle, Publisher};
+use super::keeper::Keeper;
 use super::remains::Remains;
 use super::source::SharedSource;
 use super::visit::{Visit, Visitable};
 use super::{ActuatorError, Report, Robot, SensorHandle};
 use crate::component::{Actuator, Bus, Command, Fault, HandleCall, HandleCast, Host, Permit, RequestCodec, Sensor};
-use crate::control::{Control, Execution, Summary};
+use crate::control::{Control, Execution, ReportedFault, Summary};
 use crate::declaration::{ParameterError, ParameterType};
-use crate::event::{ComponentFault, Refusal};
-use crate::journal::RequestKind;
+use crate::event::Refusal;
+use crate::journal::{ParameterEntry, RequestKind};
 use crate::message::Stamp;
 use crate::node::{
     AnyIsland, CallError, Environment, Node, NodeEntry, Turn, contained_outside, know_calls, know_casts,
@@ -29,6 +30,8 @@ pub(super) struct Machine<R: Robot> {
     pub(super) has_ended: AtomicBool,
     /// Its report at the end.
     pub(super) last_report: OnceLock<Report>,
+    /// Taken at the end.
+    pub(super) keeper: Mutex<Option<Keeper>>,
     /// Set in `drop`. The last field, since it is dropped last.
     pub(super) remains: Option<Remains>,
 }
@@ -81,6 +84,7 @@ impl<R: Robot> Machine<R> {
     where
         V::Estimator: HandleCall<Q>,
     {
+        self.check_requests(estimator.number())?;
         know_calls::<V::Estimator, Q>();
         let recorded = RequestCodec::record(RequestKind::Call, <V::Estimator as HandleCall<Q>>::RECORD, &request);
         let is_unrecorded = recorded.bytes.is_none();
@@ -112,6 +116,7 @@ impl<R: Robot> Machine<R> {
     where
         V::Estimator: HandleCast<Q>,
     {
+        self.check_requests(estimator.number())?;
         know_casts::<V::Estimator, Q>();
         let node = self.environment.node(estimator.number());
         let path = node.declaration().path;
@@ -130,6 +135,15 @@ impl<R: Robot> Machine<R> {
             island.post(&self.wiring, self.environment.clock().now(), estimator.number(), entry);
         }
         Ok(())
+    }
+
+    /// A replacement does not implement the requests of the estimator with that number.
+    fn check_requests(&self, estimator: usize) -> Result<(), Fault> {
+        let path = self.environment.node(estimator).declaration().path;
+        match self.environment.replacement(path) {
+            Some(_) => Err(Fault::new(format!("{path} is replaced, and its replacement takes no requests"))),
+            None => Ok(()),
+        }
     }
 
     pub(super) fn command<C: Command>(
@@ -157,7 +171,8 @@ impl<R: Robot> Machine<R> {
         parameter: ParameterHandle<R, T>,
         value: T,
     ) -> Result<(), ParameterError> {
-        self.control.set_parameter(parameter.number(), value.into_value(), &Permit::UNLIMITED)
+        let entry = ParameterEntry { parameter: parameter.number(), value: value.into_value() };
+        self.control.set_parameters(vec![entry], &Permit::UNLIMITED)
     }
 
     pub(super) fn shared_sources(&self) -> Vec<SharedSource> {
@@ -226,9 +241,9 @@ impl<R: Robot> Machine<R> {
     }
 
     /// Records a fault of a component that did not return.
-    pub(super) fn fault(&self, path: &'static str, message: String) -> ComponentFault {
-        self.control.note_fault(path, message.clone());
-        ComponentFault { path, message }
+    pub(super) fn fault(&self, path: &'static str, message: String) -> ReportedFault {
+        let now = self.control.note_fault_now(path, message.clone());
+        ReportedFault { path, message, count: 1, first_time: now, last_time: now }
     }
 }
 

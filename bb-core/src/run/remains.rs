@@ -17,7 +17,7 @@ pub(super) enum Remains {
     /// On a thread of its own, which is waited for, but not forever.
     Apart {
         begin: Option<Sender<()>>,
-        /// A lock that nobody contends: a receiver alone cannot be shared.
+        /// An uncontended lock, since a receiver alone cannot be shared.
         dropped: Mutex<Receiver<()>>,
     },
 }

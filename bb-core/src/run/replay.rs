@@ -1,16 +1,21 @@
 //! A run from a journal.
 
+mod comparing;
+mod cut;
+mod publishing;
+
+use self::publishing::handed_out;
 use super::describe::difference;
 use super::machine::Machine;
 use super::visit::Visitable;
 use super::{Live, Report, Robot};
 use crate::component::{HandleCall, HandleCast};
 use crate::declaration::ParameterValues;
-use crate::fault::guarded;
+use crate::fault::discard;
 use crate::joints::PlacedInput;
-use crate::journal::{Callback, Entry, Event, Publishers, Recorded, Request, decoded};
+use crate::journal::{Callback, Entry, Event, Publishers, Request};
 use crate::node::{Key, Missing, NodeEntry, Replayed, contained, know_calls, know_casts};
-use crate::pubsub::{AnyTopic, DynamicMessage};
+use crate::pubsub::AnyTopic;
 use crate::time::MonotonicTime;
 use std::collections::{HashMap, VecDeque};
 use std::fmt;
@@ -162,53 +167,6 @@ impl<R: Robot> Replay<R> {
         Ok(())
     }
 
-    /// Whether a line still lacks the durations of its callbacks, the places of its inputs, or the outputs emitted in
-    /// reply to a request.
-    fn is_open(&self, entry: &Entry) -> bool {
-        let Some(number) = self.island_of(&entry.event) else { return false };
-        if let Event::Request { request: Request { bytes: None, .. }, .. } = &entry.event
-            && self.next_of(number, 1).is_none()
-        {
-            return true;
-        }
-        self.has_not_ended(number, entry.number)
-    }
-
-    /// Whether the lines are missing that an island writes when that line's turn has ended.
-    fn has_not_ended(&self, island: usize, line: u64) -> bool {
-        let island = self.live.0.island(island);
-        let is_measured = island.is_some_and(|island| island.declaration().is_measured);
-        let routes = self.live.0.environment.joints().routes();
-        let is_placed = island.is_some_and(|island| routes.has_any(island.estimators()));
-        (is_measured && !self.measured.contains_key(&line)) || (is_placed && !self.placed.contains_key(&line))
-    }
-
-    /// Prepares the journal's data for the turn of a line; returns false if the journal ends before that turn does.
-    fn prepare(&mut self, island: usize, line: u64) -> bool {
-        let is_whole = !self.has_not_ended(island, line);
-        let environment = &self.live.0.environment;
-        for estimator in self.live.0.island(island).map_or(&[][..], |island| island.estimators()) {
-            environment.node(*estimator).begin_replayed_turn();
-        }
-        for Callback { estimator, nanos } in self.measured.remove(&line).unwrap_or_default() {
-            environment.node(estimator).replay_latency(nanos);
-        }
-        for placed in self.placed.remove(&line).unwrap_or_default() {
-            environment.node(placed.estimator).replay_placement(placed);
-        }
-        is_whole
-    }
-
-    /// The next waiting line, from `first` on, that an island processed, or wrote while processing.
-    fn next_of(&self, island: usize, first: usize) -> Option<usize> {
-        let is_of_island = |event: &Event| match event {
-            Event::Output { island: other, .. } => *other == island,
-            Event::Emission { publisher, .. } => self.emitter(*publisher).is_some_and(|(_, other)| other == island),
-            other => self.island_of(other) == Some(island),
-        };
-        (first..self.waiting.len()).find(|&index| is_of_island(&self.waiting[index].event))
-    }
-
     /// The estimator that a publisher belongs to, and its island.
     fn emitter(&self, publisher: usize) -> Option<(usize, usize)> {
         let path = self.path_of(publisher);
@@ -275,6 +233,7 @@ impl<R: Robot> Replay<R> {
                 machine.environment.set_replayed_line(number);
                 let mut is_fed = true;
                 handed_out(|| is_fed = R::feed(&machine.wiring, publisher, &message, time));
+                discard(message);
                 if !is_fed {
                     return Err("the robot has no such sensor, or one of another payload".to_owned());
                 }
@@ -327,7 +286,7 @@ impl<R: Robot> Replay<R> {
             }
             Event::Noted { path, message } => control.note_fault(path, message),
             Event::HardwareError { path, message } => control.note_hardware_error(path, message),
-            Event::Parameter { parameter, value } => control.replay_parameter(parameter, value),
+            Event::Parameters { changes } => control.replay_parameters(changes),
             Event::Command { command } => control.replay_command(command),
             Event::Ended { execution, end } => control.replay_end(execution, end),
             Event::Cancel { execution } => control.cancel(execution),
@@ -422,110 +381,9 @@ impl<R: Robot> Replay<R> {
         self.island(declared.island, time, Replayed::Node(estimator, NodeEntry::Cast { request, handle: None }))
     }
 
-    /// Compares an output with the recorded one.
-    fn compare(&self, island: usize, publisher: usize, checksum: u64) -> Result<(), String> {
-        let path = self.path_of(publisher);
-        match self.live.0.environment.replayed().take(island) {
-            Some(again) if again == (publisher, checksum) => Ok(()),
-            Some((other, _)) if other == publisher => Err(format!(
-                "`{path}` emits another message than it did: the algorithm is not deterministic{}",
-                self.hint(island)
-            )),
-            Some((other, _)) => {
-                let other = self.path_of(other);
-                Err(format!("`{path}` emitted a message then, and `{other}` does now{}", self.hint(island)))
-            }
-            None => Err(format!("`{path}` emitted a message then, and does not now{}", self.hint(island))),
-        }
-    }
-
-    /// Compares the outputs of the last turn with those in the lines that follow.
-    fn compare_outputs_of(&self, island: usize) -> Result<(), String> {
-        let mut next = self.next_of(island, 0);
-        while let Some(index) = next
-            && let Event::Output { publisher, checksum, .. } = self.waiting[index].event
-        {
-            self.compare(island, publisher, checksum)?;
-            next = self.next_of(island, index + 1);
-        }
-        self.no_more_outputs_of(island)
-    }
-
-    fn no_more_outputs_of(&self, island: usize) -> Result<(), String> {
-        let Some((publisher, _)) = self.live.0.environment.replayed().take(island) else { return Ok(()) };
-        Err(format!("`{}` emits a message more than it did{}", self.path_of(publisher), self.hint(island)))
-    }
-
-    /// What may explain a difference.
-    fn hint(&self, island: usize) -> String {
-        let Some((line, name)) = self.unrecorded.get(&island) else { return String::new() };
-        format!(
-            "; or the request of type `{name}` in line {line} has changed it, which the journal does not hold: set \
-             `RECORD` for it"
-        )
-    }
-
-    /// Publishes an estimator's output in reply to a request that the journal does not hold.
-    fn emit(&self, publisher: usize, is_first: bool, time: MonotonicTime, message: Recorded) -> Result<(), String> {
-        let message = self.message(publisher, message)?;
-        let (number, island) = self.emitter(publisher).ok_or("the robot has no such publisher")?;
-        if is_first {
-            self.live.0.environment.node(number).counters().emitted.increment();
-        }
-        self.island(island, time, Replayed::Emission(&message))?;
-        // It matches the journal.
-        let _ = self.live.0.environment.replayed().take(island);
-        Ok(())
-    }
-
-    fn actuated(&self, number: usize, message: Recorded) -> Result<(), String> {
-        let actuators = R::all_actuators(&self.live.0.wiring);
-        let actuator = actuators.get(number).ok_or("the robot has no such actuator")?;
-        let message = decoded(actuator.any_topic(), message).map_err(|error| error.to_string())?;
-        let mut is_known = true;
-        handed_out(|| is_known = actuator.replay(&message));
-        if is_known { Ok(()) } else { Err("the actuator takes other commands".to_owned()) }
-    }
-
-    fn publish_own(&self, path: &'static str, message: Recorded) -> Result<(), String> {
-        let registry = &self.live.0.control.topics().registry;
-        if !registry.has(path) {
-            R::all_actuators(&self.live.0.wiring).iter().for_each(|actuator| actuator.announce(path));
-        }
-        let topics = registry.topics();
-        let topic = match (topics.iter().find(|topic| topic.path() == path), &message) {
-            (Some(topic), _) => Arc::clone(topic),
-            (None, Recorded::Message(message)) => registry.topic_of(message).map_err(|error| error.to_string())?,
-            (None, Recorded::Bytes(_)) => {
-                return Err(format!(
-                    "something was published at `{path}`, a path made at run time, and the payload is not known: make a \
-                     publisher there first, `replay.bus().publisher::<T>(\"{path}\")`"
-                ));
-            }
-        };
-        let message = decoded(&*topic, message).map_err(|error| error.to_string())?;
-        let mut is_known = true;
-        handed_out(|| is_known = topic.publish_dynamic(&message));
-        if is_known { Ok(()) } else { Err(format!("`{path}` has another payload")) }
-    }
-
-    fn message(&self, publisher: usize, message: Recorded) -> Result<DynamicMessage, String> {
-        let topics = R::all_topics(R::wired_topics(&self.live.0.wiring));
-        let topic = topics.get(publisher).ok_or("the robot has no such publisher")?;
-        decoded(*topic, message).map_err(|error| error.to_string())
-    }
-
     fn path_of(&self, publisher: usize) -> &'static str {
         let topics = R::all_topics(R::wired_topics(&self.live.0.wiring));
         topics.get(publisher).map_or("?", |topic| topic.path())
-    }
-}
-
-/// Hands a recorded message to the current subscribers. If its code panics for one of them, the message and its
-/// consequences are still the same.
-fn handed_out(hand_out: impl FnOnce()) {
-    if let Err(fault) = guarded(hand_out) {
-        tracing::error!(%fault, "a recorded message failed where it was copied");
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::SourceStatistics;
 use super::actuator::ActuatorStatistics;
-use crate::control::CommandStatistics;
+use crate::control::{CommandStatistics, ReportedFault};
 use crate::event::{ComponentFault, Safety};
 use crate::joints::{JointRefusal, JointStatistics};
 use crate::message::LimitedQuantity;
@@ -30,9 +30,10 @@ pub struct Report {
     pub state: &'static str,
     /// The safety state.
     pub safety: Safety,
-    /// Components that have failed: the newest 256 faults, in order.
-    pub faults: Vec<ComponentFault>,
-    /// How many faults there were.
+    /// Components that have failed: the newest 256 faults, in the order in which they occurred last. A fault that a component
+    /// repeats is listed once, with its count.
+    pub faults: Vec<ReportedFault>,
+    /// How many faults there were, with those that were repeated.
     pub all_faults: u64,
 }
 
@@ -52,7 +53,7 @@ impl Report {
         self.actuators.iter().find(|actuator| actuator.path == path)
     }
 
-    pub(super) fn add_fault(&mut self, fault: ComponentFault) {
+    pub(super) fn add_fault(&mut self, fault: ReportedFault) {
         self.faults.push(fault);
         self.all_faults += 1;
     }
@@ -63,7 +64,7 @@ impl Report {
     /// The first fault that is kept.
     pub fn ok(self) -> Result<Self, ComponentFault> {
         match self.faults.first() {
-            Some(fault) => Err(fault.clone()),
+            Some(fault) => Err(fault.clone().into()),
             None => Ok(self),
         }
     }

@@ -58,7 +58,7 @@ impl<R: Robot> Running<R> {
     }
 
     /// Disarms the robot and cancels commands at once, even if code hangs. Then stops sensors and services, then
-    /// estimators and actuators; tells the subscribers, and returns the last report. Code that has not returned 5 s
+    /// estimators and actuators; ends the subscriptions, and returns the last report. Code that has not returned 5 s
     /// after the call is left running and reported as a fault.
     pub fn stop(mut self) -> Report {
         self.shut_down();
@@ -74,8 +74,11 @@ impl<R: Robot> Running<R> {
         machine.control.begin_stop();
         machine.control.wait_until_disarmed();
         let mut deadline = (start + STOP_WITHIN).max(Instant::now() + GRACE);
-        if machine.islands().any(|island| island.is_inside(&machine.wiring)) {
-            // An estimator's message has woken the caller: its island cannot stop before this call returns.
+        if machine.islands().any(|island| island.is_inside(&machine.wiring))
+            || machine.control.is_waiting_for_caller()
+        {
+            // An estimator's message has woken the caller, or an actuator or a disarm callback has called: they cannot stop before
+            // this call returns.
             deadline = Instant::now() + GRACE;
         }
         for (path, thread) in std::mem::take(&mut self.sources) {

@@ -15,11 +15,13 @@
 
 mod arguments;
 mod assign;
+mod environment;
 mod error;
 #[cfg(feature = "toml")]
 mod file;
 mod list;
 mod schema;
+mod stored;
 
 pub use error::{SettingProblem, SettingsError};
 pub use list::SettingsList;
@@ -39,7 +41,7 @@ impl<R: Robot> Builder<R> {
         assign::assign(self, &[Assignment::from_text(Place::Code, path, value)])
     }
 
-    /// Sets what a TOML file says. If anything in it is wrong, nothing is set.
+    /// Applies the settings of a TOML file: all of them, or none if any is wrong.
     ///
     /// # Errors
     /// All problems, each with its line and column.

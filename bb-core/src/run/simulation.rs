@@ -110,7 +110,7 @@ impl<R: Robot> Simulation<R> {
         self.live.0.environment.node(estimator.number()).pretend_latency(nanos);
     }
 
-    /// Stops sensors, then estimators, tells the subscribers, and returns the last report.
+    /// Stops sensors, then estimators, ends the subscriptions, and returns the last report.
     pub fn stop(mut self) -> Report {
         self.shut_down();
         self.live.0.report()
@@ -203,10 +203,10 @@ impl<R: Robot> Simulation<R> {
         machine.control.begin_stop();
         machine.control.stop_signal().set();
         self.stop_sources();
-        machine.close_door(std::time::Instant::now() + super::running::STOP_WITHIN);
         // One thread runs all of this, so nothing can be busy elsewhere.
         machine.retire_quietly();
         machine.terminate_actuators(std::time::Instant::now());
+        machine.close_door(std::time::Instant::now() + super::running::STOP_WITHIN);
         machine.settle();
         machine.end(std::time::Instant::now() + super::running::STOP_WITHIN);
     }

@@ -1,8 +1,12 @@
 //! Sensors, controllers and bridges, which are called at a rate or at the times they ask for: when each is called,
 //! where its readings go, and how it is restarted.
 
+mod shared;
+
+use self::shared::Order;
+pub(super) use self::shared::SharedSource;
+pub use self::shared::SourceStatistics;
 use super::Robot;
-use super::occupied::{Entered, Occupied};
 use crate::component::{Binding, Next};
 use crate::control::{ComponentOrder, Control};
 use crate::declaration::SensorDeclaration;
@@ -12,9 +16,7 @@ use crate::message::{Stamp, Stamped};
 use crate::node::{BindTarget, Environment, blame};
 use crate::time::{Clock, MonotonicTime};
 use std::fmt;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::thread::Thread;
 
 /// Shared state from which components are created.
 #[derive(Clone, Debug)]
@@ -35,7 +37,7 @@ impl Assembly {
 pub trait Source: Send {
     /// Its path.
     fn path(&self) -> &'static str;
-    /// When it wants its first reading, if it says so.
+    /// The time of its first reading, if it asks for one.
     fn starts_at(&mut self) -> Option<MonotonicTime>;
     /// Starts it: its first reading is due at once, or at the time it asks for.
     fn begin(&mut self);
@@ -50,114 +52,6 @@ pub trait Source: Send {
     /// Its state shared with other threads.
     #[doc(hidden)]
     fn shared(&self) -> SharedSource;
-}
-
-/// The part of a source that other threads reach. Clones share it.
-#[derive(Clone, Debug)]
-pub struct SharedSource(Arc<Shared>);
-
-#[derive(Debug)]
-struct Shared {
-    path: &'static str,
-    /// Whether it is read at a rate; otherwise it may wait for its device.
-    has_rate: bool,
-    inbox: Mutex<Inbox>,
-    readings: AtomicU64,
-    skipped: AtomicU64,
-    restarts: AtomicU64,
-    occupied: Occupied,
-    stopped: Mutex<Option<String>>,
-}
-
-#[derive(Debug, Default)]
-struct Inbox {
-    /// Each kind at most once.
-    orders: Vec<Order>,
-    thread: Option<Thread>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Order {
-    Options,
-    Restart,
-    GiveUp,
-}
-
-/// What a sensor or a service has done since the start.
-#[derive(Clone, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub struct SourceStatistics {
-    /// Its path.
-    pub path: &'static str,
-    /// How often it was read.
-    pub readings: u64,
-    /// Readings at its rate that it missed because it, or a component downstream, took too long.
-    pub skipped: u64,
-    /// How often it was restarted.
-    pub restarts: u64,
-    /// Why it does not run, if it does not.
-    pub stopped: Option<String>,
-}
-
-impl SharedSource {
-    fn new(path: &'static str, has_rate: bool) -> Self {
-        Self(Arc::new(Shared {
-            path,
-            has_rate,
-            inbox: Mutex::default(),
-            readings: AtomicU64::new(0),
-            skipped: AtomicU64::new(0),
-            restarts: AtomicU64::new(0),
-            occupied: Occupied::new(),
-            stopped: Mutex::default(),
-        }))
-    }
-
-    fn tell(&self, order: Order) {
-        let mut inbox = lock(&self.0.inbox);
-        if !inbox.orders.contains(&order) {
-            inbox.orders.push(order);
-        }
-        if let Some(thread) = &inbox.thread {
-            thread.unpark();
-        }
-    }
-
-    fn take_orders(&self) -> Vec<Order> {
-        std::mem::take(&mut lock(&self.0.inbox).orders)
-    }
-
-    /// The calling thread reads it from now on.
-    pub(super) fn adopt(&self) {
-        lock(&self.0.inbox).thread = Some(std::thread::current());
-    }
-
-    pub(super) fn path(&self) -> &'static str {
-        self.0.path
-    }
-
-    pub(super) fn has_rate(&self) -> bool {
-        self.0.has_rate
-    }
-
-    /// When its code was entered, if it is inside.
-    pub(super) fn entered_at(&self) -> Option<MonotonicTime> {
-        self.0.occupied.entered_at()
-    }
-
-    fn enter(&self, clock: &Clock) -> Entered<'_> {
-        self.0.occupied.enter(clock)
-    }
-
-    pub(super) fn statistics(&self) -> SourceStatistics {
-        SourceStatistics {
-            path: self.0.path,
-            readings: self.0.readings.load(Ordering::Relaxed),
-            skipped: self.0.skipped.load(Ordering::Relaxed),
-            restarts: self.0.restarts.load(Ordering::Relaxed),
-            stopped: lock(&self.0.stopped).clone(),
-        }
-    }
 }
 
 /// A next reading of a real sensor further ahead is a mistake: a day.
@@ -247,11 +141,11 @@ where
         self.environment.clock()
     }
 
-    /// Reads it once, publishes the reading, and says when to read it next; `next` is set to the time it asked for.
+    /// Takes one reading, publishes it, and returns when to take the next one; `next` is set to the time it asked for.
     fn read(&mut self, due: MonotonicTime, next: &mut Next) -> Result<Option<MonotonicTime>, Fault> {
         let now = self.clock().now();
         let Some(component) = self.slot.running() else { return Ok(None) };
-        self.shared.0.readings.fetch_add(1, Ordering::Relaxed);
+        self.shared.count_reading();
         let mut reading = {
             let _entered = self.shared.enter(self.environment.clock());
             component.read(now)?
@@ -293,7 +187,7 @@ where
             (Next::At(time), _) => time.max(due),
             (Next::AtRate, Some(period)) => {
                 let (next, skipped) = next_on_grid(due, period, now);
-                self.shared.0.skipped.fetch_add(skipped, Ordering::Relaxed);
+                self.shared.count_skipped(skipped);
                 next
             }
             (Next::AtRate, None) if !is_virtual => now,
@@ -314,7 +208,7 @@ where
     fn fail(&mut self, failed: Failed) {
         let SensorDeclaration { path, supervisor, .. } = *self.declaration;
         let message = failed.fault.to_string();
-        *lock(&self.shared.0.stopped) = Some(message.clone());
+        self.shared.note_stop(message.clone());
         self.due = match self.slot.fail(&failed, self.environment.clock().now()) {
             AfterFault::RestartAt(at) => Some(at),
             AfterFault::Stopped => None,
@@ -338,8 +232,7 @@ where
         match made {
             Ok(()) => {
                 tracing::info!(component = path, "restarted");
-                self.shared.0.restarts.fetch_add(1, Ordering::Relaxed);
-                *lock(&self.shared.0.stopped) = None;
+                self.shared.note_restart();
                 self.begin();
             }
             Err(failed) => self.fail(failed),
@@ -437,7 +330,7 @@ where
         let mut next = Next::AtRate;
         let read = match caught(|| self.read(due, &mut next)) {
             Ok(read) => Ok(read),
-            // If somebody else's code has failed, the source has still given its reading.
+            // If another component's code has failed, the reading of this source still counts.
             Err(failed) => blame(&self.environment, failed)
                 .and_then(|()| self.next_due(next, due, self.clock().now()).map_err(Failed::from)),
         };

@@ -1,6 +1,7 @@
 //! Enforces the limits of an actuator's joint on its commands, and counts how often this happens.
 
 use crate::component::ActuatorContext;
+use crate::fault::{Fault, caught};
 use crate::joints::Joints;
 use crate::message::{Exceeded, JointBounds, LimitedQuantity, OutOfBounds, Payload};
 use std::fmt;
@@ -40,44 +41,41 @@ impl ActuatorStatistics {
     }
 }
 
+/// Why a command is not carried out.
+pub(super) enum NotLimited {
+    /// It is the first one if `is_first`.
+    OutOfBounds { out: OutOfBounds, is_first: bool },
+    /// The payload's code has panicked.
+    Failed(Fault),
+}
+
 impl Counts {
-    /// Clamps a command to the limits of its joint.
+    /// Clamps a command to the limits of its joint. The payload's code may panic. Returns the quantities whose limit was
+    /// exceeded for the first time.
     pub(super) fn limit<T: Payload>(
         &self,
         command: &mut T,
         context: &ActuatorContext,
         joints: &Joints,
-    ) -> Result<(), OutOfBounds> {
+    ) -> Result<Vec<LimitedQuantity>, NotLimited> {
         if !T::COMMANDS_JOINT {
-            return Ok(());
+            return Ok(Vec::new());
         }
-        let (path, joint) = (context.path(), context.joint());
-        match command.limit_command(&bounds(context, joints)) {
-            Ok(exceeded) => {
-                self.count(exceeded, path, joint);
-                Ok(())
+        let bounds = bounds(context, joints);
+        match caught(|| Ok(command.limit_command(&bounds))) {
+            Ok(Ok(exceeded)) => Ok(self.count(exceeded)),
+            Ok(Err(out)) => {
+                let is_first = self.refused[out.quantity as usize].fetch_add(1, Ordering::Relaxed) == 0;
+                Err(NotLimited::OutOfBounds { out, is_first })
             }
-            Err(out) => {
-                if self.refused[out.quantity as usize].fetch_add(1, Ordering::Relaxed) == 0 {
-                    tracing::warn!(component = path, joint, reason = %out, "a command was refused");
-                }
-                Err(out)
-            }
+            Err(failed) => Err(NotLimited::Failed(failed.fault)),
         }
     }
 
-    fn count(&self, exceeded: Exceeded, path: &'static str, joint: &'static str) {
-        for quantity in exceeded.quantities() {
-            if self.limited[quantity as usize].fetch_add(1, Ordering::Relaxed) == 0 {
-                let quantity = quantity.name();
-                tracing::warn!(
-                    component = path,
-                    joint,
-                    quantity,
-                    "a command exceeded a limit and was brought back to it"
-                );
-            }
-        }
+    fn count(&self, exceeded: Exceeded) -> Vec<LimitedQuantity> {
+        let is_first =
+            |quantity: &LimitedQuantity| self.limited[*quantity as usize].fetch_add(1, Ordering::Relaxed) == 0;
+        exceeded.quantities().filter(is_first).collect()
     }
 
     pub(super) fn carried_out(&self) {
@@ -113,7 +111,7 @@ impl fmt::Display for ActuatorStatistics {
         write!(f, "{}: {} commands", self.path, self.commands)?;
         for quantity in LimitedQuantity::ALL.iter().copied() {
             if self.limited(quantity) > 0 {
-                write!(f, ", {} beyond the limit of {quantity} and brought back to it", self.limited(quantity))?;
+                write!(f, ", {} clamped to the limit of {quantity}", self.limited(quantity))?;
             }
             if self.refused(quantity) > 0 {
                 write!(f, ", {} refused for its {quantity}", self.refused(quantity))?;

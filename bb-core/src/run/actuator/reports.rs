@@ -6,7 +6,7 @@ use crate::message::{Frame, Payload, Stamp, Stamped};
 use crate::node::Environment;
 use crate::payload::{BeginMotion, EndMotion};
 use crate::pubsub::{AnyTopic as _, DynamicMessage, Topic, Wakers};
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// The topics are created with the first report. For an actuator of standard commands they are created at the start, so that
 /// subscriptions find them.
@@ -14,6 +14,8 @@ use std::sync::{Arc, OnceLock};
 pub(super) struct Reports {
     begin: OnceLock<Option<Arc<Topic<BeginMotion>>>>,
     end: OnceLock<Option<Arc<Topic<EndMotion>>>>,
+    /// Why there is no topic, to be logged once the actuator's lock is released.
+    refusals: Mutex<Vec<String>>,
 }
 
 impl Reports {
@@ -64,22 +66,27 @@ impl Reports {
         }
     }
 
+    /// Returns why topics could not be created, once for each.
+    pub(super) fn take_refusals(&self) -> Vec<String> {
+        std::mem::take(&mut *self.refusals.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
     fn begin(&self, context: &ActuatorContext, host: &dyn Host) -> Option<&Topic<BeginMotion>> {
-        self.begin.get_or_init(|| topic(context, host, "begin_motion")).as_deref()
+        self.begin.get_or_init(|| self.topic(context, host, "begin_motion")).as_deref()
     }
 
     fn end(&self, context: &ActuatorContext, host: &dyn Host) -> Option<&Topic<EndMotion>> {
-        self.end.get_or_init(|| topic(context, host, "end_motion")).as_deref()
+        self.end.get_or_init(|| self.topic(context, host, "end_motion")).as_deref()
     }
-}
 
-fn topic<T: Payload>(context: &ActuatorContext, host: &dyn Host, name: &str) -> Option<Arc<Topic<T>>> {
-    let path = format!("{}/{name}", context.path());
-    match host.registry().topic_noted(&path, &mut |change| host.note_path(change)) {
-        Ok(topic) => Some(topic),
-        Err(error) => {
-            tracing::warn!(component = context.path(), %error, "its motions are not published");
-            None
+    fn topic<T: Payload>(&self, context: &ActuatorContext, host: &dyn Host, name: &str) -> Option<Arc<Topic<T>>> {
+        let path = format!("{}/{name}", context.path());
+        match host.registry().topic_noted(&path, &mut |change| host.note_path(change)) {
+            Ok(topic) => Some(topic),
+            Err(error) => {
+                self.refusals.lock().unwrap_or_else(PoisonError::into_inner).push(error.to_string());
+                None
+            }
         }
     }
 }

@@ -6,6 +6,7 @@ use super::error::Place;
 use crate::run::{Builder, Robot};
 use std::ffi::OsString;
 use std::io::{ErrorKind, Write};
+use std::path::Path;
 
 impl<R: Robot> Builder<R> {
     /// Takes the settings out of a program's arguments and returns the others:
@@ -50,7 +51,7 @@ impl<R: Robot> Builder<R> {
         let mut read = Arguments::default();
         read.read(arguments.into_iter())?;
         for file in &read.files {
-            self.load(file)?;
+            self.load_file(file.as_ref())?;
         }
         assign(self, &read.settings)?;
         if read.lists {
@@ -63,13 +64,13 @@ impl<R: Robot> Builder<R> {
     }
 
     #[cfg(feature = "toml")]
-    fn load(&mut self, file: &OsString) -> Result<(), SettingsError> {
+    pub(super) fn load_file(&mut self, file: &Path) -> Result<(), SettingsError> {
         self.load_settings(file)
     }
 
     #[cfg(not(feature = "toml"))]
-    fn load(&mut self, _: &OsString) -> Result<(), SettingsError> {
-        Err(wrong("`--config` needs the feature `toml` of `bb-core`"))
+    pub(super) fn load_file(&mut self, _: &Path) -> Result<(), SettingsError> {
+        Err(wrong("a file of settings needs the feature `toml` of `bb-core`"))
     }
 }
 

@@ -30,6 +30,8 @@ pub(super) enum Place {
     },
     /// On the command line.
     Argument,
+    /// In an environment variable of that name.
+    Variable(Arc<str>),
     /// In code.
     Code,
 }
@@ -73,7 +75,7 @@ impl SettingProblem {
     pub fn position(&self) -> Option<(usize, usize)> {
         match self.place {
             Place::File { position, .. } => position,
-            Place::Argument | Place::Code => None,
+            Place::Argument | Place::Variable(_) | Place::Code => None,
         }
     }
 }
@@ -84,6 +86,7 @@ impl fmt::Display for SettingProblem {
             Place::File { name, position: Some((line, column)) } => write!(f, "{name}:{line}:{column}: ")?,
             Place::File { name, position: None } => write!(f, "{name}: ")?,
             Place::Argument => f.write_str("--set ")?,
+            Place::Variable(name) => write!(f, "environment variable {name}: ")?,
             Place::Code => {}
         }
         if !self.path.is_empty() {

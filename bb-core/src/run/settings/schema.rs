@@ -1,8 +1,8 @@
 //! The JSON Schema of a robot's settings: for editors, and for programs that write them.
 
 use crate::component::{OptionField, Setting, SettingKind};
+use crate::declaration::schema::{number, parameter_schema, quantity, with_notes};
 use crate::declaration::unit::si_unit;
-use crate::declaration::{ParameterDeclaration, ParameterDefault, Range};
 use crate::message::codec::{Definitions, Shape, document, member, to_json};
 use crate::run::Robot;
 use crate::run::bound::{bound_to, component_paths};
@@ -24,7 +24,7 @@ pub(crate) fn settings_schema<R: Robot>() -> String {
         }
     }
     for declared in R::PARAMETERS {
-        insert(&mut root, declared.path, of_parameter(declared));
+        insert(&mut root, declared.path, parameter_schema(declared));
     }
     document(&member("title", R::NAME), &object(&root), definitions)
 }
@@ -94,53 +94,6 @@ fn of_option(field: &OptionField, setting: &dyn Setting, definitions: &mut Defin
         }
     };
     Some(with_notes(keywords, field.doc, &unit, range, setting.value().as_deref()))
-}
-
-fn of_parameter(declared: &ParameterDeclaration) -> String {
-    let (keywords, default) = match declared.default {
-        ParameterDefault::Bool(value) => (member("type", "boolean"), value.to_string()),
-        ParameterDefault::Integer(value) => (number("integer", declared.range), value.to_string()),
-        ParameterDefault::Text(value) => (member("type", "string"), to_json(&value.to_owned())),
-        ParameterDefault::Float(value) if declared.unit.is_empty() => {
-            (number("number", declared.range), to_json(&value))
-        }
-        ParameterDefault::Float(value) => (quantity(declared.unit), to_json(&format!("{value} {}", declared.unit))),
-    };
-    // The range of a parameter is written with its units.
-    with_notes(keywords, declared.doc, "", declared.range, Some(&default))
-}
-
-fn with_notes(keywords: String, doc: &str, unit: &str, range: Option<Range>, default: Option<&str>) -> String {
-    let mut description = doc.trim().to_owned();
-    if let Some(range) = range {
-        let separator = if description.is_empty() { "" } else { " " };
-        description = format!("{description}{separator}In {} {unit}", range.text).trim_end().to_owned() + ".";
-    }
-    let mut all = vec![keywords];
-    if !description.is_empty() {
-        all.push(member("description", &description));
-    }
-    all.extend(default.filter(|default| *default != "null").map(|default| format!(r#""default":{default}"#)));
-    format!("{{{}}}", all.join(","))
-}
-
-/// A string of a number and a unit; whether the unit has the right dimension is checked when it is read.
-fn quantity(unit: &str) -> String {
-    // The number is followed by a unit; no unit begins with a character that could continue the number.
-    let pattern = r"^\s*[-+]?([0-9][0-9_]*\.?[0-9_]*|\.[0-9][0-9_]*)([eE][-+]?[0-9]+)?\s*[^\s0-9._+\-eE].*$";
-    format!(
-        "{},{},\"examples\":[{}]",
-        member("type", "string"),
-        member("pattern", pattern),
-        to_json(&format!("1 {unit}"))
-    )
-}
-
-fn number(kind: &str, range: Option<Range>) -> String {
-    let limits = range.map_or(String::new(), |range| {
-        format!(r#","minimum":{},"maximum":{}"#, to_json(&range.start), to_json(&range.end))
-    });
-    member("type", kind) + &limits
 }
 
 fn is_integer(shape: Shape) -> bool {

@@ -1,0 +1,146 @@
+//! The faults that a report lists.
+
+use crate::event::ComponentFault;
+use crate::time::MonotonicTime;
+use std::collections::VecDeque;
+use std::fmt;
+use std::time::Duration;
+
+/// The number of faults that are kept. Earlier ones are only counted.
+const KEPT: usize = 256;
+
+/// A fault of a component, and how often it occurred before the component had another one.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct ReportedFault {
+    /// The path of the component.
+    pub path: &'static str,
+    /// What happened.
+    pub message: String,
+    /// How often it occurred.
+    pub count: u64,
+    /// When it occurred first.
+    pub first_time: MonotonicTime,
+    /// When it occurred last.
+    pub last_time: MonotonicTime,
+}
+
+impl From<ReportedFault> for ComponentFault {
+    fn from(ReportedFault { path, message, .. }: ReportedFault) -> Self {
+        Self { path, message }
+    }
+}
+
+impl fmt::Display for ReportedFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { path, message, count, first_time, last_time } = self;
+        write!(f, "{path} failed: {message}")?;
+        if *count > 1 {
+            let nanos = last_time.nanos_since(*first_time).max(0).unsigned_abs();
+            write!(f, " ({count} times in {:.3} s)", Duration::from_nanos(nanos).as_secs_f64())?;
+        }
+        Ok(())
+    }
+}
+
+/// The newest faults in the order in which they occurred last, and the number of all faults.
+#[derive(Debug, Default)]
+pub(super) struct Faults {
+    newest: VecDeque<ReportedFault>,
+    count: u64,
+}
+
+impl Faults {
+    /// Adds a fault. If it equals the last one of its component, it is counted there: a driver that retries does not displace the
+    /// faults of others.
+    pub(super) fn add(&mut self, ComponentFault { path, message }: ComponentFault, now: MonotonicTime) {
+        self.count += 1;
+        let last = self.newest.iter().rposition(|fault| fault.path == path);
+        let same = last.filter(|index| self.newest[*index].message == message);
+        let fault = match same.and_then(|index| self.newest.remove(index)) {
+            Some(mut fault) => {
+                fault.count += 1;
+                fault.last_time = now;
+                fault
+            }
+            None => ReportedFault { path, message, count: 1, first_time: now, last_time: now },
+        };
+        if self.newest.len() == KEPT {
+            self.newest.pop_front();
+        }
+        self.newest.push_back(fault);
+    }
+
+    pub(super) fn newest(&self) -> Vec<ReportedFault> {
+        self.newest.iter().cloned().collect()
+    }
+
+    pub(super) fn count(&self) -> u64 {
+        self.count
+    }
+}
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const PATHS: [&str; 3] = ["sensor/a", "sensor/b", "sensor/c"];
+
+    fn faults(all: &[(usize, u64)]) -> Faults {
+        let mut faults = Faults::default();
+        for (nanos, (path, message)) in all.iter().enumerate() {
+            let fault = ComponentFault { path: PATHS[*path], message: message.to_string() };
+            faults.add(fault, MonotonicTime::from_nanos(nanos as i64 * 1_000_000));
+        }
+        faults
+    }
+
+    #[test]
+    fn retries_of_two_drivers_are_two_lines() {
+        let all: Vec<_> = (0..1000).map(|retry| (retry % 2, 7)).collect();
+        let texts: Vec<_> = faults(&all).newest().iter().map(ToString::to_string).collect();
+        assert_eq!(
+            texts,
+            ["sensor/a failed: 7 (500 times in 0.998 s)", "sensor/b failed: 7 (500 times in 0.998 s)"]
+        );
+    }
+
+    #[test]
+    fn a_fault_between_two_equal_ones_of_its_component_parts_them() {
+        let newest = faults(&[(0, 1), (0, 2), (1, 1), (0, 1)]).newest();
+        let seen: Vec<_> = newest.iter().map(|fault| (fault.path, fault.message.as_str(), fault.count)).collect();
+        assert_eq!(seen, [("sensor/a", "1", 1), ("sensor/a", "2", 1), ("sensor/b", "1", 1), ("sensor/a", "1", 1)]);
+    }
+
+    proptest! {
+        /// No fault is uncounted; of each component, no two neighbours are equal, and its last line is its last fault.
+        #[test]
+        fn groups_hold_all_faults_in_order(all in prop::collection::vec((0..3_usize, 0..3_u64), 0..200)) {
+            let faults = faults(&all);
+            let newest = faults.newest();
+            prop_assert_eq!(faults.count(), all.len() as u64);
+            prop_assert_eq!(newest.iter().map(|fault| fault.count).sum::<u64>(), all.len() as u64);
+            prop_assert!(newest.is_sorted_by(|one, other| one.last_time < other.last_time));
+            for (number, path) in PATHS.iter().enumerate() {
+                let of_path = || all.iter().filter(|(path, _)| *path == number).map(|(_, message)| message.to_string());
+                let messages: Vec<String> = of_path().collect();
+                let groups: Vec<_> = newest.iter().filter(|fault| fault.path == *path).collect();
+                let again: Vec<String> =
+                    groups.iter().flat_map(|group| vec![group.message.clone(); group.count as usize]).collect();
+                prop_assert_eq!(messages, again);
+                prop_assert!(groups.windows(2).all(|pair| pair[0].message != pair[1].message));
+            }
+        }
+
+        /// The newest 256 different faults are kept.
+        #[test]
+        fn the_oldest_make_room(count in 1..600_u64) {
+            let all: Vec<_> = (0..count).map(|message| (0, message)).collect();
+            let faults = faults(&all);
+            let kept: Vec<_> = faults.newest().into_iter().map(|fault| fault.message).collect();
+            let expected: Vec<_> = (count.saturating_sub(KEPT as u64)..count).map(|message| message.to_string()).collect();
+            prop_assert_eq!(kept, expected);
+        }
+    }
+}

@@ -1,0 +1,148 @@
+//! Carries out commands, within the limits of the joint.
+
+use super::limits::NotLimited;
+use super::telling::Told;
+use super::{Inner, State};
+use crate::component::{Accepts, Actuator, ActuatorError, Permit};
+use crate::event::Safety;
+use crate::fault::{caught, of_panic};
+use crate::journal::{Event, Recorded};
+use crate::message::{Finite, Frame, Payload, Stamp, copied};
+use crate::pubsub::{DynamicMessage, Wakers};
+
+impl<A: Actuator> Accepts<A::Command> for Inner<A> {
+    fn accept(&self, command: A::Command, permit: &Permit) -> Result<A::Command, ActuatorError> {
+        if !command.is_finite() {
+            return Err(ActuatorError::NonFinite);
+        }
+        if let Some(journal) = self.environment.journal() {
+            journal.wait_for_room();
+        }
+        let mut wakers = Wakers::default();
+        let done = self.alone(|state| self.carry_out(state, command, permit, &mut wakers));
+        wakers.run();
+        done.unwrap_or(Err(ActuatorError::Inside))
+    }
+
+    fn stop_motion_of(&self, permit: &Permit) {
+        let stop = match caught(|| Ok(A::Command::stop_command())) {
+            Ok(Some(stop)) => stop,
+            Ok(None) => return,
+            Err(failed) => {
+                let message = format!("its command to stop {}", failed.fault);
+                return self.control.note_fault(self.declaration.path, message);
+            }
+        };
+        let mut wakers = Wakers::default();
+        self.alone(|state| {
+            if state.moved_by.is_of_same(permit) {
+                // Disarming has already stopped it, and a failing actuator is made safe.
+                let _ = self.carry_out(state, stop, &Permit::UNLIMITED, &mut wakers);
+            }
+        });
+        wakers.run();
+    }
+}
+
+impl<A: Actuator> Inner<A> {
+    fn carry_out(
+        &self,
+        state: &mut State<A>,
+        mut command: A::Command,
+        permit: &Permit,
+        wakers: &mut Wakers,
+    ) -> Result<A::Command, ActuatorError> {
+        self.obey(state);
+        // This lock is also taken by disarming: nothing moves after disarming has returned.
+        let safety = self.control.safety_now();
+        if safety != Safety::Armed {
+            return Err(ActuatorError::NotArmed(safety));
+        }
+        if !permit.is_valid() {
+            return Err(ActuatorError::Cancelled);
+        }
+        let clock = self.environment.clock();
+        let now = clock.now();
+        self.restart_if_due(state, now);
+        // A stream of commands must not starve it.
+        if state.alarm.is_some_and(|alarm| alarm <= now) {
+            self.update_if_due(state, now);
+        }
+        if !state.slot.is_running() {
+            return Err(ActuatorError::Stopped);
+        }
+        self.limit(state, &mut command)?;
+        let stamp = Stamp {
+            monotonic_time: now,
+            wall_time: clock.wall_at(now),
+            frame: Frame::new(self.declaration.joint),
+            origin: self.environment.origin(),
+        };
+        let message = stamp.message(command);
+        let Some(actuator) = state.slot.running() else { return Err(ActuatorError::Stopped) };
+        state.may_move = true;
+        let handled = {
+            let _entered = self.occupied.enter(clock);
+            caught(|| actuator.handle_command(&message))
+        };
+        if let Err(failed) = handled {
+            let text = failed.fault.to_string();
+            self.fail(state, &failed, now);
+            return Err(ActuatorError::Failed(text));
+        }
+        state.moved_by = permit.clone();
+        self.counts.carried_out();
+        let mut panic = None;
+        if let Some(journal) = self.environment.journal()
+            && let Some(copy) = copied(&message, &mut panic)
+        {
+            let message = Recorded::Message(DynamicMessage::of(self.declaration.path, copy));
+            journal.write(now, clock.wall_offset_nanos(), Event::Actuated { actuator: self.number, message });
+        }
+        // Under the lock, so that messages keep the order in which commands are carried out.
+        self.topic.publish_deferred(&message, wakers, &mut panic);
+        if let Some(panic) = panic {
+            // The actuator has moved: neither it nor the sender fails.
+            self.tell_control(state, Told::MessageFailed(format!("its message {}", of_panic(panic))));
+        }
+        Ok(message.payload)
+    }
+
+    /// Applies the limits of the joint to a command.
+    fn limit(&self, state: &mut State<A>, command: &mut A::Command) -> Result<(), ActuatorError> {
+        let (component, joint) = (self.declaration.path, self.declaration.joint);
+        let limited = {
+            let _entered = self.occupied.enter(self.environment.clock());
+            self.counts.limit(command, &self.context, self.environment.joints())
+        };
+        match limited {
+            Ok(exceeded) => {
+                for quantity in exceeded {
+                    self.log(state, move || {
+                        let quantity = quantity.name();
+                        tracing::warn!(
+                            component,
+                            joint,
+                            quantity,
+                            "a command exceeded a limit and was clamped to it"
+                        );
+                    });
+                }
+                Ok(())
+            }
+            Err(NotLimited::OutOfBounds { out, is_first }) => {
+                if is_first {
+                    self.log(state, move || {
+                        tracing::warn!(component, joint, reason = %out, "a command was refused");
+                    });
+                }
+                Err(out.into())
+            }
+            Err(NotLimited::Failed(fault)) => {
+                let message = fault.to_string();
+                self.tell_control(state, Told::MessageFailed(format!("the limit of its command {message}")));
+                Err(ActuatorError::NotLimited(message))
+            }
+        }
+    }
+}

@@ -1,0 +1,168 @@
+//! Keeps parameters over restarts: hands each set of values to the store, on a thread of its own.
+
+use crate::component::{Fault, ParameterStore};
+use crate::control::Control;
+use crate::event::ParameterValue;
+use crate::fault::{caught, guarded};
+use crate::journal::ParameterEntry;
+use std::collections::BTreeMap;
+use std::fmt;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, channel, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// The path at which faults of a store are reported.
+pub(super) const PATH: &str = "param";
+
+/// How long the last set may take to be stored when the robot stops.
+const STORED_WITHIN: Duration = Duration::from_secs(2);
+
+/// A store, with the values that it has.
+pub(super) struct Kept {
+    store: Box<dyn ParameterStore>,
+    values: BTreeMap<String, ParameterValue>,
+}
+
+/// Values that were set since the last look, by the number of the parameter.
+type Changed = Arc<Mutex<BTreeMap<usize, ParameterValue>>>;
+
+/// A store at work.
+pub(super) enum Keeper {
+    /// On a thread of its own.
+    Apart {
+        /// Wakes the thread; it ends once this is empty.
+        wake: Arc<Mutex<Option<SyncSender<()>>>>,
+        /// Closed when the thread has ended.
+        ended: Receiver<()>,
+    },
+    /// On virtual time all user code runs on the caller's thread: everything is stored at the end.
+    Here(Box<Work>),
+}
+
+impl Kept {
+    /// Reads what the store has.
+    pub(super) fn load(store: impl ParameterStore) -> Result<Self, Fault> {
+        let mut store: Box<dyn ParameterStore> = Box::new(store);
+        let values = caught(|| store.load()).map_err(|failed| failed.fault)?;
+        Ok(Self { store, values })
+    }
+
+    /// The stored values, by path.
+    pub(super) fn values(&self) -> &BTreeMap<String, ParameterValue> {
+        &self.values
+    }
+}
+
+impl Keeper {
+    /// Starts to keep what is set.
+    pub(super) fn start(kept: Kept, control: &Control) -> Result<Self, Fault> {
+        let changed = Changed::default();
+        let work = Work { kept, changed: Arc::clone(&changed), control: control.clone() };
+        let note = move |changes: &[ParameterEntry]| {
+            lock(&changed).extend(changes.iter().map(|change| (change.parameter, change.value.clone())));
+        };
+        if control.is_virtual() {
+            control.on_parameters(note);
+            return Ok(Self::Here(Box::new(work)));
+        }
+        let (sender, woken) = sync_channel(1);
+        let wake = Arc::new(Mutex::new(Some(sender)));
+        let (end, ended) = channel::<()>();
+        let run = move || {
+            // The store is closed with `work`.
+            if let Err(fault) = guarded(|| work.run(&woken)) {
+                tracing::error!(%fault, "the store of parameters failed as it was closed");
+            }
+            drop(end);
+        };
+        std::thread::Builder::new().name(PATH.to_owned()).spawn(run).map_err(Fault::from)?;
+        let waking = Arc::clone(&wake);
+        control.on_parameters(move |changes| {
+            note(changes);
+            if let Some(sender) = &*lock(&waking) {
+                // If it is full, the thread has yet to look.
+                let _ = sender.try_send(());
+            }
+        });
+        Ok(Self::Apart { wake, ended })
+    }
+
+    /// Waits until everything is stored, at most until `deadline`.
+    pub(super) fn finish(mut self, control: &Control, deadline: Instant) {
+        match &mut self {
+            Self::Here(work) => work.store_rest(true),
+            Self::Apart { wake, ended } => {
+                drop(lock(wake).take());
+                let left = deadline.saturating_duration_since(Instant::now()).min(STORED_WITHIN);
+                if ended.recv_timeout(left) == Err(RecvTimeoutError::Timeout) {
+                    control.note_fault(PATH, "the store of parameters did not return in time".to_owned());
+                }
+            }
+        }
+    }
+}
+
+impl Drop for Keeper {
+    /// The thread owns the control state, which owns the callback that wakes the thread.
+    fn drop(&mut self) {
+        if let Self::Apart { wake, .. } = self {
+            drop(lock(wake).take());
+        }
+    }
+}
+
+/// See [`Keeper`].
+pub(super) struct Work {
+    kept: Kept,
+    changed: Changed,
+    control: Control,
+}
+
+impl Work {
+    fn run(mut self, woken: &Receiver<()>) {
+        let mut is_stored = true;
+        while woken.recv().is_ok() {
+            is_stored = self.store();
+        }
+        self.store_rest(is_stored);
+    }
+
+    /// A change that came with the end, or one that was not stored before.
+    fn store_rest(&mut self, is_stored: bool) {
+        if !is_stored || !lock(&self.changed).is_empty() {
+            self.store();
+        }
+    }
+
+    fn store(&mut self) -> bool {
+        for (number, value) in std::mem::take(&mut *lock(&self.changed)) {
+            if let Some(path) = self.control.parameter_path(number) {
+                self.kept.values.insert(path.to_owned(), value);
+            }
+        }
+        let Kept { store, values } = &mut self.kept;
+        match caught(|| store.store(values)) {
+            Ok(()) => true,
+            Err(failed) => {
+                self.control.note_fault(PATH, format!("the parameters are not stored: {}", failed.fault));
+                false
+            }
+        }
+    }
+}
+
+impl fmt::Debug for Keeper {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Keeper").finish_non_exhaustive()
+    }
+}
+
+impl fmt::Debug for Kept {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Kept").field("values", &self.values).finish_non_exhaustive()
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

@@ -1,0 +1,79 @@
+//! Publishing recorded messages of others than estimators.
+
+use super::{Replay, Robot};
+use crate::fault::{discard, guarded};
+use crate::journal::{Recorded, decoded};
+use crate::node::Replayed;
+use crate::pubsub::DynamicMessage;
+use crate::time::MonotonicTime;
+use std::sync::Arc;
+
+impl<R: Robot> Replay<R> {
+    /// Publishes an estimator's output in reply to a request that the journal does not hold.
+    pub(super) fn emit(
+        &self,
+        publisher: usize,
+        is_first: bool,
+        time: MonotonicTime,
+        message: Recorded,
+    ) -> Result<(), String> {
+        let message = self.message(publisher, message)?;
+        let (number, island) = self.emitter(publisher).ok_or("the robot has no such publisher")?;
+        if is_first {
+            self.live.0.environment.node(number).counters().emitted.increment();
+        }
+        let played = self.island(island, time, Replayed::Emission(&message));
+        discard(message);
+        played?;
+        // It matches the journal.
+        let _ = self.live.0.environment.replayed().take(island);
+        Ok(())
+    }
+
+    pub(super) fn actuated(&self, number: usize, message: Recorded) -> Result<(), String> {
+        let actuators = R::all_actuators(&self.live.0.wiring);
+        let actuator = actuators.get(number).ok_or("the robot has no such actuator")?;
+        let message = decoded(actuator.any_topic(), message).map_err(|error| error.to_string())?;
+        let mut is_known = true;
+        handed_out(|| is_known = actuator.replay(&message));
+        discard(message);
+        if is_known { Ok(()) } else { Err("the actuator takes other commands".to_owned()) }
+    }
+
+    pub(super) fn publish_own(&self, path: &'static str, message: Recorded) -> Result<(), String> {
+        let registry = &self.live.0.control.topics().registry;
+        if !registry.has(path) {
+            R::all_actuators(&self.live.0.wiring).iter().for_each(|actuator| actuator.announce(path));
+        }
+        let topics = registry.topics();
+        let topic = match (topics.iter().find(|topic| topic.path() == path), &message) {
+            (Some(topic), _) => Arc::clone(topic),
+            (None, Recorded::Message(message)) => registry.topic_of(message).map_err(|error| error.to_string())?,
+            (None, Recorded::Bytes(_)) => {
+                return Err(format!(
+                    "something was published at `{path}`, a path made at run time, and the payload is not known: make a \
+                     publisher there first, `replay.bus().publisher::<T>(\"{path}\")`"
+                ));
+            }
+        };
+        let message = decoded(&*topic, message).map_err(|error| error.to_string())?;
+        let mut is_known = true;
+        handed_out(|| is_known = topic.publish_dynamic(&message));
+        discard(message);
+        if is_known { Ok(()) } else { Err(format!("`{path}` has another payload")) }
+    }
+
+    pub(super) fn message(&self, publisher: usize, message: Recorded) -> Result<DynamicMessage, String> {
+        let topics = R::all_topics(R::wired_topics(&self.live.0.wiring));
+        let topic = topics.get(publisher).ok_or("the robot has no such publisher")?;
+        decoded(*topic, message).map_err(|error| error.to_string())
+    }
+}
+
+/// Hands a recorded message to the current subscribers. If its code panics for one of them, the message and its
+/// consequences are still the same.
+pub(super) fn handed_out(hand_out: impl FnOnce()) {
+    if let Err(fault) = guarded(hand_out) {
+        tracing::error!(%fault, "a recorded message failed where it was copied");
+    }
+}

@@ -1,0 +1,133 @@
+//! The part of a source that other threads reach.
+
+use super::lock;
+use crate::run::occupied::{Entered, Occupied};
+use crate::time::{Clock, MonotonicTime};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+use std::thread::Thread;
+
+/// The part of a source that other threads reach. Clones share it.
+#[derive(Clone, Debug)]
+pub struct SharedSource(Arc<Shared>);
+
+#[derive(Debug)]
+struct Shared {
+    path: &'static str,
+    /// Whether it is read at a rate; otherwise it may wait for its device.
+    has_rate: bool,
+    inbox: Mutex<Inbox>,
+    readings: AtomicU64,
+    skipped: AtomicU64,
+    restarts: AtomicU64,
+    occupied: Occupied,
+    stopped: Mutex<Option<String>>,
+}
+
+#[derive(Debug, Default)]
+struct Inbox {
+    /// Each kind at most once.
+    orders: Vec<Order>,
+    thread: Option<Thread>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Order {
+    Options,
+    Restart,
+    GiveUp,
+}
+
+/// What a sensor or a service has done since the start.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct SourceStatistics {
+    /// Its path.
+    pub path: &'static str,
+    /// How often it was read.
+    pub readings: u64,
+    /// Readings at its rate that it missed because it, or a component downstream, took too long.
+    pub skipped: u64,
+    /// How often it was restarted.
+    pub restarts: u64,
+    /// Why it does not run, if it does not.
+    pub stopped: Option<String>,
+}
+
+impl SharedSource {
+    pub(super) fn new(path: &'static str, has_rate: bool) -> Self {
+        Self(Arc::new(Shared {
+            path,
+            has_rate,
+            inbox: Mutex::default(),
+            readings: AtomicU64::new(0),
+            skipped: AtomicU64::new(0),
+            restarts: AtomicU64::new(0),
+            occupied: Occupied::new(),
+            stopped: Mutex::default(),
+        }))
+    }
+
+    pub(super) fn tell(&self, order: Order) {
+        let mut inbox = lock(&self.0.inbox);
+        if !inbox.orders.contains(&order) {
+            inbox.orders.push(order);
+        }
+        if let Some(thread) = &inbox.thread {
+            thread.unpark();
+        }
+    }
+
+    pub(super) fn take_orders(&self) -> Vec<Order> {
+        std::mem::take(&mut lock(&self.0.inbox).orders)
+    }
+
+    /// The calling thread reads it from now on.
+    pub(in crate::run) fn adopt(&self) {
+        lock(&self.0.inbox).thread = Some(std::thread::current());
+    }
+
+    pub(in crate::run) fn path(&self) -> &'static str {
+        self.0.path
+    }
+
+    pub(in crate::run) fn has_rate(&self) -> bool {
+        self.0.has_rate
+    }
+
+    /// When its code was entered, if it is inside.
+    pub(in crate::run) fn entered_at(&self) -> Option<MonotonicTime> {
+        self.0.occupied.entered_at()
+    }
+
+    pub(super) fn enter(&self, clock: &Clock) -> Entered<'_> {
+        self.0.occupied.enter(clock)
+    }
+
+    pub(in crate::run) fn statistics(&self) -> SourceStatistics {
+        SourceStatistics {
+            path: self.0.path,
+            readings: self.0.readings.load(Ordering::Relaxed),
+            skipped: self.0.skipped.load(Ordering::Relaxed),
+            restarts: self.0.restarts.load(Ordering::Relaxed),
+            stopped: lock(&self.0.stopped).clone(),
+        }
+    }
+
+    pub(super) fn count_reading(&self) {
+        self.0.readings.fetch_add(1, Ordering::Relaxed);
+    }
+
+    pub(super) fn count_skipped(&self, skipped: u64) {
+        self.0.skipped.fetch_add(skipped, Ordering::Relaxed);
+    }
+
+    pub(super) fn note_restart(&self) {
+        self.0.restarts.fetch_add(1, Ordering::Relaxed);
+        *lock(&self.0.stopped) = None;
+    }
+
+    pub(super) fn note_stop(&self, reason: String) {
+        *lock(&self.0.stopped) = Some(reason);
+    }
+}
