@@ -6,13 +6,14 @@ mod graph;
 pub(crate) mod join;
 pub(crate) mod parameter;
 mod quantity;
+pub(crate) mod schema;
 mod source;
 pub(crate) mod unit;
 
 pub use command::{Cancel, CommandDeclaration, Role};
 pub(crate) use estimator::IslandDeclaration;
 pub use estimator::{EstimatorDeclaration, HealthDeclaration, InputDeclaration, WorkerDeclaration};
-pub(crate) use graph::graph;
+pub(crate) use graph::{Graphed, graph};
 pub(crate) use parameter::ParameterValues;
 pub use parameter::{ParameterDeclaration, ParameterDefault, ParameterError, ParameterType};
 pub use quantity::{Dimension, Range};

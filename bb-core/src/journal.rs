@@ -12,7 +12,7 @@
 //! difference. It holds a checksum of each output, so an algorithm that is not deterministic is named at the first
 //! message that differs.
 //!
-//! Requests ([`Live::call`](crate::Live::call), [`Live::cast`](crate::Live::cast)) are held if their type says how,
+//! Requests ([`Live::call`](crate::Live::call), [`Live::cast`](crate::Live::cast)) are recorded if their type defines how,
 //! see [`HandleCall::RECORD`](crate::HandleCall::RECORD). For other requests, the journal holds only the outputs they
 //! caused; if such a request changed the estimator otherwise, the replay stops at the first output that differs.
 
@@ -23,7 +23,7 @@ mod reader;
 mod writer;
 
 pub(crate) use checksum::checksum;
-pub use entry::{Callback, End, Entry, Event, JournalLine, Recorded, Request, RequestKind};
+pub use entry::{Callback, End, Entry, Event, JournalLine, ParameterEntry, Recorded, Request, RequestKind};
 pub(crate) use reader::decoded;
 pub use reader::{JournalReader, Publishers};
 pub(crate) use writer::Journal;

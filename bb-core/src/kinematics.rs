@@ -24,11 +24,12 @@
 //! `base_from_tip` transforms points from the frame of the link `tip` to that of `base`. A link's frame is that of
 //! the joint which carries it, as in URDF.
 //!
-//! The equations are those of Featherstone, *Rigid Body Dynamics Algorithms*, 2008, chapters 4 and 5, for vectors at the origin
+//! The equations are those of Featherstone, *Rigid Body Dynamics Algorithms*, 2008, chapters 4 to 6, for vectors at the origin
 //! of each frame and in its axes.
 
 mod chain;
 mod coordinates;
+mod dynamics;
 mod error;
 mod gravity;
 mod inverse;
@@ -37,6 +38,7 @@ mod model;
 mod tree;
 
 pub use chain::Chain;
+pub use dynamics::Dynamics;
 pub use error::KinematicsError;
 pub use inverse::{InverseKinematics, InverseParams, Solution, Target};
 pub use model::{JointCoordinates, Kinematics, LinkId};

@@ -155,7 +155,9 @@ pub mod __private {
         ActuatorHandle, BridgeHandle, CommandHandle, ControllerHandle, EstimatorHandle, EstimatorOfSeveralHandle,
         OutputHandle, ParameterHandle, Report, Robot, SensorHandle, StartError,
     };
-    pub use crate::stub::{Known, NoField, NotProbed, Probe, Unknown, as_known, both_known, stub};
+    pub use crate::stub::{
+        Known, NoField, NotProbed, Probe, Probed, Unknown, as_known, both_known, implemented, stub,
+    };
     pub use crate::time::MonotonicTime;
     pub use crate::topology::{
         Collision, Dynamics, Geometry, Inertial, Joint, JointKind, Limit, Link, Material, Mimic, Origin, Topology,

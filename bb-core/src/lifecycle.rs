@@ -20,4 +20,6 @@ pub(crate) use adapter::{AsActuator, AsEstimator, Component, HostHandle};
 pub use adapter::{AsSensor, AsService, Periodic};
 pub use backoff::Supervision;
 pub(crate) use slot::{AfterFault, Recipe, Slot};
-pub(crate) use stand_in::{replacement_of_actuator, replacement_of_sensor};
+pub(crate) use stand_in::{
+    replacement_of_actuator, replacement_of_estimator, replacement_of_sensor, replacement_of_service,
+};

@@ -2,14 +2,16 @@
 //!
 //! A type that is declared as a sensor but is not one would be reported at each use in the wiring. So the wiring
 //! refers to it through [`Known`], which replaces such a type by [`Unknown`], a type that fits everywhere. The
-//! mistake is reported once, where the options are set. An input or output that the algorithm does not have is
+//! mistake is reported once: where the options are set, or where the type implements the trait wrongly. An input or output that the algorithm does not have is
 //! `Unknown` as well, and is reported by its check (see `check`). None of this ever runs, since such a robot does not
 //! compile.
 
 mod unknown;
+mod wrong;
 
 pub(crate) use unknown::UNKNOWN_INDEX;
 pub use unknown::{NoField, Unknown};
+use wrong::Wrong;
 
 use crate::component::{Actuator, Command, Estimator, Inputs, Options, Outputs, Sensor, Service};
 use crate::message::Payload;
@@ -63,6 +65,31 @@ where
     pub const IS_COMMAND: bool = true;
 }
 
+impl<T: Sensor> Probe<T> {
+    /// `T` implements the trait, correctly or not.
+    pub const IMPLEMENTS_SENSOR: bool = true;
+}
+
+impl<T: Estimator> Probe<T> {
+    /// `T` implements the trait, correctly or not.
+    pub const IMPLEMENTS_ESTIMATOR: bool = true;
+}
+
+impl<T: Actuator> Probe<T> {
+    /// `T` implements the trait, correctly or not.
+    pub const IMPLEMENTS_ACTUATOR: bool = true;
+}
+
+impl<T: Service> Probe<T> {
+    /// `T` implements the trait, correctly or not.
+    pub const IMPLEMENTS_SERVICE: bool = true;
+}
+
+impl<T: Command> Probe<T> {
+    /// `T` implements the trait, correctly or not.
+    pub const IMPLEMENTS_COMMAND: bool = true;
+}
+
 /// Fallback: every constant is `false`.
 pub trait NotProbed {
     /// Not a sensor.
@@ -75,22 +102,61 @@ pub trait NotProbed {
     const IS_SERVICE: bool = false;
     /// Not a command.
     const IS_COMMAND: bool = false;
+    /// No implementation of the trait.
+    const IMPLEMENTS_SENSOR: bool = false;
+    /// No implementation of the trait.
+    const IMPLEMENTS_ESTIMATOR: bool = false;
+    /// No implementation of the trait.
+    const IMPLEMENTS_ACTUATOR: bool = false;
+    /// No implementation of the trait.
+    const IMPLEMENTS_SERVICE: bool = false;
+    /// No implementation of the trait.
+    const IMPLEMENTS_COMMAND: bool = false;
 }
 
 impl<T> NotProbed for Probe<T> {}
 
-/// The type itself if it implements the trait it was declared with, otherwise [`Unknown`].
-pub trait Known<const KNOWN: bool> {
-    /// `Self` or `Unknown`.
+/// A declared type, and whether it implements the trait it was declared with: see [`implemented`].
+#[derive(Debug)]
+pub struct Probed<T, const IMPLEMENTED: u8>(PhantomData<fn() -> T>);
+
+/// It does not.
+const NO: u8 = 0;
+/// It does.
+const YES: u8 = 1;
+/// It does in a way that rustc reports at the implementation.
+const WRONGLY: u8 = 2;
+
+/// How a type implements its trait, by the constants of [`Probe`].
+pub const fn implemented(is: bool, implements: bool) -> u8 {
+    match (is, implements) {
+        (true, _) => YES,
+        (false, true) => WRONGLY,
+        (false, false) => NO,
+    }
+}
+
+/// The types to use for a declared one.
+pub trait Known {
+    /// The type itself if it implements the trait, otherwise [`Unknown`].
     type Type;
+    /// The type whose options are set, where a type that does not implement the trait is reported.
+    type Given;
 }
 
-impl<T> Known<true> for T {
+impl<T> Known for Probed<T, YES> {
     type Type = T;
+    type Given = T;
 }
 
-impl<T> Known<false> for T {
+impl<T> Known for Probed<T, NO> {
     type Type = Unknown;
+    type Given = T;
+}
+
+impl<T> Known for Probed<T, WRONGLY> {
+    type Type = Unknown;
+    type Given = Wrong<T>;
 }
 
 /// Whether both payloads are known, and must therefore be equal.

@@ -239,6 +239,39 @@ impl Topology {
         (owner, multiplier, offset)
     }
 
+    /// The path of a link: the joints and links from the root to it, `base/pan/head`.
+    pub fn link_path(&self, link: &Link) -> String {
+        match link.parent_joint.and_then(|joint| self.joints.get(joint)) {
+            Some(joint) => format!("{}/{}", self.joint_path(joint), link.name),
+            None => link.name.to_owned(),
+        }
+    }
+
+    /// The path of a joint: the links and joints from the root to it, `base/pan`.
+    pub fn joint_path(&self, joint: &Joint) -> String {
+        let mut names = vec![joint.name];
+        let mut link = self.links.get(joint.parent);
+        // A declared robot is a tree. The loop terminates even if it is not.
+        for _ in 0..=self.links.len() {
+            let Some(at) = link else { break };
+            names.push(at.name);
+            let Some(carrier) = at.parent_joint.and_then(|number| self.joints.get(number)) else { break };
+            names.push(carrier.name);
+            link = self.links.get(carrier.parent);
+        }
+        names.reverse();
+        names.join("/")
+    }
+
+    /// The number of the joint with that name or path.
+    pub fn joint_number(&self, name_or_path: &str) -> Option<usize> {
+        let mut joints = self.joints.iter();
+        if name_or_path.contains('/') {
+            return joints.position(|joint| self.joint_path(joint) == name_or_path);
+        }
+        joints.position(|joint| joint.name == name_or_path)
+    }
+
     /// The joint of that name.
     pub fn joint(&self, name: &str) -> Option<&'static Joint> {
         self.joints.iter().find(|joint| joint.name == name)

@@ -27,6 +27,15 @@ impl<T: Payload> ActuatorLink<T> {
     /// The robot is not armed, the command holds a NaN, the actuator has failed, or the command that obtained this link has
     /// ended.
     pub fn send(&self, command: T) -> Result<(), ActuatorError> {
+        self.apply(command).map(drop)
+    }
+
+    /// As [`send`](Self::send), and returns the command that was carried out: with the limits of the joint applied. A controller
+    /// uses it to see that its output was clamped.
+    ///
+    /// # Errors
+    /// As [`send`](Self::send).
+    pub fn apply(&self, command: T) -> Result<T, ActuatorError> {
         self.accepts.accept(command, &self.permit)
     }
 
@@ -62,8 +71,11 @@ pub enum ActuatorError {
     Cancelled,
     /// The command holds a NaN or an infinity.
     NonFinite,
-    /// The command leads beyond a limit of the joint, and cannot be brought back to it.
+    /// The command exceeds a limit of the joint and cannot be clamped to it.
     OutOfBounds(String),
+    /// The code that applies the limits of the joint to the command ([`JointCommand::limit`](crate::JointCommand::limit))
+    /// has panicked.
+    NotLimited(String),
     /// The actuator has failed and does not run.
     Stopped,
     /// The actuator has failed at this command.
@@ -80,6 +92,9 @@ impl fmt::Display for ActuatorError {
             Self::Cancelled => f.write_str("the command that sent this has ended or was cancelled"),
             Self::NonFinite => f.write_str("the command holds a NaN or an infinity"),
             Self::OutOfBounds(message) => f.write_str(message),
+            Self::NotLimited(message) => {
+                write!(f, "the limits of the joint could not be applied to the command: {message}")
+            }
             Self::Stopped => f.write_str("the actuator has failed and does not run"),
             Self::Failed(message) => write!(f, "the actuator failed: {message}"),
             Self::Inside => {
@@ -99,7 +114,8 @@ impl From<OutOfBounds> for ActuatorError {
 
 /// An actuator that takes commands of type `T`.
 pub(crate) trait Accepts<T>: Send + Sync {
-    fn accept(&self, command: T, permit: &Permit) -> Result<(), ActuatorError>;
+    /// Returns the command with the limits applied.
+    fn accept(&self, command: T, permit: &Permit) -> Result<T, ActuatorError>;
     /// Stops the joint if the last command carried out came with that permit.
     fn stop_motion_of(&self, permit: &Permit);
 }

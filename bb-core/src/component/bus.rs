@@ -1,7 +1,7 @@
 //! The robot by path, for code that does not know its type: commands, controllers, bridges, dashboards.
 
 use super::host::Host;
-use super::{Accepts, ActuatorLink, CommandInfo, DynamicExecution, Fault, Permit};
+use super::{Accepts, ActuatorLink, CommandInfo, Description, DynamicExecution, Fault, Permit};
 use crate::declaration::ParameterError;
 use crate::event::{ArmError, DisarmError, ParameterValue, Safety};
 use crate::fault::of_panic;
@@ -13,7 +13,7 @@ use crate::pubsub::{
     SubscriberStatistics, Subscription, Topic, unmatched_at,
 };
 use crate::time::Clock;
-use crate::topology::Topology;
+use crate::topology::{GraphFormat, Topology};
 use std::fmt;
 use std::sync::Arc;
 
@@ -131,7 +131,30 @@ impl Bus {
     /// # Errors
     /// The value is not accepted, or the command that this bus belongs to has been cancelled.
     pub fn set_parameter(&self, path: &str, value: impl Into<ParameterValue>) -> Result<(), ParameterError> {
-        self.host.set_parameter(path, value.into(), &self.permit)
+        self.set_parameters([(path, value.into())])
+    }
+
+    /// Sets parameters by path, all at once: nobody sees some of them with the new value and others with the old one. If one of
+    /// the values is not accepted, none is set.
+    ///
+    /// # Errors
+    /// The first value that is not accepted, or the command that this bus belongs to has been cancelled.
+    pub fn set_parameters<P: Into<String>>(
+        &self,
+        values: impl IntoIterator<Item = (P, ParameterValue)>,
+    ) -> Result<(), ParameterError> {
+        let changes = values.into_iter().map(|(path, value)| (path.into(), value)).collect();
+        self.host.set_parameters(changes, &self.permit)
+    }
+
+    /// The whole robot: links, joints, components, topics, parameters and commands, with their schemas.
+    pub fn description(&self) -> Description {
+        self.host.description()
+    }
+
+    /// The robot as a picture, like [`Robot::graph`](crate::run::Robot::graph), with replaced components marked.
+    pub fn graph(&self, format: GraphFormat) -> String {
+        self.host.graph(format)
     }
 
     /// All commands, with the shapes of their arguments and results.

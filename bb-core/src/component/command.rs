@@ -178,7 +178,20 @@ impl CommandContext {
     /// # Errors
     /// The value is not accepted, or the command has been cancelled.
     pub fn set_parameter(&self, path: &str, value: impl Into<ParameterValue>) -> Result<(), ParameterError> {
-        self.host.set_parameter(path, value.into(), &self.permit)
+        self.set_parameters([(path, value.into())])
+    }
+
+    /// Sets parameters by path, all at once: nobody sees some of them with the new value and others with the old one. If one of
+    /// the values is not accepted, none is set.
+    ///
+    /// # Errors
+    /// The first value that is not accepted, or the command has been cancelled.
+    pub fn set_parameters<P: Into<String>>(
+        &self,
+        values: impl IntoIterator<Item = (P, ParameterValue)>,
+    ) -> Result<(), ParameterError> {
+        let changes = values.into_iter().map(|(path, value)| (path.into(), value)).collect();
+        self.host.set_parameters(changes, &self.permit)
     }
 }
 

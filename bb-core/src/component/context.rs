@@ -2,11 +2,12 @@
 
 use super::guardian::Guardian;
 use super::host::Host;
+use super::motion_reports::{MotionReport, MotionReports};
 use super::replacement::Replacement;
 use super::{Bus, Fault, Permit, Request, SafetyLink};
 use crate::declaration::{ActuatorDeclaration, EstimatorDeclaration, InputDeclaration, SensorDeclaration};
 use crate::message::Frame;
-use crate::payload::{BeginMotion, EndMotion};
+use crate::payload::{BeginMotion, EndMotion, MotionEnd};
 use crate::time::{Clock, MonotonicTime};
 use crate::topology::{Topology, Transform};
 use nalgebra::Isometry3;
@@ -22,6 +23,7 @@ pub struct Context {
     now: MonotonicTime,
     safety: SafetyLink,
     requests: RefCell<Vec<Request>>,
+    replacement: Option<Replacement>,
 }
 
 impl Context {
@@ -32,7 +34,16 @@ impl Context {
         guardian: Option<Arc<dyn Guardian>>,
     ) -> Self {
         let safety = SafetyLink::new(declaration.path, guardian);
-        Self { robot, declaration, now, safety, requests: RefCell::default() }
+        Self { robot, declaration, now, safety, requests: RefCell::default(), replacement: None }
+    }
+
+    /// The same, of an estimator that takes the place of the declared one.
+    pub(crate) fn with_replacement(self, replacement: Option<Replacement>) -> Self {
+        Self { replacement, ..self }
+    }
+
+    pub(crate) fn replacement(&self) -> Option<&Replacement> {
+        self.replacement.as_ref()
     }
 
     /// Takes the requests made so far.
@@ -254,15 +265,7 @@ component_context! {
 pub struct ActuatorContext {
     common: ComponentContext,
     declaration: &'static ActuatorDeclaration,
-    /// Reports not yet published.
-    reports: Arc<Mutex<Vec<MotionReport>>>,
-}
-
-/// An actuator's report of its motion.
-#[derive(Clone, Debug)]
-pub(crate) enum MotionReport {
-    Begin(BeginMotion),
-    End(EndMotion),
+    reports: Arc<Mutex<MotionReports>>,
 }
 
 impl Deref for ActuatorContext {
@@ -323,20 +326,26 @@ impl ActuatorContext {
     /// published once the current call of its code has returned. Reports from its own threads wait for the next call
     /// of its code.
     pub fn begin_motion(&self, motion: BeginMotion) {
-        self.report(MotionReport::Begin(motion));
+        lock(&self.reports).begin(motion);
     }
 
     /// The same at `end_motion`, for the end of a motion.
     pub fn end_motion(&self, motion: EndMotion) {
-        self.report(MotionReport::End(motion));
-    }
-
-    fn report(&self, report: MotionReport) {
-        lock(&self.reports).push(report);
+        lock(&self.reports).end(motion);
     }
 
     pub(crate) fn take_reports(&self) -> Vec<MotionReport> {
-        std::mem::take(&mut *lock(&self.reports))
+        lock(&self.reports).take()
+    }
+
+    /// The actuator is failing: ends that it reports from now on until [`Self::end_current_motion`] get this reason.
+    pub(crate) fn set_failing(&self, reason: &str) {
+        lock(&self.reports).set_failing(reason);
+    }
+
+    /// Reports the end of the motion under way, if the actuator has not reported it.
+    pub(crate) fn end_current_motion(&self, end: MotionEnd, position: impl FnOnce(&BeginMotion) -> f64) {
+        lock(&self.reports).end_current(end, position);
     }
 }
 

@@ -3,14 +3,14 @@
 use super::guardian::Guardian;
 use super::replacement::Replacement;
 use super::shared::SharedValues;
-use super::{CommandInfo, DynamicExecution, Fault, Permit};
+use super::{CommandInfo, Description, DynamicExecution, Fault, Permit};
 use crate::declaration::ParameterError;
 use crate::event::{ArmError, DisarmError, ParameterValue, Safety};
 use crate::joints::Joints;
 use crate::message::Origin;
 use crate::pubsub::{AnyTopic, DynamicMessage, PathChange, Registry};
 use crate::time::Clock;
-use crate::topology::Topology;
+use crate::topology::{GraphFormat, Topology};
 use std::any::Any;
 use std::fmt;
 
@@ -30,7 +30,9 @@ pub(crate) trait Host: Guardian {
     fn arm(&self, permit: &Permit) -> Result<(), ArmError>;
     fn disarm(&self) -> Result<(), DisarmError>;
     fn parameter(&self, path: &str) -> Option<ParameterValue>;
-    fn set_parameter(&self, path: &str, value: ParameterValue, permit: &Permit) -> Result<(), ParameterError>;
+    /// Sets all of them, or none.
+    fn set_parameters(&self, changes: Vec<(String, ParameterValue)>, permit: &Permit)
+    -> Result<(), ParameterError>;
     /// The declared topics.
     fn with_topics(&self, call: &mut dyn FnMut(&[&dyn AnyTopic]));
     /// The topics created at run time.
@@ -52,6 +54,8 @@ pub(crate) trait Host: Guardian {
     /// The paths of all actuators, each with its joint.
     fn actuated_joints(&self) -> Vec<(&'static str, &'static str)>;
     fn commands(&self) -> Vec<CommandInfo>;
+    fn description(&self) -> Description;
+    fn graph(&self, format: GraphFormat) -> String;
     fn start_command(&self, path: &str, arguments: &str, permit: &Permit) -> Result<DynamicExecution, Fault>;
 }
 

@@ -1,19 +1,41 @@
 //! The replacement of a declared component.
 
 use std::any::Any;
+use std::collections::HashMap;
+use std::fmt;
 use std::sync::Arc;
 
 /// Creates a component that replaces another one; the lifecycle knows how.
 #[derive(Clone)]
 pub(crate) struct Replacement {
     make: Arc<dyn Any + Send + Sync>,
-    /// The name of its payload.
-    payload: &'static str,
+    /// What it publishes or takes: "publishes `Imu`".
+    does: String,
+    /// Of an estimator.
+    estimator: Option<OfEstimator>,
+}
+
+/// What the runtime has to know of an estimator before it is created.
+#[derive(Clone)]
+struct OfEstimator {
+    handles_moving_joints: bool,
+    /// Its type and its options. The options' `Debug` is code of the user.
+    shown: Arc<dyn Fn() -> String + Send + Sync>,
 }
 
 impl Replacement {
-    pub(crate) fn new(make: impl Any + Send + Sync, payload: &'static str) -> Self {
-        Self { make: Arc::new(make), payload }
+    pub(crate) fn new(make: impl Any + Send + Sync, does: String) -> Self {
+        Self { make: Arc::new(make), does, estimator: None }
+    }
+
+    /// The same, of an estimator; `shown` writes its type and its options.
+    pub(crate) fn of_estimator(
+        self,
+        handles_moving_joints: bool,
+        shown: impl Fn() -> String + Send + Sync + 'static,
+    ) -> Self {
+        let estimator = Some(OfEstimator { handles_moving_joints, shown: Arc::new(shown) });
+        Self { estimator, ..self }
     }
 
     /// The constructor, if it is an `M`.
@@ -21,8 +43,27 @@ impl Replacement {
         self.make.downcast_ref()
     }
 
-    /// The name of its payload.
-    pub(crate) fn payload(&self) -> &'static str {
-        self.payload
+    /// What it publishes or takes.
+    pub(crate) fn does(&self) -> &str {
+        &self.does
+    }
+
+    /// Whether the inputs of the estimator may span moving joints.
+    pub(crate) fn handles_moving_joints(&self) -> bool {
+        self.estimator.as_ref().is_some_and(|estimator| estimator.handles_moving_joints)
+    }
+
+    /// The type and the options of the estimator.
+    pub(crate) fn shown(&self) -> String {
+        self.estimator.as_ref().map_or_else(String::new, |estimator| (estimator.shown)())
     }
 }
+
+impl fmt::Debug for Replacement {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Replacement").field("does", &self.does).finish_non_exhaustive()
+    }
+}
+
+/// The replacements of a robot's components, by the path of the declared one.
+pub(crate) type Replacements = Arc<HashMap<&'static str, Replacement>>;

@@ -2,6 +2,7 @@
 
 use super::Fault;
 use crate::joints::LookupError;
+use crate::time::MonotonicTime;
 use nalgebra::Isometry3;
 
 /// The transforms of an estimator's inputs at one dispatch, each at the time of its message; see
@@ -9,6 +10,7 @@ use nalgebra::Isometry3;
 #[derive(Clone, Copy, Debug)]
 pub struct InputTransforms<'a> {
     inputs: &'a [InputTransform],
+    driver_time: MonotonicTime,
 }
 
 /// The transform of one input.
@@ -76,7 +78,17 @@ impl InputTransform {
 impl<'a> InputTransforms<'a> {
     /// Of these inputs; the first one is the driver. For tests of an estimator.
     pub fn new(inputs: &'a [InputTransform]) -> Self {
-        Self { inputs }
+        Self { inputs, driver_time: MonotonicTime::ZERO }
+    }
+
+    /// The same, for a message of the driver with this stamp.
+    pub fn at(self, driver_time: MonotonicTime) -> Self {
+        Self { driver_time, ..self }
+    }
+
+    /// The stamp of the driver's message, which is also that of the output.
+    pub fn driver_time(&self) -> MonotonicTime {
+        self.driver_time
     }
 
     /// Transforms points from the frame of `input`, at the time of its message, to that of the output.

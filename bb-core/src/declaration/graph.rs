@@ -1,43 +1,66 @@
-//! A robot as a graph: links and joints, and the dataflow from sensors through estimators.
+//! A robot as a graph: links and joints, the dataflow from sensors through estimators, what moves the joints, and the
+//! commands.
 
-use super::{EstimatorDeclaration, SensorDeclaration};
+use super::{ActuatorDeclaration, CommandDeclaration, EstimatorDeclaration, SensorDeclaration};
 use crate::topology::{GraphFormat, Topology};
 use std::fmt::Write;
 
-/// Writes the topology (links, with the joints between them) and the dataflow (what each estimator takes).
-pub(crate) fn graph(
-    format: GraphFormat,
-    topology: &Topology,
-    sensors: &[SensorDeclaration],
-    estimators: &[EstimatorDeclaration],
-) -> String {
+/// What a graph shows.
+pub(crate) struct Graphed {
+    pub(crate) topology: &'static Topology,
+    pub(crate) sensors: &'static [SensorDeclaration],
+    pub(crate) estimators: &'static [EstimatorDeclaration],
+    pub(crate) actuators: &'static [ActuatorDeclaration],
+    pub(crate) services: &'static [SensorDeclaration],
+    pub(crate) commands: &'static [CommandDeclaration],
+}
+
+/// Writes the topology (links, with the joints between them), the dataflow (what each estimator takes), actuators with
+/// their joints, controllers and bridges, and commands with the estimators whose health starts them.
+pub(crate) fn graph(format: GraphFormat, robot: &Graphed, is_replaced: &dyn Fn(&str) -> bool) -> String {
     let mut graph = Graph { format, text: String::new() };
     graph.line(match format {
         GraphFormat::Mermaid => "flowchart LR",
         GraphFormat::Dot => "digraph robot {\n  rankdir=LR;",
     });
-    for link in topology.links {
-        graph.node(&format!("link/{}", link.name), link.name, Shape::Link);
-    }
-    for joint in topology.joints {
-        let name_of =
-            |link: usize| topology.links.get(link).map_or(String::new(), |link| format!("link/{}", link.name));
-        let label = format!("{}: {}", joint.name, joint.kind.name());
-        graph.edge(&name_of(joint.parent), &name_of(joint.child), &label, Line::Joint);
-    }
-    for sensor in sensors {
-        graph.node(sensor.path, sensor.path, Shape::Sensor);
-        if !sensor.frame.name().is_empty() && topology.link(sensor.frame.name()).is_some() {
+    graph.topology(robot.topology);
+    let label = |path: &str| if is_replaced(path) { format!("{path} (replaced)") } else { path.to_owned() };
+    for sensor in robot.sensors {
+        graph.node(sensor.path, &label(sensor.path), Shape::Sensor);
+        if !sensor.frame.name().is_empty() && robot.topology.link(sensor.frame.name()).is_some() {
             graph.edge(&format!("link/{}", sensor.frame), sensor.path, "", Line::Mount);
         }
     }
-    for estimator in estimators {
-        graph.node(estimator.path, estimator.path, Shape::Estimator);
+    for estimator in robot.estimators {
+        graph.node(estimator.path, &label(estimator.path), Shape::Estimator);
     }
-    for estimator in estimators {
+    for estimator in robot.estimators {
         for input in estimator.inputs {
             let label = if input.driver { format!("{} (driver)", input.name) } else { input.name.to_owned() };
-            graph.edge(publisher_of(input.source, estimators), estimator.path, &label, Line::Flow);
+            graph.edge(publisher_of(input.source, robot.estimators), estimator.path, &label, Line::Flow);
+        }
+    }
+    for actuator in robot.actuators {
+        graph.node(actuator.path, &label(actuator.path), Shape::Actuator);
+        let moved = robot.topology.joint(actuator.joint).and_then(|joint| robot.topology.links.get(joint.child));
+        if let Some(link) = moved {
+            graph.edge(actuator.path, &format!("link/{}", link.name), actuator.joint, Line::Moves);
+        }
+    }
+    for service in robot.services {
+        graph.node(service.path, &label(service.path), Shape::Service);
+    }
+    for command in robot.commands {
+        graph.node(command.path, command.path, Shape::Command);
+    }
+    for estimator in robot.estimators {
+        let health = &estimator.health;
+        let starts =
+            [("degraded", health.on_degraded), ("lost", health.on_lost), ("recovered", health.on_recovered)];
+        for (when, command) in starts {
+            if let Some(command) = command.and_then(|command| robot.commands.get(command)) {
+                graph.edge(estimator.path, command.path, when, Line::Starts);
+            }
         }
     }
     if format == GraphFormat::Dot {
@@ -57,12 +80,17 @@ enum Shape {
     Link,
     Sensor,
     Estimator,
+    Actuator,
+    Service,
+    Command,
 }
 
 enum Line {
     Joint,
     Mount,
     Flow,
+    Moves,
+    Starts,
 }
 
 struct Graph {
@@ -71,6 +99,18 @@ struct Graph {
 }
 
 impl Graph {
+    fn topology(&mut self, topology: &Topology) {
+        for link in topology.links {
+            self.node(&format!("link/{}", link.name), link.name, Shape::Link);
+        }
+        let name_of =
+            |link: usize| topology.links.get(link).map_or(String::new(), |link| format!("link/{}", link.name));
+        for joint in topology.joints {
+            let label = format!("{}: {}", joint.name, joint.kind.name());
+            self.edge(&name_of(joint.parent), &name_of(joint.child), &label, Line::Joint);
+        }
+    }
+
     fn line(&mut self, line: &str) {
         // Writing to a string cannot fail.
         let _ = writeln!(self.text, "{line}");
@@ -82,9 +122,15 @@ impl Graph {
             (GraphFormat::Mermaid, Shape::Link) => format!("  {id}([\"{label}\"])"),
             (GraphFormat::Mermaid, Shape::Sensor) => format!("  {id}[/\"{label}\"/]"),
             (GraphFormat::Mermaid, Shape::Estimator) => format!("  {id}[\"{label}\"]"),
+            (GraphFormat::Mermaid, Shape::Actuator) => format!("  {id}[\\\"{label}\"/]"),
+            (GraphFormat::Mermaid, Shape::Service) => format!("  {id}[[\"{label}\"]]"),
+            (GraphFormat::Mermaid, Shape::Command) => format!("  {id}{{{{\"{label}\"}}}}"),
             (GraphFormat::Dot, Shape::Link) => format!("  {id} [label=\"{label}\", shape=ellipse];"),
             (GraphFormat::Dot, Shape::Sensor) => format!("  {id} [label=\"{label}\", shape=parallelogram];"),
             (GraphFormat::Dot, Shape::Estimator) => format!("  {id} [label=\"{label}\", shape=box];"),
+            (GraphFormat::Dot, Shape::Actuator) => format!("  {id} [label=\"{label}\", shape=invtrapezium];"),
+            (GraphFormat::Dot, Shape::Service) => format!("  {id} [label=\"{label}\", shape=component];"),
+            (GraphFormat::Dot, Shape::Command) => format!("  {id} [label=\"{label}\", shape=hexagon];"),
         };
         self.line(&line);
     }
@@ -96,7 +142,8 @@ impl Graph {
                 let arrow = match line {
                     Line::Joint => "===",
                     Line::Mount => "-.-",
-                    Line::Flow => "-->",
+                    Line::Flow | Line::Moves => "-->",
+                    Line::Starts => "-.->",
                 };
                 if label.is_empty() {
                     format!("  {from} {arrow} {to}")
@@ -108,7 +155,8 @@ impl Graph {
                 let style = match line {
                     Line::Joint => "dir=none, style=bold",
                     Line::Mount => "dir=none, style=dotted",
-                    Line::Flow => "style=solid",
+                    Line::Flow | Line::Moves => "style=solid",
+                    Line::Starts => "style=dashed",
                 };
                 format!("  {from} -> {to} [label=\"{label}\", {style}];")
             }

@@ -127,12 +127,15 @@ impl ParameterValues {
         &self.0
     }
 
-    /// A copy with another value for the parameter `number`, and the previous value; `None` if there is no such
-    /// parameter.
-    pub(crate) fn with(&self, number: usize, value: ParameterValue) -> Option<(Self, ParameterValue)> {
+    /// A copy with other values for the parameters of these numbers.
+    pub(crate) fn with<'a>(&self, changes: impl IntoIterator<Item = (usize, &'a ParameterValue)>) -> Self {
         let mut values = self.0.to_vec();
-        let previous = std::mem::replace(values.get_mut(number)?, value);
-        Some((Self(values.into()), previous))
+        for (number, value) in changes {
+            if let Some(slot) = values.get_mut(number) {
+                *slot = value.clone();
+            }
+        }
+        Self(values.into())
     }
 
     /// The value of the parameter of that number.

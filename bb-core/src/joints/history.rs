@@ -21,7 +21,18 @@ pub(super) struct History {
     /// The slot for the next state.
     next: usize,
     length: usize,
+    /// The first and the last stamp of successive states that were refused because they were older than the newest one, and how many
+    /// there were.
+    behind: Option<(i64, i64, u32)>,
 }
+
+/// For how long a joint's states may be out of order before the history restarts with them.
+const SET_BACK_NANOS: i64 = 100_000_000;
+/// How many of them there must be.
+const SET_BACK_STATES: u32 = 5;
+
+/// The time over which an acceleration is taken.
+const ACCELERATION_NANOS: i64 = 50_000_000;
 
 /// A state. An incoming state has empty slices where a quantity is not measured.
 #[derive(Clone, Copy, Debug)]
@@ -54,6 +65,7 @@ impl History {
             rows: Box::default(),
             next: 0,
             length: 0,
+            behind: None,
         }
     }
 
@@ -74,9 +86,12 @@ impl History {
         let time = state.time.as_nanos();
         match self.newest() {
             Some(newest) if time == newest => return Err(JointRefusal::Duplicate),
-            Some(newest) if time < newest => return Err(JointRefusal::OutOfOrder),
+            Some(newest) if time < newest && !self.is_set_back(time) => return Err(JointRefusal::OutOfOrder),
+            // Nothing of the past is comparable with the new clock.
+            Some(newest) if time < newest => self.length = 0,
             _ => {}
         }
+        self.behind = None;
         if self.times.is_empty() {
             self.times = vec![0; self.capacity].into();
             self.rows = vec![f64::NAN; self.capacity * self.stride()].into();
@@ -108,6 +123,17 @@ impl History {
             self.length -= 1;
         }
         Ok(())
+    }
+
+    /// Whether states older than the newest one have arrived in order, and without a newer one between, for
+    /// [`SET_BACK_NANOS`] and as [`SET_BACK_STATES`]. Then the clock of the joint's sensor was set back, or the newest stamp was wrong.
+    fn is_set_back(&mut self, time: i64) -> bool {
+        let (first, count) = match self.behind {
+            Some((first, last, count)) if time > last => (first, count.saturating_add(1)),
+            _ => (time, 1),
+        };
+        self.behind = Some((first, time, count));
+        count >= SET_BACK_STATES && time.saturating_sub(first) >= SET_BACK_NANOS
     }
 
     /// The quaternion of a floating joint must have a direction.
@@ -174,6 +200,19 @@ impl History {
         let (position, rest) = self.row(last).split_at_checked(self.positions)?;
         let (velocity, effort) = rest.split_at_checked(self.velocities)?;
         Some(State { time: MonotonicTime::from_nanos(self.time(last)), position, velocity, effort })
+    }
+
+    /// The change of the velocities over the last 50 ms, per second, or between the two newest states if they are further apart;
+    /// nothing if they were not measured. Over less, it would be noise.
+    pub(super) fn newest_accelerations(&self) -> impl Iterator<Item = f64> + '_ {
+        let last = self.length.saturating_sub(1);
+        let is_recent = |number: &usize| self.time(last).saturating_sub(self.time(*number)) <= ACCELERATION_NANOS;
+        let before = (0..last).rev().take_while(is_recent).last().unwrap_or(last.saturating_sub(1));
+        let duration_s = self.time(last).saturating_sub(self.time(before)) as f64 * 1e-9;
+        let velocities = |number| self.row(number).iter().skip(self.positions).take(self.velocities);
+        let values = velocities(before).zip(velocities(last)).map(move |(from, to)| (to - from) / duration_s);
+        // Also with a single state, whose duration is zero.
+        values.filter(|value| value.is_finite())
     }
 
     /// The position at a time, at most `tolerance_nanos` after the newest state.

@@ -88,6 +88,9 @@ pub struct JointStatus {
     pub position: Vec<f64>,
     /// Its velocity at that time; empty if it was not measured.
     pub velocity: Vec<f64>,
+    /// Its mean acceleration over the last 50 ms, or between the last two states if they are further apart; empty unless the velocity
+    /// was measured at both ends.
+    pub acceleration: Vec<f64>,
     /// Its effort at that time; empty if it was not measured.
     pub effort: Vec<f64>,
 }

@@ -9,7 +9,7 @@ use super::status::{JointStatistics, JointStatus, REFUSALS};
 use crate::kinematics::{Kinematics, KinematicsError};
 use crate::message::{Frame, JointReading, Payload, Stamp, Stamped};
 use crate::time::{Clock, MonotonicTime, nanos_of};
-use crate::topology::{Joint, JointKind, Topology};
+use crate::topology::{JointKind, Topology};
 use nalgebra::Isometry3;
 use std::collections::HashMap;
 use std::fmt;
@@ -65,7 +65,7 @@ impl Joints {
         let kinematics = Kinematics::new(topology)?;
         let names =
             topology.joints.iter().enumerate().flat_map(|(number, joint)| {
-                [(joint.name.to_owned(), number), (joint_path(topology, joint), number)]
+                [(joint.name.to_owned(), number), (topology.joint_path(joint), number)]
             });
         let routes = Routes::new(topology, &kinematics, nanos_of(settings.stale_after), estimators);
         let states = SharedStates::new(topology, settings.states, settings.history);
@@ -180,7 +180,8 @@ impl Joints {
     fn status_of(&self, states: &States, number: usize) -> Option<JointStatus> {
         let joint = self.0.topology.joints.get(number).filter(|joint| joint.kind != JointKind::Fixed)?;
         let (owner, multiplier, offset) = self.0.topology.followed(number);
-        let newest = states.history(owner)?.newest_state();
+        let history = states.history(owner)?;
+        let newest = history.newest_state();
         let stale_nanos = self.stale_nanos();
         let scaled = |values: &[f64], factor: f64| -> Vec<f64> {
             values.iter().filter(|value| !value.is_nan()).map(|value| value * factor).collect()
@@ -191,6 +192,7 @@ impl Joints {
             is_stale: true,
             position: Vec::new(),
             velocity: Vec::new(),
+            acceleration: Vec::new(),
             effort: Vec::new(),
         };
         let Some(State { time, position, velocity, effort }) = newest else { return Some(status) };
@@ -198,6 +200,7 @@ impl Joints {
         status.is_stale = self.0.clock.now().nanos_since(time) > stale_nanos;
         status.position = scaled(position, multiplier);
         status.velocity = scaled(velocity, multiplier);
+        status.acceleration = history.newest_accelerations().map(|value| value * multiplier).collect();
         if owner == number {
             status.effort = scaled(effort, 1.0);
         } else {
@@ -227,22 +230,6 @@ impl Joints {
         });
         declared.chain(unknown).collect()
     }
-}
-
-/// The path of links and joints from the root: `base/pan`.
-fn joint_path(topology: &Topology, joint: &Joint) -> String {
-    let mut names = vec![joint.name];
-    let mut link = topology.links.get(joint.parent);
-    // A declared robot is a tree. The loop terminates even if it is not.
-    for _ in 0..=topology.links.len() {
-        let Some(at) = link else { break };
-        names.push(at.name);
-        let Some(carrier) = at.parent_joint.and_then(|number| topology.joints.get(number)) else { break };
-        names.push(carrier.name);
-        link = topology.links.get(carrier.parent);
-    }
-    names.reverse();
-    names.join("/")
 }
 
 impl fmt::Debug for Joints {

@@ -192,12 +192,10 @@ pub enum Event {
         /// What happened.
         message: String,
     },
-    /// A parameter was set.
-    Parameter {
-        /// The parameter.
-        parameter: usize,
-        /// Its new value.
-        value: ParameterValue,
+    /// Parameters were set, all at once.
+    Parameters {
+        /// Each with its new value.
+        changes: Vec<ParameterEntry>,
     },
     /// A command was requested.
     Command {
@@ -260,9 +258,18 @@ pub enum Event {
     OwnPublisher {
         /// The path.
         path: &'static str,
-        /// The name of the payload's type; empty if nobody has used the path any more, and it has made room for another one.
+        /// The name of the payload's type; empty if the path was no longer used and made room for another one.
         payload: &'static str,
     },
+}
+
+/// A new value of a parameter.
+#[derive(Clone, Debug, PartialEq, Payload)]
+pub struct ParameterEntry {
+    /// The parameter, by its number.
+    pub parameter: usize,
+    /// Its new value.
+    pub value: ParameterValue,
 }
 
 /// How long a callback took.
@@ -296,7 +303,7 @@ pub struct Request {
     pub kind: RequestKind,
     /// The name of its type.
     pub name: String,
-    /// The request itself, if its type says how it is recorded.
+    /// The request itself, if its type defines how it is recorded.
     pub bytes: Option<Vec<u8>>,
 }
 

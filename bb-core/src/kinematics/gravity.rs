@@ -41,10 +41,7 @@ impl Frames {
             body.motion.each_velocity(|velocity, rate| {
                 efforts[velocity] += rate.linear.dot(&force) + rate.angular.dot(&torque);
             });
-            let parent_from_body = match body.parent {
-                Some(parent) => self.states[parent].root_from_body.inv_mul(&root_from_body),
-                None => root_from_body,
-            };
+            let parent_from_body = self.parent_from_body(number);
             let moment =
                 parent_from_body.rotation * carried.moment + parent_from_body.translation.vector * carried.mass;
             self.masses[body.parent.map_or(0, |parent| parent + 1)].add(&Mass { mass: carried.mass, moment });

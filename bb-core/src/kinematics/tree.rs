@@ -10,6 +10,8 @@ use nalgebra::{Isometry3, Vector3};
 #[derive(Clone, Debug)]
 pub struct Frames {
     kinematics: Kinematics,
+    /// The motion of the root.
+    root: LinkMotion,
     pub(super) states: Vec<State>,
     /// The mass of each body with everything it carries, for [`Self::gravity_efforts`].
     pub(super) masses: Vec<Mass>,
@@ -17,14 +19,15 @@ pub struct Frames {
     pub(super) own_masses: Vec<Mass>,
 }
 
-/// The state of a body, relative to the root; vectors in its own axes, at its origin.
+/// The state of a body: its pose relative to the root, and its motion; vectors in its own axes, at its origin.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct State {
     pub(super) root_from_body: Isometry3<f64>,
     pub(super) motion: LinkMotion,
 }
 
-/// The motion of a link relative to the root: that of its origin, in the axes of the link.
+/// The motion of a link: that of its origin, in the axes of the link. It is relative to the root, or to the frame in which
+/// [`Frames::set_root_motion`] gives that of the root.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinkMotion {
     /// Linear velocity, m/s.
@@ -81,7 +84,13 @@ impl Frames {
         let own_masses = own_masses(&kinematics);
         let bodies = kinematics.bodies.len();
         let neutral = kinematics.neutral();
-        let mut frames = Self { states: vec![at_rest; bodies], masses: own_masses.clone(), own_masses, kinematics };
+        let mut frames = Self {
+            root: LinkMotion::REST,
+            states: vec![at_rest; bodies],
+            masses: own_masses.clone(),
+            own_masses,
+            kinematics,
+        };
         frames.place(&neutral);
         frames
     }
@@ -91,13 +100,20 @@ impl Frames {
         &self.kinematics
     }
 
-    /// Sets the position of the robot, at rest.
+    /// Sets the motion of the root link in an inertial frame, in the axes of the root: of a robot that drives or flies. At
+    /// rest if this is not called. Applies to the motions of the following [`Self::update_motion`].
+    pub fn set_root_motion(&mut self, motion: LinkMotion) {
+        self.root = motion;
+    }
+
+    /// Sets the position of the robot, all of it at rest.
     ///
     /// # Errors
     /// The number of positions is not that of the robot.
     pub fn update(&mut self, positions: &[f64]) -> Result<(), KinematicsError> {
         self.kinematics.check_positions(positions)?;
         self.place(positions);
+        self.root = LinkMotion::REST;
         self.states.iter_mut().for_each(|state| state.motion = LinkMotion::REST);
         Ok(())
     }
@@ -117,7 +133,7 @@ impl Frames {
         self.kinematics.check_velocities("accelerations", accelerations)?;
         self.place(positions);
         for (index, body) in self.kinematics.bodies.iter().enumerate() {
-            let parent = body.parent.map_or(LinkMotion::REST, |parent| self.states[parent].motion);
+            let parent = body.parent.map_or(self.root, |parent| self.states[parent].motion);
             let joint_from_body = body.motion.carry(positions, &Isometry3::identity());
             let carried = parent.at(&(body.parent_from_joint * joint_from_body));
             self.states[index].motion =
@@ -134,6 +150,13 @@ impl Frames {
                 None => parent_from_body,
             };
         }
+    }
+
+    /// `parent_from_body`, or `root_from_body` if its parent is the root.
+    pub(super) fn parent_from_body(&self, body: usize) -> Isometry3<f64> {
+        let root_from_body = &self.states[body].root_from_body;
+        let parent = self.kinematics.bodies[body].parent;
+        parent.map_or(*root_from_body, |parent| self.states[parent].root_from_body.inv_mul(root_from_body))
     }
 
     /// `root_from_link`.
@@ -160,7 +183,7 @@ impl Frames {
     /// The link does not belong to this robot.
     pub fn motion(&self, link: LinkId) -> Result<LinkMotion, KinematicsError> {
         let placement = self.kinematics.placement(link)?;
-        let motion = placement.body.map_or(LinkMotion::REST, |body| self.states[body].motion);
+        let motion = placement.body.map_or(self.root, |body| self.states[body].motion);
         Ok(motion.at(&placement.body_from_link))
     }
 }

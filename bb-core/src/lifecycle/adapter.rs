@@ -1,11 +1,14 @@
 //! The common interface of all components, whatever trait they implement.
 
-use super::stand_in::{AnySensor, StandIn, make_actuator, make_sensor};
+use super::stand_in::{
+    AnyEstimator, AnySensor, AnyService, StandIn, make_actuator, make_estimator, make_sensor, make_service,
+};
 use crate::component::{
-    Actuator, ActuatorContext, Context, Estimator, Options, Reading, Sensor, SensorContext, Service, ServiceContext,
+    Actuator, ActuatorContext, Context, Estimator, Info, InputTransforms, Inputs, Options, Reading, Reply, Sensor,
+    SensorContext, Service, ServiceContext,
 };
 use crate::declaration::SensorDeclaration;
-use crate::fault::Fault;
+use crate::fault::{Fault, discard};
 use crate::message::{Payload, Stamped};
 use crate::time::MonotonicTime;
 use std::fmt;
@@ -52,34 +55,88 @@ pub trait Periodic: Component {
 #[derive(Clone, Debug)]
 pub struct HostHandle(pub(crate) std::sync::Arc<dyn crate::component::Host>);
 
-macro_rules! component {
-    ($(#[$doc:meta])* $visibility:vis $wrapper:ident: $contract:ident, $context:ty) => {
-        $(#[$doc])*
-        #[derive(Debug)]
-        $visibility struct $wrapper<C>(pub(crate) C);
-
-        impl<C: $contract> Component for $wrapper<C> {
-            type Options = C::Options;
-            type Context = $context;
-
-            fn make(options: C::Options, context: &$context) -> Result<Self, Fault> {
-                C::init(options, context).map(Self)
-            }
-
-            fn change(&mut self, options: C::Options, context: &$context) -> Result<(), Fault> {
-                self.0.handle_options(options, context)
-            }
-
-            fn close(&mut self) {
-                self.0.terminate();
-            }
+/// Calls the component, whichever it is.
+macro_rules! whichever {
+    ($self:expr, $declared:ident => $call:expr, $replaced:ident => $other:expr) => {
+        match $self {
+            Self::Declared($declared) => $call,
+            Self::Replaced($replaced) => $other,
         }
     };
 }
 
-component! {
-    /// An estimator.
-    pub(crate) AsEstimator: Estimator, Context
+/// An estimator, or its replacement.
+pub(crate) enum AsEstimator<E: Estimator> {
+    Declared(E),
+    Replaced(Box<dyn AnyEstimator<E::Input, E::Output>>),
+}
+
+impl<E: Estimator> AsEstimator<E> {
+    /// The declared one: only it handles requests.
+    pub(crate) fn declared(&mut self) -> Option<&mut E> {
+        match self {
+            Self::Declared(estimator) => Some(estimator),
+            Self::Replaced(_) => None,
+        }
+    }
+
+    #[inline]
+    pub(crate) fn handles_moving_joints(&self) -> bool {
+        match self {
+            Self::Declared(_) => E::HANDLES_MOVING_JOINTS,
+            Self::Replaced(other) => other.handles_moving_joints(),
+        }
+    }
+
+    #[inline]
+    pub(crate) fn handle_input(
+        &mut self,
+        input: <E::Input as Inputs>::View<'_>,
+    ) -> Result<Reply<E::Output>, Fault> {
+        whichever!(self, own => own.handle_input(input), other => other.handle_input(input))
+    }
+
+    pub(crate) fn handle_transforms(&mut self, transforms: &InputTransforms<'_>) -> Result<(), Fault> {
+        whichever!(self, own => own.handle_transforms(transforms), other => other.handle_transforms(transforms))
+    }
+
+    pub(crate) fn handle_info(&mut self, info: Info) -> Result<Reply<E::Output>, Fault> {
+        whichever!(self, own => own.handle_info(info), other => other.handle_info(info))
+    }
+
+    pub(crate) fn handle_continue(&mut self, step: u32) -> Result<Reply<E::Output>, Fault> {
+        whichever!(self, own => own.handle_continue(step), other => other.handle_continue(step))
+    }
+}
+
+impl<E: Estimator> Component for AsEstimator<E> {
+    type Options = E::Options;
+    type Context = Context;
+
+    fn make(options: E::Options, context: &Context) -> Result<Self, Fault> {
+        match context.replacement() {
+            Some(replacement) => {
+                discard(options);
+                make_estimator(replacement, context).map(Self::Replaced)
+            }
+            None => E::init(options, context).map(Self::Declared),
+        }
+    }
+
+    fn change(&mut self, options: E::Options, context: &Context) -> Result<(), Fault> {
+        match self {
+            Self::Declared(estimator) => estimator.handle_options(options, context),
+            // The options belong to the replaced component.
+            Self::Replaced(_) => {
+                discard(options);
+                Ok(())
+            }
+        }
+    }
+
+    fn close(&mut self) {
+        whichever!(self, own => own.terminate(), other => other.terminate());
+    }
 }
 
 /// A sensor, or its replacement.
@@ -113,7 +170,10 @@ impl<S: Sensor> Component for AsSensor<S> {
 
     fn make(options: S::Options, context: &SensorContext) -> Result<Self, Fault> {
         match context.replacement() {
-            Some(replacement) => make_sensor(&replacement, context).map(|made| Self::Replaced(StandInSensor(made))),
+            Some(replacement) => {
+                discard(options);
+                make_sensor(&replacement, context).map(|made| Self::Replaced(StandInSensor(made)))
+            }
             None => S::init(options, context).map(Self::Declared),
         }
     }
@@ -122,7 +182,10 @@ impl<S: Sensor> Component for AsSensor<S> {
         match self {
             Self::Declared(sensor) => sensor.handle_options(options, context),
             // The options belong to the replaced component.
-            Self::Replaced(_) => Ok(()),
+            Self::Replaced(_) => {
+                discard(options);
+                Ok(())
+            }
         }
     }
 
@@ -134,25 +197,68 @@ impl<S: Sensor> Component for AsSensor<S> {
     }
 }
 
-component! {
-    /// A controller or a bridge.
-    pub AsService: Service, ServiceContext
+/// A controller or a bridge, or its replacement.
+#[doc(hidden)]
+pub enum AsService<S: Service> {
+    /// As declared.
+    Declared(S),
+    /// A replacement.
+    Replaced(StandInService<S::Output>),
+}
+
+/// The replacement of a service.
+#[doc(hidden)]
+pub struct StandInService<T>(Box<dyn AnyService<T>>);
+
+impl<S: Service> fmt::Debug for AsService<S> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("AsService").finish_non_exhaustive()
+    }
+}
+
+impl<T> fmt::Debug for StandInService<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("StandInService").finish_non_exhaustive()
+    }
+}
+
+impl<S: Service> Component for AsService<S> {
+    type Options = S::Options;
+    type Context = ServiceContext;
+
+    fn make(options: S::Options, context: &ServiceContext) -> Result<Self, Fault> {
+        match context.replacement() {
+            Some(replacement) => {
+                discard(options);
+                make_service(&replacement, context).map(|made| Self::Replaced(StandInService(made)))
+            }
+            None => S::init(options, context).map(Self::Declared),
+        }
+    }
+
+    fn change(&mut self, options: S::Options, context: &ServiceContext) -> Result<(), Fault> {
+        match self {
+            Self::Declared(service) => service.handle_options(options, context),
+            // The options belong to the replaced component.
+            Self::Replaced(_) => {
+                discard(options);
+                Ok(())
+            }
+        }
+    }
+
+    fn close(&mut self) {
+        match self {
+            Self::Declared(service) => service.terminate(),
+            Self::Replaced(StandInService(service)) => service.terminate(),
+        }
+    }
 }
 
 /// An actuator, or its replacement.
 pub(crate) enum AsActuator<A: Actuator> {
     Declared(A),
     Replaced(Box<dyn StandIn<A::Command>>),
-}
-
-/// Calls the actuator, whichever it is.
-macro_rules! whichever {
-    ($self:expr, $actuator:ident => $call:expr, $replaced:ident => $other:expr) => {
-        match $self {
-            Self::Declared($actuator) => $call,
-            Self::Replaced($replaced) => $other,
-        }
-    };
 }
 
 impl<A: Actuator> AsActuator<A> {
@@ -179,7 +285,10 @@ impl<A: Actuator> Component for AsActuator<A> {
 
     fn make(options: A::Options, context: &ActuatorContext) -> Result<Self, Fault> {
         match context.replacement() {
-            Some(replacement) => make_actuator(&replacement, context).map(Self::Replaced),
+            Some(replacement) => {
+                discard(options);
+                make_actuator(&replacement, context).map(Self::Replaced)
+            }
             None => A::init(options, context).map(Self::Declared),
         }
     }
@@ -188,7 +297,10 @@ impl<A: Actuator> Component for AsActuator<A> {
         match self {
             Self::Declared(actuator) => actuator.handle_options(options, context),
             // The options belong to the replaced component.
-            Self::Replaced(_) => Ok(()),
+            Self::Replaced(_) => {
+                discard(options);
+                Ok(())
+            }
         }
     }
 
@@ -227,7 +339,10 @@ impl<S: Service> Periodic for AsService<S> {
     }
 
     fn read(&mut self, now: MonotonicTime) -> Result<Reading<S::Output>, Fault> {
-        self.0.update(now)
+        match self {
+            Self::Declared(service) => service.update(now),
+            Self::Replaced(StandInService(service)) => service.update(now),
+        }
     }
 
     fn starts_at(&self) -> Option<MonotonicTime> {

@@ -4,7 +4,7 @@ use super::backoff::{Failures, Supervision};
 use super::{Component, backoff};
 use crate::component::{Binding, Options};
 use crate::declaration::ParameterValues;
-use crate::fault::{Failed, Fault, Then, caught, retire};
+use crate::fault::{Failed, Fault, Then, caught, discard, retire};
 use crate::time::MonotonicTime;
 
 /// The options and the context from which a component is created, at the start and at every restart.
@@ -150,8 +150,9 @@ impl<C: Component> Slot<C> {
 }
 
 impl<C: Component> Drop for Slot<C> {
-    /// For a robot that did not start.
+    /// For a robot that did not start. The `Drop` of the options is code of the user, too.
     fn drop(&mut self) {
         let _ = self.retire();
+        discard(std::mem::replace(&mut self.recipe.options, Err(String::new())));
     }
 }

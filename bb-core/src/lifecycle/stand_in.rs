@@ -1,19 +1,42 @@
-//! Replacements of declared components: simulated sensors and actuators.
+//! Replacements of declared components: simulated sensors and actuators, other estimators, controllers and bridges.
 
 use crate::component::replacement::Replacement;
-use crate::component::{Actuator, ActuatorContext, Options, Reading, Sensor, SensorContext};
+use crate::component::{
+    Actuator, ActuatorContext, Context, Estimator, Info, InputTransforms, Inputs, Options, Outputs, Reading, Reply,
+    Sensor, SensorContext, Service, ServiceContext,
+};
 use crate::fault::Fault;
 use crate::message::{Payload, Stamped};
 use crate::time::MonotonicTime;
+use std::any::type_name;
+use std::sync::Arc;
 
 type Make<C, T> = Box<dyn Fn(&C) -> Result<T, Fault> + Send + Sync>;
+type MakeEstimator<I, O> = Make<Context, Box<dyn AnyEstimator<I, O>>>;
 type MakeSensor<T> = Make<SensorContext, Box<dyn AnySensor<T>>>;
+type MakeService<T> = Make<ServiceContext, Box<dyn AnyService<T>>>;
 type MakeActuator<T> = Make<ActuatorContext, Box<dyn StandIn<T>>>;
+
+/// An estimator that takes `I` and emits `O`.
+pub(crate) trait AnyEstimator<I: Inputs, O>: Send {
+    fn handles_moving_joints(&self) -> bool;
+    fn handle_input(&mut self, input: I::View<'_>) -> Result<Reply<O>, Fault>;
+    fn handle_transforms(&mut self, transforms: &InputTransforms<'_>) -> Result<(), Fault>;
+    fn handle_info(&mut self, info: Info) -> Result<Reply<O>, Fault>;
+    fn handle_continue(&mut self, step: u32) -> Result<Reply<O>, Fault>;
+    fn terminate(&mut self);
+}
 
 /// A sensor that publishes `T`.
 pub(crate) trait AnySensor<T>: Send {
     fn read(&mut self, now: MonotonicTime) -> Result<Reading<T>, Fault>;
     fn starts_at(&self) -> Option<MonotonicTime>;
+    fn terminate(&mut self);
+}
+
+/// A service that publishes `T`.
+pub(crate) trait AnyService<T>: Send {
+    fn update(&mut self, now: MonotonicTime) -> Result<Reading<T>, Fault>;
     fn terminate(&mut self);
 }
 
@@ -26,6 +49,21 @@ pub(crate) trait StandIn<T>: Send {
     fn terminate(&mut self);
 }
 
+/// An estimator of type `E`, with options, to replace another one.
+pub(crate) fn replacement_of_estimator<E: Estimator>(options: E::Options) -> Replacement
+where
+    E::Options: Sync,
+{
+    let options = Arc::new(options);
+    let shown = Arc::clone(&options);
+    let make: MakeEstimator<E::Input, E::Output> = Box::new(move |context| {
+        options.validate().map_err(Fault::permanent)?;
+        Ok(Box::new(E::init(E::Options::clone(&options), context)?))
+    });
+    let shown = move || format!("{} {shown:?}", type_name::<E>());
+    Replacement::new(make, takes_and_emits::<E::Input, E::Output>()).of_estimator(E::HANDLES_MOVING_JOINTS, shown)
+}
+
 /// A sensor of type `S`, with options, to replace another one.
 pub(crate) fn replacement_of_sensor<S: Sensor>(options: S::Options) -> Replacement
 where
@@ -35,7 +73,19 @@ where
         options.validate().map_err(Fault::permanent)?;
         Ok(Box::new(S::init(options.clone(), context)?))
     });
-    Replacement::new(make, S::Output::NAME)
+    Replacement::new(make, publishes::<S::Output>())
+}
+
+/// A service of type `S`, with options, to replace another one.
+pub(crate) fn replacement_of_service<S: Service>(options: S::Options) -> Replacement
+where
+    S::Options: Sync,
+{
+    let make: MakeService<S::Output> = Box::new(move |context| {
+        options.validate().map_err(Fault::permanent)?;
+        Ok(Box::new(S::init(options.clone(), context)?))
+    });
+    Replacement::new(make, publishes::<S::Output>())
 }
 
 /// An actuator of type `A`, with options, to replace another one.
@@ -47,7 +97,16 @@ where
         options.validate().map_err(Fault::permanent)?;
         Ok(Box::new(A::init(options.clone(), context)?))
     });
-    Replacement::new(make, A::Command::NAME)
+    Replacement::new(make, takes::<A::Command>())
+}
+
+/// Creates the replacement of an estimator that takes `I` and emits `O`.
+pub(super) fn make_estimator<I: Inputs, O: Outputs>(
+    replacement: &Replacement,
+    context: &Context,
+) -> Result<Box<dyn AnyEstimator<I, O>>, Fault> {
+    let make = replacement.make::<MakeEstimator<I, O>>();
+    make.ok_or_else(|| other(replacement, &takes_and_emits::<I, O>()))?(context)
 }
 
 /// Creates the replacement of a sensor that publishes `T`.
@@ -56,7 +115,16 @@ pub(super) fn make_sensor<T: Payload>(
     context: &SensorContext,
 ) -> Result<Box<dyn AnySensor<T>>, Fault> {
     let make = replacement.make::<MakeSensor<T>>();
-    make.ok_or_else(|| other(replacement, "publishes", T::NAME))?(context)
+    make.ok_or_else(|| other(replacement, &publishes::<T>()))?(context)
+}
+
+/// Creates the replacement of a service that publishes `T`.
+pub(super) fn make_service<T: Payload>(
+    replacement: &Replacement,
+    context: &ServiceContext,
+) -> Result<Box<dyn AnyService<T>>, Fault> {
+    let make = replacement.make::<MakeService<T>>();
+    make.ok_or_else(|| other(replacement, &publishes::<T>()))?(context)
 }
 
 /// Creates the replacement of an actuator that takes `T`.
@@ -65,12 +133,50 @@ pub(super) fn make_actuator<T: Payload>(
     context: &ActuatorContext,
 ) -> Result<Box<dyn StandIn<T>>, Fault> {
     let make = replacement.make::<MakeActuator<T>>();
-    make.ok_or_else(|| other(replacement, "takes", T::NAME))?(context)
+    make.ok_or_else(|| other(replacement, &takes::<T>()))?(context)
 }
 
-fn other(replacement: &Replacement, does: &str, declared: &str) -> Fault {
-    let payload = replacement.payload();
-    Fault::permanent(format!("its replacement {does} `{payload}`, and what is declared {does} `{declared}`"))
+fn other(replacement: &Replacement, declared: &str) -> Fault {
+    Fault::permanent(format!("its replacement {}, and what is declared {declared}", replacement.does()))
+}
+
+fn publishes<T: Payload>() -> String {
+    format!("publishes `{}`", T::NAME)
+}
+
+fn takes<T: Payload>() -> String {
+    format!("takes `{}`", T::NAME)
+}
+
+/// A struct of inputs or outputs has no name but that of its type.
+fn takes_and_emits<I, O>() -> String {
+    format!("takes `{}` and emits `{}`", type_name::<I>(), type_name::<O>())
+}
+
+impl<E: Estimator> AnyEstimator<E::Input, E::Output> for E {
+    fn handles_moving_joints(&self) -> bool {
+        E::HANDLES_MOVING_JOINTS
+    }
+
+    fn handle_input(&mut self, input: <E::Input as Inputs>::View<'_>) -> Result<Reply<E::Output>, Fault> {
+        Estimator::handle_input(self, input)
+    }
+
+    fn handle_transforms(&mut self, transforms: &InputTransforms<'_>) -> Result<(), Fault> {
+        Estimator::handle_transforms(self, transforms)
+    }
+
+    fn handle_info(&mut self, info: Info) -> Result<Reply<E::Output>, Fault> {
+        Estimator::handle_info(self, info)
+    }
+
+    fn handle_continue(&mut self, step: u32) -> Result<Reply<E::Output>, Fault> {
+        Estimator::handle_continue(self, step)
+    }
+
+    fn terminate(&mut self) {
+        Estimator::terminate(self);
+    }
 }
 
 impl<S: Sensor> AnySensor<S::Output> for S {
@@ -84,6 +190,16 @@ impl<S: Sensor> AnySensor<S::Output> for S {
 
     fn terminate(&mut self) {
         Sensor::terminate(self);
+    }
+}
+
+impl<S: Service> AnyService<S::Output> for S {
+    fn update(&mut self, now: MonotonicTime) -> Result<Reading<S::Output>, Fault> {
+        Service::update(self, now)
+    }
+
+    fn terminate(&mut self) {
+        Service::terminate(self);
     }
 }
 

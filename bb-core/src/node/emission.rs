@@ -99,7 +99,7 @@ pub(super) fn copy_failed(environment: &Environment, path: &'static str, panic: 
 }
 
 /// The number of the estimator that publishes at `path`, if there is one.
-pub(super) fn emitter(environment: &Environment, path: &'static str) -> Option<usize> {
+fn emitter(environment: &Environment, path: &'static str) -> Option<usize> {
     let emits = |node: &&SharedNode| node.declaration().outputs.contains(&path);
     environment.nodes().iter().find(emits).map(SharedNode::number)
 }

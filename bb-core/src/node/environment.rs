@@ -1,20 +1,24 @@
 //! State shared by the estimators, sensors and services of one run.
 
+mod comparison;
+
+pub(crate) use self::comparison::{Comparison, Missing};
 use super::entry::Report;
 use super::mark::{Mark, RobotMark};
 use super::shared::SharedNode;
+use crate::component::replacement::{Replacement, Replacements};
 use crate::component::{Binding, Guardian, Options, Template};
 use crate::declaration::{EstimatorDeclaration, ParameterValues};
-use crate::fault::{Failed, Fault, guarded};
+use crate::fault::{Failed, Fault, of_panic};
 use crate::joints::Joints;
 use crate::journal::{Event, Journal, Recorded};
 use crate::lifecycle::Supervision;
-use crate::message::{Origin, Payload, Stamped};
+use crate::message::{Origin, Payload, Stamped, copied};
 use crate::pubsub::{AnyTopic as _, DynamicMessage, Topic};
 use crate::schedule::{Agenda, Door, Lane, Pool};
 use crate::telemetry::Telemetry;
 use crate::time::{Clock, MonotonicTime, Stopwatch};
-use std::collections::{HashMap, VecDeque};
+use std::collections::VecDeque;
 use std::fmt;
 use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -82,23 +86,45 @@ pub(crate) struct Refusal {
 #[derive(Clone)]
 pub struct Environment(Arc<Inner>);
 
+/// What each message reads. All else is behind a trait object: rustc proves for each robot that its wiring may be sent to
+/// other threads, and would walk every type in here.
 struct Inner {
     mode: Mode,
     clock: Clock,
     origin: Origin,
-    overseer: Arc<dyn Overseer>,
-    supervision: Supervision,
-    agenda: Agenda,
-    pool: Pool,
     door: Door,
-    nodes: Box<[SharedNode]>,
-    journal: Option<Journal>,
-    telemetry: Option<Telemetry>,
-    joints: Joints,
     /// The time that all components see in their first `init`.
     start: MonotonicTime,
     /// Identifies the robot to threads that are inside its islands.
     mark: RobotMark,
+    has_journal: bool,
+    has_telemetry: bool,
+    /// The line of the journal that is being replayed.
+    replayed_line: AtomicU64,
+    shared: Box<dyn Opaque>,
+}
+
+/// [`Shared`], whose types rustc does not look into where it is used.
+trait Opaque: Send + Sync {
+    fn shared(&self) -> &Shared;
+}
+
+impl Opaque for Shared {
+    fn shared(&self) -> &Shared {
+        self
+    }
+}
+
+struct Shared {
+    overseer: Arc<dyn Overseer>,
+    supervision: Supervision,
+    agenda: Agenda,
+    pool: Pool,
+    nodes: Box<[SharedNode]>,
+    journal: Option<Journal>,
+    telemetry: Option<Telemetry>,
+    joints: Joints,
+    replacements: Replacements,
     /// Drains an island, once the robot is wired.
     drain: OnceLock<Drain>,
     /// Islands with waiting entries, on virtual time.
@@ -108,48 +134,9 @@ struct Inner {
     facts: Mutex<Vec<String>>,
     /// Facts about the declaration.
     declared_facts: Mutex<Vec<String>>,
-    /// The line of the journal that is being replayed.
-    replayed_line: AtomicU64,
     replayed: Comparison,
     /// Islands whose estimators have stopped.
     retired: (Mutex<usize>, Condvar),
-}
-
-/// State used by a replay and its comparison with the journal.
-#[derive(Debug, Default)]
-pub(crate) struct Comparison {
-    /// Outputs of islands: publisher and checksum, in order.
-    outputs: Mutex<HashMap<usize, VecDeque<(usize, u64)>>>,
-    missing: Mutex<Option<Missing>>,
-}
-
-/// A value that an estimator asked for in a replay but the journal does not have.
-#[derive(Clone, Debug)]
-pub(crate) struct Missing {
-    /// Its path.
-    pub(crate) estimator: &'static str,
-    /// The missing value, such as `how long its callback took`.
-    pub(crate) what: String,
-}
-
-impl Comparison {
-    pub(crate) fn add(&self, island: usize, publisher: usize, checksum: u64) {
-        lock(&self.outputs).entry(island).or_default().push_back((publisher, checksum));
-    }
-
-    /// Takes the first output of an island that has not been compared yet.
-    pub(crate) fn take(&self, island: usize) -> Option<(usize, u64)> {
-        lock(&self.outputs).get_mut(&island)?.pop_front()
-    }
-
-    /// Keeps the first value missing in a turn.
-    pub(super) fn miss(&self, missing: Missing) {
-        lock(&self.missing).get_or_insert(missing);
-    }
-
-    pub(crate) fn take_missing(&self) -> Option<Missing> {
-        lock(&self.missing).take()
-    }
 }
 
 /// The arguments of [`Environment::new`].
@@ -164,6 +151,7 @@ pub(crate) struct EnvironmentParts {
     pub(crate) journal: Option<Journal>,
     pub(crate) telemetry: Option<Telemetry>,
     pub(crate) joints: Joints,
+    pub(crate) replacements: Replacements,
     pub(crate) start: MonotonicTime,
 }
 
@@ -180,35 +168,47 @@ impl Environment {
             journal,
             telemetry,
             joints,
+            replacements,
             start,
         } = parts;
         if mode == Mode::Real {
             Stopwatch::prepare();
         }
-        Self(Arc::new(Inner {
-            mode,
-            clock,
-            origin,
+        let (has_journal, has_telemetry) = (journal.is_some(), telemetry.is_some());
+        let shared = Shared {
             overseer,
             supervision,
             agenda,
             pool,
-            door: Door::new(journal.is_some()),
             nodes,
             journal,
             telemetry,
             joints,
-            start,
-            mark: RobotMark::take(),
+            replacements,
             drain: OnceLock::new(),
             posted: Mutex::default(),
             refusal: Mutex::default(),
             facts: Mutex::default(),
             declared_facts: Mutex::default(),
-            replayed_line: AtomicU64::new(0),
             replayed: Comparison::default(),
             retired: Default::default(),
+        };
+        Self(Arc::new(Inner {
+            mode,
+            clock,
+            origin,
+            door: Door::new(has_journal),
+            start,
+            mark: RobotMark::take(),
+            has_journal,
+            has_telemetry,
+            replayed_line: AtomicU64::new(0),
+            shared: Box::new(shared),
         }))
+    }
+
+    fn shared(&self) -> &Shared {
+        self.0.shared.shared()
     }
 
     /// Makes a component of a robot that starts, unless another component has failed to start. A failure is stored. The error says
@@ -218,7 +218,7 @@ impl Environment {
         path: &'static str,
         make: impl FnOnce() -> Result<C, Fault>,
     ) -> Result<C, Option<String>> {
-        if lock(&self.0.refusal).is_some() {
+        if lock(&self.shared().refusal).is_some() {
             return Err(None);
         }
         // No lock is held: this is user code, and so is the logger.
@@ -236,12 +236,12 @@ impl Environment {
 
     /// Stores why the robot cannot start, unless another component has already done so.
     pub(crate) fn refuse(&self, path: &'static str, fault: Fault) {
-        lock(&self.0.refusal).get_or_insert(Refusal { path, fault });
+        lock(&self.shared().refusal).get_or_insert(Refusal { path, fault });
     }
 
     /// The reason why the robot could not start, if any.
     pub(crate) fn take_refusal(&self) -> Option<Refusal> {
-        lock(&self.0.refusal).take()
+        lock(&self.shared().refusal).take()
     }
 
     /// Notifies `target` of changes to the parameters bound to these options. A value that would make the options invalid is
@@ -259,33 +259,33 @@ impl Environment {
                 Err(fault) => return self.refuse(path, fault),
             };
             let check = move |values: &ParameterValues| template.bound(&binding, values).map(drop);
-            self.0.overseer.bind(path, binding.parameters, Box::new(check), target);
+            self.shared().overseer.bind(path, binding.parameters, Box::new(check), target);
         }
     }
 
     /// Adds a fact to the header of the journal.
     pub(crate) fn add_fact(&self, fact: String) {
-        lock(&self.0.facts).push(fact);
+        lock(&self.shared().facts).push(fact);
     }
 
     pub(crate) fn add_declared_fact(&self, fact: String) {
-        lock(&self.0.declared_facts).push(fact);
+        lock(&self.shared().declared_facts).push(fact);
     }
 
     /// Facts of the components.
     pub(crate) fn facts(&self) -> Vec<String> {
-        lock(&self.0.facts).clone()
+        lock(&self.shared().facts).clone()
     }
 
     /// All facts, for the header of a journal.
     pub(crate) fn all_facts(&self) -> Vec<String> {
-        lock(&self.0.declared_facts).iter().chain(&*lock(&self.0.facts)).cloned().collect()
+        lock(&self.shared().declared_facts).iter().chain(&*lock(&self.shared().facts)).cloned().collect()
     }
 
     /// Sets the function that drains an island, once the robot is wired.
     pub(crate) fn set_drain(&self, drain: impl Fn(&Self, usize) + Send + Sync + 'static) {
         // This is set only once.
-        let _ = self.0.drain.set(Box::new(drain));
+        let _ = self.shared().drain.set(Box::new(drain));
     }
 
     /// Schedules an island with a new entry to be drained by the pool or by the loop of a simulation.
@@ -293,15 +293,15 @@ impl Environment {
         match self.0.mode {
             Mode::Real => {
                 let environment = self.clone();
-                self.0.pool.submit(Lane::Robot, move || environment.drain(island));
+                self.shared().pool.submit(Lane::Robot, move || environment.drain(island));
             }
-            Mode::Virtual => lock(&self.0.posted).push_back(island),
+            Mode::Virtual => lock(&self.shared().posted).push_back(island),
             Mode::Replay => {}
         }
     }
 
     pub(crate) fn drain(&self, island: usize) {
-        if let Some(drain) = self.0.drain.get() {
+        if let Some(drain) = self.shared().drain.get() {
             drain(self, island);
         }
     }
@@ -309,7 +309,7 @@ impl Environment {
     /// Drains the islands with waiting entries, on virtual time.
     pub(crate) fn drain_posted(&self) {
         loop {
-            let island = lock(&self.0.posted).pop_front();
+            let island = lock(&self.shared().posted).pop_front();
             match island {
                 Some(island) => self.drain(island),
                 None => return,
@@ -319,24 +319,24 @@ impl Environment {
 
     /// Records that the estimators of one more island have stopped.
     pub(super) fn note_retired(&self) {
-        *lock(&self.0.retired.0) += 1;
-        self.0.retired.1.notify_all();
+        *lock(&self.shared().retired.0) += 1;
+        self.shared().retired.1.notify_all();
     }
 
     /// Waits until the estimators of this many islands have stopped, or until `deadline`.
     pub(crate) fn wait_for_retired(&self, islands: usize, deadline: Instant) {
-        let mut retired = lock(&self.0.retired.0);
+        let mut retired = lock(&self.shared().retired.0);
         while *retired < islands {
             let left = deadline.saturating_duration_since(Instant::now());
             if left.is_zero() {
                 return;
             }
-            retired = self.0.retired.1.wait_timeout(retired, left).unwrap_or_else(PoisonError::into_inner).0;
+            retired = self.shared().retired.1.wait_timeout(retired, left).unwrap_or_else(PoisonError::into_inner).0;
         }
     }
 
     pub(crate) fn node(&self, number: usize) -> SharedNode {
-        match self.0.nodes.get(number) {
+        match self.shared().nodes.get(number) {
             Some(node) => node.clone(),
             // Numbers and declarations come from the same expansion.
             None => SharedNode::new(usize::MAX, &EstimatorDeclaration::NONE),
@@ -344,7 +344,7 @@ impl Environment {
     }
 
     pub(crate) fn nodes(&self) -> &[SharedNode] {
-        &self.0.nodes
+        &self.shared().nodes
     }
 
     pub(crate) fn mode(&self) -> Mode {
@@ -360,25 +360,30 @@ impl Environment {
     }
 
     pub(crate) fn overseer(&self) -> &Arc<dyn Overseer> {
-        &self.0.overseer
+        &self.shared().overseer
     }
 
     pub(crate) fn supervision(&self) -> Supervision {
-        self.0.supervision
+        self.shared().supervision
     }
 
     pub(crate) fn agenda(&self) -> &Agenda {
-        &self.0.agenda
+        &self.shared().agenda
     }
 
     pub(crate) fn pool(&self) -> &Pool {
-        &self.0.pool
+        &self.shared().pool
     }
 
     /// The states of the joints.
     #[inline]
     pub(crate) fn joints(&self) -> &Joints {
-        &self.0.joints
+        &self.shared().joints
+    }
+
+    /// The replacement of the component at `path`, if there is one.
+    pub(crate) fn replacement(&self, path: &str) -> Option<&Replacement> {
+        self.shared().replacements.get(path)
     }
 
     /// The entry point for messages.
@@ -398,22 +403,22 @@ impl Environment {
 
     #[inline]
     pub(crate) fn journal(&self) -> Option<&Journal> {
-        self.0.journal.as_ref()
+        if self.0.has_journal { self.shared().journal.as_ref() } else { None }
     }
 
     #[inline]
     pub(crate) fn telemetry(&self) -> Option<&Telemetry> {
-        self.0.telemetry.as_ref()
+        if self.0.has_telemetry { self.shared().telemetry.as_ref() } else { None }
     }
 
     /// Whether individual messages are observed by a journal, a telemetry handler or the comparison of a replay.
     #[inline]
     pub(crate) fn is_observed(&self) -> bool {
-        self.0.journal.is_some() || self.0.telemetry.is_some() || self.0.mode == Mode::Replay
+        self.0.has_journal || self.0.has_telemetry || self.0.mode == Mode::Replay
     }
 
     pub(crate) fn replayed(&self) -> &Comparison {
-        &self.0.replayed
+        &self.shared().replayed
     }
 
     pub(crate) fn set_replayed_line(&self, line: u64) {
@@ -421,7 +426,8 @@ impl Environment {
     }
 
     /// Passes a message of a sensor or a service to its subscribers and writes it to the journal, if there is one. Returns the line
-    /// number, or 0.
+    /// number, or 0. If the payload's `Clone` panics, all of them get the message through its encoded form, and so will the islands:
+    /// the panic is a fault of the publisher.
     #[inline]
     pub fn publish<T: Payload>(
         &self,
@@ -430,38 +436,39 @@ impl Environment {
         message: &Stamped<T>,
         now: MonotonicTime,
     ) -> u64 {
-        self.0.joints.hear(message, now);
-        match &self.0.journal {
-            None if self.0.mode == Mode::Replay => {
-                // Islands get the message even if copying it for current subscribers panics.
-                if let Err(fault) = guarded(|| topic.publish(message)) {
-                    tracing::error!(%fault, "a recorded message failed where it was copied");
-                }
-                self.0.replayed_line.load(Ordering::Relaxed)
-            }
+        if T::TELLS_JOINT_POSITION {
+            self.shared().joints.hear(message, now);
+        }
+        let mut panic = None;
+        let line = match self.journal() {
             None => {
-                topic.publish(message);
+                topic.publish_contained(message, &mut panic);
                 self.0.replayed_line.load(Ordering::Relaxed)
             }
             Some(journal) => {
                 journal.wait_for_room();
-                let recorded = Recorded::Message(DynamicMessage::new(topic.path(), message));
-                let event = Event::Message { publisher, message: recorded };
-                let mut panic = None;
-                let line = topic.publish_as_written(message, &mut panic, || {
-                    journal.write(now, self.0.clock.wall_offset_nanos(), event)
-                });
-                if let Some(panic) = panic {
-                    resume_unwind(panic);
+                match copied(message, &mut panic) {
+                    Some(copy) => {
+                        let recorded = Recorded::Message(DynamicMessage::of(topic.path(), copy));
+                        let event = Event::Message { publisher, message: recorded };
+                        topic.publish_as_written(message, &mut panic, || {
+                            journal.write(now, self.0.clock.wall_offset_nanos(), event)
+                        })
+                    }
+                    // Without a line, no island may get it. The publisher fails, as it would in its own code.
+                    None => panic.take().map_or(0, |panic| resume_unwind(panic)),
                 }
-                line
             }
+        };
+        if let Some(panic) = panic {
+            self.shared().overseer.message_failed(topic.path(), format!("its message {}", of_panic(panic)));
         }
+        line
     }
 
     /// Counts a message that did not fit in the inbox of the estimator's island.
     pub fn overflow(&self, estimator: usize, input: usize) {
-        if let Some(node) = self.0.nodes.get(estimator) {
+        if let Some(node) = self.shared().nodes.get(estimator) {
             node.overflow(input);
         }
     }

@@ -20,13 +20,16 @@ mod inside;
 mod member;
 #[cfg(all(test, loom))]
 mod model;
+mod processing;
+mod waiting;
 
 pub use self::any::IslandOf;
 pub(crate) use self::any::{AnyIsland, Replayed};
-use self::inbox::{Entry, Inbox, Pending, Taken};
+use self::inbox::Inbox;
 use self::inside::{Inside, Within};
 pub use self::member::{Act, Member, act, alone, enter, feed, island, receive, start};
 pub(crate) use self::member::{publish, take_turn};
+use self::processing::{deliver, dropped};
 use super::environment::Environment;
 use super::{NodeEntry, Turn};
 use crate::declaration::IslandDeclaration;
@@ -34,7 +37,6 @@ use crate::journal::Event;
 use crate::pubsub::DynamicMessage;
 use crate::time::MonotonicTime;
 use std::fmt;
-use std::marker::PhantomData;
 use std::time::Duration;
 
 #[cfg(loom)]
@@ -109,9 +111,6 @@ pub trait IslandState: Sized {
     }
 }
 
-/// How long a publisher waits for room in a full inbox before it concludes that the holder hangs.
-const LONGEST_WAIT: Duration = Duration::from_millis(500);
-
 /// How long a caller waits for an island.
 const LONGEST_CALL: Duration = Duration::from_secs(5);
 
@@ -178,25 +177,6 @@ struct Looked {
     has_kept: bool,
 }
 
-/// Writes a turn's findings to the journal when the turn ends, even if the code of a message panics.
-struct Ending<'a, 'b, S: IslandState> {
-    turn: &'a Turn<'b>,
-    /// The number of the turn's line.
-    cause: u64,
-    island: PhantomData<S>,
-}
-
-impl<S: IslandState> Drop for Ending<'_, '_, S> {
-    fn drop(&mut self) {
-        if S::DECLARATION.is_measured {
-            self.turn.write(|turn| Event::Measured { cause: self.cause, callbacks: turn.take_measured() });
-        }
-        if self.turn.environment().joints().routes().has_any(S::DECLARATION.estimators) {
-            self.turn.write(|turn| Event::Placed { cause: self.cause, inputs: turn.take_placed() });
-        }
-    }
-}
-
 type Held<'a, S> = Within<MutexGuard<'a, S>>;
 
 impl<S: IslandState> Island<S> {
@@ -239,45 +219,6 @@ impl<S: IslandState> Island<S> {
         self.enqueue(wiring, now, Keyed { key, message: message() });
     }
 
-    /// Processes one entry: writes its line, runs it, and records how long measured callbacks took.
-    #[inline]
-    fn process<T>(
-        &self,
-        wiring: &S::Wiring,
-        now: MonotonicTime,
-        line: impl FnOnce() -> Event,
-        run: impl FnOnce(&Turn<'_>) -> T,
-    ) -> T {
-        let environment = wiring.environment();
-        let Some(journal) = environment.journal() else { return self.process_line(wiring, now, None, run) };
-        let wall_offset_nanos = environment.clock().wall_offset_nanos();
-        let line = journal.write(now, wall_offset_nanos, line());
-        self.process_line(wiring, now, Some((line, wall_offset_nanos)), run)
-    }
-
-    /// As above, for an entry whose line has already been written with that offset of the wall clock.
-    #[inline]
-    fn process_line<T>(
-        &self,
-        wiring: &S::Wiring,
-        now: MonotonicTime,
-        line: Option<(u64, i64)>,
-        run: impl FnOnce(&Turn<'_>) -> T,
-    ) -> T {
-        let environment = wiring.environment();
-        let wall_offset_nanos = match line {
-            Some((_, offset)) => offset,
-            None => environment.clock().wall_offset_nanos(),
-        };
-        let turn = Turn::new(environment, S::DECLARATION.number, now, wall_offset_nanos, &self.running);
-        let _ending = line.map(|(cause, _)| Ending::<S> { turn: &turn, cause, island: PhantomData });
-        // Only one thread writes at a time, so plain stores suffice instead of atomic additions. They are for the report of a turn
-        // that hangs.
-        self.entered_nanos.store(now.as_nanos(), RELAXED);
-        self.turns.store(self.turns.load(RELAXED).wrapping_add(1), RELAXED);
-        run(&turn)
-    }
-
     /// Puts a message into the inbox and ensures that a thread processes it.
     #[cold]
     fn enqueue(&self, wiring: &S::Wiring, now: MonotonicTime, message: Keyed<S::Message>) {
@@ -311,48 +252,6 @@ impl<S: IslandState> Island<S> {
             crate::fault::discard(dropped);
         }
         self.attend(wiring);
-    }
-
-    /// Back-pressure: waits until the holder drains the inbox. Returns `false` at once if the holder hangs or if this thread
-    /// is inside an island of this robot.
-    fn wait_for_room(&self, wiring: &S::Wiring) -> bool {
-        if self.hangs.load(Ordering::Relaxed) || Inside::is_here(wiring.environment().mark()) {
-            return false;
-        }
-        self.waiting.fetch_add(1, Ordering::SeqCst);
-        let has_room = |pending: usize| Pending(pending).has_room(S::CAPACITY);
-        let in_time = self.wait(LONGEST_WAIT, || has_room(self.pending.load(Ordering::Relaxed)) || self.is_free());
-        if !in_time {
-            self.hangs.store(true, Ordering::Relaxed);
-        }
-        // This must precede this thread's check of the inbox: see `drain`.
-        self.waiting.fetch_sub(1, Ordering::SeqCst);
-        in_time
-    }
-
-    /// Waits until `holds` returns true, for at most `longest`; returns whether it did.
-    #[cfg(not(loom))]
-    fn wait(&self, longest: Duration, holds: impl Fn() -> bool) -> bool {
-        // A change just before this thread began to wait is not signalled: this bounds the time until it is noticed.
-        const STEP: Duration = Duration::from_millis(1);
-        let start = std::time::Instant::now();
-        loop {
-            if holds() {
-                return true;
-            }
-            let Some(left) = longest.checked_sub(start.elapsed()).filter(|left| !left.is_zero()) else {
-                return false;
-            };
-            let inbox = self.inbox();
-            drop(self.moved.wait_timeout(inbox, left.min(STEP)));
-        }
-    }
-
-    /// A model has no time: other threads proceed once.
-    #[cfg(loom)]
-    fn wait(&self, _: Duration, holds: impl Fn() -> bool) -> bool {
-        loom::thread::yield_now();
-        holds()
     }
 
     /// Adds a control entry.
@@ -419,59 +318,6 @@ impl<S: IslandState> Island<S> {
         self.tell_waiting();
     }
 
-    fn tell_waiting(&self) {
-        if self.waiting.load(Ordering::SeqCst) != 0 {
-            drop(self.inbox());
-            self.moved.notify_all();
-        }
-    }
-
-    fn gives_way(&self, processed: usize) -> bool {
-        processed >= S::CAPACITY && self.waiting.load(Ordering::Relaxed) != 0
-    }
-
-    /// Takes the next entry and processes it; returns `false` if the inbox is empty.
-    fn process_next(&self, state: &mut S, wiring: &S::Wiring) -> bool {
-        let environment = wiring.environment();
-        let mut inbox = self.inbox();
-        let Some(taken) = inbox.take() else { return false };
-        self.pending.store(inbox.pending().0, Ordering::Relaxed);
-        self.hangs.store(false, Ordering::Relaxed);
-        // The inbox's lock is held here, so the line of a message dropped at the same time comes after this one.
-        let (now, line) = match &taken {
-            Taken::Retire(now) => (*now, Event::Retire { island: S::DECLARATION.number }),
-            Taken::Entry(now, entry) => (*now, line_of::<S>(entry)),
-        };
-        let line = environment.journal().map(|journal| {
-            let offset = environment.clock().wall_offset_nanos();
-            (journal.write(now, offset, line), offset)
-        });
-        drop(inbox);
-        self.tell_waiting();
-        let retires = matches!(taken, Taken::Retire(_));
-        self.process_line(wiring, now, line, |turn| match taken {
-            Taken::Retire(_) => for_all(state, wiring, turn, || NodeEntry::Retire),
-            Taken::Entry(_, Entry::Message(Keyed { message: Some(message), .. })) => {
-                state.deliver(wiring, &message, turn);
-                crate::fault::discard(message);
-            }
-            Taken::Entry(_, Entry::Message(Keyed { key, message: None })) => S::dropped(wiring, key),
-            Taken::Entry(_, Entry::Wake) => state.wake(wiring, turn),
-            Taken::Entry(_, Entry::Start) => for_all(state, wiring, turn, || NodeEntry::Start),
-            Taken::Entry(_, Entry::Node(estimator, entry)) => state.handle(wiring, estimator, entry, turn),
-        });
-        if retires {
-            // Count and journal the remaining entries before the last report.
-            let mut processed = 0;
-            while processed < S::CAPACITY && self.process_next(state, wiring) {
-                processed += 1;
-            }
-            self.has_retired.store(true, Ordering::SeqCst);
-            environment.note_retired();
-        }
-        true
-    }
-
     /// Runs `call` once the island is free and all earlier entries have been processed. Then processes the entries added since.
     ///
     /// With a journal, `line` is written first.
@@ -493,24 +339,6 @@ impl<S: IslandState> Island<S> {
         let result = self.process(wiring, now, || line, |turn| call(&mut state, turn));
         self.leave(wiring, state);
         Ok(result)
-    }
-
-    /// Takes the island once it is free, waiting for at most `longest`.
-    fn hold(&self, wiring: &S::Wiring, longest: Duration) -> Option<Held<'_, S>> {
-        if let Some(state) = self.try_hold(wiring) {
-            return Some(state);
-        }
-        self.waiting.fetch_add(1, Ordering::SeqCst);
-        let held = std::cell::Cell::new(None);
-        self.wait(longest, || {
-            held.set(self.try_hold(wiring));
-            let is_held = held.take();
-            let found = is_held.is_some();
-            held.set(is_held);
-            found
-        });
-        self.waiting.fetch_sub(1, Ordering::SeqCst);
-        held.take()
     }
 
     #[inline]
@@ -556,30 +384,6 @@ impl<S: IslandState> Island<S> {
 
     fn inbox(&self) -> MutexGuard<'_, Inbox<Keyed<S::Message>>> {
         self.inbox.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-fn deliver<S: IslandState>(key: Key) -> Event {
-    Event::Deliver { island: S::DECLARATION.number, entry: key.entry, message: key.line }
-}
-
-fn dropped<S: IslandState>(key: Key) -> Event {
-    Event::Drop { island: S::DECLARATION.number, entry: key.entry, message: key.line }
-}
-
-fn line_of<S: IslandState>(entry: &Entry<Keyed<S::Message>>) -> Event {
-    match entry {
-        Entry::Message(Keyed { key, message: Some(_) }) => deliver::<S>(*key),
-        Entry::Message(Keyed { key, message: None }) => dropped::<S>(*key),
-        Entry::Wake => Event::Wake { island: S::DECLARATION.number },
-        Entry::Start => Event::Start { island: S::DECLARATION.number },
-        Entry::Node(estimator, entry) => entry.line(*estimator, S::DECLARATION.number),
-    }
-}
-
-fn for_all<S: IslandState>(state: &mut S, wiring: &S::Wiring, turn: &Turn<'_>, entry: impl Fn() -> NodeEntry) {
-    for estimator in S::DECLARATION.estimators {
-        state.handle(wiring, *estimator, entry(), turn);
     }
 }
 

@@ -1,27 +1,26 @@
 //! One running estimator: its inputs, its outputs and its failures.
 
+mod judging;
 mod placing;
 mod recovery;
 mod requests;
 
+use super::DropReason;
 use super::admission::Admission;
 use super::backlog::Backlog;
 use super::counters::SAMPLED;
 use super::emission::{copied_of, copy_failed};
-use super::environment::{BindTarget, Environment, Missing, Mode};
-use super::health::{Event, Health};
+use super::environment::{BindTarget, Environment, Mode};
+use super::health::Health;
 use super::shared::{SharedNode, Stopped};
 use super::timers::Timers;
-use super::timing::{Begun, Measured};
 use super::turn::Turn;
-use super::{DropReason, HealthReport, Report};
 use crate::component::{Binding, Context, Estimator, Guardian, Inputs, Reply, Request, SyncMiss, TakenAt};
-use crate::declaration::{EstimatorDeclaration, InputDeclaration, ParameterValues};
-use crate::event::{HealthReason, HealthState, HealthTransition};
-use crate::fault::{Failed, Fault, caught};
+use crate::declaration::{EstimatorDeclaration, ParameterValues};
+use crate::event::HealthReason;
+use crate::fault::{Failed, Fault, caught, discard};
 use crate::lifecycle::{AsEstimator, Recipe, Slot};
 use crate::message::{Stamp, Stamped};
-use crate::telemetry::TelemetryEvent;
 use crate::time::MonotonicTime;
 use placing::{Placing, Unplaced};
 use std::fmt;
@@ -124,7 +123,16 @@ impl<E: Estimator> Node<E> {
     ) -> Self {
         let shared = environment.node(number);
         let declaration = shared.declaration();
-        match caught(|| Ok(format!("options of {}: {options:?}", declaration.path))) {
+        let placing = Placing::new(number, declaration, environment);
+        let replacement = environment.replacement(declaration.path);
+        if let Some(fault) = replacement.and_then(|replacement| placing.fault_of(replacement)) {
+            environment.refuse(declaration.path, fault);
+        }
+        let fact = || match replacement {
+            Some(replacement) => format!("replacement of {}: {}", declaration.path, replacement.shown()),
+            None => format!("options of {}: {options:?}", declaration.path),
+        };
+        match caught(|| Ok(fact())) {
             Ok(fact) => environment.add_fact(fact),
             Err(failed) => environment.refuse(declaration.path, failed.fault),
         }
@@ -139,7 +147,7 @@ impl<E: Estimator> Node<E> {
             make_cache,
             admission: Admission::new(declaration.inputs.len()),
             backlog: Backlog::new(),
-            placing: Placing::new(number, declaration, environment),
+            placing,
             health: Health::default(),
             epoch: 0,
             was_good: false,
@@ -186,7 +194,8 @@ impl<E: Estimator> Node<E> {
         emitted: &mut Option<E::Output>,
     ) -> Option<Stamp> {
         let declared = self.declaration.inputs.get(input)?;
-        let AsEstimator(running) = self.slot.running()?;
+        let running = self.slot.running()?;
+        let handles_moving_joints = running.handles_moving_joints();
         let (admission, cache) = (&mut self.admission, &mut self.cache);
         let placing = &mut self.placing;
         let mut taken = Taken::new(emitted, &mut self.timers);
@@ -209,12 +218,10 @@ impl<E: Estimator> Node<E> {
                 turn.timing().interrupt();
                 return Ok(Handled::Stored);
             }
-            if E::HANDLES_MOVING_JOINTS {
+            if handles_moving_joints {
                 turn.timing().interrupt();
             }
-            if E::HANDLES_MOVING_JOINTS
-                && let Err(unplaced) = placing.place(message.monotonic_time, admission, turn)
-            {
+            if handles_moving_joints && let Err(unplaced) = placing.place(message.monotonic_time, admission, turn) {
                 return Ok(Handled::Unplaced(unplaced));
             }
             let view = match F::snapshot(cache, message) {
@@ -227,8 +234,8 @@ impl<E: Estimator> Node<E> {
             } else {
                 turn.timing().interrupt();
             }
-            if E::HANDLES_MOVING_JOINTS {
-                running.handle_transforms(&placing.transforms())?;
+            if handles_moving_joints {
+                running.handle_transforms(&placing.transforms(message.monotonic_time))?;
             }
             taken.take(running.handle_input(view)?, turn.now());
             Ok(Handled::Ran)
@@ -326,9 +333,9 @@ impl<E: Estimator> Node<E> {
         &mut self,
         turn: &Turn<'_>,
         emitted: &mut Option<E::Output>,
-        callback: impl FnOnce(&mut E) -> Result<Reply<E::Output>, Fault>,
+        callback: impl FnOnce(&mut AsEstimator<E>) -> Result<Reply<E::Output>, Fault>,
     ) -> Next {
-        let Some(AsEstimator(running)) = self.slot.running() else { return Next::Quiet };
+        let Some(running) = self.slot.running() else { return Next::Quiet };
         turn.enter(self.shared.number() as u32);
         let is_measured = self.declaration.health.latency_budget_nanos.is_some();
         let begun = is_measured.then(|| turn.timing().begin(turn.environment()));
@@ -354,148 +361,6 @@ impl<E: Estimator> Node<E> {
         }
     }
 
-    /// `source` is the driver's publisher after a run on its message.
-    #[inline]
-    fn complete(
-        &mut self,
-        diverged: Option<&'static str>,
-        has_asked: bool,
-        bad: Option<HealthReason>,
-        source: Option<&'static str>,
-        has_emitted: bool,
-        turn: &Turn<'_>,
-    ) {
-        if has_asked {
-            self.schedule();
-        }
-        if bad.is_some() || diverged.is_some() || self.health.state != HealthState::Healthy {
-            turn.timing().interrupt();
-            self.assess(bad, diverged, source, turn.now());
-        } else if source.is_some() {
-            self.was_good = true;
-        }
-        if has_emitted {
-            self.shared.counters().emitted.increment();
-            turn.begin_emission(self.declaration);
-        } else {
-            turn.no_emission();
-        }
-    }
-
-    #[cold]
-    fn assess(
-        &mut self,
-        bad: Option<HealthReason>,
-        diverged: Option<&'static str>,
-        source: Option<&'static str>,
-        now: MonotonicTime,
-    ) {
-        if let Some(reason) = diverged {
-            self.shared.counters().diverge(reason);
-            tracing::debug!(estimator = self.declaration.path, reason, "diverged");
-        }
-        let bad = bad.or(diverged.map(|_| HealthReason::Diverged));
-        let path = source.unwrap_or(self.declaration.path);
-        if source.is_some() {
-            self.was_good = bad.is_none();
-            self.judge(Event::Run, path, now);
-        }
-        match bad {
-            Some(reason) => self.judge(Event::Bad(reason), path, now),
-            None if source.is_some() => self.judge(Event::Good, path, now),
-            None => {}
-        }
-    }
-
-    /// Measures a callback that has begun; returns a reason if it exceeded its budget. `driver` is the input passed to the callback
-    /// and the message's stamp.
-    fn measure(
-        &mut self,
-        begun: Begun,
-        driver: Option<(usize, MonotonicTime)>,
-        turn: &Turn<'_>,
-    ) -> Option<HealthReason> {
-        let budget = self.declaration.health.latency_budget_nanos;
-        let Measured { end, nanos } = turn.timing().end(begun, turn.environment(), || {
-            if turn.environment().mode() == Mode::Replay && budget.is_some() {
-                let nanos = self.shared.replayed_latency_nanos();
-                nanos.unwrap_or_else(|| self.miss_in_journal("how long its callback took".to_owned()))
-            } else {
-                self.shared.pretended_latency_nanos()
-            }
-        });
-        let counters = self.shared.counters();
-        counters.latency.add(nanos.max(0) as u64);
-        if let Some((input, stamp)) = driver
-            && let Some(age) = counters.inputs.get(input).and_then(|input| input.age.as_ref())
-        {
-            age.add(end.nanos_since(stamp).max(0) as u64);
-        }
-        if let Some(telemetry) = self.environment.telemetry() {
-            let duration = std::time::Duration::from_nanos(nanos.max(0) as u64);
-            let event = TelemetryEvent::Latency { estimator: self.declaration.path, duration };
-            telemetry.tell(self.environment.origin().robot, &event);
-            turn.timing().interrupt();
-        }
-        let budget = budget?;
-        turn.keep(self.shared.number(), nanos);
-        (nanos > budget).then_some(HealthReason::LatencyOverrun)
-    }
-
-    /// In a replay: the journal does not have the value that the estimator asks for.
-    #[cold]
-    fn miss_in_journal<D: Default>(&self, what: String) -> D {
-        self.environment.replayed().miss(Missing { estimator: self.declaration.path, what });
-        D::default()
-    }
-
-    #[cold]
-    fn judge(&mut self, event: Event, source: &'static str, time: MonotonicTime) {
-        let from = self.health.state;
-        let Some((to, reason)) = self.health.on(event, self.declaration.health.recover_after) else { return };
-        let transition = HealthTransition { estimator: self.declaration.path, source, from, to, reason, time };
-        let report = HealthReport { transition, epoch: self.epoch };
-        self.environment.overseer().report(self.shared.number(), Report::Health(report));
-    }
-
-    #[cold]
-    fn refuse(&self, input: &InputDeclaration, reason: DropReason, time_nanos: i64) {
-        self.shared.counters().drop(input.index, reason);
-        let (estimator, input, reason) = (self.declaration.path, input.name, reason.name());
-        tracing::debug!(estimator, input, reason, time_nanos, "message dropped");
-        self.tell_drop(input, reason);
-    }
-
-    #[cold]
-    fn miss(&mut self, miss: SyncMiss, turn: &Turn<'_>) {
-        self.shared.counters().drop(miss.input, DropReason::SyncMiss);
-        let Some(input) = self.declaration.inputs.get(miss.input) else { return };
-        let (age_nanos, tolerance_nanos) = (miss.age_nanos, input.tolerance_nanos);
-        let estimator = self.declaration.path;
-        tracing::debug!(estimator, input = input.name, age_nanos, tolerance_nanos, "dispatch dropped for sync");
-        self.tell_drop(input.name, DropReason::SyncMiss.name());
-        self.judge(Event::Bad(HealthReason::SyncMiss), input.source, turn.now());
-    }
-
-    #[cold]
-    fn tell_input(&self, input: usize, stamp: Stamp, turn: &Turn<'_>) {
-        if let Some(telemetry) = turn.environment().telemetry()
-            && let Some(input) = self.declaration.inputs.get(input)
-        {
-            let event = TelemetryEvent::Input { estimator: self.declaration.path, input: input.name, stamp };
-            telemetry.tell(self.environment.origin().robot, &event);
-            turn.timing().interrupt();
-        }
-    }
-
-    #[cold]
-    fn tell_drop(&self, input: &'static str, reason: &'static str) {
-        if let Some(telemetry) = self.environment.telemetry() {
-            let event = TelemetryEvent::Dropped { estimator: self.declaration.path, input, reason };
-            telemetry.tell(self.environment.origin().robot, &event);
-        }
-    }
-
     /// Stores a message until after the restart, or counts it as dropped if no restart is planned.
     #[cold]
     fn keep<F: TakenAt<E::Input>>(&mut self, input: usize, message: &Stamped<F::Payload>) {
@@ -510,8 +375,11 @@ impl<E: Estimator> Node<E> {
             self.shared.counters().drop(input, DropReason::Stopped);
             return;
         };
-        let deliver: Deliver<E> =
-            Box::new(move |node, turn, emitted| node.take_in::<F>(input, &message, turn, emitted));
+        let deliver: Deliver<E> = Box::new(move |node, turn, emitted| {
+            let next = node.take_in::<F>(input, &message, turn, emitted);
+            discard(message);
+            next
+        });
         // Dropping the oldest message to make room runs user code.
         match caught(|| Ok(self.backlog.push(input, deliver))) {
             Ok(Some(oldest)) => self.shared.counters().drop(oldest, DropReason::Stopped),
@@ -540,7 +408,9 @@ impl<E: Estimator> Node<E> {
 
     fn context(&self, now: MonotonicTime) -> Context {
         let guardian: Arc<dyn Guardian> = Arc::clone(self.environment.overseer()) as _;
+        let replacement = self.environment.replacement(self.declaration.path).cloned();
         Context::new(self.environment.origin().robot, self.declaration, now, Some(guardian))
+            .with_replacement(replacement)
     }
 }
 

@@ -171,6 +171,14 @@ impl<'a> Turn<'a> {
         }
     }
 
+    /// Drops an emitted message. If its `Drop` panics, the estimator is charged, and the turn goes on.
+    #[inline]
+    pub fn release<T: Payload>(&self, topic: &Topic<T>, message: Stamped<T>) {
+        if std::mem::needs_drop::<Stamped<T>>() {
+            handed_on(self.environment, topic.path(), || drop(message));
+        }
+    }
+
     #[cold]
     fn follow<T: Payload>(&self, publisher: usize, path: &'static str, message: &Stamped<T>) {
         if self.environment.journal().is_some() {

@@ -58,8 +58,11 @@ pub struct EffortCommand {
 pub struct BeginMotion {
     /// Position at the start, rad or m.
     pub initial_position: f64,
-    /// Position at the end, rad or m.
-    pub target_position: f64,
+    /// Position at the end, rad or m; `None` if the motion goes on until another command, as that of a velocity or an effort
+    /// on a joint without an end of its range.
+    pub target_position: Option<f64>,
+    /// Velocity, if one is commanded, rad/s or m/s; negative if it leads to smaller positions.
+    pub velocity: Option<f64>,
     /// Speed of the motion, if known, rad/s or m/s; never negative.
     pub speed: Option<f64>,
     /// When the joint is expected to arrive.
@@ -82,13 +85,13 @@ pub enum MotionEnd {
     Reached,
     /// Another command replaced the motion.
     Replaced,
-    /// The actuator was told to stop, or was disarmed.
+    /// The actuator got a command to hold or to stop, or was disarmed.
     Stopped,
     /// The actuator applies its maximum effort, and the joint does not move: something blocks it.
     Stalled,
     /// The joint is at the end of its range, short of the target.
     Limit,
-    /// The actuator failed, with its reason.
+    /// The actuator failed, was restarted or could not be disarmed; the reason.
     Failed(String),
 }
 

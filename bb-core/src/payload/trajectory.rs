@@ -34,7 +34,7 @@ pub struct TrajectoryPoint {
 /// What a position of a trajectory is rounded to, rad or m: points that are close in time are not too fast for it.
 const ROUNDING: f64 = 1e-9;
 
-/// A trajectory that leads one joint beyond its limits is refused as a whole: brought back to them, it would be another one,
+/// A trajectory that leads one joint beyond its limits is refused as a whole: clamped to them, it would be another one,
 /// and this joint would no longer keep step with the others.
 ///
 /// The position, velocity and effort of each point are checked, of each column with the name of the joint, and the mean velocity

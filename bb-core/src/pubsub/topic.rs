@@ -76,10 +76,12 @@ impl<T: Payload> Topic<T> {
     }
 
     /// The same; a panic of the payload's `Clone` is kept in `panic`, unless there is one already.
+    #[inline]
     pub(crate) fn publish_contained(&self, message: &Stamped<T>, panic: &mut Option<Panic>) {
-        let mut wakers = Wakers::dropping_at_once();
-        self.publish_deferred(message, &mut wakers, panic);
-        wakers.run();
+        self.published.fetch_add(1, Ordering::Relaxed);
+        if self.is_listened_to() {
+            self.deliver_and_wake(message, panic);
+        }
     }
 
     /// The same for a publisher that is alone, as an estimator is in its island: it need not fear that somebody else counts
@@ -150,20 +152,20 @@ impl<T: Payload> Topic<T> {
 
     #[inline]
     fn hand_out(&self, message: &Stamped<T>) {
-        if self.listening.load(Ordering::Acquire) > 0 {
-            self.deliver_and_wake(message);
+        if self.is_listened_to() {
+            let mut panic = None;
+            self.deliver_and_wake(message, &mut panic);
+            if let Some(panic) = panic {
+                resume_unwind(panic);
+            }
         }
     }
 
     #[cold]
-    fn deliver_and_wake(&self, message: &Stamped<T>) {
+    fn deliver_and_wake(&self, message: &Stamped<T>, panic: &mut Option<Panic>) {
         let mut wakers = Wakers::dropping_at_once();
-        let mut panic = None;
-        self.deliver(message, &mut wakers, &mut panic);
+        self.deliver(message, &mut wakers, panic);
         wakers.run();
-        if let Some(panic) = panic {
-            resume_unwind(panic);
-        }
     }
 
     /// Keeps a panic of the payload's `Clone`, if there is none yet; the message is handed to everybody all the same.

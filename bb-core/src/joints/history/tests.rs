@@ -229,3 +229,60 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn a_joint_whose_clock_is_set_back_is_known_again() {
+    let mut history = History::new(JointKind::Revolute, 64, 10_000_000_000);
+    for millis in (0..200).step_by(10) {
+        history.add(state(millis, &[millis as f64], &[])).expect("it is newer");
+    }
+    // One stamp is a second ahead: the states that follow are older than it.
+    history.add(state(1_190, &[0.0], &[])).expect("it is newer");
+    let added: Vec<_> =
+        (200..400).step_by(10).map(|millis| history.add(state(millis, &[millis as f64], &[]))).collect();
+    let refused = added.iter().take_while(|added| **added == Err(JointRefusal::OutOfOrder)).count();
+    assert_eq!(refused, 10, "for 100 ms");
+    assert!(added[refused..].iter().all(Result::is_ok), "{added:?}");
+    assert_eq!((sampled(&history, 345, 0), history.newest()), (Ok(345.0), Some(390_000_000)));
+    // Nothing of the time before is left to interpolate with.
+    assert_eq!(sampled(&history, 250, 0), Err(Missing::TooOld { nanos: 50_000_000 }));
+}
+
+#[test]
+fn late_states_do_not_restart_the_history() {
+    let mut history = History::new(JointKind::Revolute, 64, 10_000_000_000);
+    // A second source is 300 ms late, and a third delivers old states in reverse.
+    for millis in (1000..3000).step_by(10) {
+        history.add(state(millis, &[1.0], &[])).expect("it is newer");
+        assert_eq!(history.add(state(millis - 300, &[2.0], &[])), Err(JointRefusal::OutOfOrder));
+    }
+    for millis in (1000..2990).rev() {
+        assert_eq!(history.add(state(millis, &[3.0], &[])), Err(JointRefusal::OutOfOrder));
+    }
+    assert_eq!(sampled(&history, 2990, 0), Ok(1.0));
+}
+
+/// An encoder at 1 kHz whose velocity is off by a hundredth: between two states that is 20 rad/s².
+#[test]
+fn the_acceleration_of_a_noisy_encoder_is_a_mean() {
+    let mut history = History::new(JointKind::Revolute, 1000, 1_000_000_000);
+    for millis in 0..200 {
+        let noise = if millis % 2 == 0 { 0.01 } else { -0.01 };
+        history.add(state(millis, &[0.0], &[1e-3 * millis as f64 + noise])).expect("it is newer");
+        let acceleration = history.newest_accelerations().next();
+        assert!(millis < 60 || acceleration.is_some_and(|is| (is - 1.0).abs() < 0.5), "{acceleration:?}");
+    }
+}
+
+#[test]
+fn the_acceleration_is_that_of_the_last_two_velocities() {
+    let mut history = History::new(JointKind::Prismatic, 4, 1_000_000_000);
+    let accelerations = |history: &History| history.newest_accelerations().collect::<Vec<_>>();
+    assert_eq!(accelerations(&history), Vec::<f64>::new());
+    history.add(state(0, &[0.0], &[1.0])).expect("it is the first");
+    assert_eq!(accelerations(&history), Vec::<f64>::new());
+    history.add(state(500, &[0.0], &[2.0])).expect("it is newer");
+    assert_eq!(accelerations(&history), [2.0]);
+    history.add(state(600, &[0.0], &[])).expect("it is newer");
+    assert_eq!(accelerations(&history), Vec::<f64>::new());
+}

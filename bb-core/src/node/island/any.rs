@@ -6,7 +6,7 @@ use crate::pubsub::DynamicMessage;
 use crate::time::MonotonicTime;
 
 #[cfg(not(loom))]
-use super::{Island, IslandState, IslandWiring, RELAXED, for_all, inbox::Pending, inside::Inside};
+use super::{Island, IslandState, IslandWiring, RELAXED, inbox::Pending, inside::Inside, processing::for_all};
 #[cfg(not(loom))]
 use std::{
     sync::PoisonError,
@@ -184,7 +184,7 @@ impl<S: IslandState> AnyIsland<S::Wiring> for Island<S> {
             _ => None,
         };
         let Some(mut state) = self.try_hold(wiring) else { return false };
-        self.process_line(wiring, now, None, |turn| {
+        let is_known = self.process_line(wiring, now, None, |turn| {
             match entry {
                 Replayed::Deliver(_) => {
                     let Some(message) = message.as_ref().and_then(|keyed| keyed.message.as_ref()) else {
@@ -203,6 +203,8 @@ impl<S: IslandState> AnyIsland<S::Wiring> for Island<S> {
                 Replayed::Emission(message) => return state.emit(wiring, message, turn),
             }
             true
-        })
+        });
+        crate::fault::discard(message);
+        is_known
     }
 }

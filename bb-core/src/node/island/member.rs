@@ -5,8 +5,8 @@ use super::{Island, IslandState, IslandWiring as _, Key};
 use crate::component::{Binding, EmittedAt, Estimator, Inputs, Outputs, TakenAt};
 use crate::fault::of_panic;
 use crate::message::{Payload, Stamp, Stamped, copied};
-use crate::node::emission::{copy_failed, emitter};
-use crate::node::{AnyIsland, Emitting, Mode, Next, Node, NodeEntry, Turn};
+use crate::node::emission::copy_failed;
+use crate::node::{AnyIsland, Emitting, Next, Node, NodeEntry, Turn};
 use crate::pubsub::DynamicMessage;
 use crate::time::MonotonicTime;
 use std::panic::resume_unwind;
@@ -166,8 +166,8 @@ pub fn enter<S: IslandState, T: Payload>(
     S::find(wiring).enter(wiring, now, key, direct, || copy_for::<S, T>(wiring, key.entry, message).map(keep));
 }
 
-/// Copies a message for an island that another thread holds. An estimator whose payload's `Clone` panics is charged with the panic,
-/// and the turn that emitted the message continues. A panic in the code of a sensor's or a service's message is resumed.
+/// Copies a message for an island that another thread holds. The publisher is charged if the payload's `Clone` panics; this island
+/// and those after it get the message all the same.
 #[cold]
 fn copy_for<S: IslandState, T: Payload>(
     wiring: &S::Wiring,
@@ -183,7 +183,7 @@ fn copy_for<S: IslandState, T: Payload>(
         let source = input.and_then(|(estimator, input)| {
             environment.node(*estimator).declaration().inputs.get(*input).map(|input| input.source)
         });
-        match source.filter(|path| environment.mode() == Mode::Replay || emitter(environment, path).is_some()) {
+        match source {
             Some(path) => copy_failed(environment, path, panic),
             None => resume_unwind(panic),
         }

@@ -1,7 +1,8 @@
 //! Transforms of an estimator's inputs across moving joints, at the times of their messages.
 
 use super::Node;
-use crate::component::{Estimator, InputTransform, InputTransforms};
+use crate::component::replacement::Replacement;
+use crate::component::{Estimator, Fault, InputTransform, InputTransforms};
 use crate::declaration::EstimatorDeclaration;
 use crate::event::HealthReason;
 use crate::joints::{Gap, InputRoute, LookupError, PlacedInput, Placement};
@@ -58,6 +59,16 @@ impl Placing {
         Self { declaration, shared: environment.node(number), routes, placed, inputs: inputs.collect() }
     }
 
+    /// Why `replacement` cannot take the place of the estimator: `robot!` has checked only the declared one.
+    pub(super) fn fault_of(&self, replacement: &Replacement) -> Option<Fault> {
+        let spans = self.routes.first().filter(|_| !replacement.handles_moving_joints())?;
+        let input = self.declaration.inputs.get(spans.input).map_or("", |input| input.name);
+        Some(Fault::permanent(format!(
+            "its input `{input}` spans a moving joint, and its replacement takes fixed transforms only; set \
+             `HANDLES_MOVING_JOINTS` in its `Estimator`"
+        )))
+    }
+
     /// Finds the transforms of the inputs for a dispatch on a message of the driver. `admission` knows when the other inputs were
     /// measured.
     pub(super) fn place(
@@ -92,8 +103,8 @@ impl Placing {
         Ok(())
     }
 
-    pub(super) fn transforms(&self) -> InputTransforms<'_> {
-        InputTransforms::new(&self.inputs)
+    pub(super) fn transforms(&self, driver_time: MonotonicTime) -> InputTransforms<'_> {
+        InputTransforms::new(&self.inputs).at(driver_time)
     }
 }
 

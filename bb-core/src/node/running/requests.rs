@@ -58,7 +58,7 @@ impl<E: Estimator> Node<E> {
                     if request.bytes.is_none() {
                         turn.set_unrecorded(declaration);
                     }
-                    handle(estimator)
+                    estimator.declared().map_or_else(|| Ok(Reply::none()), handle)
                 });
             }
             NodeEntry::OutputFailed { message } => {
@@ -111,7 +111,7 @@ impl<E: Estimator> Node<E> {
         E: HandleCall<Q>,
     {
         let mut response = Err(Fault::new(format!("{} does not run", self.declaration.path)));
-        if !self.slot.is_running() {
+        if self.slot.running().is_none_or(|estimator| estimator.declared().is_none()) {
             return (response, None);
         }
         let declaration = self.declaration;
@@ -119,6 +119,7 @@ impl<E: Estimator> Node<E> {
             if is_unrecorded {
                 turn.set_unrecorded(declaration);
             }
+            let Some(estimator) = estimator.declared() else { return Ok(Reply::none()) };
             let (answer, reply) = estimator.handle_call(request)?;
             response = Ok(answer);
             Ok(reply)

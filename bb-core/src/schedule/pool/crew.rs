@@ -16,16 +16,16 @@ const RETRY: Duration = Duration::from_millis(20);
 
 /// The jobs and the threads of a pool.
 ///
-/// Every job that a thread may take is taken. When there is one, [`Crew::call`] says which thread to tell: an idle
-/// one, then counted as starting until it looks, or else the timekeeper. The timekeeper looks as long as jobs wait,
-/// and starts a thread unless one is starting or jobs were taken lately. `call` is asked when a job was added, when a
+/// Every job that a thread may take is taken. When there is one, [`Crew::call`] returns which thread to notify: an
+/// idle one, then counted as starting until it looks, or else the timekeeper. The timekeeper looks as long as jobs wait,
+/// and starts a thread unless one is starting or jobs were taken lately. `call` runs when a job was added, when a
 /// job of a full lane returned, and when no thread could be started. A thread that runs out of work looks once more
 /// before it ends, under the same lock.
 #[derive(Default)]
 pub(super) struct Crew {
     lanes: [Queue; Lane::ALL.len()],
     threads: usize,
-    /// Threads that were started or told of a job and do not run yet. While there are any, the machine is busy, and
+    /// Threads that were started or notified of a job and do not run yet. While there are any, the machine is busy, and
     /// one more would not help.
     starting: usize,
     /// Idle threads, the most recently active last. That one takes the next job, so those at the front can end.
@@ -62,7 +62,7 @@ pub(super) enum Next {
     End,
 }
 
-/// Who is to be told that a job may be taken.
+/// The threads to notify of jobs.
 pub(super) enum Call {
     Nobody,
     Thread(Thread),
@@ -75,7 +75,7 @@ impl Crew {
         self.lanes[lane as usize].waiting.push_back((now, job));
     }
 
-    /// Who is to be told of the jobs that may be taken.
+    /// The threads to notify of the jobs that may be taken.
     pub(super) fn call(&mut self) -> Call {
         if !self.may_take() {
             return Call::Nobody;
@@ -88,13 +88,13 @@ impl Crew {
         }
         match (self.is_closed, self.starting) {
             (false, _) => Call::Timekeeper,
-            // Nobody keeps time any more, but each thread that takes a job asks this again.
+            // No thread keeps time any more, but each thread that takes a job checks this again.
             (true, 0) => Call::NewThread,
             (true, _) => Call::Nobody,
         }
     }
 
-    /// The thread that is to be told of a job.
+    /// The thread to notify of a job.
     pub(super) fn take_idle(&mut self) -> Option<Thread> {
         let thread = if self.may_take() { self.idle.pop() } else { None };
         self.starting += usize::from(thread.is_some());
@@ -233,7 +233,7 @@ impl Crew {
         (self.threads > READY).then_some(longest)
     }
 
-    /// The calling thread goes on. Returns whether it was told of a job.
+    /// The calling thread continues. Returns whether it was notified of a job.
     pub(super) fn rise(&mut self) -> bool {
         let this = current().id();
         let position = self.idle.iter().position(|thread| thread.id() == this);
@@ -276,7 +276,7 @@ mod tests {
         (0..100).for_each(|_| crew.add(Lane::Robot, Box::new(|| {}), start));
         assert_eq!(crew.wait(at(1)), Some(Duration::from_millis(1)));
         assert_eq!(crew.wait(at(2)), Some(Duration::ZERO));
-        // One comes back and goes on: the machine is busy, and nothing blocks.
+        // One returns and continues: the machine is busy, and nothing blocks.
         for millis in 1..50 {
             crew.done(if millis == 1 { Lane::Commands } else { Lane::Robot });
             assert!(matches!(crew.next(at(millis)), Next::Job(Lane::Robot, _)));

@@ -331,7 +331,8 @@ fn what_ros_appends_is_ignored() {
 fn motions_say_when_they_end() {
     let begin = BeginMotion {
         initial_position: 0.0,
-        target_position: 0.5,
+        target_position: Some(0.5),
+        velocity: None,
         speed: Some(1.0),
         expected_arrival: Some(MonotonicTime::from_nanos(500_000_000)),
     };

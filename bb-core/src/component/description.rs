@@ -1,0 +1,187 @@
+//! A running robot as a whole, for tools that do not know its type: what it consists of, and what can be asked of it.
+
+mod json;
+
+use super::CommandInfo;
+use crate::event::ParameterValue;
+use crate::topology::{JointKind, Limit};
+use std::time::Duration;
+
+/// Everything that a robot consists of, see [`Bus::description`](super::Bus::description). [`Self::to_json`] writes it for
+/// other programs.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Description {
+    /// The name of the robot.
+    pub robot: &'static str,
+    /// Its links.
+    pub links: Vec<LinkDescription>,
+    /// Its joints.
+    pub joints: Vec<JointDescription>,
+    /// Its sensors, estimators, actuators, controllers and bridges.
+    pub components: Vec<ComponentDescription>,
+    /// Its topics, those created at run time included.
+    pub topics: Vec<TopicDescription>,
+    /// Its parameters.
+    pub parameters: Vec<ParameterDescription>,
+    /// Its commands.
+    pub commands: Vec<CommandInfo>,
+    /// Its operational states.
+    pub states: Vec<&'static str>,
+}
+
+/// A link.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct LinkDescription {
+    /// The joints and links from the root to it: `base/pan/head`.
+    pub path: String,
+    /// Its name.
+    pub name: &'static str,
+    /// The joint that carries it; `None` for the root.
+    pub parent_joint: Option<&'static str>,
+    /// Its mass, kg, if declared.
+    pub mass: Option<f64>,
+}
+
+/// A joint.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct JointDescription {
+    /// The links and joints from the root to it: `base/pan`.
+    pub path: String,
+    /// Its name.
+    pub name: &'static str,
+    /// How it moves.
+    pub kind: JointKind,
+    /// The link that carries it.
+    pub parent: &'static str,
+    /// The link that it carries.
+    pub child: &'static str,
+    /// Its limits.
+    pub limit: Option<Limit>,
+    /// The joint that it mimics.
+    pub mimics: Option<&'static str>,
+    /// The paths of the actuators that move it.
+    pub actuators: Vec<&'static str>,
+}
+
+/// What a component is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ComponentKind {
+    /// A sensor.
+    Sensor,
+    /// An estimator.
+    Estimator,
+    /// An actuator.
+    Actuator,
+    /// A controller.
+    Controller,
+    /// A bridge.
+    Bridge,
+}
+
+impl ComponentKind {
+    /// The word for it in `robot!`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Sensor => "sensor",
+            Self::Estimator => "estimator",
+            Self::Actuator => "actuator",
+            Self::Controller => "controller",
+            Self::Bridge => "bridge",
+        }
+    }
+}
+
+/// A component.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct ComponentDescription {
+    /// Its path: `sensor/base/imu`.
+    pub path: &'static str,
+    /// What it is.
+    pub kind: ComponentKind,
+    /// The frame of what it publishes: a link or a joint; empty for none.
+    pub frame: &'static str,
+    /// How often it is read or called, if it has a rate.
+    pub period: Option<Duration>,
+    /// What an estimator takes.
+    pub inputs: Vec<InputDescription>,
+    /// The paths at which it publishes; an actuator, the commands that it has carried out, and its motions.
+    pub topics: Vec<&'static str>,
+    /// Whether another component took its place, see [`Builder::replace_sensor`](crate::run::Builder::replace_sensor).
+    pub is_replaced: bool,
+}
+
+/// An input of an estimator.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct InputDescription {
+    /// Its name.
+    pub name: &'static str,
+    /// The path of its publisher.
+    pub source: &'static str,
+    /// Whether its arrival triggers a dispatch.
+    pub is_driver: bool,
+    /// Whether the estimator is called without it.
+    pub is_optional: bool,
+}
+
+/// A topic.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct TopicDescription {
+    /// Its path.
+    pub path: &'static str,
+    /// The name of its payload.
+    pub payload: &'static str,
+    /// How often it is published, if that is declared: the rate of a sensor or a service.
+    pub period: Option<Duration>,
+}
+
+/// A parameter.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct ParameterDescription {
+    /// Its path: `param/gains/kp`.
+    pub path: &'static str,
+    /// Its documentation.
+    pub doc: &'static str,
+    /// Its present value, in SI.
+    pub value: ParameterValue,
+    /// Its value as declared, in SI.
+    pub default: ParameterValue,
+    /// The unit it is declared with; empty for none.
+    pub unit: &'static str,
+    /// The JSON Schema of its value as it is written in a file of settings.
+    pub schema: String,
+}
+
+/// The element of a list with this path.
+macro_rules! by_path {
+    ($($(#[$doc:meta])* $name:ident, $list:ident, $type:ty;)*) => { $(
+        $(#[$doc])*
+        pub fn $name(&self, path: &str) -> Option<&$type> {
+            self.$list.iter().find(|element| element.path == path)
+        }
+    )* };
+}
+
+impl Description {
+    by_path! {
+        /// The component at a path.
+        component, components, ComponentDescription;
+        /// The topic at a path.
+        topic, topics, TopicDescription;
+        /// The parameter at a path.
+        parameter, parameters, ParameterDescription;
+        /// The command at a path.
+        command, commands, CommandInfo;
+        /// The link at a path: `base/pan/head`.
+        link, links, LinkDescription;
+        /// The joint at a path: `base/pan`.
+        joint, joints, JointDescription;
+    }
+}

@@ -1,0 +1,144 @@
+//! A description as JSON. Quantities are in SI, and what is unknown or infinite is `null`; schemas are objects.
+
+use super::{
+    ComponentDescription, Description, InputDescription, JointDescription, LinkDescription, ParameterDescription,
+    TopicDescription,
+};
+use crate::component::CommandInfo;
+use crate::event::ParameterValue;
+use crate::message::codec::{json_schema, to_json};
+use std::time::Duration;
+
+impl Description {
+    /// One JSON object with the lists `links`, `joints`, `components`, `topics`, `parameters`, `commands` and `states`, whose
+    /// elements have a `path`.
+    pub fn to_json(&self) -> String {
+        object([
+            ("robot", text(self.robot)),
+            ("states", array(self.states.iter().map(|state| text(state)))),
+            ("links", array(self.links.iter().map(link))),
+            ("joints", array(self.joints.iter().map(joint))),
+            ("components", array(self.components.iter().map(component))),
+            ("topics", array(self.topics.iter().map(topic))),
+            ("parameters", array(self.parameters.iter().map(parameter))),
+            ("commands", array(self.commands.iter().map(command))),
+        ])
+    }
+}
+
+fn link(link: &LinkDescription) -> String {
+    object([
+        ("path", text(&link.path)),
+        ("name", text(link.name)),
+        ("parent_joint", optional(link.parent_joint, text)),
+        ("mass", optional(link.mass, number)),
+    ])
+}
+
+fn joint(joint: &JointDescription) -> String {
+    let limit = joint.limit.map(|limit| {
+        object([
+            ("lower", optional(limit.lower, number)),
+            ("upper", optional(limit.upper, number)),
+            ("velocity", optional(limit.velocity, number)),
+            ("effort", optional(limit.effort, number)),
+        ])
+    });
+    object([
+        ("path", text(&joint.path)),
+        ("name", text(joint.name)),
+        ("kind", text(joint.kind.name())),
+        ("parent", text(joint.parent)),
+        ("child", text(joint.child)),
+        ("limit", limit.unwrap_or_else(null)),
+        ("mimics", optional(joint.mimics, text)),
+        ("actuators", array(joint.actuators.iter().map(|path| text(path)))),
+    ])
+}
+
+fn component(component: &ComponentDescription) -> String {
+    object([
+        ("path", text(component.path)),
+        ("kind", text(component.kind.name())),
+        ("frame", text(component.frame)),
+        ("rate_hz", rate(component.period)),
+        ("inputs", array(component.inputs.iter().map(input))),
+        ("topics", array(component.topics.iter().map(|path| text(path)))),
+        ("replaced", component.is_replaced.to_string()),
+    ])
+}
+
+fn input(input: &InputDescription) -> String {
+    object([
+        ("name", text(input.name)),
+        ("source", text(input.source)),
+        ("driver", input.is_driver.to_string()),
+        ("optional", input.is_optional.to_string()),
+    ])
+}
+
+fn topic(topic: &TopicDescription) -> String {
+    object([("path", text(topic.path)), ("payload", text(topic.payload)), ("rate_hz", rate(topic.period))])
+}
+
+fn parameter(parameter: &ParameterDescription) -> String {
+    object([
+        ("path", text(parameter.path)),
+        ("doc", text(parameter.doc.trim())),
+        ("type", text(parameter.default.type_name())),
+        ("value", value(&parameter.value)),
+        ("default", value(&parameter.default)),
+        ("unit", text(parameter.unit)),
+        ("schema", parameter.schema.clone()),
+    ])
+}
+
+fn command(command: &CommandInfo) -> String {
+    let states = command.allowed_states.map(|states| array(states.iter().map(|state| text(state))));
+    object([
+        ("path", text(command.path)),
+        ("category", text(command.category)),
+        ("allowed_states", states.unwrap_or_else(null)),
+        ("timeout_s", optional(command.timeout.map(|timeout| timeout.as_secs_f64()), number)),
+        ("arguments", json_schema(command.arguments)),
+        ("result", json_schema(command.output)),
+    ])
+}
+
+fn rate(period: Option<Duration>) -> String {
+    optional(period.map(|period| 1.0 / period.as_secs_f64()), number)
+}
+
+fn value(value: &ParameterValue) -> String {
+    match value {
+        ParameterValue::Bool(value) => value.to_string(),
+        ParameterValue::Integer(value) => value.to_string(),
+        ParameterValue::Float(value) => number(*value),
+        ParameterValue::Text(value) => text(value),
+    }
+}
+
+fn text(text: &str) -> String {
+    to_json(&text.to_owned())
+}
+
+fn number(number: f64) -> String {
+    if number.is_finite() { to_json(&number) } else { null() }
+}
+
+fn null() -> String {
+    "null".to_owned()
+}
+
+fn optional<T>(value: Option<T>, write: impl FnOnce(T) -> String) -> String {
+    value.map_or_else(null, write)
+}
+
+fn array(elements: impl Iterator<Item = String>) -> String {
+    format!("[{}]", elements.collect::<Vec<_>>().join(","))
+}
+
+fn object<const N: usize>(members: [(&str, String); N]) -> String {
+    let members = members.map(|(name, value)| format!("{}:{value}", text(name)));
+    format!("{{{}}}", members.join(","))
+}
