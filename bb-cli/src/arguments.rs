@@ -52,8 +52,7 @@ enum Eval {
     Noise(Box<NoiseArguments>),
 }
 
-const EXAMPLES: &str =
-    "Exit code: 0; 1 if a recording could not be evaluated, or not to its end; 2 for a wrong use.
+const EXAMPLES: &str = "Exit code: 0; 1 if a recording could not be evaluated to its end; 2 for a wrong use.
 
 Examples:
   bb eval attitude walk.mcap

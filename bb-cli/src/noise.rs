@@ -14,8 +14,7 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 use still::{Still, still};
 
-pub(crate) const EXAMPLES: &str =
-    "Exit code: 0; 1 if a recording gave no noise, or not of all axes; 2 for a wrong use.
+pub(crate) const EXAMPLES: &str = "Exit code: 0; 1 if the noise of an axis could not be found; 2 for a wrong use.
 
 Examples:
   bb eval noise night.mcap --plot allan.svg
@@ -25,16 +24,16 @@ Examples:
 #[derive(Debug, Args)]
 pub(crate) struct NoiseArguments {
     /// ROS 2 bags in MCAP, folders of them, or CSV files of t (s), angular velocity (rad/s) and specific force (m/s²), with a
-    /// header row. The IMU is at rest, for three hours if its random walk is to be seen.
+    /// header row. The IMU must be at rest, for three hours to show its random walk.
     #[arg(value_name = "BAG", required = true)]
     paths: Vec<PathBuf>,
-    /// The topic of the IMU, where several fit (sensor_msgs/Imu).
+    /// The topic of the IMU, if there are several (sensor_msgs/Imu).
     #[arg(long, value_name = "TOPIC")]
     imu_topic: Option<String>,
     /// Prints an array of objects instead of the text.
     #[arg(long)]
     json: bool,
-    /// Plots the Allan deviations and what was fitted to them into this file, an SVG or a PNG.
+    /// Plots the Allan deviations and the fitted models to this file, an SVG or a PNG.
     #[arg(long, value_name = "FILE", value_parser = picture)]
     plot: Option<PathBuf>,
 }

@@ -80,6 +80,55 @@ fn a_smoother_tells_of_its_window() {
     assert_eq!((output.code, &rows[0]["position_smoothed_rmse_m"]), (Some(0), &Value::Null));
 }
 
+/// The drive with landmarks 50 m below, each seen at the pixel that `pixel` makes of the true one.
+fn drive_above(name: &str, keyframes: std::ops::Range<u32>, pixel: fn(u32, (f64, f64)) -> (f64, f64)) -> PathBuf {
+    let (mut seen, mut known) = (String::from("k,id,u,v,sigma_px\n"), String::from("id,x,y,z,gx,gy,gz,sigma\n"));
+    let place = |id: u32| (f64::from(id % 5) * 6.0 - 6.0, f64::from(id / 5) * 6.0 - 9.0, -50.0);
+    for id in 0..20 {
+        let (x, y, z) = place(id);
+        let _ = writeln!(known, "{id},{x},{y},{z},{x},{y},{z},1");
+    }
+    for k in keyframes {
+        for id in 0..20 {
+            let (x, y, z) = place(id);
+            // From the camera, which is 10 cm ahead of the body and 5 cm below.
+            let (ahead, down) = (x - 0.2 * f64::from(k) - 0.1, -0.05 - z);
+            let (u, v) = pixel(id, (376.0 - 458.0 * y / down, 240.0 - 458.0 * ahead / down));
+            let _ = writeln!(seen, "{k},{id},{u},{v},1");
+        }
+    }
+    file(&format!("{name}_obs.csv"), seen.as_bytes());
+    file(&format!("{name}_landmarks.csv"), known.as_bytes());
+    drive(name)
+}
+
+#[test]
+fn landmarks_count_from_the_first_keyframe_on() {
+    let first = |id, (u, v)| if id < 3 { (-5.0, v) } else { (u, v) };
+    let drive = drive_above("first_seen", 0..1, first);
+    let prefix = drive.to_str().expect("is text");
+    let output = bb(&["eval", "navigation", prefix, "--filter", "smoother-single", "--json"]);
+    let rows: Vec<Value> = serde_json::from_str(&output.out).expect("an array");
+    assert_eq!((&*output.err, &rows[0]["refused"]), ("", &3.into()));
+    let drive = drive_above("never_off", 0..101, |_, pixel| pixel);
+    let prefix = drive.to_str().expect("is text");
+    let output = bb(&["eval", "navigation", prefix, "--filter", "smoother-single", "--json"]);
+    let rows: Vec<Value> = serde_json::from_str(&output.out).expect("an array");
+    assert_eq!((&*output.err, &rows[0]["refused"]), ("", &0.into()));
+}
+
+#[test]
+fn landmarks_that_are_refused_are_reported() {
+    let drive = drive_above("scrambled", 0..101, |id, (u, v)| if id < 11 { (-5.0, v) } else { (u, v) });
+    let prefix = drive.to_str().expect("is text");
+    let output = bb(&["eval", "navigation", prefix, "--filter", "smoother-single"]);
+    let said = "1111 of 2020 observations of landmarks were refused (the first: a value is beyond the range of any \
+        sensor): more than half, so its figures are not to be trusted";
+    assert!(output.code == Some(1) && output.err.contains(said), "{}", output.err);
+    let output = bb(&["eval", "navigation", prefix, "--filter", "smoother-single", "--set", "landmarks=false"]);
+    assert_eq!((output.code, &*output.err), (Some(0), ""));
+}
+
 /// Each by its file, its line and its column.
 #[test]
 fn numbers_that_nothing_can_have_are_named() {

@@ -132,13 +132,32 @@ fn a_start_is_at_rest_or_at_a_pose_or_at_the_truth() {
     let row = rows(&[&[text(&bag)], &turned[..], &options].concat());
     assert!(number(&row[0], "orientation_rmse_deg") > 5.0, "{}", row[0]);
     let moving = drive.bag("course.mcap", &Bagged { fixes: true, ..Bagged::default() });
-    let course =
-        ["--truth", "/truth", "--start", "align", "--set", "heading_from_course=true", "--origin", drive::ORIGIN];
-    let row = rows(&[&[text(&moving)], &course[..]].concat());
-    // It turns by 14° a second: a course of fixes a second apart lags by 7° but for the gyroscope, and their noise adds 8° at first.
-    assert!(number(&row[0], "orientation_rmse_deg") < 8.0, "{}", row[0]);
     let output = bb(&["eval", "navigation", text(&moving), "--truth", "/truth", "--start", "align"]);
     assert!(output.code == Some(1) && output.err.contains("the IMU is never at rest"), "{}", output.err);
+}
+
+/// The course of fixes a second apart, whose noise turns it by 8°: the heading that a filter starts with is off by as much, and the
+/// filter knows it. Of forty drives, the second and the third are those with the largest errors, 19° and 15°.
+#[test]
+fn a_start_with_the_course_is_as_wrong_as_the_filter_says() {
+    for seed in [5, 6, 18] {
+        let name = format!("course_{seed}.mcap");
+        let moving = Drive::new(seed, 300).bag(&name, &Bagged { fixes: true, ..Bagged::default() });
+        let course = [
+            "--truth",
+            "/truth",
+            "--start",
+            "align",
+            "--set",
+            "heading_from_course=true",
+            "--origin",
+            drive::ORIGIN,
+        ];
+        let row = &rows(&[&[text(&moving)], &course[..]].concat())[0];
+        // Nine for a heading three deviations off, and one for each of the other five dimensions.
+        assert!((1.0..9.0 + 5.0).contains(&number(row, "nees")), "{row}");
+        assert!(number(row, "orientation_rmse_deg") < 3.0 * 8.1, "{row}");
+    }
 }
 
 /// Positions alone for the truth, of an antenna on a mast.

@@ -30,11 +30,12 @@ fn the_project_compiles_passes_its_tests_and_records() {
     // The versions that the workspace has, so that nothing is fetched, and what it has built.
     std::fs::copy(Path::new(WORKSPACE).join("Cargo.lock"), folder.join("Cargo.lock")).expect("copies");
     let target = Path::new(env!("CARGO_BIN_EXE_bb")).ancestors().nth(2).expect("target/debug/bb");
+    let profiles = profiles();
     let cargo = |command: &[&str]| {
         let output = Command::new(env!("CARGO"))
             .current_dir(&folder)
             .args([&command[..1], &["--offline", "--quiet"]].concat())
-            .args(["--config", "profile.dev.package.nalgebra.opt-level=2"])
+            .args(profiles.iter().flat_map(|profile| ["--config", profile]))
             .args(&command[1..])
             .env("CARGO_TARGET_DIR", target)
             .output()
@@ -94,6 +95,18 @@ fn the_project_compiles_passes_its_tests_and_records() {
             assert_eq!(info.code, Some(0), "it is whole: {}", info.err);
         }
     }
+}
+
+/// How the workspace compiles its dependencies in the profile `dev`, as configuration.
+fn profiles() -> Vec<String> {
+    let manifest = std::fs::read_to_string(Path::new(WORKSPACE).join("Cargo.toml")).expect("reads");
+    let tables = manifest.split("\n[").filter_map(|table| table.split_once("]\n"));
+    let profiles = tables.filter(|(name, _)| name.starts_with("profile.dev.package."));
+    let profiles: Vec<_> = profiles
+        .filter_map(|(name, settings)| Some(format!("{name}.{}", settings.lines().next()?.replace(' ', ""))))
+        .collect();
+    assert!(profiles.contains(&"profile.dev.package.nalgebra.opt-level=2".to_owned()), "{profiles:?}");
+    profiles
 }
 
 /// The recording that a run names.

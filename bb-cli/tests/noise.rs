@@ -4,6 +4,7 @@ mod common;
 
 use bb_core::nalgebra::Vector3 as V;
 use common::bags::ros::*;
+use common::noise::Noise;
 use common::{bags, bb, file};
 use serde_json::Value;
 use std::fmt::Write;
@@ -14,28 +15,11 @@ const ACCELEROMETER: f64 = 2e-3;
 const WALK: f64 = 1e-4;
 const RATE: f64 = 100.0;
 
-/// Noise that is the same in every run: sums of twelve numbers of a 64-bit congruential generator.
-struct Noise(u64);
-
-impl Noise {
-    fn next(&mut self) -> f64 {
-        let mut even = || {
-            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-        };
-        (0..12).map(|_| even()).sum::<f64>() - 6.0
-    }
-
-    fn vector(&mut self, deviation: f64) -> V<f64> {
-        V::new(self.next(), self.next(), self.next()) * deviation
-    }
-}
-
 type Sample = (i64, V<f64>, V<f64>);
 
 /// An IMU at rest: white noise, and a gyroscope whose bias walks.
 fn night(seed: u64, seconds: f64) -> Vec<Sample> {
-    let mut noise = Noise(seed);
+    let mut noise = Noise::new(seed);
     let mut bias = V::new(0.01, -0.02, 0.005);
     let sample = |i: i64| {
         bias += noise.vector(WALK / RATE.sqrt());

@@ -14,8 +14,8 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 
 pub(crate) const EXAMPLES: &str =
-    "Exit code: 0; 1 if a data set could not be evaluated, or not to its end, or most of it was left
-out or refused; 2 for a wrong use.
+    "Exit code: 0; 1 if a data set could not be evaluated to its end, or most of it was left out or
+rejected; 2 for a wrong use.
 
 Examples:
   bb eval navigation drive.mcap --truth /ground_truth --plot drive.svg
@@ -30,24 +30,24 @@ pub(crate) struct NavigationArguments {
     /// `folder/name_keyframes.csv` and the others.
     #[arg(value_name = "DATA", required_unless_present = "list")]
     data: Vec<PathBuf>,
-    /// The filters; several with commas.
+    /// The filters: several with commas.
     #[arg(long = "filter", value_name = "NAME", value_delimiter = ',', default_value = NAVIGATION_FILTERS[0].name,
           value_parser = filter, long_help = filters_in_words())]
     filters: Vec<NavigationFilter>,
-    /// How many keyframes a smoother holds.
+    /// The number of keyframes in a smoother's window.
     #[arg(long, value_name = "KEYFRAMES", default_value_t = 20,
           value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(2..=1000))]
     window: usize,
-    /// Sets a parameter, in SI or with a unit, in place of what the data set says.
+    /// Sets a parameter, in SI or with a unit, instead of the data set's value.
     #[arg(long = "set", value_name = "NAME=VALUE")]
     settings: Vec<NavigationSetting>,
-    /// Prints the parameters, with defaults, ranges and units, and does nothing else.
+    /// Only prints the parameters, with defaults, ranges and units.
     #[arg(long)]
     list: bool,
     /// Prints an array of objects instead of the table.
     #[arg(long)]
     json: bool,
-    /// Plots track, errors, innovations and errors by the age of poses into this file, an SVG or a PNG.
+    /// Plots the track, errors, innovations, and errors by the age of poses to this file, an SVG or a PNG.
     #[arg(long, value_name = "FILE", value_parser = picture)]
     plot: Option<PathBuf>,
     #[command(flatten)]
@@ -61,7 +61,7 @@ fn filter(name: &str) -> Result<NavigationFilter, String> {
 }
 
 fn filters_in_words() -> String {
-    let mut text = String::from("The filters; several with commas. Those there are:\n");
+    let mut text = String::from("The filters: several with commas.\n");
     for filter in NAVIGATION_FILTERS {
         text += &format!("\n{}: {}", filter.name, filter.about);
     }

@@ -91,7 +91,7 @@ pub(crate) fn play(
     mut progress: impl FnMut(),
 ) -> Result<Played, String> {
     let mut player = Player::new(filter, data, settings, window)?;
-    player.start(&data.start).map_err(|error| format!("cannot start: {error}"))?;
+    player.start(data).map_err(|error| format!("cannot start: {error}"))?;
     let left_out = MOST_LEFT_OUT.min(data.keyframes.len().saturating_sub(1) / 10);
     let (mut newest, mut oldest) = (Sums::default(), Sums::default());
     let (mut propagation_s, mut samples) = (0.0, 0_usize);

@@ -31,22 +31,22 @@ pub(crate) enum Kind {
 pub const NAVIGATION_FILTERS: [NavigationFilter; 6] = [
     NavigationFilter {
         name: "eskf",
-        about: "error-state Kalman filters over multiples of the data sheets' noise, weighed by their likelihood",
+        about: "error-state Kalman filters with multiples of the data sheets' noise, weighted by their likelihood",
         kind: Kind::Bank,
     },
     NavigationFilter {
         name: "eskf-single",
-        about: "one error-state Kalman filter with the noise as it is given",
+        about: "one error-state Kalman filter with the given noise",
         kind: Kind::Single,
     },
     NavigationFilter {
         name: "smoother",
-        about: "a fixed-lag smoother with the noise that those filters have found",
+        about: "a fixed-lag smoother with the noise that the filters of `eskf` found",
         kind: Kind::Smoother,
     },
     NavigationFilter {
         name: "smoother-single",
-        about: "a fixed-lag smoother with the noise as it is given",
+        about: "a fixed-lag smoother with the given noise",
         kind: Kind::SmootherSingle,
     },
     NavigationFilter {

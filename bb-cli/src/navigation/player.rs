@@ -4,7 +4,7 @@ use super::data::{DataSet, Keyframe, nanoseconds};
 use super::filters::{Kind, NavigationFilter, NavigationSetting, aiding, params, uses_landmarks};
 use super::flown::Flown;
 use super::measured::{Answers, Measured};
-use super::step::{Known, Step};
+use super::step::{Known, Observed, Step};
 use bb_core::nalgebra::Matrix6;
 use bb_estimators::navigation::{
     FixedLagSmoother, ImuMean, LandmarkParams, Learnt, NAVIGATED, NAVIGATION, Navigated, Navigator, Optional,
@@ -39,8 +39,8 @@ pub(crate) struct Smoothed {
     relative: Stream,
     velocities: Stream,
     landmarks: Stream,
-    /// Observations of landmarks that were refused at the last keyframe.
-    unseen: u64,
+    /// The observations of landmarks since the last step.
+    observed: Observed,
     is_watching: bool,
 }
 
@@ -79,7 +79,7 @@ impl Player {
                 relative: gated,
                 velocities: gated,
                 landmarks: gated,
-                unseen: 0,
+                observed: Observed::default(),
                 is_watching: camera.is_some(),
             })))
         };
@@ -95,11 +95,15 @@ impl Player {
         }
     }
 
-    pub(crate) fn start(&mut self, start: &Start) -> Result<(), String> {
+    pub(crate) fn start(&mut self, data: &DataSet) -> Result<(), String> {
         if let Self::State(flown) = self {
-            return flown.start(start);
+            return flown.start(&data.start);
         }
-        self.start_filter(start).map_err(|refusal| refusal.to_string())
+        self.start_filter(&data.start).map_err(|refusal| refusal.to_string())?;
+        if let Self::Smoother(smoothed) = self {
+            smoothed.observe(&Measured::at(data, 0), 0);
+        }
+        Ok(())
     }
 
     fn start_filter(&mut self, start: &Start) -> Result<(), Refusal> {
@@ -238,7 +242,7 @@ impl Smoothed {
         step.keyframe_s = began.elapsed().as_secs_f64();
         step.allocations = counted.count_total;
         step.answer(result.map_err(|error: Refusal| format!("keyframe {k}: {error}"))?);
-        step.refused += self.unseen;
+        step.observe(std::mem::take(&mut self.observed));
         self.learn(Some(k));
         Ok(())
     }
@@ -253,15 +257,22 @@ impl Smoothed {
             measured.fix.map(|fix| smoother.add(&mut self.gnss, k, fix)),
             measured.velocity.map(|velocity| smoother.add(&mut self.velocities, k, velocity)),
         ];
-        self.unseen = 0;
-        if self.is_watching {
-            for observation in measured.seen {
-                self.unseen += u64::from(smoother.observe(&mut self.landmarks, k, observation).is_err());
-            }
-        }
+        self.observe(measured, k);
+        let smoother = &mut self.smoother;
         smoother.update()?;
         let _ = (smoother.estimate(), smoother.pose_covariance());
         Ok(answers)
+    }
+
+    /// Adds the observations of landmarks at a keyframe.
+    fn observe(&mut self, measured: &Measured, k: u64) {
+        for observation in measured.seen.iter().filter(|_| self.is_watching) {
+            self.observed.all += 1;
+            if let Err(refusal) = self.smoother.observe(&mut self.landmarks, k, observation) {
+                self.observed.refused += 1;
+                self.observed.first.get_or_insert(refusal);
+            }
+        }
     }
 
     /// Adopts the noise that the filters have found, if its own is implausible in comparison. It then adopts their

@@ -2,7 +2,7 @@
 
 use super::measured::Answers;
 use bb_core::nalgebra::{Matrix6, UnitQuaternion, Vector3};
-use bb_estimators::navigation::Estimate;
+use bb_estimators::navigation::{Estimate, Refusal};
 
 /// The estimate at a keyframe.
 #[derive(Clone, Copy, Debug)]
@@ -25,12 +25,21 @@ impl Known {
 /// [`Sensor::ALL`](super::measured::Sensor::ALL).
 pub(crate) type Taken = [Option<Result<(), String>>; 4];
 
+/// The observations of landmarks at a keyframe: how many, how many refused, and why the first was.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Observed {
+    pub(crate) all: u64,
+    pub(crate) refused: u64,
+    pub(crate) first: Option<Refusal>,
+}
+
 /// The step from one keyframe to the next.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Step {
     pub(crate) refused: u64,
     /// The number of refused IMU samples, and why the first was.
     pub(crate) samples: (u64, Option<String>),
+    pub(crate) landmarks: Observed,
     /// Includes the samples for a filter; not for a smoother, whose samples are integrated as they arrive.
     pub(crate) keyframe_s: f64,
     pub(crate) propagation_s: f64,
@@ -48,6 +57,12 @@ impl Step {
         self.take(
             answers.map(|answer| answer.map(|answer| answer.map(drop).map_err(|refusal| refusal.to_string()))),
         );
+    }
+
+    /// Records the results of the observations of landmarks.
+    pub(crate) fn observe(&mut self, observed: Observed) {
+        self.refused += observed.refused;
+        self.landmarks = observed;
     }
 
     /// Records the results of the measurements.

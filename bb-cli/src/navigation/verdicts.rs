@@ -12,10 +12,11 @@ struct Verdict {
     first: Option<String>,
 }
 
-/// The results of the IMU samples and of the measurements.
+/// The results of the IMU samples, of the measurements, and of the observations of landmarks.
 #[derive(Debug, Default)]
 pub(crate) struct Verdicts {
     samples: Verdict,
+    landmarks: Verdict,
     measured: [Verdict; Sensor::ALL.len()],
 }
 
@@ -27,6 +28,12 @@ impl Verdicts {
         self.samples.refused += refused;
         if self.samples.first.is_none() {
             self.samples.first.clone_from(first);
+        }
+        let seen = &step.landmarks;
+        self.landmarks.all += seen.all;
+        self.landmarks.refused += seen.refused;
+        if self.landmarks.first.is_none() {
+            self.landmarks.first = seen.first.map(|refusal| refusal.to_string());
         }
         for (verdict, taken) in self.measured.iter_mut().zip(&step.taken) {
             let Some(taken) = taken else { continue };
@@ -42,6 +49,7 @@ impl Verdicts {
     pub(crate) fn doubts(&self) -> Vec<String> {
         let names = Sensor::ALL.iter().map(|sensor| sensor.name());
         let all = std::iter::once(("samples of the IMU", &self.samples)).chain(names.zip(&self.measured));
+        let all = all.chain(std::iter::once(("observations of landmarks", &self.landmarks)));
         let refused = all.filter(|(_, verdict)| is_most(verdict.refused, verdict.all));
         let said = |(name, Verdict { all, refused, first }): (&str, &Verdict)| {
             let why = first.as_ref().map_or_else(String::new, |why| format!(" (the first: {why})"));

@@ -5,6 +5,7 @@
 
 #[path = "../../../integrations/mcap/tests/bags/common.rs"]
 pub mod bags;
+pub mod noise;
 pub mod poses;
 
 use bags::ros::*;

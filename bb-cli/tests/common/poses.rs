@@ -1,6 +1,7 @@
 //! A simulated IMU of known errors in many poses.
 
 use super::bags;
+use super::noise::Noise;
 use bags::ros::*;
 use bb_core::nalgebra::{Matrix3, UnitQuaternion, Vector3 as V};
 use std::path::PathBuf;
@@ -39,15 +40,7 @@ pub fn samples(errors: &Errors) -> Vec<Read> {
     let inverse = |(offset, matrix): &(V<f64>, Matrix3<f64>), truth: V<f64>| {
         matrix.try_inverse().expect("near 1") * truth + offset
     };
-    let mut state = 1_u32;
-    // Xorshift; of a mean of 0 and a deviation of 1, even.
-    let mut even = || {
-        state ^= state << 13;
-        state ^= state >> 17;
-        state ^= state << 5;
-        (f64::from(state) / f64::from(u32::MAX) - 0.5) * 12_f64.sqrt()
-    };
-    let mut noise = |deviation: f64| V::new(even(), even(), even()) * deviation;
+    let mut noise = Noise::new(1);
     let mut samples = Vec::new();
     for pose in 0..24 {
         let (from, to) = (orientation(pose), orientation(pose + 1));
@@ -59,9 +52,9 @@ pub fn samples(errors: &Errors) -> Vec<Read> {
             let shaken = if i < 300 { 0.02 } else { 1.0 };
             let field = world_from_body.inverse() * V::new(0.0, 20e-6, -44e-6);
             samples.push([
-                rate + errors.gyroscope + noise(0.002),
-                inverse(&errors.accelerometer, force + noise(shaken)),
-                inverse(&errors.magnetometer, field + noise(2e-7)),
+                rate + errors.gyroscope + noise.vector(0.002),
+                inverse(&errors.accelerometer, force + noise.vector(shaken)),
+                inverse(&errors.magnetometer, field + noise.vector(2e-7)),
             ]);
         }
     }

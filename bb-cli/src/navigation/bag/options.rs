@@ -10,40 +10,41 @@ use std::str::FromStr;
 #[derive(Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Options for bags")]
 pub struct BagOptions {
-    /// The topic of the IMU, where several fit (sensor_msgs/Imu).
+    /// The topic of the IMU, if there are several (sensor_msgs/Imu).
     #[arg(long, value_name = "TOPIC")]
     pub imu_topic: Option<String>,
-    /// The topic of the fixes, where several fit (sensor_msgs/NavSatFix), or `none`.
+    /// The topic of the fixes, if there are several (sensor_msgs/NavSatFix), or `none`.
     #[arg(long, value_name = "TOPIC")]
     pub gnss_topic: Option<String>,
-    /// The topic whose velocity is that of wheels, where several fit (nav_msgs/Odometry), or `none`.
+    /// The topic of the wheel odometry, of which the velocity is used, if there are several (nav_msgs/Odometry), or `none`.
     #[arg(long, value_name = "TOPIC")]
     pub odometry_topic: Option<String>,
-    /// A topic whose poses are taken relative to the one before, as of visual odometry (nav_msgs/Odometry).
+    /// A topic whose poses are used as relative poses, each from the previous one, as for visual odometry (nav_msgs/Odometry).
     #[arg(long, value_name = "TOPIC")]
     pub relative_topic: Option<String>,
-    /// The topic of poses in the world, where several fit (geometry_msgs/PoseWithCovarianceStamped), or `none`.
+    /// The topic of poses in the world, if there are several (geometry_msgs/PoseWithCovarianceStamped), or `none`.
     #[arg(long, value_name = "TOPIC")]
     pub pose_topic: Option<String>,
-    /// The topic of the truth, where several fit (geometry_msgs/PoseStamped, TransformStamped; by name also
-    /// nav_msgs/Odometry, sensor_msgs/NavSatFix), or `none`.
+    /// The topic of the truth, if there are several (geometry_msgs/PoseStamped, TransformStamped) or if it is
+    /// nav_msgs/Odometry or sensor_msgs/NavSatFix; or `none`.
     #[arg(long, alias = "truth-topic", value_name = "TOPIC")]
     pub truth: Option<String>,
     /// Where the filters start: `truth`, `align` (from rest, or in motion with --set heading_from_course=true), or the topic
-    /// of a pose (geometry_msgs/PoseWithCovarianceStamped, nav_msgs/Odometry). Without it /initialpose, the truth, or align.
+    /// of a pose (geometry_msgs/PoseWithCovarianceStamped, nav_msgs/Odometry). Default: the first available of /initialpose,
+    /// truth, and align.
     #[arg(long, value_name = "FROM")]
     pub start: Option<StartFrom>,
-    /// Where a frame is in that of the IMU, m and degrees: FRAME=X,Y,Z or FRAME=X,Y,Z,ROLL,PITCH,YAW. FRAME may be the topic of a
-    /// sensor. TOPIC=FRAME says whose pose or velocity a topic tells.
+    /// The pose of a frame in that of the IMU, m and degrees: FRAME=X,Y,Z or FRAME=X,Y,Z,ROLL,PITCH,YAW. FRAME may be the topic
+    /// of a sensor. TOPIC=FRAME sets the frame whose pose or velocity a topic contains.
     #[arg(long, value_name = "FRAME=…", allow_hyphen_values = true)]
     pub mount: Vec<Mount>,
-    /// Where the origin of the world is, degrees and m above the ellipsoid; else at the first fix.
+    /// The origin of the world, in degrees and m above the ellipsoid. Default: the first fix.
     #[arg(long, value_name = "LATITUDE,LONGITUDE,HEIGHT", allow_hyphen_values = true)]
     pub origin: Option<Origin>,
-    /// Standard deviations of a relative pose, m and rad; else as much as the covariance grew since the one before.
+    /// Standard deviations of a relative pose, m and rad. Default: from the growth of the covariance since the previous pose.
     #[arg(long, value_name = "TRANSLATION,ROTATION")]
     pub relative_deviation: Option<RelativeDeviation>,
-    /// Standard deviations of the biases at the start, rad/s and m/s²; 0.02 and 0.2 without it.
+    /// Standard deviations of the biases at the start, rad/s and m/s². Default: 0.02,0.2.
     #[arg(long, value_name = "GYROSCOPE,ACCELEROMETER")]
     pub bias_deviation: Option<BiasDeviation>,
 }

@@ -28,8 +28,9 @@ impl Sensor for Thermometer {
     type Options = ThermometerOptions;
     type Output = Temperature;
 
-    /// Opens the device; `?` converts any error to a `Fault`. If it fails at the start, the robot does not start; after a
-    /// restart it is retried.
+    /// Opens the device; `?` converts any error to a `Fault`, and `map_err` adds the device's name:
+    /// `.map_err(|error| Fault::new(format!("opening {}: {error}", options.port)))?`. If it fails at the start, the robot does
+    /// not start; after a restart it is retried.
     fn init(options: ThermometerOptions, _: &SensorContext) -> Result<Self, Fault> {
         Ok(Self { noise_k: options.noise, readings: 0 })
     }
