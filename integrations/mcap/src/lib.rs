@@ -5,6 +5,7 @@
 //! | write what a robot publishes | [`Recorder`] |
 //! | read it back, bit for bit | [`Recording`] |
 //! | read ROS messages from any bag, including those of a [`Recorder`] | [`Bag`] |
+//! | play back what was recorded in the place of a sensor or an estimator | [`PlayedSensor`], [`PlayedEstimator`] |
 //! | play back a recorded IMU as the sensor of a robot, or read its samples | [`BagImu`], [`MargSamples`] |
 //! | read messages of any type, by the definition in the file | [`MessageDefinition`], [`Value`] |
 //! | write payloads as ROS messages | [`BagWriter`] |
@@ -74,6 +75,7 @@ mod definition;
 mod error;
 mod file;
 mod layout;
+mod played;
 mod recorder;
 mod recording;
 mod recover;
@@ -85,6 +87,7 @@ pub use bag::{
 };
 pub use definition::{MessageDefinition, Value};
 pub use error::{RecordingError, RecordingErrorKind};
+pub use played::{PlayedEstimator, PlayedOptions, PlayedSensor};
 pub use recorder::{BackgroundRecorder, Compression, Recorder, RecorderOptions, RecorderReport};
 pub use recording::{AllMessages, Messages, RecordedChannel, RecordedMessage, Recording};
 pub use recover::{Recovered, recover};

@@ -241,9 +241,12 @@ const OTHERS: [(&[u8], &str); 10] = [
     (
         b"SQLite format 3",
         "it is an SQLite database; if it is a ROS 2 bag, build with the feature `sqlite`, or convert it with `ros2 bag \
-         convert` to storage `mcap`",
+         convert`, or with `rosbags-convert --src BAG --dst NEW --dst-storage mcap`",
     ),
-    (b"#ROSBAG", "it is a ROS 1 bag; convert it to a ROS 2 bag with storage `mcap`"),
+    (
+        b"#ROSBAG",
+        "it is a ROS 1 bag; convert it with `rosbags-convert --src BAG --dst NEW --dst-storage mcap` of `pip install rosbags`",
+    ),
     (&[0x28, 0xb5, 0x2f, 0xfd], "it is packed as a whole with zstd; unpack it with `zstd -d`"),
     (&[0x1f, 0x8b], "it is packed as a whole with gzip; unpack it with `gunzip`"),
     (&[0x04, 0x22, 0x4d, 0x18], "it is packed as a whole with lz4; unpack it with `lz4 -d`"),

@@ -79,8 +79,8 @@ impl Frames {
         let stamp = message.stamp();
         message.tell_joints(&mut |reading| {
             let name = reading.joint.unwrap_or_else(|| stamp.frame.name());
-            let mut joints = self.topology.joints.iter().enumerate();
-            let Some((number, joint)) = joints.find(|(_, joint)| joint.name == name) else { return };
+            let Some(number) = self.topology.joint_number(name) else { return };
+            let Some(joint) = self.topology.joints.get(number) else { return };
             let gear = joint.transmission.filter(|_| reading.side == JointSide::Motor);
             let position: Vec<f64> = match (gear, reading.position) {
                 (Some(gear), [motor]) => vec![gear.joint_position(*motor)],

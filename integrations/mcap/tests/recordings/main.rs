@@ -3,6 +3,7 @@
 mod damage;
 mod kill;
 mod moving;
+mod played;
 mod robot;
 mod ros;
 mod round_trip;

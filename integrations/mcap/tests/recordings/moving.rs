@@ -75,7 +75,8 @@ fn viewers_see_the_robot_where_it_knows_itself() -> Result<(), Box<dyn std::erro
     let turn = mover::sensor::world_link::drive::platform::mount::tower::turn::motor;
     simulation.publish(turn, time, MotorState { position: 45.0, velocity: None, effort: None });
     let fingers = JointStates {
-        names: vec!["left".to_owned(), "claw".to_owned()].into(),
+        // By path, and by name.
+        names: vec!["world_link/drive/platform/mount/tower/turn/gripper/left".to_owned(), "claw".to_owned()].into(),
         positions: vec![0.03, -0.4],
         ..JointStates::default()
     };
