@@ -1,5 +1,5 @@
 //! What kinematics cost: a transform through seven moving joints, its Jacobian, all links, and inverse kinematics of random
-//! poses within the limits of two arms.
+//! poses within the limits of two arms, the fastest of three times each.
 //!
 //! `cargo bench -p bb-benches --bench kinematics` prints one JSON object a line.
 
@@ -56,10 +56,18 @@ fn inverse<R: Robot>(
     let (mut times, mut iterations) = (Vec::new(), 0);
     for _ in 0..POSES {
         let target = Target::Pose(chain.transform(&position(random, kinematics))?);
-        let start = Instant::now();
-        if let Ok(solution) = black_box(solver.solve(&target, &neutral)) {
-            times.push(start.elapsed().as_secs_f64() * 1e6);
-            iterations += solution.iterations;
+        // The solver does the same each time: other programs can only make it slower.
+        let mut fastest_us = f64::INFINITY;
+        for round in 0..3 {
+            let start = Instant::now();
+            let solution = black_box(solver.solve(&target, &neutral));
+            let took_us = start.elapsed().as_secs_f64() * 1e6;
+            let Ok(solution) = solution else { break };
+            fastest_us = fastest_us.min(took_us);
+            iterations += if round == 0 { solution.iterations } else { 0 };
+        }
+        if fastest_us.is_finite() {
+            times.push(fastest_us);
         }
     }
     let in_time = times.iter().filter(|time| **time < 5_000.0).count();
@@ -67,12 +75,14 @@ fn inverse<R: Robot>(
     let percentile = |part: f64| times.get((times.len() as f64 * part) as usize).copied().unwrap_or(f64::NAN);
     println!(
         "{{\"robot\": {:?}, \"poses\": {POSES}, \"solved\": {}, \"solved_within_5_ms\": {in_time}, \
-         \"iterations\": {:.1}, \"p50_us\": {:.1}, \"p99_us\": {:.1}}}",
+         \"iterations\": {:.1}, \"mean_us\": {:.1}, \"p50_us\": {:.1}, \"p99_us\": {:.1}, \"max_us\": {:.1}}}",
         R::NAME,
         times.len(),
         f64::from(iterations) / POSES as f64,
+        times.iter().sum::<f64>() / times.len() as f64,
         percentile(0.5),
-        percentile(0.99)
+        percentile(0.99),
+        times.last().copied().unwrap_or(f64::NAN)
     );
     Ok(())
 }

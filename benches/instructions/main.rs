@@ -12,7 +12,7 @@ use std::error::Error;
 use std::process::ExitCode;
 use steps::{STEPS, Step};
 
-/// Steps of the two runs that are subtracted.
+/// Steps of the two runs that are subtracted, of most.
 const SHORT: usize = 1000;
 const LONG: usize = 3000;
 
@@ -60,8 +60,9 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
 
 /// Of one step, less those of what it is made on top of.
 fn instructions(step: &Step) -> Result<f64, Box<dyn Error>> {
+    let (short, long) = step.steps;
     let of = |name: &str| {
-        callgrind::per_step(callgrind::ANY_PROCESSOR, SHORT, LONG, |steps| {
+        callgrind::per_step(callgrind::ANY_PROCESSOR, short, long, |steps| {
             [COUNT, name, &steps.to_string()].map(String::from).to_vec()
         })
     };

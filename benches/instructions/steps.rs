@@ -1,12 +1,13 @@
 //! The steps, and what is stored for each.
 
-use crate::LONG;
 use crate::motion::{Reading, readings};
+use crate::{LONG, SHORT};
+use bb_benches::overflight::{Overflight, Pilot, passed};
 use bb_core::nalgebra::{UnitQuaternion, Vector2, Vector3};
 use bb_estimators::attitude::{AttitudeFilter, ImuSample, MekfFilter, VqfFilter};
 use bb_estimators::navigation::planar::{PlanarEkf, PlanarParams, PlanarPosition, PlanarStart};
 use bb_estimators::navigation::{
-    Eskf, EskfParams, GnssPosition, Height, ImuMean, Navigation, Refusal, Start, Stream,
+    Eskf, EskfParams, GnssPosition, Height, ImuMean, Navigation, Refusal, SmootherParams, Start, Stream,
 };
 use std::error::Error;
 use std::hint::black_box;
@@ -16,18 +17,32 @@ pub(crate) struct Step {
     pub(crate) name: &'static str,
     /// Each step does this one as well; its instructions are taken off.
     pub(crate) on: Option<&'static str>,
+    /// Steps of the two runs that are subtracted.
+    pub(crate) steps: (usize, usize),
     /// Instructions.
     pub(crate) stored: f64,
     /// Makes so many steps.
     pub(crate) run: fn(usize) -> Result<(), Box<dyn Error>>,
 }
 
+/// Of a step that takes microseconds.
+const USUAL: (usize, usize) = (SHORT, LONG);
+/// Of a keyframe, after its window of 20 is full of tracks.
+const KEYFRAMES: (usize, usize) = (60, 160);
+
 /// In `f64`. Those of `Eskf` have 15 states, those of the attitude filters read the orientation too.
 pub(crate) const STEPS: &[Step] = &[
-    Step { name: "eskf/sample", on: None, stored: 4993.0, run: |steps| eskf(steps, |_, _, _| Ok(())) },
+    Step {
+        name: "eskf/sample",
+        on: None,
+        steps: USUAL,
+        stored: 4993.0,
+        run: |steps| eskf(steps, |_, _, _| Ok(())),
+    },
     Step {
         name: "eskf/update_3_with_gate",
         on: Some("eskf/sample"),
+        steps: USUAL,
         stored: 6236.0,
         run: |steps| {
             eskf(steps, |filter, stream, reading| {
@@ -39,6 +54,7 @@ pub(crate) const STEPS: &[Step] = &[
     Step {
         name: "eskf/update_1_with_gate",
         on: Some("eskf/sample"),
+        steps: USUAL,
         stored: 2990.0,
         run: |steps| {
             eskf(steps, |filter, stream, reading| {
@@ -47,10 +63,17 @@ pub(crate) const STEPS: &[Step] = &[
             })
         },
     },
-    Step { name: "planar/sample", on: None, stored: 1074.0, run: |steps| planar(steps, |_, _, _| Ok(())) },
+    Step {
+        name: "planar/sample",
+        on: None,
+        steps: USUAL,
+        stored: 1074.0,
+        run: |steps| planar(steps, |_, _, _| Ok(())),
+    },
     Step {
         name: "planar/position_with_gate",
         on: Some("planar/sample"),
+        steps: USUAL,
         stored: 1866.0,
         run: |steps| {
             planar(steps, |filter, stream, reading| {
@@ -59,8 +82,22 @@ pub(crate) const STEPS: &[Step] = &[
             })
         },
     },
-    Step { name: "mekf/nine", on: None, stored: 2054.0, run: attitude::<MekfFilter> },
-    Step { name: "vqf/nine", on: None, stored: 1879.0, run: attitude::<VqfFilter> },
+    Step { name: "mekf/nine", on: None, steps: USUAL, stored: 2054.0, run: attitude::<MekfFilter> },
+    Step {
+        name: "smoother/30_landmarks",
+        on: None,
+        steps: KEYFRAMES,
+        stored: 10_442_158.0,
+        run: |steps| smoother(steps, 30),
+    },
+    Step {
+        name: "smoother/100_landmarks",
+        on: None,
+        steps: KEYFRAMES,
+        stored: 19_260_779.0,
+        run: |steps| smoother(steps, 100),
+    },
+    Step { name: "vqf/nine", on: None, steps: USUAL, stored: 1879.0, run: attitude::<VqfFilter> },
 ];
 
 /// The filter takes a sample and is corrected.
@@ -110,15 +147,20 @@ fn attitude<F: AttitudeFilter>(steps: usize) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
+/// A keyframe with so many landmarks in its image, and its samples.
+fn smoother(steps: usize, landmarks: usize) -> Result<(), Box<dyn Error>> {
+    let mut overflight = Overflight::new(landmarks);
+    let mut pilot = Pilot::new(SmootherParams::default(), &overflight)?;
+    let keyframes = (0..KEYFRAMES.1).map(|_| overflight.next_keyframe()).collect::<Result<Vec<_>, _>>()?;
+    for keyframe in keyframes.iter().take(steps) {
+        pilot.propagate(keyframe)?;
+        pilot.fly(keyframe)?;
+    }
+    black_box(pilot);
+    Ok(())
+}
+
 fn sample(reading: &Reading) -> ImuMean {
     let &Reading { time_ns, angular_velocity, specific_force, .. } = reading;
     ImuMean { time_ns, angular_velocity, specific_force }
-}
-
-/// One in 10,000 is far out, as the gate has it.
-fn passed<T>(result: Result<T, Refusal>) -> Result<(), Refusal> {
-    match result {
-        Ok(_) | Err(Refusal::Gate { .. }) => Ok(()),
-        Err(error) => Err(error),
-    }
 }
