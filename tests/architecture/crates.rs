@@ -19,11 +19,13 @@ fn arrows_between_crates_point_one_way() {
         ("bb-core", "bb-mavlink"),
         ("bb-core", "bb-mcap"),
         ("bb-core", "bb-metrics"),
+        ("bb-core", "bb-redb"),
         ("bb-estimators", "bb-macros"),
         ("bb-estimators", "bb-cli"),
         ("bb-estimators", "bb-mavlink"),
         ("bb-estimators", "bb-mcap"),
         ("bb-estimators", "bb-metrics"),
+        ("bb-estimators", "bb-redb"),
         ("integrations/mavlink", "bb-macros"),
         ("integrations/mavlink", "bb-mcap"),
         ("integrations/mavlink", "bb-metrics"),
@@ -36,6 +38,9 @@ fn arrows_between_crates_point_one_way() {
         ("integrations/metrics", "bb-estimators"),
         ("integrations/metrics", "bb-mcap"),
         ("integrations/metrics", "bb-cli"),
+        ("integrations/redb", "bb-macros"),
+        ("integrations/redb", "bb-estimators"),
+        ("integrations/redb", "bb-cli"),
     ] {
         assert!(!depends(krate, on), "{krate} must not depend on {on}");
     }

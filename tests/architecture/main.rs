@@ -19,7 +19,7 @@ fn read(file: &str) -> String {
 }
 
 /// The folders of the crates with code that others use.
-const CRATES: [&str; 7] = [
+const CRATES: [&str; 8] = [
     "bb-macros",
     "bb-core",
     "bb-estimators",
@@ -27,6 +27,7 @@ const CRATES: [&str; 7] = [
     "integrations/mavlink",
     "integrations/mcap",
     "integrations/metrics",
+    "integrations/redb",
 ];
 
 /// All files of code below a folder, without those of tests.

@@ -1,5 +1,6 @@
-//! What a latency budget charges an estimator with in real time.
+//! What a latency budget charges an estimator with in real time, and what is measured without one.
 
+use crate::components::{Number, Scale, at};
 use bb_core::prelude::*;
 
 /// How long a copy for a subscriber takes.
@@ -76,5 +77,22 @@ fn copies_and_drops_of_messages_are_charged_to_no_estimator() -> Result<(), Box<
         // The median, since the machine may give the thread no core now and then.
         assert!(latency.median < DROPPING / 2, "{path}: {latency:?}");
     }
+    Ok(())
+}
+
+robot! {
+    robot Sampled;
+    link base { sensor number: External<Number>() { estimator scale: Scale(); } }
+}
+
+#[test]
+fn without_a_budget_one_of_64_callbacks_is_measured() -> Result<(), Box<dyn std::error::Error>> {
+    let mut simulation = Sampled::builder().simulate()?;
+    for number in 1..=640 {
+        simulation.publish(sampled::sensor::base::number, at(number), Number(1.0));
+    }
+    let report = simulation.stop();
+    let scale = report.estimator("sensor/base/number/scale").ok_or("it is declared")?;
+    assert_eq!((scale.emitted, scale.latency.count), (640, 10));
     Ok(())
 }

@@ -128,6 +128,15 @@ pub(crate) fn at(millis: i64) -> MonotonicTime {
     MonotonicTime::from_nanos(millis * 1_000_000)
 }
 
+/// Runs tests that wait most of their time on a thread each.
+pub(crate) fn side_by_side<const N: usize>(tests: [fn(); N]) {
+    for thread in tests.map(std::thread::spawn) {
+        if let Err(panic) = thread.join() {
+            std::panic::resume_unwind(panic);
+        }
+    }
+}
+
 /// Runs a test that might hang; panics if it is not over after `seconds`.
 pub(crate) fn within(seconds: u64, test: impl FnOnce() + Send + 'static) {
     let thread = std::thread::spawn(test);

@@ -29,7 +29,8 @@ impl Sensor for Accelerometer {
 
     fn init(options: AccelerometerOptions, _: &SensorContext) -> Result<Self, Fault> {
         // With a timeout, so that `read` returns now and then even if nothing arrives.
-        let port = serialport::new(&options.port, options.baud).timeout(Duration::from_millis(50)).open()?;
+        let port = serialport::new(&options.port, options.baud).timeout(Duration::from_millis(50)).open();
+        let port = port.map_err(|error| Fault::new(format!("opening {}: {error}", options.port)))?;
         Ok(Self { port, line: Vec::new() })
     }
 
@@ -97,6 +98,9 @@ fn a_serial_device_is_unplugged_and_comes_back() {
     drop((device, line));
     let fault = faults.recv_timeout(Duration::from_secs(10)).expect("it is unplugged");
     assert_eq!(fault.path, "sensor/base/accelerometer");
+    let opening = format!("opening {}: ", link.display());
+    let fault = faults.recv_timeout(Duration::from_secs(10)).expect("it is not there");
+    assert!(fault.message.starts_with(&opening), "{}", fault.message);
     let (mut device, _line) = plug_in(&link);
     readings.drain().for_each(drop);
     assert!(received(&mut device).is_some(), "it comes back");

@@ -1,45 +1,58 @@
 //! What an `init` has started that fails then: how it is made safe, and what becomes of callbacks that fail or hang.
 
-use crate::components::{Number, within};
+use crate::components::{Number, side_by_side, within};
 use crate::gate::Gate;
 use bb_core::prelude::*;
-use bb_core::{DisarmError, Running};
-use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use bb_core::{Builder, DisarmError, Running};
+use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
 
-/// The devices of these tests are there once.
-static ALONE: Mutex<()> = Mutex::new(());
-
-static GATE: Gate = Gate::new();
-/// How often the device was made.
-static MADE: AtomicU32 = AtomicU32::new(0);
-/// How many threads are in its callbacks, and how many have left them.
-static INSIDE: AtomicI32 = AtomicI32::new(0);
-static LEFT: AtomicI32 = AtomicI32::new(0);
-/// Whether callbacks pass the gate, or fail.
-static HANGS: AtomicBool = AtomicBool::new(false);
-
-fn alone(hangs: bool) -> MutexGuard<'static, ()> {
-    let alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
-    HANGS.store(hangs, Ordering::SeqCst);
-    MADE.store(0, Ordering::SeqCst);
-    INSIDE.store(0, Ordering::SeqCst);
-    LEFT.store(0, Ordering::SeqCst);
-    alone
+/// The devices of one test.
+struct Rig {
+    gate: Gate,
+    /// Whether callbacks pass the gate, or fail.
+    hangs: bool,
+    /// How often the device was made.
+    made: AtomicU32,
+    /// How many threads are in its callbacks, and how many have left them.
+    inside: AtomicI32,
+    left: AtomicI32,
 }
 
-fn entered() -> i32 {
-    INSIDE.load(Ordering::SeqCst) + LEFT.load(Ordering::SeqCst)
-}
+/// A rig for each test, so that they run side by side: most of their time they wait for limits of several seconds.
+static RIGS: [Rig; 4] = [Rig::new(false), Rig::new(true), Rig::new(true), Rig::new(true)];
+const FAILS: usize = 0;
+const DISARMS: usize = 1;
+const LOCKS: usize = 2;
+const DIES: usize = 3;
 
-fn stop() -> Result<(), Fault> {
-    INSIDE.fetch_add(1, Ordering::SeqCst);
-    if HANGS.load(Ordering::SeqCst) {
-        GATE.pass("here");
+impl Rig {
+    const fn new(hangs: bool) -> Self {
+        let (made, inside, left) = (AtomicU32::new(0), AtomicI32::new(0), AtomicI32::new(0));
+        Self { gate: Gate::new(), hangs, made, inside, left }
     }
-    INSIDE.fetch_sub(1, Ordering::SeqCst);
-    LEFT.fetch_add(1, Ordering::SeqCst);
-    if HANGS.load(Ordering::SeqCst) { Ok(()) } else { Err(Fault::new("no answer")) }
+
+    /// How many threads have entered its callbacks.
+    fn entered(&self) -> i32 {
+        self.inside.load(Ordering::SeqCst) + self.left.load(Ordering::SeqCst)
+    }
+
+    fn stop(&self) -> Result<(), Fault> {
+        self.inside.fetch_add(1, Ordering::SeqCst);
+        if self.hangs {
+            self.gate.pass("here");
+        }
+        self.inside.fetch_sub(1, Ordering::SeqCst);
+        self.left.fetch_add(1, Ordering::SeqCst);
+        if self.hangs { Ok(()) } else { Err(Fault::new("no answer")) }
+    }
+}
+
+/// Options of [`Device`] and [`Servo`].
+#[derive(Clone, Debug, Options)]
+pub(crate) struct DeviceOptions {
+    /// Its rig.
+    #[option(default = 0)]
+    pub(crate) rig: usize,
 }
 
 /// Works once, until it is read; never again.
@@ -47,22 +60,23 @@ fn stop() -> Result<(), Fault> {
 pub(crate) struct Device;
 
 impl Device {
-    fn make(mut register: impl FnMut()) -> Result<Self, Fault> {
-        if MADE.fetch_add(1, Ordering::SeqCst) == 0 {
+    fn make(options: &DeviceOptions, register: impl Fn(&'static Rig)) -> Result<Self, Fault> {
+        let rig = RIGS.get(options.rig).ok_or_else(|| Fault::new("there is no such rig"))?;
+        if rig.made.fetch_add(1, Ordering::SeqCst) == 0 {
             return Ok(Self);
         }
-        register();
-        register();
+        register(rig);
+        register(rig);
         Err(Fault::new("no handshake"))
     }
 }
 
 impl Sensor for Device {
-    type Options = NoOptions;
+    type Options = DeviceOptions;
     type Output = Number;
 
-    fn init(_: NoOptions, context: &SensorContext) -> Result<Self, Fault> {
-        Self::make(|| context.on_disarm(stop))
+    fn init(options: DeviceOptions, context: &SensorContext) -> Result<Self, Fault> {
+        Self::make(&options, |rig| context.on_disarm(move || rig.stop()))
     }
 
     fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
@@ -75,11 +89,11 @@ impl Sensor for Device {
 pub(crate) struct Servo;
 
 impl Actuator for Servo {
-    type Options = NoOptions;
+    type Options = DeviceOptions;
     type Command = Number;
 
-    fn init(_: NoOptions, context: &ActuatorContext) -> Result<Self, Fault> {
-        Device::make(|| context.on_disarm(stop)).map(|_| Self)
+    fn init(options: DeviceOptions, context: &ActuatorContext) -> Result<Self, Fault> {
+        Device::make(&options, |rig| context.on_disarm(move || rig.stop())).map(|_| Self)
     }
 
     fn handle_command(&mut self, _: &Stamped<Number>) -> Result<(), Fault> {
@@ -104,8 +118,9 @@ robot! {
 }
 
 /// A robot whose backoff is so long that a second attempt of `attempts` is not followed by another.
-fn sensing(backoff: Duration) -> bb_core::Builder<Sensing> {
+fn sensing(rig: usize, backoff: Duration) -> Builder<Sensing> {
     let mut builder = Sensing::builder();
+    builder.options(sensing::sensor::base::device).rig = rig;
     builder.supervision().first_backoff = backoff;
     builder.supervision().longest_backoff = backoff;
     builder
@@ -117,9 +132,8 @@ fn arm<R: bb_core::Robot>(robot: &Running<R>) {
 
 #[test]
 fn a_callback_that_fails_is_a_fault_and_stays_for_the_next_disarming() {
-    let _alone = alone(false);
     within(60, || {
-        let builder = sensing(Duration::from_millis(100));
+        let builder = sensing(FAILS, Duration::from_millis(100));
         let faults = builder.subscribe(system::Faults);
         let robot = builder.start().expect("it starts");
         arm(&robot);
@@ -137,32 +151,40 @@ fn a_callback_that_fails_is_a_fault_and_stays_for_the_next_disarming() {
 }
 
 #[test]
+fn callbacks_that_hang_are_waited_for_within_limits() {
+    side_by_side([
+        a_robot_that_is_disarmed_while_such_callbacks_run_waits_for_them,
+        an_actuator_whose_failed_init_hangs_in_its_callbacks_keeps_no_disarming_waiting_for_its_lock,
+        a_dead_device_whose_callbacks_hang_is_not_started_again_before_they_return,
+    ]);
+}
+
 fn a_robot_that_is_disarmed_while_such_callbacks_run_waits_for_them() {
-    let _alone = alone(true);
-    within(60, || {
-        GATE.close("here");
-        let robot = sensing(Duration::from_secs(10)).start().expect("it starts");
+    let rig = &RIGS[DISARMS];
+    within(60, move || {
+        rig.gate.close("here");
+        let robot = sensing(DISARMS, Duration::from_secs(10)).start().expect("it starts");
         arm(&robot);
         // Both are run at once, each on a thread of its own, though each hangs.
-        GATE.wait_for(2);
+        rig.gate.wait_for(2);
         let live = robot.live();
         let disarms = std::thread::spawn(move || live.disarm());
         while robot.safety() != Safety::Disarming {
             std::thread::yield_now();
         }
-        assert_eq!((robot.safety(), entered()), (Safety::Disarming, 2), "they are not entered twice at a time");
-        GATE.open();
+        assert_eq!((robot.safety(), rig.entered()), (Safety::Disarming, 2), "they are not entered twice at a time");
+        rig.gate.open();
         assert_eq!(disarms.join().expect("it does not panic"), Ok(()));
-        assert_eq!((robot.safety(), entered()), (Safety::Disarmed, 4), "the disarming has run them once more");
+        assert_eq!((robot.safety(), rig.entered()), (Safety::Disarmed, 4), "the disarming has run them once more");
     });
 }
 
-#[test]
 fn an_actuator_whose_failed_init_hangs_in_its_callbacks_keeps_no_disarming_waiting_for_its_lock() {
-    let _alone = alone(true);
-    within(60, || {
-        GATE.close("here");
+    let rig = &RIGS[LOCKS];
+    within(60, move || {
+        rig.gate.close("here");
         let mut builder = Moving::builder();
+        builder.options(moving::actuator::base::pan::servo).rig = LOCKS;
         builder.supervision().first_backoff = Duration::from_millis(1);
         let robot = builder.start().expect("it starts");
         arm(&robot);
@@ -170,25 +192,24 @@ fn an_actuator_whose_failed_init_hangs_in_its_callbacks_keeps_no_disarming_waiti
         while robot.actuate(servo, Number(1.0)).is_ok() {}
         let live = robot.live();
         let sends = std::thread::spawn(move || {
-            while INSIDE.load(Ordering::SeqCst) < 2 {
+            while rig.inside.load(Ordering::SeqCst) < 2 {
                 let _ = live.actuate(servo, Number(1.0));
             }
         });
-        GATE.wait_for(2);
+        rig.gate.wait_for(2);
         let error = robot.disarm().expect_err("its callbacks hang");
         let DisarmError::Failed(errors) = &error else { panic!("{error}") };
         assert_eq!(errors.len(), 2, "its own `disarm` came back: {error}");
-        GATE.open();
+        rig.gate.open();
         sends.join().expect("it does not panic");
     });
 }
 
-#[test]
 fn a_dead_device_whose_callbacks_hang_is_not_started_again_before_they_return() {
-    let _alone = alone(true);
-    within(120, || {
-        GATE.close("here");
-        let builder = sensing(Duration::from_millis(1));
+    let rig = &RIGS[DIES];
+    within(120, move || {
+        rig.gate.close("here");
+        let builder = sensing(DIES, Duration::from_millis(1));
         let faults = builder.subscribe(system::Faults);
         let robot = builder.start().expect("it starts");
         arm(&robot);
@@ -203,15 +224,73 @@ fn a_dead_device_whose_callbacks_hang_is_not_started_again_before_they_return() 
             assert_eq!(fault.path, "sensor/base/device");
             expected.retain(|message| *message != fault.message);
         }
-        assert_eq!((robot.safety(), entered()), (Safety::Armed, 2));
+        assert_eq!((robot.safety(), rig.entered()), (Safety::Armed, 2));
         assert!(robot.disarm().is_err() && robot.force_disarm().is_err());
-        assert_eq!((robot.safety(), entered()), (Safety::Disarmed, 2), "no thread for each time");
-        assert_eq!(MADE.load(Ordering::SeqCst), 2);
+        assert_eq!((robot.safety(), rig.entered()), (Safety::Disarmed, 2), "no thread for each time");
+        assert_eq!(rig.made.load(Ordering::SeqCst), 2);
         arm(&robot);
-        GATE.open();
-        while MADE.load(Ordering::SeqCst) < 3 {
+        rig.gate.open();
+        while rig.made.load(Ordering::SeqCst) < 3 {
             std::thread::sleep(Duration::from_millis(1));
         }
         assert_eq!(robot.safety(), Safety::Armed);
+    });
+}
+
+/// A value shared by components whose `Drop` hangs.
+struct Fragile;
+
+static FRAGILE: Gate = Gate::new();
+static DROPPED: AtomicU32 = AtomicU32::new(0);
+
+impl Drop for Fragile {
+    fn drop(&mut self) {
+        FRAGILE.pass("drop");
+        DROPPED.fetch_add(1, Ordering::SeqCst);
+        panic!("it is dropped badly");
+    }
+}
+
+/// Shares the value, and does not start.
+#[derive(Debug)]
+struct Sharing;
+
+impl Sensor for Sharing {
+    type Options = NoOptions;
+    type Output = Number;
+
+    fn init(_: NoOptions, context: &SensorContext) -> Result<Self, Fault> {
+        let _ = context.shared(|| Fragile);
+        Err(Fault::new("no handshake"))
+    }
+
+    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
+        Ok(Reading::nothing())
+    }
+}
+
+robot! {
+    robot Clumsy;
+    link base { sensor device: Sharing() { rate: 10 Hz; } }
+}
+
+#[test]
+fn a_shared_value_that_drops_badly_does_not_concern_the_caller_of_a_failed_start() {
+    within(60, || {
+        FRAGILE.close("drop");
+        // The value hangs in its `Drop` when `start` has returned.
+        let error = Clumsy::builder().start().expect_err("it does not start").to_string();
+        assert_eq!(error, "sensor/base/device cannot start: no handshake");
+        assert_eq!(DROPPED.load(Ordering::SeqCst), 0);
+        FRAGILE.open();
+        while DROPPED.load(Ordering::SeqCst) == 0 {
+            std::thread::yield_now();
+        }
+        // On virtual time it is dropped on this thread, and its panic is contained.
+        let error = Clumsy::builder().simulate().expect_err("it does not start").to_string();
+        assert_eq!(
+            (error.as_str(), DROPPED.load(Ordering::SeqCst)),
+            ("sensor/base/device cannot start: no handshake", 2)
+        );
     });
 }

@@ -8,6 +8,15 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 /// Longer than anything takes that does not hang, however busy the machine.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(20);
 
+/// Waits until `holds`, however busy the machine.
+pub(crate) fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
+    let start = std::time::Instant::now();
+    while !holds() {
+        assert!(start.elapsed() < PATIENCE, "not reached: {what}");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
 /// A place at which code waits until the test lets it go on.
 pub(crate) struct Gate {
     /// The place that is closed, and how many have come there.

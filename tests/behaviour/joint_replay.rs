@@ -1,6 +1,7 @@
 //! A replay gives estimators the transforms that they had, whatever raced.
 
 use crate::components::at;
+use crate::gate::wait_until;
 use crate::joints::{Fusion, Pixel, Spotter};
 use crate::replay::{Heard, Lines, Random, counts, hear, overflow, same};
 use bb_core::Report;
@@ -149,13 +150,12 @@ fn played(mut lines: Vec<Entry>, random: &mut Random) -> Result<(Heard, Report),
     Ok((heard, report))
 }
 
-/// That some were answered, and some were not, for each of the reasons.
-fn is_a_bad_day(report: &Report) {
-    for path in ["estimator/base/spot", "estimator/base/busy"] {
+/// Whether some were answered, and some were not, for each of the reasons.
+fn is_a_bad_day(report: &Report) -> bool {
+    ["estimator/base/spot", "estimator/base/busy"].iter().all(|path| {
         let estimator = report.estimator(path).expect("it is declared");
-        assert!(estimator.emitted > 20, "{report}");
-        assert!(estimator.inputs[0].dropped(bb_core::run::DropReason::NoTransform) > 3, "{report}");
-    }
+        estimator.emitted > 20 && estimator.inputs[0].dropped(bb_core::run::DropReason::NoTransform) > 3
+    })
 }
 
 #[test]
@@ -167,7 +167,7 @@ fn random_days_on_virtual_time_are_the_same_again() -> Result<(), Box<dyn std::e
         let mut simulation = builder.simulate()?;
         simulation.run_until(at(1000));
         let report = simulation.stop();
-        is_a_bad_day(&report);
+        assert!(is_a_bad_day(&report), "{report}");
         let mut first = Heard::new();
         hear(&all, &mut first);
         let (again, report_again) = replayed(&lines, &mut random)?;
@@ -184,10 +184,10 @@ fn random_days_on_many_threads_are_the_same_again() -> Result<(), Box<dyn std::e
         let (builder, lines) = builder(day * 100, 300);
         let all = builder.subscribe_any(Select::All, None, overflow());
         let running = builder.start()?;
-        // Sensors have 300 readings and are done after a second; the bridge goes on.
+        // Sensors have 300 readings and are done after a second, if the machine is not busy; the bridge goes on.
         std::thread::sleep(Duration::from_millis(1100));
+        wait_until("it is a bad day", || is_a_bad_day(&running.report()));
         let report = running.stop();
-        is_a_bad_day(&report);
         let mut first = Heard::new();
         hear(&all, &mut first);
         let (again, report_again) = replayed(&lines, &mut random)?;

@@ -1,7 +1,7 @@
 //! Commands whose code goes on after they were cancelled: what it starts is made safe.
 
 use crate::components::{Number, within};
-use crate::gate::Gate;
+use crate::gate::{Gate, wait_until};
 use bb_core::prelude::*;
 use bb_core::run::CommandError;
 use bb_core::{ArmError, Running};
@@ -169,6 +169,8 @@ fn what_the_future_of_a_command_starts_when_it_is_dropped_is_stopped() {
 pub(crate) struct Tell;
 
 static PUBLISHED: AtomicBool = AtomicBool::new(false);
+/// Whether its thread is about to publish.
+static TELLS: AtomicBool = AtomicBool::new(false);
 
 impl Command for Tell {
     type Options = NoOptions;
@@ -178,6 +180,7 @@ impl Command for Tell {
     async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
         let publisher = context.bus().publisher::<Number>("own/drive")?;
         std::thread::spawn(move || {
+            TELLS.store(true, Ordering::SeqCst);
             // The journal has no room.
             publisher.publish(Number(1.0));
             PUBLISHED.store(true, Ordering::SeqCst);
@@ -203,6 +206,7 @@ fn a_publisher_that_waits_for_the_journal_publishes_nothing_once_its_command_was
     let _alone = alone(BEFORE);
     within(60, || {
         PUBLISHED.store(false, Ordering::SeqCst);
+        TELLS.store(false, Ordering::SeqCst);
         GATE.close("here");
         let mut builder = Telling::builder();
         builder.journal(|_| GATE.pass("here"));
@@ -213,6 +217,8 @@ fn a_publisher_that_waits_for_the_journal_publishes_nothing_once_its_command_was
         let told = robot.bus().publisher::<Number>("own/drive").expect("it may publish");
         let told = robot.bus().subscribe::<Number>(told.path(), Overflow::default()).expect("it is there");
         let tell = robot.command(telling::command::tell, NoArguments).expect("it starts");
+        wait_until("it publishes", || TELLS.load(Ordering::SeqCst));
+        // Until it waits.
         std::thread::sleep(Duration::from_millis(50));
         assert_eq!((robot.disarm(), robot.arm()), (Ok(()), Ok(())));
         assert_eq!(tell.wait(), Err(CommandError::Cancelled));

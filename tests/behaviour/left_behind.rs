@@ -341,6 +341,56 @@ robot! {
     link base { sensor number: External<Number>() { estimator cannon: Cannon(); } }
 }
 
+/// Keeps its options for ever, so that only the robot drops any; and starts if it is told to.
+#[derive(Debug)]
+pub(crate) struct Keeping;
+
+static MAY_START: std::sync::atomic::AtomicBool = std::sync::atomic::AtomicBool::new(true);
+
+impl Keeping {
+    fn with<O>(options: O) -> Result<Self, Fault> {
+        std::mem::forget(options);
+        if MAY_START.load(Ordering::SeqCst) { Ok(Self) } else { Err(Fault::new("not today")) }
+    }
+}
+
+impl Sensor for Keeping {
+    type Options = Fused;
+    type Output = Number;
+
+    fn init(options: Fused, _: &SensorContext) -> Result<Self, Fault> {
+        Self::with(options)
+    }
+
+    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
+        Ok(Reading::nothing())
+    }
+}
+
+impl Estimator for Keeping {
+    type Options = Tuning;
+    type Input = Number;
+    type Output = Number;
+
+    fn init(options: Tuning, _: &bb_core::Context) -> Result<Self, Fault> {
+        Self::with(options)
+    }
+
+    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
+        Ok(Reply::emit(number.payload))
+    }
+}
+
+robot! {
+    robot Burning;
+    link base { sensor keeping: Keeping() { rate: 10 Hz; } }
+}
+
+robot! {
+    robot Clogged;
+    link base { sensor number: External<Number>() { estimator keeping: Keeping(); } }
+}
+
 fn with_bomb() -> bb_core::Builder<Armoury> {
     let mut builder = Armoury::builder();
     let bomb = Bomb;
@@ -371,6 +421,59 @@ fn a_handler_or_options_that_panic_when_they_are_dropped_do_not_reach_whoever_st
         IS_LIT.store(true, Ordering::SeqCst);
         replay.stop().ok().expect("nothing is wrong");
         IS_LIT.store(false, Ordering::SeqCst);
+    });
+}
+
+/// The options of the builder are dropped when the robot has started or has not; those of a sensor with it.
+#[test]
+fn options_that_panic_when_they_are_dropped_do_not_reach_whoever_starts_the_robot() {
+    within(60, || {
+        let _alone = ALONE.lock();
+        for may_start in [true, false] {
+            MAY_START.store(may_start, Ordering::SeqCst);
+            let builders = || {
+                let mut builder = Burning::builder();
+                let fused = Fused { gain: 0.5 };
+                builder.replace_sensor::<Keeping>("sensor/base/keeping", fused).expect("it is declared");
+                [Burning::builder(), builder]
+            };
+            for builder in builders() {
+                IS_LIT.store(true, Ordering::SeqCst);
+                let simulated = builder.simulate().map(drop).map_err(|error| error.to_string());
+                IS_LIT.store(false, Ordering::SeqCst);
+                let refused = Err("sensor/base/keeping cannot start: not today".to_owned());
+                assert_eq!(simulated, if may_start { Ok(()) } else { refused });
+            }
+            for builder in builders() {
+                IS_LIT.store(true, Ordering::SeqCst);
+                let started = builder.start().map(|running| running.stop().ok().map(drop)).is_ok();
+                IS_LIT.store(false, Ordering::SeqCst);
+                assert_eq!(started, may_start);
+            }
+        }
+        MAY_START.store(true, Ordering::SeqCst);
+    });
+}
+
+#[test]
+fn options_that_hang_when_they_are_dropped_do_not_keep_whoever_starts_the_robot() {
+    within(60, || {
+        let _alone = ALONE.lock();
+        for may_start in [true, false] {
+            MAY_START.store(may_start, Ordering::SeqCst);
+            let builder = Clogged::builder();
+            TUNINGS.lock().expect("it does not panic").clear();
+            GONE.close("gone");
+            let start = std::time::Instant::now();
+            let started = builder.start();
+            assert!(start.elapsed() < Duration::from_secs(8), "{:?}", start.elapsed());
+            GONE.wait_for(1);
+            GONE.open();
+            assert_eq!(started.is_ok(), may_start);
+            let tunings = TUNINGS.lock().expect("it does not panic").clone();
+            assert!(tunings.iter().all(|thread| thread.as_deref() == Some("drop")), "{tunings:?}");
+        }
+        MAY_START.store(true, Ordering::SeqCst);
     });
 }
 

@@ -1,10 +1,11 @@
 //! Hardware that is started, and commands that arm, while the robot is being disarmed or was.
 
 use crate::components::{Number, within};
-use crate::gate::{Brake, Brakes};
+use crate::gate::{Brake, Brakes, wait_until};
 use bb_core::prelude::*;
 use bb_core::{ArmError, DisarmError, Live};
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, Ordering};
+use std::sync::mpsc::channel;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// The devices of these tests are there once.
@@ -287,8 +288,13 @@ fn a_robot_that_was_disarmed_is_not_armed_by_what_began_before() -> Result<(), B
     assert_eq!(robot.disarm(), Ok(()));
     // Both wait for the code that blocks.
     let live = robot.live();
-    let arms = std::thread::spawn(move || live.arm());
+    let (begins, has_begun) = channel();
+    let arms = std::thread::spawn(move || {
+        let _ = begins.send(());
+        live.arm()
+    });
     let check = robot.command(commanded::command::check, NoArguments)?;
+    has_begun.recv()?;
     std::thread::sleep(Duration::from_millis(50));
     assert_eq!((robot.disarm(), robot.safety()), (Ok(()), Safety::Disarmed));
     assert_eq!(arms.join().map_err(|_| "it does not panic")?, Err(ArmError::Cancelled));
@@ -326,7 +332,7 @@ fn a_command_that_was_cancelled_while_it_made_arguments_starts_nothing() -> Resu
     assert_eq!(WENT.load(Ordering::SeqCst), 0);
     // The same one goes if nobody cancels it.
     robot.command(commanded::command::mission, NoArguments)?.wait()?;
-    std::thread::sleep(Duration::from_millis(300));
+    wait_until("the other command goes", || WENT.load(Ordering::SeqCst) > 0);
     assert_eq!(WENT.load(Ordering::SeqCst), 5);
     Ok(())
 }
@@ -360,11 +366,8 @@ fn each_disarm_reports_its_own_callbacks() {
         assert_eq!(robot.arm(), Ok(()));
         let live: Live<Commanded> = robot.live();
         let disarms = std::thread::spawn(move || live.disarm());
-        std::thread::sleep(Duration::from_millis(150));
         // Its callback has read that the brake slips by the time the next one begins.
-        while robot.safety() == Safety::Disarming {
-            std::thread::sleep(Duration::from_micros(100));
-        }
+        wait_until("it has disarmed", || !matches!(robot.safety(), Safety::Armed | Safety::Disarming));
         HOLDS.store(true, Ordering::SeqCst);
         assert_eq!(robot.force_disarm(), Ok(()));
         let why = disarms.join().expect("it does not panic").expect_err("the brake slips");

@@ -1,7 +1,8 @@
 //! Real time: a thread per sensor. Nothing here asserts how late a thread was.
 
-use crate::components::{Counter, Number, Scale};
+use crate::components::{Counter, Number, Scale, within};
 use bb_core::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 /// A driver that waits for its device.
@@ -51,4 +52,72 @@ fn sensors_run_on_threads_of_their_own_and_stop_when_told() -> Result<(), StartE
     assert_eq!(report.topic("sensor/base/rare").map(|topic| topic.published), Some(1));
     assert!(report.ok().is_ok());
     Ok(())
+}
+
+/// Wants to be called every two milliseconds, and counts its calls.
+#[derive(Debug)]
+pub(crate) struct Checking {
+    context: ActuatorContext,
+    next: MonotonicTime,
+}
+
+static CHECKED: AtomicU64 = AtomicU64::new(0);
+
+impl Actuator for Checking {
+    type Options = NoOptions;
+    type Command = Number;
+
+    fn init(_: NoOptions, context: &ActuatorContext) -> Result<Self, Fault> {
+        Ok(Self { context: context.clone(), next: context.clock().now() })
+    }
+
+    fn handle_command(&mut self, command: &Stamped<Number>) -> Result<(), Fault> {
+        // However late the thread is that keeps time.
+        if command.monotonic_time < self.next { Ok(()) } else { Err(Fault::new("a call is overdue")) }
+    }
+
+    fn next_update(&self) -> Option<MonotonicTime> {
+        Some(self.next)
+    }
+
+    fn update(&mut self, now: MonotonicTime) -> Result<(), Fault> {
+        assert!(now >= self.next && self.context.clock().now() >= self.next, "not before it wants");
+        self.next = now + Duration::from_millis(2);
+        CHECKED.fetch_add(1, Ordering::SeqCst);
+        Ok(())
+    }
+
+    fn disarm(&mut self) -> Result<(), Fault> {
+        Ok(())
+    }
+}
+
+robot! {
+    robot Streamed;
+    link base {
+        joint pan: continuous { axis: z; actuator servo: Checking(); sensor encoder: External<Number>(); link head {} }
+    }
+}
+
+/// Commands come so fast that the actuator's lock is hardly ever free.
+#[test]
+fn a_stream_of_commands_does_not_starve_the_updates_of_an_actuator() {
+    within(60, || {
+        let running = Streamed::builder().start().expect("it starts");
+        running.arm().expect("it may be armed");
+        let servo = streamed::actuator::base::pan::servo;
+        let mut commands = 0_u64;
+        for _ in 0..50 {
+            let before = CHECKED.load(Ordering::SeqCst);
+            while CHECKED.load(Ordering::SeqCst) == before {
+                running.actuate(servo, Number(1.0)).expect("it is armed");
+                commands += 1;
+            }
+        }
+        let report = running.stop();
+        let counts = report.actuator(servo.path()).expect("it is declared");
+        assert_eq!(counts.commands, commands, "none was lost meanwhile");
+        assert!(commands > 100, "{commands} commands are no stream");
+        report.ok().expect("nothing is wrong");
+    });
 }

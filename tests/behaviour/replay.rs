@@ -170,7 +170,7 @@ robot! {
     }
 }
 
-/// What is published, as text that differs if a bit does.
+/// What is published, as text that differs if a bit of payload or stamp does.
 pub(crate) fn text(message: &DynamicMessage) -> String {
     let stamp = message.stamp();
     let payload = message
@@ -179,7 +179,7 @@ pub(crate) fn text(message: &DynamicMessage) -> String {
         .or_else(|| message.downcast::<Seen>().map(|seen| format!("{:?}", seen.payload)))
         .or_else(|| message.downcast::<HealthTransition>().map(|change| change.to_string()))
         .unwrap_or_else(|| format!("{message:?}"));
-    format!("{} {} {:?} {payload}", message.path(), stamp.monotonic_time, stamp.frame)
+    format!("{} {stamp:?} {payload}", message.path())
 }
 
 /// Whatever is published while the robot runs, path by path.

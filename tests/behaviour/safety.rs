@@ -60,17 +60,21 @@ impl Actuator for Motor {
     }
 
     fn handle_command(&mut self, command: &Stamped<Number>) -> Result<(), Fault> {
-        TORQUE.store(true, Ordering::SeqCst);
-        assert!(command.0 != PANICS, "a wire is loose");
         self.hangs = command.0 == HANGS_AT_DISARM;
+        // The test of one that hangs runs beside the others, and does not look at the torque.
+        TORQUE.fetch_or(!self.hangs, Ordering::SeqCst);
+        assert!(command.0 != PANICS, "a wire is loose");
         self.panics = command.0 == PANICS_AT_DISARM;
         Ok(())
     }
 
     fn disarm(&mut self) -> Result<(), Fault> {
         assert!(!self.panics, "no brake");
-        while self.hangs && !LET_GO.load(Ordering::SeqCst) {
-            std::thread::sleep(Duration::from_millis(1));
+        if self.hangs {
+            while !LET_GO.load(Ordering::SeqCst) {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            return Ok(());
         }
         TORQUE.store(false, Ordering::SeqCst);
         Ok(())
@@ -86,6 +90,19 @@ robot! {
             actuator motor: Motor();
             sensor encoder: External<Number>();
             link head { sensor lidar: Lidar() { rate: 10 Hz; } }
+        }
+    }
+}
+
+robot! {
+    robot Unstoppable;
+
+    link base {
+        joint pan: continuous {
+            axis: z;
+            actuator motor: Motor();
+            sensor encoder: External<Number>();
+            link head {}
         }
     }
 }
@@ -108,6 +125,43 @@ fn a_restarted_sensor_is_made_safe_once() -> Result<(), StartError> {
     assert!(last > 3, "it has broken");
     assert_eq!(*STOPPED.lock().expect("nobody panics with it"), [last]);
     Ok(())
+}
+
+/// One after the other, and by many threads at once: each gets the answer, the hardware is made safe once.
+#[test]
+fn a_robot_that_is_disarmed_twice_is_made_safe_once() {
+    let _alone = ALONE.lock();
+    within(60, || {
+        let builder = Powered::builder();
+        let changes = builder.subscribe(system::SafetyState);
+        let running = builder.start().expect("it starts");
+        let last = MADE.load(Ordering::SeqCst) - 1;
+        let stopped = || std::mem::take(&mut *STOPPED.lock().expect("nobody panics with it"));
+        let changes = || changes.drain().map(|change| change.payload.to).collect::<Vec<_>>();
+        let once = [Safety::Armed, Safety::Disarming, Safety::Disarmed];
+        for many in [1, 2, 8] {
+            running.arm().expect("it may be armed");
+            running.actuate(powered::actuator::base::pan::motor, Number(1.0)).expect("it is armed");
+            stopped();
+            std::thread::scope(|scope| {
+                let disarms: Vec<_> = (0..many).map(|_| scope.spawn(|| running.disarm())).collect();
+                for disarm in disarms {
+                    assert_eq!(disarm.join().expect("it does not panic"), Ok(()));
+                }
+            });
+            assert!(!TORQUE.load(Ordering::SeqCst));
+            assert_eq!((stopped(), changes()), (vec![last], once.to_vec()), "{many} at once");
+            assert_eq!(running.disarm(), Ok(()));
+            assert_eq!((stopped(), changes()), (vec![], vec![]), "it was disarmed");
+        }
+        // What could not be made safe is not safe the second time either, until it is forced.
+        running.arm().expect("it may be armed");
+        running.actuate(powered::actuator::base::pan::motor, Number(PANICS_AT_DISARM)).expect("it does as told");
+        for _ in 0..2 {
+            assert!(running.disarm().is_err());
+            assert_eq!(running.safety(), Safety::Error);
+        }
+    });
 }
 
 #[test]
@@ -143,12 +197,11 @@ fn a_disarm_that_panics_leads_to_error_and_the_next_one_may_succeed() -> Result<
 
 #[test]
 fn a_disarm_that_hangs_is_an_error_and_does_not_keep_the_robot_from_stopping() {
-    let _alone = ALONE.lock();
     within(60, || {
         LET_GO.store(false, Ordering::SeqCst);
-        let running = Powered::builder().start().expect("it starts");
+        let running = Unstoppable::builder().start().expect("it starts");
         running.arm().expect("it may be armed");
-        running.actuate(powered::actuator::base::pan::motor, Number(HANGS_AT_DISARM)).expect("it does as told");
+        running.actuate(unstoppable::actuator::base::pan::motor, Number(HANGS_AT_DISARM)).expect("it does as told");
         let start = std::time::Instant::now();
         let why = running.disarm().expect_err("it hangs").to_string();
         let expected = "not everything could be made safe: `actuator/base/pan/motor`: did not come back from disarming in time";

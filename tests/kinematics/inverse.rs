@@ -2,7 +2,7 @@
 
 use crate::robots::{Arm, panda, ur5};
 use bb_core::kinematics::{InverseKinematics, InverseParams, KinematicsError, Target};
-use bb_core::nalgebra::{Isometry3, Vector3};
+use bb_core::nalgebra::{Isometry3, Matrix6xX, Vector3};
 use proptest::prelude::Rng;
 use proptest::test_runner::{RngAlgorithm, TestRng};
 
@@ -77,6 +77,44 @@ fn a_path_is_followed_without_jumps() -> Result<(), KinematicsError> {
             solution.positions.iter().zip(&positions).fold(0.0_f64, |most, (new, old)| most.max((new - old).abs()));
         assert!(jump < 0.05 && solution.restarts == 0, "step {step}: {jump} rad");
         positions.copy_from_slice(solution.positions);
+    }
+    Ok(())
+}
+
+/// Elbow stretched, wrist stretched, both, or all at zero: there a direction is left in which no joint moves the tip.
+#[test]
+fn singular_poses_are_reached_and_left_again() -> Result<(), KinematicsError> {
+    let arm = ur5();
+    let chain = arm.kinematics.chain(arm.base, arm.tip)?;
+    let mut solver = solver(&arm, InverseParams::default());
+    let mut random = Uniform::new(11);
+    let mut jacobian = Matrix6xX::zeros(arm.kinematics.velocities());
+    let (elbow, wrist) = (2, 4);
+    for stretched in [&[elbow][..], &[wrist], &[elbow, wrist], &[0, 1, 2, 3, 4, 5]] {
+        for number in 0..50 {
+            let mut singular = random.position(&arm);
+            stretched.iter().for_each(|joint| singular[*joint] = 0.0);
+            let target = chain.jacobian(&singular, &mut jacobian)?;
+            let smallest = jacobian.singular_values().min();
+            assert!(smallest < 1e-9, "{stretched:?}: {smallest} is not singular");
+            let solution = solver.solve(&Target::Pose(target), &arm.kinematics.neutral());
+            let solution = solution.unwrap_or_else(|error| panic!("{stretched:?} {number}: {error}"));
+            let (position, rotation) = apart(&chain.transform(solution.positions)?, &target);
+            assert!(position <= 1.001e-6 && rotation <= 1.001e-6, "{stretched:?}: {position} m, {rotation} rad");
+            // Back towards the base by a millimetre, which is where an arm that is stretched cannot go at once.
+            let mut back = target;
+            back.translation.vector *= 1.0 - 1e-3 / target.translation.vector.norm();
+            let told = match solver.solve(&Target::Pose(back), &singular) {
+                Ok(solution) => solution.position_error,
+                // No other pose of a stretched wrist need be in reach.
+                Err(KinematicsError::NotConverged { position_error, .. }) if stretched.contains(&wrist) => {
+                    position_error
+                }
+                Err(error) => panic!("{stretched:?} {number}, back: {error}"),
+            };
+            let is = apart(&chain.transform(solver.best())?, &back).0;
+            assert!((told - is).abs() < 1e-12 && is < 1e-3, "{stretched:?} {number}: {told} m, but {is} m");
+        }
     }
     Ok(())
 }

@@ -1,8 +1,8 @@
 //! Random robots beside Pinocchio, with what that computed stored in `pinocchio.jsonl`. More of them:
 //! `tests/kinematics/check`.
 
-use bb_core::kinematics::{Frames, Kinematics};
-use bb_core::nalgebra::{Isometry3, Matrix6xX, Rotation3, Translation3, Vector3};
+use bb_core::kinematics::{Dynamics, Frames, Kinematics};
+use bb_core::nalgebra::{DMatrix, DVector, Isometry3, Matrix6xX, Rotation3, Translation3, Vector3};
 use bb_core::topology::{Inertial, Joint, JointKind, Link, Mimic, Origin, Topology};
 use serde_json::Value;
 use std::error::Error;
@@ -60,10 +60,10 @@ fn topology(robot: &Value) -> Result<Topology, Failure> {
     let listed = robot["inertials"].as_array().ok_or("inertials")?;
     let links = listed.iter().enumerate().map(|(number, inertial)| {
         let inertial = match inertial.as_array().map(Vec::as_slice) {
-            Some([mass, centre]) => Some(Inertial {
-                link_from_inertia: Origin { xyz: three(centre)?, rpy: [0.0; 3] },
+            Some([mass, centre, angles, inertia]) => Some(Inertial {
+                link_from_inertia: Origin { xyz: three(centre)?, rpy: three(angles)? },
                 mass: mass.as_f64().ok_or("mass")?,
-                inertia: [0.1, 0.0, 0.0, 0.1, 0.0, 0.1],
+                inertia: numbers(inertia)?.try_into().map_err(|given| format!("not six: {given:?}"))?,
             }),
             _ => None,
         };
@@ -99,15 +99,22 @@ fn entries(isometry: &Isometry3<f64>) -> Vec<f64> {
     isometry.to_homogeneous().iter().copied().collect()
 }
 
-/// The largest differences: of frames, motions, Jacobian, efforts and centre of mass.
-fn compare(case: &Value) -> Result<[f64; 5], Failure> {
+/// The largest differences: of frames, motions, Jacobian, efforts against gravity, centre of mass, efforts of the motion, mass
+/// matrix and accelerations caused by efforts.
+const WORST: [&str; 8] =
+    ["frames", "motions", "Jacobians", "efforts", "centres", "motion efforts", "mass matrices", "accelerations"];
+
+/// The bounds of these. Accelerations are multiplied by the condition of the mass matrix, which is at most 1e4.
+const BOUNDS: [f64; 8] = [1e-12, 1e-12, 1e-12, 1e-12, 1e-12, 1e-12, 1e-12, 1e-10];
+
+fn compare(case: &Value) -> Result<[f64; 8], Failure> {
     let topology = topology(&case["robot"])?;
     let kinematics = Kinematics::new(&topology)?;
     let id = |number: usize| kinematics.link(topology.links[number].name).ok_or("a link");
     let [q, v, a] = [numbers(&case["positions"])?, numbers(&case["velocities"])?, numbers(&case["accelerations"])?];
     let mut frames = Frames::new(kinematics.clone());
     frames.update_motion(&q, &v, &a)?;
-    let mut worst = [0.0_f64; 5];
+    let mut worst = [0.0_f64; 8];
     for number in 0..topology.links.len() {
         let expected = isometry(&case["root_from_link"][number])?;
         let root_from_link = frames.root_from_link(id(number)?)?;
@@ -136,23 +143,55 @@ fn compare(case: &Value) -> Result<[f64; 5], Failure> {
         worst[4] = difference(centre.as_slice(), &numbers(&case["centre_of_mass"])?);
         assert!((frames.mass() - case["mass"].as_f64().ok_or("mass")?).abs() < 1e-12 * frames.mass());
     }
+    let [of_motion, of_masses, forward] = compare_dynamics(case, kinematics, [&q, &v, &a])?;
+    (worst[5], worst[6], worst[7]) = (of_motion, of_masses, forward);
     Ok(worst)
 }
 
+/// The differences of the efforts of a motion, of the mass matrix, and of the accelerations that efforts cause.
+fn compare_dynamics(case: &Value, kinematics: Kinematics, [q, v, a]: [&[f64]; 3]) -> Result<[f64; 3], Failure> {
+    let velocities = kinematics.velocities();
+    let gravity = Vector3::from(three(&case["gravity"])?);
+    let mut dynamics = Dynamics::new(kinematics);
+    dynamics.frames_mut().update_motion(q, v, a)?;
+    let mut efforts = vec![0.0; velocities];
+    dynamics.efforts(&gravity, &mut efforts)?;
+    let of_motion = difference(&efforts, &numbers(&case["motion_efforts"])?);
+    let mut masses = DMatrix::zeros(velocities, velocities);
+    dynamics.mass_matrix(&mut masses)?;
+    let rows = case["mass_matrix"].as_array().ok_or("rows")?;
+    let rows: Vec<f64> = rows.iter().map(numbers).collect::<Result<Vec<_>, _>>()?.concat();
+    let of_masses = difference(masses.transpose().as_slice(), &rows);
+    assert!((&masses - masses.transpose()).abs().max() <= 1e-12 * masses.abs().max());
+    let Some([given, expected]) = case["forward"].as_array().map(Vec::as_slice) else {
+        return Ok([of_motion, of_masses, 0.0]);
+    };
+    dynamics.frames_mut().update_motion(q, v, &vec![0.0; velocities])?;
+    dynamics.efforts(&gravity, &mut efforts)?;
+    let left = DVector::from(numbers(given)?) - DVector::from(efforts);
+    let accelerations = masses.cholesky().ok_or("the mass matrix is positive definite")?.solve(&left);
+    Ok([of_motion, of_masses, difference(accelerations.as_slice(), &numbers(expected)?)])
+}
+
 fn agree(cases: &str) -> Result<usize, Failure> {
-    let mut worst = [0.0_f64; 5];
+    let mut worst = [0.0_f64; 8];
+    let mut forward = 0;
     for (number, case) in cases.lines().enumerate() {
-        let differences =
-            compare(&serde_json::from_str(case)?).map_err(|error| format!("robot {number}: {error}"))?;
-        let bounds = [1e-12; 5];
+        let case: Value = serde_json::from_str(case)?;
+        forward += usize::from(!case["forward"].is_null());
+        let differences = compare(&case).map_err(|error| format!("robot {number}: {error}"))?;
         assert!(
-            differences.iter().zip(&bounds).all(|(difference, bound)| difference < bound),
+            differences.iter().zip(&BOUNDS).all(|(difference, bound)| difference < bound),
             "robot {number} differs by {differences:?}"
         );
         worst.iter_mut().zip(differences).for_each(|(worst, difference)| *worst = worst.max(difference));
     }
-    println!(
-        "{} robots, largest differences of frames, motions, Jacobians, efforts, centres: {worst:?}",
+    let worst: Vec<String> =
+        WORST.iter().zip(worst).map(|(what, difference)| format!("{what} {difference:.1e}")).collect();
+    println!("{} robots, largest differences: {}", cases.lines().count(), worst.join(", "));
+    assert!(
+        forward * 20 >= cases.lines().count(),
+        "only {forward} of {} with accelerations",
         cases.lines().count()
     );
     Ok(cases.lines().count())

@@ -26,6 +26,15 @@ def from_z(axis):
     return pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), axis).toRotationMatrix()
 
 
+def inertial(rng):
+    """Mass, centre, angles of its axes, and xx, xy, xz, yy, yz, zz of a body that could exist."""
+    mass = float(rng.uniform(0.1, 5.0))
+    spread = rng.normal(size=(3, 4))
+    second = mass * spread @ spread.T
+    inertia = np.trace(second) * np.eye(3) - second
+    return [mass, rng.normal(size=3).tolist(), rng.uniform(-3, 3, size=3).tolist(), inertia[np.triu_indices(3)].tolist()]
+
+
 def robot(rng):
     links = int(rng.integers(2, 14))
     joints = []
@@ -50,9 +59,7 @@ def robot(rng):
         if DEGREES[kind][0] == 1 and single and rng.random() < 0.2:
             joint["mimic"] = [int(rng.choice(single)), float(rng.normal()), float(rng.normal())]
         joints.append(joint)
-    inertials = [
-        [float(rng.uniform(0.1, 5.0)), rng.normal(size=3).tolist()] if rng.random() < 0.8 else None for _ in range(links)
-    ]
+    inertials = [inertial(rng) if rng.random() < 0.8 else None for _ in range(links)]
     return {"links": links, "joints": joints, "inertials": inertials}
 
 
@@ -85,8 +92,10 @@ def model_of(robot):
         joint, offset = carrier[link]
         model.addFrame(pin.Frame(f"link{link}", joint, 0, offset, pin.FrameType.BODY))
         if robot["inertials"][link]:
-            mass, centre = robot["inertials"][link]
-            model.appendBodyToJoint(joint, pin.Inertia(mass, np.array(centre), np.eye(3) * 0.1), offset)
+            mass, centre, angles, (xx, xy, xz, yy, yz, zz) = robot["inertials"][link]
+            inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+            own = pin.SE3(rotation(angles), np.array(centre))
+            model.appendBodyToJoint(joint, own.act(pin.Inertia(mass, np.zeros(3), inertia)), offset)
     return model, number
 
 
@@ -158,7 +167,23 @@ def case(rng):
     jacobian = np.vstack([turn @ linear, turn @ (of_tip[3:] - of_base[3:])])
     gravity = rng.normal(size=3) * 5
     model.gravity.linear = gravity
-    efforts = derivative.T @ pin.computeGeneralizedGravity(model, model.createData(), full_q)
+    # What it returns is memory of its argument, which has to live on.
+    spare = model.createData()
+    efforts = derivative.T @ pin.computeGeneralizedGravity(model, spare, full_q)
+    motion_efforts = derivative.T @ pin.rnea(model, spare, full_q, full_v, full_a)
+    # By columns: its `crba` takes the joints of a subtree to be numbered in a row, and these are not.
+    still, weightless = np.zeros(model.nv), model.copy()
+    weightless.gravity.linear = np.zeros(3)
+    columns = [pin.rnea(weightless, spare, full_q, still, unit).copy() for unit in np.eye(model.nv)]
+    mass_matrix = np.array(columns).T
+    forward = None
+    # Without mimics, velocities are those of Pinocchio; and each joint has something to move.
+    if derivative.shape[0] == derivative.shape[1] and np.linalg.cond(mass_matrix) < 1e4:
+        given = rng.normal(size=model.nv) * 10
+        # In its own order of the joints, which is that of `derivative`.
+        accelerations = pin.aba(model, spare, full_q, full_v, given)
+        forward = [(derivative.T @ given).tolist(), (derivative.T @ accelerations).tolist()]
+    mass_matrix = derivative.T @ mass_matrix @ derivative
     # Pinocchio leaves out what is fixed to the world.
     masses = [(one["inertials"][link], data.oMf[frames[link]]) for link in range(one["links"]) if one["inertials"][link]]
     mass = sum(inertial[0] for inertial, _ in masses)
@@ -175,6 +200,9 @@ def case(rng):
         "jacobian": jacobian.T.tolist(),
         "gravity": gravity.tolist(),
         "efforts": efforts.tolist(),
+        "motion_efforts": motion_efforts.tolist(),
+        "mass_matrix": mass_matrix.tolist(),
+        "forward": forward,
         "mass": mass,
         "centre_of_mass": (centre / mass).tolist() if mass else None,
     }

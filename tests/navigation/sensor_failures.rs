@@ -1,6 +1,6 @@
 //! One robot with all that its filters take; each sensor fails in turn, and what becomes of it is a file.
 
-use super::navigation::{Noise, ORIGIN, Truth, truth};
+use super::rover::{Noise, ORIGIN, Truth, truth};
 use bb_core::nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3};
 use bb_core::payload::{FluidPressure, GeodeticPosition, GnssFix, GnssServices, GnssStatus, RelativePose, Twist};
 use bb_core::prelude::*;
@@ -278,7 +278,7 @@ fn drive() -> Result<Driven, Box<dyn std::error::Error>> {
 #[test]
 fn each_sensor_fails_in_turn_and_the_robot_says_so() -> Result<(), Box<dyn std::error::Error>> {
     let (table, seen) = drive()?;
-    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/behaviour/sensor_failures.txt");
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/sensor_failures.txt");
     if std::env::var_os("UPDATE_EXPECTED").is_some() {
         std::fs::write(file, &table)?;
     }

@@ -1,7 +1,7 @@
 //! Fixes that are kilometres off, at the start and later: no filter begins at one that no other agrees with, and one that has
 //! begun at wrong ones, or followed them, is moved to where the right ones are and is as good as before.
 
-use super::navigation::{Noise, ORIGIN, Truth, truth};
+use super::rover::{Noise, ORIGIN, Truth, truth};
 use bb_core::nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use bb_core::payload::{GeodeticPosition, GnssFix, GnssServices, GnssStatus, Twist};
 use bb_core::prelude::*;

@@ -1,7 +1,7 @@
 //! A rover whose antenna is not where it is declared, whose receiver stamps late, and which is magnetic: the declared filter finds all
 //! three, as well as it says.
 
-use super::navigation::{Noise, ORIGIN};
+use super::rover::{Noise, ORIGIN};
 use bb_core::nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use bb_core::payload::{GeodeticPosition, GnssFix, GnssServices, GnssStatus, MagneticField, Twist};
 use bb_core::prelude::*;

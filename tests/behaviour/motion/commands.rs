@@ -1,0 +1,348 @@
+//! Commands that move several joints.
+
+use super::*;
+
+#[test]
+fn joints_move_through_points_and_arrive_together() -> Result<(), Failure> {
+    let mut simulation = ready()?;
+    let progress = simulation.subscribe_any(Select::Below("command/go"), "MotionProgress", Overflow::default());
+    let ends = ends(&simulation.bus());
+    let execution = simulation.command(crane::command::go, targets(&[[0.5, 1.0], [-0.5, 1.5]]))?;
+    simulation.run_for(Duration::from_secs(10));
+    assert_eq!(execution.try_result(), Some(Ok(())));
+    let reports: Vec<_> = ends.drain().collect();
+    let mut ended: Vec<_> = reports.iter().filter_map(|report| report.downcast::<EndMotion>()).collect();
+    ended.sort_by_key(|end| end.frame.name());
+    let told: Vec<_> = ended.iter().map(|end| (end.frame.name(), &end.end)).collect();
+    assert_eq!(told, [("reach", &MotionEnd::Reached), ("slew", &MotionEnd::Reached)]);
+    // What a motor deviates from its path decays at 50 1/s, from less than 1e-7 down to the 1e-9 at which a target is reached.
+    let apart_s = ended[0].monotonic_time.seconds_since(ended[1].monotonic_time);
+    assert!(apart_s.abs() <= 0.1, "{apart_s} s apart");
+    let (slew, reach) = (true_position(&simulation, "slew")?, true_position(&simulation, "reach")?);
+    assert!((slew + 0.5).abs() < 1e-6 && (reach - 1.5).abs() < 1e-6, "{slew} {reach}");
+    let shares: Vec<f64> = progress
+        .drain()
+        .filter_map(|message| message.downcast::<MotionProgress>().map(|progress| progress.progress))
+        .collect();
+    assert!(shares.len() > 20 && shares.is_sorted() && shares.last() == Some(&1.0), "{shares:?}");
+    Ok(())
+}
+
+/// Where the joints are 2 s after what happened to the command 1 s after its start; they rest since.
+fn after(what: impl FnOnce(&Simulation<Crane>, &Execution<()>) -> Result<(), Failure>) -> Result<(), Failure> {
+    let mut simulation = ready()?;
+    let ends = ends(&simulation.bus());
+    let execution = simulation.command(crane::command::go, targets(&[[1.2, 1.9]]))?;
+    simulation.run_for(Duration::from_secs(1));
+    what(&simulation, &execution)?;
+    let (slew, reach) = (true_position(&simulation, "slew")?, true_position(&simulation, "reach")?);
+    simulation.run_for(Duration::from_secs(2));
+    let (slew_then, reach_then) = (true_position(&simulation, "slew")?, true_position(&simulation, "reach")?);
+    // v² / 2a: 1 / 8 rad, 0.25 / 8 m at most.
+    assert!((0.001..0.126).contains(&(slew_then - slew)), "{slew} {slew_then}");
+    assert!((0.001..0.032).contains(&(reach_then - reach)), "{reach} {reach_then}");
+    let ended: Vec<_> = std::iter::from_fn(|| next_end(&ends)).map(|(_, end)| end).collect();
+    assert_eq!(ended, [MotionEnd::Stopped, MotionEnd::Stopped]);
+    simulation.run_for(Duration::from_secs(1));
+    assert_eq!(true_position(&simulation, "slew")?, slew_then);
+    assert!(execution.try_result().is_some_and(|result| result.is_err()));
+    Ok(())
+}
+
+#[test]
+fn a_command_that_is_cancelled_stops_its_joints() -> Result<(), Failure> {
+    after(|_, execution| {
+        execution.cancel();
+        Ok(())
+    })
+}
+
+/// Before it has begun, on its first step, while its joints speed up, go on, slow down, and once it has ended; and once more
+/// after that.
+#[test]
+fn a_command_may_be_cancelled_in_each_phase_of_its_motion() -> Result<(), Failure> {
+    let mut phases = Vec::new();
+    for millis in [0, 1, 7, 60, 300, 600, 900, 1_000, 1_400, 2_500] {
+        let mut simulation = ready()?;
+        let execution = simulation.command(crane::command::go, targets(&[[0.8, 0.5]]))?;
+        simulation.run_for(Duration::from_millis(millis));
+        execution.cancel();
+        execution.cancel();
+        simulation.run_for(Duration::from_secs(1));
+        execution.cancel();
+        let joints = ["slew", "reach"].map(|joint| true_position(&simulation, joint));
+        let [slew, reach] = [joints[0].as_ref(), joints[1].as_ref()].map(|joint| *joint.unwrap_or(&f64::NAN));
+        // The last steps of the trajectory brake less than the servo can: it may come to rest beyond by a fraction of a step.
+        assert!(
+            (0.0..=0.8 + 2e-5).contains(&slew) && (0.0..=0.5 + 2e-5).contains(&reach),
+            "{millis}: {slew} {reach}"
+        );
+        // A result is taken once.
+        let result = execution.try_result();
+        let has_arrived = result == Some(Ok(()));
+        phases.push((millis, has_arrived, slew > 0.0));
+        if has_arrived {
+            assert!((slew - 0.8).abs() < 1e-6 && (reach - 0.5).abs() < 1e-6, "{millis}: {slew} {reach}");
+        } else {
+            assert_eq!(result, Some(Err(bb_core::run::CommandError::Cancelled)), "{millis}");
+        }
+        // They rest, and hold.
+        simulation.run_for(Duration::from_secs(1));
+        assert_eq!((true_position(&simulation, "slew")?, true_position(&simulation, "reach")?), (slew, reach));
+        assert_eq!(simulation.state(), "idle", "{millis}");
+        let next = simulation.command(crane::command::go, targets(&[[0.1, 0.2]]))?;
+        simulation.run_for(Duration::from_secs(6));
+        assert_eq!(next.try_result(), Some(Ok(())), "{millis}");
+    }
+    let moved: Vec<_> = phases.iter().map(|(_, has_arrived, has_moved)| (*has_arrived, *has_moved)).collect();
+    // Each phase was met: nothing moved, moved in part, arrived.
+    assert_eq!((moved.first(), moved.last()), (Some(&(false, false)), Some(&(true, true))), "{phases:?}");
+    assert!(moved.iter().filter(|phase| **phase == (false, true)).count() >= 6, "{phases:?}");
+    Ok(())
+}
+
+#[test]
+fn joints_stop_when_the_robot_is_disarmed() -> Result<(), Failure> {
+    after(|simulation, _| {
+        assert_eq!(simulation.disarm(), Ok(()));
+        Ok(())
+    })
+}
+
+#[test]
+fn a_command_that_times_out_stops_its_joints() -> Result<(), Failure> {
+    let mut simulation = ready()?;
+    let execution = simulation.command(crane::command::hurry, targets(&[[1.2, 1.9]]))?;
+    simulation.run_for(Duration::from_secs(2));
+    assert!(execution.try_result().is_some_and(|result| result.is_err()));
+    // It keeps step with the other, which is slower: 1.2 / 1.9 of its way.
+    let (slew, reach) = (true_position(&simulation, "slew")?, true_position(&simulation, "reach")?);
+    assert!((0.1..0.2).contains(&reach) && (slew - reach * 1.2 / 1.9).abs() < 0.01, "{slew} {reach}");
+    simulation.run_for(Duration::from_secs(1));
+    assert_eq!(true_position(&simulation, "slew")?, slew);
+    Ok(())
+}
+
+/// The one that is pre-empted is dropped after the other has begun: what it leaves does not stop that one's motion.
+#[test]
+fn a_command_that_preempts_another_takes_over_its_joints() -> Result<(), Failure> {
+    let mut simulation = ready()?;
+    let first = simulation.command(crane::command::go, targets(&[[1.2, 1.9]]))?;
+    simulation.run_for(Duration::from_secs(1));
+    let second = simulation.command(crane::command::go, targets(&[[0.0, 0.1]]))?;
+    simulation.run_for(Duration::from_secs(10));
+    assert!(first.try_result().is_some_and(|result| result.is_err()));
+    assert_eq!(second.try_result(), Some(Ok(())));
+    assert!(true_position(&simulation, "slew")?.abs() < 1e-6);
+    Ok(())
+}
+
+/// It fails at the first joint that it loses; by then the other one is somebody else's too.
+#[test]
+fn a_command_that_loses_its_joints_leaves_them_to_whoever_moves_them() -> Result<(), Failure> {
+    let mut simulation = ready()?;
+    let execution = simulation.command(crane::command::go, targets(&[[1.2, 1.9]]))?;
+    simulation.run_for(Duration::from_secs(1));
+    let there = |position| ActuatorCommand::from(PositionCommand { position, ..Default::default() });
+    simulation.actuate(crane::actuator::base::slew::motor, there(-0.5))?;
+    simulation.actuate(crane::actuator::base::slew::boom::reach::motor, there(0.1))?;
+    simulation.run_for(Duration::from_secs(10));
+    let error = execution.try_result().ok_or("it has ended")?.expect_err("it was replaced").to_string();
+    assert!(error.contains("another command has taken over the joint `slew`"), "{error}");
+    let (slew, reach) = (true_position(&simulation, "slew")?, true_position(&simulation, "reach")?);
+    assert!((slew + 0.5).abs() < 1e-6 && (reach - 0.1).abs() < 1e-6, "{slew} {reach}");
+    Ok(())
+}
+
+#[test]
+fn a_joint_that_is_held_fails_the_command_and_stops_the_others() -> Result<(), Failure> {
+    let mut simulation = ready()?;
+    let world = simulation.shared(|| SimulatedWorld::new(Crane::TOPOLOGY));
+    world.obstruct("slew", -0.3, 0.3, simulation.clock().now())?;
+    let execution = simulation.command(crane::command::go, targets(&[[1.2, 1.9]]))?;
+    simulation.run_for(Duration::from_secs(10));
+    let error = execution.try_result().ok_or("it has ended")?.expect_err("it is held").to_string();
+    assert!(error.contains("the joint `slew` has stalled at 0.3"), "{error}");
+    assert!(true_position(&simulation, "reach")? < 1.0);
+    Ok(())
+}
+
+/// A motor that says at once that it is stuck.
+#[derive(Debug)]
+struct Jammed(ActuatorContext);
+
+impl Actuator for Jammed {
+    type Options = NoOptions;
+    type Command = ActuatorCommand;
+
+    fn init(_: NoOptions, context: &ActuatorContext) -> Result<Self, Fault> {
+        Ok(Self(context.clone()))
+    }
+
+    fn handle_command(&mut self, command: &Stamped<ActuatorCommand>) -> Result<(), Fault> {
+        if matches!(command.payload, ActuatorCommand::Trajectory(_)) {
+            self.0.end_motion(EndMotion { position: 0.0, end: MotionEnd::Stalled });
+        }
+        Ok(())
+    }
+
+    fn disarm(&mut self) -> Result<(), Fault> {
+        Ok(())
+    }
+}
+
+robot! {
+    robot Vice;
+    commands { close: MoveJoints(); }
+    link base {
+        joint screw: revolute {
+            axis: z;
+            limit: { lower: -1 rad, upper: 1 rad, velocity: 1 rad/s, effort: 1 N*m };
+            actuator motor: Jammed();
+            sensor encoder: External<JointState>();
+            link jaws;
+        }
+    }
+}
+
+#[test]
+fn a_joint_that_is_stuck_from_the_start_fails_the_command() -> Result<(), Failure> {
+    let mut simulation = Vice::builder().simulate()?;
+    simulation.run_until(at(10));
+    let state = JointState { position: 0.0, velocity: None, effort: None };
+    simulation.publish(vice::sensor::base::screw::encoder, simulation.clock().now(), state);
+    simulation.run_until(at(20));
+    assert_eq!(simulation.arm(), Ok(()));
+    let there = JointTarget { positions: vec![0.5] };
+    let targets = JointTargets { joints: vec!["screw".into()], points: vec![there] };
+    let execution = simulation.command(vice::command::close, targets)?;
+    simulation.run_for(Duration::from_secs(10));
+    let error = execution.try_result().ok_or("it has ended")?.expect_err("it is stuck").to_string();
+    assert!(error.contains("the joint `screw` has stalled at 0"), "{error}");
+    Ok(())
+}
+
+#[test]
+fn a_trajectory_starts_with_the_motion_of_the_joint() -> Result<(), Failure> {
+    let mut simulation = ready()?;
+    let motor = crane::actuator::base::slew::motor;
+    for speed in [0.4, -0.8] {
+        simulation.actuate(motor, PositionCommand { position: 0.0, ..Default::default() }.into())?;
+        simulation.run_for(Duration::from_secs(5));
+        simulation.actuate(motor, VelocityCommand { velocity: speed, effort: None }.into())?;
+        simulation.run_for(Duration::from_millis(903));
+        let sent = simulation.subscribe_any(Select::Path(motor.path()), None, Overflow::default());
+        let world = simulation.shared(|| SimulatedWorld::new(Crane::TOPOLOGY));
+        let before = world.joint("slew", simulation.clock().now())?.point;
+        assert!((before.velocity - speed).abs() < 1e-9);
+        let execution = simulation.command(crane::command::go, targets(&[[1.2 * speed.signum(), 0.5]]))?;
+        let mut slowest = f64::INFINITY;
+        for _ in 0..100 {
+            simulation.run_for(Duration::from_millis(1));
+            let now = world.joint("slew", simulation.clock().now())?.point;
+            slowest = slowest.min(now.velocity * speed.signum());
+        }
+        assert!(slowest > 0.99 * speed.abs(), "it goes on: {slowest}");
+        let trajectory = sent.try_recv().ok_or("it is sent")?;
+        let Some(ActuatorCommand::Trajectory(trajectory)) =
+            trajectory.downcast::<ActuatorCommand>().map(|command| command.payload.clone())
+        else {
+            return Err("a trajectory".into());
+        };
+        // The encoder was read at 200 Hz, 3 ms before.
+        let start = &trajectory.points[0];
+        assert!((start.positions[0] - before.position).abs() < 1e-4, "{start:?} {before:?}");
+        assert!((start.velocities[0] - before.velocity).abs() < 1e-6, "{start:?} {before:?}");
+        simulation.run_for(Duration::from_secs(8));
+        assert_eq!(execution.try_result(), Some(Ok(())));
+    }
+    Ok(())
+}
+
+#[test]
+fn a_joint_that_moves_out_of_its_range_is_planned_from_rest() -> Result<(), Failure> {
+    let mut simulation = Vice::builder().simulate()?;
+    simulation.run_until(at(10));
+    assert_eq!(simulation.arm(), Ok(()));
+    let state = JointState { position: 1.0, velocity: Some(0.9), effort: None };
+    simulation.publish(vice::sensor::base::screw::encoder, simulation.clock().now(), state);
+    let sent = simulation.subscribe_any(Select::Below("actuator"), "ActuatorCommand", Overflow::default());
+    let targets = JointTargets { joints: vec!["screw".into()], points: vec![JointTarget { positions: vec![0.0] }] };
+    let _execution = simulation.command(vice::command::close, targets)?;
+    simulation.run_for(Duration::from_millis(10));
+    let sent = sent.try_recv().ok_or("it is planned")?;
+    let Some(ActuatorCommand::Trajectory(trajectory)) =
+        sent.downcast::<ActuatorCommand>().map(|command| command.payload.clone())
+    else {
+        return Err("a trajectory".into());
+    };
+    assert_eq!((trajectory.points[0].positions[0], trajectory.points[0].velocities[0]), (1.0, 0.0));
+    assert!(trajectory.points.iter().all(|point| point.positions[0] <= 1.0));
+    Ok(())
+}
+
+/// A motor that reports a motion more often than it has any.
+#[derive(Debug)]
+struct Chatty(ActuatorContext, MonotonicTime);
+
+impl Actuator for Chatty {
+    type Options = NoOptions;
+    type Command = ActuatorCommand;
+
+    fn init(_: NoOptions, context: &ActuatorContext) -> Result<Self, Fault> {
+        Ok(Self(context.clone(), MonotonicTime::ZERO))
+    }
+
+    fn handle_command(&mut self, _: &Stamped<ActuatorCommand>) -> Result<(), Fault> {
+        Ok(())
+    }
+
+    fn next_update(&self) -> Option<MonotonicTime> {
+        Some(self.1 + Duration::from_millis(1))
+    }
+
+    fn update(&mut self, now: MonotonicTime) -> Result<(), Fault> {
+        self.1 = now;
+        self.0.end_motion(EndMotion { position: 0.0, end: MotionEnd::Stopped });
+        Ok(())
+    }
+
+    fn disarm(&mut self) -> Result<(), Fault> {
+        Ok(())
+    }
+}
+
+robot! {
+    robot Shaker;
+    commands { go: MoveJoints(); }
+    link base {
+        joint sieve: prismatic {
+            axis: x;
+            limit: { lower: 0 m, upper: 1 m, velocity: 1 m/s, effort: 1 N };
+            actuator motor: Chatty();
+            sensor encoder: SimulatedEncoder() { rate: 100 Hz; }
+            link mesh;
+        }
+        joint lift: prismatic {
+            axis: z;
+            limit: { lower: 0 m, upper: 1 m, velocity: 0.1 m/s, effort: 10 N };
+            actuator motor: SimulatedActuator();
+            sensor encoder: SimulatedEncoder() { rate: 100 Hz; }
+            link tray;
+        }
+    }
+}
+
+#[test]
+fn progress_is_published_ten_times_a_second_however_much_is_reported() -> Result<(), Failure> {
+    let mut simulation = Shaker::builder().simulate()?;
+    simulation.run_until(at(20));
+    assert_eq!(simulation.arm(), Ok(()));
+    let progress = simulation.subscribe_any(Select::Below("command/go"), "MotionProgress", Overflow::default());
+    let targets = JointTargets { joints: vec!["lift".into()], points: vec![JointTarget { positions: vec![0.5] }] };
+    let execution = simulation.command(shaker::command::go, targets)?;
+    simulation.run_for(Duration::from_secs(5));
+    let count = progress.drain().count();
+    assert!(execution.try_result().is_none() && (49..=51).contains(&count), "{count}");
+    Ok(())
+}

@@ -1,0 +1,164 @@
+//! Controllers that drive an actuator.
+
+use super::*;
+use bb_estimators::motion::PidState;
+
+#[test]
+fn a_controller_holds_its_setpoint_which_is_a_parameter() -> Result<(), Failure> {
+    let mut simulation = ready()?;
+    simulation.run_for(Duration::from_secs(5));
+    assert!((true_position(&simulation, "spin")? - 0.5).abs() < 1e-3);
+    simulation.set_parameter(crane::param::gains::setpoint, -20.0)?;
+    simulation.run_for(Duration::from_millis(1500));
+    let motion =
+        simulation.shared(|| SimulatedWorld::new(Crane::TOPOLOGY)).joint("spin", simulation.clock().now())?;
+    assert!((motion.point.velocity + 3.0).abs() < 1e-9, "at most the joint's limit: {motion:?}");
+    let report = simulation.report();
+    let counts = report.actuator("actuator/base/spin/motor").ok_or("it is declared")?;
+    assert!(counts.limited(LimitedQuantity::Velocity) > 100);
+    Ok(())
+}
+
+#[test]
+fn a_controller_that_is_blind_holds_its_joint() -> Result<(), Failure> {
+    let mut simulation = ready()?;
+    simulation.set_parameter(crane::param::gains::setpoint, -20.0)?;
+    simulation.run_for(Duration::from_millis(1500));
+    let world = simulation.shared(|| SimulatedWorld::new(Crane::TOPOLOGY));
+    let velocity = |simulation: &Simulation<Crane>| -> Result<f64, Failure> {
+        Ok(world.joint("spin", simulation.clock().now())?.point.velocity)
+    };
+    let commands = simulation.subscribe_any(Select::Path("actuator/base/spin/motor"), None, Overflow::default());
+    assert!((velocity(&simulation)? + 3.0).abs() < 1e-9);
+    world.set_unplugged("sensor/base/spin/encoder", true);
+    // 0.1 s until the measurement is stale, and 3 rad/s at 10 rad/s².
+    simulation.run_for(Duration::from_millis(600));
+    assert_eq!(velocity(&simulation)?, 0.0);
+    let holds = |message: DynamicMessage| {
+        message.downcast::<ActuatorCommand>().is_some_and(|command| command.payload == ActuatorCommand::Hold)
+    };
+    assert_eq!(commands.drain().filter(|message| holds(message.clone())).count(), 1, "once");
+    world.set_unplugged("sensor/base/spin/encoder", false);
+    simulation.run_for(Duration::from_secs(1));
+    assert!(velocity(&simulation)? < -1.0, "it goes on");
+    Ok(())
+}
+
+robot! {
+    robot Sump;
+    controllers {
+        controller level: ThresholdController(
+            measurement = "sensor/base/float/level",
+            actuator = "actuator/base/pump/motor",
+            on_at = 0.8,
+            off_at = 0.2,
+            on_velocity = 2.0,
+        ) { rate: 100 Hz; }
+    }
+    link base {
+        joint float: prismatic {
+            axis: z;
+            limit: { lower: 0 m, upper: 1 m, velocity: 1 m/s, effort: 1 N };
+            sensor level: External<JointState>();
+            link ball;
+        }
+        joint pump: continuous {
+            axis: z;
+            limit: { velocity: 3 rad/s, effort: 2 N*m };
+            actuator motor: SimulatedActuator();
+            sensor encoder: SimulatedEncoder() { rate: 100 Hz; }
+            link rotor;
+        }
+    }
+}
+
+#[test]
+fn a_threshold_switches_its_actuator_on_again_after_a_disarming() -> Result<(), Failure> {
+    let mut simulation = Sump::builder().simulate()?;
+    let states = simulation.subscribe_any(Select::All, "ThresholdState", Overflow::default());
+    let rise = |simulation: &mut Simulation<Sump>, level: f64| -> Result<f64, Failure> {
+        for _ in 0..50 {
+            simulation.run_for(Duration::from_millis(20));
+            let state = JointState { position: level, velocity: None, effort: None };
+            simulation.publish(sump::sensor::base::float::level, simulation.clock().now(), state);
+        }
+        let world = simulation.shared(|| SimulatedWorld::new(Sump::TOPOLOGY));
+        Ok(world.joint("pump", simulation.clock().now())?.point.velocity)
+    };
+    assert_eq!(simulation.arm(), Ok(()));
+    assert_eq!((rise(&mut simulation, 0.5)?, rise(&mut simulation, 0.9)?), (0.0, 2.0));
+    assert_eq!(simulation.disarm(), Ok(()));
+    assert_eq!(rise(&mut simulation, 0.5)?, 0.0);
+    assert_eq!(simulation.arm(), Ok(()));
+    assert_eq!((rise(&mut simulation, 0.5)?, rise(&mut simulation, 0.1)?), (2.0, 0.0));
+    // Off, on, off: it says what has changed.
+    assert_eq!(states.drain().count(), 3);
+    Ok(())
+}
+
+/// Always commands the same velocity.
+#[derive(Debug)]
+struct Steady(bb_core::run::ActuatorLink<ActuatorCommand>, f64);
+
+#[derive(Clone, Debug, Options)]
+struct SteadyOptions {
+    #[option(default = 0.5, range = -1.0..=1.0)]
+    velocity: f64,
+}
+
+impl Service for Steady {
+    type Options = SteadyOptions;
+    type Output = PidState;
+
+    fn init(options: SteadyOptions, context: &ServiceContext) -> Result<Self, Fault> {
+        Ok(Self(context.bus().actuator("actuator/base/spin/motor")?, options.velocity))
+    }
+
+    fn update(&mut self, _: MonotonicTime) -> Result<Reading<PidState>, Fault> {
+        // It is refused until the robot is armed.
+        let _ = self.0.send(VelocityCommand { velocity: self.1, effort: None }.into());
+        Ok(Reading::nothing())
+    }
+}
+
+#[test]
+fn another_controller_takes_the_place_of_a_declared_one() -> Result<(), Failure> {
+    let mut builder = simulated()?;
+    let options = SteadyOptions { velocity: -0.5 };
+    let error = builder.replace_service::<Steady>("controller/hod", options.clone()).expect_err("a typo");
+    assert_eq!(
+        error.to_string(),
+        "no controller or bridge is at `controller/hod`; did you mean `controller/hold`?"
+    );
+    builder.replace_service::<Steady>("controller/hold", options)?;
+    let mut simulation = builder.simulate()?;
+    assert_eq!(simulation.arm(), Ok(()));
+    simulation.run_for(Duration::from_secs(1));
+    // The gain belongs to the replaced one.
+    simulation.set_parameter(crane::param::gains::kp, 9.0)?;
+    simulation.run_for(Duration::from_secs(1));
+    let world = simulation.shared(|| SimulatedWorld::new(Crane::TOPOLOGY));
+    assert_eq!(world.joint("spin", simulation.clock().now())?.point.velocity, -0.5);
+
+    let mut builder = simulated()?;
+    let threshold = bb_estimators::motion::ThresholdControllerOptions {
+        measurement: "sensor/base/spin/encoder",
+        actuator: "actuator/base/spin/motor",
+        on_at: 1.0,
+        off_at: 0.0,
+        on_velocity: 1.0,
+        off_velocity: 0.0,
+    };
+    builder.replace_service::<ThresholdController>("controller/hold", threshold)?;
+    let error = builder.simulate().expect_err("another payload").to_string();
+    assert_eq!(
+        error,
+        "controller/hold cannot start: its replacement publishes `ThresholdState`, and what is declared publishes `PidState`"
+    );
+    let refused = SteadyOptions { velocity: 3.0 };
+    let mut builder = simulated()?;
+    builder.replace_service::<Steady>("controller/hold", refused)?;
+    let error = builder.simulate().expect_err("its options are wrong").to_string();
+    assert_eq!(error, "controller/hold cannot start: option `velocity` is 3, but must be in -1.0..=1.0");
+    Ok(())
+}

@@ -1,0 +1,121 @@
+//! Commands beyond the limits of a joint.
+
+use super::*;
+
+#[test]
+fn commands_beyond_a_limit_are_brought_back_and_counted() -> Result<(), Failure> {
+    let told = Arc::new(Mutex::new(Vec::new()));
+    let mut builder = simulated()?;
+    builder.options(crane::actuator::base::flap::servo).told = Arc::clone(&told);
+    let simulation = builder.simulate()?;
+    assert_eq!(simulation.arm(), Ok(()));
+    let servo = crane::actuator::base::flap::servo;
+    let carried_out = simulation.subscribe_any(Select::Path(servo.path()), None, Overflow::default());
+    let limit = 10_f64.to_radians();
+    for (position, velocity) in [(0.1, None), (0.2, Some(0.5)), (-9.0, Some(-7.0)), (limit, None)] {
+        simulation.actuate(servo, PositionCommand { position, velocity, effort: None })?;
+    }
+    assert_eq!(*told.lock().map_err(|_| "poisoned")?, [0.1, limit, -limit, limit]);
+    let velocities: Vec<_> = carried_out
+        .drain()
+        .filter_map(|message| message.downcast::<PositionCommand>().map(|command| command.velocity))
+        .collect();
+    assert_eq!(velocities, [None, Some(0.5), Some(-1.0), None]);
+    let report = simulation.report();
+    let counts = report.actuator(servo.path()).ok_or("it is declared")?;
+    assert_eq!(counts.commands, 4);
+    let limited = LimitedQuantity::ALL.iter().map(|quantity| counts.limited(*quantity));
+    assert_eq!(limited.collect::<Vec<_>>(), [2, 1, 0]);
+    let line = "actuator/base/flap/servo: 4 commands, 2 clamped to the limit of position, 1 clamped to the limit of \
+                velocity";
+    assert!(report.to_string().contains(line), "{report}");
+    Ok(())
+}
+
+/// A value at a bound is carried out as it is; the next number beyond it is clamped, and counted.
+#[test]
+fn each_bound_belongs_to_what_is_allowed() -> Result<(), Failure> {
+    let told = Arc::new(Mutex::new(Vec::new()));
+    let mut builder = simulated()?;
+    builder.options(crane::actuator::base::flap::servo).told = told;
+    let simulation = builder.simulate()?;
+    assert_eq!(simulation.arm(), Ok(()));
+    let servo = crane::actuator::base::flap::servo;
+    let carried_out = simulation.subscribe_any(Select::Path(servo.path()), None, Overflow::default());
+    let limited = || -> Vec<u64> {
+        let report = simulation.report();
+        let counts = report.actuator(servo.path());
+        LimitedQuantity::ALL.iter().map(|quantity| counts.map_or(0, |counts| counts.limited(*quantity))).collect()
+    };
+    let plain = PositionCommand { position: 0.0, velocity: Some(0.5), effort: Some(0.5) };
+    let command = |quantity: usize, value: f64| match quantity {
+        0 => PositionCommand { position: value, ..plain },
+        1 => PositionCommand { velocity: Some(value), ..plain },
+        _ => PositionCommand { effort: Some(value), ..plain },
+    };
+    let mut expected = vec![0, 0, 0];
+    // The limits of velocity and effort are both 1.
+    for (quantity, limit) in [10_f64.to_radians(), 1.0, 1.0].into_iter().enumerate() {
+        for bound in [limit, -limit] {
+            let beyond = bound.signum() * bound.abs().next_up();
+            for (value, is_beyond) in [(bound, false), (beyond, true), (bound / 2.0, false)] {
+                simulation.actuate(servo, command(quantity, value))?;
+                expected[quantity] += u64::from(is_beyond);
+                assert_eq!(limited(), expected, "{value}");
+                let carried_out = carried_out.try_recv().ok_or("it was carried out")?;
+                let carried_out = carried_out.downcast::<PositionCommand>().ok_or("a position")?.payload;
+                assert_eq!(carried_out, command(quantity, if is_beyond { bound } else { value }));
+            }
+        }
+    }
+    simulation.actuate(servo, plain)?;
+    assert_eq!(limited(), [2, 2, 2]);
+    for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        let error = simulation.actuate(servo, PositionCommand { position: value, ..plain });
+        assert_eq!(error, Err(ActuatorError::NonFinite));
+    }
+    Ok(())
+}
+
+#[test]
+fn a_trajectory_beyond_a_limit_is_refused() -> Result<(), Failure> {
+    let simulation = ready()?;
+    let motor = crane::actuator::base::slew::motor;
+    let point = |position: f64, velocity: f64, millis: u64| bb_core::payload::TrajectoryPoint {
+        positions: vec![position],
+        velocities: vec![velocity],
+        time_from_start: Duration::from_millis(millis),
+        ..Default::default()
+    };
+    let trajectory =
+        |points: Vec<_>| JointTrajectory { joint_names: ["slew".to_owned()].into(), points: points.into() };
+    let far = trajectory(vec![point(0.0, 0.0, 0), point(2.0, 0.0, 5000)]);
+    let error = simulation.actuate(motor, far.into()).expect_err("it is beyond");
+    let expected = format!("the position 2 is beyond the limit {} of the joint", 90_f64.to_radians());
+    assert_eq!(error, ActuatorError::OutOfBounds(expected));
+    let fast = trajectory(vec![point(0.0, 0.0, 0), point(0.5, -1.5, 500), point(1.0, 0.0, 5000)]);
+    let error = simulation.actuate(motor, fast.into()).expect_err("it is too fast").to_string();
+    assert_eq!(error, "the velocity -1.5 is beyond the limit -1 of the joint");
+    // Nor is there a way around the limits.
+    let jump = trajectory(vec![point(0.0, 0.0, 0), point(1.0, 0.0, 500)]);
+    let error = simulation.actuate(motor, jump.into()).expect_err("it is too fast between its points").to_string();
+    assert_eq!(error, "the velocity 2 is beyond the limit 1 of the joint");
+    let mut twice = trajectory(vec![point(0.0, 0.0, 0), point(0.5, 0.0, 5000)]);
+    twice.joint_names = ["slew".to_owned(), "slew".to_owned()].into();
+    twice.points = twice
+        .points
+        .iter()
+        .map(|point| bb_core::payload::TrajectoryPoint { positions: vec![0.0, -2.0], ..point.clone() })
+        .collect();
+    let error = simulation.actuate(motor, twice.into()).expect_err("its second column is beyond").to_string();
+    assert_eq!(error, format!("the position -2 is beyond the limit {} of the joint", -90_f64.to_radians()));
+    let other =
+        JointTrajectory { joint_names: ["reach".to_owned()].into(), ..trajectory(vec![point(0.0, 0.0, 0)]) };
+    let error = simulation.actuate(motor, other.into()).expect_err("it is not named").to_string();
+    assert_eq!(error, "the actuator failed: the trajectory does not name the joint `slew`");
+    let report = simulation.report();
+    let counts = report.actuator(motor.path()).ok_or("it is declared")?;
+    let refused = LimitedQuantity::ALL.iter().map(|quantity| counts.refused(*quantity));
+    assert_eq!((counts.commands, refused.collect::<Vec<_>>()), (0, vec![2, 2, 0]));
+    Ok(())
+}

@@ -1,0 +1,233 @@
+//! Parameters that are set at once: all of them, or none.
+
+use crate::components::{Number, within};
+use crate::journals::Failure;
+use crate::parameters::{Bound, Which};
+use bb_core::EstimatorHandle;
+use bb_core::event::{ParameterChange, ParameterValue};
+use bb_core::journal::{Entry, Event, JournalReader};
+use bb_core::message::codec::{decode, encode};
+use bb_core::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Sets two parameters of which the second may be refused.
+#[derive(Debug)]
+pub(crate) struct SetBoth;
+
+impl Command for SetBoth {
+    type Options = NoOptions;
+    type Arguments = NoArguments;
+    type Output = ();
+
+    async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
+        context.set_parameters([("param/gain", 7.0.into()), ("param/count", 7.into())])?;
+        context.bus().set_parameters([("param/count", 8.into()), ("param/gain", 1e8.into())])?;
+        Ok(Outcome::done(()))
+    }
+}
+
+robot! {
+    robot Mixer;
+    parameters {
+        gain: f64 = 1.0, range: 0.0..=1000000000.0;
+        count: i64 = 1;
+        name: String = "one";
+    }
+    commands { set_both: SetBoth() { allowed_states: [disarmed]; } }
+    link base {
+        sensor number: External<Number>() { estimator bound: Bound(gain = param::gain, count = param::count); }
+    }
+}
+
+const BOUND: EstimatorHandle<Mixer, Bound, Number> = mixer::sensor::base::number::bound;
+
+fn values(live: &Live<Mixer>) -> (f64, i64, String) {
+    (live.parameter(mixer::param::gain), live.parameter(mixer::param::count), live.parameter(mixer::param::name))
+}
+
+fn changes(all: &bb_core::DynamicSubscription) -> Vec<(&'static str, ParameterValue, ParameterValue)> {
+    let changes = all.drain().filter_map(|change| {
+        change.downcast::<ParameterChange>().map(|change| (change.path, change.from.clone(), change.to.clone()))
+    });
+    changes.collect()
+}
+
+#[test]
+fn a_set_that_is_refused_in_the_middle_changes_nothing() -> Result<(), Failure> {
+    let simulation = Mixer::builder().simulate()?;
+    let all = simulation.subscribe_any(Select::Below("param"), None, Overflow::default());
+    let gain = || ("param/gain", ParameterValue::from(2.0));
+    // The option `gain` of the estimator is at most 1e6.
+    let refused: [(Vec<(&str, ParameterValue)>, &str); 6] = [
+        (
+            vec![gain(), ("param/count", 2.5.into())],
+            "param/count is not set: expected a value of type `i64`, found `2.5`",
+        ),
+        (
+            vec![gain(), ("param/cuont", 2.into())],
+            "param/cuont is not set: no such parameter is declared; did you mean `param/count`?",
+        ),
+        (
+            vec![gain(), ("param/name", "two".to_owned().into()), ("param/gain", 3.0.into())],
+            "param/gain is not set: it is set twice at once",
+        ),
+        (
+            vec![("param/name", "two".to_owned().into()), ("param/gain", (-1.0).into())],
+            "param/gain is not set: expected a number in 0.0..=1000000000.0, found `-1.0`",
+        ),
+        (
+            vec![("param/count", 2.into()), ("param/gain", 1e8.into())],
+            "param/gain is not set: sensor/base/number/bound would refuse it: ",
+        ),
+        (
+            vec![("param/name", "two".to_owned().into()), ("param/gain", 1e8.into())],
+            "param/gain is not set: sensor/base/number/bound would refuse it: ",
+        ),
+    ];
+    for (set, message) in refused {
+        let error = simulation.set_parameters(set).expect_err("one of them is wrong").to_string();
+        assert!(error.starts_with(message), "{error}");
+        assert_eq!(values(&simulation), (1.0, 1, "one".to_owned()));
+    }
+    assert_eq!(changes(&all), []);
+    assert_eq!(simulation.call(BOUND, Which)?, (1.0, None, 1));
+    assert_eq!(simulation.set_parameters::<&str>([]), Ok(()));
+
+    simulation.set_parameters([
+        mixer::param::count.to(2),
+        mixer::param::name.to("two"),
+        mixer::param::gain.to(2.0),
+    ])?;
+    assert_eq!(values(&simulation), (2.0, 2, "two".to_owned()));
+    assert_eq!(simulation.call(BOUND, Which)?, (2.0, None, 2));
+    let told = changes(&all);
+    let paths: Vec<_> = told.iter().map(|(path, ..)| *path).collect();
+    assert_eq!(
+        (paths, told[0].1.clone()),
+        (vec!["param/count", "param/name", "param/gain"], ParameterValue::Integer(1))
+    );
+    Ok(())
+}
+
+#[test]
+fn a_command_sets_all_or_none() -> Result<(), Failure> {
+    let mut simulation = Mixer::builder().simulate()?;
+    let execution = simulation.command(mixer::command::set_both, NoArguments)?;
+    simulation.run_for(Duration::from_millis(10));
+    assert!(execution.try_result().is_some_and(|result| result.is_err()));
+    assert_eq!(values(&simulation), (7.0, 7, "one".to_owned()));
+    Ok(())
+}
+
+/// Sets from several threads, each with equal values: nobody ever sees different ones.
+#[test]
+fn a_set_is_seen_as_a_whole() {
+    within(60, || {
+        let running = Mixer::builder().start().expect("it starts");
+        let is_over = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            let setters: Vec<_> = (0..3)
+                .map(|thread| {
+                    let running = &running;
+                    scope.spawn(move || {
+                        for round in 0..500 {
+                            let value = (thread * 80 + round % 80) as i64;
+                            let set = [mixer::param::count.to(value), mixer::param::gain.to(value as f64)];
+                            running.set_parameters(set).expect("they are in range");
+                        }
+                    })
+                })
+                .collect();
+            scope.spawn(|| {
+                while !is_over.load(Ordering::SeqCst) {
+                    if let Ok((gain, _, count)) = running.call(BOUND, Which) {
+                        assert_eq!(gain, f64::from(count));
+                    }
+                }
+            });
+            for setter in setters {
+                setter.join().expect("no set is refused");
+            }
+            is_over.store(true, Ordering::SeqCst);
+        });
+        let (gain, count, _) = values(&running);
+        assert_eq!(gain, count as f64);
+        running.stop();
+    });
+}
+
+#[test]
+fn a_set_is_one_entry_of_the_journal_and_the_same_in_a_replay() -> Result<(), Failure> {
+    let lines = Arc::new(Mutex::new(Vec::<Entry>::new()));
+    let mut builder = Mixer::builder();
+    let sink = Arc::clone(&lines);
+    builder.journal(move |entry| sink.lock().unwrap_or_else(PoisonError::into_inner).push(entry));
+    let mut simulation = builder.simulate()?;
+    let all = simulation.subscribe_any(Select::Below("param"), None, Overflow::default());
+    simulation.run_for(Duration::from_millis(10));
+    simulation.set_parameters([mixer::param::count.to(2), mixer::param::gain.to(2.0)])?;
+    assert!(simulation.set_parameters([mixer::param::count.to(3), mixer::param::gain.to(1e8)]).is_err());
+    simulation.set_parameter(mixer::param::gain, 4.0)?;
+    simulation.run_for(Duration::from_millis(10));
+    simulation.stop();
+    let first = changes(&all);
+    assert_eq!(first.len(), 3);
+
+    let mut lines = std::mem::take(&mut *lines.lock().unwrap_or_else(PoisonError::into_inner));
+    lines.sort_by_key(|line| line.number);
+    let sizes = lines.iter().filter_map(|line| match &line.event {
+        Event::Parameters { changes } => Some(changes.len()),
+        _ => None,
+    });
+    assert_eq!(sizes.collect::<Vec<_>>(), [2, 1]);
+    let reader = JournalReader::<Mixer>::default();
+    let read: Result<Vec<Entry>, Failure> = lines
+        .iter()
+        .map(|line| {
+            let mut bytes = Vec::new();
+            encode(line, &mut bytes);
+            Ok(reader.entry(&decode(&bytes)?)?)
+        })
+        .collect();
+    let mut replay = Mixer::builder().replay()?;
+    let all = replay.subscribe_any(Select::Below("param"), None, Overflow::default());
+    replay.play(read?)?;
+    assert_eq!(values(&replay), (4.0, 2, "one".to_owned()));
+    assert_eq!(changes(&all), first);
+    replay.stop();
+    Ok(())
+}
+
+robot! {
+    robot Ranged;
+    parameters {
+        share: f64 = 0.25, range: -0.5..=0.75;
+        level: i64 = 1, range: -3..=4;
+    }
+    link base { sensor number: External<Number>(); }
+}
+
+/// A parameter may have each end of its range and not the next number beyond it, alone or among others.
+#[test]
+fn the_ends_of_a_range_belong_to_it() -> Result<(), Failure> {
+    let simulation = Ranged::builder().simulate()?;
+    let values = || (simulation.parameter(ranged::param::share), simulation.parameter(ranged::param::level));
+    for (share, level) in [(-0.5, -3), (0.75, 4)] {
+        simulation.set_parameters([("param/share", share.into()), ("param/level", level.into())])?;
+        assert_eq!(values(), (share, level));
+        let beyond: f64 = share.signum() * share.abs().next_up();
+        for wrong in [beyond, f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            assert!(simulation.set_parameter(ranged::param::share, wrong).is_err(), "{wrong}");
+            let set = [("param/level", 0.into()), ("param/share", wrong.into())];
+            assert!(simulation.set_parameters(set).is_err(), "{wrong}");
+        }
+        for wrong in [level + level.signum(), i64::MIN, i64::MAX] {
+            assert!(simulation.set_parameter(ranged::param::level, wrong).is_err(), "{wrong}");
+            let set = [("param/share", 0.0.into()), ("param/level", wrong.into())];
+            assert!(simulation.set_parameters(set).is_err(), "{wrong}");
+        }
+        assert_eq!(values(), (share, level), "nothing of it was set");
+    }
+    Ok(())
+}

@@ -1,0 +1,256 @@
+//! Parameters that are kept over restarts, and start-up values from the environment.
+
+use crate::components::within;
+use crate::gate::{Gate, PATIENCE};
+use crate::journals::Failure;
+use bb_core::component::ParameterStore;
+use bb_core::event::ParameterValue;
+use bb_core::prelude::*;
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+type Values = BTreeMap<String, ParameterValue>;
+
+/// Keeps every set that it was told to store.
+#[derive(Clone, Debug, Default)]
+struct Memory(Arc<Mutex<State>>);
+
+#[derive(Debug, Default)]
+struct State {
+    sets: Vec<Values>,
+    /// How many attempts fail.
+    fails: u32,
+    panics: bool,
+    attempts: u32,
+}
+
+impl Memory {
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn of(values: &[(&str, ParameterValue)]) -> Self {
+        let memory = Self::default();
+        memory.lock().sets.push(values.iter().map(|(path, value)| ((*path).to_owned(), value.clone())).collect());
+        memory
+    }
+
+    fn last(&self) -> Vec<(String, ParameterValue)> {
+        self.lock().sets.last().cloned().unwrap_or_default().into_iter().collect()
+    }
+}
+
+impl ParameterStore for Memory {
+    fn load(&mut self) -> Result<Values, Fault> {
+        Ok(self.lock().sets.last().cloned().unwrap_or_default())
+    }
+
+    fn store(&mut self, values: &Values) -> Result<(), Fault> {
+        let mut state = self.lock();
+        state.attempts += 1;
+        if state.fails > 0 {
+            state.fails -= 1;
+            if state.panics {
+                drop(state);
+                panic!("an index");
+            }
+            return Err(Fault::new("the disk is full"));
+        }
+        state.sets.push(values.clone());
+        Ok(())
+    }
+}
+
+robot! {
+    robot Rig;
+    parameters {
+        gains { kp: f64 = 1.0, range: 0.0..=10.0; ki: f64 = 0.1; }
+        limit: f64 = 0.5 m, range: 0 m..=2 m;
+        name: String = "rig";
+    }
+    link base;
+}
+
+fn kept(store: &Memory) -> Result<(bb_core::Builder<Rig>, Vec<String>), Failure> {
+    let mut builder = Rig::builder();
+    let unused = builder.keep_parameters(store.clone())?;
+    Ok((builder, unused.iter().map(ToString::to_string).collect()))
+}
+
+fn named(values: &[(&str, ParameterValue)]) -> Vec<(String, ParameterValue)> {
+    values.iter().map(|(path, value)| ((*path).to_owned(), value.clone())).collect()
+}
+
+#[test]
+fn what_is_set_while_the_robot_runs_is_there_at_the_next_start() -> Result<(), Failure> {
+    let memory = Memory::default();
+    let (builder, unused) = kept(&memory)?;
+    assert_eq!(unused, Vec::<String>::new());
+    let simulation = builder.simulate()?;
+    simulation.set_parameters([rig::param::gains::kp.to(4.5), rig::param::gains::ki.to(0.2)])?;
+    assert!(simulation.set_parameters([rig::param::gains::kp.to(5.5), rig::param::limit.to(9.0)]).is_err());
+    simulation.stop();
+    // Only what was set, and no set in part.
+    assert_eq!(memory.last(), named(&[("param/gains/ki", 0.2.into()), ("param/gains/kp", 4.5.into())]));
+    assert!(memory.lock().sets.iter().all(|set| set.len() == 2));
+
+    let simulation = kept(&memory)?.0.simulate()?;
+    assert_eq!((simulation.parameter(rig::param::gains::kp), simulation.parameter(rig::param::limit)), (4.5, 0.5));
+    simulation.stop();
+    let stores = memory.lock().attempts;
+    kept(&memory)?.0.replay()?.stop();
+    assert_eq!(memory.lock().attempts, stores, "nothing has changed");
+    Ok(())
+}
+
+#[test]
+fn overrides_at_the_start_are_not_stored() -> Result<(), Failure> {
+    let memory = Memory::of(&[("param/gains/kp", 4.5.into())]);
+    let (mut builder, _) = kept(&memory)?;
+    builder.set("param/gains/kp", "7.0")?;
+    builder.set("param/limit", "1 m")?;
+    let simulation = builder.simulate()?;
+    assert_eq!(simulation.parameter(rig::param::gains::kp), 7.0);
+    simulation.set_parameter(rig::param::gains::ki, 0.3)?;
+    simulation.stop();
+    assert_eq!(memory.last(), named(&[("param/gains/ki", 0.3.into()), ("param/gains/kp", 4.5.into())]));
+    Ok(())
+}
+
+#[test]
+fn stored_values_that_do_not_fit_are_named_and_stay_until_they_are_set() -> Result<(), Failure> {
+    let stored: [(&str, ParameterValue); 4] = [
+        ("param/gains/kp", 99.0.into()),
+        ("param/gains/ki", 0.4.into()),
+        ("param/name", 3.into()),
+        ("param/old", true.into()),
+    ];
+    let memory = Memory::of(&stored);
+    let (builder, unused) = kept(&memory)?;
+    assert_eq!(
+        unused,
+        [
+            "param/gains/kp is not set: expected a number in 0.0..=10.0, found `99.0`",
+            "param/name is not set: expected a value of type `String`, found `3`",
+            "param/old is not set: no such parameter is declared",
+        ]
+    );
+    let simulation = builder.simulate()?;
+    assert_eq!(simulation.parameter(rig::param::gains::ki), 0.4);
+    simulation.set_parameter(rig::param::gains::kp, 2.0)?;
+    simulation.stop();
+    let expected = [
+        ("param/gains/ki", 0.4.into()),
+        ("param/gains/kp", 2.0.into()),
+        ("param/name", 3.into()),
+        ("param/old", true.into()),
+    ];
+    assert_eq!(memory.last(), named(&expected));
+    Ok(())
+}
+
+#[test]
+fn a_store_that_fails_is_a_fault_and_is_tried_again() -> Result<(), Failure> {
+    for (panics, message) in [(false, "the disk is full"), (true, "panicked: an index")] {
+        let memory = Memory::default();
+        (memory.lock().fails, memory.lock().panics) = (1, panics);
+        let simulation = kept(&memory)?.0.simulate()?;
+        let faults = simulation.subscribe(system::Faults);
+        simulation.set_parameter(rig::param::gains::kp, 2.0)?;
+        let fault = faults.recv_timeout(PATIENCE).ok_or("it is reported")?;
+        assert_eq!(
+            (fault.path, fault.message.clone()),
+            ("param", format!("the parameters are not stored: {message}"))
+        );
+        simulation.stop();
+        assert_eq!(memory.last(), named(&[("param/gains/kp", 2.0.into())]));
+    }
+    Ok(())
+}
+
+static GATE: Gate = Gate::new();
+
+/// Hangs until the gate opens.
+struct Hanging;
+
+impl ParameterStore for Hanging {
+    fn load(&mut self) -> Result<Values, Fault> {
+        Ok(Values::new())
+    }
+
+    fn store(&mut self, _: &Values) -> Result<(), Fault> {
+        GATE.pass("store");
+        Ok(())
+    }
+}
+
+#[test]
+fn a_store_that_hangs_keeps_nobody_waiting() {
+    within(60, || {
+        let mut builder = Rig::builder();
+        builder.keep_parameters(Hanging).expect("nothing is stored");
+        GATE.close("store");
+        let running = builder.start().expect("it starts");
+        running.set_parameter(rig::param::gains::kp, 2.0).expect("it is in range");
+        GATE.wait_for(1);
+        running.set_parameter(rig::param::gains::kp, 3.0).expect("it is in range");
+        let report = running.stop();
+        GATE.open();
+        let faults: Vec<_> = report.faults.iter().map(|fault| (fault.path, fault.message.as_str())).collect();
+        assert_eq!(faults, [("param", "the store of parameters did not return in time")]);
+    });
+}
+
+#[test]
+fn the_environment_sets_what_it_names() -> Result<(), Failure> {
+    let mut builder = Rig::builder();
+    let variables = [
+        ("PATH", "/bin"),
+        ("BB_SET_param__gains__kp", "4.5"),
+        ("BB_SET_PARAM__LIMIT", "80 cm"),
+        ("BB_SET_param__name", "12"),
+    ];
+    builder.load_environment(variables)?;
+    let simulation = builder.simulate()?;
+    assert_eq!(simulation.parameter(rig::param::gains::kp), 4.5);
+    assert_eq!(simulation.parameter(rig::param::limit), 0.8);
+    assert_eq!(simulation.parameter(rig::param::name), "12");
+
+    let mut builder = Rig::builder();
+    let refused = |builder: &mut bb_core::Builder<Rig>, name: &str, value: &str| {
+        let variables = [("BB_SET_param__gains__ki", "9.5"), (name, value)];
+        builder.load_environment(variables).expect_err("it is refused").to_string()
+    };
+    assert_eq!(
+        refused(&mut builder, "BB_SET_param__gians__kp", "1"),
+        "environment variable BB_SET_param__gians__kp: there is no such setting; did you mean `BB_SET_param__gains__kp`?"
+    );
+    assert_eq!(
+        refused(&mut builder, "BB_SET_param__gains__kp", "11"),
+        "environment variable BB_SET_param__gains__kp: param/gains/kp: expected a number in 0.0..=10.0, found `11.0`"
+    );
+    assert!(refused(&mut builder, "BB_SET_param__limit", "80").contains("expected a length"));
+    assert!(refused(&mut builder, "BB_CONFIG", "/there/is/none.toml").contains("cannot be read"));
+    // None of them has set the other.
+    assert_eq!(builder.simulate()?.parameter(rig::param::gains::ki), 0.1);
+    Ok(())
+}
+
+#[test]
+fn files_named_in_the_environment_come_before_its_variables() -> Result<(), Failure> {
+    let file = std::env::temp_dir().join(format!("bb-environment-{}.toml", std::process::id()));
+    std::fs::write(&file, "[param]\ngains.kp = 2.0\ngains.ki = 0.7\n")?;
+    let mut builder = Rig::builder();
+    let files = file.clone().into_os_string();
+    let set = builder
+        .load_environment([("BB_CONFIG".into(), files), ("BB_SET_param__gains__kp".into(), "3.0".into())]
+            as [(std::ffi::OsString, std::ffi::OsString); 2]);
+    std::fs::remove_file(&file)?;
+    set?;
+    let simulation = builder.simulate()?;
+    assert_eq!(
+        (simulation.parameter(rig::param::gains::kp), simulation.parameter(rig::param::gains::ki)),
+        (3.0, 0.7)
+    );
+    Ok(())
+}

@@ -1,0 +1,345 @@
+//! Estimators that others take the place of: what stays, what is refused, and what a replay says to it.
+
+use crate::components::{Counter, Number, Scale, ScaleOptions, at};
+use crate::joints::{Pixel, Spot, Spotter};
+use crate::replay::{Lines, overflow};
+use bb_core::Builder;
+use bb_core::component::InputTransforms;
+use bb_core::prelude::*;
+use bb_core::topology::GraphFormat;
+use std::sync::{Arc, PoisonError};
+
+type Failure = Box<dyn std::error::Error>;
+
+/// Options of [`Ramp`].
+#[derive(Clone, Debug, Options)]
+struct RampOptions {
+    /// What it adds at each message.
+    #[option(default = 1.0, range = 0.0..=10.0)]
+    step: f64,
+    /// The message at which it fails; 0 for none.
+    #[option(default = 0)]
+    fails_at: u32,
+}
+
+/// Counts its messages by its step, and fails once in a life.
+#[derive(Debug)]
+struct Ramp {
+    options: RampOptions,
+    messages: u32,
+}
+
+impl Estimator for Ramp {
+    type Options = RampOptions;
+    type Input = Number;
+    type Output = Number;
+
+    fn init(options: RampOptions, context: &Context) -> Result<Self, Fault> {
+        context.request(Request::Timer(7, Duration::from_millis(15)));
+        Ok(Self { options, messages: 0 })
+    }
+
+    fn handle_input(&mut self, _: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
+        self.messages += 1;
+        if self.messages == self.options.fails_at {
+            return Err(Fault::new("told to"));
+        }
+        Ok(Reply::emit(Number(f64::from(self.messages) * self.options.step)))
+    }
+
+    fn handle_info(&mut self, info: Info) -> Result<Reply<Number>, Fault> {
+        assert_eq!(info, Info::Timer(7));
+        Ok(Reply::emit(Number(-1.0)).and(Request::Continue(3)))
+    }
+
+    fn handle_continue(&mut self, step: u32) -> Result<Reply<Number>, Fault> {
+        Ok(Reply::emit(Number(-f64::from(step))))
+    }
+}
+
+/// Emits where the driver was, as [`Spotter`] does, one metre higher.
+#[derive(Debug, Default)]
+struct Above(Spotter, MonotonicTime);
+
+impl Estimator for Above {
+    type Options = NoOptions;
+    type Input = Pixel;
+    type Output = Spot;
+    const HANDLES_MOVING_JOINTS: bool = true;
+
+    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
+        Ok(Self::default())
+    }
+
+    fn handle_transforms(&mut self, transforms: &InputTransforms<'_>) -> Result<(), Fault> {
+        self.1 = transforms.driver_time();
+        self.0.handle_transforms(transforms)
+    }
+
+    fn handle_input(&mut self, pixel: &Stamped<Pixel>) -> Result<Reply<Spot>, Fault> {
+        assert_eq!(self.1, pixel.monotonic_time);
+        let spot = self.0.handle_input(pixel)?.into_output();
+        Ok(spot.map(|spot| Spot { at: spot.at + bb_core::nalgebra::Vector3::z(), ..spot }).into())
+    }
+}
+
+/// The same of an estimator that knows of fixed transforms only.
+#[derive(Debug)]
+struct Fixed;
+
+impl Estimator for Fixed {
+    type Options = NoOptions;
+    type Input = Pixel;
+    type Output = Spot;
+
+    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+
+    fn handle_input(&mut self, _: &Stamped<Pixel>) -> Result<Reply<Spot>, Fault> {
+        Ok(Reply::none())
+    }
+}
+
+/// Adds up, and takes requests.
+#[derive(Debug)]
+struct Asked;
+
+impl Estimator for Asked {
+    type Options = NoOptions;
+    type Input = Number;
+    type Output = Number;
+
+    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+
+    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
+        Ok(Reply::emit(number.payload))
+    }
+}
+
+struct Ask;
+
+impl HandleCall<Ask> for Asked {
+    type Response = u32;
+    fn handle_call(&mut self, Ask: Ask) -> Result<(u32, Reply<Number>), Fault> {
+        Ok((1, Reply::none()))
+    }
+}
+
+impl HandleCast<Ask> for Asked {
+    fn handle_cast(&mut self, Ask: Ask) -> Result<Reply<Number>, Fault> {
+        Ok(Reply::emit(Number(1.0)))
+    }
+}
+
+/// Publishes nothing.
+#[derive(Debug)]
+struct Quiet;
+
+impl Service for Quiet {
+    type Options = NoOptions;
+    type Output = Number;
+
+    fn init(_: NoOptions, _: &ServiceContext) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+
+    fn update(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
+        Ok(Reading::nothing())
+    }
+}
+
+robot! {
+    robot Bench;
+
+    parameters { factor: f64 = 2.0, range: 0.0..=10.0; }
+    controllers { controller idle: Quiet() { rate: 10 Hz; } }
+
+    link base {
+        sensor count: Counter(count = 6) {
+            rate: 100 Hz;
+            estimator scaled: Scale(factor = param::factor) { lost_after: 20 ms; recover_after: 2; }
+            estimator asked: Asked();
+        }
+        estimator last: Scale(factor = 10.0) { input number: sensor::base::count::scaled; }
+    }
+}
+
+const SCALED: &str = "sensor/base/count/scaled";
+
+fn replaced(options: RampOptions) -> Result<Builder<Bench>, Failure> {
+    let mut builder = Bench::builder();
+    builder.replace_estimator::<Ramp>(SCALED, options)?;
+    Ok(builder)
+}
+
+#[test]
+fn a_replacement_keeps_path_frame_inputs_and_those_downstream() -> Result<(), Failure> {
+    let builder = replaced(RampOptions { step: 0.5, ..RampOptions::defaults() })?;
+    let scaled = builder.subscribe(bench::sensor::base::count::scaled);
+    let last = builder.subscribe(bench::estimator::base::last);
+    let mut simulation = builder.simulate()?;
+    simulation.run_until(at(25));
+    let scaled: Vec<_> = scaled.drain().collect();
+    // Its timer and what it continues with too.
+    let seen: Vec<_> = scaled.iter().map(|number| (number.monotonic_time, number.0)).collect();
+    assert_eq!(seen, [(at(0), 0.5), (at(10), 1.0), (at(15), -1.0), (at(15), -3.0), (at(20), 1.5)]);
+    assert!(scaled.iter().all(|number| number.frame.name() == "base"));
+    let last: Vec<_> = last.drain().map(|number| number.0).collect();
+    assert_eq!(last, [5.0, 10.0, -10.0, -30.0, 15.0]);
+
+    // The declared options belong to the declared one.
+    simulation.set_parameter(bench::param::factor, 3.0)?;
+    simulation.run_until(at(35));
+    let report = simulation.stop();
+    let counts = report.estimator(SCALED).ok_or("it is declared")?;
+    assert_eq!((counts.inputs[0].received, counts.restarts), (4, 0));
+    Ok(())
+}
+
+#[test]
+fn a_replacement_has_the_health_and_the_supervision_of_what_is_declared() -> Result<(), Failure> {
+    let builder = replaced(RampOptions { fails_at: 3, ..RampOptions::defaults() })?;
+    let numbers = builder.subscribe(bench::sensor::base::count::scaled);
+    let health = builder.subscribe(system::Health);
+    let mut simulation = builder.simulate()?;
+    simulation.run_until(at(100));
+    let positive: Vec<_> = numbers.drain().filter(|number| number.0 > 0.0).collect();
+    let seen: Vec<_> = positive.iter().map(|number| (number.monotonic_time, number.0)).collect();
+    // It fails at 20 ms, and is made anew at 30 ms from the same options: it counts from one, until it fails again.
+    assert_eq!(seen, [(at(0), 1.0), (at(10), 2.0), (at(30), 1.0), (at(40), 2.0)]);
+    let health: Vec<_> = health.drain().map(|change| change.payload.to_string()).collect();
+    let expected = [
+        "0.020000000 s: sensor/base/count/scaled healthy -> degraded (restarted; sensor/base/count/scaled)",
+        "0.040000000 s: sensor/base/count/scaled degraded -> healthy (recovered; sensor/base/count)",
+        "0.050000000 s: sensor/base/count/scaled healthy -> degraded (restarted; sensor/base/count/scaled)",
+        "0.060000000 s: sensor/base/count/scaled degraded -> lost (lost; sensor/base/count)",
+    ];
+    assert_eq!(health, expected);
+    Ok(())
+}
+
+#[test]
+fn requests_to_a_replaced_estimator_are_refused_and_do_not_fail_it() -> Result<(), Failure> {
+    let mut builder = Bench::builder();
+    builder.replace_estimator::<Scale>("sensor/base/count/asked", ScaleOptions { factor: 5.0 })?;
+    let numbers = builder.subscribe(bench::sensor::base::count::asked);
+    let mut simulation = builder.simulate()?;
+    let refused = "sensor/base/count/asked is replaced, and its replacement takes no requests";
+    let asked = bench::sensor::base::count::asked;
+    assert_eq!(simulation.call(asked, Ask).expect_err("it is replaced").to_string(), refused);
+    assert_eq!(simulation.cast(asked, Ask).expect_err("it is replaced").to_string(), refused);
+    simulation.run_until(at(15));
+    assert_eq!(numbers.drain().map(|number| number.0).collect::<Vec<_>>(), [0.0, 5.0]);
+    simulation.stop().ok()?;
+    Ok(())
+}
+
+#[test]
+fn a_replacement_that_does_not_fit_keeps_the_robot_from_starting() -> Result<(), Failure> {
+    let mut builder = Bench::builder();
+    let error = builder.replace_estimator::<Ramp>("sensor/base/count/scald", RampOptions::defaults());
+    assert_eq!(
+        error.expect_err("a typo").to_string(),
+        "no estimator is at `sensor/base/count/scald`; did you mean `sensor/base/count/scaled`?"
+    );
+    assert!(builder.replace_estimator::<Ramp>("sensor/base/count", RampOptions::defaults()).is_err());
+    assert!(builder.replace_sensor::<Counter>(SCALED, crate::components::CounterOptions::defaults()).is_err());
+
+    builder.replace_estimator::<Fixed>(SCALED, NoOptions)?;
+    let error = builder.simulate().expect_err("other payloads").to_string();
+    assert_eq!(
+        error,
+        "sensor/base/count/scaled cannot start: its replacement takes `behaviour::joints::Pixel` and emits \
+         `behaviour::joints::Spot`, and what is declared takes `behaviour::components::Number` and emits \
+         `behaviour::components::Number`"
+    );
+
+    let error = replaced(RampOptions { step: 11.0, ..RampOptions::defaults() })?.simulate();
+    assert_eq!(
+        error.expect_err("out of range").to_string(),
+        "sensor/base/count/scaled cannot start: option `step` is 11, but must be in 0.0..=10.0"
+    );
+    Ok(())
+}
+
+/// `robot!` checks that the declared estimator handles moving joints; of a replacement, the start does.
+#[test]
+fn a_replacement_across_moving_joints_has_to_handle_them() -> Result<(), Failure> {
+    use crate::joints::{CAMERA, LIFT, Reach, SHOULDER, joint, reach};
+    let mut builder = Reach::builder();
+    builder.replace_estimator::<Fixed>("estimator/base/spot", NoOptions)?;
+    assert_eq!(
+        builder.simulate().expect_err("it needs fixed transforms").to_string(),
+        "estimator/base/spot cannot start: its input `camera` spans a moving joint, and its replacement takes fixed \
+         transforms only; set `HANDLES_MOVING_JOINTS` in its `Estimator`"
+    );
+
+    let mut builder = Reach::builder();
+    builder.replace_estimator::<Above>("estimator/base/spot", NoOptions)?;
+    let spots = builder.subscribe(reach::estimator::base::spot);
+    let mut simulation = builder.simulate()?;
+    simulation.publish(CAMERA, at(1), Pixel(1.0));
+    simulation.publish(SHOULDER, at(2), joint(0.0));
+    simulation.publish(LIFT, at(2), joint(1.5));
+    simulation.publish(CAMERA, at(3), Pixel(1.0));
+    let spots: Vec<_> = spots.drain().collect();
+    assert_eq!(spots.len(), 1, "the joints were unknown at first");
+    assert!((spots[0].at.z - 1.0).abs() < 1e-12 && (spots[0].at.norm() - 1.5_f64.hypot(1.0)).abs() < 1e-12);
+    Ok(())
+}
+
+#[test]
+fn replacements_are_marked_where_the_robot_is_described() -> Result<(), Failure> {
+    let mut builder = replaced(RampOptions::defaults())?;
+    builder.replace_service::<Quiet>("controller/idle", NoOptions)?;
+    let simulation = builder.simulate()?;
+    let bus = simulation.bus();
+    let description = bus.description();
+    let replaced: Vec<_> =
+        description.components.iter().filter(|component| component.is_replaced).map(|found| found.path).collect();
+    assert_eq!(replaced, ["controller/idle", SCALED]);
+    for format in [GraphFormat::Mermaid, GraphFormat::Dot] {
+        let graph = bus.graph(format);
+        let marked: Vec<_> = graph.lines().filter(|line| line.contains("(replaced)")).collect();
+        assert_eq!(marked.len(), 2, "{graph}");
+        assert!(marked.iter().any(|line| line.contains("controller/idle (replaced)")), "{graph}");
+        assert!(marked.iter().any(|line| line.contains("sensor/base/count/scaled (replaced)")), "{graph}");
+    }
+    Ok(())
+}
+
+/// A replay makes estimators anew, so it needs the same replacements with the same options.
+#[test]
+fn a_journal_is_replayed_with_the_same_replacements_only() -> Result<(), Failure> {
+    let options = || RampOptions { step: 0.5, fails_at: 4 };
+    let lines = Lines::default();
+    let mut builder = replaced(options())?;
+    let sink = Arc::clone(&lines);
+    builder.journal(move |line| sink.lock().unwrap_or_else(PoisonError::into_inner).push(line));
+    let all = builder.subscribe_any(Select::Below("sensor"), None, overflow());
+    let mut simulation = builder.simulate()?;
+    simulation.run_until(at(100));
+    simulation.stop();
+    let entries = std::mem::take(&mut *lines.lock().unwrap_or_else(PoisonError::into_inner));
+    let numbers = |all: &bb_core::DynamicSubscription| -> Vec<_> {
+        let number = |message: bb_core::DynamicMessage| message.downcast::<Number>().map(|number| number.0);
+        all.drain().map(|message| (message.path(), message.stamp(), number(message))).collect()
+    };
+
+    let builder = replaced(options())?;
+    let again = builder.subscribe_any(Select::Below("sensor"), None, overflow());
+    let mut replay = builder.replay()?;
+    replay.play(entries.clone())?;
+    replay.stop();
+    assert_eq!(numbers(&all), numbers(&again));
+
+    let refused = |builder: Builder<Bench>| builder.replay().map(|mut replay| replay.play(entries.clone()));
+    let error = refused(Bench::builder())?.expect_err("the algorithm is another").to_string();
+    assert!(error.contains("replacement of sensor/base/count/scaled"), "{error}");
+    let error = refused(replaced(RampOptions { step: 0.25, ..options() })?)?.expect_err("another step").to_string();
+    assert!(error.contains("step: 0.5"), "{error}");
+    Ok(())
+}

@@ -1,0 +1,8 @@
+//! Robots that navigate with the filters of `bb_estimators`, whose sensors fail.
+
+mod optional_states;
+mod planar;
+mod rover;
+mod sensor_failures;
+mod small_stacks;
+mod wrong_fixes;
