@@ -58,6 +58,7 @@ use apart::Apart;
 use budgets::Budgets;
 use callback::Callback;
 use effects::Reporter;
+use ending::EndedCode;
 use execution::Slot;
 use faults::Faults;
 use hooks::Hooks;
@@ -203,6 +204,8 @@ struct State {
     /// Disarm callbacks that run outside of a disarming.
     apart: Vec<Apart>,
     next_apart: u64,
+    /// Commands that arm the robot, whose code has ended while something is being made safe.
+    held: Vec<EndedCode>,
     /// The outcome of the last disarming.
     last_disarm: Result<(), DisarmError>,
     /// How often a disarming was requested. A caller that has been waiting to arm the robot since before then gives
@@ -215,6 +218,8 @@ struct State {
     is_stopping: bool,
     /// The journal and the last report are complete: later entries are neither written nor published.
     has_ended: bool,
+    /// The last set of parameters is being stored: no other is accepted.
+    parameters_are_final: bool,
 }
 
 /// An execution of a command.

@@ -311,7 +311,11 @@ fn an_actuators_code_that_disarms_a_robot_whose_callback_sends_to_it_does_not_wa
     within(60, || {
         for _ in 0..5 {
             assert_eq!(pull(false), (vec![Err(ActuatorError::Inside)], vec![Ok(())]));
-            assert_eq!(pull(true), (vec![Ok(())], vec![Err(DisarmError::Callback)]));
+            // Whichever waits last closes the circle, and is told; the other one goes on.
+            let told = pull(true);
+            let by_lever = (vec![Ok(())], vec![Err(DisarmError::Callback)]);
+            let by_callback = (vec![Err(ActuatorError::Inside)], vec![Ok(())]);
+            assert!(told == by_lever || told == by_callback, "{told:?}");
         }
     });
 }

@@ -35,6 +35,8 @@ impl Gate {
 
     pub(crate) fn close(&self, place: &'static str) {
         *self.lock() = (Some(place), 0);
+        // Who waits at another place goes on.
+        self.changed.notify_all();
     }
 
     pub(crate) fn is_closed(&self) -> bool {

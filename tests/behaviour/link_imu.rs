@@ -68,8 +68,10 @@ fn an_imu_on_a_moving_link_measures_how_that_moves() -> Result<(), Failure> {
         let sum = before.translation.vector + after.translation.vector - 2.0 * now.translation.vector;
         let force = now.rotation.inverse() * (sum / 1e-8 + Vector3::new(0.0, 0.0, GRAVITY));
         let rate = (before.rotation.inverse() * after.rotation).scaled_axis() / 2e-4;
-        worst_force = worst_force.max((reading.linear_acceleration - force).norm());
-        worst_rate = worst_rate.max((reading.angular_velocity - rate).norm());
+        let (force_error, rate_error) =
+            ((reading.linear_acceleration - force).norm(), (reading.angular_velocity - rate).norm());
+        assert!(force_error.is_finite() && rate_error.is_finite(), "at {millis} ms: {reading:?}");
+        (worst_force, worst_rate) = (worst_force.max(force_error), worst_rate.max(rate_error));
         fastest = fastest.max(reading.angular_velocity.norm());
     }
     assert!(fastest > 1.4, "{fastest}");

@@ -1,7 +1,7 @@
 //! Hardware that is started, and commands that arm, while the robot is being disarmed or was.
 
 use crate::components::{Number, within};
-use crate::gate::{Brake, Brakes, wait_until};
+use crate::gate::{Brake, Brakes, Gate, wait_until};
 use bb_core::prelude::*;
 use bb_core::{ArmError, DisarmError, Live};
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, Ordering};
@@ -18,6 +18,9 @@ static MADE: AtomicU32 = AtomicU32::new(0);
 /// What the motor made first, and the later ones, do in `init`.
 static FIRST: AtomicU32 = AtomicU32::new(WORKS);
 static LATER: AtomicU32 = AtomicU32::new(WORKS);
+/// Armed by the lidar's callback, with what that was told.
+static ARMS: Mutex<Option<Live<Scanner>>> = Mutex::new(None);
+static ARMED: Mutex<Option<Result<(), ArmError>>> = Mutex::new(None);
 /// Whether a brake holds.
 static HOLDS: AtomicBool = AtomicBool::new(true);
 
@@ -30,6 +33,20 @@ const PANICS: u32 = 2;
 const FAILS_FOR_GOOD: u32 = 3;
 /// It works until it is read.
 const FAILS_WHEN_READ: u32 = 4;
+/// It works, and goes on when it is made safe.
+const STAYS: u32 = 5;
+
+/// What a brake waits for.
+static BRAKES: AtomicU32 = AtomicU32::new(SLOWLY);
+/// For 300 ms.
+const SLOWLY: u32 = 0;
+/// For a lidar that was started meanwhile to be made safe.
+const UNTIL_SAFE: u32 = 1;
+/// For a lidar to be at the gate of its `init`.
+const UNTIL_AT_GATE: u32 = 2;
+
+/// Where the second lidar's `init` and then its callback may wait.
+static GATE: Gate = Gate::new();
 
 fn alone() -> MutexGuard<'static, ()> {
     let alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
@@ -38,6 +55,8 @@ fn alone() -> MutexGuard<'static, ()> {
     FIRST.store(WORKS, Ordering::SeqCst);
     LATER.store(WORKS, Ordering::SeqCst);
     HOLDS.store(true, Ordering::SeqCst);
+    BRAKES.store(SLOWLY, Ordering::SeqCst);
+    REGISTERS_FIRST.store(false, Ordering::SeqCst);
     alone
 }
 
@@ -50,6 +69,7 @@ fn turning() -> i32 {
 pub(crate) struct Lidar {
     turns: Arc<AtomicBool>,
     fails: bool,
+    stays: bool,
 }
 
 impl Sensor for Lidar {
@@ -61,6 +81,10 @@ impl Sensor for Lidar {
         let stops = Arc::clone(&turns);
         let stop = move || {
             if stops.swap(false, Ordering::SeqCst) {
+                GATE.pass("callback");
+                if let Some(live) = ARMS.lock().map_err(|_| "it panicked")?.take() {
+                    *ARMED.lock().map_err(|_| "it panicked")? = Some(live.arm());
+                }
                 TURNING.fetch_sub(1, Ordering::SeqCst);
             }
             Ok(())
@@ -70,6 +94,9 @@ impl Sensor for Lidar {
             context.on_disarm(stop.clone());
             // Meanwhile the callback may run.
             std::thread::sleep(Duration::from_millis(30));
+        }
+        if MADE.load(Ordering::SeqCst) > 0 {
+            GATE.pass("init");
         }
         turns.store(true, Ordering::SeqCst);
         TURNING.fetch_add(1, Ordering::SeqCst);
@@ -81,31 +108,38 @@ impl Sensor for Lidar {
             FAILS => Err(Fault::new("no handshake")),
             PANICS => panic!("no handshake"),
             FAILS_FOR_GOOD => Err(Fault::permanent("no handshake")),
-            way => Ok(Self { turns, fails: way == FAILS_WHEN_READ }),
+            way => Ok(Self { turns, fails: way == FAILS_WHEN_READ, stays: way == STAYS }),
         }
     }
 
     fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        if self.fails || !self.turns.load(Ordering::SeqCst) {
+        if self.fails || !(self.stays || self.turns.load(Ordering::SeqCst)) {
             return Err(Fault::new("it does not turn"));
         }
         Ok(Reading::nothing())
     }
 }
 
-/// Takes 300 ms.
+/// Takes its time.
 #[derive(Debug)]
 pub(crate) struct Slowly;
 
 impl Brakes for Slowly {
     fn brake() -> Result<(), Fault> {
-        std::thread::sleep(Duration::from_millis(300));
+        match BRAKES.load(Ordering::SeqCst) {
+            UNTIL_SAFE => {
+                wait_until("it is restarted and made safe", || MADE.load(Ordering::SeqCst) > 1 && turning() == 0)
+            }
+            UNTIL_AT_GATE => GATE.wait_for(1),
+            _ => std::thread::sleep(Duration::from_millis(300)),
+        }
         if HOLDS.load(Ordering::SeqCst) { Ok(()) } else { Err(Fault::new("it slips")) }
     }
 }
 
 robot! {
     robot Scanner;
+    commands { arm: Arm; }
     link base {
         sensor lidar: Lidar() { rate: 100 Hz; }
         sensor brake: Brake<Slowly>() { rate: 10 Hz; }
@@ -116,18 +150,81 @@ robot! {
 fn what_is_started_while_the_robot_is_disarmed_is_made_safe_as_well() {
     let _alone = alone();
     within(60, || {
+        LATER.store(STAYS, Ordering::SeqCst);
+        BRAKES.store(UNTIL_SAFE, Ordering::SeqCst);
         for registers_first in [false, true] {
             MADE.store(0, Ordering::SeqCst);
             REGISTERS_FIRST.store(registers_first, Ordering::SeqCst);
-            // The lidar's own callback stops it at once, it fails and restarts, while the brake takes its time.
+            // The lidar's own callback stops it at once, it fails and is restarted once. The brake waits for the second one.
             let robot = Scanner::builder().start().expect("it starts");
             assert_eq!(robot.arm(), Ok(()));
             assert_eq!((robot.disarm(), turning()), (Ok(()), 0), "{registers_first}");
-            assert!(MADE.load(Ordering::SeqCst) > 1, "it was restarted meanwhile");
+            assert_eq!(MADE.load(Ordering::SeqCst), 2, "it was restarted meanwhile");
             let report = robot.stop();
             assert_eq!((report.safety, turning()), (Safety::Disarmed, 0), "{registers_first}");
         }
-        REGISTERS_FIRST.store(false, Ordering::SeqCst);
+    });
+}
+
+/// `disarm` does not wait for an `init` that takes longer. What that has started is made safe when it returns, and the robot is
+/// not armed before.
+#[test]
+fn what_is_started_after_a_disarming_by_an_init_from_before_is_made_safe_before_the_robot_is_armed() {
+    let _alone = alone();
+    within(60, || {
+        LATER.store(STAYS, Ordering::SeqCst);
+        BRAKES.store(UNTIL_AT_GATE, Ordering::SeqCst);
+        for (registers_first, by_command) in [(false, false), (true, false), (false, true), (true, true)] {
+            MADE.store(0, Ordering::SeqCst);
+            REGISTERS_FIRST.store(registers_first, Ordering::SeqCst);
+            GATE.close("init");
+            let robot = Scanner::builder().start().expect("it starts");
+            assert_eq!(robot.arm(), Ok(()));
+            assert_eq!((robot.disarm(), turning(), robot.safety()), (Ok(()), 0, Safety::Disarmed));
+            GATE.close("callback");
+            GATE.wait_for(1);
+            assert_eq!((MADE.load(Ordering::SeqCst), turning()), (2, 1), "it turns, and its callback was called");
+            let live = robot.live();
+            let (begins, has_begun) = channel();
+            let arms = std::thread::spawn(move || {
+                let _ = begins.send(());
+                if by_command {
+                    let arm = live.command(scanner::command::arm, NoArguments).expect("it is allowed");
+                    arm.wait().map_err(|error| error.to_string())
+                } else {
+                    live.arm().map_err(|error| error.to_string())
+                }
+            });
+            has_begun.recv().expect("it begins");
+            std::thread::sleep(Duration::from_millis(30));
+            assert_eq!((robot.safety(), turning()), (Safety::Disarmed, 1), "it is not armed while something turns");
+            GATE.open();
+            assert_eq!(arms.join().expect("it does not panic"), Ok(()));
+            assert_eq!((robot.safety(), turning()), (Safety::Armed, 0));
+            let report = robot.stop();
+            assert_eq!((report.safety, turning()), (Safety::Disarmed, 0), "{registers_first}");
+        }
+    });
+}
+
+/// Its own code that would wait for itself is told at once.
+#[test]
+fn what_makes_hardware_safe_cannot_arm_the_robot_meanwhile() {
+    let _alone = alone();
+    within(60, || {
+        LATER.store(STAYS, Ordering::SeqCst);
+        BRAKES.store(UNTIL_AT_GATE, Ordering::SeqCst);
+        GATE.close("init");
+        let robot = Scanner::builder().start().expect("it starts");
+        assert_eq!((robot.arm(), robot.disarm()), (Ok(()), Ok(())));
+        *ARMS.lock().unwrap_or_else(PoisonError::into_inner) = Some(robot.live());
+        GATE.open();
+        wait_until("the second one is made safe", || MADE.load(Ordering::SeqCst) > 1 && turning() == 0);
+        let told = ARMED.lock().unwrap_or_else(PoisonError::into_inner).take();
+        assert_eq!(told, Some(Err(ArmError::MakingSafe(vec!["sensor/base/lidar"]))));
+        wait_until("it may be armed", || robot.arm() == Ok(()));
+        ARMS.lock().unwrap_or_else(PoisonError::into_inner).take();
+        assert_eq!(robot.stop().safety, Safety::Disarmed);
     });
 }
 

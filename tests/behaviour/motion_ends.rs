@@ -18,6 +18,8 @@ enum Fails {
     Panics,
     Update,
     NextUpdate,
+    /// Hangs, in fact.
+    NextUpdateHangs,
     Disarm,
     DisarmPanics,
 }
@@ -80,6 +82,9 @@ impl Actuator for Drive {
     }
 
     fn next_update(&self) -> Option<MonotonicTime> {
+        if self.script.get().0 == Fails::NextUpdateHangs {
+            HANG.pass("next update");
+        }
         assert!(self.next.is_none() || self.script.get().0 != Fails::NextUpdate, "an overflow");
         self.next
     }
@@ -255,18 +260,26 @@ fn a_limit_that_panics_refuses_the_command_alone() -> Result<(), Failure> {
 }
 
 #[test]
-fn a_limit_that_hangs_is_reported() -> Result<(), Failure> {
-    let running = Press::builder().start()?;
-    assert_eq!(running.arm(), Ok(()));
-    let faults = running.subscribe(system::Faults);
-    HANG.close("limit");
-    let live = running.live();
-    let sender = std::thread::spawn(move || live.actuate(DRIVE, Push { position: HANGS }));
-    HANG.wait_for(1);
-    let fault = faults.recv_timeout(crate::gate::PATIENCE).ok_or("it is reported while it hangs")?;
-    HANG.open();
-    assert_eq!(fault.path, DRIVE.path());
-    assert!(sender.join().is_ok_and(|sent| sent.is_ok()));
-    running.stop();
+fn code_that_hangs_beside_a_command_is_reported() -> Result<(), Failure> {
+    for (place, position) in [("limit", HANGS), ("next update", 0.5)] {
+        let script = Script::default();
+        let mut builder = Press::builder();
+        builder.options(DRIVE).script = script.clone();
+        let running = builder.start()?;
+        assert_eq!(running.arm(), Ok(()));
+        if place == "next update" {
+            script.set(Fails::NextUpdateHangs, false);
+        }
+        let faults = running.subscribe(system::Faults);
+        HANG.close(place);
+        let live = running.live();
+        let sender = std::thread::spawn(move || live.actuate(DRIVE, Push { position }));
+        HANG.wait_for(1);
+        let fault = faults.recv_timeout(crate::gate::PATIENCE).ok_or("it is reported while it hangs")?;
+        HANG.open();
+        assert_eq!(fault.path, DRIVE.path());
+        assert!(sender.join().is_ok_and(|sent| sent.is_ok()), "{place}");
+        running.stop();
+    }
     Ok(())
 }

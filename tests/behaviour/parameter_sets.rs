@@ -139,10 +139,12 @@ fn a_set_is_seen_as_a_whole() {
                     })
                 })
                 .collect();
-            scope.spawn(|| {
-                while !is_over.load(Ordering::SeqCst) {
+            let reader = scope.spawn(|| {
+                let mut seen = 0_u32;
+                while seen == 0 || !is_over.load(Ordering::SeqCst) {
                     if let Ok((gain, _, count)) = running.call(BOUND, Which) {
                         assert_eq!(gain, f64::from(count));
+                        seen += 1;
                     }
                 }
             });
@@ -150,6 +152,7 @@ fn a_set_is_seen_as_a_whole() {
                 setter.join().expect("no set is refused");
             }
             is_over.store(true, Ordering::SeqCst);
+            reader.join().expect("no set is seen in part");
         });
         let (gain, count, _) = values(&running);
         assert_eq!(gain, count as f64);

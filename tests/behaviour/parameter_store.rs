@@ -1,6 +1,6 @@
 //! Parameters that are kept over restarts, and start-up values from the environment.
 
-use crate::components::within;
+use crate::components::{Number, within};
 use crate::gate::{Gate, PATIENCE};
 use crate::journals::Failure;
 use bb_core::component::ParameterStore;
@@ -152,18 +152,153 @@ fn stored_values_that_do_not_fit_are_named_and_stay_until_they_are_set() -> Resu
 #[test]
 fn a_store_that_fails_is_a_fault_and_is_tried_again() -> Result<(), Failure> {
     for (panics, message) in [(false, "the disk is full"), (true, "panicked: an index")] {
-        let memory = Memory::default();
-        (memory.lock().fails, memory.lock().panics) = (1, panics);
-        let simulation = kept(&memory)?.0.simulate()?;
-        let faults = simulation.subscribe(system::Faults);
-        simulation.set_parameter(rig::param::gains::kp, 2.0)?;
+        let told = format!("the parameters are not stored: {message}");
+        let failing = || {
+            let memory = Memory::default();
+            (memory.lock().fails, memory.lock().panics) = (1, panics);
+            memory
+        };
+
+        let memory = failing();
+        let running = kept(&memory)?.0.start()?;
+        let faults = running.subscribe(system::Faults);
+        running.set_parameter(rig::param::gains::kp, 2.0)?;
         let fault = faults.recv_timeout(PATIENCE).ok_or("it is reported")?;
-        assert_eq!(
-            (fault.path, fault.message.clone()),
-            ("param", format!("the parameters are not stored: {message}"))
-        );
-        simulation.stop();
+        assert_eq!((fault.path, &fault.message), ("param", &told));
+        running.stop();
         assert_eq!(memory.last(), named(&[("param/gains/kp", 2.0.into())]));
+
+        let memory = failing();
+        let simulation = kept(&memory)?.0.simulate()?;
+        simulation.set_parameter(rig::param::gains::kp, 3.0)?;
+        let report = simulation.stop();
+        let faults: Vec<_> = report.faults.iter().map(|fault| (fault.path, &fault.message)).collect();
+        assert_eq!(faults, [("param", &told)]);
+        assert_eq!(memory.last(), named(&[("param/gains/kp", 3.0.into())]));
+    }
+    Ok(())
+}
+
+/// Panics when it is closed.
+struct Bomb(Memory);
+
+impl ParameterStore for Bomb {
+    fn load(&mut self) -> Result<Values, Fault> {
+        self.0.load()
+    }
+
+    fn store(&mut self, values: &Values) -> Result<(), Fault> {
+        self.0.store(values)
+    }
+}
+
+impl Drop for Bomb {
+    fn drop(&mut self) {
+        panic!("it is closed");
+    }
+}
+
+#[test]
+fn a_store_that_panics_when_it_is_closed_concerns_nobody() -> Result<(), Failure> {
+    for is_virtual in [true, false] {
+        let memory = Memory::default();
+        let mut builder = Rig::builder();
+        builder.keep_parameters(Bomb(memory.clone()))?;
+        let report = if is_virtual {
+            let simulation = builder.simulate()?;
+            simulation.set_parameter(rig::param::gains::kp, 2.0)?;
+            simulation.stop()
+        } else {
+            let running = builder.start()?;
+            running.set_parameter(rig::param::gains::kp, 2.0)?;
+            running.stop()
+        };
+        assert_eq!(memory.last(), named(&[("param/gains/kp", 2.0.into())]));
+        report.ok()?;
+    }
+    Ok(())
+}
+
+/// Calibrates itself as it starts.
+#[derive(Debug)]
+pub(crate) struct Calibrating;
+
+impl Sensor for Calibrating {
+    type Options = NoOptions;
+    type Output = Number;
+
+    fn init(_: NoOptions, context: &SensorContext) -> Result<Self, Fault> {
+        context.bus().set_parameter("param/offset", 0.25)?;
+        Ok(Self)
+    }
+
+    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
+        Ok(Reading::nothing())
+    }
+}
+
+robot! {
+    robot Calibrated;
+    parameters { offset: f64 = 0.0; }
+    link base { sensor device: Calibrating() { rate: 100 Hz; } }
+}
+
+#[test]
+fn what_a_component_sets_as_it_starts_is_stored() -> Result<(), Failure> {
+    for is_virtual in [true, false] {
+        let memory = Memory::default();
+        let mut builder = Calibrated::builder();
+        builder.keep_parameters(memory.clone())?;
+        if is_virtual {
+            builder.simulate()?.stop().ok()?;
+        } else {
+            builder.start()?.stop().ok()?;
+        }
+        assert_eq!(memory.last(), named(&[("param/offset", 0.25.into())]));
+    }
+    Ok(())
+}
+
+/// Its last set takes a moment to be durable.
+struct Slow(Memory);
+
+impl ParameterStore for Slow {
+    fn load(&mut self) -> Result<Values, Fault> {
+        self.0.load()
+    }
+
+    fn store(&mut self, values: &Values) -> Result<(), Fault> {
+        std::thread::sleep(Duration::from_millis(3));
+        self.0.store(values)
+    }
+}
+
+#[test]
+fn whatever_is_accepted_while_the_robot_stops_is_stored() -> Result<(), Failure> {
+    for round in 0..20_u64 {
+        let memory = Memory::default();
+        let mut builder = Rig::builder();
+        builder.keep_parameters(Slow(memory.clone()))?;
+        let running = builder.start()?;
+        let live = running.live();
+        let (begins, has_begun) = std::sync::mpsc::channel();
+        let sets = std::thread::spawn(move || {
+            let mut accepted = None;
+            for number in 0_u32.. {
+                let value = f64::from(number % 10_000) * 1e-3;
+                if live.set_parameter(rig::param::gains::kp, value).is_err() {
+                    break;
+                }
+                accepted = Some(value);
+                let _ = begins.send(());
+            }
+            accepted
+        });
+        has_begun.recv()?;
+        std::thread::sleep(Duration::from_micros(137 * round));
+        running.stop().ok()?;
+        let accepted = sets.join().map_err(|_| "it does not panic")?.ok_or("one at least")?;
+        assert_eq!(memory.last(), named(&[("param/gains/kp", accepted.into())]), "round {round}");
     }
     Ok(())
 }
@@ -193,8 +328,13 @@ fn a_store_that_hangs_keeps_nobody_waiting() {
         let running = builder.start().expect("it starts");
         running.set_parameter(rig::param::gains::kp, 2.0).expect("it is in range");
         GATE.wait_for(1);
+        let start = std::time::Instant::now();
         running.set_parameter(rig::param::gains::kp, 3.0).expect("it is in range");
+        let set = start.elapsed();
         let report = running.stop();
+        let stopped = start.elapsed();
+        // It has 2 s as the robot stops.
+        assert!(set < Duration::from_secs(1) && stopped < Duration::from_secs(5), "{set:?}, {stopped:?}");
         GATE.open();
         let faults: Vec<_> = report.faults.iter().map(|fault| (fault.path, fault.message.as_str())).collect();
         assert_eq!(faults, [("param", "the store of parameters did not return in time")]);

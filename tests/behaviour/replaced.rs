@@ -265,6 +265,102 @@ fn a_replacement_that_does_not_fit_keeps_the_robot_from_starting() -> Result<(),
     Ok(())
 }
 
+/// Options that are always refused, as those of a driver whose device file is not on the desk.
+#[derive(Clone, Debug)]
+struct Absent;
+
+impl Options for Absent {
+    const FIELDS: &'static [bb_core::component::OptionField] = &[];
+
+    fn defaults() -> Self {
+        Self
+    }
+
+    fn validate(&self) -> Result<(), String> {
+        Err("there is no such device".to_owned())
+    }
+}
+
+/// Cannot be made.
+#[derive(Debug)]
+struct Driver;
+
+impl Sensor for Driver {
+    type Options = Absent;
+    type Output = Number;
+
+    fn init(_: Absent, _: &SensorContext) -> Result<Self, Fault> {
+        Err(Fault::permanent("it is never made"))
+    }
+
+    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
+        Ok(Reading::nothing())
+    }
+}
+
+robot! {
+    robot Desk;
+    link base { sensor device: Driver() { rate: 100 Hz; } }
+}
+
+#[test]
+fn options_of_what_is_replaced_are_not_looked_at() -> Result<(), Failure> {
+    let error = Desk::builder().simulate().expect_err("its options are refused").to_string();
+    assert_eq!(error, "sensor/base/device cannot start: there is no such device");
+
+    let mut builder = Desk::builder();
+    builder.replace_sensor::<Counter>("sensor/base/device", crate::components::CounterOptions::defaults())?;
+    builder.simulate()?.stop().ok()?;
+
+    // A parameter that is out of range for them only: as the declared one's gain it is refused.
+    let simulation = Tuned::builder().simulate()?;
+    assert!(simulation.set_parameter(tuned::param::gain, 20.0).is_err());
+    drop(simulation);
+    let mut builder = Tuned::builder();
+    builder.replace_estimator::<Ramp>("sensor/base/count/scaled", RampOptions::defaults())?;
+    let simulation = builder.simulate()?;
+    assert_eq!(simulation.set_parameter(tuned::param::gain, 20.0), Ok(()));
+    simulation.stop().ok()?;
+    Ok(())
+}
+
+/// Takes gains up to 10 only.
+#[derive(Clone, Debug, Options)]
+struct GainOptions {
+    /// Factor.
+    #[option(default = 1.0, range = 0.0..=10.0)]
+    gain: f64,
+}
+
+/// Multiplies by its gain.
+#[derive(Debug)]
+struct Gained(f64);
+
+impl Estimator for Gained {
+    type Options = GainOptions;
+    type Input = Number;
+    type Output = Number;
+
+    fn init(options: GainOptions, _: &Context) -> Result<Self, Fault> {
+        Ok(Self(options.gain))
+    }
+
+    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
+        Ok(Reply::emit(Number(number.0 * self.0)))
+    }
+}
+
+robot! {
+    robot Tuned;
+    parameters { gain: f64 = 2.0, range: 0.0..=100.0; }
+    link base {
+        sensor count: Counter(count = 6) {
+            rate: 100 Hz;
+            estimator scaled: Gained(gain = param::gain);
+        }
+    }
+}
+
 /// `robot!` checks that the declared estimator handles moving joints; of a replacement, the start does.
 #[test]
 fn a_replacement_across_moving_joints_has_to_handle_them() -> Result<(), Failure> {

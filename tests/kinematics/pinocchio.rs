@@ -91,6 +91,8 @@ fn isometry(rows: &Value) -> Result<Isometry3<f64>, Failure> {
 /// The largest difference of their entries, relative to the largest entry where that is beyond 1.
 fn difference(left: &[f64], right: &[f64]) -> f64 {
     assert_eq!(left.len(), right.len());
+    // The larger one of NaN and a number is the number.
+    assert!(left.iter().all(|entry| entry.is_finite()), "{left:?}");
     let largest = right.iter().fold(1.0_f64, |largest, entry| largest.max(entry.abs()));
     left.iter().zip(right).fold(0.0_f64, |most, (left, right)| most.max((left - right).abs())) / largest
 }

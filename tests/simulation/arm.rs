@@ -159,7 +159,9 @@ fn motors_carry_and_accelerate_the_arm() -> Result<(), Failure> {
         dynamics.efforts(&Vector3::new(0.0, 0.0, -GRAVITY), &mut efforts)?;
         for joint in 0..4 {
             let own = MOTORS[joint] * sample.acceleration[joint] + DAMPING[joint] * sample.velocity[joint];
-            worst = worst.max((efforts[joint] + own - sample.effort[joint]).abs());
+            let error = (efforts[joint] + own - sample.effort[joint]).abs();
+            assert!(error.is_finite(), "joint {joint}: {sample:?}");
+            worst = worst.max(error);
             largest = largest.max(sample.effort[joint].abs());
         }
     }

@@ -71,6 +71,8 @@ fn eight(time_s: f64) -> Isometry3<f64> {
 /// What an estimator says in a span of time: its largest error, m, and its deviation at the end, m.
 #[derive(Debug, Default)]
 struct Span {
+    /// In how many tenths of a second it has said anything.
+    spoken: usize,
     worst: f64,
     last: f64,
     deviation: f64,
@@ -148,12 +150,16 @@ fn drive(faults: Option<Faults>, spans: &[f64]) -> Result<[Vec<Span>; 2], Failur
                 let error = (estimate.pose.position + origin - truth).xy().norm();
                 let covariance = estimate.pose.covariance.ok_or("a covariance")?;
                 span.deviation = (covariance[(0, 0)] + covariance[(1, 1)]).sqrt();
+                assert!(error.is_finite() && span.deviation > 0.0, "at {now} s: {error} m, {} m", span.deviation);
                 span.worst = span.worst.max(error);
+                span.spoken += 1;
                 span.last = error;
             }
         }
-        for (errors, span) in errors.iter_mut().zip(of_span) {
-            errors.push(span);
+        let tenths = ((span[1] - span[0]) * 10.0).round() as usize;
+        for (errors, of_span) in errors.iter_mut().zip(of_span) {
+            assert!(of_span.spoken + 1 >= tenths || span[0] == 0.0, "from {} s: {of_span:?}", span[0]);
+            errors.push(of_span);
         }
     }
     let report = simulation.stop().ok()?;

@@ -64,6 +64,6 @@ pub trait ParameterStore: Send + 'static {
     ///
     /// # Errors
     /// Why it was not stored; the last set remains. It is reported as a fault at `param`, and tried again with the next
-    /// change and when the robot stops.
+    /// change and when the robot stops. A simulation stores once it stops, and tries again once.
     fn store(&mut self, values: &BTreeMap<String, ParameterValue>) -> Result<(), Fault>;
 }

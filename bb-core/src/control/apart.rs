@@ -44,6 +44,16 @@ impl State {
         self.apart.iter().any(|apart| apart.key == key && apart.left.contains(&number))
     }
 
+    /// Whether hardware that was started on a disarmed robot is still being made safe.
+    pub(super) fn is_making_safe(&self) -> bool {
+        self.apart.iter().any(|apart| apart.why == Why::Started)
+    }
+
+    /// The paths of the components of which this is true.
+    pub(super) fn being_made_safe(&self) -> Vec<&'static str> {
+        self.apart.iter().filter(|apart| apart.why == Why::Started).map(|apart| apart.path).collect()
+    }
+
     /// The paths of components whose callbacks run.
     pub(super) fn apart_paths(&self) -> impl Iterator<Item = &'static str> {
         self.apart.iter().map(|apart| apart.path)
@@ -275,6 +285,9 @@ impl Step<'_> {
         self.control.0.limits.clear(Limit::Apart(key));
         if let Why::Lingered(id) = apart.why {
             self.gone(id);
+        }
+        if !self.state.is_making_safe() {
+            self.effects.ended.append(&mut self.state.held);
         }
     }
 }

@@ -48,7 +48,8 @@ impl State {
 }
 
 impl Control {
-    /// Arms the robot, unless it is in `error` or stopping. Waits until cancelled commands are gone.
+    /// Arms the robot, unless it is in `error` or stopping. Waits until cancelled commands are gone, and until what was started on
+    /// the disarmed robot has been made safe.
     pub(crate) fn arm(&self, permit: &Permit) -> Result<(), ArmError> {
         if self.0.mode == Mode::Replay {
             return Err(ArmError::Replay);
@@ -58,10 +59,12 @@ impl Control {
             return Err(ArmError::Cancelled);
         }
         if self.0.mode == Mode::Real {
-            // If the wait fails, the entry finds them still there.
+            // Code that is itself waited for does not wait.
+            let waits = inside::waits_for(self.id());
+            // If the wait fails, they are still there below.
             self.wait_until(ARM_WITHIN, |state| {
                 state.machine.safety != Safety::Disarmed
-                    || !state.has_lingering()
+                    || !(state.has_lingering() || state.is_making_safe() && waits.is_some())
                     || state.is_stopping
                     || state.disarms != disarms
             });
@@ -72,6 +75,10 @@ impl Control {
         // The command may have been cancelled while this waited, or the robot disarmed.
         if !permit.is_valid() || step.state.disarms != disarms {
             return Err(ArmError::Cancelled);
+        }
+        // A replay knows nothing of those callbacks, so there is no entry.
+        if step.state.machine.safety == Safety::Disarmed && step.state.is_making_safe() {
+            return Err(ArmError::MakingSafe(step.state.being_made_safe()));
         }
         step.line(Event::Arm);
         step.arm()

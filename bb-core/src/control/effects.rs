@@ -2,6 +2,7 @@
 //! waits for.
 
 use super::callback::{Callback, Reason};
+use super::ending::EndedCode;
 use super::execution::CommandError;
 use super::execution::Slot;
 use super::inside;
@@ -39,6 +40,8 @@ pub(super) struct Effects {
     pub(super) forgotten: Vec<Arc<Callback>>,
     /// References to the wiring, which may be the last ones.
     pub(super) wired: Vec<Wired>,
+    /// Commands that arm the robot, whose code had ended while something was being made safe.
+    pub(super) ended: Vec<EndedCode>,
 }
 
 /// A message for loggers and telemetry handlers.
@@ -95,8 +98,20 @@ impl Effects {
     }
 
     pub(super) fn run(self, control: &Control) {
-        let Self { wakers, logs: _, has_lines, begun, cancelled, results, hooks, apart, dropped, forgotten, wired } =
-            self;
+        let Self {
+            wakers,
+            logs: _,
+            has_lines,
+            begun,
+            cancelled,
+            results,
+            hooks,
+            apart,
+            dropped,
+            forgotten,
+            wired,
+            ended,
+        } = self;
         // Hardware comes first.
         let hooks = hooks.into_iter().map(|(generation, callbacks)| {
             (Reason::Disarming(generation), control.start_hooks(generation, callbacks))
@@ -128,6 +143,9 @@ impl Effects {
         }
         for task in begun {
             task.schedule();
+        }
+        for EndedCode { id, end, value } in ended {
+            control.process_end(id, end, value);
         }
     }
 }

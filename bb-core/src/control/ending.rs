@@ -17,6 +17,13 @@ use std::time::Duration;
 /// How often to check whether the handles of a command still act.
 const LOOK_AGAIN: Duration = Duration::from_millis(1);
 
+/// A command whose code has ended.
+pub(super) struct EndedCode {
+    pub(super) id: u64,
+    pub(super) end: End,
+    pub(super) value: Option<Value>,
+}
+
 impl Control {
     /// Cancels an execution for its caller.
     pub(crate) fn cancel(&self, id: u64) {
@@ -55,8 +62,14 @@ impl Control {
         self.process_end(id, end, None);
     }
 
-    fn process_end(&self, id: u64, end: End, value: Option<Value>) {
+    pub(super) fn process_end(&self, id: u64, end: End, value: Option<Value>) {
         let mut step = self.step();
+        // Callbacks that make safe what was started late must not run on an armed robot. A replay knows nothing of them, so the
+        // entry is written afterwards.
+        if step.state.is_making_safe() && step.is_arming(id) {
+            step.state.held.push(EndedCode { id, end, value });
+            return step.finish();
+        }
         let Some(index) = step.running(id) else {
             // It was cancelled meanwhile, or has timed out.
             step.effects.dropped.extend(value);
@@ -148,6 +161,12 @@ impl Step<'_> {
             Role::Arming => self.arm_by(index, value, next_state),
             Role::Plain | Role::Disarming => self.end(index, Ok(value), next_state),
         }
+    }
+
+    /// Whether that execution is of a command that arms the robot.
+    fn is_arming(&self, id: u64) -> bool {
+        let execution = self.state.executions.iter().find(|execution| execution.id == id);
+        execution.is_some_and(|execution| self.role(execution.command) == Role::Arming)
     }
 
     fn set_phase(&mut self, index: usize, phase: Phase) {

@@ -98,6 +98,9 @@ impl Control {
                 let message = "the command that sets it has ended or was cancelled";
                 return Err(refuse(first_path, message.to_owned()));
             }
+            if step.state.parameters_are_final {
+                return Err(refuse(first_path, "the robot has stopped".to_owned()));
+            }
             if step.state.version != version {
                 continue;
             }
@@ -121,6 +124,11 @@ impl Control {
             step.finish();
             return Ok(());
         }
+    }
+
+    /// From here on, no parameter is accepted.
+    pub(crate) fn close_parameters(&self) {
+        self.lock().parameters_are_final = true;
     }
 
     /// In a replay: parameters were set. Components whose options are bound to them are notified by their own lines.

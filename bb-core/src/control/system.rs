@@ -47,12 +47,14 @@ impl Control {
             disarming: None,
             apart: Vec::new(),
             next_apart: 0,
+            held: Vec::new(),
             last_disarm: Ok(()),
             disarms: 0,
             generation: 0,
             has_begun: false,
             is_stopping: false,
             has_ended: false,
+            parameters_are_final: false,
         };
         let bell = Bell::default();
         let alarm = bell.clone();

@@ -15,6 +15,8 @@ pub enum ArmError {
     Stopping,
     /// The code of these commands, which were cancelled, has not returned.
     Lingering(Vec<&'static str>),
+    /// These components were started while the robot was being disarmed, and their disarm callbacks have not returned.
+    MakingSafe(Vec<&'static str>),
     /// The robot was disarmed while this waited, or the command that arms it was cancelled.
     Cancelled,
     /// The robot is replayed: its journal says when it is armed.
@@ -48,6 +50,9 @@ impl fmt::Display for ArmError {
             Self::Stopping => f.write_str("it stops"),
             Self::Lingering(paths) => {
                 write!(f, "the code of cancelled commands has not returned: {}", paths.join(", "))
+            }
+            Self::MakingSafe(paths) => {
+                write!(f, "what was started late is still being made safe: {}", paths.join(", "))
             }
             Self::Cancelled => f.write_str("it was disarmed meanwhile, or the command that arms it was cancelled"),
             Self::Replay => f.write_str("it is replayed"),

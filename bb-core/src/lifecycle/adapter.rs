@@ -8,7 +8,7 @@ use crate::component::{
     SensorContext, Service, ServiceContext,
 };
 use crate::declaration::SensorDeclaration;
-use crate::fault::{Fault, discard};
+use crate::fault::Fault;
 use crate::message::{Payload, Stamped};
 use crate::time::MonotonicTime;
 use std::fmt;
@@ -20,16 +20,21 @@ pub trait Component: Sized + Send + 'static {
     /// The context for its start.
     type Context: Send;
 
-    /// Creates it.
+    /// Creates it. Its options are not asked for if it is replaced.
     ///
     /// # Errors
     /// Why it cannot start.
-    fn make(options: Self::Options, context: &Self::Context) -> Result<Self, Fault>;
+    fn make(options: impl FnOnce() -> Result<Self::Options, Fault>, context: &Self::Context)
+    -> Result<Self, Fault>;
     /// Takes new options.
     ///
     /// # Errors
     /// Why it cannot go on.
-    fn change(&mut self, options: Self::Options, context: &Self::Context) -> Result<(), Fault>;
+    fn change(
+        &mut self,
+        options: impl FnOnce() -> Result<Self::Options, Fault>,
+        context: &Self::Context,
+    ) -> Result<(), Fault>;
     /// Closes it.
     fn close(&mut self);
 }
@@ -113,24 +118,22 @@ impl<E: Estimator> Component for AsEstimator<E> {
     type Options = E::Options;
     type Context = Context;
 
-    fn make(options: E::Options, context: &Context) -> Result<Self, Fault> {
+    fn make(options: impl FnOnce() -> Result<E::Options, Fault>, context: &Context) -> Result<Self, Fault> {
         match context.replacement() {
-            Some(replacement) => {
-                discard(options);
-                make_estimator(replacement, context).map(Self::Replaced)
-            }
-            None => E::init(options, context).map(Self::Declared),
+            Some(replacement) => make_estimator(replacement, context).map(Self::Replaced),
+            None => E::init(options()?, context).map(Self::Declared),
         }
     }
 
-    fn change(&mut self, options: E::Options, context: &Context) -> Result<(), Fault> {
+    fn change(
+        &mut self,
+        options: impl FnOnce() -> Result<E::Options, Fault>,
+        context: &Context,
+    ) -> Result<(), Fault> {
         match self {
-            Self::Declared(estimator) => estimator.handle_options(options, context),
+            Self::Declared(estimator) => estimator.handle_options(options()?, context),
             // The options belong to the replaced component.
-            Self::Replaced(_) => {
-                discard(options);
-                Ok(())
-            }
+            Self::Replaced(_) => Ok(()),
         }
     }
 
@@ -168,24 +171,22 @@ impl<S: Sensor> Component for AsSensor<S> {
     type Options = S::Options;
     type Context = SensorContext;
 
-    fn make(options: S::Options, context: &SensorContext) -> Result<Self, Fault> {
+    fn make(options: impl FnOnce() -> Result<S::Options, Fault>, context: &SensorContext) -> Result<Self, Fault> {
         match context.replacement() {
-            Some(replacement) => {
-                discard(options);
-                make_sensor(&replacement, context).map(|made| Self::Replaced(StandInSensor(made)))
-            }
-            None => S::init(options, context).map(Self::Declared),
+            Some(replacement) => make_sensor(&replacement, context).map(|made| Self::Replaced(StandInSensor(made))),
+            None => S::init(options()?, context).map(Self::Declared),
         }
     }
 
-    fn change(&mut self, options: S::Options, context: &SensorContext) -> Result<(), Fault> {
+    fn change(
+        &mut self,
+        options: impl FnOnce() -> Result<S::Options, Fault>,
+        context: &SensorContext,
+    ) -> Result<(), Fault> {
         match self {
-            Self::Declared(sensor) => sensor.handle_options(options, context),
+            Self::Declared(sensor) => sensor.handle_options(options()?, context),
             // The options belong to the replaced component.
-            Self::Replaced(_) => {
-                discard(options);
-                Ok(())
-            }
+            Self::Replaced(_) => Ok(()),
         }
     }
 
@@ -226,24 +227,24 @@ impl<S: Service> Component for AsService<S> {
     type Options = S::Options;
     type Context = ServiceContext;
 
-    fn make(options: S::Options, context: &ServiceContext) -> Result<Self, Fault> {
+    fn make(options: impl FnOnce() -> Result<S::Options, Fault>, context: &ServiceContext) -> Result<Self, Fault> {
         match context.replacement() {
             Some(replacement) => {
-                discard(options);
                 make_service(&replacement, context).map(|made| Self::Replaced(StandInService(made)))
             }
-            None => S::init(options, context).map(Self::Declared),
+            None => S::init(options()?, context).map(Self::Declared),
         }
     }
 
-    fn change(&mut self, options: S::Options, context: &ServiceContext) -> Result<(), Fault> {
+    fn change(
+        &mut self,
+        options: impl FnOnce() -> Result<S::Options, Fault>,
+        context: &ServiceContext,
+    ) -> Result<(), Fault> {
         match self {
-            Self::Declared(service) => service.handle_options(options, context),
+            Self::Declared(service) => service.handle_options(options()?, context),
             // The options belong to the replaced component.
-            Self::Replaced(_) => {
-                discard(options);
-                Ok(())
-            }
+            Self::Replaced(_) => Ok(()),
         }
     }
 
@@ -283,24 +284,22 @@ impl<A: Actuator> Component for AsActuator<A> {
     type Options = A::Options;
     type Context = ActuatorContext;
 
-    fn make(options: A::Options, context: &ActuatorContext) -> Result<Self, Fault> {
+    fn make(options: impl FnOnce() -> Result<A::Options, Fault>, context: &ActuatorContext) -> Result<Self, Fault> {
         match context.replacement() {
-            Some(replacement) => {
-                discard(options);
-                make_actuator(&replacement, context).map(Self::Replaced)
-            }
-            None => A::init(options, context).map(Self::Declared),
+            Some(replacement) => make_actuator(&replacement, context).map(Self::Replaced),
+            None => A::init(options()?, context).map(Self::Declared),
         }
     }
 
-    fn change(&mut self, options: A::Options, context: &ActuatorContext) -> Result<(), Fault> {
+    fn change(
+        &mut self,
+        options: impl FnOnce() -> Result<A::Options, Fault>,
+        context: &ActuatorContext,
+    ) -> Result<(), Fault> {
         match self {
-            Self::Declared(actuator) => actuator.handle_options(options, context),
+            Self::Declared(actuator) => actuator.handle_options(options()?, context),
             // The options belong to the replaced component.
-            Self::Replaced(_) => {
-                discard(options);
-                Ok(())
-            }
+            Self::Replaced(_) => Ok(()),
         }
     }
 

@@ -85,7 +85,7 @@ impl<C: Component> Slot<C> {
     pub(crate) fn make(&mut self, context: &C::Context, parameters: &ParameterValues) -> Result<(), Failed> {
         // An error while the previous one closes does not concern the next one.
         let _ = self.retire();
-        let made = caught(|| C::make(self.recipe.bound(parameters)?, context))?;
+        let made = caught(|| C::make(|| self.recipe.bound(parameters), context))?;
         self.state = State::Running(made);
         Ok(())
     }
@@ -93,7 +93,7 @@ impl<C: Component> Slot<C> {
     /// Passes new options to it. `Ok(false)`: it must be restarted with them.
     pub(crate) fn change(&mut self, context: &C::Context, parameters: &ParameterValues) -> Result<bool, Failed> {
         let State::Running(component) = &mut self.state else { return Ok(true) };
-        let changed = caught(|| component.change(self.recipe.bound(parameters)?, context));
+        let changed = caught(|| component.change(|| self.recipe.bound(parameters), context));
         match changed {
             Ok(()) => Ok(true),
             Err(failed) if failed.fault.then == Then::Remake => Ok(false),

@@ -253,7 +253,8 @@ impl Environment {
         binding: Binding<O>,
         target: BindTarget,
     ) {
-        if !binding.parameters.is_empty() {
+        // The options of a component that is replaced are not used.
+        if !binding.parameters.is_empty() && self.replacement(path).is_none() {
             let template = match Template::new(options) {
                 Ok(template) => template,
                 Err(fault) => return self.refuse(path, fault),

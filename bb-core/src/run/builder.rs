@@ -302,6 +302,9 @@ impl<R: Robot> Builder<R> {
         let topics = std::mem::replace(&mut self.topics, R::topics());
         let options = &self.options;
         let is_replay = mode == Mode::Replay;
+        if let Some(kept) = self.kept.as_ref().filter(|_| !is_replay) {
+            kept.note(&control);
+        }
         let wired = caught(|| {
             let wiring = Arc::new(R::wire(topics, options, &assembly));
             // It is set once.

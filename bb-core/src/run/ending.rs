@@ -18,8 +18,8 @@ use std::time::{Duration, Instant};
 /// How long the journal's sink may take for the last lines.
 const HAND_OVER_WITHIN: Duration = Duration::from_secs(1);
 
-/// How long actuators have to stop, and how long parameters have to be stored, the sink has for the last lines and components to drop their values,
-/// no matter how much time has been used up before.
+/// How long actuators have to stop and parameters to be stored, and how long the sink has for the last lines and components
+/// to drop their values, no matter how much time has been used up before.
 const LEAST_TO_STOP: Duration = Duration::from_millis(100);
 const LEAST_TO_CLOSE: Duration = Duration::from_millis(200);
 
@@ -93,9 +93,12 @@ impl<R: Robot> Machine<R> {
     /// the values of disarm callbacks, and makes the last report. The journal's sink and these drops may take until
     /// `deadline`.
     pub(super) fn end(&self, deadline: Instant) {
+        // What is accepted is stored.
+        self.control.close_parameters();
         let keeper = self.keeper.lock().unwrap_or_else(PoisonError::into_inner).take();
         if let Some(keeper) = keeper {
-            keeper.finish(&self.control, deadline.max(Instant::now() + LEAST_TO_CLOSE));
+            let stored_by = deadline.checked_sub(LEAST_TO_CLOSE).unwrap_or(deadline);
+            keeper.finish(&self.control, stored_by.max(Instant::now() + LEAST_TO_STOP));
         }
         let summary = self.control.end(|summary| {
             if let Some(journal) = self.environment.journal() {

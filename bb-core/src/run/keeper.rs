@@ -3,8 +3,7 @@
 use crate::component::{Fault, ParameterStore};
 use crate::control::Control;
 use crate::event::ParameterValue;
-use crate::fault::{caught, guarded};
-use crate::journal::ParameterEntry;
+use crate::fault::{caught, discard, guarded};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, channel, sync_channel};
@@ -21,6 +20,9 @@ const STORED_WITHIN: Duration = Duration::from_secs(2);
 pub(super) struct Kept {
     store: Box<dyn ParameterStore>,
     values: BTreeMap<String, ParameterValue>,
+    changed: Changed,
+    wake: Arc<Mutex<Option<SyncSender<()>>>>,
+    woken: Receiver<()>,
 }
 
 /// Values that were set since the last look, by the number of the parameter.
@@ -44,29 +46,36 @@ impl Kept {
     pub(super) fn load(store: impl ParameterStore) -> Result<Self, Fault> {
         let mut store: Box<dyn ParameterStore> = Box::new(store);
         let values = caught(|| store.load()).map_err(|failed| failed.fault)?;
-        Ok(Self { store, values })
+        let (sender, woken) = sync_channel(1);
+        Ok(Self { store, values, changed: Changed::default(), wake: Arc::new(Mutex::new(Some(sender))), woken })
     }
 
     /// The stored values, by path.
     pub(super) fn values(&self) -> &BTreeMap<String, ParameterValue> {
         &self.values
     }
+
+    /// Notes what is set from now on: components may set parameters in their first `init`.
+    pub(super) fn note(&self, control: &Control) {
+        let (changed, wake) = (Arc::clone(&self.changed), Arc::clone(&self.wake));
+        control.on_parameters(move |changes| {
+            lock(&changed).extend(changes.iter().map(|change| (change.parameter, change.value.clone())));
+            if let Some(sender) = &*lock(&wake) {
+                // If it is full, the thread has yet to look.
+                let _ = sender.try_send(());
+            }
+        });
+    }
 }
 
 impl Keeper {
     /// Starts to keep what is set.
     pub(super) fn start(kept: Kept, control: &Control) -> Result<Self, Fault> {
-        let changed = Changed::default();
-        let work = Work { kept, changed: Arc::clone(&changed), control: control.clone() };
-        let note = move |changes: &[ParameterEntry]| {
-            lock(&changed).extend(changes.iter().map(|change| (change.parameter, change.value.clone())));
-        };
+        let Kept { store, values, changed, wake, woken } = kept;
+        let work = Work { store, values, changed, control: control.clone() };
         if control.is_virtual() {
-            control.on_parameters(note);
             return Ok(Self::Here(Box::new(work)));
         }
-        let (sender, woken) = sync_channel(1);
-        let wake = Arc::new(Mutex::new(Some(sender)));
         let (end, ended) = channel::<()>();
         let run = move || {
             // The store is closed with `work`.
@@ -76,21 +85,16 @@ impl Keeper {
             drop(end);
         };
         std::thread::Builder::new().name(PATH.to_owned()).spawn(run).map_err(Fault::from)?;
-        let waking = Arc::clone(&wake);
-        control.on_parameters(move |changes| {
-            note(changes);
-            if let Some(sender) = &*lock(&waking) {
-                // If it is full, the thread has yet to look.
-                let _ = sender.try_send(());
-            }
-        });
         Ok(Self::Apart { wake, ended })
     }
 
     /// Waits until everything is stored, at most until `deadline`.
     pub(super) fn finish(mut self, control: &Control, deadline: Instant) {
         match &mut self {
-            Self::Here(work) => work.store_rest(true),
+            Self::Here(work) => {
+                let is_stored = work.store_rest(true);
+                work.store_rest(is_stored);
+            }
             Self::Apart { wake, ended } => {
                 drop(lock(wake).take());
                 let left = deadline.saturating_duration_since(Instant::now()).min(STORED_WITHIN);
@@ -99,6 +103,7 @@ impl Keeper {
                 }
             }
         }
+        discard(self);
     }
 }
 
@@ -113,7 +118,8 @@ impl Drop for Keeper {
 
 /// See [`Keeper`].
 pub(super) struct Work {
-    kept: Kept,
+    store: Box<dyn ParameterStore>,
+    values: BTreeMap<String, ParameterValue>,
     changed: Changed,
     control: Control,
 }
@@ -127,20 +133,18 @@ impl Work {
         self.store_rest(is_stored);
     }
 
-    /// A change that came with the end, or one that was not stored before.
-    fn store_rest(&mut self, is_stored: bool) {
-        if !is_stored || !lock(&self.changed).is_empty() {
-            self.store();
-        }
+    /// Stores a change that came with the end, or one that was not stored before. Whether all is stored then.
+    fn store_rest(&mut self, is_stored: bool) -> bool {
+        if is_stored && lock(&self.changed).is_empty() { true } else { self.store() }
     }
 
     fn store(&mut self) -> bool {
         for (number, value) in std::mem::take(&mut *lock(&self.changed)) {
             if let Some(path) = self.control.parameter_path(number) {
-                self.kept.values.insert(path.to_owned(), value);
+                self.values.insert(path.to_owned(), value);
             }
         }
-        let Kept { store, values } = &mut self.kept;
+        let Self { store, values, .. } = self;
         match caught(|| store.store(values)) {
             Ok(()) => true,
             Err(failed) => {

@@ -61,9 +61,9 @@ impl Report {
     /// This report, if no component has failed.
     ///
     /// # Errors
-    /// The first fault that is kept.
+    /// Of the faults that are kept, the one that occurred first.
     pub fn ok(self) -> Result<Self, ComponentFault> {
-        match self.faults.first() {
+        match self.faults.iter().min_by_key(|fault| fault.first_time) {
             Some(fault) => Err(fault.clone().into()),
             None => Ok(self),
         }

@@ -58,6 +58,7 @@ fn motions_and_their_reports_are_the_same_in_a_replay() -> Result<(), Failure> {
         for (path, messages) in &first {
             assert_eq!(Some(messages), again.get(path), "{path}");
         }
+        assert_eq!(first.len(), again.len(), "nothing else is heard");
     }
     Ok(())
 }

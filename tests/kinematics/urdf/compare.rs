@@ -29,6 +29,10 @@ fn difference(left: &[f64], right: &[f64]) -> Result<f64> {
     if left.len() != right.len() {
         return Err(format!("{} numbers instead of {}", left.len(), right.len()).into());
     }
+    // The larger one of NaN and a number is the number.
+    if !left.iter().all(|entry| entry.is_finite()) {
+        return Err(format!("not finite: {left:?}").into());
+    }
     let largest = right.iter().fold(1.0_f64, |largest, entry| largest.max(entry.abs()));
     Ok(left.iter().zip(right).fold(0.0_f64, |most, (left, right)| most.max((left - right).abs())) / largest)
 }
@@ -36,7 +40,6 @@ fn difference(left: &[f64], right: &[f64]) -> Result<f64> {
 pub fn robot<R: Robot>(cases: &Value) -> Result<()> {
     let (frames, others) = compare::<R>(&cases[R::NAME]).map_err(|error| format!("{}: {error}", R::NAME))?;
     println!("urdf: {}: frames within {frames:.1e}, all else within {others:.1e}", R::NAME);
-    // Also if one is NaN.
     if frames <= FRAMES && others <= OTHERS { Ok(()) } else { Err(format!("{} differs", R::NAME).into()) }
 }
 
@@ -87,7 +90,7 @@ fn compare<R: Robot>(case: &Value) -> Result<(f64, f64)> {
     frames_at_rest.gravity_efforts(&gravity, &mut efforts)?;
     others = others.max(difference(&efforts, &placed(&case["gravity"])?)?);
     let mass = case["mass"].as_f64().ok_or("mass")?;
-    others = others.max((frames_at_rest.mass() - mass).abs());
+    others = others.max(difference(&[frames_at_rest.mass()], &[mass])?);
     match (frames_at_rest.centre_of_mass(), case["centre_of_mass"].is_null()) {
         (Some(centre), false) => others = others.max(difference(centre.as_slice(), &numbers(&case["centre_of_mass"])?)?),
         (None, true) => {}
