@@ -374,6 +374,28 @@ fn what_does_not_fit_is_refused_and_counted() -> Result<(), StartError> {
     Ok(())
 }
 
+/// At 10 Hz, 100 ms are two states: five of them decide.
+#[test]
+fn a_slow_joint_whose_clock_is_set_back_is_known_again_after_five_states() -> Result<(), StartError> {
+    let mut simulation = Reach::builder().simulate()?;
+    simulation.run_until(at(60_000));
+    simulation.publish(LIFT, at(60_000), joint(0.0));
+    let joints = simulation.joints();
+    let mut known = Vec::new();
+    for number in 1..=7 {
+        simulation.run_for(Duration::from_millis(100));
+        // By a minute.
+        simulation.publish(LIFT, at(100 * number), joint(0.1 * number as f64));
+        known.push(joints.status("lift").and_then(|lift| lift.time));
+    }
+    let first = Some(at(60_000));
+    assert_eq!(known, [first, first, first, first, Some(at(500)), Some(at(600)), Some(at(700))]);
+    let report = simulation.report();
+    let lift = report.joints.iter().find(|joint| joint.joint == "lift").expect("it was counted");
+    assert_eq!((lift.states, lift.refused(JointRefusal::OutOfOrder)), (4, 4));
+    Ok(())
+}
+
 #[test]
 fn a_joint_that_falls_silent_is_stale() -> Result<(), StartError> {
     let mut simulation = Reach::builder().simulate()?;

@@ -2,3 +2,4 @@
 
 mod arm;
 mod drive;
+mod late;

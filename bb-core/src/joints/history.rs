@@ -130,6 +130,8 @@ impl History {
     fn is_set_back(&mut self, time: i64) -> bool {
         let (first, count) = match self.behind {
             Some((first, last, count)) if time > last => (first, count.saturating_add(1)),
+            // The same state once more.
+            Some((_, last, _)) if time == last => return false,
             _ => (time, 1),
         };
         self.behind = Some((first, time, count));

@@ -36,7 +36,7 @@ impl<R: Robot> Simulation<R> {
     pub(super) fn new(machine: Machine<R>, mut sources: Vec<Box<dyn Source>>) -> Self {
         // A simulation of a recording starts when the recording was made.
         if let Some(first) = sources.iter_mut().filter_map(|source| source.starts_at()).min() {
-            machine.environment.clock().advance_to(first);
+            machine.environment.clock().start_at(first);
         }
         let now = machine.environment.clock().now();
         machine.control.begin_watch(now);

@@ -27,6 +27,8 @@ pub struct Clock {
     kind: Kind,
     /// Wall time minus monotonic time, in nanoseconds; shared by the clones.
     wall_offset_nanos: Arc<AtomicI64>,
+    /// See [`Clock::start`]; shared by the clones.
+    start_nanos: Arc<AtomicI64>,
 }
 
 #[derive(Clone, Debug)]
@@ -45,13 +47,18 @@ impl Clock {
         static ZERO: OnceLock<Instant> = OnceLock::new();
         let zero = *ZERO.get_or_init(Instant::now);
         let offset = median_wall_offset(|| read_both(zero));
-        Self { kind: Kind::Real(zero), wall_offset_nanos: Arc::new(AtomicI64::new(offset)) }
+        let start = nanos_of(zero.elapsed());
+        Self {
+            kind: Kind::Real(zero),
+            wall_offset_nanos: Arc::new(AtomicI64::new(offset)),
+            start_nanos: Arc::new(AtomicI64::new(start)),
+        }
     }
 
     /// A virtual clock at `start`, with the Unix epoch at its zero.
     pub fn virtual_at(start: MonotonicTime) -> Self {
-        let now = Arc::new(AtomicI64::new(start.as_nanos()));
-        Self { kind: Kind::Virtual(now), wall_offset_nanos: Arc::new(AtomicI64::new(0)) }
+        let nanos = || Arc::new(AtomicI64::new(start.as_nanos()));
+        Self { kind: Kind::Virtual(nanos()), wall_offset_nanos: Arc::new(AtomicI64::new(0)), start_nanos: nanos() }
     }
 
     /// The current time.
@@ -60,6 +67,13 @@ impl Clock {
             Kind::Real(zero) => MonotonicTime::ZERO + zero.elapsed(),
             Kind::Virtual(nanos) => MonotonicTime::from_nanos(nanos.load(Ordering::Acquire)),
         }
+    }
+
+    /// The time at which the run begins. On virtual time, components are created at zero, and a run that plays recordings then
+    /// begins at the first of their stamps: whatever a component computes over time starts here, not at its `init`. On real time
+    /// it is the time at which this clock was created.
+    pub fn start(&self) -> MonotonicTime {
+        MonotonicTime::from_nanos(self.start_nanos.load(Ordering::Acquire))
     }
 
     /// The calendar time at `time`, by the current offset.
@@ -114,6 +128,14 @@ impl Clock {
     pub(crate) fn advance_to(&self, time: MonotonicTime) {
         if let Kind::Virtual(nanos) = &self.kind {
             nanos.fetch_max(time.as_nanos(), Ordering::AcqRel);
+        }
+    }
+
+    /// Advances a virtual clock to the beginning of the run.
+    pub(crate) fn start_at(&self, time: MonotonicTime) {
+        self.advance_to(time);
+        if self.is_virtual() {
+            self.start_nanos.store(self.now().as_nanos(), Ordering::Release);
         }
     }
 

@@ -6,8 +6,8 @@ use bb_core::joints::JointStatus;
 use bb_core::payload::{ActuatorCommand, EndMotion, JointTrajectory, MotionEnd};
 use bb_core::pubsub::Select;
 use bb_core::{
-    Bus, Command, CommandContext, DynamicMessage, DynamicSubscription, Fault, MonotonicTime, Options, Outcome,
-    Overflow, Payload, Stamped,
+    Bus, Command, CommandContext, DynamicMessage, DynamicSubscription, Fault, JointBounds, JointCommand,
+    MonotonicTime, Options, Outcome, Overflow, Payload, Stamped,
 };
 use std::future::Future;
 use std::pin::pin;
@@ -17,7 +17,8 @@ use std::time::Duration;
 
 /// Moves joints through positions, and comes to rest at the last of them; all joints arrive together.
 ///
-/// The trajectory is [planned](plan) from the measured state of the joints, which may be moving, and each actuator, which takes [`ActuatorCommand`], follows its part of it. It
+/// The trajectory is [planned](plan) from the measured state of the joints, which may be moving; if their motion would lead beyond
+/// the declared limits, from their velocities alone, or else from rest. Each actuator, which takes [`ActuatorCommand`], follows its part of it. It
 /// publishes a [`MotionProgress`] ten times a second at `progress` below its path. It succeeds when all actuators have
 /// reported that they have reached their target. If one reports anything else, the joints that it still moves are commanded to hold, and it
 /// fails with the reason. If it is cancelled or times out, its actuators come to rest and hold.
@@ -92,9 +93,6 @@ const PROGRESS_PERIOD: Duration = Duration::from_millis(100);
 /// Between two points of a trajectory.
 const POINT_PERIOD: Duration = Duration::from_millis(10);
 
-/// The relative rounding error of a position at a limit.
-const ROUNDING: f64 = 1e-9;
-
 impl MoveJoints {
     /// The command's motion, for other commands: moves `joints` through `points`.
     ///
@@ -152,8 +150,10 @@ fn planned(
     now: MonotonicTime,
 ) -> Result<JointTrajectory, Fault> {
     let known = bus.joints();
-    let mut from = Vec::with_capacity(joints.len());
+    let mut from: Vec<JointPoint> = Vec::with_capacity(joints.len());
     let mut limits = Vec::with_capacity(joints.len());
+    // What each actuator will check its part against.
+    let mut declared = Vec::with_capacity(joints.len());
     for name in joints {
         let joint = bus.topology().joint(name).ok_or_else(|| Fault::new(format!("there is no joint `{name}`")))?;
         let state = known.status(name).filter(|status| !status.is_stale);
@@ -169,27 +169,28 @@ fn planned(
             velocity: start.velocity.clamp(-limit.velocity, limit.velocity),
             acceleration: start.acceleration.clamp(-limit.acceleration, limit.acceleration),
         });
+        let mut bounds = JointBounds::NONE;
+        (bounds.joint, bounds.lower, bounds.upper) = (joint.name, limit.lower, limit.upper);
+        bounds.velocity = limit.velocity;
+        declared.push(bounds);
         limit.velocity *= options.speed;
         limits.push(limit);
     }
     let names: Arc<[String]> = joints.into();
-    // A joint at its limit whose measured motion leads out of it, if only by noise, cannot go on with that motion.
-    let is_within = |at: f64, limit: &JointMotionLimits| {
-        let tolerance = |bound: f64| ROUNDING * bound.abs().max(1.0);
-        at >= limit.lower - tolerance(limit.lower) && at <= limit.upper + tolerance(limit.upper)
-    };
-    let stays = |trajectory: &JointTrajectory| {
-        let mut points = trajectory.points.iter();
-        points.all(|point| point.positions.iter().zip(&limits).all(|(at, limit)| is_within(*at, limit)))
-    };
-    let moving = plan(&names, &from, points, &limits, POINT_PERIOD);
-    if let Ok(trajectory) = moving
-        && stays(&trajectory)
-    {
-        return Ok(trajectory);
+    // The measured motion may lead beyond a limit, if only by noise: a joint at the end of its range leaves it, and one at its largest
+    // velocity that still accelerates exceeds that, since its acceleration takes time to end. Then it begins with less of that motion.
+    let with_velocity = |start: &JointPoint| JointPoint { acceleration: 0.0, ..*start };
+    let at_rest = |start: &JointPoint| JointPoint { position: start.position, ..JointPoint::default() };
+    let starts = [from.clone(), from.iter().map(with_velocity).collect()];
+    for start in &starts {
+        if let Ok(mut trajectory) = plan(&names, start, points, &limits, POINT_PERIOD)
+            && declared.iter().all(|bounds| trajectory.limit(bounds).is_ok())
+        {
+            return Ok(trajectory);
+        }
     }
-    from.iter_mut().for_each(|start| *start = JointPoint { position: start.position, ..JointPoint::default() });
-    Ok(plan(&names, &from, points, &limits, POINT_PERIOD)?)
+    let start: Vec<_> = from.iter().map(at_rest).collect();
+    Ok(plan(&names, &start, points, &limits, POINT_PERIOD)?)
 }
 
 /// The position of a joint now, and its measured velocity and acceleration; zero where they are not measured.

@@ -122,7 +122,9 @@ impl Service for PidController {
     }
 
     fn update(&mut self, now: MonotonicTime) -> Result<Reading<PidState>, Fault> {
-        if let Some(state) = self.measurement.try_recv() {
+        // A message that arrives late, or twice, must not take the place of a newer one.
+        let is_newer = |time: MonotonicTime| self.latest.is_none_or(|(last, _)| time > last);
+        if let Some(state) = self.measurement.try_recv().filter(|state| is_newer(state.monotonic_time)) {
             // The sensor has its own rate: the derivative is that between its measurements.
             let interval_s = self.latest.map_or(0.0, |(last, _)| state.monotonic_time.seconds_since(last));
             self.pid.measured(state.position, interval_s);

@@ -82,6 +82,7 @@ impl<C: Payload + Into<ActuatorCommand>> Actuator for SimulatedActuator<C> {
         let world = context.shared(|| SimulatedWorld::new(context.topology()));
         let initial = options.initial.max(drivetrain.lower).min(drivetrain.upper);
         let now = context.clock().now();
+        world.set_clock(context.clock());
         let joint = world.add(context.joint(), drivetrain, initial, now)?;
         // A restarted one has lost its command.
         world.set_goal(joint, Goal::Stop, now);

@@ -57,6 +57,7 @@ pub(super) struct Coupling {
     masses: DMatrix<f64>,
     bias: Vec<f64>,
     accelerations: Vec<f64>,
+    sweeps: u64,
 }
 
 /// The accelerations of a step are found by this many sweeps at most, each joint in turn. For a positive definite mass matrix, also
@@ -78,7 +79,12 @@ impl Coupling {
         dynamics.mass_matrix(&mut masses).ok()?;
         let has_mass = masses.iter().any(|mass| *mass != 0.0);
         let (bias, accelerations) = (vec![0.0; size], vec![0.0; size]);
-        has_mass.then_some(Self { dynamics, vectors, masses, bias, accelerations })
+        has_mass.then_some(Self { dynamics, vectors, masses, bias, accelerations, sweeps: 0 })
+    }
+
+    /// How many sweeps over the joints all steps together have taken; a step takes one at least.
+    pub(super) fn sweeps(&self) -> u64 {
+        self.sweeps
     }
 
     /// Sets the load of each joint for the step that begins at `now`.
@@ -116,12 +122,14 @@ impl Coupling {
         // A root that is nowhere, by the function that moves it, loads no joint; a joint could not forget a NaN.
         if updated && self.bias.iter().all(|effort| effort.is_finite()) {
             self.solve(plants);
+        } else {
+            self.sweeps += 1;
         }
     }
 
     /// Finds accelerations and loads that agree: the projected Gauss–Seidel method.
     fn solve(&mut self, plants: &mut [Option<Plant>]) {
-        let Self { vectors, masses, bias, accelerations, .. } = self;
+        let Self { vectors, masses, bias, accelerations, sweeps, .. } = self;
         accelerations.fill(0.0);
         for (joint, _, velocity) in &vectors.joints {
             if let Some(plant) = plants.get(*joint).and_then(Option::as_ref) {
@@ -129,6 +137,7 @@ impl Coupling {
             }
         }
         for _ in 0..SWEEPS {
+            *sweeps += 1;
             let (mut change, mut largest) = (0.0_f64, 1.0_f64);
             for (joint, _, velocity) in &vectors.joints {
                 let (velocity, Some(plant)) = (*velocity, plants.get_mut(*joint).and_then(Option::as_mut)) else {

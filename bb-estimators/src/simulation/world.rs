@@ -8,15 +8,15 @@ use super::root::RootMotion;
 use crate::motion::JointPoint;
 use bb_core::kinematics::{Frames, Kinematics, LinkMotion};
 use bb_core::topology::Topology;
-use bb_core::{Fault, MonotonicTime};
+use bb_core::{Clock, Fault, MonotonicTime};
 use nalgebra::{Isometry3, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// The most steps integrated while the lock is held: some tens of microseconds for a joint by itself, a few milliseconds for
-/// coupled ones.
-const MOST_STEPS: u64 = 1000;
+/// The most work done while the lock is held: steps of a joint by itself, or [sweeps](Coupling::sweeps) over coupled joints. That
+/// is some tens of microseconds, or up to a few milliseconds. Commands and disarming wait for it.
+const MOST_WORK: u64 = 1000;
 
 /// The joints of a simulated robot, moved by [`SimulatedActuator`](super::SimulatedActuator)s and measured by
 /// simulated sensors.
@@ -37,9 +37,13 @@ pub(super) struct State {
     /// By joint; `None` if nothing moves it.
     plants: Vec<Option<Plant>>,
     /// `None` if no link that moves has a mass.
-    coupling: Option<Coupling>,
+    pub(super) coupling: Option<Coupling>,
     /// The beginning of the present step of all plants, if they are coupled.
     time: MonotonicTime,
+    /// The clock of the run, once an actuator has told it.
+    clock: Option<Clock>,
+    /// When the run begins, as far as is known: nothing moves before.
+    start: MonotonicTime,
     root: RootMotion,
     /// m/s², in the world.
     gravity: Vector3<f64>,
@@ -49,18 +53,28 @@ pub(super) struct State {
 }
 
 impl State {
-    /// Integrates a joint, and all that are coupled to it, up to the last whole step before `now`, at most `most` steps. Returns
+    /// Has all joints begin with the run. Those of actuators that are created earlier, on virtual time before the first stamp of a
+    /// recording, rest until then.
+    fn begin(&mut self) {
+        let Some(start) = self.clock.as_ref().map(Clock::start).filter(|start| *start > self.start) else { return };
+        self.start = start;
+        self.time = self.time.max(start);
+        self.plants.iter_mut().flatten().for_each(|plant| plant.skip_to(start));
+    }
+
+    /// Integrates a joint, and all that are coupled to it, up to the last whole step before `now`, with `most` work at most. Returns
     /// whether it got there; what remains of the last step a plant does by itself. Steps in which nothing changes are skipped.
     pub(super) fn advance(&mut self, joint: usize, now: MonotonicTime, most: u64) -> bool {
+        self.begin();
         if self.plants.iter().all(Option::is_none) {
             self.time = self.time.max(now);
             return true;
         }
-        if self.coupling.is_none() {
+        let Some(begun) = self.coupling.as_ref().map(Coupling::sweeps) else {
             let plant = self.plants.get_mut(joint).and_then(Option::as_mut);
             return plant.is_none_or(|plant| plant.advance(now, most));
-        }
-        for _ in 0..most {
+        };
+        while self.coupling.as_ref().is_some_and(|coupling| coupling.sweeps() - begun < most) {
             let next = self.time + STEP;
             if next > now {
                 return true;
@@ -115,6 +129,8 @@ impl SimulatedWorld {
             plants: topology.joints.iter().map(|_| None).collect(),
             coupling: Coupling::new(topology),
             time: MonotonicTime::ZERO,
+            clock: None,
+            start: MonotonicTime::ZERO,
             root: RootMotion::default(),
             gravity: Vector3::new(0.0, 0.0, -GRAVITY),
             unplugged: BTreeSet::new(),
@@ -242,6 +258,11 @@ impl SimulatedWorld {
         Ok(())
     }
 
+    /// Tells it the clock of the run, whose joints rest until its [`start`](Clock::start).
+    pub(super) fn set_clock(&self, clock: &Clock) {
+        self.lock().clock.get_or_insert_with(|| clock.clone());
+    }
+
     /// Adds a motor to a joint, at `position`. A motor already there, from an actuator that is restarted, is left
     /// where it is.
     pub(super) fn add(
@@ -289,7 +310,7 @@ impl SimulatedWorld {
     fn advanced(&self, joint: usize, now: MonotonicTime) -> MutexGuard<'_, State> {
         loop {
             let mut state = self.lock();
-            if state.advance(joint, now, MOST_STEPS) {
+            if state.advance(joint, now, MOST_WORK) {
                 return state;
             }
             drop(state);

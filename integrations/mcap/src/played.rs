@@ -19,12 +19,16 @@ pub struct PlayedOptions {
     /// Added to the recorded stamps: the difference between this run's clock and that of the recorded run. Default: 0.
     #[option(default = 0.0, range = -1e9..=1e9, unit = "s")]
     pub offset: f64,
+    /// How long after its stamp a sensor's message is published: the time that it took from the measurement to the robot, which is
+    /// not recorded. The stamp remains that of the measurement. An estimator ignores it. Unit: s. Default: 0.
+    #[option(default = Duration::ZERO)]
+    pub delay: Duration,
 }
 
 impl PlayedOptions {
     /// The defaults, with this recording.
     pub fn of(file: impl AsRef<Path>) -> Self {
-        Self { file: file.as_ref().to_owned(), path: String::new(), offset: 0.0 }
+        Self { file: file.as_ref().to_owned(), path: String::new(), offset: 0.0, delay: Duration::ZERO }
     }
 }
 
@@ -63,14 +67,19 @@ impl<T: Payload> Played<T> {
     }
 }
 
-/// Publishes what a recording contains of a sensor, at the recorded stamps.
+/// Publishes what a recording contains of a sensor, with the recorded stamps.
 ///
-/// On virtual time, the run starts at the first stamp of its recordings. In real time, set
+/// Each message is published at its stamp, the time of its measurement. Those of a sensor with stamps of its own were published
+/// later, by a latency that a recording does not contain: give it as [`delay`](PlayedOptions::delay) if what runs on the messages
+/// depends on it.
+///
+/// On virtual time, the run starts when the first message of its recordings is due. In real time, set
 /// [`offset`](PlayedOptions::offset) so that the recording begins after the start: messages that would have been due
 /// before it are left out.
 #[derive(Debug)]
 pub struct PlayedSensor<T: Payload> {
     played: Played<T>,
+    delay: Duration,
     first: Option<MonotonicTime>,
 }
 
@@ -81,12 +90,12 @@ impl<T: Payload> Sensor for PlayedSensor<T> {
     fn init(options: PlayedOptions, context: &SensorContext) -> Result<Self, Fault> {
         let mut played = Played::open(&options, context.path())?;
         // After a restart, and in real time.
-        let now = context.clock().now();
-        while now > MonotonicTime::ZERO && played.next_time().is_some_and(|time| time < now) {
+        let (now, delay) = (context.clock().now(), options.delay);
+        while now > MonotonicTime::ZERO && played.next_time().is_some_and(|time| time + delay < now) {
             played.advance()?;
         }
-        let first = played.next_time();
-        Ok(Self { played, first })
+        let first = played.next_time().map(|time| time + delay);
+        Ok(Self { played, delay, first })
     }
 
     fn starts_at(&self) -> Option<MonotonicTime> {
@@ -96,7 +105,7 @@ impl<T: Payload> Sensor for PlayedSensor<T> {
     fn read(&mut self, _: MonotonicTime) -> Result<Reading<T>, Fault> {
         let Some((time, payload)) = self.played.advance()? else { return Ok(Reading::finished()) };
         let next = self.played.next_time().unwrap_or(time);
-        Ok(Reading::at(time, payload).next_at(next))
+        Ok(Reading::at(time, payload).next_at(next + self.delay))
     }
 }
 
@@ -104,7 +113,12 @@ impl<T: Payload> Sensor for PlayedSensor<T> {
 ///
 /// It keeps the inputs of the declared estimator, `I`, and runs when a message of the driver arrives: it then emits
 /// the newest recorded message that is not younger than that message and was not emitted before, with the stamp of
-/// the driver's message. If the driver plays back the same recording, the output is the recorded one, bit for bit.
+/// the driver's message. If the driver plays back the same recording, the output of an estimator that emits at most once for each
+/// message of its driver is the recorded one, bit for bit. Of those emitted in between, by a timer or a continuation, only the
+/// newest at each message of the driver is emitted, with that message's stamp.
+///
+/// Whatever keeps the declared estimator from running does so here too: a required input that is missing or too old, or has no
+/// known transform.
 ///
 /// ```no_run
 /// use bb_core::prelude::*;
@@ -136,7 +150,8 @@ impl<I: Inputs, T: Payload> Estimator for PlayedEstimator<I, T> {
     type Input = I;
     type Output = T;
 
-    // It needs no transform, so its inputs may span any joint.
+    // Its inputs may span the same joints as those of the declared estimator, and `handle_transforms` gives it the stamp of the
+    // driver's message. As there, a dispatch is dropped if a joint to a required input is unknown.
     const HANDLES_MOVING_JOINTS: bool = true;
 
     fn init(options: PlayedOptions, context: &Context) -> Result<Self, Fault> {

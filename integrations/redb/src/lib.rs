@@ -44,6 +44,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::io::ErrorKind;
 use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// By path, the value as JSON, which other programs can read.
 const PARAMETERS: TableDefinition<'_, &str, &str> = TableDefinition::new("parameters");
@@ -108,16 +109,22 @@ impl RedbStore {
     }
 }
 
-/// Creates an empty store. A file that is written only in part is not a store, so it gets its name once it is complete.
+/// Creates an empty store, unless another program does so at the same time. A file that is written only in part is not a store, so
+/// it gets its name once it is complete.
 fn create(file: &Path) -> Result<(), redb::Error> {
+    // Nobody else writes to this one.
+    static CREATED: AtomicU64 = AtomicU64::new(0);
+    let number = CREATED.fetch_add(1, Ordering::Relaxed);
     let mut part = file.as_os_str().to_owned();
-    part.push(".part");
-    match std::fs::remove_file(&part) {
+    part.push(format!(".{}-{number}.part", std::process::id()));
+    let part = Path::new(&part);
+    // A killed program, whose number this one has got, may have left its own.
+    match std::fs::remove_file(part) {
         Err(error) if error.kind() != ErrorKind::NotFound => return Err(error.into()),
         _ => {}
     }
-    drop(Database::create(&part)?);
-    std::fs::rename(&part, file)?;
+    drop(Database::create(part)?);
+    publish(part, file)?;
     // The name, too, must survive a loss of power.
     #[cfg(unix)]
     {
@@ -125,6 +132,19 @@ fn create(file: &Path) -> Result<(), redb::Error> {
         std::fs::File::open(folder.unwrap_or(Path::new(".")))?.sync_all()?;
     }
     Ok(())
+}
+
+/// Gives the file `part` the name `file`, unless there is one: another program may have created it, and have it open.
+fn publish(part: &Path, file: &Path) -> std::io::Result<()> {
+    // Unlike `rename`, it does not replace a file.
+    match std::fs::hard_link(part, file) {
+        Ok(()) => {}
+        Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+        // A file system without hard links, such as FAT.
+        Err(_) if !file.exists() => return std::fs::rename(part, file),
+        Err(_) => {}
+    }
+    std::fs::remove_file(part)
 }
 
 impl ParameterStore for RedbStore {

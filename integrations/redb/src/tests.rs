@@ -145,3 +145,63 @@ fn a_file_that_is_no_store_is_refused_and_left_as_it_is() {
     assert_eq!(std::fs::read_to_string(&file).ok(), Some("gains: 4.5\n".repeat(2000)));
     std::fs::remove_file(&file).expect("it is there");
 }
+
+/// A folder of its own, which is removed at the end.
+struct Folder(std::path::PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let folder = std::env::temp_dir().join(format!("bb-redb-{name}-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).expect("it is writable");
+        Self(folder)
+    }
+
+    fn names(&self) -> Vec<std::ffi::OsString> {
+        let entries = std::fs::read_dir(&self.0).expect("it is there");
+        entries.map(|entry| entry.expect("it is readable").file_name()).collect()
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+#[test]
+fn a_store_that_another_program_has_created_meanwhile_is_kept() {
+    let folder = Folder::new("meanwhile");
+    let file = folder.0.join("store.redb");
+    let mut other = RedbStore::open(&file).expect("it is created");
+    // What `open` does where there was no file a moment ago.
+    create(&file).expect("there is one");
+    other.store(&set(1)).expect("it is open");
+    drop(other);
+    assert_eq!(RedbStore::open(&file).and_then(|mut store| store.load()).expect("it opens"), set(1));
+    assert_eq!(folder.names(), ["store.redb"]);
+}
+
+#[test]
+fn one_of_many_that_create_a_store_at_once_has_it_open() {
+    let folder = Folder::new("at_once");
+    for round in 0..20 {
+        let file = folder.0.join(format!("store-{round}.redb"));
+        let (threads, gate) = (4, std::sync::Barrier::new(4));
+        let opened: Vec<_> = std::thread::scope(|scope| {
+            let open = || {
+                gate.wait();
+                RedbStore::open(&file)
+            };
+            let threads: Vec<_> = (0..threads).map(|_| scope.spawn(open)).collect();
+            threads.into_iter().map(|thread| thread.join().expect("no panic")).collect()
+        });
+        let errors: Vec<_> = opened.iter().filter_map(|opened| opened.as_ref().err()).collect();
+        assert_eq!(errors.len(), threads - 1, "{errors:?}");
+        assert!(errors.iter().all(|error| error.to_string().contains("already open")), "{errors:?}");
+        for mut store in opened.into_iter().flatten() {
+            store.store(&set(round)).expect("it is open");
+        }
+        assert_eq!(RedbStore::open(&file).and_then(|mut store| store.load()).expect("it opens"), set(round));
+    }
+    assert_eq!(folder.names().len(), 20, "{:?}", folder.names());
+}

@@ -22,6 +22,7 @@ fn set(number: i64) -> BTreeMap<String, ParameterValue> {
 #[ignore = "the next test runs it as a process of its own"]
 fn stores_until_it_is_killed() {
     let Some(file) = std::env::var_os(FILE) else { return };
+    println!("opening");
     let mut store = RedbStore::open(file).expect("it opens");
     let first = match store.load().expect("it is whole").get("param/number_0") {
         Some(ParameterValue::Integer(number)) => number + 1,
@@ -71,4 +72,41 @@ fn a_store_that_is_killed_opens_with_the_last_complete_set() {
         last = number;
     }
     std::fs::remove_file(&file).expect("it is there");
+}
+
+#[test]
+fn a_store_that_is_killed_while_it_is_created_opens() {
+    let folder = std::env::temp_dir().join(format!("bb-redb-created-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).expect("it is writable");
+    let mut random = 0x2545_F491_u64 ^ u64::from(std::process::id());
+    let (mut before, mut after) = (0, 0);
+    for round in 0..40_i64 {
+        let file = folder.join(format!("{round}.redb"));
+        let mut child = Command::new(std::env::current_exe().expect("it runs"))
+            .args(["--exact", "stores_until_it_is_killed", "--ignored", "--nocapture"])
+            .env(FILE, &file)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("it starts");
+        let mut lines = BufReader::new(child.stdout.take().expect("it is piped")).lines().map_while(Result::ok);
+        lines.by_ref().find(|line| line.ends_with("opening")).expect("it begins");
+        random ^= random << 13;
+        random ^= random >> 7;
+        random ^= random << 17;
+        // From before the file exists until it has its name.
+        std::thread::sleep(Duration::from_micros(random % 4_000 * (round % 4 + 1).unsigned_abs() / 2));
+        child.kill().expect("it runs");
+        child.wait().expect("it has ended");
+        if file.exists() {
+            after += 1
+        } else {
+            before += 1
+        }
+        let mut store = RedbStore::open(&file).unwrap_or_else(|error| panic!("round {round}: {error}"));
+        store.load().unwrap_or_else(|error| panic!("round {round}: {error}"));
+        store.store(&set(round)).unwrap_or_else(|error| panic!("round {round}: {error}"));
+    }
+    eprintln!("{before} killed before the file had its name, {after} after");
+    std::fs::remove_dir_all(&folder).expect("it is there");
 }

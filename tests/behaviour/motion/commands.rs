@@ -281,6 +281,51 @@ fn a_joint_that_moves_out_of_its_range_is_planned_from_rest() -> Result<(), Fail
     Ok(())
 }
 
+robot! {
+    robot Winch;
+    commands { wind: MoveJoints(speed = 1.0, acceleration = 2.0, jerk = 20.0); }
+    link base {
+        joint drum: continuous {
+            axis: z;
+            limit: { velocity: 1 rad/s, effort: 10 N*m };
+            actuator motor: SimulatedActuator();
+            sensor encoder: SimulatedEncoder(velocity_noise = 0.01) { rate: 1000 Hz; }
+            link rope;
+        }
+    }
+}
+
+/// The jerk is finite, so the acceleration that noise pretends would take the planned velocity above the limit.
+#[test]
+fn a_joint_at_its_largest_velocity_may_be_commanded_however_noisy_that_is() -> Result<(), Failure> {
+    let mut kept = 0;
+    for seed in 0..100 {
+        let mut builder = Winch::builder();
+        builder.options(winch::sensor::base::drum::encoder).seed = seed;
+        let mut simulation = builder.simulate()?;
+        simulation.run_until(at(10));
+        assert_eq!(simulation.arm(), Ok(()));
+        let motor = winch::actuator::base::drum::motor;
+        simulation.actuate(motor, VelocityCommand { velocity: 1.0, effort: None }.into())?;
+        simulation.run_for(Duration::from_millis(1_000));
+        let sent = simulation.subscribe_any(Select::Path(motor.path()), None, Overflow::default());
+        let targets =
+            JointTargets { joints: vec!["drum".into()], points: vec![JointTarget { positions: vec![5.0] }] };
+        let execution = simulation.command(winch::command::wind, targets)?;
+        simulation.run_for(Duration::from_secs(8));
+        assert_eq!(execution.try_result(), Some(Ok(())), "seed {seed}");
+        let sent = sent.try_recv().ok_or("it is sent")?;
+        let Some(ActuatorCommand::Trajectory(trajectory)) =
+            sent.downcast::<ActuatorCommand>().map(|command| command.payload.clone())
+        else {
+            return Err("a trajectory".into());
+        };
+        kept += u32::from(trajectory.points[0].velocities[0] > 0.9);
+    }
+    assert_eq!(kept, 100, "it goes on with its velocity");
+    Ok(())
+}
+
 /// A motor that reports a motion more often than it has any.
 #[derive(Debug)]
 struct Chatty(ActuatorContext, MonotonicTime);

@@ -45,6 +45,46 @@ fn a_controller_that_is_blind_holds_its_joint() -> Result<(), Failure> {
 }
 
 robot! {
+    robot Servo;
+    controllers {
+        controller hold: PidController(
+            measurement = "sensor/base/arm/encoder", actuator = "actuator/base/arm/motor", stale_after = 1 s,
+        ) { rate: 100 Hz; }
+    }
+    link base {
+        joint arm: continuous {
+            axis: z;
+            limit: { velocity: 3 rad/s, effort: 2 N*m };
+            actuator motor: SimulatedActuator();
+            sensor encoder: External<JointState>();
+            link hand;
+        }
+    }
+}
+
+/// A message that was kept back on its way, or arrives twice, is not the newest measurement.
+#[test]
+fn a_controller_does_not_go_back_to_an_older_measurement() -> Result<(), Failure> {
+    let mut simulation = Servo::builder().simulate()?;
+    assert_eq!(simulation.arm(), Ok(()));
+    let terms = simulation.subscribe(servo::controller::hold);
+    let mut measured = |now: i64, stamp: i64, position: f64| -> Result<f64, Failure> {
+        simulation.run_until(at(now - 1));
+        let _ = terms.drain().count();
+        let state = JointState { position, velocity: None, effort: None };
+        simulation.publish(servo::sensor::base::arm::encoder, at(stamp), state);
+        simulation.run_until(at(now));
+        Ok(terms.drain().last().ok_or("it commands")?.measurement)
+    };
+    assert_eq!(measured(100, 99, 0.5)?, 0.5);
+    assert_eq!(measured(200, 199, 0.4)?, 0.4);
+    assert_eq!(measured(300, 150, 0.9)?, 0.4, "it is older");
+    assert_eq!(measured(400, 199, 0.8)?, 0.4, "it is as old");
+    assert_eq!(measured(500, 200, 0.3)?, 0.3);
+    Ok(())
+}
+
+robot! {
     robot Sump;
     controllers {
         controller level: ThresholdController(

@@ -249,6 +249,24 @@ fn a_joint_whose_clock_is_set_back_is_known_again() {
 }
 
 #[test]
+fn a_clock_that_is_set_back_is_noticed_if_each_state_arrives_twice() {
+    let mut history = History::new(JointKind::Revolute, 64, 10_000_000_000);
+    history.add(state(1_000, &[0.0], &[])).expect("it is the first");
+    let twice = (0..300).step_by(10).flat_map(|millis| [millis, millis]);
+    let added: Vec<_> = twice.map(|millis| history.add(state(millis, &[millis as f64], &[]))).collect();
+    let (refused, known) = added.split_at(20);
+    assert!(refused.iter().all(|added| *added == Err(JointRefusal::OutOfOrder)), "for 100 ms: {added:?}");
+    assert!(known.iter().step_by(2).all(Result::is_ok), "{added:?}");
+    assert!(known.iter().skip(1).step_by(2).all(|added| *added == Err(JointRefusal::Duplicate)), "{added:?}");
+    // Two states, however often they are repeated, are no succession.
+    let mut history = History::new(JointKind::Revolute, 64, 10_000_000_000);
+    history.add(state(1_000, &[0.0], &[])).expect("it is the first");
+    for millis in [0; 20].into_iter().chain([200; 20]) {
+        assert_eq!(history.add(state(millis, &[0.0], &[])), Err(JointRefusal::OutOfOrder));
+    }
+}
+
+#[test]
 fn late_states_do_not_restart_the_history() {
     let mut history = History::new(JointKind::Revolute, 64, 10_000_000_000);
     // A second source is 300 ms late, and a third delivers old states in reverse.

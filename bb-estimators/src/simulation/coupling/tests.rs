@@ -310,6 +310,53 @@ fn an_arm_at_rest_catches_up_at_once() {
     assert!((fallen[0].position - rest[0].position).abs() > 0.01, "{fallen:?}");
 }
 
+/// Eight parallel joints whose motors have little inertia, the worst case for the sweeps.
+static CHAIN: Topology = Topology {
+    links: &[
+        link("base", None, 9.0, [0.0; 3]),
+        link("l1", Some(0), 1.0, [0.2, 0.0, 0.0]),
+        link("l2", Some(1), 1.0, [0.2, 0.0, 0.0]),
+        link("l3", Some(2), 1.0, [0.2, 0.0, 0.0]),
+        link("l4", Some(3), 1.0, [0.2, 0.0, 0.0]),
+        link("l5", Some(4), 1.0, [0.2, 0.0, 0.0]),
+        link("l6", Some(5), 1.0, [0.2, 0.0, 0.0]),
+        link("l7", Some(6), 1.0, [0.2, 0.0, 0.0]),
+        link("l8", Some(7), 1.0, [0.2, 0.0, 0.0]),
+    ],
+    joints: &[
+        joint("j1", 1, [0.0, 0.0, 0.4], [0.0, 1.0, 0.0], JointKind::Continuous),
+        joint("j2", 2, [0.4, 0.0, 0.0], [0.0, 1.0, 0.0], JointKind::Continuous),
+        joint("j3", 3, [0.4, 0.0, 0.0], [0.0, 1.0, 0.0], JointKind::Continuous),
+        joint("j4", 4, [0.4, 0.0, 0.0], [0.0, 1.0, 0.0], JointKind::Continuous),
+        joint("j5", 5, [0.4, 0.0, 0.0], [0.0, 1.0, 0.0], JointKind::Continuous),
+        joint("j6", 6, [0.4, 0.0, 0.0], [0.0, 1.0, 0.0], JointKind::Continuous),
+        joint("j7", 7, [0.4, 0.0, 0.0], [0.0, 1.0, 0.0], JointKind::Continuous),
+        joint("j8", 8, [0.4, 0.0, 0.0], [0.0, 1.0, 0.0], JointKind::Continuous),
+    ],
+};
+
+/// Commands and disarming wait for the lock: what is done under it is bounded however slowly the sweeps converge.
+#[test]
+fn the_work_under_the_lock_is_bounded() {
+    let world = SimulatedWorld::new(&CHAIN);
+    for joint in CHAIN.joints {
+        world.add(joint.name, Drivetrain { inertia: 0.01, ..FREE }, 0.1, at(0)).expect("it is declared");
+    }
+    let sweeps = || world.lock().coupling.as_ref().map_or(0, Coupling::sweeps);
+    let (begun, mut most) = (sweeps(), 0);
+    loop {
+        let before = sweeps();
+        let has_arrived = world.lock().advance(0, at(50_000), 1_000);
+        most = most.max(sweeps() - before);
+        if has_arrived {
+            break;
+        }
+    }
+    assert!(sweeps() - begun > 10_000, "it is a slow one: {}", sweeps() - begun);
+    // The last step is finished.
+    assert!(most < 1_000 + u64::from(SWEEPS), "{most}");
+}
+
 /// Two loops of control that are not synchronized: no step of the integration is whole.
 #[test]
 fn a_joint_arrives_while_another_one_is_commanded_all_the_time() {

@@ -74,6 +74,30 @@ fn a_recorded_sensor_publishes_what_it_measured_and_all_others_run_on_it() -> Re
     Ok(())
 }
 
+/// A delayed message has the stamp of its measurement, and is published later.
+#[test]
+fn a_recorded_sensor_may_be_as_late_as_it_was() -> Result<(), Failure> {
+    let (file, first) = recorded("played_delay")?;
+    let mut builder = Walker::builder();
+    let options = PlayedOptions { delay: Duration::from_millis(25), ..PlayedOptions::of(&file) };
+    builder.replace_sensor::<PlayedSensor<Marg>>(IMU, options)?;
+    let samples = builder.subscribe(walker::sensor::base::imu);
+    let tilts = builder.subscribe(walker::sensor::base::imu::tilt);
+    let mut simulation = builder.simulate()?;
+    let mut published = Vec::new();
+    while simulation.step() {
+        let now = simulation.clock().now();
+        for sample in samples.drain() {
+            assert_eq!(now.nanos_since(sample.monotonic_time), 25_000_000);
+            published.push(sample);
+        }
+    }
+    simulation.stop().ok()?;
+    assert_eq!(published, first.samples);
+    assert_eq!(tilts.drain().collect::<Vec<_>>(), first.tilts);
+    Ok(())
+}
+
 #[test]
 fn a_recorded_estimator_emits_what_it_emitted() -> Result<(), Failure> {
     let (file, first) = recorded("played_estimator")?;
