@@ -16,6 +16,9 @@ const SAME: f64 = 0.1;
 /// A field further from the reference than this many times that, squared, is that of iron and says nothing about a drift.
 const NEARBY: f64 = 4.0;
 
+/// A changed field nearer than that is iron that the body passes, for up to this time, s, and part of a drift from then on.
+const PASSING_S: f64 = 6.0;
+
 /// Time constant of the mean over a field that may become the reference, s. VQF's `magCurrentTau` is 0.05 s, with an
 /// additional wait of 20 s; here, mean and wait are one.
 const CANDIDATE_TIME_CONSTANT_S: f64 = 5.0;
@@ -48,6 +51,10 @@ const SLOW_S: f64 = CANDIDATE_TIME_CONSTANT_S;
 /// How soon the size of a drift is forgotten, s: longer than the drifts that the heading follows take.
 const DRIFT_TIME_CONSTANT_S: f64 = 60.0;
 
+/// A drift is one from the mean of this many seconds: much longer than a drift takes, but a change that lasts becomes
+/// the usual field, however long the filter has run.
+const DRIFT_MEAN_S: f64 = 5.0 * DRIFT_TIME_CONSTANT_S;
+
 /// A larger deviation from the reference, as a multiple of it, makes no difference.
 const LARGEST: f64 = 10.0;
 
@@ -73,6 +80,7 @@ struct Drift<T> {
     mean: Plane<T>,
     /// Squared distance between the two: the largest of late.
     squared: T,
+    /// The time averaged over, s.
     duration: T,
 }
 
@@ -83,7 +91,7 @@ impl<T: Real> Drift<T> {
 
     /// Adds the field of a window of `dt` seconds.
     fn add(&mut self, dt: T, field: Plane<T>) {
-        self.duration += dt;
+        self.duration = (self.duration + dt).min(T::of(DRIFT_MEAN_S));
         approach(&mut self.slow, field, dt / self.duration.min(T::of(SLOW_S)));
         // Until a first mean exists, the start is not part of a drift: the tilt may still be wrong.
         let gain = if self.duration < T::of(SLOW_S) { T::ONE } else { dt / self.duration };
@@ -110,6 +118,8 @@ pub(super) struct FieldReference<T> {
     /// Squared size of the disturbance: the largest recent one.
     disturbance: T,
     contradicted_s: T,
+    /// How long the field has differed from the reference, s.
+    changed_s: T,
     drift: Drift<T>,
 }
 
@@ -123,6 +133,7 @@ impl<T: Real> FieldReference<T> {
             candidate_s: T::ZERO,
             disturbance: T::ZERO,
             contradicted_s: T::ZERO,
+            changed_s: T::ZERO,
             drift: Drift::new(field),
         }
     }
@@ -194,11 +205,13 @@ impl<T: Real> FieldReference<T> {
             self.candidate_s = self.candidate_s.min(T::of(LEAST_EVIDENCE_S));
         }
 
-        // Iron nearby is no drift: the filter does not follow it.
-        if distance(field, self.reference) < T::of(NEARBY) * same {
+        let difference = distance(field, self.reference);
+        let undisturbed = difference < same;
+        self.changed_s = if undisturbed { T::ZERO } else { (self.changed_s + dt).min(T::of(PASSING_S)) };
+        // Iron that is passed is no drift: the filter hardly follows it.
+        if undisturbed || (difference < T::of(NEARBY) * same && self.changed_s >= T::of(PASSING_S)) {
             self.drift.add(dt, field);
         }
-        let undisturbed = distance(field, self.reference) < same;
         if undisturbed {
             self.seen_s = (self.seen_s + dt).min(T::of(MOST_EVIDENCE_S));
         }
@@ -252,6 +265,8 @@ fn shortened<T: Real>(field: Plane<T>, longest: T) -> Plane<T> {
 
 #[cfg(test)]
 mod tests {
+    use std::vec::Vec;
+
     use super::*;
 
     const WINDOW_S: f64 = 0.03;
@@ -262,6 +277,32 @@ mod tests {
         (1..=windows)
             .find(|_| reference.observe(WINDOW_S, field, false) == Verdict::HeadingUnknown)
             .map(|window| f64::from(window) * WINDOW_S)
+    }
+
+    /// Standard deviation of the heading by the drift, degrees: the most, and half an hour after a step of the field that
+    /// comes after hours.
+    fn after_a_step<T: Real>(hours: i32) -> [f64; 2] {
+        let window_s = T::of(0.08);
+        let mut reference = FieldReference::new([T::of(20.0), T::of(-45.0)]);
+        for _ in 0..hours * 45_000 {
+            reference.observe(window_s, [T::of(20.0), T::of(-45.0)], false);
+        }
+        let mut deviation = || {
+            assert_ne!(reference.observe(window_s, [T::of(24.6), T::of(-45.0)], false), Verdict::HeadingUnknown);
+            reference.drift_variance().as_f64().sqrt().to_degrees()
+        };
+        let deviations: Vec<_> = (0..22_500).map(|_| deviation()).collect();
+        [deviations.iter().copied().fold(0.0, f64::max), deviations[deviations.len() - 1]]
+    }
+
+    #[test]
+    fn a_lasting_change_becomes_the_usual_field_however_long_it_has_run() {
+        for hours in [1, 10, 30] {
+            for [most, left] in [after_a_step::<f64>(hours), after_a_step::<f32>(hours)] {
+                assert!(most > 5.0, "the heading may have followed it: {most}");
+                assert!(left < 0.5, "{left} after {hours} h");
+            }
+        }
     }
 
     #[test]

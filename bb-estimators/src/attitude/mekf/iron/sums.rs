@@ -69,6 +69,8 @@ pub(super) struct Fit<T> {
     pub(super) lag: T,
     /// Covariance of both.
     pub(super) covariance: Matrix4<T>,
+    /// The determinant of the offset's information, with any lag: that of its covariance, by the noise, is one by this.
+    offset_determinant: T,
     /// B there, in the world.
     pub(super) field: Vector3<T>,
     /// ∂B/∂x, negated: the means of R and q.
@@ -152,7 +154,12 @@ impl<T: Real> Sums<T> {
         }
         regular[(3, 3)] += lag_information;
         right[3] += lag_information * prior.mean;
-        let inverse = regular.cholesky()?.inverse();
+        let factor = regular.cholesky()?;
+        // By Schur's complement. Every factor is positive; the determinant of the covariance of a body that turns about
+        // one axis is a difference below the rounding of its terms in `f32`.
+        let root = factor.l_dirty().diagonal().product();
+        let offset_determinant = root * root / regular[(3, 3)];
+        let inverse = factor.inverse();
         let solution = inverse * right;
         let mut fit = Fit {
             duration: self.duration,
@@ -162,6 +169,7 @@ impl<T: Real> Sums<T> {
             offset: solution.xyz(),
             lag: solution.w,
             covariance: inverse,
+            offset_determinant,
             field: mean_field - slope * solution.xyz() - mean_rate * solution.w,
             slope,
             rate: mean_rate,
@@ -189,9 +197,9 @@ impl<T: Real> Fit<T> {
     /// How much the data tells about the offset: the logarithm of the ratio of its prior and its own volume, squared.
     pub(super) fn offset_information(&self, unit: T) -> T {
         let prior = T::of(PRIOR_OFFSET) * unit;
-        let relative = self.covariance.fixed_view::<3, 3>(0, 0) / (prior * prior);
+        let noise = self.noise / (prior * prior);
         // The prior is scaled by the noise of the fit, so that little data may seem to say less than nothing.
-        (-relative.determinant().ln()).max(T::ZERO)
+        (self.offset_determinant / (noise * noise * noise)).ln().max(T::ZERO)
     }
 
     /// The field in the world with an offset and a lag.
@@ -226,5 +234,46 @@ impl<T: Real> Fit<T> {
         let on_body = self.slope.tr_mul(&across);
         let gradient = Vector4::new(on_body.x, on_body.y, on_body.z, self.rate.dot(&across));
         gradient.dot(&(self.covariance * gradient)) + self.noise / (self.duration * squared)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DT_S: f64 = 0.08;
+    const FIELD: Vector3<f64> = Vector3::new(0.0, 20.0, -45.0);
+
+    /// The information on the offset after 30 s of turning about one axis at 1 rad/s.
+    fn information<T: Real>(axis: &Vector3<f64>) -> f64 {
+        let cast = |vector: Vector3<f64>| vector.map(T::of);
+        let mut sums = Sums::<T>::new();
+        for window in 0..375 {
+            let rotation = UnitQuaternion::from_scaled_axis(axis * (DT_S * f64::from(window)));
+            sums.add(
+                T::of(DT_S),
+                T::of(1.0 - DT_S / 30.0),
+                &FieldMeans {
+                    rotation: rotation.to_rotation_matrix().matrix().map(T::of),
+                    field: cast(FIELD),
+                    rate: cast(axis.cross(&FIELD)),
+                },
+            );
+        }
+        let fit = sums.fit(T::of(FIELD.norm()), Lag { mean: T::ZERO, variance: T::of(1e-4) });
+        fit.expect("information is positive definite").offset_information(T::of(FIELD.norm())).as_f64()
+    }
+
+    #[test]
+    fn turning_about_one_axis_tells_as_much_in_single_precision() {
+        for direction in 0..200 {
+            let height = (f64::from(direction) + 0.5) / 100.0 - 1.0;
+            let (sin, cos) = (2.4 * f64::from(direction)).sin_cos();
+            let around = (1.0 - height * height).sqrt();
+            let axis = Vector3::new(around * cos, around * sin, height);
+            let (single, double) = (information::<f32>(&axis), information::<f64>(&axis));
+            assert!(double > 15.0, "two axes of three: {double}");
+            assert!((single - double).abs() < 0.01 * double, "{axis:?}: {single}, in `f64` {double}");
+        }
     }
 }
