@@ -209,9 +209,18 @@ impl<const N: usize> Covariance<N> {
         self.bound(layout);
     }
 
-    /// Scales the covariance of position and velocity. Their correlation coefficients, also with other states, remain.
-    pub(in crate::navigation) fn scale_motion(&mut self, layout: &Layout<N>, factor: f64) {
-        let scales = layout.blocks.map(|block| if layout.motion.contains(&block) { sqrt(factor) } else { 1.0 });
+    /// Adds noise to one direction in the space of errors: `P ← P + factor · along alongᵀ`.
+    pub(in crate::navigation) fn raise_along(&mut self, layout: &Layout<N>, along: &[f64; N], factor: f64) {
+        let deviations = along.map(|x| x * sqrt(factor));
+        for (row, deviation) in self.rows_mut().iter_mut().zip(deviations) {
+            row.iter_mut().zip(deviations).for_each(|(x, other)| *x += deviation * other);
+        }
+        self.bound(layout);
+    }
+
+    /// Scales the covariance of some states. Their correlation coefficients, also with other states, remain.
+    pub(in crate::navigation) fn scale(&mut self, layout: &Layout<N>, states: &[bool; N], factor: f64) {
+        let scales = states.map(|is_scaled| if is_scaled { sqrt(factor) } else { 1.0 });
         for (row, scale) in self.rows_mut().iter_mut().zip(scales) {
             row.iter_mut().zip(scales).for_each(|(x, other)| *x *= scale * other);
         }
