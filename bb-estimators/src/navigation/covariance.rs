@@ -209,15 +209,6 @@ impl<const N: usize> Covariance<N> {
         self.bound(layout);
     }
 
-    /// Adds noise to one direction in the space of errors: `P ← P + factor · along alongᵀ`.
-    pub(in crate::navigation) fn raise_along(&mut self, layout: &Layout<N>, along: &[f64; N], factor: f64) {
-        let deviations = along.map(|x| x * sqrt(factor));
-        for (row, deviation) in self.rows_mut().iter_mut().zip(deviations) {
-            row.iter_mut().zip(deviations).for_each(|(x, other)| *x += deviation * other);
-        }
-        self.bound(layout);
-    }
-
     /// Scales the covariance of some states. Their correlation coefficients, also with other states, remain.
     pub(in crate::navigation) fn scale(&mut self, layout: &Layout<N>, states: &[bool; N], factor: f64) {
         let scales = states.map(|is_scaled| if is_scaled { sqrt(factor) } else { 1.0 });

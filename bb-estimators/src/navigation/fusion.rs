@@ -36,7 +36,9 @@ pub(super) enum Sight<const N: usize> {
 enum Jump {
     /// As a whole, and its correlations are set to zero.
     Block,
-    /// Only what the measurement observes of it, `uᵀ H_b x_b`, as if noise had been added to that. It keeps its correlations.
+    /// Only those of its errors that the measurement observes, as if each had received noise of its own, in proportion to its
+    /// covariance with `uᵀ H_b x_b`. Which of them has jumped, such as the height or the bias of the barometer, is then unknown.
+    /// Correlations remain, and a keyframe, which has nothing to do with the way since, keeps its covariance.
     Observed,
 }
 
@@ -249,17 +251,35 @@ fn fitted_by_one<const D: usize, const N: usize>(
         let block = u8::try_from(block).ok()?;
         match jump {
             Jump::Block => covariance.raise(layout, block, factor),
-            Jump::Observed => {
-                let is_observed = |i: usize| layout.blocks[i] == block && seen[i] != 0.0;
-                let mut along = [0.0; N];
-                for i in (0..N).filter(|i| is_observed(*i)) {
-                    along[i] = (0..N).filter(|j| is_observed(*j)).map(|j| p[(i, j)] * seen[j]).sum();
-                }
-                covariance.raise_along(layout, &along, (factor - 1.0) / part);
-            }
+            Jump::Observed => raise_observed(covariance, layout, block, &seen, (factor - 1.0) * part)?,
         }
     }
     raised(covariance, model).ok()
+}
+
+/// Adds noise to the errors of a block that a measurement observes, `seen`, until their contribution has grown by `amount`; `None` if
+/// that is impossible.
+fn raise_observed<const N: usize>(
+    covariance: &mut Covariance<N>,
+    layout: &Layout<N>,
+    block: u8,
+    seen: &SVector<f64, N>,
+    amount: f64,
+) -> Option<()> {
+    let p = covariance.matrix();
+    let is_observed = |i: usize| layout.blocks[i] == block && seen[i] != 0.0;
+    let mut shares = [0.0; N];
+    for i in (0..N).filter(|i| is_observed(*i)) {
+        shares[i] = (0..N).filter(|j| is_observed(*j)).map(|j| p[(i, j)] * seen[j]).sum();
+    }
+    let unit: f64 = (0..N).map(|i| seen[i] * seen[i] * shares[i] * shares[i]).sum();
+    let noise = amount / unit;
+    if !noise.is_finite() {
+        return None;
+    }
+    (0..N).for_each(|i| covariance.inflate(i, noise * shares[i] * shares[i]));
+    covariance.bound(layout);
+    Some(())
 }
 
 /// The innovation once more, apart from the update that every measurement takes.

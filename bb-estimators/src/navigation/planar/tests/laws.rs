@@ -202,7 +202,9 @@ fn a_gap_that_fixes_divide_is_a_gap() {
         let fixes: Vec<_> = (21..70).step_by(5).filter(|_| is_divided).collect();
         let divide = |history: &mut History<Fixed, 150, 50, 6>| {
             let fix = PlanarPosition::new(Vector2::zeros(), 1e6);
-            fixes.iter().for_each(|taken| drop(history.update(taken * 10_000_000, &fix).unwrap()));
+            for taken in &fixes {
+                history.update(taken * 10_000_000, &fix).unwrap();
+            }
         };
         if !is_late {
             divide(&mut history);
@@ -237,7 +239,9 @@ fn a_pose_that_jumps_to_the_side_does_not_change_the_velocity() {
     (1..=200).for_each(|i| assert_eq!(pose(&mut filter, i, Vector2::zeros(), 0.3), 0));
     let before = filter.estimate().unwrap().velocity;
     // Both are off by 2.5 rad, as seen from where the filter is by then.
-    (201..=204).for_each(|i| drop(pose(&mut filter, i, Vector2::new(1.0, 0.0), 2.8)));
+    for i in 201..=204 {
+        pose(&mut filter, i, Vector2::new(1.0, 0.0), 2.8);
+    }
     let heading = filter.estimate().unwrap().heading;
     let recoveries = (205..=208).map(|i| pose(&mut filter, i, Vector2::new(1.0, 1.0), heading + 2.5)).last();
     assert_eq!(recoveries, Some(2));
