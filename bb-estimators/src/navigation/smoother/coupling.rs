@@ -80,7 +80,9 @@ pub(super) struct Coupling<const N: usize> {
     ends: Vec<u64>,
     /// The index of the pose at which the rows of each pose end; it never decreases. Λ and the front are zero beyond.
     reach: Vec<usize>,
-    /// The first pose whose information has changed since the last elimination.
+    /// The serial number of the first pose that no landmark has seen, nor any after it. Nothing is tied to it.
+    unseen: u64,
+    /// The first pose whose information, or whose share of what earlier keyframes leave, has changed since the last elimination.
     changed: usize,
     checkpoint: Checkpoint,
     /// Products with C.
@@ -107,6 +109,7 @@ impl<const N: usize> Coupling<N> {
             ties: vec![0.0; slots * N * stride],
             ends: vec![0; slots],
             reach: (1..=slots).collect(),
+            unseen: 0,
             changed: usize::MAX,
             checkpoint: Checkpoint::new(slots, N),
             product: vec![0.0; N * stride],
@@ -123,6 +126,7 @@ impl<const N: usize> Coupling<N> {
     pub(super) fn clear(&mut self) {
         self.first = 0;
         self.idle = None;
+        self.unseen = 0;
         self.changed = usize::MAX;
         self.checkpoint.forget();
         for values in [&mut self.matrix, &mut self.vector, &mut self.front, &mut self.ties] {
@@ -147,7 +151,7 @@ impl<const N: usize> Coupling<N> {
         self.append_to_points(len);
     }
 
-    /// The first pose whose information has changed since the last elimination.
+    /// The first pose that has changed since the last elimination.
     pub(super) fn changed(&self) -> usize {
         self.changed
     }
@@ -167,6 +171,19 @@ impl<const N: usize> Coupling<N> {
         self.changed = self.changed.min(from);
         self.checkpoint.forget_after(self.first + from as u64);
         self.reach[from..].iter_mut().take_while(|reach| **reach < to).for_each(|reach| *reach = to);
+        self.unseen = self.unseen.max(self.first + to as u64);
+    }
+
+    /// The link between this keyframe and the previous one changes. What the previous one leaves to later poses depends on
+    /// it, unless no landmark ties a keyframe before the link to one after it.
+    pub(super) fn relink(&mut self, index: usize) {
+        let Some(before) = index.checked_sub(1) else { return };
+        let is_seen = self.idle.is_some() && self.unseen > self.first + index as u64;
+        if is_seen && (self.points() > 0 || self.reach[before] > index) {
+            self.changed = self.changed.min(index);
+            // Also one at this keyframe: the previous one is eliminated by then.
+            self.checkpoint.forget_after(self.first + before as u64);
+        }
     }
 
     /// The index of the pose at which the ties of a keyframe end in an elimination of `len`. It includes the next keyframe.

@@ -93,6 +93,9 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
                 rows.weigh(weight);
                 if ties {
                     keyframe.link.add(&rows);
+                    if let Some(landmarks) = &mut self.landmarks {
+                        landmarks.coupling.relink(index);
+                    }
                 } else {
                     keyframe.own.add_rows(&rows.at[..dimension], &rows.residual[..dimension]);
                 }

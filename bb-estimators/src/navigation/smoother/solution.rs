@@ -22,9 +22,16 @@ pub struct Updated {
 impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
     /// Linearises all factors on a keyframe, including those that it shares with the previous one.
     pub(super) fn linearise(&mut self, index: usize) {
+        let coupling = self.landmarks.as_mut().map(|landmarks| &mut landmarks.coupling);
         let (before, after) = self.window.make_contiguous().split_at_mut(index);
-        if let Some(keyframe) = after.first_mut() {
-            keyframe.linearise::<S>(before.last().map(|before| &**before), &self.params);
+        let Some(keyframe) = after.first_mut() else { return };
+        let coupling = coupling.filter(|coupling| coupling.is_tied()).map(|coupling| (coupling, keyframe.link));
+        keyframe.linearise::<S>(before.last().map(|before| &**before), &self.params);
+        // A new weight or linearisation point of a factor on this keyframe alone leaves the link as it was.
+        if let Some((coupling, link)) = coupling
+            && link != keyframe.link
+        {
+            coupling.relink(index);
         }
     }
 
@@ -36,7 +43,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         // A keyframe passes its ties to all later ones.
         let end = if landmarks.is_some() { len } else { end };
         let mut first = self.dirty;
-        // If only the newest changed, and not by a landmark, nothing that others leave did.
+        // If only the newest changed, neither by a landmark nor in its link, nothing that others leave did.
         let is_passing = landmarks.as_ref().is_some_and(|of| of.coupling.is_changed() || first + 1 < len);
         if let Some(landmarks) = landmarks.as_mut().filter(|_| is_passing) {
             landmarks.gather(len);
@@ -190,17 +197,16 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         // If a keyframe moved, the next must be linearised as well.
         let mut is_next = false;
         for index in first..count {
-            let params = &self.params;
             let window = self.window.make_contiguous();
             let (before, after) = window.split_at_mut(index);
             let (before, Some(keyframe)) = (before.last(), after.first_mut()) else { continue };
-            let is_off = keyframe.is_free() && keyframe.is_off(params);
+            let is_off = keyframe.is_free() && keyframe.is_off(&self.params);
             if is_off {
                 keyframe.relinearise::<S>();
                 moved += 1;
             }
             if is_off || is_next || keyframe.is_misweighed::<S>(before.map(|before| &**before)) {
-                keyframe.linearise::<S>(before.map(|before| &**before), params);
+                self.linearise(index);
                 self.dirty = self.dirty.min(index);
             }
             is_next = is_off;

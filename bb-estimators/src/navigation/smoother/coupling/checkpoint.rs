@@ -1,7 +1,7 @@
 //! What the keyframes before all current tracks leave of Λ, λ and ties, so that an elimination can resume after them.
 //!
 //! Marginalising a keyframe does not change what it and those after it leave, and information that is added to later poses
-//! adds to it. It is lost as soon as information on an earlier pose changes.
+//! adds to it. It is lost as soon as information on an earlier pose changes, or the link to an earlier keyframe or to its own.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -39,7 +39,7 @@ impl Checkpoint {
         self.at = None;
     }
 
-    /// The information on this pose changes.
+    /// Forgets a checkpoint after this pose.
     pub(super) fn forget_after(&mut self, serial: u64) {
         self.at = self.at.filter(|at| *at <= serial);
     }

@@ -4,7 +4,11 @@ use proptest::prelude::*;
 
 use super::flight::{Flight, N, Smoother, linear, open, sensors};
 use super::scenery::{Scenery, camera, exact};
-use crate::navigation::{GnssPosition, LandmarkParams, Refusal, SmootherParams};
+use crate::navigation::{
+    GnssPosition, Kernel, LandmarkParams, NavigationFactor, Refusal, RelativePose, SmootherParams, Stream,
+    StreamParams,
+};
+use nalgebra::Vector3;
 
 /// The solution as it is, and after everything is eliminated again.
 fn both(smoother: &mut Smoother) -> Result<(), TestCaseError> {
@@ -29,11 +33,145 @@ fn both(smoother: &mut Smoother) -> Result<(), TestCaseError> {
     Ok(())
 }
 
+/// How a relative pose changes the link between its keyframes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Way {
+    /// It adds information.
+    Adds,
+    /// Its weight changes with each update.
+    Robust,
+    /// It fits so badly that the noise of the motion is raised, if its keyframe is the newest.
+    Raises,
+}
+
+const WAYS: [Way; 3] = [Way::Adds, Way::Robust, Way::Raises];
+
+impl Way {
+    /// Adds a relative pose at keyframe `id` that is more precise than the one of the flight, and some of its deviations off.
+    fn add(self, smoother: &mut Smoother, flight: &Flight, id: usize) {
+        let Some(NavigationFactor::RelativePose(pose)) = flight.measured[id].first().copied() else { panic!() };
+        let off = if self == Self::Adds { 0.01 } else { 0.3 };
+        let pose = RelativePose {
+            translation: pose.translation + Vector3::new(off, -off, off),
+            translation_covariance: pose.translation_covariance * 0.04,
+            ..pose
+        };
+        let id = id as u64;
+        let result = match self {
+            Self::Adds => smoother.add(&mut open(), id, pose),
+            Self::Robust => smoother.add_robust(&mut open(), id, pose, Kernel::Huber(1.345)),
+            Self::Raises => {
+                let mut impatient = Stream::new(StreamParams { patience: 1, ..StreamParams::default() });
+                let first = smoother.add(&mut impatient, id, pose);
+                first.or_else(|_| smoother.add(&mut impatient, id, pose))
+            }
+        };
+        assert!(matches!(result, Ok(_) | Err(Refusal::Gate { .. } | Refusal::Full { .. })), "{id}: {result:?}");
+    }
+}
+
+/// Keyframes stay where they were linearised first, but weights of kernels change.
+fn weighing(window: usize) -> SmootherParams {
+    SmootherParams { relinearise_rotation: 1.0, relinearise_position: 1e6, iterations: 10, ..linear(window) }
+}
+
+/// The length of the tracks in [`compared`].
+const LONGEST: usize = 6;
+
+/// Flies with `step` at each keyframe, and compares the solution after each with an elimination of everything. Returns how many
+/// updates did not eliminate the whole window.
+fn compared(window: usize, mut step: impl FnMut(&mut Smoother, &Flight, &Scenery, usize)) -> usize {
+    let flight = Flight::new(5, 60, 1.0);
+    let scenery = Scenery::new(&flight, 5, 8, LONGEST, Some(5.0));
+    let mut smoother = Smoother::new(weighing(window)).unwrap();
+    smoother.set_camera(camera(), LandmarkParams { relinearise: 1.0, ..exact() }).unwrap();
+    smoother.start(0, &flight.start).unwrap();
+    let mut resumed = 0;
+    for k in 1..60 {
+        flight.fly_to(&mut smoother, k);
+        step(&mut smoother, &flight, &scenery, k);
+        let updated = smoother.update().unwrap();
+        resumed += usize::from(updated.eliminated < smoother.window.len());
+        if smoother.is_tied() {
+            both(&mut smoother).unwrap();
+        }
+    }
+    resumed
+}
+
+/// The newest keyframe is not eliminated alone if what it gets past the link to the previous one has changed.
+#[test]
+fn relative_poses_may_follow_the_observations() {
+    compared(24, |smoother, flight, scenery, k| {
+        scenery.observe(smoother, k);
+        flight.measure(smoother, k);
+    });
+}
+
+#[test]
+fn relative_poses_may_follow_the_update() {
+    compared(24, |smoother, flight, scenery, k| {
+        flight.measure(smoother, k);
+        scenery.observe(smoother, k);
+        smoother.update().unwrap();
+        Way::Adds.add(smoother, flight, k);
+    });
+}
+
+/// In the usual order, the update changes the weight last.
+#[test]
+fn the_weights_of_relative_poses_may_change() {
+    compared(24, |smoother, flight, scenery, k| {
+        flight.measure(smoother, k);
+        Way::Robust.add(smoother, flight, k);
+        scenery.observe(smoother, k);
+    });
+}
+
+#[test]
+fn the_noise_of_the_newest_motion_may_be_raised() {
+    compared(24, |smoother, flight, scenery, k| {
+        flight.measure(smoother, k);
+        scenery.observe(smoother, k);
+        Way::Raises.add(smoother, flight, k);
+    });
+}
+
+/// At each keyframe before the newest in turn, so also at the one where an elimination resumes, which then begins earlier.
+#[test]
+fn relative_poses_may_come_late() {
+    for way in WAYS {
+        let resumed = compared(24, |smoother, flight, scenery, k| {
+            flight.measure(smoother, k);
+            scenery.observe(smoother, k);
+            let back = 1 + k % (2 * LONGEST);
+            if back < k {
+                smoother.update().unwrap();
+                way.add(smoother, flight, k - back);
+            }
+        });
+        assert!(resumed > 10, "{way:?}: {resumed}");
+    }
+}
+
+/// What a relative pose changes before its keyframe has seen anything passes over no link.
+#[test]
+fn in_the_usual_order_only_the_newest_is_eliminated() {
+    for window in [12, 2 * LONGEST + 12] {
+        compared(window, |smoother, flight, scenery, k| {
+            flight.measure(smoother, k);
+            assert_eq!(smoother.eliminate(usize::MAX), 1, "{k}");
+            scenery.observe(smoother, k);
+        });
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
-    /// Whatever changes in the window: observations and positions that come late, at any keyframe, tracks that begin and
-    /// end, and relinearised keyframes and landmarks.
+    /// Whatever changes in the window: observations, positions and relative poses that come late, at any keyframe, before or
+    /// after the others or the update; weights, and noise that is raised; tracks that begin and end, and relinearised
+    /// keyframes and landmarks.
     #[test]
     fn it_is_the_elimination_of_all(
         seed in any::<u64>(),
@@ -41,12 +179,14 @@ proptest! {
         longest in 2_usize..9,
         late in prop::collection::vec((0_usize..40, 0_usize..12), 0..40),
         positions in prop::collection::vec((0_usize..40, 0_usize..24), 0..6),
+        poses in prop::collection::vec((0_usize..40, 0_usize..24, 0_usize..4, 0_usize..3), 0..24),
+        observed_first in prop::collection::vec(0_usize..40, 0..20),
         is_linear in any::<bool>(),
     ) {
         let flight = Flight::new(seed, 40, 1.0);
         let scenery = Scenery::new(&flight, seed, 6, longest, Some(5.0));
         let params = SmootherParams { sensors: sensors(), window, ..SmootherParams::default() };
-        let params = if is_linear { linear(window) } else { params };
+        let params = if is_linear { weighing(window) } else { params };
         let mut smoother = Smoother::new(params).unwrap();
         let landmarks = if is_linear { LandmarkParams { relinearise: 1.0, ..exact() } } else { exact() };
         smoother.set_camera(camera(), landmarks).unwrap();
@@ -55,7 +195,19 @@ proptest! {
         let mut least = usize::MAX;
         for k in 1..40 {
             flight.fly_to(&mut smoother, k);
-            flight.measure(&mut smoother, k);
+            // At most the oldest keyframe but one: a relative pose needs the previous one.
+            let pose = |smoother: &mut Smoother, now: usize| {
+                for (_, back, _, way) in poses.iter().filter(|(at, _, moment, _)| (*at, *moment) == (k, now)) {
+                    if *back < (window - 1).min(k) {
+                        WAYS[*way].add(smoother, &flight, k - back);
+                    }
+                }
+            };
+            pose(&mut smoother, 0);
+            if !observed_first.contains(&k) {
+                flight.measure(&mut smoother, k);
+            }
+            pose(&mut smoother, 1);
             for (index, seen) in scenery.seen[k].iter().enumerate() {
                 let delay = late.iter().find(|(at, _)| *at == (k + 7 * index) % 40).map_or(0, |(_, delay)| *delay);
                 waiting.push((k + delay, k as u64, *seen));
@@ -74,7 +226,19 @@ proptest! {
                 let fix = GnssPosition::new(flight.truth[id].position, 1.0, 2.0);
                 smoother.add(&mut open(), id as u64, fix).unwrap();
             }
-            least = least.min(smoother.update().unwrap().eliminated);
+            if observed_first.contains(&k) {
+                flight.measure(&mut smoother, k);
+            }
+            pose(&mut smoother, 2);
+            let eliminated = smoother.update().unwrap().eliminated;
+            // Before the window is full, that may be all there is.
+            if k > window {
+                least = least.min(eliminated);
+            }
+            if poses.iter().any(|(at, _, moment, _)| *at == k && *moment == 3) {
+                pose(&mut smoother, 3);
+                smoother.update().unwrap();
+            }
             // Until landmarks tie keyframes, small corrections are not propagated back.
             if smoother.is_tied() {
                 both(&mut smoother)?;

@@ -7,10 +7,13 @@ use super::super::coupling::POSE;
 use super::super::landmark::Sight;
 use super::super::link::{Information, Link};
 use super::super::matrix::Square;
+use super::super::rows::Rows;
+use super::flight::open;
 use crate::navigation::camera::Undistorted;
 use crate::navigation::noise::Noise;
 use crate::navigation::{
-    Camera, FixedLagSmoother, Kernel, LandmarkParams, NAVIGATION, POSITION, ROTATION, SmootherParams, Start,
+    Camera, FixedLagSmoother, Kernel, LandmarkParams, NAVIGATION, Navigation, POSITION, ROTATION, RelativePose,
+    SmootherParams, Start,
 };
 
 type Plain = FixedLagSmoother;
@@ -169,6 +172,26 @@ impl Problem {
             self.vector += dense.transpose() * sight.residual * sight.weight;
         }
     }
+
+    /// A relative pose between a keyframe and the previous one, more or less precise than the link between them.
+    fn relative_pose(&mut self, noise: &mut Noise, k: usize) {
+        let deviation = 0.3 * noise.next().exp();
+        let level = UnitQuaternion::identity();
+        let pose = RelativePose::new(k as u64 - 1, (noise.vector(1.0), deviation), (level, deviation));
+        let (before, keyframe) = (&self.smoother.window[k - 1], &self.smoother.window[k]);
+        let mut rows = Rows::new();
+        keyframe.rows::<Navigation>(&pose.into(), Some(before), &mut rows).unwrap();
+        let mut dense = DMatrix::zeros(rows.count, self.matrix.ncols());
+        for i in 0..rows.count {
+            for j in 0..N {
+                dense[(i, (k - 1) * N + j)] = rows.previous[i][j];
+                dense[(i, k * N + j)] = rows.at[i][j];
+            }
+        }
+        self.matrix += dense.transpose() * &dense;
+        self.vector += dense.transpose() * DVector::from_row_slice(&rows.residual[..rows.count]);
+        self.smoother.add(&mut open(), k as u64, pose).unwrap();
+    }
 }
 
 fn agrees(numbers: impl Iterator<Item = (f64, f64)>, within: f64, what: &str) -> Result<(), TestCaseError> {
@@ -238,6 +261,25 @@ proptest! {
             // Also when everything is eliminated again.
             problem.smoother.dirty = 0;
             compare(&mut problem.smoother, left, &batch, keyframes)?;
+        }
+    }
+
+    /// A relative pose may come at any keyframe, after landmarks that both its keyframes have seen.
+    #[test]
+    fn later_relative_poses_are_in_the_batch(
+        seed in any::<u64>(),
+        keyframes in 2_usize..8,
+        landmarks in 1_usize..6,
+        places in prop::collection::vec(1_usize..8, 1..5),
+    ) {
+        let mut problem = Problem::new(seed, keyframes, landmarks);
+        let batch = problem.batch();
+        compare(&mut problem.smoother, 0, &batch, keyframes)?;
+        let mut noise = Noise::new(!seed);
+        for place in places {
+            problem.relative_pose(&mut noise, (place - 1) % (keyframes - 1) + 1);
+            let batch = problem.batch();
+        compare(&mut problem.smoother, 0, &batch, keyframes)?;
         }
     }
 
