@@ -26,6 +26,14 @@ impl Replayed for Rover {
         self.filter.propagate(sample)
     }
 
+    fn longest_sample(&self) -> f64 {
+        self.filter.params().longest_sample
+    }
+
+    fn propagate_part(&mut self, part: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
+        self.filter.propagate_part(part, is_gap)
+    }
+
     fn update(&mut self, fix: &GnssPosition) -> Result<Fused, Refusal> {
         self.filter.update(&mut self.gnss, fix)
     }

@@ -209,9 +209,9 @@ impl<const N: usize> Covariance<N> {
         self.bound(layout);
     }
 
-    /// Scales the covariance of position and velocity. Their correlation coefficients, also with other states, remain.
-    pub(in crate::navigation) fn scale_motion(&mut self, layout: &Layout<N>, factor: f64) {
-        let scales = layout.blocks.map(|block| if layout.motion.contains(&block) { sqrt(factor) } else { 1.0 });
+    /// Scales the covariance of some states. Their correlation coefficients, also with other states, remain.
+    pub(in crate::navigation) fn scale(&mut self, layout: &Layout<N>, states: &[bool; N], factor: f64) {
+        let scales = states.map(|is_scaled| if is_scaled { sqrt(factor) } else { 1.0 });
         for (row, scale) in self.rows_mut().iter_mut().zip(scales) {
             row.iter_mut().zip(scales).for_each(|(x, other)| *x *= scale * other);
         }

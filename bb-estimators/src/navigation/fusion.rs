@@ -19,6 +19,29 @@ const FITS: f64 = 1.01;
 /// The largest normalised innovation squared, relative to its mean, that the motion explains: ten deviations a dimension.
 const COMMON: f64 = 100.0;
 
+/// What a measurement observes of the position.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Sight<const N: usize> {
+    /// The position in the world.
+    Position,
+    /// Only the height, with the errors of the vertical motion.
+    Height([bool; N]),
+    /// Only the position relative to the keyframe.
+    Relative,
+    Nothing,
+}
+
+/// How a quantity that has jumped is raised.
+#[derive(Clone, Copy, Debug)]
+enum Jump {
+    /// As a whole, and its correlations are set to zero.
+    Block,
+    /// Only those of its errors that the measurement observes, as if each had received noise of its own, in proportion to its
+    /// covariance with `uᵀ H_b x_b`. Which of them has jumped, such as the height or the bias of the barometer, is then unknown.
+    /// Correlations remain, and a keyframe, which has nothing to do with the way since, keeps its covariance.
+    Observed,
+}
+
 /// A measurement that the gate has accepted, with its effect on the errors.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Weighed<const D: usize, const N: usize> {
@@ -62,7 +85,7 @@ pub(super) fn innovation<const D: usize, const N: usize>(
 
 impl<const D: usize, const N: usize> Weighed<D, N> {
     /// Applies the gate of `stream`. If its patience has run out, the covariance is raised until the measurement fits.
-    /// `sees_position` tells whether a measurement observes the position in the world.
+    /// `sight` tells what a measurement observes of the position.
     ///
     /// # Errors
     ///
@@ -74,7 +97,7 @@ impl<const D: usize, const N: usize> Weighed<D, N> {
         model: &Linearised<D, N>,
         gate: Gate,
         layout: &Layout<N>,
-        sees_position: impl Fn(&Linearised<D, N>) -> bool,
+        sight: impl Fn(&Linearised<D, N>) -> Sight<N>,
     ) -> Result<Self, Refusal> {
         let plain = innovation(covariance, model)?;
         let nis = plain.nis();
@@ -90,7 +113,7 @@ impl<const D: usize, const N: usize> Weighed<D, N> {
         }
         if verdict.raised > 1.0 {
             weighed.before = Some(*covariance);
-            match fitted(covariance, stream, model, layout, sees_position) {
+            match fitted(covariance, stream, model, layout, sight(model)) {
                 Some(fitted) => weighed.innovation = fitted,
                 None => {
                     weighed.undo(covariance);
@@ -110,19 +133,24 @@ impl<const D: usize, const N: usize> Weighed<D, N> {
 
     /// The outcome of the update.
     #[inline]
-    pub(super) fn fused(&self, model: &Linearised<D, N>) -> Fused {
+    pub(super) fn fused(&self, model: &Linearised<D, N>, layout: &Layout<N>) -> Fused {
         let Verdict { weight, raised, limit, log_likelihood } = self.verdict;
         let whitened = self.innovation.whitened.first().copied().unwrap_or(0.0);
-        let misfit = if self.before.is_some() { misfit(model) } else { [0.0; 3] };
+        let misfit = if self.before.is_some() { misfit(model, layout) } else { [0.0; 3] };
         Fused { nis: self.nis, dimension: D, weight, raised, limit, log_likelihood, whitened, misfit }
     }
 }
 
-/// The first components of a residual.
+/// The first components of a residual that observe the position. Others can have other units.
 #[cold]
 #[inline(never)]
-fn misfit<const D: usize, const N: usize>(model: &Linearised<D, N>) -> [f64; 3] {
-    core::array::from_fn(|i| model.residual.get(i).copied().unwrap_or(0.0))
+fn misfit<const D: usize, const N: usize>(model: &Linearised<D, N>, layout: &Layout<N>) -> [f64; 3] {
+    let sees_position = |row: &[f64; N]| {
+        row.iter().zip(&layout.blocks).any(|(derivative, block)| *derivative != 0.0 && *block == layout.motion[0])
+    };
+    let rows = model.jacobian.iter().zip(&model.residual).filter(|(row, _)| sees_position(row));
+    let mut residuals = rows.map(|(_, residual)| *residual);
+    core::array::from_fn(|_| residuals.next().unwrap_or(0.0))
 }
 
 /// The innovation of a measurement that overrides its gate, with the covariance raised until it fits; `None` if no observed error
@@ -132,7 +160,10 @@ fn misfit<const D: usize, const N: usize>(model: &Linearised<D, N>) -> [f64; 3] 
 /// has jumped. A misfit of up to [`COMMON`] counts as the first: position and velocity are raised together and keep their
 /// correlations, so that the correction of the position also goes to the velocity that led it away. A larger one counts as the
 /// second. If the first measurements after a jump are off in the same direction, it was no jump, and position and velocity are raised
-/// regardless of the factor. A measurement that does not see the position does not raise it.
+/// regardless of the factor.
+///
+/// What a measurement does not observe of the position it does not raise: a height raises the vertical motion, or itself, and a
+/// relative pose the way from its keyframe. One that does not observe the position at all raises another quantity.
 #[cold]
 #[inline(never)]
 fn fitted<const D: usize, const N: usize>(
@@ -140,27 +171,32 @@ fn fitted<const D: usize, const N: usize>(
     stream: &Stream,
     model: &Linearised<D, N>,
     layout: &Layout<N>,
-    sees_position: impl Fn(&Linearised<D, N>) -> bool,
+    sight: Sight<N>,
 ) -> Option<Innovation<D, N>> {
-    let before = *covariance;
-    // What does not see the position must not make it uncertain.
-    let most = match (sees_position(model), stream.goes_on(&misfit(model))) {
-        (false, _) => 0.0,
-        (true, false) => COMMON,
-        (true, true) => f64::INFINITY,
+    let (motion, jump) = match sight {
+        Sight::Position => (Some(layout.blocks.map(|block| layout.motion.contains(&block))), Jump::Block),
+        Sight::Height(motion) => (Some(motion), Jump::Observed),
+        Sight::Relative => (None, Jump::Observed),
+        Sight::Nothing => (None, Jump::Block),
     };
-    fitted_by_motion(covariance, model, layout, most).or_else(|| {
+    if let Some(motion) = motion {
+        let before = *covariance;
+        let most = if stream.goes_on(&misfit(model, layout)) { f64::INFINITY } else { COMMON };
+        if let Some(fitted) = fitted_by_motion(covariance, model, layout, &motion, most) {
+            return Some(fitted);
+        }
         *covariance = before;
-        fitted_by_one(covariance, model, layout)
-    })
+    }
+    fitted_by_one(covariance, model, layout, jump)
 }
 
-/// Raises position and velocity until the measurement fits; `None` if its normalised innovation squared is more than `most` times
+/// Raises the errors of `motion` until the measurement fits; `None` if its normalised innovation squared is more than `most` times
 /// its mean.
 fn fitted_by_motion<const D: usize, const N: usize>(
     covariance: &mut Covariance<N>,
     model: &Linearised<D, N>,
     layout: &Layout<N>,
+    motion: &[bool; N],
     most: f64,
 ) -> Option<Innovation<D, N>> {
     for round in 0..ROUNDS {
@@ -173,7 +209,7 @@ fn fitted_by_motion<const D: usize, const N: usize>(
             return None;
         }
         // The noise of the measurement is not multiplied: one round is not enough.
-        covariance.scale_motion(layout, misfit);
+        covariance.scale(layout, motion, misfit);
     }
     None
 }
@@ -182,12 +218,13 @@ fn fitted_by_motion<const D: usize, const N: usize>(
 ///
 /// With the residual r of covariance `S = H P Hᵀ + R`, block b of the errors contributes `uᵀ H_b P_bb H_bᵀ u` to the normalised
 /// innovation squared, `uᵀ S u` with `u = S⁻¹ r`, independently of axes and units. The block with the largest contribution is
-/// taken to be wrong. Its covariance is raised until the normalised innovation squared equals its mean, and its correlations are
-/// set to zero. All other blocks keep their covariance.
+/// taken to be wrong. Its covariance is raised as `jump` tells until the normalised innovation squared equals its mean. All other
+/// blocks keep their covariance.
 fn fitted_by_one<const D: usize, const N: usize>(
     covariance: &mut Covariance<N>,
     model: &Linearised<D, N>,
     layout: &Layout<N>,
+    jump: Jump,
 ) -> Option<Innovation<D, N>> {
     let jacobian = SMatrix::<f64, D, N>::from_fn(|i, j| model.jacobian[i][j]);
     for _ in 0..ROUNDS {
@@ -211,9 +248,38 @@ fn fitted_by_one<const D: usize, const N: usize>(
         if !(*part > 0.0 && factor.is_finite()) {
             return None;
         }
-        covariance.raise(layout, u8::try_from(block).ok()?, factor);
+        let block = u8::try_from(block).ok()?;
+        match jump {
+            Jump::Block => covariance.raise(layout, block, factor),
+            Jump::Observed => raise_observed(covariance, layout, block, &seen, (factor - 1.0) * part)?,
+        }
     }
     raised(covariance, model).ok()
+}
+
+/// Adds noise to the errors of a block that a measurement observes, `seen`, until their contribution has grown by `amount`; `None` if
+/// that is impossible.
+fn raise_observed<const N: usize>(
+    covariance: &mut Covariance<N>,
+    layout: &Layout<N>,
+    block: u8,
+    seen: &SVector<f64, N>,
+    amount: f64,
+) -> Option<()> {
+    let p = covariance.matrix();
+    let is_observed = |i: usize| layout.blocks[i] == block && seen[i] != 0.0;
+    let mut shares = [0.0; N];
+    for i in (0..N).filter(|i| is_observed(*i)) {
+        shares[i] = (0..N).filter(|j| is_observed(*j)).map(|j| p[(i, j)] * seen[j]).sum();
+    }
+    let unit: f64 = (0..N).map(|i| seen[i] * seen[i] * shares[i] * shares[i]).sum();
+    let noise = amount / unit;
+    if !noise.is_finite() {
+        return None;
+    }
+    (0..N).for_each(|i| covariance.inflate(i, noise * shares[i] * shares[i]));
+    covariance.bound(layout);
+    Some(())
 }
 
 /// The innovation once more, apart from the update that every measurement takes.

@@ -5,7 +5,7 @@
 //! their stamps. T. D. Larsen et al., "Incorporation of time delayed measurements in a discrete-time Kalman filter", CDC 1998,
 //! compare this with cheaper, approximate methods.
 
-use super::eskf::ImuMean;
+use super::eskf::{ImuMean, seconds_between};
 use super::fused::Fused;
 use super::refusal::Refusal;
 
@@ -35,6 +35,12 @@ use ring::Ring;
 ///     fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
 ///         self.filter.propagate(sample)
 ///     }
+///     fn longest_sample(&self) -> f64 {
+///         self.filter.params().longest_sample
+///     }
+///     fn propagate_part(&mut self, part: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
+///         self.filter.propagate_part(part, is_gap)
+///     }
 ///     fn update(&mut self, fix: &GnssPosition) -> Result<Fused, Refusal> {
 ///         self.filter.update(&mut self.gnss, fix)
 ///     }
@@ -53,6 +59,25 @@ pub trait Replayed: Clone {
     ///
     /// Returns the reason why the sample is rejected. The filter is then unchanged.
     fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal>;
+
+    /// The longest interval, s, that one sample covers; a longer one is a gap. Infinite, as by default, for a filter without gaps.
+    fn longest_sample(&self) -> f64 {
+        f64::INFINITY
+    }
+
+    /// Propagates the filter over a part of a sample that measurements divide. `is_gap` tells whether the whole sample is longer than
+    /// [`longest_sample`](Self::longest_sample): every part of a gap is a gap, however short it is.
+    ///
+    /// By default, the part is propagated like a sample of its own. Provide it together with `longest_sample` if your filter treats
+    /// gaps differently, as [`Eskf`](super::Eskf) and [`PlanarEkf`](super::planar::PlanarEkf) do.
+    ///
+    /// # Errors
+    ///
+    /// The same as [`propagate`](Self::propagate).
+    fn propagate_part(&mut self, part: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
+        let _ = is_gap;
+        self.propagate(part)
+    }
 
     /// Corrects the filter with a measurement at its current time.
     ///
@@ -263,6 +288,8 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
     fn advance(&mut self, sample: &ImuMean, place: Option<usize>) -> Option<Result<Fused, Refusal>> {
         let mut result = None;
         let from = self.now.time_ns().unwrap_or(i64::MAX);
+        // Decided by the whole sample: its parts can be of any length.
+        let is_gap = seconds_between(from, sample.time_ns).is_ok_and(|dt| dt > self.now.longest_sample());
         for (index, (time_ns, measurement)) in self.measurements.iter().enumerate() {
             if *time_ns <= from || *time_ns > sample.time_ns {
                 continue;
@@ -270,7 +297,7 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
             if self.now.time_ns() != Some(*time_ns) {
                 // The sample is a mean, so each part of it is the same.
                 let part = ImuMean { time_ns: *time_ns, ..*sample };
-                let _ = self.now.propagate(&part);
+                let _ = self.now.propagate_part(&part, is_gap);
             }
             let of_it = self.now.update(measurement);
             if place == Some(index) {
@@ -278,7 +305,7 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
             }
         }
         if self.now.time_ns() != Some(sample.time_ns) {
-            let _ = self.now.propagate(sample);
+            let _ = self.now.propagate_part(sample, is_gap);
         }
         result
     }

@@ -13,6 +13,9 @@ const DIMENSIONS: usize = 7;
 /// The upper bound on the reported misfit.
 const MOST_RAISED: f64 = 1e6;
 
+/// The cosine of the largest angle between misfits in the same direction: 45°.
+const SAME_DIRECTION: f64 = 0.7;
+
 params! {
     /// How the measurements of one sensor are judged.
     pub struct StreamParams {
@@ -27,7 +30,10 @@ params! {
         ///
         /// In `Eskf` and `PlanarEkf`, a position that is off by up to ten deviations a dimension raises position and velocity
         /// together. Of a larger difference, what explains it best, the position for a fix, is raised alone and loses its
-        /// correlations; all else stays as it is. If the next ones are off in the same direction, position and velocity are raised. A filter that should move only where several positions agree is better [moved](super::Eskf::relocate).
+        /// correlations; all else stays as it is. If the next ones are off in the same direction, position and velocity are raised.
+        /// A height does the same to the height, the vertical velocity and the barometer's bias, but they keep their correlations. A
+        /// relative pose raises only the way from its keyframe. A filter that should move only where several positions agree is
+        /// better [moved](super::Eskf::relocate).
         ///
         /// Small: a few outliers in a row move the filter. Large: a filter that is off stays so for long.
         patience: u32 = 3;
@@ -98,7 +104,7 @@ pub struct Stream {
     counts: Counts,
     /// Fused since the last recovery.
     fused_since_recovery: u64,
-    /// The residual of the last recovery.
+    /// The residual of the position at the last recovery.
     recovered: [f64; 3],
     consistency: Consistency,
 }
@@ -167,8 +173,10 @@ impl Stream {
     /// Whether a misfit goes on in the direction of the last one, and too few have fitted since to call that a recovery. Outliers
     /// that end are off in the other direction.
     pub(crate) fn goes_on(&self, misfit: &[f64; 3]) -> bool {
-        let along: f64 = self.recovered.iter().zip(misfit).map(|(before, now)| before * now).sum();
-        self.fused_since_recovery < u64::from(self.params.patience) && along > 0.0
+        let dot = |a: &[f64; 3], b: &[f64; 3]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
+        let along = dot(&self.recovered, misfit);
+        let lengths = sqrt(dot(&self.recovered, &self.recovered)) * sqrt(dot(misfit, misfit));
+        self.fused_since_recovery < u64::from(self.params.patience) && along > SAME_DIRECTION * lengths
     }
 
     /// Decides how a measurement is fused, or rejects it.

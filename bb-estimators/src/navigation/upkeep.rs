@@ -47,7 +47,7 @@ macro_rules! upkeep_methods {
             self.estimate.as_ref().map_or(0.0, |estimate| since(estimate.time_ns))
         }
 
-        /// The number of gaps bridged.
+        /// The number of gaps bridged; one that measurements divide counts once for each part.
         pub fn gaps(&self) -> u32 {
             self.upkeep.gaps
         }

@@ -9,13 +9,13 @@ use super::start::Start;
 use crate::attitude::ParamsError;
 use crate::navigation::covariance::Covariance;
 use crate::navigation::fused::Fused;
-use crate::navigation::fusion::{Weighed, innovation, prepared};
+use crate::navigation::fusion::{Sight, Weighed, innovation, prepared};
 use crate::navigation::layout::Layout;
 use crate::navigation::math::{Integrals, exp, sqrt};
 use crate::navigation::measurement::{Linearised, Measurement};
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{
-    Estimate, NAVIGATION, Navigation, Optional, POSITION, ROTATION, States, distinct, offset,
+    Estimate, NAVIGATION, Navigation, Optional, POSITION, ROTATION, States, VELOCITY, distinct, offset,
 };
 use crate::navigation::stream::{Gate, Stream};
 use crate::navigation::upkeep::{Upkeep, upkeep_methods};
@@ -110,9 +110,14 @@ impl<S: States, const N: usize> Eskf<S, N> {
         self.propagate_part(sample, false)
     }
 
-    /// The same over a part of a sample. A part of a gap is a gap, however short it is.
+    /// Propagates the filter over a part of a sample that measurements divide. `is_gap` tells whether the whole sample is a gap,
+    /// longer than [`EskfParams::longest_sample`]: every part of a gap is a gap, however short it is, and counts as one.
+    ///
+    /// # Errors
+    ///
+    /// The same as [`propagate`](Self::propagate).
     #[inline]
-    pub(in crate::navigation) fn propagate_part(&mut self, sample: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
+    pub fn propagate_part(&mut self, sample: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
         let estimate = self.estimate.as_mut().ok_or(Refusal::NotStarted)?;
         sample.check()?;
         let dt = seconds_between(estimate.time_ns, sample.time_ns)?;
@@ -214,8 +219,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
         gate: Gate,
     ) -> Result<Fused, Refusal> {
         let model = self.linearised(stream, measurement)?;
-        let weighed =
-            Weighed::new(&mut self.covariance, stream, &model, gate, &Self::LAYOUT, Self::fixes_position)?;
+        let weighed = Weighed::new(&mut self.covariance, stream, &model, gate, &Self::LAYOUT, Self::sight)?;
         let error = weighed.innovation.mean();
         if !Self::LAYOUT.admits(&error) {
             weighed.undo(&mut self.covariance);
@@ -232,7 +236,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
             self.reset_rotation(index + 3, &error);
         }
         self.covariance.settle(&Self::LAYOUT);
-        Ok(weighed.fused(&model))
+        Ok(weighed.fused(&model, &Self::LAYOUT))
     }
 
     #[inline]
@@ -254,6 +258,29 @@ impl<S: States, const N: usize> Eskf<S, N> {
             let sees = |first: usize| row[first] != 0.0 || row[first + 1] != 0.0;
             sees(POSITION) && !keyframe.is_some_and(sees)
         })
+    }
+
+    /// What a measurement observes of the position.
+    #[cold]
+    fn sight<const D: usize>(model: &Linearised<D, N>) -> Sight<N> {
+        let sees = |error: usize| model.jacobian.iter().any(|row| row[error] != 0.0);
+        if Self::fixes_position(model) {
+            return Sight::Position;
+        }
+        if offset::<S>(Optional::Keyframe).is_some_and(|first| (first..first + 3).any(sees)) {
+            return Sight::Relative;
+        }
+        if !sees(POSITION + 2) {
+            return Sight::Nothing;
+        }
+        let mut motion = [false; N];
+        motion[POSITION + 2] = true;
+        motion[VELOCITY + 2] = true;
+        // What a barometer measures is the sum of the height and its bias.
+        if let Some(bias) = offset::<S>(Optional::BarometerBias) {
+            motion[bias] = sees(bias);
+        }
+        Sight::Height(motion)
     }
 
     /// Resets the errors to the corrected rotation: `exp(θ) exp(-θ̂) ≈ exp(Γ1(θ̂) (θ - θ̂))`.

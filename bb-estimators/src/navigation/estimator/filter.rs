@@ -160,6 +160,14 @@ impl<S: States, const N: usize> Replayed for Filter<S, N> {
         self.eskf.propagate(sample)
     }
 
+    fn longest_sample(&self) -> f64 {
+        self.eskf.params().longest_sample
+    }
+
+    fn propagate_part(&mut self, part: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
+        self.eskf.propagate_part(part, is_gap)
+    }
+
     fn update(&mut self, measured: &Measured) -> Result<Fused, Refusal> {
         let Self { eskf, streams } = self;
         let stream = &mut streams[measured.sensor()];
@@ -178,5 +186,25 @@ impl<S: States, const N: usize> Replayed for Filter<S, N> {
             Measured::MagneticField(heading) => eskf.update(stream, heading),
             Measured::Pressure(height) => eskf.update(stream, height),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::navigation::History;
+    use crate::navigation::state::{NAVIGATION, Navigation};
+
+    /// The parts of a gap that a measurement divides are gaps.
+    #[test]
+    fn a_divided_gap_is_counted() {
+        let (rest, level) = (Vector3::zeros(), UnitQuaternion::identity());
+        let start = Start::at(0, (rest, 2.0), (rest, 0.5), (level, 0.1));
+        let filter = Filter::<Navigation, NAVIGATION>::new(&NavigationOptions::default(), &start).unwrap();
+        let mut history = History::<_, 10, 10, 2>::new(filter, 90_000_000).unwrap();
+        history.update(90_000_000, &Measured::Gnss(GnssPosition::new(rest, 1.0, 2.0))).unwrap();
+        let specific_force = Vector3::new(0.0, 0.0, 9.8);
+        history.propagate(&ImuMean { time_ns: 180_000_000, angular_velocity: rest, specific_force }).unwrap();
+        assert_eq!(history.now().eskf().gaps(), 2);
     }
 }

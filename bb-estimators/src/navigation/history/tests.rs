@@ -32,6 +32,14 @@ impl Replayed for Drone {
         self.filter.propagate(sample)
     }
 
+    fn longest_sample(&self) -> f64 {
+        self.filter.params().longest_sample
+    }
+
+    fn propagate_part(&mut self, part: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
+        self.filter.propagate_part(part, is_gap)
+    }
+
     fn update(&mut self, measurement: &Sensed) -> Result<Fused, Refusal> {
         match measurement {
             Sensed::Position(position) => self.filter.update(&mut self.positions, position),
@@ -173,4 +181,37 @@ fn more_measurements_than_there_is_room_for_shorten_the_history() {
         history.propagate(&sample(i)).unwrap();
     }
     assert!(history.update(95 * SAMPLE_NS, &sensed(false, 0.1)).is_ok());
+}
+
+/// A velocity that says next to nothing, in a gap of 180 ms: both parts are shorter than a sample may be.
+#[test]
+fn a_gap_that_a_measurement_divides_is_a_gap() {
+    let after = |in_gap_ns: Option<i64>, is_late: bool| {
+        let mut history = Long::new(drone(), 20 * SAMPLE_NS).unwrap();
+        (1..=50).for_each(|i| history.propagate(&sample(i)).unwrap());
+        let nothing = Sensed::Velocity(GnssVelocity::new(Vector3::zeros(), 1e6, 1e6));
+        let measure = |history: &mut Long| in_gap_ns.map(|time_ns| history.update(time_ns, &nothing).unwrap());
+        if !is_late {
+            measure(&mut history);
+        }
+        history.propagate(&sample(68)).unwrap();
+        if is_late {
+            measure(&mut history);
+        }
+        history.propagate(&sample(69)).unwrap();
+        history.now().clone()
+    };
+    let whole = after(None, false);
+    assert_eq!(whole.filter.gaps(), 1);
+    for in_gap_ns in [51 * SAMPLE_NS, 59 * SAMPLE_NS, 67 * SAMPLE_NS] {
+        let divided = after(Some(in_gap_ns), false);
+        assert_eq!(divided, after(Some(in_gap_ns), true));
+        assert_eq!(divided.filter.gaps(), 2, "each part counts");
+        assert_eq!(divided.velocities.counts().fused, 1);
+        for i in 3..9 {
+            let (whole, divided) = (whole.filter.covariance()[(i, i)], divided.filter.covariance()[(i, i)]);
+            // The tilt turns gravity from part to part.
+            assert!((0.99 * whole..1.2 * whole).contains(&divided), "{i}: {whole} and {divided}");
+        }
+    }
 }

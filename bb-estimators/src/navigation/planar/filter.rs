@@ -11,7 +11,7 @@ use crate::navigation::bounds::{MOST_ROTATION, MOST_VARIANCE, is_on_earth, is_wi
 use crate::navigation::covariance::Covariance;
 use crate::navigation::eskf::{ImuMean, LONGEST_GAP_S, seconds_between};
 use crate::navigation::fused::Fused;
-use crate::navigation::fusion::{Weighed, prepared};
+use crate::navigation::fusion::{Sight, Weighed, prepared};
 use crate::navigation::layout::Layout;
 use crate::navigation::math::{exp, wrapped};
 use crate::navigation::measurement::Linearised;
@@ -38,6 +38,11 @@ const KNOWN: f64 = 1e-24;
 /// Whether a measurement observes the position.
 fn sees_position<const D: usize>(model: &Linearised<D, STATES>) -> bool {
     model.jacobian.iter().any(|row| row[POSITION] != 0.0 || row[POSITION + 1] != 0.0)
+}
+
+#[cold]
+fn sight<const D: usize>(model: &Linearised<D, STATES>) -> Sight<STATES> {
+    if sees_position(model) { Sight::Position } else { Sight::Nothing }
 }
 
 /// The state and uncertainty that a filter starts with.
@@ -169,10 +174,21 @@ impl PlanarEkf {
     /// Returns a [`Refusal`] if the filter has not started, a value is not finite or absurdly large, time does not increase, or
     /// the gap is longer than a minute. The filter is then unchanged.
     pub fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
+        self.propagate_part(sample, false)
+    }
+
+    /// Propagates the filter over a part of a sample that measurements divide. `is_gap` tells whether the whole sample is a gap,
+    /// longer than [`PlanarParams::longest_sample`]: every part of a gap is a gap, however short it is, and counts as one.
+    ///
+    /// # Errors
+    ///
+    /// The same as [`propagate`](Self::propagate).
+    #[inline]
+    pub fn propagate_part(&mut self, sample: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
         let estimate = self.estimate.as_mut().ok_or(Refusal::NotStarted)?;
         sample.check()?;
         let dt = seconds_between(estimate.time_ns, sample.time_ns)?;
-        let is_gap = dt > self.params.longest_sample;
+        let is_gap = is_gap || dt > self.params.longest_sample;
         if dt > LONGEST_GAP_S {
             return Err(Refusal::Gap { seconds: dt });
         }
@@ -224,7 +240,7 @@ impl PlanarEkf {
         let mut model = Linearised::new();
         measurement.linearise(estimate, &mut model)?;
         let model = prepared(model, stream)?;
-        let weighed = Weighed::new(&mut self.covariance, stream, &model, Gate::Closed, &LAYOUT, sees_position)?;
+        let weighed = Weighed::new(&mut self.covariance, stream, &model, Gate::Closed, &LAYOUT, sight)?;
         let error = weighed.innovation.mean();
         if !LAYOUT.admits(&error) {
             weighed.undo(&mut self.covariance);
@@ -236,7 +252,7 @@ impl PlanarEkf {
         if sees_position(&model) {
             self.upkeep.fixed_ns = estimate.time_ns;
         }
-        Ok(weighed.fused(&model))
+        Ok(weighed.fused(&model, &LAYOUT))
     }
 
     /// Relocates a filter that was wrong, m: sets the position and, if given, the velocity (in the world, m/s) and the heading

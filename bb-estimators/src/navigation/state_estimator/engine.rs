@@ -39,6 +39,8 @@ pub(super) struct Engine<F: ProvidedFactor> {
     key: Key,
     /// The IMU time up to which it has run.
     now_ns: Option<i64>,
+    /// The time from which the first sample continues.
+    begun_ns: Option<i64>,
     world: Option<World>,
     origin: Option<TakeoffOrigin>,
     phase: Phase,
@@ -93,6 +95,7 @@ impl<F: ProvidedFactor> Engine<F> {
         Ok(Self {
             key: Key::FIRST,
             now_ns: None,
+            begun_ns: None,
             world: None,
             origin: None,
             phase: Phase::Starting(Starter::new(config)),
@@ -128,6 +131,12 @@ impl<F: ProvidedFactor> Engine<F> {
 
     pub(super) fn now_ns(&self) -> Option<i64> {
         self.now_ns
+    }
+
+    /// The time from which the first sample continues: that of a warm start before it, or of the estimate that was taken to a new
+    /// clock.
+    pub(super) fn begun_ns(&self) -> Option<i64> {
+        self.begun_ns
     }
 
     pub(super) fn condition(&self) -> Condition {
@@ -199,7 +208,7 @@ impl<F: ProvidedFactor> Engine<F> {
     /// The clock of the IMU was set back. The estimate is kept, but the times of its measurements are dropped. A receiver that was
     /// not let in stays out. The new clock has been seen for `for_ns`, and the same time again may have passed before.
     pub(super) fn set_clock_back(&mut self, sample_ns: i64, for_ns: i64, config: &StateEstimatorConfig) {
-        (self.key, self.now_ns) = (Key::FIRST, None);
+        (self.key, self.now_ns, self.begun_ns) = (Key::FIRST, None, None);
         self.sources = Sources::default();
         self.gate.forget_times();
         (self.fixes, self.anchors) = (Agreement::default(), Agreement::default());
@@ -213,7 +222,7 @@ impl<F: ProvidedFactor> Engine<F> {
             Phase::Running => {
                 let resumed_ns = sample_ns.saturating_sub(for_ns.saturating_mul(2));
                 if self.strategy.set_clock(resumed_ns).is_ok() {
-                    self.now_ns = Some(resumed_ns);
+                    (self.now_ns, self.begun_ns) = (Some(resumed_ns), Some(resumed_ns));
                     self.unconfirmed = CONFIRMATIONS;
                     self.resets = self.resets.wrapping_add(1);
                 } else {
@@ -295,7 +304,9 @@ impl<F: ProvidedFactor> Engine<F> {
         self.key = entry.key;
         if matches!(entry.payload, Payload::Warm(_)) {
             // The first known time. The first sample continues from it.
-            self.now_ns = self.now_ns.or(Some(entry.key.time_ns));
+            if self.now_ns.is_none() {
+                (self.now_ns, self.begun_ns) = (Some(entry.key.time_ns), Some(entry.key.time_ns));
+            }
         }
         // Reports before the first sample count as well.
         let is_told = matches!(entry.payload, Payload::Attitude(_) | Payload::Health(_) | Payload::Frame);

@@ -86,6 +86,8 @@ pub(super) enum Told {
 #[derive(Debug)]
 pub(super) struct Queue<F: ProvidedFactor> {
     samples: VecDeque<ImuMean>,
+    /// The time of the last sample that was dropped: the first one held begins there.
+    dropped_ns: Option<i64>,
     inputs: VecDeque<Entry<F>>,
     engine: Engine<F>,
     copies: VecDeque<Engine<F>>,
@@ -109,6 +111,7 @@ impl<F: ProvidedFactor> Queue<F> {
         let rooms = Rooms::of(&config.params);
         Ok(Self {
             samples: VecDeque::with_capacity(rooms.samples),
+            dropped_ns: None,
             inputs: VecDeque::with_capacity(rooms.inputs),
             engine,
             copies,
@@ -348,8 +351,10 @@ impl<F: ProvidedFactor> Queue<F> {
     /// Whether a sample is the first after a gap. Inputs may divide the sample into parts of any length.
     fn follows_gap(&self, index: usize, config: &StateEstimatorConfig) -> bool {
         let before = index.checked_sub(1).and_then(|before| self.samples.get(before));
-        let (Some(before), Some(sample)) = (before, self.samples.get(index)) else { return false };
-        sample.time_ns.saturating_sub(before.time_ns) > ns(config.sensors.longest_sample)
+        // The first sample held follows one that was dropped, or continues from where the engine began.
+        let before_ns = before.map(|before| before.time_ns).or(self.dropped_ns).or(self.engine.begun_ns());
+        let (Some(before_ns), Some(sample)) = (before_ns, self.samples.get(index)) else { return false };
+        sample.time_ns.saturating_sub(before_ns) > ns(config.sensors.longest_sample)
     }
 
     fn advance(&mut self, key: Key, sample: &ImuMean, is_gap: bool, config: &StateEstimatorConfig) {
@@ -428,7 +433,7 @@ impl<F: ProvidedFactor> Queue<F> {
         let kept_ns = oldest.needed_ns().min(self.engine.needed_ns());
         // The sample before the first needed one shows whether that one follows a gap.
         while self.samples.get(1).is_some_and(|sample| sample.time_ns <= kept_ns) {
-            self.samples.pop_front();
+            self.dropped_ns = self.samples.pop_front().map(|sample| sample.time_ns);
         }
         while self.inputs.front().is_some_and(|entry| entry.key <= key) {
             self.inputs.pop_front();

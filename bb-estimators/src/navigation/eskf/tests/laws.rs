@@ -167,6 +167,14 @@ impl<S: States, const N: usize> Replayed for Fixed<S, N> {
         self.filter.propagate(sample)
     }
 
+    fn longest_sample(&self) -> f64 {
+        self.filter.params().longest_sample
+    }
+
+    fn propagate_part(&mut self, part: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
+        self.filter.propagate_part(part, is_gap)
+    }
+
     fn update(&mut self, measurement: &GnssPosition) -> Result<Fused, Refusal> {
         self.filter.update(&mut self.stream, measurement)
     }

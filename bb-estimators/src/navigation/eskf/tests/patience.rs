@@ -3,9 +3,23 @@
 use nalgebra::{UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
-use super::started;
-use crate::navigation::state::Navigation;
-use crate::navigation::{BodyVelocity, Eskf, GnssPosition, ImuMean, Stream};
+use super::{Boat, Drone, started};
+use crate::navigation::state::{Navigation, POSITION, ROTATION, States, VELOCITY};
+use crate::navigation::{
+    BarometricHeight, BodyVelocity, Eskf, GnssPosition, Height, ImuMean, RelativePose, Stream,
+};
+
+/// Propagates over a second at rest.
+fn rest<S: States, const N: usize>(filter: &mut Eskf<S, N>, from_s: i64) {
+    for i in 1..=100 {
+        let sample = ImuMean {
+            time_ns: from_s * 1_000_000_000 + i * 10_000_000,
+            angular_velocity: Vector3::zeros(),
+            specific_force: Vector3::new(0.0, 0.0, filter.params().gravity),
+        };
+        filter.propagate(&sample).unwrap();
+    }
+}
 
 /// Fixes of a robot that drives on while a filter at rest, which knows its velocity well, is wrong.
 struct Drive {
@@ -36,15 +50,7 @@ impl Drive {
     }
 
     fn second(&mut self, position: Vector3<f64>) {
-        for i in 1..=100 {
-            let gravity = self.filter.params().gravity;
-            let sample = ImuMean {
-                time_ns: self.time_s * 1_000_000_000 + i * 10_000_000,
-                angular_velocity: Vector3::zeros(),
-                specific_force: Vector3::new(0.0, 0.0, gravity),
-            };
-            self.filter.propagate(&sample).unwrap();
-        }
+        rest(&mut self.filter, self.time_s);
         self.time_s += 1;
         let fix = GnssPosition::new(position, self.deviation, self.deviation);
         self.refused += u32::from(self.filter.update(&mut self.stream, &fix).is_err());
@@ -148,4 +154,135 @@ fn a_velocity_that_is_slightly_wrong_costs_no_more_than_the_patience() {
     let (position, velocity) = drive.drive(10);
     assert!(drive.refused <= 3, "{}", drive.refused);
     assert!(position < 1.0 && velocity < 1.0, "{position} m, {velocity} m/s");
+}
+
+/// Outliers that agree, and then others beside the first: that is no motion.
+#[test]
+fn a_jump_to_the_side_does_not_change_the_velocity() {
+    let mut drive = Drive::new(Vector3::zeros(), 1.0);
+    for (there, recoveries) in [(Vector3::new(1e3, 0.0, 0.0), 1), (Vector3::new(1.2e3, 1e3, 0.0), 2)] {
+        for _ in 0..4 {
+            drive.second(there);
+            let velocity = drive.filter.estimate().unwrap().velocity.norm();
+            assert!(velocity < 0.5, "{velocity} m/s at {there}");
+        }
+        assert_eq!(drive.stream.counts().recoveries, recoveries);
+    }
+}
+
+/// A filter that barometer and fixes have followed at rest for a minute, with the barometer's stream.
+fn with_barometer<S: States, const N: usize>() -> (Eskf<S, N>, Stream) {
+    let (mut filter, mut gnss, mut pressure) = (started::<S, N>(), Stream::default(), Stream::default());
+    for second in 0..60 {
+        rest(&mut filter, second);
+        filter.update(&mut gnss, &GnssPosition::new(Vector3::zeros(), 1.0, 2.0)).unwrap();
+        filter.update(&mut pressure, &BarometricHeight { height: 0.0, deviation: 0.5 }).unwrap();
+    }
+    (filter, pressure)
+}
+
+/// A door opens, and the pressure changes: the horizontal position and velocity are as well known as before.
+fn a_pressure_step_leaves_the_horizontal_motion<S: States, const N: usize>() {
+    for step in [3.0, 30.0, 1e3] {
+        let (mut filter, mut pressure) = with_barometer::<S, N>();
+        let before = *filter.covariance();
+        for _ in 0..4 {
+            let _ = filter.update(&mut pressure, &BarometricHeight { height: step, deviation: 0.5 });
+        }
+        assert_eq!((pressure.counts().gate, pressure.counts().recoveries), (3, 1));
+        let after = filter.covariance();
+        for i in [POSITION, POSITION + 1, VELOCITY, VELOCITY + 1] {
+            for j in 0..N {
+                let scale = (before[(i, i)] * before[(j, j)]).sqrt();
+                assert!((after[(i, j)] - before[(i, j)]).abs() < 1e-9 * scale, "{step} m: {i}, {j}");
+            }
+        }
+        assert!(filter.is_consistent() && after == &after.transpose());
+    }
+}
+
+#[test]
+fn a_pressure_step_leaves_the_horizontal_motion_with_and_without_a_bias() {
+    a_pressure_step_leaves_the_horizontal_motion::<Navigation, 15>();
+    a_pressure_step_leaves_the_horizontal_motion::<Boat, { Boat::DIMENSION }>();
+}
+
+/// Whether the height or the barometer has jumped is unknown: the next fix tells.
+#[test]
+fn a_fix_tells_a_pressure_step_from_a_climb() {
+    for (step, climb) in [(3.0, 0.0), (30.0, 0.0), (30.0, 30.0), (1e3, 0.0), (1e3, 1e3)] {
+        let (mut filter, mut pressure) = with_barometer::<Boat, { Boat::DIMENSION }>();
+        for _ in 0..4 {
+            let _ = filter.update(&mut pressure, &BarometricHeight { height: step, deviation: 0.5 });
+        }
+        let fix = GnssPosition::new(Vector3::new(0.0, 0.0, climb), 1.0, 2.0);
+        assert!(filter.update(&mut Stream::default(), &fix).is_ok(), "{step} m, {climb} m");
+        let height = filter.estimate().unwrap().position.z;
+        assert!((height - climb).abs() < 3.0, "{step} m, {climb} m: {height} m");
+    }
+}
+
+/// A filter at rest that climbs instead, by what only the height shows: with its error of the height and of the velocity.
+fn climb<S: States, const N: usize>(
+    speed: f64,
+    fuse: impl Fn(&mut Eskf<S, N>, &mut Stream, f64),
+) -> (f64, f64, u64) {
+    let (mut filter, mut stream) = (started::<S, N>(), Stream::default());
+    for second in 0..90 {
+        rest(&mut filter, second);
+        fuse(&mut filter, &mut stream, speed * (second - 59).max(0) as f64);
+    }
+    assert!(filter.is_consistent());
+    let estimate = filter.estimate().unwrap();
+    (estimate.position.z - speed * 30.0, estimate.velocity.z - speed, stream.counts().gate)
+}
+
+#[test]
+fn a_wrong_vertical_velocity_is_found_by_the_height() {
+    for speed in [1.0, -2.0, 5.0, 20.0] {
+        let height = |filter: &mut Eskf<Navigation, 15>, stream: &mut Stream, height| {
+            let _ = filter.update(stream, &Height { height, deviation: 0.5 });
+        };
+        let (height, velocity, refused) = climb(speed, height);
+        assert!(height.abs() < 1.0 && velocity.abs() < 0.3, "{speed} m/s: {height} m, {velocity} m/s");
+        assert!(refused <= 6, "{speed} m/s: {refused}");
+        let pressure = |filter: &mut Eskf<Boat, { Boat::DIMENSION }>, stream: &mut Stream, height| {
+            let _ = filter.update(stream, &BarometricHeight { height, deviation: 0.5 });
+        };
+        let (_, velocity, refused) = climb(speed, pressure);
+        assert!(velocity.abs() < 0.3, "{speed} m/s: {velocity} m/s");
+        assert!(refused <= 6, "{speed} m/s: {refused}");
+    }
+}
+
+/// Odometry that jumps says nothing of the keyframe: position and attitude in the world become uncertain by no more than the jump.
+#[test]
+fn a_relative_pose_that_does_not_fit_leaves_the_keyframe() {
+    for (way, turn) in [(3.0, 0.0), (0.0, 0.5), (3.0, 0.5)] {
+        let (mut filter, mut odometry) = (started::<Drone, { Drone::DIMENSION }>(), Stream::default());
+        let mut drift = |filter: &mut Eskf<Drone, _>, second: i64, way: f64, turn: f64| {
+            rest(filter, second);
+            let way = (Vector3::new(way, 0.0, 0.0), 0.02);
+            let turn = (UnitQuaternion::from_euler_angles(0.0, 0.0, turn), 0.01);
+            let _ = filter.update(&mut odometry, &RelativePose::new(second as u64, way, turn));
+            odometry.counts().recoveries
+        };
+        for second in 0..20 {
+            filter.set_keyframe(second as u64);
+            assert_eq!(drift(&mut filter, second, 0.0, 0.0), 0);
+        }
+        let before = *filter.covariance();
+        for second in 20..24 {
+            filter.set_keyframe(second as u64);
+            let recoveries = drift(&mut filter, second, way, turn);
+            assert_eq!(recoveries, u64::from(second == 23), "{way} m, {turn} rad");
+        }
+        let after = filter.covariance();
+        for i in 0..3 {
+            let [position, tilt] = [POSITION + i, ROTATION + i].map(|i| (before[(i, i)], after[(i, i)]));
+            assert!(position.1 < position.0 + 4.0 * way * way + 0.5, "{way} m, {turn} rad: {i}, {position:?} m²");
+            assert!(tilt.1 < tilt.0 + 4.0 * turn * turn + 1e-3, "{way} m, {turn} rad: {i}, {tilt:?} rad²");
+        }
+        assert!(filter.is_consistent());
+    }
 }

@@ -147,6 +147,14 @@ impl Replayed for Filter {
         self.ekf.propagate(sample)
     }
 
+    fn longest_sample(&self) -> f64 {
+        self.ekf.params().longest_sample
+    }
+
+    fn propagate_part(&mut self, part: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
+        self.ekf.propagate_part(part, is_gap)
+    }
+
     fn update(&mut self, measured: &Measured) -> Result<Fused, Refusal> {
         match measured {
             Measured::Gnss(fix) => self.ekf.update(&mut self.gnss, fix),
@@ -155,5 +163,25 @@ impl Replayed for Filter {
             Measured::Pose(pose) => self.ekf.update(&mut self.pose, pose),
             Measured::Orientation(heading) => self.ekf.update(&mut self.orientation, heading),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::navigation::History;
+    use nalgebra::Vector3;
+
+    /// The parts of a gap that a measurement divides are gaps.
+    #[test]
+    fn a_divided_gap_is_counted() {
+        let rest = Vector2::zeros();
+        let start = PlanarStart::at(0, (rest, 2.0), (0.3, 0.1), (rest, 0.5));
+        let filter = Filter::new(&PlanarOptions::default(), &start).unwrap();
+        let mut history = History::<_, 10, 10, 2>::new(filter, 90_000_000).unwrap();
+        history.update(90_000_000, &Measured::Gnss(PlanarPosition::new(rest, 1.0))).unwrap();
+        let (angular_velocity, specific_force) = (Vector3::zeros(), Vector3::new(0.0, 0.0, 9.8));
+        history.propagate(&ImuMean { time_ns: 180_000_000, angular_velocity, specific_force }).unwrap();
+        assert_eq!(history.now().ekf().gaps(), 2);
     }
 }

@@ -97,6 +97,7 @@ impl<F: ProvidedFactor> Queue<F> {
         }
         self.engine.set_clock_back(sample.time_ns, for_ns, config);
         self.samples.clear();
+        self.dropped_ns = None;
         self.copies.clear();
         self.copies.push_back(self.engine.clone());
         self.left_ns = i64::MIN;
@@ -149,7 +150,8 @@ impl<F: ProvidedFactor> Queue<F> {
         }
         if self.samples.len() >= most {
             // All remaining samples are later than the newest keyframe. The prediction has to bridge the dropped ones.
-            self.samples.drain(..(most / LEAVING).max(1));
+            let last = self.samples.drain(..(most / LEAVING).max(1)).next_back();
+            self.dropped_ns = last.map(|sample| sample.time_ns).or(self.dropped_ns);
         }
         self.predict(config);
         let dropped = held.saturating_sub(self.samples.len()) as u64;

@@ -3,6 +3,7 @@
 use super::flight::{SECOND, STEP};
 use super::*;
 use crate::navigation::{ImuMean, Refusal};
+use nalgebra::Matrix6;
 use proptest::prelude::*;
 
 /// An input on a clock that is behind by `by_ns`.
@@ -325,6 +326,71 @@ fn an_imu_that_is_too_fast_drops_the_oldest_and_says_so() {
             let late = estimator.add_pose_anchor(PoseAnchor { provider: 3, ..flight.anchors[9] });
             let too_old = Refusal::TooOld { time_ns: flight.anchors[9].time_ns };
             assert_eq!(late, Err(EstimatorError::Degraded(Reason::Refused(too_old))), "{}", strategy.name());
+        }
+    }
+}
+
+/// The gap that a clock set back leaves is one even if frames on the new clock divide it into parts shorter than a sample may be.
+#[test]
+fn the_gap_of_a_clock_that_is_set_back_is_as_uncertain_if_it_is_divided() {
+    let flight = Flight::new(8, 2);
+    let (jump_ns, by_ns) = (4 * SECOND, 3600 * SECOND);
+    for strategy in StrategyKind::ALL {
+        let [whole, divided] = [false, true].map(|with_frames| {
+            let mut estimator = started(&flight, *strategy);
+            let mut frames = 0;
+            for sent in flight.sent(true, false, false) {
+                let is_after = sent.time_ns() > jump_ns;
+                match behind(&sent, if is_after { by_ns } else { 0 }) {
+                    Sent::Vio(_) if is_after => {}
+                    sent => {
+                        let is_bridged = sent.to(&mut estimator) == Err(EstimatorError::Degraded(Reason::Bridged));
+                        if !(is_bridged && with_frames) {
+                            continue;
+                        }
+                        // It continues from half a second before the jump.
+                        let in_gap =
+                            |vio: &&VioOutput| (jump_ns - SECOND / 2..jump_ns + SECOND / 2).contains(&vio.to_ns);
+                        for vio in flight.vio.iter().filter(in_gap) {
+                            let said = VioOutput { covariance: Matrix6::identity() * 1e8, ..*vio };
+                            ignore(behind(&Sent::Vio(said), by_ns).to(&mut estimator));
+                            frames += 1;
+                        }
+                    }
+                }
+            }
+            assert_eq!((estimator.counts().set_back, frames), (1, if with_frames { 10 } else { 0 }));
+            estimator.predicted(8 * SECOND - by_ns).unwrap().covariance
+        });
+        for i in 0..6 {
+            let ratio = divided[(i, i)] / whole[(i, i)];
+            assert!((0.8..2.0).contains(&ratio), "{strategy:?}, {i}: {} and {}", whole[(i, i)], divided[(i, i)]);
+        }
+    }
+}
+
+/// The same for a warm start some time before the first sample.
+#[test]
+fn the_gap_before_the_first_sample_is_as_uncertain_if_it_is_divided() {
+    let flight = Flight::new(4, 2);
+    for strategy in StrategyKind::ALL {
+        let [whole, divided] = [false, true].map(|with_frames| {
+            let mut estimator = estimator(*strategy);
+            estimator.warm_start(flight.warm_start(0)).unwrap();
+            if with_frames {
+                for vio in flight.vio.iter().filter(|vio| vio.to_ns < SECOND / 2) {
+                    let said = VioOutput { covariance: Matrix6::identity() * 1e8, ..*vio };
+                    ignore(estimator.add_vio(said));
+                }
+            }
+            for sample in flight.samples.iter().filter(|sample| sample.time_ns >= SECOND / 2) {
+                ignore(estimator.add_imu(sample));
+            }
+            estimator.predicted(4 * SECOND).unwrap().covariance
+        });
+        for i in 0..6 {
+            let ratio = divided[(i, i)] / whole[(i, i)];
+            assert!((0.8..2.0).contains(&ratio), "{strategy:?}, {i}: {} and {}", whole[(i, i)], divided[(i, i)]);
         }
     }
 }
