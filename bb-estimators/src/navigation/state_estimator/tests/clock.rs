@@ -199,7 +199,7 @@ proptest! {
         silence_ns in 0..2 * SECOND,
         seed in 0..1000_u64,
     ) {
-        let flight = Flight::new(24, seed);
+        let flight = Flight::new(30, seed);
         let by_ns = if is_ahead { -off_ns } else { off_ns };
         let jump_ns = 6 * SECOND;
         for strategy in StrategyKind::ALL {
