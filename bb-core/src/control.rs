@@ -193,8 +193,6 @@ struct State {
     statistics: Vec<CommandStatistics>,
     next_id: u64,
     parameters: ParameterValues,
-    /// How often parameters were set.
-    version: u64,
     bound: Vec<Bound>,
     hooks: Hooks,
     budgets: Budgets,
@@ -206,6 +204,8 @@ struct State {
     next_apart: u64,
     /// Commands that arm the robot, whose code has ended while something is being made safe.
     held: Vec<EndedCode>,
+    /// Cancelled commands that are gone since, which the former wait for.
+    held_gone: Vec<u64>,
     /// The outcome of the last disarming.
     last_disarm: Result<(), DisarmError>,
     /// How often a disarming was requested. A caller that has been waiting to arm the robot since before then gives

@@ -1,7 +1,7 @@
 //! Hardware that is started, and commands that arm, while the robot is being disarmed or was.
 
 use crate::components::{Number, within};
-use crate::gate::{Brake, Brakes, Gate, wait_until};
+use crate::gate::{Brake, Brakes, Gate, Place, Stuck, wait_until};
 use bb_core::prelude::*;
 use bb_core::{ArmError, DisarmError, Live};
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, Ordering};
@@ -137,9 +137,24 @@ impl Brakes for Slowly {
     }
 }
 
+/// Where a command blocks its thread.
+static BLOCK: Gate = Gate::new();
+
+#[derive(Debug)]
+pub(crate) struct Held;
+
+impl Place for Held {
+    const GATE: &'static Gate = &BLOCK;
+    const NAME: &'static str = "block";
+}
+
 robot! {
     robot Scanner;
-    commands { arm: Arm; }
+    commands {
+        category other { concurrency: 3; }
+        arm: Arm;
+        block: Stuck<Held> { allowed_states: [idle]; category: other; }
+    }
     link base {
         sensor lidar: Lidar() { rate: 100 Hz; }
         sensor brake: Brake<Slowly>() { rate: 10 Hz; }
@@ -166,43 +181,64 @@ fn what_is_started_while_the_robot_is_disarmed_is_made_safe_as_well() {
     });
 }
 
-/// `disarm` does not wait for an `init` that takes longer. What that has started is made safe when it returns, and the robot is
-/// not armed before.
+/// Who arms the robot.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Arms {
+    Call,
+    Command,
+    /// A command that waits for another one, which is gone while something is made safe.
+    AfterAnother,
+}
+
+/// `disarm` does not wait for an `init` that takes longer. What that has started is made safe when it returns or fails, and the
+/// robot is not armed before.
 #[test]
 fn what_is_started_after_a_disarming_by_an_init_from_before_is_made_safe_before_the_robot_is_armed() {
     let _alone = alone();
     within(60, || {
-        LATER.store(STAYS, Ordering::SeqCst);
         BRAKES.store(UNTIL_AT_GATE, Ordering::SeqCst);
-        for (registers_first, by_command) in [(false, false), (true, false), (false, true), (true, true)] {
-            MADE.store(0, Ordering::SeqCst);
-            REGISTERS_FIRST.store(registers_first, Ordering::SeqCst);
-            GATE.close("init");
-            let robot = Scanner::builder().start().expect("it starts");
-            assert_eq!(robot.arm(), Ok(()));
-            assert_eq!((robot.disarm(), turning(), robot.safety()), (Ok(()), 0, Safety::Disarmed));
-            GATE.close("callback");
-            GATE.wait_for(1);
-            assert_eq!((MADE.load(Ordering::SeqCst), turning()), (2, 1), "it turns, and its callback was called");
-            let live = robot.live();
-            let (begins, has_begun) = channel();
-            let arms = std::thread::spawn(move || {
-                let _ = begins.send(());
-                if by_command {
-                    let arm = live.command(scanner::command::arm, NoArguments).expect("it is allowed");
-                    arm.wait().map_err(|error| error.to_string())
-                } else {
-                    live.arm().map_err(|error| error.to_string())
+        for by in [Arms::Call, Arms::Command, Arms::AfterAnother] {
+            for (registers_first, later) in [(false, STAYS), (true, STAYS), (false, FAILS_FOR_GOOD)] {
+                let case = format!("{by:?}, {registers_first}, {later}");
+                MADE.store(0, Ordering::SeqCst);
+                LATER.store(later, Ordering::SeqCst);
+                REGISTERS_FIRST.store(registers_first, Ordering::SeqCst);
+                GATE.close("init");
+                let robot = Scanner::builder().start().expect("it starts");
+                assert_eq!(robot.arm(), Ok(()));
+                if by == Arms::AfterAnother {
+                    BLOCK.close("block");
+                    robot.command(scanner::command::block, NoArguments).expect("it is allowed");
+                    BLOCK.wait_for(1);
                 }
-            });
-            has_begun.recv().expect("it begins");
-            std::thread::sleep(Duration::from_millis(30));
-            assert_eq!((robot.safety(), turning()), (Safety::Disarmed, 1), "it is not armed while something turns");
-            GATE.open();
-            assert_eq!(arms.join().expect("it does not panic"), Ok(()));
-            assert_eq!((robot.safety(), turning()), (Safety::Armed, 0));
-            let report = robot.stop();
-            assert_eq!((report.safety, turning()), (Safety::Disarmed, 0), "{registers_first}");
+                assert_eq!((robot.disarm(), turning(), robot.safety()), (Ok(()), 0, Safety::Disarmed), "{case}");
+                let live = robot.live();
+                let arm = move || match by {
+                    Arms::Call => live.arm().map_err(|error| error.to_string()),
+                    _ => {
+                        let arm = live.command(scanner::command::arm, NoArguments).expect("it is allowed");
+                        arm.wait().map_err(|error| error.to_string())
+                    }
+                };
+                let mut arms = None;
+                if by == Arms::AfterAnother {
+                    arms = Some(std::thread::spawn(arm.clone()));
+                    // It waits for the other one by now.
+                    std::thread::sleep(Duration::from_millis(30));
+                }
+                GATE.close("callback");
+                GATE.wait_for(1);
+                assert_eq!((MADE.load(Ordering::SeqCst), turning()), (2, 1), "{case}: it turns, its callback runs");
+                let arms = arms.unwrap_or_else(|| std::thread::spawn(arm));
+                BLOCK.open();
+                std::thread::sleep(Duration::from_millis(30));
+                assert_eq!((robot.safety(), turning()), (Safety::Disarmed, 1), "{case}: not while something turns");
+                GATE.open();
+                assert_eq!(arms.join().expect("it does not panic"), Ok(()), "{case}");
+                assert_eq!((robot.safety(), turning()), (Safety::Armed, 0), "{case}");
+                let report = robot.stop();
+                assert_eq!((report.safety, turning()), (Safety::Disarmed, 0), "{case}");
+            }
         }
     });
 }

@@ -234,3 +234,91 @@ fn the_ends_of_a_range_belong_to_it() -> Result<(), Failure> {
     }
     Ok(())
 }
+
+/// Options that take a while to copy.
+#[derive(Debug, Options)]
+pub(crate) struct SlowOptions {
+    /// Factor.
+    #[option(default = 1.0, range = 0.0..=10.0)]
+    gain: f64,
+}
+
+impl Clone for SlowOptions {
+    fn clone(&self) -> Self {
+        std::thread::sleep(Duration::from_millis(5));
+        Self { gain: self.gain }
+    }
+}
+
+/// What it was told: its gains in order, and whether 50 was refused.
+static TUNED: Mutex<(Vec<f64>, Option<bool>)> = Mutex::new((Vec::new(), None));
+
+/// Tunes itself as it starts.
+#[derive(Debug)]
+pub(crate) struct Tuning;
+
+impl Sensor for Tuning {
+    type Options = SlowOptions;
+    type Output = Number;
+
+    fn init(options: SlowOptions, context: &SensorContext) -> Result<Self, Fault> {
+        let refused = context.bus().set_parameter("param/gain", 50.0).is_err();
+        context.bus().set_parameter("param/gain", 5.0)?;
+        let mut tuned = TUNED.lock().map_err(|_| "it panicked")?;
+        *tuned = (vec![options.gain], Some(refused));
+        Ok(Self)
+    }
+
+    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
+        Ok(Reading::nothing())
+    }
+
+    fn handle_options(&mut self, options: SlowOptions, _: &SensorContext) -> Result<(), Fault> {
+        TUNED.lock().map_err(|_| "it panicked")?.0.push(options.gain);
+        Ok(())
+    }
+}
+
+robot! {
+    robot SelfTuned;
+    parameters { gain: f64 = 1.0; other: f64 = 0.0; }
+    link base { sensor device: Tuning(gain = param::gain) { rate: 100 Hz; } }
+}
+
+static ALONE: Mutex<()> = Mutex::new(());
+
+#[test]
+fn what_a_sensor_sets_as_it_starts_reaches_its_own_options() -> Result<(), Failure> {
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut simulation = SelfTuned::builder().simulate()?;
+    simulation.run_for(Duration::from_millis(50));
+    assert_eq!(*TUNED.lock().map_err(|_| "it panicked")?, (vec![1.0, 5.0], Some(true)));
+    simulation.stop().ok()?;
+    Ok(())
+}
+
+#[test]
+fn a_set_does_not_wait_for_an_end_of_sets_of_other_parameters() {
+    within(60, || {
+        let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+        let running = SelfTuned::builder().start().expect("it starts");
+        let is_over = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                for number in 0_u32.. {
+                    if is_over.load(Ordering::SeqCst) {
+                        break;
+                    }
+                    running.set_parameter(self_tuned::param::other, f64::from(number)).expect("it is in range");
+                    // Another one before the options are checked.
+                    std::thread::sleep(Duration::from_millis(1));
+                }
+            });
+            for round in 0..10 {
+                running.set_parameter(self_tuned::param::gain, f64::from(round)).expect("it is in range");
+            }
+            is_over.store(true, Ordering::SeqCst);
+        });
+        running.stop();
+    });
+}

@@ -321,6 +321,14 @@ fn options_of_what_is_replaced_are_not_looked_at() -> Result<(), Failure> {
     let simulation = builder.simulate()?;
     assert_eq!(simulation.set_parameter(tuned::param::gain, 20.0), Ok(()));
     simulation.stop().ok()?;
+
+    // Also before the start.
+    let mut builder = Tuned::builder();
+    assert!(builder.set_parameter(tuned::param::gain, 20.0).is_err());
+    builder.replace_estimator::<Ramp>("sensor/base/count/scaled", RampOptions::defaults())?;
+    builder.set_parameter(tuned::param::gain, 20.0)?;
+    builder.set("param/gain", "30.0")?;
+    assert_eq!(builder.simulate()?.parameter(tuned::param::gain), 30.0);
     Ok(())
 }
 

@@ -38,20 +38,26 @@ enum Why {
     Lingered(u64),
 }
 
+impl Apart {
+    fn is_of_start(&self) -> bool {
+        matches!(self.why, Why::Started | Why::FailedInit)
+    }
+}
+
 impl State {
     /// Whether a callback still has to run for `key`.
     pub(super) fn is_apart(&self, key: Key, number: u64) -> bool {
         self.apart.iter().any(|apart| apart.key == key && apart.left.contains(&number))
     }
 
-    /// Whether hardware that was started on a disarmed robot is still being made safe.
+    /// Whether hardware that an `init` or a `handle_options` has started is still being made safe.
     pub(super) fn is_making_safe(&self) -> bool {
-        self.apart.iter().any(|apart| apart.why == Why::Started)
+        self.apart.iter().any(Apart::is_of_start)
     }
 
     /// The paths of the components of which this is true.
     pub(super) fn being_made_safe(&self) -> Vec<&'static str> {
-        self.apart.iter().filter(|apart| apart.why == Why::Started).map(|apart| apart.path).collect()
+        self.apart.iter().filter(|apart| apart.is_of_start()).map(|apart| apart.path).collect()
     }
 
     /// The paths of components whose callbacks run.
@@ -287,6 +293,9 @@ impl Step<'_> {
             self.gone(id);
         }
         if !self.state.is_making_safe() {
+            for id in std::mem::take(&mut self.state.held_gone) {
+                self.gone(id);
+            }
             self.effects.ended.append(&mut self.state.held);
         }
     }

@@ -11,7 +11,7 @@ use crate::event::{ArmError, DisarmError, Safety, SafetyError};
 use crate::journal::Event;
 use crate::node::Mode;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// How long disarm callbacks may take.
 pub(crate) const DISARM_WITHIN: Duration = Duration::from_secs(5);
@@ -58,30 +58,39 @@ impl Control {
         if !permit.is_valid() {
             return Err(ArmError::Cancelled);
         }
-        if self.0.mode == Mode::Real {
+        let deadline = Instant::now() + ARM_WITHIN;
+        loop {
             // Code that is itself waited for does not wait.
             let waits = inside::waits_for(self.id());
-            // If the wait fails, they are still there below.
-            self.wait_until(ARM_WITHIN, |state| {
-                state.machine.safety != Safety::Disarmed
-                    || !(state.has_lingering() || state.is_making_safe() && waits.is_some())
-                    || state.is_stopping
-                    || state.disarms != disarms
-            });
-        } else {
-            self.drop_cancelled();
+            if self.0.mode == Mode::Real {
+                let left = deadline.saturating_duration_since(Instant::now());
+                // If the wait fails, they are still there below.
+                self.wait_until(left, |state| {
+                    state.machine.safety != Safety::Disarmed
+                        || !(state.has_lingering() || state.is_making_safe() && waits.is_some())
+                        || state.is_stopping
+                        || state.disarms != disarms
+                });
+            } else {
+                self.drop_cancelled();
+            }
+            let step = self.step();
+            // The command may have been cancelled while this waited, or the robot disarmed.
+            if !permit.is_valid() || step.state.disarms != disarms {
+                return Err(ArmError::Cancelled);
+            }
+            let may_turn = step.state.machine.safety == Safety::Disarmed && step.state.is_making_safe();
+            if !may_turn || step.state.is_stopping {
+                step.line(Event::Arm);
+                return step.arm();
+            }
+            // A replay knows nothing of those callbacks, so there is no entry. A device that is unplugged is started again and
+            // again, so they may be those of another start.
+            let may_wait = self.0.mode == Mode::Real && waits.is_some() && !cfg!(loom);
+            if !may_wait || Instant::now() >= deadline {
+                return Err(ArmError::MakingSafe(step.state.being_made_safe()));
+            }
         }
-        let step = self.step();
-        // The command may have been cancelled while this waited, or the robot disarmed.
-        if !permit.is_valid() || step.state.disarms != disarms {
-            return Err(ArmError::Cancelled);
-        }
-        // A replay knows nothing of those callbacks, so there is no entry.
-        if step.state.machine.safety == Safety::Disarmed && step.state.is_making_safe() {
-            return Err(ArmError::MakingSafe(step.state.being_made_safe()));
-        }
-        step.line(Event::Arm);
-        step.arm()
     }
 
     /// In a replay: arming was requested.

@@ -299,6 +299,11 @@ impl Step<'_> {
         let lingering =
             |execution: &RunningCommand| execution.id == id && matches!(execution.phase, Phase::Lingering);
         let Some(index) = self.state.executions.iter().position(lingering) else { return };
+        let arming = |execution: &RunningCommand| matches!(execution.phase, Phase::Arming(..));
+        if self.state.is_making_safe() && self.state.executions.iter().any(arming) {
+            // As in `process_end`: what waits for it would arm the robot.
+            return self.state.held_gone.push(id);
+        }
         self.line(Event::Gone { execution: id });
         self.state.executions.remove(index);
         self.effects.forgotten.extend(self.state.hooks.take_of_execution(id));

@@ -69,18 +69,17 @@ impl Control {
         }
         let is_bound_to_any =
             |bound: &Bound| changes.iter().any(|change| bound.parameters.contains(&change.parameter));
-        // Validation of options is user code, so it runs without the lock, and again if another parameter was set
-        // meanwhile.
+        // Validation of options is user code, so it runs without the lock, and again if another parameter that the component is bound
+        // to was set meanwhile.
         loop {
-            let (values, version, checks) = {
+            let (before, checks) = {
                 let state = self.lock();
                 let bound = state.bound.iter().filter(|component| is_bound_to_any(component));
                 let checks: Vec<_> = bound
                     .map(|component| (component.path, component.parameters, Arc::clone(&component.check)))
                     .collect();
-                (state.parameters.clone(), state.version, checks)
+                (state.parameters.clone(), checks)
             };
-            let before = values;
             let values = before.with(changed(&changes));
             for (path, bound_to, check) in &checks {
                 check(&values).map_err(|message| {
@@ -101,11 +100,13 @@ impl Control {
             if step.state.parameters_are_final {
                 return Err(refuse(first_path, "the robot has stopped".to_owned()));
             }
-            if step.state.version != version {
+            let is_as_checked =
+                |number: &usize| step.state.parameters.all().get(*number) == before.all().get(*number);
+            if !checks.iter().all(|(_, bound_to, _)| bound_to.iter().all(is_as_checked)) {
                 continue;
             }
+            let values = step.state.parameters.with(changed(&changes));
             step.line(Event::Parameters { changes: changes.clone() });
-            step.state.version += 1;
             let mut estimators = Vec::new();
             for component in step.state.bound.iter().filter(|component| is_bound_to_any(component)) {
                 match &component.target {

@@ -15,7 +15,8 @@ pub enum ArmError {
     Stopping,
     /// The code of these commands, which were cancelled, has not returned.
     Lingering(Vec<&'static str>),
-    /// These components were started while the robot was being disarmed, and their disarm callbacks have not returned.
+    /// These components were started on the disarmed robot, or could not be started, and their disarm callbacks have not
+    /// returned.
     MakingSafe(Vec<&'static str>),
     /// The robot was disarmed while this waited, or the command that arms it was cancelled.
     Cancelled,

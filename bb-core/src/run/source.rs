@@ -88,15 +88,6 @@ impl Assembly {
         sources: &mut Vec<Box<dyn Source>>,
     ) {
         let context = S::context(declaration, self.host.clone());
-        let mut slot = Slot::<S>::new(Recipe::new(options, binding), self.environment.supervision());
-        let parameters = self.control.parameters();
-        let made = self.environment.make(declaration.path, || {
-            let made = self.control.replacing_hooks(declaration.path, true, || slot.make(&context, &parameters));
-            made.map_err(|failed| failed.fault)
-        });
-        if made.is_err() {
-            return;
-        }
         let shared = SharedSource::new(declaration.path, declaration.period_nanos.is_some());
         let tell = {
             let (told, control) = (shared.clone(), self.control.downgrade());
@@ -110,6 +101,15 @@ impl Assembly {
         let told = tell.clone();
         let target = BindTarget::Other(Box::new(move || told(Order::Options)));
         self.environment.bind(declaration.path, options, binding, target);
+        let mut slot = Slot::<S>::new(Recipe::new(options, binding), self.environment.supervision());
+        let parameters = self.control.parameters();
+        let made = self.environment.make(declaration.path, || {
+            let made = self.control.replacing_hooks(declaration.path, true, || slot.make(&context, &parameters));
+            made.map_err(|failed| failed.fault)
+        });
+        if made.is_err() {
+            return;
+        }
         self.control.look_after(declaration.path, declaration.supervisor, move |order| {
             tell(match order {
                 ComponentOrder::Restart => Order::Restart,

@@ -93,6 +93,7 @@ impl Overseer for Nobody {
 fn environment() -> Environment {
     let parts = EnvironmentParts {
         mode: Mode::Virtual,
+        replacements: Default::default(),
         clock: Clock::virtual_at(NOW),
         origin: Origin::default(),
         overseer: std::sync::Arc::new(Nobody),

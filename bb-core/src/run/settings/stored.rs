@@ -19,7 +19,8 @@ impl<R: Robot> Builder<R> {
     ///
     /// Returns the stored values that are not used: their parameter is no longer declared, or accepts other values. They stay in
     /// the store until the parameter is set. Each value is checked alone: if the values of a component contradict each other, because
-    /// one of them is no longer used, the robot does not start.
+    /// one of them is no longer used, the robot does not start. Replace components before this call: the options of a declared
+    /// component refuse values that its replacement may take.
     ///
     /// # Errors
     /// The store cannot be read.
@@ -40,7 +41,7 @@ impl<R: Robot> Builder<R> {
         if let Some(slot) = parameters.get_mut(number) {
             *slot = value.clone();
         }
-        if let Some(message) = refused_by_bound::<R>(&mut self.options, &parameters, path) {
+        if let Some(message) = refused_by_bound(self, &parameters, path) {
             return Err(refuse(message));
         }
         self.parameters = parameters;

@@ -204,7 +204,7 @@ proptest! {
         let jump_ns = 6 * SECOND;
         for strategy in StrategyKind::ALL {
             let mut estimator = started(&flight, *strategy);
-            let (mut again_ns, mut last) = (None, None);
+            let (mut again_ns, mut last, mut is_confirmed) = (None, None, false);
             for sent in &flight.sent(true, true, false) {
                 let time_ns = sent.time_ns();
                 if (jump_ns..jump_ns + silence_ns).contains(&time_ns) {
@@ -219,7 +219,9 @@ proptest! {
                 if let Some(output) = now {
                     again_ns.get_or_insert(time_ns);
                     let of_then = EstimatorOutput { time_ns: output.time_ns + by_ns, ..output };
-                    last = Some((flight.error(&of_then).0, output.degraded));
+                    last = Some(flight.error(&of_then).0);
+                    // An anchor that the gate refuses by chance makes it degraded for some seconds.
+                    is_confirmed |= time_ns > jump_ns + 10 * SECOND && !output.degraded;
                 }
             }
             let again_ns = again_ns.unwrap() - jump_ns - silence_ns;
@@ -227,11 +229,12 @@ proptest! {
             let is_lost = is_ahead && off_ns + silence_ns + SECOND / 2 + 2 * STEP > 60 * SECOND;
             let bound_ns = if is_lost { 3 * SECOND / 2 + 5 * STEP } else { SECOND / 2 + 2 * STEP };
             prop_assert!(again_ns <= bound_ns, "{}: again after {again_ns} ns", strategy.name());
-            let (error_m, degraded) = last.unwrap();
-            // After a long gap the attitude is unknown, and confirming it may take longer.
+            let error_m = last.unwrap();
+            // After a long gap the attitude is unknown, and confirming it may take longer than the flight.
             let is_long = is_ahead && !is_lost && off_ns + silence_ns > 10 * SECOND;
-            let is_told = error_m < 6.0 && (!degraded || is_long);
-            prop_assert!(is_told, "{}: {error_m} m, degraded {degraded}", strategy.name());
+            // A clock that is set back does not tell how long it was silent, so what the filter takes for its velocity may be wrong.
+            let is_told = error_m < 6.0 && (is_confirmed || is_long || !is_ahead);
+            prop_assert!(is_told, "{}: {error_m} m, confirmed {is_confirmed}", strategy.name());
         }
     }
 }
