@@ -16,6 +16,10 @@ use crate::navigation::state::States;
 use crate::navigation::stream::{Gate, Stream};
 use crate::params::ParamsError;
 
+/// The least deviation of an observation, pixels, and of a prior position, m. Below it, the rounding errors of one observation
+/// exceed all that others tell.
+const LEAST_DEVIATION: f64 = 1e-3;
+
 /// A camera's observation of one landmark.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observation {
@@ -23,10 +27,11 @@ pub struct Observation {
     pub landmark: u64,
     /// u, v in the distorted image.
     pub pixel: Vector2<f64>,
-    /// Standard deviation of each coordinate, pixels.
+    /// Standard deviation of each coordinate, pixels; a thousandth at least.
     pub deviation_px: f64,
     /// Prior position of the landmark in the world, m, and the standard deviation of each component. It is used only if
-    /// this observation begins the landmark. It counts as information, so it must not be given twice.
+    /// this observation begins the landmark. It counts as information, so it must not be given twice. The deviation is a millimetre at
+    /// least.
     pub guess: Option<(Vector3<f64>, f64)>,
 }
 
@@ -247,14 +252,14 @@ fn sighted(camera: &Camera, seen: &Observation, serial: u64, factor: f64) -> Res
         if !is_on_earth(&position) {
             return Err(Refusal::OutOfRange);
         }
-        if !(1e-6..=1e9).contains(&deviation) {
+        if !(LEAST_DEVIATION..=1e9).contains(&deviation) {
             return Err(Refusal::Noise);
         }
     }
     if seen.deviation_px.is_nan() {
         return Err(Refusal::NonFinite);
     }
-    if !(1e-6..=1e6).contains(&seen.deviation_px) {
+    if !(LEAST_DEVIATION..=1e6).contains(&seen.deviation_px) {
         return Err(Refusal::Noise);
     }
     let precision = 1.0 / (seen.deviation_px * sqrt(factor));

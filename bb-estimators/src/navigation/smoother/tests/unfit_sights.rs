@@ -41,12 +41,14 @@ fn refusals_are_named_and_counted() {
     assert_eq!(refused(with((1.0, 1e9), 1.0)), Err(Refusal::OutOfRange));
     assert_eq!(refused(with((-3.0, 1.0), 1.0)), Err(Refusal::OutOfRange));
     assert_eq!(refused(with((1.0, 1.0), 0.0)), Err(Refusal::Noise));
+    assert_eq!(refused(with((1.0, 1.0), 9e-4)), Err(Refusal::Noise));
     assert_eq!(refused(with((1.0, 1.0), f64::NAN)), Err(Refusal::NonFinite));
     let (above, deviation) = (Vector3::new(0.0, 0.0, 1e4), 1.0);
     let new =
         Observation { guess: Some((above, deviation)), ..Observation::new(9999, Vector2::new(5.0, 5.0), 1.0) };
     assert_eq!(refused(new), Err(Refusal::NotObservable), "behind the camera");
     assert_eq!(refused(Observation { guess: Some((above, 0.0)), ..new }), Err(Refusal::Noise));
+    assert_eq!(refused(Observation { guess: Some((above, 9e-4)), ..new }), Err(Refusal::Noise));
     assert_eq!(refused(Observation { guess: Some((above * f64::NAN, 1.0)), ..new }), Err(Refusal::NonFinite));
     assert_eq!(refused(Observation { guess: Some((above * 1e6, 1.0)), ..new }), Err(Refusal::OutOfRange));
     assert!(matches!(refused(with((5.0, 5.0), 1.0)), Err(Refusal::Gate { .. })), "a wrong match");
