@@ -58,7 +58,6 @@ use apart::Apart;
 use budgets::Budgets;
 use callback::Callback;
 use effects::Reporter;
-use ending::EndedCode;
 use execution::Slot;
 use faults::Faults;
 use hooks::Hooks;
@@ -70,7 +69,7 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, OnceLock, Weak};
 #[cfg(not(loom))]
 use std::sync::{Condvar, Mutex as StateMutex, MutexGuard, atomic::AtomicU8};
-use task::{Task, Value};
+use task::{EndedCode, Task, Value};
 
 /// The parts of the declaration used here.
 #[derive(Clone, Copy, Debug)]

@@ -302,7 +302,8 @@ fn a_robot_that_has_stopped_answers_whatever_it_is_asked() {
         assert!(live.cast(crowded::estimator::base::ordered, Tell).is_err());
         assert_eq!((live.arm(), live.disarm()), (Err(ArmError::Stopping), Ok(())));
         assert!(live.subscribe(crowded::sensor::base::a).recv().is_none());
-        live.set_parameter(crowded::param::gain, 2.0).expect("it is finite");
+        let refused = live.set_parameter(crowded::param::gain, 2.0).expect_err("it would not be stored");
+        assert_eq!(refused.message, "the robot has stopped");
         assert_eq!(live.report(), report, "it was the last one");
     });
 }

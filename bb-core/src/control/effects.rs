@@ -2,11 +2,10 @@
 //! waits for.
 
 use super::callback::{Callback, Reason};
-use super::ending::EndedCode;
 use super::execution::CommandError;
 use super::execution::Slot;
 use super::inside;
-use super::task::{Task, Value};
+use super::task::{EndedCode, Task, Value};
 use super::{Control, Key, Wired};
 use crate::event::{ComponentFault, HealthTransition, Refusal, Safety, SafetyError};
 use crate::fault::{discard, wake};

@@ -4,7 +4,7 @@ use super::arming::ARM_WITHIN;
 use super::execution::CommandError;
 use super::machine::IDLE;
 use super::step::Step;
-use super::task::{Ended, Value};
+use super::task::{Ended, EndedCode, Value};
 use super::{Control, Limit, Phase, RunningCommand};
 use crate::component::Outcome;
 use crate::declaration::Role;
@@ -16,13 +16,6 @@ use std::time::Duration;
 
 /// How often to check whether the handles of a command still act.
 const LOOK_AGAIN: Duration = Duration::from_millis(1);
-
-/// A command whose code has ended.
-pub(super) struct EndedCode {
-    pub(super) id: u64,
-    pub(super) end: End,
-    pub(super) value: Option<Value>,
-}
 
 impl Control {
     /// Cancels an execution for its caller.

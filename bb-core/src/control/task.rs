@@ -3,6 +3,7 @@
 use super::WeakControl;
 use crate::component::Outcome;
 use crate::fault::{Fault, caught, discard};
+use crate::journal::End;
 use crate::schedule::Lane;
 use crate::time::MonotonicTime;
 use std::any::Any;
@@ -18,6 +19,13 @@ pub(super) type Ended = Result<Outcome<Value>, Fault>;
 pub(super) type RunningFuture = Pin<Box<dyn Future<Output = Ended> + Send>>;
 /// Creates the future. This is user code too, and runs where the future is polled.
 pub(super) type Starter = Box<dyn FnOnce() -> Result<RunningFuture, Fault> + Send>;
+
+/// A command whose code has ended.
+pub(super) struct EndedCode {
+    pub(super) id: u64,
+    pub(super) end: End,
+    pub(super) value: Option<Value>,
+}
 
 /// One execution's future.
 pub(super) struct Task {

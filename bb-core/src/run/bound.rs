@@ -1,6 +1,6 @@
 //! Options of components by number, and those that are bound to parameters.
 
-use super::{Builder, Robot};
+use super::Robot;
 use crate::component::OptionField;
 use crate::event::ParameterValue;
 
@@ -28,7 +28,8 @@ pub(super) fn bound_to<R: Robot>(component: usize, path: &str) -> Option<&'stati
 
 /// Why an option bound to this parameter would refuse its new value. Options of a component that is replaced refuse nothing.
 pub(super) fn refused_by_bound<R: Robot>(
-    builder: &mut Builder<R>,
+    options: &mut R::Options,
+    is_replaced: impl Fn(&str) -> bool,
     parameters: &[ParameterValue],
     path: &str,
 ) -> Option<String> {
@@ -40,8 +41,8 @@ pub(super) fn refused_by_bound<R: Robot>(
         ParameterValue::Bool(_) | ParameterValue::Text(_) => return None,
     };
     R::BOUND_OPTIONS.iter().filter(|bound| bound.2 == number).find_map(|(component, name, _)| {
-        let path = paths.get(*component).filter(|path| !builder.replacements.contains_key(*path))?;
-        let fields = fields::<R>(&mut builder.options, *component).iter();
+        let path = paths.get(*component).filter(|path| !is_replaced(path))?;
+        let fields = fields::<R>(options, *component).iter();
         let range = fields.filter(|field| field.name == *name).find_map(|field| field.range)?;
         let is_inside = (range.start..=range.end).contains(&value);
         (!is_inside)

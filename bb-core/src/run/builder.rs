@@ -97,7 +97,12 @@ impl<R: Robot> Builder<R> {
         if let Some(slot) = parameters.get_mut(parameter.number()) {
             *slot = value;
         }
-        if let Some(message) = refused_by_bound(self, &parameters, declared.path) {
+        if let Some(message) = refused_by_bound::<R>(
+            &mut self.options,
+            |path| self.replacements.contains_key(path),
+            &parameters,
+            declared.path,
+        ) {
             return Err(ParameterError { path: declared.path.to_owned(), message });
         }
         self.parameters = parameters;

@@ -105,7 +105,12 @@ pub(super) fn assign<R: Robot>(builder: &mut Builder<R>, assignments: &[Assignme
             }
         }
         for assignment in assignments {
-            if let Some(message) = refused_by_bound(builder, &parameters, &assignment.path) {
+            if let Some(message) = refused_by_bound::<R>(
+                &mut builder.options,
+                |path| builder.replacements.contains_key(path),
+                &parameters,
+                &assignment.path,
+            ) {
                 problems.push(assignment.problem(message));
             }
         }

@@ -41,7 +41,9 @@ impl<R: Robot> Builder<R> {
         if let Some(slot) = parameters.get_mut(number) {
             *slot = value.clone();
         }
-        if let Some(message) = refused_by_bound(self, &parameters, path) {
+        if let Some(message) =
+            refused_by_bound::<R>(&mut self.options, |path| self.replacements.contains_key(path), &parameters, path)
+        {
             return Err(refuse(message));
         }
         self.parameters = parameters;

@@ -56,7 +56,7 @@ fn refusals_are_named_and_counted() {
     assert_eq!(refused(good), Err(Refusal::Repeated { landmark: good.landmark }));
     assert_eq!(smoother.observe(&mut stream, 500, &good), Err(Refusal::NoKeyframe { id: 500 }));
     let counts = stream.counts();
-    assert_eq!((counts.invalid, counts.gate, counts.not_applicable, counts.fused), (8, 1, 3, 1));
+    assert_eq!((counts.invalid, counts.gate, counts.not_applicable, counts.fused), (10, 1, 3, 1));
     smoother.update().unwrap();
     assert!(apart(&before, &smoother.estimate().unwrap()) < 0.01);
     // Fill it with new ids that are never seen again.
