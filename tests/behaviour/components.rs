@@ -123,6 +123,23 @@ impl Estimator for Snapshot {
     }
 }
 
+/// The driver of an encoder on a bus that is not there.
+#[derive(Debug)]
+pub(crate) struct CanEncoder;
+
+impl Sensor for CanEncoder {
+    type Options = NoOptions;
+    type Output = JointState;
+
+    fn init(_: NoOptions, _: &SensorContext) -> Result<Self, Fault> {
+        Err(Fault::new("no such bus: can0"))
+    }
+
+    fn read(&mut self, _: MonotonicTime) -> Result<Reading<JointState>, Fault> {
+        Ok(Reading::nothing())
+    }
+}
+
 /// The time `millis` after zero.
 pub(crate) fn at(millis: i64) -> MonotonicTime {
     MonotonicTime::from_nanos(millis * 1_000_000)

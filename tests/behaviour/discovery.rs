@@ -1,6 +1,6 @@
 //! What tools learn of a running robot: its description as JSON, by path, and its picture.
 
-use crate::components::{Counter, Scale};
+use crate::components::{CanEncoder, Counter, Scale};
 use bb_core::component::{ComponentKind, JointPublisher};
 use bb_core::prelude::*;
 use bb_core::topology::GraphFormat;
@@ -11,23 +11,6 @@ use serde_json::Value;
 use std::path::Path;
 
 type Failure = Box<dyn std::error::Error>;
-
-/// An encoder that is not here.
-#[derive(Debug)]
-struct CanEncoder;
-
-impl Sensor for CanEncoder {
-    type Options = NoOptions;
-    type Output = JointState;
-
-    fn init(_: NoOptions, _: &SensorContext) -> Result<Self, Fault> {
-        Err(Fault::new("no bus"))
-    }
-
-    fn read(&mut self, _: MonotonicTime) -> Result<Reading<JointState>, Fault> {
-        Err(Fault::new("no bus"))
-    }
-}
 
 /// Does nothing.
 #[derive(Debug)]

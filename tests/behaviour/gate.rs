@@ -18,6 +18,7 @@ pub(crate) fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
 }
 
 /// A place at which code waits until the test lets it go on.
+#[derive(Debug, Default)]
 pub(crate) struct Gate {
     /// The place that is closed, and how many have come there.
     state: Mutex<(Option<&'static str>, u32)>,

@@ -4,55 +4,85 @@ use crate::components::{Number, within};
 use crate::gate::{Gate, wait_until};
 use bb_core::prelude::*;
 use bb_core::run::CommandError;
-use bb_core::{ArmError, Running};
+use bb_core::{ArmError, Builder, Running};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// The devices of these tests are there once.
-static ALONE: Mutex<()> = Mutex::new(());
-
-static GATE: Gate = Gate::new();
-static TURNS: AtomicBool = AtomicBool::new(false);
-/// How often the motor was stopped.
-static STOPPED: AtomicU32 = AtomicU32::new(0);
-static WAY: AtomicU32 = AtomicU32::new(0);
-
-/// The motor is started before the code blocks.
-const BEFORE: u32 = 0;
-/// The motor is started afterwards.
-const AFTER: u32 = 1;
-/// What stops the motor is registered afterwards, too.
-const REGISTERS_AFTER: u32 = 2;
-/// That is done by a thread that the command leaves behind.
-const LEAVES_A_THREAD: u32 = 3;
-/// The motor is started when its future is dropped.
-const DROPS: u32 = 4;
-
-fn alone(way: u32) -> MutexGuard<'static, ()> {
-    let alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
-    WAY.store(way, Ordering::SeqCst);
-    TURNS.store(false, Ordering::SeqCst);
-    STOPPED.store(0, Ordering::SeqCst);
-    alone
+/// When the motor is started, and what stops it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Way {
+    /// The motor is started before the code blocks.
+    #[default]
+    Before,
+    /// The motor is started afterwards.
+    After,
+    /// What stops the motor is registered afterwards, too.
+    RegistersAfter,
+    /// That is done by a thread that the command leaves behind.
+    LeavesAThread,
+    /// The motor is started when its future is dropped.
+    Drops,
 }
 
-fn stopped() -> (bool, u32) {
-    (TURNS.load(Ordering::SeqCst), STOPPED.load(Ordering::SeqCst))
+/// The devices of one test: most of the tests wait for limits of several seconds, side by side.
+#[derive(Debug, Default)]
+struct Rig {
+    way: Way,
+    /// Where the code blocks.
+    gate: Gate,
+    turns: AtomicBool,
+    /// How often the motor was stopped.
+    stopped: AtomicU32,
 }
 
-fn stop() -> Result<(), Fault> {
-    TURNS.store(false, Ordering::SeqCst);
-    STOPPED.fetch_add(1, Ordering::SeqCst);
-    Ok(())
+impl Rig {
+    fn new(way: Way) -> Arc<Self> {
+        Arc::new(Self { way, ..Self::default() })
+    }
+
+    /// Whether the motor turns, and how often it was stopped.
+    fn stopped(&self) -> (bool, u32) {
+        (self.turns.load(Ordering::SeqCst), self.stopped.load(Ordering::SeqCst))
+    }
+
+    fn stop(&self) -> Result<(), Fault> {
+        self.turns.store(false, Ordering::SeqCst);
+        self.stopped.fetch_add(1, Ordering::SeqCst);
+        Ok(())
+    }
+
+    /// A robot whose commands turn this motor.
+    fn builder(self: &Arc<Self>) -> Builder<Turning> {
+        let mut builder = Turning::builder();
+        builder.options(turning::command::turn).rig = Arc::clone(self);
+        builder.options(turning::command::short).rig = Arc::clone(self);
+        builder
+    }
+
+    /// An armed robot whose code will block.
+    fn armed(self: &Arc<Self>) -> Running<Turning> {
+        let robot = self.builder().start().expect("it starts");
+        assert_eq!(robot.arm(), Ok(()));
+        self.gate.close("here");
+        robot
+    }
 }
 
 /// Starts the motor when it is dropped.
-struct Starts;
+struct Starts(Arc<Rig>);
 
 impl Drop for Starts {
     fn drop(&mut self) {
-        TURNS.store(true, Ordering::SeqCst);
+        self.0.turns.store(true, Ordering::SeqCst);
     }
+}
+
+/// Options of [`Turn`].
+#[derive(Clone, Debug, Options)]
+pub(crate) struct TurnOptions {
+    /// Where the motor is.
+    #[option(required)]
+    rig: Arc<Rig>,
 }
 
 /// Turns a motor with a library that blocks and knows nothing of robots.
@@ -60,30 +90,34 @@ impl Drop for Starts {
 pub(crate) struct Turn;
 
 impl Command for Turn {
-    type Options = NoOptions;
+    type Options = TurnOptions;
     type Arguments = NoArguments;
     type Output = ();
 
-    async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
-        let way = WAY.load(Ordering::SeqCst);
-        if matches!(way, BEFORE | AFTER | DROPS) {
-            context.on_disarm(stop);
+    async fn run(options: TurnOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
+        let TurnOptions { rig } = options;
+        let stopped = Arc::clone(&rig);
+        let stop = move || stopped.stop();
+        if matches!(rig.way, Way::Before | Way::After | Way::Drops) {
+            context.on_disarm(stop.clone());
         }
-        if way == DROPS {
-            let _starts = Starts;
+        if rig.way == Way::Drops {
+            let _starts = Starts(rig);
             std::future::pending::<()>().await;
+            return Ok(Outcome::done(()));
         }
-        TURNS.store(way == BEFORE, Ordering::SeqCst);
+        rig.turns.store(rig.way == Way::Before, Ordering::SeqCst);
+        let leaves_a_thread = rig.way == Way::LeavesAThread;
         let rest = move || {
-            GATE.pass("here");
-            if way == REGISTERS_AFTER || way == LEAVES_A_THREAD {
+            rig.gate.pass("here");
+            if matches!(rig.way, Way::RegistersAfter | Way::LeavesAThread) {
                 context.on_disarm(stop);
             }
-            if way == AFTER || way == REGISTERS_AFTER {
-                TURNS.store(true, Ordering::SeqCst);
+            if matches!(rig.way, Way::After | Way::RegistersAfter) {
+                rig.turns.store(true, Ordering::SeqCst);
             }
         };
-        if way == LEAVES_A_THREAD {
+        if leaves_a_thread {
             std::thread::spawn(rest);
         } else {
             rest();
@@ -96,35 +130,32 @@ robot! {
     robot Turning;
     commands {
         category other { concurrency: 3; }
-        turn: Turn { allowed_states: [idle]; category: other; }
-        short: Turn { allowed_states: [idle]; timeout: 50 ms; }
+        turn: Turn(rig = Arc::default()) { allowed_states: [idle]; category: other; }
+        short: Turn(rig = Arc::default()) { allowed_states: [idle]; timeout: 50 ms; }
     }
     link base { sensor number: External<Number>(); }
 }
 
-fn armed() -> Running<Turning> {
-    let robot = Turning::builder().start().expect("it starts");
-    assert_eq!(robot.arm(), Ok(()));
-    GATE.close("here");
-    robot
-}
-
 #[test]
 fn what_the_code_of_a_command_starts_after_the_robot_was_disarmed_is_stopped_before_it_is_armed_again() {
-    for way in [AFTER, REGISTERS_AFTER] {
-        let _alone = alone(way);
+    for way in [Way::After, Way::RegistersAfter] {
         within(60, move || {
-            let robot = armed();
+            let rig = Rig::new(way);
+            let robot = rig.armed();
             let turn = robot.command(turning::command::turn, NoArguments).expect("it starts");
-            GATE.wait_for(1);
+            rig.gate.wait_for(1);
             assert_eq!(robot.disarm(), Ok(()));
             assert_eq!(turn.wait(), Err(CommandError::Cancelled));
-            GATE.open();
+            rig.gate.open();
             assert_eq!(robot.arm(), Ok(()), "that waits until the code has returned");
-            let times = if way == AFTER { 2 } else { 1 };
-            assert_eq!(stopped(), (false, times), "{way}: when the robot was disarmed, and when the code returned");
+            let times = if way == Way::After { 2 } else { 1 };
+            assert_eq!(
+                rig.stopped(),
+                (false, times),
+                "{way:?}: when the robot was disarmed, and when the code returned"
+            );
             let report = robot.stop();
-            assert_eq!(stopped(), (false, times), "{way}: what is gone is forgotten");
+            assert_eq!(rig.stopped(), (false, times), "{way:?}: what is gone is forgotten");
             assert!(report.faults.is_empty(), "{:?}", report.faults);
         });
     }
@@ -132,11 +163,10 @@ fn what_the_code_of_a_command_starts_after_the_robot_was_disarmed_is_stopped_bef
 
 #[test]
 fn what_the_future_of_a_command_starts_when_it_is_dropped_is_stopped() {
-    let _alone = alone(DROPS);
     within(60, || {
         for stops in [false, true] {
-            STOPPED.store(0, Ordering::SeqCst);
-            let robot = Turning::builder().start().expect("it starts");
+            let rig = Rig::new(Way::Drops);
+            let robot = rig.builder().start().expect("it starts");
             assert_eq!(robot.arm(), Ok(()));
             let turn = robot.command(turning::command::turn, NoArguments).expect("it starts");
             // It waits, outside of its code.
@@ -149,18 +179,19 @@ fn what_the_future_of_a_command_starts_when_it_is_dropped_is_stopped() {
                 assert_eq!(robot.arm(), Ok(()), "that waits until it was dropped");
             }
             assert_eq!(turn.wait(), Err(CommandError::Cancelled));
-            while STOPPED.load(Ordering::SeqCst) < 2 {
+            while rig.stopped().1 < 2 {
                 std::thread::yield_now();
             }
-            assert!(!stopped().0, "{stops}");
+            assert!(!rig.stopped().0, "{stops}");
         }
-        let mut simulation = Turning::builder().simulate().expect("it starts");
+        let rig = Rig::new(Way::Drops);
+        let mut simulation = rig.builder().simulate().expect("it starts");
         assert_eq!(simulation.arm(), Ok(()));
         let _turn = simulation.command(turning::command::turn, NoArguments).expect("it starts");
         simulation.run_for(Duration::from_millis(1));
         assert_eq!(simulation.disarm(), Ok(()));
         simulation.run_for(Duration::from_millis(1));
-        assert!(!stopped().0, "on virtual time");
+        assert!(!rig.stopped().0, "on virtual time");
     });
 }
 
@@ -203,10 +234,8 @@ struct Filling {
 
 #[test]
 fn a_publisher_that_waits_for_the_journal_publishes_nothing_once_its_command_was_cancelled() {
-    let _alone = alone(BEFORE);
     within(60, || {
-        PUBLISHED.store(false, Ordering::SeqCst);
-        TELLS.store(false, Ordering::SeqCst);
+        static GATE: Gate = Gate::new();
         GATE.close("here");
         let mut builder = Telling::builder();
         builder.journal(|_| GATE.pass("here"));
@@ -233,34 +262,34 @@ fn a_publisher_that_waits_for_the_journal_publishes_nothing_once_its_command_was
 
 #[test]
 fn a_command_that_blocks_beyond_its_timeout_is_made_safe_as_long_as_it_does() {
-    let _alone = alone(BEFORE);
     within(60, || {
-        let robot = armed();
+        let rig = Rig::new(Way::Before);
+        let robot = rig.armed();
         let turn = robot.command(turning::command::short, NoArguments).expect("it starts");
         assert_eq!(turn.wait(), Err(CommandError::TimedOut));
-        GATE.wait_for(1);
-        assert_eq!(stopped(), (true, 0), "a timeout disarms nothing");
+        rig.gate.wait_for(1);
+        assert_eq!(rig.stopped(), (true, 0), "a timeout disarms nothing");
         assert_eq!(robot.disarm(), Ok(()));
-        assert_eq!(stopped(), (false, 1));
-        TURNS.store(true, Ordering::SeqCst);
-        GATE.open();
+        assert_eq!(rig.stopped(), (false, 1));
+        rig.turns.store(true, Ordering::SeqCst);
+        rig.gate.open();
         assert_eq!(robot.arm(), Ok(()));
-        assert_eq!(stopped(), (false, 2));
+        assert_eq!(rig.stopped(), (false, 2));
     });
 }
 
 #[test]
 fn what_the_code_of_a_command_starts_after_the_robot_has_stopped_is_stopped_as_well() {
-    let _alone = alone(AFTER);
     within(60, || {
-        let robot = armed();
+        let rig = Rig::new(Way::After);
+        let robot = rig.armed();
         let turn = robot.command(turning::command::turn, NoArguments).expect("it starts");
-        GATE.wait_for(1);
+        rig.gate.wait_for(1);
         let report = robot.stop();
         assert_eq!(turn.wait(), Err(CommandError::Cancelled));
         assert!(report.faults.iter().any(|fault| fault.path == "command/turn"), "{:?}", report.faults);
-        GATE.open();
-        while stopped() != (false, 2) {
+        rig.gate.open();
+        while rig.stopped() != (false, 2) {
             std::thread::sleep(Duration::from_millis(1));
         }
     });
@@ -268,42 +297,42 @@ fn what_the_code_of_a_command_starts_after_the_robot_has_stopped_is_stopped_as_w
 
 #[test]
 fn a_command_that_is_cancelled_on_an_armed_robot_keeps_nothing() {
-    let _alone = alone(BEFORE);
     within(60, || {
-        let robot = armed();
+        let rig = Rig::new(Way::Before);
+        let robot = rig.armed();
         let turn = robot.command(turning::command::turn, NoArguments).expect("it starts");
-        GATE.wait_for(1);
+        rig.gate.wait_for(1);
         turn.cancel();
-        GATE.open();
+        rig.gate.open();
         while robot.command(turning::command::short, NoArguments).map(|short| short.wait()).is_err() {
             std::thread::yield_now();
         }
-        assert_eq!(stopped().1, 0, "what a command starts is its own affair while the robot is armed");
+        assert_eq!(rig.stopped().1, 0, "what a command starts is its own affair while the robot is armed");
         assert_eq!(robot.disarm(), Ok(()));
     });
 }
 
 #[test]
 fn a_thread_that_outlives_its_command_has_its_callback_run_at_once() {
-    let _alone = alone(LEAVES_A_THREAD);
     within(60, || {
-        let builder = Turning::builder();
+        let rig = Rig::new(Way::LeavesAThread);
+        let builder = rig.builder();
         let faults = builder.subscribe(system::Faults);
         let robot = builder.start().expect("it starts");
         assert_eq!(robot.arm(), Ok(()));
-        GATE.close("here");
+        rig.gate.close("here");
         let turn = robot.command(turning::command::turn, NoArguments).expect("it starts");
         assert_eq!(turn.wait(), Ok(()));
-        GATE.wait_for(1);
-        GATE.open();
+        rig.gate.wait_for(1);
+        rig.gate.open();
         let fault = faults.recv_timeout(Duration::from_secs(20)).expect("it is reported");
         assert_eq!(fault.path, "command/turn");
         assert_eq!(fault.message, "it registered a disarm callback when it had ended; that was run at once");
-        while stopped().1 == 0 {
+        while rig.stopped().1 == 0 {
             std::thread::yield_now();
         }
         assert_eq!(robot.disarm(), Ok(()));
-        assert_eq!(stopped().1, 1, "it is not kept");
+        assert_eq!(rig.stopped().1, 1, "it is not kept");
     });
 }
 
@@ -311,25 +340,27 @@ robot! {
     robot Crowd;
     commands {
         category many { concurrency: 1000; }
-        turn: Turn { allowed_states: [idle, executing]; category: many; }
+        turn: Turn(rig = Arc::default()) { allowed_states: [idle, executing]; category: many; }
     }
     link base { sensor number: External<Number>(); }
 }
 
 #[test]
 fn a_cancelled_command_that_never_began_is_gone_though_others_hang_in_every_thread() {
-    let _alone = alone(AFTER);
     within(120, || {
-        let robot = Crowd::builder().start().expect("it starts");
+        let rig = Rig::new(Way::After);
+        let mut builder = Crowd::builder();
+        builder.options(crowd::command::turn).rig = Arc::clone(&rig);
+        let robot = builder.start().expect("it starts");
         assert_eq!(robot.arm(), Ok(()));
-        GATE.close("here");
+        rig.gate.close("here");
         (0..560).for_each(|_| drop(robot.command(crowd::command::turn, NoArguments).expect("it starts")));
-        GATE.wait_for(512);
+        rig.gate.wait_for(512);
         assert_eq!(robot.disarm(), Ok(()));
         let Err(ArmError::Lingering(inside)) = robot.arm() else { panic!("512 threads are in their code") };
         assert_eq!(inside.len(), 512);
-        GATE.open();
+        rig.gate.open();
         assert_eq!(robot.arm(), Ok(()));
-        assert!(!stopped().0);
+        assert!(!rig.stopped().0);
     });
 }

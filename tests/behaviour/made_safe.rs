@@ -313,21 +313,6 @@ impl Command for Check {
     }
 }
 
-/// Blocks for 400 ms.
-#[derive(Debug)]
-pub(crate) struct Block;
-
-impl Command for Block {
-    type Options = NoOptions;
-    type Arguments = NoArguments;
-    type Output = ();
-
-    async fn run(_: NoOptions, _: NoArguments, _: CommandContext) -> Result<Outcome<()>, Fault> {
-        std::thread::sleep(Duration::from_millis(400));
-        Ok(Outcome::done(()))
-    }
-}
-
 /// Registers callbacks, over and over.
 #[derive(Debug)]
 pub(crate) struct Guards;
@@ -394,7 +379,7 @@ robot! {
     commands {
         category other { concurrency: 3; }
         check: Check;
-        block: Block { allowed_states: [idle]; category: other; }
+        block: Stuck<Held> { allowed_states: [idle]; category: other; }
         guards: Guards { allowed_states: [idle]; category: other; }
         go: Go { allowed_states: [idle, executing]; category: other; }
         mission: Mission { allowed_states: [idle]; category: other; }
@@ -416,8 +401,9 @@ fn a_robot_that_was_disarmed_is_not_armed_by_what_began_before() -> Result<(), B
 
     let robot = Commanded::builder().start()?;
     assert_eq!(robot.arm(), Ok(()));
+    BLOCK.close("block");
     let _block = robot.command(commanded::command::block, NoArguments)?;
-    std::thread::sleep(Duration::from_millis(20));
+    BLOCK.wait_for(1);
     assert_eq!(robot.disarm(), Ok(()));
     // Both wait for the code that blocks.
     let live = robot.live();
@@ -428,8 +414,9 @@ fn a_robot_that_was_disarmed_is_not_armed_by_what_began_before() -> Result<(), B
     });
     let check = robot.command(commanded::command::check, NoArguments)?;
     has_begun.recv()?;
-    std::thread::sleep(Duration::from_millis(50));
+    std::thread::sleep(Duration::from_millis(100));
     assert_eq!((robot.disarm(), robot.safety()), (Ok(()), Safety::Disarmed));
+    BLOCK.open();
     assert_eq!(arms.join().map_err(|_| "it does not panic")?, Err(ArmError::Cancelled));
     std::thread::sleep(Duration::from_millis(600));
     assert_eq!(robot.safety(), Safety::Disarmed);

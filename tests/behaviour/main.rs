@@ -36,6 +36,7 @@ mod hanging_code;
 mod hardware;
 mod health;
 mod hygiene;
+mod joint_history;
 mod joint_replay;
 mod joints;
 mod journal_order;

@@ -6,7 +6,7 @@ mod limits;
 mod replay;
 mod reports;
 
-use crate::components::at;
+use crate::components::{CanEncoder, at};
 use crate::journals::Failure;
 use bb_core::component::ActuatorError;
 use bb_core::journal::{Entry, JournalReader};
@@ -42,23 +42,6 @@ impl Actuator for CanMotor {
 
     fn disarm(&mut self) -> Result<(), Fault> {
         Ok(())
-    }
-}
-
-/// The same of an encoder.
-#[derive(Debug)]
-struct CanEncoder;
-
-impl Sensor for CanEncoder {
-    type Options = NoOptions;
-    type Output = JointState;
-
-    fn init(_: NoOptions, _: &SensorContext) -> Result<Self, Fault> {
-        Err(Fault::new("no such bus: can0"))
-    }
-
-    fn read(&mut self, _: MonotonicTime) -> Result<Reading<JointState>, Fault> {
-        Ok(Reading::nothing())
     }
 }
 

@@ -208,7 +208,7 @@ fn a_replacement_has_the_health_and_the_supervision_of_what_is_declared() -> Res
     simulation.run_until(at(100));
     let positive: Vec<_> = numbers.drain().filter(|number| number.0 > 0.0).collect();
     let seen: Vec<_> = positive.iter().map(|number| (number.monotonic_time, number.0)).collect();
-    // It fails at 20 ms, and is made anew at 30 ms from the same options: it counts from one, until it fails again.
+    // It fails at 20 ms and is created again at 30 ms with the same options, so it counts from one until it fails again.
     assert_eq!(seen, [(at(0), 1.0), (at(10), 2.0), (at(30), 1.0), (at(40), 2.0)]);
     let health: Vec<_> = health.drain().map(|change| change.payload.to_string()).collect();
     let expected = [
@@ -415,7 +415,7 @@ fn replacements_are_marked_where_the_robot_is_described() -> Result<(), Failure>
     Ok(())
 }
 
-/// A replay makes estimators anew, so it needs the same replacements with the same options.
+/// A replay creates the estimators again, so it needs the same replacements with the same options.
 #[test]
 fn a_journal_is_replayed_with_the_same_replacements_only() -> Result<(), Failure> {
     let options = || RampOptions { step: 0.5, fails_at: 4 };

@@ -186,7 +186,7 @@ fn a_base_that_accelerates_throws_the_arm_back() {
         assert!((is.position - expected.position).abs() < 1e-6, "{name}: {is:?} {expected:?}");
     }
     assert!(points(&world, at(800_000))[0].position > 0.3);
-    // And the direction of gravity is that of the world, whatever stands on its head.
+    // Gravity points down in the world, even if the base is upside down.
     let tilted = self::world(FREE, [0.0; 3]);
     let upside_down = UnitQuaternion::from_euler_angles(std::f64::consts::PI, 0.0, 0.0);
     tilted.move_root(at(0), move |_| Isometry3::from_parts([0.0, 0.0, 0.0].into(), upside_down));

@@ -76,7 +76,7 @@ fn happen(world: &SimulatedWorld, happens: &Happens, drivetrain: Drivetrain, now
         Happens::Goal(joint, goal) => world.set_goal(*joint, goal.clone(), at(now)),
         Happens::Obstacle(joint, gap) => {
             let (gap, position) = (gap.unwrap_or(f64::INFINITY), state(*joint).position);
-            // There is none at a joint that nothing moves.
+            // A joint without an actuator has no obstacles: the error is not of interest here.
             let _ = world.obstruct(NAMES[*joint], position - gap, position + gap, at(now));
         }
         Happens::Motor(joint) => {
