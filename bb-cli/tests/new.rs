@@ -97,15 +97,20 @@ fn the_project_compiles_passes_its_tests_and_records() {
     }
 }
 
-/// How the workspace compiles its dependencies in the profile `dev`, as configuration.
+/// How the workspace compiles in the profile `dev`, as configuration: with anything else, cargo would compile every dependency again.
 fn profiles() -> Vec<String> {
     let manifest = std::fs::read_to_string(Path::new(WORKSPACE).join("Cargo.toml")).expect("reads");
     let tables = manifest.split("\n[").filter_map(|table| table.split_once("]\n"));
-    let profiles = tables.filter(|(name, _)| name.starts_with("profile.dev.package."));
+    let profiles = tables.filter(|(name, _)| *name == "profile.dev" || name.starts_with("profile.dev.package."));
     let profiles: Vec<_> = profiles
-        .filter_map(|(name, settings)| Some(format!("{name}.{}", settings.lines().next()?.replace(' ', ""))))
+        .flat_map(|(name, settings)| {
+            let settings = settings.lines().filter(|line| line.contains(" = ") && !line.starts_with('#'));
+            settings.map(move |line| format!("{name}.{}", line.replace(' ', "")))
+        })
         .collect();
-    assert!(profiles.contains(&"profile.dev.package.nalgebra.opt-level=2".to_owned()), "{profiles:?}");
+    for expected in ["profile.dev.debug=\"line-tables-only\"", "profile.dev.package.nalgebra.opt-level=2"] {
+        assert!(profiles.iter().any(|profile| profile == expected), "{expected}: {profiles:?}");
+    }
     profiles
 }
 
