@@ -37,6 +37,7 @@ mod navigator;
 #[cfg(test)]
 mod noise;
 pub mod planar;
+mod propagate;
 mod refusal;
 #[cfg(any(feature = "smoother", feature = "eskf"))]
 pub mod smoother;
@@ -67,6 +68,7 @@ pub use measurement::{
     ZeroVelocity,
 };
 pub use navigator::{Aiding, Learnt, NAVIGATED, Navigated, Navigator};
+pub use propagate::Propagate;
 pub use refusal::Refusal;
 #[cfg(feature = "autodiff")]
 pub use smoother::{Automatic, Differentiable, Expectation};

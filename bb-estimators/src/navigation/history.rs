@@ -7,6 +7,7 @@
 
 use super::eskf::{ImuMean, seconds_between};
 use super::fused::Fused;
+use super::propagate::Propagate;
 use super::refusal::Refusal;
 
 mod ring;
@@ -18,7 +19,7 @@ use ring::Ring;
 /// A filter with its streams, as one value that can be stored and replayed.
 ///
 /// ```
-/// use bb_estimators::navigation::{Eskf, Fused, GnssPosition, ImuMean, Refusal, Replayed, Stream};
+/// use bb_estimators::navigation::{Eskf, Fused, GnssPosition, Refusal, Replayed, Stream};
 ///
 /// #[derive(Clone)]
 /// struct Rover {
@@ -27,19 +28,14 @@ use ring::Ring;
 /// }
 ///
 /// impl Replayed for Rover {
+///     type Filter = Eskf;
 ///     type Measurement = GnssPosition;
 ///
-///     fn time_ns(&self) -> Option<i64> {
-///         self.filter.estimate().map(|estimate| estimate.time_ns)
+///     fn filter(&self) -> &Eskf {
+///         &self.filter
 ///     }
-///     fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
-///         self.filter.propagate(sample)
-///     }
-///     fn longest_sample(&self) -> f64 {
-///         self.filter.params().longest_sample
-///     }
-///     fn propagate_part(&mut self, part: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
-///         self.filter.propagate_part(part, is_gap)
+///     fn filter_mut(&mut self) -> &mut Eskf {
+///         &mut self.filter
 ///     }
 ///     fn update(&mut self, fix: &GnssPosition) -> Result<Fused, Refusal> {
 ///         self.filter.update(&mut self.gnss, fix)
@@ -47,37 +43,16 @@ use ring::Ring;
 /// }
 /// ```
 pub trait Replayed: Clone {
+    /// The type of the filter.
+    type Filter: Propagate;
     /// The type of its measurements: an enum if there are several sensors.
     type Measurement: Copy;
 
-    /// The current time of the filter; `None` before its start.
-    fn time_ns(&self) -> Option<i64>;
+    /// The filter.
+    fn filter(&self) -> &Self::Filter;
 
-    /// Propagates the filter over one IMU sample.
-    ///
-    /// # Errors
-    ///
-    /// Returns the reason why the sample is rejected. The filter is then unchanged.
-    fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal>;
-
-    /// The longest interval, s, that one sample covers; a longer one is a gap. Infinite, as by default, for a filter without gaps.
-    fn longest_sample(&self) -> f64 {
-        f64::INFINITY
-    }
-
-    /// Propagates the filter over a part of a sample that measurements divide. `is_gap` tells whether the whole sample is longer than
-    /// [`longest_sample`](Self::longest_sample): every part of a gap is a gap, however short it is.
-    ///
-    /// By default, the part is propagated like a sample of its own. Provide it together with `longest_sample` if your filter treats
-    /// gaps differently, as [`Eskf`](super::Eskf) and [`PlanarEkf`](super::planar::PlanarEkf) do.
-    ///
-    /// # Errors
-    ///
-    /// The same as [`propagate`](Self::propagate).
-    fn propagate_part(&mut self, part: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
-        let _ = is_gap;
-        self.propagate(part)
-    }
+    /// The filter, for the history to propagate it.
+    fn filter_mut(&mut self) -> &mut Self::Filter;
 
     /// Corrects the filter with a measurement at its current time.
     ///
@@ -140,7 +115,7 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
             assert!(STATES >= 1 && SAMPLES >= STATES, "a history needs a state, and a sample for each");
             assert!(MEASUREMENTS >= 1, "a history needs room for a measurement");
         }
-        if started.time_ns().is_none() {
+        if time_of(&started).is_none() {
             return Err(Refusal::NotStarted);
         }
         let mut states = Ring::new();
@@ -162,7 +137,7 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
     ///
     /// Returns [`Refusal::NotStarted`]. The history is then unchanged.
     pub fn restart(&mut self, started: F) -> Result<(), Refusal> {
-        if started.time_ns().is_none() {
+        if time_of(&started).is_none() {
             return Err(Refusal::NotStarted);
         }
         self.samples.clear();
@@ -188,11 +163,11 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
     ///
     /// # Errors
     ///
-    /// The same as [`Replayed::propagate`]. The history is then unchanged.
+    /// The same as [`Propagate::propagate`]. The history is then unchanged.
     pub fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
         // A rejected sample must not have fused any measurement.
         let mut alone = self.now.clone();
-        alone.propagate(sample)?;
+        alone.filter_mut().propagate(sample)?;
         if self.has_measurements_until(sample.time_ns) {
             self.advance(sample, None);
         } else {
@@ -209,7 +184,7 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
     ///
     /// Returns [`Refusal::TooOld`], [`Refusal::InTheFuture`], or an error of [`Replayed::update`].
     pub fn update(&mut self, time_ns: i64, measurement: &F::Measurement) -> Result<Placed, Refusal> {
-        let now_ns = self.now.time_ns().ok_or(Refusal::NotStarted)?;
+        let now_ns = time_of(&self.now).ok_or(Refusal::NotStarted)?;
         let is_ahead = time_ns > now_ns;
         let too_far = is_ahead && time_ns.saturating_sub(now_ns) > self.longest_lead_ns;
         if too_far || !self.make_room(now_ns) {
@@ -221,7 +196,7 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
             return Ok(Placed::Waits);
         }
         // The last state that is not after the measurement: the measurements in that state are not newer.
-        let is_before = |state: &F| state.time_ns().is_some_and(|state_ns| state_ns <= time_ns);
+        let is_before = |state: &F| time_of(state).is_some_and(|state_ns| state_ns <= time_ns);
         let found = self.states.rposition(is_before);
         let Some((index, state)) = found.and_then(|index| Some((index, self.states.get(index)?.clone()))) else {
             self.counts.too_old += 1;
@@ -233,7 +208,7 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
         self.states.truncate(index + 1);
         self.now = state;
         self.since_state = 0;
-        let from = self.now.time_ns().ok_or(Refusal::NotStarted)?;
+        let from = time_of(&self.now).ok_or(Refusal::NotStarted)?;
         let first = self.samples.position(|sample| sample.time_ns > from).unwrap_or(self.samples.len());
         let mut result = Err(Refusal::NotStarted);
         if from == time_ns {
@@ -252,7 +227,7 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
     }
 
     fn has_measurements_until(&self, time_ns: i64) -> bool {
-        let now_ns = self.now.time_ns().unwrap_or(i64::MAX);
+        let now_ns = time_of(&self.now).unwrap_or(i64::MAX);
         self.measurements.iter().any(|(at, _)| (now_ns.saturating_add(1)..=time_ns).contains(at))
     }
 
@@ -267,7 +242,7 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
             return false;
         }
         self.measurements.pop_front();
-        while self.states.get(0).and_then(F::time_ns).is_some_and(|state_ns| state_ns < left_ns) {
+        while self.states.get(0).and_then(time_of).is_some_and(|state_ns| state_ns < left_ns) {
             self.states.pop_front();
         }
         if self.states.len() == 0 {
@@ -287,25 +262,25 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
     /// Advances `now` over one sample with the measurements in it, and returns the result of the one at `place`.
     fn advance(&mut self, sample: &ImuMean, place: Option<usize>) -> Option<Result<Fused, Refusal>> {
         let mut result = None;
-        let from = self.now.time_ns().unwrap_or(i64::MAX);
+        let from = time_of(&self.now).unwrap_or(i64::MAX);
         // Decided by the whole sample: its parts can be of any length.
-        let is_gap = seconds_between(from, sample.time_ns).is_ok_and(|dt| dt > self.now.longest_sample());
+        let is_gap = seconds_between(from, sample.time_ns).is_ok_and(|dt| dt > self.now.filter().longest_sample());
         for (index, (time_ns, measurement)) in self.measurements.iter().enumerate() {
             if *time_ns <= from || *time_ns > sample.time_ns {
                 continue;
             }
-            if self.now.time_ns() != Some(*time_ns) {
+            if time_of(&self.now) != Some(*time_ns) {
                 // The sample is a mean, so each part of it is the same.
                 let part = ImuMean { time_ns: *time_ns, ..*sample };
-                let _ = self.now.propagate_part(&part, is_gap);
+                let _ = self.now.filter_mut().propagate_part(&part, is_gap);
             }
             let of_it = self.now.update(measurement);
             if place == Some(index) {
                 result = Some(of_it);
             }
         }
-        if self.now.time_ns() != Some(sample.time_ns) {
-            let _ = self.now.propagate_part(sample, is_gap);
+        if time_of(&self.now) != Some(sample.time_ns) {
+            let _ = self.now.filter_mut().propagate_part(sample, is_gap);
         }
         result
     }
@@ -318,9 +293,13 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
         }
         self.since_state = 0;
         self.states.push(self.now.clone());
-        let oldest_ns = self.states.get(0).and_then(F::time_ns).unwrap_or(i64::MIN);
+        let oldest_ns = self.states.get(0).and_then(time_of).unwrap_or(i64::MIN);
         while self.measurements.get(0).is_some_and(|(time_ns, _)| *time_ns <= oldest_ns) {
             self.measurements.pop_front();
         }
     }
+}
+
+fn time_of<F: Replayed>(state: &F) -> Option<i64> {
+    state.filter().time_ns()
 }

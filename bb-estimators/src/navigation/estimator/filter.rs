@@ -4,7 +4,7 @@ use super::health::{Sight, largest_deviation};
 use super::input::keyframe_at;
 use super::options::NavigationOptions;
 use super::refuted::Found;
-use crate::navigation::eskf::{Eskf, ImuMean, Start};
+use crate::navigation::eskf::{Eskf, Start};
 use crate::navigation::fused::Fused;
 use crate::navigation::history::Replayed;
 use crate::navigation::math::skew;
@@ -106,7 +106,7 @@ impl<S: States, const N: usize> Filter<S, N> {
     /// The data from which its health is judged.
     pub(super) fn sight<'a>(&self, counts: &'a [&'a Counts]) -> Option<Sight<'a>> {
         Some(Sight {
-            now_ns: self.time_ns()?,
+            now_ns: self.estimate()?.time_ns,
             counts,
             resets: self.eskf.resets(),
             dead_reckoning_s: self.eskf.dead_reckoning_s(),
@@ -150,22 +150,15 @@ impl<S: States, const N: usize> Filter<S, N> {
 }
 
 impl<S: States, const N: usize> Replayed for Filter<S, N> {
+    type Filter = Eskf<S, N>;
     type Measurement = Measured;
 
-    fn time_ns(&self) -> Option<i64> {
-        self.estimate().map(|estimate| estimate.time_ns)
+    fn filter(&self) -> &Eskf<S, N> {
+        &self.eskf
     }
 
-    fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
-        self.eskf.propagate(sample)
-    }
-
-    fn longest_sample(&self) -> f64 {
-        self.eskf.params().longest_sample
-    }
-
-    fn propagate_part(&mut self, part: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
-        self.eskf.propagate_part(part, is_gap)
+    fn filter_mut(&mut self) -> &mut Eskf<S, N> {
+        &mut self.eskf
     }
 
     fn update(&mut self, measured: &Measured) -> Result<Fused, Refusal> {
@@ -193,6 +186,7 @@ impl<S: States, const N: usize> Replayed for Filter<S, N> {
 mod tests {
     use super::*;
     use crate::navigation::History;
+    use crate::navigation::eskf::ImuMean;
     use crate::navigation::state::{NAVIGATION, Navigation};
 
     /// The parts of a gap that a measurement divides are gaps.

@@ -22,22 +22,15 @@ struct Drone {
 }
 
 impl Replayed for Drone {
+    type Filter = Eskf;
     type Measurement = Sensed;
 
-    fn time_ns(&self) -> Option<i64> {
-        self.filter.estimate().map(|estimate| estimate.time_ns)
+    fn filter(&self) -> &Eskf {
+        &self.filter
     }
 
-    fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
-        self.filter.propagate(sample)
-    }
-
-    fn longest_sample(&self) -> f64 {
-        self.filter.params().longest_sample
-    }
-
-    fn propagate_part(&mut self, part: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
-        self.filter.propagate_part(part, is_gap)
+    fn filter_mut(&mut self) -> &mut Eskf {
+        &mut self.filter
     }
 
     fn update(&mut self, measurement: &Sensed) -> Result<Fused, Refusal> {
@@ -126,7 +119,7 @@ fn at_the_time_of_a_sample_it_is_the_filter_alone() {
     let mut alone = drone();
     let mut arrivals = Vec::new();
     for i in 1..=200 {
-        alone.propagate(&sample(i)).unwrap();
+        alone.filter.propagate(&sample(i)).unwrap();
         if i % 20 == 0 {
             alone.update(&sensed(i % 40 == 0, 0.1)).unwrap();
             arrivals.push((200, i * SAMPLE_NS, sensed(i % 40 == 0, 0.1)));

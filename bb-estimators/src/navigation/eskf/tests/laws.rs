@@ -157,22 +157,15 @@ struct Fixed<S: States, const N: usize> {
 }
 
 impl<S: States, const N: usize> Replayed for Fixed<S, N> {
+    type Filter = Eskf<S, N>;
     type Measurement = GnssPosition;
 
-    fn time_ns(&self) -> Option<i64> {
-        self.filter.estimate().map(|estimate| estimate.time_ns)
+    fn filter(&self) -> &Eskf<S, N> {
+        &self.filter
     }
 
-    fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
-        self.filter.propagate(sample)
-    }
-
-    fn longest_sample(&self) -> f64 {
-        self.filter.params().longest_sample
-    }
-
-    fn propagate_part(&mut self, part: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
-        self.filter.propagate_part(part, is_gap)
+    fn filter_mut(&mut self) -> &mut Eskf<S, N> {
+        &mut self.filter
     }
 
     fn update(&mut self, measurement: &GnssPosition) -> Result<Fused, Refusal> {

@@ -1,7 +1,6 @@
 //! The filter, with a stream for each sensor.
 
 use super::options::PlanarOptions;
-use crate::navigation::eskf::ImuMean;
 use crate::navigation::estimator::health::{Sight, largest_deviation};
 use crate::navigation::estimator::refuted::Found;
 use crate::navigation::fused::Fused;
@@ -127,7 +126,7 @@ impl Filter {
     /// The inputs to the health assessment.
     pub(super) fn sight<'a>(&self, counts: &'a [&'a Counts]) -> Option<Sight<'a>> {
         Some(Sight {
-            now_ns: self.time_ns()?,
+            now_ns: self.ekf.estimate()?.time_ns,
             counts,
             resets: self.ekf.resets(),
             dead_reckoning_s: self.ekf.dead_reckoning_s(),
@@ -137,22 +136,15 @@ impl Filter {
 }
 
 impl Replayed for Filter {
+    type Filter = PlanarEkf;
     type Measurement = Measured;
 
-    fn time_ns(&self) -> Option<i64> {
-        self.ekf.estimate().map(|estimate| estimate.time_ns)
+    fn filter(&self) -> &PlanarEkf {
+        &self.ekf
     }
 
-    fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
-        self.ekf.propagate(sample)
-    }
-
-    fn longest_sample(&self) -> f64 {
-        self.ekf.params().longest_sample
-    }
-
-    fn propagate_part(&mut self, part: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
-        self.ekf.propagate_part(part, is_gap)
+    fn filter_mut(&mut self) -> &mut PlanarEkf {
+        &mut self.ekf
     }
 
     fn update(&mut self, measured: &Measured) -> Result<Fused, Refusal> {
@@ -170,6 +162,7 @@ impl Replayed for Filter {
 mod tests {
     use super::*;
     use crate::navigation::History;
+    use crate::navigation::eskf::ImuMean;
     use nalgebra::Vector3;
 
     /// The parts of a gap that a measurement divides are gaps.

@@ -168,22 +168,15 @@ struct Fixed {
 }
 
 impl Replayed for Fixed {
+    type Filter = PlanarEkf;
     type Measurement = PlanarPosition;
 
-    fn time_ns(&self) -> Option<i64> {
-        self.filter.estimate().map(|estimate| estimate.time_ns)
+    fn filter(&self) -> &PlanarEkf {
+        &self.filter
     }
 
-    fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
-        self.filter.propagate(sample)
-    }
-
-    fn longest_sample(&self) -> f64 {
-        self.filter.params().longest_sample
-    }
-
-    fn propagate_part(&mut self, part: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
-        self.filter.propagate_part(part, is_gap)
+    fn filter_mut(&mut self) -> &mut PlanarEkf {
+        &mut self.filter
     }
 
     fn update(&mut self, measurement: &PlanarPosition) -> Result<Fused, Refusal> {
