@@ -6,6 +6,10 @@
 //! prior Π. Eliminating the landmark leaves `Σ Dᵢᵀ Nᵢ Dᵢ - Yᵀ Y` with `Yᵢ = V^-½ Nᵢ Dᵢ`. Each further observation adds
 //! two rows: `(I + B V⁻¹ Bᵀ)^-½ [-B V⁻¹ Nᵢ Dᵢ … B D]`. Moving or rotating the whole world changes only the contribution
 //! of the prior.
+//!
+//! V⁻¹ itself is never formed. Without a guess, the first direction determines V to within a factor of 10⁹ from one axis to
+//! another, and what remains of `N - N V⁻¹ N` would be the rounding of the inverse. With `V = L Lᵀ`, it is `N - (L⁻¹ N)ᵀ L⁻¹ N`,
+//! whose error is the rounding of N.
 
 #![allow(clippy::needless_range_loop, reason = "the indices are those of the equations")]
 
@@ -59,9 +63,10 @@ pub(super) struct Landmark {
     pub(super) refused_in_a_row: u32,
     /// In chronological order.
     pub(super) sights: Vec<Sight>,
-    /// V⁻¹ and `V⁻¹ b`, where b is the information vector of prior and observations.
-    inverse: Matrix3<f64>,
-    mean: Vector3<f64>,
+    /// L; `None` if V is singular.
+    root: Option<Matrix3<f64>>,
+    /// `L⁻¹ b`, where b is the information vector of prior and observations.
+    vector: Vector3<f64>,
 }
 
 impl Landmark {
@@ -77,8 +82,8 @@ impl Landmark {
             last: 0,
             refused_in_a_row: 0,
             sights: Vec::with_capacity(sights),
-            inverse: Matrix3::zeros(),
-            mean: Vector3::zeros(),
+            root: None,
+            vector: Vector3::zeros(),
         }
     }
 
@@ -98,17 +103,31 @@ impl Landmark {
 
     /// The covariance that its uncertainty gives an observation with the Jacobian B: `B V⁻¹ Bᵀ`.
     pub(super) fn seen_covariance(&self, jacobian: &Matrix2x3<f64>) -> SMatrix<f64, 2, 2> {
-        jacobian * self.inverse * jacobian.transpose()
+        let whitened = self.whitened(&jacobian.transpose());
+        whitened.transpose() * whitened
+    }
+
+    /// `L⁻¹ M`; zero if V is singular.
+    fn whitened<const C: usize>(&self, matrix: &SMatrix<f64, 3, C>) -> SMatrix<f64, 3, C> {
+        let whitened = self.root.and_then(|root| root.solve_lower_triangular(matrix));
+        whitened.unwrap_or_else(SMatrix::zeros)
+    }
+
+    /// `L⁻ᵀ M`; zero if V is singular.
+    fn solved_back<const C: usize>(&self, matrix: &SMatrix<f64, 3, C>) -> SMatrix<f64, 3, C> {
+        let solved = self.root.and_then(|root| root.tr_solve_lower_triangular(matrix));
+        solved.unwrap_or_else(SMatrix::zeros)
     }
 
     /// The standard deviation of its position given the keyframes, m, as the root of the sum over the axes.
     pub(super) fn deviation(&self) -> f64 {
-        sqrt(self.inverse.trace())
+        sqrt(self.whitened(&Matrix3::identity()).norm_squared())
     }
 
     /// The share of the prior: `V⁻¹ Π`.
     pub(super) fn held(&self) -> Matrix3<f64> {
-        self.prior.map_or(Matrix3::zeros(), |(_, weight)| self.inverse * weight)
+        let weight = self.prior.map_or(0.0, |(_, weight)| weight);
+        self.solved_back(&self.whitened(&Matrix3::from_diagonal_element(weight)))
     }
 
     /// Sums prior and observations. If they do not determine the position, the landmark is not used until further
@@ -126,16 +145,17 @@ impl Landmark {
             matrix += sight.normal();
             vector += sight.jacobian.transpose() * sight.residual * sight.weight;
         }
-        let inverse = matrix.cholesky().map(|root| root.inverse());
-        let inverse = inverse.filter(|inverse| inverse.iter().all(|x| x.is_finite()));
+        self.root = matrix.cholesky().map(|root| root.l());
+        if !self.whitened(&Matrix3::identity()).iter().all(|x| x.is_finite()) {
+            self.root = None;
+        }
         // An unknown of its own is eliminated as such, not begun again.
         if self.slot.is_some() {
-            self.is_open &= inverse.is_some();
+            self.is_open &= self.root.is_some();
         } else {
-            self.is_used &= inverse.is_some();
+            self.is_used &= self.root.is_some();
         }
-        self.inverse = inverse.unwrap_or_else(Matrix3::zeros);
-        self.mean = self.inverse * vector;
+        self.vector = self.whitened(&vector);
     }
 
     /// The estimated offset from the linearisation point, for a landmark that is not an unknown of its own.
@@ -145,26 +165,26 @@ impl Landmark {
             let Some(keyframe) = window.get((sight.serial - first) as usize) else { continue };
             pull += sight.normal() * sight.moved(&keyframe.correction);
         }
-        self.mean - self.inverse * pull
+        self.solved_back(&(self.vector - self.whitened(&pull)))
     }
 
     /// Adds its information on the poses to Λ, or removes it again, using the stored linearisation.
     pub(super) fn add_to<const N: usize>(&self, coupling: &mut Coupling<N>, rows: &mut [Vec<f64>; 3], sign: f64) {
-        let Some(root) = self.inverse.cholesky().map(|root| root.l()) else { return };
+        if self.root.is_none() {
+            return;
+        }
         let Some((from, to)) = self.range(coupling.first, rows) else { return };
         for sight in &self.sights {
             let index = (sight.serial - coupling.first) as usize;
             coupling.add_pose(index, &sight.information(), sign);
-            // With V⁻¹ = L Lᵀ, Y = Lᵀ N D.
-            let share = root.transpose() * sight.normal();
+            // Y = L⁻¹ N D.
+            let share = self.whitened(&sight.normal());
             for (i, row) in rows.iter_mut().enumerate() {
                 sight.write(&share.row(i).transpose(), &mut row[POSE * index..]);
             }
         }
-        // Lᵀ b = L⁻¹ V⁻¹ b
-        let residual = root.solve_lower_triangular(&self.mean).unwrap_or_else(Vector3::zeros);
         let [a, b, c] = &*rows;
-        coupling.add_rows((from, to), &[a, b, c], &residual.into(), -sign);
+        coupling.add_rows((from, to), &[a, b, c], &self.vector.into(), -sign);
     }
 
     /// Adds the information of an observation that is not inserted yet, or removes that of one that is no longer stored.
@@ -189,13 +209,15 @@ impl Landmark {
             }
         }
         (from, to) = (from.min(index), to.max(index + 1));
-        let covariance = SMatrix::<f64, 2, 2>::identity() + self.seen_covariance(&jacobian);
+        // L⁻¹ Bᵀ
+        let whitened = self.whitened(&jacobian.transpose());
+        let covariance = SMatrix::<f64, 2, 2>::identity() + whitened.transpose() * whitened;
         let Some(root) = covariance.cholesky().map(|root| root.l()) else { return };
         let divided = |rows: Matrix2x3<f64>| root.solve_lower_triangular(&rows).unwrap_or_else(Matrix2x3::zeros);
-        let by_landmark = divided(jacobian * self.inverse);
+        let by_landmark = divided(whitened.transpose());
         for other in &self.sights {
             let index = (other.serial - coupling.first) as usize;
-            let share = by_landmark * other.normal();
+            let share = by_landmark * self.whitened(&other.normal());
             for i in 0..2 {
                 other.write(&-share.row(i).transpose(), &mut rows[i][POSE * index..]);
             }
@@ -204,7 +226,7 @@ impl Landmark {
         for i in 0..2 {
             sight.write(&own.row(i).transpose(), &mut rows[i][POSE * index..]);
         }
-        let residual = sight.residual * weight - jacobian * self.mean;
+        let residual = sight.residual * weight - whitened.transpose() * self.vector;
         let residual = root.solve_lower_triangular(&residual).unwrap_or_else(Vector2::zeros);
         let [a, b, _] = &*rows;
         coupling.add_rows((from, to), &[a, b], &residual.into(), sign);

@@ -19,3 +19,5 @@ mod scenery;
 mod sights;
 mod tracks;
 mod unfit_sights;
+#[cfg(feature = "std")]
+mod whole_flights;
