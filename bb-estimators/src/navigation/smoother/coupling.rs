@@ -177,13 +177,18 @@ impl<const N: usize> Coupling<N> {
     /// The link between this keyframe and the previous one changes. What the previous one leaves to later poses depends on
     /// it, unless no landmark ties a keyframe before the link to one after it.
     pub(super) fn relink(&mut self, index: usize) {
-        let Some(before) = index.checked_sub(1) else { return };
-        let is_seen = self.idle.is_some() && self.unseen > self.first + index as u64;
-        if is_seen && (self.points() > 0 || self.reach[before] > index) {
+        if self.spans(index) {
             self.changed = self.changed.min(index);
             // Also one at this keyframe: the previous one is eliminated by then.
-            self.checkpoint.forget_after(self.first + before as u64);
+            self.checkpoint.forget_after(self.first + index as u64 - 1);
         }
+    }
+
+    /// Whether a landmark ties a keyframe before this one to it or to one after it.
+    pub(super) fn spans(&self, index: usize) -> bool {
+        let Some(before) = index.checked_sub(1) else { return false };
+        let is_seen = self.idle.is_some() && self.unseen > self.first + index as u64;
+        is_seen && (self.points() > 0 || self.reach[before] > index)
     }
 
     /// The index of the pose at which the ties of a keyframe end in an elimination of `len`. It includes the next keyframe.

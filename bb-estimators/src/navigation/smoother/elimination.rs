@@ -288,7 +288,22 @@ pub(super) fn judge<const N: usize>(
     decompose(factor, residual, covariance)
 }
 
-/// Compares a factor on a keyframe and the previous one with their estimates. The pivot is that of the previous keyframe.
+/// Compares a factor on a keyframe and the previous one with their estimates, given the covariance that their uncertainty gives it.
+pub(super) fn judge_with<const N: usize>(
+    factor: &Rows<N>,
+    corrections: (&[f64; N], &[f64; N]),
+    mut covariance: [[f64; MOST_ROWS]; MOST_ROWS],
+) -> Option<Judged> {
+    let mut residual = factor.residual;
+    for i in 0..factor.count {
+        covariance[i][i] += 1.0;
+        residual[i] -= dot(&factor.previous[i], corrections.0) + dot(&factor.at[i], corrections.1);
+    }
+    decompose(factor, residual, covariance)
+}
+
+/// The same if no landmark ties keyframes before the later one to it or to those after it. The pivot is that of the previous
+/// keyframe.
 pub(super) fn judge_pair<const N: usize>(
     factor: &Rows<N>,
     before: &Pivot<N>,

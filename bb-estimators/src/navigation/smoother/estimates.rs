@@ -6,7 +6,8 @@ use super::coupling::{Coupling, POSE, place};
 use super::factor::Factor;
 use super::filter::FixedLagSmoother;
 use super::link::predicted;
-use super::matrix::{Square, mirror};
+use super::matrix::{Square, axpy, dot, mirror};
+use super::rows::{MOST_ROWS, Rows};
 use super::scratch::Scratch;
 use crate::navigation::state::{Estimate, POSITION, ROTATION, States};
 
@@ -102,20 +103,54 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         for column in 0..N {
             let mut impulse = [0.0; N];
             impulse[column] = 1.0;
-            let response = self.response(index, impulse, coupling, scratch)?;
+            self.respond(index, impulse, &[0.0; N], coupling, scratch)?;
+            let response = scratch.corrections.get(index)?;
             (0..N).for_each(|row| covariance[row][column] = response[row]);
         }
         Some(covariance)
     }
 
-    /// The correction of a keyframe if the only information vector is this one, at that keyframe.
-    fn response(
+    /// The covariance that the uncertainty of a keyframe and the previous one gives a factor on both, on and below the diagonal;
+    /// where landmarks couple keyframes.
+    pub(super) fn pair_covariance(
+        &mut self,
+        index: usize,
+        factor: &Rows<N>,
+    ) -> Option<[[f64; MOST_ROWS]; MOST_ROWS]> {
+        let mut scratch = core::mem::take(&mut self.scratch);
+        let covariance = self.pair_covariance_in(index, factor, &mut scratch);
+        self.scratch = scratch;
+        covariance
+    }
+
+    fn pair_covariance_in(
+        &self,
+        index: usize,
+        factor: &Rows<N>,
+        scratch: &mut Scratch<N>,
+    ) -> Option<[[f64; MOST_ROWS]; MOST_ROWS]> {
+        let coupling = &self.landmarks.as_ref()?.coupling;
+        let before = index.checked_sub(1)?;
+        let mut covariance = [[0.0; MOST_ROWS]; MOST_ROWS];
+        for (i, sums) in covariance.iter_mut().enumerate().take(factor.count) {
+            self.respond(before, factor.previous[i], &factor.at[i], coupling, scratch)?;
+            let (earlier, later) = (scratch.corrections.get(before)?, scratch.corrections.get(index)?);
+            for (j, sum) in sums.iter_mut().enumerate().take(i + 1) {
+                *sum = dot(&factor.previous[j], earlier) + dot(&factor.at[j], later);
+            }
+        }
+        Some(covariance)
+    }
+
+    /// The corrections of a keyframe and of later ones if the only information vectors are these, at that keyframe and at the next.
+    fn respond(
         &self,
         index: usize,
         impulse: [f64; N],
+        at_next: &[f64; N],
         coupling: &Coupling<N>,
         scratch: &mut Scratch<N>,
-    ) -> Option<[f64; N]> {
+    ) -> Option<()> {
         let last = self.window.len() - 1;
         let Scratch { means, corrections, poses } = scratch;
         poses.fill(0.0);
@@ -126,6 +161,9 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
             *means.get_mut(k)? = response.mean;
             coupling.push(k, &response.at, poses.get_mut(POSE * (k + 1)..POSE * (last + 1))?);
             arrived = response.next;
+            if k == index {
+                axpy(&mut arrived, 1.0, at_next);
+            }
             for i in 0..POSE {
                 arrived[place(i)] += poses[POSE * (k + 1) + i];
             }
@@ -138,7 +176,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
             let correction = keyframe.pivot.respond_back(means.get(k)?, &next.link, corrections.get(k + 1)?, &pull);
             *corrections.get_mut(k)? = correction;
         }
-        corrections.get(index).copied()
+        Some(())
     }
 
     pub(super) fn covariance_at(&self, index: usize) -> Option<Square<N>> {

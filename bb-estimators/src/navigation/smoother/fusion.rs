@@ -1,6 +1,6 @@
 //! Gates and adds measurements at any keyframe of the window.
 
-use super::elimination::{Judged, Known, judge, judge_pair};
+use super::elimination::{Judged, Known, judge, judge_pair, judge_with};
 use super::factor::Factor;
 use super::filter::FixedLagSmoother;
 use super::kernel::Kernel;
@@ -122,6 +122,11 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         let newest = self.window.back_mut()?;
         newest.correction = newest.pivot.newest();
         let correction = if is_newest { newest.correction } else { self.correction_at(index)? };
+        if ties && self.landmarks.as_ref().is_some_and(|landmarks| landmarks.coupling.spans(index)) {
+            let earlier = self.back(index.checked_sub(1)?, &correction)?;
+            let covariance = self.pair_covariance(index, rows)?;
+            return judge_with(rows, (&earlier, &correction), covariance);
+        }
         let covariance = if is_newest { None } else { Some(self.covariance_now(index)?) };
         let keyframe = self.window.get(index)?;
         let known = covariance.as_ref().map_or(Known::Newest(&keyframe.pivot.root), Known::Other);

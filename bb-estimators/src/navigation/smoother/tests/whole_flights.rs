@@ -317,3 +317,34 @@ fn a_window_is_the_dense_system_of_the_flight() {
         }
     }
 }
+
+/// The gate of a relative pose knows what landmarks say of the motion: at the newest keyframe, and at earlier ones.
+#[test]
+fn relative_poses_are_judged_by_all_that_is_known() {
+    for (seed, persistent) in [(1, 32), (2, 0), (3, 32)] {
+        flown(seed, (14, 6), Some(5.0), persistent, |smoother, record, flight, k| {
+            for back in [0, 1, 3] {
+                if k < 6 || k % 3 != 0 {
+                    continue;
+                }
+                let id = k - back;
+                let factor = flight.measured[id][0];
+                let index = smoother.window.iter().position(|keyframe| keyframe.id == id as u64).unwrap();
+                let mut rows = Rows::new();
+                let before = Some(&*smoother.window[index - 1]);
+                smoother.window[index].rows::<Drone>(&factor, before, &mut rows).unwrap();
+                let of = |rows: &[[f64; N]], count| DMatrix::from_fn(count, N, |i, j| rows[i][j]);
+                let parts =
+                    [(id as u64 - 1, of(&rows.previous, rows.count)), (id as u64, of(&rows.at, rows.count))];
+                let (mean, covariance) = record.solved().of(&parts);
+                let innovation = DVector::from_row_slice(&rows.residual[..rows.count]) - mean;
+                let covariance = covariance + DMatrix::identity(rows.count, rows.count);
+                let expected = innovation.dot(&covariance.cholesky().unwrap().solve(&innovation));
+                // It is added to a copy: the flight stays what it is.
+                let judged = smoother.clone().add(&mut open(), id as u64, factor).unwrap();
+                let off = (judged.nis / expected - 1.0).abs();
+                assert!(off < 1e-6, "seed {seed}, keyframe {id} of {k}: {} {expected}", judged.nis);
+            }
+        });
+    }
+}
