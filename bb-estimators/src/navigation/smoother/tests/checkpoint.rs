@@ -166,6 +166,49 @@ fn in_the_usual_order_only_the_newest_is_eliminated() {
     }
 }
 
+/// Landmarks that outlive the window couple all of it. Once the last is lost, an elimination resumes again.
+#[test]
+fn landmarks_that_outlive_the_window_cost_no_longer_than_they_last() {
+    const KEYFRAMES: usize = 90;
+    /// Tracks that begin before end here, or are short after.
+    const CUT: usize = 50;
+    let window = 2 * LONGEST + 4;
+    let flight = Flight::new(5, KEYFRAMES, 1.0);
+    let scenery = Scenery::new(&flight, 5, 8, 30, Some(5.0));
+    let mut smoother = Smoother::new(linear(window)).unwrap();
+    smoother.set_camera(camera(), LandmarkParams { relinearise: 1.0, ..exact() }).unwrap();
+    smoother.landmarks.as_mut().unwrap().known_within = f64::INFINITY;
+    smoother.start(0, &flight.start).unwrap();
+    let mut begun = vec![None; scenery.places.len()];
+    let (mut coupled, mut last_coupled, mut last_seen) = (0, 0, 0);
+    for k in 1..KEYFRAMES {
+        flight.fly_to(&mut smoother, k);
+        flight.measure(&mut smoother, k);
+        let mut seen_before = None;
+        for seen in &scenery.seen[k] {
+            let age = k - *begun[seen.landmark as usize].get_or_insert(k);
+            if k < CUT || age < LONGEST {
+                seen_before.get_or_insert(core::mem::replace(&mut last_seen, k));
+                let result = smoother.observe(&mut open(), k as u64, seen);
+                assert!(matches!(result, Ok(_) | Err(Refusal::NotObservable)), "{k}: {result:?}");
+            }
+        }
+        let eliminated = smoother.update().unwrap().eliminated;
+        if smoother.landmarks.as_ref().unwrap().coupling.points() > 0 {
+            (coupled, last_coupled) = (coupled + 1, k);
+            assert!(k >= CUT || eliminated == window, "{k}: {eliminated}");
+        } else if last_coupled > 0 {
+            // The first has nothing to resume from; keyframes that saw nothing are eliminated with the next that does.
+            let blind = seen_before.map_or(0, |before| k - before - 1);
+            assert!(k == last_coupled + 1 || eliminated <= LONGEST + 2 + blind, "{k}: {eliminated}, {blind} blind");
+        }
+        if smoother.is_tied() {
+            both(&mut smoother).unwrap();
+        }
+    }
+    assert!(coupled > 20 && (CUT..KEYFRAMES - window).contains(&last_coupled), "{coupled} {last_coupled}");
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
