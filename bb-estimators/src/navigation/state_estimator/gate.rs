@@ -174,7 +174,7 @@ impl SpoofGate {
         })
     }
 
-    /// Handles a fused anchor. `offset` is the anchor minus the estimate, m. Returns whether it let the receiver in, if that was
+    /// Handles a fused anchor. `offset` is the anchor minus the estimate before it, m. Returns whether it let the receiver in, if that was
     /// pending.
     pub(super) fn anchor(
         &mut self,

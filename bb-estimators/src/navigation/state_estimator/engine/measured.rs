@@ -149,6 +149,8 @@ impl<F: ProvidedFactor> Engine<F> {
             let factor = core::mem::take(&mut self.refused_anchor);
             return Err(Reason::Raised { factor }.into());
         }
+        // As the fixes are compared: what the anchor corrects is no difference between the two.
+        let before = self.strategy.motion();
         let result = self.measure(&Measured::Anchor(measured, trust));
         self.refused_anchor = match &result {
             Err(Trouble::Degraded(Reason::Refused(Refusal::Gate { nis, .. }))) => nis / 6.0,
@@ -161,7 +163,7 @@ impl<F: ProvidedFactor> Engine<F> {
         }
         self.sources.anchored(anchor.time_ns, &config.params);
         self.is_anchor_degraded = anchor.is_covariance_degraded;
-        if let Some((position, _)) = self.strategy.motion() {
+        if let Some((position, _)) = before {
             let offset = measured.position - position;
             *rejection = self.gate.anchor(anchor.time_ns, &offset, &config.params).and_then(Result::err);
         }

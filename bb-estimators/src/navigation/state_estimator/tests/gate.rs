@@ -349,3 +349,51 @@ fn a_receiver_beside_a_camera_never_overrules_it() {
         }
     }
 }
+
+/// After a long time without a camera, an anchor moves the estimate far. A fix is compared with the anchor, not with what the anchor
+/// has corrected: one that follows the wrong estimate stays out, and one that agrees with the anchor is let in.
+#[test]
+fn what_an_anchor_corrects_is_no_difference_to_a_fix() {
+    let flight = Flight::new(120, 5);
+    for strategy in StrategyKind::ALL {
+        for is_genuine in [true, false] {
+            let mut estimator = started(&flight, *strategy);
+            let mut judged = None;
+            for sent in &flight.sent(true, true, true) {
+                let time_ns = sent.time_ns();
+                let is_blind = time_ns > 10 * SECOND;
+                let off = |estimator: &Estimator| {
+                    estimator.predicted(time_ns).map(|output| (flight.error(&output).0, output))
+                };
+                match sent {
+                    Sent::Health(reading) => {
+                        let health = spoofed_from_5_to_10(time_ns);
+                        estimator.add_gps_health(GpsHealthReading { health, ..*reading }).unwrap();
+                    }
+                    Sent::Fix(_) if time_ns < 22 * SECOND => {}
+                    Sent::Fix(fix) => {
+                        let (_, estimate) = off(&estimator).unwrap();
+                        let position = if is_genuine { fix.position } else { estimate.position };
+                        let added = estimator.add_gnss(GnssReading { position, ..*fix });
+                        assert!(matches!(added, Ok(Added::Waits)), "it is judged with the next sample: {added:?}");
+                    }
+                    Sent::Vio(_) if is_blind => {}
+                    Sent::Anchor(anchor) if is_blind => {
+                        let (error_m, _) = off(&estimator).unwrap();
+                        if time_ns > 23 * SECOND && error_m > 40.0 {
+                            assert!(error_m < 200.0, "{error_m}");
+                            let added = estimator.add_pose_anchor(*anchor).unwrap();
+                            assert!(matches!(added, Added::Taken { .. }), "{added:?}");
+                            judged = Some(error_m);
+                            break;
+                        }
+                    }
+                    sent => sent.to(&mut estimator).unwrap(),
+                }
+            }
+            let error_m = judged.unwrap();
+            let gate = estimator.health().gate;
+            assert_eq!(gate.is_open(), is_genuine, "{}, off by {error_m} m: {gate:?}", strategy.name());
+        }
+    }
+}
