@@ -20,7 +20,7 @@ pub(super) enum Stamped {
     Ahead,
     /// It is too old to be placed.
     TooOld,
-    /// It and the ones before it are old: the clock was set back.
+    /// It and the ones before it are old, or repeat the time of others: the clock was set back.
     SetBack {
         /// Time for which stamps have come from the new clock, ns.
         for_ns: i64,
@@ -68,11 +68,16 @@ impl Run {
 }
 
 impl Clock {
-    /// Judges a stamp. `longest_ns` is how late a stamp may be to be placed, and how far ahead to be believed at once.
-    pub(super) fn judge(&mut self, time_ns: i64, newest_ns: i64, longest_ns: i64) -> Stamped {
+    /// Judges a stamp. `longest_ns` is how late a stamp may be to be placed, and how far ahead to be believed at once. `is_surplus`
+    /// is whether other samples already cover its time: a clock that was set back by less than `longest_ns` sends such ones alone.
+    pub(super) fn judge(&mut self, time_ns: i64, newest_ns: i64, longest_ns: i64, is_surplus: bool) -> Stamped {
         let ahead_ns = time_ns.saturating_sub(newest_ns);
         // A stamp that agrees with the newest is no jump, even if late samples are placed for a shorter time only.
         if (-longest_ns..=longest_ns.max(AGREED_NS)).contains(&ahead_ns) {
+            if ahead_ns <= 0 && is_surplus {
+                let believed = self.doubt(time_ns);
+                return believed.map_or(Stamped::Late, |run| Stamped::SetBack { for_ns: run.length_ns() });
+            }
             self.doubted = None;
             return if ahead_ns > 0 { Stamped::Next } else { Stamped::Late };
         }
@@ -111,7 +116,7 @@ mod tests {
     const NEWEST: i64 = 100_000;
 
     fn judged(clock: &mut Clock, millis: i64) -> Stamped {
-        clock.judge(millis * MS, NEWEST * MS, 2000 * MS)
+        clock.judge(millis * MS, NEWEST * MS, 2000 * MS, false)
     }
 
     #[test]
@@ -123,8 +128,8 @@ mod tests {
             assert_eq!(judged(&mut clock, 100_005), Stamped::Next);
             assert_eq!(judged(&mut clock, millis), Stamped::Ahead, "and again");
         }
-        assert_eq!(Clock::default().judge(i64::MIN, i64::MAX, 0), Stamped::TooOld);
-        assert_eq!(Clock::default().judge(i64::MAX, i64::MIN, 0), Stamped::Ahead);
+        assert_eq!(Clock::default().judge(i64::MIN, i64::MAX, 0, false), Stamped::TooOld);
+        assert_eq!(Clock::default().judge(i64::MAX, i64::MIN, 0, false), Stamped::Ahead);
     }
 
     #[test]
@@ -153,8 +158,33 @@ mod tests {
     #[test]
     fn a_second_ahead_is_no_jump() {
         for lateness in [0, 50, 2000] {
-            let stamped = Clock::default().judge((NEWEST + 1000) * MS, NEWEST * MS, lateness * MS);
+            let stamped = Clock::default().judge((NEWEST + 1000) * MS, NEWEST * MS, lateness * MS, false);
             assert_eq!(stamped, Stamped::Next);
+        }
+    }
+
+    /// Half a second of stamps, none of them new, at times that are covered already: too old to be placed at first, or not.
+    #[test]
+    fn a_clock_that_is_set_back_a_little_repeats_time() {
+        for first in [97_900, 98_000, 99_000] {
+            let mut clock = Clock::default();
+            let mut late = |millis: i64| clock.judge(millis * MS, NEWEST * MS, 2000 * MS, true);
+            for millis in (first..first + 500).step_by(5) {
+                let doubted = if millis < 98_000 { Stamped::TooOld } else { Stamped::Late };
+                assert_eq!(late(millis), doubted, "{millis}");
+            }
+            assert_eq!(late(first + 500), Stamped::SetBack { for_ns: 500 * MS });
+        }
+        // Late samples between new ones, or where none was, are late.
+        for is_surplus in [true, false] {
+            let mut clock = Clock::default();
+            for millis in (99_000..100_000).step_by(5) {
+                let time_ns = millis * MS;
+                assert_eq!(clock.judge(time_ns, NEWEST * MS, 2000 * MS, is_surplus), Stamped::Late);
+                if is_surplus && millis % 100 == 0 {
+                    assert_eq!(judged(&mut clock, NEWEST + 5), Stamped::Next);
+                }
+            }
         }
     }
 

@@ -142,7 +142,10 @@ impl Emission {
         output.quality.covariance_norm = output.covariance.norm();
         let norm = Norm::of(&output);
         self.growing_since_ns = match (self.last, self.growing_since_ns) {
-            (Some(last), since_ns) if norm.norm > last.norm => since_ns.or(Some(last.time_ns)),
+            // If the clock was set back, the time is measured from there.
+            (Some(last), since_ns) if norm.norm > last.norm => {
+                Some(since_ns.unwrap_or(last.time_ns).min(norm.time_ns))
+            }
             _ => None,
         };
         self.last = Some(norm);

@@ -220,8 +220,10 @@ impl<F: ProvidedFactor> Engine<F> {
             Phase::Starting(_) => self.phase = Phase::Starting(Starter::new(config)),
             Phase::Lost => {}
             Phase::Running => {
-                let resumed_ns = sample_ns.saturating_sub(for_ns.saturating_mul(2));
-                if self.strategy.set_clock(resumed_ns).is_ok() {
+                let passed_ns = for_ns.saturating_mul(2);
+                let resumed_ns = sample_ns.saturating_sub(passed_ns);
+                // It was silent for any time before it was seen: what has passed is known to within itself.
+                if self.strategy.set_clock(resumed_ns, passed_ns as f64 * 1e-9).is_ok() {
                     (self.now_ns, self.begun_ns) = (Some(resumed_ns), Some(resumed_ns));
                     self.unconfirmed = CONFIRMATIONS;
                     self.resets = self.resets.wrapping_add(1);

@@ -177,6 +177,13 @@ impl Cadence {
     }
 }
 
+/// Raises the covariance of the position by what a body moves in a time with this standard deviation, s.
+fn add_time<const N: usize>(covariance: &mut SMatrix<f64, N, N>, velocity: &Vector3<f64>, deviation_s: f64) {
+    let way = velocity * deviation_s;
+    let mut of_position = covariance.fixed_view_mut::<3, 3>(POSITION, POSITION);
+    of_position += way * way.transpose();
+}
+
 /// Converts a stamp to an id that increases with it.
 pub(super) fn id_of(time_ns: i64) -> u64 {
     (time_ns as u64) ^ (1 << 63)
@@ -294,9 +301,9 @@ impl<F: ProvidedFactor> Strategy<F> {
         each!(self, strategy => strategy.relocate(place))
     }
 
-    /// Assigns a new time to the present state. Keyframes are dropped.
-    pub(super) fn set_clock(&mut self, time_ns: i64) -> Result<(), Refusal> {
-        each!(self, strategy => strategy.set_clock(time_ns))
+    /// Assigns a new time to the present state, with the standard deviation of that time, s. Keyframes are dropped.
+    pub(super) fn set_clock(&mut self, time_ns: i64, deviation_s: f64) -> Result<(), Refusal> {
+        each!(self, strategy => strategy.set_clock(time_ns, deviation_s))
     }
 
     /// Moves to another world.

@@ -26,7 +26,13 @@ impl<F: ProvidedFactor> Queue<F> {
         sample.check()?;
         let time_ns = sample.time_ns;
         let Some(newest) = self.newest else { return self.place_first(sample, config) };
-        match self.clock.judge(time_ns, newest.time_ns, ns(config.params.lateness)) {
+        let held = self.samples.binary_search_by_key(&time_ns, |other| other.time_ns);
+        if held.is_ok_and(|index| self.samples.get(index) == Some(sample)) {
+            // Sent twice: it says nothing about the clock.
+            return Err(Reason::Duplicate);
+        }
+        let is_surplus = time_ns <= newest.time_ns && self.is_surplus(time_ns);
+        match self.clock.judge(time_ns, newest.time_ns, ns(config.params.lateness), is_surplus) {
             Stamped::Next => {}
             Stamped::Late => return self.place_late_sample(sample, config),
             Stamped::Ahead => return Err(Refusal::InTheFuture { time_ns }.into()),
@@ -52,6 +58,21 @@ impl<F: ProvidedFactor> Queue<F> {
             self.settle(last.time_ns, config);
         }
         Ok(if is_gap { Sampled::Bridged } else { Sampled::Taken })
+    }
+
+    /// Whether no sample is missing at a time: those before and after it are no farther apart than others.
+    fn is_surplus(&self, time_ns: i64) -> bool {
+        let (Some(first), Some(last)) = (self.samples.front(), self.samples.back()) else { return false };
+        let index = self.samples.partition_point(|other| other.time_ns < time_ns);
+        if self.samples.get(index).is_some_and(|other| other.time_ns == time_ns) {
+            return true;
+        }
+        let before = index.checked_sub(1).and_then(|before| self.samples.get(before));
+        let before_ns = before.map(|before| before.time_ns).or(self.dropped_ns);
+        let (Some(before_ns), Some(after)) = (before_ns, self.samples.get(index)) else { return false };
+        let apart_ns = last.time_ns.saturating_sub(first.time_ns) / (self.samples.len() as i64 - 1).max(1);
+        // Where one is missing, they are twice as far apart.
+        after.time_ns.saturating_sub(before_ns) <= apart_ns.saturating_add(apart_ns / 2)
     }
 
     /// The first sample sets the time, once another stamp agrees with its own. Two stamps are not enough to discard earlier

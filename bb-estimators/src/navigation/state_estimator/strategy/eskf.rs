@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 
 use nalgebra::{Isometry3, SMatrix, Vector3};
 
-use super::{Cadence, Failure, Measured, Place, Pose, Predictor, Streams, id_of, trusting};
+use super::{Cadence, Failure, Measured, Place, Pose, Predictor, Streams, add_time, id_of, trusting};
 use crate::attitude::ParamsError;
 use crate::navigation::eskf::{Eskf, ImuMean, Start};
 use crate::navigation::fused::Fused;
@@ -164,9 +164,10 @@ impl EskfStrategy {
         self.past.len()
     }
 
-    pub(super) fn set_clock(&mut self, time_ns: i64) -> Result<(), Refusal> {
+    pub(super) fn set_clock(&mut self, time_ns: i64, deviation_s: f64) -> Result<(), Refusal> {
         let estimate = Estimate { time_ns, ..*self.filter.estimate().ok_or(Refusal::NotStarted)? };
-        let covariance = *self.filter.covariance();
+        let mut covariance = *self.filter.covariance();
+        add_time(&mut covariance, &estimate.velocity, deviation_s);
         self.filter.adopt::<Navigated, NAVIGATED>(&estimate, &covariance)?;
         self.begin(time_ns);
         Ok(())

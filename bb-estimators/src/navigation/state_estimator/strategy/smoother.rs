@@ -7,7 +7,7 @@ use alloc::vec::Vec;
 
 use nalgebra::{Isometry3, Matrix3, SMatrix, UnitQuaternion, Vector3};
 
-use super::{Cadence, Failure, Measured, Place, Pose, Predictor, Streams, id_of, trusting};
+use super::{Cadence, Failure, Measured, Place, Pose, Predictor, Streams, add_time, id_of, trusting};
 use crate::attitude::ParamsError;
 use crate::navigation::eskf::{ImuMean, Start, seconds_between};
 use crate::navigation::fused::Fused;
@@ -240,12 +240,13 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
     }
 
     /// The window restarts with the newest keyframe.
-    pub(super) fn set_clock(&mut self, time_ns: i64) -> Result<(), Refusal> {
+    pub(super) fn set_clock(&mut self, time_ns: i64, deviation_s: f64) -> Result<(), Refusal> {
         if let Err(Failure::Refused(refusal) | Failure::Fatal(refusal)) = self.keyframe() {
             return Err(refusal);
         }
-        let covariance = self.smoother.covariance().ok_or(Refusal::Noise)?;
+        let mut covariance = self.smoother.covariance().ok_or(Refusal::Noise)?;
         let estimate = Estimate { time_ns, ..self.smoother.estimate().ok_or(Refusal::NotStarted)? };
+        add_time(&mut covariance, &estimate.velocity, deviation_s);
         self.smoother.adopt::<Smoothed, SMOOTHED>(id_of(time_ns), &estimate, &covariance)?;
         self.cadence.begin(time_ns);
         Ok(())
