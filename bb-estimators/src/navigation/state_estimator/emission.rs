@@ -1,7 +1,7 @@
 //! Emission of estimates at the output's rate, with monitoring of covariance growth and of ticks without an estimate.
 
 use super::engine::Engine;
-use super::event::EventKind;
+use super::event::{EventKind, StartedFrom};
 use super::factor::ProvidedFactor;
 use super::fallback::{Fallback, Watchdog};
 use super::input::check_position;
@@ -42,12 +42,13 @@ struct Norm {
     /// Traces of the position and rotation blocks.
     traces: [f64; 2],
     label: SourceLabel,
+    started: Option<(i64, StartedFrom)>,
 }
 
 impl Norm {
-    fn of(output: &EstimatorOutput) -> Self {
-        let norm = output.covariance.norm();
-        Self { time_ns: output.emitted_ns, norm, traces: traces(&output.covariance), label: output.label }
+    fn of(output: &EstimatorOutput, started: Option<(i64, StartedFrom)>) -> Self {
+        let (time_ns, label) = (output.emitted_ns, output.label);
+        Self { time_ns, norm: output.covariance.norm(), traces: traces(&output.covariance), label, started }
     }
 }
 
@@ -125,22 +126,25 @@ impl Emission {
         })
     }
 
-    /// Turns an estimate into an output. Returns the factor by which the covariance has grown, if that requires a warning.
+    /// Turns an estimate into an output. `started` is the start that the estimate comes from. Returns the factor by which the covariance has grown, if that requires a warning.
     pub(super) fn emitted(
         &mut self,
         now_ns: i64,
         estimate: EstimatorOutput,
+        started: Option<(i64, StartedFrom)>,
         params: &StateEstimatorParams,
     ) -> (EstimatorOutput, Option<f64>) {
         let mut output = EstimatorOutput { frame_id: self.ids.next(), emitted_ns: now_ns, ..estimate };
         if let Some(last) = self.last
             && output.label == SourceLabel::DeadReckoned
             && last.label == SourceLabel::DeadReckoned
+            // The flight controller knows what another start was uncertain of.
+            && last.started == started
         {
             raise(&mut output.covariance, &last);
         }
         output.quality.covariance_norm = output.covariance.norm();
-        let norm = Norm::of(&output);
+        let norm = Norm::of(&output, started);
         self.growing_since_ns = match (self.last, self.growing_since_ns) {
             // If the clock was set back, the time is measured from there.
             (Some(last), since_ns) if norm.norm > last.norm => {

@@ -344,7 +344,8 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
             self.describe(&pose, &sources, false)
         });
         let output = described.map(|estimate| {
-            let (output, warning) = self.emission.emitted(now_ns, estimate, &self.config.params);
+            let started = self.queue.engine().started();
+            let (output, warning) = self.emission.emitted(now_ns, estimate, started, &self.config.params);
             if let Some(ratio) = warning {
                 self.tell(now_ns, EventKind::CovarianceGrowing { ratio });
             }

@@ -2,6 +2,7 @@
 
 use super::flight::SECOND;
 use super::*;
+use crate::navigation::ImuMean;
 
 /// Labels with their times, s, of a flight with camera and anchors only at some times.
 fn timeline(
@@ -106,5 +107,37 @@ fn growth_of_the_covariance_is_in_the_health_and_warned_of_once() {
             kinds(estimator.sink(), "covariance_growing").filter(|event| event.time_ns > 15 * SECOND).collect();
         assert_eq!(warnings.len(), 1, "{warnings:?}");
         assert_eq!(warnings[0].level(), Level::Warn);
+    }
+}
+
+/// A warm start after the estimate was lost is as uncertain as the flight controller says, and not as what was lost.
+#[test]
+fn a_warm_start_begins_the_covariance_anew() {
+    let flight = Flight::new(22, 4);
+    for strategy in StrategyKind::ALL {
+        let mut estimator = started(&flight, *strategy);
+        let (mut before, mut after) = (0.0_f64, None);
+        for sample in &flight.samples[1..] {
+            // After 20 s of dead reckoning, the clock jumps by more than a gap may last.
+            let time_ns = sample.time_ns + if sample.time_ns > 20 * SECOND { 100 * SECOND } else { 0 };
+            ignore(estimator.add_imu(&ImuMean { time_ns, ..*sample }));
+            if sample.time_ns == 21 * SECOND {
+                assert_eq!(estimator.health().state, HealthState::Lost);
+                let mut state = flight.warm_start(sample.time_ns);
+                state.attitude.time_ns = time_ns;
+                estimator.warm_start(state).unwrap();
+            }
+            let Some(output) = estimator.tick(time_ns) else { continue };
+            assert_eq!(output.label, SourceLabel::DeadReckoned);
+            let own = estimator.predicted(time_ns).unwrap().covariance.norm();
+            match sample.time_ns > 20 * SECOND {
+                false => before = output.covariance.norm(),
+                true => {
+                    assert!(output.covariance.norm() < 1.001 * own, "{}: {output:?}, not {own}", strategy.name());
+                    after.get_or_insert(own);
+                }
+            }
+        }
+        assert!(after.unwrap() < 0.1 * before, "{after:?} {before}");
     }
 }
