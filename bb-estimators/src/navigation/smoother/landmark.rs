@@ -7,9 +7,9 @@
 //! two rows: `(I + B V⁻¹ Bᵀ)^-½ [-B V⁻¹ Nᵢ Dᵢ … B D]`. Moving or rotating the whole world changes only the contribution
 //! of the prior.
 //!
-//! V⁻¹ itself is never formed. Without a guess, the first direction determines V to within a factor of 10⁹ from one axis to
-//! another, and what remains of `N - N V⁻¹ N` would be the rounding of the inverse. With `V = L Lᵀ`, it is `N - (L⁻¹ N)ᵀ L⁻¹ N`,
-//! whose error is the rounding of N.
+//! V⁻¹ itself is never formed. Without a guess, the first direction leaves V with a condition of 10⁹, and what remains of
+//! `N - N V⁻¹ N` would be the rounding of the inverse. With `V = L Lᵀ` it is `N - (L⁻¹ N)ᵀ (L⁻¹ N)`, whose error is the rounding
+//! of N.
 
 #![allow(clippy::needless_range_loop, reason = "the indices are those of the equations")]
 

@@ -126,7 +126,8 @@ impl Emission {
         })
     }
 
-    /// Turns an estimate into an output. `started` is the start that the estimate comes from. Returns the factor by which the covariance has grown, if that requires a warning.
+    /// Turns an estimate into an output. `started` is the start that it comes from. Returns the factor by which the covariance has
+    /// grown, if that requires a warning.
     pub(super) fn emitted(
         &mut self,
         now_ns: i64,

@@ -174,8 +174,8 @@ impl SpoofGate {
         })
     }
 
-    /// Handles a fused anchor. `offset` is the anchor minus the estimate before it, m. Returns whether it let the receiver in, if that was
-    /// pending.
+    /// Handles a fused anchor. `offset` is the anchor minus the estimate before it, m. Returns whether it let the receiver in, if
+    /// that was pending.
     pub(super) fn anchor(
         &mut self,
         time_ns: i64,
