@@ -55,8 +55,23 @@ impl<S: States, const N: usize, const M: usize> Bank<S, N, M> {
     ///
     /// The same as [`Eskf::propagate`]; all filters agree on whether a sample is valid.
     pub fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
+        self.propagate_part(sample, false)
+    }
+
+    /// Propagates all filters over a part of a sample that measurements divide; see [`Eskf::propagate_part`]. `is_gap` tells whether
+    /// the whole sample is longer than [`longest_sample`](Self::longest_sample).
+    ///
+    /// # Errors
+    ///
+    /// The same as [`propagate`](Self::propagate).
+    pub fn propagate_part(&mut self, sample: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
         let mut alive = self.filters.iter_mut().zip(&self.alive).filter(|(_, alive)| **alive);
-        alive.try_for_each(|(filter, _)| filter.propagate(sample))
+        alive.try_for_each(|(filter, _)| filter.propagate_part(sample, is_gap))
+    }
+
+    /// The longest interval that one sample covers, s: the shortest [`longest_sample`](super::EskfParams::longest_sample) of all filters.
+    pub fn longest_sample(&self) -> f64 {
+        self.filters.iter().map(|filter| filter.params().longest_sample).fold(f64::INFINITY, f64::min)
     }
 
     /// Updates all filters with a measurement and reweights them by its likelihood; see [`Eskf::update`].

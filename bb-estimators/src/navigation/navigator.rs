@@ -119,6 +119,20 @@ impl Navigator {
         self.bank.propagate(sample)
     }
 
+    /// See [`Bank::propagate_part`].
+    ///
+    /// # Errors
+    ///
+    /// The same as [`Bank::propagate_part`].
+    pub fn propagate_part(&mut self, sample: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
+        self.bank.propagate_part(sample, is_gap)
+    }
+
+    /// See [`Bank::longest_sample`].
+    pub fn longest_sample(&self) -> f64 {
+        self.bank.longest_sample()
+    }
+
     /// Fuses a satellite position; see [`Bank::update`].
     ///
     /// # Errors

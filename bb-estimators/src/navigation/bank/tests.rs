@@ -5,8 +5,8 @@ use nalgebra::{UnitQuaternion, Vector3};
 use super::Bank;
 use crate::navigation::noise::Noise;
 use crate::navigation::{
-    Eskf, EskfParams, GaussMarkov, GnssPosition, ImuMean, Optional, RelativePose, Start, States, Stream,
-    StreamParams,
+    Aiding, Eskf, EskfParams, Fused, GaussMarkov, GnssPosition, History, ImuMean, Navigator, Optional, Refusal,
+    RelativePose, Replayed, Start, States, Stream, StreamParams,
 };
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -84,4 +84,66 @@ fn outliers_do_not_decide() {
         assert!(bank.update(&mut gnss, &far).is_err());
     }
     assert_eq!(bank.weights(), before);
+}
+
+/// A navigator whose late fixes are fused at their own time.
+#[derive(Clone)]
+struct Flown(Navigator);
+
+impl Replayed for Flown {
+    type Measurement = GnssPosition;
+
+    fn time_ns(&self) -> Option<i64> {
+        self.0.estimate().map(|(estimate, _)| estimate.time_ns)
+    }
+
+    fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
+        self.0.propagate(sample)
+    }
+
+    fn longest_sample(&self) -> f64 {
+        self.0.longest_sample()
+    }
+
+    fn propagate_part(&mut self, part: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
+        self.0.propagate_part(part, is_gap)
+    }
+
+    fn update(&mut self, fix: &GnssPosition) -> Result<Fused, Refusal> {
+        self.0.gnss_position(fix)
+    }
+}
+
+/// A fix that says next to nothing, in the middle of a gap of 180 ms: both parts are shorter than a sample may be.
+#[test]
+fn a_gap_that_a_fix_divides_is_a_gap() {
+    let after = |is_divided: bool| {
+        let mut navigator = Navigator::new(EskfParams::default(), Aiding::Gnss).unwrap();
+        let rest = Vector3::zeros();
+        navigator.start(&Start::at(0, (rest, 1.0), (rest, 0.1), (UnitQuaternion::identity(), 0.01))).unwrap();
+        let mut history = History::<_, 10, 4, 2>::new(Flown(navigator), 200_000_000).unwrap();
+        let specific_force = Vector3::new(0.0, 0.0, EskfParams::default().gravity);
+        let sample = |time_ns| ImuMean { time_ns, angular_velocity: rest, specific_force };
+        history.propagate(&sample(10_000_000)).unwrap();
+        if is_divided {
+            history.update(100_000_000, &GnssPosition::new(rest, 1e6, 1e6)).unwrap();
+        }
+        history.propagate(&sample(190_000_000)).unwrap();
+        let (_, covariance) = history.now().0.estimate().unwrap();
+        // Of a component of the velocity, and of the heading.
+        [covariance[(3, 3)], covariance[(8, 8)]]
+    };
+    let (whole, divided) = (after(false), after(true));
+    assert!(whole[0] > 1.0 && whole[1] > 0.1, "a gap hides much: {whole:?}");
+    for (whole, divided) in whole.into_iter().zip(divided) {
+        assert!((0.99 * whole..1.2 * whole).contains(&divided), "{whole} and {divided}");
+    }
+}
+
+/// Filters may differ in what is a gap; the parts of a sample are gaps for all of them if it is one for any.
+#[test]
+fn the_shortest_sample_decides_what_is_a_gap() {
+    let filter = |longest_sample: f64| Eskf::new(EskfParams { longest_sample, ..EskfParams::default() }).unwrap();
+    let bank: Bank<crate::navigation::Navigation, 15, 2> = Bank::new([(filter(0.2), 1.0), (filter(0.05), 1.0)]);
+    assert_eq!(bank.longest_sample(), 0.05);
 }
