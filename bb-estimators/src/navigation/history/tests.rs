@@ -208,3 +208,36 @@ fn a_gap_that_a_measurement_divides_is_a_gap() {
         }
     }
 }
+
+/// The oldest of as many measurements as there is room for goes, and with it every state from before it: a replay from there would lack
+/// the measurement. A state that contains it stays.
+#[test]
+fn what_makes_room_takes_along_the_states_without_it() {
+    let measured = |i: i64| sensed(i % 2 == 0, 0.01 * i as f64);
+    let full = |first: i64, late: i64| {
+        let mut history = History::<Drone, 100, 4, 10>::new(drone(), SAMPLE_NS).unwrap();
+        let mut alone = drone();
+        for i in 1..=35 {
+            history.propagate(&sample(i)).unwrap();
+            alone.propagate(&sample(i)).unwrap();
+            if (first..first + 4).contains(&i) {
+                history.update(i * SAMPLE_NS, &measured(i)).unwrap();
+            }
+            if i == late || (first..first + 4).contains(&i) {
+                alone.update(&measured(i)).unwrap();
+            }
+        }
+        (history, alone)
+    };
+    // There is a state at every tenth sample. The one at sample 20 contains the measurement at its time.
+    let (mut history, alone) = full(20, 24);
+    history.update(24 * SAMPLE_NS, &measured(24)).unwrap();
+    assert_eq!(history.now(), &alone);
+    let (mut history, alone) = full(21, 31);
+    let before = history.now().clone();
+    let time_ns = 24 * SAMPLE_NS;
+    assert_eq!(history.update(time_ns, &measured(24)), Err(Refusal::TooOld { time_ns }));
+    assert_eq!(history.now(), &before);
+    history.update(31 * SAMPLE_NS, &measured(31)).unwrap();
+    assert_eq!(history.now(), &alone);
+}
