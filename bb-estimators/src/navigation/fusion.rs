@@ -28,6 +28,8 @@ pub(super) enum Sight<const N: usize> {
     Height([bool; N]),
     /// Only the position relative to the keyframe.
     Relative,
+    /// Not the position, and of the attitude only the heading.
+    Heading,
     Nothing,
 }
 
@@ -131,6 +133,12 @@ impl<const D: usize, const N: usize> Weighed<D, N> {
         }
     }
 
+    /// Whether the covariance was raised to fit the measurement.
+    #[inline]
+    pub(super) fn is_raised(&self) -> bool {
+        self.before.is_some()
+    }
+
     /// The outcome of the update.
     #[inline]
     pub(super) fn fused(&self, model: &Linearised<D, N>, layout: &Layout<N>) -> Fused {
@@ -159,11 +167,13 @@ fn misfit<const D: usize, const N: usize>(model: &Linearised<D, N>, layout: &Lay
 /// Two explanations compete. Either the motion differed from the prediction because its noise was assumed too small, or one quantity
 /// has jumped. A misfit of up to [`COMMON`] counts as the first: position and velocity are raised together and keep their
 /// correlations, so that the correction of the position also goes to the velocity that led it away. A larger one counts as the
-/// second. If the first measurements after a jump are off in the same direction, it was no jump, and position and velocity are raised
-/// regardless of the factor.
+/// second. If the first measurements after a jump are off in the same direction, it was no jump, and position, velocity and heading are
+/// raised regardless of the factor: wheels would take the velocity alone back to where a wrong heading points. If that does not help,
+/// the whole attitude is raised with them, because gravity takes the velocity to where a wrong tilt does.
 ///
 /// What a measurement does not observe of the position it does not raise: a height raises the vertical motion, or itself, and a
-/// relative pose the way from its keyframe. One that does not observe the position at all raises another quantity.
+/// relative pose the way from its keyframe. One that does not observe the position at all raises another quantity, and one that
+/// observes only the heading leaves the tilt.
 #[cold]
 #[inline(never)]
 fn fitted<const D: usize, const N: usize>(
@@ -173,15 +183,26 @@ fn fitted<const D: usize, const N: usize>(
     layout: &Layout<N>,
     sight: Sight<N>,
 ) -> Option<Innovation<D, N>> {
+    let misfit = misfit(model, layout);
+    let goes_on = stream.goes_on(&misfit);
     let (motion, jump) = match sight {
-        Sight::Position => (Some(layout.blocks.map(|block| layout.motion.contains(&block))), Jump::Block),
+        Sight::Position => {
+            let goes_on_again = stream.goes_on_again(&misfit);
+            let is_raised = |i: usize| {
+                let block = layout.blocks[i];
+                let is_attitude = goes_on && i == layout.heading || goes_on_again && block == layout.attitude;
+                layout.motion.contains(&block) || is_attitude
+            };
+            (Some(core::array::from_fn(is_raised)), Jump::Block)
+        }
         Sight::Height(motion) => (Some(motion), Jump::Observed),
         Sight::Relative => (None, Jump::Observed),
+        Sight::Heading => return fitted_by_one(covariance, model, &layout.of_heading(), Jump::Block),
         Sight::Nothing => (None, Jump::Block),
     };
     if let Some(motion) = motion {
         let before = *covariance;
-        let most = if stream.goes_on(&misfit(model, layout)) { f64::INFINITY } else { COMMON };
+        let most = if goes_on { f64::INFINITY } else { COMMON };
         if let Some(fitted) = fitted_by_motion(covariance, model, layout, &motion, most) {
             return Some(fitted);
         }
@@ -218,8 +239,8 @@ fn fitted_by_motion<const D: usize, const N: usize>(
 ///
 /// With the residual r of covariance `S = H P Hᵀ + R`, block b of the errors contributes `uᵀ H_b P_bb H_bᵀ u` to the normalised
 /// innovation squared, `uᵀ S u` with `u = S⁻¹ r`, independently of axes and units. The block with the largest contribution is
-/// taken to be wrong. Its covariance is raised as `jump` tells until the normalised innovation squared equals its mean. All other
-/// blocks keep their covariance.
+/// taken to be wrong. Its covariance is raised as `jump` tells until the normalised innovation squared equals its mean, or to the
+/// largest that a jump explains, and then the next block's. All other blocks keep their covariance.
 fn fitted_by_one<const D: usize, const N: usize>(
     covariance: &mut Covariance<N>,
     model: &Linearised<D, N>,
@@ -238,13 +259,20 @@ fn fitted_by_one<const D: usize, const N: usize>(
         let s = jacobian * p * jacobian.transpose() + model.noise;
         let seen = jacobian.transpose() * s.try_inverse()? * SVector::from(model.residual);
         let mut parts = [0.0; N];
+        let mut most = [f64::INFINITY; N];
         for i in 0..N {
+            let block = usize::from(layout.blocks[i]);
+            if block >= N {
+                continue;
+            }
+            most[block] = layout.most_jump[i].max(p[(i, i)]) / p[(i, i)];
             for j in (0..N).filter(|j| layout.blocks[*j] == layout.blocks[i]) {
-                parts[usize::from(layout.blocks[i])] += seen[i] * p[(i, j)] * seen[j];
+                parts[block] += seen[i] * p[(i, j)] * seen[j];
             }
         }
-        let (block, part) = parts.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
-        let factor = 1.0 + nis * (nis - mean) / (mean * part);
+        let can_jump = parts.iter().enumerate().filter(|(block, _)| most[*block] > FITS);
+        let (block, part) = can_jump.max_by(|a, b| a.1.total_cmp(b.1))?;
+        let factor = (1.0 + nis * (nis - mean) / (mean * part)).min(most[block]);
         if !(*part > 0.0 && factor.is_finite()) {
             return None;
         }

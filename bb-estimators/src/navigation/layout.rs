@@ -9,8 +9,18 @@ use crate::attitude::{MAX_ANGULAR_VELOCITY, MAX_SPECIFIC_FORCE};
 /// A filter with a variance above this fraction of the largest is lost, and rounding may break its covariance.
 const LOST: f64 = 1e-4;
 
+/// The block of the heading in [`Layout::of_heading`]; the others have smaller numbers.
+const OF_HEADING: u8 = 10;
+
+/// The block of errors that explain no misfit.
+const NEVER_RAISED: u8 = u8::MAX;
+
 /// A correction is at most this many times the largest deviation.
 const MOST_DEVIATIONS: f64 = 100.0;
+
+/// The largest variance of a scale that a jump leaves behind: by a third, as a tyre that bursts. One that is off by more is the fault of
+/// what it multiplies: a velocity that is ten times too large is not explained by wheels of a tenth of their size.
+pub(in crate::navigation) const MOST_SCALE: f64 = 0.1;
 
 /// Groups the errors by quantity, with the largest meaningful variance of each.
 #[derive(Clone, Copy, Debug)]
@@ -19,6 +29,12 @@ pub(in crate::navigation) struct Layout<const N: usize> {
     pub(in crate::navigation) blocks: [u8; N],
     /// The blocks of position and velocity.
     pub(in crate::navigation) motion: [u8; 2],
+    /// The block of the attitude, which leads the velocity.
+    pub(in crate::navigation) attitude: u8,
+    /// The error of the heading, one of the attitude.
+    pub(in crate::navigation) heading: usize,
+    /// The largest variance to which a jump raises an error.
+    pub(in crate::navigation) most_jump: [f64; N],
     /// In the squares of the errors' units.
     pub(in crate::navigation) largest: [f64; N],
     /// Above this variance the filter is lost.
@@ -27,13 +43,21 @@ pub(in crate::navigation) struct Layout<const N: usize> {
 
 impl<const N: usize> Layout<N> {
     /// A layout in which all errors form one quantity that is known.
-    pub(in crate::navigation) const EMPTY: Self =
-        Self { blocks: [0; N], motion: [0; 2], largest: [0.0; N], lost: [0.0; N] };
+    pub(in crate::navigation) const EMPTY: Self = Self {
+        blocks: [0; N],
+        motion: [0; 2],
+        attitude: 0,
+        heading: 0,
+        most_jump: [f64::INFINITY; N],
+        largest: [0.0; N],
+        lost: [0.0; N],
+    };
 
     /// The layout of an [`Eskf`](super::Eskf). The keyframe and the barometer's bias refer to the pose.
     pub(in crate::navigation) const fn of<S: States>() -> Self {
         let mut layout = Self::EMPTY;
         layout.motion = [0, 1];
+        (layout.attitude, layout.heading) = (2, ROTATION + 2);
         layout.set((POSITION, 3), 0, MOST_VARIANCE);
         layout.set((VELOCITY, 3), 1, MOST_VARIANCE);
         layout.set((ROTATION, 3), 2, MOST_ROTATION);
@@ -50,15 +74,30 @@ impl<const N: usize> Layout<N> {
                     layout.set((first, 3), 0, MOST_VARIANCE);
                     layout.set((first + 3, 3), 2, MOST_ROTATION);
                 }
-                Optional::RelativeScale => layout.set(range, 5, 1e4),
+                Optional::RelativeScale => {
+                    layout.set(range, 5, 1e4);
+                    layout.most_jump[first] = MOST_SCALE;
+                }
                 Optional::GnssLeverArm => layout.set(range, 6, 1e8),
                 Optional::GnssDelay => layout.set(range, 7, 1e6),
-                Optional::WheelScale => layout.set(range, 8, 1e4),
+                Optional::WheelScale => {
+                    layout.set(range, 8, 1e4);
+                    layout.most_jump[first] = MOST_SCALE;
+                }
                 Optional::HardIron => layout.set(range, 9, 1e4),
                 Optional::BarometerBias => layout.set(range, 0, 1e12),
             }
             first += state.dimension();
             i += 1;
+        }
+        layout
+    }
+
+    /// The layout for a measurement that observes nothing of the attitude but its heading: it raises the heading alone.
+    pub(in crate::navigation) fn of_heading(&self) -> Self {
+        let mut layout = *self;
+        for (i, block) in layout.blocks.iter_mut().enumerate().filter(|(_, block)| **block == self.attitude) {
+            *block = if i == self.heading { OF_HEADING } else { NEVER_RAISED };
         }
         layout
     }

@@ -44,6 +44,7 @@ mod estimate;
 #[cfg(feature = "runtime")]
 mod estimator;
 mod filter;
+mod jump;
 mod measurement;
 mod params;
 mod propagation;

@@ -13,8 +13,13 @@ const DIMENSIONS: usize = 7;
 /// The upper bound on the reported misfit.
 const MOST_RAISED: f64 = 1e6;
 
-/// The cosine of the largest angle between misfits in the same direction: 45°.
-const SAME_DIRECTION: f64 = 0.7;
+/// The cosine of the largest angle between misfits in the same direction: 60°. A robot that turns while the gate closes turns what a
+/// wrong heading makes of its way.
+const SAME_DIRECTION: f64 = 0.5;
+
+/// A recovery is long ago once so many times the patience has been fused. A heading that is slightly wrong lets a few measurements
+/// pass after each one.
+const SOON: u64 = 4;
 
 params! {
     /// How the measurements of one sensor are judged.
@@ -30,8 +35,8 @@ params! {
         ///
         /// In `Eskf` and `PlanarEkf`, a position that is off by up to ten deviations a dimension raises position and velocity
         /// together. Of a larger difference, what explains it best, the position for a fix, is raised alone and loses its
-        /// correlations; all else stays as it is. If the next ones are off in the same direction, position and velocity are raised.
-        /// A height does the same to the height, the vertical velocity and the barometer's bias, but they keep their correlations. A
+        /// correlations; all else stays as it is. If the next ones are off in the same direction, position, velocity and
+        /// heading are raised, and if that does not help, the whole attitude. A height does the same to the height, the vertical velocity and the barometer's bias, but they keep their correlations. A
         /// relative pose raises only the way from its keyframe. A filter that should move only where several positions agree is
         /// better [moved](super::Eskf::relocate).
         ///
@@ -104,8 +109,12 @@ pub struct Stream {
     counts: Counts,
     /// Fused since the last recovery.
     fused_since_recovery: u64,
+    /// When a measurement was last fused, if the filter tells.
+    fused_ns: Option<i64>,
     /// The residual of the position at the last recovery.
     recovered: [f64; 3],
+    /// Whether the last recovery was soon after another, from a misfit in the same direction.
+    has_gone_on: bool,
     consistency: Consistency,
 }
 
@@ -125,7 +134,9 @@ impl Stream {
             noise_factor: 1.0,
             counts: Counts::default(),
             fused_since_recovery: 0,
+            fused_ns: None,
             recovered: [0.0; 3],
+            has_gone_on: false,
             consistency: Consistency::default(),
         }
     }
@@ -168,15 +179,41 @@ impl Stream {
     pub(crate) fn forgive(&mut self) {
         self.counts.gate_in_a_row = 0;
         self.recovered = [0.0; 3];
+        self.has_gone_on = false;
+    }
+
+    /// When [`fused_at`](Self::fused_at) was last called; `None` before the first time.
+    pub(crate) fn fused_ns(&self) -> Option<i64> {
+        self.fused_ns
+    }
+
+    /// Tells the time of a fused measurement, for filters that ask for it.
+    #[inline]
+    pub(crate) fn fused_at(&mut self, time_ns: i64) {
+        self.fused_ns = Some(time_ns);
     }
 
     /// Whether a misfit goes on in the direction of the last one, and too few have fitted since to call that a recovery. Outliers
     /// that end are off in the other direction.
     pub(crate) fn goes_on(&self, misfit: &[f64; 3]) -> bool {
+        self.fused_since_recovery < u64::from(self.params.patience) && self.is_alike(misfit)
+    }
+
+    /// Whether a misfit goes on even though the last recovery was because of that.
+    pub(crate) fn goes_on_again(&self, misfit: &[f64; 3]) -> bool {
+        self.has_gone_on && self.is_soon() && self.is_alike(misfit)
+    }
+
+    /// Whether the last recovery is not long ago.
+    fn is_soon(&self) -> bool {
+        self.fused_since_recovery < SOON * u64::from(self.params.patience)
+    }
+
+    /// Whether a misfit has the direction of the last one.
+    fn is_alike(&self, misfit: &[f64; 3]) -> bool {
         let dot = |a: &[f64; 3], b: &[f64; 3]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
-        let along = dot(&self.recovered, misfit);
         let lengths = sqrt(dot(&self.recovered, &self.recovered)) * sqrt(dot(misfit, misfit));
-        self.fused_since_recovery < u64::from(self.params.patience) && along > SAME_DIRECTION * lengths
+        dot(&self.recovered, misfit) > SAME_DIRECTION * lengths
     }
 
     /// Decides how a measurement is fused, or rejects it.
@@ -221,6 +258,7 @@ impl Stream {
                 if fused.raised > 1.0 {
                     // A measurement that did not fit carries no information about the noise of those that do.
                     self.counts.recoveries += 1;
+                    self.has_gone_on = self.is_soon() && self.is_alike(&fused.misfit);
                     self.fused_since_recovery = 0;
                     self.recovered = fused.misfit;
                     return;

@@ -271,7 +271,8 @@ impl<S: States, const N: usize> Eskf<S, N> {
             return Sight::Relative;
         }
         if !sees(POSITION + 2) {
-            return Sight::Nothing;
+            let is_heading = D == 1 && sees(ROTATION + 2) && !(VELOCITY..ROTATION).any(sees);
+            return if is_heading { Sight::Heading } else { Sight::Nothing };
         }
         let mut motion = [false; N];
         motion[POSITION + 2] = true;

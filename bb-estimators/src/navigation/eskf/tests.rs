@@ -8,6 +8,7 @@ mod jacobians;
 mod laws;
 mod patience;
 mod transition;
+mod wrong;
 
 use nalgebra::{SVector, UnitQuaternion, Vector3};
 use proptest::prelude::*;

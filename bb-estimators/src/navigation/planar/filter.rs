@@ -3,6 +3,7 @@
 use nalgebra::{Matrix2, Matrix3, SMatrix, Vector2};
 
 use super::estimate::{GYROSCOPE_BIAS, HEADING, POSITION, PlanarEstimate, STATES, VELOCITY, WHEEL_SCALE};
+use super::jump::BiasJump;
 use super::measurement::PlanarMeasurement;
 use super::params::PlanarParams;
 use super::propagation::Transition;
@@ -12,7 +13,7 @@ use crate::navigation::covariance::Covariance;
 use crate::navigation::eskf::{ImuMean, LONGEST_GAP_S, seconds_between};
 use crate::navigation::fused::Fused;
 use crate::navigation::fusion::{Sight, Weighed, prepared};
-use crate::navigation::layout::Layout;
+use crate::navigation::layout::{Layout, MOST_SCALE};
 use crate::navigation::math::{exp, wrapped};
 use crate::navigation::measurement::Linearised;
 use crate::navigation::refusal::Refusal;
@@ -23,12 +24,14 @@ use crate::params::Params as _;
 const LAYOUT: Layout<STATES> = {
     let mut layout = Layout::EMPTY;
     layout.motion = [0, 2];
+    (layout.attitude, layout.heading) = (1, HEADING);
     layout.set((POSITION, 2), 0, MOST_VARIANCE);
     layout.set((HEADING, 1), 1, MOST_ROTATION);
     layout.set((VELOCITY, 2), 2, MOST_VARIANCE);
     layout.set((GYROSCOPE_BIAS, 1), 3, MAX_ANGULAR_VELOCITY * MAX_ANGULAR_VELOCITY);
     // A hundred times the largest deviation that its parameter accepts.
     layout.set((WHEEL_SCALE, 1), 4, 1e4);
+    layout.most_jump[WHEEL_SCALE] = MOST_SCALE;
     layout
 };
 
@@ -128,9 +131,10 @@ impl PlanarStart {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlanarEkf {
     params: PlanarParams,
-    estimate: Option<PlanarEstimate>,
-    covariance: Covariance<STATES>,
+    pub(super) estimate: Option<PlanarEstimate>,
+    pub(super) covariance: Covariance<STATES>,
     upkeep: Upkeep,
+    pub(super) jump: Option<BiasJump>,
 }
 
 impl PlanarEkf {
@@ -141,7 +145,7 @@ impl PlanarEkf {
     /// Returns the name of the first parameter outside its accepted range.
     pub fn new(params: PlanarParams) -> Result<Self, ParamsError> {
         params.check()?;
-        Ok(Self { params, estimate: None, covariance: Covariance::new(), upkeep: Upkeep::default() })
+        Ok(Self { params, estimate: None, covariance: Covariance::new(), upkeep: Upkeep::default(), jump: None })
     }
 
     /// The parameters that the filter was created with.
@@ -161,6 +165,7 @@ impl PlanarEkf {
         self.upkeep.started(start.time_ns);
         self.estimate = Some(estimate);
         self.covariance = covariance;
+        self.jump = None;
         Ok(())
     }
 
@@ -228,6 +233,9 @@ impl PlanarEkf {
     ) -> Result<Fused, Refusal> {
         let result = self.fuse(stream, measurement);
         stream.count(&result);
+        if let (Ok(_), Some(estimate)) = (&result, &self.estimate) {
+            stream.fused_at(estimate.time_ns);
+        }
         result
     }
 
@@ -252,7 +260,11 @@ impl PlanarEkf {
         if sees_position(&model) {
             self.upkeep.fixed_ns = estimate.time_ns;
         }
-        Ok(weighed.fused(&model, &LAYOUT))
+        let fused = weighed.fused(&model, &LAYOUT);
+        if weighed.is_raised() && error[GYROSCOPE_BIAS] != 0.0 {
+            self.follow_jump(stream, error[GYROSCOPE_BIAS]);
+        }
+        Ok(fused)
     }
 
     /// Relocates a filter that was wrong, m: sets the position and, if given, the velocity (in the world, m/s) and the heading

@@ -4,6 +4,7 @@ mod cases;
 mod consistency;
 mod jacobians;
 mod laws;
+mod wrong;
 
 use nalgebra::{Vector2, Vector3};
 use proptest::prelude::*;

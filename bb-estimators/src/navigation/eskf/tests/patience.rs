@@ -3,10 +3,11 @@
 use nalgebra::{UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
-use super::{Boat, Drone, started};
-use crate::navigation::state::{Navigation, POSITION, ROTATION, States, VELOCITY};
+use super::{Boat, Drone, Rover, started};
+use crate::navigation::state::{Navigation, Optional, POSITION, ROTATION, States, VELOCITY};
 use crate::navigation::{
-    BarometricHeight, BodyVelocity, Eskf, GnssPosition, Height, ImuMean, RelativePose, Stream,
+    BarometricHeight, BodyVelocity, Eskf, GnssPosition, GnssVelocity, Height, ImuMean, MagneticHeading,
+    RelativePose, Stream, WheelSpeed,
 };
 
 /// Propagates over a second at rest.
@@ -285,4 +286,67 @@ fn a_relative_pose_that_does_not_fit_leaves_the_keyframe() {
         }
         assert!(filter.is_consistent());
     }
+}
+
+/// A magnet nearby turns the heading. The field is inclined, so that the heading changes with the tilt too, but what the filter knows
+/// of the tilt is not in question.
+#[test]
+fn a_magnetic_heading_that_does_not_fit_leaves_the_tilt() {
+    let (mut filter, mut gnss, mut compass) = (started::<Navigation, 15>(), Stream::default(), Stream::default());
+    let heading = |turn: f64| {
+        let field = UnitQuaternion::from_euler_angles(0.0, 0.0, turn) * Vector3::new(1e-6, 20e-6, -45e-6);
+        MagneticHeading { field, declination: 0.0, deviation: 0.02 }
+    };
+    for second in 0..30 {
+        rest(&mut filter, second);
+        filter.update(&mut gnss, &GnssPosition::new(Vector3::zeros(), 1.0, 2.0)).unwrap();
+        filter.update(&mut compass, &heading(0.0)).unwrap();
+    }
+    let before = *filter.covariance();
+    for _ in 0..4 {
+        let _ = filter.update(&mut compass, &heading(1.0));
+    }
+    assert_eq!((compass.counts().gate, compass.counts().recoveries), (3, 1));
+    let after = filter.covariance();
+    for i in [ROTATION, ROTATION + 1] {
+        assert!(
+            after[(i, i)] <= before[(i, i)] * (1.0 + 1e-9),
+            "{i}: {} rad², then {}",
+            before[(i, i)],
+            after[(i, i)]
+        );
+    }
+    assert!(filter.is_consistent());
+    let (roll, pitch, yaw) = filter.estimate().unwrap().world_from_body.euler_angles();
+    assert!(roll.abs() < 0.02 && pitch.abs() < 0.02 && (yaw.abs() - 1.0).abs() < 0.1, "{roll} {pitch} {yaw}");
+}
+
+/// Velocities that are ten times too large were believed. Wheels that are right then say that the velocity is wrong, and not that they
+/// are a tenth of their size.
+#[test]
+fn wheels_do_not_shrink_to_fit_a_wrong_velocity() {
+    let (mut filter, mut gnss, mut wheels) =
+        (started::<Rover, { Rover::DIMENSION }>(), Stream::default(), Stream::default());
+    let along = |speed: f64| Vector3::new(speed, 0.0, 0.0);
+    for second in 0..60 {
+        rest(&mut filter, second);
+        let velocity = if second < 56 { 6.0 } else { 60.0 };
+        let _ = filter.update(&mut gnss, &GnssVelocity::new(along(velocity), 0.05, 0.05));
+        for _ in 0..10 {
+            let speed =
+                WheelSpeed { speed: 6.0, deviation: 0.05, forward: Vector3::x(), lever_arm: Vector3::zeros() };
+            if second < 56 {
+                let _ = filter.update(&mut wheels, &speed);
+            }
+        }
+    }
+    assert!((filter.estimate().unwrap().velocity.x - 60.0).abs() < 1.0);
+    let speed = WheelSpeed { speed: 6.0, deviation: 0.05, forward: Vector3::x(), lever_arm: Vector3::zeros() };
+    for _ in 0..8 {
+        let _ = filter.update(&mut wheels, &speed);
+    }
+    let estimate = filter.estimate().unwrap();
+    let scale = estimate.scalar::<Rover>(Optional::WheelScale);
+    assert!(scale.abs() < 0.4 && estimate.velocity.x < 10.0, "{scale}, {} m/s", estimate.velocity.x);
+    assert!(filter.is_consistent());
 }
