@@ -74,6 +74,11 @@ impl<S: States, const N: usize, const M: usize> Bank<S, N, M> {
         self.filters.iter().map(|filter| filter.params().longest_sample).fold(f64::INFINITY, f64::min)
     }
 
+    /// The current time of the filters, ns; `None` before their start.
+    pub fn time_ns(&self) -> Option<i64> {
+        Some(self.filters.get(self.best())?.estimate()?.time_ns)
+    }
+
     /// Updates all filters with a measurement and reweights them by its likelihood; see [`Eskf::update`].
     ///
     /// The filters share a gate: if one filter accepts a measurement, all fuse it, and it counts against the filters that did not

@@ -133,6 +133,11 @@ impl Navigator {
         self.bank.longest_sample()
     }
 
+    /// See [`Bank::time_ns`].
+    pub fn time_ns(&self) -> Option<i64> {
+        self.bank.time_ns()
+    }
+
     /// Fuses a satellite position; see [`Bank::update`].
     ///
     /// # Errors

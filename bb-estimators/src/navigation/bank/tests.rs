@@ -91,22 +91,15 @@ fn outliers_do_not_decide() {
 struct Flown(Navigator);
 
 impl Replayed for Flown {
+    type Filter = Navigator;
     type Measurement = GnssPosition;
 
-    fn time_ns(&self) -> Option<i64> {
-        self.0.estimate().map(|(estimate, _)| estimate.time_ns)
+    fn filter(&self) -> &Navigator {
+        &self.0
     }
 
-    fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
-        self.0.propagate(sample)
-    }
-
-    fn longest_sample(&self) -> f64 {
-        self.0.longest_sample()
-    }
-
-    fn propagate_part(&mut self, part: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
-        self.0.propagate_part(part, is_gap)
+    fn filter_mut(&mut self) -> &mut Navigator {
+        &mut self.0
     }
 
     fn update(&mut self, fix: &GnssPosition) -> Result<Fused, Refusal> {

@@ -219,7 +219,7 @@ fn what_makes_room_takes_along_the_states_without_it() {
         let mut alone = drone();
         for i in 1..=35 {
             history.propagate(&sample(i)).unwrap();
-            alone.propagate(&sample(i)).unwrap();
+            alone.filter.propagate(&sample(i)).unwrap();
             if (first..first + 4).contains(&i) {
                 history.update(i * SAMPLE_NS, &measured(i)).unwrap();
             }
