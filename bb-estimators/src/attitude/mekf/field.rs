@@ -23,7 +23,8 @@ const PASSING_S: f64 = 6.0;
 /// additional wait of 20 s; here, mean and wait are one.
 const CANDIDATE_TIME_CONSTANT_S: f64 = 5.0;
 
-/// The reference is the mean of this many seconds of undisturbed field. Source: VQF's `magRefTau`.
+/// The reference is the mean of this many seconds of undisturbed field, and is trusted in full after them when it says that a
+/// field is disturbed. Source: VQF's `magRefTau`.
 const REFERENCE_TIME_CONSTANT_S: f64 = 20.0;
 
 /// The shortest time before a new field is accepted, s.
@@ -39,13 +40,14 @@ const MOST_EVIDENCE_S: f64 = 40.0;
 /// How soon a disturbance is forgotten, s: passing a piece of iron takes about a second.
 const DISTURBANCE_TIME_CONSTANT_S: f64 = 3.0;
 
-/// A reference seen this long, s, is half trusted when it says that a field is disturbed.
-const TRUST_TIME_CONSTANT_S: f64 = 10.0;
+/// A reference seen this long, s, is trusted in full when another field may be due to iron on the body: before, the heading of
+/// the reference is in as much doubt.
+const OFFSET_DOUBTED_S: f64 = 8.0;
 
 /// A heading that contradicts an undisturbed field for this long, s, is wrong.
 const CONTRADICTION_S: f64 = 10.0;
 
-/// Changes of the field over more than this time, s, are a drift: that of a candidate.
+/// Changes of the field over more than this time, s, are a drift: that of a candidate. So a drift lasts at least as long.
 const SLOW_S: f64 = CANDIDATE_TIME_CONSTANT_S;
 
 /// How soon the size of a drift is forgotten, s: longer than the drifts that the heading follows take.
@@ -159,6 +161,16 @@ impl<T: Real> FieldReference<T> {
         self.drift.variance() / (self.squared_norm() * horizontal * horizontal)
     }
 
+    /// The same as that of a white error of `dt` seconds with the same effect: of an error that lasts.
+    pub(super) fn lasting_drift_variance(&self, dt: T) -> T {
+        T::TWO * T::of(SLOW_S) * self.drift_variance() / dt
+    }
+
+    /// How far an unknown offset of the magnetometer is held against another field than the reference, up to 1.
+    pub(super) fn offset_doubt(&self) -> T {
+        (self.seen_s * T::of(1.0 / OFFSET_DOUBTED_S)).min(T::ONE)
+    }
+
     fn norm(&self) -> T {
         norm(self.reference)
     }
@@ -229,7 +241,7 @@ impl<T: Real> FieldReference<T> {
         let size = distance(field, self.reference) / (unit * unit);
         let fade = (dt / T::of(DISTURBANCE_TIME_CONSTANT_S)).min(T::ONE);
         self.disturbance = (self.disturbance + (size - self.disturbance) * fade).max(size);
-        let trust = self.seen_s / (self.seen_s + T::of(TRUST_TIME_CONSTANT_S));
+        let trust = (self.seen_s * T::of(1.0 / REFERENCE_TIME_CONSTANT_S)).min(T::ONE);
         let verdict = Verdict::Disturbed(self.disturbance * trust);
         if undisturbed {
             let gain = dt / self.seen_s.min(T::of(REFERENCE_TIME_CONSTANT_S)).max(dt);
@@ -303,6 +315,18 @@ mod tests {
                 assert!(left < 0.5, "{left} after {hours} h");
             }
         }
+    }
+
+    #[test]
+    fn an_offset_is_doubted_as_long_as_the_reference_was_seen() {
+        let mut reference = FieldReference::new([20.0, -45.0]);
+        assert_eq!(reference.offset_doubt(), 0.0, "the first field may be the one of iron as well");
+        believed_after(&mut reference, [20.0, -45.0], 0.5 * OFFSET_DOUBTED_S);
+        assert!((reference.offset_doubt() - 0.5).abs() < 0.01, "{}", reference.offset_doubt());
+        believed_after(&mut reference, [30.0, -45.0], 2.0);
+        assert!((reference.offset_doubt() - 0.5).abs() < 0.01, "another field says nothing about the reference");
+        believed_after(&mut reference, [20.0, -45.0], 2.0 * OFFSET_DOUBTED_S);
+        assert_eq!(reference.offset_doubt(), 1.0);
     }
 
     #[test]

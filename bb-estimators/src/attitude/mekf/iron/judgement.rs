@@ -10,7 +10,7 @@ use crate::attitude::mekf::field::FieldReference;
 /// An offset is adopted if the cost falls by this multiple of the information that its three numbers fit anyway, in
 /// units of its noise. The evidence of Bayes' rule asks for one (D. J. C. MacKay, "Bayesian interpolation", Neural
 /// Computation 4(3), 1992, the Occam factor); the rest is for errors with longer tails than Gaussian ones.
-const EVIDENCE: f64 = 1.5;
+const EVIDENCE: f64 = 2.0;
 
 /// And by this fraction of itself.
 const EVIDENCE_PART: f64 = 0.5;
@@ -26,7 +26,7 @@ const RETURN: f64 = 1.0 / 3.0;
 const GOOD_FIT: f64 = 0.1;
 
 /// The error of a fit that is good enough to need no other.
-const BAD_FIT: f64 = 0.03;
+const BAD_FIT: f64 = 0.02;
 
 /// The shortest time for a fit, s.
 const LEAST_S: f64 = 0.5;

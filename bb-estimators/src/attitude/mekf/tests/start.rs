@@ -3,6 +3,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::{World, filter};
+use crate::attitude::laws::FIELD;
 use crate::attitude::{AttitudeFilter, ImuSample};
 
 #[test]
@@ -69,4 +70,22 @@ fn a_levelled_start_has_the_heading_of_all_fields_since() {
     let error = world.error_of(&filter);
     assert!(error.inclination > 10.0, "not levelled: {error:?}");
     assert!(error.heading < 5.0, "{error:?}");
+}
+
+/// A start beside iron that is moved: what the field was for seconds is no better known than what it is afterwards.
+#[test]
+fn iron_at_the_start_is_left_behind() {
+    let (mut before, mut after) = (0.0, 0.0);
+    for (first, second) in [((1.4, 1.4), (1.2, 0.7)), ((1.5, -1.2), (1.2, -0.5)), ((0.6, 1.2), (1.3, 0.6))] {
+        let (mut world, mut filter) = (World::new(), filter(true));
+        for (part, turned) in [first, second] {
+            world.field = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turned) * FIELD * part;
+            world.run(&mut filter, 1, false);
+        }
+        before += world.error_of(&filter).heading;
+        world.field = FIELD;
+        world.run(&mut filter, 2, true);
+        after += world.error_of(&filter).heading;
+    }
+    assert!(after < 0.62 * before, "{before} to {after}, degrees in all");
 }

@@ -92,3 +92,23 @@ fn another_field_tells_nothing_about_the_heading() {
     world.run(&mut filter, 30, true);
     assert_eq!(filter.is_heading_trusted(), Some(true), "{}", deviation(&filter));
 }
+
+/// A field that is known to drift contradicts no heading.
+#[test]
+fn a_drift_does_not_make_the_heading_jump() {
+    let drift = Vector3::new(9e-6, 3e-6, 0.0);
+    let (mut world, mut filter) = (World::new(), filter(true));
+    let (mut before, mut worst, mut step) = (0.0, 0.0_f64, 0.0_f64);
+    for second in 0..240 {
+        world.field = FIELD + drift * (std::f64::consts::TAU * f64::from(second) / 60.0).sin();
+        world.run(&mut filter, 1, second > 3);
+        let error = world.error_of(&filter).heading;
+        if second > 40 {
+            worst = worst.max(error);
+            step = step.max((error - before).abs());
+        }
+        before = error;
+    }
+    // The field turns by 28°, and 3° in a second.
+    assert!(worst < 20.0 && step < 10.0, "{worst}, {step} in a second");
+}
