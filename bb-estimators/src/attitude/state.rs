@@ -51,8 +51,12 @@ impl<T: Real> AttitudeState<T> {
         }
         let world_from_body = self.world_from_body?;
         let previous_ns = self.previous_ns.as_mut()?;
-        let dt_ns = sample.time_ns.checked_sub(*previous_ns)?;
-        if !(1..=MAX_GAP_NS).contains(&dt_ns) || !sample.is_usual() {
+        if sample.time_ns <= *previous_ns {
+            return None;
+        }
+        // As unsigned, the difference of any two stamps in order is exact.
+        let dt_ns = sample.time_ns.wrapping_sub(*previous_ns);
+        if dt_ns.cast_unsigned() > MAX_GAP_NS.cast_unsigned() || !sample.is_usual() {
             return None;
         }
         *previous_ns = sample.time_ns;

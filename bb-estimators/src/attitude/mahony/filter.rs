@@ -98,12 +98,10 @@ impl<T: Real> MahonyFilter<T> {
         up: &Vector3<T>,
         field: Option<&Vector3<T>>,
     ) {
-        // Ṙ = R [Ω - b + k_P ω_mes]×: first the correction, known in the body frame of the previous sample, then the
-        // gyroscope. Both rotations are applied as one, to third order in small quantities (Baker, Campbell,
-        // Hausdorff).
+        // Ṙ = R [Ω - b + k_P ω_mes]×, as one rotation. ω_mes is known in the body frame of the previous sample, so the axis
+        // of the correction, not its size, is off by half of what the body turns by in a sample.
         let rotation = (sample.angular_velocity - self.bias) * dt_s;
-        let turning = self.error + self.error.cross(&rotation) * T::HALF;
-        let both = rotation + turning * self.gain(dt_s);
+        let both = rotation + self.error * self.gain(dt_s);
         let squared = both.norm_squared();
         if squared < T::of(SERIES_SQUARED_ANGLE) {
             self.compare(turn_little(before, &both, squared), dt_s, up, field);
