@@ -18,6 +18,7 @@ use alloc::vec::Vec;
 use nalgebra::{Matrix2x3, Matrix3, SMatrix, Vector2, Vector3};
 
 use super::coupling::{Coupling, POSE, PoseInformation, Seen};
+use super::kernel::Kernel;
 use super::keyframe::{Keyframe, Window};
 use crate::navigation::camera::{Camera, Undistorted, normalised};
 use crate::navigation::math::sqrt;
@@ -265,6 +266,22 @@ impl Sight {
         self.arm = point - at.position;
         self.version = keyframe.version;
         self.jacobian.iter().chain(self.residual.iter()).all(|x| x.abs() < 1e12)
+    }
+
+    /// Linearises at a landmark of the window, and weighs it by its residual there. Returns `false` if the landmark would be behind
+    /// the camera.
+    pub(super) fn relinearise<F, S: States, const N: usize>(
+        &mut self,
+        camera: &Camera,
+        kernel: Kernel,
+        window: &Window<F, N>,
+        first: u64,
+        point: &Vector3<f64>,
+    ) -> bool {
+        let Some(keyframe) = window.get((self.serial - first) as usize) else { return false };
+        let Some((_, residual)) = self.estimated::<F, S, N>(camera, keyframe, point) else { return false };
+        self.weight = kernel.weight(residual.norm_squared());
+        self.linearise(camera, keyframe, point)
     }
 
     /// B and the residual at the estimates of keyframe and landmark.

@@ -157,14 +157,30 @@ impl<const N: usize> Landmarks<N> {
         let first = self.coupling.first;
         let (camera, kernel) = (self.camera, self.params.kernel);
         let Some(landmark) = self.all.get_mut(index) else { return };
-        landmark.point = located::<F, S, N>(landmark, &camera, point, window, first).unwrap_or(point);
-        let place = landmark.point;
-        landmark.sights.retain_mut(|sight| {
-            let Some(keyframe) = window.get((sight.serial - first) as usize) else { return false };
-            let Some((_, residual)) = sight.estimated::<F, S, N>(&camera, keyframe, &place) else { return false };
-            sight.weight = kernel.weight(residual.norm_squared());
-            sight.linearise(&camera, keyframe, &place)
-        });
+        let before = landmark.point;
+        // Triangulated right now, it has not been linearised yet.
+        let is_linearised = landmark.sights.iter().any(|sight| sight.arm != Vector3::zeros());
+        let linearise = |landmark: &mut Landmark, place: Vector3<f64>| {
+            landmark.point = place;
+            landmark
+                .sights
+                .iter_mut()
+                .all(|sight| sight.relinearise::<F, S, N>(&camera, kernel, window, first, &place))
+        };
+        let place = located::<F, S, N>(landmark, &camera, point, window, first).unwrap_or(point);
+        // A landmark that is hardly known along its direction may move behind a camera when keyframes do. What its observations say
+        // must not be lost for that.
+        let mut is_seen = linearise(landmark, place);
+        if !is_seen && is_linearised {
+            let place = located::<F, S, N>(landmark, &camera, before, window, first).unwrap_or(before);
+            is_seen = linearise(landmark, place) || linearise(landmark, before);
+        }
+        if !is_seen {
+            let place = landmark.point;
+            landmark
+                .sights
+                .retain_mut(|sight| sight.relinearise::<F, S, N>(&camera, kernel, window, first, &place));
+        }
         landmark.sum();
         if !landmark.sights.is_empty() {
             landmark.add_to(&mut self.coupling, &mut self.rows, 1.0);
