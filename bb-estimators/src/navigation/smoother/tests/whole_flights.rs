@@ -255,8 +255,11 @@ impl Solution {
     }
 
     /// The largest differences to a window: of its means, in deviations, and of its covariances, as correlations.
-    fn differences(&self, smoother: &mut Smoother) -> (f64, f64) {
+    fn differences(&self, smoother: &Smoother) -> (f64, f64) {
         let (mut of_means, mut of_covariances) = (0.0_f64, 0.0_f64);
+        // Until landmarks tie keyframes, an update does not propagate small corrections back.
+        let mut smoother = smoother.clone();
+        smoother.solve_all();
         for index in 0..smoother.window.len() {
             let here = smoother.covariance_now(index).unwrap();
             let keyframe = &smoother.window[index];
