@@ -59,7 +59,7 @@ impl Case {
         let mut noise = Noise::new(seed);
         let mut between = |low: f64, high: f64| noise.between(low, high);
         let (speed, rate) = (between(0.5, 5.0), (between(-0.2, 0.2), between(0.0, 0.4)));
-        let (direction, has_heading) = (between(0.0, 6.28), between(0.0, 1.0) < 0.3);
+        let (direction, has_heading) = (between(0.0, core::f64::consts::TAU), between(0.0, 1.0) < 0.3);
         let seconds = (between(5.0, 60.0), between(0.5, 12.0));
         let faults = core::array::from_fn(|_| Fault::random(&mut noise));
         Self { seed, speed, rate, faults, direction, has_heading, seconds }
