@@ -161,9 +161,9 @@ impl<T: Real> FieldReference<T> {
         self.drift.variance() / (self.squared_norm() * horizontal * horizontal)
     }
 
-    /// The same as that of a white error of `dt` seconds with the same effect: of an error that lasts.
-    pub(super) fn lasting_drift_variance(&self, dt: T) -> T {
-        T::TWO * T::of(SLOW_S) * self.drift_variance() / dt
+    /// The spectral density of one component of the drift, an error that lasts, as a fraction of the norm squared, s.
+    pub(super) fn lasting_drift(&self) -> T {
+        T::TWO * T::of(SLOW_S) * self.drift.variance() / self.squared_norm()
     }
 
     /// How far an unknown offset of the magnetometer is held against another field than the reference, up to 1.

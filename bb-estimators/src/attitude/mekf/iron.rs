@@ -151,13 +151,17 @@ impl<T: Real> HardIron<T> {
     }
 
     /// Covariance of the uncertainty of the offset that disturbs the heading: an offset of zero is trusted until
-    /// there is a reason to doubt it, and then doubted as far as `doubt`, up to 1.
-    pub(super) fn covariance(&self, doubt: T) -> Matrix3<T> {
-        match self.adopted {
-            Some(_) => self.offset_covariance(),
-            None if self.is_doubted => self.offset_covariance() * doubt,
-            None => Matrix3::zeros(),
+    /// there is a reason to doubt it.
+    pub(super) fn covariance(&self) -> Matrix3<T> {
+        if !self.is_doubted && self.adopted.is_none() {
+            return Matrix3::zeros();
         }
+        self.offset_covariance()
+    }
+
+    /// Whether there is evidence for the offset since the sums began.
+    pub(super) fn is_adopted(&self) -> bool {
+        self.adopted.is_some()
     }
 
     /// Covariance of the offset, in the field's unit squared.

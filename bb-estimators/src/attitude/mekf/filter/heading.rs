@@ -32,9 +32,11 @@ impl<T: Real> MekfFilter<T> {
         let reference = self.field.get_or_insert_with(|| FieldReference::new(plane));
         let angle = field.x.atan2(field.y);
         // The errors that the measurements have in common contradict nothing.
-        let common = self.iron.heading_variance() + reference.drift_variance();
-        let deviation = (self.errors.variance(ROTATION + 2).max(T::ZERO) + common).sqrt();
-        let contradicts = angle.abs() > T::of(CONTRADICTION).max(T::of(CONTRADICTION_DEVIATIONS) * deviation);
+        let contradicts = angle.abs() > T::of(CONTRADICTION) && {
+            let common = self.iron.heading_variance() + reference.drift_variance();
+            let variance = self.errors.variance(ROTATION + 2).max(T::ZERO) + common;
+            angle * angle > T::of(CONTRADICTION_DEVIATIONS * CONTRADICTION_DEVIATIONS) * variance
+        };
         let disturbance = match reference.observe(dt, plane, contradicts) {
             Verdict::Disturbed(variance) => variance,
             Verdict::HeadingUnknown => {
@@ -48,12 +50,12 @@ impl<T: Real> MekfFilter<T> {
         let rate = (rate.x * field.y - rate.y * field.x) / squared.max(least);
         // The uncertainty of the offset, across the field, as a fraction of its norm.
         let across = rotation.tr_mul(&Vector3::new(field.y, -field.x, T::ZERO)) / squared.max(least).sqrt();
-        let covariance = self.iron.covariance(reference.offset_doubt());
-        let unknown = across.dot(&(covariance * across)) / reference.squared_norm();
-        let disturbed = T::TWO * T::of(FIELD_TIME_S) * (usual + disturbance + unknown) / (horizontal * horizontal);
+        let doubt = if self.iron.is_adopted() { T::ONE } else { reference.offset_doubt() };
+        let unknown = across.dot(&(self.iron.covariance() * across)) * doubt / reference.squared_norm();
+        let white = T::TWO * T::of(FIELD_TIME_S) * (usual + disturbance + unknown);
+        let disturbed = (white + reference.lasting_drift()) / (horizontal * horizontal);
         let slope = reference.vertical() / horizontal;
-        let drift = reference.lasting_drift_variance(dt);
-        let variance = disturbed / dt + drift + rate * rate * self.iron.lag_variance();
+        let variance = disturbed / dt + rate * rate * self.iron.lag_variance();
         let known = self.errors.variance(ROTATION + 2);
         self.iron.correct_heading(known / (known + variance));
         Heading { angle, slope, variance }
