@@ -99,9 +99,11 @@ impl<T: Real> MahonyFilter<T> {
         field: Option<&Vector3<T>>,
     ) {
         // Ṙ = R [Ω - b + k_P ω_mes]×, as one rotation. ω_mes is known in the body frame of the previous sample, so the axis
-        // of the correction, not its size, is off by half of what the body turns by in a sample.
+        // of the correction, not its size, is off by half of what the body turns by in a sample. Errors of the field are
+        // large and last, so that with one the axis is put right (Baker, Campbell, Hausdorff).
         let rotation = (sample.angular_velocity - self.bias) * dt_s;
-        let both = rotation + self.error * self.gain(dt_s);
+        let turning = if field.is_some() { self.error + self.error.cross(&rotation) * T::HALF } else { self.error };
+        let both = rotation + turning * self.gain(dt_s);
         let squared = both.norm_squared();
         if squared < T::of(SERIES_SQUARED_ANGLE) {
             self.compare(turn_little(before, &both, squared), dt_s, up, field);
