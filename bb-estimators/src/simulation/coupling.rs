@@ -65,6 +65,9 @@ pub(super) struct Coupling {
 /// motors have little inertia: six with 0.01 kg m² each are still off by 4e-4 of the largest.
 const SWEEPS: u32 = 1_000;
 
+/// After so many sweeps, a joint that comes to an end of its range in one of them does so in all that follow.
+const UNDECIDED: u32 = 50;
+
 /// The change of the accelerations in a sweep that ends the search, relative to the largest, or rad/s² or m/s².
 const CONVERGED: f64 = 1e-13;
 
@@ -136,7 +139,7 @@ impl Coupling {
                 accelerations[*velocity] = plant.state().point.acceleration;
             }
         }
-        for _ in 0..SWEEPS {
+        for sweep in 0..SWEEPS {
             *sweeps += 1;
             let (mut change, mut largest) = (0.0_f64, 1.0_f64);
             for (joint, _, velocity) in &vectors.joints {
@@ -147,6 +150,9 @@ impl Coupling {
                 let all: f64 =
                     masses.column(velocity).iter().zip(accelerations.iter()).map(|(mass, a)| mass * a).sum();
                 plant.load = Load { inertia, effort: bias[velocity] + all - inertia * accelerations[velocity] };
+                if sweep >= UNDECIDED {
+                    plant.decide();
+                }
                 let acceleration = plant.mean_acceleration();
                 change = change.max((acceleration - accelerations[velocity]).abs());
                 largest = largest.max(acceleration.abs());

@@ -98,6 +98,14 @@ pub(super) struct Plant {
     state: PlantState,
     /// The position it holds, once it is at rest.
     hold_at: Option<f64>,
+    /// The end of the range at which the present step is decided to end, see [`decide`](Self::decide).
+    lands_at: Option<End>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum End {
+    Lower,
+    Upper,
 }
 
 impl Plant {
@@ -112,6 +120,7 @@ impl Plant {
             time,
             state: PlantState { point, ..PlantState::default() },
             hold_at: None,
+            lands_at: None,
         }
     }
 
@@ -148,6 +157,7 @@ impl Plant {
         self.state = self.at(now);
         self.planned = self.load;
         self.time = self.time.max(now);
+        self.lands_at = None;
         // Commands to other joints may end every step before it is whole.
         self.settle();
         before == (self.state, self.planned, self.hold_at, discriminant(&self.goal))
@@ -189,6 +199,28 @@ impl Plant {
     /// The mean acceleration over the present step, impacts included.
     pub(super) fn mean_acceleration(&self) -> f64 {
         (self.after(STEP_S).point.velocity - self.state.point.velocity) / STEP_S
+    }
+
+    /// Decides, for the present step, that it ends at an end of the range if it does with the present load.
+    ///
+    /// Whether a joint stops there in this step or goes on and stops in the next is a matter of rounding, but changes its load: there
+    /// may be no load with which it does what it was assumed to do. Once decided, it stops even if it would just not get there.
+    pub(super) fn decide(&mut self) {
+        if self.lands_at.is_some() {
+            return;
+        }
+        let (lower, upper) = self.range();
+        let (before, next) = (self.state.point, self.after(STEP_S).point);
+        if next.velocity == 0.0 && before.velocity > 0.0 && next.position >= upper {
+            self.lands_at = Some(End::Upper);
+        } else if next.velocity == 0.0 && before.velocity < 0.0 && next.position <= lower {
+            self.lands_at = Some(End::Lower);
+        }
+    }
+
+    /// The positions at which it stops.
+    fn range(&self) -> (f64, f64) {
+        (self.drivetrain.lower.max(self.free.0), self.drivetrain.upper.min(self.free.1))
     }
 
     /// The inertia that the motor accelerates.
@@ -343,9 +375,12 @@ impl Plant {
 
     /// The state at an end of the range or at an obstacle, if it would be beyond.
     fn stopped(&self, state: PlantState, step_s: f64) -> PlantState {
-        let (lower, upper) = (self.drivetrain.lower.max(self.free.0), self.drivetrain.upper.min(self.free.1));
+        let (lower, upper) = self.range();
         let JointPoint { position, velocity, .. } = state.point;
-        let is_out = (position > upper && velocity >= 0.0) || (position < lower && velocity <= 0.0);
+        let lands_at = self.lands_at.filter(|_| step_s >= STEP_S);
+        let is_above = position > upper || lands_at == Some(End::Upper);
+        let is_below = position < lower || lands_at == Some(End::Lower);
+        let is_out = (is_above && velocity >= 0.0) || (is_below && velocity <= 0.0);
         if !is_out {
             return state;
         }
