@@ -12,6 +12,7 @@ use super::eskf::{Eskf, ImuMean, Start};
 use super::fused::Fused;
 use super::math::{exp, ln};
 use super::measurement::Measurement;
+use super::propagate::Propagate;
 use super::refusal::Refusal;
 use super::state::{Estimate, States};
 use super::stream::Stream;
@@ -164,6 +165,24 @@ impl<S: States, const N: usize, const M: usize> Bank<S, N, M> {
             *weight -= most;
             *alive &= *weight > -IMPLAUSIBLE;
         }
+    }
+}
+
+impl<S: States, const N: usize, const M: usize> Propagate for Bank<S, N, M> {
+    fn time_ns(&self) -> Option<i64> {
+        self.time_ns()
+    }
+
+    fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
+        self.propagate(sample)
+    }
+
+    fn longest_sample(&self) -> f64 {
+        self.longest_sample()
+    }
+
+    fn propagate_part(&mut self, part: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
+        self.propagate_part(part, is_gap)
     }
 }
 

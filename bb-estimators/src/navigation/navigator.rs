@@ -6,6 +6,7 @@ use super::bank::Bank;
 use super::eskf::{Eskf, EskfParams, GaussMarkov, ImuMean, Start};
 use super::fused::Fused;
 use super::measurement::{AbsolutePose, BodyVelocity, GnssPosition, RelativePose};
+use super::propagate::Propagate;
 use super::refusal::Refusal;
 use super::state::{Estimate, Optional, States};
 use super::stream::{Stream, StreamParams};
@@ -246,6 +247,24 @@ impl Hypothesis {
             relative_scale: if self.scale { params.relative_scale } else { known },
             ..*params
         }
+    }
+}
+
+impl Propagate for Navigator {
+    fn time_ns(&self) -> Option<i64> {
+        self.time_ns()
+    }
+
+    fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
+        self.propagate(sample)
+    }
+
+    fn longest_sample(&self) -> f64 {
+        self.longest_sample()
+    }
+
+    fn propagate_part(&mut self, part: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
+        self.propagate_part(part, is_gap)
     }
 }
 

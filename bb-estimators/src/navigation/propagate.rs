@@ -1,9 +1,6 @@
-//! What a [`History`](super::History) needs of a filter to replay it.
+//! What a `History` needs of a filter to replay it.
 
-use super::bank::Bank;
 use super::eskf::{Eskf, ImuMean};
-use super::navigator::Navigator;
-use super::planar::PlanarEkf;
 use super::refusal::Refusal;
 use super::state::States;
 
@@ -28,7 +25,7 @@ pub trait Propagate: Clone {
     /// [`longest_sample`](Self::longest_sample): every part of a gap is a gap, however short it is.
     ///
     /// By default, the part is propagated like a sample of its own. Provide it together with `longest_sample` if your filter treats
-    /// gaps differently, as [`Eskf`], [`PlanarEkf`], [`Bank`] and [`Navigator`] do.
+    /// gaps differently, as the filters of this module do.
     ///
     /// # Errors
     ///
@@ -50,60 +47,6 @@ impl<S: States, const N: usize> Propagate for Eskf<S, N> {
 
     fn longest_sample(&self) -> f64 {
         self.params().longest_sample
-    }
-
-    fn propagate_part(&mut self, part: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
-        self.propagate_part(part, is_gap)
-    }
-}
-
-impl Propagate for PlanarEkf {
-    fn time_ns(&self) -> Option<i64> {
-        self.estimate().map(|estimate| estimate.time_ns)
-    }
-
-    fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
-        self.propagate(sample)
-    }
-
-    fn longest_sample(&self) -> f64 {
-        self.params().longest_sample
-    }
-
-    fn propagate_part(&mut self, part: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
-        self.propagate_part(part, is_gap)
-    }
-}
-
-impl<S: States, const N: usize, const M: usize> Propagate for Bank<S, N, M> {
-    fn time_ns(&self) -> Option<i64> {
-        self.time_ns()
-    }
-
-    fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
-        self.propagate(sample)
-    }
-
-    fn longest_sample(&self) -> f64 {
-        self.longest_sample()
-    }
-
-    fn propagate_part(&mut self, part: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
-        self.propagate_part(part, is_gap)
-    }
-}
-
-impl Propagate for Navigator {
-    fn time_ns(&self) -> Option<i64> {
-        self.time_ns()
-    }
-
-    fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
-        self.propagate(sample)
-    }
-
-    fn longest_sample(&self) -> f64 {
-        self.longest_sample()
     }
 
     fn propagate_part(&mut self, part: &ImuMean, is_gap: bool) -> Result<(), Refusal> {

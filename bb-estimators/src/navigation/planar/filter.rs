@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Matrix3, SMatrix, Vector2};
 
 use super::estimate::{GYROSCOPE_BIAS, HEADING, POSITION, PlanarEstimate, STATES, VELOCITY, WHEEL_SCALE};
-use super::jump::BiasJump;
+use super::jump::{BiasJump, Moved};
 use super::measurement::PlanarMeasurement;
 use super::params::PlanarParams;
 use super::propagation::Transition;
@@ -16,10 +16,14 @@ use crate::navigation::fusion::{Sight, Weighed, prepared};
 use crate::navigation::layout::{Layout, MOST_SCALE};
 use crate::navigation::math::{exp, wrapped};
 use crate::navigation::measurement::Linearised;
+use crate::navigation::propagate::Propagate;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::stream::{Gate, Stream};
 use crate::navigation::upkeep::{Upkeep, upkeep_methods};
 use crate::params::Params as _;
+
+/// The variance of a heading of which nothing is known, rad²: uniform over a turn.
+const UNKNOWN_HEADING: f64 = core::f64::consts::PI * core::f64::consts::PI / 3.0;
 
 const LAYOUT: Layout<STATES> = {
     let mut layout = Layout::EMPTY;
@@ -131,10 +135,11 @@ impl PlanarStart {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlanarEkf {
     params: PlanarParams,
-    pub(super) estimate: Option<PlanarEstimate>,
-    pub(super) covariance: Covariance<STATES>,
+    estimate: Option<PlanarEstimate>,
+    covariance: Covariance<STATES>,
     upkeep: Upkeep,
-    pub(super) jump: Option<BiasJump>,
+    /// A jump of the bias that may be the fault of a sensor.
+    jump: Option<BiasJump>,
 }
 
 impl PlanarEkf {
@@ -262,9 +267,20 @@ impl PlanarEkf {
         }
         let fused = weighed.fused(&model, &LAYOUT);
         if weighed.is_raised() && error[GYROSCOPE_BIAS] != 0.0 {
-            self.follow_jump(stream, error[GYROSCOPE_BIAS]);
+            self.follow_jump(stream.fused_ns(), error[GYROSCOPE_BIAS]);
         }
         Ok(fused)
+    }
+
+    /// Raises the variance of the heading after a measurement has overridden its gate and added `change` to the bias.
+    #[cold]
+    fn follow_jump(&mut self, fused_ns: Option<i64>, change: f64) {
+        let Some(estimate) = &self.estimate else { return };
+        let moved = Moved { now_ns: estimate.time_ns, fused_ns, bias: estimate.gyroscope_bias, change };
+        let (jump, variance) = BiasJump::follow(self.jump, &moved);
+        self.jump = jump;
+        let unknown = (UNKNOWN_HEADING - self.covariance.matrix()[(HEADING, HEADING)]).max(0.0);
+        self.covariance.inflate(HEADING, variance.min(unknown));
     }
 
     /// Relocates a filter that was wrong, m: sets the position and, if given, the velocity (in the world, m/s) and the heading
@@ -347,4 +363,22 @@ impl PlanarEkf {
     }
 
     upkeep_methods!();
+}
+
+impl Propagate for PlanarEkf {
+    fn time_ns(&self) -> Option<i64> {
+        self.estimate().map(|estimate| estimate.time_ns)
+    }
+
+    fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
+        self.propagate(sample)
+    }
+
+    fn longest_sample(&self) -> f64 {
+        self.params().longest_sample
+    }
+
+    fn propagate_part(&mut self, part: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
+        self.propagate_part(part, is_gap)
+    }
 }

@@ -4,12 +4,6 @@
 //! the heading has turned with the wrong one since. If it soon jumps back, more likely the sensor was wrong, and the heading has turned
 //! by what the sensor made of the bias all the while. No fused measurement shows either, so the heading becomes as uncertain as that.
 
-use core::f64::consts::PI;
-
-use super::estimate::HEADING;
-use super::filter::PlanarEkf;
-use crate::navigation::stream::Stream;
-
 /// A bias that stays for longer, s, is the gyroscope's.
 const LONGEST_S: f64 = 120.0;
 
@@ -18,9 +12,6 @@ const LONGEST_CLOSED_S: f64 = 10.0;
 
 /// A bias is back if it is closer to the former one than this fraction of the way that it had come.
 const BACK: f64 = 0.5;
-
-/// The variance of a heading of which nothing is known, rad²: uniform over a turn.
-const UNKNOWN: f64 = PI * PI / 3.0;
 
 /// A jump of the bias that may be the fault of a sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,32 +25,38 @@ pub(super) struct BiasJump {
     turned: f64,
 }
 
-impl PlanarEkf {
-    /// Raises the variance of the heading after `stream` has overridden its gate and moved the bias by `change`.
+/// What a measurement that has overridden its gate did to the bias.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Moved {
+    pub(super) now_ns: i64,
+    /// When a measurement of its stream was last fused before it.
+    pub(super) fused_ns: Option<i64>,
+    /// The bias now, rad/s.
+    pub(super) bias: f64,
+    /// What the measurement has added to it, rad/s.
+    pub(super) change: f64,
+}
+
+impl BiasJump {
+    /// What is known of a jump after the bias has moved, and how uncertain the heading has become by that, rad².
     #[cold]
-    pub(super) fn follow_jump(&mut self, stream: &Stream, change: f64) {
-        let Some(estimate) = &self.estimate else { return };
-        let now_ns = estimate.time_ns;
+    pub(super) fn follow(jump: Option<Self>, moved: &Moved) -> (Option<Self>, f64) {
+        let Moved { now_ns, fused_ns, bias, change } = *moved;
         let since = |time_ns: i64| now_ns.saturating_sub(time_ns) as f64 * 1e-9;
-        let bias = estimate.gyroscope_bias;
         let left = bias - change;
-        let closed_s = stream.fused_ns().map_or(0.0, since).min(LONGEST_CLOSED_S);
-        let mut variance = change * change * closed_s * closed_s;
-        let open = self.jump.filter(|jump| since(jump.first_ns) <= LONGEST_S);
-        self.jump = match open {
+        let closed_s = fused_ns.map_or(0.0, since).min(LONGEST_CLOSED_S);
+        let variance = change * change * closed_s * closed_s;
+        match jump.filter(|jump| since(jump.first_ns) <= LONGEST_S) {
             Some(jump) => {
                 let way = left - jump.before;
                 let turned = jump.turned - way * since(jump.last_ns);
                 if (bias - jump.before).abs() < BACK * way.abs() {
-                    variance = variance.max(turned * turned);
-                    None
+                    (None, variance.max(turned * turned))
                 } else {
-                    Some(BiasJump { last_ns: now_ns, turned, ..jump })
+                    (Some(Self { last_ns: now_ns, turned, ..jump }), variance)
                 }
             }
-            None => Some(BiasJump { before: left, first_ns: now_ns, last_ns: now_ns, turned: 0.0 }),
-        };
-        let unknown = (UNKNOWN - self.covariance.matrix()[(HEADING, HEADING)]).max(0.0);
-        self.covariance.inflate(HEADING, variance.min(unknown));
+            None => (Some(Self { before: left, first_ns: now_ns, last_ns: now_ns, turned: 0.0 }), variance),
+        }
     }
 }
