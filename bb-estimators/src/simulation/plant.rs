@@ -210,10 +210,10 @@ impl Plant {
             return;
         }
         let (lower, upper) = self.range();
-        let (before, next) = (self.state.point, self.after(STEP_S).point);
-        if next.velocity == 0.0 && before.velocity > 0.0 && next.position >= upper {
+        let JointPoint { position, velocity, .. } = self.after(STEP_S).point;
+        if velocity == 0.0 && position >= upper {
             self.lands_at = Some(End::Upper);
-        } else if next.velocity == 0.0 && before.velocity < 0.0 && next.position <= lower {
+        } else if velocity == 0.0 && position <= lower {
             self.lands_at = Some(End::Lower);
         }
     }
