@@ -59,27 +59,6 @@ impl<S: States, const N: usize, const M: usize> Bank<S, N, M> {
         self.propagate_part(sample, false)
     }
 
-    /// Propagates all filters over a part of a sample that measurements divide; see [`Eskf::propagate_part`]. `is_gap` tells whether
-    /// the whole sample is longer than [`longest_sample`](Self::longest_sample).
-    ///
-    /// # Errors
-    ///
-    /// The same as [`propagate`](Self::propagate).
-    pub fn propagate_part(&mut self, sample: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
-        let mut alive = self.filters.iter_mut().zip(&self.alive).filter(|(_, alive)| **alive);
-        alive.try_for_each(|(filter, _)| filter.propagate_part(sample, is_gap))
-    }
-
-    /// The longest interval that one sample covers, s: the shortest [`longest_sample`](super::EskfParams::longest_sample) of all filters.
-    pub fn longest_sample(&self) -> f64 {
-        self.filters.iter().map(|filter| filter.params().longest_sample).fold(f64::INFINITY, f64::min)
-    }
-
-    /// The current time of the filters, ns; `None` before their start.
-    pub fn time_ns(&self) -> Option<i64> {
-        Some(self.filters.get(self.best())?.estimate()?.time_ns)
-    }
-
     /// Updates all filters with a measurement and reweights them by its likelihood; see [`Eskf::update`].
     ///
     /// The filters share a gate: if one filter accepts a measurement, all fuse it, and it counts against the filters that did not
@@ -170,19 +149,21 @@ impl<S: States, const N: usize, const M: usize> Bank<S, N, M> {
 
 impl<S: States, const N: usize, const M: usize> Propagate for Bank<S, N, M> {
     fn time_ns(&self) -> Option<i64> {
-        self.time_ns()
+        Some(self.filters.get(self.best())?.estimate()?.time_ns)
     }
 
     fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
         self.propagate(sample)
     }
 
+    /// The shortest [`longest_sample`](super::EskfParams::longest_sample) of all filters, s.
     fn longest_sample(&self) -> f64 {
-        self.longest_sample()
+        self.filters.iter().map(|filter| filter.params().longest_sample).fold(f64::INFINITY, f64::min)
     }
 
     fn propagate_part(&mut self, part: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
-        self.propagate_part(part, is_gap)
+        let mut alive = self.filters.iter_mut().zip(&self.alive).filter(|(_, alive)| **alive);
+        alive.try_for_each(|(filter, _)| filter.propagate_part(part, is_gap))
     }
 }
 

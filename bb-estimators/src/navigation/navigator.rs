@@ -50,6 +50,8 @@ pub enum Aiding {
 /// Position, velocity and attitude from an IMU, positions, poses and relative poses, without tuning. It is a [`Bank`] of filters
 /// whose noise is that of the data sheets and multiples of it. The scale of their relative poses is either 1 or drifts according
 /// to [`EskfParams::relative_scale`].
+///
+/// All 36 filters are stored inline, 210 kB in total: keep a navigator in a `Box` or a `static` where the stack is small.
 #[derive(Clone, Debug)]
 pub struct Navigator {
     bank: Bank<Navigated, NAVIGATED, FILTERS>,
@@ -118,25 +120,6 @@ impl Navigator {
     /// The same as [`Eskf::propagate`].
     pub fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
         self.bank.propagate(sample)
-    }
-
-    /// See [`Bank::propagate_part`].
-    ///
-    /// # Errors
-    ///
-    /// The same as [`Bank::propagate_part`].
-    pub fn propagate_part(&mut self, sample: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
-        self.bank.propagate_part(sample, is_gap)
-    }
-
-    /// See [`Bank::longest_sample`].
-    pub fn longest_sample(&self) -> f64 {
-        self.bank.longest_sample()
-    }
-
-    /// See [`Bank::time_ns`].
-    pub fn time_ns(&self) -> Option<i64> {
-        self.bank.time_ns()
     }
 
     /// Fuses a satellite position; see [`Bank::update`].
@@ -252,7 +235,7 @@ impl Hypothesis {
 
 impl Propagate for Navigator {
     fn time_ns(&self) -> Option<i64> {
-        self.time_ns()
+        self.bank.time_ns()
     }
 
     fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
@@ -260,11 +243,11 @@ impl Propagate for Navigator {
     }
 
     fn longest_sample(&self) -> f64 {
-        self.longest_sample()
+        self.bank.longest_sample()
     }
 
     fn propagate_part(&mut self, part: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
-        self.propagate_part(part, is_gap)
+        self.bank.propagate_part(part, is_gap)
     }
 }
 

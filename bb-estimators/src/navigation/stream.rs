@@ -36,9 +36,10 @@ params! {
         /// In `Eskf` and `PlanarEkf`, a position that is off by up to ten deviations a dimension raises position and velocity
         /// together. Of a larger difference, what explains it best, the position for a fix, is raised alone and loses its
         /// correlations; all else stays as it is. If the next ones are off in the same direction, position, velocity and
-        /// heading are raised, and if that does not help, the whole attitude. A height does the same to the height, the vertical velocity and the barometer's bias, but they keep their correlations. A
-        /// relative pose raises only the way from its keyframe. A filter that should move only where several positions agree is
-        /// better [moved](super::Eskf::relocate).
+        /// heading are raised, and if that does not help, the whole attitude. A height does the same to the height, the
+        /// vertical velocity and the barometer's bias, but they keep their correlations. A relative pose raises only the
+        /// way from its keyframe. A filter that should move only where several positions agree is better
+        /// [moved](super::Eskf::relocate).
         ///
         /// Small: a few outliers in a row move the filter. Large: a filter that is off stays so for long.
         patience: u32 = 3;
