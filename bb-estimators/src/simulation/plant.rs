@@ -301,7 +301,7 @@ impl Plant {
         if step_s <= 0.0 {
             return self.state;
         }
-        let Drivetrain { effort: most, acceleration, damping, friction, .. } = self.drivetrain;
+        let Drivetrain { effort: most, acceleration, friction, .. } = self.drivetrain;
         let (inertia, load) = (self.inertia(), self.load.effort);
         let JointPoint { position, velocity, .. } = self.state.point;
         let rest_at = match &self.goal {
@@ -312,36 +312,22 @@ impl Plant {
         if let Some(target) = rest_at.filter(|target| self.can_hold() && self.is_at(*target)) {
             return self.to_rest(target, step_s);
         }
-        // What is left of an effort after load and friction; at rest, friction acts against where it is pushed.
-        let drag = |effort: f64, towards: f64| {
-            let along = if velocity == 0.0 { towards } else { velocity };
-            let left = effort - load;
-            if along == 0.0 { left } else { left - damping * velocity - friction * along.signum() }
-        };
-        // Backward Euler: the friction is that of the velocity after the step, or a light joint would swing ever further.
-        let pushed = |effort: f64| drag(effort, effort - load) / (inertia + damping * STEP_S);
-        let (effort, mut accelerated) = match self.wanted() {
+        let (effort, accelerated) = match self.wanted() {
             Ok(wanted) => {
                 let asked = ((wanted - velocity) / STEP_S).clamp(-acceleration, acceleration);
                 // The servo compensates for the known friction and load, as far as the motor can.
-                // That of the velocity in the middle of the step.
-                let needed = inertia * asked - drag(0.0, asked) + damping * asked * STEP_S / 2.0;
+                let reached = velocity + asked * STEP_S;
+                let along = if reached.abs() < AT_REST { velocity } else { reached };
+                let dry = if along == 0.0 { 0.0 } else { friction * along.signum() };
+                let needed = inertia * asked + load + self.damping_after(reached) + dry;
                 let effort = needed.clamp(-most, most);
-                let accelerated = if effort == needed { asked } else { pushed(effort) };
-                (effort, accelerated)
+                (effort, if effort == needed { asked } else { self.pushed(effort) })
             }
-            Err(effort) => (effort.clamp(-most, most), pushed(effort.clamp(-most, most))),
+            Err(effort) => {
+                let effort = effort.clamp(-most, most);
+                (effort, self.pushed(effort))
+            }
         };
-        // Dry friction holds a joint at rest, and stops a moving one; it never reverses it.
-        let is_stuck = (effort - load).abs() <= friction;
-        let is_held = velocity == 0.0 && is_stuck;
-        if is_held {
-            accelerated = 0.0;
-        }
-        let turns = velocity != 0.0 && (velocity + accelerated * STEP_S) * velocity < 0.0;
-        if turns && (is_stuck || self.wanted() == Ok(0.0)) {
-            accelerated = -velocity / STEP_S;
-        }
         let stalled_s = match velocity == 0.0 && effort.abs() >= most && accelerated == 0.0 {
             true => self.state.stalled_s + step_s,
             false => 0.0,
@@ -354,6 +340,34 @@ impl Plant {
             acceleration: accelerated,
         };
         self.stopped(PlantState { point: next, effort, stalled_s }, step_s)
+    }
+
+    /// The acceleration by an effort of the motor.
+    ///
+    /// Dry friction is that of the velocity after the step, or it would reverse a joint that it can only stop. The acceleration falls
+    /// with the load continuously, without which the search for the loads of coupled joints might not converge.
+    fn pushed(&self, effort: f64) -> f64 {
+        let velocity = self.state.point.velocity;
+        let inertia = self.inertia() / STEP_S;
+        let end = self.drivetrain.damping * self.damped_at();
+        // What drives it on, but for dry friction.
+        let left = (inertia - self.drivetrain.damping + end) * velocity + effort - self.load.effort;
+        let left = (left.abs() - self.drivetrain.friction).max(0.0).copysign(left);
+        (left / (inertia + end) - velocity) / STEP_S
+    }
+
+    /// The viscous friction of a step at whose end it has a velocity.
+    fn damping_after(&self, velocity: f64) -> f64 {
+        let before = self.state.point.velocity;
+        self.drivetrain.damping * (before + self.damped_at() * (velocity - before))
+    }
+
+    /// The viscous friction is that of the velocity at this part of a step: the middle, which is of second order. With less inertia than
+    /// friction takes away in half a step, the velocity would then overshoot that of its effort; later in the step it does not.
+    fn damped_at(&self) -> f64 {
+        let stopped_in_s = self.inertia() / self.drivetrain.damping;
+        // Without damping, infinite.
+        (1.0 - stopped_in_s / STEP_S).max(0.5)
     }
 
     /// It comes to rest within the step, and is at `target` at its end.

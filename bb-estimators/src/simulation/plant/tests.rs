@@ -101,6 +101,25 @@ proptest! {
         prop_assert!((early.position - target).abs() > 0.0 || expected < 5, "sooner than it can");
     }
 
+    /// What the search for the loads of coupled joints relies on: more load never accelerates more, and no load is a threshold.
+    #[test]
+    fn the_acceleration_falls_with_the_load_continuously(
+        drivetrain in drivetrains(), goal in goals(), velocity in prop_oneof![Just(0.0), -0.01..0.01, -4.0..4.0],
+        load in -20.0..20.0, more in prop_oneof![1e-6..1e-3, 0.0..5.0],
+    ) {
+        let drivetrain = Drivetrain { lower: f64::NEG_INFINITY, upper: f64::INFINITY, ..drivetrain };
+        let mut plant = Plant::new(drivetrain, 0.0, at(0));
+        plant.state.point.velocity = velocity;
+        plant.set(goal, at(0));
+        let mut with = |effort| {
+            plant.load = Load { inertia: 0.1, effort };
+            plant.mean_acceleration()
+        };
+        let less = with(load) - with(load + more);
+        let most = more / (drivetrain.inertia + 0.1);
+        prop_assert!((-1e-8..=most + 1e-8).contains(&less), "{less} of {most}");
+    }
+
     /// Who asks, and how often, does not change how it moves.
     #[test]
     fn questions_do_not_change_it(
