@@ -132,12 +132,13 @@ fn a_reading_whose_clone_panics_gets_to_all_estimators_and_subscribers() -> Resu
         if let Some(heard) = &heard {
             assert_eq!(numbers(heard), expected, "{case}");
         }
-        // One of three breaks, once for each of the two workers, and for the subscriber or the journal.
+        // One of three breaks: once for each of the two workers, for the subscriber or the journal, and for the estimator beside
+        // the sensor if another thread holds it just then.
         for path in ["sensor/base/fed", "sensor/base/kiln"] {
             let fault = format!("{path} failed: its message panicked: the vase breaks");
             let count = faults(&report).iter().filter(|text| **text == fault).count();
-            let copies = if is_journaled || is_heard { 3 } else { 2 };
-            assert_eq!(count, COUNT as usize / 3 * copies, "{case} {path}");
+            let (broken, copies) = (COUNT as usize / 3, if is_journaled || is_heard { 3 } else { 2 });
+            assert!((broken * copies..=broken * (copies + 1)).contains(&count), "{case} {path}: {count}");
         }
         assert!(report.sources.iter().all(|source| source.restarts == 0 && source.stopped.is_none()));
 
