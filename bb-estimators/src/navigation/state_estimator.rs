@@ -47,7 +47,8 @@
 //!
 //! *Degraded*: the input was left out of the estimate, or was fused with the covariance raised; there is an estimate. *Fatal*:
 //! there is no estimate for this tick; the input that caused the failure is excluded from then on. Each success and each failure
-//! is an [`Event`], with its reason. After three seconds without an estimate, exactly one event reports this, and one more
+//! is an [`Event`], with its reason. If a late input changes what an earlier one became, that is an event as it would have been at
+//! once, and each is told once. After three seconds without an estimate, exactly one event reports this, and one more
 //! reports when an estimate is available again.
 //!
 //! # Conventions

@@ -79,7 +79,8 @@ pub struct FlightEstimator {
     health: Option<FlightHealth>,
 }
 
-/// Maximum number of events in one output.
+/// Maximum number of events in one output, not counting errors, warnings and changes of state. A run of late inputs may revise all
+/// that the queue holds, and there are no more of them than that.
 const EVENTS: usize = 256;
 
 /// Logs events, and stores those to be published.
@@ -87,6 +88,15 @@ const EVENTS: usize = 256;
 struct Sink {
     log: TracingSink,
     events: FlightEvents,
+    /// Number of these that may be lost.
+    spare: usize,
+}
+
+impl Sink {
+    fn take(&mut self) -> FlightEvents {
+        self.spare = 0;
+        std::mem::take(&mut self.events)
+    }
 }
 
 impl EventSink for Sink {
@@ -95,11 +105,14 @@ impl EventSink for Sink {
         if event.level() > Level::Info && !matches!(event.kind, EventKind::Keyframe { .. }) {
             return;
         }
-        if self.events.events.len() < EVENTS {
-            self.events.events.push(FlightEvent::of(event));
-        } else {
+        // A recorder must have each error and each warning, and each change of gate and label.
+        let is_spare = matches!(event.kind, EventKind::Keyframe { .. } | EventKind::Revised { .. });
+        if is_spare && self.spare == EVENTS {
             self.events.lost += 1;
+            return;
         }
+        self.spare += usize::from(is_spare);
+        self.events.events.push(FlightEvent::of(event));
     }
 }
 
@@ -108,7 +121,7 @@ impl FlightEstimator {
         let emitted: Option<EstimatorOutput> = self.estimator.tick(now_ns);
         let health = FlightHealth::of(&self.estimator.health());
         let changed = self.health.is_none_or(|before| before.differs(&health));
-        let events = std::mem::take(&mut self.estimator.sink_mut().events);
+        let events = self.estimator.sink_mut().take();
         let outputs = FlightOutputs {
             estimate: emitted.as_ref().map(FlightEstimate::of),
             health: (emitted.is_some() || changed).then_some(health),
@@ -198,3 +211,29 @@ impl Estimator for FlightEstimator {
 
 /// Shortest period of the checks for a silent IMU.
 const SLOWEST_LOOK: Duration = Duration::from_millis(50);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::navigation::Refusal;
+    use crate::navigation::state_estimator::{GateState, InputKind, Reason};
+
+    #[test]
+    fn errors_and_warnings_have_room_in_a_full_message() {
+        let mut sink = Sink::default();
+        let mut tell = |time_ns: i64, kind: EventKind| sink.event(&Event { time_ns, kind });
+        let reason = Reason::Refused(Refusal::NonFinite);
+        (0..300).for_each(|time_ns| tell(time_ns, EventKind::Revised { input: InputKind::Gnss }));
+        (300..600).for_each(|time_ns| tell(time_ns, EventKind::Degraded { input: InputKind::Vio, reason }));
+        tell(600, EventKind::Fatal { input: InputKind::Anchor, reason });
+        tell(601, EventKind::Gate { from: GateState::Open, to: GateState::Blocked });
+        tell(602, EventKind::FallbackEngaged);
+        let FlightEvents { events, lost } = sink.take();
+        let count = |level: Level| events.iter().filter(|event| event.level == level).count();
+        assert_eq!((lost, count(Level::Error), events.len()), (44, 2, 256 + 300 + 3));
+        assert!(events.is_sorted_by_key(|event| event.time));
+        // The next message has room again.
+        sink.event(&Event { time_ns: 603, kind: EventKind::Revised { input: InputKind::Gnss } });
+        assert_eq!((sink.events.lost, sink.take().events.len()), (0, 1));
+    }
+}

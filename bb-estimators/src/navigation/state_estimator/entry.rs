@@ -57,18 +57,22 @@ impl<F> Payload<F> {
         Key { time_ns, rank, provider }
     }
 
-    /// `None` for entries that no user has added.
-    pub(super) fn kind(&self) -> Option<InputKind> {
-        Some(match self {
+    pub(super) fn kind(&self) -> InputKind {
+        match self {
             Self::Warm(_) => InputKind::WarmStart,
             Self::Attitude(_) => InputKind::Attitude,
             Self::Health(_) => InputKind::Health,
-            Self::Frame => return None,
+            Self::Frame => InputKind::Frame,
             Self::Vio(_) => InputKind::Vio,
             Self::Anchor(_) => InputKind::Anchor,
             Self::Gnss(_) => InputKind::Gnss,
             Self::Provided(..) => InputKind::Factor,
-        })
+        }
+    }
+
+    /// Whether a user has added it. A frame comes with a relative pose, which is reported instead unless the frame fails.
+    pub(super) fn is_added(&self) -> bool {
+        !matches!(self, Self::Frame)
     }
 }
 
@@ -87,11 +91,14 @@ pub(super) enum Outcome {
 }
 
 impl Outcome {
-    /// The reason, if the input is not in the estimate or degraded it.
-    pub(super) fn reason(&self) -> Option<Reason> {
-        match self {
-            Self::Added { .. } => None,
-            Self::Degraded(reason) | Self::Fatal(reason) => Some(*reason),
+    /// Whether the input became the same, for the same reason. The numbers may differ.
+    pub(super) fn is_alike(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Added { .. }, Self::Added { .. }) => true,
+            (Self::Degraded(reason), Self::Degraded(other)) | (Self::Fatal(reason), Self::Fatal(other)) => {
+                reason.is_alike(other)
+            }
+            _ => false,
         }
     }
 }
@@ -105,4 +112,36 @@ pub(super) struct Entry<F> {
     pub(super) outcome: Option<Outcome>,
     /// Rejection by the gate of the receiver.
     pub(super) rejection: Option<Rejection>,
+}
+
+/// What is to be told of an input.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum News {
+    /// It became this, for the first time or instead of something else.
+    Became(Outcome),
+    /// It is in the estimate after all.
+    Revised,
+}
+
+impl<F> Entry<F> {
+    /// Takes what it has become, and returns what is news of that.
+    pub(super) fn became(
+        &mut self,
+        outcome: Outcome,
+        rejection: Option<Rejection>,
+    ) -> (Option<News>, Option<Rejection>) {
+        let is_news = self.outcome.is_none_or(|before| !before.is_alike(&outcome));
+        let news = match (self.outcome, outcome) {
+            (None, Outcome::Added { .. }) if !self.payload.is_added() => None,
+            // An anchor may be in the estimate, and let the receiver in after all.
+            (Some(_), Outcome::Added { .. }) if is_news || (self.rejection.is_some() && rejection.is_none()) => {
+                Some(News::Revised)
+            }
+            (_, outcome) => is_news.then_some(News::Became(outcome)),
+        };
+        let is_same = |rejection: &Rejection| self.rejection.is_some_and(|before| before.is_alike(rejection));
+        let rejected = rejection.filter(|rejection| !is_same(rejection));
+        (self.outcome, self.rejection) = (Some(outcome), rejection);
+        (news, rejected)
+    }
 }

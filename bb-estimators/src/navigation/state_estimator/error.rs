@@ -2,6 +2,7 @@
 
 use core::error::Error;
 use core::fmt;
+use core::mem::discriminant;
 
 use super::gate::Rejection;
 use crate::navigation::refusal::Refusal;
@@ -24,6 +25,17 @@ pub enum Reason {
     },
     /// Samples of the IMU were missing, and the gap was bridged.
     Bridged,
+}
+
+impl Reason {
+    /// Whether it is the same reason, with the same or other numbers.
+    pub(super) fn is_alike(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Refused(refusal), Self::Refused(other)) => discriminant(refusal) == discriminant(other),
+            (Self::Gate(rejection), Self::Gate(other)) => rejection.is_alike(other),
+            _ => discriminant(self) == discriminant(other),
+        }
+    }
 }
 
 impl fmt::Display for Reason {

@@ -288,10 +288,7 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
                 Told::Taken(key, input, Outcome::Fatal(reason)) => {
                     self.fail(key.time_ns, input, EstimatorError::Fatal(reason));
                 }
-                Told::Revised(key, input, outcome) => {
-                    self.has_failed |= matches!(outcome, Outcome::Fatal(_));
-                    self.tell(key.time_ns, EventKind::Revised { input, reason: outcome.reason() });
-                }
+                Told::Revised(key, input) => self.tell(key.time_ns, EventKind::Revised { input }),
                 Told::Rejected(time_ns, rejection) => self.tell(time_ns, EventKind::Rejected { rejection }),
                 Told::Started(time_ns, from) => self.tell(time_ns, EventKind::Started { from }),
                 Told::Broken(time_ns, reason) => {

@@ -14,6 +14,8 @@ pub enum InputKind {
     Imu,
     /// Relative pose.
     Vio,
+    /// Frame of a camera, at either end of a relative pose. Only its failures are events.
+    Frame,
     /// Pose from a satellite image.
     Anchor,
     /// Factor from an outside provider.
@@ -34,6 +36,7 @@ impl InputKind {
         match self {
             Self::Imu => "imu",
             Self::Vio => "vio",
+            Self::Frame => "frame",
             Self::Anchor => "anchor",
             Self::Factor => "factor",
             Self::Gnss => "gnss",
@@ -143,12 +146,11 @@ pub enum EventKind {
         /// The reason.
         reason: Reason,
     },
-    /// A late input has changed whether an earlier one is in the estimate.
+    /// With a late input, an earlier one is in the estimate that was reported otherwise. The opposite is reported as it would have
+    /// been at once: as [`Degraded`](Self::Degraded), [`Fatal`](Self::Fatal) or [`Rejected`](Self::Rejected).
     Revised {
         /// The earlier input.
         input: InputKind,
-        /// Why it is not in the estimate. `None` if it is.
-        reason: Option<Reason>,
     },
     /// The source of the estimate has changed.
     Label {
@@ -236,8 +238,10 @@ impl Event {
             | EventKind::Started { .. }
             | EventKind::Label { .. }
             | EventKind::Gate { .. }
+            // It takes a warning back, and belongs wherever the warning went.
+            | EventKind::Revised { .. }
             | EventKind::FallbackRecovered => Level::Info,
-            EventKind::Added { .. } | EventKind::Revised { .. } | EventKind::Keyframe { .. } => Level::Debug,
+            EventKind::Added { .. } | EventKind::Keyframe { .. } => Level::Debug,
         }
     }
 

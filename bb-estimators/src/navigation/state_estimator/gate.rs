@@ -72,6 +72,11 @@ pub enum Rejection {
 }
 
 impl Rejection {
+    /// Whether it is by the same condition, with the same or other numbers.
+    pub(super) fn is_alike(&self, other: &Self) -> bool {
+        core::mem::discriminant(self) == core::mem::discriminant(other)
+    }
+
     /// Whether it restarts the dwell.
     pub fn restarts_dwell(&self) -> bool {
         matches!(self, Self::TooFar { .. } | Self::Disagrees { .. })

@@ -9,7 +9,7 @@ use alloc::vec::Vec;
 
 use super::clock::Clock;
 use super::engine::Engine;
-use super::entry::{Entry, Key, Outcome, Payload};
+use super::entry::{Entry, Key, News, Outcome, Payload};
 use super::error::Reason;
 use super::event::{InputKind, StartedFrom};
 use super::factor::ProvidedFactor;
@@ -64,10 +64,10 @@ pub(super) enum Sampled {
 /// Reports of the queue.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Told {
-    /// An input was applied for the first time.
+    /// An input was applied for the first time, or again and became something worse or else.
     Taken(Key, InputKind, Outcome),
-    /// An input was applied again, with a different result.
-    Revised(Key, InputKind, Outcome),
+    /// An input was applied again, and is in the estimate after all.
+    Revised(Key, InputKind),
     /// The gate of the receiver rejected something.
     Rejected(i64, Rejection),
     /// It has started.
@@ -98,7 +98,10 @@ pub(super) struct Queue<F: ProvidedFactor> {
     clock: Clock,
     rooms: Rooms,
     counts: QueueCounts,
-    started: Option<(i64, StartedFrom)>,
+    /// Starts that were told and may be run again.
+    started: Vec<(i64, StartedFrom)>,
+    /// The last failure by a sample that was told.
+    broken: Option<(i64, Reason)>,
     left_ns: i64,
     pub(super) told: Vec<Told>,
 }
@@ -121,7 +124,8 @@ impl<F: ProvidedFactor> Queue<F> {
             clock: Clock::default(),
             rooms,
             counts: QueueCounts::default(),
-            started: None,
+            started: Vec::new(),
+            broken: None,
             left_ns: i64::MIN,
             told: Vec::new(),
         })
@@ -362,7 +366,11 @@ impl<F: ProvidedFactor> Queue<F> {
         if let Err(reason) = self.engine.advance(key, sample, is_gap, config)
             && self.engine.condition() != was
         {
-            self.told.push(Told::Broken(sample.time_ns, reason));
+            let time_ns = sample.time_ns;
+            if self.broken.is_none_or(|(at_ns, before)| at_ns != time_ns || !before.is_alike(&reason)) {
+                self.told.push(Told::Broken(time_ns, reason));
+            }
+            self.broken = Some((time_ns, reason));
         }
         self.look();
     }
@@ -373,20 +381,13 @@ impl<F: ProvidedFactor> Queue<F> {
             return Ok(());
         }
         let (outcome, rejection) = self.engine.apply(entry, config);
-        let (key, before) = (entry.key, entry.outcome.replace(outcome));
-        if let Some(kind) = entry.payload.kind() {
-            match before {
-                None => self.told.push(Told::Taken(key, kind, outcome)),
-                Some(before) if before.reason().is_some() != outcome.reason().is_some() => {
-                    self.told.push(Told::Revised(key, kind, outcome));
-                }
-                Some(_) => {}
-            }
-        }
-        if let (Some(rejection), None) = (rejection, entry.rejection) {
-            self.told.push(Told::Rejected(key.time_ns, rejection));
-        }
-        entry.rejection = rejection;
+        let (key, kind) = (entry.key, entry.payload.kind());
+        let (news, rejection) = entry.became(outcome, rejection);
+        self.told.extend(news.map(|news| match news {
+            News::Revised => Told::Revised(key, kind),
+            News::Became(outcome) => Told::Taken(key, kind, outcome),
+        }));
+        self.told.extend(rejection.map(|rejection| Told::Rejected(key.time_ns, rejection)));
         if matches!(outcome, Outcome::Fatal(_)) {
             return Err(key);
         }
@@ -402,11 +403,11 @@ impl<F: ProvidedFactor> Queue<F> {
             self.left_ns = pose.time_ns;
             self.told.push(Told::Left(pose, sources));
         }
-        let started = self.engine.started();
-        if started != self.started
-            && let Some((time_ns, from)) = started
+        if let Some(started) = self.engine.started()
+            && !self.started.contains(&started)
         {
-            self.started = started;
+            self.started.push(started);
+            let (time_ns, from) = started;
             self.told.push(Told::Started(time_ns, from));
         }
     }
@@ -438,6 +439,9 @@ impl<F: ProvidedFactor> Queue<F> {
         while self.inputs.front().is_some_and(|entry| entry.key <= key) {
             self.inputs.pop_front();
         }
+        // The start of the oldest copy is that of any run.
+        let last = oldest.started();
+        self.started.retain(|started| started.0 >= key.time_ns || Some(*started) == last);
     }
 
     /// Restarts the prediction at the newest estimate.

@@ -8,12 +8,15 @@ mod gate;
 mod interface;
 mod labels;
 mod order;
+mod provided;
 mod records;
 mod refusals;
+mod revised;
 mod soak;
 
 use super::*;
 use flight::{Flight, Sent};
+use provided::Provided;
 
 /// All events.
 type Events = Vec<Event>;
@@ -25,6 +28,9 @@ impl EventSink for Events {
 }
 
 type Estimator = StateEstimator<Events>;
+
+/// With factors of outside providers.
+type Providing = StateEstimator<Events, Provided>;
 
 fn config(strategy: StrategyKind) -> StateEstimatorConfig {
     StateEstimatorConfig { strategy, flight: 7, ..StateEstimatorConfig::default() }

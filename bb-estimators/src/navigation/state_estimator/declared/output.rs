@@ -117,7 +117,8 @@ impl FlightHealth {
 pub struct FlightEvents {
     /// The events.
     pub events: Vec<FlightEvent>,
-    /// Number of further events that did not fit in the message.
+    /// Number of further reports of the level info, and of further keyframes, that did not fit in the message. Errors and warnings
+    /// always do.
     pub lost: u32,
 }
 
@@ -178,12 +179,11 @@ impl Parts {
     pub(super) fn of(kind: &EventKind) -> Self {
         let none = Self::default();
         match kind {
-            EventKind::Added { input, .. } => Self { input: Some(input.name()), ..none },
+            EventKind::Added { input, .. } | EventKind::Revised { input } => {
+                Self { input: Some(input.name()), ..none }
+            }
             EventKind::Degraded { input, reason } | EventKind::Fatal { input, reason } => {
                 Self { input: Some(input.name()), reason: Some(reason.to_string()), ..none }
-            }
-            EventKind::Revised { input, reason } => {
-                Self { input: Some(input.name()), reason: reason.map(|reason| reason.to_string()), ..none }
             }
             EventKind::Rejected { rejection } => Self { reason: Some(rejection.to_string()), ..none },
             EventKind::Label { from, to } => Self { from: Some(from.name()), to: Some(to.name()), ..none },

@@ -110,10 +110,10 @@ impl<F: ProvidedFactor> Queue<F> {
     fn set_back(&mut self, sample: &ImuMean, for_ns: i64, newest_ns: i64, config: &StateEstimatorConfig) {
         self.settle(newest_ns, config);
         for entry in self.inputs.drain(..) {
-            if let (None, Some(kind)) = (entry.outcome, entry.payload.kind()) {
+            if entry.outcome.is_none() && entry.payload.is_added() {
                 self.counts.too_old += 1;
                 let reason = Refusal::TooOld { time_ns: entry.key.time_ns }.into();
-                self.told.push(Told::Taken(entry.key, kind, Outcome::Degraded(reason)));
+                self.told.push(Told::Taken(entry.key, entry.payload.kind(), Outcome::Degraded(reason)));
             }
         }
         self.engine.set_clock_back(sample.time_ns, for_ns, config);
@@ -122,6 +122,7 @@ impl<F: ProvidedFactor> Queue<F> {
         self.copies.clear();
         self.copies.push_back(self.engine.clone());
         self.left_ns = i64::MIN;
+        (self.started, self.broken) = (self.engine.started().into_iter().collect(), None);
         self.counts.set_back += 1;
         self.told.push(Told::SetBack(sample.time_ns, newest_ns.saturating_sub(sample.time_ns)));
         self.newest = Some(*sample);
@@ -184,13 +185,13 @@ impl<F: ProvidedFactor> Queue<F> {
     fn drop_strangers(&mut self, time_ns: i64, config: &StateEstimatorConfig) {
         let mut index = 0;
         while let Some(entry) = self.inputs.get(index) {
-            let (key, kind) = (entry.key, entry.payload.kind());
+            let (key, kind, is_added) = (entry.key, entry.payload.kind(), entry.payload.is_added());
             if self.is_near(key.time_ns, time_ns, config) {
                 index += 1;
                 continue;
             }
             self.inputs.remove(index);
-            if let Some(kind) = kind {
+            if is_added {
                 let reason = self.count(stranger(key.time_ns, time_ns).into());
                 self.told.push(Told::Taken(key, kind, Outcome::Degraded(reason)));
             }

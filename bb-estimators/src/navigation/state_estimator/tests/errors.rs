@@ -2,21 +2,8 @@
 
 use super::flight::{SECOND, STEP};
 use super::*;
-use crate::navigation::smoother::{Factor, Rows};
-use crate::navigation::{Estimate, POSITION, Refusal, States};
-use nalgebra::{Matrix1, Matrix6, Vector3};
-
-/// A provider that reports its position along x, with any value.
-#[derive(Clone, Copy, Debug)]
-struct Along(f64);
-
-impl<S: States, const N: usize> Factor<S, N> for Along {
-    fn linearise(&self, _: Option<&Estimate<N>>, at: &Estimate<N>, rows: &mut Rows<N>) -> Result<(), Refusal> {
-        let mut jacobian = [[0.0; N]];
-        jacobian[0][POSITION] = 1.0;
-        rows.set([self.0 - at.position.x], None, &jacobian, &Matrix1::new(1.0))
-    }
-}
+use crate::navigation::Refusal;
+use nalgebra::{Matrix6, Vector3};
 
 #[test]
 fn degraded_an_outlier_is_refused_and_the_estimate_goes_on() {
@@ -169,11 +156,11 @@ fn fatal_a_window_that_overflows_has_no_estimate_for_this_tick() {
 fn fatal_numbers_that_are_no_good_are_taken_back() {
     let flight = Flight::new(3, 2);
     for strategy in StrategyKind::ALL {
-        let mut estimator: StateEstimator<Events, Along> =
-            StateEstimator::new(config(*strategy), Events::new()).unwrap();
+        let mut estimator: Providing = StateEstimator::new(config(*strategy), Events::new()).unwrap();
         estimator.warm_start(flight.warm_start(0)).unwrap();
         flight.samples.iter().for_each(|sample| estimator.add_imu(sample).unwrap());
-        let results: Vec<_> = (0..5).map(|i| estimator.add_factor(2 * SECOND + i * STEP, 0, Along(1e12))).collect();
+        let results: Vec<_> =
+            (0..5).map(|i| estimator.add_factor(2 * SECOND + i * STEP, 0, Provided::Along(1e12))).collect();
         // The fourth overrides the gate, and would move the estimate to the far side of the sun.
         assert!(matches!(results[3], Err(EstimatorError::Fatal(Reason::Refused(_)))), "{results:?}");
         assert!(estimator.tick(3 * SECOND).is_none(), "none for this tick");

@@ -87,19 +87,3 @@ fn what_is_older_than_the_window_is_refused_and_counted() {
         assert_eq!(count(estimator.sink(), "degraded"), 3, "each is an event");
     }
 }
-
-/// A late input may change earlier decisions, and this is reported.
-#[test]
-fn what_is_revised_is_told() {
-    let flight = Flight::new(4, 1);
-    for strategy in StrategyKind::ALL {
-        let mut estimator = started(&flight, *strategy);
-        flight.samples[1..].iter().for_each(|sample| estimator.add_imu(sample).unwrap());
-        // Fixes first, and only then the health at their times.
-        flight.fixes[14..].iter().for_each(|fix| assert!(estimator.add_gnss(*fix).is_err()));
-        flight.health[10..].iter().for_each(|reading| ignore(estimator.add_gps_health(*reading)));
-        let revised = kinds(estimator.sink(), "revised").map(|event| event.kind);
-        let taken = EventKind::Revised { input: InputKind::Gnss, reason: None };
-        assert_eq!(revised.filter(|kind| *kind == taken).count(), flight.fixes[14..].len());
-    }
-}

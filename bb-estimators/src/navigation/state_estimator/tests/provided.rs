@@ -1,0 +1,45 @@
+//! Factors of outside providers. One type: each costs the compilation of both strategies.
+
+use crate::navigation::smoother::{Factor, NavigationFactor, Rows};
+use crate::navigation::{Estimate, POSITION, Refusal, States};
+use nalgebra::Matrix1;
+
+#[expect(clippy::large_enum_variant, reason = "there are few of them")]
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Provided {
+    /// It observes nothing.
+    Nothing,
+    /// It is out of range at the estimate.
+    Elsewhere,
+    /// A position.
+    Place(NavigationFactor),
+    /// This position along x, whatever its value.
+    Along(f64),
+    /// Wherever the estimate is, as long as that is within 2 m of this position along x. Otherwise far away.
+    Near(f64),
+    /// Always 8 m ahead of the estimate along x, so that iterating does not converge.
+    Ahead,
+}
+
+impl<S: States, const N: usize> Factor<S, N> for Provided {
+    fn linearise(
+        &self,
+        previous: Option<&Estimate<N>>,
+        at: &Estimate<N>,
+        rows: &mut Rows<N>,
+    ) -> Result<(), Refusal> {
+        let x = at.position.x;
+        let (residual, variance) = match self {
+            Self::Nothing => return Err(Refusal::NotObservable),
+            Self::Elsewhere => return Err(Refusal::OutOfRange),
+            Self::Place(factor) => return Factor::<S, N>::linearise(factor, previous, at, rows),
+            Self::Along(value) => (value - x, 1.0),
+            Self::Near(value) if (value - x).abs() < 2.0 => (0.0, 1.0),
+            Self::Near(_) => (1e12, 1.0),
+            Self::Ahead => (8.0, 0.1),
+        };
+        let mut jacobian = [[0.0; N]];
+        jacobian[0][POSITION] = 1.0;
+        rows.set([residual], None, &jacobian, &Matrix1::new(variance))
+    }
+}

@@ -1,0 +1,218 @@
+//! A late input may change what earlier ones became. The events say so as they would have at once, and nothing twice.
+
+use super::entry::{Entry, News, Outcome, Payload};
+use super::flight::{FRAME, SECOND, STEP};
+use super::*;
+use crate::navigation::{ImuMean, Refusal};
+use nalgebra::{Matrix6, Vector3};
+
+/// A flight by the IMU alone.
+fn flown(flight: &Flight, strategy: StrategyKind) -> Providing {
+    let mut estimator: Providing = StateEstimator::new(config(strategy), Events::new()).unwrap();
+    estimator.warm_start(flight.warm_start(0)).unwrap();
+    flight.samples.iter().for_each(|sample| estimator.add_imu(sample).unwrap());
+    estimator
+}
+
+/// An anchor at the truth, moved by `off` metres along x, with this standard deviation of the position.
+fn anchor(flight: &Flight, time_ns: i64, off: f64, deviation: f64) -> PoseAnchor {
+    let truth = Flight::truth(time_ns);
+    let covariance = Matrix6::from_fn(|i, j| match (i == j, i < 3) {
+        (false, _) => 0.0,
+        (true, true) => deviation * deviation,
+        (true, false) => 1e-3,
+    });
+    let position = flight.frame.geodetic(&(truth.position + Vector3::x() * off));
+    PoseAnchor { time_ns, position, covariance, world_from_body: truth.world_from_body, ..flight.anchors[0] }
+}
+
+/// What was told of an input: the name of the event, its level and its reason.
+fn told(events: &[Event], input: InputKind, time_ns: i64) -> Vec<(&'static str, Level, Option<Reason>)> {
+    let of_it = |event: &&Event| {
+        let is_input = match event.kind {
+            EventKind::Added { input: this, .. }
+            | EventKind::Degraded { input: this, .. }
+            | EventKind::Fatal { input: this, .. }
+            | EventKind::Revised { input: this, .. } => this == input,
+            EventKind::Rejected { .. } => input == InputKind::Gnss,
+            _ => false,
+        };
+        is_input && event.time_ns == time_ns
+    };
+    let reason = |event: &Event| match event.kind {
+        EventKind::Degraded { reason, .. } | EventKind::Fatal { reason, .. } => Some(reason),
+        EventKind::Rejected { rejection } => Some(Reason::Gate(rejection)),
+        _ => None,
+    };
+    events.iter().filter(of_it).map(|event| (event.kind.name(), event.level(), reason(event))).collect()
+}
+
+#[test]
+fn an_anchor_that_no_longer_fits_is_degraded_and_warned_of() {
+    let flight = Flight::new(3, 1);
+    for strategy in StrategyKind::ALL {
+        let mut estimator = flown(&flight, *strategy);
+        let wrong_ns = 3 * SECOND - STEP;
+        assert!(matches!(estimator.add_pose_anchor(anchor(&flight, wrong_ns, 9.0, 1.5)), Ok(Added::Taken { .. })));
+        let before = estimator.sink().len();
+        // A precise one, and earlier: with it, the other is far off.
+        assert!(estimator.add_pose_anchor(anchor(&flight, wrong_ns - FRAME, 0.0, 0.1)).is_ok());
+        let told_of = told(&estimator.sink()[before..], InputKind::Anchor, wrong_ns);
+        let [("degraded", Level::Warn, Some(Reason::Refused(Refusal::Gate { .. })))] = told_of[..] else {
+            panic!("{}: {told_of:?}", strategy.name())
+        };
+        // Run again without a change: nothing is new.
+        let before = estimator.sink().len();
+        ignore(estimator.add_gps_health(GpsHealthReading { time_ns: wrong_ns - FRAME, health: GpsHealth::NoFix }));
+        assert_eq!(told(&estimator.sink()[before..], InputKind::Anchor, wrong_ns), []);
+        assert!(estimator.counts().reruns >= 2);
+    }
+}
+
+#[test]
+fn an_anchor_that_overrules_the_estimate_after_all_says_so() {
+    let flight = Flight::new(4, 1);
+    for strategy in StrategyKind::ALL {
+        let mut estimator = flown(&flight, *strategy);
+        let at = |i: i64| 3 * SECOND + i * FRAME;
+        for i in 1..=3 {
+            let refused = estimator.add_pose_anchor(anchor(&flight, at(i), 30.0, 1.0)).unwrap_err();
+            assert!(matches!(refused.reason(), Reason::Refused(Refusal::Gate { .. })), "{refused:?}");
+        }
+        let before = estimator.sink().len();
+        // The first of four that agree comes last.
+        ignore(estimator.add_pose_anchor(anchor(&flight, at(0), 30.0, 1.0)));
+        let told_of = told(&estimator.sink()[before..], InputKind::Anchor, at(3));
+        let [("degraded", Level::Warn, Some(Reason::Raised { .. }))] = told_of[..] else {
+            panic!("{}: {told_of:?}", strategy.name())
+        };
+        for i in 1..=2 {
+            assert_eq!(told(&estimator.sink()[before..], InputKind::Anchor, at(i)), [], "still refused");
+        }
+    }
+}
+
+#[test]
+fn an_input_that_breaks_the_estimate_after_all_is_fatal() {
+    let flight = Flight::new(3, 1);
+    for strategy in StrategyKind::ALL {
+        let mut estimator = flown(&flight, *strategy);
+        let x = |estimator: &Providing, time_ns| {
+            let position = estimator.predicted(time_ns).unwrap().position;
+            estimator.frame().unwrap().position(&position).x
+        };
+        let at = |i: i64| 3 * SECOND - FRAME + i * STEP;
+        for i in 0..3 {
+            let refused = estimator.add_factor(at(i), 0, Provided::Along(1e12)).unwrap_err();
+            assert!(matches!(refused.reason(), Reason::Refused(Refusal::Gate { .. })), "{refused:?}");
+        }
+        let truth_x = flight.frame.position(&flight.frame.geodetic(&Flight::truth(at(3)).position)).x;
+        let origin_x = flight.frame.position(&flight.warm_start(0).position).x;
+        let near = Provided::Near(truth_x - origin_x);
+        assert!(matches!(estimator.add_factor(at(3), 0, near), Ok(Added::Taken { .. })), "{}", strategy.name());
+        assert!(estimator.tick(3 * SECOND).is_some());
+        let (before, was) = (estimator.sink().len(), x(&estimator, 3 * SECOND));
+        assert!(estimator.add_pose_anchor(anchor(&flight, 2 * SECOND, 6.0, 0.1)).is_ok());
+        assert!((x(&estimator, 3 * SECOND) - was) > 3.0, "the anchor is in the estimate");
+        let told_of = told(&estimator.sink()[before..], InputKind::Factor, at(3));
+        let [("fatal", Level::Error, Some(Reason::Refused(refusal)))] = told_of[..] else {
+            panic!("{}: {told_of:?}", strategy.name())
+        };
+        assert!(matches!(refusal, Refusal::OutOfRange | Refusal::NonFinite), "{refusal:?}");
+        assert!(estimator.tick(3 * SECOND + SECOND / 5).is_none(), "none for this tick");
+    }
+}
+
+/// A frame that succeeds is told by its relative pose. Its failure would be told by nothing else. No input is known that makes one
+/// fail: what a factor says is bounded, and so is the state.
+#[test]
+fn a_frame_is_told_if_it_fails() {
+    let payload = Payload::<Provided>::Frame;
+    let mut frame = Entry { key: payload.key(SECOND), payload, outcome: None, rejection: None };
+    assert_eq!(frame.payload.kind(), InputKind::Frame);
+    let added = Outcome::Added { nis: None };
+    let fatal = Outcome::Fatal(Reason::Refused(Refusal::NonFinite));
+    let degraded = Outcome::Degraded(Reason::Refused(Refusal::NonFinite));
+    assert_eq!(frame.became(added, None), (None, None));
+    assert_eq!(frame.became(degraded, None), (Some(News::Became(degraded)), None));
+    assert_eq!(frame.became(degraded, None), (None, None));
+    assert_eq!(frame.became(added, None), (Some(News::Revised), None));
+    assert_eq!(frame.became(fatal, None), (Some(News::Became(fatal)), None));
+}
+
+/// A rejection by another condition is another rejection.
+#[test]
+fn a_fix_that_is_rejected_for_another_reason_says_so() {
+    let flight = Flight::new(4, 1);
+    for strategy in StrategyKind::ALL {
+        let mut estimator = flown(&flight, *strategy);
+        let fix = flight.fixes[14];
+        let unhealthy = Reason::Gate(Rejection::Unhealthy);
+        assert_eq!(estimator.add_gnss(fix), Err(EstimatorError::Degraded(unhealthy)));
+        let spoofed = GpsHealthReading { time_ns: fix.time_ns - STEP, health: GpsHealth::Spoofed };
+        estimator.add_gps_health(spoofed).unwrap();
+        let expected = [unhealthy, Reason::Gate(Rejection::Spoofed)];
+        let told_of = told(estimator.sink(), InputKind::Gnss, fix.time_ns);
+        assert_eq!(told_of, expected.map(|reason| ("rejected", Level::Warn, Some(reason))), "{}", strategy.name());
+    }
+}
+
+/// What was warned of and is not so goes to the recorder as well.
+#[test]
+fn fixes_that_are_taken_after_all_are_told_once() {
+    let flight = Flight::new(4, 1);
+    for strategy in StrategyKind::ALL {
+        let mut estimator = flown(&flight, *strategy);
+        // Fixes first, and only then the health at their times.
+        let late = &flight.fixes[14..];
+        let unhealthy = EstimatorError::Degraded(Reason::Gate(Rejection::Unhealthy));
+        late.iter().for_each(|fix| assert_eq!(estimator.add_gnss(*fix), Err(unhealthy)));
+        let before = estimator.sink().len();
+        flight.health[10..].iter().for_each(|reading| ignore(estimator.add_gps_health(*reading)));
+        for fix in late {
+            let told_of = told(&estimator.sink()[before..], InputKind::Gnss, fix.time_ns);
+            assert_eq!(told_of, [("revised", Level::Info, None)], "{}", strategy.name());
+        }
+    }
+}
+
+/// However often the time at which it was lost is run again.
+#[test]
+fn an_estimate_that_is_lost_is_told_once() {
+    let flight = Flight::new(3, 1);
+    for strategy in StrategyKind::ALL {
+        let mut estimator = flown(&flight, *strategy);
+        let last = flight.samples[flight.samples.len() - 1];
+        let mut time_ns = last.time_ns;
+        while estimator.health().state != HealthState::Lost {
+            time_ns += STEP;
+            let specific_force = Vector3::new(0.0, 0.0, 900.0);
+            ignore(estimator.add_imu(&ImuMean { time_ns, specific_force, ..last }));
+        }
+        assert_eq!(count(estimator.sink(), "fatal"), 1);
+        let health = GpsHealth::Unstable;
+        estimator.add_gps_health(GpsHealthReading { time_ns: time_ns - FRAME, health }).unwrap();
+        assert_eq!((estimator.counts().reruns, count(estimator.sink(), "fatal")), (1, 1), "{}", strategy.name());
+    }
+}
+
+/// Several starts in a time that is run again.
+#[test]
+fn each_start_is_told_once() {
+    let flight = Flight::new(3, 1);
+    for strategy in StrategyKind::ALL {
+        let mut estimator: Providing = StateEstimator::new(config(*strategy), Events::new()).unwrap();
+        flight.samples.iter().for_each(|sample| estimator.add_imu(sample).unwrap());
+        let at = |i: i64| 2 * SECOND + i * FRAME;
+        estimator.add_pose_anchor(anchor(&flight, at(0), 0.0, 1.0)).unwrap();
+        // The fourth that agrees, far from the first, starts it again.
+        (1..=4).for_each(|i| ignore(estimator.add_pose_anchor(anchor(&flight, at(i), 4000.0, 1.0))));
+        let started = |estimator: &Providing| {
+            kinds(estimator.sink(), "started").map(|event| event.time_ns).collect::<Vec<_>>()
+        };
+        assert_eq!(started(&estimator), [at(0), at(4)]);
+        let reading = GpsHealthReading { time_ns: at(0) - STEP, health: GpsHealth::Unstable };
+        estimator.add_gps_health(reading).unwrap();
+        assert_eq!((estimator.counts().reruns > 0, started(&estimator)), (true, vec![at(0), at(4)]));
+    }
+}
