@@ -62,7 +62,8 @@ impl From<Refusal> for Reason {
 pub enum EstimatorError {
     /// There still is an estimate: without the input, or with its covariance raised.
     Degraded(Reason),
-    /// There is no estimate for this tick: its numbers are no longer usable, or the window overflowed.
+    /// There is no estimate for this tick: its numbers are no longer usable, or the window overflowed. An overflow by what the flight
+    /// controller sends, [`add_fc_imu`](super::StateEstimator::add_fc_imu), is [`Degraded`](Self::Degraded).
     Fatal(Reason),
 }
 

@@ -142,11 +142,12 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
     }
 
     /// Adds the data that the flight controller has sent: samples of its IMU, attitudes, and the health and fixes of its receiver.
-    /// All inputs are added, even if some fail.
+    /// All inputs are added, even if some fail. However many there are, they leave room for cameras, anchors and factors, so that a
+    /// flood of them is not fatal.
     ///
     /// # Errors
     ///
-    /// The error of the first input that is not in the estimate.
+    /// The error of the first input that is not in the estimate: [`EstimatorError::Degraded`], unless a fix broke the estimate.
     pub fn add_fc_imu(&mut self, window: &FlightControllerWindow<'_>) -> Result<(), EstimatorError> {
         let mut first = Ok(());
         let mut note = |result: Result<(), EstimatorError>| first = first.and(result);
@@ -177,7 +178,7 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
             let result = match sampled {
                 Ok(Sampled::Taken | Sampled::Waits) => Ok(()),
                 Ok(Sampled::Bridged) => Err(EstimatorError::Degraded(Reason::Bridged)),
-                Err(reason) => Err(failed(reason)),
+                Err(reason) => Err(EstimatorError::Degraded(reason)),
             };
             waits = sampled == Ok(Sampled::Waits);
             self.drain();
@@ -235,7 +236,7 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
         match placed {
             Ok(key) => self.became(key, input),
             Err(reason) => {
-                let error = failed(reason);
+                let error = failed(input, reason);
                 self.fail(time_ns, input, error);
                 Err(error)
             }
@@ -451,6 +452,11 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
     }
 }
 
-fn failed(reason: Reason) -> EstimatorError {
-    if reason == Reason::Overflow { EstimatorError::Fatal(reason) } else { EstimatorError::Degraded(reason) }
+/// The error of an input that was refused. Only what belongs to the window can overflow it.
+fn failed(input: InputKind, reason: Reason) -> EstimatorError {
+    if reason == Reason::Overflow && input.is_of_window() {
+        EstimatorError::Fatal(reason)
+    } else {
+        EstimatorError::Degraded(reason)
+    }
 }

@@ -31,6 +31,14 @@ pub enum InputKind {
 }
 
 impl InputKind {
+    /// Whether it adds to the window of the estimator. All else comes from the flight controller.
+    pub(super) const fn is_of_window(self) -> bool {
+        match self {
+            Self::Vio | Self::Frame | Self::Anchor | Self::Factor => true,
+            Self::Imu | Self::Gnss | Self::Health | Self::Attitude | Self::WarmStart => false,
+        }
+    }
+
     /// The name in logs and recordings.
     pub const fn name(self) -> &'static str {
         match self {

@@ -74,7 +74,8 @@ params! {
         imu_rate: f64 = 400.0, in 1.0..=10_000.0, unit "Hz";
         /// The most inputs a second that are no samples of the IMU; a frame of the camera counts twice.
         ///
-        /// Small: if more come, they are refused as an overflow. Large: costs memory, about 700 bytes an input.
+        /// Small: if more come, they are refused as an overflow. A quarter of the room is kept for relative poses, anchors and
+        /// factors: a flight controller that floods takes none from them. Large: costs memory, about 700 bytes an input.
         input_rate: f64 = 128.0, in 1.0..=10_000.0, unit "Hz";
         /// How far ahead of the newest sample of the IMU an input may be stamped.
         lead: f64 = 0.5, in 0.0..=10.0, unit "s";
@@ -156,6 +157,12 @@ impl Rooms {
     pub(super) fn of(params: &StateEstimatorParams) -> Self {
         let [samples, inputs] = params.room();
         Self { samples, inputs }
+    }
+
+    /// Number of inputs up to which those of the flight controller are accepted: it alone may fill three quarters, which at the
+    /// configured rate it does not.
+    pub(super) fn of_controller(self) -> usize {
+        self.inputs - self.inputs / 4
     }
 }
 

@@ -251,7 +251,8 @@ impl<F: ProvidedFactor> Queue<F> {
         if self.inputs.binary_search_by(|entry| entry.key.cmp(&key)).is_ok() {
             return Err(Reason::Duplicate);
         }
-        if self.inputs.len() + 1 + frames.len() > self.rooms.inputs {
+        let room = if payload.kind().is_of_window() { self.rooms.inputs } else { self.rooms.of_controller() };
+        if self.inputs.len() + 1 + frames.len() > room {
             return Err(Reason::Overflow);
         }
         let mut first = key;

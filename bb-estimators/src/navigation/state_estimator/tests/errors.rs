@@ -152,6 +152,44 @@ fn fatal_a_window_that_overflows_has_no_estimate_for_this_tick() {
     }
 }
 
+/// A flood of what the flight controller sends only degrades: it takes no room from the camera and the anchors.
+#[test]
+fn degraded_a_flood_of_the_flight_controller_stops_no_estimate() {
+    let flight = Flight::new(8, 2);
+    for strategy in StrategyKind::ALL {
+        let mut estimator = started(&flight, *strategy);
+        let (mut outputs, mut overflows) = (0, 0);
+        for sent in &flight.sent(true, true, false) {
+            sent.to(&mut estimator).unwrap();
+            let time_ns = sent.time_ns();
+            // Every 5 ms, five of each: 3,000 a second, instead of 128 altogether.
+            for i in 0..5 {
+                let time_ns = time_ns + i;
+                let window = FlightControllerWindow {
+                    imu: &[],
+                    attitudes: &[AttitudeReading { time_ns, ..flight.warm_start(0).attitude }],
+                    health: &[GpsHealthReading { time_ns, health: GpsHealth::Stable }],
+                    fixes: &[GnssReading {
+                        time_ns,
+                        ..flight.fixes[(time_ns / (SECOND / 5)).clamp(1, 39) as usize - 1]
+                    }],
+                };
+                match estimator.add_fc_imu(&window) {
+                    Err(EstimatorError::Degraded(Reason::Overflow)) => overflows += 1,
+                    Err(error) => assert!(!error.is_fatal(), "{error}"),
+                    Ok(()) => {}
+                }
+            }
+            outputs += u32::from(estimator.tick(time_ns).is_some());
+        }
+        assert_eq!((outputs, count(estimator.sink(), "fatal")), (40, 0), "{}", strategy.name());
+        assert!(overflows > 1000 && estimator.counts().overflows > overflows, "{overflows}");
+        let told = |event: &&Event| matches!(event.kind, EventKind::Degraded { reason: Reason::Overflow, .. });
+        let told = kinds(estimator.sink(), "degraded").filter(told).count();
+        assert_eq!(told as u64, estimator.counts().overflows, "each is told");
+    }
+}
+
 #[test]
 fn fatal_numbers_that_are_no_good_are_taken_back() {
     let flight = Flight::new(3, 2);
