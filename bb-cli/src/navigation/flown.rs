@@ -191,11 +191,13 @@ impl Flown {
     }
 }
 
-/// Whether an input is in the estimate, or why not. An input accepted despite a mismatch, and a bridged gap, count as
-/// included.
+/// Whether an input is in the estimate, or why not. An input accepted despite a mismatch, one whose iterations have not converged,
+/// and a bridged gap count as included.
 fn taken<T>(added: Result<T, EstimatorError>) -> Result<(), String> {
     match added {
-        Ok(_) | Err(EstimatorError::Degraded(Reason::Raised { .. } | Reason::Bridged)) => Ok(()),
+        Ok(_) | Err(EstimatorError::Degraded(Reason::Raised { .. } | Reason::Bridged | Reason::NotConverged)) => {
+            Ok(())
+        }
         Err(error) => Err(error.reason().to_string()),
     }
 }

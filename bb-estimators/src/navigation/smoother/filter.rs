@@ -68,6 +68,8 @@ pub struct FixedLagSmoother<S: States = Navigation, const N: usize = NAVIGATION,
     pub(super) dirty: usize,
     /// Corrections of keyframes before this one may be out of date.
     pub(super) exact_from: usize,
+    /// Whether the last update has left keyframes to relinearise.
+    pub(super) is_pending: bool,
     /// `None` without a camera.
     pub(super) landmarks: Option<Landmarks<N>>,
     pub(super) scratch: Scratch<N>,
@@ -112,6 +114,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
             last: ImuMean { time_ns: 0, angular_velocity: rest, specific_force: rest },
             dirty: 0,
             exact_from: 0,
+            is_pending: false,
             landmarks: None,
             scratch: Scratch::new(params.window + 1),
             gaps: 0,
@@ -229,7 +232,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         self.window.push_back(keyframe);
         self.motion = motion;
         self.time_ns = point.time_ns;
-        (self.dirty, self.exact_from) = (0, 0);
+        (self.dirty, self.exact_from, self.is_pending) = (0, 0, false);
         self.eliminate(1);
     }
 

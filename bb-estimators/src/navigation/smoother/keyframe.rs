@@ -71,6 +71,8 @@ pub(super) struct Keyframe<F, const N: usize> {
     pub(super) seen: Information<N>,
     /// Changes whenever the keyframe is relinearised.
     pub(super) version: u32,
+    /// Whether the last iteration relinearised it.
+    pub(super) has_moved: bool,
     /// Whether a marginalised landmark is linearised about this keyframe's linearisation point.
     pub(super) is_fixed: bool,
     pub(super) pivot: Pivot<N>,
@@ -92,6 +94,7 @@ impl<F, const N: usize> Keyframe<F, N> {
             incoming: Information::none(),
             seen: Information::none(),
             version: 0,
+            has_moved: false,
             is_fixed: false,
             pivot: Pivot::none(),
         }
@@ -111,6 +114,7 @@ impl<F, const N: usize> Keyframe<F, N> {
         self.incoming = Information::none();
         self.seen = Information::none();
         self.version = self.version.wrapping_add(1);
+        self.has_moved = false;
         self.is_fixed = false;
     }
 
@@ -146,6 +150,7 @@ impl<F, const N: usize> Keyframe<F, N> {
         self.point = self.estimate::<S>();
         self.correction = [0.0; N];
         self.version = self.version.wrapping_add(1);
+        self.has_moved = true;
     }
 }
 

@@ -17,6 +17,10 @@ pub struct Updated {
     pub eliminated: usize,
     /// Number of keyframe relinearisations, counting repeated ones.
     pub relinearised: usize,
+    /// Whether it has reached the solution. If not, the limit of iterations was reached while a keyframe was still moving by more than
+    /// [`relinearise_rotation`](SmootherParams::relinearise_rotation) or [`relinearise_position`](SmootherParams::relinearise_position)
+    /// from one iteration to the next: the covariance is that of another place.
+    pub is_converged: bool,
 }
 
 impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
@@ -158,7 +162,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
     /// Solves the window with everything added since the last update.
     ///
     /// Keyframes that moved far are relinearised and eliminated again, as often as the parameters allow. Reaching that
-    /// limit is not an error: the next update continues.
+    /// limit is not an error: the next update continues, and [`Updated::is_converged`] is `false`.
     ///
     /// # Errors
     ///
@@ -171,7 +175,13 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         if let Some(landmarks) = &mut self.landmarks {
             landmarks.judging.forget();
         }
-        for iteration in 0..=self.params.iterations {
+        self.window.iter_mut().for_each(|keyframe| keyframe.has_moved = false);
+        let continues = core::mem::take(&mut self.is_pending);
+        if continues {
+            // The keyframes that are still moving need not be among those that change now.
+            updated.relinearised += self.relinearise(0);
+        }
+        for iteration in usize::from(continues)..=self.params.iterations {
             let least = self.dirty;
             updated.eliminated += self.eliminate(self.window.len());
             let first = self.solve(least);
@@ -179,11 +189,16 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
                 return Err(Refusal::NonFinite);
             }
             if iteration == self.params.iterations {
+                // A keyframe that crosses its threshold for the first time only now has hardly moved.
+                let mut solved = self.window.range(first..);
+                updated.is_converged = !solved.any(|keyframe| keyframe.has_moved && keyframe.is_off(&self.params));
+                self.is_pending = !updated.is_converged;
                 break;
             }
             let moved = self.relinearise(first);
             updated.relinearised += moved;
             if self.dirty >= self.window.len() {
+                updated.is_converged = true;
                 break;
             }
         }
@@ -201,6 +216,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
             let (before, after) = window.split_at_mut(index);
             let (before, Some(keyframe)) = (before.last(), after.first_mut()) else { continue };
             let is_off = keyframe.is_free() && keyframe.is_off(&self.params);
+            keyframe.has_moved = false;
             if is_off {
                 keyframe.relinearise::<S>();
                 moved += 1;

@@ -273,7 +273,8 @@ impl<F: ProvidedFactor> Engine<F> {
             Phase::Running => {
                 let gaps = self.strategy.gaps();
                 let result = self.strategy.propagate(sample, is_gap);
-                if is_gap || self.strategy.gaps() != gaps || self.unconfirmed > 0 {
+                let is_missing = is_gap || self.strategy.gaps() != gaps;
+                if is_missing || self.unconfirmed > 0 || !self.strategy.is_converged() {
                     self.distrust(sample.time_ns);
                 }
                 match result {
@@ -354,6 +355,9 @@ impl<F: ProvidedFactor> Engine<F> {
                 if fused.raised > 1.0 {
                     self.distrust(now_ns);
                     Outcome::Degraded(Reason::Raised { factor: fused.raised })
+                } else if !self.strategy.is_converged() {
+                    self.distrust(now_ns);
+                    Outcome::Degraded(Reason::NotConverged)
                 } else {
                     Outcome::Added { nis: Some(nis) }
                 }

@@ -25,6 +25,9 @@ pub enum Reason {
     },
     /// Samples of the IMU were missing, and the gap was bridged.
     Bridged,
+    /// The measurement is in the estimate, but the smoother's iterations have not converged: the covariance does not fit the estimate yet.
+    /// Later updates continue. The filter corrects in one step and cannot tell.
+    NotConverged,
 }
 
 impl Reason {
@@ -47,6 +50,7 @@ impl fmt::Display for Reason {
             Self::Overflow => f.write_str("there is no room for more inputs within the window"),
             Self::Raised { factor } => write!(f, "it does not fit: the covariance was raised by {factor:.1}"),
             Self::Bridged => f.write_str("a gap of the IMU was bridged"),
+            Self::NotConverged => f.write_str("the iterations have not converged"),
         }
     }
 }

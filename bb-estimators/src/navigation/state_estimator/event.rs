@@ -241,6 +241,7 @@ impl Event {
             | EventKind::Rejected { .. }
             | EventKind::ClockSetBack { .. }
             | EventKind::SamplesDropped { .. }
+            | EventKind::Gate { to: GateState::Blocked, .. }
             | EventKind::CovarianceGrowing { .. } => Level::Warn,
             EventKind::Ready { .. }
             | EventKind::Started { .. }

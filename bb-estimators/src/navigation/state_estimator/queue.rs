@@ -182,7 +182,7 @@ impl<F: ProvidedFactor> Queue<F> {
             Reason::Refused(Refusal::TooOld { .. }) => counts.too_old += 1,
             Reason::Refused(Refusal::InTheFuture { .. }) => counts.in_the_future += 1,
             Reason::Refused(_) => counts.invalid += 1,
-            Reason::Gate(_) | Reason::Raised { .. } | Reason::Bridged => {}
+            Reason::Gate(_) | Reason::Raised { .. } | Reason::Bridged | Reason::NotConverged => {}
         }
         reason
     }

@@ -240,6 +240,17 @@ impl<F: ProvidedFactor> Strategy<F> {
         each!(self, strategy => strategy.measure(measured))
     }
 
+    /// Whether the last correction has converged. If not, the covariance is not to be trusted.
+    pub(super) fn is_converged(&self) -> bool {
+        match self {
+            #[cfg(feature = "smoother")]
+            Self::Smoother(strategy) => strategy.is_converged(),
+            // It corrects in one step.
+            #[cfg(feature = "eskf")]
+            Self::Eskf(..) => true,
+        }
+    }
+
     /// Present position and velocity.
     pub(super) fn motion(&self) -> Option<(Vector3<f64>, Vector3<f64>)> {
         each!(self, strategy => strategy.motion())

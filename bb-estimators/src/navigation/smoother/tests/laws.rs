@@ -198,3 +198,30 @@ fn elimination_is_the_same_from_the_start() {
         assert!(apart(&a, &b) < 1e-10, "{id}: {}", apart(&a, &b));
     }
 }
+
+/// An update that reaches its limit of iterations says so, and the next ones continue, though nothing is added.
+#[test]
+fn an_update_continues_what_the_last_did_not_reach() {
+    let flight = Flight::new(5, 12, 1.0);
+    let solved = |iterations: usize| {
+        let params =
+            SmootherParams { relinearise_rotation: 1e-7, relinearise_position: 1e-6, iterations, ..linear(12) };
+        let mut smoother = Smoother::new(params).unwrap();
+        smoother.start(0, &flight.start).unwrap();
+        for k in 1..12 {
+            flight.fly_to(&mut smoother, k);
+            for factor in &flight.measured[k] {
+                smoother.add(&mut open(), k as u64, *factor).unwrap();
+            }
+        }
+        smoother
+    };
+    let (mut at_once, mut hasty) = (solved(20), solved(1));
+    assert!(at_once.update().unwrap().is_converged);
+    let updates: Vec<bool> = (0..6).map(|_| hasty.update().unwrap().is_converged).collect();
+    assert_eq!((updates[0], updates[5]), (false, true), "{updates:?}");
+    for id in 0..12 {
+        let apart = apart(&at_once.smoothed(id).unwrap(), &hasty.smoothed(id).unwrap());
+        assert!(apart < 1e-6, "{id}: {apart}");
+    }
+}

@@ -55,6 +55,7 @@ pub(in crate::navigation::state_estimator) struct SmootherStrategy<F: ProvidedFa
     cadence: Cadence,
     records: bool,
     left: Option<Pose>,
+    is_converged: bool,
 }
 
 /// Motion from the newest keyframe to the present.
@@ -77,11 +78,17 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
             cadence: Cadence::new(config),
             records: config.params.record_keyframes,
             left: None,
+            is_converged: true,
         })
+    }
+
+    pub(super) fn is_converged(&self) -> bool {
+        self.is_converged
     }
 
     pub(super) fn start(&mut self, start: &Start) -> Result<(), Refusal> {
         self.smoother.start(id_of(start.time_ns), start)?;
+        self.is_converged = true;
         self.cadence.begin(start.time_ns);
         // Earlier refusals relate to another estimate.
         self.streams.anchors.forgive();
@@ -128,7 +135,7 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
     }
 
     fn update(&mut self) -> Result<(), Failure> {
-        self.smoother.update().map_err(Failure::Fatal)?;
+        self.is_converged = self.smoother.update().map_err(Failure::Fatal)?.is_converged;
         Ok(())
     }
 
@@ -248,6 +255,7 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
         let estimate = Estimate { time_ns, ..self.smoother.estimate().ok_or(Refusal::NotStarted)? };
         add_time(&mut covariance, &estimate.velocity, deviation_s);
         self.smoother.adopt::<Smoothed, SMOOTHED>(id_of(time_ns), &estimate, &covariance)?;
+        self.is_converged = true;
         self.cadence.begin(time_ns);
         Ok(())
     }
@@ -266,6 +274,7 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
             replace(&mut covariance, VELOCITY, &of_velocity);
         }
         self.smoother.adopt::<Smoothed, SMOOTHED>(id_of(estimate.time_ns), &estimate, &covariance)?;
+        self.is_converged = true;
         self.streams.positions.forgive();
         Ok(())
     }

@@ -66,6 +66,29 @@ fn degraded_what_does_not_fit_again_and_again_raises_the_covariance() {
     }
 }
 
+/// The smoother tells that its iterations have not converged. The filter has none.
+#[test]
+fn degraded_a_correction_that_does_not_converge_is_told() {
+    let flight = Flight::new(3, 2);
+    for strategy in StrategyKind::ALL {
+        let mut estimator: Providing = StateEstimator::new(config(*strategy), Events::new()).unwrap();
+        estimator.warm_start(flight.warm_start(0)).unwrap();
+        flight.samples.iter().for_each(|sample| estimator.add_imu(sample).unwrap());
+        let time_ns = 3 * SECOND - STEP;
+        let result = estimator.add_factor(time_ns, 0, Provided::Ahead);
+        let output = estimator.predicted(3 * SECOND).unwrap();
+        if strategy.is_smoothing() {
+            assert_eq!(result, Err(EstimatorError::Degraded(Reason::NotConverged)));
+            let input = InputKind::Factor;
+            let told = EventKind::Degraded { input, reason: Reason::NotConverged };
+            assert_eq!(kinds(estimator.sink(), "degraded").map(|event| event.kind).collect::<Vec<_>>(), [told]);
+        } else {
+            assert!(matches!(result, Ok(Added::Taken { .. })), "{result:?}");
+        }
+        assert_eq!(output.degraded, strategy.is_smoothing(), "it is emitted, but degraded");
+    }
+}
+
 #[test]
 fn degraded_a_gap_of_the_imu_is_bridged() {
     let flight = Flight::new(4, 2);
@@ -168,7 +191,7 @@ fn degraded_a_flood_of_the_flight_controller_stops_no_estimate() {
                 let window = FlightControllerWindow {
                     imu: &[],
                     attitudes: &[AttitudeReading { time_ns, ..flight.warm_start(0).attitude }],
-                    health: &[GpsHealthReading { time_ns, health: GpsHealth::Stable }],
+                    health: &[GpsHealthReading { time_ns, health: GpsHealth::Unstable }],
                     fixes: &[GnssReading {
                         time_ns,
                         ..flight.fixes[(time_ns / (SECOND / 5)).clamp(1, 39) as usize - 1]

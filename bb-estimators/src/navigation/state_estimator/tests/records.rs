@@ -70,15 +70,19 @@ fn every_input_is_an_event() {
 fn levels_are_those_of_the_design() {
     for strategy in StrategyKind::ALL {
         let estimator = bad_day(*strategy);
-        let expected = |name: &str| match name {
+        let is_blocking = |event: &Event| matches!(event.kind, EventKind::Gate { to: GateState::Blocked, .. });
+        let expected = |event: &Event| match event.kind.name() {
             "fatal" | "fallback_imminent" | "fallback_engaged" => Level::Error,
             "degraded" | "rejected" | "covariance_growing" => Level::Warn,
-            "ready" | "started" | "gate" | "label" | "fallback_recovered" => Level::Info,
-            _ => Level::Debug,
+            "gate" if is_blocking(event) => Level::Warn,
+            "ready" | "started" | "gate" | "label" | "revised" | "fallback_recovered" => Level::Info,
+            "added" | "keyframe" => Level::Debug,
+            other => panic!("{other}"),
         };
         for event in estimator.sink() {
-            assert_eq!(event.level(), expected(event.kind.name()), "{event:?}");
+            assert_eq!(event.level(), expected(event), "{event:?}");
         }
+        assert_eq!(estimator.sink().iter().filter(|event| is_blocking(event)).count(), 1, "{}", strategy.name());
         let seen = |name: &str| count(estimator.sink(), name) > 0;
         for name in
             ["ready", "started", "added", "degraded", "rejected", "label", "gate", "keyframe", "fallback_engaged"]
