@@ -126,6 +126,23 @@ fn each_event_is_one_json_object_of_its_level_with_its_fields() {
     }
 }
 
+/// A recorder beside the log has everything, whatever is logged.
+#[test]
+fn a_log_that_is_off_costs_the_recorder_nothing() {
+    for strategy in StrategyKind::ALL {
+        let (all, expected) = logged(*strategy, LevelFilter::TRACE);
+        let (none, events) = logged(*strategy, LevelFilter::OFF);
+        assert_eq!((all.len(), none.len()), (expected.len(), 0), "{}", strategy.name());
+        assert_eq!(events, expected, "{}", strategy.name());
+        let texts = events.iter().filter_map(Event::status_text);
+        assert!(
+            texts.clone().count() >= 5 && texts.clone().all(|text| text.as_str().len() <= 50),
+            "{}",
+            strategy.name()
+        );
+    }
+}
+
 #[test]
 fn a_level_holds_what_is_as_severe_or_more() {
     let filters = [

@@ -7,10 +7,11 @@ use bb_core::prelude::*;
 use bb_core::run::DropReason;
 use bb_estimators::StateEstimator;
 use bb_estimators::navigation::state_estimator::{
-    AttitudeReport, FlightEstimator, FlightInputs, FlightOptions, FlightOutputs, GpsHealth, GpsReport,
-    RelativePoseReading, WarmStartReport,
+    AttitudeReport, FlightEstimator, FlightEvents, FlightInputs, FlightOptions, FlightOutputs, GpsHealth,
+    GpsReport, Level, RelativePoseReading, WarmStartReport,
 };
 use bb_estimators::navigation::{Geodetic, LocalFrame};
+use bb_mcap::{Recorder, RecorderOptions, Recording};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 robot! {
@@ -127,10 +128,8 @@ fn the_attitude_levels_the_start_at_the_origin() -> Result<(), StartError> {
     for strategy in ["smoother", "eskf"] {
         let mut builder = Surveying::builder();
         let options = builder.options(surveying::estimator::base::navigation);
-        let origin = *frame().origin();
         options.strategy = strategy.to_owned();
-        (options.origin_latitude, options.origin_longitude) = (origin.latitude, origin.longitude);
-        options.origin_height = origin.height;
+        set_origin(options);
         let estimates = builder.subscribe(surveying::estimator::base::navigation::estimate);
         let mut simulation = builder.simulate()?;
         simulation.publish(surveying::sensor::base::attitude, at(0), attitude());
@@ -141,6 +140,140 @@ fn the_attitude_levels_the_start_at_the_origin() -> Result<(), StartError> {
         let first = estimates.drain().next().expect("it starts at once");
         assert!(first.time < at(250), "{strategy}: {:?}", first.time);
         assert!(first.world_from_body.angle_to(&north()) < 1e-3, "{strategy}");
+    }
+    Ok(())
+}
+
+fn set_origin(options: &mut FlightOptions) {
+    let origin = *frame().origin();
+    (options.origin_latitude, options.origin_longitude) = (origin.latitude, origin.longitude);
+    options.origin_height = origin.height;
+}
+
+/// Without samples nothing drives the estimator, but its ticks go on: one event when the fallback engages, one when it recovers, with
+/// each of two outages.
+#[test]
+fn an_imu_that_stops_engages_the_fallback_and_its_return_recovers_it() -> Result<(), StartError> {
+    for strategy in ["smoother", "eskf"] {
+        let mut builder = Surveying::builder();
+        let options = builder.options(surveying::estimator::base::navigation);
+        options.strategy = strategy.to_owned();
+        set_origin(options);
+        let estimates = builder.subscribe(surveying::estimator::base::navigation::estimate);
+        let health = builder.subscribe(surveying::estimator::base::navigation::health);
+        let events = builder.subscribe(surveying::estimator::base::navigation::events);
+        let mut simulation = builder.simulate()?;
+        simulation.publish(surveying::sensor::base::attitude, at(0), attitude());
+        let (mut told, mut engaged, mut times) = (Vec::new(), Vec::new(), Vec::new());
+        // Samples for three seconds, and silence for seven.
+        for step in (1..=4600).filter(|step| step % 2000 <= 600) {
+            simulation.publish(surveying::sensor::base::shelf::board::imu, at(5 * step), at_rest());
+            times.extend(estimates.drain().map(|estimate| estimate.time));
+            engaged.extend(health.drain().map(|health| (health.state, health.is_fallback_engaged)));
+            let fallbacks = events.drain().flat_map(|events| events.payload.events);
+            let fallbacks = fallbacks.filter(|event| event.kind.starts_with("fallback"));
+            told.extend(fallbacks.map(|event| (event.time.as_nanos() / 1_000_000, event.level, event.kind)));
+        }
+        let expected = [
+            (5000, Level::Error, "fallback_imminent"),
+            (6000, Level::Error, "fallback_engaged"),
+            // A gap of seven seconds is believed after half a second of samples.
+            (10_500, Level::Info, "fallback_recovered"),
+            (15_000, Level::Error, "fallback_imminent"),
+            (16_000, Level::Error, "fallback_engaged"),
+            (20_500, Level::Info, "fallback_recovered"),
+        ];
+        assert_eq!(told.len(), expected.len(), "{strategy}: {told:?}");
+        for ((time_ms, level, kind), (expected_ms, of_level, name)) in told.iter().zip(expected) {
+            let is_it = *level == of_level && kind == name;
+            // Outputs and ticks are 0.2 s apart, and an estimate is predicted for as long.
+            assert!(is_it && (0..=400).contains(&(time_ms - expected_ms)), "{strategy}: {told:?}");
+        }
+        let silent = |time: &MonotonicTime| (at(3300)..at(10_500)).contains(time);
+        assert!(!times.iter().any(silent), "{strategy}: no estimate without the IMU");
+        engaged.dedup_by_key(|(_, is_engaged)| *is_engaged);
+        let engaged: Vec<bool> = engaged.iter().map(|(_, is_engaged)| *is_engaged).collect();
+        assert_eq!(engaged, [false, true, false, true, false], "{strategy}");
+    }
+    Ok(())
+}
+
+/// What went to the recorder is in the file, though nothing is logged: no subscriber of `tracing` is set.
+#[test]
+fn the_recorder_holds_labels_the_gate_rejections_and_faults() -> Result<(), Box<dyn std::error::Error>> {
+    for strategy in ["smoother", "eskf"] {
+        let file = std::env::temp_dir().join(format!("bb-flights-{strategy}-{}.mcap", std::process::id()));
+        let mut builder = Surveying::builder();
+        let options = builder.options(surveying::estimator::base::navigation);
+        options.strategy = strategy.to_owned();
+        set_origin(options);
+        let live = builder.subscribe(surveying::estimator::base::navigation::events);
+        let path = Select::Path("estimator/base/navigation/events");
+        let recorded = builder.subscribe_any(path, None, Overflow::default());
+        let mut recorder = Recorder::new(&file, recorded, RecorderOptions::of::<Surveying>())?;
+        let mut simulation = builder.simulate()?;
+        simulation.publish(surveying::sensor::base::attitude, at(0), attitude());
+        let mut expected = Vec::new();
+        for step in 1..=1600 {
+            let time = at(5 * step);
+            // Stable, then spoofed from 3 s to 4 s, and stable again. No anchor lets the receiver in.
+            if step % 40 == 0 {
+                let health = if (600..800).contains(&step) { GpsHealth::Spoofed } else { GpsHealth::Stable };
+                simulation.publish(surveying::sensor::base::gps_report, time, GpsReport { health });
+                let fix = GnssFix {
+                    status: GnssStatus::Fix,
+                    services: GnssServices::default(),
+                    // One is far off.
+                    position: Some(geodetic(Vector3::new(if step == 400 { 500.0 } else { -0.4 }, -1.5, 1.0))),
+                    position_covariance: Some(Matrix3::identity()),
+                };
+                simulation.publish(surveying::sensor::base::mast::antenna::gps, time, fix);
+            }
+            // The IMU breaks at 7 s, and leads the estimate away: 9 km/s within a second.
+            let broken = Imu::new(Vector3::zeros(), Vector3::new(0.0, 0.0, 900.0));
+            let imu = if step <= 1400 { at_rest() } else { broken };
+            simulation.publish(surveying::sensor::base::shelf::board::imu, time, imu);
+            expected.extend(live.drain().flat_map(|events| events.payload.events));
+            recorder.drain()?;
+        }
+        // Samples of the broken sensor go on at five times the rate, until the estimate is lost.
+        for step in 8001..=24_000 {
+            let broken = Imu::new(Vector3::zeros(), Vector3::new(0.0, 0.0, 900.0));
+            simulation.publish(surveying::sensor::base::shelf::board::imu, at(step), broken);
+            expected.extend(live.drain().flat_map(|events| events.payload.events));
+            recorder.drain()?;
+        }
+        simulation.stop().ok()?;
+        recorder.finish()?;
+        let mut events = Vec::new();
+        for message in Recording::open(&file)?.messages::<FlightEvents>("estimator/base/navigation/events")? {
+            let message = message?;
+            assert_eq!(message.lost, 0);
+            events.extend(message.events.iter().cloned());
+        }
+        std::fs::remove_file(&file)?;
+        assert_eq!(events, expected, "{strategy}: all that was published, in order");
+        let of = |kind: &str| events.iter().filter(|event| event.kind == kind).collect::<Vec<_>>();
+        let changes = |kind: &str| of(kind).into_iter().filter_map(|event| event.to.clone()).collect::<Vec<_>>();
+        assert_eq!(changes("label")[..2], ["satellite_anchored", "dead_reckoned"], "{strategy}");
+        assert_eq!(changes("gate")[..2], ["blocked", "dwelling"], "{strategy}");
+        assert_eq!(of("gate")[0].level, Level::Warn, "{strategy}");
+        let reasons: Vec<_> = of("rejected").into_iter().filter_map(|event| event.reason.as_deref()).collect();
+        assert_eq!(reasons.iter().filter(|reason| **reason == "the receiver was spoofed").count(), 5, "{strategy}");
+        assert!(reasons.iter().any(|reason| reason.starts_with("the receiver has been stable for")), "{reasons:?}");
+        let refused: Vec<_> = of("degraded").into_iter().filter(|event| event.time == at(2000)).collect();
+        let [refused] = refused[..] else { panic!("{strategy}: {refused:?}") };
+        assert_eq!((refused.input.as_deref(), refused.level), (Some("gnss"), Level::Warn));
+        assert!(refused.reason.as_deref().is_some_and(|reason| reason.contains("beyond the gate")), "{refused:?}");
+        let [fatal] = of("fatal")[..] else { panic!("{strategy}: {:?}", of("fatal")) };
+        assert_eq!((fatal.input.as_deref(), fatal.level), (Some("imu"), Level::Error));
+        assert_eq!(of("fallback_engaged").len(), 1, "{strategy}");
+        for event in &events {
+            let length = event.status_text.as_ref().map_or(0, |text| text.chars().count());
+            assert!(length <= 50, "{strategy}: {event:?}");
+            let is_for_ground = ["rejected", "gate", "label", "fatal", "fallback_engaged"].contains(&&*event.kind);
+            assert!(event.status_text.is_some() || !is_for_ground, "{strategy}: {event:?}");
+        }
     }
     Ok(())
 }
@@ -213,13 +346,8 @@ impl Drop for LetsGo {
 fn a_keyframe_that_takes_long_delays_no_sample_of_the_imu() {
     within(60, || {
         let mut builder = Flying::builder();
-        let origin = *frame().origin();
-        let set = |options: &mut FlightOptions| {
-            (options.origin_latitude, options.origin_longitude) = (origin.latitude, origin.longitude);
-            options.origin_height = origin.height;
-        };
-        set(builder.options(flying::estimator::base::navigation));
-        set(builder.options(flying::estimator::base::twin));
+        set_origin(builder.options(flying::estimator::base::navigation));
+        set_origin(builder.options(flying::estimator::base::twin));
         let twin = builder.subscribe(flying::estimator::base::twin::estimate);
         let slow = builder.subscribe(flying::estimator::base::navigation::estimate);
         let running = builder.start().expect("it starts");
