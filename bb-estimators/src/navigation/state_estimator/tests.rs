@@ -1,10 +1,10 @@
 //! The requirements of the design, for every strategy that was built.
 
 mod cadence;
-mod clock;
 mod errors;
 mod flight;
 mod frames;
+mod gaps;
 mod gate;
 mod gate_limits;
 mod interface;
@@ -14,10 +14,13 @@ mod obeyed;
 mod order;
 mod outages;
 mod provided;
+mod rates;
 mod records;
 mod refusals;
 mod revised;
+mod set_back;
 mod soak;
+mod stamps;
 mod unfit_vio;
 
 use super::*;

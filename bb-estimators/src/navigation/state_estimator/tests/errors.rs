@@ -3,7 +3,7 @@
 use super::flight::{SECOND, STEP};
 use super::*;
 use crate::navigation::Refusal;
-use nalgebra::{Matrix6, Vector3};
+use nalgebra::Vector3;
 
 #[test]
 fn degraded_an_outlier_is_refused_and_the_estimate_goes_on() {
@@ -17,7 +17,11 @@ fn degraded_an_outlier_is_refused_and_the_estimate_goes_on() {
                     let moved = flight.frame.position(&anchor.position) + Vector3::new(80.0, 0.0, 0.0);
                     let outlier = PoseAnchor { position: flight.frame.geodetic(&moved), ..*anchor };
                     let error = estimator.add_pose_anchor(outlier).unwrap_err();
-                    assert!(matches!(error, EstimatorError::Degraded(Reason::Refused(Refusal::Gate { .. }))));
+                    let EstimatorError::Degraded(Reason::Refused(Refusal::Gate { nis, limit })) = error else {
+                        panic!("{error:?}")
+                    };
+                    // 80 m at 1.5 m of the anchor and up to 2 m of the estimate, with six degrees of freedom.
+                    assert!(nis > 1000.0 && (27.0..29.0).contains(&limit), "{nis}, {limit}");
                 }
                 sent => sent.to(&mut estimator).unwrap(),
             }
@@ -49,7 +53,13 @@ fn degraded_what_does_not_fit_again_and_again_raises_the_covariance() {
                     let result = estimator.add_pose_anchor(PoseAnchor { position, ..*anchor }).map(drop);
                     let after = estimator.current_estimate().unwrap().quality.covariance_norm;
                     if let Err(EstimatorError::Degraded(Reason::Raised { factor })) = result {
-                        assert!(factor > 1.0 && after > 0.2 * before, "{factor}: {before} to {after}");
+                        // The anchor alone then determines the position: 1.5 m in each axis. Fused with what was known, it would
+                        // be 0.6 of what it was.
+                        let own = 3.0_f64.sqrt() * 1.5 * 1.5;
+                        assert!(
+                            factor > 50.0 && (0.9 * before..1.1 * own).contains(&after),
+                            "{factor}: {before} to {after}"
+                        );
                     }
                     result
                 }
@@ -86,68 +96,6 @@ fn degraded_a_correction_that_does_not_converge_is_told() {
             assert!(matches!(result, Ok(Added::Taken { .. })), "{result:?}");
         }
         assert_eq!(output.degraded, strategy.is_smoothing(), "it is emitted, but degraded");
-    }
-}
-
-#[test]
-fn degraded_a_gap_of_the_imu_is_bridged() {
-    let flight = Flight::new(4, 2);
-    for strategy in StrategyKind::ALL {
-        let mut estimator = started(&flight, *strategy);
-        for sample in
-            flight.samples[1..].iter().filter(|sample| !(2 * SECOND..5 * SECOND / 2).contains(&sample.time_ns))
-        {
-            let result = estimator.add_imu(sample);
-            let is_after = sample.time_ns == 5 * SECOND / 2;
-            assert_eq!(result, if is_after { Err(EstimatorError::Degraded(Reason::Bridged)) } else { Ok(()) });
-        }
-        assert!(estimator.predicted(4 * SECOND).unwrap().covariance[(0, 0)] > 0.1);
-        // The camera divides the gap and measures the motion in it. The motion that the IMU missed is still unknown.
-        let mut estimator = started(&flight, *strategy);
-        for sent in &flight.sent(true, false, false) {
-            let is_missing = (2 * SECOND..5 * SECOND / 2).contains(&sent.time_ns());
-            if is_missing && matches!(sent, Sent::Imu(_)) {
-                continue;
-            }
-            ignore(sent.to(&mut estimator));
-            if let (Sent::Imu(sample), Some(output)) = (sent, estimator.predicted(sent.time_ns())) {
-                let is_before = sample.time_ns < 2 * SECOND;
-                let is_after = (5 * SECOND / 2..3 * SECOND).contains(&sample.time_ns);
-                assert!(if output.degraded { !is_before } else { !is_after }, "{}", sample.time_ns);
-            }
-        }
-        assert!(kinds(estimator.sink(), "degraded").all(|event| event.level() == Level::Warn));
-    }
-}
-
-/// Frames of the camera that say nothing do not make a gap of the IMU shorter: its noise is no smaller if they divide it.
-#[test]
-fn a_gap_that_the_camera_divides_is_as_uncertain() {
-    let flight = Flight::new(4, 2);
-    for strategy in StrategyKind::ALL {
-        let [whole, divided] = [false, true].map(|with_frames| {
-            let mut estimator = started(&flight, *strategy);
-            for sent in &flight.sent(true, false, false) {
-                let is_missing = (2 * SECOND..5 * SECOND / 2).contains(&sent.time_ns());
-                match sent {
-                    Sent::Imu(_) if is_missing => {}
-                    // Once the camera is known, the smoother waits for its frames.
-                    Sent::Vio(vio) if vio.to_ns > 2 * SECOND => {
-                        if with_frames {
-                            let covariance = Matrix6::identity() * 1e8;
-                            ignore(estimator.add_vio(VioOutput { covariance, ..*vio }));
-                        }
-                    }
-                    sent => ignore(sent.to(&mut estimator)),
-                }
-            }
-            estimator.predicted(4 * SECOND).unwrap().covariance
-        });
-        for i in 0..6 {
-            let ratio = divided[(i, i)] / whole[(i, i)];
-            // Undivided, it is one step, in which the tilt does not turn gravity yet.
-            assert!((0.9..2.0).contains(&ratio), "{strategy:?}, {i}: {} and {}", whole[(i, i)], divided[(i, i)]);
-        }
     }
 }
 
@@ -223,7 +171,7 @@ fn fatal_numbers_that_are_no_good_are_taken_back() {
         let results: Vec<_> =
             (0..5).map(|i| estimator.add_factor(2 * SECOND + i * STEP, 0, Provided::Along(1e12))).collect();
         // The fourth overrides the gate, and would move the estimate to the far side of the sun.
-        assert!(matches!(results[3], Err(EstimatorError::Fatal(Reason::Refused(_)))), "{results:?}");
+        assert_eq!(results[3], Err(EstimatorError::Fatal(Reason::Refused(Refusal::OutOfRange))), "{results:?}");
         assert!(estimator.tick(3 * SECOND).is_none(), "none for this tick");
         let after = estimator.tick(3 * SECOND + SECOND / 5).unwrap();
         assert!(flight.frame.position(&after.position).norm() < 200.0, "{:?}", after.position);

@@ -41,6 +41,19 @@ impl Sent {
         }
     }
 
+    /// On a clock that is behind by `by_ns`.
+    pub(super) fn behind(&self, by_ns: i64) -> Self {
+        match *self {
+            Self::Imu(sample) => Self::Imu(ImuMean { time_ns: sample.time_ns - by_ns, ..sample }),
+            Self::Vio(vio) => {
+                Self::Vio(VioOutput { from_ns: vio.from_ns - by_ns, to_ns: vio.to_ns - by_ns, ..vio })
+            }
+            Self::Anchor(anchor) => Self::Anchor(PoseAnchor { time_ns: anchor.time_ns - by_ns, ..anchor }),
+            Self::Fix(fix) => Self::Fix(GnssReading { time_ns: fix.time_ns - by_ns, ..fix }),
+            Self::Health(health) => Self::Health(GpsHealthReading { time_ns: health.time_ns - by_ns, ..health }),
+        }
+    }
+
     pub(super) fn to(&self, estimator: &mut Estimator) -> Result<(), EstimatorError> {
         match self {
             Self::Imu(sample) => estimator.add_imu(sample),

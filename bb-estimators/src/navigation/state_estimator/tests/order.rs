@@ -2,6 +2,7 @@
 
 use super::flight::SECOND;
 use super::*;
+use crate::navigation::Refusal;
 use proptest::prelude::*;
 
 /// All query results.
@@ -77,11 +78,14 @@ fn what_is_older_than_the_window_is_refused_and_counted() {
         let late = |estimator: &mut Estimator, index: usize| estimator.add_pose_anchor(flight.anchors[index]);
         assert!(matches!(late(&mut estimator, 4), Ok(Added::Taken { .. })), "1 s late");
         let refused = late(&mut estimator, 2).unwrap_err();
-        assert!(matches!(refused.reason(), Reason::Refused(crate::navigation::Refusal::TooOld { .. })));
+        let too_old = |time_ns| Reason::Refused(Refusal::TooOld { time_ns });
+        assert_eq!(refused.reason(), too_old(flight.anchors[2].time_ns));
         assert_eq!(refused.to_string(), "degraded: time stamp 3015000000 ns is older than the history");
-        assert!(estimator.add_imu(&flight.samples[100]).is_err());
+        let refused = estimator.add_imu(&flight.samples[100]).unwrap_err();
+        assert_eq!(refused.reason(), too_old(flight.samples[100].time_ns));
         let ahead = PoseAnchor { time_ns: 7 * SECOND, ..flight.anchors[4] };
-        assert!(estimator.add_pose_anchor(ahead).is_err());
+        let in_the_future = Reason::Refused(Refusal::InTheFuture { time_ns: 7 * SECOND });
+        assert_eq!(estimator.add_pose_anchor(ahead), Err(EstimatorError::Degraded(in_the_future)));
         let counts = *estimator.counts();
         assert_eq!((counts.too_old, counts.in_the_future), (2, 1));
         assert_eq!(count(estimator.sink(), "degraded"), 3, "each is an event");

@@ -1,7 +1,7 @@
 //! Each reason for which an input is not in the estimate is provoked, counted and reported.
 
 use super::flight::{FRAME, SECOND, STEP};
-use super::strategy::{Measured, Strategy, Trust};
+use super::strategy::{Failure, Measured, Strategy, Trust};
 use super::*;
 use crate::navigation::eskf::Start;
 use crate::navigation::geodesy::Geodetic;
@@ -193,7 +193,8 @@ fn a_start_forgets_which_anchors_were_refused() {
             rotation_covariance: Matrix3::identity(),
         };
         for _ in 0..3 {
-            assert!(strategy.measure(&Measured::Anchor(far, Trust::Doubted)).is_err());
+            let refused = strategy.measure(&Measured::Anchor(far, Trust::Doubted));
+            assert!(matches!(refused, Err(Failure::Refused(Refusal::Gate { .. }))), "{refused:?}");
         }
         assert_eq!(strategy.refused_positions(), 3);
         strategy.start(&Start { time_ns: 2 * SECOND, ..start }).unwrap();

@@ -1,0 +1,141 @@
+//! Implausible stamps: too few to be a clock that was set.
+
+use super::flight::{SECOND, STEP};
+use super::*;
+use crate::navigation::{ImuMean, Refusal};
+use proptest::prelude::*;
+
+/// An isolated absurd stamp, before the first sample, as the first, or among others. Other inputs are processed as if it were
+/// absent.
+#[test]
+fn one_absurd_stamp_moves_nothing() {
+    let flight = Flight::new(8, 3);
+    for strategy in StrategyKind::ALL {
+        for absurd_ns in [i64::MAX, i64::MIN, 59 * SECOND, -59 * SECOND, 1 << 60] {
+            for at in [0, 1, 800] {
+                let mut estimator = estimator(*strategy);
+                estimator.warm_start(flight.warm_start(0)).unwrap();
+                let mut outputs = 0;
+                for (i, sent) in flight.sent(true, true, false).iter().enumerate() {
+                    if i == at {
+                        let sample = ImuMean { time_ns: absurd_ns, ..flight.samples[0] };
+                        ignore(estimator.add_imu(&sample));
+                    }
+                    sent.to(&mut estimator).unwrap();
+                    if let Some(output) = estimator.tick(sent.time_ns()) {
+                        outputs += 1;
+                        let (error_m, _) = flight.error(&output);
+                        assert!(error_m < 5.0 && !output.degraded, "{}, {absurd_ns}: {error_m}", strategy.name());
+                    }
+                }
+                assert!(outputs >= 39, "{}, {absurd_ns} at {at}: {outputs}", strategy.name());
+                let told = kinds(estimator.sink(), "degraded").count();
+                assert_eq!(told, 1, "{absurd_ns} at {at}: it is refused, and said so");
+            }
+        }
+    }
+}
+
+/// A burst of stamps too small to be believed.
+#[derive(Clone, Copy, Debug)]
+struct Burst {
+    /// The index of the sample it precedes.
+    at: usize,
+    count: i64,
+    step_ns: i64,
+    /// Offset from the present.
+    off_ns: i64,
+    /// Whether it replaces the regular samples of that time.
+    replaces: bool,
+}
+
+fn burst() -> impl Strategy<Value = Burst> {
+    let off = prop_oneof![2 * SECOND + STEP..10 * SECOND, 10 * SECOND..8000 * SECOND];
+    // Many within less than half a second, or up to four over any time.
+    let size = prop_oneof![(1..100_i64, Just(STEP)), (1..=4_i64, STEP..SECOND)];
+    (0..2000_usize, size, off, any::<bool>(), any::<bool>()).prop_map(
+        |(at, (count, step_ns), off_ns, is_ahead, replaces)| {
+            // Times before the origin of the clock are valid.
+            let off_ns = if is_ahead { off_ns } else { -off_ns - count * step_ns };
+            Burst { at, count, step_ns, off_ns, replaces }
+        },
+    )
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(8))]
+
+    /// The estimate is the same as without the burst, except for any missing samples.
+    #[test]
+    fn stamps_that_are_too_few_move_nothing(mut bursts in prop::collection::vec(burst(), 1..6), seed in 0..1000_u64) {
+        let flight = Flight::new(10, seed);
+        bursts.sort_by_key(|burst| burst.at);
+        for strategy in StrategyKind::ALL {
+            let mut estimator = started(&flight, *strategy);
+            let mut left = bursts.iter().peekable();
+            let mut missing_until = 0;
+            let mut seen = 0;
+            for sent in &flight.sent(true, true, false) {
+                if let Sent::Imu(sample) = sent {
+                    seen += 1;
+                    // Two bursts in a row would form a larger one.
+                    while let Some(burst) = left.next_if(|burst| burst.at <= seen) {
+                        if seen < missing_until + 2 {
+                            continue;
+                        }
+                        for i in 0..burst.count {
+                            let time_ns = sample.time_ns + burst.off_ns + i * burst.step_ns;
+                            let refused = estimator.add_imu(&ImuMean { time_ns, ..*sample });
+                            let refusal = if burst.off_ns > 0 {
+                                Refusal::InTheFuture { time_ns }
+                            } else {
+                                Refusal::TooOld { time_ns }
+                            };
+                            prop_assert_eq!(refused, Err(EstimatorError::Degraded(Reason::Refused(refusal))));
+                        }
+                        missing_until = seen + if burst.replaces { burst.count.min(20) as usize } else { 0 };
+                    }
+                    if seen < missing_until {
+                        continue;
+                    }
+                }
+                ignore(sent.to(&mut estimator));
+            }
+            prop_assert_eq!(estimator.counts().set_back, 0);
+            prop_assert_eq!(count(estimator.sink(), "started"), 1);
+            prop_assert_eq!(count(estimator.sink(), "fatal"), 0);
+            let (error_m, _) = flight.error(&estimator.predicted(10 * SECOND).unwrap());
+            prop_assert!(error_m < 5.0, "{}: {error_m} m", strategy.name());
+        }
+    }
+}
+
+/// Reports before the first sample are not discarded for two stamps that agree.
+#[test]
+fn two_absurd_stamps_before_the_first_do_not_cost_the_warm_start() {
+    let flight = Flight::new(4, 3);
+    for strategy in StrategyKind::ALL {
+        let mut estimator = estimator(*strategy);
+        estimator.warm_start(flight.warm_start(0)).unwrap();
+        for i in 0..2 {
+            ignore(estimator.add_imu(&ImuMean { time_ns: 3600 * SECOND + i * STEP, ..flight.samples[0] }));
+        }
+        flight.samples.iter().for_each(|sample| ignore(estimator.add_imu(sample)));
+        assert!(flight.error(&estimator.predicted(4 * SECOND).unwrap()).0 < 5.0, "{}", strategy.name());
+    }
+}
+
+#[test]
+fn the_first_sample_waits_for_one_that_agrees() {
+    let flight = Flight::new(2, 3);
+    for strategy in StrategyKind::ALL {
+        let mut estimator = estimator(*strategy);
+        estimator.add_imu(&flight.samples[0]).unwrap();
+        let last = estimator.sink().last().unwrap().kind;
+        assert_eq!(last, EventKind::Added { input: InputKind::Imu, nis: None, waits: true });
+        let origin = TakeoffOrigin::new(*flight.frame.origin());
+        assert_eq!(estimator.set_takeoff_origin(origin), Err(OriginError::AfterMeasurement));
+        estimator.add_imu(&flight.samples[1]).unwrap();
+        assert_eq!(estimator.held()[0], 2, "none is lost");
+    }
+}
