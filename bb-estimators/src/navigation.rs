@@ -30,6 +30,7 @@ mod fused;
 mod fusion;
 mod geodesy;
 mod history;
+mod jump;
 mod layout;
 mod math;
 pub mod measurement;

@@ -62,7 +62,7 @@ impl<S: States, const N: usize, const M: usize> Bank<S, N, M> {
     /// Updates all filters with a measurement and reweights them by its likelihood; see [`Eskf::update`].
     ///
     /// The filters share a gate: if one filter accepts a measurement, all fuse it, and it counts against the filters that did not
-    /// expect it. A measurement that every filter rejects does not change the weights.
+    /// expect it. A measurement that every filter rejects does not change the weights, and neither does one that overrides every gate.
     ///
     /// # Errors
     ///
@@ -74,7 +74,7 @@ impl<S: States, const N: usize, const M: usize> Bank<S, N, M> {
     ) -> Result<Fused, Refusal> {
         let best = self.best();
         let mut answer = Err(Refusal::NotStarted);
-        let is_plausible = (0..M).any(|i| self.alive[i] && self.filters[i].accepts(&streams[i], measurement));
+        let is_plausible = (0..M).any(|i| self.alive[i] && self.filters[i].fits(&streams[i], measurement));
         for i in (0..M).filter(|i| self.alive[*i]) {
             let (filter, stream) = (&mut self.filters[i], &mut streams[i]);
             let result = if is_plausible {

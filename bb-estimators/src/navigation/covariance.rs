@@ -2,7 +2,7 @@
 
 #![allow(clippy::needless_range_loop, reason = "the indices are those of the equations")]
 
-use nalgebra::{Matrix2, Matrix3, SMatrix, SVector};
+use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector3};
 
 use super::layout::Layout;
 use super::math::{ln, sqrt};
@@ -247,6 +247,17 @@ impl<const N: usize> Covariance<N> {
     /// Adds to a variance.
     pub(in crate::navigation) fn inflate(&mut self, state: usize, variance: f64) {
         self.rows_mut()[state][state] += variance;
+    }
+
+    /// Adds a common error of three states each, of unit variance times these vectors: `P ← P + v vᵀ`.
+    pub(in crate::navigation) fn inflate_along(&mut self, parts: &[(usize, Vector3<f64>)]) {
+        let mut along = [0.0; N];
+        for (first, part) in parts {
+            along[*first..first + 3].copy_from_slice(part.as_slice());
+        }
+        for (row, x) in self.rows_mut().iter_mut().zip(along) {
+            row.iter_mut().zip(along).for_each(|(entry, y)| *entry += x * y);
+        }
     }
 
     /// Rotates three states by a matrix close to the identity: `P ← G P Gᵀ`.

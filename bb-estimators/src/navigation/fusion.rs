@@ -152,7 +152,7 @@ impl<const D: usize, const N: usize> Weighed<D, N> {
 /// The first components of a residual that observe the position. Others can have other units.
 #[cold]
 #[inline(never)]
-fn misfit<const D: usize, const N: usize>(model: &Linearised<D, N>, layout: &Layout<N>) -> [f64; 3] {
+pub(super) fn misfit<const D: usize, const N: usize>(model: &Linearised<D, N>, layout: &Layout<N>) -> [f64; 3] {
     let sees_position = |row: &[f64; N]| {
         row.iter().zip(&layout.blocks).any(|(derivative, block)| *derivative != 0.0 && *block == layout.motion[0])
     };
@@ -196,7 +196,15 @@ fn fitted<const D: usize, const N: usize>(
             (Some(core::array::from_fn(is_raised)), Jump::Block)
         }
         Sight::Height(motion) => (Some(motion), Jump::Observed),
-        Sight::Relative => (None, Jump::Observed),
+        Sight::Relative => {
+            let before = *covariance;
+            let of_heading = fitted_by_one(covariance, model, &layout.of_heading(), Jump::Observed);
+            if let Some(fitted) = of_heading.filter(|fitted| fitted.nis() <= FITS * D as f64) {
+                return Some(fitted);
+            }
+            *covariance = before;
+            (None, Jump::Observed)
+        }
         Sight::Heading => return fitted_by_one(covariance, model, &layout.of_heading(), Jump::Block),
         Sight::Nothing => (None, Jump::Block),
     };

@@ -279,7 +279,11 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
                 result = Some(of_it);
             }
         }
-        if time_of(&self.now) != Some(sample.time_ns) {
+        let reached = time_of(&self.now);
+        if reached == Some(from) {
+            // A whole sample is replayed as it was propagated at first: filters of a bank may differ in what is a gap.
+            let _ = self.now.filter_mut().propagate(sample);
+        } else if reached != Some(sample.time_ns) {
             let _ = self.now.filter_mut().propagate_part(sample, is_gap);
         }
         result

@@ -18,9 +18,9 @@ const NEVER_RAISED: u8 = u8::MAX;
 /// A correction is at most this many times the largest deviation.
 const MOST_DEVIATIONS: f64 = 100.0;
 
-/// The largest variance of a scale that a jump leaves behind: by a third, as a tyre that bursts. One that is off by more is the fault of
-/// what it multiplies: a velocity that is ten times too large is not explained by wheels of a tenth of their size.
-pub(in crate::navigation) const MOST_SCALE: f64 = 0.1;
+/// The largest variance of a scale that a jump leaves behind: three deviations are a third, as a tyre that bursts. One that is off by
+/// more is the fault of what it multiplies: a velocity that is ten times too large is not explained by wheels of a tenth of their size.
+pub(in crate::navigation) const MOST_SCALE: f64 = 0.01;
 
 /// Groups the errors by quantity, with the largest meaningful variance of each.
 #[derive(Clone, Copy, Debug)]

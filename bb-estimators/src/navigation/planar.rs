@@ -44,7 +44,6 @@ mod estimate;
 #[cfg(feature = "runtime")]
 mod estimator;
 mod filter;
-mod jump;
 mod measurement;
 mod params;
 mod propagation;

@@ -140,3 +140,63 @@ fn the_shortest_sample_decides_what_is_a_gap() {
     let bank: Bank<crate::navigation::Navigation, 15, 2> = Bank::new([(filter(0.2), 1.0), (filter(0.05), 1.0)]);
     assert_eq!(bank.longest_sample(), 0.05);
 }
+
+/// A sample that one filter takes for a gap and the other does not, with a fix that arrives only after it.
+#[test]
+fn filters_that_differ_in_what_is_a_gap_fuse_late_fixes_as_in_time() {
+    #[derive(Clone, PartialEq, Debug)]
+    struct Pair(Bank<crate::navigation::Navigation, 15, 2>, [Stream; 2]);
+
+    impl Replayed for Pair {
+        type Filter = Bank<crate::navigation::Navigation, 15, 2>;
+        type Measurement = GnssPosition;
+
+        fn filter(&self) -> &Self::Filter {
+            &self.0
+        }
+
+        fn filter_mut(&mut self) -> &mut Self::Filter {
+            &mut self.0
+        }
+
+        fn update(&mut self, fix: &GnssPosition) -> Result<Fused, Refusal> {
+            self.0.update(&mut self.1, fix)
+        }
+    }
+
+    let filter = |longest_sample: f64| Eskf::new(EskfParams { longest_sample, ..EskfParams::default() }).unwrap();
+    let mut bank = Bank::new([(filter(0.3), 1.0), (filter(0.1), 1.0)]);
+    let rest = Vector3::zeros();
+    bank.start(&Start::at(0, (rest, 1.0), (rest, 0.1), (UnitQuaternion::identity(), 0.01))).unwrap();
+    let after = |arrives_ns: i64| {
+        let mut history = History::<_, 10, 4, 2>::new(Pair(bank.clone(), Default::default()), 0).unwrap();
+        let specific_force = Vector3::new(0.0, 0.0, EskfParams::default().gravity);
+        for time_ns in [10_000_000, 20_000_000, 220_000_000, 230_000_000] {
+            history.propagate(&ImuMean { time_ns, angular_velocity: rest, specific_force }).unwrap();
+            if time_ns == arrives_ns {
+                history.update(20_000_000, &GnssPosition::new(rest, 1.0, 1.0)).unwrap();
+            }
+        }
+        history.now().clone()
+    };
+    assert_eq!(after(20_000_000), after(230_000_000));
+}
+
+/// Like that of a single filter, the covariance of each is raised until the fix fits.
+#[test]
+fn a_fix_that_overrides_the_gates_raises_every_covariance() {
+    let (mut bank, [_, mut gnss]) = fly(0.0);
+    let before = bank.weights();
+    let far = GnssPosition::new(Vector3::new(1200.0, 1e3, 0.0), 1.0, 1.0);
+    for _ in 0..3 {
+        assert!(bank.update(&mut gnss, &far).is_err());
+    }
+    let fused = bank.update(&mut gnss, &far).unwrap();
+    assert!(fused.raised > 1.0, "{fused:?}");
+    for (i, filter) in bank.filters().iter().enumerate().filter(|(i, _)| before[*i] > 0.0) {
+        assert_eq!(gnss[i].counts().recoveries, 1);
+        let off = (filter.estimate().unwrap().position - far.position).norm();
+        assert!(off < 5.0 && filter.is_consistent(), "{i}: {off} m");
+    }
+    assert_eq!(bank.weights(), before);
+}

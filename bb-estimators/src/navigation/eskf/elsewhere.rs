@@ -75,6 +75,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
         self.upkeep.started(estimate.time_ns);
         self.estimate = Some(estimate);
         self.covariance = adopted;
+        self.jump = None;
         Ok(())
     }
 
@@ -130,6 +131,9 @@ impl<S: States, const N: usize> Eskf<S, N> {
         self.covariance.bound(&Self::LAYOUT);
         self.estimate = Some(estimate);
         self.upkeep.started(estimate.time_ns);
+        if let (Some(jump), Some(_)) = (&mut self.jump, world_from_body) {
+            jump.relocated();
+        }
         Ok(())
     }
 
@@ -181,6 +185,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
             self.covariance.transform(first + 3, &rotation);
         }
         self.covariance.enforce();
+        self.jump = self.jump.map(|jump| jump.rotated(&rotation));
         Ok(())
     }
 

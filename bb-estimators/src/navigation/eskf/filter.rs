@@ -1,6 +1,6 @@
 //! The filter: IMU samples propagate it, and measurements correct it.
 
-use nalgebra::{Matrix6, SMatrix, SVector, Vector3};
+use nalgebra::{Matrix3, Matrix6, SMatrix, SVector, Vector3};
 
 use super::params::{EskfParams, ImuDensities};
 use super::propagation::Transition;
@@ -9,13 +9,15 @@ use super::start::Start;
 use crate::attitude::ParamsError;
 use crate::navigation::covariance::Covariance;
 use crate::navigation::fused::Fused;
-use crate::navigation::fusion::{Sight, Weighed, innovation, prepared};
+use crate::navigation::fusion::{Sight, Weighed, innovation, misfit, prepared};
+use crate::navigation::jump::{BiasJump, Moved, bounded};
 use crate::navigation::layout::Layout;
 use crate::navigation::math::{Integrals, exp, sqrt};
 use crate::navigation::measurement::{Linearised, Measurement};
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{
-    Estimate, NAVIGATION, Navigation, Optional, POSITION, ROTATION, States, VELOCITY, distinct, offset,
+    Estimate, GYROSCOPE_BIAS, NAVIGATION, Navigation, Optional, POSITION, ROTATION, States, VELOCITY, distinct,
+    offset,
 };
 use crate::navigation::stream::{Gate, Stream};
 use crate::navigation::upkeep::{Upkeep, upkeep_methods};
@@ -54,6 +56,8 @@ pub struct Eskf<S: States = Navigation, const N: usize = NAVIGATION> {
     pub(super) estimate: Option<Estimate<N>>,
     pub(super) covariance: Covariance<N>,
     pub(super) upkeep: Upkeep,
+    /// A jump of the gyroscope's bias that may be the fault of a sensor.
+    pub(super) jump: Option<BiasJump<3>>,
     states: core::marker::PhantomData<S>,
 }
 
@@ -74,7 +78,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
         let densities = params.densities();
         let covariance = Covariance::new();
         let states = core::marker::PhantomData;
-        Ok(Self { params, densities, estimate: None, covariance, upkeep: Upkeep::default(), states })
+        Ok(Self { params, densities, estimate: None, covariance, upkeep: Upkeep::default(), jump: None, states })
     }
 
     /// The parameters that the filter was created with.
@@ -94,6 +98,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
         self.upkeep.started(start.time_ns);
         self.estimate = Some(estimate);
         self.covariance = covariance;
+        self.jump = None;
         Ok(())
     }
 
@@ -129,6 +134,10 @@ impl<S: States, const N: usize> Eskf<S, N> {
         estimate.angular_velocity = sample.angular_velocity - estimate.gyroscope_bias;
         estimate.specific_force = sample.specific_force - estimate.accelerometer_bias;
         let transition = Transition::advance(estimate, dt, self.params.gravity);
+        if let Some(jump) = self.jump {
+            let by_bias = Matrix3::from_fn(|i, k| transition.rotation[i][k]);
+            self.jump = jump.turned(sample.time_ns, &estimate.gyroscope_bias, |way| by_bias * way);
+        }
         transition.apply(self.covariance.rows_mut(), &self.densities);
         self.covariance.bound(&Self::LAYOUT);
         self.decay(dt);
@@ -189,6 +198,9 @@ impl<S: States, const N: usize> Eskf<S, N> {
     ) -> Result<Fused, Refusal> {
         let result = self.fuse(stream, measurement, Gate::Closed);
         stream.count(&result);
+        if let (Ok(_), Some(estimate)) = (&result, &self.estimate) {
+            stream.fused_at(estimate.time_ns);
+        }
         result
     }
 
@@ -200,15 +212,19 @@ impl<S: States, const N: usize> Eskf<S, N> {
     ) -> Result<Fused, Refusal> {
         let result = self.fuse(stream, measurement, Gate::Open);
         stream.count(&result);
+        if let (Ok(_), Some(estimate)) = (&result, &self.estimate) {
+            stream.fused_at(estimate.time_ns);
+        }
         result
     }
 
-    /// Whether the gate of `stream` would accept a measurement.
-    pub(crate) fn accepts<M: Measurement<D>, const D: usize>(&self, stream: &Stream, measurement: &M) -> bool {
+    /// Whether a measurement fits the gate of `stream`, and would not only override it.
+    pub(crate) fn fits<M: Measurement<D>, const D: usize>(&self, stream: &Stream, measurement: &M) -> bool {
         let model = self.linearised(stream, measurement);
         let innovation = model.and_then(|model| innovation(&self.covariance, &model));
         innovation.is_ok_and(|innovation| {
-            stream.weigh(innovation.nis(), D, innovation.log_density(), Gate::Closed).is_ok()
+            let verdict = stream.weigh(innovation.nis(), D, innovation.log_density(), Gate::Closed);
+            verdict.is_ok_and(|verdict| verdict.raised <= 1.0)
         })
     }
 
@@ -235,8 +251,62 @@ impl<S: States, const N: usize> Eskf<S, N> {
         if let Some(index) = offset::<S>(Optional::Keyframe) {
             self.reset_rotation(index + 3, &error);
         }
+        if weighed.is_raised() {
+            self.doubt(stream, &model, &error);
+        }
         self.covariance.settle(&Self::LAYOUT);
         Ok(weighed.fused(&model, &Self::LAYOUT))
+    }
+
+    /// Raises what a measurement that has overridden its gate and corrected `error` may have made wrong, if the sensor was, and cannot
+    /// find itself.
+    #[cold]
+    #[inline(never)]
+    fn doubt<const D: usize>(&mut self, stream: &Stream, model: &Linearised<D, N>, error: &SVector<f64, N>) {
+        let fused_ns = stream.fused_ns();
+        let Some(estimate) = &self.estimate else { return };
+        let part = |first: usize| error.fixed_rows::<3>(first).into_owned();
+        if model.jacobian.iter().any(|row| row[GYROSCOPE_BIAS..GYROSCOPE_BIAS + 3].iter().any(|x| *x != 0.0)) {
+            let (bias, change) = (estimate.gyroscope_bias, part(GYROSCOPE_BIAS));
+            let in_world = estimate.world_from_body * change;
+            let moved = Moved { now_ns: estimate.time_ns, fused_ns, bias, change, in_world };
+            let (jump, turned) = BiasJump::follow(self.jump, &moved);
+            self.jump = jump;
+            let turned = self.bounded(&turned);
+            self.covariance.inflate_along(&[(ROTATION, turned)]);
+        }
+        if let (Sight::Relative, Some(keyframe), Some(first)) =
+            (Self::sight(model), estimate.keyframe, offset::<S>(Optional::Keyframe))
+        {
+            // Both poses, so that the relative pose between them stays as well known: the next keyframe is set at the wrong one.
+            let (way, moved) = (estimate.position - keyframe.position, part(POSITION) - part(first));
+            let turned = self.bounded(&(part(ROTATION) - part(first + 3)));
+            self.covariance.inflate_along(&[(POSITION, moved), (first, moved)]);
+            let turn = |covariance: &mut Covariance<N>, turned: Vector3<f64>| {
+                covariance.inflate_along(&[(ROTATION, turned), (first + 3, turned), (first, way.cross(&turned))]);
+            };
+            turn(&mut self.covariance, turned);
+            let misfit = misfit(model, &Self::LAYOUT);
+            let closed_s = fused_ns.map_or(0.0, |from| estimate.time_ns.saturating_sub(from) as f64 * 1e-9);
+            if stream.goes_on(&misfit) && closed_s > 0.0 {
+                let apart = moved / closed_s;
+                self.covariance.inflate_along(&[(VELOCITY, apart)]);
+                if stream.goes_on_again(&misfit) {
+                    let tilt = apart.norm() / (closed_s * self.params.gravity);
+                    for axis in [Vector3::x(), Vector3::y()] {
+                        let tilted = self.bounded(&(axis * tilt));
+                        turn(&mut self.covariance, tilted);
+                    }
+                }
+            }
+        }
+        self.covariance.bound(&Self::LAYOUT);
+    }
+
+    /// The part of a turn that makes the attitude at most unknown.
+    fn bounded(&self, turned: &Vector3<f64>) -> Vector3<f64> {
+        let variance = self.covariance.matrix().fixed_view::<3, 3>(ROTATION, ROTATION).trace();
+        bounded(turned, variance)
     }
 
     #[inline]
@@ -271,8 +341,8 @@ impl<S: States, const N: usize> Eskf<S, N> {
             return Sight::Relative;
         }
         if !sees(POSITION + 2) {
-            let is_heading = D == 1 && sees(ROTATION + 2) && !(VELOCITY..ROTATION).any(sees);
-            return if is_heading { Sight::Heading } else { Sight::Nothing };
+            let is_heading = D == 1 || (VELOCITY..ROTATION).any(sees);
+            return if is_heading && sees(ROTATION + 2) { Sight::Heading } else { Sight::Nothing };
         }
         let mut motion = [false; N];
         motion[POSITION + 2] = true;

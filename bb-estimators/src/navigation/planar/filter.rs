@@ -1,9 +1,8 @@
 //! The filter: gyroscope samples propagate it, and measurements correct it.
 
-use nalgebra::{Matrix2, Matrix3, SMatrix, Vector2};
+use nalgebra::{Matrix2, Matrix3, SMatrix, Vector1, Vector2};
 
 use super::estimate::{GYROSCOPE_BIAS, HEADING, POSITION, PlanarEstimate, STATES, VELOCITY, WHEEL_SCALE};
-use super::jump::{BiasJump, Moved};
 use super::measurement::PlanarMeasurement;
 use super::params::PlanarParams;
 use super::propagation::Transition;
@@ -13,6 +12,7 @@ use crate::navigation::covariance::Covariance;
 use crate::navigation::eskf::{ImuMean, LONGEST_GAP_S, seconds_between};
 use crate::navigation::fused::Fused;
 use crate::navigation::fusion::{Sight, Weighed, prepared};
+use crate::navigation::jump::{BiasJump, Moved, bounded};
 use crate::navigation::layout::{Layout, MOST_SCALE};
 use crate::navigation::math::{exp, wrapped};
 use crate::navigation::measurement::Linearised;
@@ -21,9 +21,6 @@ use crate::navigation::refusal::Refusal;
 use crate::navigation::stream::{Gate, Stream};
 use crate::navigation::upkeep::{Upkeep, upkeep_methods};
 use crate::params::Params as _;
-
-/// The variance of a heading of which nothing is known, rad²: uniform over a turn.
-const UNKNOWN_HEADING: f64 = core::f64::consts::PI * core::f64::consts::PI / 3.0;
 
 const LAYOUT: Layout<STATES> = {
     let mut layout = Layout::EMPTY;
@@ -139,7 +136,7 @@ pub struct PlanarEkf {
     covariance: Covariance<STATES>,
     upkeep: Upkeep,
     /// A jump of the bias that may be the fault of a sensor.
-    jump: Option<BiasJump>,
+    jump: Option<BiasJump<1>>,
 }
 
 impl PlanarEkf {
@@ -208,6 +205,9 @@ impl PlanarEkf {
         Transition::advance(estimate, dt).apply(self.covariance.rows_mut(), &densities);
         if is_gap {
             self.upkeep.bridged();
+        } else if let Some(jump) = self.jump {
+            let bias = Vector1::new(estimate.gyroscope_bias);
+            self.jump = jump.turned(sample.time_ns, &bias, |way| -way * dt);
         }
         let scale = self.params.wheel_scale;
         if scale.time_s != f64::INFINITY {
@@ -276,11 +276,12 @@ impl PlanarEkf {
     #[cold]
     fn follow_jump(&mut self, fused_ns: Option<i64>, change: f64) {
         let Some(estimate) = &self.estimate else { return };
-        let moved = Moved { now_ns: estimate.time_ns, fused_ns, bias: estimate.gyroscope_bias, change };
-        let (jump, variance) = BiasJump::follow(self.jump, &moved);
+        let (bias, change) = (Vector1::new(estimate.gyroscope_bias), Vector1::new(change));
+        let moved = Moved { now_ns: estimate.time_ns, fused_ns, bias, change, in_world: change };
+        let (jump, turned) = BiasJump::follow(self.jump, &moved);
         self.jump = jump;
-        let unknown = (UNKNOWN_HEADING - self.covariance.matrix()[(HEADING, HEADING)]).max(0.0);
-        self.covariance.inflate(HEADING, variance.min(unknown));
+        let turned = bounded(&turned, self.covariance.matrix()[(HEADING, HEADING)]);
+        self.covariance.inflate(HEADING, turned.norm_squared());
     }
 
     /// Relocates a filter that was wrong, m: sets the position and, if given, the velocity (in the world, m/s) and the heading
@@ -325,6 +326,9 @@ impl PlanarEkf {
         self.estimate = Some(estimate);
         self.covariance = covariance;
         self.upkeep.started(estimate.time_ns);
+        if let (Some(jump), true) = (&mut self.jump, heading.is_some()) {
+            jump.relocated();
+        }
         Ok(())
     }
 

@@ -6,8 +6,8 @@ use proptest::prelude::*;
 use super::{Boat, Drone, Rover, started};
 use crate::navigation::state::{Navigation, Optional, POSITION, ROTATION, States, VELOCITY};
 use crate::navigation::{
-    BarometricHeight, BodyVelocity, Eskf, GnssPosition, GnssVelocity, Height, ImuMean, MagneticHeading,
-    RelativePose, Stream, WheelSpeed,
+    BarometricHeight, BodyVelocity, Eskf, EskfParams, GnssHeading, GnssPosition, GnssVelocity, Height, ImuMean,
+    MagneticHeading, RelativePose, Start, Stream, WheelSpeed,
 };
 
 /// Propagates over a second at rest.
@@ -348,5 +348,62 @@ fn wheels_do_not_shrink_to_fit_a_wrong_velocity() {
     let estimate = filter.estimate().unwrap();
     let scale = estimate.scalar::<Rover>(Optional::WheelScale);
     assert!(scale.abs() < 0.4 && estimate.velocity.x < 10.0, "{scale}, {} m/s", estimate.velocity.x);
+    assert!(filter.is_consistent());
+}
+
+/// A wheel that contradicts the heading, which was believed wrongly, turns it back. It says nothing against the tilt.
+#[test]
+fn a_wheel_that_does_not_fit_leaves_the_tilt() {
+    let mut filter = Eskf::<Navigation, 15>::new(EskfParams::default()).unwrap();
+    let along = Vector3::new(10.0, 0.0, 0.0);
+    let level = UnitQuaternion::identity();
+    filter.start(&Start::at(0, (Vector3::zeros(), 2.0), (along, 0.5), (level, 0.1))).unwrap();
+    let [mut gnss, mut compass, mut wheels] = [Stream::default(); 3];
+    let heading = |heading: f64| GnssHeading { heading, deviation: 0.02, baseline: Vector3::x() };
+    let speed = WheelSpeed { speed: 10.0, deviation: 0.05, forward: Vector3::x(), lever_arm: Vector3::zeros() };
+    for second in 0..30 {
+        rest(&mut filter, second);
+        filter.update(&mut gnss, &GnssVelocity::new(along, 0.02, 0.02)).unwrap();
+        filter.update(&mut compass, &heading(0.0)).unwrap();
+        filter.update(&mut wheels, &speed).unwrap();
+    }
+    for _ in 0..4 {
+        let _ = filter.update(&mut compass, &heading(0.4));
+    }
+    let before = *filter.covariance();
+    for _ in 0..4 {
+        let _ = filter.update(&mut wheels, &speed);
+    }
+    assert_eq!(wheels.counts().recoveries, 1, "{:?}", wheels.counts());
+    for i in [ROTATION, ROTATION + 1] {
+        let [before, after] = [&before, filter.covariance()].map(|covariance| covariance[(i, i)]);
+        assert!(after <= before * (1.0 + 1e-9), "{i}: {before} rad², then {after}");
+    }
+    let (roll, pitch, _) = filter.estimate().unwrap().world_from_body.euler_angles();
+    assert!(roll.abs() < 0.02 && pitch.abs() < 0.02, "{roll} {pitch}");
+}
+
+/// Odometry that has turned wrongly is believed, and the next keyframe is set at the wrong pose, where odometry that is right again fits.
+#[test]
+fn the_heading_in_the_world_is_as_uncertain_as_odometry_has_turned_it() {
+    let (mut filter, mut odometry) = (started::<Drone, { Drone::DIMENSION }>(), Stream::default());
+    let step = |filter: &mut Eskf<Drone, _>, odometry: &mut Stream, second: i64, turn: f64| {
+        filter.set_keyframe(second as u64);
+        rest(filter, second);
+        let turn = (UnitQuaternion::from_euler_angles(0.0, 0.0, turn), 0.005);
+        let _ = filter.update(odometry, &RelativePose::new(second as u64, (Vector3::zeros(), 0.02), turn));
+    };
+    let mut compass = Stream::default();
+    for second in 0..20 {
+        step(&mut filter, &mut odometry, second, 0.0);
+        let heading = GnssHeading { heading: 0.0, deviation: 0.02, baseline: Vector3::x() };
+        filter.update(&mut compass, &heading).unwrap();
+    }
+    (20..24).for_each(|second| step(&mut filter, &mut odometry, second, 0.5));
+    assert_eq!(odometry.counts().recoveries, 1, "{:?}", odometry.counts());
+    (24..40).for_each(|second| step(&mut filter, &mut odometry, second, 0.0));
+    let (.., heading) = filter.estimate().unwrap().world_from_body.euler_angles();
+    let deviation = filter.covariance()[(ROTATION + 2, ROTATION + 2)].sqrt();
+    assert!((heading - 0.5).abs() < 0.1 && deviation > 0.3, "{heading} rad, {deviation} rad");
     assert!(filter.is_consistent());
 }

@@ -4,7 +4,9 @@ use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 
 use super::super::EskfParams;
 use crate::navigation::noise::Noise;
-use crate::navigation::{BarometricHeight, BodyVelocity, Eskf, GnssPosition, ImuMean, Navigation, Start, Stream};
+use crate::navigation::{
+    BarometricHeight, BodyVelocity, Eskf, GnssPosition, ImuMean, Navigation, ROTATION, Start, Stream, ZeroRotation,
+};
 
 const DT: f64 = 0.01;
 
@@ -72,4 +74,46 @@ fn an_attitude_that_is_wrong_for_no_known_reason_is_found() {
         }
     }
     assert!(off.len() <= 4, "{}: {off:?}", off.len());
+}
+
+/// A robot that turns by 0.2 rad/s while something says that it does not, and is at rest before and after. Returns the error of the
+/// heading, its deviation, and that of the tilt.
+fn turn_at_rest(seed: u64, wrong_s: f64, world: UnitQuaternion<f64>) -> (f64, f64, f64) {
+    let mut noise = Noise::new(seed);
+    let params = EskfParams::default();
+    let mut filter = Eskf::<Navigation>::new(params).unwrap();
+    let (mut heading, mut rotation) = (0.0, Stream::default());
+    let origin = Vector3::zeros();
+    filter.start(&Start::at(0, (origin, 0.5), (origin, 0.1), (world, 0.01))).unwrap();
+    let last = ((50.0 + wrong_s) / DT) as i64;
+    for i in 1..=last {
+        let time_s = i as f64 * DT;
+        let is_turning = (40.0..40.0 + wrong_s).contains(&time_s);
+        let rate = if is_turning { 0.2 } else { 0.0 };
+        heading += rate * DT;
+        let angular_velocity = Vector3::new(0.0, 0.0, rate) + noise.vector(params.gyroscope_noise / DT.sqrt());
+        let specific_force = Vector3::z() * params.gravity + noise.vector(params.accelerometer_noise / DT.sqrt());
+        filter.propagate(&ImuMean { time_ns: i * 10_000_000, angular_velocity, specific_force }).unwrap();
+        // Not while it starts and stops.
+        if i % 10 == 0 && !(0.0..0.5).contains(&(time_s - 40.0 - wrong_s)) {
+            let _ = filter.update(&mut rotation, &ZeroRotation { deviation: 0.005 });
+        }
+    }
+    assert!(filter.is_consistent() && rotation.counts().recoveries >= 2, "{:?}", rotation.counts());
+    let truth = world * UnitQuaternion::from_euler_angles(0.0, 0.0, heading);
+    let error = (truth * filter.estimate().unwrap().world_from_body.inverse()).scaled_axis();
+    let deviation = |i: usize| filter.covariance()[(ROTATION + i, ROTATION + i)].sqrt();
+    (error.z.abs(), deviation(2), deviation(0).max(deviation(1)))
+}
+
+/// A bias that jumps there and back has turned the heading meanwhile, but not the tilt.
+#[test]
+fn a_bias_that_jumps_back_makes_the_attitude_uncertain_by_as_much_as_it_has_turned() {
+    for seed in 0..8 {
+        let wrong_s = 2.0 + 0.5 * seed as f64;
+        let world = UnitQuaternion::from_euler_angles(0.0, 0.0, 0.4 * seed as f64);
+        let (heading, deviation, tilt) = turn_at_rest(seed, wrong_s, world);
+        assert!(heading > 0.2 && heading < 4.0 * deviation, "{seed}: {heading} rad, {deviation} rad");
+        assert!(tilt < 0.1, "{seed}: {tilt} rad");
+    }
 }

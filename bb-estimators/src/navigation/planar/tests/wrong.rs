@@ -171,6 +171,29 @@ fn a_bias_that_jumps_back_makes_the_heading_uncertain() {
     }
 }
 
+/// A small jump of the bias that is two minutes old by then does not hide a large one that is taken back.
+#[test]
+fn a_small_jump_does_not_hide_a_large_one() {
+    let mut filter = PlanarEkf::new(PlanarParams::default()).unwrap();
+    filter.start(&PlanarStart::at(0, (Vector2::zeros(), 0.5), (0.0, 0.01), (Vector2::zeros(), 0.1))).unwrap();
+    let (mut rates, mut noise, mut heading) = (Stream::default(), Noise::new(3), 0.0);
+    for i in 1..=14_000_i64 {
+        let time_s = i as f64 * DT;
+        let rate = if (122.0..127.0).contains(&time_s) { 0.3 } else { 0.0 };
+        let bias = if time_s > 5.0 { 0.02 } else { 0.0 };
+        heading += rate * DT;
+        let measured = rate + bias + noise.next() * PlanarParams::default().gyroscope_noise / sqrt(DT);
+        let (angular_velocity, specific_force) = (Vector3::new(0.0, 0.0, measured), Vector3::zeros());
+        filter.propagate(&ImuMean { time_ns: i * 10_000_000, angular_velocity, specific_force }).unwrap();
+        if i % 10 == 0 {
+            let _ = filter.update(&mut rates, &YawRate { rate: 0.002 * noise.next(), deviation: 0.002 });
+        }
+    }
+    assert!(rates.counts().recoveries >= 3, "{:?}", rates.counts());
+    let (error, deviation) = (heading - filter.estimate().unwrap().heading, filter.covariance()[(2, 2)].sqrt());
+    assert!(error > 1.0 && error < 4.0 * deviation, "{error} rad, {deviation} rad");
+}
+
 /// Of wheels, yaw rates, fixes and headings, any may be wrong in any way for up to twelve seconds.
 #[test]
 fn whatever_was_wrong_is_over_a_minute_later() {
