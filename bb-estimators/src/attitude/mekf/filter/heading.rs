@@ -22,6 +22,10 @@ const CONTRADICTION: f64 = 0.35;
 
 const CONTRADICTION_DEVIATIONS: f64 = 4.0;
 
+/// A field that contradicts the heading by more than this, rad, is turned by iron: a drift, which the heading follows, does
+/// not get as far ahead of it.
+const TURNED: f64 = 2.0 * CONTRADICTION;
+
 impl<T: Real> MekfFilter<T> {
     /// The heading measured by the field, corrected for the offset and the lag.
     pub(super) fn heading(&mut self, dt: T, fields: &FieldMeans<T>) -> Heading<T> {
@@ -52,7 +56,10 @@ impl<T: Real> MekfFilter<T> {
         let across = rotation.tr_mul(&Vector3::new(field.y, -field.x, T::ZERO)) / squared.max(least).sqrt();
         let doubt = if self.iron.is_adopted() { T::ONE } else { reference.offset_doubt() };
         let unknown = across.dot(&(self.iron.covariance() * across)) * doubt / reference.squared_norm();
-        let white = T::TWO * T::of(FIELD_TIME_S) * (usual + disturbance + unknown);
+        // A known heading shows the component of a disturbance that norm and dip do not.
+        let is_turned = contradicts && angle.abs() > T::of(TURNED);
+        let turned = if is_turned { angle * angle * horizontal * horizontal } else { T::ZERO };
+        let white = T::TWO * T::of(FIELD_TIME_S) * (usual + disturbance + turned + unknown);
         let disturbed = (white + reference.lasting_drift()) / (horizontal * horizontal);
         let slope = reference.vertical() / horizontal;
         let variance = disturbed / dt + rate * rate * self.iron.lag_variance();

@@ -112,3 +112,20 @@ fn a_drift_does_not_make_the_heading_jump() {
     // The field turns by 28°, and 3° in a second.
     assert!(worst < 20.0 && step < 10.0, "{worst}, {step} in a second");
 }
+
+/// A field that is turned has the norm and dip of the reference: only the heading itself tells that it is disturbed.
+#[test]
+fn a_field_that_contradicts_a_known_heading_is_hardly_followed() {
+    for turned in [1.0, 2.0, -1.0] {
+        let (mut world, mut filter) = (World::new(), filter(true));
+        world.run(&mut filter, 60, true);
+        world.field = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turned) * FIELD;
+        world.run(&mut filter, 3, true);
+        let error = world.error_of(&filter).heading;
+        assert!(error < 0.5, "turned by {turned} rad: {error}");
+        // One that lasts is another field.
+        world.run(&mut filter, 40, true);
+        let error = world.error_of(&filter).heading;
+        assert!((error - f64::abs(turned).to_degrees()).abs() < 6.0, "turned by {turned} rad: {error}");
+    }
+}
