@@ -52,6 +52,8 @@ pub struct MekfFilter<T: Real = f64> {
     /// Shown by the last window; takes effect with the next sample, since the end of a window is work enough.
     adoption: Option<Adoption<T>>,
     last_field: Vector3<T>,
+    /// Whether the body has moved since that was measured.
+    last_field_is_stale: bool,
     squared_acceleration: T,
     vertical: Vertical<T>,
 }
@@ -76,6 +78,7 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
             iron: HardIron::new(params.magnetometer_latency),
             adoption: None,
             last_field: Vector3::zeros(),
+            last_field_is_stale: false,
             squared_acceleration: T::ZERO,
             vertical: Vertical::new(false),
         };
@@ -102,6 +105,7 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
 
         let bias_deviation = self.errors.variance(BIAS).max(T::ZERO).sqrt();
         self.rest.add(step.dt_s, measured, &sample.specific_force, &self.bias, bias_deviation);
+        self.last_field_is_stale |= self.rest.is_moving();
         let before = core::mem::replace(&mut self.rotation, *orientation.to_rotation_matrix().matrix());
         let middle = (before + self.rotation) * T::HALF;
         self.window.add_rate(step.dt_s, &middle, measured);
@@ -109,11 +113,9 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
         self.window.add_force(step.dt_s, rotation, &rate, &sample.specific_force);
         if step.field.is_some()
             && let Some(field) = sample.magnetic_field
-            && (field != self.last_field || self.rest.is_detected())
+            && self.is_present(&field)
         {
-            // A driver that is faster than the magnetometer repeats its last value, which is then stale.
             self.window.add_field(&self.rotation, &rate, &field, &self.iron.offset);
-            self.last_field = field;
         }
 
         if self.window.is_full() {
@@ -186,6 +188,17 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
 }
 
 impl<T: Real> MekfFilter<T> {
+    /// Whether a field is one of the present orientation. A driver that is faster than the magnetometer repeats the last
+    /// value, and so does a magnetometer that hangs; at rest, a value that was measured since the motion may repeat.
+    fn is_present(&mut self, field: &Vector3<T>) -> bool {
+        if *field != self.last_field {
+            self.last_field = *field;
+            self.last_field_is_stale = false;
+            return true;
+        }
+        self.rest.is_detected() && !self.last_field_is_stale
+    }
+
     /// The gyroscope's scale and misalignment errors: its reading is `(1 + E)` times the angular velocity and the
     /// bias, for small E.
     pub fn gyroscope_calibration(&self) -> Matrix3<T> {

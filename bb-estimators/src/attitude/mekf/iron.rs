@@ -66,6 +66,13 @@ pub(super) struct HardIron<T> {
     /// Variance of the heading due to the uncertain offset when the sums restarted, as far as the field has not
     /// corrected the heading since, rad².
     unknown_heading: T,
+    /// Mean square error of what has replaced that: of the field's heading, without a turn as uncertain after any number of
+    /// measurements, rad².
+    followed: T,
+    /// Variance of a heading that was known and turned to another field, rad²: the previous one may have been right.
+    reopened: T,
+    /// The time constant with which that fades, s.
+    reopened_s: T,
 }
 
 impl<T: Real> HardIron<T> {
@@ -90,6 +97,9 @@ impl<T: Real> HardIron<T> {
             home: Vector3::zeros(),
             held_s: T::ZERO,
             unknown_heading: T::ZERO,
+            followed: T::ZERO,
+            reopened: T::ZERO,
+            reopened_s: T::ONE,
         }
     }
 
@@ -119,12 +129,28 @@ impl<T: Real> HardIron<T> {
         self.held_s = T::ZERO;
         if is_heading {
             self.unknown_heading = T::ZERO;
+            self.followed = T::ZERO;
+            self.reopened = T::ZERO;
         }
     }
 
-    /// A measurement of the heading corrects this fraction of its error.
+    /// A measurement of the heading replaces this fraction of its error by that of the field.
     pub(super) fn correct_heading(&mut self, fraction: T) {
-        self.unknown_heading *= (T::ONE - fraction) * (T::ONE - fraction);
+        let left = (T::ONE - fraction) * (T::ONE - fraction);
+        self.unknown_heading *= left;
+        self.followed *= left;
+        if !self.is_heading
+            && let Some(fit) = &self.fit
+        {
+            self.followed += (T::ONE - left) * fit.squared_heading_error();
+        }
+    }
+
+    /// The heading was known, and was turned to another field than one seen for this long, s: that field, too, may have been
+    /// the right one, until the new one has been seen for longer.
+    pub(super) fn reopen_heading(&mut self, variance: T, seen_s: T) {
+        self.reopened = variance;
+        self.reopened_s = seen_s.max(T::ONE);
     }
 
     /// The mean field in the world without the offset, if there was a field since the sums began.
@@ -148,6 +174,8 @@ impl<T: Real> HardIron<T> {
         self.turn(rotation);
         self.is_heading = true;
         self.unknown_heading = T::ZERO;
+        self.followed = T::ZERO;
+        self.reopened = T::ZERO;
     }
 
     /// Covariance of the uncertainty of the offset that disturbs the heading: an offset of zero is trusted until
@@ -184,6 +212,16 @@ impl<T: Real> HardIron<T> {
         }
     }
 
+    /// Mean square error of the heading by all that the fields leave open, rad²: also that the fit, which is not adopted, is
+    /// right, or the heading of before.
+    pub(super) fn squared_heading_error(&self) -> T {
+        let error = match &self.fit {
+            Some(fit) if self.is_heading => fit.squared_heading_error(),
+            _ => self.unknown_heading + self.followed,
+        };
+        error + self.reopened
+    }
+
     /// Adds the field of a window of `dt` seconds.
     pub(super) fn observe(
         &mut self,
@@ -200,6 +238,7 @@ impl<T: Real> HardIron<T> {
             self.is_doubted = true;
         }
         self.held_s += dt;
+        self.reopened *= T::ONE - (dt / self.reopened_s).min(T::ONE);
         self.seen_s += dt;
         if self.held_s > T::of(HOME_S) {
             self.home = self.offset;
@@ -219,11 +258,16 @@ impl<T: Real> HardIron<T> {
             return None;
         }
         self.fit = Some(fit);
-        if !self.is_heading && self.unknown_heading > T::of(KNOWN_HEADING * KNOWN_HEADING) {
+        let known = T::of(KNOWN_HEADING * KNOWN_HEADING);
+        if !self.is_heading && (self.unknown_heading > known || self.followed > known) {
             // By these sums alone, the heading is off by no more than this.
             let field = fit.field_of(&self.offset, self.lag.mean);
             let angle = field.x.atan2(field.y);
-            self.unknown_heading = self.unknown_heading.min(angle * angle + fit.heading_variance());
+            let most = angle * angle + fit.heading_variance();
+            if self.unknown_heading > known {
+                self.unknown_heading = self.unknown_heading.min(most);
+            }
+            self.followed = self.followed.min(most);
         }
         if norm > T::of(0.1) * means.field.norm() {
             self.unit = norm;
@@ -233,7 +277,9 @@ impl<T: Real> HardIron<T> {
 
     /// Begins again, with what is known of the heading.
     fn begin_anew(&mut self) {
+        let error = self.squared_heading_error() - self.reopened;
         self.unknown_heading = self.heading_variance();
+        self.followed = error - self.unknown_heading;
         self.begin(false);
     }
 

@@ -72,7 +72,7 @@ impl<T: Real> MekfFilter<T> {
     /// the offset and by a drift of the field.
     pub(super) fn field_heading_variance(&self) -> T {
         let drift = self.field.as_ref().map_or(T::ZERO, FieldReference::drift_variance);
-        self.iron.heading_variance() + drift
+        self.iron.squared_heading_error() + drift
     }
 
     /// Adopts an offset shown by the field, and the heading if the fields are its only source.
@@ -81,6 +81,7 @@ impl<T: Real> MekfFilter<T> {
         let Adoption { field, variance, is_heading, is_other_field, duration } = adoption;
         // The heading measurement of this window used the previous offset.
         self.measurements.forget_heading();
+        let seen_s = self.field.as_ref().map_or(T::ZERO, FieldReference::seen_s);
         if *is_heading || *is_other_field {
             self.field = Some(FieldReference::seen(in_plane(field), *duration));
         }
@@ -89,6 +90,9 @@ impl<T: Real> MekfFilter<T> {
         let is_evident = angle.abs() > T::of(REOPENED) && angle * angle > T::of(4.0) * known;
         if !is_heading && !is_evident {
             return orientation;
+        }
+        if !is_heading {
+            self.iron.reopen_heading(angle * angle, seen_s);
         }
         let turned = turn_heading(&orientation, angle);
         let rotation = turn_heading(&UnitQuaternion::identity(), angle);

@@ -27,6 +27,7 @@ impl<T: Real> MekfFilter<T> {
         self.heading_known = direction.is_some_and(|direction| heading_error(&(orientation * direction)).is_some());
         self.rest = Rest::new(&sample.angular_velocity, &sample.specific_force);
         self.last_field = sample.magnetic_field.unwrap_or_default();
+        self.last_field_is_stale = false;
         self.begin(&orientation, T::of(INITIAL_TILT), T::of(INITIAL_HEADING));
         self.vertical = Vertical::new(true);
     }

@@ -243,6 +243,13 @@ impl<T: Real> Fit<T> {
         let gradient = Vector4::new(on_body.x, on_body.y, on_body.z, self.rate.dot(&across));
         gradient.dot(&(self.covariance * gradient)) + self.noise / (self.duration * squared)
     }
+
+    /// Mean square error of a heading in use, rad², which may be that of another offset or field: how far B is from north, and
+    /// how uncertain that is.
+    pub(super) fn squared_heading_error(&self) -> T {
+        let angle = self.field.x.atan2(self.field.y);
+        angle * angle + self.heading_variance()
+    }
 }
 
 #[cfg(test)]

@@ -3,15 +3,20 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::{World, filter};
-use crate::attitude::AttitudeFilter;
 use crate::attitude::laws::FIELD;
 use crate::attitude::mekf::MekfFilter;
+use crate::attitude::{AttitudeFilter, ImuSample};
 
 /// Standard deviation of the heading, degrees.
 fn deviation(filter: &MekfFilter) -> f64 {
     let rotation = filter.world_from_body().unwrap().to_rotation_matrix();
     let in_world = rotation * filter.orientation_uncertainty().unwrap() * rotation.transpose();
     in_world[(2, 2)].sqrt().to_degrees()
+}
+
+/// What looks like noise, in -1..=1.
+fn noise(i: i32) -> Vector3<f64> {
+    Vector3::new(1.7, 2.9, 4.3).map(|factor| (factor * f64::from(i) * f64::from(i % 997)).sin())
 }
 
 #[test]
@@ -127,5 +132,90 @@ fn a_field_that_contradicts_a_known_heading_is_hardly_followed() {
         world.run(&mut filter, 40, true);
         let error = world.error_of(&filter).heading;
         assert!((error - f64::abs(turned).to_degrees()).abs() < 6.0, "turned by {turned} rad: {error}");
+    }
+}
+
+/// The offset of a sensor that has not turned is no better known after any number of fields, however noisy they are.
+#[test]
+fn a_weak_and_noisy_field_at_rest_shows_no_heading() {
+    for seed in 0..4 {
+        let (mut world, mut filter) = (World::new(), filter(true));
+        world.field = FIELD * 0.02;
+        for i in 0..6_000 {
+            let noise = noise(i * (7 + seed)) * 0.4e-6;
+            let sample = world.sample(false);
+            filter
+                .update(&ImuSample { magnetic_field: sample.magnetic_field.map(|field| field + noise), ..sample })
+                .unwrap();
+            let second = i / 100;
+            assert_ne!(filter.is_heading_trusted(), Some(true), "after {second} s: {}", deviation(&filter));
+        }
+    }
+}
+
+/// A heading by the offset in use is as uncertain as the fit of another offset says, until that is adopted.
+#[test]
+fn a_heading_far_from_the_fits_is_not_trusted() {
+    let (mut trusted, mut missed) = (0, 0);
+    for case in 0..24 {
+        let (mut world, mut filter) = (World::new(), filter(true));
+        let angle = f64::from(case);
+        world.magnet = Vector3::new((3.1 * angle).sin(), angle.cos(), (5.3 * angle).sin()) * 12e-6;
+        for i in 0..4_000 {
+            let t = f64::from(i) * 0.01;
+            // Hardly enough to tell an offset.
+            let rate = Vector3::new((3.1 * t).sin(), (4.3 * t + angle).sin(), (2.6 * t).cos()) * 0.2;
+            world.truth *= UnitQuaternion::from_scaled_axis(rate * 0.01);
+            let sample = world.sample(false);
+            let field = sample.magnetic_field.map(|field| field + noise(i) * 0.5e-6);
+            filter.update(&ImuSample { angular_velocity: rate, magnetic_field: field, ..sample }).unwrap();
+            if filter.is_heading_trusted() == Some(true) {
+                trusted += 1;
+                missed += i32::from(world.error_of(&filter).heading > 2.0 * deviation(&filter));
+            }
+        }
+    }
+    assert!(f64::from(missed) < 0.05 * f64::from(trusted), "{missed} of {trusted}");
+}
+
+/// A magnetometer that hangs gives the field of an orientation of long ago, also at rest.
+#[test]
+fn a_magnetometer_that_hangs_does_not_turn_the_heading() {
+    let (mut world, mut filter) = (World::new(), filter(true));
+    world.run(&mut filter, 25, true);
+    let hung = world.sample(true).magnetic_field;
+    for i in 0..6_000 {
+        let sample = ImuSample { magnetic_field: hung, ..world.sample(i < 800) };
+        filter.update(&sample).unwrap();
+        let error = world.error_of(&filter).heading;
+        assert!(error < 3.0, "after {} s: {error}", i / 100);
+    }
+}
+
+/// Another offset and another field at once, found beside a reference that was seen for long: the previous heading may have
+/// been the right one.
+#[test]
+fn a_known_heading_that_was_reopened_is_trusted_late() {
+    for case in 0..12 {
+        let (mut world, mut filter) = (World::new(), filter(true));
+        let angle = f64::from(case);
+        let axis = Vector3::new(angle.sin(), (2.3 * angle).cos(), 2.0).normalize();
+        let mut trusted_s = 0.0;
+        for i in 0..8_000 {
+            let rate = axis * (0.01 * f64::from(i)).sin();
+            world.truth *= UnitQuaternion::from_scaled_axis(rate * 0.01);
+            let sample = world.sample(false);
+            let mut field = sample.magnetic_field.map(|field| field + noise(i) * 0.3e-6);
+            if i > 4_000 {
+                // Axes that are mixed up.
+                field = field.map(|field| Vector3::new(field.y, field.x, -field.z));
+            }
+            filter.update(&ImuSample { angular_velocity: rate, magnetic_field: field, ..sample }).unwrap();
+            let (error, deviation) = (world.error_of(&filter).heading, deviation(&filter));
+            if filter.is_heading_trusted() == Some(true) && error > 20.0 && error > 4.0 * deviation {
+                trusted_s += 0.01;
+            }
+        }
+        assert!(trusted_s < 1.0, "case {case}: wrong and trusted for {trusted_s} s");
     }
 }
