@@ -28,6 +28,9 @@ const GIVEN: f64 = 0.087;
 /// Standard deviation of the heading from one magnetic sample indoors, rad.
 const INITIAL_HEADING: f64 = 1.0;
 
+/// A faster angular velocity is a rotation, rad/s: 2°/s, as in the detection of rest.
+const TURNING: f64 = 0.035;
+
 /// A heading known up to this standard deviation is trusted, rad: 10°.
 const TRUSTED_HEADING: f64 = 0.175;
 
@@ -52,7 +55,7 @@ pub struct MekfFilter<T: Real = f64> {
     /// Shown by the last window; takes effect with the next sample, since the end of a window is work enough.
     adoption: Option<Adoption<T>>,
     last_field: Vector3<T>,
-    /// Whether the body has moved since that was measured.
+    /// Whether the body has turned since that was measured.
     last_field_is_stale: bool,
     squared_acceleration: T,
     vertical: Vertical<T>,
@@ -105,7 +108,7 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
 
         let bias_deviation = self.errors.variance(BIAS).max(T::ZERO).sqrt();
         self.rest.add(step.dt_s, measured, &sample.specific_force, &self.bias, bias_deviation);
-        self.last_field_is_stale |= self.rest.is_moving();
+        self.last_field_is_stale |= rate.norm_squared() > T::of(TURNING * TURNING);
         let before = core::mem::replace(&mut self.rotation, *orientation.to_rotation_matrix().matrix());
         let middle = (before + self.rotation) * T::HALF;
         self.window.add_rate(step.dt_s, &middle, measured);
@@ -189,7 +192,7 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
 
 impl<T: Real> MekfFilter<T> {
     /// Whether a field is one of the present orientation. A driver that is faster than the magnetometer repeats the last
-    /// value, and so does a magnetometer that hangs; at rest, a value that was measured since the motion may repeat.
+    /// value, and so does a magnetometer that hangs; at rest, a value that was measured since the last turn may repeat.
     fn is_present(&mut self, field: &Vector3<T>) -> bool {
         if *field != self.last_field {
             self.last_field = *field;

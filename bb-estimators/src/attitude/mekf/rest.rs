@@ -57,11 +57,6 @@ impl<T: Real> Rest<T> {
         self.still_s = if still { (self.still_s + dt).min(T::of(1e3)) } else { T::ZERO };
     }
 
-    /// Whether the last sample shows motion.
-    pub(super) fn is_moving(&self) -> bool {
-        self.still_s <= T::ZERO
-    }
-
     pub(super) fn is_detected(&self) -> bool {
         self.still_s > T::of(LEAST_S)
     }
