@@ -321,8 +321,7 @@ fn each_sensor_fails_in_turn_and_the_robot_says_so() -> Result<(), Box<dyn std::
         // while it is blind it does not know.
         let most = if *time < 22.0 {
             7.0
-        } else if is_blind || (52.0..66.0).contains(time) {
-            // It follows the magnet by a degree more than it did when it trusted the reference field less soon.
+        } else if is_blind {
             3.5
         } else {
             2.5
