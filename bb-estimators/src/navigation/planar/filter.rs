@@ -205,9 +205,6 @@ impl PlanarEkf {
         Transition::advance(estimate, dt).apply(self.covariance.rows_mut(), &densities);
         if is_gap {
             self.upkeep.bridged();
-        } else if let Some(jump) = self.jump {
-            let bias = Vector1::new(estimate.gyroscope_bias);
-            self.jump = jump.turned(sample.time_ns, &bias, |way| -way * dt);
         }
         let scale = self.params.wheel_scale;
         if scale.time_s != f64::INFINITY {
@@ -219,8 +216,19 @@ impl PlanarEkf {
         self.covariance.bound(&LAYOUT);
         if is_gap {
             self.covariance.enforce();
+        } else if self.jump.is_some() {
+            self.turn_jump(dt);
         }
         Ok(())
+    }
+
+    /// Adds a sample of `dt` seconds to what a jump of the bias makes of the heading.
+    #[cold]
+    #[inline(never)]
+    fn turn_jump(&mut self, dt: f64) {
+        let (Some(estimate), Some(jump)) = (&self.estimate, self.jump) else { return };
+        let bias = Vector1::new(estimate.gyroscope_bias);
+        self.jump = jump.turned(estimate.time_ns, &bias, |way| -way * dt);
     }
 
     /// Corrects the filter with a measurement taken at its current time.
