@@ -375,6 +375,7 @@ impl<F: ProvidedFactor> Engine<F> {
         self.resets = self.resets.wrapping_add(u32::from(self.started.is_some()));
         self.started = Some((start.time_ns, from));
         self.marks.clear();
+        self.gate.moved();
         Ok(())
     }
 

@@ -189,6 +189,7 @@ impl SpoofGate {
     ) -> Option<Result<(), Rejection>> {
         self.look(time_ns, params);
         if self.state != GateState::AwaitsAnchor {
+            self.moved();
             return None;
         }
         let recent = |candidate: &Candidate| time_ns.saturating_sub(candidate.time_ns) <= ns(params.health_gap);
@@ -200,6 +201,11 @@ impl SpoofGate {
         }
         self.restart(time_ns);
         Some(Err(Rejection::Disagrees { distance_m }))
+    }
+
+    /// The estimate was moved: how far a fix is from the estimate before says nothing of how far an anchor is from the one after.
+    pub(super) fn moved(&mut self) {
+        self.candidate = None;
     }
 
     /// The clock was set back: drops the times of reports.

@@ -157,16 +157,16 @@ impl<F: ProvidedFactor> Engine<F> {
             _ => 0.0,
         };
         let fused = result?;
+        if let Some((position, _)) = before {
+            let offset = measured.position - position;
+            *rejection = self.gate.anchor(anchor.time_ns, &offset, &config.params).and_then(Result::err);
+        }
         if fused.raised > FAR || (fused.raised > 1.0 && self.overruled > 1) {
             // Far off, or still wrong after the last correction: the estimate is unreliable.
             self.start_at(now_ns, anchor, config)?;
         }
         self.sources.anchored(anchor.time_ns, &config.params);
         self.is_anchor_degraded = anchor.is_covariance_degraded;
-        if let Some((position, _)) = before {
-            let offset = measured.position - position;
-            *rejection = self.gate.anchor(anchor.time_ns, &offset, &config.params).and_then(Result::err);
-        }
         Ok(Some(fused))
     }
 
@@ -222,6 +222,7 @@ impl<F: ProvidedFactor> Engine<F> {
     ) -> Result<(), Reason> {
         let place = Place { position: (fix.position, fix.covariance), lever_arm: fix.lever_arm, velocity };
         self.strategy.relocate(&place)?;
+        self.gate.moved();
         self.marks.clear();
         self.unconfirmed = CONFIRMATIONS;
         self.overruled += 1;

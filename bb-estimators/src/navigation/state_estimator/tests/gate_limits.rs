@@ -175,3 +175,24 @@ fn an_anchor_that_is_refused_does_not_let_the_receiver_in() {
         assert_eq!(estimator.health().gate.name(), "dwelling", "{}", strategy.name());
     }
 }
+
+/// A fix was where the estimate had been. Anchors that agree move the estimate elsewhere, and the next one fits it: that says nothing of
+/// the fix.
+#[test]
+fn anchors_that_overrule_the_estimate_do_not_let_a_fix_from_before_in() {
+    let flight = Flight::new(20, 5);
+    for strategy in StrategyKind::ALL {
+        let mut now_ns = STABLE_NS + 11 * SECOND + STEP;
+        let mut estimator = flown(&flight, *strategy, now_ns);
+        assert_eq!(fix(&flight, &mut estimator, now_ns, 0.0), Rejection::AwaitsAnchor);
+        let mut is_moved = false;
+        for _ in 0..6 {
+            advance(&flight, &mut estimator, now_ns, now_ns + 2 * FRAME);
+            now_ns += 2 * FRAME;
+            let added = anchor(&flight, &mut estimator, now_ns, if is_moved { 0.0 } else { 1000.0 });
+            is_moved |= added.is_err_and(|error| matches!(error.reason(), Reason::Raised { .. }));
+        }
+        assert!(is_moved, "{}", strategy.name());
+        assert!(!estimator.health().gate.is_open(), "{}: {:?}", strategy.name(), estimator.health().gate);
+    }
+}
