@@ -1,6 +1,7 @@
 //! What happens at one instant, or in the middle of something else, happens in the same order again from the journal.
 
 use crate::components::{Number, at};
+use crate::gate::wait_until;
 use crate::replay::{Heard, Lines, counts, hear, overflow, same};
 use bb_core::prelude::*;
 use bb_core::{Builder, Report, Robot};
@@ -110,10 +111,10 @@ robot! {
     link base {
         sensor number: External<Number>() {
             estimator first: Echo() { latency_budget: 10 ms; recover_after: 2; }
-            estimator second: Echo() { latency_budget: 1 s; recover_after: 2; }
+            estimator second: Echo() { latency_budget: 60 s; recover_after: 2; }
             estimator third: Slow() { latency_budget: 10 ms; }
         }
-        estimator apart: Echo() { input number: sensor::base::number::first; latency_budget: 1 s; runs_on: worker; }
+        estimator apart: Echo() { input number: sensor::base::number::first; latency_budget: 60 s; runs_on: worker; }
         estimator late: Echo() { input number: sensor::base::number::third; latency_budget: 10 ms; recover_after: 2; }
     }
 }
@@ -230,19 +231,21 @@ fn messages_that_wait_for_a_worker_as_the_robot_stops() -> Result<(), Box<dyn Er
 #[test]
 fn one_of_several_callbacks_of_a_message_that_overruns() -> Result<(), Box<dyn Error>> {
     let _alone = alone();
-    let (heard, report) = same_again(Budgeted::builder, |builder| {
+    let overrunning = ["sensor/base/number/first", "estimator/base/late"];
+    let (heard, _) = same_again(Budgeted::builder, |builder| {
         let running = builder.start()?;
-        for round in 0..24 {
+        let overrun_twice = |path: &&str| running.report().estimator(path).is_some_and(|now| now.transitions >= 4);
+        let mut round = 0;
+        // On a busy machine, what is published waits for a thread, and any number overruns.
+        wait_until("both overrun, recover and do so again", || {
             let number = if round % 6 == 3 { IS_SLOW } else { 10.0 };
             running.publish(budgeted::sensor::base::number, running.clock().now(), Number(number));
-        }
+            round += 1;
+            overrunning.iter().all(overrun_twice)
+        });
         Ok(running.stop())
     })?;
-    for path in ["sensor/base/number/first", "estimator/base/late"] {
-        let estimator = report.estimator(path).ok_or("it is declared")?;
-        assert!(estimator.transitions >= 4, "{path} overruns: {}", estimator.transitions);
-    }
     let of_second = |text: &&String| text.contains("number/second") && text.contains("latency overrun");
-    assert_eq!(heard["health"].iter().filter(of_second).count(), 0, "it has a second");
+    assert_eq!(heard["health"].iter().filter(of_second).count(), 0, "it has a minute");
     Ok(())
 }

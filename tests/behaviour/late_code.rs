@@ -30,6 +30,8 @@ struct Rig {
     way: Way,
     /// Where the code blocks.
     gate: Gate,
+    /// Whether the code is about to wait without blocking.
+    waits: AtomicBool,
     turns: AtomicBool,
     /// How often the motor was stopped.
     stopped: AtomicU32,
@@ -102,7 +104,8 @@ impl Command for Turn {
             context.on_disarm(stop.clone());
         }
         if rig.way == Way::Drops {
-            let _starts = Starts(rig);
+            let _starts = Starts(Arc::clone(&rig));
+            rig.waits.store(true, Ordering::SeqCst);
             std::future::pending::<()>().await;
             return Ok(Outcome::done(()));
         }
@@ -169,8 +172,8 @@ fn what_the_future_of_a_command_starts_when_it_is_dropped_is_stopped() {
             let robot = rig.builder().start().expect("it starts");
             assert_eq!(robot.arm(), Ok(()));
             let turn = robot.command(turning::command::turn, NoArguments).expect("it starts");
+            wait_until("its code has begun", || rig.waits.load(Ordering::SeqCst));
             // It waits, outside of its code.
-            while robot.report().commands.iter().all(|command| command.started == 0) {}
             std::thread::sleep(Duration::from_millis(20));
             if stops {
                 assert_eq!(robot.stop().safety, Safety::Disarmed);
@@ -179,9 +182,7 @@ fn what_the_future_of_a_command_starts_when_it_is_dropped_is_stopped() {
                 assert_eq!(robot.arm(), Ok(()), "that waits until it was dropped");
             }
             assert_eq!(turn.wait(), Err(CommandError::Cancelled));
-            while rig.stopped().1 < 2 {
-                std::thread::yield_now();
-            }
+            wait_until("what it starts is stopped", || rig.stopped().1 >= 2);
             assert!(!rig.stopped().0, "{stops}");
         }
         let rig = Rig::new(Way::Drops);
