@@ -258,49 +258,63 @@ impl<S: States, const N: usize> Eskf<S, N> {
         Ok(weighed.fused(&model, &Self::LAYOUT))
     }
 
-    /// Raises what a measurement that has overridden its gate and corrected `error` may have made wrong, if the sensor was, and cannot
-    /// find itself.
+    /// A measurement that has overridden its gate corrected `error`, but the sensor may have been wrong. Raises what that made wrong
+    /// and no later measurement of the same sensor can correct.
     #[cold]
     #[inline(never)]
     fn doubt<const D: usize>(&mut self, stream: &Stream, model: &Linearised<D, N>, error: &SVector<f64, N>) {
-        let fused_ns = stream.fused_ns();
-        let Some(estimate) = &self.estimate else { return };
-        let part = |first: usize| error.fixed_rows::<3>(first).into_owned();
         if model.jacobian.iter().any(|row| row[GYROSCOPE_BIAS..GYROSCOPE_BIAS + 3].iter().any(|x| *x != 0.0)) {
-            let (bias, change) = (estimate.gyroscope_bias, part(GYROSCOPE_BIAS));
-            let in_world = estimate.world_from_body * change;
-            let moved = Moved { now_ns: estimate.time_ns, fused_ns, bias, change, in_world };
-            let (jump, turned) = BiasJump::follow(self.jump, &moved);
-            self.jump = jump;
-            let turned = self.bounded(&turned);
-            self.covariance.inflate_along(&[(ROTATION, turned)]);
+            self.doubt_bias(stream, error);
         }
-        if let (Sight::Relative, Some(keyframe), Some(first)) =
-            (Self::sight(model), estimate.keyframe, offset::<S>(Optional::Keyframe))
-        {
-            // Both poses, so that the relative pose between them stays as well known: the next keyframe is set at the wrong one.
-            let (way, moved) = (estimate.position - keyframe.position, part(POSITION) - part(first));
-            let turned = self.bounded(&(part(ROTATION) - part(first + 3)));
-            self.covariance.inflate_along(&[(POSITION, moved), (first, moved)]);
-            let turn = |covariance: &mut Covariance<N>, turned: Vector3<f64>| {
-                covariance.inflate_along(&[(ROTATION, turned), (first + 3, turned), (first, way.cross(&turned))]);
-            };
-            turn(&mut self.covariance, turned);
-            let misfit = misfit(model, &Self::LAYOUT);
-            let closed_s = fused_ns.map_or(0.0, |from| estimate.time_ns.saturating_sub(from) as f64 * 1e-9);
-            if stream.goes_on(&misfit) && closed_s > 0.0 {
-                let apart = moved / closed_s;
-                self.covariance.inflate_along(&[(VELOCITY, apart)]);
-                if stream.goes_on_again(&misfit) {
-                    let tilt = apart.norm() / (closed_s * self.params.gravity);
-                    for axis in [Vector3::x(), Vector3::y()] {
-                        let tilted = self.bounded(&(axis * tilt));
-                        turn(&mut self.covariance, tilted);
-                    }
-                }
-            }
+        if matches!(Self::sight(model), Sight::Relative) {
+            self.doubt_odometry(stream, &misfit(model, &Self::LAYOUT), error);
         }
         self.covariance.bound(&Self::LAYOUT);
+    }
+
+    /// Raises the attitude by as much as a jump of the gyroscope's bias has turned it.
+    fn doubt_bias(&mut self, stream: &Stream, error: &SVector<f64, N>) {
+        let Some(estimate) = &self.estimate else { return };
+        let (bias, change) = (estimate.gyroscope_bias, error.fixed_rows::<3>(GYROSCOPE_BIAS).into_owned());
+        let in_world = estimate.world_from_body * change;
+        let moved = Moved { now_ns: estimate.time_ns, fused_ns: stream.fused_ns(), bias, change, in_world };
+        let (jump, turned) = BiasJump::follow(self.jump, &moved);
+        self.jump = jump;
+        let turned = self.bounded(&turned);
+        self.covariance.inflate_along(&[(ROTATION, turned)]);
+    }
+
+    /// Raises the pose in the world by as much as a relative pose has moved it: that of the body and that of the keyframe alike, so that
+    /// the relative pose between them stays as well known. The next keyframe is set at the wrong pose.
+    fn doubt_odometry(&mut self, stream: &Stream, misfit: &[f64; 3], error: &SVector<f64, N>) {
+        let Some(estimate) = &self.estimate else { return };
+        let (Some(keyframe), Some(first)) = (estimate.keyframe, offset::<S>(Optional::Keyframe)) else { return };
+        let closed_s = stream.fused_ns().map_or(0.0, |from| estimate.time_ns.saturating_sub(from) as f64 * 1e-9);
+        let way = estimate.position - keyframe.position;
+        let part = |first: usize| error.fixed_rows::<3>(first).into_owned();
+        let (moved, turned) = (part(POSITION) - part(first), part(ROTATION) - part(first + 3));
+        self.covariance.inflate_along(&[(POSITION, moved), (first, moved)]);
+        self.turn_both(first, &way, &turned);
+        if !stream.goes_on(misfit) || closed_s <= 0.0 {
+            return;
+        }
+        // Moved again in the same direction: perhaps it is the velocity that is wrong, by the way over the time of the closed gate.
+        let apart = moved / closed_s;
+        self.covariance.inflate_along(&[(VELOCITY, apart)]);
+        if stream.goes_on_again(misfit) {
+            // And if that did not help, the tilt, by which gravity makes such a velocity in that time.
+            let tilt = apart.norm() / (closed_s * self.params.gravity);
+            for axis in [Vector3::x(), Vector3::y()] {
+                self.turn_both(first, &way, &(axis * tilt));
+            }
+        }
+    }
+
+    /// Raises the attitude of the body and of the keyframe, whose errors begin at `first`, by a common turn about the body, which is
+    /// `way` from the keyframe.
+    fn turn_both(&mut self, first: usize, way: &Vector3<f64>, turned: &Vector3<f64>) {
+        let turned = self.bounded(turned);
+        self.covariance.inflate_along(&[(ROTATION, turned), (first + 3, turned), (first, way.cross(&turned))]);
     }
 
     /// The part of a turn that makes the attitude at most unknown.

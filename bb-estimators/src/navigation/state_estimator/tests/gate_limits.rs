@@ -8,7 +8,7 @@ use nalgebra::{Matrix6, Vector3};
 /// Spoofed from 5 s to 6 s, and stable since then.
 const STABLE_NS: i64 = 6 * SECOND;
 
-/// A flight with a camera and anchors until the receiver is stable, and then with the camera alone up to a time that is none of its
+/// A flight with a camera and anchors until the receiver is stable, and then with the camera alone, up to a time between two of its
 /// frames.
 fn flown(flight: &Flight, strategy: StrategyKind, until_ns: i64) -> Estimator {
     let mut estimator = started(flight, strategy);
