@@ -36,7 +36,8 @@ pub struct SmootherParams {
     pub relinearise_position: f64,
     /// How often an update may linearise again before it leaves the rest to the next.
     ///
-    /// Small: bounds the time of an update. Large: as exact as a batch, at its cost. From 0 to 100.
+    /// Small: bounds the time of an update. Large: as exact as a batch, at its cost. From 0 to 100. At 0 nothing is linearised again,
+    /// and an update that moves a keyframe beyond its threshold has not converged.
     ///
     /// Unit: times. Default: 2. Source: the Gauss–Newton method converges within two so close to the solution.
     pub iterations: usize,

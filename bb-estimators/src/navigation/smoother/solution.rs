@@ -189,10 +189,14 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
                 return Err(Refusal::NonFinite);
             }
             if iteration == self.params.iterations {
-                // A keyframe that crosses its threshold for the first time only now has hardly moved.
-                let mut solved = self.window.range(first..);
-                updated.is_converged = !solved.any(|keyframe| keyframe.has_moved && keyframe.is_off(&self.params));
-                self.is_pending = !updated.is_converged;
+                // A keyframe that crosses its threshold for the first time only now has hardly moved. If none may be linearised again,
+                // it may have crossed it long ago.
+                let is_fixed = self.params.iterations == 0;
+                let from = if is_fixed { 0 } else { first };
+                let mut solved = self.window.range(from..).filter(|keyframe| keyframe.is_off(&self.params));
+                updated.is_converged =
+                    !solved.any(|keyframe| keyframe.has_moved || (is_fixed && keyframe.is_free()));
+                self.is_pending = !updated.is_converged && !is_fixed;
                 break;
             }
             let moved = self.relinearise(first);

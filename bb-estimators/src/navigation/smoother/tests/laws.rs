@@ -224,4 +224,9 @@ fn an_update_continues_what_the_last_did_not_reach() {
         let apart = apart(&at_once.smoothed(id).unwrap(), &hasty.smoothed(id).unwrap());
         assert!(apart < 1e-6, "{id}: {apart}");
     }
+    let mut fixed = solved(0);
+    for _ in 0..3 {
+        let updated = fixed.update().unwrap();
+        assert_eq!((updated.relinearised, updated.is_converged), (0, false), "it never gets there");
+    }
 }
