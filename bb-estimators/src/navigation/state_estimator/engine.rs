@@ -163,6 +163,11 @@ impl<F: ProvidedFactor> Engine<F> {
         &self.gate
     }
 
+    /// A report of spoofing was refused, see [`SpoofGate::block`].
+    pub(super) fn block(&mut self, until_ns: Option<i64>) {
+        self.gate.block(until_ns);
+    }
+
     pub(super) fn sources(&self) -> &Sources {
         &self.sources
     }

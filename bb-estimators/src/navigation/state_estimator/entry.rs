@@ -10,6 +10,7 @@ use super::input::{AttitudeReading, FlightControllerState, GnssReading, GpsHealt
 pub(super) struct Key {
     pub(super) time_ns: i64,
     rank: u8,
+    /// The number of a provider; of reports at one time, the worse comes later, and counts.
     provider: u32,
 }
 
@@ -47,7 +48,7 @@ impl<F> Payload<F> {
         let (rank, provider) = match self {
             Self::Warm(_) => (1, 0),
             Self::Attitude(_) => (2, 0),
-            Self::Health(_) => (3, 0),
+            Self::Health(health) => (3, health.severity()),
             Self::Frame => (4, 0),
             Self::Vio(_) => (5, 0),
             Self::Anchor(anchor) => (6, anchor.provider),
@@ -68,6 +69,11 @@ impl<F> Payload<F> {
             Self::Gnss(_) => InputKind::Gnss,
             Self::Provided(..) => InputKind::Factor,
         }
+    }
+
+    /// Whether it must not be lost: a report of spoofing.
+    pub(super) fn is_alarm(&self) -> bool {
+        matches!(self, Self::Health(GpsHealth::Spoofed))
     }
 
     /// Whether a user has added it. A frame comes with a relative pose, which is reported instead unless the frame fails.

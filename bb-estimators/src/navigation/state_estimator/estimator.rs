@@ -15,7 +15,7 @@ use super::input::{
 };
 use super::label::{SourceLabel, Sources};
 use super::output::{EstimatorHealth, EstimatorOutput, HealthState};
-use super::params::StateEstimatorConfig;
+use super::params::{StateEstimatorConfig, ns};
 use super::queue::{Queue, QueueCounts, Sampled, Told};
 use super::strategy::Pose;
 use crate::attitude::ParamsError;
@@ -23,6 +23,9 @@ use crate::navigation::eskf::ImuMean;
 use crate::navigation::geodesy::LocalFrame;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::smoother::NavigationFactor;
+
+/// How far the caller's clock may lag behind the IMU's, ns.
+const LONGEST_LAG_NS: i64 = 200_000_000;
 
 /// Result of an input that was accepted.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -355,8 +358,9 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
         output
     }
 
-    /// The estimate predicted to a time. Returns `None` if there is no estimate, or if the last sample of the IMU is too old. Does
-    /// not change the state.
+    /// The estimate predicted to a time. Returns `None` if there is no estimate, or if the last sample of the IMU is too old. Up to
+    /// 0.2 s before that sample, it is the estimate at the sample, and its time says so; further back, there is none. Does not change
+    /// the state.
     pub fn predicted(&self, time_ns: i64) -> Option<EstimatorOutput> {
         let pose = self.pose_at(time_ns)?;
         self.describe(&pose, self.queue.engine().sources(), false)
@@ -365,9 +369,8 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
     fn pose_at(&self, time_ns: i64) -> Option<Pose> {
         let newest = self.queue.newest()?;
         let ahead_ns = time_ns.saturating_sub(newest.time_ns);
-        let is_past = ahead_ns < -super::params::ns(self.config.params.lateness);
-        if is_past || ahead_ns > super::params::ns(self.config.params.longest_prediction) {
-            // After the clock was set back, an old position must not be reported again.
+        if ahead_ns < -LONGEST_LAG_NS || ahead_ns > ns(self.config.params.longest_prediction) {
+            // While the clock may have been set back, an old position must not be reported as a new one.
             return None;
         }
         let predictor = self.queue.predictor()?;

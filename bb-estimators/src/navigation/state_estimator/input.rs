@@ -114,6 +114,18 @@ pub enum GpsHealth {
     Spoofed,
 }
 
+impl GpsHealth {
+    /// The rank among reports at one time: the last one counts, and none hides another.
+    pub(super) const fn severity(self) -> u32 {
+        match self {
+            Self::Stable => 0,
+            Self::Unstable => 1,
+            Self::NoFix => 2,
+            Self::Spoofed => 3,
+        }
+    }
+}
+
 /// A report of the receiver's health.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GpsHealthReading {

@@ -14,7 +14,8 @@ pub struct EstimatorOutput {
     pub frame_id: Uuid,
     /// Time of emission, ns.
     pub emitted_ns: i64,
-    /// Time that the estimate refers to, ns. For estimates at the output's rate, it is the time of emission.
+    /// Time that the estimate refers to, ns. For estimates at the output's rate, it is the time of emission, or that of the newest
+    /// sample of the IMU if that is later.
     pub time_ns: i64,
     /// Position of the body's origin.
     pub position: Geodetic,

@@ -24,8 +24,11 @@ use crate::navigation::refusal::Refusal;
 
 mod samples;
 
-/// Number of copies of the engine.
+/// Number of copies of the engine: as many as cover the lateness, at the time between them.
 const COPIES: usize = 8;
+
+/// Shortest time between two copies, ns. A copy costs as much as some samples.
+const SHORTEST_NS: i64 = 100_000_000;
 
 /// Counts of inputs by how they arrived.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -109,7 +112,7 @@ pub(super) struct Queue<F: ProvidedFactor> {
 impl<F: ProvidedFactor> Queue<F> {
     pub(super) fn new(config: &StateEstimatorConfig) -> Result<Self, ParamsError> {
         let engine = Engine::new(config)?;
-        let mut copies = VecDeque::with_capacity(COPIES + 1);
+        let mut copies = VecDeque::with_capacity(COPIES + 2);
         copies.push_back(engine.clone());
         let rooms = Rooms::of(&config.params);
         Ok(Self {
@@ -227,8 +230,21 @@ impl<F: ProvidedFactor> Queue<F> {
         frames: &[i64],
         config: &StateEstimatorConfig,
     ) -> Result<Key, Reason> {
+        let is_alarm = payload.is_alarm();
         let result = self.place(time_ns, payload, frames, config);
-        result.map_err(|reason| self.count(reason))
+        result.map_err(|reason| {
+            if is_alarm && reason != Reason::Duplicate {
+                self.block();
+            }
+            self.count(reason)
+        })
+    }
+
+    /// Blocks the gate: a report of spoofing was refused.
+    fn block(&mut self) {
+        let until_ns = self.newest.map(|newest| newest.time_ns);
+        self.engine.block(until_ns);
+        self.copies.iter_mut().for_each(|copy| copy.block(until_ns));
     }
 
     fn place(
@@ -285,7 +301,7 @@ impl<F: ProvidedFactor> Queue<F> {
     /// Runs the engine on, through all inputs stamped up to a time.
     fn settle(&mut self, until_ns: i64, config: &StateEstimatorConfig) {
         self.run(until_ns, config);
-        self.keep_copy(config);
+        self.forget(config);
         self.predict(config);
     }
 
@@ -319,6 +335,8 @@ impl<F: ProvidedFactor> Queue<F> {
         let mut sample_index = self.samples.partition_point(|sample| Key::of_sample(sample.time_ns) <= key);
         let mut input_index = self.inputs.partition_point(|entry| entry.key <= key);
         loop {
+            // Also on the way of a run that is repeated: it has dropped those after the late input, and the next one may be as late.
+            self.keep_copy(config);
             let sample = self.samples.get(sample_index).copied();
             let sample_key = sample.map(|sample| Key::of_sample(sample.time_ns));
             let input_key = self.inputs.get(input_index).map(|entry| entry.key);
@@ -413,14 +431,20 @@ impl<F: ProvidedFactor> Queue<F> {
         }
     }
 
+    /// Copies the engine if the last copy is old enough.
     fn keep_copy(&mut self, config: &StateEstimatorConfig) {
-        let lateness_ns = ns(config.params.lateness);
-        let (Some(now_ns), Some(newest)) = (self.engine.now_ns(), self.newest) else { return };
-        let last_ns = self.copies.back().and_then(Engine::now_ns).unwrap_or(i64::MIN);
-        if now_ns.saturating_sub(last_ns) >= lateness_ns / (COPIES as i64 - 2) {
+        let apart_ns = (ns(config.params.lateness) / (COPIES as i64 - 2)).max(SHORTEST_NS);
+        let Some(now_ns) = self.engine.now_ns() else { return };
+        let last_ns = self.copies.back().and_then(Engine::now_ns);
+        if last_ns.is_none_or(|last_ns| now_ns.saturating_sub(last_ns) >= apart_ns) {
             self.copies.push_back(self.engine.clone());
         }
-        let oldest_ns = newest.time_ns.saturating_sub(lateness_ns);
+    }
+
+    /// Drops the copies that no late input needs.
+    fn forget(&mut self, config: &StateEstimatorConfig) {
+        let Some(newest) = self.newest else { return };
+        let oldest_ns = newest.time_ns.saturating_sub(ns(config.params.lateness));
         let is_old = |copy: &Engine<F>| copy.key().time_ns < oldest_ns;
         while self.copies.len() > COPIES || self.copies.get(1).is_some_and(is_old) {
             self.copies.pop_front();

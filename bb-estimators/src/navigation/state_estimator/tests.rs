@@ -1,5 +1,6 @@
 //! The requirements of the design, for every strategy that was built.
 
+mod alarms;
 mod cadence;
 mod errors;
 mod flight;

@@ -109,8 +109,10 @@ impl<F: ProvidedFactor> Queue<F> {
     /// The clock of the IMU was set back: the engine continues on the new clock, without the past.
     fn set_back(&mut self, sample: &ImuMean, for_ns: i64, newest_ns: i64, config: &StateEstimatorConfig) {
         self.settle(newest_ns, config);
+        let mut is_alarmed = false;
         for entry in self.inputs.drain(..) {
             if entry.outcome.is_none() && entry.payload.is_added() {
+                is_alarmed |= entry.payload.is_alarm();
                 self.counts.too_old += 1;
                 let reason = Refusal::TooOld { time_ns: entry.key.time_ns }.into();
                 self.told.push(Told::Taken(entry.key, entry.payload.kind(), Outcome::Degraded(reason)));
@@ -127,6 +129,9 @@ impl<F: ProvidedFactor> Queue<F> {
         self.told.push(Told::SetBack(sample.time_ns, newest_ns.saturating_sub(sample.time_ns)));
         self.newest = Some(*sample);
         self.samples.push_back(*sample);
+        if is_alarmed {
+            self.block();
+        }
         self.settle(sample.time_ns, config);
     }
 
@@ -136,15 +141,19 @@ impl<F: ProvidedFactor> Queue<F> {
             return Err(Reason::Duplicate);
         }
         self.make_room(config);
-        if !self.reaches(Key::of_sample(time_ns)) {
+        let index = self.samples.partition_point(|other| other.time_ns < time_ns);
+        let before = index.checked_sub(1).and_then(|before| self.samples.get(before));
+        let before_ns = before.map(|before| before.time_ns).or(self.dropped_ns).or(self.engine.begun_ns());
+        // Inputs since the sample before have been reached with a part of the sample after.
+        let from = before_ns.filter(|at_ns| *at_ns < time_ns).map_or(Key::of_sample(time_ns), Key::end_of);
+        if !self.reaches(from) {
             return Err(Refusal::TooOld { time_ns }.into());
         }
-        let index = self.samples.partition_point(|other| other.time_ns < time_ns);
         self.samples.insert(index, *sample);
         self.counts.late += 1;
         let engine_ns = self.engine.now_ns().unwrap_or(i64::MIN);
-        if Key::of_sample(time_ns) < self.engine.key() {
-            self.run_again(Key::of_sample(time_ns), engine_ns, config);
+        if from < self.engine.key() {
+            self.run_again(from, engine_ns, config);
         } else {
             self.predict(config);
         }
@@ -190,7 +199,9 @@ impl<F: ProvidedFactor> Queue<F> {
                 index += 1;
                 continue;
             }
-            self.inputs.remove(index);
+            if self.inputs.remove(index).is_some_and(|entry| entry.payload.is_alarm()) {
+                self.block();
+            }
             if is_added {
                 let reason = self.count(stranger(key.time_ns, time_ns).into());
                 self.told.push(Told::Taken(key, kind, Outcome::Degraded(reason)));

@@ -1,6 +1,6 @@
 //! The result does not depend on the order of arrival.
 
-use super::flight::SECOND;
+use super::flight::{SECOND, STEP};
 use super::*;
 use crate::navigation::Refusal;
 use proptest::prelude::*;
@@ -50,10 +50,10 @@ proptest! {
             // One IMU sample in ten is up to 0.3 s late, and other inputs up to 1.6 s. The limit is 2 s.
             let mut arriving: Vec<(i64, &Sent)> = sent.iter().enumerate().map(|(i, sent)| {
                 let most = match sent {
- Sent::Imu(_) if i % 10 == 0 => 0.3e9,
- Sent::Imu(_) => 0.0,
- _ => 1.6e9,
- };
+                    Sent::Imu(_) if i % 10 == 0 => 0.3e9,
+                    Sent::Imu(_) => 0.0,
+                    _ => 1.6e9,
+                };
                 let share = delays[(i * 31 + i / 7) % delays.len()];
                 (sent.time_ns() + (most * share * share) as i64, sent)
             }).collect();
@@ -66,6 +66,79 @@ proptest! {
             prop_assert_eq!(shuffled.counts().too_old + shuffled.counts().in_the_future, 0);
             prop_assert_eq!(answers(&mut in_order), answers(&mut shuffled));
         }
+    }
+}
+
+/// For as long as one likes: an input that is late drops no copy that the next one, as late, needs.
+#[test]
+fn anchors_that_are_always_late_lose_nothing() {
+    let flight = Flight::new(9, 2);
+    let sent = flight.sent(true, true, false);
+    let cases =
+        [1_500_000_000, 1_900_000_000].map(|late_ns| StrategyKind::ALL.iter().map(move |kind| (kind, late_ns)));
+    for (strategy, late_ns) in cases.into_iter().flatten() {
+        let mut arriving: Vec<(i64, &Sent)> = sent
+            .iter()
+            .map(|sent| {
+                let is_late = matches!(sent, Sent::Anchor(_));
+                (sent.time_ns() + if is_late { late_ns } else { 0 }, sent)
+            })
+            .collect();
+        arriving.sort_by_key(|(at_ns, _)| *at_ns);
+        arriving.retain(|(at_ns, _)| *at_ns <= 9 * SECOND);
+        let mut in_order: Vec<&Sent> = arriving.iter().map(|(_, sent)| *sent).collect();
+        in_order.sort_by_key(|sent| sent.time_ns());
+        let (mut late, mut on_time) = (started(&flight, *strategy), started(&flight, *strategy));
+        let mut most_copies = 0;
+        for (_, sent) in &arriving {
+            ignore(sent.to(&mut late));
+            most_copies = most_copies.max(late.held()[2]);
+        }
+        in_order.iter().for_each(|sent| ignore(sent.to(&mut on_time)));
+        let counts = *late.counts();
+        let more = counts.late - on_time.counts().late;
+        assert_eq!((more, counts.too_old, counts.dropped), (7, 0, 0), "{}: {counts:?}", strategy.name());
+        assert!(most_copies <= 8, "{most_copies} copies");
+        assert!(late.held()[0] < 900, "{:?} samples", late.held());
+        assert_eq!(answers(&mut late), answers(&mut on_time), "{}", strategy.name());
+    }
+}
+
+/// A fix between two samples, and the second of them is late: the fix was reached with a part of the third.
+#[test]
+fn a_late_sample_replaces_the_part_of_the_next_that_was_used_instead() {
+    let flight = Flight::new(2, 1);
+    let (fix, late_ns) = (flight.fixes[4], SECOND + STEP);
+    assert_eq!(fix.time_ns, SECOND + STEP / 2);
+    for (strategy, is_fix_late) in
+        StrategyKind::ALL.iter().flat_map(|strategy| [(*strategy, false), (*strategy, true)])
+    {
+        let run = |is_sample_late: bool| {
+            let mut estimator = started(&flight, strategy);
+            for sample in &flight.samples[1..] {
+                if sample.time_ns == SECOND {
+                    estimator.add_gps_health(flight.health[5]).unwrap();
+                }
+                if sample.time_ns == late_ns && !(is_sample_late && is_fix_late) {
+                    ignore(estimator.add_gnss(fix));
+                }
+                if sample.time_ns != late_ns || !is_sample_late {
+                    estimator.add_imu(sample).unwrap();
+                }
+                if sample.time_ns == late_ns + STEP && is_sample_late {
+                    if is_fix_late {
+                        estimator.add_gnss(fix).unwrap();
+                    }
+                    let index = flight.samples.iter().position(|sample| sample.time_ns == late_ns).unwrap();
+                    estimator.add_imu(&flight.samples[index]).unwrap();
+                }
+            }
+            assert_eq!(count(estimator.sink(), "rejected"), 0);
+            estimator
+        };
+        let (mut late, mut on_time) = (run(true), run(false));
+        assert_eq!(late.predicted(2 * SECOND), on_time.predicted(2 * SECOND), "{} {is_fix_late}", strategy.name());
+        assert_eq!(answers(&mut late), answers(&mut on_time));
     }
 }
 

@@ -43,6 +43,23 @@ fn a_clock_that_is_set_back_is_followed_and_told() {
     }
 }
 
+/// Until the new clock is believed, there is no estimate for its times: the newest one belongs to the old clock.
+#[test]
+fn an_old_estimate_is_not_given_for_the_time_of_a_new_clock() {
+    let flight = Flight::new(4, 3);
+    for strategy in StrategyKind::ALL {
+        let mut estimator = started(&flight, *strategy);
+        flight.samples[1..].iter().for_each(|sample| estimator.add_imu(sample).unwrap());
+        let newest_ns = 4 * SECOND;
+        for (behind_ns, is_given) in [(0, true), (SECOND / 5, true), (SECOND / 5 + 1, false), (2 * SECOND, false)] {
+            let output = estimator.predicted(newest_ns - behind_ns);
+            assert_eq!(output.map(|output| output.time_ns), is_given.then_some(newest_ns), "{behind_ns}");
+        }
+        assert!(estimator.tick(newest_ns - SECOND).is_none());
+        assert_eq!(estimator.tick(newest_ns).unwrap().time_ns, newest_ns);
+    }
+}
+
 /// Nobody knows for how long the IMU was silent before its clock was set back. What the body may have moved by in that time is in the
 /// covariance, so the first anchor fits, and no later one is needed to overrule the estimate.
 #[test]
