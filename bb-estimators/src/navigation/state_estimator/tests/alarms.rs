@@ -1,4 +1,4 @@
-//! A report of spoofing is never lost, however bad its stamp and however full the queue.
+//! A report of spoofing blocks the gate even if its stamp is bad or the queue is full.
 
 use super::flight::{SECOND, STEP};
 use super::*;
