@@ -1,6 +1,7 @@
 //! The requirements of the design, for every strategy that was built.
 
 mod alarms;
+mod alarms_at_random;
 mod cadence;
 mod errors;
 mod flight;
