@@ -256,6 +256,11 @@ impl<F: ProvidedFactor> Strategy<F> {
         each!(self, strategy => strategy.motion())
     }
 
+    /// The attitude at the present time.
+    pub(super) fn attitude(&self) -> Option<UnitQuaternion<f64>> {
+        each!(self, strategy => strategy.attitude())
+    }
+
     /// Number of gaps in the IMU samples that were bridged.
     pub(super) fn gaps(&self) -> u32 {
         each!(self, strategy => strategy.gaps())

@@ -186,7 +186,9 @@ impl<F: ProvidedFactor> Engine<F> {
             return Err(Refusal::NotStarted.into());
         };
         let (measured, velocity) = world.fix(fix);
-        let offset: Vector3<f64> = measured.position - position;
+        // Anchors, with which it is compared, are positions of the body.
+        let antenna = self.strategy.attitude().map_or_else(Vector3::zeros, |attitude| attitude * fix.lever_arm);
+        let offset = measured.position - antenna - position;
         if let Err(rejected) = self.gate.fix(fix.time_ns, &offset, &config.params) {
             *rejection = Some(rejected);
             return Err(Trouble::Degraded(Reason::Gate(rejected)));

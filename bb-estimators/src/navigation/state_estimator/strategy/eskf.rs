@@ -3,7 +3,7 @@
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 
-use nalgebra::{Isometry3, SMatrix, Vector3};
+use nalgebra::{Isometry3, SMatrix, UnitQuaternion, Vector3};
 
 use super::{Cadence, Failure, Measured, Place, Pose, Predictor, Streams, add_time, id_of, trusting};
 use crate::attitude::ParamsError;
@@ -129,6 +129,10 @@ impl EskfStrategy {
 
     pub(super) fn motion(&self) -> Option<(Vector3<f64>, Vector3<f64>)> {
         self.filter.estimate().map(|estimate| (estimate.position, estimate.velocity))
+    }
+
+    pub(super) fn attitude(&self) -> Option<UnitQuaternion<f64>> {
+        self.filter.estimate().map(|estimate| estimate.world_from_body)
     }
 
     pub(super) fn streams(&self) -> &Streams {

@@ -212,6 +212,10 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
         self.smoother.predicted().map(|estimate| (estimate.position, estimate.velocity))
     }
 
+    pub(super) fn attitude(&self) -> Option<UnitQuaternion<f64>> {
+        self.smoother.predicted().map(|estimate| estimate.world_from_body)
+    }
+
     pub(super) fn streams(&self) -> &Streams {
         &self.streams
     }

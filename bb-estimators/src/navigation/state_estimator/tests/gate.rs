@@ -397,3 +397,41 @@ fn what_an_anchor_corrects_is_no_difference_to_a_fix() {
         }
     }
 }
+
+/// Anchors are positions of the body, and fixes are of the antenna: how they are mounted is no difference between them.
+#[test]
+fn a_receiver_is_let_in_by_where_its_antenna_puts_the_body() {
+    let flight = Flight::new(9, 4);
+    // With an arm of 24 m, a fix 40 m too low is 16 m from the body.
+    for (arm_m, off_m, is_let_in) in [(60.0, 0.0, true), (24.0, -40.0, false)] {
+        for strategy in StrategyKind::ALL {
+            let mut config = config(*strategy);
+            config.params.dwell = 2.0;
+            let mut estimator: Estimator = StateEstimator::new(config, Events::new()).unwrap();
+            estimator.warm_start(flight.warm_start(0)).unwrap();
+            estimator.add_imu(&flight.samples[0]).unwrap();
+            let lever_arm = Vector3::new(0.0, 0.0, arm_m);
+            for sent in &flight.sent(true, true, true) {
+                let is_after = sent.time_ns() > 3 * SECOND;
+                ignore(match sent {
+                    Sent::Health(reading) if reading.time_ns == 3 * SECOND => estimator
+                        .add_gps_health(GpsHealthReading { health: GpsHealth::Spoofed, ..*reading })
+                        .map(drop),
+                    Sent::Fix(fix) => {
+                        let antenna = Flight::truth(fix.time_ns).world_from_body * lever_arm;
+                        let off = Vector3::new(0.0, 0.0, if is_after { off_m } else { 0.0 });
+                        let position =
+                            flight.frame.geodetic(&(flight.frame.position(&fix.position) + antenna + off));
+                        let fix = GnssReading { position, lever_arm, velocity: None, ..*fix };
+                        let added = estimator.add_gnss(fix).map(drop);
+                        assert!(is_after || added.is_ok(), "{added:?}");
+                        added
+                    }
+                    sent => sent.to(&mut estimator),
+                });
+            }
+            let gate = estimator.health().gate;
+            assert_eq!(gate.is_open(), is_let_in, "{}, arm {arm_m} m, off {off_m} m: {gate:?}", strategy.name());
+        }
+    }
+}
