@@ -57,7 +57,7 @@ pub(crate) use inputs::{At, FieldIndex, InputAt, SyncMiss, TakenAt};
 pub use inputs::{Input, InputField, Inputs};
 pub use joint_publisher::JointPublisher;
 pub(crate) use motion_reports::MotionReport;
-pub(crate) use options::AnyOptions;
+pub(crate) use options::{AnyOptions, OptionsList};
 pub use options::{NoOptions, Options};
 pub use outputs::Outputs;
 pub(crate) use outputs::{EmittedAt, OutputAt};

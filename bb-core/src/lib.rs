@@ -115,13 +115,13 @@ pub mod prelude {
 pub mod __private {
     pub use crate::__stub_robot as stub_robot;
     pub use crate::check::{
-        Given, check_dynamic, check_estimator, check_input, check_option, check_optional, check_output,
-        check_position, check_reachable, check_required, check_role, find_input, find_output,
+        check_dynamic, check_estimator, check_input, check_nested, check_number, check_optional, check_output,
+        check_position, check_quantity, check_reachable, check_required, check_role, find_input, find_output,
     };
     pub use crate::component::binding::{Binding, FromParameter};
     pub use crate::component::field::{FromQuantity, FromText};
     pub use crate::component::inputs::{At, FieldIndex, InputAt, Slot, SyncMiss, TakenAt, declare};
-    pub use crate::component::options::AnyOptions;
+    pub use crate::component::options::OptionsList;
     pub use crate::component::outputs::{EmittedAt, OutputAt};
     pub use crate::component::setting::{ByCode, ByText, ByValue, Setting, SettingOf, WithUnit};
     pub use crate::component::{Command, Input, InputField, OptionField};
@@ -140,16 +140,16 @@ pub mod __private {
         DecodeError, EnumShape, FieldShape, Reader, RosLayout, Shape, StructShape, Writer,
     };
     pub use crate::message::{
-        Exceeded, Feeds, Finite, Frame, JointBounds, JointCommand, JointPositions, JointReading, OutOfBounds,
-        Stamp, Stamped,
+        BothKnown, Exceeded, Feeds, Finite, Frame, JointBounds, JointCommand, JointPositions, JointReading,
+        OutOfBounds, Stamp, Stamped,
     };
     pub use crate::node::{
-        Act, Environment, Island, IslandOf, IslandState, IslandWiring, Key, Member, Node, Turn, act, alone, enter,
-        feed, island_of, receive, start,
+        Act, Alone, Environment, Inlet, Island, IslandOf, IslandState, IslandWiring, Key, Member, Node, Solo, Turn,
+        act, alone, emit, enter, enter_alone, island_of, receive, start, start_alone,
     };
     pub use crate::pubsub::{AnyTopic, DynamicMessage, Topic};
     pub use crate::run::actuator::{ActuatorNode, AnyActuator};
-    pub use crate::run::source::{Assembly, Source};
+    pub use crate::run::source::{Assembly, Sources};
     pub use crate::run::visit::visit;
     pub use crate::run::{
         ActuatorHandle, BridgeHandle, CommandHandle, ControllerHandle, EstimatorHandle, EstimatorOfSeveralHandle,

@@ -13,7 +13,7 @@ pub(crate) use copy::{Panic, copied, copy_to};
 pub use finite::Finite;
 pub use joint::{JointPositions, JointReading, JointSide};
 pub use joint_command::{Exceeded, JointBounds, JointCommand, LimitedQuantity, OutOfBounds};
-pub use stamped::{Feeds, Frame, Origin, Stamp, Stamped};
+pub use stamped::{BothKnown, Feeds, Frame, Origin, Stamp, Stamped};
 
 /// The content of a message: plain data in SI units. Derive it:
 ///

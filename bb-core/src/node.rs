@@ -24,8 +24,8 @@ pub(crate) use entry::{HealthReport, NodeEntry, Report};
 pub use environment::Environment;
 pub(crate) use environment::{BindTarget, Check, EnvironmentParts, Missing, Mode, Overseer};
 pub use island::{
-    Act, Island, IslandOf, IslandState, IslandWiring, Key, Member, act, alone, enter, feed, island as island_of,
-    receive, start,
+    Act, Alone, Inlet, Island, IslandOf, IslandState, IslandWiring, Key, Member, Solo, act, alone, emit, enter,
+    enter_alone, island as island_of, receive, start, start_alone,
 };
 pub(crate) use island::{AnyIsland, CallError, Replayed, publish, take_turn};
 pub use latency::LatencyStatistics;

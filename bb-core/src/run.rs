@@ -50,24 +50,22 @@ pub use running::Running;
 pub use settings::{SettingProblem, SettingsError, SettingsList};
 pub use simulation::Simulation;
 pub use source::SourceStatistics;
-pub(crate) use source::{Assembly, Source};
+pub(crate) use source::{Assembly, Source, Sources};
 pub(crate) use visit::Visit;
 pub use visit::Visitable;
 
-use crate::component::AnyOptions;
+use crate::component::OptionsList;
 use crate::control::Prepared;
 use crate::declaration::{
     ActuatorDeclaration, CommandDeclaration, EstimatorDeclaration, ParameterDeclaration, SensorDeclaration, graph,
 };
 use crate::event::CategoryDeclaration;
 use crate::node::IslandOf;
-use crate::pubsub::{AnyTopic, DynamicMessage};
-use crate::time::MonotonicTime;
+use crate::pubsub::AnyTopic;
 use crate::topology::{GraphFormat, Topology};
 use builder::MadeByNew;
 use discovery::graphed;
 use settings::settings_schema;
-use std::sync::Arc;
 
 /// A declared robot. `robot!` implements it for the type that it defines; users call [`Robot::builder`].
 pub trait Robot: Sized + Send + Sync + 'static {
@@ -94,14 +92,11 @@ pub trait Robot: Sized + Send + Sync + 'static {
     /// Where its islands are in the wiring.
     #[doc(hidden)]
     const ISLANDS: &'static [IslandOf<Self::Wiring>];
-    /// The options bound to a parameter: the number of the component in [`Robot::options_of`], the option's name, and
+    /// The options bound to a parameter: the number of the component in [`Robot::options`], the option's name, and
     /// the number of the parameter.
     #[doc(hidden)]
     const BOUND_OPTIONS: &'static [(usize, &'static str, usize)];
 
-    /// The options of all components.
-    #[doc(hidden)]
-    type Options: Send;
     /// The topics of all publishers.
     #[doc(hidden)]
     type Topics: Send + Sync;
@@ -111,33 +106,26 @@ pub trait Robot: Sized + Send + Sync + 'static {
 
     /// The options as declared.
     #[doc(hidden)]
-    fn options() -> Self::Options;
+    fn options() -> OptionsList;
     #[doc(hidden)]
     fn topics() -> Self::Topics;
     /// Starts all estimators; errors are stored in `assembly`.
     #[doc(hidden)]
-    fn wire(topics: Self::Topics, options: &Self::Options, assembly: &Assembly) -> Self::Wiring;
-    /// Starts all sensors; errors are stored in `assembly`.
+    fn wire(topics: Self::Topics, options: &OptionsList, assembly: &Assembly) -> Self::Wiring;
+    /// Its sensors and services.
     #[doc(hidden)]
-    fn sources(wiring: &Arc<Self::Wiring>, options: &Self::Options, assembly: &Assembly) -> Vec<Box<dyn Source>>;
+    fn sources() -> Sources<Self>;
     #[doc(hidden)]
     fn wired_topics(wiring: &Self::Wiring) -> &Self::Topics;
     /// The topic of that publisher; `None` beyond the last.
     #[doc(hidden)]
     fn topic(topics: &Self::Topics, publisher: usize) -> Option<&dyn AnyTopic>;
-    /// The options of that component, an `S::Options`; `None` beyond the last.
-    #[doc(hidden)]
-    fn options_of(options: &mut Self::Options, component: usize) -> Option<&mut dyn AnyOptions>;
     /// The actuator of that number; `None` beyond the last.
     #[doc(hidden)]
     fn actuator(wiring: &Self::Wiring, actuator: usize) -> Option<&dyn AnyActuator>;
-    /// Publishes a recorded message of a sensor or a service. Returns false if that publisher is an estimator's, or
-    /// has another payload.
-    #[doc(hidden)]
-    fn feed(wiring: &Self::Wiring, publisher: usize, message: &DynamicMessage, now: MonotonicTime) -> bool;
     /// The commands with their options.
     #[doc(hidden)]
-    fn commands(options: &Self::Options) -> Vec<Prepared>;
+    fn commands(options: &OptionsList) -> Vec<Prepared>;
 
     #[doc(hidden)]
     fn all_topics(topics: &Self::Topics) -> Vec<&dyn AnyTopic> {

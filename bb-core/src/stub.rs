@@ -196,18 +196,15 @@ macro_rules! __stub_robot {
             const PARAMETERS: &'static [$crate::__private::ParameterDeclaration] = &[];
             const ISLANDS: &'static [$crate::__private::IslandOf<()>] = &[];
             const BOUND_OPTIONS: &'static [(usize, &'static str, usize)] = &[];
-            type Options = ();
             type Topics = ();
             type Wiring = ();
-            fn options() {}
+            fn options() -> $crate::__private::OptionsList {
+                ::core::default::Default::default()
+            }
             fn topics() {}
-            fn wire(_: (), _: &(), _: &$crate::__private::Assembly) {}
-            fn sources(
-                _: &$crate::__private::Arc<()>,
-                _: &(),
-                _: &$crate::__private::Assembly,
-            ) -> ::std::vec::Vec<::std::boxed::Box<dyn $crate::__private::Source>> {
-                ::std::vec::Vec::new()
+            fn wire(_: (), _: &$crate::__private::OptionsList, _: &$crate::__private::Assembly) {}
+            fn sources() -> $crate::__private::Sources<Self> {
+                ::core::default::Default::default()
             }
             fn wired_topics(_: &()) -> &() {
                 &()
@@ -215,21 +212,10 @@ macro_rules! __stub_robot {
             fn topic(_: &(), _: usize) -> ::core::option::Option<&dyn $crate::__private::AnyTopic> {
                 ::core::option::Option::None
             }
-            fn options_of(_: &mut (), _: usize) -> ::core::option::Option<&mut dyn $crate::__private::AnyOptions> {
-                ::core::option::Option::None
-            }
             fn actuator(_: &(), _: usize) -> ::core::option::Option<&dyn $crate::__private::AnyActuator> {
                 ::core::option::Option::None
             }
-            fn feed(
-                _: &(),
-                _: usize,
-                _: &$crate::__private::DynamicMessage,
-                _: $crate::__private::MonotonicTime,
-            ) -> bool {
-                false
-            }
-            fn commands(_: &()) -> ::std::vec::Vec<$crate::__private::Prepared> {
+            fn commands(_: &$crate::__private::OptionsList) -> ::std::vec::Vec<$crate::__private::Prepared> {
                 ::std::vec::Vec::new()
             }
         }

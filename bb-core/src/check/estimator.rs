@@ -4,7 +4,7 @@ use super::find::find_input;
 use super::names::list;
 use super::options::{describe_missing, missing_option};
 use super::text::{Text, contains};
-use crate::component::{Estimator, Inputs, Options, Outputs, TakenAt};
+use crate::component::{Estimator, Inputs, OptionField, Options, Outputs, TakenAt};
 use crate::stub::UNKNOWN_INDEX;
 
 /// A fault in the inputs of an estimator.
@@ -21,22 +21,35 @@ enum InputFault {
 }
 
 /// Checks that an estimator has its required options among `given`, its required inputs among `declared`, and an
-/// output if it has several. `declared` is `None` for a nested estimator, whose only input is its sensor's.
+/// output if it has several.
 ///
 /// Everything missing is reported in one message, since it is reported at one token. The text is built only if
 /// something is missing: rustc interprets these functions for each estimator of each robot.
 #[track_caller]
-pub const fn check_estimator<E: Estimator>(
+pub const fn check_estimator<E: Estimator, const G: usize, const D: usize>(
     estimator: &str,
-    given: &[&str],
-    declared: Option<&[&str]>,
+    given: [&str; G],
+    declared: [&str; D],
     has_outputs: bool,
 ) {
-    let option = missing_option(<E::Options as Options>::FIELDS, given);
-    let input = match declared {
-        Some(declared) => missing_input::<E::Input>(declared),
-        None => no_nested_input::<E::Input>(),
-    };
+    let option = missing_option(<E::Options as Options>::FIELDS, &given);
+    report::<E>(estimator, option, missing_input::<E::Input>(&declared), has_outputs);
+}
+
+/// The same for a nested estimator, whose only input is its sensor's.
+#[track_caller]
+pub const fn check_nested<E: Estimator, const G: usize>(estimator: &str, given: [&str; G], has_outputs: bool) {
+    let option = missing_option(<E::Options as Options>::FIELDS, &given);
+    report::<E>(estimator, option, no_nested_input::<E::Input>(), has_outputs);
+}
+
+#[track_caller]
+const fn report<E: Estimator>(
+    estimator: &str,
+    option: Option<&OptionField>,
+    input: Option<InputFault>,
+    has_outputs: bool,
+) {
     let outputs = <E::Output as Outputs>::FIELDS;
     let lacks_output = !has_outputs && !outputs.is_empty();
     if option.is_some() || input.is_some() || lacks_output {

@@ -1,29 +1,43 @@
 //! Whether the options given to a component are complete, of the right dimension and in range.
 
 use super::text::{Text, contains, equal};
-use crate::component::OptionField;
+use crate::component::{OptionField, Options};
 use crate::declaration::Dimension;
 
-/// One option as written in `robot!`.
-#[derive(Clone, Copy, Debug)]
-pub struct Given {
-    /// Its name.
-    pub name: &'static str,
-    /// The dimension of its unit, if it is a number with a unit.
-    pub dimension: Option<Dimension>,
-    /// Its number in SI, if it is a literal number.
-    pub number: Option<f64>,
+/// Checks the range of an option given as a number without a unit, and that it has none. Unknown names are left to rustc.
+///
+/// The arguments of the checks are passed by value: rustc makes a constant of its own of each reference in a constant.
+#[track_caller]
+pub const fn check_number<O: Options>(component: &str, name: &str, number: f64) {
+    check_given(component, O::FIELDS, name, None, number);
 }
 
-/// Checks the dimension and the range of a given option. Unknown names are left to rustc.
+/// Checks the dimension and the range of an option given as a number with a unit; `number` is in SI.
 #[track_caller]
-pub const fn check_option(component: &str, fields: &[OptionField], given: Given) {
+pub const fn check_quantity<O: Options>(
+    component: &str,
+    name: &str,
+    number: f64,
+    exponents: [i8; 6],
+    dimension: &'static str,
+) {
+    check_given(component, O::FIELDS, name, Some(Dimension { exponents, name: dimension }), number);
+}
+
+#[track_caller]
+const fn check_given(
+    component: &str,
+    fields: &[OptionField],
+    name: &str,
+    dimension: Option<Dimension>,
+    number: f64,
+) {
     let mut index = 0;
     while index < fields.len() {
         let field = &fields[index];
-        if equal(field.name, given.name) {
-            check_dimension(component, field, &given);
-            check_range(component, field, &given);
+        if equal(field.name, name) {
+            check_dimension(component, field, dimension.as_ref());
+            check_range(component, field, number);
             return;
         }
         index += 1;
@@ -32,8 +46,8 @@ pub const fn check_option(component: &str, fields: &[OptionField], given: Given)
 
 /// Checks that every required option is given.
 #[track_caller]
-pub const fn check_required(component: &str, fields: &[OptionField], given: &[&str]) {
-    if let Some(field) = missing_option(fields, given) {
+pub const fn check_required<O: Options, const N: usize>(component: &str, given: [&str; N]) {
+    if let Some(field) = missing_option(O::FIELDS, &given) {
         panic!("{}", describe_missing(Text::new(""), component, field).as_str())
     }
 }
@@ -58,14 +72,14 @@ pub(super) const fn describe_missing(text: Text, component: &str, field: &Option
 }
 
 #[track_caller]
-const fn check_dimension(component: &str, field: &OptionField, given: &Given) {
-    match (&field.dimension, &given.dimension) {
+const fn check_dimension(component: &str, field: &OptionField, given: Option<&Dimension>) {
+    match (&field.dimension, given) {
         (Some(expected), Some(found)) if !expected.equals(found) => {
             let text = Text::new("expected ").push(expected.name).push(", found ").push(found.name);
             let text = text.push("; ").name(field.name).push(" of ").name(component);
             panic!("{}", text.push(" is in ").push(field.unit).as_str())
         }
-        (Some(expected), None) if given.number.is_some() => {
+        (Some(expected), None) => {
             let text = Text::new("expected ").push(expected.name).push(", found a number without a unit; ");
             panic!("{}", text.push("write it with one, as in `1 ").push(field.unit).push("`").as_str())
         }
@@ -78,8 +92,8 @@ const fn check_dimension(component: &str, field: &OptionField, given: &Given) {
 }
 
 #[track_caller]
-const fn check_range(component: &str, field: &OptionField, given: &Given) {
-    if let (Some(range), Some(number)) = (&field.range, given.number)
+const fn check_range(component: &str, field: &OptionField, number: f64) {
+    if let Some(range) = &field.range
         && !(number >= range.start && number <= range.end)
     {
         let text = Text::new("").name(field.name).push(" of ").name(component).push(" must be in ");

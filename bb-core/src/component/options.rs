@@ -67,8 +67,43 @@ impl Options for NoOptions {
     }
 }
 
+/// The options of all components of a robot, by the number of the component.
+#[allow(missing_debug_implementations)]
+#[derive(Default)]
+pub struct OptionsList(Vec<Box<dyn AnyOptions>>);
+
+impl OptionsList {
+    /// Adds those of the next component.
+    pub fn add<O: Options>(&mut self, options: O) {
+        self.0.push(Box::new(options));
+    }
+
+    /// Those of a component.
+    pub(crate) fn any(&mut self, component: usize) -> Option<&mut dyn AnyOptions> {
+        self.0.get_mut(component).map(Box::as_mut)
+    }
+
+    /// The same, of the type that the expansion knows them to be of.
+    pub(crate) fn of<O: 'static>(&self, component: usize) -> &O {
+        let options: Option<&dyn Any> = self.0.get(component).map(|options| &**options as &dyn Any);
+        options.and_then(<dyn Any>::downcast_ref).unwrap_or_else(unverified)
+    }
+
+    /// The same, to change them.
+    pub(crate) fn of_mut<O: 'static>(&mut self, component: usize) -> &mut O {
+        let options = self.any(component).map(|options| options as &mut dyn Any);
+        options.and_then(<dyn Any>::downcast_mut).unwrap_or_else(unverified)
+    }
+}
+
+/// For what only a robot that failed to verify does not have.
+#[allow(clippy::panic, reason = "such a robot does not compile")]
+pub(crate) fn unverified<T>() -> T {
+    panic!("this robot did not verify")
+}
+
 /// The options of one component, whatever its type.
-pub trait AnyOptions: Any + Send {
+pub(crate) trait AnyOptions: Any + Send {
     /// See [`Options::FIELDS`].
     fn fields(&self) -> &'static [OptionField];
     /// The option number `index` of [`AnyOptions::fields`].

@@ -1,7 +1,7 @@
 //! Commands with their options, whatever their types.
 
 use super::task::{RunningFuture, Value};
-use crate::component::{Binding, Command, CommandContext, Outcome, Template};
+use crate::component::{Binding, Command, CommandContext, OptionsList, Outcome, Template};
 use crate::declaration::{ParameterValues, Role};
 use crate::event::Refusal;
 use crate::fault::Fault;
@@ -67,9 +67,9 @@ struct OfType<C: Command> {
 }
 
 impl Prepared {
-    /// The command `C` with its options.
-    pub fn new<C: Command>(options: &C::Options, binding: Binding<C::Options>) -> Self {
-        let options = Template::new(options).map_err(|fault| fault.to_string());
+    /// The command `C` with its options, those of the component with that number.
+    pub fn new<C: Command>(options: &OptionsList, component: usize, binding: Binding<C::Options>) -> Self {
+        let options = Template::new(options.of::<C::Options>(component)).map_err(|fault| fault.to_string());
         Self(Box::new(OfType::<C> { options, binding }))
     }
 }

@@ -99,27 +99,31 @@ impl<T> Deref for Stamped<T> {
     }
 }
 
+/// Whether two payloads are known, as a type: it is computed once for all publishers and inputs of the same types.
+#[derive(Debug)]
+pub struct BothKnown<const KNOWN: bool>;
+
 /// Whether a publisher of `Self` may feed an input of type `T`. It may if the types are equal, or if one of them is
 /// unknown because of another error.
 ///
-/// The wiring calls it at every `input`, where a mismatch is reported.
+/// The wiring names it at every `input`, where a mismatch is reported. `K` is a [`BothKnown`].
 #[diagnostic::on_unimplemented(
     message = "this publishes `{Self}`, but the estimator's input takes `{T}`",
     label = "publishes `{Self}`, not `{T}`"
 )]
-pub trait Feeds<T: Payload, const KNOWN: bool>: Payload {
+pub trait Feeds<T: Payload, K>: Payload {
     /// The same message.
     fn feed(message: &Stamped<Self>) -> &Stamped<T>;
 }
 
-impl<T: Payload> Feeds<T, true> for T {
+impl<T: Payload> Feeds<T, BothKnown<true>> for T {
     #[inline(always)]
     fn feed(message: &Stamped<T>) -> &Stamped<T> {
         message
     }
 }
 
-impl<P: Payload, T: Payload> Feeds<T, false> for P {
+impl<P: Payload, T: Payload> Feeds<T, BothKnown<false>> for P {
     #[expect(clippy::panic, reason = "named only by a robot that did not verify, which does not compile")]
     fn feed(_: &Stamped<P>) -> &Stamped<T> {
         panic!("this robot did not verify")

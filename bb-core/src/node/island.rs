@@ -14,6 +14,7 @@
 //! an answer, a publisher waiting for room) waits on a condition variable with a timeout. An estimator that hangs therefore
 //! blocks no other thread forever.
 
+mod alone;
 mod any;
 mod inbox;
 mod inside;
@@ -23,16 +24,17 @@ mod model;
 mod processing;
 mod waiting;
 
+pub use self::alone::{Alone, Inlet, Solo, enter_alone, start_alone};
 pub use self::any::IslandOf;
 pub(crate) use self::any::{AnyIsland, Replayed};
 use self::inbox::Inbox;
 use self::inside::{Inside, Within};
-pub use self::member::{Act, Member, act, alone, enter, feed, island, receive, start};
+pub use self::member::{Act, Member, act, alone, emit, enter, island, receive, start};
 pub(crate) use self::member::{publish, take_turn};
 use self::processing::{deliver, dropped};
 use super::environment::Environment;
 use super::{NodeEntry, Turn};
-use crate::declaration::IslandDeclaration;
+use crate::declaration::{EstimatorDeclaration, IslandDeclaration};
 use crate::journal::Event;
 use crate::pubsub::DynamicMessage;
 use crate::time::MonotonicTime;
@@ -54,6 +56,9 @@ use std::sync::{PoisonError, TryLockError};
 
 /// Implemented by `robot!` for its wiring.
 pub trait IslandWiring {
+    /// The estimators as declared.
+    const ESTIMATORS: &'static [EstimatorDeclaration];
+
     /// State shared by all islands.
     fn environment(&self) -> &Environment;
 }

@@ -17,7 +17,7 @@ use self::telling::Told;
 use self::updating::Due;
 use super::occupied::Occupied;
 use super::source::Assembly;
-use crate::component::{Accepts, Actuator, ActuatorContext, ActuatorError, Binding, Permit};
+use crate::component::{Accepts, Actuator, ActuatorContext, ActuatorError, Binding, OptionsList, Permit};
 use crate::control::{ComponentOrder, Control};
 use crate::declaration::ActuatorDeclaration;
 use crate::fault::{Failed, Fault, caught};
@@ -81,10 +81,12 @@ impl<A: Actuator> ActuatorNode<A> {
     pub fn new(
         number: usize,
         declaration: &'static ActuatorDeclaration,
-        options: &A::Options,
+        options: &OptionsList,
+        component: usize,
         binding: Binding<A::Options>,
         assembly: &Assembly,
     ) -> Self {
+        let options = options.of::<A::Options>(component);
         let context = ActuatorContext::new(declaration, Arc::clone(&assembly.host.0));
         let environment = assembly.environment.clone();
         let control = assembly.control.clone();

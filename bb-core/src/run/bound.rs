@@ -1,7 +1,7 @@
 //! Options of components by number, and those that are bound to parameters.
 
 use super::Robot;
-use crate::component::OptionField;
+use crate::component::{OptionField, OptionsList};
 use crate::event::ParameterValue;
 
 /// The paths of a robot's components, in the order of their options.
@@ -15,8 +15,8 @@ pub(super) fn component_paths<R: Robot>() -> Vec<&'static str> {
 }
 
 /// The options of a component.
-pub(super) fn fields<R: Robot>(options: &mut R::Options, component: usize) -> &'static [OptionField] {
-    R::options_of(options, component).map_or(&[], |options| options.fields())
+pub(super) fn fields<R: Robot>(options: &mut OptionsList, component: usize) -> &'static [OptionField] {
+    options.any(component).map_or(&[], |options| options.fields())
 }
 
 /// The path of the parameter that an option is bound to.
@@ -28,7 +28,7 @@ pub(super) fn bound_to<R: Robot>(component: usize, path: &str) -> Option<&'stati
 
 /// Why an option bound to this parameter would refuse its new value. Options of a component that is replaced refuse nothing.
 pub(super) fn refused_by_bound<R: Robot>(
-    options: &mut R::Options,
+    options: &mut OptionsList,
     is_replaced: impl Fn(&str) -> bool,
     parameters: &[ParameterValue],
     path: &str,

@@ -14,7 +14,7 @@ use super::source::Assembly;
 use super::{Replay, Robot, Running, Simulation, Source, StartError, Supervision};
 use crate::component::replacement::{Replacement, Replacements};
 use crate::component::shared::SharedValues;
-use crate::component::{Fault, Host};
+use crate::component::{Fault, Host, OptionsList};
 use crate::control::{Control, Declared, Parts, SystemTopics};
 use crate::declaration::{ParameterError, ParameterType, ParameterValues};
 use crate::event::ParameterValue;
@@ -40,7 +40,7 @@ pub(super) type Assembled<R> = (Machine<R>, Vec<Box<dyn Source>>);
 /// A robot that is assembled but not yet started. Options may still be changed, and a subscription made here misses
 /// nothing.
 pub struct Builder<R: Robot> {
-    pub(super) options: R::Options,
+    pub(super) options: OptionsList,
     topics: R::Topics,
     system: Arc<SystemTopics>,
     pub(super) parameters: Vec<ParameterValue>,
@@ -314,7 +314,7 @@ impl<R: Robot> Builder<R> {
             let wiring = Arc::new(R::wire(topics, options, &assembly));
             // It is set once.
             let _ = place.set(Arc::downgrade(&wiring));
-            let sources = if is_replay { Vec::new() } else { R::sources(&wiring, options, &assembly) };
+            let sources = if is_replay { Vec::new() } else { R::sources().open(&wiring, options, &assembly) };
             Ok((wiring, sources))
         });
         if let Some(refusal) = environment.take_refusal() {

@@ -1,6 +1,7 @@
 //! Typed names of what a robot declares; `robot!` generates one per publisher, at its path.
 
 use super::{ActuatorNode, Robot, Visit, Visitable};
+use crate::component::options::{OptionsList, unverified};
 use crate::component::{Actuator, Command, Estimator, Sensor, Service};
 use crate::control::SystemTopics;
 use crate::declaration::ParameterType;
@@ -13,7 +14,6 @@ use crate::message::{Frame, Payload, Stamp, Stamped};
 use crate::pubsub::Topic;
 
 use crate::time::MonotonicTime;
-use std::any::Any;
 use std::fmt;
 use std::marker::PhantomData;
 
@@ -40,18 +40,6 @@ pub trait Publisher<R: Robot>: Copy {
 fn topic<R: Robot, T: Payload>(topics: &R::Topics, publisher: usize) -> &Topic<T> {
     let topic = R::topic(topics, publisher).and_then(|topic| topic.as_any().downcast_ref());
     topic.unwrap_or_else(unverified)
-}
-
-/// The same for the options of a component.
-fn options<R: Robot, O: 'static>(options: &mut R::Options, component: usize) -> &mut O {
-    R::options_of(options, component)
-        .and_then(|options| (options as &mut dyn Any).downcast_mut())
-        .unwrap_or_else(unverified)
-}
-
-#[allow(clippy::panic, reason = "only a robot that failed to verify gets here, and such a robot does not compile")]
-fn unverified<T>() -> T {
-    panic!("this robot did not verify")
 }
 
 type NodeOf<R, A> = fn(&<R as Robot>::Wiring) -> &ActuatorNode<A>;
@@ -145,8 +133,8 @@ macro_rules! service_handle {
 
         impl<R: Robot, S: Service> Configurable<R> for $name<R, S> {
             type Options = S::Options;
-            fn options(self, options: &mut R::Options) -> &mut S::Options {
-                self::options::<R, _>(options, self.component)
+            fn options(self, options: &mut OptionsList) -> &mut S::Options {
+                options.of_mut(self.component)
             }
         }
     };
@@ -185,8 +173,8 @@ impl<R: Robot, A: Actuator> ActuatorHandle<R, A> {
 
 impl<R: Robot, A: Actuator> Configurable<R> for ActuatorHandle<R, A> {
     type Options = A::Options;
-    fn options(self, options: &mut R::Options) -> &mut A::Options {
-        self::options::<R, _>(options, self.component)
+    fn options(self, options: &mut OptionsList) -> &mut A::Options {
+        options.of_mut(self.component)
     }
 }
 
@@ -198,8 +186,8 @@ impl<R: Robot, C: Command> CommandHandle<R, C> {
 
 impl<R: Robot, C: Command> Configurable<R> for CommandHandle<R, C> {
     type Options = C::Options;
-    fn options(self, options: &mut R::Options) -> &mut C::Options {
-        self::options::<R, _>(options, self.component)
+    fn options(self, options: &mut OptionsList) -> &mut C::Options {
+        options.of_mut(self.component)
     }
 }
 
@@ -340,26 +328,26 @@ pub trait Configurable<R: Robot>: Copy {
     type Options;
     /// Returns them from the options of the robot.
     #[doc(hidden)]
-    fn options(self, options: &mut R::Options) -> &mut Self::Options;
+    fn options(self, options: &mut OptionsList) -> &mut Self::Options;
 }
 
 impl<R: Robot, S: Sensor> Configurable<R> for SensorHandle<R, S> {
     type Options = S::Options;
-    fn options(self, options: &mut R::Options) -> &mut S::Options {
-        self::options::<R, _>(options, self.component)
+    fn options(self, options: &mut OptionsList) -> &mut S::Options {
+        options.of_mut(self.component)
     }
 }
 
 impl<R: Robot, E: Estimator, T: Payload> Configurable<R> for EstimatorHandle<R, E, T> {
     type Options = E::Options;
-    fn options(self, options: &mut R::Options) -> &mut E::Options {
-        self::options::<R, _>(options, self.component)
+    fn options(self, options: &mut OptionsList) -> &mut E::Options {
+        options.of_mut(self.component)
     }
 }
 
 impl<R: Robot, E: Estimator> Configurable<R> for EstimatorOfSeveralHandle<R, E> {
     type Options = E::Options;
-    fn options(self, options: &mut R::Options) -> &mut E::Options {
-        self::options::<R, _>(options, self.component)
+    fn options(self, options: &mut OptionsList) -> &mut E::Options {
+        options.of_mut(self.component)
     }
 }

@@ -7,6 +7,7 @@ mod publishing;
 use self::publishing::handed_out;
 use super::describe::difference;
 use super::machine::Machine;
+use super::source::AnySource;
 use super::visit::Visitable;
 use super::{Live, Report, Robot};
 use crate::component::{HandleCall, HandleCast};
@@ -25,6 +26,8 @@ use std::sync::Arc;
 /// A robot replayed from its journal, on the caller's thread. Subscribers receive the messages of that run.
 pub struct Replay<R: Robot> {
     live: Live<R>,
+    /// The sensors and services, by publisher.
+    sources: HashMap<usize, Box<dyn AnySource<R>>>,
     /// Lines not played yet: the line of a measured turn waits for the line with the durations of its callbacks.
     waiting: VecDeque<Entry>,
     measured: HashMap<u64, Vec<Callback>>,
@@ -58,6 +61,7 @@ impl<R: Robot> Replay<R> {
             measured: HashMap::new(),
             placed: HashMap::new(),
             last: 0,
+            sources: R::sources().by_publisher(),
             has_begun: false,
             is_virtual: false,
             unrecorded: HashMap::new(),
@@ -232,7 +236,9 @@ impl<R: Robot> Replay<R> {
                 let message = self.message(publisher, message)?;
                 machine.environment.set_replayed_line(number);
                 let mut is_fed = true;
-                handed_out(|| is_fed = R::feed(&machine.wiring, publisher, &message, time));
+                let source = self.sources.get(&publisher);
+                let feed = |source: &dyn AnySource<R>| source.feed(&machine.wiring, &message, time);
+                handed_out(|| is_fed = source.is_some_and(|source| feed(&**source)));
                 discard(message);
                 if !is_fed {
                     return Err("the robot has no such sensor, or one of another payload".to_owned());

@@ -7,14 +7,16 @@ use self::shared::Order;
 pub(super) use self::shared::SharedSource;
 pub use self::shared::SourceStatistics;
 use super::Robot;
-use crate::component::{Binding, Next};
+use crate::component::{Binding, Next, OptionsList};
 use crate::control::{ComponentOrder, Control};
 use crate::declaration::SensorDeclaration;
 use crate::fault::{Failed, Fault, Then, caught};
 use crate::lifecycle::{AfterFault, HostHandle, Periodic, Recipe, Slot};
 use crate::message::{Stamp, Stamped};
 use crate::node::{BindTarget, Environment, blame};
+use crate::pubsub::DynamicMessage;
 use crate::time::{Clock, MonotonicTime};
+use std::collections::HashMap;
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -34,7 +36,7 @@ impl Assembly {
 }
 
 /// A running sensor or service, whatever its type.
-pub trait Source: Send {
+pub(crate) trait Source: Send {
     /// Its path.
     fn path(&self) -> &'static str;
     /// The time of its first reading, if it asks for one.
@@ -73,12 +75,106 @@ struct Running<R: Robot, S: Periodic, P> {
     at_one_instant: u32,
 }
 
+/// The sensors and services of a robot, in the order in which they are opened.
+#[allow(missing_debug_implementations)]
+pub struct Sources<R: Robot>(Vec<Box<dyn AnySource<R>>>);
+
+impl<R: Robot> Sources<R> {
+    /// Adds one; its readings go to `publish`. `component` is the number of its options, and `publisher` that of its topic.
+    pub fn add<S: Periodic>(
+        &mut self,
+        declaration: &'static SensorDeclaration,
+        component: usize,
+        publisher: usize,
+        binding: Binding<S::Options>,
+        publish: impl Fn(&R::Wiring, &Stamped<S::Output>, MonotonicTime) + Copy + Send + 'static,
+    ) {
+        self.0.push(Box::new(OfType::<S, _> { declaration, component, publisher, binding, publish }));
+    }
+
+    /// Makes all of them.
+    pub(super) fn open(
+        &self,
+        wiring: &Arc<R::Wiring>,
+        options: &OptionsList,
+        assembly: &Assembly,
+    ) -> Vec<Box<dyn Source>> {
+        let mut sources = Vec::new();
+        for source in &self.0 {
+            source.open(wiring, options, assembly, &mut sources);
+        }
+        sources
+    }
+
+    /// By the number of the publisher.
+    pub(super) fn by_publisher(self) -> HashMap<usize, Box<dyn AnySource<R>>> {
+        self.0.into_iter().map(|source| (source.publisher(), source)).collect()
+    }
+}
+
+impl<R: Robot> Default for Sources<R> {
+    fn default() -> Self {
+        Self(Vec::new())
+    }
+}
+
+/// A sensor or a service before it is made, whatever its type.
+pub(super) trait AnySource<R: Robot>: Send {
+    /// The number of its publisher.
+    fn publisher(&self) -> usize;
+    /// Makes it.
+    fn open(
+        &self,
+        wiring: &Arc<R::Wiring>,
+        options: &OptionsList,
+        assembly: &Assembly,
+        sources: &mut Vec<Box<dyn Source>>,
+    );
+    /// Publishes a recorded message; returns `false` if it has another payload.
+    fn feed(&self, wiring: &R::Wiring, message: &DynamicMessage, now: MonotonicTime) -> bool;
+}
+
+struct OfType<S: Periodic, P> {
+    declaration: &'static SensorDeclaration,
+    component: usize,
+    publisher: usize,
+    binding: Binding<S::Options>,
+    publish: P,
+}
+
+impl<R, S, P> AnySource<R> for OfType<S, P>
+where
+    R: Robot,
+    S: Periodic,
+    P: Fn(&R::Wiring, &Stamped<S::Output>, MonotonicTime) + Copy + Send + 'static,
+{
+    fn publisher(&self) -> usize {
+        self.publisher
+    }
+
+    fn open(
+        &self,
+        wiring: &Arc<R::Wiring>,
+        options: &OptionsList,
+        assembly: &Assembly,
+        sources: &mut Vec<Box<dyn Source>>,
+    ) {
+        let options = options.of(self.component);
+        assembly.source::<R, S>(self.declaration, options, self.binding, wiring, self.publish, sources);
+    }
+
+    fn feed(&self, wiring: &R::Wiring, message: &DynamicMessage, now: MonotonicTime) -> bool {
+        let message = message.downcast();
+        message.map(|message| (self.publish)(wiring, message, now)).is_some()
+    }
+}
+
 impl Assembly {
     /// Makes a sensor or a service and adds it to `sources`; its readings go to `publish`.
     ///
     /// The wiring is passed beside the function instead of in a closure. That the wiring is `Send` is known for every
     /// robot, and need not be proven again for each of its sensors.
-    pub fn source<R: Robot, S: Periodic>(
+    fn source<R: Robot, S: Periodic>(
         &self,
         declaration: &'static SensorDeclaration,
         options: &S::Options,

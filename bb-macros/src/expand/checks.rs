@@ -1,15 +1,16 @@
 //! Constants that check facts about types. Each calls a function of `bb_core` at the user's token; a fault is a panic
 //! there while rustc evaluates it.
 
-use super::literal::{option, spanned_call};
+use super::literal::spanned_call;
 use super::part::Part;
 use super::types::{Types, type_name};
 use crate::diagnostics::Place;
 use crate::model::{EstimatorId, Robot};
 use crate::parse::{Component, ComponentOption, OptionValue, Value};
+use crate::units::Dimension;
 use crate::verify::Verified;
 use proc_macro2::TokenStream;
-use quote::{ToTokens, quote};
+use quote::quote;
 
 pub(super) fn checks(verified: &Verified<'_>, types: &Types<'_>) -> TokenStream {
     let robot = verified.robot;
@@ -34,75 +35,69 @@ pub(super) fn checks(verified: &Verified<'_>, types: &Types<'_>) -> TokenStream 
 /// Required options are given.
 fn required(component: &Component, options: &TokenStream) -> TokenStream {
     let (name, given) = (type_name(component), given(component));
-    spanned_call(
-        Place::of(&component.kind),
-        quote!(::bb_core::__private::check_required),
-        quote!(#name, <#options as ::bb_core::Options>::FIELDS, #given),
-    )
+    spanned_call(Place::of(&component.kind), ("check_required", quote!(::<#options, _>)), quote!(#name, #given))
 }
 
 /// An estimator has its required options, all inputs that the algorithm needs, and an output if it has several.
 fn estimator(robot: &Robot, types: &Types<'_>, id: EstimatorId) -> TokenStream {
     let estimator = &robot.estimators[id];
     let (name, kind, given) = (type_name(&estimator.component), types.estimator(id), given(&estimator.component));
-    let declared = estimator.inputs.iter().map(|input| crate::names::text(&input.name));
-    let declared = option((!estimator.is_nested()).then(|| quote!(&[#(#declared),*])));
     let has_outputs = !estimator.outputs.is_empty();
-    spanned_call(
-        Place::of(&estimator.component.kind),
-        quote!(::bb_core::__private::check_estimator::<#kind>),
-        quote!(#name, #given, #declared, #has_outputs),
-    )
+    let (check, arguments) = if estimator.is_nested() {
+        (("check_nested", quote!(::<#kind, _>)), quote!(#name, #given, #has_outputs))
+    } else {
+        let declared = estimator.inputs.iter().map(|input| crate::names::text(&input.name));
+        let arguments = quote!(#name, #given, [#(#declared),*], #has_outputs);
+        (("check_estimator", quote!(::<#kind, _, _>)), arguments)
+    };
+    spanned_call(Place::of(&estimator.component.kind), check, arguments)
 }
 
 /// The names of the options given.
 fn given(component: &Component) -> TokenStream {
     let names = component.options.iter().map(|option| crate::names::text(&option.name));
-    quote!(&[#(#names),*])
+    quote!([#(#names),*])
 }
 
 /// Literals have the right dimension and are in range.
 fn options(robot: &Robot, component: &Component, options: &TokenStream) -> TokenStream {
     let name = type_name(component);
-    let fields = quote!(<#options as ::bb_core::Options>::FIELDS);
     let mut checks = TokenStream::new();
     for option in &component.options {
-        if let Some((place, given)) = given_number(robot, option) {
-            checks.extend(spanned_call(
-                place,
-                quote!(::bb_core::__private::check_option),
-                quote!(#name, #fields, #given),
-            ));
-        }
+        let Some((place, dimension, number)) = given_number(robot, option) else { continue };
+        let option = crate::names::text(&option.name);
+        let (check, arguments) = match dimension {
+            Some(dimension) => {
+                let (Dimension(exponents), dimension) = (dimension, dimension.name());
+                let arguments = quote!(#name, #option, #number, [#(#exponents),*], #dimension);
+                (("check_quantity", quote!(::<#options>)), arguments)
+            }
+            None => (("check_number", quote!(::<#options>)), quote!(#name, #option, #number)),
+        };
+        checks.extend(spanned_call(place, check, arguments));
     }
     checks
 }
 
-/// A literal number as a `bb_core::check::Given`, and its place.
-fn given_number(robot: &Robot, given: &ComponentOption) -> Option<(Place, TokenStream)> {
-    let (place, unit, number) = match &given.value {
+/// A literal number: its place, its dimension if it has a unit, and its value in SI.
+fn given_number(robot: &Robot, given: &ComponentOption) -> Option<(Place, Option<Dimension>, f64)> {
+    match &given.value {
         OptionValue::Quantity(quantity) => {
-            let unit = quantity.has_unit.then(|| quantity.dimension.to_token_stream());
-            (quantity.place, option(unit), quantity.value)
+            Some((quantity.place, quantity.has_unit.then_some(quantity.dimension), quantity.value))
         }
         // Its default is checked where it is declared.
         OptionValue::Parameter(path) => {
             let default = &robot.parameters[robot.parameter(path)?].default;
-            let unit = default.has_unit.then(|| default.dimension.to_token_stream());
-            let number = match default.value {
-                Value::Number(number) => number,
+            match default.value {
+                Value::Number(number) => {
+                    Some((path.place(), default.has_unit.then_some(default.dimension), number))
+                }
                 // rustc checks whether an integer fits, and the start checks the range.
-                Value::Integer(_) | Value::Bool(_) | Value::Text(_) => return None,
-            };
-            (path.place(), option(unit), number)
+                Value::Integer(_) | Value::Bool(_) | Value::Text(_) => None,
+            }
         }
-        OptionValue::Expression { expression, number } => {
-            (Place::of(&**expression), option(None), number.as_ref().copied()?)
-        }
-    };
-    let name = crate::names::text(&given.name);
-    let number = option(Some(quote!(#number)));
-    Some((place, quote!(::bb_core::__private::Given { name: #name, dimension: #unit, number: #number })))
+        OptionValue::Expression { expression, number } => Some((Place::of(&**expression), None, (*number)?)),
+    }
 }
 
 /// The declared inputs are those of the algorithm, and optional ones are optional there.
@@ -111,11 +106,11 @@ fn inputs(robot: &Robot, types: &Types<'_>, id: EstimatorId) -> TokenStream {
     let (name, taken) = (type_name(&estimator.component), types.estimator_input(id));
     let known = estimator.inputs.iter().map(|input| {
         let (input_name, place) = (crate::names::text(&input.name), Place::of(&input.name));
-        spanned_call(place, quote!(::bb_core::__private::check_input::<#taken>), quote!(#name, #input_name))
+        spanned_call(place, ("check_input", quote!(::<#taken>)), quote!(#name, #input_name))
     });
     let optional = estimator.inputs.iter().filter_map(|input| {
         let (input_name, place) = (crate::names::text(&input.name), Place::of(input.optional.as_ref()?));
-        let check = quote!(::bb_core::__private::check_optional::<#taken>);
+        let check = ("check_optional", quote!(::<#taken>));
         Some(spanned_call(place, check, quote!(#name, #input_name)))
     });
     known.chain(optional).collect()
@@ -127,7 +122,7 @@ fn outputs(robot: &Robot, types: &Types<'_>, id: EstimatorId) -> TokenStream {
     let (name, emitted) = (type_name(&estimator.component), types.estimator_output(id));
     let known = estimator.outputs.iter().map(|output| {
         let (output_name, place) = (crate::names::text(&output.name), Place::of(&output.name));
-        spanned_call(place, quote!(::bb_core::__private::check_output::<#emitted>), quote!(#name, #output_name))
+        spanned_call(place, ("check_output", quote!(::<#emitted>)), quote!(#name, #output_name))
     });
     known.collect()
 }
@@ -146,7 +141,7 @@ fn moving_joints(verified: &Verified<'_>, types: &Types<'_>) -> TokenStream {
             let payload = types.payload(*source);
             checks.extend(spanned_call(
                 Place::of(&input.word),
-                quote!(::bb_core::__private::check_dynamic),
+                ("check_dynamic", quote!()),
                 quote!(
                     #name,
                     <#kind as ::bb_core::Estimator>::HANDLES_MOVING_JOINTS
@@ -172,7 +167,7 @@ fn positions(robot: &Robot, types: &Types<'_>) -> TokenStream {
         });
         Some(spanned_call(
             Place::of(&actuator.name),
-            quote!(::bb_core::__private::check_position),
+            ("check_position", quote!()),
             quote!(#name, #joint, &[#(#payloads),*]),
         ))
     });
@@ -188,7 +183,7 @@ fn roles(robot: &Robot, types: &Types<'_>) -> TokenStream {
         let role = quote!(<#kind as ::bb_core::Command>::ROLE);
         checks.extend(spanned_call(
             Place::of(&command.name),
-            quote!(::bb_core::__private::check_role),
+            ("check_role", quote!()),
             quote!(#name, #role, &[#(#before),*]),
         ));
         if let Some(states) = &command.allowed_states {
@@ -197,11 +192,7 @@ fn roles(robot: &Robot, types: &Types<'_>) -> TokenStream {
                 (Some(first), Some(last)) => Place { start: first.span(), end: last.span() },
                 _ => Place::of(&command.name),
             };
-            checks.extend(spanned_call(
-                place,
-                quote!(::bb_core::__private::check_reachable),
-                quote!(#name, #role, &[#(#names),*]),
-            ));
+            checks.extend(spanned_call(place, ("check_reachable", quote!()), quote!(#name, #role, &[#(#names),*])));
         }
         before.push(quote!((#name, #role)));
     }

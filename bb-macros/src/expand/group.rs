@@ -11,8 +11,6 @@ use proc_macro2::{Ident, TokenStream};
 use quote::{ToTokens, format_ident, quote};
 use syn::Token;
 
-type Mut = Token![mut];
-
 /// Fields in a group.
 const SIZE: usize = 16;
 
@@ -80,13 +78,7 @@ pub(super) fn structs(
 }
 
 /// `fn function(whole, number) -> Option<&object>`: the field of that number as a trait object.
-pub(super) fn by_number(
-    name: &str,
-    function: &str,
-    fields: &[Field],
-    object: &TokenStream,
-    mutability: Option<Mut>,
-) -> TokenStream {
+pub(super) fn by_number(name: &str, function: &str, fields: &[Field], object: &TokenStream) -> TokenStream {
     let (whole, find) = (format_ident!("{name}"), format_ident!("{function}"));
     let (mut groups, mut arms) = (TokenStream::new(), TokenStream::new());
     for (number, fields) in fields.chunks(SIZE).enumerate() {
@@ -94,17 +86,17 @@ pub(super) fn by_number(
             (group_name(number), format_ident!("{name}{number}"), format_ident!("{function}{number}"));
         let (numbers, names) = (0..fields.len(), fields.iter().map(|field| &field.name));
         groups.extend(quote! {
-            fn #function(group: & #mutability #group, number: usize) -> __private::Option<& #mutability #object> {
+            fn #function(group: &#group, number: usize) -> __private::Option<&#object> {
                 match number {
-                    #(#numbers => __private::Some(& #mutability group.#names),)*
+                    #(#numbers => __private::Some(&group.#names),)*
                     _ => __private::None
                 }
             }
         });
-        arms.extend(quote!(#number => #function(& #mutability whole.#field, number % #SIZE),));
+        arms.extend(quote!(#number => #function(&whole.#field, number % #SIZE),));
     }
     quote! {
-        fn #find(whole: & #mutability #whole, number: usize) -> __private::Option<& #mutability #object> {
+        fn #find(whole: &#whole, number: usize) -> __private::Option<&#object> {
             match number / #SIZE { #arms _ => __private::None }
         }
 

@@ -2,8 +2,8 @@
 
 use crate::diagnostics::Place;
 use crate::model::Rigid;
-use proc_macro2::{Group, Ident, Span, TokenStream, TokenTree};
-use quote::quote;
+use proc_macro2::{Delimiter, Group, Ident, Span, TokenStream, TokenTree};
+use quote::{quote, quote_spanned};
 
 pub(super) fn option(value: Option<TokenStream>) -> TokenStream {
     match value {
@@ -41,14 +41,19 @@ pub(super) fn ident(text: &str) -> Ident {
     }
 }
 
-/// `const _: () = function(arguments);`, spanned so that rustc underlines all of `place`.
+/// `const _: () = ::bb_core::__private::check(arguments);`, spanned so that rustc underlines all of `place`.
 ///
 /// It has no local names, so it may have the span of user code: rustc then does not say that the error originates in
-/// a macro.
-pub(super) fn spanned_call(place: Place, function: TokenStream, arguments: TokenStream) -> TokenStream {
-    let head = at(quote!(const _: () = #function), place.start);
-    let tail = at(quote!((#arguments);), place.end);
-    quote!(#head #tail)
+/// a macro. `generics` are those of the function, as in `::<Imu>`.
+pub(super) fn spanned_call(
+    place: Place,
+    (check, generics): (&str, TokenStream),
+    arguments: TokenStream,
+) -> TokenStream {
+    let (check, generics) = (Ident::new(check, place.start), at(generics, place.start));
+    let mut arguments = Group::new(Delimiter::Parenthesis, arguments);
+    arguments.set_span(place.end);
+    quote_spanned!(place.start=> const _: () = ::bb_core::__private::#check #generics #arguments;)
 }
 
 /// The same tokens, all at `span`. Names are resolved as in the expansion, wherever `span` comes from: a robot may be

@@ -7,7 +7,7 @@
 
 use super::part::Part;
 use crate::diagnostics::Place;
-use crate::model::{PublisherId, Robot, Table};
+use crate::model::{From, Publisher, PublisherId, Robot, Table};
 use proc_macro2::{Ident, Span};
 use quote::{ToTokens as _, format_ident};
 use std::collections::{HashMap, HashSet};
@@ -25,7 +25,7 @@ pub(super) struct Naming {
 pub(super) struct PartNames {
     /// `sensor_base_imu`
     pub(super) name: Ident,
-    /// `__Rover_2_11__sensor_base_imu`: its type.
+    /// `__Rover_2_11__sensor_base_imu`: its type, named after the first part with this type.
     pub(super) alias: Ident,
     /// `__Rover_2_11__given__sensor_base_imu`: its type as the user wrote it.
     pub(super) given: Ident,
@@ -46,8 +46,10 @@ pub(super) struct PartNames {
 pub(super) struct PublisherNames {
     /// `sensor_base_imu`
     pub(super) name: Ident,
-    /// `__Rover_2_11__payload__sensor_base_imu_tilt`
+    /// `__Rover_2_11__payload__sensor_base_imu_tilt`, named after the first publisher of this output of this type.
     pub(super) payload: Ident,
+    /// Whether it is the first.
+    pub(super) is_first: bool,
 }
 
 impl Naming {
@@ -63,15 +65,17 @@ impl Naming {
             let span = Place::of(kind).start.resolved_at(call_site);
             let own = item("probed__", &name, call_site);
             let tokens = kind.to_token_stream().to_string();
-            let (first, probed) = match tokens.contains('$') {
+            let own = (number, own, item("", &name, span));
+            let (first, probed, mut alias) = match tokens.contains('$') {
                 // `$crate` of two macros may be two crates.
-                true => (number, own),
-                false => probed.entry((std::mem::discriminant(&part), tokens)).or_insert((number, own)).clone(),
+                true => own,
+                false => probed.entry((std::mem::discriminant(&part), tokens)).or_insert(own).clone(),
             };
+            alias.set_span(span);
             PartNames {
                 probed,
                 first,
-                alias: item("", &name, span),
+                alias,
                 given: item("given__", &name, span),
                 member: item("member__", &name, call_site),
                 exported: item("exported__", &name, call_site),
@@ -79,17 +83,28 @@ impl Naming {
                 span,
             }
         });
-        let parts = parts.collect();
+        let parts: Vec<PartNames> = parts.collect();
+        let mut payloads = HashMap::new();
         let publishers = robot.publishers.map(|id| {
-            let name = fresh(&robot.publishers[id].path, &mut taken_by_publishers);
-            PublisherNames { payload: item("payload__", &name, call_site), name }
+            let Publisher { path, from } = &robot.publishers[id];
+            let name = fresh(path, &mut taken_by_publishers);
+            let (part, output) = match *from {
+                From::Sensor(id) => (Part::Sensor(id), None),
+                From::Service(id) => (Part::Service(id), None),
+                From::Estimator(id, output) => {
+                    let output = output.and_then(|output| robot.estimators[id].outputs.get(output));
+                    (Part::Estimator(id), output.map(|output| crate::names::text(&output.name)))
+                }
+            };
+            let (mut payload, mut is_first) = (item("payload__", &name, call_site), false);
+            let first = payloads.entry((parts[part.position(robot)].first, output)).or_insert_with(|| {
+                is_first = true;
+                payload.clone()
+            });
+            payload.clone_from(first);
+            PublisherNames { payload, is_first, name }
         });
         Self { parts, publishers }
-    }
-
-    /// The names of the part at that position.
-    pub(super) fn of_number(&self, position: usize) -> &PartNames {
-        &self.parts[position]
     }
 
     pub(super) fn part(&self, robot: &Robot, part: Part) -> &PartNames {

@@ -1,6 +1,5 @@
-//! `struct __Options`: the options of every component, initially as declared, and the parameters they are bound to.
+//! The options of every component, as declared, and the parameters they are bound to.
 
-use super::group::{self, Field};
 use super::literal::respan;
 use super::part::Part;
 use super::types::Types;
@@ -10,31 +9,44 @@ use crate::model::Robot;
 use crate::parse::{Component, OptionValue, ParameterKind};
 use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
-use syn::Token;
 
-/// The structs, and `fn __declared_options() -> __Options`.
+/// Number of components whose options are made by one function: rustc's time for one grows with its square.
+const SIZE: usize = 16;
+
+/// `fn __declared_options() -> OptionsList`
 pub(super) fn options(types: &Types<'_>) -> TokenStream {
     let robot = types.model();
-    let (mut fields, mut functions) = (Vec::new(), TokenStream::new());
+    let (mut added, mut functions) = (Vec::new(), TokenStream::new());
     for part in Part::all(robot) {
         let component = part.component(robot);
-        let (options, given) = (types.options(part), types.given_options(part));
-        let name = types.name_of(part).clone();
-        let value = if component.options.is_empty() {
-            let defaults = quote!(<#given as ::bb_core::Options>::defaults());
-            respan(quote!(__private::as_known(#defaults)), Place::of(&component.kind).start)
+        let given = types.given_options(part);
+        if component.options.is_empty() {
+            let place = Place::of(&component.kind).start;
+            added.push(respan(quote!(options.add(<#given as ::bb_core::Options>::defaults());), place));
         } else {
             // Values are user expressions, so the names in scope must not be ones that a user writes.
-            let function = format_ident!("__declared_{name}");
-            functions.extend(filled(&function, &options, &given, component));
-            quote!(#function())
-        };
-        fields.push(Field { name, kind: options, value });
+            let function = format_ident!("__declared_{}", types.name_of(part));
+            functions.extend(filled(&function, &given, component));
+            added.push(quote!(#function(options);));
+        }
     }
-    let structs = group::structs("__Options", "__declared_options", &fields, &quote!(), &quote!());
-    let any = quote!(dyn __private::AnyOptions);
-    let by_number = group::by_number("__Options", "__options_of", &fields, &any, Some(<Token![mut]>::default()));
-    quote!(#structs #by_number #functions)
+    let groups = added.chunks(SIZE).enumerate().map(|(number, added)| {
+        let group = format_ident!("__declared_options{number}");
+        quote!(fn #group(options: &mut __private::OptionsList) { #(#added)* })
+    });
+    let calls = (0..added.len().div_ceil(SIZE)).map(|number| {
+        let group = format_ident!("__declared_options{number}");
+        quote!(#group(&mut options);)
+    });
+    quote! {
+        fn __declared_options() -> __private::OptionsList {
+            let mut options = __private::Default::default();
+            #(#calls)*
+            options
+        }
+        #(#groups)*
+        #functions
+    }
 }
 
 /// `&[(2, "beta", 0)]`: the options that are bound to a parameter, by the number of their component.
@@ -51,10 +63,10 @@ pub(super) fn bound(robot: &Robot) -> TokenStream {
     quote!(&[#(#bound),*])
 }
 
-/// `fn __declared_sensor_base_imu() -> … { let mut options = defaults(); options.beta = 0.1; options }`
+/// `fn __declared_sensor_base_imu(all) { let mut options = defaults(); options.beta = 0.1; all.add(options) }`
 ///
 /// Only this uses the type as the user wrote it, so a type of another kind is reported here.
-fn filled(function: &Ident, options: &TokenStream, given: &TokenStream, component: &Component) -> TokenStream {
+fn filled(function: &Ident, given: &TokenStream, component: &Component) -> TokenStream {
     let settings: Vec<TokenStream> = component
         .options
         .iter()
@@ -80,10 +92,10 @@ fn filled(function: &Ident, options: &TokenStream, given: &TokenStream, componen
     // Spanned at the user's type, which rustc points at when a value does not fit.
     let start = respan(quote!(let #mutability __options: #given = ::bb_core::Options::defaults();), place);
     quote! {
-        fn #function() -> #options {
+        fn #function(__all: &mut __private::OptionsList) {
             #start
             #(#settings)*
-            __private::as_known(__options)
+            __all.add(__options);
         }
     }
 }

@@ -4,12 +4,12 @@ use super::options::{binding, bound};
 use super::part::Part;
 use super::types::Types;
 use super::{control, order};
-use crate::model::{From, PublisherId};
+use crate::model::PublisherId;
 use crate::verify::Verified;
 use proc_macro2::TokenStream;
 use quote::{format_ident, quote};
 
-/// The number of sources opened by one function.
+/// The number of sources added by one function.
 const SIZE: usize = 16;
 
 pub(super) fn robot_impl(verified: &Verified<'_>, types: &Types<'_>) -> TokenStream {
@@ -24,35 +24,19 @@ pub(super) fn robot_impl(verified: &Verified<'_>, types: &Types<'_>) -> TokenStr
     let sources: Vec<TokenStream> = sensors.chain(services).collect();
     // In groups: rustc takes longer for one function with all of them.
     let groups = sources.chunks(SIZE).enumerate().map(|(number, sources)| {
-        let group = format_ident!("__open_group_{number}");
-        quote! {
-            fn #group(
-                wiring: &__private::Arc<__Wiring>,
-                options: &__Options,
-                assembly: &__private::Assembly,
-                sources: &mut __private::Vec<__private::Box<dyn __private::Source>>,
-            ) {
-                #(#sources)*
-            }
-        }
+        let group = format_ident!("__sources_{number}");
+        quote!(fn #group(sources: &mut __private::Sources<#this>) { #(#sources)* })
     });
-    let open_sources = (0..sources.len().div_ceil(SIZE)).map(|number| {
-        let group = format_ident!("__open_group_{number}");
-        quote!(#group(wiring, options, assembly, &mut sources);)
-    });
-    let feeds = robot.publishers.ids().filter_map(|id| match types.from(id) {
-        From::Sensor(_) | From::Service(_) => {
-            let publish = types.publisher(id);
-            Some(quote!(#id => __private::feed(wiring, message, now, __Wiring::#publish),))
-        }
-        From::Estimator(..) => None,
+    let add_sources = (0..sources.len().div_ceil(SIZE)).map(|number| {
+        let group = format_ident!("__sources_{number}");
+        quote!(#group(&mut sources);)
     });
     let states = control::states(robot);
     let bound = bound(robot);
     let commands = robot.commands.ids().map(|id| {
         let part = Part::Command(id);
-        let (kind, options, binding) = (types.part(part), types.options_place(part), binding(types, part));
-        quote!(__private::Prepared::new::<#kind>(&options.#options, #binding))
+        let (kind, component, binding) = (types.part(part), part.position(robot), binding(types, part));
+        quote!(__private::Prepared::new::<#kind>(options, #component, #binding))
     });
     quote! {
         #(#groups)*
@@ -71,11 +55,10 @@ pub(super) fn robot_impl(verified: &Verified<'_>, types: &Types<'_>) -> TokenStr
             const ISLANDS: &'static [__private::IslandOf<__Wiring>] = &__ISLANDS;
             const BOUND_OPTIONS: &'static [(usize, &'static str, usize)] = #bound;
 
-            type Options = __Options;
             type Topics = __Topics;
             type Wiring = __Wiring;
 
-            fn options() -> __Options {
+            fn options() -> __private::OptionsList {
                 __declared_options()
             }
 
@@ -83,7 +66,7 @@ pub(super) fn robot_impl(verified: &Verified<'_>, types: &Types<'_>) -> TokenStr
                 __new_topics()
             }
 
-            fn wire(topics: __Topics, options: &__Options, assembly: &__private::Assembly) -> __Wiring {
+            fn wire(topics: __Topics, options: &__private::OptionsList, assembly: &__private::Assembly) -> __Wiring {
                 __Wiring {
                     topics,
                     islands: __new_islands(options, assembly),
@@ -92,13 +75,9 @@ pub(super) fn robot_impl(verified: &Verified<'_>, types: &Types<'_>) -> TokenStr
                 }
             }
 
-            fn sources(
-                wiring: &__private::Arc<__Wiring>,
-                options: &__Options,
-                assembly: &__private::Assembly,
-            ) -> __private::Vec<__private::Box<dyn __private::Source>> {
-                let mut sources = __private::Vec::new();
-                #(#open_sources)*
+            fn sources() -> __private::Sources<Self> {
+                let mut sources = __private::Default::default();
+                #(#add_sources)*
                 sources
             }
 
@@ -113,13 +92,6 @@ pub(super) fn robot_impl(verified: &Verified<'_>, types: &Types<'_>) -> TokenStr
                 __topic(topics, publisher)
             }
 
-            fn options_of(
-                options: &mut __Options,
-                component: usize,
-            ) -> __private::Option<&mut dyn __private::AnyOptions> {
-                __options_of(options, component)
-            }
-
             fn actuator(
                 wiring: &__Wiring,
                 actuator: usize,
@@ -127,23 +99,14 @@ pub(super) fn robot_impl(verified: &Verified<'_>, types: &Types<'_>) -> TokenStr
                 __actuator(&wiring.actuators, actuator)
             }
 
-            fn feed(
-                wiring: &__Wiring,
-                publisher: usize,
-                message: &__private::DynamicMessage,
-                now: __private::MonotonicTime,
-            ) -> bool {
-                match publisher { #(#feeds)* _ => false }
-            }
-
-            fn commands(options: &__Options) -> __private::Vec<__private::Prepared> {
+            fn commands(options: &__private::OptionsList) -> __private::Vec<__private::Prepared> {
                 ::std::vec![#(#commands),*]
             }
         }
     }
 }
 
-/// Creates one sensor or service, whose readings go to its publisher.
+/// One sensor or service, whose readings go to its publisher.
 fn source(
     types: &Types<'_>,
     part: Part,
@@ -151,16 +114,15 @@ fn source(
     wrapper: TokenStream,
     declaration: TokenStream,
 ) -> TokenStream {
-    let (options, publish) = (types.options_place(part), types.publisher(publisher));
-    let (kind, binding, robot) = (types.part(part), binding(types, part), types.robot());
+    let (component, publish) = (part.position(types.model()), types.publisher(publisher));
+    let (kind, binding) = (types.part(part), binding(types, part));
     quote! {
-        assembly.source::<#robot, __private::#wrapper<#kind>>(
+        sources.add::<__private::#wrapper<#kind>>(
             #declaration,
-            &options.#options,
+            #component,
+            #publisher,
             #binding,
-            wiring,
             __Wiring::#publish,
-            sources,
         );
     }
 }

@@ -17,7 +17,7 @@ use syn::Token;
 /// `__Rover_2_11__given__sensor_base_imu`; and the payload of each estimator's output,
 /// `__Rover_2_11__payload__sensor_base_imu_tilt`.
 ///
-/// Parts with the same kind and type are probed once. A type that fails is still reported at each part, since its
+/// Parts with the same kind and type are probed once, and share the names of what follows from their type. A type that fails is still reported at each part, since its
 /// options are those of the type as written there.
 pub(super) fn aliases(types: &Types<'_>) -> TokenStream {
     let (robot, name) = (types.robot, types.name);
@@ -33,20 +33,20 @@ pub(super) fn aliases(types: &Types<'_>) -> TokenStream {
             }>);
             aliases.push((probed.clone(), implemented));
             aliases.push((without_span(alias), quote!(<#probed as ::bb_core::__private::Known>::Type)));
-        } else {
-            let first = &types.naming.of_number(*first).alias;
-            aliases.push((without_span(alias), without_span(first).into_token_stream()));
         }
         aliases
     });
-    let outputs = robot.publishers.ids().filter_map(|id| match types.from(id) {
-        From::Estimator(estimator, output) => {
-            let (field, emitted) = (types.output_field(estimator, output), types.estimator_output(estimator));
-            let span = types.span(Part::Estimator(estimator));
-            let payload = quote_spanned!(span=> <#field as ::bb_core::__private::EmittedAt<#emitted>>::Payload);
-            Some((types.naming.publisher(id).payload.clone(), payload))
-        }
-        From::Sensor(_) | From::Service(_) => None,
+    let outputs = types.payloads().map(|id| {
+        let payload = match types.from(id) {
+            From::Estimator(estimator, output) => {
+                let (field, emitted) = (types.output_field(estimator, output), types.estimator_output(estimator));
+                let span = types.span(Part::Estimator(estimator));
+                quote_spanned!(span=> <#field as ::bb_core::__private::EmittedAt<#emitted>>::Payload)
+            }
+            From::Sensor(id) => types.output(Part::Sensor(id)),
+            From::Service(id) => types.output(Part::Service(id)),
+        };
+        (types.naming.publisher(id).payload.clone(), payload)
     });
     let marker = (marker(name), robot_type(name));
     let aliases = parts.flatten().chain(outputs).chain([marker]).map(|(alias, kind)| {
@@ -91,8 +91,9 @@ pub(super) const ROBOT: &str = "__Robot";
 /// name explains the error, since rustc prints it.
 pub(super) fn imports(types: &Types<'_>, accessors: Accessors) -> TokenStream {
     let (robot, name) = (types.robot, types.name);
-    let parts = Part::all(robot).map(|part| &types.names(part).alias);
-    let outputs = robot.publishers.ids().filter(|id| matches!(types.from(*id), From::Estimator(..)));
+    let parts = Part::all(robot).enumerate().map(|(number, part)| (number, types.names(part)));
+    let parts = parts.filter(|(number, names)| names.first == *number).map(|(_, names)| &names.alias);
+    let outputs = types.payloads().filter(|id| matches!(types.from(*id), From::Estimator(..)));
     let payloads = outputs.map(|id| &types.naming.publisher(id).payload);
     let is_wired = accessors == Accessors::Wired;
     let members = robot.estimators.ids().filter(|_| is_wired).map(|id| &types.names(Part::Estimator(id)).exported);
@@ -182,9 +183,9 @@ impl<'a> Types<'a> {
         self.naming.part(self.robot, part)
     }
 
-    /// The place of a part's options in `__Options`.
-    pub(super) fn options_place(&self, part: Part) -> group::Path {
-        group::path(part.position(self.robot), self.name_of(part))
+    /// The first part with the same type.
+    pub(super) fn first(&self, part: Part) -> usize {
+        self.names(part).first
     }
 
     /// The place of a publisher's topic in `__Topics`.
@@ -251,17 +252,21 @@ impl<'a> Types<'a> {
         quote_spanned!(span=> <#estimator as ::bb_core::Estimator>::Output)
     }
 
-    /// The payload of a publisher.
-    pub(super) fn payload(&self, publisher: PublisherId) -> TokenStream {
-        match self.from(publisher) {
-            From::Sensor(id) => self.output(Part::Sensor(id)),
-            From::Service(id) => self.output(Part::Service(id)),
-            From::Estimator(id, _) => {
-                let mut alias = self.naming.publisher(publisher).payload.clone();
-                alias.set_span(self.span(Part::Estimator(id)));
-                self.named(&alias).into_token_stream()
-            }
-        }
+    /// The payload of a publisher, at the span of the user's type.
+    pub(super) fn payload(&self, publisher: PublisherId) -> Named {
+        let part = match self.from(publisher) {
+            From::Sensor(id) => Part::Sensor(id),
+            From::Service(id) => Part::Service(id),
+            From::Estimator(id, _) => Part::Estimator(id),
+        };
+        let mut alias = self.naming.publisher(publisher).payload.clone();
+        alias.set_span(self.span(part));
+        self.named(&alias)
+    }
+
+    /// The publishers that payloads are named after.
+    fn payloads(&self) -> impl Iterator<Item = PublisherId> {
+        self.robot.publishers.ids().filter(|id| self.naming.publisher(*id).is_first)
     }
 
     /// A declared output as a field of the algorithm's output type, looked up by name at compile time; or its only

@@ -20,16 +20,17 @@
 //! ```
 
 use super::group::{self, Field};
-use super::islands::{IslandId, Islands};
+use super::islands::{self, IslandId, Islands};
 use super::literal::respan;
 use super::options::binding;
 use super::part::Part;
-use super::types::Types;
+use super::types::{Named, Types};
 use super::{order, path_text};
 use crate::model::{EstimatorId, From, Home, Id as _, PublisherId, Table};
 use crate::verify::Verified;
 use proc_macro2::{Ident, Span, TokenStream};
-use quote::{format_ident, quote};
+use quote::{ToTokens as _, format_ident, quote};
+use std::collections::HashMap;
 
 /// The context of all functions here.
 struct Wiring<'a> {
@@ -38,12 +39,26 @@ struct Wiring<'a> {
     consumers: &'a Table<PublisherId, Vec<Consumer>>,
     /// The messages that enter each island from outside.
     inlets: Table<IslandId, Vec<(PublisherId, Visit<'a>)>>,
+    /// The inputs of each estimator; of a nested one, the implicit one.
+    inputs: Table<EstimatorId, Vec<Input>>,
+}
+
+/// The aliases for an input: each is named after the first input that it fits, and declared there.
+struct Input {
+    source: PublisherId,
+    /// Its field, and the payload it takes.
+    field: Ident,
+    taken: Ident,
+    declares_field: bool,
+    /// Whether that payload and its publisher's are known.
+    known: Ident,
+    declares_known: bool,
 }
 
 pub(super) fn wiring(verified: &Verified<'_>, types: &Types<'_>, islands: &Islands) -> TokenStream {
     let robot = verified.robot;
     let consumers = consumers(verified);
-    let wiring = Wiring::new(types, islands, &consumers);
+    let wiring = Wiring::new(verified, types, islands, &consumers);
     let topics: Vec<Field> = robot
         .publishers
         .enumerate()
@@ -61,20 +76,25 @@ pub(super) fn wiring(verified: &Verified<'_>, types: &Types<'_>, islands: &Islan
         .enumerate()
         .map(|(number, island)| {
             let kind = wiring.island_struct(number);
-            let nodes = island.estimators.iter().map(|id| wiring.start(*id));
-            Field {
-                name: wiring.island_name(number).clone(),
-                kind: quote!(__private::Island<#kind>),
-                value: quote!(__private::Island::new(#kind { #(#nodes)* })),
-            }
+            let value = match wiring.alone(number) {
+                Some((id, ..)) => {
+                    let started = wiring.started(id);
+                    quote!(__private::start_alone(#started))
+                }
+                None => {
+                    let nodes = island.estimators.iter().map(|id| wiring.start(*id));
+                    quote!(__private::Island::new(#kind { #(#nodes)* }))
+                }
+            };
+            Field { name: wiring.island_name(number).clone(), kind: quote!(__private::Island<#kind>), value }
         })
         .collect();
     let topic_structs = group::structs("__Topics", "__new_topics", &topics, &quote!(), &quote!());
-    let parameters = quote!(options: &__Options, assembly: &__private::Assembly);
+    let parameters = quote!(options: &__private::OptionsList, assembly: &__private::Assembly);
     let island_structs =
         group::structs("__Islands", "__new_islands", &places, &parameters, &quote!(options, assembly));
     let object = quote!(dyn __private::AnyTopic);
-    let topic_by_number = group::by_number("__Topics", "__topic", &topics, &object, None);
+    let topic_by_number = group::by_number("__Topics", "__topic", &topics, &object);
     let (count, states) = (islands.all.len(), islands.all.ids().map(|number| wiring.island_struct(number)));
     let actuators = actuators(types);
     let published = robot.publishers.ids().map(|id| wiring.published(id));
@@ -95,6 +115,8 @@ pub(super) fn wiring(verified: &Verified<'_>, types: &Types<'_>, islands: &Islan
             [#(__private::island_of::<#states>),*];
 
         impl __private::IslandWiring for __Wiring {
+            const ESTIMATORS: &'static [__private::EstimatorDeclaration] = &__ESTIMATORS;
+
             #[inline]
             fn environment(&self) -> &__private::Environment {
                 &self.environment
@@ -115,20 +137,20 @@ fn actuators(types: &Types<'_>) -> TokenStream {
         .ids()
         .map(|id| {
             let part = Part::Actuator(id);
-            let (kind, options, binding) = (types.part(part), types.options_place(part), binding(types, part));
+            let (kind, component, binding) = (types.part(part), part.position(robot), binding(types, part));
             let node = quote!(__private::ActuatorNode);
             Field {
                 name: types.name_of(part).clone(),
                 kind: quote!(#node<#kind>),
-                value: quote!(#node::<#kind>::new(#id, &__ACTUATORS[#id], &options.#options, #binding, assembly)),
+                value: quote!(#node::<#kind>::new(#id, &__ACTUATORS[#id], options, #component, #binding, assembly)),
             }
         })
         .collect();
-    let parameters = quote!(options: &__Options, assembly: &__private::Assembly);
+    let parameters = quote!(options: &__private::OptionsList, assembly: &__private::Assembly);
     let arguments = quote!(options, assembly);
     let structs = group::structs("__Actuators", "__new_actuators", &fields, &parameters, &arguments);
     let object = quote!(dyn __private::AnyActuator);
-    let by_number = group::by_number("__Actuators", "__actuator", &fields, &object, None);
+    let by_number = group::by_number("__Actuators", "__actuator", &fields, &object);
     quote!(#structs #by_number)
 }
 
@@ -192,7 +214,12 @@ fn visits<'a>(consumers: &'a [Consumer], islands: &Islands) -> Vec<Visit<'a>> {
 }
 
 impl<'a> Wiring<'a> {
-    fn new(types: &'a Types<'a>, islands: &'a Islands, consumers: &'a Table<PublisherId, Vec<Consumer>>) -> Self {
+    fn new(
+        verified: &Verified<'_>,
+        types: &'a Types<'a>,
+        islands: &'a Islands,
+        consumers: &'a Table<PublisherId, Vec<Consumer>>,
+    ) -> Self {
         let mut inlets: Table<IslandId, Vec<(PublisherId, Visit<'a>)>> = islands.all.map(|_| Vec::new());
         for (id, consumers) in consumers.enumerate() {
             for visit in visits(consumers, islands) {
@@ -201,12 +228,27 @@ impl<'a> Wiring<'a> {
                 }
             }
         }
-        Self { types, islands, consumers, inlets }
+        Self { types, islands, consumers, inlets, inputs: inputs(verified, types) }
     }
 
-    /// `__Island_sensor_base_imu_tilt`, by its first estimator.
-    fn island_struct(&self, number: IslandId) -> Ident {
-        format_ident!("__Island_{}", self.island_name(number))
+    /// `__Island_sensor_base_imu_tilt`, by its first estimator; or `Solo<…>` of its only one.
+    fn island_struct(&self, number: IslandId) -> TokenStream {
+        match self.alone(number) {
+            Some((id, ..)) => {
+                let member = self.types.member(id);
+                quote!(__private::Solo<#member>)
+            }
+            None => format_ident!("__Island_{}", self.island_name(number)).into_token_stream(),
+        }
+    }
+
+    /// The only estimator of an island, if it has one input; its publisher, and the input as a consumer.
+    fn alone(&self, number: IslandId) -> Option<(EstimatorId, PublisherId, &'a Consumer)> {
+        let ([id], [(publisher, visit)]) = (&*self.islands.all[number].estimators, &*self.inlets[number]) else {
+            return None;
+        };
+        let [consumer] = &*visit.consumers else { return None };
+        (self.types.model().estimators[*id].inputs.len() < 2).then_some((*id, *publisher, consumer))
     }
 
     fn island_name(&self, number: IslandId) -> &Ident {
@@ -258,6 +300,10 @@ impl<'a> Wiring<'a> {
         now: TokenStream,
         line: TokenStream,
     ) -> TokenStream {
+        if let Some((estimator, ..)) = self.alone(visit.island) {
+            let member = self.types.member(estimator);
+            return quote!(__private::enter_alone::<#member>(#wiring, #now, #line, message););
+        }
         let (kind, entry) = (self.island_struct(visit.island), entry(id, visit.runs));
         let (deliver, keep) = if self.inlets[visit.island].len() == 1 {
             let deliver = quote!(<#kind as __private::IslandState>::deliver);
@@ -279,54 +325,36 @@ impl<'a> Wiring<'a> {
     }
 
     /// Hands a message to one estimator.
-    fn receive(&self, payload: &TokenStream, consumer: &Consumer, island: &TokenStream) -> TokenStream {
-        let Consumer { estimator, input, span, .. } = consumer;
-        let (member, field) = (self.types.member(*estimator), self.field(*estimator, *input));
-        let taken = self.taken(*estimator, *input);
-        let known = quote!({ __private::both_known::<#payload, #taken>() });
-        let feed = quote!(<#payload as __private::Feeds<#taken, #known>>::feed(message));
-        let (feed, number) = (respan(feed, *span), input.unwrap_or_default());
+    fn receive(&self, payload: &Named, consumer: &Consumer, island: &TokenStream) -> TokenStream {
+        let Consumer { estimator, input, .. } = consumer;
+        let (member, Input { field, .. }) = (self.types.member(*estimator), self.input(*estimator, *input));
+        let (feed, number) = (self.feed(payload, consumer, quote!((message))), input.unwrap_or_default());
         quote!(__private::receive::<#member, #field>(#island, wiring, #number, #feed, turn);)
     }
 
-    /// The alias of an input's field.
-    fn field(&self, id: EstimatorId, input: Option<usize>) -> Ident {
-        self.of_input("__input__", id, input)
+    /// `<Imu as Feeds<Imu, …>>::feed`, where rustc reports a payload mismatch.
+    fn feed(&self, payload: &Named, consumer: &Consumer, arguments: TokenStream) -> TokenStream {
+        let Input { taken, known, .. } = self.input(consumer.estimator, consumer.input);
+        respan(quote!(<#payload as __private::Feeds<#taken, #known>>::feed #arguments), consumer.span)
     }
 
-    /// The alias of an input's payload.
-    fn taken(&self, id: EstimatorId, input: Option<usize>) -> Ident {
-        self.of_input("__taken__", id, input)
-    }
-
-    fn of_input(&self, kind: &str, id: EstimatorId, input: Option<usize>) -> Ident {
-        let estimator = &self.types.model().estimators[id];
-        let name = input
-            .and_then(|input| estimator.inputs.get(input))
-            .map_or_else(String::new, |input| format!("__{}", crate::names::text(&input.name)));
-        format_ident!("{kind}{}{name}", self.types.name_of(Part::Estimator(id)))
+    fn input(&self, id: EstimatorId, input: Option<usize>) -> &Input {
+        &self.inputs[id][input.unwrap_or_default()]
     }
 
     /// `impl Member`: the place of an estimator, and the destinations of its outputs.
     fn member(&self, id: EstimatorId) -> TokenStream {
         let (types, estimator) = (self.types, &self.types.model().estimators[id]);
         let (member, name) = (types.member(id), types.name_of(Part::Estimator(id)));
-        let (kind, island) = (types.estimator(id), self.island_struct(self.islands.of[id]));
+        let island = self.islands.of[id];
+        let alone = self.alone(island);
+        let (kind, island) = (types.estimator(id), self.island_struct(island));
         let (taken, emitted) = (types.estimator_input(id), types.estimator_output(id));
-        let numbers: Vec<Option<usize>> =
-            if estimator.is_nested() { vec![None] } else { (0..estimator.inputs.len()).map(Some).collect() };
-        let fields = numbers.iter().map(|input| {
-            let (field, found) = (self.field(id, *input), types.input_field(id, *input));
-            let payload = self.taken(id, *input);
-            quote! {
-                type #field = #found;
-                type #payload = <#field as __private::TakenAt<#taken>>::Payload;
-            }
-        });
+        let inputs = &self.inputs[id];
+        let fields = inputs.iter().enumerate().map(|(number, input)| self.aliases(id, number, input));
         // The driver's input is not kept.
-        let cache = (numbers.len() > 1).then(|| {
-            let fields = numbers.iter().map(|input| self.field(id, *input));
-            let numbers = 0..numbers.len();
+        let cache = (inputs.len() > 1).then(|| {
+            let (fields, numbers) = (inputs.iter().map(|input| &input.field), 0..inputs.len());
             quote! {
                 fn cache() -> <#taken as ::bb_core::Inputs>::Cache {
                     let mut cache = __private::Default::default();
@@ -350,6 +378,39 @@ impl<'a> Wiring<'a> {
                 }
             }
         });
+        if let Some((_, source, consumer)) = alone {
+            let (payload, Input { field, taken, .. }) = (types.payload(source), self.input(id, consumer.input));
+            let entry = entry(source, consumer.runs);
+            let feed = self.feed(&payload, consumer, quote!());
+            let place = group::path(self.islands.of[id].number(), name);
+            return quote! {
+                #(#fields)*
+                impl __private::Alone for #member {
+                    type Wiring = __Wiring;
+                    type Estimator = #kind;
+                    type Source = #payload;
+                    type Input = #field;
+                    const INLET: __private::Inlet<#payload, #taken> =
+                        __private::Inlet { number: #id, entry: #entry, feed: #feed };
+
+                    #[inline(always)]
+                    fn find(wiring: &__Wiring) -> &__private::Island<#island> {
+                        &wiring.islands.#place
+                    }
+
+                    #[inline]
+                    fn publish(
+                        wiring: &__Wiring,
+                        emitted: &mut __private::Option<#emitted>,
+                        stamp: __private::Stamp,
+                        turn: &__private::Turn<'_>,
+                    ) {
+                        #(#outputs)*
+                    }
+                    #again
+                }
+            };
+        }
         quote! {
             #(#fields)*
             impl __private::Member for #member {
@@ -378,6 +439,25 @@ impl<'a> Wiring<'a> {
         }
     }
 
+    /// The aliases for an input that are not declared for an earlier one.
+    fn aliases(&self, id: EstimatorId, number: usize, input: &Input) -> TokenStream {
+        let Input { source, field, taken, known, .. } = input;
+        let is_nested = self.types.model().estimators[id].is_nested();
+        let fields = input.declares_field.then(|| {
+            let found = self.types.input_field(id, (!is_nested).then_some(number));
+            let of = self.types.estimator_input(id);
+            quote! {
+                type #field = #found;
+                type #taken = <#field as __private::TakenAt<#of>>::Payload;
+            }
+        });
+        let knowns = input.declares_known.then(|| {
+            let payload = self.types.payload(*source);
+            quote!(type #known = __private::BothKnown<{ __private::both_known::<#payload, #taken>() }>;)
+        });
+        quote!(#fields #knowns)
+    }
+
     fn output_field(&self, id: EstimatorId, publisher: PublisherId) -> TokenStream {
         match self.types.from(publisher) {
             From::Estimator(_, output) => self.types.output_field(id, output),
@@ -392,6 +472,9 @@ impl<'a> Wiring<'a> {
         let (types, own) = (self.types, self.islands.of[id]);
         let (field, payload, topic) =
             (self.output_field(id, publisher), types.payload(publisher), types.topic_place(publisher));
+        if self.consumers[publisher].is_empty() {
+            return quote!(__private::emit::<#field, _>(emitted, stamp, turn, #publisher, &wiring.topics.#topic););
+        }
         let calls = visits(&self.consumers[publisher], self.islands).into_iter().map(|visit| {
             if visit.island == own {
                 let receives =
@@ -416,6 +499,9 @@ impl<'a> Wiring<'a> {
 
     /// The struct of an island, the messages that may be queued for it, and the processing of entries.
     fn island(&self, number: IslandId) -> TokenStream {
+        if self.alone(number).is_some() {
+            return TokenStream::new();
+        }
         let (types, island) = (self.types, &self.islands.all[number]);
         let (kind, place) = (self.island_struct(number), group::path(number.number(), self.island_name(number)));
         let nodes = island.estimators.iter().map(|id| {
@@ -523,13 +609,44 @@ impl<'a> Wiring<'a> {
 
     /// `sensor_base_imu_tilt: start::<…>(…),`
     fn start(&self, id: EstimatorId) -> TokenStream {
-        let (types, part) = (self.types, Part::Estimator(id));
-        let (name, member) = (types.name_of(part), types.member(id));
-        let (options, binding) = (types.options_place(part), binding(types, part));
-        quote! {
-            #name: __private::start::<#member>(&options.#options, #binding, assembly.environment()),
-        }
+        let (name, member, started) =
+            (self.types.name_of(Part::Estimator(id)), self.types.member(id), self.started(id));
+        quote!(#name: __private::start::<#member>(#started),)
     }
+
+    /// The arguments from which an estimator is created.
+    fn started(&self, id: EstimatorId) -> TokenStream {
+        let part = Part::Estimator(id);
+        let (component, binding) = (part.position(self.types.model()), binding(self.types, part));
+        quote!(options, #component, #binding, assembly.environment())
+    }
+}
+
+/// The inputs of each estimator. Those of the same name and type share their aliases.
+fn inputs(verified: &Verified<'_>, types: &Types<'_>) -> Table<EstimatorId, Vec<Input>> {
+    let robot = verified.robot;
+    let (mut fields, mut knowns) = (HashMap::new(), HashMap::new());
+    robot.estimators.map(|id| {
+        let (part, estimator) = (Part::Estimator(id), &robot.estimators[id]);
+        let names = estimator.inputs.iter().map(|input| Some(crate::names::text(&input.name)));
+        let names = names.chain(estimator.is_nested().then_some(None));
+        let inputs = names.zip(islands::sources(verified, id)).map(|(name, source)| {
+            let suffix = name.as_ref().map_or_else(String::new, |name| format!("__{name}"));
+            let own = format!("{}{suffix}", types.name_of(part));
+            let field: &String = fields.entry((types.first(part), name)).or_insert_with(|| own.clone());
+            let payload = types.payload(source).into_token_stream().to_string();
+            let known: &String = knowns.entry((payload, field.clone())).or_insert_with(|| own.clone());
+            Input {
+                source,
+                field: format_ident!("__input__{field}"),
+                taken: format_ident!("__taken__{field}"),
+                declares_field: *field == own,
+                known: format_ident!("__known__{known}"),
+                declares_known: *known == own,
+            }
+        });
+        inputs.collect()
+    })
 }
 
 /// The island that a publisher is in.

@@ -2,19 +2,19 @@
 //! uses them is here, once for all estimators.
 
 use super::{Island, IslandState, IslandWiring as _, Key};
-use crate::component::{Binding, EmittedAt, Estimator, Inputs, Outputs, TakenAt};
+use crate::component::{Binding, EmittedAt, Estimator, Inputs, OptionsList, Outputs, TakenAt};
 use crate::fault::of_panic;
 use crate::message::{Payload, Stamp, Stamped, copied};
 use crate::node::emission::copy_failed;
 use crate::node::{AnyIsland, Emitting, Next, Node, NodeEntry, Turn};
-use crate::pubsub::DynamicMessage;
+use crate::pubsub::{DynamicMessage, Topic};
 use crate::time::MonotonicTime;
 use std::panic::resume_unwind;
 
 type WiringOf<M> = <<M as Member>::State as IslandState>::Wiring;
 type InputOf<M> = <<M as Member>::Estimator as Estimator>::Input;
-type OutputOf<M> = <<M as Member>::Estimator as Estimator>::Output;
-type OptionsOf<M> = <<M as Member>::Estimator as Estimator>::Options;
+pub(super) type OutputOf<M> = <<M as Member>::Estimator as Estimator>::Output;
+pub(super) type OptionsOf<M> = <<M as Member>::Estimator as Estimator>::Options;
 
 /// Implemented by `robot!` for each estimator.
 pub trait Member {
@@ -58,6 +58,22 @@ pub fn alone<F: EmittedAt<O>, O>(message: &DynamicMessage) -> Option<O> {
     copy.map(|message| F::alone(message.payload))
 }
 
+/// Publishes the output `F` if it was emitted, and no estimator takes it.
+#[inline]
+pub fn emit<F: EmittedAt<O>, O>(
+    emitted: &mut Option<O>,
+    stamp: Stamp,
+    turn: &Turn<'_>,
+    publisher: usize,
+    topic: &Topic<F::Payload>,
+) {
+    if let Some(payload) = F::take(emitted) {
+        let emission = stamp.message(payload);
+        turn.emit(publisher, topic, &emission);
+        turn.release(topic, emission);
+    }
+}
+
 /// An operation of an island on one of its estimators, other than delivering messages.
 #[allow(missing_debug_implementations)]
 pub enum Act<'a, 'b> {
@@ -71,13 +87,14 @@ pub enum Act<'a, 'b> {
     Emit(&'a DynamicMessage, &'a Turn<'b>),
 }
 
-/// Creates an estimator.
+/// Creates an estimator, whose options are those of the component with that number.
 pub fn start<M: Member>(
-    options: &OptionsOf<M>,
+    options: &OptionsList,
+    component: usize,
     binding: Binding<OptionsOf<M>>,
     environment: &super::Environment,
 ) -> Node<M::Estimator> {
-    Node::new(M::NUMBER, options, binding, M::cache, environment)
+    Node::new(M::NUMBER, options.of(component), binding, M::cache, environment)
 }
 
 /// Delivers a message to the estimator's input with that number, publishes its outputs, and lets it continue if it asks to.
@@ -197,15 +214,4 @@ where
     Island<S>: AnyIsland<S::Wiring>,
 {
     S::find(wiring)
-}
-
-/// Publishes a recorded message of a sensor or a service; returns `false` if its payload has another type.
-pub fn feed<W, T: Payload>(
-    wiring: &W,
-    message: &DynamicMessage,
-    now: MonotonicTime,
-    publish: impl FnOnce(&W, &Stamped<T>, MonotonicTime),
-) -> bool {
-    let message = message.downcast::<T>();
-    message.map(|message| publish(wiring, message, now)).is_some()
 }

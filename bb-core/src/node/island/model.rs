@@ -4,7 +4,7 @@
 //! take effect, and nothing remains in the inbox. The lock's type ensures that only one thread at a time is inside. (The checker's
 //! locks order more than real ones do: the comments at the fences explain their purpose.)
 
-use super::{Act, Island, IslandDeclaration, IslandState, IslandWiring, Key};
+use super::{Act, EstimatorDeclaration, Island, IslandDeclaration, IslandState, IslandWiring, Key};
 use crate::component::{DisarmHook, Guardian};
 use crate::declaration::ParameterValues;
 use crate::fault::Failed;
@@ -50,6 +50,8 @@ struct Wiring {
 }
 
 impl IslandWiring for Wiring {
+    const ESTIMATORS: &'static [EstimatorDeclaration] = &[];
+
     fn environment(&self) -> &Environment {
         &self.environment
     }

@@ -1,7 +1,7 @@
 //! Applies settings to options and parameters: all of them, or none.
 
 use super::error::{Place, SettingProblem, SettingsError};
-use crate::component::{AnyOptions, quantity};
+use crate::component::{AnyOptions, OptionsList, quantity};
 use crate::declaration::{ParameterDeclaration, ParameterDefault, unit};
 use crate::event::ParameterValue;
 use crate::message::codec::{from_json, to_json};
@@ -75,7 +75,7 @@ pub(super) fn assign<R: Robot>(builder: &mut Builder<R>, assignments: &[Assignme
             }),
             Some(Target::Option { component, field }) => match bound_to::<R>(component, &assignment.path) {
                 Some(bound) => Err(format!("is bound to `{bound}`; set that")),
-                None => match R::options_of(&mut builder.options, component) {
+                None => match builder.options.any(component) {
                     Some(options) => {
                         let (copy, by) = changed.entry(component).or_insert_with(|| (options.copy(), Vec::new()));
                         by.push(assignment);
@@ -119,7 +119,7 @@ pub(super) fn assign<R: Robot>(builder: &mut Builder<R>, assignments: &[Assignme
         return Err(SettingsError::new(problems));
     }
     for (component, (copy, _)) in changed {
-        if let Some(options) = R::options_of(&mut builder.options, component) {
+        if let Some(options) = builder.options.any(component) {
             options.replace(copy);
         }
     }
@@ -132,7 +132,7 @@ enum Target {
     Option { component: usize, field: usize },
 }
 
-fn target<R: Robot>(paths: &[&str], options: &mut R::Options, path: &str) -> Option<Target> {
+fn target<R: Robot>(paths: &[&str], options: &mut OptionsList, path: &str) -> Option<Target> {
     if let Some(number) = R::PARAMETERS.iter().position(|declared| declared.path == path) {
         return Some(Target::Parameter(number));
     }

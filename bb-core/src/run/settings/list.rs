@@ -48,8 +48,8 @@ pub(super) fn list<R: Robot>(builder: &mut Builder<R>) -> SettingsList {
     let mut declared = R::options();
     let paths = component_paths::<R>();
     for (number, path) in paths.into_iter().enumerate() {
-        let Some(options) = R::options_of(&mut builder.options, number) else { continue };
-        let mut declared = R::options_of(&mut declared, number);
+        let Some(options) = builder.options.any(number) else { continue };
+        let mut declared = declared.any(number);
         let mut is_declared_none = |index| {
             let declared = declared.as_mut().and_then(|options| options.setting(index));
             declared.and_then(|setting| setting.value()).is_some_and(|json| json == "null")

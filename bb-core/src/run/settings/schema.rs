@@ -13,7 +13,7 @@ pub(crate) fn settings_schema<R: Robot>() -> String {
     let mut root = BTreeMap::new();
     let mut options = R::options();
     for (number, path) in component_paths::<R>().into_iter().enumerate() {
-        let Some(options) = R::options_of(&mut options, number) else { continue };
+        let Some(options) = options.any(number) else { continue };
         for (index, field) in options.fields().iter().enumerate() {
             let Some(setting) = options.setting(index) else { continue };
             if bound_to::<R>(number, field.name).is_none()

@@ -9,7 +9,7 @@ use std::thread::Thread;
 
 /// The part of a source that other threads reach. Clones share it.
 #[derive(Clone, Debug)]
-pub struct SharedSource(Arc<Shared>);
+pub(crate) struct SharedSource(Arc<Shared>);
 
 #[derive(Debug)]
 struct Shared {

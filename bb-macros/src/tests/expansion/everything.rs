@@ -185,6 +185,14 @@ pub type __Rover_2_11__probed__command_stop = ::bb_core::__private::Probed<
 #[doc(hidden)]
 pub type __Rover_2_11__command_stop = <__Rover_2_11__probed__command_stop as ::bb_core::__private::Known>::Type;
 #[doc(hidden)]
+pub type __Rover_2_11__payload__sensor_battery = <__Rover_2_11__sensor_battery as ::bb_core::Sensor>::Output;
+#[doc(hidden)]
+pub type __Rover_2_11__payload__controller_stability = <__Rover_2_11__controller_stability as ::bb_core::Service>::Output;
+#[doc(hidden)]
+pub type __Rover_2_11__payload__bridge_ros = <__Rover_2_11__bridge_ros as ::bb_core::Service>::Output;
+#[doc(hidden)]
+pub type __Rover_2_11__payload__sensor_base_imu = <__Rover_2_11__sensor_base_imu as ::bb_core::Sensor>::Output;
+#[doc(hidden)]
 pub type __Rover_2_11__payload__sensor_base_imu_tilt = <<<__Rover_2_11__sensor_base_imu_tilt as ::bb_core::Estimator>::Output as ::bb_core::Outputs>::Only as ::bb_core::__private::EmittedAt<
     <__Rover_2_11__sensor_base_imu_tilt as ::bb_core::Estimator>::Output,
 >>::Payload;
@@ -209,6 +217,8 @@ pub type __Rover_2_11__payload__nav_velocity = <::bb_core::__private::At<
     <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Output,
 >>::Payload;
 #[doc(hidden)]
+pub type __Rover_2_11__payload__sensor_base_pan_encoder = <__Rover_2_11__sensor_base_pan_encoder as ::bb_core::Sensor>::Output;
+#[doc(hidden)]
 pub type __Rover_2_11_must_be_declared_outside_of_functions = __Rover_2_11::Rover;
 #[allow(non_camel_case_types, dead_code)]
 enum __Rover_2_11__member__sensor_base_imu_tilt {}
@@ -221,105 +231,66 @@ pub type __Rover_2_11__exported__estimator_base_pose = __Rover_2_11__member__est
 #[allow(clippy::all, non_snake_case, unused_variables)]
 const _: () = {
     use ::bb_core::__private;
-    const _: () = ::bb_core::__private::check_required(
-        "Ina219",
-        <<__Rover_2_11__sensor_battery as ::bb_core::Sensor>::Options as ::bb_core::Options>::FIELDS,
-        &[],
-    );
-    const _: () = ::bb_core::__private::check_required(
-        "Bmi270",
-        <<__Rover_2_11__sensor_base_imu as ::bb_core::Sensor>::Options as ::bb_core::Options>::FIELDS,
-        &["bus"],
-    );
-    const _: () = ::bb_core::__private::check_required(
-        "Encoder",
-        <<__Rover_2_11__sensor_base_pan_encoder as ::bb_core::Sensor>::Options as ::bb_core::Options>::FIELDS,
-        &["id"],
-    );
-    const _: () = ::bb_core::__private::check_option(
-        "Encoder",
-        <<__Rover_2_11__sensor_base_pan_encoder as ::bb_core::Sensor>::Options as ::bb_core::Options>::FIELDS,
-        ::bb_core::__private::Given {
-            name: "id",
-            dimension: __private::None,
-            number: __private::Some(3f64),
-        },
-    );
-    const _: () = ::bb_core::__private::check_estimator::<
+    const _: () = ::bb_core::__private::check_required::<
+        <__Rover_2_11__sensor_battery as ::bb_core::Sensor>::Options,
+        _,
+    >("Ina219", []);
+    const _: () = ::bb_core::__private::check_required::<
+        <__Rover_2_11__sensor_base_imu as ::bb_core::Sensor>::Options,
+        _,
+    >("Bmi270", ["bus"]);
+    const _: () = ::bb_core::__private::check_required::<
+        <__Rover_2_11__sensor_base_pan_encoder as ::bb_core::Sensor>::Options,
+        _,
+    >("Encoder", ["id"]);
+    const _: () = ::bb_core::__private::check_number::<
+        <__Rover_2_11__sensor_base_pan_encoder as ::bb_core::Sensor>::Options,
+    >("Encoder", "id", 3f64);
+    const _: () = ::bb_core::__private::check_nested::<
         __Rover_2_11__sensor_base_imu_tilt,
-    >("Madgwick", &["beta"], __private::None, false);
-    const _: () = ::bb_core::__private::check_option(
-        "Madgwick",
-        <<__Rover_2_11__sensor_base_imu_tilt as ::bb_core::Estimator>::Options as ::bb_core::Options>::FIELDS,
-        ::bb_core::__private::Given {
-            name: "beta",
-            dimension: __private::None,
-            number: __private::Some(0.1f64),
-        },
-    );
+        _,
+    >("Madgwick", ["beta"], false);
+    const _: () = ::bb_core::__private::check_number::<
+        <__Rover_2_11__sensor_base_imu_tilt as ::bb_core::Estimator>::Options,
+    >("Madgwick", "beta", 0.1f64);
     const _: () = ::bb_core::__private::check_estimator::<
         __Rover_2_11__estimator_base_pose,
-    >("Eskf", &[], __private::Some(&["imu", "tilt", "wheel"]), true);
-    const _: () = ::bb_core::__private::check_required(
-        "Dynamixel",
-        <<__Rover_2_11__actuator_base_pan_servo as ::bb_core::Actuator>::Options as ::bb_core::Options>::FIELDS,
-        &["id"],
-    );
-    const _: () = ::bb_core::__private::check_option(
-        "Dynamixel",
-        <<__Rover_2_11__actuator_base_pan_servo as ::bb_core::Actuator>::Options as ::bb_core::Options>::FIELDS,
-        ::bb_core::__private::Given {
-            name: "id",
-            dimension: __private::None,
-            number: __private::Some(3f64),
-        },
-    );
-    const _: () = ::bb_core::__private::check_required(
-        "Stability",
-        <<__Rover_2_11__controller_stability as ::bb_core::Service>::Options as ::bb_core::Options>::FIELDS,
-        &[],
-    );
-    const _: () = ::bb_core::__private::check_required(
-        "RosBridge",
-        <<__Rover_2_11__bridge_ros as ::bb_core::Service>::Options as ::bb_core::Options>::FIELDS,
-        &["port"],
-    );
-    const _: () = ::bb_core::__private::check_option(
-        "RosBridge",
-        <<__Rover_2_11__bridge_ros as ::bb_core::Service>::Options as ::bb_core::Options>::FIELDS,
-        ::bb_core::__private::Given {
-            name: "port",
-            dimension: __private::None,
-            number: __private::Some(1f64),
-        },
-    );
-    const _: () = ::bb_core::__private::check_required(
-        "Arm",
-        <<__Rover_2_11__command_arm as ::bb_core::Command>::Options as ::bb_core::Options>::FIELDS,
-        &[],
-    );
-    const _: () = ::bb_core::__private::check_required(
-        "MoveTo",
-        <<__Rover_2_11__command_move_to as ::bb_core::Command>::Options as ::bb_core::Options>::FIELDS,
-        &["speed"],
-    );
-    const _: () = ::bb_core::__private::check_option(
-        "MoveTo",
-        <<__Rover_2_11__command_move_to as ::bb_core::Command>::Options as ::bb_core::Options>::FIELDS,
-        ::bb_core::__private::Given {
-            name: "speed",
-            dimension: __private::Some(::bb_core::__private::Dimension {
-                exponents: [1i8, 0i8, -1i8, 0i8, 0i8, 0i8],
-                name: "a velocity",
-            }),
-            number: __private::Some(1f64),
-        },
-    );
-    const _: () = ::bb_core::__private::check_required(
-        "Stop",
-        <<__Rover_2_11__command_stop as ::bb_core::Command>::Options as ::bb_core::Options>::FIELDS,
-        &[],
-    );
+        _,
+        _,
+    >("Eskf", [], ["imu", "tilt", "wheel"], true);
+    const _: () = ::bb_core::__private::check_required::<
+        <__Rover_2_11__actuator_base_pan_servo as ::bb_core::Actuator>::Options,
+        _,
+    >("Dynamixel", ["id"]);
+    const _: () = ::bb_core::__private::check_number::<
+        <__Rover_2_11__actuator_base_pan_servo as ::bb_core::Actuator>::Options,
+    >("Dynamixel", "id", 3f64);
+    const _: () = ::bb_core::__private::check_required::<
+        <__Rover_2_11__controller_stability as ::bb_core::Service>::Options,
+        _,
+    >("Stability", []);
+    const _: () = ::bb_core::__private::check_required::<
+        <__Rover_2_11__bridge_ros as ::bb_core::Service>::Options,
+        _,
+    >("RosBridge", ["port"]);
+    const _: () = ::bb_core::__private::check_number::<
+        <__Rover_2_11__bridge_ros as ::bb_core::Service>::Options,
+    >("RosBridge", "port", 1f64);
+    const _: () = ::bb_core::__private::check_required::<
+        <__Rover_2_11__command_arm as ::bb_core::Command>::Options,
+        _,
+    >("Arm", []);
+    const _: () = ::bb_core::__private::check_required::<
+        <__Rover_2_11__command_move_to as ::bb_core::Command>::Options,
+        _,
+    >("MoveTo", ["speed"]);
+    const _: () = ::bb_core::__private::check_quantity::<
+        <__Rover_2_11__command_move_to as ::bb_core::Command>::Options,
+    >("MoveTo", "speed", 1f64, [1i8, 0i8, -1i8, 0i8, 0i8, 0i8], "a velocity");
+    const _: () = ::bb_core::__private::check_required::<
+        <__Rover_2_11__command_stop as ::bb_core::Command>::Options,
+        _,
+    >("Stop", []);
     const _: () = ::bb_core::__private::check_input::<
         <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Input,
     >("Eskf", "imu");
@@ -342,7 +313,7 @@ const _: () = {
         "servo",
         "pan",
         &[
-            <<__Rover_2_11__sensor_base_pan_encoder as ::bb_core::Sensor>::Output as ::bb_core::Payload>::TELLS_JOINT_POSITION,
+            <__Rover_2_11__payload__sensor_base_pan_encoder as ::bb_core::Payload>::TELLS_JOINT_POSITION,
         ],
     );
     const _: () = ::bb_core::__private::check_role(
@@ -578,108 +549,67 @@ const _: () = {
             },
         ],
     };
-    pub struct __Options {
-        g0: __Options0,
+    fn __declared_options() -> __private::OptionsList {
+        let mut options = __private::Default::default();
+        __declared_options0(&mut options);
+        options
     }
-    fn __declared_options() -> __Options {
-        __Options {
-            g0: __declared_options0(),
-        }
-    }
-    pub struct __Options0 {
-        sensor_battery: <__Rover_2_11__sensor_battery as ::bb_core::Sensor>::Options,
-        sensor_base_imu: <__Rover_2_11__sensor_base_imu as ::bb_core::Sensor>::Options,
-        sensor_base_pan_encoder: <__Rover_2_11__sensor_base_pan_encoder as ::bb_core::Sensor>::Options,
-        sensor_base_imu_tilt: <__Rover_2_11__sensor_base_imu_tilt as ::bb_core::Estimator>::Options,
-        estimator_base_pose: <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Options,
-        actuator_base_pan_servo: <__Rover_2_11__actuator_base_pan_servo as ::bb_core::Actuator>::Options,
-        controller_stability: <__Rover_2_11__controller_stability as ::bb_core::Service>::Options,
-        bridge_ros: <__Rover_2_11__bridge_ros as ::bb_core::Service>::Options,
-        command_arm: <__Rover_2_11__command_arm as ::bb_core::Command>::Options,
-        command_move_to: <__Rover_2_11__command_move_to as ::bb_core::Command>::Options,
-        command_stop: <__Rover_2_11__command_stop as ::bb_core::Command>::Options,
-    }
-    fn __declared_options0() -> __Options0 {
-        __Options0 {
-            sensor_battery: __private::as_known(
+    fn __declared_options0(options: &mut __private::OptionsList) {
+        options
+            .add(
                 <<<__Rover_2_11__probed__sensor_battery as __private::Known>::Given as ::bb_core::Sensor>::Options as ::bb_core::Options>::defaults(),
-            ),
-            sensor_base_imu: __declared_sensor_base_imu(),
-            sensor_base_pan_encoder: __declared_sensor_base_pan_encoder(),
-            sensor_base_imu_tilt: __declared_sensor_base_imu_tilt(),
-            estimator_base_pose: __private::as_known(
+            );
+        __declared_sensor_base_imu(options);
+        __declared_sensor_base_pan_encoder(options);
+        __declared_sensor_base_imu_tilt(options);
+        options
+            .add(
                 <<<__Rover_2_11__probed__estimator_base_pose as __private::Known>::Given as ::bb_core::Estimator>::Options as ::bb_core::Options>::defaults(),
-            ),
-            actuator_base_pan_servo: __declared_actuator_base_pan_servo(),
-            controller_stability: __private::as_known(
+            );
+        __declared_actuator_base_pan_servo(options);
+        options
+            .add(
                 <<<__Rover_2_11__probed__controller_stability as __private::Known>::Given as ::bb_core::Service>::Options as ::bb_core::Options>::defaults(),
-            ),
-            bridge_ros: __declared_bridge_ros(),
-            command_arm: __private::as_known(
+            );
+        __declared_bridge_ros(options);
+        options
+            .add(
                 <<<__Rover_2_11__probed__command_arm as __private::Known>::Given as ::bb_core::Command>::Options as ::bb_core::Options>::defaults(),
-            ),
-            command_move_to: __declared_command_move_to(),
-            command_stop: __private::as_known(
+            );
+        __declared_command_move_to(options);
+        options
+            .add(
                 <<<__Rover_2_11__probed__command_stop as __private::Known>::Given as ::bb_core::Command>::Options as ::bb_core::Options>::defaults(),
-            ),
-        }
+            );
     }
-    fn __options_of(
-        whole: &mut __Options,
-        number: usize,
-    ) -> __private::Option<&mut dyn __private::AnyOptions> {
-        match number / 16usize {
-            0usize => __options_of0(&mut whole.g0, number % 16usize),
-            _ => __private::None,
-        }
-    }
-    fn __options_of0(
-        group: &mut __Options0,
-        number: usize,
-    ) -> __private::Option<&mut dyn __private::AnyOptions> {
-        match number {
-            0usize => __private::Some(&mut group.sensor_battery),
-            1usize => __private::Some(&mut group.sensor_base_imu),
-            2usize => __private::Some(&mut group.sensor_base_pan_encoder),
-            3usize => __private::Some(&mut group.sensor_base_imu_tilt),
-            4usize => __private::Some(&mut group.estimator_base_pose),
-            5usize => __private::Some(&mut group.actuator_base_pan_servo),
-            6usize => __private::Some(&mut group.controller_stability),
-            7usize => __private::Some(&mut group.bridge_ros),
-            8usize => __private::Some(&mut group.command_arm),
-            9usize => __private::Some(&mut group.command_move_to),
-            10usize => __private::Some(&mut group.command_stop),
-            _ => __private::None,
-        }
-    }
-    fn __declared_sensor_base_imu() -> <__Rover_2_11__sensor_base_imu as ::bb_core::Sensor>::Options {
+    fn __declared_sensor_base_imu(__all: &mut __private::OptionsList) {
         let mut __options: <<__Rover_2_11__probed__sensor_base_imu as __private::Known>::Given as ::bb_core::Sensor>::Options = ::bb_core::Options::defaults();
         __options.bus = ::bb_core::__private::FromText::from_text("i2c-1");
-        __private::as_known(__options)
+        __all.add(__options);
     }
-    fn __declared_sensor_base_pan_encoder() -> <__Rover_2_11__sensor_base_pan_encoder as ::bb_core::Sensor>::Options {
+    fn __declared_sensor_base_pan_encoder(__all: &mut __private::OptionsList) {
         let mut __options: <<__Rover_2_11__probed__sensor_base_pan_encoder as __private::Known>::Given as ::bb_core::Sensor>::Options = ::bb_core::Options::defaults();
         __options.id = 3;
-        __private::as_known(__options)
+        __all.add(__options);
     }
-    fn __declared_sensor_base_imu_tilt() -> <__Rover_2_11__sensor_base_imu_tilt as ::bb_core::Estimator>::Options {
+    fn __declared_sensor_base_imu_tilt(__all: &mut __private::OptionsList) {
         let __options: <<__Rover_2_11__probed__sensor_base_imu_tilt as __private::Known>::Given as ::bb_core::Estimator>::Options = ::bb_core::Options::defaults();
-        __private::as_known(__options)
+        __all.add(__options);
     }
-    fn __declared_actuator_base_pan_servo() -> <__Rover_2_11__actuator_base_pan_servo as ::bb_core::Actuator>::Options {
+    fn __declared_actuator_base_pan_servo(__all: &mut __private::OptionsList) {
         let mut __options: <<__Rover_2_11__probed__actuator_base_pan_servo as __private::Known>::Given as ::bb_core::Actuator>::Options = ::bb_core::Options::defaults();
         __options.id = 3;
-        __private::as_known(__options)
+        __all.add(__options);
     }
-    fn __declared_bridge_ros() -> <__Rover_2_11__bridge_ros as ::bb_core::Service>::Options {
+    fn __declared_bridge_ros(__all: &mut __private::OptionsList) {
         let mut __options: <<__Rover_2_11__probed__bridge_ros as __private::Known>::Given as ::bb_core::Service>::Options = ::bb_core::Options::defaults();
         __options.port = 1;
-        __private::as_known(__options)
+        __all.add(__options);
     }
-    fn __declared_command_move_to() -> <__Rover_2_11__command_move_to as ::bb_core::Command>::Options {
+    fn __declared_command_move_to(__all: &mut __private::OptionsList) {
         let mut __options: <<__Rover_2_11__probed__command_move_to as __private::Known>::Given as ::bb_core::Command>::Options = ::bb_core::Options::defaults();
         __options.speed = __private::FromQuantity::from_quantity(1f64);
-        __private::as_known(__options)
+        __all.add(__options);
     }
     pub struct __Wiring {
         topics: __Topics,
@@ -694,18 +624,12 @@ const _: () = {
         __Topics { g0: __new_topics0() }
     }
     pub struct __Topics0 {
-        sensor_battery: __private::Topic<
-            <__Rover_2_11__sensor_battery as ::bb_core::Sensor>::Output,
-        >,
+        sensor_battery: __private::Topic<__Rover_2_11__payload__sensor_battery>,
         controller_stability: __private::Topic<
-            <__Rover_2_11__controller_stability as ::bb_core::Service>::Output,
+            __Rover_2_11__payload__controller_stability,
         >,
-        bridge_ros: __private::Topic<
-            <__Rover_2_11__bridge_ros as ::bb_core::Service>::Output,
-        >,
-        sensor_base_imu: __private::Topic<
-            <__Rover_2_11__sensor_base_imu as ::bb_core::Sensor>::Output,
-        >,
+        bridge_ros: __private::Topic<__Rover_2_11__payload__bridge_ros>,
+        sensor_base_imu: __private::Topic<__Rover_2_11__payload__sensor_base_imu>,
         sensor_base_imu_tilt: __private::Topic<
             __Rover_2_11__payload__sensor_base_imu_tilt,
         >,
@@ -714,7 +638,7 @@ const _: () = {
         >,
         nav_velocity: __private::Topic<__Rover_2_11__payload__nav_velocity>,
         sensor_base_pan_encoder: __private::Topic<
-            <__Rover_2_11__sensor_base_pan_encoder as ::bb_core::Sensor>::Output,
+            __Rover_2_11__payload__sensor_base_pan_encoder,
         >,
     }
     fn __new_topics0() -> __Topics0 {
@@ -732,47 +656,45 @@ const _: () = {
     pub struct __Islands {
         g0: __Islands0,
     }
-    fn __new_islands(options: &__Options, assembly: &__private::Assembly) -> __Islands {
+    fn __new_islands(
+        options: &__private::OptionsList,
+        assembly: &__private::Assembly,
+    ) -> __Islands {
         __Islands {
             g0: __new_islands0(options, assembly),
         }
     }
     pub struct __Islands0 {
-        sensor_base_imu_tilt: __private::Island<__Island_sensor_base_imu_tilt>,
+        sensor_base_imu_tilt: __private::Island<
+            __private::Solo<__Rover_2_11__member__sensor_base_imu_tilt>,
+        >,
         estimator_base_pose: __private::Island<__Island_estimator_base_pose>,
     }
     fn __new_islands0(
-        options: &__Options,
+        options: &__private::OptionsList,
         assembly: &__private::Assembly,
     ) -> __Islands0 {
         __Islands0 {
-            sensor_base_imu_tilt: __private::Island::new(__Island_sensor_base_imu_tilt {
-                sensor_base_imu_tilt: __private::start::<
-                    __Rover_2_11__member__sensor_base_imu_tilt,
-                >(
-                    &options.g0.sensor_base_imu_tilt,
-                    __private::Binding {
-                        apply: |
-                            options: &mut <__Rover_2_11__sensor_base_imu_tilt as ::bb_core::Estimator>::Options,
-                            values: &__private::ParameterValues|
-                        {
-                            options.beta = __private::FromParameter::from_parameter(
-                                values.get::<f64>(0usize),
-                            );
-                        },
-                        parameters: &[0usize],
+            sensor_base_imu_tilt: __private::start_alone(
+                options,
+                3usize,
+                __private::Binding {
+                    apply: |
+                        options: &mut <__Rover_2_11__sensor_base_imu_tilt as ::bb_core::Estimator>::Options,
+                        values: &__private::ParameterValues|
+                    {
+                        options.beta = __private::FromParameter::from_parameter(
+                            values.get::<f64>(0usize),
+                        );
                     },
-                    assembly.environment(),
-                ),
-            }),
+                    parameters: &[0usize],
+                },
+                assembly.environment(),
+            ),
             estimator_base_pose: __private::Island::new(__Island_estimator_base_pose {
                 estimator_base_pose: __private::start::<
                     __Rover_2_11__member__estimator_base_pose,
-                >(
-                    &options.g0.estimator_base_pose,
-                    __private::Binding::NONE,
-                    assembly.environment(),
-                ),
+                >(options, 4usize, __private::Binding::NONE, assembly.environment()),
             }),
         }
     }
@@ -780,7 +702,7 @@ const _: () = {
         g0: __Actuators0,
     }
     fn __new_actuators(
-        options: &__Options,
+        options: &__private::OptionsList,
         assembly: &__private::Assembly,
     ) -> __Actuators {
         __Actuators {
@@ -793,7 +715,7 @@ const _: () = {
         >,
     }
     fn __new_actuators0(
-        options: &__Options,
+        options: &__private::OptionsList,
         assembly: &__private::Assembly,
     ) -> __Actuators0 {
         __Actuators0 {
@@ -802,7 +724,8 @@ const _: () = {
             >::new(
                 0usize,
                 &__ACTUATORS[0usize],
-                &options.g0.actuator_base_pan_servo,
+                options,
+                5usize,
                 __private::Binding::NONE,
                 assembly,
             ),
@@ -852,10 +775,13 @@ const _: () = {
         }
     }
     static __ISLANDS: [__private::IslandOf<__Wiring>; 2usize] = [
-        __private::island_of::<__Island_sensor_base_imu_tilt>,
+        __private::island_of::<
+            __private::Solo<__Rover_2_11__member__sensor_base_imu_tilt>,
+        >,
         __private::island_of::<__Island_estimator_base_pose>,
     ];
     impl __private::IslandWiring for __Wiring {
+        const ESTIMATORS: &'static [__private::EstimatorDeclaration] = &__ESTIMATORS;
         #[inline]
         fn environment(&self) -> &__private::Environment {
             &self.environment
@@ -865,9 +791,7 @@ const _: () = {
         #[inline]
         fn sensor_battery(
             &self,
-            message: &__private::Stamped<
-                <__Rover_2_11__sensor_battery as ::bb_core::Sensor>::Output,
-            >,
+            message: &__private::Stamped<__Rover_2_11__payload__sensor_battery>,
             now: __private::MonotonicTime,
         ) {
             let line = self
@@ -877,9 +801,7 @@ const _: () = {
         #[inline]
         fn controller_stability(
             &self,
-            message: &__private::Stamped<
-                <__Rover_2_11__controller_stability as ::bb_core::Service>::Output,
-            >,
+            message: &__private::Stamped<__Rover_2_11__payload__controller_stability>,
             now: __private::MonotonicTime,
         ) {
             let line = self
@@ -889,9 +811,7 @@ const _: () = {
         #[inline]
         fn bridge_ros(
             &self,
-            message: &__private::Stamped<
-                <__Rover_2_11__bridge_ros as ::bb_core::Service>::Output,
-            >,
+            message: &__private::Stamped<__Rover_2_11__payload__bridge_ros>,
             now: __private::MonotonicTime,
         ) {
             let line = self
@@ -901,28 +821,15 @@ const _: () = {
         #[inline]
         fn sensor_base_imu(
             &self,
-            message: &__private::Stamped<
-                <__Rover_2_11__sensor_base_imu as ::bb_core::Sensor>::Output,
-            >,
+            message: &__private::Stamped<__Rover_2_11__payload__sensor_base_imu>,
             now: __private::MonotonicTime,
         ) {
             let line = self
                 .environment
                 .publish(3usize, &self.topics.g0.sensor_base_imu, message, now);
-            __private::enter::<
-                __Island_sensor_base_imu_tilt,
-                _,
-            >(
-                self,
-                now,
-                __private::Key {
-                    entry: 7usize,
-                    line: line,
-                },
-                message,
-                <__Island_sensor_base_imu_tilt as __private::IslandState>::deliver,
-                __private::identity,
-            );
+            __private::enter_alone::<
+                __Rover_2_11__member__sensor_base_imu_tilt,
+            >(self, now, line, message);
             __private::enter::<
                 __Island_estimator_base_pose,
                 _,
@@ -941,9 +848,7 @@ const _: () = {
         #[inline]
         fn sensor_base_pan_encoder(
             &self,
-            message: &__private::Stamped<
-                <__Rover_2_11__sensor_base_pan_encoder as ::bb_core::Sensor>::Output,
-            >,
+            message: &__private::Stamped<__Rover_2_11__payload__sensor_base_pan_encoder>,
             now: __private::MonotonicTime,
         ) {
             let line = self
@@ -969,20 +874,41 @@ const _: () = {
     type __taken__sensor_base_imu_tilt = <__input__sensor_base_imu_tilt as __private::TakenAt<
         <__Rover_2_11__sensor_base_imu_tilt as ::bb_core::Estimator>::Input,
     >>::Payload;
-    impl __private::Member for __Rover_2_11__member__sensor_base_imu_tilt {
-        type State = __Island_sensor_base_imu_tilt;
+    type __known__sensor_base_imu_tilt = __private::BothKnown<
+        {
+            __private::both_known::<
+                __Rover_2_11__payload__sensor_base_imu,
+                __taken__sensor_base_imu_tilt,
+            >()
+        },
+    >;
+    impl __private::Alone for __Rover_2_11__member__sensor_base_imu_tilt {
+        type Wiring = __Wiring;
         type Estimator = __Rover_2_11__sensor_base_imu_tilt;
-        const NUMBER: usize = 0usize;
+        type Source = __Rover_2_11__payload__sensor_base_imu;
+        type Input = __input__sensor_base_imu_tilt;
+        const INLET: __private::Inlet<
+            __Rover_2_11__payload__sensor_base_imu,
+            __taken__sensor_base_imu_tilt,
+        > = __private::Inlet {
+            number: 0usize,
+            entry: 7usize,
+            feed: <__Rover_2_11__payload__sensor_base_imu as __private::Feeds<
+                __taken__sensor_base_imu_tilt,
+                __known__sensor_base_imu_tilt,
+            >>::feed,
+        };
         #[inline(always)]
-        fn node(
-            island: &mut __Island_sensor_base_imu_tilt,
-        ) -> &mut __private::Node<__Rover_2_11__sensor_base_imu_tilt> {
-            &mut island.sensor_base_imu_tilt
+        fn find(
+            wiring: &__Wiring,
+        ) -> &__private::Island<
+            __private::Solo<__Rover_2_11__member__sensor_base_imu_tilt>,
+        > {
+            &wiring.islands.g0.sensor_base_imu_tilt
         }
         #[inline]
         fn publish(
             wiring: &__Wiring,
-            island: &mut __Island_sensor_base_imu_tilt,
             emitted: &mut __private::Option<
                 <__Rover_2_11__sensor_base_imu_tilt as ::bb_core::Estimator>::Output,
             >,
@@ -1024,6 +950,14 @@ const _: () = {
     type __taken__estimator_base_pose__imu = <__input__estimator_base_pose__imu as __private::TakenAt<
         <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Input,
     >>::Payload;
+    type __known__estimator_base_pose__imu = __private::BothKnown<
+        {
+            __private::both_known::<
+                __Rover_2_11__payload__sensor_base_imu,
+                __taken__estimator_base_pose__imu,
+            >()
+        },
+    >;
     type __input__estimator_base_pose__tilt = ::bb_core::__private::At<
         {
             ::bb_core::__private::find_input::<
@@ -1034,6 +968,14 @@ const _: () = {
     type __taken__estimator_base_pose__tilt = <__input__estimator_base_pose__tilt as __private::TakenAt<
         <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Input,
     >>::Payload;
+    type __known__estimator_base_pose__tilt = __private::BothKnown<
+        {
+            __private::both_known::<
+                __Rover_2_11__payload__sensor_base_imu_tilt,
+                __taken__estimator_base_pose__tilt,
+            >()
+        },
+    >;
     type __input__estimator_base_pose__wheel = ::bb_core::__private::At<
         {
             ::bb_core::__private::find_input::<
@@ -1044,6 +986,14 @@ const _: () = {
     type __taken__estimator_base_pose__wheel = <__input__estimator_base_pose__wheel as __private::TakenAt<
         <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Input,
     >>::Payload;
+    type __known__estimator_base_pose__wheel = __private::BothKnown<
+        {
+            __private::both_known::<
+                __Rover_2_11__payload__sensor_base_pan_encoder,
+                __taken__estimator_base_pose__wheel,
+            >()
+        },
+    >;
     impl __private::Member for __Rover_2_11__member__estimator_base_pose {
         type State = __Island_estimator_base_pose;
         type Estimator = __Rover_2_11__estimator_base_pose;
@@ -1064,30 +1014,26 @@ const _: () = {
             stamp: __private::Stamp,
             turn: &__private::Turn<'_>,
         ) {
-            if let __private::Some(payload) = <::bb_core::__private::At<
-                {
-                    ::bb_core::__private::find_output::<
-                        <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Output,
-                    >("pose")
-                },
-            > as __private::EmittedAt<_>>::take(emitted) {
-                let emission = stamp.message(payload);
-                let message = &emission;
-                turn.emit(5usize, &wiring.topics.g0.estimator_base_pose_pose, message);
-                turn.release(&wiring.topics.g0.estimator_base_pose_pose, emission);
-            }
-            if let __private::Some(payload) = <::bb_core::__private::At<
-                {
-                    ::bb_core::__private::find_output::<
-                        <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Output,
-                    >("velocity")
-                },
-            > as __private::EmittedAt<_>>::take(emitted) {
-                let emission = stamp.message(payload);
-                let message = &emission;
-                turn.emit(6usize, &wiring.topics.g0.nav_velocity, message);
-                turn.release(&wiring.topics.g0.nav_velocity, emission);
-            }
+            __private::emit::<
+                ::bb_core::__private::At<
+                    {
+                        ::bb_core::__private::find_output::<
+                            <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Output,
+                        >("pose")
+                    },
+                >,
+                _,
+            >(emitted, stamp, turn, 5usize, &wiring.topics.g0.estimator_base_pose_pose);
+            __private::emit::<
+                ::bb_core::__private::At<
+                    {
+                        ::bb_core::__private::find_output::<
+                            <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Output,
+                        >("velocity")
+                    },
+                >,
+                _,
+            >(emitted, stamp, turn, 6usize, &wiring.topics.g0.nav_velocity);
         }
         fn cache() -> <<__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Input as ::bb_core::Inputs>::Cache {
             let mut cache = __private::Default::default();
@@ -1140,92 +1086,17 @@ const _: () = {
             }
         }
     }
-    struct __Island_sensor_base_imu_tilt {
-        sensor_base_imu_tilt: __private::Node<__Rover_2_11__sensor_base_imu_tilt>,
-    }
-    impl __private::IslandState for __Island_sensor_base_imu_tilt {
-        type Wiring = __Wiring;
-        type Message = __private::Stamped<
-            <__Rover_2_11__sensor_base_imu as ::bb_core::Sensor>::Output,
-        >;
-        const DECLARATION: __private::IslandDeclaration = __private::IslandDeclaration {
-            number: 0usize,
-            name: "sensor/base/imu/tilt",
-            worker: __private::None,
-            is_measured: true,
-            estimators: &[0usize],
-            inlets: &[
-                __private::InletDeclaration {
-                    entry: 7usize,
-                    inputs: &[(0usize, 0usize)],
-                },
-            ],
-        };
-        #[inline(always)]
-        fn find(wiring: &__Wiring) -> &__private::Island<Self> {
-            &wiring.islands.g0.sensor_base_imu_tilt
-        }
-        #[inline]
-        fn deliver(
-            &mut self,
-            wiring: &__Wiring,
-            message: &__private::Stamped<
-                <__Rover_2_11__sensor_base_imu as ::bb_core::Sensor>::Output,
-            >,
-            turn: &__private::Turn<'_>,
-        ) {
-            __private::receive::<
-                __Rover_2_11__member__sensor_base_imu_tilt,
-                __input__sensor_base_imu_tilt,
-            >(
-                self,
-                wiring,
-                0usize,
-                <<__Rover_2_11__sensor_base_imu as ::bb_core::Sensor>::Output as __private::Feeds<
-                    __taken__sensor_base_imu_tilt,
-                    {
-                        __private::both_known::<
-                            <__Rover_2_11__sensor_base_imu as ::bb_core::Sensor>::Output,
-                            __taken__sensor_base_imu_tilt,
-                        >()
-                    },
-                >>::feed(message),
-                turn,
-            );
-        }
-        fn act(
-            &mut self,
-            wiring: &__Wiring,
-            estimator: usize,
-            act: __private::Act<'_, '_>,
-        ) -> bool {
-            match estimator {
-                0usize => {
-                    __private::act::<
-                        __Rover_2_11__member__sensor_base_imu_tilt,
-                    >(self, wiring, act)
-                }
-                _ => false,
-            }
-        }
-    }
     struct __Island_estimator_base_pose {
         estimator_base_pose: __private::Node<__Rover_2_11__estimator_base_pose>,
     }
     #[allow(non_camel_case_types, clippy::large_enum_variant)]
     enum __Message_estimator_base_pose {
-        sensor_base_imu(
-            __private::Stamped<
-                <__Rover_2_11__sensor_base_imu as ::bb_core::Sensor>::Output,
-            >,
-        ),
+        sensor_base_imu(__private::Stamped<__Rover_2_11__payload__sensor_base_imu>),
         sensor_base_imu_tilt__kept(
             __private::Stamped<__Rover_2_11__payload__sensor_base_imu_tilt>,
         ),
         sensor_base_pan_encoder__kept(
-            __private::Stamped<
-                <__Rover_2_11__sensor_base_pan_encoder as ::bb_core::Sensor>::Output,
-            >,
+            __private::Stamped<__Rover_2_11__payload__sensor_base_pan_encoder>,
         ),
     }
     impl __Island_estimator_base_pose {
@@ -1233,9 +1104,7 @@ const _: () = {
         fn sensor_base_imu(
             &mut self,
             wiring: &__Wiring,
-            message: &__private::Stamped<
-                <__Rover_2_11__sensor_base_imu as ::bb_core::Sensor>::Output,
-            >,
+            message: &__private::Stamped<__Rover_2_11__payload__sensor_base_imu>,
             turn: &__private::Turn<'_>,
         ) {
             __private::receive::<
@@ -1245,14 +1114,9 @@ const _: () = {
                 self,
                 wiring,
                 0usize,
-                <<__Rover_2_11__sensor_base_imu as ::bb_core::Sensor>::Output as __private::Feeds<
+                <__Rover_2_11__payload__sensor_base_imu as __private::Feeds<
                     __taken__estimator_base_pose__imu,
-                    {
-                        __private::both_known::<
-                            <__Rover_2_11__sensor_base_imu as ::bb_core::Sensor>::Output,
-                            __taken__estimator_base_pose__imu,
-                        >()
-                    },
+                    __known__estimator_base_pose__imu,
                 >>::feed(message),
                 turn,
             );
@@ -1273,12 +1137,7 @@ const _: () = {
                 1usize,
                 <__Rover_2_11__payload__sensor_base_imu_tilt as __private::Feeds<
                     __taken__estimator_base_pose__tilt,
-                    {
-                        __private::both_known::<
-                            __Rover_2_11__payload__sensor_base_imu_tilt,
-                            __taken__estimator_base_pose__tilt,
-                        >()
-                    },
+                    __known__estimator_base_pose__tilt,
                 >>::feed(message),
                 turn,
             );
@@ -1287,9 +1146,7 @@ const _: () = {
         fn sensor_base_pan_encoder__kept(
             &mut self,
             wiring: &__Wiring,
-            message: &__private::Stamped<
-                <__Rover_2_11__sensor_base_pan_encoder as ::bb_core::Sensor>::Output,
-            >,
+            message: &__private::Stamped<__Rover_2_11__payload__sensor_base_pan_encoder>,
             turn: &__private::Turn<'_>,
         ) {
             __private::receive::<
@@ -1299,14 +1156,9 @@ const _: () = {
                 self,
                 wiring,
                 2usize,
-                <<__Rover_2_11__sensor_base_pan_encoder as ::bb_core::Sensor>::Output as __private::Feeds<
+                <__Rover_2_11__payload__sensor_base_pan_encoder as __private::Feeds<
                     __taken__estimator_base_pose__wheel,
-                    {
-                        __private::both_known::<
-                            <__Rover_2_11__sensor_base_pan_encoder as ::bb_core::Sensor>::Output,
-                            __taken__estimator_base_pose__wheel,
-                        >()
-                    },
+                    __known__estimator_base_pose__wheel,
                 >>::feed(message),
                 turn,
             );
@@ -1378,71 +1230,56 @@ const _: () = {
             }
         }
     }
-    fn __open_group_0(
-        wiring: &__private::Arc<__Wiring>,
-        options: &__Options,
-        assembly: &__private::Assembly,
-        sources: &mut __private::Vec<__private::Box<dyn __private::Source>>,
-    ) {
-        assembly
-            .source::<
-                __Rover_2_11::Rover,
+    fn __sources_0(sources: &mut __private::Sources<__Rover_2_11::Rover>) {
+        sources
+            .add::<
                 __private::AsSensor<__Rover_2_11__sensor_battery>,
             >(
                 &__SENSORS[0usize],
-                &options.g0.sensor_battery,
+                0usize,
+                0usize,
                 __private::Binding::NONE,
-                wiring,
                 __Wiring::sensor_battery,
-                sources,
             );
-        assembly
-            .source::<
-                __Rover_2_11::Rover,
+        sources
+            .add::<
                 __private::AsSensor<__Rover_2_11__sensor_base_pan_encoder>,
             >(
                 &__SENSORS[2usize],
-                &options.g0.sensor_base_pan_encoder,
+                2usize,
+                7usize,
                 __private::Binding::NONE,
-                wiring,
                 __Wiring::sensor_base_pan_encoder,
-                sources,
             );
-        assembly
-            .source::<
-                __Rover_2_11::Rover,
+        sources
+            .add::<
                 __private::AsSensor<__Rover_2_11__sensor_base_imu>,
             >(
                 &__SENSORS[1usize],
-                &options.g0.sensor_base_imu,
+                1usize,
+                3usize,
                 __private::Binding::NONE,
-                wiring,
                 __Wiring::sensor_base_imu,
-                sources,
             );
-        assembly
-            .source::<
-                __Rover_2_11::Rover,
+        sources
+            .add::<
                 __private::AsService<__Rover_2_11__controller_stability>,
             >(
                 &__SERVICES[0usize],
-                &options.g0.controller_stability,
+                6usize,
+                1usize,
                 __private::Binding::NONE,
-                wiring,
                 __Wiring::controller_stability,
-                sources,
             );
-        assembly
-            .source::<
-                __Rover_2_11::Rover,
+        sources
+            .add::<
                 __private::AsService<__Rover_2_11__bridge_ros>,
             >(
                 &__SERVICES[1usize],
-                &options.g0.bridge_ros,
+                7usize,
+                2usize,
                 __private::Binding::NONE,
-                wiring,
                 __Wiring::bridge_ros,
-                sources,
             );
     }
     impl ::bb_core::Robot for __Rover_2_11::Rover {
@@ -1460,10 +1297,9 @@ const _: () = {
         const BOUND_OPTIONS: &'static [(usize, &'static str, usize)] = &[
             (3usize, "beta", 0usize),
         ];
-        type Options = __Options;
         type Topics = __Topics;
         type Wiring = __Wiring;
-        fn options() -> __Options {
+        fn options() -> __private::OptionsList {
             __declared_options()
         }
         fn topics() -> __Topics {
@@ -1471,7 +1307,7 @@ const _: () = {
         }
         fn wire(
             topics: __Topics,
-            options: &__Options,
+            options: &__private::OptionsList,
             assembly: &__private::Assembly,
         ) -> __Wiring {
             __Wiring {
@@ -1481,13 +1317,9 @@ const _: () = {
                 environment: __private::Clone::clone(assembly.environment()),
             }
         }
-        fn sources(
-            wiring: &__private::Arc<__Wiring>,
-            options: &__Options,
-            assembly: &__private::Assembly,
-        ) -> __private::Vec<__private::Box<dyn __private::Source>> {
-            let mut sources = __private::Vec::new();
-            __open_group_0(wiring, options, assembly, &mut sources);
+        fn sources() -> __private::Sources<Self> {
+            let mut sources = __private::Default::default();
+            __sources_0(&mut sources);
             sources
         }
         fn wired_topics(wiring: &__Wiring) -> &__Topics {
@@ -1499,52 +1331,21 @@ const _: () = {
         ) -> __private::Option<&dyn __private::AnyTopic> {
             __topic(topics, publisher)
         }
-        fn options_of(
-            options: &mut __Options,
-            component: usize,
-        ) -> __private::Option<&mut dyn __private::AnyOptions> {
-            __options_of(options, component)
-        }
         fn actuator(
             wiring: &__Wiring,
             actuator: usize,
         ) -> __private::Option<&dyn __private::AnyActuator> {
             __actuator(&wiring.actuators, actuator)
         }
-        fn feed(
-            wiring: &__Wiring,
-            publisher: usize,
-            message: &__private::DynamicMessage,
-            now: __private::MonotonicTime,
-        ) -> bool {
-            match publisher {
-                0usize => __private::feed(wiring, message, now, __Wiring::sensor_battery),
-                1usize => {
-                    __private::feed(wiring, message, now, __Wiring::controller_stability)
-                }
-                2usize => __private::feed(wiring, message, now, __Wiring::bridge_ros),
-                3usize => {
-                    __private::feed(wiring, message, now, __Wiring::sensor_base_imu)
-                }
-                7usize => {
-                    __private::feed(
-                        wiring,
-                        message,
-                        now,
-                        __Wiring::sensor_base_pan_encoder,
-                    )
-                }
-                _ => false,
-            }
-        }
-        fn commands(options: &__Options) -> __private::Vec<__private::Prepared> {
+        fn commands(
+            options: &__private::OptionsList,
+        ) -> __private::Vec<__private::Prepared> {
             ::std::vec![
-                __private::Prepared::new:: < __Rover_2_11__command_arm > (& options.g0
-                .command_arm, __private::Binding::NONE), __private::Prepared::new:: <
-                __Rover_2_11__command_move_to > (& options.g0.command_move_to,
+                __private::Prepared::new:: < __Rover_2_11__command_arm > (options,
+                8usize, __private::Binding::NONE), __private::Prepared::new:: <
+                __Rover_2_11__command_move_to > (options, 9usize,
                 __private::Binding::NONE), __private::Prepared::new:: <
-                __Rover_2_11__command_stop > (& options.g0.command_stop,
-                __private::Binding::NONE)
+                __Rover_2_11__command_stop > (options, 10usize, __private::Binding::NONE)
             ]
         }
     }

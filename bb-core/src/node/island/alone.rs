@@ -1,0 +1,142 @@
+//! An estimator that is an island of its own, with one input: most are. The island's code is here, once for all of them; the
+//! expansion of `robot!` provides what differs.
+
+use super::member::{Act, Member, OptionsOf, OutputOf, act, alone, enter, receive};
+use super::{Environment, Island, IslandState, IslandWiring, Key};
+use crate::component::{Binding, Estimator, OptionsList, Outputs, TakenAt};
+use crate::declaration::IslandDeclaration;
+use crate::declaration::estimator::InletDeclaration;
+use crate::message::{Payload, Stamp, Stamped};
+use crate::node::{Node, Turn};
+use crate::pubsub::DynamicMessage;
+use crate::time::MonotonicTime;
+use std::convert::identity;
+
+/// Implemented by `robot!` for each estimator that is an island of its own, with one input.
+pub trait Alone: Sized + 'static {
+    /// The robot's wiring.
+    type Wiring: IslandWiring;
+    /// The estimator's type.
+    type Estimator: Estimator;
+    /// What the publisher of its input publishes.
+    type Source: Payload;
+    /// Its input.
+    type Input: TakenAt<<Self::Estimator as Estimator>::Input>;
+    /// Its number, and where its messages come from.
+    const INLET: Inlet<Self::Source, <Self::Input as TakenAt<<Self::Estimator as Estimator>::Input>>::Payload>;
+
+    /// Finds the island in the wiring.
+    fn find(wiring: &Self::Wiring) -> &Island<Solo<Self>>;
+
+    /// See [`Member::publish`].
+    fn publish(
+        wiring: &Self::Wiring,
+        emitted: &mut Option<<Self::Estimator as Estimator>::Output>,
+        stamp: Stamp,
+        turn: &Turn<'_>,
+    );
+
+    /// See [`Member::emitted`].
+    fn emitted(output: usize, message: &DynamicMessage) -> Option<<Self::Estimator as Estimator>::Output> {
+        if output == 0 {
+            alone::<<<Self::Estimator as Estimator>::Output as Outputs>::Only, _>(message)
+        } else {
+            None
+        }
+    }
+}
+
+/// Where the messages of an estimator that is an island of its own come from.
+#[allow(missing_debug_implementations)]
+pub struct Inlet<P, T> {
+    /// The estimator's number.
+    pub number: usize,
+    /// The publisher, as the island numbers them.
+    pub entry: usize,
+    /// The publisher's message as the input takes it.
+    pub feed: fn(&Stamped<P>) -> &Stamped<T>,
+}
+
+/// The island of a single estimator.
+#[allow(missing_debug_implementations)]
+pub struct Solo<A: Alone>(Node<A::Estimator>);
+
+impl<A: Alone> IslandState for Solo<A> {
+    type Wiring = A::Wiring;
+    type Message = Stamped<A::Source>;
+    const DECLARATION: IslandDeclaration = {
+        let estimator = &A::Wiring::ESTIMATORS[A::INLET.number];
+        IslandDeclaration {
+            number: estimator.island,
+            name: estimator.path,
+            worker: estimator.worker,
+            is_measured: estimator.health.latency_budget_nanos.is_some(),
+            estimators: &[A::INLET.number],
+            inlets: &[InletDeclaration { entry: A::INLET.entry, inputs: &[(A::INLET.number, 0)] }],
+        }
+    };
+
+    #[inline(always)]
+    fn find(wiring: &A::Wiring) -> &Island<Self> {
+        A::find(wiring)
+    }
+
+    #[inline]
+    fn deliver(&mut self, wiring: &A::Wiring, message: &Stamped<A::Source>, turn: &Turn<'_>) {
+        receive::<A, A::Input>(self, wiring, 0, (A::INLET.feed)(message), turn);
+    }
+
+    fn act(&mut self, wiring: &A::Wiring, estimator: usize, act: Act<'_, '_>) -> bool {
+        estimator == A::INLET.number && self::act::<A>(self, wiring, act)
+    }
+}
+
+impl<A: Alone> Member for A {
+    type State = Solo<A>;
+    type Estimator = A::Estimator;
+    const NUMBER: usize = A::INLET.number;
+
+    #[inline(always)]
+    fn node(island: &mut Solo<A>) -> &mut Node<A::Estimator> {
+        &mut island.0
+    }
+
+    #[inline]
+    fn publish(
+        wiring: &A::Wiring,
+        _: &mut Solo<A>,
+        emitted: &mut Option<OutputOf<A>>,
+        stamp: Stamp,
+        turn: &Turn<'_>,
+    ) {
+        <A as Alone>::publish(wiring, emitted, stamp, turn);
+    }
+
+    fn emitted(output: usize, message: &DynamicMessage) -> Option<OutputOf<A>> {
+        <A as Alone>::emitted(output, message)
+    }
+}
+
+/// Creates the estimator and its island: see [`start`](super::start).
+pub fn start_alone<A: Alone>(
+    options: &OptionsList,
+    component: usize,
+    binding: Binding<OptionsOf<A>>,
+    environment: &Environment,
+) -> Island<Solo<A>> {
+    Island::new(Solo(super::start::<A>(options, component, binding, environment)))
+}
+
+/// Delivers a message to the island of the estimator directly, or keeps it for the thread that holds the island; `line` is that
+/// of the message in the journal.
+#[inline]
+pub fn enter_alone<A: Alone>(wiring: &A::Wiring, now: MonotonicTime, line: u64, message: &Stamped<A::Source>) {
+    enter::<Solo<A>, _>(
+        wiring,
+        now,
+        Key { entry: A::INLET.entry, line },
+        message,
+        <Solo<A> as IslandState>::deliver,
+        identity,
+    );
+}
