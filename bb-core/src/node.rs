@@ -25,9 +25,9 @@ pub use environment::Environment;
 pub(crate) use environment::{BindTarget, Check, EnvironmentParts, Missing, Mode, Overseer};
 pub use island::{
     Act, Alone, Inlet, Island, IslandOf, IslandState, IslandWiring, Key, Member, Solo, act, alone, emit, enter,
-    enter_alone, island as island_of, receive, start, start_alone,
+    enter_alone, island as island_of, publish_to, receive, start, start_alone,
 };
-pub(crate) use island::{AnyIsland, CallError, Replayed, publish, take_turn};
+pub(crate) use island::{AnyIsland, CallError, Replayed};
 pub use latency::LatencyStatistics;
 pub(crate) use requests::{know_calls, know_casts};
 pub(crate) use running::Next;

@@ -26,7 +26,7 @@ mod simulation;
 pub(crate) mod source;
 mod threads;
 mod timekeeper;
-pub(crate) mod visit;
+mod visit;
 
 pub use crate::component::{ActuatorError, ActuatorLink, Bus};
 pub use crate::control::{CommandError, CommandStatistics, Execution, ReportedFault};
@@ -51,7 +51,6 @@ pub use settings::{SettingProblem, SettingsError, SettingsList};
 pub use simulation::Simulation;
 pub use source::SourceStatistics;
 pub(crate) use source::{Assembly, Source, Sources};
-pub(crate) use visit::Visit;
 pub use visit::Visitable;
 
 use crate::component::OptionsList;

@@ -3,13 +3,15 @@
 //! ```text
 //! mod __Rover_2_11 { pub struct Rover; }               // the robot's type, whose name is at line 2, column 11
 //! impl Rover { pub fn builder() … }                    // so that no trait has to be imported
-//! type __Rover_2_11__sensor_base_imu = Bmi270;         // one alias per component: its type is named once
-//! enum __Rover_2_11__member__sensor_base_imu_tilt {}   // the marker of an estimator in its island
+//! type __Rover_2_11__sensor_base_imu = Bmi270;         // one alias per type of component, named after the first one
 //! const _: () = {
 //!     …                                                // constants that check type facts at the user's tokens
 //!     static __SENSORS, __ESTIMATORS, …                // what was declared, as data
-//!     struct __Options, __Topics, __Wiring             // a field per component, publisher, island
-//!     struct __Island_sensor_base_imu_tilt { … }       // estimators that always run together
+//!     fn __declared_options() -> OptionsList           // the options of each component, by number
+//!     struct __Topics, __Islands, __Wiring             // a field per publisher, island
+//!     enum __member__sensor_base_imu_tilt {}           // the marker of an estimator in its island
+//!     impl Alone for __member__sensor_base_imu_tilt    // an estimator with one input that is an island of its own
+//!     struct __Island_estimator_base_pose { … }        // otherwise: estimators that always run together
 //!     impl __Wiring { fn sensor_base_imu(&self, …) }   // what is downstream of each publisher, by direct calls
 //!     impl Robot for Rover { … }
 //! };
@@ -52,7 +54,6 @@ pub(crate) fn robot(verified: &Verified<'_>) -> TokenStream {
     let naming = naming::Naming::of(robot, name);
     let types = types::Types::new(robot, &naming, name, 0);
     let aliases = types::aliases(&types);
-    let members = types::members(&types);
     let checks = checks::checks(verified, &types);
     let islands = islands::Islands::of(verified);
     let declarations = declarations::declarations(verified, &islands);
@@ -65,8 +66,7 @@ pub(crate) fn robot(verified: &Verified<'_>) -> TokenStream {
     quote! {
         #definition
         #aliases
-        #members
-        #[allow(clippy::all, non_snake_case, unused_variables)]
+        #[allow(clippy::all, non_snake_case, non_camel_case_types, unused_variables)]
         const _: () = {
             use ::bb_core::__private;
             #checks

@@ -14,6 +14,7 @@
 //! an answer, a publisher waiting for room) waits on a condition variable with a timeout. An estimator that hangs therefore
 //! blocks no other thread forever.
 
+mod act;
 mod alone;
 mod any;
 mod inbox;
@@ -24,13 +25,13 @@ mod model;
 mod processing;
 mod waiting;
 
-pub use self::alone::{Alone, Inlet, Solo, enter_alone, start_alone};
+pub use self::act::Act;
+pub use self::alone::{Alone, Inlet, Solo, enter_alone, publish_to, start_alone};
 pub use self::any::IslandOf;
 pub(crate) use self::any::{AnyIsland, Replayed};
 use self::inbox::Inbox;
 use self::inside::{Inside, Within};
-pub use self::member::{Act, Member, act, alone, emit, enter, island, receive, start};
-pub(crate) use self::member::{publish, take_turn};
+pub use self::member::{Member, act, alone, emit, enter, island, receive, start};
 use self::processing::{deliver, dropped};
 use super::environment::Environment;
 use super::{NodeEntry, Turn};
@@ -168,7 +169,7 @@ struct Keyed<M> {
 
 /// Why a call was not made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum CallError {
+pub enum CallError {
     /// The calling thread is inside an island of the same robot and would wait for itself.
     Inside,
     /// Another thread has held the island for too long.

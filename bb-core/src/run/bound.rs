@@ -15,7 +15,7 @@ pub(super) fn component_paths<R: Robot>() -> Vec<&'static str> {
 }
 
 /// The options of a component.
-pub(super) fn fields<R: Robot>(options: &mut OptionsList, component: usize) -> &'static [OptionField] {
+pub(super) fn fields(options: &mut OptionsList, component: usize) -> &'static [OptionField] {
     options.any(component).map_or(&[], |options| options.fields())
 }
 
@@ -42,7 +42,7 @@ pub(super) fn refused_by_bound<R: Robot>(
     };
     R::BOUND_OPTIONS.iter().filter(|bound| bound.2 == number).find_map(|(component, name, _)| {
         let path = paths.get(*component).filter(|path| !is_replaced(path))?;
-        let fields = fields::<R>(options, *component).iter();
+        let fields = fields(options, *component).iter();
         let range = fields.filter(|field| field.name == *name).find_map(|field| field.range)?;
         let is_inside = (range.start..=range.end).contains(&value);
         (!is_inside)

@@ -1,6 +1,6 @@
 //! Typed names of what a robot declares; `robot!` generates one per publisher, at its path.
 
-use super::{ActuatorNode, Robot, Visit, Visitable};
+use super::{ActuatorNode, Robot, Visitable};
 use crate::component::options::{OptionsList, unverified};
 use crate::component::{Actuator, Command, Estimator, Sensor, Service};
 use crate::control::SystemTopics;
@@ -44,8 +44,6 @@ fn topic<R: Robot, T: Payload>(topics: &R::Topics, publisher: usize) -> &Topic<T
 
 type NodeOf<R, A> = fn(&<R as Robot>::Wiring) -> &ActuatorNode<A>;
 type PublishOf<R, T> = fn(&<R as Robot>::Wiring, &Stamped<T>, MonotonicTime);
-/// Calls a function with an estimator once it is free, and publishes what it emits.
-type VisitOf<R, E> = fn(&<R as Robot>::Wiring, MonotonicTime, Visit<'_, E>);
 
 macro_rules! handle {
     ($(#[$doc:meta])* $name:ident<$($component:ident: $bound:path),+> { $($field:ident: $type:ty),* }) => {
@@ -53,12 +51,13 @@ macro_rules! handle {
         pub struct $name<R: Robot, $($component: $bound),+> {
             path: &'static str,
             $($field: $type,)*
+            of: PhantomData<fn() -> (R, $($component),+)>,
         }
 
         impl<R: Robot, $($component: $bound),+> $name<R, $($component),+> {
             #[doc(hidden)]
             pub const fn new(path: &'static str, $($field: $type),*) -> Self {
-                Self { path, $($field),* }
+                Self { path, $($field,)* of: PhantomData }
             }
 
             /// Its path.
@@ -86,9 +85,9 @@ macro_rules! handle {
 handle! {
     /// Names a sensor of the robot `R`.
     SensorHandle<S: Sensor> {
-        frame: Frame,
         publisher: usize,
         component: usize,
+        frame: Frame,
         publish: PublishOf<R, S::Output>
     }
 }
@@ -98,9 +97,7 @@ handle! {
     EstimatorHandle<E: Estimator, T: Payload> {
         number: usize,
         publisher: usize,
-        component: usize,
-        visit: VisitOf<R, E>,
-        kind: PhantomData<fn() -> T>
+        component: usize
     }
 }
 
@@ -108,8 +105,7 @@ handle! {
     /// Names an estimator with several outputs of the robot `R`; each has an [`OutputHandle`] below it.
     EstimatorOfSeveralHandle<E: Estimator> {
         number: usize,
-        component: usize,
-        visit: VisitOf<R, E>
+        component: usize
     }
 }
 
@@ -117,7 +113,7 @@ macro_rules! service_handle {
     ($(#[$doc:meta])* $name:ident) => {
         handle! {
             $(#[$doc])*
-            $name<S: Service> { publisher: usize, component: usize, kind: PhantomData<fn() -> (R, S)> }
+            $name<S: Service> { publisher: usize, component: usize }
         }
 
         #[diagnostic::do_not_recommend]
@@ -152,17 +148,17 @@ service_handle! {
 
 handle! {
     /// Names an actuator of the robot `R`.
-    ActuatorHandle<A: Actuator> { node: NodeOf<R, A>, component: usize }
+    ActuatorHandle<A: Actuator> { component: usize, node: NodeOf<R, A> }
 }
 
 handle! {
     /// Names a command of the robot `R`. Its progress is published at its path.
-    CommandHandle<C: Command> { number: usize, component: usize, kind: PhantomData<fn() -> (R, C)> }
+    CommandHandle<C: Command> { number: usize, component: usize }
 }
 
 handle! {
     /// Names a parameter of the robot `R`, of type `T`. Its changes are published at its path.
-    ParameterHandle<T: ParameterType> { number: usize, value: PhantomData<fn() -> (R, T)> }
+    ParameterHandle<T: ParameterType> { number: usize }
 }
 
 impl<R: Robot, A: Actuator> ActuatorHandle<R, A> {
@@ -258,7 +254,7 @@ system_topic! {
 
 handle! {
     /// Names one output of an estimator of the robot `R`.
-    OutputHandle<T: Payload> { publisher: usize, kind: PhantomData<fn() -> (R, T)> }
+    OutputHandle<T: Payload> { publisher: usize }
 }
 
 impl<R: Robot, S: Sensor> SensorHandle<R, S> {
@@ -307,14 +303,6 @@ macro_rules! visitable {
             type Estimator = E;
             fn number(self) -> usize {
                 self.number
-            }
-            fn visit(
-                self,
-                wiring: &R::Wiring,
-                now: MonotonicTime,
-                visit: Visit<'_, E>,
-            ) {
-                (self.visit)(wiring, now, visit);
             }
         }
     )* };

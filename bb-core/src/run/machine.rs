@@ -4,19 +4,20 @@ use super::handle::{ActuatorHandle, CommandHandle, ParameterHandle, Publisher};
 use super::keeper::Keeper;
 use super::remains::Remains;
 use super::source::SharedSource;
-use super::visit::{Visit, Visitable};
+use super::visit::Visitable;
 use super::{ActuatorError, Report, Robot, SensorHandle};
 use crate::component::{Actuator, Bus, Command, Fault, HandleCall, HandleCast, Host, Permit, RequestCodec, Sensor};
 use crate::control::{Control, Execution, ReportedFault, Summary};
 use crate::declaration::{ParameterError, ParameterType};
 use crate::event::Refusal;
-use crate::journal::{ParameterEntry, RequestKind};
+use crate::journal::{Event, ParameterEntry, RequestKind};
 use crate::message::Stamp;
 use crate::node::{
     AnyIsland, CallError, Environment, Node, NodeEntry, Turn, contained_outside, know_calls, know_casts,
 };
 use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Payloads, Select, Subscription};
 use crate::time::MonotonicTime;
+use std::any::Any;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
@@ -91,16 +92,22 @@ impl<R: Robot> Machine<R> {
         let mut request = Some(request);
         let mut response = None;
         let mut error = None;
-        let mut call = |node: &mut Node<V::Estimator>, turn: &Turn<'_>, emitted: &mut Option<_>| {
+        let mut call = |node: &mut dyn Any, turn: &Turn<'_>, emitted: &mut dyn Any| {
+            let node = node.downcast_mut::<Node<V::Estimator>>()?;
+            let emitted = emitted.downcast_mut()?;
             let (answer, stamp) = node.call(request.take()?, is_unrecorded, turn, emitted);
             response = Some(answer);
             stamp
         };
         let now = self.environment.clock().now();
         let number = estimator.number();
-        let visit = Visit { estimator: number, request: recorded, call: &mut call, error: &mut error };
-        contained_outside(&self.environment, || estimator.visit(&self.wiring, now, visit));
-        let path = self.environment.node(estimator.number()).declaration().path;
+        let line = Event::Request { estimator: number, request: recorded };
+        let declaration = self.environment.node(number).declaration();
+        let island = self.island(declaration.island);
+        contained_outside(&self.environment, || {
+            error = island.and_then(|island| island.visit(&self.wiring, now, number, line, &mut call).err());
+        });
+        let path = declaration.path;
         response.unwrap_or_else(|| {
             Err(Fault::new(match error {
                 Some(CallError::Busy) => format!("{path} has been busy for 5 s and has not answered"),

@@ -3,14 +3,14 @@
 
 use super::literal::spanned_call;
 use super::part::Part;
-use super::types::{Types, type_name};
+use super::types::{Named, Types, type_name};
 use crate::diagnostics::Place;
 use crate::model::{EstimatorId, Robot};
 use crate::parse::{Component, ComponentOption, OptionValue, Value};
 use crate::units::Dimension;
 use crate::verify::Verified;
 use proc_macro2::TokenStream;
-use quote::quote;
+use quote::{quote, quote_spanned};
 
 pub(super) fn checks(verified: &Verified<'_>, types: &Types<'_>) -> TokenStream {
     let robot = verified.robot;
@@ -33,9 +33,11 @@ pub(super) fn checks(verified: &Verified<'_>, types: &Types<'_>) -> TokenStream 
 }
 
 /// Required options are given.
-fn required(component: &Component, options: &TokenStream) -> TokenStream {
-    let (name, given) = (type_name(component), given(component));
-    spanned_call(Place::of(&component.kind), ("check_required", quote!(::<#options, _>)), quote!(#name, #given))
+fn required(component: &Component, options: &Named) -> TokenStream {
+    let (name, given, count) = (type_name(component), given(component), component.options.len());
+    let place = Place::of(&component.kind);
+    let start = place.start;
+    spanned_call(place, ("check_required", quote_spanned!(start=> ::<#options, #count>)), quote!(#name, #given))
 }
 
 /// An estimator has its required options, all inputs that the algorithm needs, and an output if it has several.
@@ -43,14 +45,17 @@ fn estimator(robot: &Robot, types: &Types<'_>, id: EstimatorId) -> TokenStream {
     let estimator = &robot.estimators[id];
     let (name, kind, given) = (type_name(&estimator.component), types.estimator(id), given(&estimator.component));
     let has_outputs = !estimator.outputs.is_empty();
+    let (count, inputs) = (estimator.component.options.len(), estimator.inputs.len());
+    let place = Place::of(&estimator.component.kind);
+    let start = place.start;
     let (check, arguments) = if estimator.is_nested() {
-        (("check_nested", quote!(::<#kind, _>)), quote!(#name, #given, #has_outputs))
+        (("check_nested", quote_spanned!(start=> ::<#kind, #count>)), quote!(#name, #given, #has_outputs))
     } else {
         let declared = estimator.inputs.iter().map(|input| crate::names::text(&input.name));
         let arguments = quote!(#name, #given, [#(#declared),*], #has_outputs);
-        (("check_estimator", quote!(::<#kind, _, _>)), arguments)
+        (("check_estimator", quote_spanned!(start=> ::<#kind, #count, #inputs>)), arguments)
     };
-    spanned_call(Place::of(&estimator.component.kind), check, arguments)
+    spanned_call(place, check, arguments)
 }
 
 /// The names of the options given.
@@ -60,19 +65,19 @@ fn given(component: &Component) -> TokenStream {
 }
 
 /// Literals have the right dimension and are in range.
-fn options(robot: &Robot, component: &Component, options: &TokenStream) -> TokenStream {
+fn options(robot: &Robot, component: &Component, options: &Named) -> TokenStream {
     let name = type_name(component);
     let mut checks = TokenStream::new();
     for option in &component.options {
         let Some((place, dimension, number)) = given_number(robot, option) else { continue };
-        let option = crate::names::text(&option.name);
+        let (option, start) = (crate::names::text(&option.name), place.start);
         let (check, arguments) = match dimension {
             Some(dimension) => {
                 let (Dimension(exponents), dimension) = (dimension, dimension.name());
                 let arguments = quote!(#name, #option, #number, [#(#exponents),*], #dimension);
-                (("check_quantity", quote!(::<#options>)), arguments)
+                (("check_quantity", quote_spanned!(start=> ::<#options>)), arguments)
             }
-            None => (("check_number", quote!(::<#options>)), quote!(#name, #option, #number)),
+            None => (("check_number", quote_spanned!(start=> ::<#options>)), quote!(#name, #option, #number)),
         };
         checks.extend(spanned_call(place, check, arguments));
     }
@@ -106,11 +111,13 @@ fn inputs(robot: &Robot, types: &Types<'_>, id: EstimatorId) -> TokenStream {
     let (name, taken) = (type_name(&estimator.component), types.estimator_input(id));
     let known = estimator.inputs.iter().map(|input| {
         let (input_name, place) = (crate::names::text(&input.name), Place::of(&input.name));
-        spanned_call(place, ("check_input", quote!(::<#taken>)), quote!(#name, #input_name))
+        let start = place.start;
+        spanned_call(place, ("check_input", quote_spanned!(start=> ::<#taken>)), quote!(#name, #input_name))
     });
     let optional = estimator.inputs.iter().filter_map(|input| {
         let (input_name, place) = (crate::names::text(&input.name), Place::of(input.optional.as_ref()?));
-        let check = ("check_optional", quote!(::<#taken>));
+        let start = place.start;
+        let check = ("check_optional", quote_spanned!(start=> ::<#taken>));
         Some(spanned_call(place, check, quote!(#name, #input_name)))
     });
     known.chain(optional).collect()
@@ -122,7 +129,8 @@ fn outputs(robot: &Robot, types: &Types<'_>, id: EstimatorId) -> TokenStream {
     let (name, emitted) = (type_name(&estimator.component), types.estimator_output(id));
     let known = estimator.outputs.iter().map(|output| {
         let (output_name, place) = (crate::names::text(&output.name), Place::of(&output.name));
-        spanned_call(place, ("check_output", quote!(::<#emitted>)), quote!(#name, #output_name))
+        let start = place.start;
+        spanned_call(place, ("check_output", quote_spanned!(start=> ::<#emitted>)), quote!(#name, #output_name))
     });
     known.collect()
 }

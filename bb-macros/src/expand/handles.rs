@@ -107,7 +107,7 @@ pub(super) fn handles(types: &Types<'_>, name: &Ident, module: &str, accessors: 
     let module = respan(quote!(mod #module), name.span());
     let (visibility, text) = (&robot.visibility, format!("Handles of what [`{name}`] declares, each at its path."));
     let content = root.tokens(types, accessors, 1);
-    let imports = imports(types, accessors);
+    let imports = imports(types);
     let mut body = Group::new(Delimiter::Brace, quote!(#imports #content));
     body.set_span(name.span());
     quote! {
@@ -179,108 +179,103 @@ impl Module {
 impl Handle {
     /// `pub const imu: SensorHandle<Rover, Bmi270> = SensorHandle::new(…);`
     fn tokens(self, types: &Types<'_>, name: &Ident, accessors: Accessors) -> TokenStream {
-        let (robot, this) = (types.model(), types.robot());
-        let (attributes, path, (handle, kinds), arguments) = match self {
+        let (robot, this) = (types.model(), types.robot_below());
+        let number = |part: Part| part.position(robot);
+        // What it names, the types that tell it apart, its numbers, and its access to the wiring.
+        let mut access = None;
+        let (attributes, path, handle, kinds, numbers) = match self {
             Self::Sensor(id) => {
                 let sensor = &robot.sensors[id];
-                let (component, frame) = (types.sensor(id), robot.frame_name(sensor.mount));
-                let publish = types.publisher(sensor.publisher);
+                let (frame, publish) = (robot.frame_name(sensor.mount), types.publisher(sensor.publisher));
                 let publish = match accessors {
                     Accessors::Wired => quote!(<<#this as ::bb_core::Robot>::Wiring>::#publish),
                     Accessors::Stub => quote!(|_, _, _| {}),
                 };
-                let (publisher, position) = (sensor.publisher, Part::Sensor(id).position(robot));
-                let arguments = quote!(::bb_core::__private::Frame::new(#frame), #publisher, #position, #publish);
-                let kind = (quote!(SensorHandle), quote!(#this, #component));
-                (&sensor.attributes, &robot.publishers[sensor.publisher].path, kind, arguments)
+                access = Some(quote!(::bb_core::__private::Frame::new(#frame), #publish));
+                let path = &robot.publishers[sensor.publisher].path;
+                let numbers = vec![sensor.publisher.number(), number(Part::Sensor(id))];
+                (&sensor.attributes, path, "SensorHandle", vec![types.sensor(id)], numbers)
             }
             Self::Estimator(id, publisher) => {
                 let estimator = &robot.estimators[id];
-                let (component, payload) = (types.estimator(id), types.payload(publisher));
-                let (visit, position) = (visit(types, id, accessors), Part::Estimator(id).position(robot));
-                let arguments = quote!(#id, #publisher, #position, #visit, ::core::marker::PhantomData);
-                let kind = (quote!(EstimatorHandle), quote!(#this, #component, #payload));
-                (&estimator.attributes, &estimator.path, kind, arguments)
+                let kinds = vec![types.estimator(id), types.payload(publisher)];
+                let numbers = vec![id.number(), publisher.number(), number(Part::Estimator(id))];
+                (&estimator.attributes, &estimator.path, "EstimatorHandle", kinds, numbers)
             }
             Self::Several(id) => {
-                let (estimator, component) = (&robot.estimators[id], types.estimator(id));
-                let (visit, position) = (visit(types, id, accessors), Part::Estimator(id).position(robot));
-                let kind = (quote!(EstimatorOfSeveralHandle), quote!(#this, #component));
-                (&estimator.attributes, &estimator.path, kind, quote!(#id, #position, #visit))
+                let estimator = &robot.estimators[id];
+                let numbers = vec![id.number(), number(Part::Estimator(id))];
+                let kinds = vec![types.estimator(id)];
+                (&estimator.attributes, &estimator.path, "EstimatorOfSeveralHandle", kinds, numbers)
             }
             Self::Output(id, publisher) => {
-                let (estimator, payload) = (&robot.estimators[id], types.payload(publisher));
+                let estimator = &robot.estimators[id];
                 let output = match robot.publishers[publisher].from {
                     From::Estimator(_, output) => output.and_then(|output| estimator.outputs.get(output)),
                     From::Sensor(_) | From::Service(_) => None,
                 };
                 let attributes = output.map_or(&estimator.attributes, |output| &output.attributes);
-                let kind = (quote!(OutputHandle), quote!(#this, #payload));
-                let arguments = quote!(#publisher, ::core::marker::PhantomData);
-                (attributes, &robot.publishers[publisher].path, kind, arguments)
+                let path = &robot.publishers[publisher].path;
+                (attributes, path, "OutputHandle", vec![types.payload(publisher)], vec![publisher.number()])
             }
             Self::Service(id) => {
                 let (service, part) = (&robot.services[id], Part::Service(id));
                 let handle = match service.kind {
-                    ServiceKind::Controller => quote!(ControllerHandle),
-                    ServiceKind::Bridge => quote!(BridgeHandle),
+                    ServiceKind::Controller => "ControllerHandle",
+                    ServiceKind::Bridge => "BridgeHandle",
                 };
-                let (component, publisher, position) = (types.part(part), service.publisher, part.position(robot));
-                let kind = (handle, quote!(#this, #component));
-                let arguments = quote!(#publisher, #position, ::core::marker::PhantomData);
-                (&service.attributes, &service.path, kind, arguments)
+                let numbers = vec![service.publisher.number(), number(part)];
+                (&service.attributes, &service.path, handle, vec![types.part(part)], numbers)
             }
             Self::Actuator(id) => {
                 let (actuator, part) = (&robot.actuators[id], Part::Actuator(id));
-                let (component, position) = (types.part(part), part.position(robot));
                 let place = group::path(id.number(), types.name_of(part));
-                let node = match accessors {
+                access = Some(match accessors {
                     Accessors::Wired => {
                         quote!(|wiring: &<#this as ::bb_core::Robot>::Wiring| &wiring.actuators.#place)
                     }
                     Accessors::Stub => quote!(|_| ::bb_core::__private::stub()),
-                };
-                let kind = (quote!(ActuatorHandle), quote!(#this, #component));
-                (&actuator.attributes, &actuator.path, kind, quote!(#node, #position))
+                });
+                (&actuator.attributes, &actuator.path, "ActuatorHandle", vec![types.part(part)], vec![number(part)])
             }
             Self::Command(id) => {
                 let (command, part) = (&robot.commands[id], Part::Command(id));
-                let (component, position) = (types.part(part), part.position(robot));
-                let kind = (quote!(CommandHandle), quote!(#this, #component));
-                (&command.attributes, &command.path, kind, quote!(#id, #position, ::core::marker::PhantomData))
+                let numbers = vec![id.number(), number(part)];
+                (&command.attributes, &command.path, "CommandHandle", vec![types.part(part)], numbers)
             }
             Self::Parameter(id) => {
                 let parameter = &robot.parameters[id];
                 let value = parameter_type(parameter.kind);
-                let kind = (quote!(ParameterHandle), quote!(#this, #value));
-                (&parameter.attributes, &parameter.path, kind, quote!(#id, ::core::marker::PhantomData))
+                let (path, number) = (path_text(&parameter.path), id.number());
+                let (docs, gap, text) = documented(&parameter.attributes, &path);
+                return quote! {
+                    #(#docs)*
+                    #gap
+                    #[doc = #text]
+                    pub const #name: ::bb_core::__private::ParameterHandle<#this, #value> =
+                        ::bb_core::__private::ParameterHandle::new(#path, #number);
+                };
             }
             Self::State(id) => return text(name, &robot.states[id].attributes, &robot.states[id].name),
             Self::Category(id) => return text(name, &robot.categories[id].attributes, &robot.categories[id].name),
         };
-        let docs: Vec<_> = docs(attributes).collect();
-        let handle = quote!(::bb_core::__private::#handle);
-        let gap = (!docs.is_empty()).then(|| quote!(#[doc = ""]));
-        let path = path_text(path);
-        let text = format!("`{path}`");
+        let (handle, path) = (Ident::new(handle, Span::call_site()), path_text(path));
+        let (docs, gap, text) = documented(attributes, &path);
         quote! {
             #(#docs)*
             #gap
             #[doc = #text]
-            pub const #name: #handle<#kinds> = #handle::new(#path, #arguments);
+            pub const #name: ::bb_core::__private::#handle<#this, #(#kinds),*> =
+                ::bb_core::__private::#handle::new(#path, #(#numbers,)* #access);
         }
     }
 }
 
-/// Lets a caller reach an estimator.
-fn visit(types: &Types<'_>, id: EstimatorId, accessors: Accessors) -> TokenStream {
-    match accessors {
-        Accessors::Wired => {
-            let member = types.member(id);
-            quote!(::bb_core::__private::visit::<#member>)
-        }
-        Accessors::Stub => quote!(|_, _, _| {}),
-    }
+/// The doc comments of a handle: those of the user, and its path.
+fn documented<'a>(attributes: &'a [Attribute], path: &str) -> (Vec<&'a Attribute>, Option<TokenStream>, String) {
+    let docs: Vec<_> = docs(attributes).collect();
+    let gap = (!docs.is_empty()).then(|| quote!(#[doc = ""]));
+    (docs, gap, format!("`{path}`"))
 }
 
 /// The constant for a part that has a name instead of a handle: `pub const moving: &str = "moving";`

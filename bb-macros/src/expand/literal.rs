@@ -44,13 +44,13 @@ pub(super) fn ident(text: &str) -> Ident {
 /// `const _: () = ::bb_core::__private::check(arguments);`, spanned so that rustc underlines all of `place`.
 ///
 /// It has no local names, so it may have the span of user code: rustc then does not say that the error originates in
-/// a macro. `generics` are those of the function, as in `::<Imu>`.
+/// a macro. `generics` are those of the function, as in `::<Imu>`, at the start of `place`.
 pub(super) fn spanned_call(
     place: Place,
     (check, generics): (&str, TokenStream),
     arguments: TokenStream,
 ) -> TokenStream {
-    let (check, generics) = (Ident::new(check, place.start), at(generics, place.start));
+    let check = Ident::new(check, place.start);
     let mut arguments = Group::new(Delimiter::Parenthesis, arguments);
     arguments.set_span(place.end);
     quote_spanned!(place.start=> const _: () = ::bb_core::__private::#check #generics #arguments;)

@@ -33,10 +33,12 @@ pub(super) struct PartNames {
     pub(super) probed: Ident,
     /// The number of that part.
     pub(super) first: usize,
-    /// `__Rover_2_11__member__sensor_base_imu_tilt`: an estimator in its island.
+    /// `__Rover_2_11__options__sensor_base_imu`: its options, named after the first part with this type.
+    pub(super) options: Ident,
+    /// `__Rover_2_11__given_options__sensor_base_imu`: the same, of the type as the user wrote it.
+    pub(super) given_options: Ident,
+    /// `__member__sensor_base_imu_tilt`: an estimator in its island.
     pub(super) member: Ident,
-    /// `__Rover_2_11__exported__sensor_base_imu_tilt`: the same, for the robot's module.
-    pub(super) exported: Ident,
     /// Where the user wrote its type. Names are looked up as in the expansion.
     pub(super) span: Span,
 }
@@ -65,20 +67,20 @@ impl Naming {
             let span = Place::of(kind).start.resolved_at(call_site);
             let own = item("probed__", &name, call_site);
             let tokens = kind.to_token_stream().to_string();
-            let own = (number, own, item("", &name, span));
-            let (first, probed, mut alias) = match tokens.contains('$') {
+            let own = (number, own, name.clone());
+            let (first, probed, named) = match tokens.contains('$') {
                 // `$crate` of two macros may be two crates.
                 true => own,
                 false => probed.entry((std::mem::discriminant(&part), tokens)).or_insert(own).clone(),
             };
-            alias.set_span(span);
             PartNames {
                 probed,
                 first,
-                alias,
+                options: item("options__", &named, span),
+                given_options: item("given_options__", &named, span),
+                alias: item("", &named, span),
                 given: item("given__", &name, span),
-                member: item("member__", &name, call_site),
-                exported: item("exported__", &name, call_site),
+                member: format_ident!("__member__{name}"),
                 name,
                 span,
             }

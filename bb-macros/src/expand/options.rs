@@ -2,13 +2,12 @@
 
 use super::literal::respan;
 use super::part::Part;
-use super::types::Types;
+use super::types::{Named, Types};
 use crate::derive::into_if_text;
-use crate::diagnostics::Place;
 use crate::model::Robot;
 use crate::parse::{Component, OptionValue, ParameterKind};
-use proc_macro2::{Ident, TokenStream};
-use quote::{format_ident, quote};
+use proc_macro2::{Ident, Span, TokenStream};
+use quote::{format_ident, quote, quote_spanned};
 
 /// Number of components whose options are made by one function: rustc's time for one grows with its square.
 const SIZE: usize = 16;
@@ -21,12 +20,12 @@ pub(super) fn options(types: &Types<'_>) -> TokenStream {
         let component = part.component(robot);
         let given = types.given_options(part);
         if component.options.is_empty() {
-            let place = Place::of(&component.kind).start;
-            added.push(respan(quote!(options.add(<#given as ::bb_core::Options>::defaults());), place));
+            let span = types.span(part);
+            added.push(quote_spanned!(span=> options.add(<#given as ::bb_core::Options>::defaults());));
         } else {
             // Values are user expressions, so the names in scope must not be ones that a user writes.
             let function = format_ident!("__declared_{}", types.name_of(part));
-            functions.extend(filled(&function, &given, component));
+            functions.extend(filled(&function, &given, types.span(part), component));
             added.push(quote!(#function(options);));
         }
     }
@@ -66,7 +65,7 @@ pub(super) fn bound(robot: &Robot) -> TokenStream {
 /// `fn __declared_sensor_base_imu(all) { let mut options = defaults(); options.beta = 0.1; all.add(options) }`
 ///
 /// Only this uses the type as the user wrote it, so a type of another kind is reported here.
-fn filled(function: &Ident, given: &TokenStream, component: &Component) -> TokenStream {
+fn filled(function: &Ident, given: &Named, span: Span, component: &Component) -> TokenStream {
     let settings: Vec<TokenStream> = component
         .options
         .iter()
@@ -75,8 +74,8 @@ fn filled(function: &Ident, given: &TokenStream, component: &Component) -> Token
             let value = match &option.value {
                 OptionValue::Quantity(quantity) => {
                     let number = quantity.value;
-                    let place = quantity.place.start;
-                    respan(quote!(__private::FromQuantity::from_quantity(#number)), place)
+                    let span = quantity.place.start.resolved_at(Span::call_site());
+                    quote_spanned!(span=> __private::FromQuantity::from_quantity(#number))
                 }
                 OptionValue::Expression { expression, .. } => into_if_text(expression),
                 // It has the parameter's value from the start, see `binding`.
@@ -87,10 +86,9 @@ fn filled(function: &Ident, given: &TokenStream, component: &Component) -> Token
             Some(quote!(#receiver #name = #value;))
         })
         .collect();
-    let place = Place::of(&component.kind).start;
     let mutability = (!settings.is_empty()).then(|| quote!(mut));
     // Spanned at the user's type, which rustc points at when a value does not fit.
-    let start = respan(quote!(let #mutability __options: #given = ::bb_core::Options::defaults();), place);
+    let start = quote_spanned!(span=> let #mutability __options: #given = ::bb_core::Options::defaults(););
     quote! {
         fn #function(__all: &mut __private::OptionsList) {
             #start

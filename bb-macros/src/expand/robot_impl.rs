@@ -69,7 +69,7 @@ pub(super) fn robot_impl(verified: &Verified<'_>, types: &Types<'_>) -> TokenStr
             fn wire(topics: __Topics, options: &__private::OptionsList, assembly: &__private::Assembly) -> __Wiring {
                 __Wiring {
                     topics,
-                    islands: __new_islands(options, assembly),
+                    islands: __new_islands(options, assembly.environment()),
                     actuators: __new_actuators(options, assembly),
                     environment: __private::Clone::clone(assembly.environment()),
                 }

@@ -23,16 +23,20 @@ pub(super) fn aliases(types: &Types<'_>) -> TokenStream {
     let (robot, name) = (types.robot, types.name);
     let parts = Part::all(robot).enumerate().map(|(number, part)| {
         let kind = &part.component(robot).kind;
-        let PartNames { alias, given, probed, first, .. } = types.names(part);
+        let PartNames { alias, given, probed, first, options, given_options, .. } = types.names(part);
         let mut aliases = vec![(without_span(given), quote!(#kind))];
         if *first == number {
-            let (_, [is_known, implements]) = part.contract();
+            let (contract, [is_known, implements]) = part.contract();
             let implemented = quote!(::bb_core::__private::Probed<#given, {
                 use ::bb_core::__private::{NotProbed as _, Probe};
                 ::bb_core::__private::implemented(<Probe<#given>>::#is_known, <Probe<#given>>::#implements)
             }>);
             aliases.push((probed.clone(), implemented));
             aliases.push((without_span(alias), quote!(<#probed as ::bb_core::__private::Known>::Type)));
+            let known = quote!(<<#probed as ::bb_core::__private::Known>::Type as #contract>::Options);
+            aliases.push((without_span(options), known));
+            let as_given = quote!(<<#probed as ::bb_core::__private::Known>::Given as #contract>::Options);
+            aliases.push((without_span(given_options), as_given));
         }
         aliases
     });
@@ -58,21 +62,6 @@ pub(super) fn aliases(types: &Types<'_>) -> TokenStream {
     aliases.collect()
 }
 
-/// `enum __Rover_2_11__member__sensor_base_imu_tilt {}`: the marker of an estimator in its island; and an alias
-/// through which the robot's module, which exports its imports, can import it.
-pub(super) fn members(types: &Types<'_>) -> TokenStream {
-    let names = || types.robot.estimators.ids().map(|id| types.names(Part::Estimator(id)));
-    let (members, aliases) = (names().map(|names| &names.member), names().map(|names| &names.exported));
-    quote! {
-        #(
-            #[allow(non_camel_case_types, dead_code)]
-            enum #members {}
-            #[doc(hidden)]
-            pub type #aliases = #members;
-        )*
-    }
-}
-
 /// How handles reach the parts they name.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Accessors {
@@ -89,15 +78,13 @@ pub(super) const ROBOT: &str = "__Robot";
 ///
 /// A single import, so that it causes a single error inside a function, whose items a module cannot name. Its first
 /// name explains the error, since rustc prints it.
-pub(super) fn imports(types: &Types<'_>, accessors: Accessors) -> TokenStream {
+pub(super) fn imports(types: &Types<'_>) -> TokenStream {
     let (robot, name) = (types.robot, types.name);
     let parts = Part::all(robot).enumerate().map(|(number, part)| (number, types.names(part)));
     let parts = parts.filter(|(number, names)| names.first == *number).map(|(_, names)| &names.alias);
     let outputs = types.payloads().filter(|id| matches!(types.from(*id), From::Estimator(..)));
     let payloads = outputs.map(|id| &types.naming.publisher(id).payload);
-    let is_wired = accessors == Accessors::Wired;
-    let members = robot.estimators.ids().filter(|_| is_wired).map(|id| &types.names(Part::Estimator(id)).exported);
-    let items = parts.chain(payloads).chain(members);
+    let items = parts.chain(payloads);
     let (marker, kind, this) = (marker(name), robot_type(name), ident(ROBOT));
     let imports = quote!(pub use super::{#marker as _, #kind as #this, #(#items),*};);
     let imports = respan(imports, name.span());
@@ -143,6 +130,15 @@ pub(super) struct Types<'a> {
 pub(super) struct Named {
     above: usize,
     name: Ident,
+}
+
+impl Named {
+    /// The same at `span`.
+    pub(super) fn at(&self, span: Span) -> Self {
+        let Self { above, mut name } = self.clone();
+        name.set_span(span.resolved_at(Span::call_site()));
+        Self { above, name }
+    }
 }
 
 impl ToTokens for Named {
@@ -194,9 +190,8 @@ impl<'a> Types<'a> {
     }
 
     /// The marker of an estimator in its island.
-    pub(super) fn member(&self, id: EstimatorId) -> Named {
-        let names = self.names(Part::Estimator(id));
-        self.named(if self.depth > 0 { &names.exported } else { &names.member })
+    pub(super) fn member(&self, id: EstimatorId) -> &'a Ident {
+        &self.names(Part::Estimator(id)).member
     }
 
     pub(super) fn model(&self) -> &'a Robot {
@@ -210,7 +205,12 @@ impl<'a> Types<'a> {
 
     /// The robot's type.
     pub(super) fn robot(&self) -> TokenStream {
-        if self.depth > 0 { self.named(&ident(ROBOT)).into_token_stream() } else { robot_type(self.name) }
+        if self.depth > 0 { self.robot_below().into_token_stream() } else { robot_type(self.name) }
+    }
+
+    /// The robot's type, named from below.
+    pub(super) fn robot_below(&self) -> Named {
+        self.named(&Ident::new(ROBOT, Span::call_site()))
     }
 
     /// The type of a part, at the span of the user's type.
@@ -227,19 +227,13 @@ impl<'a> Types<'a> {
     }
 
     /// The type of a part's options.
-    pub(super) fn options(&self, part: Part) -> TokenStream {
-        self.options_of(part, &self.part(part).into_token_stream())
+    pub(super) fn options(&self, part: Part) -> Named {
+        self.named(&self.names(part).options)
     }
 
     /// The same for the type as the user wrote it.
-    pub(super) fn given_options(&self, part: Part) -> TokenStream {
-        let (probed, span) = (self.named(&self.names(part).probed), self.span(part));
-        self.options_of(part, &quote_spanned!(span=> <#probed as __private::Known>::Given))
-    }
-
-    fn options_of(&self, part: Part, kind: &TokenStream) -> TokenStream {
-        let (contract, _) = part.contract();
-        quote_spanned!(self.span(part)=> <#kind as #contract>::Options)
+    pub(super) fn given_options(&self, part: Part) -> Named {
+        self.named(&self.names(part).given_options)
     }
 
     pub(super) fn estimator_input(&self, id: EstimatorId) -> TokenStream {

@@ -7,12 +7,18 @@
 //!         enter::<__Island_sensor_base_imu_tilt, _>(self, now, key, message, IslandState::deliver, identity);
 //!     }
 //! }
+//! // An estimator with one input that is an island of its own, as most are:
+//! impl Alone for __member__sensor_base_gyro_rates {
+//!     const INLET: Inlet<Gyro, Gyro> = …;
+//!     fn find(wiring: &__Wiring) -> (&Island<…>, &Topic<Rates>) { … }
+//! }
+//! // Any other:
 //! impl IslandState for __Island_sensor_base_imu_tilt {
 //!     fn deliver(&mut self, wiring: &__Wiring, message: &Stamped<Imu>, turn: &Turn) {
-//!         receive::<__Rover_2_11__member__sensor_base_imu_tilt, …>(self, wiring, 0, feed(message), turn);
+//!         receive::<__member__sensor_base_imu_tilt, …>(self, wiring, 0, feed(message), turn);
 //!     }
 //! }
-//! impl Member for __Rover_2_11__member__sensor_base_imu_tilt {
+//! impl Member for __member__sensor_base_imu_tilt {
 //!     fn publish(wiring: &__Wiring, island: &mut __Island…, emitted: &mut Option<Orientation>, stamp: Stamp, turn: &Turn) {
 //!         if let Some(payload) = take(emitted) { … }
 //!     }
@@ -21,7 +27,6 @@
 
 use super::group::{self, Field};
 use super::islands::{self, IslandId, Islands};
-use super::literal::respan;
 use super::options::binding;
 use super::part::Part;
 use super::types::{Named, Types};
@@ -29,7 +34,7 @@ use super::{order, path_text};
 use crate::model::{EstimatorId, From, Home, Id as _, PublisherId, Table};
 use crate::verify::Verified;
 use proc_macro2::{Ident, Span, TokenStream};
-use quote::{ToTokens as _, format_ident, quote};
+use quote::{ToTokens as _, format_ident, quote, quote_spanned};
 use std::collections::HashMap;
 
 /// The context of all functions here.
@@ -90,9 +95,9 @@ pub(super) fn wiring(verified: &Verified<'_>, types: &Types<'_>, islands: &Islan
         })
         .collect();
     let topic_structs = group::structs("__Topics", "__new_topics", &topics, &quote!(), &quote!());
-    let parameters = quote!(options: &__private::OptionsList, assembly: &__private::Assembly);
+    let parameters = quote!(options: &__private::OptionsList, environment: &__private::Environment);
     let island_structs =
-        group::structs("__Islands", "__new_islands", &places, &parameters, &quote!(options, assembly));
+        group::structs("__Islands", "__new_islands", &places, &parameters, &quote!(options, environment));
     let object = quote!(dyn __private::AnyTopic);
     let topic_by_number = group::by_number("__Topics", "__topic", &topics, &object);
     let (count, states) = (islands.all.len(), islands.all.ids().map(|number| wiring.island_struct(number)));
@@ -275,9 +280,20 @@ impl<'a> Wiring<'a> {
         }
         let (name, payload) = (self.types.publisher(id), self.types.payload(id));
         let topic = self.types.topic_place(id);
-        let enters = visits(&self.consumers[id], self.islands)
-            .into_iter()
-            .map(|visit| self.enter(id, &visit, quote!(self), quote!(now), quote!(line)));
+        let visits = visits(&self.consumers[id], self.islands);
+        if let [visit] = &*visits
+            && let Some((estimator, ..)) = self.alone(visit.island)
+        {
+            let member = self.types.member(estimator);
+            return quote! {
+                #[inline]
+                fn #name(&self, message: &__private::Stamped<#payload>, now: __private::MonotonicTime) {
+                    __private::publish_to::<#member>(self, #id, &self.topics.#topic, message, now);
+                }
+            };
+        }
+        let enters =
+            visits.into_iter().map(|visit| self.enter(id, &visit, quote!(self), quote!(now), quote!(line)));
         quote! {
             #[inline]
             fn #name(
@@ -335,7 +351,9 @@ impl<'a> Wiring<'a> {
     /// `<Imu as Feeds<Imu, …>>::feed`, where rustc reports a payload mismatch.
     fn feed(&self, payload: &Named, consumer: &Consumer, arguments: TokenStream) -> TokenStream {
         let Input { taken, known, .. } = self.input(consumer.estimator, consumer.input);
-        respan(quote!(<#payload as __private::Feeds<#taken, #known>>::feed #arguments), consumer.span)
+        let payload = payload.at(consumer.span);
+        let span = consumer.span.resolved_at(Span::call_site());
+        quote_spanned!(span=> <#payload as __private::Feeds<#taken, #known>>::feed #arguments)
     }
 
     fn input(&self, id: EstimatorId, input: Option<usize>) -> &Input {
@@ -351,7 +369,7 @@ impl<'a> Wiring<'a> {
         let (kind, island) = (types.estimator(id), self.island_struct(island));
         let (taken, emitted) = (types.estimator_input(id), types.estimator_output(id));
         let inputs = &self.inputs[id];
-        let fields = inputs.iter().enumerate().map(|(number, input)| self.aliases(id, number, input));
+        let fields = inputs.iter().enumerate().filter_map(|(number, input)| self.aliases(id, number, input));
         // The driver's input is not kept.
         let cache = (inputs.len() > 1).then(|| {
             let (fields, numbers) = (inputs.iter().map(|input| &input.field), 0..inputs.len());
@@ -378,26 +396,17 @@ impl<'a> Wiring<'a> {
                 }
             }
         });
+        let marker = quote!(enum #member {});
         if let Some((_, source, consumer)) = alone {
             let (payload, Input { field, taken, .. }) = (types.payload(source), self.input(id, consumer.input));
-            let entry = entry(source, consumer.runs);
+            let Some(publisher) = estimator.publishers.first() else { return TokenStream::new() };
+            let (entry, output) = (entry(source, consumer.runs), self.output_field(id, *publisher));
+            let (topic, published) = (types.topic_place(*publisher), types.payload(*publisher));
             let feed = self.feed(&payload, consumer, quote!());
             let place = group::path(self.islands.of[id].number(), name);
-            return quote! {
-                #(#fields)*
-                impl __private::Alone for #member {
-                    type Wiring = __Wiring;
-                    type Estimator = #kind;
-                    type Source = #payload;
-                    type Input = #field;
-                    const INLET: __private::Inlet<#payload, #taken> =
-                        __private::Inlet { number: #id, entry: #entry, feed: #feed };
-
-                    #[inline(always)]
-                    fn find(wiring: &__Wiring) -> &__private::Island<#island> {
-                        &wiring.islands.#place
-                    }
-
+            let is_alone = estimator.publishers.len() == 1 && self.consumers[*publisher].is_empty();
+            let publish = (!is_alone).then(|| {
+                quote! {
                     #[inline]
                     fn publish(
                         wiring: &__Wiring,
@@ -407,12 +416,32 @@ impl<'a> Wiring<'a> {
                     ) {
                         #(#outputs)*
                     }
+                }
+            });
+            return quote! {
+                #(#fields)*
+                #marker
+                impl __private::Alone for #member {
+                    type Wiring = __Wiring;
+                    type Estimator = #kind;
+                    type Source = #payload;
+                    type Input = #field;
+                    type Output = #output;
+                    const INLET: __private::Inlet<#payload, #taken> =
+                        __private::Inlet { number: #id, entry: #entry, publisher: #publisher, feed: #feed };
+
+                    #[inline(always)]
+                    fn find(wiring: &__Wiring) -> (&__private::Island<#island>, &__private::Topic<#published>) {
+                        (&wiring.islands.#place, &wiring.topics.#topic)
+                    }
+                    #publish
                     #again
                 }
             };
         }
         quote! {
             #(#fields)*
+            #marker
             impl __private::Member for #member {
                 type State = #island;
                 type Estimator = #kind;
@@ -440,7 +469,10 @@ impl<'a> Wiring<'a> {
     }
 
     /// The aliases for an input that are not declared for an earlier one.
-    fn aliases(&self, id: EstimatorId, number: usize, input: &Input) -> TokenStream {
+    fn aliases(&self, id: EstimatorId, number: usize, input: &Input) -> Option<TokenStream> {
+        if !input.declares_field && !input.declares_known {
+            return None;
+        }
         let Input { source, field, taken, known, .. } = input;
         let is_nested = self.types.model().estimators[id].is_nested();
         let fields = input.declares_field.then(|| {
@@ -455,7 +487,7 @@ impl<'a> Wiring<'a> {
             let payload = self.types.payload(*source);
             quote!(type #known = __private::BothKnown<{ __private::both_known::<#payload, #taken>() }>;)
         });
-        quote!(#fields #knowns)
+        Some(quote!(#fields #knowns))
     }
 
     fn output_field(&self, id: EstimatorId, publisher: PublisherId) -> TokenStream {
@@ -599,7 +631,6 @@ impl<'a> Wiring<'a> {
             });
         }
         let items = quote! {
-            #[allow(non_camel_case_types, clippy::large_enum_variant)]
             enum #enumeration { #variants }
 
             impl #kind { #functions }
@@ -618,7 +649,7 @@ impl<'a> Wiring<'a> {
     fn started(&self, id: EstimatorId) -> TokenStream {
         let part = Part::Estimator(id);
         let (component, binding) = (part.position(self.types.model()), binding(self.types, part));
-        quote!(options, #component, #binding, assembly.environment())
+        quote!(options, #component, #binding, environment)
     }
 }
 

@@ -1,14 +1,15 @@
 //! An estimator that is an island of its own, with one input: most are. The island's code is here, once for all of them; the
 //! expansion of `robot!` provides what differs.
 
-use super::member::{Act, Member, OptionsOf, OutputOf, act, alone, enter, receive};
+use super::act::Act;
+use super::member::{Member, OptionsOf, OutputOf, act, alone, emit, enter, receive};
 use super::{Environment, Island, IslandState, IslandWiring, Key};
-use crate::component::{Binding, Estimator, OptionsList, Outputs, TakenAt};
+use crate::component::{Binding, EmittedAt, Estimator, OptionsList, TakenAt};
 use crate::declaration::IslandDeclaration;
 use crate::declaration::estimator::InletDeclaration;
 use crate::message::{Payload, Stamp, Stamped};
 use crate::node::{Node, Turn};
-use crate::pubsub::DynamicMessage;
+use crate::pubsub::{DynamicMessage, Topic};
 use crate::time::MonotonicTime;
 use std::convert::identity;
 
@@ -22,37 +23,44 @@ pub trait Alone: Sized + 'static {
     type Source: Payload;
     /// Its input.
     type Input: TakenAt<<Self::Estimator as Estimator>::Input>;
-    /// Its number, and where its messages come from.
-    const INLET: Inlet<Self::Source, <Self::Input as TakenAt<<Self::Estimator as Estimator>::Input>>::Payload>;
+    /// Its output, or the first of several.
+    type Output: EmittedAt<<Self::Estimator as Estimator>::Output>;
+    /// Its number, where its messages come from, and where they go.
+    const INLET: Inlet<Self::Source, TakenBy<Self>>;
 
-    /// Finds the island in the wiring.
-    fn find(wiring: &Self::Wiring) -> &Island<Solo<Self>>;
+    /// Finds the island and the output's topic in the wiring.
+    fn find(wiring: &Self::Wiring) -> (&Island<Solo<Self>>, &Topic<PayloadOf<Self>>);
 
-    /// See [`Member::publish`].
+    /// See [`Member::publish`]. By default it has one output, which no estimator takes.
+    #[inline]
     fn publish(
         wiring: &Self::Wiring,
         emitted: &mut Option<<Self::Estimator as Estimator>::Output>,
         stamp: Stamp,
         turn: &Turn<'_>,
-    );
+    ) {
+        let (_, topic) = Self::find(wiring);
+        emit::<Self::Output, _>(emitted, stamp, turn, Self::INLET.publisher, topic);
+    }
 
     /// See [`Member::emitted`].
     fn emitted(output: usize, message: &DynamicMessage) -> Option<<Self::Estimator as Estimator>::Output> {
-        if output == 0 {
-            alone::<<<Self::Estimator as Estimator>::Output as Outputs>::Only, _>(message)
-        } else {
-            None
-        }
+        if output == 0 { alone::<Self::Output, _>(message) } else { None }
     }
 }
 
-/// Where the messages of an estimator that is an island of its own come from.
+type TakenBy<A> = <<A as Alone>::Input as TakenAt<<<A as Alone>::Estimator as Estimator>::Input>>::Payload;
+type PayloadOf<A> = <<A as Alone>::Output as EmittedAt<<<A as Alone>::Estimator as Estimator>::Output>>::Payload;
+
+/// Where the messages of an estimator that is an island of its own come from, and where they go.
 #[allow(missing_debug_implementations)]
 pub struct Inlet<P, T> {
     /// The estimator's number.
     pub number: usize,
-    /// The publisher, as the island numbers them.
+    /// The publisher of its messages, as the island numbers them.
     pub entry: usize,
+    /// The estimator's publisher, or the first of several.
+    pub publisher: usize,
     /// The publisher's message as the input takes it.
     pub feed: fn(&Stamped<P>) -> &Stamped<T>,
 }
@@ -78,7 +86,7 @@ impl<A: Alone> IslandState for Solo<A> {
 
     #[inline(always)]
     fn find(wiring: &A::Wiring) -> &Island<Self> {
-        A::find(wiring)
+        A::find(wiring).0
     }
 
     #[inline]
@@ -125,6 +133,19 @@ pub fn start_alone<A: Alone>(
     environment: &Environment,
 ) -> Island<Solo<A>> {
     Island::new(Solo(super::start::<A>(options, component, binding, environment)))
+}
+
+/// Publishes a message of a sensor or a service that only this estimator takes, and delivers it.
+#[inline]
+pub fn publish_to<A: Alone>(
+    wiring: &A::Wiring,
+    publisher: usize,
+    topic: &Topic<A::Source>,
+    message: &Stamped<A::Source>,
+    now: MonotonicTime,
+) {
+    let line = wiring.environment().publish(publisher, topic, message, now);
+    enter_alone::<A>(wiring, now, line, message);
 }
 
 /// Delivers a message to the island of the estimator directly, or keeps it for the thread that holds the island; `line` is that

@@ -1,7 +1,9 @@
 //! A type-erased island: the interface used by the runtime.
 
-use super::{Key, NodeEntry};
+use super::act::Visit;
+use super::{CallError, Key, NodeEntry};
 use crate::declaration::{IslandDeclaration, WorkerDeclaration};
+use crate::journal::Event;
 use crate::pubsub::DynamicMessage;
 use crate::time::MonotonicTime;
 
@@ -39,6 +41,16 @@ pub trait AnyIsland<W> {
     fn give_to_worker(&self);
     /// Processes entries on the calling thread until its estimators have stopped.
     fn serve(&self, wiring: &W);
+    /// Enters it as a caller: visits an estimator, publishes what that emits, and does what is due afterwards. With a journal,
+    /// `line` is written first.
+    fn visit(
+        &self,
+        wiring: &W,
+        now: MonotonicTime,
+        estimator: usize,
+        line: Event,
+        visit: &mut Visit<'_>,
+    ) -> Result<(), CallError>;
     /// The number of entries processed and the estimator whose callback ran last; `None` if no thread holds the island.
     fn busy(&self, wiring: &W) -> Option<(u64, usize)>;
     /// The time of the last entry.
@@ -141,6 +153,19 @@ impl<S: IslandState> AnyIsland<S::Wiring> for Island<S> {
         // Messages that arrived after the estimators had stopped are counted.
         fence(Ordering::SeqCst);
         Self::drain(self, wiring);
+    }
+
+    fn visit(
+        &self,
+        wiring: &S::Wiring,
+        now: MonotonicTime,
+        estimator: usize,
+        line: Event,
+        visit: &mut Visit<'_>,
+    ) -> Result<(), CallError> {
+        self.call(wiring, now, line, |state, turn| {
+            state.act(wiring, estimator, super::act::Act::Visit(visit, turn));
+        })
     }
 
     fn busy(&self, wiring: &S::Wiring) -> Option<(u64, usize)> {

@@ -1,12 +1,13 @@
 //! An estimator in its island. The expansion of `robot!` provides its location and the destinations of its outputs. The code that
 //! uses them is here, once for all estimators.
 
+use super::act::Act;
 use super::{Island, IslandState, IslandWiring as _, Key};
 use crate::component::{Binding, EmittedAt, Estimator, Inputs, OptionsList, Outputs, TakenAt};
 use crate::fault::of_panic;
 use crate::message::{Payload, Stamp, Stamped, copied};
 use crate::node::emission::copy_failed;
-use crate::node::{AnyIsland, Emitting, Next, Node, NodeEntry, Turn};
+use crate::node::{AnyIsland, Emitting, Next, Node, Turn};
 use crate::pubsub::{DynamicMessage, Topic};
 use crate::time::MonotonicTime;
 use std::panic::resume_unwind;
@@ -74,19 +75,6 @@ pub fn emit<F: EmittedAt<O>, O>(
     }
 }
 
-/// An operation of an island on one of its estimators, other than delivering messages.
-#[allow(missing_debug_implementations)]
-pub enum Act<'a, 'b> {
-    /// Do all that is due.
-    Turn(&'a Turn<'b>),
-    /// Handle an entry.
-    Handle(NodeEntry, &'a Turn<'b>),
-    /// In a replay: create the estimator.
-    BeginReplay,
-    /// In a replay: publish the output emitted in reply to a request missing from the journal.
-    Emit(&'a DynamicMessage, &'a Turn<'b>),
-}
-
 /// Creates an estimator, whose options are those of the component with that number.
 pub fn start<M: Member>(
     options: &OptionsList,
@@ -117,7 +105,7 @@ pub fn receive<M: Member, F: TakenAt<InputOf<M>>>(
 
 /// Publishes an estimator's outputs; a panic in one is attributed to that output.
 #[inline]
-pub(crate) fn publish<M: Member>(
+fn publish<M: Member>(
     wiring: &WiringOf<M>,
     island: &mut M::State,
     emitted: &mut Option<OutputOf<M>>,
@@ -143,6 +131,13 @@ pub fn act<M: Member>(island: &mut M::State, wiring: &WiringOf<M>, act: Act<'_, 
             }
             take_turn::<M>(island, wiring, turn);
         }
+        Act::Visit(visit, turn) => {
+            let mut emitted: Option<OutputOf<M>> = None;
+            if let Some(stamp) = visit(M::node(island), turn, &mut emitted) {
+                publish::<M>(wiring, island, &mut emitted, stamp, turn);
+            }
+            take_turn::<M>(island, wiring, turn);
+        }
         Act::BeginReplay => M::node(island).begin_replay(),
         Act::Emit(message, turn) => {
             let output = M::node(island).output_at(message.path());
@@ -158,7 +153,7 @@ pub fn act<M: Member>(island: &mut M::State, wiring: &WiringOf<M>, act: Act<'_, 
 
 /// Does all that is due in an estimator.
 #[cold]
-pub(crate) fn take_turn<M: Member>(island: &mut M::State, wiring: &WiringOf<M>, turn: &Turn<'_>) {
+fn take_turn<M: Member>(island: &mut M::State, wiring: &WiringOf<M>, turn: &Turn<'_>) {
     loop {
         let mut emitted = None;
         match M::node(island).turn(turn, &mut emitted) {

@@ -46,7 +46,7 @@ impl Assignment {
 pub(super) fn names<R: Robot>(builder: &mut Builder<R>) -> BTreeSet<String> {
     let paths = component_paths::<R>().into_iter().enumerate();
     let options = paths.flat_map(|(component, path)| {
-        fields::<R>(&mut builder.options, component).iter().map(move |field| format!("{path}/{}", field.name))
+        fields(&mut builder.options, component).iter().map(move |field| format!("{path}/{}", field.name))
     });
     options.chain(R::PARAMETERS.iter().map(|declared| declared.path.to_owned())).collect()
 }
@@ -138,7 +138,7 @@ fn target<R: Robot>(paths: &[&str], options: &mut OptionsList, path: &str) -> Op
     }
     let (component, name) = path.rsplit_once('/')?;
     let component = paths.iter().position(|path| *path == component)?;
-    let field = fields::<R>(options, component).iter().position(|field| field.name == name)?;
+    let field = fields(options, component).iter().position(|field| field.name == name)?;
     Some(Target::Option { component, field })
 }
 

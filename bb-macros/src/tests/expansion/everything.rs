@@ -35,6 +35,10 @@ pub type __Rover_2_11__probed__sensor_battery = ::bb_core::__private::Probed<
 #[doc(hidden)]
 pub type __Rover_2_11__sensor_battery = <__Rover_2_11__probed__sensor_battery as ::bb_core::__private::Known>::Type;
 #[doc(hidden)]
+pub type __Rover_2_11__options__sensor_battery = <<__Rover_2_11__probed__sensor_battery as ::bb_core::__private::Known>::Type as ::bb_core::Sensor>::Options;
+#[doc(hidden)]
+pub type __Rover_2_11__given_options__sensor_battery = <<__Rover_2_11__probed__sensor_battery as ::bb_core::__private::Known>::Given as ::bb_core::Sensor>::Options;
+#[doc(hidden)]
 pub type __Rover_2_11__given__sensor_base_imu = Bmi270;
 #[doc(hidden)]
 pub type __Rover_2_11__probed__sensor_base_imu = ::bb_core::__private::Probed<
@@ -49,6 +53,10 @@ pub type __Rover_2_11__probed__sensor_base_imu = ::bb_core::__private::Probed<
 >;
 #[doc(hidden)]
 pub type __Rover_2_11__sensor_base_imu = <__Rover_2_11__probed__sensor_base_imu as ::bb_core::__private::Known>::Type;
+#[doc(hidden)]
+pub type __Rover_2_11__options__sensor_base_imu = <<__Rover_2_11__probed__sensor_base_imu as ::bb_core::__private::Known>::Type as ::bb_core::Sensor>::Options;
+#[doc(hidden)]
+pub type __Rover_2_11__given_options__sensor_base_imu = <<__Rover_2_11__probed__sensor_base_imu as ::bb_core::__private::Known>::Given as ::bb_core::Sensor>::Options;
 #[doc(hidden)]
 pub type __Rover_2_11__given__sensor_base_pan_encoder = Encoder;
 #[doc(hidden)]
@@ -65,6 +73,10 @@ pub type __Rover_2_11__probed__sensor_base_pan_encoder = ::bb_core::__private::P
 #[doc(hidden)]
 pub type __Rover_2_11__sensor_base_pan_encoder = <__Rover_2_11__probed__sensor_base_pan_encoder as ::bb_core::__private::Known>::Type;
 #[doc(hidden)]
+pub type __Rover_2_11__options__sensor_base_pan_encoder = <<__Rover_2_11__probed__sensor_base_pan_encoder as ::bb_core::__private::Known>::Type as ::bb_core::Sensor>::Options;
+#[doc(hidden)]
+pub type __Rover_2_11__given_options__sensor_base_pan_encoder = <<__Rover_2_11__probed__sensor_base_pan_encoder as ::bb_core::__private::Known>::Given as ::bb_core::Sensor>::Options;
+#[doc(hidden)]
 pub type __Rover_2_11__given__sensor_base_imu_tilt = Madgwick;
 #[doc(hidden)]
 pub type __Rover_2_11__probed__sensor_base_imu_tilt = ::bb_core::__private::Probed<
@@ -79,6 +91,10 @@ pub type __Rover_2_11__probed__sensor_base_imu_tilt = ::bb_core::__private::Prob
 >;
 #[doc(hidden)]
 pub type __Rover_2_11__sensor_base_imu_tilt = <__Rover_2_11__probed__sensor_base_imu_tilt as ::bb_core::__private::Known>::Type;
+#[doc(hidden)]
+pub type __Rover_2_11__options__sensor_base_imu_tilt = <<__Rover_2_11__probed__sensor_base_imu_tilt as ::bb_core::__private::Known>::Type as ::bb_core::Estimator>::Options;
+#[doc(hidden)]
+pub type __Rover_2_11__given_options__sensor_base_imu_tilt = <<__Rover_2_11__probed__sensor_base_imu_tilt as ::bb_core::__private::Known>::Given as ::bb_core::Estimator>::Options;
 #[doc(hidden)]
 pub type __Rover_2_11__given__estimator_base_pose = Eskf;
 #[doc(hidden)]
@@ -95,6 +111,10 @@ pub type __Rover_2_11__probed__estimator_base_pose = ::bb_core::__private::Probe
 #[doc(hidden)]
 pub type __Rover_2_11__estimator_base_pose = <__Rover_2_11__probed__estimator_base_pose as ::bb_core::__private::Known>::Type;
 #[doc(hidden)]
+pub type __Rover_2_11__options__estimator_base_pose = <<__Rover_2_11__probed__estimator_base_pose as ::bb_core::__private::Known>::Type as ::bb_core::Estimator>::Options;
+#[doc(hidden)]
+pub type __Rover_2_11__given_options__estimator_base_pose = <<__Rover_2_11__probed__estimator_base_pose as ::bb_core::__private::Known>::Given as ::bb_core::Estimator>::Options;
+#[doc(hidden)]
 pub type __Rover_2_11__given__actuator_base_pan_servo = Dynamixel;
 #[doc(hidden)]
 pub type __Rover_2_11__probed__actuator_base_pan_servo = ::bb_core::__private::Probed<
@@ -109,6 +129,10 @@ pub type __Rover_2_11__probed__actuator_base_pan_servo = ::bb_core::__private::P
 >;
 #[doc(hidden)]
 pub type __Rover_2_11__actuator_base_pan_servo = <__Rover_2_11__probed__actuator_base_pan_servo as ::bb_core::__private::Known>::Type;
+#[doc(hidden)]
+pub type __Rover_2_11__options__actuator_base_pan_servo = <<__Rover_2_11__probed__actuator_base_pan_servo as ::bb_core::__private::Known>::Type as ::bb_core::Actuator>::Options;
+#[doc(hidden)]
+pub type __Rover_2_11__given_options__actuator_base_pan_servo = <<__Rover_2_11__probed__actuator_base_pan_servo as ::bb_core::__private::Known>::Given as ::bb_core::Actuator>::Options;
 #[doc(hidden)]
 pub type __Rover_2_11__given__controller_stability = Stability;
 #[doc(hidden)]
@@ -125,6 +149,10 @@ pub type __Rover_2_11__probed__controller_stability = ::bb_core::__private::Prob
 #[doc(hidden)]
 pub type __Rover_2_11__controller_stability = <__Rover_2_11__probed__controller_stability as ::bb_core::__private::Known>::Type;
 #[doc(hidden)]
+pub type __Rover_2_11__options__controller_stability = <<__Rover_2_11__probed__controller_stability as ::bb_core::__private::Known>::Type as ::bb_core::Service>::Options;
+#[doc(hidden)]
+pub type __Rover_2_11__given_options__controller_stability = <<__Rover_2_11__probed__controller_stability as ::bb_core::__private::Known>::Given as ::bb_core::Service>::Options;
+#[doc(hidden)]
 pub type __Rover_2_11__given__bridge_ros = RosBridge;
 #[doc(hidden)]
 pub type __Rover_2_11__probed__bridge_ros = ::bb_core::__private::Probed<
@@ -139,6 +167,10 @@ pub type __Rover_2_11__probed__bridge_ros = ::bb_core::__private::Probed<
 >;
 #[doc(hidden)]
 pub type __Rover_2_11__bridge_ros = <__Rover_2_11__probed__bridge_ros as ::bb_core::__private::Known>::Type;
+#[doc(hidden)]
+pub type __Rover_2_11__options__bridge_ros = <<__Rover_2_11__probed__bridge_ros as ::bb_core::__private::Known>::Type as ::bb_core::Service>::Options;
+#[doc(hidden)]
+pub type __Rover_2_11__given_options__bridge_ros = <<__Rover_2_11__probed__bridge_ros as ::bb_core::__private::Known>::Given as ::bb_core::Service>::Options;
 #[doc(hidden)]
 pub type __Rover_2_11__given__command_arm = Arm;
 #[doc(hidden)]
@@ -155,6 +187,10 @@ pub type __Rover_2_11__probed__command_arm = ::bb_core::__private::Probed<
 #[doc(hidden)]
 pub type __Rover_2_11__command_arm = <__Rover_2_11__probed__command_arm as ::bb_core::__private::Known>::Type;
 #[doc(hidden)]
+pub type __Rover_2_11__options__command_arm = <<__Rover_2_11__probed__command_arm as ::bb_core::__private::Known>::Type as ::bb_core::Command>::Options;
+#[doc(hidden)]
+pub type __Rover_2_11__given_options__command_arm = <<__Rover_2_11__probed__command_arm as ::bb_core::__private::Known>::Given as ::bb_core::Command>::Options;
+#[doc(hidden)]
 pub type __Rover_2_11__given__command_move_to = MoveTo;
 #[doc(hidden)]
 pub type __Rover_2_11__probed__command_move_to = ::bb_core::__private::Probed<
@@ -170,6 +206,10 @@ pub type __Rover_2_11__probed__command_move_to = ::bb_core::__private::Probed<
 #[doc(hidden)]
 pub type __Rover_2_11__command_move_to = <__Rover_2_11__probed__command_move_to as ::bb_core::__private::Known>::Type;
 #[doc(hidden)]
+pub type __Rover_2_11__options__command_move_to = <<__Rover_2_11__probed__command_move_to as ::bb_core::__private::Known>::Type as ::bb_core::Command>::Options;
+#[doc(hidden)]
+pub type __Rover_2_11__given_options__command_move_to = <<__Rover_2_11__probed__command_move_to as ::bb_core::__private::Known>::Given as ::bb_core::Command>::Options;
+#[doc(hidden)]
 pub type __Rover_2_11__given__command_stop = Stop;
 #[doc(hidden)]
 pub type __Rover_2_11__probed__command_stop = ::bb_core::__private::Probed<
@@ -184,6 +224,10 @@ pub type __Rover_2_11__probed__command_stop = ::bb_core::__private::Probed<
 >;
 #[doc(hidden)]
 pub type __Rover_2_11__command_stop = <__Rover_2_11__probed__command_stop as ::bb_core::__private::Known>::Type;
+#[doc(hidden)]
+pub type __Rover_2_11__options__command_stop = <<__Rover_2_11__probed__command_stop as ::bb_core::__private::Known>::Type as ::bb_core::Command>::Options;
+#[doc(hidden)]
+pub type __Rover_2_11__given_options__command_stop = <<__Rover_2_11__probed__command_stop as ::bb_core::__private::Known>::Given as ::bb_core::Command>::Options;
 #[doc(hidden)]
 pub type __Rover_2_11__payload__sensor_battery = <__Rover_2_11__sensor_battery as ::bb_core::Sensor>::Output;
 #[doc(hidden)]
@@ -220,76 +264,68 @@ pub type __Rover_2_11__payload__nav_velocity = <::bb_core::__private::At<
 pub type __Rover_2_11__payload__sensor_base_pan_encoder = <__Rover_2_11__sensor_base_pan_encoder as ::bb_core::Sensor>::Output;
 #[doc(hidden)]
 pub type __Rover_2_11_must_be_declared_outside_of_functions = __Rover_2_11::Rover;
-#[allow(non_camel_case_types, dead_code)]
-enum __Rover_2_11__member__sensor_base_imu_tilt {}
-#[doc(hidden)]
-pub type __Rover_2_11__exported__sensor_base_imu_tilt = __Rover_2_11__member__sensor_base_imu_tilt;
-#[allow(non_camel_case_types, dead_code)]
-enum __Rover_2_11__member__estimator_base_pose {}
-#[doc(hidden)]
-pub type __Rover_2_11__exported__estimator_base_pose = __Rover_2_11__member__estimator_base_pose;
-#[allow(clippy::all, non_snake_case, unused_variables)]
+#[allow(clippy::all, non_snake_case, non_camel_case_types, unused_variables)]
 const _: () = {
     use ::bb_core::__private;
     const _: () = ::bb_core::__private::check_required::<
-        <__Rover_2_11__sensor_battery as ::bb_core::Sensor>::Options,
-        _,
+        __Rover_2_11__options__sensor_battery,
+        0usize,
     >("Ina219", []);
     const _: () = ::bb_core::__private::check_required::<
-        <__Rover_2_11__sensor_base_imu as ::bb_core::Sensor>::Options,
-        _,
+        __Rover_2_11__options__sensor_base_imu,
+        1usize,
     >("Bmi270", ["bus"]);
     const _: () = ::bb_core::__private::check_required::<
-        <__Rover_2_11__sensor_base_pan_encoder as ::bb_core::Sensor>::Options,
-        _,
+        __Rover_2_11__options__sensor_base_pan_encoder,
+        1usize,
     >("Encoder", ["id"]);
     const _: () = ::bb_core::__private::check_number::<
-        <__Rover_2_11__sensor_base_pan_encoder as ::bb_core::Sensor>::Options,
+        __Rover_2_11__options__sensor_base_pan_encoder,
     >("Encoder", "id", 3f64);
     const _: () = ::bb_core::__private::check_nested::<
         __Rover_2_11__sensor_base_imu_tilt,
-        _,
+        1usize,
     >("Madgwick", ["beta"], false);
     const _: () = ::bb_core::__private::check_number::<
-        <__Rover_2_11__sensor_base_imu_tilt as ::bb_core::Estimator>::Options,
+        __Rover_2_11__options__sensor_base_imu_tilt,
     >("Madgwick", "beta", 0.1f64);
     const _: () = ::bb_core::__private::check_estimator::<
         __Rover_2_11__estimator_base_pose,
-        _,
-        _,
+        0usize,
+        3usize,
     >("Eskf", [], ["imu", "tilt", "wheel"], true);
     const _: () = ::bb_core::__private::check_required::<
-        <__Rover_2_11__actuator_base_pan_servo as ::bb_core::Actuator>::Options,
-        _,
+        __Rover_2_11__options__actuator_base_pan_servo,
+        1usize,
     >("Dynamixel", ["id"]);
     const _: () = ::bb_core::__private::check_number::<
-        <__Rover_2_11__actuator_base_pan_servo as ::bb_core::Actuator>::Options,
+        __Rover_2_11__options__actuator_base_pan_servo,
     >("Dynamixel", "id", 3f64);
     const _: () = ::bb_core::__private::check_required::<
-        <__Rover_2_11__controller_stability as ::bb_core::Service>::Options,
-        _,
+        __Rover_2_11__options__controller_stability,
+        0usize,
     >("Stability", []);
     const _: () = ::bb_core::__private::check_required::<
-        <__Rover_2_11__bridge_ros as ::bb_core::Service>::Options,
-        _,
+        __Rover_2_11__options__bridge_ros,
+        1usize,
     >("RosBridge", ["port"]);
     const _: () = ::bb_core::__private::check_number::<
-        <__Rover_2_11__bridge_ros as ::bb_core::Service>::Options,
+        __Rover_2_11__options__bridge_ros,
     >("RosBridge", "port", 1f64);
     const _: () = ::bb_core::__private::check_required::<
-        <__Rover_2_11__command_arm as ::bb_core::Command>::Options,
-        _,
+        __Rover_2_11__options__command_arm,
+        0usize,
     >("Arm", []);
     const _: () = ::bb_core::__private::check_required::<
-        <__Rover_2_11__command_move_to as ::bb_core::Command>::Options,
-        _,
+        __Rover_2_11__options__command_move_to,
+        1usize,
     >("MoveTo", ["speed"]);
     const _: () = ::bb_core::__private::check_quantity::<
-        <__Rover_2_11__command_move_to as ::bb_core::Command>::Options,
+        __Rover_2_11__options__command_move_to,
     >("MoveTo", "speed", 1f64, [1i8, 0i8, -1i8, 0i8, 0i8, 0i8], "a velocity");
     const _: () = ::bb_core::__private::check_required::<
-        <__Rover_2_11__command_stop as ::bb_core::Command>::Options,
-        _,
+        __Rover_2_11__options__command_stop,
+        0usize,
     >("Stop", []);
     const _: () = ::bb_core::__private::check_input::<
         <__Rover_2_11__estimator_base_pose as ::bb_core::Estimator>::Input,
@@ -557,57 +593,57 @@ const _: () = {
     fn __declared_options0(options: &mut __private::OptionsList) {
         options
             .add(
-                <<<__Rover_2_11__probed__sensor_battery as __private::Known>::Given as ::bb_core::Sensor>::Options as ::bb_core::Options>::defaults(),
+                <__Rover_2_11__given_options__sensor_battery as ::bb_core::Options>::defaults(),
             );
         __declared_sensor_base_imu(options);
         __declared_sensor_base_pan_encoder(options);
         __declared_sensor_base_imu_tilt(options);
         options
             .add(
-                <<<__Rover_2_11__probed__estimator_base_pose as __private::Known>::Given as ::bb_core::Estimator>::Options as ::bb_core::Options>::defaults(),
+                <__Rover_2_11__given_options__estimator_base_pose as ::bb_core::Options>::defaults(),
             );
         __declared_actuator_base_pan_servo(options);
         options
             .add(
-                <<<__Rover_2_11__probed__controller_stability as __private::Known>::Given as ::bb_core::Service>::Options as ::bb_core::Options>::defaults(),
+                <__Rover_2_11__given_options__controller_stability as ::bb_core::Options>::defaults(),
             );
         __declared_bridge_ros(options);
         options
             .add(
-                <<<__Rover_2_11__probed__command_arm as __private::Known>::Given as ::bb_core::Command>::Options as ::bb_core::Options>::defaults(),
+                <__Rover_2_11__given_options__command_arm as ::bb_core::Options>::defaults(),
             );
         __declared_command_move_to(options);
         options
             .add(
-                <<<__Rover_2_11__probed__command_stop as __private::Known>::Given as ::bb_core::Command>::Options as ::bb_core::Options>::defaults(),
+                <__Rover_2_11__given_options__command_stop as ::bb_core::Options>::defaults(),
             );
     }
     fn __declared_sensor_base_imu(__all: &mut __private::OptionsList) {
-        let mut __options: <<__Rover_2_11__probed__sensor_base_imu as __private::Known>::Given as ::bb_core::Sensor>::Options = ::bb_core::Options::defaults();
+        let mut __options: __Rover_2_11__given_options__sensor_base_imu = ::bb_core::Options::defaults();
         __options.bus = ::bb_core::__private::FromText::from_text("i2c-1");
         __all.add(__options);
     }
     fn __declared_sensor_base_pan_encoder(__all: &mut __private::OptionsList) {
-        let mut __options: <<__Rover_2_11__probed__sensor_base_pan_encoder as __private::Known>::Given as ::bb_core::Sensor>::Options = ::bb_core::Options::defaults();
+        let mut __options: __Rover_2_11__given_options__sensor_base_pan_encoder = ::bb_core::Options::defaults();
         __options.id = 3;
         __all.add(__options);
     }
     fn __declared_sensor_base_imu_tilt(__all: &mut __private::OptionsList) {
-        let __options: <<__Rover_2_11__probed__sensor_base_imu_tilt as __private::Known>::Given as ::bb_core::Estimator>::Options = ::bb_core::Options::defaults();
+        let __options: __Rover_2_11__given_options__sensor_base_imu_tilt = ::bb_core::Options::defaults();
         __all.add(__options);
     }
     fn __declared_actuator_base_pan_servo(__all: &mut __private::OptionsList) {
-        let mut __options: <<__Rover_2_11__probed__actuator_base_pan_servo as __private::Known>::Given as ::bb_core::Actuator>::Options = ::bb_core::Options::defaults();
+        let mut __options: __Rover_2_11__given_options__actuator_base_pan_servo = ::bb_core::Options::defaults();
         __options.id = 3;
         __all.add(__options);
     }
     fn __declared_bridge_ros(__all: &mut __private::OptionsList) {
-        let mut __options: <<__Rover_2_11__probed__bridge_ros as __private::Known>::Given as ::bb_core::Service>::Options = ::bb_core::Options::defaults();
+        let mut __options: __Rover_2_11__given_options__bridge_ros = ::bb_core::Options::defaults();
         __options.port = 1;
         __all.add(__options);
     }
     fn __declared_command_move_to(__all: &mut __private::OptionsList) {
-        let mut __options: <<__Rover_2_11__probed__command_move_to as __private::Known>::Given as ::bb_core::Command>::Options = ::bb_core::Options::defaults();
+        let mut __options: __Rover_2_11__given_options__command_move_to = ::bb_core::Options::defaults();
         __options.speed = __private::FromQuantity::from_quantity(1f64);
         __all.add(__options);
     }
@@ -658,21 +694,21 @@ const _: () = {
     }
     fn __new_islands(
         options: &__private::OptionsList,
-        assembly: &__private::Assembly,
+        environment: &__private::Environment,
     ) -> __Islands {
         __Islands {
-            g0: __new_islands0(options, assembly),
+            g0: __new_islands0(options, environment),
         }
     }
     pub struct __Islands0 {
         sensor_base_imu_tilt: __private::Island<
-            __private::Solo<__Rover_2_11__member__sensor_base_imu_tilt>,
+            __private::Solo<__member__sensor_base_imu_tilt>,
         >,
         estimator_base_pose: __private::Island<__Island_estimator_base_pose>,
     }
     fn __new_islands0(
         options: &__private::OptionsList,
-        assembly: &__private::Assembly,
+        environment: &__private::Environment,
     ) -> __Islands0 {
         __Islands0 {
             sensor_base_imu_tilt: __private::start_alone(
@@ -680,7 +716,7 @@ const _: () = {
                 3usize,
                 __private::Binding {
                     apply: |
-                        options: &mut <__Rover_2_11__sensor_base_imu_tilt as ::bb_core::Estimator>::Options,
+                        options: &mut __Rover_2_11__options__sensor_base_imu_tilt,
                         values: &__private::ParameterValues|
                     {
                         options.beta = __private::FromParameter::from_parameter(
@@ -689,12 +725,12 @@ const _: () = {
                     },
                     parameters: &[0usize],
                 },
-                assembly.environment(),
+                environment,
             ),
             estimator_base_pose: __private::Island::new(__Island_estimator_base_pose {
                 estimator_base_pose: __private::start::<
-                    __Rover_2_11__member__estimator_base_pose,
-                >(options, 4usize, __private::Binding::NONE, assembly.environment()),
+                    __member__estimator_base_pose,
+                >(options, 4usize, __private::Binding::NONE, environment),
             }),
         }
     }
@@ -775,9 +811,7 @@ const _: () = {
         }
     }
     static __ISLANDS: [__private::IslandOf<__Wiring>; 2usize] = [
-        __private::island_of::<
-            __private::Solo<__Rover_2_11__member__sensor_base_imu_tilt>,
-        >,
+        __private::island_of::<__private::Solo<__member__sensor_base_imu_tilt>>,
         __private::island_of::<__Island_estimator_base_pose>,
     ];
     impl __private::IslandWiring for __Wiring {
@@ -828,7 +862,7 @@ const _: () = {
                 .environment
                 .publish(3usize, &self.topics.g0.sensor_base_imu, message, now);
             __private::enter_alone::<
-                __Rover_2_11__member__sensor_base_imu_tilt,
+                __member__sensor_base_imu_tilt,
             >(self, now, line, message);
             __private::enter::<
                 __Island_estimator_base_pose,
@@ -882,17 +916,20 @@ const _: () = {
             >()
         },
     >;
-    impl __private::Alone for __Rover_2_11__member__sensor_base_imu_tilt {
+    enum __member__sensor_base_imu_tilt {}
+    impl __private::Alone for __member__sensor_base_imu_tilt {
         type Wiring = __Wiring;
         type Estimator = __Rover_2_11__sensor_base_imu_tilt;
         type Source = __Rover_2_11__payload__sensor_base_imu;
         type Input = __input__sensor_base_imu_tilt;
+        type Output = <<__Rover_2_11__sensor_base_imu_tilt as ::bb_core::Estimator>::Output as ::bb_core::Outputs>::Only;
         const INLET: __private::Inlet<
             __Rover_2_11__payload__sensor_base_imu,
             __taken__sensor_base_imu_tilt,
         > = __private::Inlet {
             number: 0usize,
             entry: 7usize,
+            publisher: 4usize,
             feed: <__Rover_2_11__payload__sensor_base_imu as __private::Feeds<
                 __taken__sensor_base_imu_tilt,
                 __known__sensor_base_imu_tilt,
@@ -901,10 +938,14 @@ const _: () = {
         #[inline(always)]
         fn find(
             wiring: &__Wiring,
-        ) -> &__private::Island<
-            __private::Solo<__Rover_2_11__member__sensor_base_imu_tilt>,
-        > {
-            &wiring.islands.g0.sensor_base_imu_tilt
+        ) -> (
+            &__private::Island<__private::Solo<__member__sensor_base_imu_tilt>>,
+            &__private::Topic<__Rover_2_11__payload__sensor_base_imu_tilt>,
+        ) {
+            (
+                &wiring.islands.g0.sensor_base_imu_tilt,
+                &wiring.topics.g0.sensor_base_imu_tilt,
+            )
         }
         #[inline]
         fn publish(
@@ -994,7 +1035,8 @@ const _: () = {
             >()
         },
     >;
-    impl __private::Member for __Rover_2_11__member__estimator_base_pose {
+    enum __member__estimator_base_pose {}
+    impl __private::Member for __member__estimator_base_pose {
         type State = __Island_estimator_base_pose;
         type Estimator = __Rover_2_11__estimator_base_pose;
         const NUMBER: usize = 1usize;
@@ -1089,7 +1131,6 @@ const _: () = {
     struct __Island_estimator_base_pose {
         estimator_base_pose: __private::Node<__Rover_2_11__estimator_base_pose>,
     }
-    #[allow(non_camel_case_types, clippy::large_enum_variant)]
     enum __Message_estimator_base_pose {
         sensor_base_imu(__private::Stamped<__Rover_2_11__payload__sensor_base_imu>),
         sensor_base_imu_tilt__kept(
@@ -1108,7 +1149,7 @@ const _: () = {
             turn: &__private::Turn<'_>,
         ) {
             __private::receive::<
-                __Rover_2_11__member__estimator_base_pose,
+                __member__estimator_base_pose,
                 __input__estimator_base_pose__imu,
             >(
                 self,
@@ -1129,7 +1170,7 @@ const _: () = {
             turn: &__private::Turn<'_>,
         ) {
             __private::receive::<
-                __Rover_2_11__member__estimator_base_pose,
+                __member__estimator_base_pose,
                 __input__estimator_base_pose__tilt,
             >(
                 self,
@@ -1150,7 +1191,7 @@ const _: () = {
             turn: &__private::Turn<'_>,
         ) {
             __private::receive::<
-                __Rover_2_11__member__estimator_base_pose,
+                __member__estimator_base_pose,
                 __input__estimator_base_pose__wheel,
             >(
                 self,
@@ -1222,9 +1263,7 @@ const _: () = {
         ) -> bool {
             match estimator {
                 1usize => {
-                    __private::act::<
-                        __Rover_2_11__member__estimator_base_pose,
-                    >(self, wiring, act)
+                    __private::act::<__member__estimator_base_pose>(self, wiring, act)
                 }
                 _ => false,
             }
@@ -1312,7 +1351,7 @@ const _: () = {
         ) -> __Wiring {
             __Wiring {
                 topics,
-                islands: __new_islands(options, assembly),
+                islands: __new_islands(options, assembly.environment()),
                 actuators: __new_actuators(options, assembly),
                 environment: __private::Clone::clone(assembly.environment()),
             }
@@ -1390,8 +1429,6 @@ pub mod rover {
         __Rover_2_11__payload__sensor_base_imu_tilt,
         __Rover_2_11__payload__estimator_base_pose_pose,
         __Rover_2_11__payload__nav_velocity,
-        __Rover_2_11__exported__sensor_base_imu_tilt,
-        __Rover_2_11__exported__estimator_base_pose,
     };
     pub mod sensor {
         ///`sensor/battery`
@@ -1400,9 +1437,9 @@ pub mod rover {
             super::__Rover_2_11__sensor_battery,
         > = ::bb_core::__private::SensorHandle::new(
             "sensor/battery",
+            0usize,
+            0usize,
             ::bb_core::__private::Frame::new(""),
-            0usize,
-            0usize,
             <<super::__Robot as ::bb_core::Robot>::Wiring>::sensor_battery,
         );
         pub mod base {
@@ -1414,9 +1451,9 @@ pub mod rover {
                 super::super::__Rover_2_11__sensor_base_imu,
             > = ::bb_core::__private::SensorHandle::new(
                 "sensor/base/imu",
-                ::bb_core::__private::Frame::new("base"),
                 3usize,
                 1usize,
+                ::bb_core::__private::Frame::new("base"),
                 <<super::super::__Robot as ::bb_core::Robot>::Wiring>::sensor_base_imu,
             );
             pub mod pan {
@@ -1426,9 +1463,9 @@ pub mod rover {
                     super::super::super::__Rover_2_11__sensor_base_pan_encoder,
                 > = ::bb_core::__private::SensorHandle::new(
                     "sensor/base/pan/encoder",
-                    ::bb_core::__private::Frame::new("pan"),
                     7usize,
                     2usize,
+                    ::bb_core::__private::Frame::new("pan"),
                     <<super::super::super::__Robot as ::bb_core::Robot>::Wiring>::sensor_base_pan_encoder,
                 );
             }
@@ -1443,10 +1480,6 @@ pub mod rover {
                     0usize,
                     4usize,
                     3usize,
-                    ::bb_core::__private::visit::<
-                        super::super::super::__Rover_2_11__exported__sensor_base_imu_tilt,
-                    >,
-                    ::core::marker::PhantomData,
                 );
             }
         }
@@ -1461,9 +1494,6 @@ pub mod rover {
                 "estimator/base/pose",
                 1usize,
                 4usize,
-                ::bb_core::__private::visit::<
-                    super::super::__Rover_2_11__exported__estimator_base_pose,
-                >,
             );
             pub mod pose {
                 /// Where it is.
@@ -1475,7 +1505,6 @@ pub mod rover {
                 > = ::bb_core::__private::OutputHandle::new(
                     "estimator/base/pose/pose",
                     5usize,
-                    ::core::marker::PhantomData,
                 );
             }
         }
@@ -1485,11 +1514,7 @@ pub mod rover {
         pub const velocity: ::bb_core::__private::OutputHandle<
             super::__Robot,
             super::__Rover_2_11__payload__nav_velocity,
-        > = ::bb_core::__private::OutputHandle::new(
-            "nav/velocity",
-            6usize,
-            ::core::marker::PhantomData,
-        );
+        > = ::bb_core::__private::OutputHandle::new("nav/velocity", 6usize);
     }
     pub mod controller {
         ///`controller/stability`
@@ -1500,7 +1525,6 @@ pub mod rover {
             "controller/stability",
             1usize,
             6usize,
-            ::core::marker::PhantomData,
         );
     }
     pub mod bridge {
@@ -1508,12 +1532,7 @@ pub mod rover {
         pub const ros: ::bb_core::__private::BridgeHandle<
             super::__Robot,
             super::__Rover_2_11__bridge_ros,
-        > = ::bb_core::__private::BridgeHandle::new(
-            "bridge/ros",
-            2usize,
-            7usize,
-            ::core::marker::PhantomData,
-        );
+        > = ::bb_core::__private::BridgeHandle::new("bridge/ros", 2usize, 7usize);
     }
     pub mod actuator {
         pub mod base {
@@ -1524,10 +1543,10 @@ pub mod rover {
                     super::super::super::__Rover_2_11__actuator_base_pan_servo,
                 > = ::bb_core::__private::ActuatorHandle::new(
                     "actuator/base/pan/servo",
+                    5usize,
                     |
                         wiring: &<super::super::super::__Robot as ::bb_core::Robot>::Wiring|
                     &wiring.actuators.g0.actuator_base_pan_servo,
-                    5usize,
                 );
             }
         }
@@ -1537,34 +1556,19 @@ pub mod rover {
         pub const arm: ::bb_core::__private::CommandHandle<
             super::__Robot,
             super::__Rover_2_11__command_arm,
-        > = ::bb_core::__private::CommandHandle::new(
-            "command/arm",
-            0usize,
-            8usize,
-            ::core::marker::PhantomData,
-        );
+        > = ::bb_core::__private::CommandHandle::new("command/arm", 0usize, 8usize);
         /// It moves.
         ///
         ///`command/move_to`
         pub const move_to: ::bb_core::__private::CommandHandle<
             super::__Robot,
             super::__Rover_2_11__command_move_to,
-        > = ::bb_core::__private::CommandHandle::new(
-            "command/move_to",
-            1usize,
-            9usize,
-            ::core::marker::PhantomData,
-        );
+        > = ::bb_core::__private::CommandHandle::new("command/move_to", 1usize, 9usize);
         ///`command/stop`
         pub const stop: ::bb_core::__private::CommandHandle<
             super::__Robot,
             super::__Rover_2_11__command_stop,
-        > = ::bb_core::__private::CommandHandle::new(
-            "command/stop",
-            2usize,
-            10usize,
-            ::core::marker::PhantomData,
-        );
+        > = ::bb_core::__private::CommandHandle::new("command/stop", 2usize, 10usize);
     }
     pub mod param {
         pub mod imu {
@@ -1574,11 +1578,7 @@ pub mod rover {
             pub const beta: ::bb_core::__private::ParameterHandle<
                 super::super::__Robot,
                 f64,
-            > = ::bb_core::__private::ParameterHandle::new(
-                "param/imu/beta",
-                0usize,
-                ::core::marker::PhantomData,
-            );
+            > = ::bb_core::__private::ParameterHandle::new("param/imu/beta", 0usize);
         }
     }
     pub mod state {
