@@ -229,6 +229,7 @@ impl<T: Real> HardIron<T> {
         means: &FieldMeans<T>,
         is_at_rest: bool,
         reference: Option<&FieldReference<T>>,
+        drift: T,
     ) -> Option<Adoption<T>> {
         if self.unit <= T::ZERO {
             self.unit = means.field.norm();
@@ -244,7 +245,7 @@ impl<T: Real> HardIron<T> {
             self.home = self.offset;
         }
         let fading = if is_at_rest { REST_S } else { FADING_S };
-        self.sums.add(dt, T::ONE - (dt / T::of(fading)).min(T::ONE), means);
+        self.sums.add(dt, T::ONE - (dt / T::of(fading)).min(T::ONE), means, drift);
         self.windows += 1;
         if self.windows < WINDOWS && self.fit.is_some() {
             return None;
@@ -273,6 +274,15 @@ impl<T: Real> HardIron<T> {
             self.unit = norm;
         }
         self.judge(&fit, reference)
+    }
+
+    /// The body has turned unnoticed: what was seen does not go together.
+    pub(super) fn forget_rotations(&mut self) {
+        if self.is_heading {
+            self.begin(true);
+        } else {
+            self.begin_anew();
+        }
     }
 
     /// Begins again, with what is known of the heading.

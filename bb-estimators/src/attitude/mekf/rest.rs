@@ -1,7 +1,13 @@
 //! Detects rest, and averages the gyroscope's readings during it.
 
-use crate::attitude::Real;
+mod trend;
+mod turning;
+
 use nalgebra::Vector3;
+
+use crate::attitude::Real;
+pub(super) use turning::{BodyMeans, KnownBias};
+use turning::{Turning, Verdict};
 
 /// Time constant of the means, s. Source: VQF's `restFilterTau`.
 const TIME_CONSTANT_S: f64 = 0.5;
@@ -28,11 +34,21 @@ pub(super) struct Rest<T> {
     pub(super) rate: Vector3<T>,
     force: Vector3<T>,
     still_s: T,
+    turning: Turning<T>,
+}
+
+/// A rotation that was taken for rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Missed<T> {
+    /// What was known of the bias before.
+    pub(super) bias: KnownBias<T>,
+    /// The square of its angle so far, rad².
+    pub(super) squared_angle: T,
 }
 
 impl<T: Real> Rest<T> {
     pub(super) fn new(rate: &Vector3<T>, force: &Vector3<T>) -> Self {
-        Self { rate: *rate, force: *force, still_s: T::ZERO }
+        Self { rate: *rate, force: *force, still_s: T::ZERO, turning: Turning::new(rate, KnownBias::none()) }
     }
 
     /// Adds a sample; the bias is known up to `bias_deviation`, rad/s.
@@ -57,7 +73,32 @@ impl<T: Real> Rest<T> {
         self.still_s = if still { (self.still_s + dt).min(T::of(1e3)) } else { T::ZERO };
     }
 
+    /// Adds the means of a window of `dt` seconds, at the end of which the bias is known as `bias`.
+    pub(super) fn observe(&mut self, dt: T, means: &BodyMeans<T>, bias: KnownBias<T>) -> Option<Missed<T>> {
+        if self.still_s <= T::ZERO || self.turning.duration <= T::ZERO {
+            self.turning = Turning::new(&self.rate, bias);
+        }
+        if self.still_s <= T::ZERO {
+            return None;
+        }
+        let was_detected = self.is_detected();
+        self.turning.add(dt, &self.rate, means, bias);
+        let Turning { bias, squared_rate, duration, .. } = &self.turning;
+        let missed = Missed { bias: *bias, squared_angle: *squared_rate * *duration * *duration };
+        (was_detected && !self.is_detected()).then_some(missed)
+    }
+
+    /// Whether the body is at rest, as far as is known: most bodies that are still for a second are.
     pub(super) fn is_detected(&self) -> bool {
+        self.is_steady() && self.turning.verdict != Verdict::Turning
+    }
+
+    /// Whether a slow rotation is excluded.
+    pub(super) fn is_certain(&self) -> bool {
+        self.turning.verdict == Verdict::Rest
+    }
+
+    fn is_steady(&self) -> bool {
         self.still_s > T::of(LEAST_S)
     }
 }

@@ -1,5 +1,6 @@
 //! Tests of the Kalman filter alone; the laws of all filters are also checked here for it.
 
+mod slow;
 mod start;
 mod trust;
 

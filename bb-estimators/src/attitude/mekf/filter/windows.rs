@@ -7,6 +7,7 @@ use crate::attitude::Real;
 use crate::attitude::mekf::errors::ProcessNoise;
 use crate::attitude::mekf::iron::FieldMeans;
 use crate::attitude::mekf::measurement::Measurements;
+use crate::attitude::mekf::rest::{BodyMeans, KnownBias, Missed};
 use crate::attitude::mekf::states::{BIAS, CALIBRATION, ROTATION};
 use crate::attitude::mekf::vertical::Contradiction;
 use crate::attitude::mekf::window::Window;
@@ -64,9 +65,11 @@ impl<T: Real> MekfFilter<T> {
         }
         self.iron.correct(&correction);
         let fields = window.mean_field(&correction);
+        let drift = self.drift_variance();
+        self.observe_rest(dt, fields.as_ref(), &force, drift);
         self.adoption = fields
             .as_ref()
-            .and_then(|fields| self.iron.observe(dt, fields, self.rest.is_detected(), self.field.as_ref()));
+            .and_then(|fields| self.iron.observe(dt, fields, self.rest.is_detected(), self.field.as_ref(), drift));
         self.measure(dt, fields.as_ref(), &force);
         orientation
     }
@@ -98,22 +101,52 @@ impl<T: Real> MekfFilter<T> {
             let squared = T::of(self.params.velocity * self.params.velocity) + growth * self.squared_acceleration;
             squared * T::TWO * T::of(VELOCITY_TIME_S) / dt
         };
-        let bias = resting.then(|| self.rest_bias(dt));
+        let bias = if resting { self.rest_bias(dt) } else { None };
         let heading = fields.map(|fields| self.heading(dt, fields));
         self.measurements = Measurements::new(velocity_variance, heading, bias);
     }
 
+    /// Variance of the gyroscope's bias about the vertical, (rad/s)².
+    fn drift_variance(&self) -> T {
+        let up = self.rotation.row(2).transpose();
+        up.dot(&(self.errors.block(BIAS) * up)).max(T::ZERO)
+    }
+
+    /// Adds a window to what distinguishes rest from a slow rotation.
+    fn observe_rest(&mut self, dt: T, fields: Option<&FieldMeans<T>>, force: &Vector3<T>, drift: T) {
+        let means = BodyMeans {
+            force: self.rotation.tr_mul(force) / dt,
+            field: fields.map(|fields| self.rotation.tr_mul(&fields.field)),
+            offset: self.iron.offset,
+        };
+        let bias = KnownBias {
+            mean: self.bias,
+            deviation: self.errors.block(BIAS).diagonal().max().max(T::ZERO).sqrt(),
+            vertical_deviation: drift.sqrt(),
+        };
+        if let Some(Missed { bias, squared_angle }) = self.rest.observe(dt, &means, bias) {
+            self.bias = bias.mean;
+            self.errors.forget::<3>(BIAS, bias.deviation * bias.deviation);
+            self.errors.doubt(ROTATION + 2, squared_angle);
+            self.iron.forget_rotations();
+        }
+    }
+
     /// The gyroscope's reading at rest is its bias.
-    fn rest_bias(&mut self, dt: T) -> (Vector3<T>, T) {
+    fn rest_bias(&mut self, dt: T) -> Option<(Vector3<T>, T)> {
         let difference = self.rest.rate - self.bias;
         let squared = difference.norm_squared();
         let expected = self.errors.variance(BIAS) + T::of(REST_BIAS * REST_BIAS);
         if squared > T::of(BIAS_STEP * BIAS_STEP) * expected {
+            // A slow rotation is as probable until it is excluded.
+            if !self.rest.is_certain() {
+                return None;
+            }
             for axis in 0..3 {
                 self.errors.doubt(BIAS + axis, squared);
             }
         }
         let most = (T::of(MAX_REST_BIAS * MAX_REST_BIAS) / squared.max(T::of(1e-12))).min(T::ONE).sqrt();
-        (difference * most, T::of(REST_BIAS * REST_BIAS) / dt)
+        Some((difference * most, T::of(REST_BIAS * REST_BIAS) / dt))
     }
 }

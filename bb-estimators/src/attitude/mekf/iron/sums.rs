@@ -3,6 +3,9 @@
 //! With R̄ the mean rotation over a window's field samples, w the mean of R m and q that of R (ω × (m - b)),
 //! `w = B + R̄ b + τ q`: an unknown field B in the world, the offset b on the body and the lag τ, seven numbers. B is
 //! eliminated; what is left is a system of four.
+//!
+//! The rotations are relative to each other, and no better known than the gyroscope's bias about the vertical: where the heading
+//! may have drifted by more than the errors of the field, that counts.
 
 use nalgebra::{Matrix3, Matrix4, UnitQuaternion, Vector3, Vector4};
 
@@ -43,6 +46,8 @@ pub(in super::super) struct FieldMeans<T> {
 pub(super) struct Sums<T> {
     /// ∫ dt, s.
     pub(super) duration: T,
+    /// ∫ dt times the variance of the gyroscope's bias about the vertical, rad²/s.
+    drift: T,
     rotation: Matrix3<T>,
     field: Vector3<T>,
     field_on_body: Vector3<T>,
@@ -89,6 +94,7 @@ impl<T: Real> Sums<T> {
     pub(super) fn new() -> Self {
         Self {
             duration: T::ZERO,
+            drift: T::ZERO,
             rotation: Matrix3::zeros(),
             field: Vector3::zeros(),
             field_on_body: Vector3::zeros(),
@@ -100,10 +106,12 @@ impl<T: Real> Sums<T> {
         }
     }
 
-    /// Adds a window of `dt` seconds, after earlier data has faded by `keep`.
-    pub(super) fn add(&mut self, dt: T, keep: T, means: &FieldMeans<T>) {
+    /// Adds a window of `dt` seconds, after earlier data has faded by `keep`; `drift` is the variance of the gyroscope's bias
+    /// about the vertical, (rad/s)².
+    pub(super) fn add(&mut self, dt: T, keep: T, means: &FieldMeans<T>, drift: T) {
         let FieldMeans { rotation, field, rate } = means;
         self.duration = self.duration * keep + dt;
+        self.drift = self.drift * keep + drift * dt;
         self.rotation = self.rotation * keep + rotation * dt;
         self.field = self.field * keep + field * dt;
         self.field_on_body = self.field_on_body * keep + rotation.tr_mul(field) * dt;
@@ -124,6 +132,18 @@ impl<T: Real> Sums<T> {
         self.rotation = correction.to_rotation_matrix() * self.rotation;
         self.field = correction * self.field;
         self.rate = correction * self.rate;
+    }
+
+    /// The power density of what the heading may have drifted by since the sums began, rad² s, where the offset is seen: at the
+    /// frequency of the body's rotation, whose `spread` is ∫ |R̄ - mean|² dt. A ramp of height 1 over D seconds has a variance
+    /// of 1/12, over all of D at the lowest frequencies; its part at ω has an amplitude of 2 / (ω D).
+    fn drift_density(&self, spread: T, unit: T) -> T {
+        let squared_height = self.drift * self.duration;
+        // |q|² is ω² |B|² times 2/3 in the mean, and |Ṙ|² is 2 ω².
+        let squared_frequency =
+            T::of(3.0) * self.squared_rate / (unit * unit * spread.max(T::of(1e-6) * self.duration));
+        let turned = squared_frequency * self.duration * self.duration;
+        squared_height * self.duration / (T::of(12.0) + turned / T::of(4.0))
     }
 
     /// Solves for offset and lag; `unit` is the norm of the field. `None` without data.
@@ -181,7 +201,8 @@ impl<T: Real> Sums<T> {
         };
         let prior = T::of(PRIOR_ERROR * PRIOR_ERROR) * unit * unit * T::of(PRIOR_S);
         let error = ((fit.cost(&solution) + prior) / (self.duration + T::of(PRIOR_S))).max(least);
-        fit.noise = error * correlation;
+        let across = fit.field.x * fit.field.x + fit.field.y * fit.field.y;
+        fit.noise = (error * correlation).max(self.drift_density(offset_block.trace(), unit) * across);
         fit.covariance = inverse * fit.noise;
         Some(fit)
     }
@@ -273,6 +294,7 @@ mod tests {
                     field: cast(FIELD),
                     rate: cast(axis.cross(&FIELD)),
                 },
+                T::ZERO,
             );
         }
         let fit = sums.fit(T::of(FIELD.norm()), Lag { mean: T::ZERO, variance: T::of(1e-4) });
