@@ -227,10 +227,10 @@ proptest! {
                         model.newest_ns = model.newest_ns.max(Some(*time_ns));
                     }
                     (Sent::Health(reading), Ok(())) => model.accepted(reading.time_ns, reading.health),
-                    (Sent::Health(reading), Err(EstimatorError::Degraded(reason))) => {
-                        if reading.health == GpsHealth::Spoofed && reason != Reason::Duplicate {
-                            model.refused_alarm();
-                        }
+                    (Sent::Health(reading), Err(EstimatorError::Degraded(reason)))
+                        if reading.health == GpsHealth::Spoofed && reason != Reason::Duplicate =>
+                    {
+                        model.refused_alarm();
                     }
                     (Sent::Anchor(anchor), Ok(())) => model.anchors.push(anchor.time_ns),
                     _ => {}
