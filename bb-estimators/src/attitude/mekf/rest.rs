@@ -66,6 +66,11 @@ impl<T: Real> Rest<T> {
         let rate_is_steady = (rate - self.rate).norm_squared() < T::of(MAX_RATE_DEVIATION * MAX_RATE_DEVIATION);
         let force_is_steady =
             (force - self.force).norm_squared() < T::of(MAX_FORCE_DEVIATION * MAX_FORCE_DEVIATION);
+        // What this rest has taught is no reason to end it.
+        let has_begun = self.still_s > T::ZERO && self.turning.duration > T::ZERO;
+        let before = &self.turning.bias;
+        let (bias, bias_deviation) =
+            if has_begun { (&before.mean, before.deviation) } else { (bias, bias_deviation) };
         let step = T::of(MAX_BIAS_STEP) + T::of(3.0) * bias_deviation;
         let rate_is_bias = (self.rate - bias).norm_squared() < step * step;
         let force_is_gravity = (self.force.norm() - T::of(super::GRAVITY)).abs() < T::of(MAX_GRAVITY_ERROR);

@@ -32,6 +32,8 @@ pub(super) struct Line<T> {
     pub(super) variance: T,
     /// How far a component of a value is off the line, mean square.
     pub(super) squared_error: T,
+    /// How far the line is off its mean, mean square of a component.
+    pub(super) squared_rise: T,
 }
 
 impl<T: Real> Trend<T> {
@@ -72,10 +74,11 @@ impl<T: Real> Trend<T> {
         let (age, value) = (self.age / weight, self.value / weight);
         let spread = (self.squared_age / weight - age * age).max(T::of(1e-6));
         let slope = (value * age - self.value_age / weight) / spread;
-        let explained = weight * (value.norm_squared() + spread * slope.norm_squared());
+        let squared_rise = spread * slope.norm_squared() / T::of(3.0);
+        let explained = weight * (value.norm_squared() + T::of(3.0) * squared_rise);
         let left = (self.squared_value - explained).max(T::ZERO);
         let squared_error = (T::of(3.0 * PRIOR) * error * error + left) / (T::of(3.0) * (weight + T::of(PRIOR)));
-        Line { slope, variance: squared_error / (weight * spread), squared_error }
+        Line { slope, variance: squared_error / (weight * spread), squared_error, squared_rise }
     }
 }
 

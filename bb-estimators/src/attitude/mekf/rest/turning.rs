@@ -33,8 +33,10 @@ const OPEN_S: f64 = 4.0;
 const FORCE_ERROR: f64 = 0.02;
 const FIELD_ERROR: f64 = 0.003;
 
-/// A field that is off its trend by this many times that error jumps, and does not turn.
+/// A field that is off its trend by this many times that error, and by this part of the trend, jumps and does not turn: a step is off
+/// by more than half of its trend, an arc of a radian by a sixth.
 const JUMP: f64 = 4.0;
+const JUMP_PART: f64 = 0.3;
 
 /// The trend of the field may show a rotation about the vertical as faster than it is, by its uncertain offset.
 const FASTER: f64 = 1.5;
@@ -175,7 +177,8 @@ impl<T: Real> Speed<T> {
         Self {
             squared: across.norm_squared() / squared_arm,
             deviation: (line.variance / squared_arm).sqrt(),
-            is_steady: line.squared_error < T::of(JUMP * JUMP) * error * error,
+            is_steady: line.squared_error
+                < T::of(JUMP * JUMP) * error * error + T::of(JUMP_PART * JUMP_PART) * line.squared_rise,
         }
     }
 

@@ -166,3 +166,23 @@ fn a_slow_rotation_after_rest_turns_the_heading() {
         }
     }
 }
+
+/// What a rest that is none has taught about the bias neither ends it, so that the next one begins with that, nor is it certain
+/// once the body has turned by more than a line follows.
+#[test]
+fn a_rotation_that_was_taken_for_rest_is_taken_back() {
+    for case in 0..CASES * 16 {
+        let (mut world, mut filter) = (world(case % CASES, 0.0), filter(true));
+        let rate =
+            Vector3::z() * (0.046 + 0.001 * f64::from(case / CASES)) * if case % 2 == 0 { 1.0 } else { -1.0 };
+        for i in 0..1_500 {
+            let sample = sample(&mut world, &rate);
+            // Enough noise that the field shows the rotation only after a second.
+            let field = sample.magnetic_field.map(|field| field + noise(i + 3) * 1.5e-6);
+            filter.update(&ImuSample { magnetic_field: field, ..sample }).unwrap();
+        }
+        assert_eq!(filter.is_at_rest(), Some(false), "case {case}");
+        let error = world.error_of(&filter).heading;
+        assert!(error < 8.0, "case {case}: {error}");
+    }
+}
