@@ -65,7 +65,8 @@ pub trait Factor<S: States, const N: usize> {
     ///
     /// # Errors
     ///
-    /// The reason if it cannot be compared, for example [`Refusal::NotObservable`].
+    /// The reason if it cannot be compared, for example [`Refusal::NotObservable`]. That is also the reason if it succeeds although
+    /// no rows were set, or with rows of the previous keyframe if [`previous`](Self::previous) returned `None`.
     fn linearise(
         &self,
         previous: Option<&Estimate<N>>,

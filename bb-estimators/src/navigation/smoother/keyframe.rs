@@ -217,7 +217,7 @@ impl<F, const N: usize> Keyframe<F, N> {
             }
             None => None,
         };
-        factor.linearise(previous, &self.point, rows)
+        rows.linearise::<S, F>(factor, previous, &self.point)
     }
 
     /// The squared norm of a whitened residual at the current estimate of the window.

@@ -2,6 +2,7 @@
 
 use nalgebra::SMatrix;
 
+use super::factor::Factor;
 use super::matrix::is_sound;
 use crate::navigation::math::{ln, sqrt};
 use crate::navigation::measurement::{Linearised, Measurement};
@@ -15,7 +16,10 @@ pub const MOST_ROWS: usize = 9;
 /// variance 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rows<const N: usize> {
+    /// Number of rows. Zero unless [`set`](Self::set) has succeeded.
     pub(super) count: usize,
+    /// Whether they involve the previous keyframe.
+    is_pair: bool,
     pub(super) residual: [f64; MOST_ROWS],
     pub(super) previous: [[f64; N]; MOST_ROWS],
     pub(super) at: [[f64; N]; MOST_ROWS],
@@ -27,7 +31,23 @@ impl<const N: usize> Rows<N> {
     /// Creates an empty factor.
     pub fn new() -> Self {
         let zeros = [[0.0; N]; MOST_ROWS];
-        Self { count: 0, residual: [0.0; MOST_ROWS], previous: zeros, at: zeros, log_density: 0.0 }
+        Self { count: 0, is_pair: false, residual: [0.0; MOST_ROWS], previous: zeros, at: zeros, log_density: 0.0 }
+    }
+
+    /// Linearises a factor, in place of whatever the rows were before.
+    pub(in crate::navigation) fn linearise<S: States, F: Factor<S, N>>(
+        &mut self,
+        factor: &F,
+        previous: Option<&Estimate<N>>,
+        at: &Estimate<N>,
+    ) -> Result<(), Refusal> {
+        self.count = 0;
+        factor.linearise(previous, at, self)?;
+        // A factor may have ignored that `set` refused its numbers, or may involve a keyframe that it did not name.
+        if self.count == 0 || (self.is_pair && previous.is_none()) {
+            return Err(Refusal::NotObservable);
+        }
+        Ok(())
     }
 
     /// Sets the residual (measured minus expected), its Jacobians with respect to the errors at the previous keyframe
@@ -45,7 +65,8 @@ impl<const N: usize> Rows<N> {
         noise: &SMatrix<f64, D, D>,
     ) -> Result<(), Refusal> {
         const { assert!(D <= MOST_ROWS, "a factor has at most `MOST_ROWS` rows") };
-        self.count = D;
+        self.count = 0;
+        self.is_pair = previous.is_some();
         self.residual[..D].copy_from_slice(&residual);
         self.at[..D].copy_from_slice(at);
         match previous {
@@ -81,6 +102,7 @@ impl<const N: usize> Rows<N> {
         }
         let mut rows = self.at[..D].iter().chain(&self.previous[..D]);
         if rows.all(|row| is_sound(row)) && is_sound(&self.residual[..D]) {
+            self.count = D;
             return Ok(());
         }
         let mut numbers = self.at[..D].iter().chain(&self.previous[..D]).flatten().chain(&self.residual[..D]);
@@ -103,11 +125,10 @@ impl<const N: usize> Rows<N> {
         self.set(model.residual, None, &model.jacobian, &model.noise)
     }
 
-    /// The whitened residual and Jacobian rows of the keyframe; `None` if the factor also depends on the previous keyframe.
+    /// The whitened residual and Jacobian rows of the keyframe.
     #[cfg(feature = "eskf")]
-    pub(in crate::navigation) fn alone(&self) -> Option<(&[f64], &[[f64; N]])> {
-        let is_alone = self.previous[..self.count].iter().flatten().all(|x| *x == 0.0);
-        is_alone.then(|| (&self.residual[..self.count], &self.at[..self.count]))
+    pub(in crate::navigation) fn alone(&self) -> (&[f64], &[[f64; N]]) {
+        (&self.residual[..self.count], &self.at[..self.count])
     }
 
     /// Multiplies the weight. The rows are multiplied by its square root.

@@ -221,8 +221,8 @@ fn update<F: ProvidedFactor>(
     }
     let at = filter.estimate().ok_or(Refusal::NotStarted)?;
     let mut rows = Rows::new();
-    Factor::<Navigated, NAVIGATED>::linearise(factor, None, at, &mut rows)?;
-    let (residual, jacobian) = rows.alone().ok_or(Refusal::NotObservable)?;
+    rows.linearise::<Navigated, F>(factor, None, at)?;
+    let (residual, jacobian) = rows.alone();
     macro_rules! of_dimension {
         ($($dimension:literal)*) => {
             match residual.len() {

@@ -99,6 +99,25 @@ fn degraded_a_correction_that_does_not_converge_is_told() {
     }
 }
 
+/// The smoother linearises a factor again where the estimate has moved to.
+#[test]
+fn degraded_a_provider_that_ignores_what_is_refused_does_not_break_the_estimate() {
+    let flight = Flight::new(3, 2);
+    for strategy in StrategyKind::ALL {
+        let mut estimator: Providing = StateEstimator::new(config(*strategy), Events::new()).unwrap();
+        estimator.warm_start(flight.warm_start(0)).unwrap();
+        flight.samples.iter().for_each(|sample| estimator.add_imu(sample).unwrap());
+        let time_ns = 3 * SECOND - STEP;
+        let position = estimator.predicted(time_ns).unwrap().position;
+        let x = estimator.frame().unwrap().position(&position).x;
+        let added = estimator.add_factor(time_ns, 0, Provided::Careless(x));
+        assert!(!added.is_err_and(|error| error.is_fatal()), "{}: {added:?}", strategy.name());
+        let (position, _) = flight.error(&estimator.predicted(3 * SECOND).unwrap());
+        assert!(position < 12.0, "{}: {position} m", strategy.name());
+        assert_eq!(count(estimator.sink(), "fatal"), 0);
+    }
+}
+
 #[test]
 fn fatal_a_window_that_overflows_has_no_estimate_for_this_tick() {
     let flight = Flight::new(3, 2);

@@ -19,6 +19,12 @@ pub(super) enum Provided {
     Near(f64),
     /// Always 8 m ahead of the estimate along x, so that iterating does not converge.
     Ahead,
+    /// Sets no rows.
+    Unset,
+    /// Involves the previous keyframe, which it does not name.
+    Unnamed,
+    /// Like `Ahead` within 2 m of this position along x. Otherwise not a number, and it ignores that this is refused.
+    Careless(f64),
 }
 
 impl<S: States, const N: usize> Factor<S, N> for Provided {
@@ -37,9 +43,15 @@ impl<S: States, const N: usize> Factor<S, N> for Provided {
             Self::Near(value) if (value - x).abs() < 2.0 => (0.0, 1.0),
             Self::Near(_) => (1e12, 1.0),
             Self::Ahead => (8.0, 0.1),
+            Self::Unset => return Ok(()),
+            Self::Unnamed => (0.0, 1.0),
+            Self::Careless(value) if (value - x).abs() < 2.0 => (8.0, 0.1),
+            Self::Careless(_) => (f64::NAN, 0.1),
         };
         let mut jacobian = [[0.0; N]];
         jacobian[0][POSITION] = 1.0;
-        rows.set([residual], None, &jacobian, &Matrix1::new(variance))
+        let before = matches!(self, Self::Unnamed).then_some(&[[1.0; N]]);
+        let set = rows.set([residual], before, &jacobian, &Matrix1::new(variance));
+        if matches!(self, Self::Careless(_)) { Ok(()) } else { set }
     }
 }

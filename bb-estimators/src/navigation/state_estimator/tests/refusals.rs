@@ -56,6 +56,10 @@ fn every_refusal_that_a_user_can_see() {
         assert_eq!(blind, Refusal::NotObservable);
         let elsewhere = refused(estimator.add_factor(2 * SECOND - STEP, 1, Provided::Elsewhere));
         assert_eq!(elsewhere, Refusal::OutOfRange, "what a provider refuses is not the end of the estimate");
+        for (provider, factor) in [(2, Provided::Unset), (3, Provided::Unnamed)] {
+            let useless = refused(estimator.add_factor(2 * SECOND - STEP, provider, factor));
+            assert_eq!(useless, Refusal::NotObservable, "{}: {factor:?}", strategy.name());
+        }
         let old = PoseAnchor { time_ns: -SECOND, ..anchor };
         assert_eq!(refused(estimator.add_pose_anchor(old)), Refusal::TooOld { time_ns: -SECOND });
         let ahead = PoseAnchor { time_ns: 3 * SECOND, ..anchor };
@@ -70,7 +74,7 @@ fn every_refusal_that_a_user_can_see() {
         let first_ns = flight.vio[0].to_ns;
         let told: Vec<i64> = kinds(estimator.sink(), "degraded").map(|event| event.time_ns).collect();
         let revised = told.iter().filter(|time_ns| **time_ns == first_ns).count();
-        assert_eq!((told.len(), revised), (11 + 1, 1), "each is told: {:#?}", estimator.counts());
+        assert_eq!((told.len(), revised), (13 + 1, 1), "each is told: {:#?}", estimator.counts());
     }
 }
 
