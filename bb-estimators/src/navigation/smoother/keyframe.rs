@@ -217,7 +217,7 @@ impl<F, const N: usize> Keyframe<F, N> {
             }
             None => None,
         };
-        rows.linearise::<S, F>(factor, previous, &self.point)
+        rows.fill(previous.is_some(), |rows| factor.linearise(previous, &self.point, rows))
     }
 
     /// The squared norm of a whitened residual at the current estimate of the window.

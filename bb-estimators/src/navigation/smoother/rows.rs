@@ -2,7 +2,6 @@
 
 use nalgebra::SMatrix;
 
-use super::factor::Factor;
 use super::matrix::is_sound;
 use crate::navigation::math::{ln, sqrt};
 use crate::navigation::measurement::{Linearised, Measurement};
@@ -34,17 +33,16 @@ impl<const N: usize> Rows<N> {
         Self { count: 0, is_pair: false, residual: [0.0; MOST_ROWS], previous: zeros, at: zeros, log_density: 0.0 }
     }
 
-    /// Linearises a factor, in place of whatever the rows were before.
-    pub(in crate::navigation) fn linearise<S: States, F: Factor<S, N>>(
+    /// Lets a factor set them, in place of whatever they were before; `has_previous` if it names the previous keyframe.
+    pub(in crate::navigation) fn fill(
         &mut self,
-        factor: &F,
-        previous: Option<&Estimate<N>>,
-        at: &Estimate<N>,
+        has_previous: bool,
+        linearise: impl FnOnce(&mut Self) -> Result<(), Refusal>,
     ) -> Result<(), Refusal> {
         self.count = 0;
-        factor.linearise(previous, at, self)?;
+        linearise(self)?;
         // A factor may have ignored that `set` refused its numbers, or may involve a keyframe that it did not name.
-        if self.count == 0 || (self.is_pair && previous.is_none()) {
+        if self.count == 0 || (self.is_pair && !has_previous) {
             return Err(Refusal::NotObservable);
         }
         Ok(())

@@ -221,7 +221,7 @@ fn update<F: ProvidedFactor>(
     }
     let at = filter.estimate().ok_or(Refusal::NotStarted)?;
     let mut rows = Rows::new();
-    rows.linearise::<Navigated, F>(factor, None, at)?;
+    rows.fill(false, |rows| Factor::<Navigated, NAVIGATED>::linearise(factor, None, at, rows))?;
     let (residual, jacobian) = rows.alone();
     macro_rules! of_dimension {
         ($($dimension:literal)*) => {
