@@ -136,7 +136,7 @@ impl<const CAPACITY: usize> IslandState for Seen<CAPACITY> {
             Act::Turn(_) => self.wakes += 1,
             Act::Handle(NodeEntry::Restart, _) => self.restarts += 1,
             Act::Handle(NodeEntry::Retire, _) => self.has_retired = true,
-            Act::Handle(..) | Act::BeginReplay | Act::Emit(..) => {}
+            Act::Handle(..) | Act::Visit(..) | Act::BeginReplay | Act::Emit(..) => {}
         }
         true
     }
