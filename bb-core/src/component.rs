@@ -54,7 +54,7 @@ pub(crate) use guardian::{DisarmHook, Guardian, OwnHooks};
 pub(crate) use host::Host;
 pub use info::{Info, Request};
 pub(crate) use inputs::{At, FieldIndex, InputAt, SyncMiss, TakenAt};
-pub use inputs::{Input, InputField, Inputs};
+pub use inputs::{Every, Input, InputField, Inputs};
 pub use joint_publisher::JointPublisher;
 pub(crate) use motion_reports::MotionReport;
 pub(crate) use options::{AnyOptions, OptionsList};

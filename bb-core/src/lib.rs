@@ -57,8 +57,8 @@ mod stub;
 pub use bb_macros::robot;
 pub use bb_macros::{Inputs, Options, Outputs, Payload};
 pub use component::{
-    Actuator, ActuatorContext, Bus, Command, CommandContext, Context, Estimator, HandleCall, HandleCast, Info,
-    Input, Inputs, Options, Outcome, Outputs, Reading, Reply, Request, RequestCodec, SafetyLink, Sensor,
+    Actuator, ActuatorContext, Bus, Command, CommandContext, Context, Estimator, Every, HandleCall, HandleCast,
+    Info, Input, Inputs, Options, Outcome, Outputs, Reading, Reply, Request, RequestCodec, SafetyLink, Sensor,
     SensorContext, Service, ServiceContext,
 };
 pub use declaration::{ParameterError, Role};
@@ -91,9 +91,9 @@ pub use nalgebra;
 /// Everything a file that declares or runs a robot needs: `use bb_core::prelude::*;`.
 pub mod prelude {
     pub use crate::component::{
-        Actuator, ActuatorContext, Arm, Command, CommandContext, Context, Disarm, Estimator, External, HandleCall,
-        HandleCast, Info, Input, NoArguments, NoOptions, Outcome, Reading, Reply, Request, SafetyLink, Sensor,
-        SensorContext, Service, ServiceContext,
+        Actuator, ActuatorContext, Arm, Command, CommandContext, Context, Disarm, Estimator, Every, External,
+        HandleCall, HandleCast, Info, Input, NoArguments, NoOptions, Outcome, Reading, Reply, Request, SafetyLink,
+        Sensor, SensorContext, Service, ServiceContext,
     };
     pub use crate::declaration::Role;
     pub use crate::event::{HealthReason, HealthState, HealthTransition, Safety};
@@ -120,11 +120,13 @@ pub mod __private {
     };
     pub use crate::component::binding::{Binding, FromParameter};
     pub use crate::component::field::{FromQuantity, FromText};
-    pub use crate::component::inputs::{At, FieldIndex, InputAt, Slot, SyncMiss, TakenAt, declare};
+    pub use crate::component::inputs::{
+        At, EverySlot, FieldIndex, InputAt, LatestSlot, Slot, SyncMiss, TakenAt, declare,
+    };
     pub use crate::component::options::OptionsList;
     pub use crate::component::outputs::{EmittedAt, OutputAt};
     pub use crate::component::setting::{ByCode, ByText, ByValue, Setting, SettingOf, WithUnit};
-    pub use crate::component::{Command, Input, InputField, OptionField};
+    pub use crate::component::{Command, Every, Input, InputField, OptionField};
     pub use crate::control::Prepared;
     pub use crate::declaration::estimator::{InletDeclaration, IslandDeclaration};
     pub use crate::declaration::join::join;

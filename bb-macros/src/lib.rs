@@ -62,7 +62,7 @@ pub fn options(tokens: TokenStream) -> TokenStream {
     derive::derive(tokens.into(), derive::options).into()
 }
 
-/// Makes a struct of `Input<'a, …>` and `Option<Input<'a, …>>` fields the input of an estimator. See the trait.
+/// Makes a struct of `Input<'a, …>`, `Option<Input<'a, …>>` and `Every<'a, …>` fields the input of an estimator. See the trait.
 #[proc_macro_derive(Inputs)]
 pub fn inputs(tokens: TokenStream) -> TokenStream {
     derive::derive(tokens.into(), derive::inputs).into()

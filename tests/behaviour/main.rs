@@ -17,6 +17,7 @@ mod disarm_first;
 mod discovery;
 mod drivers;
 mod end;
+mod every_message;
 mod everything;
 mod external;
 mod failed_starts;

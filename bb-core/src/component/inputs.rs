@@ -1,21 +1,27 @@
 //! The input of an estimator: one payload, or a struct with a field per input.
 //!
 //! The estimator gets the driver's message by reference. Every other input has a [`Slot`] that keeps its latest
-//! message. When the driver's message arrives, [`InputAt::snapshot`] checks the slots against its time, and builds
-//! the estimator's input struct or names the input that was missing or too old.
+//! message, or all messages since the last dispatch. When the driver's message arrives, [`InputAt::snapshot`] checks
+//! the slots against its time, and builds the estimator's input struct or names the input that was missing or too old.
+
+mod every;
+mod latest;
+mod slot;
+
+pub use every::{Every, EverySlot};
+pub use latest::{Input, LatestSlot};
+pub use slot::{Slot, SyncMiss};
 
 use crate::Payload;
-use crate::declaration::{EstimatorDeclaration, InputDeclaration};
-use crate::message::{Panic, Stamped, copy_to};
-use crate::time::MonotonicTime;
-use std::cell::Cell;
-use std::ops::Deref;
+use crate::declaration::EstimatorDeclaration;
+use crate::message::Stamped;
 
 /// The input of an estimator.
 ///
 /// An estimator with one input names the payload: `type Input = Imu;`, and its `handle_input` gets `&Stamped<Imu>`.
-/// One with several inputs derives a struct whose fields are the inputs by name; an `Option` means that the estimator
-/// can run without that input.
+/// One with several inputs derives a struct whose fields are the inputs by name. [`Input`] is the latest message; in
+/// an `Option`, the estimator can run without that input. [`Every`] is all messages since the last run, none or several,
+/// for events and measurements each of which counts.
 ///
 /// ```
 /// use bb_core::prelude::*;
@@ -29,6 +35,8 @@ use std::ops::Deref;
 ///     pub odometry: Input<'a, Odometry>,
 ///     /// Magnetic heading, if the robot has it.
 ///     pub magnetic_field: Option<Input<'a, MagneticField>>,
+///     /// Fixes of the receiver, none of which is skipped.
+///     pub gnss: Every<'a, GnssFix>,
 /// }
 /// ```
 ///
@@ -42,7 +50,7 @@ use std::ops::Deref;
 pub trait Inputs: 'static {
     /// The argument of `handle_input`.
     type View<'a>;
-    /// The latest message of each input.
+    /// The slots of the inputs.
     #[doc(hidden)]
     type Cache: Default + Send + 'static;
     /// The field that a nested estimator's sensor feeds: the only required one.
@@ -73,58 +81,17 @@ pub type FieldIndex = usize;
 #[derive(Clone, Copy, Debug)]
 pub struct At<const I: FieldIndex>;
 
-/// One input of a struct: its message, and whether it is new since the last dispatch.
-#[derive(Debug)]
-pub struct Input<'a, T> {
-    message: &'a Stamped<T>,
-    is_new: bool,
-}
-
-impl<T> Clone for Input<'_, T> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-
-impl<T> Copy for Input<'_, T> {}
-
-impl<'a, T> Input<'a, T> {
-    /// A message that has arrived since the last dispatch.
-    pub fn new(message: &'a Stamped<T>) -> Self {
-        Self { message, is_new: true }
-    }
-
-    /// A message that an earlier dispatch has seen already.
-    pub fn seen(message: &'a Stamped<T>) -> Self {
-        Self { message, is_new: false }
-    }
-
-    /// Whether it has arrived since the last dispatch, so that each reading of a slow sensor is fused once.
-    pub fn is_new(&self) -> bool {
-        self.is_new
-    }
-
-    /// The message.
-    pub fn message(&self) -> &'a Stamped<T> {
-        self.message
-    }
-}
-
-impl<T> Deref for Input<'_, T> {
-    type Target = Stamped<T>;
-    fn deref(&self) -> &Stamped<T> {
-        self.message
-    }
-}
-
 /// Input number `I` of `Self` exists: its payload, and how its arrival is handled.
 #[doc(hidden)]
 pub trait InputAt<const I: FieldIndex>: Inputs {
     /// The payload it takes.
     type Payload: Payload;
 
+    /// What keeps its messages until the driver arrives.
+    type Slot: Slot<Self::Payload>;
+
     /// Its slot; `None` if the estimator takes only a single payload, which needs no cache.
-    fn slot(cache: &mut Self::Cache) -> Option<&mut Slot<Self::Payload>>;
+    fn slot(cache: &mut Self::Cache) -> Option<&mut Self::Slot>;
 
     /// The estimator's input when this input is the driver and `message` has arrived.
     fn snapshot<'a>(
@@ -142,8 +109,11 @@ pub trait TakenAt<T: Inputs + ?Sized>: 'static {
     /// The payload it takes.
     type Payload: Payload;
 
+    /// See [`InputAt::Slot`].
+    type Slot: Slot<Self::Payload>;
+
     /// See [`InputAt::slot`].
-    fn slot(cache: &mut T::Cache) -> Option<&mut Slot<Self::Payload>>;
+    fn slot(cache: &mut T::Cache) -> Option<&mut Self::Slot>;
 
     /// See [`InputAt::snapshot`].
     fn snapshot<'a>(cache: &'a mut T::Cache, message: &'a Stamped<Self::Payload>) -> Result<T::View<'a>, SyncMiss>;
@@ -152,9 +122,10 @@ pub trait TakenAt<T: Inputs + ?Sized>: 'static {
 impl<T: InputAt<I>, const I: FieldIndex> TakenAt<T> for At<I> {
     const INDEX: FieldIndex = I;
     type Payload = T::Payload;
+    type Slot = T::Slot;
 
     #[inline(always)]
-    fn slot(cache: &mut T::Cache) -> Option<&mut Slot<T::Payload>> {
+    fn slot(cache: &mut T::Cache) -> Option<&mut T::Slot> {
         T::slot(cache)
     }
 
@@ -173,80 +144,15 @@ impl<T: Payload> Inputs for T {
 
 impl<T: Payload> InputAt<0> for T {
     type Payload = T;
+    type Slot = LatestSlot<T>;
 
-    fn slot(_: &mut ()) -> Option<&mut Slot<T>> {
+    fn slot(_: &mut ()) -> Option<&mut LatestSlot<T>> {
         None
     }
 
     #[inline(always)]
     fn snapshot<'a>((): &'a mut (), message: &'a Stamped<T>) -> Result<&'a Stamped<T>, SyncMiss> {
         Ok(message)
-    }
-}
-
-/// The latest message of one input, and how old it may be.
-#[doc(hidden)]
-#[derive(Debug)]
-pub struct Slot<T> {
-    message: Option<Stamped<T>>,
-    is_new: Cell<bool>,
-    declaration: Option<&'static InputDeclaration>,
-}
-
-impl<T> Default for Slot<T> {
-    fn default() -> Self {
-        Self { message: None, is_new: Cell::new(false), declaration: None }
-    }
-}
-
-/// The input because of which a dispatch was dropped.
-#[doc(hidden)]
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SyncMiss {
-    /// Its number among the declared inputs.
-    pub input: usize,
-    /// How much older than the driver it was; `None` if it has not arrived yet.
-    pub age_nanos: Option<i64>,
-}
-
-impl<T: Payload> Slot<T> {
-    /// Sets the declared input that fills it.
-    pub fn declare(&mut self, declaration: &'static InputDeclaration) {
-        self.declaration = Some(declaration);
-    }
-
-    /// Keeps `message` as the latest. If the payload's `Clone` panics, the panic is returned and the message is still
-    /// kept.
-    #[inline]
-    pub(crate) fn store(&mut self, message: &Stamped<T>) -> Result<(), Panic> {
-        self.is_new.set(true);
-        copy_to(&mut self.message, message)
-    }
-
-    /// The miss of a required input that has not arrived, or is too old for a driver of `time`; `None` if there is no
-    /// miss.
-    pub fn miss(&self, time: MonotonicTime) -> Option<SyncMiss> {
-        let declaration = self.declaration.filter(|declaration| !declaration.optional)?;
-        let Some(message) = &self.message else {
-            return Some(SyncMiss { input: declaration.index, age_nanos: None });
-        };
-        let age_nanos = time.nanos_since(message.monotonic_time);
-        declaration
-            .is_too_old(age_nanos)
-            .then_some(SyncMiss { input: declaration.index, age_nanos: Some(age_nanos) })
-    }
-
-    /// Returns the message if it has arrived and is not too old for a driver of `time`, and marks it as seen.
-    pub fn take(&self, time: MonotonicTime) -> Option<Input<'_, T>> {
-        let message = self.message.as_ref()?;
-        let is_too_old = self.declaration?.is_too_old(time.nanos_since(message.monotonic_time));
-        (!is_too_old).then(|| Input { message, is_new: self.is_new.replace(false) })
-    }
-
-    /// The message of a required input; the error is that of [`Self::miss`].
-    pub fn require(&self, time: MonotonicTime) -> Result<Input<'_, T>, SyncMiss> {
-        let input = self.declaration.map_or(usize::MAX, |declaration| declaration.index);
-        self.take(time).ok_or(SyncMiss { input, age_nanos: None })
     }
 }
 

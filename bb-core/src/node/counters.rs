@@ -26,6 +26,9 @@ pub enum DropReason {
     Overflow,
     /// The driver arrived, but the state of a joint between this input and the output was unknown or too old.
     NoTransform,
+    /// The message waited for the driver, and newer ones took its place. Only an input of the type [`Every`](crate::Every) keeps
+    /// several.
+    Displaced,
 }
 
 /// Without a declared budget, one of this many callbacks is measured.
@@ -43,6 +46,7 @@ impl DropReason {
         Self::Stopped,
         Self::Overflow,
         Self::NoTransform,
+        Self::Displaced,
     ];
 
     /// Its name in reports.
@@ -55,6 +59,7 @@ impl DropReason {
             Self::Stopped => "stopped",
             Self::Overflow => "inbox full",
             Self::NoTransform => "no transform",
+            Self::Displaced => "displaced",
         }
     }
 }

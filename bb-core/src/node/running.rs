@@ -15,6 +15,7 @@ use super::health::Health;
 use super::shared::{SharedNode, Stopped};
 use super::timers::Timers;
 use super::turn::Turn;
+use crate::component::inputs;
 use crate::component::{Binding, Context, Estimator, Guardian, Inputs, Reply, Request, SyncMiss, TakenAt};
 use crate::declaration::{EstimatorDeclaration, ParameterValues};
 use crate::event::HealthReason;
@@ -210,10 +211,14 @@ impl<E: Estimator> Node<E> {
                 return Ok(Handled::Refused(reason));
             }
             if !declared.driver {
-                if let Some(slot) = F::slot(cache)
-                    && let Err(panic) = slot.store(message)
-                {
-                    copy_failed(turn.environment(), declared.source, panic);
+                if let Some(slot) = F::slot(cache) {
+                    let stored = inputs::Slot::store(slot, message);
+                    if stored.has_displaced {
+                        counters.drop(input, DropReason::Displaced);
+                    }
+                    if let Some(panic) = stored.panic {
+                        copy_failed(turn.environment(), declared.source, panic);
+                    }
                 }
                 turn.timing().interrupt();
                 return Ok(Handled::Stored);

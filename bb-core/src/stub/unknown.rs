@@ -1,7 +1,7 @@
 //! The type that fits everywhere.
 
 use super::stub;
-use crate::component::inputs::Slot;
+use crate::component::inputs::LatestSlot;
 use crate::component::{
     Actuator, ActuatorContext, At, Command, CommandContext, Context, Estimator, Fault, InputAt, InputField, Inputs,
     NoArguments, NoOptions, Outcome, OutputAt, Outputs, Reading, Reply, Sensor, SensorContext, Service,
@@ -142,8 +142,9 @@ impl Outputs for UnknownOutput {
 
 impl<I: Inputs> InputAt<UNKNOWN_INDEX> for I {
     type Payload = Unknown;
+    type Slot = LatestSlot<Unknown>;
 
-    fn slot(_: &mut I::Cache) -> Option<&mut Slot<Unknown>> {
+    fn slot(_: &mut I::Cache) -> Option<&mut LatestSlot<Unknown>> {
         None
     }
 

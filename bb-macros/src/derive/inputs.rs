@@ -10,7 +10,62 @@ struct Field<'a> {
     name: &'a Ident,
     slot: Ident,
     payload: &'a Type,
-    optional: bool,
+    kind: Kind,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    /// The latest message.
+    Required,
+    /// The latest message, if there is one.
+    Optional,
+    /// All messages since the last run.
+    Every,
+}
+
+impl Field<'_> {
+    /// Whether the estimator can run without it.
+    fn is_optional(&self) -> bool {
+        self.kind != Kind::Required
+    }
+
+    /// The type of its slot.
+    fn slot_type(&self) -> TokenStream {
+        let payload = self.payload;
+        match self.kind {
+            Kind::Required | Kind::Optional => quote!(::bb_core::__private::LatestSlot<#payload>),
+            Kind::Every => quote!(::bb_core::__private::EverySlot<#payload>),
+        }
+    }
+
+    /// The message of the driver, as the field.
+    fn driver(&self) -> TokenStream {
+        match self.kind {
+            Kind::Required => quote!(::bb_core::__private::Input::new(message)),
+            Kind::Optional => {
+                quote!(::core::option::Option::Some(::bb_core::__private::Input::new(message)))
+            }
+            Kind::Every => quote!(::bb_core::__private::Every::one(message)),
+        }
+    }
+
+    /// What the slot keeps, as the field.
+    fn kept(&self) -> TokenStream {
+        let slot = &self.slot;
+        match self.kind {
+            Kind::Required => quote!(cache.#slot.require(time)?),
+            Kind::Optional | Kind::Every => quote!(cache.#slot.take(time)),
+        }
+    }
+}
+
+/// How a field takes its messages, and their payload.
+fn taken(field: &Type) -> Option<(Kind, &Type)> {
+    let optional = || fields::wrapped(field, "Option").and_then(|inner| fields::wrapped(inner, "Input"));
+    let required = fields::wrapped(field, "Input").map(|payload| (Kind::Required, payload));
+    required
+        .or_else(|| optional().map(|payload| (Kind::Optional, payload)))
+        .or_else(|| fields::wrapped(field, "Every").map(|payload| (Kind::Every, payload)))
 }
 
 pub(crate) fn inputs(item: &DeriveInput, diagnostics: &mut Diagnostics) -> TokenStream {
@@ -26,14 +81,12 @@ pub(crate) fn inputs(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Token
     }
     let mut inputs = Vec::new();
     for (index, field) in named.iter().enumerate() {
-        let inner = fields::wrapped(&field.ty, "Option");
-        let (Some(name), Some(payload)) = (&field.ident, fields::wrapped(inner.unwrap_or(&field.ty), "Input"))
-        else {
-            let message = "expected `Input<'a, Payload>` or `Option<Input<'a, Payload>>`";
+        let (Some(name), Some((kind, payload))) = (&field.ident, taken(&field.ty)) else {
+            let message = "expected `Input<'a, Payload>`, `Option<Input<'a, Payload>>` or `Every<'a, Payload>`";
             diagnostics.error(&field.ty, message.into());
             continue;
         };
-        inputs.push(Field { name, slot: format_ident!("f{index}"), payload, optional: inner.is_some() });
+        inputs.push(Field { name, slot: format_ident!("f{index}"), payload, kind });
     }
     let name = &item.ident;
     if diagnostics.any() {
@@ -48,10 +101,12 @@ pub(crate) fn inputs(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Token
             }
         };
     }
-    let slots =
-        inputs.iter().map(|Field { slot, payload, .. }| quote!(#slot: ::bb_core::__private::Slot<#payload>,));
-    let schema = inputs.iter().map(|Field { name, optional, .. }| {
-        let name = crate::names::text(name);
+    let slots = inputs.iter().map(|field| {
+        let (slot, slot_type) = (&field.slot, field.slot_type());
+        quote!(#slot: #slot_type,)
+    });
+    let schema = inputs.iter().map(|field| {
+        let (name, optional) = (crate::names::text(field.name), field.is_optional());
         quote!(::bb_core::__private::InputField { name: #name, optional: #optional },)
     });
     let nested = match nested(&inputs) {
@@ -78,7 +133,7 @@ pub(crate) fn inputs(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Token
 
 /// The field fed by the sensor of a nested estimator: the only required one.
 fn nested(inputs: &[Field<'_>]) -> Option<usize> {
-    let mut needed = inputs.iter().enumerate().filter(|(_, field)| !field.optional || inputs.len() == 1);
+    let mut needed = inputs.iter().enumerate().filter(|(_, field)| !field.is_optional() || inputs.len() == 1);
     let (first, _) = needed.next()?;
     needed.next().is_none().then_some(first)
 }
@@ -86,32 +141,30 @@ fn nested(inputs: &[Field<'_>]) -> Option<usize> {
 /// The arrival of the driver, field number `driver`: no input is marked as seen before all others are known to be
 /// present.
 fn input_at(name: &Ident, inputs: &[Field<'_>], driver: usize) -> TokenStream {
-    let Some(Field { slot, payload, .. }) = inputs.get(driver) else {
-        return TokenStream::new();
-    };
+    let Some(driving) = inputs.get(driver) else { return TokenStream::new() };
+    let (slot, payload, slot_type) = (&driving.slot, driving.payload, driving.slot_type());
     let (mut misses, mut view) = (TokenStream::new(), TokenStream::new());
-    for (index, Field { name, slot, optional, .. }) in inputs.iter().enumerate() {
-        let mut value = if index == driver {
-            quote!(::bb_core::__private::Input::new(message))
+    for (index, field) in inputs.iter().enumerate() {
+        let (name, slot) = (field.name, &field.slot);
+        let value = if index == driver {
+            field.driver()
         } else {
             misses.extend(quote! {
-                if let ::core::option::Option::Some(miss) = cache.#slot.miss(time) {
+                if let ::core::option::Option::Some(miss) = ::bb_core::__private::Slot::miss(&cache.#slot, time) {
                     return ::core::result::Result::Err(miss);
                 }
             });
-            if *optional { quote!(cache.#slot.take(time)) } else { quote!(cache.#slot.require(time)?) }
+            field.kept()
         };
-        if index == driver && *optional {
-            value = quote!(::core::option::Option::Some(#value));
-        }
         view.extend(quote!(#name: #value,));
     }
     quote! {
         #[automatically_derived]
         impl ::bb_core::__private::InputAt<#driver> for #name<'static> {
             type Payload = #payload;
+            type Slot = #slot_type;
 
-            fn slot(cache: &mut __Cache) -> ::core::option::Option<&mut ::bb_core::__private::Slot<#payload>> {
+            fn slot(cache: &mut __Cache) -> ::core::option::Option<&mut #slot_type> {
                 ::core::option::Option::Some(&mut cache.#slot)
             }
 

@@ -1,0 +1,150 @@
+//! All messages of an input since the last dispatch.
+
+use super::slot::{Slot, Stored};
+use crate::Payload;
+use crate::declaration::InputDeclaration;
+use crate::message::{Stamped, copy_to};
+use crate::time::MonotonicTime;
+use std::cell::Cell;
+use std::collections::VecDeque;
+use std::iter::Chain;
+use std::slice::Iter;
+
+#[cfg(test)]
+mod tests;
+
+/// All messages of one input of a struct that have arrived since the last run, in order of arrival: none or several.
+///
+/// No message is in two runs. Those older than the driver by more than the declared tolerance are left out; without a tolerance,
+/// messages of any age are in. The estimator can run without such an input. A robot that declares it as required has a run dropped if
+/// the latest message is missing or too old, as for any other input, and the messages wait for the next run.
+///
+/// While the driver is silent, up to [`MOST`](Self::MOST) messages wait for it. Further ones displace the oldest, which is counted as
+/// [`DropReason::Displaced`](crate::run::DropReason::Displaced), and [`lost`](Self::lost) tells how many. Messages that wait when the
+/// estimator is restarted are lost with its state.
+#[derive(Debug)]
+pub struct Every<'a, T> {
+    first: &'a [Stamped<T>],
+    second: &'a [Stamped<T>],
+    lost: u64,
+}
+
+impl<T> Clone for Every<'_, T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T> Copy for Every<'_, T> {}
+
+impl<T> Default for Every<'_, T> {
+    fn default() -> Self {
+        Self::new(&[])
+    }
+}
+
+impl<'a, T> Every<'a, T> {
+    /// The largest number of messages that wait for the driver, the same as in an inbox.
+    pub const MOST: usize = 1024;
+
+    /// Messages that have arrived since the last run.
+    pub fn new(messages: &'a [Stamped<T>]) -> Self {
+        Self { first: messages, second: &[], lost: 0 }
+    }
+
+    /// A single message.
+    pub fn one(message: &'a Stamped<T>) -> Self {
+        Self::new(std::slice::from_ref(message))
+    }
+
+    /// The messages, the oldest first.
+    pub fn iter(&self) -> Chain<Iter<'a, Stamped<T>>, Iter<'a, Stamped<T>>> {
+        self.first.iter().chain(self.second)
+    }
+
+    /// The newest message.
+    pub fn last(&self) -> Option<&'a Stamped<T>> {
+        self.second.last().or(self.first.last())
+    }
+
+    /// The number of messages.
+    pub fn len(&self) -> usize {
+        self.first.len() + self.second.len()
+    }
+
+    /// Whether none has arrived since the last run.
+    pub fn is_empty(&self) -> bool {
+        self.first.is_empty() && self.second.is_empty()
+    }
+
+    /// The number of messages since the last run that were displaced by newer ones or could not be copied, and are not among these.
+    pub fn lost(&self) -> u64 {
+        self.lost
+    }
+}
+
+impl<'a, T> IntoIterator for Every<'a, T> {
+    type Item = &'a Stamped<T>;
+    type IntoIter = Chain<Iter<'a, Stamped<T>>, Iter<'a, Stamped<T>>>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.iter()
+    }
+}
+
+/// The messages of one input since the last dispatch.
+#[doc(hidden)]
+#[derive(Debug)]
+pub struct EverySlot<T> {
+    /// Those that have been seen come first. They are overwritten one by one, so that nothing is allocated in the long run.
+    messages: VecDeque<Stamped<T>>,
+    seen: Cell<usize>,
+    lost: Cell<u64>,
+    declaration: Option<&'static InputDeclaration>,
+}
+
+impl<T> Default for EverySlot<T> {
+    fn default() -> Self {
+        Self { messages: VecDeque::new(), seen: Cell::new(0), lost: Cell::new(0), declaration: None }
+    }
+}
+
+impl<T: Payload> Slot<T> for EverySlot<T> {
+    fn declare(&mut self, declaration: &'static InputDeclaration) {
+        self.declaration = Some(declaration);
+    }
+
+    fn store(&mut self, message: &Stamped<T>) -> Stored {
+        let seen = self.seen.get();
+        let has_displaced = seen == 0 && self.messages.len() >= Every::<T>::MOST;
+        let mut kept = if seen > 0 || has_displaced { self.messages.pop_front() } else { None };
+        self.seen.set(seen.saturating_sub(1));
+        let panic = copy_to(&mut kept, message).err();
+        let is_kept = kept.is_some();
+        self.messages.extend(kept);
+        self.lost.set(self.lost.get() + u64::from(has_displaced) + u64::from(!is_kept));
+        Stored { has_displaced, panic }
+    }
+
+    fn latest(&self) -> (Option<&'static InputDeclaration>, Option<&Stamped<T>>) {
+        (self.declaration, self.messages.back())
+    }
+}
+
+impl<T: Payload> EverySlot<T> {
+    /// Returns the messages that no dispatch has seen and that are not too old for a driver of `time`, and marks all as seen.
+    pub fn take(&self, time: MonotonicTime) -> Every<'_, T> {
+        let Some(declaration) = self.declaration else { return Every::default() };
+        let seen = self.seen.replace(self.messages.len());
+        let is_too_old = |message: &&Stamped<T>| declaration.is_too_old(time.nanos_since(message.monotonic_time));
+        // Stamps do not decrease, so the oldest come first.
+        let seen = seen + self.messages.iter().skip(seen).take_while(is_too_old).count();
+        let (first, second) = self.messages.as_slices();
+        let (in_first, in_second) = (seen.min(first.len()), seen.saturating_sub(first.len()));
+        Every {
+            first: first.get(in_first..).unwrap_or_default(),
+            second: second.get(in_second..).unwrap_or_default(),
+            lost: self.lost.replace(0),
+        }
+    }
+}

@@ -1,0 +1,53 @@
+//! What an input keeps between two dispatches.
+
+use crate::Payload;
+use crate::declaration::InputDeclaration;
+use crate::message::{Panic, Stamped};
+use crate::time::MonotonicTime;
+
+/// Keeps messages of one input until the driver arrives.
+#[doc(hidden)]
+pub trait Slot<T: Payload> {
+    /// Sets the declared input that fills it.
+    fn declare(&mut self, declaration: &'static InputDeclaration);
+
+    /// Keeps a copy of `message`.
+    fn store(&mut self, message: &Stamped<T>) -> Stored;
+
+    /// The declared input, and its latest message.
+    fn latest(&self) -> (Option<&'static InputDeclaration>, Option<&Stamped<T>>);
+
+    /// The miss of a required input that has not arrived, or is too old for a driver of `time`; `None` if there is no
+    /// miss.
+    fn miss(&self, time: MonotonicTime) -> Option<SyncMiss> {
+        let (declaration, message) = self.latest();
+        let declaration = declaration.filter(|declaration| !declaration.optional)?;
+        let Some(message) = message else {
+            return Some(SyncMiss { input: declaration.index, age_nanos: None });
+        };
+        let age_nanos = time.nanos_since(message.monotonic_time);
+        declaration
+            .is_too_old(age_nanos)
+            .then_some(SyncMiss { input: declaration.index, age_nanos: Some(age_nanos) })
+    }
+}
+
+/// What came of keeping a message.
+#[doc(hidden)]
+#[derive(Debug, Default)]
+pub struct Stored {
+    /// A message that no dispatch has seen was dropped to make room.
+    pub(crate) has_displaced: bool,
+    /// The payload's `Clone` panicked.
+    pub(crate) panic: Option<Panic>,
+}
+
+/// The input because of which a dispatch was dropped.
+#[doc(hidden)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SyncMiss {
+    /// Its number among the declared inputs.
+    pub input: usize,
+    /// How much older than the driver it was; `None` if it has not arrived yet.
+    pub age_nanos: Option<i64>,
+}
