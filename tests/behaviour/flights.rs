@@ -278,6 +278,46 @@ fn the_recorder_holds_labels_the_gate_rejections_and_faults() -> Result<(), Box<
     Ok(())
 }
 
+/// A report of spoofing between two samples of the IMU, or while the IMU is silent, is not hidden by those that follow it.
+#[test]
+fn a_report_of_spoofing_blocks_the_gate_however_soon_the_next_one_follows() -> Result<(), StartError> {
+    // What is published after the IMU's sample at 3 s: how many reports that the receiver is stable follow, and over which time.
+    let cases = [(1, 4), (20, 1000), (20, 5000), (2000, 4), (2000, 1900)];
+    for (strategy, (stable, millis)) in
+        ["smoother", "eskf"].into_iter().flat_map(|name| cases.map(|case| (name, case)))
+    {
+        let mut builder = Surveying::builder();
+        let options = builder.options(surveying::estimator::base::navigation);
+        options.strategy = strategy.to_owned();
+        set_origin(options);
+        let live = builder.subscribe(surveying::estimator::base::navigation::events);
+        let mut simulation = builder.simulate()?;
+        simulation.publish(surveying::sensor::base::attitude, at(0), attitude());
+        for step in 1..=600 {
+            simulation.publish(surveying::sensor::base::shelf::board::imu, at(5 * step), at_rest());
+        }
+        let report = |simulation: &mut Simulation<Surveying>, time, health| {
+            simulation.publish(surveying::sensor::base::gps_report, time, GpsReport { health });
+        };
+        report(&mut simulation, at(3000), GpsHealth::Spoofed);
+        for number in 1..=stable {
+            let time = at(3000).plus_nanos(number * millis * 1_000_000 / stable);
+            report(&mut simulation, time, GpsHealth::Stable);
+        }
+        simulation.publish(surveying::sensor::base::shelf::board::imu, at(3001 + millis), at_rest());
+        let events = live.drain().flat_map(|events| events.payload.events);
+        let gate: Vec<_> = events.filter(|event| event.kind == "gate").filter_map(|event| event.to).collect();
+        // One that is more than 2 s old is refused, but blocks the gate up to the newest sample.
+        let expected = if millis > 2000 { &["blocked"][..] } else { &["blocked", "dwelling"] };
+        assert_eq!(gate, expected, "{strategy}: {stable} in {millis} ms");
+        let counts = simulation.report();
+        let displaced: u64 =
+            counts.estimators[0].inputs.iter().map(|input| input.dropped(DropReason::Displaced)).sum();
+        assert_eq!(displaced, (stable as u64 + 1).saturating_sub(1024));
+    }
+    Ok(())
+}
+
 /// The state estimator, held up at each keyframe until it is let go.
 #[derive(Debug)]
 struct Slow(FlightEstimator);
@@ -295,7 +335,7 @@ impl Estimator for Slow {
     }
 
     fn handle_input(&mut self, inputs: FlightInputs<'_>) -> Result<Reply<FlightOutputs>, Fault> {
-        if inputs.vio.is_some_and(|vio| vio.is_new()) {
+        if !inputs.vio.is_empty() {
             KEYFRAMES.fetch_add(1, Ordering::SeqCst);
             while HOLDS.load(Ordering::SeqCst) {
                 std::thread::sleep(Duration::from_millis(1));

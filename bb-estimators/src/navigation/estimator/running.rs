@@ -180,14 +180,13 @@ impl<S: States + Send, const N: usize> Core for Running<S, N> {
         mounting: &Mounting,
     ) -> Result<(), Refusal> {
         self.past.propagate(sample)?;
-        if let Some(fix) = inputs.gnss.filter(|fix| fix.is_new())
-            && let Some(measured) = self.world.fix(&fix.payload, options, mounting)
-        {
+        for fix in inputs.gnss {
+            let Some(measured) = self.world.fix(&fix.payload, options, mounting) else { continue };
             let time_ns = fix.monotonic_time.as_nanos();
             self.world.point(time_ns, &fix.payload, options).into_iter().for_each(|point| self.fixes.see(point));
             self.fuse(time_ns, Measured::Gnss(measured));
         }
-        if let Some(odometry) = inputs.odometry.filter(|odometry| odometry.is_new()) {
+        for odometry in inputs.odometry {
             let time_ns = odometry.monotonic_time.as_nanos();
             if offset::<S>(Optional::WheelScale).is_some() {
                 let (speed, sideways) = mounting.wheels(&odometry.payload, options);
@@ -197,7 +196,7 @@ impl<S: States + Send, const N: usize> Core for Running<S, N> {
                 self.fuse(time_ns, Measured::Odometry(mounting.velocity(&odometry.payload, options)));
             }
         }
-        if let Some(pose) = inputs.pose.filter(|pose| pose.is_new()) {
+        for pose in inputs.pose {
             let measured = self.world.pose(&pose.payload, options, mounting);
             let time_ns = pose.monotonic_time.as_nanos();
             let AbsolutePose { position, position_covariance: covariance, .. } = measured;
@@ -205,18 +204,17 @@ impl<S: States + Send, const N: usize> Core for Running<S, N> {
             self.orientation = Some((measured.world_from_body, measured.rotation_covariance));
             self.fuse(time_ns, Measured::Pose(measured));
         }
-        if let Some(relative) = inputs.relative.filter(|relative| relative.is_new()) {
+        for relative in inputs.relative {
             let end_ns = relative.end.as_nanos();
             let measured = mounting.relative_pose(&relative.payload, options);
             self.fuse(end_ns, Measured::Relative(measured, end_ns));
         }
-        if let Some(field) = inputs.magnetic_field.filter(|field| field.is_new()) {
+        for field in inputs.magnetic_field {
             let measured = mounting.magnetic_heading(&field.payload, options);
             self.fuse(field.monotonic_time.as_nanos(), Measured::MagneticField(measured));
         }
-        if let Some(pressure) = inputs.pressure.filter(|pressure| pressure.is_new())
-            && let Some(at) = self.past.now().estimate()
-        {
+        for pressure in inputs.pressure {
+            let Some(at) = self.past.now().estimate() else { break };
             let drop = self.world.drop(&at.position);
             if let Some(height) = self.heights.of_pressure(&pressure.payload, at, drop, options, mounting) {
                 self.fuse(pressure.monotonic_time.as_nanos(), Measured::Pressure(height));

@@ -65,6 +65,9 @@ use std::time::Duration;
 /// doubled, or at the first anchor. At the origin it is levelled by the input `attitude`, or once it has been at rest for a second.
 /// The body is the IMU, with the axes of the link. The joints give the position of the `gnss` antenna in it.
 ///
+/// Each relative pose, anchor, fix and report on the receiver is taken, however many arrive between two samples of the IMU. If more
+/// reports than [`Every::MOST`](bb_core::Every::MOST) wait for a silent IMU, the estimator assumes that those which were lost told of spoofing.
+///
 /// Estimates are emitted at the output's rate, with the health. Events at the levels error, warn and info, and keyframes that leave
 /// the window, are emitted as they occur: record `events` for a flight-data recorder. All events also go to `tracing` as structured
 /// fields.
@@ -180,20 +183,16 @@ impl Estimator for FlightEstimator {
         (self.last_ns, self.ticks) = (sample.time_ns, 0);
         self.start(&inputs);
         let _ = self.estimator.add_imu(&sample);
-        if let Some(report) = inputs.gps_health.filter(|report| report.is_new()) {
-            let _ = self.estimator.add_gps_health(input::health(report.message()));
+        for report in input::healths(inputs.gps_health, sample.time_ns) {
+            let _ = self.estimator.add_gps_health(report);
         }
-        if let Some(vio) = inputs.vio.filter(|vio| vio.is_new()) {
-            let _ = self.estimator.add_vio(input::vio(vio.message()));
+        for vio in inputs.vio {
+            let _ = self.estimator.add_vio(input::vio(vio));
         }
-        if let Some(anchor) = inputs.anchor.filter(|anchor| anchor.is_new())
-            && let Some(anchor) = input::anchor(anchor.message())
-        {
+        for anchor in inputs.anchor.iter().filter_map(input::anchor) {
             let _ = self.estimator.add_pose_anchor(anchor);
         }
-        if let Some(fix) = inputs.gnss.filter(|fix| fix.is_new())
-            && let Some(fix) = input::fix(fix.message(), &self.mounting)
-        {
+        for fix in inputs.gnss.iter().filter_map(|fix| input::fix(fix, &self.mounting)) {
             let _ = self.estimator.add_gnss(fix);
         }
         Ok(self.reply(sample.time_ns))

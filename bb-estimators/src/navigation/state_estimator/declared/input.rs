@@ -9,7 +9,7 @@ use crate::navigation::state_estimator::{
 use bb_core::message::Stamped;
 use bb_core::payload::{GeodeticPosition, GnssFix, GnssStatus, Imu};
 use bb_core::time::MonotonicTime;
-use bb_core::{Context, Fault, Input, Inputs, Payload};
+use bb_core::{Context, Every, Fault, Input, Inputs, Payload};
 use nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3};
 
 /// The inputs of [`FlightEstimator`](super::FlightEstimator).
@@ -18,13 +18,13 @@ pub struct FlightInputs<'a> {
     /// The inertial sensor: the driver.
     pub imu: Input<'a, Imu>,
     /// Visual-inertial odometry.
-    pub vio: Option<Input<'a, RelativePoseReading>>,
+    pub vio: Every<'a, RelativePoseReading>,
     /// Poses from satellite images.
-    pub anchor: Option<Input<'a, AnchorReading>>,
+    pub anchor: Every<'a, AnchorReading>,
     /// The flight controller's GNSS receiver.
-    pub gnss: Option<Input<'a, GnssFix>>,
-    /// The flight controller's report on that receiver.
-    pub gps_health: Option<Input<'a, GpsReport>>,
+    pub gnss: Every<'a, GnssFix>,
+    /// The flight controller's reports on that receiver.
+    pub gps_health: Every<'a, GpsReport>,
     /// The flight controller's attitude, used to level the start.
     pub attitude: Option<Input<'a, AttitudeReport>>,
     /// The flight controller's own state. The estimator starts from it, and restarts from it when it is lost.
@@ -186,6 +186,13 @@ pub(super) fn fix(fix: &Stamped<GnssFix>, mounting: &Mounting) -> Option<GnssRea
     })
 }
 
-pub(super) fn health(report: &Stamped<GpsReport>) -> GpsHealthReading {
-    GpsHealthReading { time_ns: report.monotonic_time.as_nanos(), health: report.health }
+/// The reports on the receiver. If some were lost, one of them may have told of spoofing.
+pub(super) fn healths(reports: Every<'_, GpsReport>, now_ns: i64) -> impl Iterator<Item = GpsHealthReading> {
+    let of = |report: &Stamped<GpsReport>| GpsHealthReading {
+        time_ns: report.monotonic_time.as_nanos(),
+        health: report.health,
+    };
+    let first_ns = reports.iter().next().map_or(now_ns, |first| first.monotonic_time.as_nanos());
+    let lost = (reports.lost() > 0).then_some(GpsHealthReading { time_ns: first_ns, health: GpsHealth::Spoofed });
+    lost.into_iter().chain(reports.into_iter().map(of))
 }
