@@ -178,7 +178,7 @@ impl Flown {
     }
 
     /// The estimate at the newest keyframe.
-    pub(crate) fn newest(&self) -> Option<Known> {
+    pub(crate) fn newest(&mut self) -> Option<Known> {
         self.estimator.predicted(*self.stamps_ns.last()?).map(|output| self.known(&output))
     }
 

@@ -178,7 +178,7 @@ impl Player {
     }
 
     /// The newest keyframe.
-    pub(crate) fn newest(&self) -> Option<Known> {
+    pub(crate) fn newest(&mut self) -> Option<Known> {
         match self {
             Self::Filter(navigator) => {
                 let (estimate, covariance) = navigator.estimate()?;

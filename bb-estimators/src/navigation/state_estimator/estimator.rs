@@ -163,7 +163,9 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
         first
     }
 
-    /// Adds one sample of the IMU.
+    /// Adds one sample of the IMU. One that is late changes what came since. That is recomputed once it is needed, for all late
+    /// samples at once: when the estimate is read or emitted, with the next input that is no sample, and after at most 0.25 s of
+    /// further samples. Events that follow from it are told then.
     ///
     /// # Errors
     ///
@@ -339,6 +341,7 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
         if !self.emission.is_due(now_ns) {
             return None;
         }
+        self.catch_up();
         let pose = if core::mem::take(&mut self.has_failed) { None } else { self.pose_at(now_ns) };
         let described = pose.and_then(|pose| {
             let sources = *self.queue.engine().sources();
@@ -358,10 +361,18 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
         output
     }
 
+    /// Recomputes what late samples have changed. All that reads the estimate for a user begins with this.
+    fn catch_up(&mut self) {
+        if self.queue.catch_up(&self.config) {
+            self.drain();
+        }
+    }
+
     /// The estimate predicted to a time. Returns `None` if there is no estimate, or if the last sample of the IMU is too old. Up to
-    /// 0.2 s before that sample, it is the estimate at the sample, and its time says so; further back, there is none. Does not change
-    /// the state.
-    pub fn predicted(&self, time_ns: i64) -> Option<EstimatorOutput> {
+    /// 0.2 s before that sample, it is the estimate at the sample, and its time says so; further back, there is none. How often it is
+    /// called does not change the estimate.
+    pub fn predicted(&mut self, time_ns: i64) -> Option<EstimatorOutput> {
+        self.catch_up();
         let pose = self.pose_at(time_ns)?;
         self.describe(&pose, self.queue.engine().sources(), false)
     }
@@ -386,7 +397,8 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
     }
 
     /// The newest keyframe. Later measurements are not in it. `None` before the start, and while the position is lost.
-    pub fn current_estimate(&self) -> Option<EstimatorOutput> {
+    pub fn current_estimate(&mut self) -> Option<EstimatorOutput> {
+        self.catch_up();
         let (pose, sources) = self.queue.engine().newest()?;
         self.describe(&pose, &sources, false)
     }
@@ -395,6 +407,7 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
     /// filter's are as originally estimated, with `smoothed` set to `false`. They are for recorders: only the forward estimate may
     /// be sent out.
     pub fn smoothed_history(&mut self, n: usize) -> Vec<EstimatorOutput> {
+        self.catch_up();
         let most = n.min(self.config.params.window as usize);
         let (history, is_smoothed) = self.queue.engine_mut().history(most);
         let poses: Vec<(Pose, Sources)> = history.collect();
@@ -413,7 +426,8 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
         self.emission.describe(pose, sources, smoothed, engine, &self.config.params)
     }
 
-    /// Health of the estimator.
+    /// Health of the estimator, at the last output or later: late samples may not be in it until they are needed, see
+    /// [`add_imu`](Self::add_imu).
     pub fn health(&self) -> EstimatorHealth {
         let engine = self.queue.engine();
         let now_ns = self.queue.newest().map_or(i64::MIN, |newest| newest.time_ns);
@@ -433,14 +447,15 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
         }
     }
 
-    /// Source of the estimate, at the newest sample of the IMU.
+    /// Source of the estimate, at the newest sample of the IMU. Late samples are in it as in [`health`](Self::health).
     pub fn label(&self) -> SourceLabel {
         self.label
     }
 
     /// The world of factors that outside providers add. `None` before the origin is known. Its origin moves when the robot is more
     /// than 5 km away from it.
-    pub fn frame(&self) -> Option<&LocalFrame> {
+    pub fn frame(&mut self) -> Option<&LocalFrame> {
+        self.catch_up();
         self.queue.engine().world().map(|world| world.frame())
     }
 
@@ -452,6 +467,12 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
     #[cfg(test)]
     pub(super) fn held(&self) -> [usize; 3] {
         self.queue.held()
+    }
+
+    /// The time up to which the engine has run.
+    #[cfg(test)]
+    pub(super) fn run_ns(&self) -> Option<i64> {
+        self.queue.engine().now_ns()
     }
 }
 

@@ -1,8 +1,8 @@
 //! The single queue of all inputs, ordered by stamp, and the only writer that follows it.
 //!
 //! The engine is run up to the newest input that is not a sample of the IMU. Later IMU samples only feed the predictor. A late
-//! input is inserted at its place, and the engine is run again from its last copy before that input. The result equals that of
-//! inputs that arrive in order, to the last bit.
+//! input is inserted at its place, and the engine is run again from its last copy before that input: at once, or for a late sample
+//! of the IMU once the estimate is needed, see [`reruns`]. The result equals that of inputs that arrive in order, to the last bit.
 
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
@@ -22,6 +22,7 @@ use crate::attitude::ParamsError;
 use crate::navigation::eskf::ImuMean;
 use crate::navigation::refusal::Refusal;
 
+mod reruns;
 mod samples;
 
 /// Number of copies of the engine: as many as cover the lateness, at the time between them.
@@ -94,6 +95,9 @@ pub(super) struct Queue<F: ProvidedFactor> {
     inputs: VecDeque<Entry<F>>,
     engine: Engine<F>,
     copies: VecDeque<Engine<F>>,
+    /// The first place at which the queue has changed since the engine and the predictor were run. While there is one, neither
+    /// runs on, and no copy is made.
+    changed: Option<Key>,
     predictor: Option<Predictor>,
     newest: Option<ImuMean>,
     /// The first sample, until another stamp agrees with its own.
@@ -121,6 +125,7 @@ impl<F: ProvidedFactor> Queue<F> {
             inputs: VecDeque::with_capacity(rooms.inputs),
             engine,
             copies,
+            changed: None,
             predictor: None,
             newest: None,
             first: None,
@@ -144,6 +149,7 @@ impl<F: ProvidedFactor> Queue<F> {
         self.copies.iter_mut().for_each(|copy| copy.set_origin(origin));
     }
 
+    /// The engine as of the last run, see [`catch_up`](Self::catch_up).
     pub(super) fn engine(&self) -> &Engine<F> {
         &self.engine
     }
@@ -152,6 +158,7 @@ impl<F: ProvidedFactor> Queue<F> {
         &mut self.engine
     }
 
+    /// The predictor as of the last run, see [`catch_up`](Self::catch_up).
     pub(super) fn predictor(&self) -> Option<&Predictor> {
         self.predictor.as_ref()
     }
@@ -234,14 +241,16 @@ impl<F: ProvidedFactor> Queue<F> {
         let result = self.place(time_ns, payload, frames, config);
         result.map_err(|reason| {
             if is_alarm && reason != Reason::Duplicate {
-                self.block();
+                self.block(config);
             }
             self.count(reason)
         })
     }
 
     /// Blocks the gate: a report of spoofing was refused.
-    fn block(&mut self) {
+    fn block(&mut self, config: &StateEstimatorConfig) {
+        // Fixes that were in the estimate before the report remain there: a run that is repeated from a blocked copy drops them.
+        self.catch_up(config);
         let until_ns = self.newest.map(|newest| newest.time_ns);
         self.engine.block(until_ns);
         self.copies.iter_mut().for_each(|copy| copy.block(until_ns));
@@ -271,24 +280,25 @@ impl<F: ProvidedFactor> Queue<F> {
         if self.inputs.len() + 1 + frames.len() > room {
             return Err(Reason::Overflow);
         }
+        let is_past = |at_ns: i64| newest_ns.is_some_and(|newest_ns| at_ns <= newest_ns);
         let mut first = key;
+        let mut until_ns = Some(time_ns).filter(|time_ns| is_past(*time_ns));
         self.insert(key, payload);
         for frame_ns in frames.iter().filter(|frame_ns| **frame_ns >= oldest_ns) {
             let frame = Payload::<F>::Frame.key(*frame_ns);
             if self.reaches(frame) && self.inputs.binary_search_by(|entry| entry.key.cmp(&frame)).is_err() {
                 self.insert(frame, Payload::Frame);
                 first = first.min(frame);
+                // The relative pose may have to wait for the IMU, but it begins where this is.
+                until_ns = until_ns.max(Some(*frame_ns).filter(|frame_ns| is_past(*frame_ns)));
             }
-        }
-        if newest_ns.is_none_or(|newest_ns| time_ns > newest_ns) {
-            return Ok(key);
         }
         if first < self.engine.key() {
             self.counts.late += 1;
-            let until_ns = self.engine.now_ns().map_or(time_ns, |now_ns| now_ns.max(time_ns));
-            self.run_again(first, until_ns, config);
-        } else {
-            self.settle(time_ns, config);
+            self.change(first);
+        }
+        if let Some(until_ns) = until_ns {
+            self.settle(until_ns, config);
         }
         Ok(key)
     }
@@ -296,37 +306,6 @@ impl<F: ProvidedFactor> Queue<F> {
     fn insert(&mut self, key: Key, payload: Payload<F>) {
         let index = self.inputs.partition_point(|entry| entry.key < key);
         self.inputs.insert(index, Entry { key, payload, outcome: None, rejection: None });
-    }
-
-    /// Runs the engine on, through all inputs stamped up to a time.
-    fn settle(&mut self, until_ns: i64, config: &StateEstimatorConfig) {
-        self.run(until_ns, config);
-        self.forget(config);
-        self.predict(config);
-    }
-
-    /// Runs the engine again from a copy before an input.
-    fn run_again(&mut self, from: Key, until_ns: i64, config: &StateEstimatorConfig) {
-        self.take_back(from);
-        self.settle(until_ns, config);
-    }
-
-    fn take_back(&mut self, from: Key) {
-        while self.copies.len() > 1 && self.copies.back().is_some_and(|copy| copy.key() >= from) {
-            self.copies.pop_back();
-        }
-        if let Some(copy) = self.copies.back() {
-            self.engine = copy.clone();
-            self.counts.reruns += 1;
-        }
-    }
-
-    fn run(&mut self, until_ns: i64, config: &StateEstimatorConfig) {
-        let until = Key::end_of(until_ns);
-        // Every input breaks the engine at most once.
-        while let Err(broken) = self.run_until(until, config) {
-            self.take_back(broken);
-        }
     }
 
     /// Runs the engine on. An input that breaks it is marked, and the engine must be restored from a copy.

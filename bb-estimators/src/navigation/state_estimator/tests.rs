@@ -11,6 +11,7 @@ mod gate;
 mod gate_limits;
 mod interface;
 mod labels;
+mod late_samples;
 mod limits;
 mod obeyed;
 mod order;

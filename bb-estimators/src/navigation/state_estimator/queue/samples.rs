@@ -46,13 +46,17 @@ impl<F: ProvidedFactor> Queue<F> {
         self.newest = Some(*sample);
         self.samples.push_back(*sample);
         let is_gap = time_ns.saturating_sub(newest.time_ns) > ns(config.sensors.longest_sample);
-        if self.predictor.as_mut().is_some_and(|predictor| predictor.propagate(sample, is_gap).is_err()) {
+        // After a change it is made anew before it is read.
+        let is_current = self.changed.is_none();
+        if is_current
+            && self.predictor.as_mut().is_some_and(|predictor| predictor.propagate(sample, is_gap).is_err())
+        {
             self.predictor = None;
         }
         let waits = |entry: &Entry<F>| entry.key > self.engine.key() && entry.key.time_ns <= time_ns;
         let behind_ns = self.engine.now_ns().map_or(i64::MAX, |now_ns| time_ns.saturating_sub(now_ns));
-        let is_running = self.engine.condition() == Condition::Running;
-        if !is_running || behind_ns > LONGEST_TAIL_NS {
+        let is_starting = is_current && self.engine.condition() != Condition::Running;
+        if is_starting || behind_ns > LONGEST_TAIL_NS {
             self.settle(time_ns, config);
         } else if let Some(last) = self.inputs.iter().rev().find(|entry| waits(entry)).map(|entry| entry.key) {
             self.settle(last.time_ns, config);
@@ -130,11 +134,12 @@ impl<F: ProvidedFactor> Queue<F> {
         self.newest = Some(*sample);
         self.samples.push_back(*sample);
         if is_alarmed {
-            self.block();
+            self.block(config);
         }
         self.settle(sample.time_ns, config);
     }
 
+    /// Inserts a sample at its place. The engine is not run: more such samples may follow.
     fn place_late_sample(&mut self, sample: &ImuMean, config: &StateEstimatorConfig) -> Result<Sampled, Reason> {
         let time_ns = sample.time_ns;
         if self.samples.binary_search_by_key(&time_ns, |other| other.time_ns).is_ok() {
@@ -151,12 +156,7 @@ impl<F: ProvidedFactor> Queue<F> {
         }
         self.samples.insert(index, *sample);
         self.counts.late += 1;
-        let engine_ns = self.engine.now_ns().unwrap_or(i64::MIN);
-        if from < self.engine.key() {
-            self.run_again(from, engine_ns, config);
-        } else {
-            self.predict(config);
-        }
+        self.change(from);
         Ok(Sampled::Taken)
     }
 
@@ -200,7 +200,7 @@ impl<F: ProvidedFactor> Queue<F> {
                 continue;
             }
             if self.inputs.remove(index).is_some_and(|entry| entry.payload.is_alarm()) {
-                self.block();
+                self.block(config);
             }
             if is_added {
                 let reason = self.count(stranger(key.time_ns, time_ns).into());

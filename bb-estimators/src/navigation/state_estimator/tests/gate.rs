@@ -362,7 +362,7 @@ fn what_an_anchor_corrects_is_no_difference_to_a_fix() {
             for sent in &flight.sent(true, true, true) {
                 let time_ns = sent.time_ns();
                 let is_blind = time_ns > 10 * SECOND;
-                let off = |estimator: &Estimator| {
+                let off = |estimator: &mut Estimator| {
                     estimator.predicted(time_ns).map(|output| (flight.error(&output).0, output))
                 };
                 match sent {
@@ -372,14 +372,14 @@ fn what_an_anchor_corrects_is_no_difference_to_a_fix() {
                     }
                     Sent::Fix(_) if time_ns < 22 * SECOND => {}
                     Sent::Fix(fix) => {
-                        let (_, estimate) = off(&estimator).unwrap();
+                        let (_, estimate) = off(&mut estimator).unwrap();
                         let position = if is_genuine { fix.position } else { estimate.position };
                         let added = estimator.add_gnss(GnssReading { position, ..*fix });
                         assert!(matches!(added, Ok(Added::Waits)), "it is judged with the next sample: {added:?}");
                     }
                     Sent::Vio(_) if is_blind => {}
                     Sent::Anchor(anchor) if is_blind => {
-                        let (error_m, _) = off(&estimator).unwrap();
+                        let (error_m, _) = off(&mut estimator).unwrap();
                         if time_ns > 23 * SECOND && error_m > 40.0 {
                             assert!(error_m < 200.0, "{error_m}");
                             let added = estimator.add_pose_anchor(*anchor).unwrap();

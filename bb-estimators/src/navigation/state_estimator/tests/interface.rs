@@ -136,7 +136,7 @@ fn without_an_attitude_rest_levels_the_start() {
 fn a_warm_start_inflates_what_the_flight_controller_says() {
     let flight = Flight::new(2, 1);
     for strategy in StrategyKind::ALL {
-        let estimator = started(&flight, *strategy);
+        let mut estimator = started(&flight, *strategy);
         let start = estimator.predicted(STEP).unwrap();
         // 1 m, doubled, and 0.03 rad, doubled.
         assert!((start.covariance[(0, 0)].sqrt() - 2.0).abs() < 0.01, "{}", start.covariance[(0, 0)].sqrt());
@@ -148,7 +148,6 @@ fn a_warm_start_inflates_what_the_flight_controller_says() {
             (event.kind, event.level()),
             (EventKind::Started { from: StartedFrom::FlightController }, Level::Info)
         );
-        let mut estimator = estimator;
         let again = estimator.warm_start(flight.warm_start(STEP));
         assert_eq!(again, Err(EstimatorError::Degraded(Reason::Duplicate)), "it runs");
     }

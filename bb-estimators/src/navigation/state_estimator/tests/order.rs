@@ -6,7 +6,7 @@ use crate::navigation::Refusal;
 use proptest::prelude::*;
 
 /// All query results.
-fn answers(estimator: &mut Estimator) -> impl PartialEq + core::fmt::Debug + use<> {
+pub(super) fn answers(estimator: &mut Estimator) -> impl PartialEq + core::fmt::Debug + use<> {
     let now_ns = 3 * SECOND;
     let gate = estimator.health().gate;
     (

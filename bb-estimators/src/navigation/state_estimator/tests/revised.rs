@@ -97,7 +97,7 @@ fn an_input_that_breaks_the_estimate_after_all_is_fatal() {
     let flight = Flight::new(3, 1);
     for strategy in StrategyKind::ALL {
         let mut estimator = flown(&flight, *strategy);
-        let x = |estimator: &Providing, time_ns| {
+        let x = |estimator: &mut Providing, time_ns| {
             let position = estimator.predicted(time_ns).unwrap().position;
             estimator.frame().unwrap().position(&position).x
         };
@@ -111,9 +111,9 @@ fn an_input_that_breaks_the_estimate_after_all_is_fatal() {
         let near = Provided::Near(truth_x - origin_x);
         assert!(matches!(estimator.add_factor(at(3), 0, near), Ok(Added::Taken { .. })), "{}", strategy.name());
         assert!(estimator.tick(3 * SECOND).is_some());
-        let (before, was) = (estimator.sink().len(), x(&estimator, 3 * SECOND));
+        let (before, was) = (estimator.sink().len(), x(&mut estimator, 3 * SECOND));
         assert!(estimator.add_pose_anchor(anchor(&flight, 2 * SECOND, 6.0, 0.1)).is_ok());
-        assert!((x(&estimator, 3 * SECOND) - was) > 3.0, "the anchor is in the estimate");
+        assert!((x(&mut estimator, 3 * SECOND) - was) > 3.0, "the anchor is in the estimate");
         let told_of = told(&estimator.sink()[before..], InputKind::Factor, at(3));
         let [("fatal", Level::Error, Some(Reason::Refused(refusal)))] = told_of[..] else {
             panic!("{}: {told_of:?}", strategy.name())
