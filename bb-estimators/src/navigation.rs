@@ -39,6 +39,8 @@ mod navigator;
 mod noise;
 pub mod planar;
 mod propagate;
+#[cfg(feature = "eskf")]
+mod realignment;
 mod refusal;
 #[cfg(any(feature = "smoother", feature = "eskf"))]
 pub mod smoother;
@@ -74,11 +76,9 @@ pub use refusal::Refusal;
 #[cfg(feature = "autodiff")]
 pub use smoother::{Automatic, Differentiable, Expectation};
 #[cfg(any(feature = "smoother", feature = "eskf"))]
-pub use smoother::{Factor, Kernel, NavigationFactor, Rows};
+pub use smoother::{Factor, Kernel, NavigationFactor, Preintegration, Rows};
 #[cfg(feature = "smoother")]
-pub use smoother::{
-    FixedLagSmoother, LandmarkParams, Observation, Preintegration, Sighted, SmootherParams, Updated,
-};
+pub use smoother::{FixedLagSmoother, LandmarkParams, Observation, Sighted, SmootherParams, Updated};
 pub use state::{
     ACCELEROMETER_BIAS, Estimate, GYROSCOPE_BIAS, Keyframe, NAVIGATION, Navigation, Optional, POSITION, ROTATION,
     States, VELOCITY, Wheeled, offset,

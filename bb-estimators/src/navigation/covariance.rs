@@ -244,6 +244,17 @@ impl<const N: usize> Covariance<N> {
         self.enforce();
     }
 
+    /// Restores the covariances between those states that are held. The others keep what an update has made of them: together a covariance,
+    /// since that differs from one by `P_h Hᵀ S⁻¹ H P_h`.
+    #[cold]
+    pub(in crate::navigation) fn restore(&mut self, before: &Self, is_held: impl Fn(usize) -> bool) {
+        for i in (0..N).filter(|i| is_held(*i)) {
+            for j in (0..N).filter(|j| is_held(*j)) {
+                self.rows_mut()[i][j] = before.rows()[i][j];
+            }
+        }
+    }
+
     /// Adds to a variance.
     pub(in crate::navigation) fn inflate(&mut self, state: usize, variance: f64) {
         self.rows_mut()[state][state] += variance;

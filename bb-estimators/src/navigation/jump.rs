@@ -18,7 +18,7 @@ const LONGEST_CLOSED_S: f64 = 10.0;
 const BACK: f64 = 0.5;
 
 /// The deviation of an attitude of which nothing is known, rad: uniform over a turn.
-const UNKNOWN: f64 = 1.813_799_364_234_218;
+pub(in crate::navigation) const UNKNOWN: f64 = 1.813_799_364_234_218;
 
 /// A jump of the bias that may be the fault of a sensor, about `A` axes.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -59,7 +59,6 @@ mod link;
 mod matrix;
 #[cfg(feature = "smoother")]
 mod params;
-#[cfg(feature = "smoother")]
 mod preintegration;
 mod relative;
 mod rows;
@@ -80,7 +79,6 @@ pub use filter::FixedLagSmoother;
 pub use kernel::Kernel;
 #[cfg(feature = "smoother")]
 pub use params::{LandmarkParams, SmootherParams};
-#[cfg(feature = "smoother")]
 pub use preintegration::Preintegration;
 pub use rows::{MOST_ROWS, Rows};
 #[cfg(feature = "smoother")]

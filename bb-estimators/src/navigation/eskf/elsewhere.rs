@@ -5,6 +5,8 @@ use nalgebra::{Isometry3, Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 use super::filter::Eskf;
 use crate::navigation::bounds::is_on_earth;
 use crate::navigation::covariance::Covariance;
+#[cfg(feature = "eskf")]
+use crate::navigation::jump::UNKNOWN;
 use crate::navigation::math::unit;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{
@@ -135,6 +137,73 @@ impl<S: States, const N: usize> Eskf<S, N> {
             jump.relocated();
         }
         Ok(())
+    }
+
+    /// Whether the attitude is too uncertain to be corrected linearly. Specific forces then do not tell where the body accelerates to: it is
+    /// assumed to keep its velocity, up to the gap noise in the parameters. Measurements correct position and velocity alone, as if their
+    /// gain for all other states were zero (S. F. Schmidt, "Application of state-space methods to navigation problems", Advances in
+    /// Control Systems 3, 1966): the covariance takes the uncertainty of the others into account, and that does not shrink.
+    #[cfg(feature = "eskf")]
+    pub(crate) fn hold_attitude(&mut self, is_held: bool) {
+        self.holds_attitude = is_held;
+    }
+
+    /// Whether an error is one of position or velocity, of the body or of the keyframe.
+    pub(super) fn is_motion(error: usize) -> bool {
+        let of_keyframe = offset::<S>(Optional::Keyframe).map(|first| first..first + 3);
+        error < ROTATION || of_keyframe.is_some_and(|errors| errors.contains(&error))
+    }
+
+    /// The part of an error that is one of position or velocity.
+    #[cold]
+    pub(super) fn of_motion(error: &SVector<f64, N>) -> SVector<f64, N> {
+        SVector::from_fn(|i, _| if Self::is_motion(i) { error[i] } else { 0.0 })
+    }
+
+    /// Sets the attitude and its covariance. It is uncorrelated with all other states, which stay as they are. There is no keyframe afterwards.
+    #[cfg(feature = "eskf")]
+    pub(crate) fn set_attitude(
+        &mut self,
+        world_from_body: &UnitQuaternion<f64>,
+        covariance: &Matrix3<f64>,
+    ) -> Result<(), Refusal> {
+        let world_from_body = unit(world_from_body).ok_or(Refusal::NonFinite)?;
+        let estimate = self.estimate.as_mut().ok_or(Refusal::NotStarted)?;
+        (estimate.world_from_body, estimate.keyframe) = (world_from_body, None);
+        self.covariance.set(ROTATION, covariance);
+        if let Some(first) = offset::<S>(Optional::Keyframe) {
+            let variance = self.params.variance(Optional::Keyframe);
+            (first..first + 6).for_each(|i| self.covariance.forget(i, variance));
+        }
+        if let Some(jump) = &mut self.jump {
+            jump.relocated();
+        }
+        self.covariance.enforce();
+        Ok(())
+    }
+
+    /// Sets the attitude to that of the keyframe and a turn since, which has this variance, rad²: as far as they are known from the keyframe,
+    /// the correlations with other states are those of the keyframe.
+    #[cfg(feature = "eskf")]
+    pub(crate) fn set_attitude_from_keyframe(
+        &mut self,
+        keyframe_from_body: &UnitQuaternion<f64>,
+        variance: f64,
+    ) -> Result<(), Refusal> {
+        let estimate = self.estimate.as_mut().ok_or(Refusal::NotStarted)?;
+        let (Some(keyframe), Some(first)) = (estimate.keyframe, offset::<S>(Optional::Keyframe)) else {
+            return Err(Refusal::NotObservable);
+        };
+        estimate.world_from_body = unit(&(keyframe.world_from_body * keyframe_from_body)).ok_or(Refusal::NonFinite)?;
+        (0..3).for_each(|i| self.covariance.copy(first + 3 + i, ROTATION + i, variance));
+        self.covariance.enforce();
+        Ok(())
+    }
+
+    /// Makes the attitude unknown, and uncorrelated with all other states.
+    #[cfg(feature = "eskf")]
+    pub(crate) fn forget_attitude(&mut self) {
+        self.covariance.set(ROTATION, &(Matrix3::identity() * (UNKNOWN * UNKNOWN)));
     }
 
     /// Makes the current pose the keyframe for relative poses. A filter without [`Optional::Keyframe`] ignores the call.

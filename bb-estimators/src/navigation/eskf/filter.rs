@@ -58,6 +58,8 @@ pub struct Eskf<S: States = Navigation, const N: usize = NAVIGATION> {
     pub(super) upkeep: Upkeep,
     /// A jump of the gyroscope's bias that may be the fault of a sensor.
     pub(super) jump: Option<BiasJump<3>>,
+    /// Whether measurements correct position and velocity alone.
+    pub(super) holds_attitude: bool,
     states: core::marker::PhantomData<S>,
 }
 
@@ -78,7 +80,8 @@ impl<S: States, const N: usize> Eskf<S, N> {
         let densities = params.densities();
         let covariance = Covariance::new();
         let states = core::marker::PhantomData;
-        Ok(Self { params, densities, estimate: None, covariance, upkeep: Upkeep::default(), jump: None, states })
+        let upkeep = Upkeep::default();
+        Ok(Self { params, densities, estimate: None, covariance, upkeep, jump: None, holds_attitude: false, states })
     }
 
     /// The parameters that the filter was created with.
@@ -128,6 +131,10 @@ impl<S: States, const N: usize> Eskf<S, N> {
         let dt = seconds_between(estimate.time_ns, sample.time_ns)?;
         if is_gap || dt > self.params.longest_sample {
             self.bridge(sample.time_ns, dt)?;
+            return Ok(());
+        }
+        if self.holds_attitude {
+            self.drift(sample, dt);
             return Ok(());
         }
         estimate.time_ns = sample.time_ns;
@@ -181,6 +188,21 @@ impl<S: States, const N: usize> Eskf<S, N> {
         self.upkeep.bridged();
         self.decay(dt);
         Ok(())
+    }
+
+    /// Propagates over a sample of the IMU with an unknown attitude, of which only the angular velocity is of use.
+    #[cold]
+    fn drift(&mut self, sample: &ImuMean, dt: f64) {
+        let Some(estimate) = &mut self.estimate else { return };
+        let up = Vector3::new(0.0, 0.0, self.params.gravity);
+        estimate.time_ns = sample.time_ns;
+        estimate.angular_velocity = sample.angular_velocity - estimate.gyroscope_bias;
+        estimate.specific_force = estimate.world_from_body.inverse_transform_vector(&up);
+        let transition = Transition::advance(estimate, dt, self.params.gravity).without_force();
+        let ImuDensities { accelerometer, .. } = self.params.gap_densities();
+        transition.apply(self.covariance.rows_mut(), &ImuDensities { accelerometer, ..self.densities });
+        self.covariance.bound(&Self::LAYOUT);
+        self.decay(dt);
     }
 
     /// Corrects the filter with a measurement taken at its current time.
@@ -241,15 +263,22 @@ impl<S: States, const N: usize> Eskf<S, N> {
             weighed.undo(&mut self.covariance);
             return Err(Refusal::OutOfRange);
         }
+        let before = self.holds_attitude.then_some(self.covariance);
+        let error = if self.holds_attitude { Self::of_motion(&error) } else { error };
         let corrected = self.estimate.as_ref().ok_or(Refusal::NotStarted)?.corrected::<S>(&error);
         self.estimate = Some(corrected);
         self.covariance.update(&weighed.innovation);
         if Self::fixes_position(&model) {
             self.upkeep.fixed_ns = corrected.time_ns;
         }
-        self.reset_rotation(ROTATION, &error);
-        if let Some(index) = offset::<S>(Optional::Keyframe) {
-            self.reset_rotation(index + 3, &error);
+        match before {
+            Some(before) => self.covariance.restore(&before, |error| !Self::is_motion(error)),
+            None => {
+                self.reset_rotation(ROTATION, &error);
+                if let Some(index) = offset::<S>(Optional::Keyframe) {
+                    self.reset_rotation(index + 3, &error);
+                }
+            }
         }
         if weighed.is_raised() {
             self.doubt(stream, &model, &error);

@@ -22,10 +22,10 @@ use crate::navigation::state::{ACCELEROMETER_BIAS, GYROSCOPE_BIAS, NAVIGATION, P
 
 /// A 3 × 3 matrix for each of position, velocity and rotation.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Columns {
-    pub(super) position: Matrix3<f64>,
-    pub(super) velocity: Matrix3<f64>,
-    pub(super) rotation: Matrix3<f64>,
+pub(in crate::navigation) struct Columns {
+    pub(in crate::navigation) position: Matrix3<f64>,
+    pub(in crate::navigation) velocity: Matrix3<f64>,
+    pub(in crate::navigation) rotation: Matrix3<f64>,
 }
 
 /// The motion over IMU samples, its derivatives with respect to the biases, and its covariance.
@@ -53,9 +53,9 @@ pub struct Preintegration {
     velocity: Vector3<f64>,
     rotation: UnitQuaternion<f64>,
     /// Derivatives with respect to the accelerometer's bias; zero for the rotation.
-    pub(super) by_accelerometer: Columns,
+    pub(in crate::navigation) by_accelerometer: Columns,
     /// Derivatives with respect to the gyroscope's bias.
-    pub(super) by_gyroscope: Columns,
+    pub(in crate::navigation) by_gyroscope: Columns,
     /// Covariance of y with the accelerometer's bias; see [`add_covariance`](Self::add_covariance).
     with_accelerometer: Columns,
     /// Covariance of y with the gyroscope's bias.

@@ -9,7 +9,7 @@ use super::error::Reason;
 use super::event::StartedFrom;
 use super::factor::ProvidedFactor;
 use super::gate::{Rejection, SpoofGate};
-use super::input::{ImuBias, MOST_VELOCITY, TakeoffOrigin};
+use super::input::{AttitudeReading, ImuBias, MOST_VELOCITY, TakeoffOrigin};
 use super::label::Sources;
 use super::params::{StateEstimatorConfig, ns};
 use super::start::{Starter, warm};
@@ -181,7 +181,10 @@ impl<F: ProvidedFactor> Engine<F> {
     }
 
     pub(super) fn is_degraded(&self, time_ns: i64) -> bool {
-        self.degraded_ns.is_some_and(|(from_ns, until_ns)| (from_ns..=until_ns).contains(&time_ns))
+        let is_within = |(from_ns, until_ns)| (from_ns..=until_ns).contains(&time_ns);
+        // Until now, and what is predicted from now on.
+        let is_now = !self.strategy.is_attitude_known() && self.now_ns.is_none_or(|now_ns| time_ns >= now_ns);
+        is_now || self.degraded_ns.is_some_and(is_within)
     }
 
     pub(super) fn predictor(&self) -> Option<Predictor> {
@@ -282,6 +285,11 @@ impl<F: ProvidedFactor> Engine<F> {
                 if is_missing || self.unconfirmed > 0 || !self.strategy.is_converged() {
                     self.distrust(sample.time_ns);
                 }
+                if !self.strategy.is_attitude_known() {
+                    // Until the next sample.
+                    let until_ns = sample.time_ns.saturating_add(ns(config.sensors.longest_sample));
+                    self.distrust_until(sample.time_ns, until_ns);
+                }
                 match result {
                     Ok(()) if !self.is_bounded() => {
                         self.phase = Phase::Lost;
@@ -334,8 +342,10 @@ impl<F: ProvidedFactor> Engine<F> {
                 }
             }
             Payload::Attitude(attitude) => {
-                if let Phase::Starting(starter) = &mut self.phase {
-                    starter.attitude(attitude);
+                match &mut self.phase {
+                    Phase::Starting(starter) => starter.attitude(attitude),
+                    Phase::Running => self.level(attitude),
+                    Phase::Lost => {}
                 }
                 Ok(None)
             }
@@ -374,6 +384,24 @@ impl<F: ProvidedFactor> Engine<F> {
         (outcome, rejection)
     }
 
+    /// An attitude of the flight controller determines one that an outage of the IMU has left unknown.
+    fn level(&mut self, attitude: &AttitudeReading) {
+        let (Some(world), Some((position, _))) = (&self.world, self.strategy.motion()) else { return };
+        if !self.strategy.is_attitude_lost() {
+            return;
+        }
+        let turn = world.local(&position).1.inverse();
+        let matrix = turn.to_rotation_matrix().into_inner();
+        let covariance = matrix * attitude.covariance() * matrix.transpose();
+        self.strategy.level(&(turn * attitude.world_from_body), &covariance);
+        self.realigned(true);
+    }
+
+    /// Counts the jump of an estimate whose attitude was lost, if it is no longer.
+    fn realigned(&mut self, was_lost: bool) {
+        self.resets = self.resets.wrapping_add(u32::from(was_lost && !self.strategy.is_attitude_lost()));
+    }
+
     fn start(&mut self, start: &Start, from: StartedFrom) -> Result<(), Reason> {
         self.strategy.start(start)?;
         self.phase = Phase::Running;
@@ -385,9 +413,13 @@ impl<F: ProvidedFactor> Engine<F> {
     }
 
     fn distrust(&mut self, now_ns: i64) {
+        self.distrust_until(now_ns, now_ns.saturating_add(ns(DISTRUST)));
+    }
+
+    fn distrust_until(&mut self, now_ns: i64, until_ns: i64) {
         let goes_on = self.degraded_ns.filter(|(_, until_ns)| now_ns <= *until_ns);
-        let from_ns = goes_on.map_or(now_ns, |(from_ns, _)| from_ns);
-        self.degraded_ns = Some((from_ns, now_ns.saturating_add(ns(DISTRUST))));
+        let (from_ns, before_ns) = goes_on.unwrap_or((now_ns, until_ns));
+        self.degraded_ns = Some((from_ns, until_ns.max(before_ns)));
     }
 
     /// Updates that follow every change of the strategy's state.

@@ -251,6 +251,37 @@ impl<F: ProvidedFactor> Strategy<F> {
         }
     }
 
+    /// Whether the attitude is to be trusted. It is not after an outage of the IMU, until it was determined anew.
+    pub(super) fn is_attitude_known(&self) -> bool {
+        match self {
+            // It linearises again until it converges.
+            #[cfg(feature = "smoother")]
+            Self::Smoother(_) => true,
+            #[cfg(feature = "eskf")]
+            Self::Eskf(strategy, _) => strategy.is_attitude_known(),
+        }
+    }
+
+    /// Whether the attitude is too uncertain to be corrected, see [`level`](Self::level).
+    pub(super) fn is_attitude_lost(&self) -> bool {
+        match self {
+            #[cfg(feature = "smoother")]
+            Self::Smoother(_) => false,
+            #[cfg(feature = "eskf")]
+            Self::Eskf(strategy, _) => strategy.is_lost(),
+        }
+    }
+
+    /// Takes the attitude of another source, with its covariance, if it is lost.
+    pub(super) fn level(&mut self, world_from_body: &UnitQuaternion<f64>, covariance: &Matrix3<f64>) {
+        match self {
+            #[cfg(feature = "smoother")]
+            Self::Smoother(_) => {}
+            #[cfg(feature = "eskf")]
+            Self::Eskf(strategy, _) => strategy.level(world_from_body, covariance),
+        }
+    }
+
     /// Present position and velocity.
     pub(super) fn motion(&self) -> Option<(Vector3<f64>, Vector3<f64>)> {
         each!(self, strategy => strategy.motion())

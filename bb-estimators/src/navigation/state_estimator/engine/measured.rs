@@ -37,7 +37,9 @@ impl<F: ProvidedFactor> Engine<F> {
         if !matches!(self.phase, Phase::Running) {
             return Err(Refusal::NotStarted.into());
         }
+        let was_lost = self.strategy.is_attitude_lost();
         let result = self.strategy.measure(measured);
+        self.realigned(was_lost);
         let is_relative = matches!(measured, Measured::Relative(_));
         match &result {
             // After this, its earlier position is not reliable either.
