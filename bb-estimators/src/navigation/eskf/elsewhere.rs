@@ -194,7 +194,8 @@ impl<S: States, const N: usize> Eskf<S, N> {
         let (Some(keyframe), Some(first)) = (estimate.keyframe, offset::<S>(Optional::Keyframe)) else {
             return Err(Refusal::NotObservable);
         };
-        estimate.world_from_body = unit(&(keyframe.world_from_body * keyframe_from_body)).ok_or(Refusal::NonFinite)?;
+        estimate.world_from_body =
+            unit(&(keyframe.world_from_body * keyframe_from_body)).ok_or(Refusal::NonFinite)?;
         (0..3).for_each(|i| self.covariance.copy(first + 3 + i, ROTATION + i, variance));
         self.covariance.enforce();
         Ok(())

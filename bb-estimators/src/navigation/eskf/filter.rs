@@ -81,7 +81,16 @@ impl<S: States, const N: usize> Eskf<S, N> {
         let covariance = Covariance::new();
         let states = core::marker::PhantomData;
         let upkeep = Upkeep::default();
-        Ok(Self { params, densities, estimate: None, covariance, upkeep, jump: None, holds_attitude: false, states })
+        Ok(Self {
+            params,
+            densities,
+            estimate: None,
+            covariance,
+            upkeep,
+            jump: None,
+            holds_attitude: false,
+            states,
+        })
     }
 
     /// The parameters that the filter was created with.

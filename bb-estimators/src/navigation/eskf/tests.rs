@@ -4,6 +4,8 @@ mod adopt;
 mod attack;
 mod cases;
 mod consistency;
+#[cfg(feature = "eskf")]
+mod held;
 mod jacobians;
 mod laws;
 mod patience;

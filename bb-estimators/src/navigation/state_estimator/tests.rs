@@ -18,6 +18,8 @@ mod order;
 mod outages;
 mod provided;
 mod rates;
+#[cfg(feature = "eskf")]
+mod realigning;
 mod records;
 mod refusals;
 mod revised;

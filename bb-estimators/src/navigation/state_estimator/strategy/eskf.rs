@@ -28,7 +28,9 @@ use crate::attitude::ParamsError;
 use crate::navigation::eskf::{Eskf, ImuMean, Start};
 use crate::navigation::fused::Fused;
 use crate::navigation::jump::UNKNOWN;
-use crate::navigation::measurement::{AbsolutePose, GnssPosition, GnssVelocity, Linearised, Measurement, RelativePose};
+use crate::navigation::measurement::{
+    AbsolutePose, GnssPosition, GnssVelocity, Linearised, Measurement, RelativePose,
+};
 use crate::navigation::navigator::{NAVIGATED, Navigated};
 use crate::navigation::realignment::{KNOWN, Realigned, Realignment};
 use crate::navigation::refusal::Refusal;
@@ -220,8 +222,11 @@ impl EskfStrategy {
         }
         if !is_known(&pose.rotation_covariance) {
             // What it says of the attitude cannot be fused linearly.
-            let position =
-                GnssPosition { position: pose.position, covariance: pose.position_covariance, lever_arm: Vector3::zeros() };
+            let position = GnssPosition {
+                position: pose.position,
+                covariance: pose.position_covariance,
+                lever_arm: Vector3::zeros(),
+            };
             let fused = self.filter.update(stream, &position).map_err(absurd)?;
             self.realign(&fused, &position, None)?;
             return Ok(fused);
@@ -296,11 +301,12 @@ impl EskfStrategy {
             ..*self.filter.estimate().ok_or(Refusal::NotStarted)?
         };
         let before = self.filter.covariance();
-        let covariance = SMatrix::<f64, NAVIGATED, NAVIGATED>::from_fn(|i, j| match (i < NAVIGATION, j < NAVIGATION) {
-            (true, true) => realigned.covariance[(i, j)],
-            (false, false) => before[(i, j)],
-            _ => 0.0,
-        });
+        let covariance =
+            SMatrix::<f64, NAVIGATED, NAVIGATED>::from_fn(|i, j| match (i < NAVIGATION, j < NAVIGATION) {
+                (true, true) => realigned.covariance[(i, j)],
+                (false, false) => before[(i, j)],
+                _ => 0.0,
+            });
         // If it cannot be used, the attitude remains lost.
         match self.filter.adopt::<Navigated, NAVIGATED>(&estimate, &covariance) {
             Ok(()) => self.know(Attitude::Known),
@@ -377,10 +383,7 @@ impl EskfStrategy {
 
     /// Takes an attitude of another source, if it is lost.
     pub(super) fn level(&mut self, world_from_body: &UnitQuaternion<f64>, covariance: &Matrix3<f64>) {
-        if self.is_lost()
-            && is_known(covariance)
-            && self.filter.set_attitude(world_from_body, covariance).is_ok()
-        {
+        if self.is_lost() && is_known(covariance) && self.filter.set_attitude(world_from_body, covariance).is_ok() {
             self.is_fast = true;
             self.know(Attitude::Known);
         }
@@ -530,11 +533,7 @@ impl<const D: usize> Whitened<D> {
 struct Relinearised(Linearised<6, NAVIGATED>);
 
 impl Relinearised {
-    fn new(
-        pose: &RelativePose,
-        estimate: &Estimate<NAVIGATED>,
-        at: &Estimate<NAVIGATED>,
-    ) -> Result<Self, Refusal> {
+    fn new(pose: &RelativePose, estimate: &Estimate<NAVIGATED>, at: &Estimate<NAVIGATED>) -> Result<Self, Refusal> {
         let mut model = Linearised::new();
         pose.linearise::<Navigated, NAVIGATED>(at, &mut model)?;
         let error = estimate.error_to::<Navigated>(at);

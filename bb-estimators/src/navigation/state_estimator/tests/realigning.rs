@@ -1,0 +1,329 @@
+//! Outages of the IMU after which the attitude is unknown: no estimate is trusted that is wrong, and each is trusted again.
+
+use super::flight::{FRAME, SECOND, STEP};
+use super::*;
+use crate::navigation::math::rotation;
+use nalgebra::{UnitQuaternion, Vector3};
+
+/// What became of flights.
+#[derive(Debug, Default)]
+struct Seen {
+    /// Outputs after the outage that are not marked `degraded`, and how many of them are off by more than four deviations on an axis of the
+    /// position.
+    trusted: usize,
+    wrong: usize,
+    /// Times from the end of the outage to the first trusted output, s.
+    again_s: Vec<f64>,
+    /// Starts of outages after which there is none.
+    never: Vec<i64>,
+    /// Rotation error of the last output, rad.
+    turned: f64,
+    resets: u32,
+}
+
+impl Seen {
+    fn median_s(&self) -> f64 {
+        let mut sorted = self.again_s.clone();
+        sorted.sort_by(f64::total_cmp);
+        sorted[sorted.len() / 2]
+    }
+
+    fn longest_s(&self) -> f64 {
+        self.again_s.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// Flies with these inputs, as `change` leaves them, without the IMU for a time.
+    fn fly(
+        &mut self,
+        flight: &Flight,
+        sent: &[Sent],
+        (from_ns, for_ns): (i64, i64),
+        until_ns: i64,
+        change: impl Fn(&Sent) -> Option<Sent>,
+    ) {
+        let mut estimator = started(flight, StrategyKind::Eskf);
+        let is_silent = |time_ns: i64| (from_ns..from_ns + for_ns).contains(&time_ns);
+        let mut again_ns = None;
+        for sent in sent.iter().take_while(|sent| sent.time_ns() <= until_ns) {
+            if matches!(sent, Sent::Imu(_)) && is_silent(sent.time_ns()) {
+                continue;
+            }
+            let Some(sent) = change(sent) else { continue };
+            ignore(sent.to(&mut estimator));
+            let Sent::Imu(sample) = sent else { continue };
+            let Some(output) = estimator.tick(sample.time_ns) else { continue };
+            self.resets = output.resets;
+            if sample.time_ns < from_ns + for_ns {
+                continue;
+            }
+            self.turned = flight.error(&output).1;
+            if output.degraded {
+                continue;
+            }
+            self.trusted += 1;
+            again_ns = again_ns.or(Some(sample.time_ns - from_ns - for_ns));
+            let off = flight.frame.position(&output.position) - Flight::truth(output.time_ns).position;
+            let is_wrong = |i: usize| off[i].abs() > 4.0 * output.covariance[(i, i)].sqrt();
+            self.wrong += usize::from((0..3).any(is_wrong));
+        }
+        match again_ns {
+            Some(again_ns) => self.again_s.push(again_ns as f64 * 1e-9),
+            None => self.never.push(from_ns),
+        }
+    }
+}
+
+fn spoofed(sent: &Sent) -> Option<Sent> {
+    Some(match sent {
+        Sent::Health(reading) => Sent::Health(GpsHealthReading { health: GpsHealth::Spoofed, ..*reading }),
+        sent => *sent,
+    })
+}
+
+/// Outages of 2 and 10 s at many times, two seeds.
+fn flights(with_vio: bool, with_anchors: bool, change: impl Fn(&Sent) -> Option<Sent>) -> Seen {
+    let mut seen = Seen::default();
+    for seed in [3, 11] {
+        let flight = Flight::new(50, seed);
+        let sent = flight.sent(with_vio, with_anchors, true);
+        for (from_s, for_s) in [(3, 2), (10, 2), (23, 2), (27, 2), (2, 10), (9, 10), (17, 10), (27, 10)] {
+            let outage = (from_s * SECOND, for_s * SECOND);
+            seen.fly(&flight, &sent, outage, outage.0 + outage.1 + 12 * SECOND, &change);
+        }
+    }
+    seen
+}
+
+#[test]
+fn with_a_receiver_alone_it_is_trusted_again_and_right() {
+    let seen = flights(false, false, |sent| Some(*sent));
+    assert!(seen.wrong == 0 && seen.trusted > 600, "{seen:?}");
+    assert!(seen.never.is_empty() && seen.median_s() < 5.0 && seen.longest_s() < 8.0, "{seen:?}");
+}
+
+#[test]
+fn with_positions_alone_it_takes_longer() {
+    let change = |sent: &Sent| {
+        Some(match sent {
+            Sent::Fix(fix) => Sent::Fix(GnssReading { velocity: None, ..*fix }),
+            sent => *sent,
+        })
+    };
+    let mut seen = Seen::default();
+    let flight = Flight::new(50, 5);
+    let sent = flight.sent(false, false, true);
+    for from_s in [3, 12, 24] {
+        seen.fly(&flight, &sent, (from_s * SECOND, 3 * SECOND), (from_s + 23) * SECOND, change);
+    }
+    assert!(seen.wrong == 0 && seen.trusted > 80, "{seen:?}");
+    assert!(seen.never.is_empty() && seen.longest_s() < 20.0, "{seen:?}");
+}
+
+#[test]
+fn with_anchors_it_is_trusted_from_the_second_on() {
+    for with_vio in [true, false] {
+        let seen = flights(with_vio, true, spoofed);
+        assert!(seen.wrong == 0 && seen.trusted > 700, "{seen:?}");
+        assert!(seen.never.is_empty() && seen.longest_s() < 2.7, "{seen:?}");
+    }
+}
+
+/// The first anchor after the outage is 150 m off and turned by a radian.
+#[test]
+fn an_anchor_that_is_an_outlier_is_not_believed() {
+    let flight = Flight::new(30, 4);
+    let sent = flight.sent(true, true, false);
+    for for_s in [2, 8] {
+        let mut seen = Seen::default();
+        let after = (6 + for_s) * SECOND;
+        let change = |sent: &Sent| {
+            Some(match sent {
+                Sent::Anchor(anchor) if (after..after + SECOND).contains(&anchor.time_ns) => {
+                    let away = flight.frame.position(&anchor.position) + Vector3::new(120.0, -90.0, 0.0);
+                    let position = flight.frame.geodetic(&away);
+                    let world_from_body = rotation(&Vector3::new(0.3, -0.2, 1.0)) * anchor.world_from_body;
+                    Sent::Anchor(PoseAnchor { position, world_from_body, ..*anchor })
+                }
+                sent => *sent,
+            })
+        };
+        seen.fly(&flight, &sent, (6 * SECOND, for_s * SECOND), 29 * SECOND, change);
+        assert!(seen.wrong == 0 && seen.never.is_empty() && seen.longest_s() < 13.0, "{for_s}: {seen:?}");
+    }
+}
+
+/// Nothing but the receiver's positions and an attitude of the flight controller, half a second after the outage.
+#[test]
+fn an_attitude_of_the_flight_controller_ends_it() {
+    let flight = Flight::new(30, 6);
+    let mut estimator = started(&flight, StrategyKind::Eskf);
+    let mut resets = 0;
+    for sent in &flight.sent(false, false, true) {
+        let now_ns = sent.time_ns();
+        if matches!(sent, Sent::Imu(_)) && (8 * SECOND..12 * SECOND).contains(&now_ns) {
+            continue;
+        }
+        ignore(sent.to(&mut estimator));
+        let Sent::Imu(sample) = sent else { continue };
+        let at_ns = 25 * SECOND / 2;
+        if sample.time_ns == at_ns {
+            let of = |heading_deviation| AttitudeReading {
+                time_ns: at_ns,
+                world_from_body: Flight::truth(at_ns).world_from_body,
+                tilt_deviation: 0.01,
+                heading_deviation,
+            };
+            resets = estimator.predicted(at_ns).unwrap().resets;
+            // It does not know the heading, and does not help.
+            estimator.add_attitude(of(1.0)).unwrap();
+            assert!(estimator.predicted(at_ns).unwrap().covariance[(5, 5)] > 1.0);
+            estimator.add_attitude(AttitudeReading { time_ns: at_ns - STEP, ..of(0.03) }).unwrap();
+        }
+        if let Some(output) = estimator.tick(sample.time_ns).filter(|output| output.time_ns >= 14 * SECOND) {
+            assert!(!output.degraded && output.resets == resets + 1, "{output:?}");
+            let (position, turned) = flight.error(&output);
+            assert!(position < 5.0 && turned < 0.15, "{position} {turned}");
+        }
+    }
+}
+
+/// The camera sees what the IMU does not: one relative pose spans the outage.
+#[test]
+fn a_relative_pose_across_the_outage_ends_it() {
+    let flight = Flight::new(14, 6);
+    let mut estimator = started(&flight, StrategyKind::Eskf);
+    // Samples after a longer one have to wait until their clock is believed.
+    let (from_ns, to_ns) = (6 * SECOND, 75 * SECOND / 10);
+    let mut last = None;
+    for sent in &flight.sent(true, false, false) {
+        let now_ns = sent.time_ns();
+        match sent {
+            Sent::Imu(_) if (from_ns..to_ns).contains(&now_ns) => continue,
+            Sent::Vio(_) if (from_ns..to_ns + FRAME).contains(&now_ns) => continue,
+            Sent::Vio(vio) if now_ns == to_ns + FRAME => {
+                let (from, to) = (Flight::truth(from_ns - FRAME), Flight::truth(now_ns));
+                let back = from.world_from_body.inverse();
+                ignore(estimator.add_vio(VioOutput {
+                    from_ns: from_ns - FRAME,
+                    translation: back * (to.position - from.position),
+                    from_to: back * to.world_from_body,
+                    ..*vio
+                }));
+            }
+            sent => ignore(sent.to(&mut estimator)),
+        }
+        let Sent::Imu(sample) = sent else { continue };
+        last = estimator.tick(sample.time_ns).or(last);
+        if let Some(output) = estimator.predicted(sample.time_ns).filter(|_| sample.time_ns > 10 * SECOND) {
+            let (position, turned) = flight.error(&output);
+            assert!(!output.degraded && turned < 0.1 && position < 8.0, "{} {position} {turned}", sample.time_ns);
+        }
+    }
+    assert!(last.is_some_and(|output| output.resets == 1), "{last:?}");
+}
+
+/// Two outages in a row, the second before the attitude is known again.
+#[test]
+fn a_second_outage_begins_it_again() {
+    let flight = Flight::new(40, 9);
+    let sent: Vec<Sent> = flight.sent(false, false, true);
+    for pause_ns in [SECOND / 2, 2 * SECOND] {
+        let mut seen = Seen::default();
+        let second_ns = 12 * SECOND + pause_ns;
+        let change = |sent: &Sent| {
+            let is_silent =
+                matches!(sent, Sent::Imu(_)) && (second_ns..second_ns + SECOND).contains(&sent.time_ns());
+            (!is_silent).then_some(*sent)
+        };
+        seen.fly(&flight, &sent, (10 * SECOND, 2 * SECOND), 30 * SECOND, change);
+        assert!(seen.wrong == 0 && seen.never.is_empty(), "{seen:?}");
+        assert!((3.0..9.0).contains(&(seen.longest_s() - pause_ns as f64 * 1e-9)), "{seen:?}");
+        assert!(seen.turned < 0.05 && seen.resets == 1, "{seen:?}");
+    }
+}
+
+/// Over a hundred estimates in level flight straight ahead, where fixes do not show the heading: it is degraded throughout, and its
+/// position is right.
+#[test]
+fn an_unknown_heading_stays_degraded() {
+    let at = |time_ns: i64| Vector3::new(20.0, 0.0, 0.0) * (time_ns as f64 * 1e-9);
+    let flight = Flight::new(1, 1);
+    let mut estimator = estimator(StrategyKind::Eskf);
+    let level = AttitudeReading {
+        time_ns: 0,
+        world_from_body: UnitQuaternion::identity(),
+        tilt_deviation: 0.01,
+        heading_deviation: 0.03,
+    };
+    let fix = &flight.fixes[0];
+    let mut noise = crate::navigation::noise::Noise::new(5);
+    let start = FlightControllerState {
+        attitude: level,
+        velocity: Vector3::new(20.0, 0.0, 0.0),
+        position: flight.frame.geodetic(&at(0)),
+        ..flight.warm_start(0)
+    };
+    estimator.warm_start(start).unwrap();
+    let mut outputs = 0;
+    for i in 1..=40 * SECOND / STEP {
+        let time_ns = i * STEP;
+        if !(5 * SECOND..8 * SECOND).contains(&time_ns) {
+            let (angular_velocity, specific_force) = (noise.vector(1e-3), Vector3::new(0.0, 0.0, 9.80665));
+            ignore(estimator.add_imu(&crate::navigation::ImuMean { time_ns, angular_velocity, specific_force }));
+        }
+        if time_ns % (SECOND / 5) == 0 {
+            ignore(estimator.add_gps_health(GpsHealthReading { time_ns, health: GpsHealth::Stable }));
+            let velocity =
+                Some((Vector3::new(20.0, 0.0, 0.0) + noise.vector(0.2), nalgebra::Matrix3::identity() * 0.04));
+            let position = flight.frame.geodetic(&(at(time_ns) + noise.vector(2.0)));
+            ignore(estimator.add_gnss(GnssReading { time_ns, position, velocity, ..*fix }));
+        }
+        if let Some(output) = estimator.tick(time_ns).filter(|_| time_ns > 9 * SECOND) {
+            outputs += 1;
+            assert!(output.degraded, "{time_ns}");
+            let off = flight.frame.position(&output.position) - at(output.time_ns);
+            assert!(
+                (0..3).all(|i| off[i].abs() < 5.0 * output.covariance[(i, i)].sqrt() && off[i].abs() < 8.0),
+                "{off}"
+            );
+        }
+    }
+    assert!(outputs > 100);
+}
+
+/// The fixes of the realignment come up to a second late.
+#[test]
+fn late_fixes_give_the_same_result() {
+    let flight = Flight::new(22, 7);
+    let sent: Vec<Sent> = flight.sent(true, true, true);
+    let sent = sent.iter().filter(|sent| {
+        let (is_silent, has_camera) = (
+            (6 * SECOND..9 * SECOND).contains(&sent.time_ns()),
+            sent.time_ns() < 6 * SECOND || sent.time_ns() > 17 * SECOND,
+        );
+        match sent {
+            Sent::Imu(_) => !is_silent,
+            Sent::Vio(_) | Sent::Anchor(_) => has_camera,
+            // Without the IMU, they would be too new for it.
+            _ => !(6 * SECOND..10 * SECOND).contains(&sent.time_ns()),
+        }
+    });
+    let sent: Vec<Sent> = sent.copied().collect();
+    let fly = |late_ns: &dyn Fn(usize, &Sent) -> i64| {
+        let mut arriving: Vec<(i64, &Sent)> =
+            sent.iter().enumerate().map(|(i, sent)| (sent.time_ns() + late_ns(i, sent), sent)).collect();
+        arriving.sort_by_key(|(at_ns, _)| *at_ns);
+        let mut estimator = started(&flight, StrategyKind::Eskf);
+        for (_, sent) in arriving {
+            ignore(sent.to(&mut estimator));
+        }
+        (estimator.predicted(22 * SECOND), estimator.current_estimate(), estimator.smoothed_history(20))
+    };
+    let in_time = fly(&|_, _| 0);
+    let late = fly(&|i, sent| match sent {
+        Sent::Fix(fix) if fix.time_ns < 20 * SECOND => (i as i64 * 7 % 10) * SECOND / 10,
+        _ => 0,
+    });
+    assert_eq!(in_time, late);
+    assert!(in_time.0.is_some_and(|output| !output.degraded && output.resets == 1), "{in_time:?}");
+}
