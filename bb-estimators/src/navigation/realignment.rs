@@ -223,7 +223,7 @@ impl Realignment {
         let (pp, pv, vv) = (factors(PLACE, PLACE), factors(PLACE, SPEED), factors(SPEED, SPEED));
         let determinant = pp * vv - pv * pv;
         // Two positions at one time determine no velocity.
-        if !(determinant > 1e-12 * pp * vv) {
+        if determinant.is_nan() || determinant <= 1e-12 * pp * vv {
             return None;
         }
         let motion = |first: usize| self.of_motion.fixed_rows::<3>(first).into_owned();

@@ -54,7 +54,8 @@ impl Field<'_> {
         let slot = &self.slot;
         match self.kind {
             Kind::Required => quote!(cache.#slot.require(time)?),
-            Kind::Optional | Kind::Every => quote!(cache.#slot.take(time)),
+            Kind::Optional => quote!(cache.#slot.take(time)),
+            Kind::Every => quote!(cache.#slot.take()),
         }
     }
 }

@@ -3,8 +3,8 @@
 use super::slot::{Slot, Stored};
 use crate::Payload;
 use crate::declaration::InputDeclaration;
+use crate::fault::discard;
 use crate::message::{Stamped, copy_to};
-use crate::time::MonotonicTime;
 use std::cell::Cell;
 use std::collections::VecDeque;
 use std::iter::Chain;
@@ -15,13 +15,14 @@ mod tests;
 
 /// All messages of one input of a struct that have arrived since the last run, in order of arrival: none or several.
 ///
-/// No message is in two runs. Those older than the driver by more than the declared tolerance are left out; without a tolerance,
-/// messages of any age are in. The estimator can run without such an input. A robot that declares it as required has a run dropped if
-/// the latest message is missing or too old, as for any other input, and the messages wait for the next run.
+/// No message is in two runs. Their age does not matter: the stamps tell it, and a tolerance leaves out none of them. The estimator can
+/// run without such an input. A robot that declares it as required has a run dropped if the latest message is missing or older than the
+/// tolerance, as for any other input, and the messages wait for the next run. Across moving joints, the transform of the input is that at
+/// the time of its last message.
 ///
 /// While the driver is silent, up to [`MOST`](Self::MOST) messages wait for it. Further ones displace the oldest, which is counted as
 /// [`DropReason::Displaced`](crate::run::DropReason::Displaced), and [`lost`](Self::lost) tells how many. Messages that wait when the
-/// estimator is restarted are lost with its state.
+/// estimator is restarted are lost with its state. Messages that a full inbox drops do not arrive here; they are counted there.
 #[derive(Debug)]
 pub struct Every<'a, T> {
     first: &'a [Stamped<T>],
@@ -77,6 +78,11 @@ impl<'a, T> Every<'a, T> {
         self.first.is_empty() && self.second.is_empty()
     }
 
+    /// The same, after others were lost.
+    pub fn after_losing(self, lost: u64) -> Self {
+        Self { lost, ..self }
+    }
+
     /// The number of messages since the last run that were displaced by newer ones or could not be copied, and are not among these.
     pub fn lost(&self) -> u64 {
         self.lost
@@ -92,11 +98,14 @@ impl<'a, T> IntoIterator for Every<'a, T> {
     }
 }
 
+/// How many messages that have been seen are kept, once another arrives.
+const KEPT: usize = 8;
+
 /// The messages of one input since the last dispatch.
 #[doc(hidden)]
 #[derive(Debug)]
 pub struct EverySlot<T> {
-    /// Those that have been seen come first. They are overwritten one by one, so that nothing is allocated in the long run.
+    /// Those that have been seen come first. Some are kept to be overwritten, so that nothing is allocated in the long run.
     messages: VecDeque<Stamped<T>>,
     seen: Cell<usize>,
     lost: Cell<u64>,
@@ -109,6 +118,13 @@ impl<T> Default for EverySlot<T> {
     }
 }
 
+impl<T> Drop for EverySlot<T> {
+    /// One by one, since each may panic.
+    fn drop(&mut self) {
+        self.messages.drain(..).for_each(discard);
+    }
+}
+
 impl<T: Payload> Slot<T> for EverySlot<T> {
     fn declare(&mut self, declaration: &'static InputDeclaration) {
         self.declaration = Some(declaration);
@@ -118,7 +134,9 @@ impl<T: Payload> Slot<T> for EverySlot<T> {
         let seen = self.seen.get();
         let has_displaced = seen == 0 && self.messages.len() >= Every::<T>::MOST;
         let mut kept = if seen > 0 || has_displaced { self.messages.pop_front() } else { None };
-        self.seen.set(seen.saturating_sub(1));
+        let surplus = seen.saturating_sub(1 + KEPT);
+        (0..surplus).for_each(|_| discard(self.messages.pop_front()));
+        self.seen.set(seen.saturating_sub(1 + surplus));
         let panic = copy_to(&mut kept, message).err();
         let is_kept = kept.is_some();
         self.messages.extend(kept);
@@ -132,13 +150,9 @@ impl<T: Payload> Slot<T> for EverySlot<T> {
 }
 
 impl<T: Payload> EverySlot<T> {
-    /// Returns the messages that no dispatch has seen and that are not too old for a driver of `time`, and marks all as seen.
-    pub fn take(&self, time: MonotonicTime) -> Every<'_, T> {
-        let Some(declaration) = self.declaration else { return Every::default() };
+    /// Returns the messages that no dispatch has seen, and marks them as seen.
+    pub fn take(&self) -> Every<'_, T> {
         let seen = self.seen.replace(self.messages.len());
-        let is_too_old = |message: &&Stamped<T>| declaration.is_too_old(time.nanos_since(message.monotonic_time));
-        // Stamps do not decrease, so the oldest come first.
-        let seen = seen + self.messages.iter().skip(seen).take_while(is_too_old).count();
         let (first, second) = self.messages.as_slices();
         let (in_first, in_second) = (seen.min(first.len()), seen.saturating_sub(first.len()));
         Every {

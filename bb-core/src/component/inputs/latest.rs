@@ -3,6 +3,7 @@
 use super::slot::{Slot, Stored, SyncMiss};
 use crate::Payload;
 use crate::declaration::InputDeclaration;
+use crate::fault::discard;
 use crate::message::{Stamped, copy_to};
 use crate::time::MonotonicTime;
 use std::cell::Cell;
@@ -64,6 +65,13 @@ pub struct LatestSlot<T> {
 impl<T> Default for LatestSlot<T> {
     fn default() -> Self {
         Self { message: None, is_new: Cell::new(false), declaration: None }
+    }
+}
+
+impl<T> Drop for LatestSlot<T> {
+    /// It may panic, and so may others that are dropped with it.
+    fn drop(&mut self) {
+        discard(self.message.take());
     }
 }
 

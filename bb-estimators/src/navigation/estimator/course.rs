@@ -4,7 +4,7 @@ use crate::navigation::eskf::ImuMean;
 use crate::navigation::geodesy::{Geodetic, LocalFrame};
 use crate::navigation::measurement::GnssPosition;
 use crate::navigation::track::{CONFIRMED, Track, TrackPoint};
-use bb_core::Every;
+use bb_core::Input;
 use bb_core::payload::GnssFix;
 use nalgebra::Vector3;
 
@@ -61,9 +61,9 @@ impl Course {
         self.turned_ns = Some(sample.time_ns);
     }
 
-    /// Takes new fixes. `deviation` applies to one that does not report its own.
-    pub(in crate::navigation) fn see(&mut self, fixes: Every<'_, GnssFix>, deviation: f64) {
-        for fix in fixes {
+    /// Takes a fix, if it is new. `deviation` applies to a fix that does not report its own.
+    pub(in crate::navigation) fn see(&mut self, fix: Option<Input<'_, GnssFix>>, deviation: f64) {
+        if let Some(fix) = fix.filter(Input::is_new) {
             self.add(fix.monotonic_time.as_nanos(), &fix.payload, deviation);
         }
     }

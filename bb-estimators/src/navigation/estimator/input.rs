@@ -5,26 +5,26 @@ use crate::navigation::eskf::ImuMean;
 use crate::navigation::measurement::{BodyVelocity, MagneticHeading, NonHolonomic, RelativePose, WheelSpeed};
 use bb_core::message::Stamped;
 use bb_core::payload::{self, FluidPressure, GnssFix, Imu, MagneticField, Odometry, Pose};
-use bb_core::{Context, Every, Fault, Input, Inputs};
+use bb_core::{Context, Fault, Input, Inputs};
 use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
 
-/// The inputs of [`EskfEstimator`](super::EskfEstimator). Each reading is used once.
+/// The inputs of [`EskfEstimator`](super::EskfEstimator).
 #[derive(Clone, Copy, Debug, Inputs)]
 pub struct NavigationInputs<'a> {
     /// The inertial sensor: the driver.
     pub imu: Input<'a, Imu>,
     /// Satellite navigation.
-    pub gnss: Every<'a, GnssFix>,
+    pub gnss: Option<Input<'a, GnssFix>>,
     /// Wheels, or any other source of odometry. Only the velocity is used.
-    pub odometry: Every<'a, Odometry>,
+    pub odometry: Option<Input<'a, Odometry>>,
     /// Poses in the world, from a map or a tracking system.
-    pub pose: Every<'a, Pose>,
+    pub pose: Option<Input<'a, Pose>>,
     /// Poses relative to the previous one, from a visual or lidar odometry: each begins where the last one ended.
-    pub relative: Every<'a, payload::RelativePose>,
+    pub relative: Option<Input<'a, payload::RelativePose>>,
     /// A magnetometer: the heading of the field is used.
-    pub magnetic_field: Every<'a, MagneticField>,
+    pub magnetic_field: Option<Input<'a, MagneticField>>,
     /// A barometer: changes of height since its first reading.
-    pub pressure: Every<'a, FluidPressure>,
+    pub pressure: Option<Input<'a, FluidPressure>>,
 }
 
 /// Poses of the sensors. `None` for inputs that the robot does not declare.

@@ -180,13 +180,14 @@ impl<S: States + Send, const N: usize> Core for Running<S, N> {
         mounting: &Mounting,
     ) -> Result<(), Refusal> {
         self.past.propagate(sample)?;
-        for fix in inputs.gnss {
-            let Some(measured) = self.world.fix(&fix.payload, options, mounting) else { continue };
+        if let Some(fix) = inputs.gnss.filter(|fix| fix.is_new())
+            && let Some(measured) = self.world.fix(&fix.payload, options, mounting)
+        {
             let time_ns = fix.monotonic_time.as_nanos();
             self.world.point(time_ns, &fix.payload, options).into_iter().for_each(|point| self.fixes.see(point));
             self.fuse(time_ns, Measured::Gnss(measured));
         }
-        for odometry in inputs.odometry {
+        if let Some(odometry) = inputs.odometry.filter(|odometry| odometry.is_new()) {
             let time_ns = odometry.monotonic_time.as_nanos();
             if offset::<S>(Optional::WheelScale).is_some() {
                 let (speed, sideways) = mounting.wheels(&odometry.payload, options);
@@ -196,7 +197,7 @@ impl<S: States + Send, const N: usize> Core for Running<S, N> {
                 self.fuse(time_ns, Measured::Odometry(mounting.velocity(&odometry.payload, options)));
             }
         }
-        for pose in inputs.pose {
+        if let Some(pose) = inputs.pose.filter(|pose| pose.is_new()) {
             let measured = self.world.pose(&pose.payload, options, mounting);
             let time_ns = pose.monotonic_time.as_nanos();
             let AbsolutePose { position, position_covariance: covariance, .. } = measured;
@@ -204,17 +205,18 @@ impl<S: States + Send, const N: usize> Core for Running<S, N> {
             self.orientation = Some((measured.world_from_body, measured.rotation_covariance));
             self.fuse(time_ns, Measured::Pose(measured));
         }
-        for relative in inputs.relative {
+        if let Some(relative) = inputs.relative.filter(|relative| relative.is_new()) {
             let end_ns = relative.end.as_nanos();
             let measured = mounting.relative_pose(&relative.payload, options);
             self.fuse(end_ns, Measured::Relative(measured, end_ns));
         }
-        for field in inputs.magnetic_field {
+        if let Some(field) = inputs.magnetic_field.filter(|field| field.is_new()) {
             let measured = mounting.magnetic_heading(&field.payload, options);
             self.fuse(field.monotonic_time.as_nanos(), Measured::MagneticField(measured));
         }
-        for pressure in inputs.pressure {
-            let Some(at) = self.past.now().estimate() else { break };
+        if let Some(pressure) = inputs.pressure.filter(|pressure| pressure.is_new())
+            && let Some(at) = self.past.now().estimate()
+        {
             let drop = self.world.drop(&at.position);
             if let Some(height) = self.heights.of_pressure(&pressure.payload, at, drop, options, mounting) {
                 self.fuse(pressure.monotonic_time.as_nanos(), Measured::Pressure(height));

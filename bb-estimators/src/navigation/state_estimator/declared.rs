@@ -65,8 +65,10 @@ use std::time::Duration;
 /// doubled, or at the first anchor. At the origin it is levelled by the input `attitude`, or once it has been at rest for a second.
 /// The body is the IMU, with the axes of the link. The joints give the position of the `gnss` antenna in it.
 ///
-/// Each relative pose, anchor, fix and report on the receiver is taken, however many arrive between two samples of the IMU. If more
-/// reports than [`Every::MOST`](bb_core::Every::MOST) wait for a silent IMU, the estimator assumes that those which were lost told of spoofing.
+/// All relative poses, anchors, fixes and reports on the receiver that arrive between two samples of the IMU are taken together, as
+/// far as there is room for them. If more reports than [`Every::MOST`](bb_core::Every::MOST) wait for a silent IMU, the estimator assumes
+/// that those which were lost told of spoofing. On a worker that is held up for so long that its inbox is full, reports are lost like all
+/// other messages, which is counted. If the estimator fails and is restarted, the gate is open as at the start.
 ///
 /// Estimates are emitted at the output's rate, with the health. Events at the levels error, warn and info, and keyframes that leave
 /// the window, are emitted as they occur: record `events` for a flight-data recorder. All events also go to `tracing` as structured
@@ -183,18 +185,22 @@ impl Estimator for FlightEstimator {
         (self.last_ns, self.ticks) = (sample.time_ns, 0);
         self.start(&inputs);
         let _ = self.estimator.add_imu(&sample);
-        for report in input::healths(inputs.gps_health, sample.time_ns) {
-            let _ = self.estimator.add_gps_health(report);
-        }
-        for vio in inputs.vio {
-            let _ = self.estimator.add_vio(input::vio(vio));
-        }
-        for anchor in inputs.anchor.iter().filter_map(input::anchor) {
-            let _ = self.estimator.add_pose_anchor(anchor);
-        }
-        for fix in inputs.gnss.iter().filter_map(|fix| input::fix(fix, &self.mounting)) {
-            let _ = self.estimator.add_gnss(fix);
-        }
+        let mounting = &self.mounting;
+        // After a silence of the IMU they are many.
+        self.estimator.together(|estimator| {
+            for report in input::healths(inputs.gps_health, sample.time_ns) {
+                let _ = estimator.add_gps_health(report);
+            }
+            for vio in inputs.vio {
+                let _ = estimator.add_vio(input::vio(vio));
+            }
+            for anchor in inputs.anchor.iter().filter_map(input::anchor) {
+                let _ = estimator.add_pose_anchor(anchor);
+            }
+            for fix in inputs.gnss.iter().filter_map(|fix| input::fix(fix, mounting)) {
+                let _ = estimator.add_gnss(fix);
+            }
+        });
         Ok(self.reply(sample.time_ns))
     }
 

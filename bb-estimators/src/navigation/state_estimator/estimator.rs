@@ -226,6 +226,14 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
         self.add(InputKind::Gnss, fix.time_ns, fix.check(), Payload::Gnss(fix), &[])
     }
 
+    /// Adds inputs that have arrived together. They are run together, however late they are. Their results are told as events.
+    pub(super) fn together(&mut self, add: impl FnOnce(&mut Self)) {
+        self.queue.hold();
+        add(self);
+        self.queue.release(&self.config);
+        self.drain();
+    }
+
     fn add(
         &mut self,
         input: InputKind,

@@ -98,6 +98,8 @@ pub(super) struct Queue<F: ProvidedFactor> {
     /// The first place at which the queue has changed since the engine and the predictor were run. While there is one, neither
     /// runs on, and no copy is made.
     changed: Option<Key>,
+    /// While inputs are added together: the time up to which they have to be run.
+    held: Option<i64>,
     predictor: Option<Predictor>,
     newest: Option<ImuMean>,
     /// The first sample, until another stamp agrees with its own.
@@ -126,6 +128,7 @@ impl<F: ProvidedFactor> Queue<F> {
             engine,
             copies,
             changed: None,
+            held: None,
             predictor: None,
             newest: None,
             first: None,
@@ -297,8 +300,10 @@ impl<F: ProvidedFactor> Queue<F> {
             self.counts.late += 1;
             self.change(first);
         }
-        if let Some(until_ns) = until_ns {
-            self.settle(until_ns, config);
+        match (&mut self.held, until_ns) {
+            (Some(held_ns), Some(until_ns)) => *held_ns = until_ns.max(*held_ns),
+            (None, Some(until_ns)) => self.settle(until_ns, config),
+            (_, None) => {}
         }
         Ok(key)
     }

@@ -59,11 +59,11 @@ impl Aligning {
         // On a plane, up is z, regardless of the accelerometer.
         self.course.turn(&ImuMean { specific_force: Vector3::z(), ..*sample });
         self.course.see(inputs.gnss, options.gnss_deviation);
-        if let Some(orientation) = inputs.orientation.last() {
+        if let Some(orientation) = inputs.orientation {
             let measured = mounting.heading(&orientation.payload, options);
             self.heading = measured.heading.is_finite().then_some((measured.heading, measured.deviation));
         }
-        if let Some(odometry) = inputs.odometry.last() {
+        if let Some(odometry) = inputs.odometry {
             self.velocity = Some(mounting.wheels(&odometry.payload, options).0.velocity);
         }
         sample.check().ok()?;

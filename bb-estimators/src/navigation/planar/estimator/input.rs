@@ -6,25 +6,25 @@ use crate::navigation::estimator::measured::told;
 use crate::navigation::planar::measurement::{PlanarHeading, PlanarPose, PlanarPosition, WheelVelocity, YawRate};
 use bb_core::message::Stamped;
 use bb_core::payload::{GnssFix, Imu, Odometry, Orientation, Pose};
-use bb_core::{Context, Every, Fault, Input, Inputs};
+use bb_core::{Context, Fault, Input, Inputs};
 use nalgebra::{Isometry3, Matrix2, Matrix3, UnitQuaternion, Vector2, Vector3};
 
 /// The largest angle between the z axes of a planar sensor and the link, as a cosine.
 const UPRIGHT: f64 = 0.999;
 
-/// The inputs of [`PlanarEstimator`](super::PlanarEstimator). Each reading is used once.
+/// The inputs of [`PlanarEstimator`](super::PlanarEstimator).
 #[derive(Clone, Copy, Debug, Inputs)]
 pub struct PlanarInputs<'a> {
     /// The inertial sensor, mounted in any direction: the driver. Only its yaw rate is used.
     pub imu: Input<'a, Imu>,
     /// Satellite navigation.
-    pub gnss: Every<'a, GnssFix>,
+    pub gnss: Option<Input<'a, GnssFix>>,
     /// Wheel odometry: its velocity and yaw rate are used.
-    pub odometry: Every<'a, Odometry>,
+    pub odometry: Option<Input<'a, Odometry>>,
     /// Poses in the world, from a map or a tracking system.
-    pub pose: Every<'a, Pose>,
+    pub pose: Option<Input<'a, Pose>>,
     /// An orientation in the world, from a compass or an attitude filter: the heading is used.
-    pub orientation: Every<'a, Orientation>,
+    pub orientation: Option<Input<'a, Orientation>>,
 }
 
 /// The mounting of the sensors.

@@ -74,21 +74,21 @@ impl Running {
         mounting: &Mounting,
     ) -> Result<(), Refusal> {
         self.past.propagate(sample)?;
-        for fix in inputs.gnss {
-            let Some(frame) = &self.frame else { break };
-            let time_ns = fix.monotonic_time.as_nanos();
-            let Some(point) = point(time_ns, &fix.payload, frame, options.gnss_deviation) else { continue };
+        if let Some(fix) = inputs.gnss.filter(|fix| fix.is_new())
+            && let Some(frame) = &self.frame
+            && let Some(point) = point(fix.monotonic_time.as_nanos(), &fix.payload, frame, options.gnss_deviation)
+        {
             let measured = mounting.position(&point.position, &point.covariance);
             self.fixes.see(point);
             self.fuse(point.time_ns, Measured::Gnss(measured));
         }
-        for odometry in inputs.odometry {
+        if let Some(odometry) = inputs.odometry.filter(|odometry| odometry.is_new()) {
             let time_ns = odometry.monotonic_time.as_nanos();
             let (velocity, rate) = mounting.wheels(&odometry.payload, options);
             self.fuse(time_ns, Measured::Odometry(velocity));
             self.fuse(time_ns, Measured::YawRate(rate));
         }
-        for pose in inputs.pose {
+        if let Some(pose) = inputs.pose.filter(|pose| pose.is_new()) {
             let measured = mounting.pose(&pose.payload, options);
             let time_ns = pose.monotonic_time.as_nanos();
             let mut covariance = measured.covariance;
@@ -98,7 +98,7 @@ impl Running {
             self.poses.see(TrackPoint { time_ns, position: measured.position.push(0.0), covariance, yaw: 0.0 });
             self.fuse(time_ns, Measured::Pose(measured));
         }
-        for orientation in inputs.orientation {
+        if let Some(orientation) = inputs.orientation.filter(|orientation| orientation.is_new()) {
             let measured = mounting.heading(&orientation.payload, options);
             self.fuse(orientation.monotonic_time.as_nanos(), Measured::Orientation(measured));
         }

@@ -129,6 +129,7 @@ impl<F: ProvidedFactor> Engine<F> {
             self.start_at(now_ns, anchor, config)?;
             // A single anchor may be an outlier.
             self.unconfirmed = self.unconfirmed.max(1);
+            self.distrust(now_ns);
             // From here on, an anchor supports the receiver.
             self.independent_ns = Some(now_ns);
             self.sources.anchored(anchor.time_ns, &config.params);

@@ -27,6 +27,18 @@ impl<F: ProvidedFactor> Queue<F> {
         has_changed
     }
 
+    /// From now on, inputs other than samples are inserted, and not run.
+    pub(in crate::navigation::state_estimator) fn hold(&mut self) {
+        self.held = Some(i64::MIN);
+    }
+
+    /// Runs the inputs since [`hold`](Self::hold) together.
+    pub(in crate::navigation::state_estimator) fn release(&mut self, config: &StateEstimatorConfig) {
+        if let Some(until_ns) = self.held.take().filter(|until_ns| *until_ns > i64::MIN) {
+            self.settle(until_ns, config);
+        }
+    }
+
     /// Runs the engine on, through all inputs stamped up to a time, and the predictor from there.
     pub(super) fn settle(&mut self, until_ns: i64, config: &StateEstimatorConfig) {
         self.run(until_ns, config);
