@@ -29,6 +29,7 @@ mod fragile_copies;
 mod fragile_drops;
 mod fragile_messages;
 mod fragile_readings;
+mod fragile_waiting;
 mod frames;
 mod gate;
 mod good_runs;

@@ -185,12 +185,13 @@ impl Estimator for FlightEstimator {
         (self.last_ns, self.ticks) = (sample.time_ns, 0);
         self.start(&inputs);
         let _ = self.estimator.add_imu(&sample);
+        // One by one, so that each change of the gate is told.
+        for report in input::healths(inputs.gps_health, sample.time_ns) {
+            let _ = self.estimator.add_gps_health(report);
+        }
         let mounting = &self.mounting;
         // After a silence of the IMU they are many.
         self.estimator.together(|estimator| {
-            for report in input::healths(inputs.gps_health, sample.time_ns) {
-                let _ = estimator.add_gps_health(report);
-            }
             for vio in inputs.vio {
                 let _ = estimator.add_vio(input::vio(vio));
             }

@@ -26,6 +26,7 @@ mod revised;
 mod set_back;
 mod soak;
 mod stamps;
+mod together;
 mod unfit_vio;
 
 use super::*;

@@ -1,0 +1,98 @@
+//! Inputs that arrive together are run together, with the result of one by one.
+
+use super::flight::{SECOND, STEP};
+use super::order::answers;
+use super::*;
+use proptest::prelude::*;
+
+/// What came while the IMU was silent, and the sample that ends it.
+fn after_silence(flight: &Flight, strategy: StrategyKind, silent_ns: i64) -> (Estimator, Vec<Sent>) {
+    let mut estimator = started(flight, strategy);
+    let (from_ns, to_ns) = (SECOND, SECOND + silent_ns);
+    let mut waiting = Vec::new();
+    for sent in flight.sent(true, true, true) {
+        let time_ns = sent.time_ns();
+        match sent {
+            Sent::Imu(_) if time_ns > from_ns && time_ns < to_ns => {}
+            sent if time_ns <= from_ns => ignore(sent.to(&mut estimator)),
+            Sent::Imu(sample) if time_ns == to_ns => ignore(estimator.add_imu(&sample)),
+            sent if time_ns < to_ns => waiting.push(sent),
+            _ => {}
+        }
+    }
+    (estimator, waiting)
+}
+
+#[test]
+fn what_came_while_the_imu_was_silent_is_run_once() {
+    let flight = Flight::new(4, 5);
+    for strategy in StrategyKind::ALL {
+        let (mut estimator, waiting) = after_silence(&flight, *strategy, 380 * STEP);
+        let before = *estimator.counts();
+        estimator.together(|estimator| waiting.iter().for_each(|sent| ignore(sent.to(estimator))));
+        assert!(waiting.len() > 30, "{}", waiting.len());
+        assert!(estimator.counts().reruns - before.reruns <= 1, "{strategy:?}: {:?}", estimator.counts());
+        let (mut one_by_one, _) = after_silence(&flight, *strategy, 380 * STEP);
+        waiting.iter().for_each(|sent| ignore(sent.to(&mut one_by_one)));
+        assert!(one_by_one.counts().reruns - before.reruns > 20, "{strategy:?}: {:?}", one_by_one.counts());
+        assert_eq!(answers(&mut estimator), answers(&mut one_by_one), "{strategy:?}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(6))]
+
+    #[test]
+    fn inputs_together_are_as_if_one_by_one(
+        chunks in prop::collection::vec(1..200_usize, 32),
+        silent_steps in 0..390_i64,
+        alarms in prop::collection::vec(0..40_usize, 0..3),
+        seed in 0..1000_u64,
+    ) {
+        let flight = Flight::new(4, seed);
+        let mut sent = flight.sent(true, true, true);
+        sent.retain(|sent| {
+            let is_silent = (SECOND..SECOND + silent_steps * STEP).contains(&sent.time_ns());
+            !(is_silent && matches!(sent, Sent::Imu(_)))
+        });
+        let mut healths: Vec<&mut GpsHealthReading> = sent.iter_mut().filter_map(|sent| match sent {
+            Sent::Health(reading) => Some(reading),
+            _ => None,
+        }).collect();
+        for index in &alarms {
+            if let Some(reading) = healths.get_mut(*index) {
+                reading.health = GpsHealth::Spoofed;
+            }
+        }
+        for strategy in StrategyKind::ALL {
+            let mut one_by_one = started(&flight, *strategy);
+            let mut in_chunks = started(&flight, *strategy);
+            let mut rest = &sent[..];
+            for size in chunks.iter().cycle() {
+                let (chunk, after) = rest.split_at(rest.len().min(*size));
+                rest = after;
+                let (samples, mut others): (Vec<&Sent>, Vec<&Sent>) =
+                    chunk.iter().partition(|sent| matches!(sent, Sent::Imu(_)));
+                others.sort_by_key(|sent| !matches!(sent, Sent::Health(_)));
+                for sample in samples {
+                    ignore(sample.to(&mut one_by_one));
+                    ignore(sample.to(&mut in_chunks));
+                }
+                others.iter().for_each(|sent| ignore(sent.to(&mut one_by_one)));
+                in_chunks.together(|estimator| others.iter().for_each(|sent| ignore(sent.to(estimator))));
+                let health = |estimator: &Estimator| (estimator.health().state, estimator.health().gate, estimator.label());
+                prop_assert_eq!(health(&one_by_one), health(&in_chunks));
+                if rest.is_empty() {
+                    break;
+                }
+            }
+            prop_assert_eq!(answers(&mut one_by_one), answers(&mut in_chunks));
+            let [one, together] = [&one_by_one, &in_chunks].map(|estimator| *estimator.counts());
+            prop_assert!(together.reruns <= one.reruns);
+            prop_assert_eq!(
+                (one.too_old, one.in_the_future, one.overflows, one.duplicates, one.invalid),
+                (together.too_old, together.in_the_future, together.overflows, together.duplicates, together.invalid)
+            );
+        }
+    }
+}
