@@ -43,6 +43,9 @@ use crate::navigation::stream::Stream;
 /// Standard deviation of the attitude after a gap, rad, from which on a filter does not correct it: a gap of two thirds of a second.
 const LOST: f64 = 0.8;
 
+/// Standard deviation of an attitude that is well known, rad.
+const WELL: f64 = 0.3;
+
 /// Standard deviation of the velocity, m/s, from which on a relative pose is linearised where it leads: the way between two frames is then
 /// wrong by more than the camera is.
 const SLOW: f64 = 1.0;
@@ -74,6 +77,8 @@ pub(in crate::navigation::state_estimator) struct EskfStrategy {
     /// Whether the present becomes the reference of the next relative pose, once all measurements at this time are fused.
     is_next: bool,
     attitude: Attitude,
+    /// What gaps have added to the variance of each axis of the attitude since it was last well known, rad².
+    by_gaps: f64,
     /// Whether the velocity may be wrong by more than [`SLOW`], because the attitude was lost.
     is_fast: bool,
 }
@@ -91,6 +96,7 @@ impl EskfStrategy {
             left: None,
             is_next: false,
             attitude: Attitude::Known,
+            by_gaps: 0.0,
             is_fast: false,
         })
     }
@@ -121,10 +127,10 @@ impl EskfStrategy {
                 self.filter.set_keyframe(id_of(self.cadence.camera_ns));
             }
         }
-        let gaps = self.filter.gaps();
+        let (gaps, before_ns) = (self.filter.gaps(), self.filter.estimate().map(|estimate| estimate.time_ns));
         self.filter.propagate_part(sample, is_gap)?;
         if self.filter.gaps() != gaps {
-            self.bridged();
+            self.bridged(sample.time_ns.saturating_sub(before_ns.unwrap_or(sample.time_ns)) as f64 * 1e-9);
         } else if let Attitude::Lost(Some(realignment)) = &mut self.attitude {
             realignment.propagate(sample);
         }
@@ -322,10 +328,16 @@ impl EskfStrategy {
         }
     }
 
-    /// A gap was bridged.
-    fn bridged(&mut self) {
-        let covariance = self.filter.covariance();
-        let is_lost = (ROTATION..ROTATION + 3).any(|i| covariance[(i, i)] > LOST * LOST);
+    /// A gap, or a part of one, was bridged.
+    fn bridged(&mut self, dt: f64) {
+        let (covariance, gap_rotation) = (self.filter.covariance(), self.filter.params().gap_rotation);
+        let variance = (ROTATION..ROTATION + 3).map(|i| covariance[(i, i)]).fold(0.0, f64::max);
+        let added = gap_rotation * gap_rotation * dt;
+        // Earlier gaps count until the attitude is well known again.
+        let earlier = if variance - added < WELL * WELL { 0.0 } else { self.by_gaps };
+        self.by_gaps = earlier + added;
+        // A heading that was never known is not lost in a short gap.
+        let is_lost = variance > LOST * LOST && self.by_gaps > 0.5 * LOST * LOST;
         if self.is_lost() || is_lost {
             self.filter.forget_attitude();
             self.filter.hold_attitude(true);
@@ -361,7 +373,7 @@ impl EskfStrategy {
 
     fn know(&mut self, attitude: Attitude) {
         self.filter.hold_attitude(false);
-        self.attitude = attitude;
+        (self.attitude, self.by_gaps) = (attitude, 0.0);
     }
 
     /// Whether the attitude is too uncertain to be corrected.
