@@ -112,10 +112,10 @@ fn with_positions_alone_it_takes_longer() {
     let mut seen = Seen::default();
     let flight = Flight::new(50, 5);
     let sent = flight.sent(false, false, true);
-    for from_s in [3, 12, 24] {
-        seen.fly(&flight, &sent, (from_s * SECOND, 3 * SECOND), (from_s + 23) * SECOND, change);
+    for from_s in [3, 6, 9, 12, 15] {
+        seen.fly(&flight, &sent, (from_s * SECOND, 10 * SECOND), (from_s + 35) * SECOND, change);
     }
-    assert!(seen.wrong == 0 && seen.trusted > 80, "{seen:?}");
+    assert!(seen.wrong == 0 && seen.trusted > 200, "{seen:?}");
     assert!(seen.never.is_empty() && seen.longest_s() < 20.0, "{seen:?}");
 }
 
