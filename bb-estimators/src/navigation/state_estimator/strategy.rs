@@ -276,7 +276,10 @@ impl<F: ProvidedFactor> Strategy<F> {
     pub(super) fn level(&mut self, world_from_body: &UnitQuaternion<f64>, covariance: &Matrix3<f64>) {
         match self {
             #[cfg(feature = "smoother")]
-            Self::Smoother(_) => {}
+            Self::Smoother(_) => {
+                // It is never lost.
+                let _ = (world_from_body, covariance);
+            }
             #[cfg(feature = "eskf")]
             Self::Eskf(strategy, _) => strategy.level(world_from_body, covariance),
         }
