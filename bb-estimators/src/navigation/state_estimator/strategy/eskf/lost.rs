@@ -1,0 +1,166 @@
+//! Whether the attitude is known, and how a lost one is determined.
+
+use super::super::Failure;
+use super::{Attitude, EskfStrategy};
+use crate::navigation::fused::Fused;
+use crate::navigation::jump::UNKNOWN;
+use crate::navigation::measurement::{GnssPosition, GnssVelocity};
+use crate::navigation::navigator::{NAVIGATED, Navigated};
+use crate::navigation::realignment::{KNOWN, Realigned, Realignment};
+use crate::navigation::refusal::Refusal;
+use crate::navigation::state::{Estimate, NAVIGATION, Optional, ROTATION, offset};
+use alloc::boxed::Box;
+use nalgebra::{Matrix3, SMatrix, UnitQuaternion};
+
+/// Standard deviation of the attitude after a gap, rad, from which on a filter does not correct it: a gap of two thirds of a second.
+const LOST: f64 = 0.8;
+
+/// Standard deviation of an attitude that is well known, rad.
+const WELL: f64 = 0.3;
+
+impl EskfStrategy {
+    /// Adds a position that the gate has let in to those that determine the attitude.
+    pub(super) fn realign(
+        &mut self,
+        fused: &Fused,
+        position: &GnssPosition,
+        velocity: Option<&GnssVelocity>,
+    ) -> Result<(), Failure> {
+        if fused.raised > 1.0 && self.is_lost() {
+            // Those before disagree.
+            self.begin_realignment();
+        }
+        let Attitude::Lost(Some(realignment)) = &mut self.attitude else { return Ok(()) };
+        realignment.position(position);
+        if let Some(velocity) = velocity {
+            realignment.velocity(velocity);
+        }
+        match realignment.solve() {
+            Ok(Some(realigned)) => self.adopt(&realigned),
+            Ok(None) => Ok(()),
+            Err(_) => {
+                self.begin_realignment();
+                Ok(())
+            }
+        }
+    }
+
+    /// Continues from the state that fixes have determined.
+    pub(super) fn adopt(&mut self, realigned: &Realigned) -> Result<(), Failure> {
+        let estimate = Estimate {
+            position: realigned.position,
+            velocity: realigned.velocity,
+            world_from_body: realigned.world_from_body,
+            accelerometer_bias: realigned.accelerometer_bias,
+            gyroscope_bias: realigned.gyroscope_bias,
+            ..*self.filter.estimate().ok_or(Refusal::NotStarted)?
+        };
+        let before = self.filter.covariance();
+        let covariance =
+            SMatrix::<f64, NAVIGATED, NAVIGATED>::from_fn(|i, j| match (i < NAVIGATION, j < NAVIGATION) {
+                (true, true) => realigned.covariance[(i, j)],
+                (false, false) => before[(i, j)],
+                _ => 0.0,
+            });
+        // If it cannot be used, the attitude remains lost.
+        match self.filter.adopt::<Navigated, NAVIGATED>(&estimate, &covariance) {
+            Ok(()) => self.know(Attitude::Known),
+            Err(_) => self.begin_realignment(),
+        }
+        Ok(())
+    }
+
+    /// A position was fused.
+    pub(super) fn fits(&mut self, fused: &Fused) {
+        if matches!(self.attitude, Attitude::Doubted) && fused.raised <= 1.0 {
+            self.attitude = Attitude::Known;
+        }
+    }
+
+    /// A gap, or a part of one, was bridged.
+    pub(super) fn bridged(&mut self, dt: f64) {
+        let (covariance, gap_rotation) = (self.filter.covariance(), self.filter.params().gap_rotation);
+        let variance = (ROTATION..ROTATION + 3).map(|i| covariance[(i, i)]).fold(0.0, f64::max);
+        let added = gap_rotation * gap_rotation * dt;
+        // Earlier gaps count until the attitude is well known again.
+        let earlier = if variance - added < WELL * WELL { 0.0 } else { self.by_gaps };
+        self.by_gaps = earlier + added;
+        // A heading that was never known is not lost in a short gap.
+        let is_lost = variance > LOST * LOST && self.by_gaps > 0.5 * LOST * LOST;
+        if self.is_lost() || is_lost {
+            self.filter.forget_attitude();
+            self.filter.hold_attitude(true);
+            self.begin_realignment();
+        }
+    }
+
+    /// The attitude is not what it was believed to be.
+    pub(super) fn lose(&mut self) {
+        let Some(attitude) = self.attitude() else { return };
+        if self.filter.set_attitude(&attitude, &unknown()).is_ok() {
+            self.filter.hold_attitude(true);
+            self.begin_realignment();
+        }
+    }
+
+    /// Time or place are others than those of the fixes so far.
+    pub(super) fn moved(&mut self) {
+        if self.is_lost() {
+            self.begin_realignment();
+        }
+    }
+
+    /// Forgets the fixes so far, and begins again.
+    pub(super) fn begin_realignment(&mut self) {
+        let begun = |estimate| Realignment::new(estimate, self.filter.covariance(), self.filter.params());
+        let begun = self.filter.estimate().and_then(begun);
+        match (&mut self.attitude, begun) {
+            (Attitude::Lost(Some(realignment)), Some(begun)) => **realignment = begun,
+            (attitude, begun) => *attitude = Attitude::Lost(begun.map(Box::new)),
+        }
+    }
+
+    pub(super) fn know(&mut self, attitude: Attitude) {
+        self.filter.hold_attitude(false);
+        (self.attitude, self.by_gaps) = (attitude, 0.0);
+    }
+
+    /// Whether the attitude is too uncertain to be corrected.
+    pub(in crate::navigation::state_estimator::strategy) fn is_lost(&self) -> bool {
+        matches!(self.attitude, Attitude::Lost(_))
+    }
+
+    /// Whether the attitude is to be trusted.
+    pub(in crate::navigation::state_estimator::strategy) fn is_attitude_known(&self) -> bool {
+        matches!(self.attitude, Attitude::Known)
+    }
+
+    /// Whether the keyframe is from before the attitude was lost.
+    pub(super) fn is_keyframe_known(&self) -> bool {
+        let Some(first) = offset::<Navigated>(Optional::Keyframe) else { return false };
+        let has_keyframe = self.filter.estimate().is_some_and(|estimate| estimate.keyframe.is_some());
+        has_keyframe && is_known(&self.filter.covariance().fixed_view::<3, 3>(first + 3, first + 3).into_owned())
+    }
+
+    /// Takes an attitude of another source, if it is lost.
+    pub(in crate::navigation::state_estimator::strategy) fn level(
+        &mut self,
+        world_from_body: &UnitQuaternion<f64>,
+        covariance: &Matrix3<f64>,
+    ) {
+        if self.is_lost() && is_known(covariance) && self.filter.set_attitude(world_from_body, covariance).is_ok() {
+            self.is_fast = true;
+            self.know(Attitude::Known);
+        }
+    }
+}
+
+/// Whether an attitude of this covariance can be corrected linearly.
+pub(super) fn is_known(covariance: &Matrix3<f64>) -> bool {
+    covariance.trace() < KNOWN * KNOWN
+}
+
+/// The covariance of an attitude of which nothing is known.
+pub(super) fn unknown() -> Matrix3<f64> {
+    Matrix3::identity() * (UNKNOWN * UNKNOWN)
+}
