@@ -278,6 +278,49 @@ fn the_recorder_holds_labels_the_gate_rejections_and_faults() -> Result<(), Box<
     Ok(())
 }
 
+/// After an outage of the IMU at rest, where fixes do not show the heading, the filter has it from the flight controller.
+#[test]
+fn the_attitude_of_the_flight_controller_ends_what_an_outage_of_the_imu_began() -> Result<(), StartError> {
+    for has_attitude in [true, false] {
+        let mut builder = Surveying::builder();
+        let options = builder.options(surveying::estimator::base::navigation);
+        options.strategy = "eskf".to_owned();
+        set_origin(options);
+        let estimates = builder.subscribe(surveying::estimator::base::navigation::estimate);
+        let mut simulation = builder.simulate()?;
+        simulation.publish(surveying::sensor::base::attitude, at(0), attitude());
+        let mut trusted = Vec::new();
+        for step in 1..=2400 {
+            let time = at(5 * step);
+            if step % 40 == 0 {
+                let report = GpsReport { health: GpsHealth::Stable };
+                simulation.publish(surveying::sensor::base::gps_report, time, report);
+                let fix = GnssFix {
+                    status: GnssStatus::Fix,
+                    services: GnssServices::default(),
+                    position: Some(geodetic(Vector3::new(-1.5, 0.4, 1.0))),
+                    position_covariance: Some(Matrix3::identity()),
+                };
+                simulation.publish(surveying::sensor::base::mast::antenna::gps, time, fix);
+                if has_attitude {
+                    simulation.publish(surveying::sensor::base::attitude, time, attitude());
+                }
+            }
+            // Silent from 4 s to 6 s.
+            if !(800..1200).contains(&step) {
+                simulation.publish(surveying::sensor::base::shelf::board::imu, time, at_rest());
+            }
+            let new = estimates.drain().filter(|estimate| !estimate.degraded);
+            trusted.extend(new.map(|estimate| estimate.emitted));
+        }
+        assert!(trusted.iter().any(|time| *time < at(4000)), "it has started");
+        let again: Vec<_> = trusted.into_iter().filter(|time| *time > at(6000)).collect();
+        assert_eq!(again.is_empty(), !has_attitude);
+        assert!(again.first().is_none_or(|first| *first < at(8500)), "{again:?}");
+    }
+    Ok(())
+}
+
 /// A report of spoofing between two samples of the IMU, or while the IMU is silent, is not hidden by those that follow it.
 #[test]
 fn a_report_of_spoofing_blocks_the_gate_however_soon_the_next_one_follows() -> Result<(), StartError> {

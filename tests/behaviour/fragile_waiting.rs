@@ -46,6 +46,10 @@ impl Estimator for Bunch {
         if balloons.driver.0 == FAILS {
             return Err(Fault::new("told to"));
         }
+        let [one, another] = [balloons.one, balloons.another].map(|latest| latest.map(|balloon| balloon.number));
+        if one != another {
+            return Err(Fault::new("they are of the same sensor"));
+        }
         Ok(Reply::emit(Number(balloons.every.iter().map(|balloon| balloon.number).sum())))
     }
 }

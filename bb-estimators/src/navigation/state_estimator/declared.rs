@@ -62,7 +62,8 @@ use std::time::Duration;
 /// ```
 ///
 /// It starts in one of three ways: at the origin of the options, at the state from the input `warm_start` with its deviations
-/// doubled, or at the first anchor. At the origin it is levelled by the input `attitude`, or once it has been at rest for a second.
+/// doubled, or at the first anchor. At the origin it is levelled by the input `attitude`, or once it has been at rest for a second. After
+/// an outage of the IMU, `attitude` tells the strategy `eskf` its attitude again.
 /// The body is the IMU, with the axes of the link. The joints give the position of the `gnss` antenna in it.
 ///
 /// All relative poses, anchors, fixes and reports on the receiver that arrive between two samples of the IMU are taken together, as
@@ -144,15 +145,17 @@ impl FlightEstimator {
 }
 
 impl FlightEstimator {
-    /// Passes on the attitude and the warm start to an estimator that has no position. One that has a position would refuse them.
+    /// Passes on the attitude to an estimator that may have none, and the warm start to one that has no position. Others would refuse
+    /// them, or have no use for them.
     fn start(&mut self, inputs: &FlightInputs<'_>) {
-        if !matches!(self.estimator.health().state, HealthState::Init | HealthState::Lost) {
-            return;
-        }
-        if let Some(attitude) = inputs.attitude.filter(|attitude| attitude.is_new()) {
+        let state = self.estimator.health().state;
+        if let Some(attitude) =
+            inputs.attitude.filter(|attitude| attitude.is_new() && state != HealthState::Tracking)
+        {
             let _ = self.estimator.add_attitude(input::attitude(attitude.message()));
         }
-        if let Some(state) = inputs.warm_start.filter(|state| state.is_new())
+        if matches!(state, HealthState::Init | HealthState::Lost)
+            && let Some(state) = inputs.warm_start.filter(|state| state.is_new())
             && let Some(state) = input::warm_start(state.message())
         {
             let _ = self.estimator.warm_start(state);
