@@ -226,12 +226,16 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
         self.add(InputKind::Gnss, fix.time_ns, fix.check(), Payload::Gnss(fix), &[])
     }
 
-    /// Adds inputs that have arrived together. They are run together, however late they are. Their results are told as events.
-    pub(super) fn together(&mut self, add: impl FnOnce(&mut Self)) {
-        self.queue.hold();
+    /// Adds inputs that have arrived together, such as those that waited for a silent IMU. They are run together once `add` returns,
+    /// however late they are, with the same result as one by one. An input that is accepted is therefore [`Added::Waits`], and what
+    /// becomes of it is told by an event. An estimate that is read in `add` may lack them.
+    pub fn together(&mut self, add: impl FnOnce(&mut Self)) {
+        let is_outermost = self.queue.hold();
         add(self);
-        self.queue.release(&self.config);
-        self.drain();
+        if is_outermost {
+            self.queue.release(&self.config);
+            self.drain();
+        }
     }
 
     fn add(

@@ -27,9 +27,11 @@ impl<F: ProvidedFactor> Queue<F> {
         has_changed
     }
 
-    /// From now on, inputs other than samples are inserted, and not run.
-    pub(in crate::navigation::state_estimator) fn hold(&mut self) {
-        self.held = Some(i64::MIN);
+    /// From now on, inputs other than samples are inserted, and not run. Returns whether they were run until now.
+    pub(in crate::navigation::state_estimator) fn hold(&mut self) -> bool {
+        let were_run = self.held.is_none();
+        self.held = self.held.or(Some(i64::MIN));
+        were_run
     }
 
     /// Runs the inputs since [`hold`](Self::hold) together.

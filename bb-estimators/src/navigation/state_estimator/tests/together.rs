@@ -39,6 +39,25 @@ fn what_came_while_the_imu_was_silent_is_run_once() {
     }
 }
 
+#[test]
+fn a_call_within_another_is_part_of_it() {
+    let flight = Flight::new(4, 5);
+    for strategy in StrategyKind::ALL {
+        let (mut estimator, waiting) = after_silence(&flight, *strategy, 380 * STEP);
+        let before = estimator.counts().reruns;
+        estimator.together(|estimator| {
+            for sent in &waiting {
+                estimator.together(|estimator| ignore(sent.to(estimator)));
+            }
+            assert_eq!(estimator.counts().reruns, before);
+        });
+        assert!(estimator.counts().reruns <= before + 1);
+        let (mut one_by_one, _) = after_silence(&flight, *strategy, 380 * STEP);
+        waiting.iter().for_each(|sent| ignore(sent.to(&mut one_by_one)));
+        assert_eq!(answers(&mut estimator), answers(&mut one_by_one));
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(6))]
 
