@@ -316,7 +316,7 @@ fn the_attitude_of_the_flight_controller_ends_what_an_outage_of_the_imu_began() 
         assert!(trusted.iter().any(|time| *time < at(4000)), "it has started");
         let again: Vec<_> = trusted.into_iter().filter(|time| *time > at(6000)).collect();
         assert_eq!(again.is_empty(), !has_attitude);
-        assert!(again.first().is_none_or(|first| *first < at(8500)), "{again:?}");
+        assert!(again.first().is_none_or(|first| *first < at(10_800)), "{again:?}");
     }
     Ok(())
 }

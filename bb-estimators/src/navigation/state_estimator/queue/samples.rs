@@ -31,7 +31,7 @@ impl<F: ProvidedFactor> Queue<F> {
             // Sent twice: it says nothing about the clock.
             return Err(Reason::Duplicate);
         }
-        let is_surplus = time_ns <= newest.time_ns && self.is_surplus(time_ns);
+        let is_surplus = time_ns <= newest.time_ns && self.is_surplus(time_ns, config);
         match self.clock.judge(time_ns, newest.time_ns, ns(config.params.lateness), is_surplus) {
             Stamped::Next => {}
             Stamped::Late => return self.place_late_sample(sample, config),
@@ -65,8 +65,7 @@ impl<F: ProvidedFactor> Queue<F> {
     }
 
     /// Whether no sample is missing at a time: those before and after it are no farther apart than others.
-    fn is_surplus(&self, time_ns: i64) -> bool {
-        let (Some(first), Some(last)) = (self.samples.front(), self.samples.back()) else { return false };
+    fn is_surplus(&self, time_ns: i64, config: &StateEstimatorConfig) -> bool {
         let index = self.samples.partition_point(|other| other.time_ns < time_ns);
         if self.samples.get(index).is_some_and(|other| other.time_ns == time_ns) {
             return true;
@@ -74,7 +73,13 @@ impl<F: ProvidedFactor> Queue<F> {
         let before = index.checked_sub(1).and_then(|before| self.samples.get(before));
         let before_ns = before.map(|before| before.time_ns).or(self.dropped_ns);
         let (Some(before_ns), Some(after)) = (before_ns, self.samples.get(index)) else { return false };
-        let apart_ns = last.time_ns.saturating_sub(first.time_ns) / (self.samples.len() as i64 - 1).max(1);
+        // An outage says nothing of how far apart they are.
+        let following = self.samples.iter().zip(self.samples.iter().skip(1));
+        let apart = following.map(|(before, after)| after.time_ns.saturating_sub(before.time_ns));
+        let usual = apart.filter(|apart_ns| *apart_ns <= ns(config.sensors.longest_sample));
+        let (sum_ns, count) =
+            usual.fold((0, 0), |(sum_ns, count), apart_ns| (apart_ns.saturating_add(sum_ns), count + 1));
+        let apart_ns = sum_ns / count.max(1);
         // Where one is missing, they are twice as far apart.
         after.time_ns.saturating_sub(before_ns) <= apart_ns.saturating_add(apart_ns / 2)
     }

@@ -5,8 +5,8 @@
 //! A filter corrects the attitude linearly. A gap of more than half a second leaves it too uncertain for that: it is *lost* until
 //! something determines it as a whole,
 //!
-//! * an anchor, which is in doubt until the next position fits: it may be an outlier,
-//! * an attitude of the flight controller,
+//! * an anchor or an attitude of the flight controller, which is in doubt until another one fits, or fixes do for some seconds: a
+//!   position says little of an attitude that is wrong,
 //! * a relative pose that begins before the gap,
 //! * fixes, by the motion that the IMU has measured since the gap, see `navigation/realignment.rs`,
 //! * or a restart.
@@ -42,8 +42,13 @@ use crate::navigation::state_estimator::params::StateEstimatorConfig;
 #[derive(Clone, Debug)]
 enum Attitude {
     Known,
-    /// From a single anchor. The next position has to fit.
-    Doubted,
+    /// From a single anchor, or from the flight controller: what follows has to fit.
+    Doubted {
+        /// The time since which nothing was refused, ns.
+        since_ns: i64,
+        /// What fixes say of it, without it.
+        realignment: Option<Box<Realignment>>,
+    },
     /// `None` if the state before the gap was unusable.
     Lost(Option<Box<Realignment>>),
 }
@@ -64,6 +69,8 @@ pub(in crate::navigation::state_estimator) struct EskfStrategy {
     attitude: Attitude,
     /// What gaps have added to the variance of each axis of the attitude since it was last well known, rad².
     by_gaps: f64,
+    /// The end of the last gap, and the variance of the rotation that it may have hidden, rad².
+    gap: (i64, f64),
     /// Whether the velocity may be wrong by more than [`SLOW`], because the attitude was lost.
     is_fast: bool,
 }
@@ -82,6 +89,7 @@ impl EskfStrategy {
             is_next: false,
             attitude: Attitude::Known,
             by_gaps: 0.0,
+            gap: (i64::MIN, 0.0),
             is_fast: false,
         })
     }
@@ -116,7 +124,7 @@ impl EskfStrategy {
         self.filter.propagate_part(sample, is_gap)?;
         if self.filter.gaps() != gaps {
             self.bridged(sample.time_ns.saturating_sub(before_ns.unwrap_or(sample.time_ns)) as f64 * 1e-9);
-        } else if let Attitude::Lost(Some(realignment)) = &mut self.attitude {
+        } else if let Some(realignment) = self.realignment() {
             realignment.propagate(sample);
         }
         if self.cadence.is_due(sample.time_ns) { self.keyframe() } else { Ok(()) }

@@ -28,6 +28,7 @@ pub(super) enum Sent {
     Anchor(PoseAnchor),
     Fix(GnssReading),
     Health(GpsHealthReading),
+    Attitude(AttitudeReading),
 }
 
 impl Sent {
@@ -38,6 +39,7 @@ impl Sent {
             Self::Anchor(anchor) => anchor.time_ns,
             Self::Fix(fix) => fix.time_ns,
             Self::Health(health) => health.time_ns,
+            Self::Attitude(attitude) => attitude.time_ns,
         }
     }
 
@@ -51,6 +53,9 @@ impl Sent {
             Self::Anchor(anchor) => Self::Anchor(PoseAnchor { time_ns: anchor.time_ns - by_ns, ..anchor }),
             Self::Fix(fix) => Self::Fix(GnssReading { time_ns: fix.time_ns - by_ns, ..fix }),
             Self::Health(health) => Self::Health(GpsHealthReading { time_ns: health.time_ns - by_ns, ..health }),
+            Self::Attitude(attitude) => {
+                Self::Attitude(AttitudeReading { time_ns: attitude.time_ns - by_ns, ..attitude })
+            }
         }
     }
 
@@ -60,6 +65,7 @@ impl Sent {
             Self::Vio(vio) => estimator.add_vio(*vio).map(drop),
             Self::Anchor(anchor) => estimator.add_pose_anchor(*anchor).map(drop),
             Self::Fix(fix) => estimator.add_gnss(*fix).map(drop),
+            Self::Attitude(attitude) => estimator.add_attitude(*attitude).map(drop),
             Self::Health(health) => estimator.add_gps_health(*health).map(drop),
         }
     }

@@ -50,6 +50,40 @@ fn with_samples_held_back(flight: &Flight, strategy: StrategyKind) -> (Estimator
     (estimator, flight.samples.iter().filter(|sample| is_held(sample)).copied().collect())
 }
 
+/// Before an outage, some samples are late, and come in one burst after it: the clock was not set back.
+#[test]
+fn samples_of_before_an_outage_that_come_after_it_are_late() {
+    let flight = Flight::new(9, 3);
+    for strategy in StrategyKind::ALL {
+        for (every, silent_ns) in [(2, SECOND / 2), (20, SECOND), (5, 11 * SECOND / 10)] {
+            let (from_ns, to_ns) = (4 * SECOND, 4 * SECOND + silent_ns);
+            let is_held = |time_ns: i64| {
+                (from_ns - 4 * SECOND / 5..from_ns).contains(&time_ns) && (time_ns / STEP) % every == 0
+            };
+            let (mut late, mut in_order) = (started(&flight, *strategy), started(&flight, *strategy));
+            let mut held = Vec::new();
+            for sent in flight.sent(true, true, true) {
+                let time_ns = sent.time_ns();
+                match sent {
+                    Sent::Imu(_) if (from_ns..to_ns).contains(&time_ns) => continue,
+                    Sent::Imu(sample) if is_held(time_ns) => held.push(sample),
+                    sent => ignore(sent.to(&mut late)),
+                }
+                ignore(sent.to(&mut in_order));
+                if matches!(sent, Sent::Imu(_)) && time_ns >= to_ns {
+                    add_all(&mut late, &core::mem::take(&mut held));
+                }
+            }
+            assert_eq!(
+                (late.counts().set_back, late.counts().too_old),
+                (0, 0),
+                "{strategy:?}: {every}, {silent_ns}"
+            );
+            assert_eq!(late.predicted(9 * SECOND), in_order.predicted(9 * SECOND), "{strategy:?}");
+        }
+    }
+}
+
 #[test]
 fn a_burst_of_late_samples_is_run_once() {
     let flight = Flight::new(2, 3);

@@ -67,8 +67,9 @@ impl EskfStrategy {
         if !matches!(self.attitude, Attitude::Lost(_)) {
             let result = self.filter.update(stream, pose);
             match &result {
-                Ok(fused) => self.fits(fused),
-                Err(Refusal::Gate { .. }) if matches!(self.attitude, Attitude::Doubted) => self.lose(),
+                Ok(fused) if fused.raised <= 1.0 => self.confirm(),
+                Err(Refusal::Gate { .. }) if matches!(self.attitude, Attitude::Doubted { .. }) => self.lose(),
+                Ok(_) => {}
                 Err(_) => {}
             }
             return result.map_err(absurd);
@@ -81,7 +82,10 @@ impl EskfStrategy {
                 lever_arm: Vector3::zeros(),
             };
             let fused = self.filter.update(stream, &position).map_err(absurd)?;
-            self.realign(&fused, &position, None)?;
+            if fused.raised > 1.0 {
+                self.begin_realignment();
+            }
+            self.realign(&position, None)?;
             return Ok(fused);
         }
         let before = self.filter;
@@ -91,7 +95,7 @@ impl EskfStrategy {
         match self.filter.update(stream, pose) {
             Ok(fused) => {
                 self.is_fast = true;
-                self.know(Attitude::Doubted);
+                self.doubt();
                 Ok(fused)
             }
             Err(refusal) => {
@@ -107,13 +111,19 @@ impl EskfStrategy {
         velocity: Option<&GnssVelocity>,
         trust: Trust,
     ) -> Result<Fused, Failure> {
+        let was_lost = self.is_lost();
         let stream = trusting(&mut self.streams.positions, trust);
-        let fused = self.filter.update(stream, position).map_err(absurd)?;
+        let result = self.filter.update(stream, position);
+        self.weigh(&result);
+        let fused = result.map_err(absurd)?;
         // A receiver with a good position is trusted even if its velocity is refused.
         let velocity =
             velocity.filter(|velocity| self.filter.update(&mut self.streams.velocities, *velocity).is_ok());
-        self.realign(&fused, position, velocity)?;
-        self.fits(&fused);
+        if fused.raised > 1.0 && was_lost {
+            // Those before disagree.
+            self.begin_realignment();
+        }
+        self.realign(position, velocity)?;
         Ok(fused)
     }
 }

@@ -2,6 +2,7 @@
 
 use super::super::Failure;
 use super::{Attitude, EskfStrategy};
+use crate::navigation::eskf::seconds_between;
 use crate::navigation::fused::Fused;
 use crate::navigation::jump::UNKNOWN;
 use crate::navigation::measurement::{GnssPosition, GnssVelocity};
@@ -18,31 +19,47 @@ const LOST: f64 = 0.8;
 /// Standard deviation of an attitude that is well known, rad.
 const WELL: f64 = 0.3;
 
+/// How long fixes have to fit, ns, before an attitude that was given is trusted. If it is wrong, gravity has led the position away by
+/// then.
+const LASTING_NS: i64 = 3_000_000_000;
+
 impl EskfStrategy {
     /// Adds a position that the gate has let in to those that determine the attitude.
     pub(super) fn realign(
         &mut self,
-        fused: &Fused,
         position: &GnssPosition,
         velocity: Option<&GnssVelocity>,
     ) -> Result<(), Failure> {
-        if fused.raised > 1.0 && self.is_lost() {
-            // Those before disagree.
-            self.begin_realignment();
-        }
-        let Attitude::Lost(Some(realignment)) = &mut self.attitude else { return Ok(()) };
+        let Some(realignment) = self.realignment() else { return Ok(()) };
         realignment.position(position);
         if let Some(velocity) = velocity {
             realignment.velocity(velocity);
         }
         match realignment.solve() {
+            Ok(Some(realigned)) if !self.is_lost() && self.agrees(&realigned.world_from_body) => {
+                self.confirm();
+                Ok(())
+            }
             Ok(Some(realigned)) => self.adopt(&realigned),
             Ok(None) => Ok(()),
             Err(_) => {
-                self.begin_realignment();
+                self.moved();
                 Ok(())
             }
         }
+    }
+
+    /// The fixes since the attitude was lost.
+    pub(super) fn realignment(&mut self) -> Option<&mut Realignment> {
+        match &mut self.attitude {
+            Attitude::Lost(realignment) | Attitude::Doubted { realignment, .. } => realignment.as_deref_mut(),
+            Attitude::Known => None,
+        }
+    }
+
+    /// Whether an attitude is about that of the filter.
+    fn agrees(&self, world_from_body: &UnitQuaternion<f64>) -> bool {
+        self.attitude().is_some_and(|attitude| attitude.angle_to(world_from_body) < 2.0 * KNOWN)
     }
 
     /// Continues from the state that fixes have determined.
@@ -65,15 +82,49 @@ impl EskfStrategy {
         // If it cannot be used, the attitude remains lost.
         match self.filter.adopt::<Navigated, NAVIGATED>(&estimate, &covariance) {
             Ok(()) => self.know(Attitude::Known),
-            Err(_) => self.begin_realignment(),
+            Err(_) => {
+                self.filter.hold_attitude(true);
+                self.begin_realignment();
+            }
         }
         Ok(())
     }
 
-    /// A position was fused.
-    pub(super) fn fits(&mut self, fused: &Fused) {
-        if matches!(self.attitude, Attitude::Doubted) && fused.raised <= 1.0 {
+    /// Begins to doubt the attitude, which is new.
+    pub(super) fn doubt(&mut self) {
+        let since_ns = self.filter.estimate().map_or(i64::MAX, |estimate| estimate.time_ns);
+        let realignment = match core::mem::replace(&mut self.attitude, Attitude::Known) {
+            Attitude::Lost(realignment) | Attitude::Doubted { realignment, .. } => realignment,
+            Attitude::Known => None,
+        };
+        self.know(Attitude::Doubted { since_ns, realignment });
+    }
+
+    /// Ends the doubt.
+    pub(super) fn confirm(&mut self) {
+        if matches!(self.attitude, Attitude::Doubted { .. }) {
             self.attitude = Attitude::Known;
+        }
+    }
+
+    /// Whether an attitude has been in doubt for long enough, and nothing was refused.
+    fn has_lasted(&self) -> bool {
+        let now_ns = self.filter.estimate().map(|estimate| estimate.time_ns);
+        matches!((&self.attitude, now_ns), (Attitude::Doubted { since_ns, .. }, Some(now_ns))
+            if now_ns.saturating_sub(*since_ns) >= LASTING_NS)
+    }
+
+    /// A fix says of an attitude in doubt where it leads.
+    pub(super) fn weigh(&mut self, result: &Result<Fused, Refusal>) {
+        match result {
+            Ok(fused) if fused.raised > 1.0 => {
+                if matches!(self.attitude, Attitude::Doubted { .. }) {
+                    self.lose();
+                }
+            }
+            Ok(_) if self.has_lasted() => self.confirm(),
+            Err(Refusal::Gate { .. }) if matches!(self.attitude, Attitude::Doubted { .. }) => self.doubt(),
+            Ok(_) | Err(_) => {}
         }
     }
 
@@ -85,12 +136,18 @@ impl EskfStrategy {
         // Earlier gaps count until the attitude is well known again.
         let earlier = if variance - added < WELL * WELL { 0.0 } else { self.by_gaps };
         self.by_gaps = earlier + added;
+        // What is fused within a gap is corrected linearly too, and must not hide how long the gap is.
+        let now_ns = self.filter.estimate().map_or(i64::MAX, |estimate| estimate.time_ns);
+        let goes_on = (seconds_between(self.gap.0, now_ns).unwrap_or(f64::INFINITY) - dt).abs() < 1e-6;
+        self.gap = (now_ns, added + if goes_on { self.gap.1 } else { 0.0 });
         // A heading that was never known is not lost in a short gap.
-        let is_lost = variance > LOST * LOST && self.by_gaps > 0.5 * LOST * LOST;
+        let is_lost = (variance > LOST * LOST && self.by_gaps > 0.5 * LOST * LOST) || self.gap.1 > LOST * LOST;
         if self.is_lost() || is_lost {
             self.filter.forget_attitude();
             self.filter.hold_attitude(true);
             self.begin_realignment();
+        } else {
+            self.moved();
         }
     }
 
@@ -99,14 +156,22 @@ impl EskfStrategy {
         let Some(attitude) = self.attitude() else { return };
         if self.filter.set_attitude(&attitude, &unknown()).is_ok() {
             self.filter.hold_attitude(true);
-            self.begin_realignment();
+            match core::mem::replace(&mut self.attitude, Attitude::Known) {
+                // The biases are not those that the filter has corrected with a wrong attitude.
+                Attitude::Doubted { realignment: Some(realignment), .. } => {
+                    self.attitude = Attitude::Lost(Some(realignment));
+                }
+                _ => self.begin_realignment(),
+            }
         }
     }
 
-    /// Time or place are others than those of the fixes so far.
+    /// The fixes so far are of no use any more: time, place or motion since are others.
     pub(super) fn moved(&mut self) {
-        if self.is_lost() {
-            self.begin_realignment();
+        match &mut self.attitude {
+            Attitude::Lost(_) => self.begin_realignment(),
+            Attitude::Doubted { realignment, .. } => *realignment = None,
+            Attitude::Known => {}
         }
     }
 
@@ -142,7 +207,7 @@ impl EskfStrategy {
         has_keyframe && is_known(&self.filter.covariance().fixed_view::<3, 3>(first + 3, first + 3).into_owned())
     }
 
-    /// Takes an attitude of another source, if it is lost.
+    /// Takes an attitude of another source, if it is lost. Another one some seconds later ends the doubt in it, if they agree.
     pub(in crate::navigation::state_estimator::strategy) fn level(
         &mut self,
         world_from_body: &UnitQuaternion<f64>,
@@ -150,7 +215,9 @@ impl EskfStrategy {
     ) {
         if self.is_lost() && is_known(covariance) && self.filter.set_attitude(world_from_body, covariance).is_ok() {
             self.is_fast = true;
-            self.know(Attitude::Known);
+            self.doubt();
+        } else if self.has_lasted() && is_known(covariance) && self.agrees(world_from_body) {
+            self.confirm();
         }
     }
 }
