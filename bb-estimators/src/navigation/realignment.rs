@@ -346,7 +346,8 @@ fn largest(covariance: &Matrix3<f64>) -> f64 {
     covariance.row_iter().map(|row| row.iter().map(|x| x.abs()).sum::<f64>()).fold(0.0, f64::max)
 }
 
-/// The χ² that [`MOST_MISFIT`] stands for; E. B. Wilson, M. M. Hilferty, "The distribution of chi-square", PNAS 17(12), 1931.
+/// The χ² at the quantile [`MOST_MISFIT`]; E. B. Wilson, M. M. Hilferty, "The distribution of chi-square", PNAS 17(12), 1931. The exact
+/// recurrence of `chi_square.rs` underflows at the thousands of degrees of freedom that fast receivers reach.
 fn limit(freedom: f64) -> f64 {
     let variance = 2.0 / (9.0 * freedom);
     let root = 1.0 - variance + MOST_MISFIT * sqrt(variance);

@@ -251,7 +251,7 @@ impl<F: ProvidedFactor> Strategy<F> {
         }
     }
 
-    /// Whether the attitude is to be trusted. It is not after an outage of the IMU, until it was determined anew.
+    /// Whether the attitude is to be trusted. After an outage of the IMU it is not, until it has been determined again.
     pub(super) fn is_attitude_known(&self) -> bool {
         match self {
             // It linearises again until it converges.

@@ -17,7 +17,7 @@ impl<F: ProvidedFactor> Queue<F> {
         self.changed = Some(self.changed.map_or(at, |before| before.min(at)));
     }
 
-    /// Runs what has changed since the last run, up to where that was. Whoever reads the engine or the predictor calls this before.
+    /// Runs what has changed since the last run, up to where that was. Must be called before the engine or the predictor is read.
     /// Returns whether anything was run.
     pub(in crate::navigation::state_estimator) fn catch_up(&mut self, config: &StateEstimatorConfig) -> bool {
         let has_changed = self.changed.is_some();

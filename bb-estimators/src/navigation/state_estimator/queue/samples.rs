@@ -46,7 +46,7 @@ impl<F: ProvidedFactor> Queue<F> {
         self.newest = Some(*sample);
         self.samples.push_back(*sample);
         let is_gap = time_ns.saturating_sub(newest.time_ns) > ns(config.sensors.longest_sample);
-        // After a change it is made anew before it is read.
+        // After a change it is rebuilt before it is read.
         let is_current = self.changed.is_none();
         if is_current
             && self.predictor.as_mut().is_some_and(|predictor| predictor.propagate(sample, is_gap).is_err())

@@ -1,4 +1,4 @@
-//! Late samples of the IMU share one run, and whoever reads the estimate has them all in it.
+//! Late samples of the IMU share one run, and every estimate that is read contains them all.
 
 use super::flight::{SECOND, STEP};
 use super::order::answers;
@@ -157,7 +157,7 @@ fn broken(sample: &ImuMean) -> ImuMean {
     }
 }
 
-/// A late sample that breaks the estimate: there is none for the next tick, and the event is told then.
+/// A late sample that breaks the estimate: the next tick has no estimate and reports the event.
 #[test]
 fn a_late_sample_that_breaks_the_estimate_is_told_with_the_next_output() {
     let flight = Flight::new(1, 3);

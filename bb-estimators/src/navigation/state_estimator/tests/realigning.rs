@@ -14,7 +14,7 @@ struct Seen {
     wrong: usize,
     /// Times from the end of the outage to the first trusted output, s.
     again_s: Vec<f64>,
-    /// Starts of outages after which there is none.
+    /// Starts of outages that no trusted output follows.
     never: Vec<i64>,
     /// Rotation error of the last output, rad.
     turned: f64,
@@ -254,7 +254,7 @@ fn what_is_fused_within_an_outage_does_not_hide_it() {
             let outage = (from_s * SECOND, for_ms * SECOND / 1000);
             seen.fly(&flight, &sent, outage, (from_s + 14) * SECOND, |sent| Some(*sent));
             assert!(seen.wrong == 0 && seen.never.is_empty(), "{seen:?}");
-            assert_eq!(seen.resets, 1, "the attitude was determined anew: {seen:?}");
+            assert_eq!(seen.resets, 1, "the attitude was determined again: {seen:?}");
         }
     }
 }

@@ -69,8 +69,7 @@ impl EskfStrategy {
             match &result {
                 Ok(fused) if fused.raised <= 1.0 => self.confirm(),
                 Err(Refusal::Gate { .. }) if matches!(self.attitude, Attitude::Doubted { .. }) => self.lose(),
-                Ok(_) => {}
-                Err(_) => {}
+                Ok(_) | Err(_) => {}
             }
             return result.map_err(absurd);
         }

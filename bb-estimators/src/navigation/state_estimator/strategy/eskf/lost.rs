@@ -114,7 +114,7 @@ impl EskfStrategy {
             if now_ns.saturating_sub(*since_ns) >= LASTING_NS)
     }
 
-    /// A fix says of an attitude in doubt where it leads.
+    /// Judges an attitude in doubt by a fix: it is lost if the fix had to be forced, and doubted for longer if the fix was refused.
     pub(super) fn weigh(&mut self, result: &Result<Fused, Refusal>) {
         match result {
             Ok(fused) if fused.raised > 1.0 => {
