@@ -201,9 +201,9 @@ pub enum RecordingErrorKind {
     #[error("cannot be created: {0}")]
     Create(#[source] io::Error),
     /// The file cannot be written to, for example because the disk is full.
-    #[error("cannot be written to after {messages} messages, the rest is not recorded: {cause}")]
+    #[error("cannot be written to, {} certain to be in it: {cause}", first(*.messages))]
     Write {
-        /// How many messages had been written.
+        /// How many messages are in the file for certain, from the first on: those that had been flushed.
         messages: u64,
         /// Why.
         cause: io::Error,
@@ -274,7 +274,16 @@ pub(crate) fn create_error(cause: io::Error) -> RecordingErrorKind {
     }
 }
 
-/// Of an error while writing.
+/// What is certain to be in a file.
+fn first(messages: u64) -> String {
+    match messages {
+        0 => "no message is".to_owned(),
+        1 => "only the first message is".to_owned(),
+        messages => format!("only the first {messages} messages are"),
+    }
+}
+
+/// Of an error while writing, after so many messages had been flushed.
 pub(crate) fn write_error(messages: u64, error: McapError) -> RecordingErrorKind {
     match error {
         McapError::Io(cause) => RecordingErrorKind::Write { messages, cause },

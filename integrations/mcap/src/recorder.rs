@@ -277,7 +277,7 @@ impl Recorder {
                 Ok(value)
             }
             Err(WriteFault::File(error)) => {
-                Err(RecordingError::new(&self.path, write_error(self.report.messages, error)))
+                Err(RecordingError::new(&self.path, write_error(self.report.flushed, error)))
             }
             Err(WriteFault::Message(kind)) => Err(RecordingError::new(&self.path, kind)),
         }
@@ -406,10 +406,11 @@ impl Recorder {
         let Some(writer) = self.writer.take() else { return Ok(()) };
         let mut file = writer.into_inner();
         let ended = file.flush().and_then(|()| self.to_sync.as_ref().map_or(Ok(()), File::sync_all));
-        self.report.flushed = report.messages;
         ended.map_err(|cause| {
-            RecordingError::new(&self.path, RecordingErrorKind::Write { messages: report.messages, cause })
-        })
+            RecordingError::new(&self.path, RecordingErrorKind::Write { messages: report.flushed, cause })
+        })?;
+        self.report.flushed = report.messages;
+        Ok(())
     }
 }
 

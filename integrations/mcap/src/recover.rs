@@ -38,8 +38,8 @@ pub fn recover(broken: impl AsRef<Path>, repaired: impl AsRef<Path>) -> Result<R
         next = records.advance();
     }
     let file = File::create_new(repaired).map_err(|cause| RecordingError::new(repaired, create_error(cause)))?;
-    let fail = |messages, error| RecordingError::new(repaired, write_error(messages, error));
-    let mut writer = options.create(BufWriter::new(file)).map_err(|error| fail(0, error))?;
+    let fail = |error| RecordingError::new(repaired, write_error(0, error));
+    let mut writer = options.create(BufWriter::new(file)).map_err(fail)?;
     let mut messages = 0;
     let end = loop {
         match next.and_then(|is_one| is_one.then(|| records.record()).transpose()) {
@@ -48,7 +48,7 @@ pub fn recover(broken: impl AsRef<Path>, repaired: impl AsRef<Path>) -> Result<R
                 match write(&mut writer, record) {
                     Ok(()) => messages += u64::from(is_message),
                     Err(error @ (McapError::Io(_) | McapError::AttemptedWriteAfterFailure)) => {
-                        return Err(fail(messages, error));
+                        return Err(fail(error));
                     }
                     // For example a message without a channel: damage.
                     Err(error) => break Some(records.corrupt(error.to_string())),
@@ -59,9 +59,9 @@ pub fn recover(broken: impl AsRef<Path>, repaired: impl AsRef<Path>) -> Result<R
             Err(kind) => break Some(kind),
         }
     };
-    writer.finish().map_err(|error| fail(messages, error))?;
+    writer.finish().map_err(fail)?;
     let flushed = writer.into_inner().flush();
-    flushed.map_err(|error| fail(messages, error.into()))?;
+    flushed.map_err(|error| fail(error.into()))?;
     Ok(Recovered { messages, broken: end.map(fail_to_read) })
 }
 

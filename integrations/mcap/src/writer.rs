@@ -79,7 +79,8 @@ impl BagWriter {
     /// Writing failed.
     pub fn finish(mut self) -> Result<u64, RecordingError> {
         let (path, messages) = (self.path, self.messages);
-        let fail = |error| RecordingError::new(&path, write_error(messages, error));
+        // What it has of the messages is not known: it was never flushed.
+        let fail = |error| RecordingError::new(&path, write_error(0, error));
         self.writer.finish().map_err(fail)?;
         self.writer.into_inner().flush().map_err(|cause| fail(cause.into()))?;
         Ok(messages)
@@ -110,7 +111,7 @@ impl BagWriter {
     }
 
     fn fail(&self, error: mcap::McapError) -> RecordingError {
-        RecordingError::new(&self.path, write_error(self.messages, error))
+        RecordingError::new(&self.path, write_error(0, error))
     }
 
     fn other_type(&self, topic: &str, schema: &str, wanted: &str) -> RecordingError {

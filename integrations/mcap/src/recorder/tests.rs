@@ -50,8 +50,10 @@ fn a_full_disk_is_an_error_that_names_the_file_and_what_was_written_before_is_re
     let mut recorder = Recorder::on(Path::new("full.mcap"), Box::new(disk), None, all, options).expect("it fits");
     publish(&topic, 1000);
     let error = recorder.drain().expect_err("it does not fit");
-    assert!(error.to_string().starts_with("full.mcap: cannot be written to after "), "{error}");
     let flushed = recorder.report().flushed;
+    let expected =
+        format!("full.mcap: cannot be written to, only the first {flushed} messages are certain to be in it: ");
+    assert!(error.to_string().starts_with(&expected), "{error}");
     assert!(flushed > 0 && recorder.report().messages < 1000);
     publish(&topic, 1);
     let again = recorder.drain().expect_err("it was given up");
@@ -64,6 +66,39 @@ fn a_full_disk_is_an_error_that_names_the_file_and_what_was_written_before_is_re
     let read = recording.messages::<JointState>("sensor/arm/encoder").expect("it was recorded");
     assert!(read.filter(Result::is_ok).count() as u64 >= flushed);
     std::fs::remove_file(&file).expect("it is ours");
+}
+
+#[test]
+fn a_disk_that_is_full_at_the_end_of_the_file_is_told() {
+    let topic = Topic::<JointState>::new("sensor/arm/encoder");
+    let mut failed_at_the_end = 0;
+    // However much fits: the header, a part of the chunk, all but the last byte.
+    for room in 0.. {
+        let all = DynamicSubscription::new([&topic as &dyn AnyTopic], Select::All, None, Overflow::default());
+        let taken = Arc::new(Mutex::new(Cursor::new(Vec::new())));
+        let disk = Disk { taken: Arc::clone(&taken), room };
+        let options = RecorderOptions { flush_messages: 2, ..RecorderOptions::default() };
+        let Ok(mut recorder) = Recorder::on(Path::new("full.mcap"), Box::new(disk), None, all, options) else {
+            continue;
+        };
+        publish(&topic, 3);
+        let Ok(_) = recorder.drain() else { continue };
+        let flushed = recorder.report().flushed;
+        match recorder.finish() {
+            Ok(report) => {
+                assert_eq!((report.messages, report.flushed), (3, 3));
+                break;
+            }
+            Err(error) => {
+                failed_at_the_end += 1;
+                assert!(
+                    matches!(error.kind(), RecordingErrorKind::Write { messages, .. } if *messages == flushed),
+                    "{error}"
+                );
+            }
+        }
+    }
+    assert!(failed_at_the_end > 10);
 }
 
 #[test]
