@@ -252,8 +252,8 @@ impl<F: ProvidedFactor> Queue<F> {
 
     /// Blocks the gate: a report of spoofing was refused.
     fn block(&mut self, config: &StateEstimatorConfig) {
-        // Fixes that were in the estimate before the report remain there: a run that is repeated from a blocked copy drops them.
-        self.catch_up(config);
+        // Fixes that came before the report remain in the estimate: a run from a blocked engine drops them.
+        self.catch_up_with_held(config);
         let until_ns = self.newest.map(|newest| newest.time_ns);
         self.engine.block(until_ns);
         self.copies.iter_mut().for_each(|copy| copy.block(until_ns));

@@ -5,6 +5,9 @@ use super::order::answers;
 use super::*;
 use proptest::prelude::*;
 
+/// Stamps that are far in the future begin here.
+const ELSEWHEN: i64 = 1000 * SECOND;
+
 /// What came while the IMU was silent, and the sample that ends it.
 fn after_silence(flight: &Flight, strategy: StrategyKind, silent_ns: i64) -> (Estimator, Vec<Sent>) {
     let mut estimator = started(flight, strategy);
@@ -58,6 +61,32 @@ fn a_call_within_another_is_part_of_it() {
     }
 }
 
+/// A fix that came before a refused alarm is in the estimate, one that came after it is not.
+#[test]
+fn a_refused_alarm_shuts_out_what_comes_after_it_alone() {
+    let flight = Flight::new(4, 5);
+    for strategy in StrategyKind::ALL {
+        let alarm = Sent::Health(GpsHealthReading { time_ns: ELSEWHEN, health: GpsHealth::Spoofed });
+        let with_alarm_at = |place: usize, are_together: bool| {
+            let (mut estimator, waiting) = after_silence(&flight, *strategy, 380 * STEP);
+            let mut waiting: Vec<Sent> =
+                waiting.into_iter().filter(|sent| !matches!(sent, Sent::Health(_))).collect();
+            let fixes = waiting.iter().filter(|sent| matches!(sent, Sent::Fix(_))).count();
+            assert!(fixes >= 2, "{fixes}");
+            waiting.sort_by_key(|sent| !matches!(sent, Sent::Fix(_)));
+            waiting.insert(place.min(waiting.len()), alarm);
+            match are_together {
+                true => estimator.together(|estimator| waiting.iter().for_each(|sent| ignore(sent.to(estimator)))),
+                false => waiting.iter().for_each(|sent| ignore(sent.to(&mut estimator))),
+            }
+            answers(&mut estimator)
+        };
+        assert_eq!(with_alarm_at(1, true), with_alarm_at(1, false), "{strategy:?}");
+        assert_eq!(with_alarm_at(usize::MAX, true), with_alarm_at(usize::MAX, false), "{strategy:?}");
+        assert_ne!(with_alarm_at(0, true), with_alarm_at(usize::MAX, true), "{strategy:?}: the fixes count");
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(6))]
 
@@ -66,6 +95,7 @@ proptest! {
         chunks in prop::collection::vec(1..200_usize, 32),
         silent_steps in 0..390_i64,
         alarms in prop::collection::vec(0..40_usize, 0..3),
+        refused in prop::collection::vec(0..40_usize, 0..3),
         seed in 0..1000_u64,
     ) {
         let flight = Flight::new(4, seed);
@@ -83,6 +113,12 @@ proptest! {
                 reading.health = GpsHealth::Spoofed;
             }
         }
+        // Alarms of another clock come between the fixes, and block the gate for those after them alone.
+        for (count, index) in refused.iter().enumerate() {
+            if let Some(reading) = healths.get_mut(*index) {
+                **reading = GpsHealthReading { time_ns: ELSEWHEN + count as i64, health: GpsHealth::Spoofed };
+            }
+        }
         for strategy in StrategyKind::ALL {
             let mut one_by_one = started(&flight, *strategy);
             let mut in_chunks = started(&flight, *strategy);
@@ -92,7 +128,7 @@ proptest! {
                 rest = after;
                 let (samples, mut others): (Vec<&Sent>, Vec<&Sent>) =
                     chunk.iter().partition(|sent| matches!(sent, Sent::Imu(_)));
-                others.sort_by_key(|sent| !matches!(sent, Sent::Health(_)));
+                others.sort_by_key(|sent| !matches!(sent, Sent::Health(reading) if reading.time_ns < ELSEWHEN));
                 for sample in samples {
                     ignore(sample.to(&mut one_by_one));
                     ignore(sample.to(&mut in_chunks));
