@@ -1,4 +1,4 @@
-//! Small sensors and estimators that the robots of these tests are made of.
+//! Small sensors, estimators and commands that the robots of these tests are made of.
 
 use bb_core::prelude::*;
 use bb_core::{JointPositions, JointReading};
@@ -137,6 +137,34 @@ impl Sensor for CanEncoder {
 
     fn read(&mut self, _: MonotonicTime) -> Result<Reading<JointState>, Fault> {
         Ok(Reading::nothing())
+    }
+}
+
+/// What a [`Move`] is told.
+#[derive(Clone, Copy, Debug, Default, Payload)]
+pub(crate) struct Target {
+    pub(crate) millis: u64,
+    pub(crate) does: Option<&'static str>,
+}
+
+/// Takes its time.
+#[derive(Debug)]
+pub(crate) struct Move;
+
+impl Command for Move {
+    type Options = NoOptions;
+    type Arguments = Target;
+    type Output = MonotonicTime;
+
+    async fn run(_: NoOptions, target: Target, context: CommandContext) -> Result<Outcome<MonotonicTime>, Fault> {
+        context.sleep(Duration::from_millis(target.millis)).await;
+        let outcome = Outcome::done(context.now());
+        match target.does {
+            Some("fail") => Err(Fault::new("no way there")),
+            Some("panic") => panic!("fell over"),
+            Some(state) => Ok(outcome.next_state(state)),
+            None => Ok(outcome),
+        }
     }
 }
 

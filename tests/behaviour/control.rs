@@ -1,39 +1,11 @@
 //! States, commands, safety, actuators, controllers and bridges.
 
-use crate::components::{Counter, Number, at};
+use crate::components::{Counter, Move, Number, Target, at};
 use bb_core::event::{CommandPhase, RefusalReason};
 use bb_core::prelude::*;
 use bb_core::run::CommandError;
 use bb_core::{ArmError, DisarmError};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-
-/// What a [`Move`] is told.
-#[derive(Clone, Copy, Debug, Default, Payload)]
-pub(crate) struct Target {
-    pub(crate) millis: u64,
-    pub(crate) does: Option<&'static str>,
-}
-
-/// Takes its time.
-#[derive(Debug)]
-pub(crate) struct Move;
-
-impl Command for Move {
-    type Options = NoOptions;
-    type Arguments = Target;
-    type Output = MonotonicTime;
-
-    async fn run(_: NoOptions, target: Target, context: CommandContext) -> Result<Outcome<MonotonicTime>, Fault> {
-        context.sleep(Duration::from_millis(target.millis)).await;
-        let outcome = Outcome::done(context.now());
-        match target.does {
-            Some("fail") => Err(Fault::new("no way there")),
-            Some("panic") => panic!("fell over"),
-            Some(state) => Ok(outcome.next_state(state)),
-            None => Ok(outcome),
-        }
-    }
-}
 
 /// Begins to wait where it is started, before it is gone on with.
 #[derive(Debug)]

@@ -18,7 +18,6 @@ mod discovery;
 mod drivers;
 mod end;
 mod every_message;
-mod everything;
 mod external;
 mod failed_starts;
 mod fan_in;

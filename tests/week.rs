@@ -1,19 +1,22 @@
 //! A robot with everything in use: every run on virtual time is the same, however long, and a week takes no more memory
 //! than an hour.
 
-use crate::components::{Counter, Number, Scale, Snapshot, at};
-use crate::control::{Move, Target};
+#[path = "behaviour/components.rs"]
+#[expect(dead_code, reason = "other robots are made of the rest")]
+mod components;
+
 use bb_core::prelude::*;
+use components::{Counter, Move, Number, Scale, Snapshot, Target, at};
 
 /// Ticks, sets timers, fails and diverges now and then.
 #[derive(Debug)]
-pub(crate) struct Lively(u32, f64);
+struct Lively(u32, f64);
 
 /// Options of [`Lively`].
 #[derive(Clone, Debug, Options)]
-pub(crate) struct LivelyOptions {
+struct LivelyOptions {
     #[option(default = 1.0, range = 0.0..=1e6)]
-    pub(crate) gain: f64,
+    gain: f64,
 }
 
 impl Estimator for Lively {
