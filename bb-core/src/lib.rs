@@ -55,7 +55,7 @@ mod stub;
 
 #[doc = include_str!("robot.md")]
 pub use bb_macros::robot;
-pub use bb_macros::{Inputs, Options, Outputs, Payload};
+pub use bb_macros::{Inputs, Options, Outputs};
 pub use component::{
     Actuator, ActuatorContext, Bus, Command, CommandContext, Context, Estimator, Every, HandleCall, HandleCast,
     Info, Input, Inputs, Options, Outcome, Outputs, Reading, Reply, Request, RequestCodec, SafetyLink, Sensor,

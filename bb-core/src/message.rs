@@ -8,6 +8,7 @@ mod joint_command;
 pub(crate) mod nearest;
 mod stamped;
 
+pub use bb_macros::Payload;
 pub use codec::{DecodeError, Field, RosLayout, RosMessage, Schema};
 pub(crate) use copy::{Panic, copied, copy_to};
 pub use finite::Finite;

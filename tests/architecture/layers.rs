@@ -1,5 +1,6 @@
 //! Folders that are layers import only from below.
 
+use super::modules::Modules;
 use super::{code_below, code_of, root};
 use std::collections::BTreeSet;
 
@@ -66,34 +67,47 @@ fn names_are_found_in_paths_and_groups() {
 
 #[test]
 fn folders_of_the_runtime_import_only_from_below() {
-    let source = root().join("bb-core/src");
-    let mut files = Vec::new();
-    code_below(&source, &mut files);
+    let modules = Modules::of("bb-core");
+    let folders: BTreeSet<&str> = modules.paths().filter_map(|path| path.first()).map(String::as_str).collect();
+    let layers: BTreeSet<&str> = LAYERS.into_iter().collect();
+    // What the expansion names: the checks at compile time.
+    assert_eq!(folders, &layers | &BTreeSet::from(["check", "stub"]));
+    let upward = upward_in(&modules);
+    assert!(upward.is_empty(), "{upward:#?}");
+}
+
+/// The imports that lead up, each from where it stands to where what it names is defined. A name that the crate re-exports
+/// leads to the module that defines it, and any other of the crate's root, such as its prelude, leads up.
+fn upward_in(modules: &Modules) -> Vec<String> {
+    let layer = |path: &[String]| LAYERS.iter().position(|name| path.first().is_some_and(|first| first == name));
     let mut upward = Vec::new();
-    let mut seen = BTreeSet::new();
-    for file in files {
-        let inside = file.strip_prefix(&source).expect("it is below").to_string_lossy().into_owned();
-        let folder = inside.split('/').next().unwrap_or("").trim_end_matches(".rs").to_owned();
-        let Some(layer) = LAYERS.iter().position(|name| *name == folder) else {
-            // What the expansion names: the crate's own list, and the checks at compile time.
-            assert!(["lib", "check", "stub"].contains(&folder.as_str()), "{folder} has no layer");
-            continue;
-        };
-        seen.insert(layer);
-        let text = std::fs::read_to_string(&file).unwrap_or_else(|error| panic!("{inside}: {error}"));
-        let text = text.split("#[cfg(test)]\nmod ").next().unwrap_or("");
-        let text = text.split("#[cfg(all(test").next().unwrap_or("");
-        let code: Vec<&str> = text.lines().filter(|line| !line.trim_start().starts_with("//")).collect();
-        for name in named_in_crate(&code.join("\n")) {
-            // The derive, which bears the name of its trait, is the macros' crate's.
-            let is_below = LAYERS.iter().position(|other| *other == name).is_some_and(|other| other <= layer);
-            if !is_below && name != "Payload" {
-                upward.push(format!("{inside} names crate::{name}"));
-            }
+    for (module, home) in modules.imports() {
+        let Some(from) = layer(module) else { continue };
+        if layer(&home).is_none_or(|to| to > from) {
+            upward.push(format!(
+                "{} imports from {}",
+                module.join("::"),
+                ["crate"].map(str::to_owned).into_iter().chain(home).collect::<Vec<_>>().join("::")
+            ));
         }
     }
-    assert_eq!(seen.len(), LAYERS.len(), "every layer is there");
-    assert!(upward.is_empty(), "{upward:#?}");
+    upward
+}
+
+#[test]
+fn an_import_that_leads_up_is_found() {
+    let files = [
+        ("", "pub use message::Stamped;\npub use run::{Live, Report as Shown};\npub mod prelude {}"),
+        ("message", "pub struct Stamped;"),
+        ("pubsub", "use crate::Stamped;"),
+        ("run", "use crate::Stamped;\npub struct Live;\npub struct Report;"),
+    ];
+    let with = |code| Modules::from_texts(files.into_iter().chain([("message::codec", code)]));
+    assert!(upward_in(&with("use super::Stamped;\nuse crate::Stamped as Again;")).is_empty());
+    for code in ["use crate::Live;", "use crate::{Stamped, Shown};", "fn f(_: crate::run::Live) {}"] {
+        assert_eq!(upward_in(&with(code)), ["message::codec imports from crate::run"], "{code}");
+    }
+    assert_eq!(upward_in(&with("use crate::prelude::*;")), ["message::codec imports from crate"]);
 }
 
 /// The modules of the algorithms, from the bottom up.

@@ -15,23 +15,37 @@ struct Code {
     names: BTreeMap<String, Vec<String>>,
 }
 
+impl Code {
+    fn new(text: String) -> Self {
+        let names = names_in(&text);
+        Self { text, names }
+    }
+}
+
 impl Modules {
     pub(super) fn of(krate: &str) -> Self {
         let source = root().join(krate).join("src");
         let mut files = Vec::new();
         code_below(&source, &mut files);
-        let mut modules = BTreeMap::new();
-        for file in files {
+        let modules = files.into_iter().map(|file| {
             let inside = file.strip_prefix(&source).expect("it is below").with_extension("");
             let mut path: Module = inside.iter().map(|name| name.to_string_lossy().into_owned()).collect();
             if path == ["lib"] {
                 path.clear();
             }
-            let text = code_of(&file);
-            let names = names_in(&text);
-            modules.insert(path, Code { text, names });
-        }
-        Self(modules)
+            (path, Code::new(code_of(&file)))
+        });
+        Self(modules.collect())
+    }
+
+    /// Modules as paths and texts. The root's path is empty.
+    pub(super) fn from_texts<'a>(texts: impl IntoIterator<Item = (&'a str, &'a str)>) -> Self {
+        let path = |path: &str| path.split("::").filter(|name| !name.is_empty()).map(str::to_owned).collect();
+        Self(texts.into_iter().map(|(at, text)| (path(at), Code::new(text.to_owned()))).collect())
+    }
+
+    pub(super) fn paths(&self) -> impl Iterator<Item = &Module> {
+        self.0.keys()
     }
 
     /// Says what a name of a module is that a macro puts there.
@@ -108,8 +122,9 @@ fn names_in(code: &str) -> BTreeMap<String, Vec<String>> {
             }
             let Some(name) = alias.or_else(|| path.last().cloned()) else { continue };
             // Of a derive and its trait, which have one name, the trait is of this crate.
-            let is_ours = |path: &Vec<String>| !path[0].starts_with("bb_");
-            if is_ours(&path) || !names.contains_key(&name) {
+            let is_ours = !path[0].starts_with("bb_");
+            let is_here = || code.contains(&format!("pub trait {name}"));
+            if is_ours || !names.contains_key(&name) && !is_here() {
                 names.insert(name, path);
             }
         }
@@ -216,18 +231,22 @@ fn groups_of_paths_are_read_one_by_one() {
 
 #[test]
 fn a_name_is_at_home_where_it_is_defined() {
-    let code = |text: &str| Code { text: text.to_owned(), names: names_in(text) };
-    let module =
-        |path: &str| path.split("::").filter(|name| !name.is_empty()).map(str::to_owned).collect::<Module>();
-    let all = [
+    let modules = Modules::from_texts([
         ("", "pub use a::B;"),
         ("a", "pub(crate) use one::{self, B, C as D};\nuse std::fmt;"),
         ("a::one", "use super::super::a::two::E;"),
-        ("a::two", "use super::{B, D, fmt};\nuse crate::B as F;\nuse super::Own;"),
-    ];
-    let modules = Modules(all.iter().map(|(path, text)| (module(path), code(text))).collect());
+        ("a::two", "use super::{B, D, fmt};\nuse crate::B as F;\nuse super::Own;\nuse crate::b::Derived;"),
+        ("b", "pub use bb_macros::Derived;\npub trait Derived {}"),
+    ]);
     let imports: Vec<String> =
         modules.imports().iter().map(|(from, to)| format!("{} -> {}", from.join("::"), to.join("::"))).collect();
-    let expected = ["a::one -> a::two", "a::two -> a::one", "a::two -> a::one", "a::two -> a::one", "a::two -> a"];
+    let expected = [
+        "a::one -> a::two",
+        "a::two -> a::one",
+        "a::two -> b",
+        "a::two -> a::one",
+        "a::two -> a::one",
+        "a::two -> a",
+    ];
     assert_eq!(imports, expected);
 }

@@ -3,10 +3,10 @@
 use super::guardian::OwnHooks;
 use super::host::Host;
 use super::{Bus, Fault, NoOptions, Options, Permit};
-use crate::Payload;
 use crate::declaration::{ParameterError, Role};
 use crate::event::{HealthTransition, ParameterValue};
 use crate::message::Field;
+use crate::message::Payload;
 use crate::schedule::{Alarm, Sleeper};
 use crate::time::MonotonicTime;
 use std::future::Future;

@@ -121,7 +121,7 @@ pub trait HandleCall<Q>: Estimator {
     type Response;
 
     /// How a journal holds these requests, so that a replay repeats them: `Some(RequestCodec::bytes())` for a request
-    /// that derives [`Payload`](crate::Payload). By default, the journal holds only the outputs that they caused.
+    /// that derives [`Payload`](crate::message::Payload). By default, the journal holds only the outputs that they caused.
     const RECORD: Option<RequestCodec<Q>> = None;
 
     /// Answers, and may emit outputs as well.

@@ -1,7 +1,7 @@
 //! A sensor fed by other code.
 
 use super::{Fault, NoOptions, Reading, Sensor, SensorContext};
-use crate::Payload;
+use crate::message::Payload;
 use crate::time::MonotonicTime;
 use std::marker::PhantomData;
 

@@ -12,8 +12,8 @@ pub use every::{Every, EverySlot};
 pub use latest::{Input, LatestSlot};
 pub use slot::{Slot, SyncMiss};
 
-use crate::Payload;
 use crate::declaration::EstimatorDeclaration;
+use crate::message::Payload;
 use crate::message::Stamped;
 
 /// The input of an estimator.

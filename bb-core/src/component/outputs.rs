@@ -1,7 +1,7 @@
 //! The output of an estimator: one payload, or a struct with a field per output.
 
 use super::{At, FieldIndex};
-use crate::Payload;
+use crate::message::Payload;
 
 /// The output of an estimator.
 ///

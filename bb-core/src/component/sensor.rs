@@ -1,7 +1,7 @@
 //! The contract of a sensor.
 
 use super::{Fault, Options, SensorContext};
-use crate::Payload;
+use crate::message::Payload;
 use crate::time::MonotonicTime;
 
 /// Reads a device, a recording or a simulation.

@@ -1,7 +1,7 @@
 //! The contract of controllers and bridges, which run beside the dataflow of sensors and estimators.
 
 use super::{Fault, Options, Reading, ServiceContext};
-use crate::Payload;
+use crate::message::Payload;
 use crate::time::MonotonicTime;
 
 /// A controller or a bridge: it runs beside the dataflow and reaches everything by path, through [`ServiceContext::bus`].

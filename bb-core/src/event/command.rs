@@ -1,7 +1,7 @@
 //! Events of commands and of the operational state.
 
 use super::HealthTransition;
-use crate::Payload;
+use crate::message::Payload;
 use std::fmt;
 
 /// A change of the operational state, published at `state_machine`.

@@ -1,6 +1,6 @@
 //! Failures of components.
 
-use crate::Payload;
+use crate::message::Payload;
 use std::fmt;
 
 /// A component that has failed while the robot runs, published at `fault`.

@@ -1,6 +1,6 @@
 //! Health of estimators, as published.
 
-use crate::Payload;
+use crate::message::Payload;
 use crate::time::MonotonicTime;
 use std::fmt;
 

@@ -1,6 +1,6 @@
 //! Parameters and their changes.
 
-use crate::Payload;
+use crate::message::Payload;
 use std::fmt;
 
 /// The value of a parameter.

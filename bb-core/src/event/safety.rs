@@ -1,6 +1,6 @@
 //! Whether the robot may move.
 
-use crate::Payload;
+use crate::message::Payload;
 use std::fmt;
 
 /// Whether the robot may move.

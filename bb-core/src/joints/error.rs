@@ -1,6 +1,6 @@
 //! Errors of transform lookups.
 
-use crate::Payload;
+use crate::message::Payload;
 use crate::time::MonotonicTime;
 use std::fmt;
 use std::time::Duration;

@@ -2,9 +2,9 @@
 
 use super::error::Gap;
 use super::states::{SharedStates, States};
-use crate::Payload;
 use crate::kinematics::{Chain, Kinematics, LinkId};
 use crate::message::Frame;
+use crate::message::Payload;
 use crate::time::MonotonicTime;
 use crate::topology::{JointKind, Topology};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};

@@ -3,9 +3,9 @@
 use super::*;
 use crate::kinematics::{Frames, Kinematics};
 use crate::message::{Frame, JointPositions, JointReading, Stamp};
+use crate::message::{Payload, Stamped};
 use crate::time::{Clock, MonotonicTime};
 use crate::topology::{Joint, JointKind, Link, Mimic, Origin, Topology};
-use crate::{Payload, Stamped};
 use nalgebra::{Isometry3, Vector3};
 use proptest::prelude::*;
 use std::collections::HashMap;

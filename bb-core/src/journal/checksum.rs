@@ -43,7 +43,7 @@ fn mix(sum: u64, word: u64) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Payload;
+    use crate::message::Payload;
     use crate::time::MonotonicTime;
 
     #[derive(Clone, Debug, Payload)]

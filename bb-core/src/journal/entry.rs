@@ -1,8 +1,8 @@
 //! The lines of a journal.
 
-use crate::Payload;
 use crate::event::{ParameterValue, SafetyError};
 use crate::joints::PlacedInput;
+use crate::message::Payload;
 use crate::message::codec::{Reader, Shape, Writer};
 use crate::message::{DecodeError, Field, Finite};
 use crate::pubsub::DynamicMessage;

@@ -52,7 +52,7 @@ fn by_encoding<T: Payload>(message: &Stamped<T>) -> Option<Stamped<T>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Payload as DerivePayload;
+    use crate::message::Payload as DerivePayload;
     use crate::time::MonotonicTime;
 
     #[derive(Debug, DerivePayload)]

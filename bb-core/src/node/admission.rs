@@ -1,7 +1,7 @@
 //! Decides which messages of an input are accepted.
 
 use super::DropReason;
-use crate::Payload;
+use crate::message::Payload;
 use crate::message::Stamped;
 use crate::time::MonotonicTime;
 

@@ -1,7 +1,7 @@
 //! Commands to an actuator, and its reports of a motion. The message's frame names the joint.
 
 use super::JointTrajectory;
-use crate::Payload;
+use crate::message::Payload;
 use crate::message::{Exceeded, JointBounds, JointCommand, OutOfBounds};
 use crate::time::MonotonicTime;
 

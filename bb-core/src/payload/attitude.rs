@@ -1,6 +1,6 @@
 //! Orientation and pose of a body.
 
-use crate::Payload;
+use crate::message::Payload;
 use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3};
 
 /// The orientation of a body in the world.

@@ -1,7 +1,7 @@
 //! Poses and twists whose covariance is known, accelerations, and forces.
 
 use super::{Pose, Twist};
-use crate::Payload;
+use crate::message::Payload;
 use nalgebra::{Matrix6, UnitQuaternion, Vector3};
 
 /// A [`Pose`] whose covariance is known (`geometry_msgs/PoseWithCovariance`), for viewers that draw it.

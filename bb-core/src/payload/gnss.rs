@@ -1,6 +1,6 @@
 //! Satellite navigation.
 
-use crate::Payload;
+use crate::message::Payload;
 use nalgebra::Matrix3;
 
 /// The position of an antenna, whose frame is the message's, from satellite navigation (`sensor_msgs/NavSatFix`).

@@ -1,6 +1,6 @@
 //! Camera images.
 
-use crate::Payload;
+use crate::message::Payload;
 use std::sync::Arc;
 
 /// An uncompressed image of a camera whose frame is the message's: x to the right, y down, z forward

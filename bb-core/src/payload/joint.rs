@@ -1,6 +1,6 @@
 //! The state of joints.
 
-use crate::Payload;
+use crate::message::Payload;
 use crate::message::{JointPositions, JointReading, JointSide};
 use std::sync::Arc;
 

@@ -1,7 +1,7 @@
 //! Motion: twist, and pose with twist.
 
 use super::Pose;
-use crate::Payload;
+use crate::message::Payload;
 use nalgebra::{Matrix6, Vector3};
 
 /// The velocity of a body, in its own frame (`geometry_msgs/TwistWithCovariance`).

@@ -1,6 +1,6 @@
 //! Poses along a path, and relative poses.
 
-use crate::Payload;
+use crate::message::Payload;
 use crate::time::{MonotonicTime, WallTime};
 use nalgebra::{Matrix6, UnitQuaternion, Vector3};
 use std::sync::Arc;

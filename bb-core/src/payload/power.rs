@@ -1,6 +1,6 @@
 //! Batteries and supplies.
 
-use crate::Payload;
+use crate::message::Payload;
 
 /// The state of a battery (`sensor_msgs/BatteryState`).
 ///

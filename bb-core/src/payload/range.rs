@@ -1,6 +1,6 @@
 //! Distances: of one beam, and of many in a plane.
 
-use crate::Payload;
+use crate::message::Payload;
 use std::sync::Arc;
 
 /// The distance to the nearest object in a cone in front of a sensor, along x of the message's frame (`sensor_msgs/Range`).

@@ -1,6 +1,6 @@
 //! Measurements of inertial, magnetic and pressure sensors.
 
-use crate::Payload;
+use crate::message::Payload;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 /// One sample of an inertial measurement unit, in the frame of its sensor (`sensor_msgs/Imu`).

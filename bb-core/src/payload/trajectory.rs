@@ -1,6 +1,6 @@
 //! Trajectories of joints.
 
-use crate::Payload;
+use crate::message::Payload;
 use crate::message::{Exceeded, JointBounds, JointCommand, OutOfBounds};
 use std::sync::Arc;
 use std::time::Duration;

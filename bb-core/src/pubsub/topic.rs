@@ -5,7 +5,7 @@ use super::queue::{Overflow, Queue, counted_bytes};
 use super::subscribers::{Subscribers, lock};
 use super::subscription::Subscription;
 use super::wakers::{Wakers, wake};
-use crate::Payload;
+use crate::message::Payload;
 use crate::message::{Panic, Stamped, copied};
 use std::fmt;
 use std::panic::resume_unwind;

@@ -1,9 +1,9 @@
 //! All messages of an input since the last dispatch.
 
 use super::slot::{Slot, Stored};
-use crate::Payload;
 use crate::declaration::InputDeclaration;
 use crate::fault::discard;
+use crate::message::Payload;
 use crate::message::{Stamped, copy_to};
 use std::cell::Cell;
 use std::collections::VecDeque;

@@ -1,9 +1,9 @@
 //! The latest message of an input.
 
 use super::slot::{Slot, Stored, SyncMiss};
-use crate::Payload;
 use crate::declaration::InputDeclaration;
 use crate::fault::discard;
+use crate::message::Payload;
 use crate::message::{Stamped, copy_to};
 use crate::time::MonotonicTime;
 use std::cell::Cell;

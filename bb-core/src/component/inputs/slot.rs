@@ -1,7 +1,7 @@
 //! What an input keeps between two dispatches.
 
-use crate::Payload;
 use crate::declaration::InputDeclaration;
+use crate::message::Payload;
 use crate::message::{Panic, Stamped};
 use crate::time::MonotonicTime;
 

@@ -53,7 +53,7 @@ macro_rules! ros_message {
         read $read:block
     ) => {
         #[doc = concat!("`", $ros, "`")]
-        #[derive(Clone, Debug, crate::Payload)]
+        #[derive(Clone, Debug, crate::message::Payload)]
         #[payload(name = $ros)]
         pub struct $name {
             header: crate::message::codec::ros::Header,

@@ -1,9 +1,9 @@
 //! Round trips bit for bit, bytes from anywhere, and what other programs see.
 
 use super::*;
-use crate::Payload;
 use crate::event::HealthTransition;
 use crate::event::{CommandEvent, CommandPhase, ParameterChange, ParameterValue, Refusal};
+use crate::message::Payload;
 use crate::message::{Frame, Origin, Stamp, Stamped};
 use crate::payload::{Imu, JointState, Marg, Odometry, Orientation, Pose};
 use crate::time::{MonotonicTime, WallTime};

@@ -1,7 +1,7 @@
 //! `geometry_msgs`; covariances are six by six: linear part first, then angular.
 
 use super::{WORLD, covariance, ros_message};
-use crate::Payload;
+use crate::message::Payload;
 use crate::message::codec::{Field, FieldShape, Reader, Shape, StructShape, Writer};
 use crate::message::{DecodeError, Finite};
 use crate::payload::{Accel, Orientation, Pose, PoseWithCovariance, Twist, TwistWithCovariance, Wrench};

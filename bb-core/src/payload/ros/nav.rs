@@ -2,7 +2,7 @@
 
 use super::geometry::{PoseMessage, PoseWithCovarianceMessage, TwistWithCovarianceMessage};
 use super::{Header, Time, WORLD, ros_message};
-use crate::Payload;
+use crate::message::Payload;
 use crate::payload::{Odometry, Path, PathPose};
 
 ros_message! {

@@ -4,7 +4,7 @@ mod battery;
 mod joint;
 
 use super::{covariance, number, ros_message};
-use crate::Payload;
+use crate::message::Payload;
 use crate::message::codec::{Field, RosCompanion};
 use crate::message::{DecodeError, RosMessage, Stamped};
 use crate::payload::{

@@ -1,8 +1,8 @@
 //! `trajectory_msgs`
 
 use super::{DurationMessage, ros_message};
-use crate::Payload;
 use crate::message::DecodeError;
+use crate::message::Payload;
 use crate::payload::{JointTrajectory, TrajectoryPoint};
 use std::sync::Arc;
 

@@ -72,7 +72,7 @@ fn paths_of_others_and_odd_ones_are_refused() {
 #[test]
 fn two_types_of_one_name_are_told_apart() {
     mod elsewhere {
-        #[derive(Clone, Debug, crate::Payload)]
+        #[derive(Clone, Debug, crate::message::Payload)]
         pub(super) struct JointState;
     }
     let registry = registry();

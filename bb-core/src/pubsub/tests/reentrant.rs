@@ -1,7 +1,7 @@
 //! User code in `Drop` and wakers may use the topic and the subscription that run it: no lock is held.
 
 use super::super::{AnyTopic, DynamicSubscription, Overflow, Select, Subscription, Topic};
-use crate::Payload;
+use crate::message::Payload;
 use crate::message::Stamped;
 use crate::time::MonotonicTime;
 use std::future::Future;

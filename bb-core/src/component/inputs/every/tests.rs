@@ -1,6 +1,6 @@
 use super::*;
-use crate::Payload as DerivePayload;
 use crate::declaration::InputDeclaration;
+use crate::message::Payload as DerivePayload;
 use crate::message::Stamp;
 use crate::time::MonotonicTime;
 use proptest::prelude::*;

@@ -1,7 +1,7 @@
 //! Written values are read back, errors name the field, and the schema accepts what the reader accepts.
 
 use super::*;
-use crate::Payload;
+use crate::message::Payload;
 use crate::message::codec::Field;
 use crate::message::codec::tests::{Choice, Everything, Nothing, bytes_of, choice, everything};
 use crate::message::{Finite, Stamped};

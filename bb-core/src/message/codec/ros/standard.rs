@@ -1,6 +1,6 @@
 //! Headers, times and transforms.
 
-use crate::Payload;
+use crate::message::Payload;
 use crate::message::codec::intern::intern;
 use crate::message::codec::{DecodeError, Field, Reader, Writer};
 use crate::message::{Finite, Stamped};
