@@ -93,12 +93,15 @@ impl<E: Estimator> AsEstimator<E> {
         }
     }
 
+    /// Hands the reply to `take` in each case by itself: joined to one value first, it would be copied, which costs more than the rest of
+    /// a hop.
     #[inline]
-    pub(crate) fn handle_input(
+    pub(crate) fn handle_input<T>(
         &mut self,
         input: <E::Input as Inputs>::View<'_>,
-    ) -> Result<Reply<E::Output>, Fault> {
-        whichever!(self, own => own.handle_input(input), other => other.handle_input(input))
+        take: impl FnOnce(Reply<E::Output>) -> T,
+    ) -> Result<T, Fault> {
+        whichever!(self, own => own.handle_input(input).map(take), other => other.handle_input(input).map(take))
     }
 
     pub(crate) fn handle_transforms(&mut self, transforms: &InputTransforms<'_>) -> Result<(), Fault> {

@@ -242,7 +242,7 @@ impl<E: Estimator> Node<E> {
             if handles_moving_joints {
                 running.handle_transforms(&placing.transforms(message.monotonic_time))?;
             }
-            taken.take(running.handle_input(view)?, turn.now());
+            running.handle_input(view, |reply| taken.take(reply, turn.now()))?;
             Ok(Handled::Ran)
         });
         let Taken { diverged, has_asked, .. } = taken;

@@ -94,6 +94,7 @@ pub(crate) fn payload(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Toke
         }
         #[automatically_derived]
         impl #generics ::bb_core::Finite for #name #arguments #bounds {
+            #[inline]
             fn is_finite(&self) -> bool {
                 match self { #finite }
             }
@@ -146,7 +147,7 @@ fn attributes(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Attributes {
     attributes
 }
 
-/// `Self { a: f0, b: f1 } => f0 is finite && f1 is finite,`
+/// `Self { a: f0, b: f1 } => f0 is finite & f1 is finite,`, without a branch.
 fn arm(head: &TokenStream, fields: &Fields, diagnostics: &mut Diagnostics) -> TokenStream {
     let patterns = patterns(fields);
     let mut checks = quote!(true);
@@ -158,7 +159,7 @@ fn arm(head: &TokenStream, fields: &Fields, diagnostics: &mut Diagnostics) -> To
             false => quote!(is_finite),
         };
         // The only place that requires the type to be a field, so that a type that is not one is reported once.
-        checks.extend(quote_spanned!(kind.span()=> && ::bb_core::__private::#check::<#kind>(#bound)));
+        checks.extend(quote_spanned!(kind.span()=> & ::bb_core::__private::#check::<#kind>(#bound)));
     }
     quote!(#head { #patterns } => #checks,)
 }

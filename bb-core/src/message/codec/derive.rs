@@ -4,6 +4,7 @@ use super::{DecodeError, Field, Reader, Shape, Writer};
 use std::marker::PhantomData;
 
 /// Whether a field is finite. Of the functions that the derive calls, only this and [`is_any`] require a [`Field`].
+#[inline]
 pub fn is_finite<T: Field>(value: &T) -> bool {
     value.is_finite()
 }
