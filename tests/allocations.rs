@@ -1,5 +1,4 @@
-//! From a sensor's publish to the outputs of all estimators downstream nothing is allocated. A binary of its own, since
-//! it replaces the allocator by one that counts.
+//! From a sensor's publish to the outputs of all estimators downstream nothing is allocated.
 
 use bb_core::component::InputTransforms;
 use bb_core::nalgebra::{UnitQuaternion, Vector2, Vector3};

@@ -1,16 +1,16 @@
 //! Tables in the guides that are made from the list of filters, from their parameters and from their figures.
-//! `UPDATE_DOCS=1 cargo test -p bb-tests --test tables` renews them.
+//! `UPDATE_DOCS=1 cargo test -p bb-tests --test robots tables` renews them.
 
 // The accuracy tests use the rest of it.
 #[allow(dead_code)]
 #[path = "accuracy/known.rs"]
 mod known;
 
-use bb_cli::Axes;
 use bb_estimators::attitude::{AnyFilter, AnyParams, AttitudeFilter, FilterParams, ImuSample};
 use bb_estimators::navigation::planar::{PlanarOptions, PlanarParams};
 use bb_estimators::navigation::{AlignmentParams, EskfParams, NavigationOptions, StreamParams};
 use bb_estimators::params::{Kind, Params};
+use bb_eval::Axes;
 use known::{Errors, Row};
 use std::error::Error;
 use std::fmt::Write;

@@ -123,7 +123,6 @@ fn memory() -> Option<u64> {
 }
 
 #[test]
-#[ignore = "measures the memory of its process: alone in a release build, as .ci/run has it"]
 fn a_week_takes_no_more_memory_than_an_hour() -> Result<(), Box<dyn std::error::Error>> {
     // Without a subscriber the robot prints each of 600,000 faults, and the test harness keeps in memory what is printed.
     let _ = tracing::subscriber::set_global_default(tracing::subscriber::NoSubscriber::new());

@@ -1,15 +1,16 @@
 //! The command line.
 
 use crate::calibrate::Calibrate;
-use crate::evaluate::Evaluator;
-use crate::filters::{Axes, Chosen, Setting};
+use crate::commands;
 use crate::navigation::{self, NavigationArguments};
 use crate::noise::{self, NoiseArguments};
-use crate::plot::Picture;
-use crate::recording::{MovingTopic, Topics};
-use crate::variants::{Field, Offset, Starts, Variants};
-use crate::{commands, files, filters};
 use bb_estimators::attitude::FilterParams;
+use bb_eval::Evaluator;
+use bb_eval::{Axes, Chosen, Setting};
+use bb_eval::{Field, Offset, Starts, Variants};
+use bb_eval::{MovingTopic, Topics};
+use bb_eval::{files, filters};
+use bb_plot::Picture;
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand};
 use std::ffi::OsString;

@@ -2,9 +2,6 @@
 
 mod report;
 
-use crate::filters::Axes;
-use crate::plot::Picture;
-use crate::recording::{End, Recording, Topics};
 use bb_core::nalgebra::Vector3;
 use bb_estimators::attitude::ImuSample;
 use bb_estimators::calibration::{
@@ -12,6 +9,9 @@ use bb_estimators::calibration::{
     gyroscope, magnetometer,
 };
 use bb_estimators::params::Params;
+use bb_eval::Axes;
+use bb_eval::{End, Recording, Topics};
+use bb_plot::Picture;
 use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
 
@@ -44,7 +44,7 @@ pub(crate) struct ImuArguments {
     gravity: f64,
     /// Local strength of the magnetic field, as 48uT. By default the calibration keeps the measured strength.
     #[arg(long, value_name = "FIELD")]
-    field: Option<crate::Field>,
+    field: Option<bb_eval::Field>,
     /// Sets what counts as rest: window, time, rotation and force, in SI or with a unit.
     #[arg(long = "set", value_name = "NAME=VALUE")]
     settings: Vec<String>,
@@ -140,7 +140,7 @@ impl Calibration {
         samples: &[ImuSample],
         params: RestParams,
         gravity: f64,
-        field: Option<crate::Field>,
+        field: Option<bb_eval::Field>,
     ) -> Result<Self, String> {
         let mut finder = Rests::new(params).map_err(|error| error.to_string())?;
         let mut rests: Vec<_> = samples.iter().filter_map(|sample| finder.add(sample)).collect();

@@ -1,54 +1,20 @@
 //! The command `bb`: inspects, plots and converts recordings, evaluates filters on them, and creates projects. The
-//! guide is `docs/command.md`.
-//!
-//! `bb eval attitude FILES…` runs the filters on each bag and prints their errors against the truth; the guide is
-//! `docs/evaluate.md`. It is also available as a library: [`Score`] and [`Averages`] define the
-//! figures, [`evaluate`](fn@evaluate) computes them for one recording, and [`Picture`] plots
-//! lines over time.
-//!
-//! `bb eval navigation DATA…` does the same for navigation filters on bags and CSV files; [`evaluate_navigation`] is its
-//! library.
+//! guide is `docs/command.md`; that of `bb eval`, which is `bb-eval` on the command line, is `docs/evaluate.md`.
 
 // A robot must not stop because of an unexpected value.
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod arguments;
-mod averages;
 mod calibrate;
 mod commands;
-mod error_plot;
-mod evaluate;
-mod files;
-mod filters;
 mod navigation;
 mod noise;
 mod periods;
-mod plot;
-mod progress;
-mod recording;
-mod report;
-mod score;
-mod table;
 mod topics;
-mod truths;
-mod units;
 mod values;
-mod variants;
-
-pub use averages::Averages;
-pub use evaluate::{Evaluation, Evaluator, Run, evaluate, evaluate_variant};
-pub use filters::{Axes, Chosen, Refused, Running, Setting};
-pub use navigation::{
-    BagOptions, BiasDeviation, DataSet, FromBag, Mount, NAVIGATION_FILTERS, NavigationBag, NavigationFilter,
-    NavigationScore, NavigationSetting, Origin, Place, RelativeDeviation, StartFrom, evaluate_navigation,
-};
-pub use plot::{Colour, Line, PALETTE, Panel, Part, Picture, Plane, Point, Scale, Sheet};
-pub use progress::Progress;
-pub use recording::{End, MovingTopic, Recording, Topics};
-pub use score::{Degrees, Score};
-pub use variants::{Field, Offset, Starts, Variants};
 
 use arguments::{Attitude, Job};
+use bb_eval::{evaluate_all, files, plot_errors, report};
 use std::ffi::OsString;
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
@@ -86,12 +52,12 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
 fn eval_attitude(attitude: &Attitude) -> Result<bool, String> {
     let Attitude { paths, evaluator, json, plot } = attitude;
     let files = files::recordings(paths);
-    let evaluations = evaluate::evaluate_all(&files, evaluator);
+    let evaluations = evaluate_all(&files, evaluator);
     let text = if *json { report::json(&evaluations)? } else { report::table(&evaluations, evaluator.axes) };
     say(&text)?;
     let is_whole = report::complain(&evaluations);
     if let Some(plot) = plot {
-        error_plot::draw(plot, &evaluations, evaluator.axes)?;
+        plot_errors(plot, &evaluations, evaluator.axes)?;
         eprintln!("plotted {}", plot.display());
     }
     Ok(is_whole)

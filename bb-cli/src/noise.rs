@@ -3,13 +3,13 @@
 mod report;
 mod still;
 
-use crate::files;
-use crate::navigation::inertial;
-use crate::plot::Picture;
-use crate::progress::Progress;
-use crate::recording::{End, Recording, Topics};
 use bb_core::nalgebra::Vector3;
 use bb_estimators::calibration::{AllanError, SensorNoise, integrate, sensor_noise};
+use bb_eval::Progress;
+use bb_eval::files;
+use bb_eval::inertial;
+use bb_eval::{End, Recording, Topics};
+use bb_plot::Picture;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use still::{Still, still};

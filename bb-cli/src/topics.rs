@@ -1,7 +1,7 @@
 //! Topics of a bag by the names on the command line, and their messages of any type.
 
-use crate::filters::near;
 use crate::values::FromJson;
+use bb_eval::filters::near;
 use bb_mcap::{Bag, BagMessage, MessageDefinition, Topic, Value};
 use std::path::Path;
 

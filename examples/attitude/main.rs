@@ -5,19 +5,29 @@
 
 mod arguments;
 mod outcome;
+#[cfg(feature = "plot")]
 mod plot;
+#[cfg(feature = "recordings")]
 mod recorded;
 mod simulated;
 
 use arguments::Arguments;
-use bb_cli::Picture;
-use clap::Parser;
 use std::error::Error;
 use std::io::Write;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let arguments = Arguments::parse();
+    let arguments = match Arguments::parse(std::env::args().skip(1)) {
+        Ok(arguments) => arguments,
+        Err((text, true)) => {
+            let _ = say(&text);
+            return ExitCode::SUCCESS;
+        }
+        Err((text, false)) => {
+            eprint!("{text}");
+            return ExitCode::from(2);
+        }
+    };
     match run(&arguments) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
@@ -37,18 +47,21 @@ fn say(text: &str) -> std::io::Result<()> {
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let params = arguments.params()?;
+    #[cfg(feature = "plot")]
     if let Some(file) = &arguments.plot {
-        Picture::check(file, "--plot")?;
+        bb_plot::Picture::check(file, "--plot")?;
     }
     let outcome = match &arguments.data {
+        #[cfg(feature = "recordings")]
         Some(file) => recorded::run(file, arguments, params)?,
-        None => simulated::run(arguments, params)?,
+        _ => simulated::run(arguments, params)?,
     };
     if arguments.json {
-        say(&format!("{}\n", serde_json::to_string(&outcome.summary())?))?;
+        say(&outcome.json())?;
     } else {
         say(&outcome.to_string())?;
     }
+    #[cfg(feature = "plot")]
     if let Some(file) = &arguments.plot {
         plot::picture(&outcome)?.write(file)?;
         eprintln!("plotted {}", file.display());

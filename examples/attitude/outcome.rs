@@ -1,10 +1,9 @@
 //! What a run gave: estimates beside the truth, and their errors.
 
-use bb_cli::{Degrees, Score};
 use bb_core::Report;
 use bb_core::nalgebra::UnitQuaternion;
 use bb_estimators::attitude::OrientationError;
-use serde::Serialize;
+use bb_eval::{Degrees, Score};
 use std::fmt;
 
 pub(crate) struct Outcome {
@@ -25,24 +24,12 @@ pub(crate) struct Series {
     score: Score,
 }
 
+#[cfg_attr(not(feature = "plot"), expect(dead_code, reason = "for pictures"))]
 pub(crate) struct Point {
     pub(crate) time_s: f64,
     pub(crate) estimate: UnitQuaternion<f64>,
     pub(crate) truth: Option<UnitQuaternion<f64>>,
     pub(crate) error: Option<OrientationError>,
-}
-
-/// The object that `--json` prints, of the first series. Errors are null where there is no truth.
-#[derive(Serialize)]
-pub(crate) struct Summary {
-    filter: &'static str,
-    samples: usize,
-    /// How many of them were compared with the truth.
-    scored: usize,
-    total_deg: Option<f64>,
-    heading_deg: Option<f64>,
-    inclination_deg: Option<f64>,
-    seconds: f64,
 }
 
 impl Series {
@@ -68,18 +55,22 @@ impl Series {
 }
 
 impl Outcome {
-    pub(crate) fn summary(&self) -> Summary {
+    /// The object that `--json` prints, of the first series. Errors are null where there is no truth.
+    pub(crate) fn json(&self) -> String {
         let first = self.series.first();
         let rms = first.and_then(|series| series.score.rms());
-        Summary {
-            filter: self.filter,
-            samples: first.map_or(0, Series::len),
-            scored: first.map_or(0, |series| series.score.count() as usize),
-            total_deg: rms.map(|rms| rms.total),
-            heading_deg: rms.map(|rms| rms.heading),
-            inclination_deg: rms.map(|rms| rms.inclination),
-            seconds: self.seconds,
-        }
+        let number = |of: fn(&Degrees) -> f64| rms.map_or_else(|| "null".to_owned(), |rms| of(&rms).to_string());
+        let samples = first.map_or(0, Series::len);
+        // How many of them were compared with the truth.
+        let scored = first.map_or(0, |series| series.score.count());
+        format!(
+            "{{\"filter\":\"{}\",\"samples\":{samples},\"scored\":{scored},\"total_deg\":{},\"heading_deg\":{},\"inclination_deg\":{},\"seconds\":{}}}\n",
+            self.filter,
+            number(|rms| rms.total),
+            number(|rms| rms.heading),
+            number(|rms| rms.inclination),
+            self.seconds,
+        )
     }
 }
 

@@ -1,8 +1,8 @@
 //! Truth and estimate over time, as a picture.
 
 use crate::outcome::{Outcome, Point};
-use bb_cli::{Colour, Line, PALETTE, Panel, Picture};
 use bb_core::nalgebra::UnitQuaternion;
+use bb_plot::{Colour, Line, PALETTE, Panel, Picture};
 
 const ESTIMATE: Colour = PALETTE[0];
 const HEADING: Colour = PALETTE[1];

@@ -2,9 +2,9 @@
 
 use crate::arguments::Arguments;
 use crate::outcome::{Outcome, Series};
-use bb_cli::{Axes, Progress};
 use bb_core::prelude::*;
 use bb_estimators::attitude::{AnyFilter, AnyParams, Attitude};
+use bb_eval::{Axes, Progress};
 use bb_mcap::{Bag, BagImu, IMU, Truth};
 use std::error::Error;
 use std::path::Path;

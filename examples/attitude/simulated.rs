@@ -2,11 +2,11 @@
 
 use crate::arguments::Arguments;
 use crate::outcome::{Outcome, Series};
-use bb_cli::{Axes, Progress};
 use bb_core::prelude::*;
 use bb_estimators::attitude::{AnyFilter, AnyParams, Attitude};
 use bb_estimators::simulation::Motion;
 use bb_estimators::{OrientationAverage, SimulatedImu};
+use bb_eval::{Axes, Progress};
 use std::error::Error;
 use std::time::Instant;
 

@@ -2,13 +2,13 @@
 
 use crate::sensors::frame;
 use crate::timeline::Happened;
-use bb_cli::{Line, PALETTE, Panel, Picture};
 use bb_core::nalgebra::Vector3;
 use bb_core::prelude::*;
 use bb_estimators::navigation::Geodetic;
 use bb_estimators::navigation::state_estimator::{
     FlightEstimate, FlightEvent, FlightEvents, FlightHealth, Level, SourceLabel,
 };
+use bb_plot::{Line, PALETTE, Panel, Picture};
 use std::fmt::Write;
 
 /// An estimate beside the truth.

@@ -19,8 +19,6 @@ mod tests {
     use crate::drive::seconds;
     use crate::{recorded, run, simulated};
     use std::error::Error;
-    use std::io::Write as _;
-    use std::path::Path;
 
     #[test]
     fn the_drive_is_the_stored_one() -> Result<(), Box<dyn Error>> {
@@ -33,14 +31,9 @@ mod tests {
 
     /// On a plane and without wheels, as `--data` plays it.
     #[test]
+    #[ignore = "needs recordings: .ci/run runs it"]
     fn the_recorded_drive_keeps_within_its_bounds() -> Result<(), Box<dyn Error>> {
-        let prefix = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/navigation/kitti_s2");
-        if !prefix.with_file_name("kitti_s2_imu.csv").exists() {
-            // To the terminal itself: the test harness keeps what a passing test prints.
-            let _ = writeln!(std::io::stderr(), "skipped: no recorded drive in ../shared/data");
-            return Ok(());
-        }
-        let mut drive = recorded::drive(&prefix)?;
+        let mut drive = recorded::drive(&bb_tests::recordings::navigation()?.join("kitti_s2"))?;
         // The rest of it is driven by the command alone.
         drive.events.retain(|(time, _)| seconds(*time) < 205.0);
         let outcome = run::of_record(&drive)?;

@@ -1,7 +1,7 @@
 //! Errors within three standard deviations, as a picture.
 
 use crate::outcome::{Outcome, Point};
-use bb_cli::{Line, PALETTE, Panel, Picture};
+use bb_plot::{Line, PALETTE, Panel, Picture};
 
 pub(crate) fn picture(outcome: &Outcome) -> Picture {
     let line = |value: &dyn Fn(&Point) -> f64| -> Vec<_> {

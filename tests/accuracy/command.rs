@@ -1,12 +1,12 @@
 //! `bb eval attitude` gives the figures of the filters in a robot: the same samples, the same score.
 
-use crate::attitude;
-use crate::known::{self, Row};
-use crate::recordings::broad;
-use bb_cli::{Degrees, Score};
+use super::attitude;
+use super::known::{self, Row};
 use bb_core::prelude::*;
 use bb_estimators::attitude::{AnyFilter, AnyParams, Attitude};
+use bb_eval::{Degrees, Score};
 use bb_mcap::{BagImu, Truth};
+use bb_tests::recordings::broad;
 use std::error::Error;
 use std::path::Path;
 
@@ -40,7 +40,7 @@ fn robot(file: &Path, row: &Row) -> Result<Degrees, Box<dyn Error>> {
 fn the_command_and_a_robot_agree() -> Result<(), Box<dyn Error>> {
     let rows = known::rows()?;
     // A disturbed one.
-    for file in broad()?.into_iter().flatten().rev().take(1) {
+    for file in broad()?.into_iter().rev().take(1) {
         for (row, command) in rows.iter().zip(attitude::errors(&file, &rows)?) {
             assert_eq!(command, robot(&file, row)?, "{}, {}", row.name(), file.display());
         }

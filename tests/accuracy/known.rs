@@ -1,8 +1,8 @@
 //! What each filter reaches on BROAD: `accuracy.csv` in its folder, which the tests are held against and the guide's tables
 //! are made from. `UPDATE_ACCURACY=1` renews it.
 
-use bb_cli::{Averages, Axes, Chosen, Degrees, Setting};
 use bb_estimators::attitude::FilterParams;
+use bb_eval::{Averages, Axes, Chosen, Degrees, Setting};
 use std::error::Error;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,7 @@
 //! `bb eval navigation` on recorded and simulated drives and flights, with one set of parameters for all.
 
-use crate::recordings::{SETS, navigation};
-use bb_cli::{DataSet, NAVIGATION_FILTERS, evaluate_navigation};
+use bb_eval::{DataSet, NAVIGATION_FILTERS, evaluate_navigation};
+use bb_tests::recordings::{SETS, navigation};
 use std::error::Error;
 use std::path::Path;
 
@@ -27,7 +27,7 @@ const KNOWN: [Known; SETS - 1] = [
 
 #[test]
 fn errors_are_no_greater_than_known() -> Result<(), Box<dyn Error>> {
-    let Some(folder) = navigation()? else { return Ok(()) };
+    let folder = navigation()?;
     let filter = &NAVIGATION_FILTERS[0];
     for Known { name, position, orientation, nees: (least, most) } in KNOWN {
         let score = evaluate_navigation(&DataSet::read(&folder.join(name))?, filter, &[], 20, || {})?;
@@ -72,9 +72,8 @@ const SMOOTHED: [Smoothed; SETS - 1] = [
 ];
 
 #[test]
-#[ignore = "takes minutes in a debug build: .ci/run runs it in release"]
 fn the_smoother_errs_no_more_than_known() -> Result<(), Box<dyn Error>> {
-    let Some(folder) = navigation()? else { return Ok(()) };
+    let folder = navigation()?;
     let smoother = NAVIGATION_FILTERS.iter().find(|filter| filter.name == "smoother").ok_or("no such filter")?;
     for Smoothed { name, position, nees: (least, most), orientation, oldest } in SMOOTHED {
         let score = evaluate_navigation(&DataSet::read(&folder.join(name))?, smoother, &[], 20, || {})?;
@@ -96,9 +95,8 @@ fn the_smoother_errs_no_more_than_known() -> Result<(), Box<dyn Error>> {
 
 /// With the noise that GTSAM was given, the smoother gives GTSAM's figures: they are the same problem.
 #[test]
-#[ignore = "takes minutes in a debug build: .ci/run runs it in release"]
 fn a_tuned_smoother_agrees_with_gtsam() -> Result<(), Box<dyn Error>> {
-    let Some(folder) = navigation()? else { return Ok(()) };
+    let folder = navigation()?;
     let single =
         NAVIGATION_FILTERS.iter().find(|filter| filter.name == "smoother-single").ok_or("no such filter")?;
     let tuned = ["gyroscope_noise=5e-3", "accelerometer_noise=5e-2"];
@@ -130,9 +128,8 @@ fn a_tuned_smoother_agrees_with_gtsam() -> Result<(), Box<dyn Error>> {
 
 /// The state estimator adds a queue, stamps, places on the Earth, gates and labels to a strategy; none of it may cost accuracy.
 #[test]
-#[ignore = "takes minutes in a debug build: .ci/run runs it in release"]
 fn the_state_estimator_errs_as_its_strategy_does() -> Result<(), Box<dyn Error>> {
-    let Some(folder) = navigation()? else { return Ok(()) };
+    let folder = navigation()?;
     let named = |name: &str| {
         NAVIGATION_FILTERS.iter().find(|filter| filter.name == name).ok_or_else(|| format!("no filter {name}"))
     };
@@ -178,7 +175,7 @@ fn the_state_estimator_errs_as_its_strategy_does() -> Result<(), Box<dyn Error>>
 /// Without the bank, and tuned by hand as GTSAM was, the filter gives GTSAM's figures: they are the same problem.
 #[test]
 fn one_tuned_filter_agrees_with_a_smoother() -> Result<(), Box<dyn Error>> {
-    let Some(folder) = navigation()? else { return Ok(()) };
+    let folder = navigation()?;
     let single = NAVIGATION_FILTERS.iter().find(|filter| filter.name == "eskf-single").ok_or("no such filter")?;
     let tuned = ["gyroscope_noise=5e-3", "accelerometer_noise=5e-2"];
     let known = ["relative_scale=0"];

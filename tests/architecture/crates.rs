@@ -16,12 +16,19 @@ fn arrows_between_crates_point_one_way() {
         ("bb-macros", "bb-estimators"),
         ("bb-core", "bb-estimators"),
         ("bb-core", "bb-cli"),
+        ("bb-core", "bb-eval"),
         ("bb-core", "bb-mavlink"),
         ("bb-core", "bb-mcap"),
         ("bb-core", "bb-metrics"),
         ("bb-core", "bb-redb"),
         ("bb-estimators", "bb-macros"),
         ("bb-estimators", "bb-cli"),
+        ("bb-estimators", "bb-eval"),
+        ("bb-eval", "bb-cli"),
+        ("bb-eval", "bb-macros"),
+        ("examples/attitude", "bb-cli"),
+        ("examples/attitude", "clap"),
+        ("integrations/plot", "bb-"),
         ("bb-estimators", "bb-mavlink"),
         ("bb-estimators", "bb-mcap"),
         ("bb-estimators", "bb-metrics"),
@@ -30,14 +37,17 @@ fn arrows_between_crates_point_one_way() {
         ("integrations/mavlink", "bb-mcap"),
         ("integrations/mavlink", "bb-metrics"),
         ("integrations/mavlink", "bb-cli"),
+        ("integrations/mavlink", "bb-eval"),
         ("integrations/mcap", "bb-macros"),
         ("integrations/mcap", "bb-estimators"),
         ("integrations/mcap", "bb-metrics"),
         ("integrations/mcap", "bb-cli"),
+        ("integrations/mcap", "bb-eval"),
         ("integrations/metrics", "bb-macros"),
         ("integrations/metrics", "bb-estimators"),
         ("integrations/metrics", "bb-mcap"),
         ("integrations/metrics", "bb-cli"),
+        ("integrations/metrics", "bb-eval"),
         ("integrations/redb", "bb-macros"),
         ("integrations/redb", "bb-estimators"),
         ("integrations/redb", "bb-cli"),
@@ -56,5 +66,8 @@ fn the_top_level_is_the_project() {
         .map(|entry| entry.file_name().to_string_lossy().into_owned())
         .collect();
     crates.sort();
-    assert_eq!(crates, ["bb-cli", "bb-core", "bb-estimators", "bb-macros", "benches", "examples", "tests"]);
+    assert_eq!(
+        crates,
+        ["bb-cli", "bb-core", "bb-estimators", "bb-eval", "bb-macros", "benches", "examples", "tests"]
+    );
 }

@@ -21,6 +21,32 @@ fn every_path_in_the_documents_exists() {
     }
 }
 
+/// Recordings come through `BB_DATA`, and nothing else is looked for outside the checkout.
+#[test]
+fn nothing_beside_the_project_is_named() {
+    let mut folders = vec![root().to_owned()];
+    let (mut read, mut found) = (0, Vec::new());
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(&folder).expect("it is a folder").flatten() {
+            let (path, name) = (entry.path(), entry.file_name());
+            if path.is_dir() {
+                let is_source = name != "target" && !name.to_string_lossy().starts_with('.');
+                folders.extend(is_source.then_some(path));
+                continue;
+            }
+            let is_text = path
+                .extension()
+                .is_none_or(|end| ["md", "rs", "py", "toml", "txt"].iter().any(|text| end == *text));
+            let Ok(text) = std::fs::read_to_string(&path) else { continue };
+            read += usize::from(is_text);
+            if is_text && text.contains(concat!("../", "shared")) {
+                found.push(path);
+            }
+        }
+    }
+    assert!(read > 500 && found.is_empty(), "{read} files read; beside the project: {found:#?}");
+}
+
 #[test]
 fn every_folder_of_code_is_on_the_map() {
     let map = read("ARCHITECTURE.md");

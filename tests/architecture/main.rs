@@ -19,14 +19,16 @@ fn read(file: &str) -> String {
 }
 
 /// The folders of the crates with code that others use.
-const CRATES: [&str; 8] = [
+const CRATES: [&str; 10] = [
     "bb-macros",
     "bb-core",
     "bb-estimators",
+    "bb-eval",
     "bb-cli",
     "integrations/mavlink",
     "integrations/mcap",
     "integrations/metrics",
+    "integrations/plot",
     "integrations/redb",
 ];
 

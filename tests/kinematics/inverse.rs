@@ -1,6 +1,6 @@
 //! Inverse kinematics of arms with six and seven axes.
 
-use crate::robots::{Arm, panda, ur5};
+use super::robots::{Arm, panda, ur5};
 use bb_core::kinematics::{InverseKinematics, InverseParams, KinematicsError, Target};
 use bb_core::nalgebra::{Isometry3, Matrix6xX, Vector3};
 use proptest::prelude::Rng;

@@ -1,6 +1,6 @@
 //! What holds of any robot.
 
-use crate::robots::{Anymal, panda, ur5};
+use super::robots::{Anymal, panda, ur5};
 use bb_core::kinematics::{Frames, InverseKinematics, InverseParams, Kinematics, KinematicsError, Target};
 use bb_core::nalgebra::{Isometry3, Matrix6xX, Vector3};
 use bb_core::prelude::*;

@@ -8,12 +8,8 @@ The robot is made here by hand from the numbers of the declaration, and joints a
 import json
 import sys
 
-try:
-    import numpy as np
-    import pinocchio as pin
-except ImportError as missing:
-    print(f"kinematics: skipped: Python has no {missing.name}, which the package `pin` brings")
-    sys.exit(77)
+import numpy as np
+import pinocchio as pin
 
 
 def at(xyz, rpy_deg=(0, 0, 0)):

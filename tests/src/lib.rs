@@ -1,6 +1,7 @@
 //! Tests of whole robots; see the test targets of this crate. The code in the documents is compiled here.
 
 pub mod random;
+pub mod recordings;
 
 #[cfg(doctest)]
 #[doc = include_str!("../../README.md")]

@@ -1,10 +1,10 @@
 //! The output and the plot of `bb calibrate imu`.
 
 use super::Calibration;
-use crate::plot::{Line, Panel, Picture};
 use bb_core::nalgebra::{Matrix3, Vector3};
 use bb_estimators::attitude::ImuSample;
 use bb_estimators::calibration::{AccelerometerFit, GyroscopeFit, MagnetometerFit, Model};
+use bb_plot::{Line, Panel, Picture};
 use std::fmt::Write;
 use std::path::Path;
 

@@ -6,7 +6,7 @@ mod source;
 mod units;
 mod write;
 
-use crate::Progress;
+use bb_eval::Progress;
 use cells::{Table, Times};
 use clap::Args;
 use columns::{Columns, Quantity};

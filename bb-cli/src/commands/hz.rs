@@ -1,8 +1,8 @@
 //! `bb hz`: the rates of topics.
 
 use crate::periods::Periods;
-use crate::table::aligned;
 use crate::topics::{TopicReader, find, is_of_events, log_ns, open};
+use bb_eval::table::aligned;
 use clap::Args;
 use serde::Serialize;
 use std::collections::HashMap;
@@ -49,7 +49,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
         topics.iter().filter_map(|topic| Some((topic.name.clone(), TopicReader::new(topic).ok()?))).collect();
 
     let expected = topics.iter().filter_map(|topic| topic.messages).sum();
-    let progress = crate::Progress::new("reading", expected);
+    let progress = bb_eval::Progress::new("reading", expected);
     let mut times: HashMap<_, Vec<i64>> = HashMap::new();
     let mut broken = None;
     for message in bag.messages_in_any_encoding(&names).map_err(|error| error.to_string())? {

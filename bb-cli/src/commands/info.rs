@@ -7,7 +7,7 @@ mod report;
 mod scan;
 mod times;
 
-use crate::files;
+use bb_eval::files;
 use clap::Args;
 use std::path::PathBuf;
 

@@ -4,9 +4,9 @@ mod select;
 mod units;
 
 use crate::periods::Periods;
-use crate::plot::{Line, PALETTE, Panel, Picture, Point};
 use crate::topics::{TopicReader, find, is_named, log_ns, open};
 use bb_mcap::{Bag, Topic, Value};
+use bb_plot::{Line, PALETTE, Panel, Picture, Point};
 use clap::Args;
 use select::{Group, Path, groups};
 use std::collections::HashSet;
@@ -107,7 +107,7 @@ fn read(bag: &Bag, chosen: &mut [Chosen<'_>]) -> Result<Option<String>, String> 
     names.sort_unstable();
     names.dedup();
     let is_read = |topic: &&Topic| names.contains(&topic.name);
-    let progress = crate::Progress::new(
+    let progress = bb_eval::Progress::new(
         "reading",
         bag.topics().iter().filter(is_read).filter_map(|topic| topic.messages).sum(),
     );

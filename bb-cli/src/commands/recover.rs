@@ -16,7 +16,7 @@ pub(crate) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
     let Arguments { broken, whole } = arguments;
-    let progress = crate::Progress::spinner("recovering");
+    let progress = bb_eval::Progress::spinner("recovering");
     let recovered = bb_mcap::recover(broken, whole).map_err(|error| error.to_string());
     progress.finish();
     let recovered = recovered?;

@@ -1,8 +1,8 @@
 //! The output and the plot of `bb eval noise`.
 
 use super::{AXES, Noise};
-use crate::plot::{Line, PALETTE, Part, Plane, Scale, Sheet};
 use bb_estimators::calibration::{Known, SensorNoise};
+use bb_plot::{Line, PALETTE, Part, Plane, Scale, Sheet};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 use std::fmt::Write;

@@ -5,7 +5,7 @@ mod callgrind;
 mod pairs;
 mod peers;
 
-use bb_cli::{Averages, Chosen, Degrees, End, Recording, Running, Score, Setting, Topics};
+use bb_eval::{Averages, Chosen, Degrees, End, Recording, Running, Score, Setting, Topics};
 use bb_estimators::attitude::ImuSample;
 use pairs::{PAIRS, Pair};
 use std::error::Error;
@@ -18,8 +18,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let json = arguments.iter().any(|argument| argument == "--json");
     let folder = arguments.iter().find(|argument| !argument.starts_with("--"));
-    let folder = folder.map_or_else(|| Path::new("../../../shared/data/broad"), Path::new);
-    let files = recordings(folder)?;
+    let folder = match folder {
+        Some(folder) => PathBuf::from(folder),
+        None => Path::new(&std::env::var("BB_DATA").map_err(|_| "name a folder of recordings, or set BB_DATA")?).join("broad"),
+    };
+    let files = recordings(&folder)?;
     for pair in PAIRS {
         if ours(pair).is_err() {
             eprintln!("left out: {}: there is no filter {} here", pair.name, pair.ours);

@@ -1,7 +1,7 @@
 //! What is compared with what.
 
 use crate::peers;
-use bb_cli::{Axes, Running};
+use bb_eval::{Axes, Running};
 
 /// One of our filters and a peer, each with its parameters.
 pub struct Pair {

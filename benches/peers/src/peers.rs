@@ -1,7 +1,7 @@
 //! The peers: each takes the samples as its own documentation has it, and gives `world_from_body` in ENU.
 
 use ahrs::Ahrs;
-use bb_cli::{Refused, Running};
+use bb_eval::{Refused, Running};
 use bb_estimators::attitude::ImuSample;
 use bb_estimators::attitude::initial::initial_orientation;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};

@@ -8,11 +8,11 @@ use std::error::Error;
 
 /// A number.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
-pub struct Number(f64);
+struct Number(f64);
 
 /// Returns numbers, and occasionally a NaN.
 #[derive(Debug)]
-pub struct Numbers(u32);
+struct Numbers(u32);
 
 impl Sensor for Numbers {
     type Options = NoOptions;
@@ -31,7 +31,7 @@ impl Sensor for Numbers {
 
 /// Adds numbers up; fails at every hundredth number.
 #[derive(Debug)]
-pub struct Sum(f64, u32);
+struct Sum(f64, u32);
 
 impl Estimator for Sum {
     type Options = NoOptions;

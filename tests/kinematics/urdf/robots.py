@@ -12,12 +12,8 @@ import shutil
 import sys
 import xml.etree.ElementTree as xml
 
-try:
-    import numpy as np
-    import pinocchio as pin
-except ImportError as missing:
-    print(f"urdf: skipped: Python has no {missing.name}, which the package `pin` brings")
-    sys.exit(77)
+import numpy as np
+import pinocchio as pin
 
 
 def found(repository):

@@ -2,7 +2,7 @@
 
 use super::columns::{Column, Columns, Quantity, What};
 use super::source::{LONGEST_HEAD, Source, is_number};
-use crate::filters::near;
+use bb_eval::filters::near;
 use csv::StringRecord;
 use std::path::Path;
 

@@ -1,7 +1,7 @@
 //! The contents of the columns.
 
 use super::units::{self, Units};
-use crate::filters::near;
+use bb_eval::filters::near;
 use std::fmt;
 use std::str::FromStr;
 

@@ -1,8 +1,8 @@
 //! What the values of a topic suggest about their units.
 
 use super::remark::{Remark, Subject};
-use crate::units::Units;
 use bb_core::payload::{FluidPressure, Imu, MagneticField};
+use bb_eval::units::Units;
 use bb_mcap::{BagMessage, IMU, MAGNETIC_FIELD, RecordingError};
 
 const PRESSURE: &str = "sensor_msgs/msg/FluidPressure";

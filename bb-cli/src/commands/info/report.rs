@@ -4,7 +4,7 @@ use super::date::date;
 use super::remark::Remark;
 use super::scan::{Content, TopicContent};
 use crate::periods::Periods;
-use crate::table::aligned;
+use bb_eval::table::aligned;
 use serde::Serialize;
 
 /// An object of `--json`.

@@ -5,7 +5,7 @@ use super::remark::{Remark, Subject};
 use super::times::Times;
 use crate::periods::Periods;
 use crate::topics::{TopicReader, is_of_events, log_ns};
-use crate::units::Units;
+use bb_eval::units::Units;
 use bb_mcap::Bag;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -45,7 +45,7 @@ struct Open {
 
 /// Reads a whole file; the error says why not even its beginning can be read.
 pub(super) fn scan(file: &Path) -> Result<Content, String> {
-    let opening = crate::Progress::spinner("opening");
+    let opening = bb_eval::Progress::spinner("opening");
     let bag = Bag::open(file);
     opening.finish();
     let bag = bag.map_err(|error| error.kind().to_string())?;
@@ -60,7 +60,7 @@ pub(super) fn scan(file: &Path) -> Result<Content, String> {
     let mut span_ns: Option<(i64, i64)> = None;
     let mut messages = 0;
     let mut damage = None;
-    let progress = crate::Progress::new("reading", expected);
+    let progress = bb_eval::Progress::new("reading", expected);
     for message in bag.messages_in_any_encoding(&names).map_err(|error| error.kind().to_string())? {
         let message = match message {
             Ok(message) => message,

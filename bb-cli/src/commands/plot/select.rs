@@ -1,6 +1,6 @@
 //! Selects the numbers of a message to plot, and their panels.
 
-use crate::filters::near;
+use bb_eval::filters::near;
 use bb_mcap::Value;
 use std::fmt;
 

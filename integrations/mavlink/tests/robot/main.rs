@@ -5,6 +5,8 @@ mod other;
 mod pymavlink;
 mod reads;
 mod sends;
+#[cfg(all(unix, feature = "serial"))]
+mod serial;
 
 use bb_core::event::ComponentFault;
 use bb_core::nalgebra::{Matrix6, UnitQuaternion, Vector3};

@@ -3,8 +3,8 @@
 use std::io::Read;
 use std::path::Path;
 
-use crate::common::ros::Bool;
-use crate::common::{Maker, file, imu, layouts, little, walk};
+use super::common::ros::Bool;
+use super::common::{Maker, file, imu, layouts, little, walk};
 use bb_core::prelude::*;
 use bb_mcap::{Bag, BagMessage, IMU, MOVING, RecordingError, RecordingErrorKind};
 use mcap::WriteOptions;

@@ -1,6 +1,6 @@
 //! Messages that are packed one by one, as rosbag2 writes them with `--compression-mode message`.
 
-use crate::common::{Maker, file, imu, little};
+use super::common::{Maker, file, imu, little};
 use bb_core::prelude::*;
 use bb_mcap::{Bag, MargSamples};
 use mcap::WriteOptions;

@@ -1,6 +1,6 @@
 //! Messages of types that are known only from the definition in the file, and bags made of payloads.
 
-use crate::common::{Maker, big, file, header, imu, little, ros};
+use super::common::{Maker, big, file, header, imu, little, ros};
 use bb_core::message::codec::{Shape, encode};
 use bb_core::message::{Field, Schema};
 use bb_core::nalgebra::Vector3;

@@ -1,7 +1,7 @@
 //! Whole bags give back what was put in.
 
-use crate::common::ros::*;
-use crate::common::{Maker, big, file, header, imu, layouts, walk};
+use super::common::ros::*;
+use super::common::{Maker, big, file, header, imu, layouts, walk};
 use bb_core::nalgebra as na;
 use bb_core::payload;
 use bb_mcap::{Bag, BagMessage, RecordingErrorKind};

@@ -1,9 +1,9 @@
 //! The samples of a recorded IMU, and the truth beside them.
 
-use crate::common::ros::{
+use super::common::ros::{
     Bool, MagneticField, Odometry, Pose, PoseStamped, PoseWithCovariance, Quaternion, Vector3,
 };
-use crate::common::{Maker, file, header, imu, layouts};
+use super::common::{Maker, file, header, imu, layouts};
 use bb_mcap::{Bag, MargSamples, RecordingErrorKind, Truth};
 use mcap::WriteOptions;
 

@@ -1,6 +1,6 @@
 //! Bags in SQLite, as `ros2 bag record` makes them.
 
-use crate::common::{file, imu, little};
+use super::common::{file, imu, little};
 use bb_core::prelude::*;
 use bb_estimators::Madgwick;
 use bb_mcap::{Bag, BagImu, MargSamples, RecordingErrorKind};

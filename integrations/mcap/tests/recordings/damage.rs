@@ -1,6 +1,6 @@
 //! Files that break off anywhere, and files with wrong bytes.
 
-use crate::robot::{Temporary, record_some};
+use super::robot::{Temporary, record_some};
 use bb_core::prelude::*;
 use bb_mcap::{Compression, RecorderOptions, Recording, recover};
 use std::fs::{File, OpenOptions};

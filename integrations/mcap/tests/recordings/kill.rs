@@ -1,6 +1,6 @@
 //! A process that is killed while it records.
 
-use crate::robot::{Rover, Temporary};
+use super::robot::{Rover, Temporary};
 use bb_core::prelude::*;
 use bb_mcap::{Recorder, RecorderOptions, Recording, recover};
 use std::io::{BufRead, BufReader};
@@ -31,7 +31,7 @@ fn what_was_flushed_survives_a_kill() {
     for round in 0..5 {
         let file = Temporary::new(&format!("killed-{round}"));
         let mut child = Command::new(std::env::current_exe().expect("this test is a program"))
-            .args(["--exact", "kill::child", "--nocapture"])
+            .args(["--exact", "recordings::kill::child", "--nocapture"])
             .env(FILE, &*file)
             .stdout(Stdio::piped())
             .stderr(Stdio::null())

@@ -1,6 +1,6 @@
 //! Viewers see a robot move as the robot itself knows it: `/tf` and `/tf_static` lead to the same transforms.
 
-use crate::robot::Temporary;
+use super::robot::Temporary;
 use bb_core::message::codec::ros::TransformsMessage;
 use bb_core::nalgebra::Isometry3;
 use bb_core::prelude::*;

@@ -1,6 +1,6 @@
 //! What was recorded, in the place of the components that published it.
 
-use crate::robot::Temporary;
+use super::robot::Temporary;
 use bb_core::prelude::*;
 use bb_estimators::{Madgwick, SimulatedImu, Vqf};
 use bb_mcap::{PlayedEstimator, PlayedOptions, PlayedSensor, Recorder, RecorderOptions};

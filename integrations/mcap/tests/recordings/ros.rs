@@ -1,6 +1,6 @@
 //! A recording is a ROS 2 bag: the reader for bags of other programs reads it.
 
-use crate::robot::{Temporary, record};
+use super::robot::{Temporary, record};
 use bb_core::prelude::*;
 use bb_mcap::{Bag, Recording, RecordingErrorKind};
 

@@ -1,6 +1,6 @@
 //! What was published is what is read.
 
-use crate::robot::{Gripper, Rover, Temporary, record, rover};
+use super::robot::{Gripper, Rover, Temporary, record, rover};
 use bb_core::message::codec::encode;
 use bb_core::prelude::*;
 use bb_core::pubsub::{AnyTopic, Topic};

@@ -1,6 +1,6 @@
 //! A recording as seen by other programs: IMUs, frames, dates, and distinguishable names.
 
-use crate::robot::{Temporary, record};
+use super::robot::{Temporary, record};
 use bb_core::message::codec::ros::TransformsMessage;
 use bb_core::nalgebra::{UnitQuaternion, Vector3};
 use bb_core::prelude::*;
@@ -214,11 +214,11 @@ fn two_types_of_one_name_are_refused_before_the_run() {
 
 #[test]
 fn a_name_of_its_own_keeps_a_type_apart() {
-    let ours = Topic::<crate::robot::Gripper>::new("sensor/one");
+    let ours = Topic::<super::robot::Gripper>::new("sensor/one");
     let theirs = Topic::<other::Gripper>::new("sensor/two");
     let topics = [&ours as &dyn AnyTopic, &theirs];
     let all = DynamicSubscription::new(topics, Select::All, None, Overflow::default());
-    ours.publish(&Stamped::new(MonotonicTime::ZERO, crate::robot::Gripper::Open));
+    ours.publish(&Stamped::new(MonotonicTime::ZERO, super::robot::Gripper::Open));
     let message = Stamped::new(MonotonicTime::ZERO, other::Gripper { label: "left".into() });
     theirs.publish(&message);
     let file = Temporary::new("apart");

@@ -1,0 +1,238 @@
+//! `bb convert`: CSV as bags that the other commands read.
+
+use crate::common::{bb, file};
+use bb_core::nalgebra::{UnitQuaternion, Vector3};
+use bb_core::payload::{Imu, MagneticField, Pose};
+use bb_mcap::Bag;
+use serde_json::Value;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+fn csv(name: &str, text: &str) -> PathBuf {
+    file(name, text.as_bytes())
+}
+
+/// Where the bag of this name goes.
+fn bag(name: &str) -> PathBuf {
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = std::fs::remove_file(&path);
+    path
+}
+
+fn convert(input: &Path, out: &Path, arguments: &[&str]) -> crate::common::Output {
+    let files = [input, out].map(|path| path.to_str().expect("is text"));
+    bb(&[&["convert"][..], &files, arguments].concat())
+}
+
+/// Ten seconds at 100 Hz: rest, then turns about z by 0.5 rad/s; angles in deg/s, forces in g, fields in µT.
+fn walk(head: &str, delimiter: &str) -> String {
+    let mut text = head.to_owned();
+    for index in 0..1000_u32 {
+        let turning = index > 300;
+        let angle = 0.005 * f64::from(index.saturating_sub(300));
+        let world_from_body = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
+        let field = world_from_body.inverse() * Vector3::new(0.0, 20.0, -40.0);
+        let [x, y, z, w] = <[f64; 4]>::from(world_from_body.coords);
+        // The magnetometer has every other sample.
+        let field =
+            if index % 2 == 0 { [field.x, field.y, field.z].map(|v| v.to_string()) } else { Default::default() };
+        let rate: f64 = if turning { 0.5 } else { 0.0 };
+        let time_us = 1_700_000_000_000_000 + 10_000 * u64::from(index);
+        let cells = [
+            time_us.to_string(),
+            "0".into(),
+            "0".into(),
+            rate.to_degrees().to_string(),
+            "0".into(),
+            "0".into(),
+            "1".into(),
+        ];
+        let truth = [w, x, y, z].map(|value| value.to_string());
+        let cells: Vec<_> =
+            cells.into_iter().chain(field).chain(truth).chain([u8::from(turning).to_string()]).collect();
+        writeln!(text, "{}", cells.join(delimiter)).expect("writes");
+    }
+    text
+}
+
+const MAP: [&str; 7] =
+    ["time=1:us", "gyr=2-4:deg/s", "acc=5-7:g", "mag=8-10:uT", "quat=11-14", "moving=15", "pos=12-14:mm"];
+
+#[test]
+fn a_converted_recording_is_scored() {
+    for (name, delimiter, head) in [("comma", ",", ""), ("semicolon", ";", "Time;Gyr;;;Acc;;\n;x;y;z;x;y;z\n")] {
+        let (input, out) = (csv(&format!("{name}.csv"), &walk(head, delimiter)), bag(&format!("{name}.mcap")));
+        let output = convert(&input, &out, &[&["--columns"], &MAP[..6]].concat());
+        assert_eq!((output.code, &*output.err), (Some(0), ""));
+        let said = "1000 on /imu, 500 on /mag, 1000 on /truth, 2 on /moving";
+        let head = if head.is_empty() { "" } else { ", after 2 lines of head" };
+        assert_eq!(output.out, format!("{}: {said}{head}\n", out.display()));
+
+        let score = bb(&["eval", "attitude", out.to_str().expect("is text"), "--json", "--filter", "madgwick"]);
+        assert_eq!(score.code, Some(0), "{}", score.err);
+        let rows: Vec<Value> = serde_json::from_str(&score.out).expect("an array");
+        assert_eq!(rows[0]["samples"], 699);
+        assert!(rows[0]["total_deg"].as_f64().expect("a number") < 1.0, "{}", score.out);
+        let info = bb(&["info", out.to_str().expect("is text"), "--json"]);
+        assert!(!info.out.contains("\"subject\""), "no units or clocks look wrong: {}", info.out);
+    }
+}
+
+#[test]
+fn values_are_in_si_with_their_nanoseconds() {
+    let text = "#timestamp [ns],w_x [deg s^-1],w_y,w_z,a_x,a_y,a_z,m,n,o,q_x,q_y,q_z,q_w\n\
+        1403636579758555392,90,0,-180,0,0,2,0.5,0,0,0.6,0,0,0.8\n\
+        1403636579763555584,0,0,0,0,0,1,,,,nan,nan,nan,nan\n";
+    let (input, out) = (csv("si.csv", text), bag("si.mcap"));
+    let map = "time=timestamp:ns gyr=w_*:deg/s acc=a_*:g mag=m,n,o:50uT quat=11-14:xyzw";
+    let output = convert(&input, &out, &["--columns", map]);
+    assert_eq!((output.code, &*output.err), (Some(0), ""));
+    let bag = Bag::open(&out).expect("opens");
+    let messages =
+        |topic: &str| bag.messages(&[topic]).expect("is there").map(|message| message.expect("is whole"));
+    let (imu, time) = messages("/imu").next().expect("is one").payload::<Imu>().expect("is one");
+    assert_eq!(time.as_unix_nanos(), 1_403_636_579_758_555_392);
+    let wanted = Vector3::new(90_f64.to_radians(), 0.0, -180_f64.to_radians());
+    assert!((imu.angular_velocity - wanted).norm() < 1e-12);
+    assert_eq!(imu.linear_acceleration, Vector3::new(0.0, 0.0, 2.0 * 9.80665));
+    assert_eq!(imu.orientation, None);
+    let fields: Vec<_> =
+        messages("/mag").map(|message| message.payload::<MagneticField>().expect("is one")).collect();
+    assert_eq!(fields.len(), 1, "empty cells are no reading");
+    assert!((fields[0].0.magnetic_field - Vector3::new(2.5e-5, 0.0, 0.0)).norm() < 1e-18);
+    let poses: Vec<_> = messages("/truth").map(|message| message.payload::<Pose>().expect("is one").0).collect();
+    assert_eq!(<[f64; 4]>::from(poses[0].world_from_body.coords), [0.6, 0.0, 0.0, 0.8]);
+    assert!(poses[1].world_from_body.coords.iter().all(|value| value.is_nan()), "an unknown truth stays unknown");
+}
+
+#[test]
+fn truth_may_have_a_file_of_its_own() {
+    let (imu, truth): (Vec<_>, Vec<_>) = walk("", ",")
+        .lines()
+        .map(|line| {
+            let cells: Vec<_> = line.split(',').collect();
+            (cells[..7].join(","), [&cells[..1], &cells[10..]].concat().join(","))
+        })
+        .unzip();
+    let (input, truth) = (csv("imu.csv", &imu.join("\n")), csv("truth.csv", &truth.join("\n")));
+    let out = bag("truth.mcap");
+    let truth = truth.to_str().expect("is text");
+    let arguments =
+        [&["--columns"], &MAP[..3], &["--truth", truth, "--truth-columns", "time=1:us", "quat=2-5", "moving=6"]];
+    let output = convert(&input, &out, &arguments.concat());
+    assert_eq!((output.code, &*output.err), (Some(0), ""));
+    let score =
+        bb(&["eval", "attitude", out.to_str().expect("is text"), "--json", "--axes", "6", "--filter", "mekf"]);
+    let rows: Vec<Value> = serde_json::from_str(&score.out).expect("an array");
+    assert_eq!(rows[0]["samples"], 699);
+    // By log time, so that players need not sort.
+    let bag = Bag::open(&out).expect("opens");
+    let times = bag.messages(&["/imu", "/truth", "/moving"]).expect("are there");
+    assert!(times.map(|message| message.expect("is whole").log_time_ns).is_sorted());
+}
+
+#[test]
+fn a_rate_takes_the_place_of_times() {
+    let (input, out) = (csv("rate.csv", "1,2,3,0,0,9.8\n1,2,3,0,0,9.8\n1,2,3,0,0,9.8\n"), bag("rate.mcap"));
+    let output = convert(&input, &out, &["--rate", "200", "--columns", "gyr=1-3", "acc=4-6"]);
+    assert_eq!((output.code, &*output.err), (Some(0), ""));
+    let hz = bb(&["hz", out.to_str().expect("is text"), "--json"]);
+    let rows: Vec<Value> = serde_json::from_str(&hz.out).expect("an array");
+    assert!((rows[0]["rate_hz"].as_f64().expect("a number") - 200.0).abs() < 1e-6);
+    assert!(!bb(&["info", out.to_str().expect("is text")]).out.contains("zero"), "the first stamp is one");
+}
+
+#[test]
+fn what_is_wrong_is_told_by_line_and_column() {
+    let map = ["--columns", "time=t gyr=gx,gy,gz acc=4-6"];
+    let head = "t,gx,gy,gz,ax,ay,az\n";
+    for (name, text, fault) in [
+        ("word", "0,1,2,3,4,5,6\n1,1,2,x,4,5,6\n", "line 3, column 4 (gz): `x` is not a number"),
+        ("short", "0,1,2,3,4,5,6\n\n1,1,2\n", "line 4, column 4 (gz): is missing, since the line has 3 columns"),
+        ("empty", "0,1,2,3,,5,6\n", "line 2, column 5 (acc): `` is not a number"),
+        ("time", "0,1,2,3,4,5,6\nnan,1,2,3,4,5,6\n", "line 3, column 1 (t): `nan` is not a time"),
+        (
+            "huge",
+            "0,1,2,3,4,5,6\r\n\r\n1,1e400,2,3,4,5,6\r\n",
+            "line 4, column 2 (gx): `1e400` is not a finite number",
+        ),
+        ("infinite", "0,1,2,3,-inf,5,6", "line 2, column 5 (acc): `-inf` is not a finite number"),
+        (
+            "before",
+            "-0.25,1,2,3,4,5,6\n",
+            "line 2, column 1 (t): `-0.25` is before 1970, where no time of a bag is; add a constant to all times",
+        ),
+        (
+            "after",
+            "1700000000000,1,2,3,4,5,6\n",
+            "line 2, column 1 (t): `1700000000000` is after 2038, which no stamp of ROS holds; is the unit another (s, ms, us, ns)?",
+        ),
+        ("words", "zero,1,2\n", "it has no line that begins with a number"),
+        ("none", "", "it has no line that begins with a number"),
+    ] {
+        let (input, out) = (csv(&format!("bad_{name}.csv"), &format!("{head}{text}")), bag("bad.mcap"));
+        let output = convert(&input, &out, &map);
+        assert_eq!((output.code, &*output.out), (Some(1), ""), "{name}");
+        assert_eq!(output.err, format!("error: {}: {fault}\n", input.display()));
+        assert!(!out.exists(), "{name}: a bag that is no use is removed");
+    }
+    let text = "t;gx;gy;gz;ax;ay;az\n0;1;2;3;4;5;6\n0,01;1;2;3;4;5;6\n";
+    let (input, out) = (csv("bad_decimal.csv", text), bag("bad.mcap"));
+    let output = convert(&input, &out, &map);
+    let fault = "line 3, column 1 (t): `0,01` has a decimal comma; make it a point, as `tr , .` does where cells are not \
+                 separated by commas";
+    assert_eq!(output.err, format!("error: {}: {fault}\n", input.display()));
+    let input = csv("bad_map.csv", &format!("{head}0,1,2,3,4,5,6\n"));
+    for (map, code, fault) in [
+        ("time=t gyr=gx,gy,gzz acc=5-7", 1, "no column `gzz`; did you mean `gz`?"),
+        ("gyr=2-4 acc=5-7", 1, "--columns: time is needed, as time=1:us, or --rate"),
+        ("time=t gyr=2-4", 1, "--columns: gyr and acc are needed"),
+        ("time=t gyr=2-4:rpm acc=5-7", 2, "no unit `rpm`; there are rad/s, deg/s, dps"),
+        ("time=t gyro=2-4 acc=5-7", 2, "no quantity `gyro`; did you mean `gyr`?"),
+    ] {
+        let output = convert(&input, &bag("bad_map.mcap"), &["--columns", map]);
+        assert_eq!(output.code, Some(code), "{map}: {}", output.err);
+        assert!(output.err.contains(fault), "{map}: {}", output.err);
+    }
+    let out = bag("there.mcap");
+    std::fs::write(&out, "mine").expect("writes");
+    let output = convert(&input, &out, &map);
+    assert!(output.err.contains("it exists already"), "{}", output.err);
+    assert_eq!(std::fs::read(&out).expect("reads"), b"mine", "what was there stays");
+}
+
+/// Of the head only its names are used, whatever is in it.
+#[test]
+fn a_comment_does_not_choose_the_delimiter() {
+    let text = "# logged at noon; by me; with a chip; in a hurry\r\nt,gx,gy,gz,ax,ay,az\r\n\r\n1,1,2,3,0,0,9.8";
+    let (input, out) = (csv("comment.csv", text), bag("comment.mcap"));
+    let output = convert(&input, &out, &["--columns", "time=t gyr=gx,gy,gz acc=ax,ay,az"]);
+    assert_eq!((output.code, &*output.err), (Some(0), ""));
+    assert_eq!(output.out, format!("{}: 1 on /imu, after 2 lines of head\n", out.display()));
+}
+
+/// A pipe gives each byte once, and its writer waits for the reader.
+#[test]
+fn a_pipe_is_read_once() {
+    let text = walk("t,gx,gy,gz,ax,ay,az,mx,my,mz,w,x,y,z,moving\n", ",");
+    let piped = |input: &str, name: &str| {
+        let out = bag(name);
+        let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_bb"))
+            .args(["convert", input, out.to_str().expect("is text"), "--columns"])
+            .args(&MAP[..6])
+            .stdin(std::process::Stdio::piped())
+            .stdout(std::process::Stdio::piped())
+            .spawn()
+            .expect("runs");
+        let mut stdin = child.stdin.take().expect("is piped");
+        std::io::Write::write_all(&mut stdin, text.as_bytes()).expect("is read");
+        drop(stdin);
+        let output = child.wait_with_output().expect("ends");
+        String::from_utf8(output.stdout).expect("is text")
+    };
+    let counts = "1000 on /imu, 500 on /mag, 1000 on /truth, 2 on /moving, after one line of head\n";
+    assert!(piped("-", "pipe.mcap").ends_with(counts));
+    if cfg!(unix) {
+        assert!(piped("/dev/stdin", "pipe_by_name.mcap").ends_with(counts));
+    }
+}

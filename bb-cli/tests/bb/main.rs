@@ -1,0 +1,16 @@
+//! The command, on small recordings that are made here.
+
+mod attitude;
+mod bad;
+mod calibrate;
+mod common;
+mod convert;
+mod doubts;
+mod guides;
+mod look;
+mod navigation;
+mod navigation_bag;
+mod new;
+mod noise;
+mod recorded;
+mod recorded_trials;

@@ -1,0 +1,55 @@
+//! The recordings that paths name.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// The extension of recordings.
+pub const EXTENSION: &str = "mcap";
+
+/// Extensions of recordings that cannot be read, or only with another feature. They are also collected from folders,
+/// so that an error says for each what to do.
+const OTHERS: [&str; 6] = [".db3", ".bag", ".mcap.zstd", ".mcap.zst", ".db3.zstd", ".mcap.gz"];
+
+/// The recordings in the order of the arguments, with those of a folder sorted by name; or the reason why a path has
+/// none.
+pub fn recordings(paths: &[PathBuf]) -> Vec<(PathBuf, Result<(), String>)> {
+    let mut recordings = Vec::new();
+    for path in paths {
+        if !path.is_dir() {
+            recordings.push((path.clone(), Ok(())));
+            continue;
+        }
+        let mut found = Vec::new();
+        match collect(path, &mut found) {
+            Err(error) => recordings.push((path.clone(), Err(format!("the folder cannot be read: {error}")))),
+            Ok(()) if found.is_empty() => {
+                let fault = "the folder holds no file that ends in .mcap; name the recordings or their folder";
+                recordings.push((path.clone(), Err(fault.into())));
+            }
+            Ok(()) => recordings.extend(found.into_iter().map(|file| (file, Ok(())))),
+        }
+    }
+    recordings
+}
+
+/// Searches subfolders as well, since a ROS 2 recording is a folder. Links to folders are not followed, as they may be
+/// circular.
+fn collect(folder: &Path, found: &mut Vec<PathBuf>) -> io::Result<()> {
+    let mut entries: Vec<_> = fs::read_dir(folder)?.collect::<Result<_, _>>()?;
+    entries.sort_by_key(fs::DirEntry::file_name);
+    for entry in entries {
+        let path = entry.path();
+        if entry.file_type()?.is_dir() {
+            collect(&path, found)?;
+        } else if is_recording(&path) {
+            found.push(path);
+        }
+    }
+    Ok(())
+}
+
+fn is_recording(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    path.extension().is_some_and(|end| end == EXTENSION) || OTHERS.iter().any(|end| name.ends_with(end))
+}

@@ -1,0 +1,164 @@
+//! `--set`: parameters by name.
+
+use super::{Axes, Chosen, MAGNETOMETER};
+use bb_estimators::attitude::FilterParams;
+use bb_estimators::params::{Params, SetError, nearest};
+use std::str::FromStr;
+
+/// A parameter and its value: of one filter, or of all that have it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Setting {
+    filter: Option<String>,
+    name: String,
+    value: String,
+}
+
+impl FromStr for Setting {
+    type Err = String;
+
+    /// `beta=0.1` or `madgwick.beta=0.1`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (path, value) = text.split_once('=').ok_or("no `=` in it; write NAME=VALUE, as beta=0.1")?;
+        let (filter, name) = match path.split_once('.') {
+            Some((filter, name)) => (Some(filter.trim().to_owned()), name),
+            None => (None, path),
+        };
+        Ok(Self { filter, name: name.trim().to_owned(), value: value.trim().to_owned() })
+    }
+}
+
+impl Chosen {
+    /// The filters with these settings.
+    ///
+    /// # Errors
+    /// No filter has the setting, a value is refused, or a filter does not have that many axes.
+    pub fn all(filters: &[FilterParams], axes: Axes, settings: &[Setting]) -> Result<Vec<Self>, String> {
+        for setting in settings {
+            setting.check(filters)?;
+        }
+        let chosen = filters.iter().map(|filter| {
+            if !axes.suit(filter) {
+                return Err(format!("{} uses no magnetometer; take it with --axes six", filter.name()));
+            }
+            let mut params = *filter;
+            let fault = |error: SetError<'_>| format!("{}: {error}", filter.name());
+            for setting in settings.iter().filter(|setting| setting.is_of(filter)) {
+                params.set(&setting.name, &setting.value).map_err(fault)?;
+            }
+            if params.get(MAGNETOMETER).is_some() {
+                params.set(MAGNETOMETER, if axes == Axes::Nine { "true" } else { "false" }).map_err(fault)?;
+            }
+            Ok(Self { params })
+        });
+        chosen.collect()
+    }
+
+    /// The filter of this name with these settings.
+    ///
+    /// # Errors
+    /// An unknown name, or a setting refused by [`all`](Self::all).
+    pub fn named(name: &str, axes: Axes, settings: &[Setting]) -> Result<Self, String> {
+        let names: Vec<_> = FilterParams::ALL.iter().map(|default| default().name()).collect();
+        let filter = FilterParams::named(name);
+        let filter = filter.ok_or_else(|| format!("no filter `{name}`; {}", near(name, &names)))?;
+        Self::all(&[filter], axes, settings)?.pop().ok_or_else(|| format!("no filter `{name}`"))
+    }
+}
+
+impl Setting {
+    fn is_of(&self, filter: &FilterParams) -> bool {
+        self.filter.as_ref().is_none_or(|name| name == filter.name()) && filter.get(&self.name).is_some()
+    }
+
+    fn check(&self, filters: &[FilterParams]) -> Result<(), String> {
+        let Self { filter, name, .. } = self;
+        if name == MAGNETOMETER {
+            return Err("--set magnetometer is not for the command line; choose --axes six or nine".into());
+        }
+        if filters.iter().any(|filter| self.is_of(filter)) {
+            return Ok(());
+        }
+        let chosen: Vec<_> = filters.iter().map(FilterParams::name).collect();
+        if let Some(filter) = filter
+            && !chosen.contains(&&**filter)
+        {
+            let near = near(filter, &chosen);
+            return Err(format!("--set {filter}.{name}: no filter `{filter}` is chosen; {near}"));
+        }
+        let of = |candidate: &&FilterParams| filter.as_ref().is_none_or(|name| name == candidate.name());
+        let among = filters.iter().filter(of).flat_map(|filter| filter.parameters().iter().map(|row| row.name));
+        let mut names: Vec<_> = among.filter(|name| *name != MAGNETOMETER).collect();
+        names.sort_unstable();
+        names.dedup();
+        let of = filter.as_ref().map_or_else(|| chosen.join(", "), Clone::clone);
+        Err(format!("--set {name}: {of} has no parameter `{name}`; {}", near(name, &names)))
+    }
+}
+
+/// A suggestion for a misspelt word.
+pub fn near(word: &str, candidates: &[&str]) -> String {
+    match nearest(word, candidates.iter().copied()) {
+        Some(name) => format!("did you mean `{name}`?"),
+        None if candidates.is_empty() => "there is none".into(),
+        None if candidates.len() == 1 => format!("there is only {}", candidates.join("")),
+        None => format!("there are {}", candidates.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fault(settings: &[&str], names: &[&str]) -> String {
+        let filters = FilterParams::ALL.iter().map(|default| default());
+        let filters: Vec<_> = filters.filter(|filter| names.contains(&filter.name())).collect();
+        let settings: Result<Vec<Setting>, _> = settings.iter().map(|text| text.parse()).collect();
+        match settings.and_then(|settings| Chosen::all(&filters, Axes::Nine, &settings)) {
+            Ok(_) => String::new(),
+            Err(fault) => fault,
+        }
+    }
+
+    #[test]
+    fn a_setting_reaches_the_filters_that_have_it() {
+        assert_eq!(fault(&["beta=0.2"], &["madgwick", "mekf"]), "");
+        assert_eq!(fault(&["madgwick.beta = 0.2", "mekf.velocity=0.3"], &["madgwick", "mekf"]), "");
+        assert_eq!(fault(&["force_is_mean=false"], &["mekf"]), "");
+    }
+
+    #[test]
+    fn a_misspelt_name_is_answered_with_the_likely_one() {
+        assert_eq!(
+            fault(&["betta=0.2"], &["madgwick"]),
+            "--set betta: madgwick has no parameter `betta`; did you mean `beta`?"
+        );
+        assert_eq!(
+            fault(&["gain=0.2"], &["madgwick", "complementary"]),
+            "--set gain: madgwick, complementary has no parameter `gain`; \
+             there are beta, heading_time_constant, tilt_time_constant"
+        );
+        assert_eq!(
+            fault(&["madgwik.beta=0.2"], &["madgwick", "mekf"]),
+            "--set madgwik.beta: no filter `madgwik` is chosen; did you mean `madgwick`?"
+        );
+        assert_eq!(
+            fault(&["mekf.beta=0.2"], &["madgwick"]),
+            "--set mekf.beta: no filter `mekf` is chosen; there is only madgwick"
+        );
+    }
+
+    #[test]
+    fn a_value_that_is_refused_is_named() {
+        assert_eq!(
+            fault(&["beta=fast"], &["madgwick"]),
+            "madgwick: `beta` is `fast`: write a number from 0 to 1000 rad/s"
+        );
+        assert_eq!(fault(&["beta=5 deg/s"], &["madgwick"]), "");
+        assert!(fault(&["beta=5 deg"], &["madgwick"]).contains("`beta` is `5 deg`: its unit is rad/s"));
+        assert_eq!(fault(&["force_is_mean=1"], &["mekf"]), "mekf: `force_is_mean` is `1`: write `true` or `false`");
+        assert!(fault(&["beta=-1"], &["madgwick"]).ends_with("choose a value from 0 to 1000 rad/s"));
+        assert!(fault(&["beta=nan"], &["madgwick"]).ends_with("choose a value from 0 to 1000 rad/s"));
+        assert!(fault(&["magnetometer=false"], &["madgwick"]).contains("--axes six"));
+        assert!(fault(&["beta"], &["madgwick"]).contains("NAME=VALUE"));
+    }
+}

@@ -1,0 +1,57 @@
+//! Filters by name, run on recordings and scored against the truth.
+//!
+//! Without features this is [`Chosen`], a filter of `bb-estimators` by its name and settings, and [`Score`] and [`Averages`],
+//! which define the errors. With the feature `recordings`, [`evaluate`](fn@evaluate) runs attitude filters on a
+//! [`Recording`], and [`evaluate_navigation`] navigation filters on a [`DataSet`], of CSV files or of a [`NavigationBag`]; with
+//! `plot`, [`plot_errors`] and [`plot_navigation`] draw the errors. `bb eval` is this library on the command line; its
+//! guide is `docs/evaluate.md`.
+
+// A robot must not stop because of an unexpected value.
+#![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
+mod averages;
+#[cfg(feature = "plot")]
+mod error_plot;
+#[cfg(feature = "recordings")]
+mod evaluate;
+#[cfg(feature = "recordings")]
+pub mod files;
+pub mod filters;
+#[cfg(feature = "recordings")]
+mod navigation;
+mod progress;
+#[cfg(feature = "recordings")]
+mod recording;
+#[cfg(feature = "recordings")]
+pub mod report;
+mod score;
+#[cfg(feature = "recordings")]
+pub mod table;
+#[cfg(feature = "recordings")]
+mod truths;
+#[cfg(feature = "recordings")]
+pub mod units;
+#[cfg(feature = "recordings")]
+mod variants;
+
+pub use averages::Averages;
+#[cfg(feature = "plot")]
+pub use error_plot::plot_errors;
+#[cfg(feature = "recordings")]
+pub use evaluate::{Evaluation, Evaluator, Run, evaluate, evaluate_all, evaluate_variant};
+pub use filters::{Axes, Chosen, Refused, Running, Setting};
+#[cfg(feature = "recordings")]
+pub use navigation::{
+    BagOptions, BiasDeviation, DataSet, FromBag, Inertial, Mount, NAVIGATION_FILTERS, NavigationBag,
+    NavigationFilter, NavigationScore, NavigationSetting, Origin, Place, Played, RelativeDeviation,
+    ScoredNavigation, StartFrom, Trace, evaluate_navigation, inertial, navigation_json, navigation_parameters,
+    navigation_table, play_navigation,
+};
+#[cfg(feature = "plot")]
+pub use navigation::{Drawn, plot_navigation};
+pub use progress::Progress;
+#[cfg(feature = "recordings")]
+pub use recording::{End, MovingTopic, Recording, Topics};
+pub use score::{Degrees, Score};
+#[cfg(feature = "recordings")]
+pub use variants::{Field, Offset, Starts, Variants};

@@ -1,0 +1,162 @@
+//! `--plot` of `bb eval navigation`: the track, errors within their bounds, innovations, errors by the age of the anchor.
+
+use super::measured::Sensor;
+use super::trace::{Row, Trace};
+use bb_estimators::navigation::chi_square::limit;
+use bb_plot::{Line, PALETTE, Panel, Part, Plane, Point, Scale, Sheet};
+use std::path::Path;
+
+/// Most viewers cannot open a picture with more panels.
+const MOST_PANELS: usize = 120;
+
+/// Of what is expected, and of what was refused.
+const BOUND: (u8, u8, u8) = (150, 150, 150);
+const TRUTH: (u8, u8, u8) = (110, 110, 110);
+const REFUSED: (u8, u8, u8) = (213, 0, 0);
+
+/// The fraction of good innovations within their bound.
+const WITHIN: f64 = 0.95;
+
+/// The number of bins for errors by the age of the anchor.
+const AGES: usize = 20;
+
+/// A filter on a data set.
+#[derive(Clone, Debug)]
+pub struct Drawn {
+    /// Data set and filter.
+    pub name: String,
+    /// Its steps.
+    pub trace: Trace,
+}
+
+/// Writes the track, errors within their bounds, innovations, and errors by the age of the anchor.
+///
+/// # Errors
+/// There is nothing to draw, too much, or it cannot be written there.
+pub fn plot_navigation(file: &Path, runs: &[Drawn]) -> Result<(), String> {
+    let parts: Vec<Part> = runs.iter().flat_map(parts).collect();
+    if parts.is_empty() {
+        return Err(format!("{}: not plotted, for nothing was estimated", file.display()));
+    }
+    if parts.len() > MOST_PANELS {
+        let (count, runs) = (parts.len(), runs.len());
+        return Err(format!("--plot draws at most {MOST_PANELS} panels, and {runs} runs have {count}; name fewer"));
+    }
+    Sheet { title: "Navigation".into(), parts, panel_size: (1400, 220) }.write(file)
+}
+
+fn parts(run: &Drawn) -> Vec<Part> {
+    let rows = &run.trace.rows;
+    if rows.is_empty() {
+        return Vec::new();
+    }
+    let mut parts = vec![Part::Plane(track(run), 3)];
+    let panel = |title: &str, axis: String, lines| Part::Panel(Panel { title: title.to_owned(), axis, lines });
+    if rows.iter().any(|row| row.errors.is_some()) {
+        for (index, axis) in ["east", "north", "up"].into_iter().enumerate() {
+            let title = if index == 0 { "error, and three standard deviations" } else { "" };
+            let error = |row: &Row| row.errors.map(|errors| errors.position[index]);
+            let deviation = |row: &Row| row.errors.map(|errors| errors.covariance[(index, index)].sqrt());
+            parts.push(panel(title, format!("{axis} (m)"), bounded(rows, &error, &deviation)));
+        }
+    }
+    if rows.iter().any(|row| row.errors.is_some_and(|errors| errors.rotation.is_some())) {
+        for (index, axis) in ["about east", "about north", "heading"].into_iter().enumerate() {
+            let error = |row: &Row| Some(row.errors?.rotation?[index].to_degrees());
+            let deviation =
+                |row: &Row| row.errors.map(|errors| errors.covariance[(3 + index, 3 + index)].sqrt().to_degrees());
+            parts.push(panel("", format!("{axis} (deg)"), bounded(rows, &error, &deviation)));
+        }
+    }
+    for sensor in Sensor::ALL {
+        if run.trace.innovations.iter().any(|innovation| innovation.sensor == sensor) {
+            let title = format!("innovations of {}", sensor.name());
+            parts.push(panel(&title, "normalised".into(), innovations(&run.trace, sensor)));
+        }
+    }
+    let has_ages = rows.iter().any(|row| row.anchor_age_s.is_some() && row.errors.is_some());
+    if has_ages {
+        parts.push(Part::Plane(by_age(rows), 1));
+    }
+    parts
+}
+
+fn track(run: &Drawn) -> Plane {
+    let rows = &run.trace.rows;
+    let truth: Vec<_> =
+        rows.iter().filter_map(|row| row.truth).map(|truth| (truth.position.x, truth.position.y)).collect();
+    let estimate: Vec<_> = rows.iter().map(|row| (row.position.x, row.position.y)).collect();
+    let fixes: Vec<_> = run.trace.fixes.iter().map(|fix| (fix.x, fix.y)).collect();
+    Plane {
+        title: run.name.clone(),
+        x_axis: "east (m)".into(),
+        y_axis: "north (m)".into(),
+        scale: Scale::Square,
+        lines: vec![
+            Line::path("fixes", PALETTE[3], 3, &fixes),
+            Line::path("truth", TRUTH, 1, &truth),
+            Line::path("estimate", PALETTE[0], 1, &estimate),
+        ],
+    }
+}
+
+/// An error and its bound.
+fn bounded(
+    rows: &[Row],
+    error: &dyn Fn(&Row) -> Option<f64>,
+    deviation: &dyn Fn(&Row) -> Option<f64>,
+) -> Vec<Line> {
+    let line = |value: &dyn Fn(&Row) -> Option<f64>| -> Vec<Point> {
+        // The line is not interrupted between samples of the truth.
+        rows.iter().filter(|row| row.errors.is_some()).map(|row| (row.time_s, value(row))).collect()
+    };
+    vec![
+        Line::new("+3σ", BOUND, 1, &line(&|row| deviation(row).map(|deviation| 3.0 * deviation))),
+        Line::new("-3σ", BOUND, 1, &line(&|row| deviation(row).map(|deviation| -3.0 * deviation))),
+        Line::new("error", PALETTE[0], 1, &line(error)),
+    ]
+}
+
+/// Square roots of the normalised innovations squared over their dimension: 1 on average.
+fn innovations(trace: &Trace, sensor: Sensor) -> Vec<Line> {
+    let dimension = sensor.dimension();
+    let of = |is_fused: bool| -> Vec<Point> {
+        let chosen = trace.innovations.iter().filter(|one| one.sensor == sensor && one.is_fused == is_fused);
+        chosen.map(|one| (one.time_s, Some((one.nis / dimension as f64).sqrt()))).collect()
+    };
+    let bound = (limit(dimension, 1.0 - WITHIN) / dimension as f64).sqrt();
+    let times: Vec<_> = trace.innovations.iter().filter(|one| one.sensor == sensor).map(|one| one.time_s).collect();
+    let ends = [times.first(), times.last()];
+    let line: Vec<Point> = ends.into_iter().flatten().map(|time_s| (*time_s, Some(bound))).collect();
+    vec![
+        Line::new("fused", PALETTE[0], 2, &of(true)),
+        Line::new("refused", REFUSED, 3, &of(false)),
+        Line::new("95 % below", BOUND, 1, &line),
+    ]
+}
+
+fn by_age(rows: &[Row]) -> Plane {
+    let aged = rows.iter().filter_map(|row| Some((row.anchor_age_s?, row.errors?.position.norm())));
+    let points: Vec<(f64, f64)> = aged.collect();
+    let oldest = points.iter().map(|(age, _)| *age).fold(0.0, f64::max);
+    let mut sums = [(0.0, 0_u32); AGES];
+    for (age, error) in &points {
+        let step = if oldest > 0.0 { (age / oldest * AGES as f64) as usize } else { 0 };
+        let sum = &mut sums[step.min(AGES - 1)];
+        *sum = (sum.0 + error * error, sum.1 + 1);
+    }
+    let middle = |step: usize| oldest * (step as f64 + 0.5) / AGES as f64;
+    let filled = sums.iter().enumerate().filter(|(_, (_, count))| *count > 0);
+    let means: Vec<_> =
+        filled.map(|(step, (sum, count))| (middle(step), (sum / f64::from(*count)).sqrt())).collect();
+    Plane {
+        title: "error by the age of the last pose".into(),
+        x_axis: "age (s)".into(),
+        y_axis: "position (m)".into(),
+        scale: Scale::Linear,
+        lines: vec![
+            Line::path("keyframes", PALETTE[5], 2, &points),
+            Line::path("root mean square", PALETTE[1], 1, &means),
+        ],
+    }
+}

@@ -1,0 +1,73 @@
+//! A record of playing a data set, for a plot.
+
+use super::data::{DataSet, Keyframe, Truth};
+use super::errors::Errors;
+use super::measured::{Answers, Sensor};
+use super::step::Known;
+use bb_core::nalgebra::Vector3;
+use bb_estimators::navigation::Refusal;
+
+/// A record of playing a data set, keyframe by keyframe.
+#[derive(Clone, Debug, Default)]
+pub struct Trace {
+    pub(crate) rows: Vec<Row>,
+    pub(crate) innovations: Vec<Innovation>,
+    /// The positions of the fixes.
+    pub(crate) fixes: Vec<Vector3<f64>>,
+    last_anchor_s: Option<f64>,
+}
+
+/// A keyframe.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Row {
+    pub(crate) time_s: f64,
+    pub(crate) position: Vector3<f64>,
+    pub(crate) truth: Option<Truth>,
+    pub(crate) errors: Option<Errors>,
+    /// Time since the last fused absolute pose, s.
+    pub(crate) anchor_age_s: Option<f64>,
+}
+
+/// A measurement compared with its prediction.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Innovation {
+    pub(crate) time_s: f64,
+    pub(crate) sensor: Sensor,
+    /// Normalised innovation squared.
+    pub(crate) nis: f64,
+    /// Whether it passed the gate.
+    pub(crate) is_fused: bool,
+}
+
+impl Trace {
+    pub(crate) fn add(
+        &mut self,
+        keyframe: &Keyframe,
+        known: &Option<Known>,
+        answers: &Answers,
+        data: &DataSet,
+        k: u64,
+    ) {
+        let time_s = keyframe.time_s;
+        for (sensor, answer) in Sensor::ALL.into_iter().zip(answers) {
+            let (nis, is_fused) = match answer {
+                Some(Ok(fused)) => (fused.nis, true),
+                Some(Err(Refusal::Gate { nis, .. })) => (*nis, false),
+                _ => continue,
+            };
+            if sensor == Sensor::Anchor && is_fused {
+                self.last_anchor_s = Some(time_s);
+            }
+            self.innovations.push(Innovation { time_s, sensor, nis, is_fused });
+        }
+        self.fixes.extend(data.fixes.get(&k).map(|fix| fix.position));
+        let Some(known) = known else { return };
+        self.rows.push(Row {
+            time_s,
+            position: known.position,
+            truth: keyframe.truth,
+            errors: keyframe.truth.map(|truth| Errors::between(&truth, &data.antenna, known)),
+            anchor_age_s: self.last_anchor_s.map(|last_s| time_s - last_s),
+        });
+    }
+}

@@ -1,0 +1,250 @@
+//! An opened recording: its samples, its truth, and remarks on it.
+
+use bb_estimators::attitude::ImuSample;
+use bb_mcap::{Bag, IMU, MOVING, MargSamples, ODOMETRY, POSE, RecordingError, RecordingErrorKind, Topic, Truth};
+use std::path::Path;
+
+use crate::filters::Axes;
+
+/// The topics to use if several in a recording match.
+#[derive(Clone, Debug, Default)]
+pub struct Topics {
+    /// The IMU; by default the only topic of its type.
+    pub imu: Option<String>,
+    /// The magnetometer; by default the one recorded with the IMU, or the only topic of its type.
+    pub magnetometer: Option<String>,
+    /// The true orientation; by default the only topic of poses, if there is one.
+    pub truth: Option<String>,
+    /// The topic that says when the body moves.
+    pub moving: MovingTopic,
+}
+
+/// The topic that says when the body moves.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum MovingTopic {
+    /// The only topic of its type, if there is one.
+    #[default]
+    ByType,
+    /// This one.
+    Named(String),
+    /// None: the body counts as moving all the time.
+    None,
+}
+
+/// A recording, opened at its first sample.
+#[derive(Debug)]
+pub struct Recording {
+    /// The known true orientation; empty if none is known.
+    pub truth: Truth,
+    /// A remark on the truth, if it gives no score.
+    pub(crate) note: Option<String>,
+    /// The available axes: six if the topic of the magnetometer holds no message.
+    pub(crate) axes: Axes,
+    /// The names of the topics, if present.
+    pub(crate) imu_topic: String,
+    pub(crate) magnetometer_topic: Option<String>,
+    pub(crate) truth_topic: Option<String>,
+    samples: MargSamples,
+    /// Samples before this time are skipped.
+    start_ns: i64,
+    /// The approximate number of samples; 0 if unknown.
+    pub expected: u64,
+}
+
+impl Recording {
+    /// Opens a recording. With `before_motion_s` it starts this many seconds before the first motion.
+    ///
+    /// # Errors
+    /// It is not a recording, lacks a topic, or has several matching ones; in words.
+    pub fn open(file: &Path, topics: &Topics, axes: Axes, before_motion_s: Option<f64>) -> Result<Self, String> {
+        let bag = Bag::open(file).map_err(|error| error.kind().to_string())?;
+        let imu = bag.choose(IMU, topics.imu.as_deref()).map_err(|error| said(&error, "--imu-topic"))?;
+        let magnetometer = match bag.magnetometer_of(&imu.name, topics.magnetometer.as_deref()) {
+            _ if axes == Axes::Six => None,
+            Ok(topic) => Some(topic),
+            Err(error) => return Err(format!("{}; without one, choose --axes 6", said(&error, "--mag-topic"))),
+        };
+        let poses = poses(&bag, topics.truth.as_deref())?;
+        let moving = moving(&bag, &topics.moving)?;
+        let truth = truth(&bag, &[poses.as_deref().ok(), moving.as_deref()])?;
+        let note = match &poses {
+            Err(fault) => Some(format!("no truth, so no errors: {fault}")),
+            Ok(topic) if !truth.is_known() => {
+                Some(format!("no truth, so no errors: {topic} holds no orientation that is a rotation"))
+            }
+            Ok(_) => None,
+        };
+        let start_ns = match before_motion_s {
+            None => i64::MIN,
+            Some(seconds) => {
+                let motion = truth.first_motion().ok_or_else(|| match &moving {
+                    Some(topic) => {
+                        format!("{topic} never says that it moves; leave out --start-before-motion")
+                    }
+                    None => format!(
+                        "no topic says when it moves ({MOVING}); name one with --moving-topic, or leave out \
+                         --start-before-motion"
+                    ),
+                })?;
+                motion.saturating_sub((seconds * 1e9) as i64)
+            }
+        };
+        let axes = if magnetometer.is_some_and(|topic| is_silent(&bag, topic)) { Axes::Six } else { axes };
+        let magnetic = magnetometer.filter(|_| axes == Axes::Nine).map(|topic| &*topic.name);
+        let samples = MargSamples::read(&bag, &imu.name, magnetic).map_err(|error| error.kind().to_string())?;
+        if samples.next_time().is_none() {
+            return Err(format!("{} holds no message, so there is nothing to play", imu.name));
+        }
+        Ok(Self {
+            truth,
+            note,
+            axes,
+            imu_topic: imu.name.to_string(),
+            magnetometer_topic: magnetometer.map(|topic| topic.name.to_string()),
+            truth_topic: poses.ok(),
+            samples,
+            start_ns,
+            expected: imu.messages.unwrap_or(0),
+        })
+    }
+
+    /// Opens a recording for its IMU alone.
+    ///
+    /// # Errors
+    /// It is not a recording, lacks the topic, or has several matching ones; in words.
+    pub fn inertial(file: &Path, topics: &Topics) -> Result<Self, String> {
+        let bag = Bag::open(file).map_err(|error| error.kind().to_string())?;
+        let imu = bag.choose(IMU, topics.imu.as_deref()).map_err(|error| said(&error, "--imu-topic"))?;
+        let samples = MargSamples::read(&bag, &imu.name, None).map_err(|error| error.kind().to_string())?;
+        Ok(Self {
+            truth: Truth::default(),
+            note: None,
+            axes: Axes::Six,
+            imu_topic: imu.name.to_string(),
+            magnetometer_topic: None,
+            truth_topic: None,
+            samples,
+            start_ns: i64::MIN,
+            expected: imu.messages.unwrap_or(0),
+        })
+    }
+
+    /// Leaves out the samples before this time, nanoseconds.
+    pub(crate) fn start_at(&mut self, time_ns: i64) {
+        self.start_ns = self.start_ns.max(time_ns);
+    }
+
+    /// Appends the next samples, until there are `most` or the recording ends. A recorder that was killed counts as
+    /// an end, with a remark.
+    ///
+    /// # Errors
+    /// The recording is damaged; in words.
+    pub fn read(&mut self, samples: &mut Vec<ImuSample>, most: usize) -> Result<End, String> {
+        while samples.len() < most {
+            let (time, marg) = match self.samples.next() {
+                None => return Ok(End::Whole),
+                Some(Ok(sample)) => sample,
+                Some(Err(error)) if is_break(&error) => return Ok(End::Broken(error.kind().to_string())),
+                Some(Err(error)) => return Err(error.kind().to_string()),
+            };
+            if time.as_nanos() < self.start_ns {
+                continue;
+            }
+            samples.push(ImuSample {
+                time_ns: time.as_nanos(),
+                angular_velocity: marg.imu.angular_velocity,
+                specific_force: marg.imu.linear_acceleration,
+                magnetic_field: marg
+                    .magnetic_field
+                    .filter(|_| self.axes == Axes::Nine)
+                    .map(|field| field.magnetic_field),
+            });
+        }
+        Ok(End::NotYet)
+    }
+}
+
+/// The state of reading.
+#[derive(Debug)]
+pub enum End {
+    /// There may be more.
+    NotYet,
+    /// Everything is read.
+    Whole,
+    /// Everything before the damage is read; describes the damage.
+    Broken(String),
+}
+
+/// Whether a topic holds no message, as when a driver announces measurements that its chip does not have.
+fn is_silent(bag: &Bag, topic: &Topic) -> bool {
+    match topic.messages {
+        Some(count) => count == 0,
+        None => bag.messages(&[&topic.name]).is_ok_and(|mut messages| messages.next().is_none()),
+    }
+}
+
+/// The topic of poses, or why there is none. An explicitly named one must exist.
+fn poses(bag: &Bag, name: Option<&str>) -> Result<Result<String, String>, String> {
+    let error = match bag.choose(POSE, name) {
+        Ok(topic) if name.is_none() && topic.is_own => {
+            return Ok(Err(format!(
+                "the poses of {} are what a robot published, an estimate say; name them with --truth-topic if they are \
+                 the truth",
+                topic.name
+            )));
+        }
+        Ok(topic) => return Ok(Ok(topic.name.to_string())),
+        Err(error) => error,
+    };
+    match error.kind() {
+        RecordingErrorKind::OtherType { .. } if bag.choose(ODOMETRY, name).is_ok() => {
+            Ok(Ok(name.unwrap_or_default().to_owned()))
+        }
+        RecordingErrorKind::NoTopicOfType { .. } => Ok(Err(said(&error, "--truth-topic"))),
+        _ => Err(said(&error, "--truth-topic")),
+    }
+}
+
+/// The topic that says when the body moves, if there is one. An explicitly named one must exist.
+fn moving(bag: &Bag, topic: &MovingTopic) -> Result<Option<String>, String> {
+    let name = match topic {
+        MovingTopic::None => return Ok(None),
+        MovingTopic::ByType => None,
+        MovingTopic::Named(name) => Some(&**name),
+    };
+    match bag.choose(MOVING, name) {
+        Ok(topic) => Ok(Some(topic.name.to_string())),
+        Err(error) => match error.kind() {
+            RecordingErrorKind::NoTopicOfType { .. } => Ok(None),
+            RecordingErrorKind::SeveralTopicsOfType { .. } => {
+                Err(format!("{}, or score all of it with --moving-topic none", said(&error, "--moving-topic")))
+            }
+            _ => Err(said(&error, "--moving-topic")),
+        },
+    }
+}
+
+/// Reads the truth, up to where the recording is cut off.
+fn truth(bag: &Bag, topics: &[Option<&str>]) -> Result<Truth, String> {
+    let topics: Vec<_> = topics.iter().copied().flatten().collect();
+    let mut truth = Truth::default();
+    let end = bag.messages(&topics).and_then(|messages| truth.extend(messages));
+    match end {
+        // Reading the samples meets the same damage, and reports it.
+        Err(error) if !is_break(&error) => Err(error.kind().to_string()),
+        _ => Ok(truth),
+    }
+}
+
+fn is_break(error: &RecordingError) -> bool {
+    matches!(error.kind(), RecordingErrorKind::Truncated { .. })
+}
+
+/// The error, with the option that chooses another topic.
+pub(crate) fn said(error: &RecordingError, option: &str) -> String {
+    let kind = error.kind();
+    match kind {
+        RecordingErrorKind::NoTopicOfType { .. } => kind.to_string(),
+        _ => format!("{kind} ({option})"),
+    }
+}

@@ -1,0 +1,170 @@
+//! The printed results.
+
+use crate::averages::Averages;
+use crate::evaluate::{Evaluation, Run};
+use crate::filters::Axes;
+use crate::score::Degrees;
+use crate::table::aligned;
+use serde::Serialize;
+use std::path::Path;
+
+/// One object of `--json`. Unknown values are null: every error without truth, and with six axes, where only the
+/// inclination is scored, total and heading.
+#[derive(Serialize)]
+struct Row {
+    file: String,
+    /// From 0; null if the recording is not modified.
+    variant: Option<u32>,
+    filter: &'static str,
+    axes: &'static str,
+    total_deg: Option<f64>,
+    heading_deg: Option<f64>,
+    inclination_deg: Option<f64>,
+    /// The fraction of headings within two of the standard deviations that the filter reported.
+    heading_within_two_sigma: Option<f64>,
+    /// The number of scored samples.
+    samples: u64,
+    ns_per_update: f64,
+}
+
+/// A JSON array with one object per recording and filter.
+///
+/// # Errors
+/// It cannot be written as JSON.
+pub fn json(evaluations: &[Evaluation]) -> Result<String, String> {
+    let row = |evaluation: &Evaluation, run: &Run| {
+        let (rms, axes) = (run.score.rms(), evaluation.axes);
+        let whole = rms.filter(|_| axes == Axes::Nine);
+        Row {
+            file: evaluation.file.display().to_string(),
+            variant: evaluation.variant,
+            filter: run.filter,
+            axes: axes.name(),
+            total_deg: whole.map(|rms| rms.total),
+            heading_deg: whole.map(|rms| rms.heading),
+            inclination_deg: rms.map(|rms| rms.inclination),
+            heading_within_two_sigma: within(&[run], axes),
+            samples: run.score.count(),
+            ns_per_update: run.ns_per_update,
+        }
+    };
+    let rows: Vec<_> = runs(evaluations).map(|(evaluation, run)| row(evaluation, run)).collect();
+    let text = serde_json::to_string_pretty(&rows).map_err(|error| error.to_string())?;
+    Ok(text + "\n")
+}
+
+/// One line per recording and filter, then the averages of each filter.
+pub fn table(evaluations: &[Evaluation], axes: Axes) -> String {
+    let is_asked = |evaluation: &Evaluation| evaluation.axes == axes;
+    // Six, if no recording has nine.
+    let axes = if runs(evaluations).any(|(evaluation, _)| is_asked(evaluation)) { axes } else { Axes::Six };
+    let mut lines: Vec<[String; 8]> = Vec::new();
+    for (evaluation, run) in runs(evaluations) {
+        let [total, heading, inclination] = angles(run.score.rms(), evaluation.axes);
+        let cost = format!("{:.0}", run.ns_per_update);
+        let count = run.score.count().to_string();
+        lines.push([
+            name(evaluation, evaluations),
+            run.filter.into(),
+            total,
+            heading,
+            inclination,
+            percent(within(&[run], evaluation.axes)),
+            count,
+            cost,
+        ]);
+    }
+    if lines.is_empty() {
+        return String::new();
+    }
+    let rows = lines.len();
+    let mut filters: Vec<&str> = Vec::new();
+    for (_, run) in runs(evaluations) {
+        if !filters.contains(&run.filter) {
+            filters.push(run.filter);
+        }
+    }
+    for filter in filters {
+        let of_filter =
+            runs(evaluations).filter(|(evaluation, run)| run.filter == filter && evaluation.axes == axes);
+        let all: Vec<_> = of_filter.clone().map(|(_, run)| run).collect();
+        let share = percent(within(&all, axes));
+        let Some(averages) = Averages::of(of_filter.filter_map(|(_, run)| run.score.rms())) else { continue };
+        // The average of a single recording adds nothing.
+        if averages.count < 2 {
+            continue;
+        }
+        for (what, score) in [("mean of", averages.mean), ("worst of", averages.worst)] {
+            let [total, heading, inclination] = angles(Some(score), axes);
+            let what = format!("{what} {}", averages.count);
+            let share = if what.starts_with("mean") { share.clone() } else { String::new() };
+            lines.push([what, filter.into(), total, heading, inclination, share, String::new(), String::new()]);
+        }
+    }
+    let head = ["recording", "filter", "total", "heading", "inclination", "in 2σ", "samples", "ns/update"];
+    lines.insert(0, head.map(String::from));
+    let mut text = format!("Error against the truth, {} axes, RMS in degrees:\n\n", axes.name());
+    text += &aligned(&lines, 2, rows + 1);
+    text
+}
+
+/// Prints remarks on the runs, then errors, to the error stream; returns whether there were no errors.
+pub fn complain(evaluations: &[Evaluation]) -> bool {
+    for evaluation in evaluations {
+        for note in &evaluation.notes {
+            eprintln!("note: {}: {note}", evaluation.file.display());
+        }
+    }
+    let mut bad = 0;
+    for evaluation in evaluations {
+        let file = evaluation.file.display();
+        match (&evaluation.runs, &evaluation.broken) {
+            (Err(fault), _) => eprintln!("error: {file}: {fault}"),
+            (Ok(_), Some(fault)) => eprintln!("error: {file}: {fault}; scored up to there"),
+            (Ok(_), None) => continue,
+        }
+        bad += 1;
+    }
+    if bad > 0 && evaluations.len() > 1 {
+        eprintln!("error: {bad} of {} recordings could not be evaluated to the end", evaluations.len());
+    }
+    bad == 0
+}
+
+/// The fraction of headings within two standard deviations; `None` if no filter reports them.
+fn within(runs: &[&Run], axes: Axes) -> Option<f64> {
+    let (told, within) =
+        runs.iter().fold((0, 0), |sum, run| (sum.0 + run.within_two_sigma.0, sum.1 + run.within_two_sigma.1));
+    (told > 0 && axes == Axes::Nine).then(|| within as f64 / told as f64)
+}
+
+fn percent(share: Option<f64>) -> String {
+    share.map_or_else(|| "-".to_owned(), |share| format!("{:.0} %", 100.0 * share))
+}
+
+fn runs(evaluations: &[Evaluation]) -> impl Clone + Iterator<Item = (&Evaluation, &Run)> {
+    evaluations.iter().flat_map(|evaluation| evaluation.runs.iter().flatten().map(move |run| (evaluation, run)))
+}
+
+/// The name of a recording in a table or a picture: without folder and extension if that is unambiguous.
+pub(crate) fn name(evaluation: &Evaluation, evaluations: &[Evaluation]) -> String {
+    let file: &Path = &evaluation.file;
+    // Variants of one recording are named by their number.
+    let is_alike =
+        |other: &&Evaluation| other.file.file_stem() == file.file_stem() && other.variant == evaluation.variant;
+    let alike = evaluations.iter().filter(is_alike).count();
+    let short = file.file_stem().filter(|_| alike == 1);
+    let name = short.unwrap_or(file.as_os_str()).to_string_lossy();
+    evaluation.variant.map_or_else(|| name.clone().into_owned(), |variant| format!("{name} #{variant}"))
+}
+
+/// With six axes the initial heading is arbitrary, so only the inclination is a result.
+fn angles(rms: Option<Degrees>, axes: Axes) -> [String; 3] {
+    let angle = |angle: f64| format!("{angle:.2}");
+    let none = || "-".to_owned();
+    match (rms, axes) {
+        (None, _) => [none(), none(), none()],
+        (Some(rms), Axes::Six) => [none(), none(), angle(rms.inclination)],
+        (Some(rms), Axes::Nine) => [angle(rms.total), angle(rms.heading), angle(rms.inclination)],
+    }
+}

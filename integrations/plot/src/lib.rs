@@ -1,0 +1,157 @@
+//! Plots of lines over time or another quantity, as SVG or PNG: a [`Picture`] of panels, or a [`Sheet`] of panels and planes.
+
+#![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
+mod frame;
+mod line;
+mod palette;
+mod panel;
+mod plane;
+
+pub use frame::Scale;
+pub use line::{Line, Point};
+pub use palette::{Colour, PALETTE};
+pub use panel::Panel;
+pub use plane::{Part, Plane, Sheet};
+
+use frame::Frame;
+
+use plotters::coord::Shift;
+use plotters::prelude::*;
+use plotters::style::{FontStyle, register_font};
+use std::path::Path;
+
+/// Panels below one another, with a title.
+#[derive(Clone, Debug)]
+pub struct Picture {
+    /// The title above the panels.
+    pub title: String,
+    /// The panels, from the top.
+    pub panels: Vec<Panel>,
+    /// Width, and height of a panel, in pixels.
+    pub panel_size: (u32, u32),
+}
+
+impl Picture {
+    /// Checks before a run whether a picture can be written to this file.
+    ///
+    /// # Errors
+    /// The file's name ends neither in `.svg` nor in `.png`, or its folder does not exist.
+    pub fn check(file: &Path, option: &str) -> Result<(), String> {
+        if format(file).is_none() {
+            let file = file.with_extension("svg");
+            return Err(format!("{option} writes an SVG or a PNG: call the file {} or .png", file.display()));
+        }
+        match file.parent() {
+            Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => {
+                Err(format!("there is no folder {} to plot into", folder.display()))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Writes it as an SVG or a PNG, depending on the file's name.
+    ///
+    /// # Errors
+    /// It cannot be written there.
+    pub fn write(&self, file: &Path) -> Result<(), String> {
+        let frames: Vec<_> = self.panels.iter().map(Panel::frame).collect();
+        write(file, &self.title, &frames, self.panel_size)
+    }
+}
+
+/// Writes frames below one another, each as high as its number of `panel_size`.
+fn write(file: &Path, title: &str, frames: &[Frame<'_>], panel_size: (u32, u32)) -> Result<(), String> {
+    Picture::check(file, "a plot")?;
+    // The font is included, so that a plot does not depend on the machine.
+    register_font("sans-serif", FontStyle::Normal, epaint_default_fonts::UBUNTU_LIGHT)
+        .map_err(|_| "the plot's font cannot be read")?;
+    let (width, height) = panel_size;
+    let panels: u32 = frames.iter().map(|frame| frame.height).sum();
+    let size = (width, TITLE + height * panels);
+    let drawn = match format(file) {
+        Some(Format::Svg) => {
+            draw(SVGBackend::new(file, size).into_drawing_area(), title, frames).map_err(|error| error.to_string())
+        }
+        _ => draw(BitMapBackend::new(file, size).into_drawing_area(), title, frames)
+            .map_err(|error| error.to_string()),
+    };
+    drawn.map_err(|error| format!("cannot write {}: {error}", file.display()))
+}
+
+fn draw<B: DrawingBackend>(root: DrawingArea<B, Shift>, title: &str, frames: &[Frame<'_>]) -> Drawn<B> {
+    root.fill(&WHITE)?;
+    let mut rest = root.titled(title, ("sans-serif", 24))?;
+    // The same for all, so that their time axes have equal length.
+    let legend = frames.iter().map(|frame| frame.legend_width(&rest)).max().unwrap_or(0);
+    let height = rest.dim_in_pixel().1;
+    let panels: u32 = frames.iter().map(|frame| frame.height).sum();
+    for frame in frames {
+        let (area, below) = rest.split_vertically(height * frame.height / panels.max(1));
+        frame.draw(&area, legend)?;
+        rest = below;
+    }
+    root.present()
+}
+
+/// The title's height, in pixels.
+const TITLE: u32 = 40;
+
+type Drawn<B> = Result<(), DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
+
+enum Format {
+    Svg,
+    Png,
+}
+
+fn format(file: &Path) -> Option<Format> {
+    match file.extension()?.to_str()? {
+        "svg" => Some(Format::Svg),
+        "png" => Some(Format::Png),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The values of a numeric attribute for all elements of a kind.
+    fn numbers(svg: &str, element: &str, attribute: &str) -> Vec<Vec<f64>> {
+        let (element, attribute) = (format!("<{element} "), format!("{attribute}=\""));
+        let elements = svg.split(&element).skip(1).filter_map(|element| {
+            let value = element.split(&attribute).nth(1)?.split('"').next()?;
+            Some(value.split([' ', ',']).filter_map(|number| number.parse().ok()).collect())
+        });
+        elements.collect()
+    }
+
+    #[test]
+    fn axes_are_labelled_and_no_legend_covers_the_data() {
+        let points: Vec<_> = (0..500).map(|i| (f64::from(i) * 0.01, Some(f64::from(i % 100)))).collect();
+        let lines: Vec<_> = (0..)
+            .zip(["truth", "an estimate with a long name"])
+            .map(|(index, label)| Line::new(label, PALETTE[index], 1, &points))
+            .collect();
+        let panel = |axis: &str| Panel { title: String::new(), axis: axis.into(), lines: lines.clone() };
+        let panels = vec![panel("roll (deg)"), panel("pitch (deg)")];
+        let file = std::env::temp_dir().join(format!("bb-plot-{}.svg", std::process::id()));
+        Picture { title: "walk".into(), panels, panel_size: (900, 240) }.write(&file).expect("writes");
+        let svg = std::fs::read_to_string(&file).expect("reads");
+        std::fs::remove_file(&file).expect("removes");
+        for label in ["roll (deg)", "pitch (deg)", "time (s)"] {
+            assert!(svg.contains(label), "{label}");
+        }
+        // The x coordinates of the coordinate pairs.
+        let data = numbers(&svg, "polyline", "points").into_iter().filter(|points| points.len() > 100);
+        let right = data.flat_map(|points| points.into_iter().step_by(2)).fold(0.0, f64::max);
+        assert!(right > 500.0, "the data take most of the room: {right}");
+        let is_legend = |text: &&str| text.contains("truth") || text.contains("estimate");
+        let legends: Vec<_> = svg.split("<text ").filter(is_legend).collect();
+        assert_eq!(legends.len(), 4);
+        for legend in legends {
+            let left = numbers(&format!("<text {legend}"), "text", "x")[0][0];
+            assert!(left > right, "{left} {right}");
+        }
+    }
+}

@@ -1,0 +1,13 @@
+//! Accuracy on recordings of real sensors, which are not part of the repository: `BB_DATA=FOLDER cargo test --release -p bb-tests
+//! --test long accuracy`. Without all of the recordings that they expect they fail.
+//!
+//! The attitude filters are those of the list in `bb-estimators`; what each reaches is in its folder, and the test fails if
+//! that changes by 2 %.
+
+mod attitude;
+mod bags;
+mod command;
+mod known;
+mod navigation;
+mod single;
+mod variants;

@@ -1,0 +1,5 @@
+//! What takes minutes, or needs recordings. Built by its name alone, with optimisation: `cargo test --release -p bb-tests --test long`.
+
+mod accuracy;
+mod stress;
+mod week;

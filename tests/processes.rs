@@ -1,0 +1,24 @@
+//! What a whole process has one of: its logger, its signals, its priorities.
+
+mod blocked_logger;
+mod features;
+mod loggers;
+mod logs;
+
+use std::error::Error;
+use std::process::Command;
+
+/// Names the test that runs alone in this process.
+const ALONE: &str = "BB_TEST_ALONE";
+
+/// Runs a test of this binary, by its whole name, alone in another process.
+fn alone(name: &str, test: impl FnOnce() -> Result<(), Box<dyn Error>>) -> Result<(), Box<dyn Error>> {
+    if std::env::var(ALONE).is_ok_and(|alone| alone == name) {
+        return test();
+    }
+    let mut other = Command::new(std::env::current_exe()?);
+    let output = other.args([name, "--exact", "--nocapture"]).env(ALONE, name).output()?;
+    let said = [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).concat();
+    assert!(output.status.success() && said.contains("1 passed"), "{name}: {said}");
+    Ok(())
+}
