@@ -56,7 +56,7 @@ robot! {
 }
 
 /// A robot without disarm callbacks.
-pub mod harmless {
+mod harmless {
     use super::Number;
     use bb_core::prelude::*;
 
