@@ -1,4 +1,4 @@
-//! What takes minutes, or needs recordings. Built by its name alone, with optimisation: `cargo test --release -p bb-tests --test long`.
+//! What takes minutes, or needs recordings. Built by its name alone, with optimisation: `cargo test --release -p bb-long-tests --test long`.
 
 mod accuracy;
 mod stress;
