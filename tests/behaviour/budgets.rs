@@ -1,6 +1,6 @@
 //! What a latency budget charges an estimator with in real time, and what is measured without one.
 
-use crate::components::{Number, Scale, at};
+use crate::components::{Failure, Number, Scale, at};
 use bb_core::prelude::*;
 
 /// How long a copy for a subscriber takes.
@@ -60,7 +60,7 @@ robot! {
 }
 
 #[test]
-fn copies_and_drops_of_messages_are_charged_to_no_estimator() -> Result<(), Box<dyn std::error::Error>> {
+fn copies_and_drops_of_messages_are_charged_to_no_estimator() -> Result<(), Failure> {
     let builder = Copying::builder();
     let copies = builder.subscribe(copying::sensor::base::camera::first);
     let running = builder.start()?;
@@ -86,7 +86,7 @@ robot! {
 }
 
 #[test]
-fn without_a_budget_one_of_64_callbacks_is_measured() -> Result<(), Box<dyn std::error::Error>> {
+fn without_a_budget_one_of_64_callbacks_is_measured() -> Result<(), Failure> {
     let mut simulation = Sampled::builder().simulate()?;
     for number in 1..=640 {
         simulation.publish(sampled::sensor::base::number, at(number), Number(1.0));

@@ -1,13 +1,12 @@
 //! Every callback of an estimator, what it may emit and ask for.
 
-use crate::components::{Number, at};
+use crate::components::{Break, Failure, Number, Replied, at};
 use bb_core::event::ParameterValue;
 use bb_core::prelude::*;
 
 /// What it can be told and asked.
 pub(crate) struct Add(f64);
 pub(crate) struct HowMuch;
-pub(crate) struct Break;
 
 /// Options of [`Sum`].
 #[derive(Clone, Debug, Options)]
@@ -45,7 +44,7 @@ impl Estimator for Sum {
         Ok(Self { options, sum: 0.0 })
     }
 
-    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
+    fn handle_input(&mut self, number: &Stamped<Number>) -> Replied {
         self.sum += self.options.gain * number.0;
         Ok(match number.0 {
             // Asks for more of each kind.
@@ -56,7 +55,7 @@ impl Estimator for Sum {
         })
     }
 
-    fn handle_info(&mut self, info: Info) -> Result<Reply<Number>, Fault> {
+    fn handle_info(&mut self, info: Info) -> Replied {
         Ok(Reply::emit(Number(match info {
             Info::Tick => 1000.0,
             Info::Timer(number) => 2000.0 + f64::from(number),
@@ -65,7 +64,7 @@ impl Estimator for Sum {
         })))
     }
 
-    fn handle_continue(&mut self, step: u32) -> Result<Reply<Number>, Fault> {
+    fn handle_continue(&mut self, step: u32) -> Replied {
         let reply = Reply::emit(Number(4000.0 + f64::from(step)));
         Ok(if step < 3 { reply.and(Request::Continue(step + 1)) } else { reply })
     }
@@ -91,7 +90,7 @@ impl HandleCall<Break> for Sum {
 }
 
 impl HandleCast<Add> for Sum {
-    fn handle_cast(&mut self, Add(number): Add) -> Result<Reply<Number>, Fault> {
+    fn handle_cast(&mut self, Add(number): Add) -> Replied {
         self.sum += number;
         Ok(Reply::none())
     }
@@ -180,7 +179,7 @@ fn a_tick_ends_on_request() -> Result<(), StartError> {
 }
 
 #[test]
-fn calls_are_answered_and_casts_are_taken() -> Result<(), Box<dyn std::error::Error>> {
+fn calls_are_answered_and_casts_are_taken() -> Result<(), Failure> {
     let sum = summing::sensor::base::number::sum;
     let builder = Summing::builder();
     let sums = builder.subscribe(sum);
@@ -200,7 +199,7 @@ fn calls_are_answered_and_casts_are_taken() -> Result<(), Box<dyn std::error::Er
 }
 
 #[test]
-fn a_parameter_reaches_the_options_bound_to_it() -> Result<(), Box<dyn std::error::Error>> {
+fn a_parameter_reaches_the_options_bound_to_it() -> Result<(), Failure> {
     let mut builder = Summing::builder();
     builder.set_parameter(summing::param::sum::gain, 3.0)?;
     let changes = builder.subscribe(summing::param::sum::gain);

@@ -1,7 +1,11 @@
-//! Small sensors, estimators and commands that the robots of these tests are made of.
+//! The kit that the robots of these tests are made of: components whose code is an option, so that a test writes only what it is
+//! about, and what many of them share.
 
 use bb_core::prelude::*;
-use bb_core::{JointPositions, JointReading};
+use bb_core::{JointPositions, JointReading, RequestCodec};
+use std::pin::{Pin, pin};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::task::{Context as Polled, Wake, Waker};
 
 /// A number; at a joint, its position.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
@@ -11,6 +15,268 @@ pub(crate) struct Number(pub(crate) f64);
 impl JointPositions for Number {
     fn tell(&self, listener: &mut dyn FnMut(JointReading<'_>)) {
         listener(JointReading::at(&[self.0]));
+    }
+}
+
+pub(crate) type Failure = Box<dyn std::error::Error>;
+
+/// What code without a result gives.
+pub(crate) type Done = Result<(), Fault>;
+
+/// What code of an [`Echo`] gives.
+pub(crate) type Replied = Result<Reply<Number>, Fault>;
+
+/// What an [`Echo`] does with a number, and with another one that it keeps.
+pub(crate) type OnNumber = fn(&mut f64, f64) -> Replied;
+
+/// What code of a [`Source`] or a [`Pulse`] gives.
+pub(crate) type Read = Result<Reading<Number>, Fault>;
+
+/// What code of a [`Task`] gives.
+pub(crate) type Doing = Pin<Box<dyn Future<Output = Result<Outcome<()>, Fault>> + Send>>;
+
+/// Options of [`Source`].
+#[derive(Clone, Debug, Options)]
+pub(crate) struct SourceOptions {
+    #[option(default = |_| Ok(()))]
+    pub(crate) init: fn(&SensorContext) -> Done,
+    /// What the reading of this number gives, counted from 1.
+    #[option(default = |_, _| Ok(Reading::nothing()))]
+    pub(crate) read: fn(u32, MonotonicTime) -> Read,
+    #[option(default = || None)]
+    pub(crate) starts_at: fn() -> Option<MonotonicTime>,
+    #[option(default = || ())]
+    pub(crate) terminate: fn(),
+    #[option(default = || ())]
+    pub(crate) dropped: fn(),
+    /// Another one is made when it changes.
+    #[option(default = 1.0)]
+    pub(crate) gain: f64,
+}
+
+/// A sensor; it measures nothing, unless it is told to.
+#[derive(Debug)]
+pub(crate) struct Source(SourceOptions, u32);
+
+impl Sensor for Source {
+    type Options = SourceOptions;
+    type Output = Number;
+
+    fn init(options: SourceOptions, context: &SensorContext) -> Result<Self, Fault> {
+        (options.init)(context)?;
+        Ok(Self(options, 0))
+    }
+
+    fn starts_at(&self) -> Option<MonotonicTime> {
+        (self.0.starts_at)()
+    }
+
+    fn read(&mut self, now: MonotonicTime) -> Read {
+        self.1 += 1;
+        (self.0.read)(self.1, now)
+    }
+
+    fn terminate(&mut self) {
+        (self.0.terminate)();
+    }
+}
+
+impl Drop for Source {
+    fn drop(&mut self) {
+        (self.0.dropped)();
+    }
+}
+
+/// Options of [`Echo`].
+#[derive(Clone, Debug, Options)]
+pub(crate) struct EchoOptions {
+    #[option(default = |_| Ok(()))]
+    pub(crate) init: fn(&Context) -> Done,
+    /// What becomes of a number, with another one that it keeps.
+    #[option(default = |_, number| Ok(Reply::emit(Number(number))))]
+    pub(crate) input: OnNumber,
+    #[option(default = |_, _| Ok(Reply::none()))]
+    pub(crate) info: fn(&mut f64, Info) -> Replied,
+    #[option(default = |_, _| Ok(Reply::none()))]
+    pub(crate) go_on: fn(&mut f64, u32) -> Replied,
+    #[option(default = || ())]
+    pub(crate) terminate: fn(),
+    #[option(default = || ())]
+    pub(crate) dropped: fn(),
+    /// Another one is made when it changes.
+    #[option(default = 1.0)]
+    pub(crate) gain: f64,
+}
+
+/// An estimator; it emits what it gets, unless it is told to do something else.
+#[derive(Debug)]
+pub(crate) struct Echo(EchoOptions, f64);
+
+impl Estimator for Echo {
+    type Options = EchoOptions;
+    type Input = Number;
+    type Output = Number;
+
+    fn init(options: EchoOptions, context: &Context) -> Result<Self, Fault> {
+        (options.init)(context)?;
+        Ok(Self(options, 0.0))
+    }
+
+    fn handle_input(&mut self, number: &Stamped<Number>) -> Replied {
+        (self.0.input)(&mut self.1, number.0)
+    }
+
+    fn handle_info(&mut self, info: Info) -> Replied {
+        (self.0.info)(&mut self.1, info)
+    }
+
+    fn handle_continue(&mut self, step: u32) -> Replied {
+        (self.0.go_on)(&mut self.1, step)
+    }
+
+    fn terminate(&mut self) {
+        (self.0.terminate)();
+    }
+}
+
+impl Drop for Echo {
+    fn drop(&mut self) {
+        (self.0.dropped)();
+    }
+}
+
+/// Asks an [`Echo`] for the number that it keeps.
+pub(crate) struct Ask;
+
+impl HandleCall<Ask> for Echo {
+    type Response = f64;
+    fn handle_call(&mut self, Ask: Ask) -> Result<(f64, Reply<Number>), Fault> {
+        Ok((self.1, Reply::none()))
+    }
+}
+
+/// Has an [`Echo`] fail.
+pub(crate) struct Break;
+
+impl HandleCall<Break> for Echo {
+    type Response = ();
+    fn handle_call(&mut self, Break: Break) -> Result<((), Reply<Number>), Fault> {
+        Err(Fault::new("broken on request"))
+    }
+}
+
+impl HandleCast<Number> for Echo {
+    const RECORD: Option<RequestCodec<Number>> = Some(RequestCodec::bytes());
+
+    fn handle_cast(&mut self, number: Number) -> Replied {
+        Ok(Reply::emit(number))
+    }
+}
+
+/// Options of [`Servo`].
+#[derive(Clone, Debug, Options)]
+pub(crate) struct ServoOptions {
+    #[option(default = |_| Ok(()))]
+    pub(crate) init: fn(&ActuatorContext) -> Done,
+    #[option(default = |_| Ok(()))]
+    pub(crate) command: fn(f64) -> Done,
+    /// What it does with the last number when it is disarmed.
+    #[option(default = |_| Ok(()))]
+    pub(crate) disarm: fn(f64) -> Done,
+    #[option(default = || ())]
+    pub(crate) terminate: fn(),
+    #[option(default = || ())]
+    pub(crate) dropped: fn(),
+    /// Another one is made when it changes.
+    #[option(default = 1.0)]
+    pub(crate) gain: f64,
+}
+
+/// An actuator; it does nothing, unless it is told to.
+#[derive(Debug)]
+pub(crate) struct Servo(ServoOptions, f64);
+
+impl Actuator for Servo {
+    type Options = ServoOptions;
+    type Command = Number;
+
+    fn init(options: ServoOptions, context: &ActuatorContext) -> Result<Self, Fault> {
+        (options.init)(context)?;
+        Ok(Self(options, 0.0))
+    }
+
+    fn handle_command(&mut self, command: &Stamped<Number>) -> Done {
+        self.1 = command.0;
+        (self.0.command)(self.1)
+    }
+
+    fn disarm(&mut self) -> Done {
+        (self.0.disarm)(self.1)
+    }
+
+    fn terminate(&mut self) {
+        (self.0.terminate)();
+    }
+}
+
+impl Drop for Servo {
+    fn drop(&mut self) {
+        (self.0.dropped)();
+    }
+}
+
+/// Options of [`Pulse`].
+#[derive(Clone, Debug, Options)]
+pub(crate) struct PulseOptions {
+    /// Gives the code of its updates.
+    #[option(default = |_| Ok(Box::new(|_| Ok(Reading::nothing()))))]
+    pub(crate) init: MakeUpdate,
+}
+
+/// What gives a [`Pulse`] its code.
+pub(crate) type MakeUpdate = fn(&ServiceContext) -> Result<Update, Fault>;
+
+/// The code of an update of a [`Pulse`].
+pub(crate) type Update = Box<dyn FnMut(MonotonicTime) -> Read + Send>;
+
+/// A controller or bridge; it publishes nothing, unless it is told to.
+pub(crate) struct Pulse(Update);
+
+impl Service for Pulse {
+    type Options = PulseOptions;
+    type Output = Number;
+
+    fn init(options: PulseOptions, context: &ServiceContext) -> Result<Self, Fault> {
+        Ok(Self((options.init)(context)?))
+    }
+
+    fn update(&mut self, now: MonotonicTime) -> Read {
+        (self.0)(now)
+    }
+}
+
+/// Options of [`Task`].
+#[derive(Clone, Debug, Options)]
+pub(crate) struct TaskOptions {
+    #[option(default = |_| Box::pin(async { Ok(Outcome::done(())) }))]
+    pub(crate) run: fn(CommandContext) -> Doing,
+}
+
+/// A command; it does nothing, unless it is told to.
+#[derive(Debug)]
+pub(crate) struct Task;
+
+impl Command for Task {
+    type Options = TaskOptions;
+    type Arguments = NoArguments;
+    type Output = ();
+
+    fn run(
+        options: TaskOptions,
+        _: NoArguments,
+        context: CommandContext,
+    ) -> impl Future<Output = Result<Outcome<()>, Fault>> + Send {
+        (options.run)(context)
     }
 }
 
@@ -166,6 +432,29 @@ impl Command for Move {
             None => Ok(outcome),
         }
     }
+}
+
+/// What threads and tests share, though one that had it panicked.
+pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The numbers that wait in a subscription.
+pub(crate) fn numbers(subscription: &Subscription<Number>) -> Vec<f64> {
+    subscription.drain().map(|number| number.0).collect()
+}
+
+/// Has `run` called on the publisher's thread at the next message.
+pub(crate) fn when_woken<T: Payload>(subscription: &mut Subscription<T>, run: impl FnMut() + Send + 'static) {
+    struct Wakes(Mutex<Box<dyn FnMut() + Send>>);
+    impl Wake for Wakes {
+        fn wake(self: Arc<Self>) {
+            (lock(&self.0))();
+        }
+    }
+    let waker = Waker::from(Arc::new(Wakes(Mutex::new(Box::new(run)))));
+    let awaited = pin!(subscription.recv_async());
+    assert!(awaited.poll(&mut Polled::from_waker(&waker)).is_pending());
 }
 
 /// The time `millis` after zero.

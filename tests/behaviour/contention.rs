@@ -1,15 +1,13 @@
 //! Several threads at once: nothing is lost uncounted, orders are kept, nobody waits for ever.
 
-use crate::components::{Number, within};
+use crate::components::{Ask, Echo, Number, lock, when_woken, within};
+use crate::gate::{Gate, wait_until};
 use bb_core::ArmError;
 use bb_core::DynamicSubscription;
 use bb_core::prelude::*;
 use bb_core::run::DropReason;
-use std::future::Future;
-use std::pin::pin;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
-use std::task::{Context as Polled, Wake, Waker};
 
 /// Numbers of two publishers, which must never go back.
 #[derive(Clone, Copy, Debug, Inputs)]
@@ -30,7 +28,7 @@ pub(crate) struct OrderedOptions {
 pub(crate) struct Ordered([f64; 2]);
 
 const HANG: f64 = 1e9;
-static HANGS: AtomicBool = AtomicBool::new(false);
+static HERE: Gate = Gate::new();
 
 impl Estimator for Ordered {
     type Options = OrderedOptions;
@@ -46,10 +44,7 @@ impl Estimator for Ordered {
             return Err(Fault::new("asked to fail"));
         }
         if two.first.0 == HANG {
-            HANGS.store(true, Ordering::SeqCst);
-            while HANGS.load(Ordering::SeqCst) {
-                std::thread::sleep(Duration::from_millis(1));
-            }
+            HERE.pass("a message");
         }
         let now = [two.first.0, two.second.map_or(0.0, |second| second.0)];
         assert!(now[0] >= self.0[0] && now[1] >= self.0[1], "out of order");
@@ -62,7 +57,6 @@ impl Estimator for Ordered {
     }
 }
 
-pub(crate) struct Ask;
 pub(crate) struct Tell;
 
 impl HandleCall<Ask> for Ordered {
@@ -102,25 +96,7 @@ robot! {
             input second: sensor::base::b, optional;
             runs_on: worker;
         }
-        estimator behind: Behind() { input number: estimator::base::ordered; }
-    }
-}
-
-/// Stands behind another.
-#[derive(Debug)]
-pub(crate) struct Behind;
-
-impl Estimator for Behind {
-    type Options = NoOptions;
-    type Input = Number;
-    type Output = Number;
-
-    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-
-    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
-        Ok(Reply::emit(number.payload))
+        estimator behind: Echo() { input number: estimator::base::ordered; }
     }
 }
 
@@ -183,44 +159,21 @@ fn an_estimator_that_hangs_does_not_delay_publishers() {
     let _alone = ALONE.lock();
     within(60, || {
         let running = Crowded::builder().start().expect("it starts");
+        HERE.close("a message");
         let live = (*running).clone();
         let hung = std::thread::spawn(move || {
             let time = live.clock().now();
             live.publish(crowded::sensor::base::a, time, Number(HANG));
         });
-        while !HANGS.load(Ordering::SeqCst) {
-            std::thread::sleep(Duration::from_millis(1));
-        }
-        let start = std::time::Instant::now();
+        HERE.wait_for(1);
         for number in 0..1100 {
             running.publish(crowded::sensor::base::b, running.clock().now(), Number(f64::from(number)));
         }
-        assert!(start.elapsed() < Duration::from_secs(5), "it took {:?}", start.elapsed());
         let full = running.report().estimator(ORDERED).map(|node| node.inputs[1].dropped(DropReason::Overflow));
         assert_eq!(full, Some(1100 - 1024));
-        // Both that hang, `ordered` and `apart`, go on.
-        for _ in 0..100 {
-            HANGS.store(false, Ordering::SeqCst);
-            std::thread::sleep(Duration::from_millis(1));
-        }
+        HERE.open();
         hung.join().expect("it does not panic");
     });
-}
-
-/// Runs a function when it is woken.
-struct Wakes(Mutex<Box<dyn FnMut() + Send>>);
-
-impl Wake for Wakes {
-    fn wake(self: Arc<Self>) {
-        (self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner))();
-    }
-}
-
-/// Has `run` called on the publisher's thread at the next message.
-fn when_woken(subscription: &mut Subscription<Number>, run: impl FnMut() + Send + 'static) {
-    let waker = Waker::from(Arc::new(Wakes(Mutex::new(Box::new(run)))));
-    let awaited = pin!(subscription.recv_async());
-    assert!(awaited.poll(&mut Polled::from_waker(&waker)).is_pending());
 }
 
 #[test]
@@ -237,23 +190,17 @@ fn a_waker_may_publish_subscribe_and_stop_and_a_call_from_there_is_refused() {
             let time = live.clock().now();
             live.publish(crowded::sensor::base::b, time, Number(1.0));
             let tap = live.subscribe_any(Select::All, None, Overflow::KeepLatest);
-            taps.lock().expect("nobody else has it").push(tap);
+            lock(&taps).push(tap);
             let answer = live.call(crowded::estimator::base::ordered, Ask).map_err(|fault| fault.to_string());
-            said.lock().expect("nobody else has it").push(answer);
+            lock(&said).push(answer);
             live.request_stop();
         });
         running.publish(crowded::sensor::base::a, running.clock().now(), Number(1.0));
         // Whoever looks at the start what is due may deliver it in our place.
-        let answers = loop {
-            let answers = answers.lock().expect("nobody else has it").clone();
-            if !answers.is_empty() {
-                break answers;
-            }
-            std::thread::sleep(Duration::from_millis(1));
-        };
+        wait_until("it was woken", || !lock(&answers).is_empty());
         let refused = "estimator/base/ordered cannot be asked by code that an estimator's message has woken, which \
                        would wait for itself: use `cast`, or another thread";
-        assert_eq!(answers, [Err(refused.to_owned())]);
+        assert_eq!(*lock(&answers), [Err(refused.to_owned())]);
         let report = running.stop();
         assert_eq!(report.estimator(ORDERED).map(|ordered| ordered.inputs[1].received), Some(1));
     });

@@ -1,118 +1,77 @@
 //! States, commands, safety, actuators, controllers and bridges.
 
-use crate::components::{Counter, Move, Number, Target, at};
+use crate::components::{
+    Counter, Doing, Done, Failure, MakeUpdate, Move, Number, Pulse, Servo, Target, Task, Update, at, lock, numbers,
+};
 use bb_core::event::{CommandPhase, RefusalReason};
 use bb_core::prelude::*;
 use bb_core::run::CommandError;
 use bb_core::{ArmError, DisarmError};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-
-/// Begins to wait where it is started, before it is gone on with.
-#[derive(Debug)]
-pub(crate) struct Eager;
-
-impl Command for Eager {
-    type Options = NoOptions;
-    type Arguments = NoArguments;
-    type Output = MonotonicTime;
-
-    fn run(
-        _: NoOptions,
-        _: NoArguments,
-        context: CommandContext,
-    ) -> impl Future<Output = Result<Outcome<MonotonicTime>, Fault>> + Send {
-        let sleep = context.sleep(Duration::from_millis(50));
-        async move {
-            sleep.await;
-            Ok(Outcome::done(context.now()))
-        }
-    }
-}
-
-/// A servo; negative targets break it.
-#[derive(Debug)]
-pub(crate) struct Servo;
+use std::sync::{Mutex, MutexGuard};
 
 static HAS_TORQUE: AtomicBool = AtomicBool::new(false);
 static REFUSES: AtomicBool = AtomicBool::new(false);
 static MADE: AtomicU32 = AtomicU32::new(0);
 
-impl Actuator for Servo {
-    type Options = NoOptions;
-    type Command = Number;
+/// The servo of these tests is one device.
+fn alone() -> MutexGuard<'static, ()> {
+    static ALONE: Mutex<()> = Mutex::new(());
+    let guard = lock(&ALONE);
+    REFUSES.store(false, Ordering::SeqCst);
+    guard
+}
 
-    fn init(_: NoOptions, context: &ActuatorContext) -> Result<Self, Fault> {
-        assert_eq!((context.path(), context.joint()), ("actuator/base/pan/servo", "pan"));
-        MADE.fetch_add(1, Ordering::SeqCst);
-        Ok(Self)
-    }
+/// Begins to wait where it is started, before it is gone on with.
+fn eager(context: CommandContext) -> Doing {
+    let sleep = context.sleep(Duration::from_millis(50));
+    Box::pin(async move {
+        sleep.await;
+        assert_eq!(context.now(), at(250), "50 ms after its start");
+        Ok(Outcome::done(()))
+    })
+}
 
-    fn handle_command(&mut self, command: &Stamped<Number>) -> Result<(), Fault> {
-        if command.0 < 0.0 {
-            return Err(Fault::new("stalled"));
-        }
-        HAS_TORQUE.store(true, Ordering::SeqCst);
-        Ok(())
-    }
+fn make(context: &ActuatorContext) -> Done {
+    assert_eq!((context.path(), context.joint()), ("actuator/base/pan/servo", "pan"));
+    MADE.fetch_add(1, Ordering::SeqCst);
+    Ok(())
+}
 
-    fn disarm(&mut self) -> Result<(), Fault> {
-        if REFUSES.load(Ordering::SeqCst) {
-            return Err(Fault::new("the brake does not close"));
-        }
-        HAS_TORQUE.store(false, Ordering::SeqCst);
-        Ok(())
+/// Negative targets break it.
+fn turn(target: f64) -> Done {
+    if target < 0.0 {
+        return Err(Fault::new("stalled"));
     }
+    HAS_TORQUE.store(true, Ordering::SeqCst);
+    Ok(())
+}
+
+fn brake(_: f64) -> Done {
+    if REFUSES.load(Ordering::SeqCst) {
+        return Err(Fault::new("the brake does not close"));
+    }
+    HAS_TORQUE.store(false, Ordering::SeqCst);
+    Ok(())
 }
 
 /// Sends twice what a sensor says to the servo.
-pub(crate) struct Follow {
-    numbers: Subscription<Number>,
-    servo: bb_core::run::ActuatorLink<Number>,
-}
-
-impl Service for Follow {
-    type Options = NoOptions;
-    type Output = Number;
-
-    fn init(_: NoOptions, context: &ServiceContext) -> Result<Self, Fault> {
-        let bus = context.bus();
-        Ok(Self {
-            numbers: bus.subscribe("sensor/base/pan/encoder", Overflow::default())?,
-            servo: bus.actuator("actuator/base/pan/servo")?,
-        })
-    }
-
-    fn update(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        let Some(number) = self.numbers.drain().last() else { return Ok(Reading::nothing()) };
+fn follow(context: &ServiceContext) -> Result<Update, Fault> {
+    let numbers = context.bus().subscribe::<Number>("sensor/base/pan/encoder", Overflow::default())?;
+    let servo = context.bus().actuator("actuator/base/pan/servo")?;
+    Ok(Box::new(move |_| {
+        let Some(number) = numbers.drain().last() else { return Ok(Reading::nothing()) };
         // It is not armed all the time.
-        let sent = self.servo.send(Number(2.0 * number.0)).is_ok();
+        let sent = servo.send(Number(2.0 * number.0)).is_ok();
         Ok(Reading::now(Number(f64::from(u8::from(sent)))))
-    }
+    }))
 }
 
-/// Options of [`Dashboard`].
-#[derive(Clone, Debug, Options)]
-pub(crate) struct DashboardOptions {
-    #[option(default = "sensor/base/pan/encoder")]
-    pub(crate) path: String,
-}
-
-/// Counts what there is.
-pub(crate) struct Dashboard(bb_core::DynamicSubscription);
-
-impl Service for Dashboard {
-    type Options = DashboardOptions;
-    type Output = Number;
-
-    fn init(options: DashboardOptions, context: &ServiceContext) -> Result<Self, Fault> {
-        // Of the right type, or an error that names what is wrong.
-        context.bus().subscribe::<Number>(&options.path, Overflow::default())?;
-        Ok(Self(context.bus().subscribe_any(Select::Below("sensor"), None, Overflow::default())))
-    }
-
-    fn update(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        Ok(Reading::now(Number(self.0.drain().count() as f64)))
-    }
+/// Counts what there is; one of the topics is of the right type, or an error names what is wrong.
+fn dashboard(context: &ServiceContext, path: &str) -> Result<Update, Fault> {
+    context.bus().subscribe::<Number>(path, Overflow::default())?;
+    let all = context.bus().subscribe_any(Select::Below("sensor"), None, Overflow::default());
+    Ok(Box::new(move |_| Ok(Reading::now(Number(all.drain().count() as f64)))))
 }
 
 robot! {
@@ -125,7 +84,7 @@ robot! {
         category motion { concurrency: 2; }
         arm: Arm;
         disarm: Disarm;
-        eager: Eager;
+        eager: Task(run = eager);
         go: Move { category: motion; timeout: 1 s; }
         turn: Move { category: motion; allowed_states: [idle, executing]; }
         look: Move { allowed_states: [idle, executing, parked]; }
@@ -133,26 +92,17 @@ robot! {
         halt: Move { allowed_states: [idle, executing]; cancel: all; }
     }
 
-    controllers { controller follow: Follow() { rate: 10 Hz; } }
-    bridges { bridge dashboard: Dashboard() { rate: 10 Hz; } }
+    controllers { controller follow: Pulse(init = follow) { rate: 10 Hz; } }
+    bridges { bridge dashboard: Pulse(init = |context| dashboard(context, "sensor/base/pan/encoder")) { rate: 10 Hz; } }
 
     link base {
         joint pan: continuous {
             axis: z;
-            actuator servo: Servo();
+            actuator servo: Servo(init = make, command = turn, disarm = brake);
             sensor encoder: Counter(count = 1000) { rate: 100 Hz; }
             link head { }
         }
     }
-}
-
-/// The servo of these tests is one device.
-static ONE_AT_A_TIME: std::sync::Mutex<()> = std::sync::Mutex::new(());
-
-fn alone() -> std::sync::MutexGuard<'static, ()> {
-    let guard = ONE_AT_A_TIME.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-    REFUSES.store(false, Ordering::SeqCst);
-    guard
 }
 
 fn millis(millis: u64) -> Target {
@@ -160,8 +110,7 @@ fn millis(millis: u64) -> Target {
 }
 
 #[test]
-fn a_robot_is_armed_by_its_command_and_executes_until_its_last_one_ends() -> Result<(), Box<dyn std::error::Error>>
-{
+fn a_robot_is_armed_by_its_command_and_executes_until_its_last_one_ends() -> Result<(), Failure> {
     let _alone = alone();
     let builder = Commanded::builder();
     let (states, safety) = (builder.subscribe(system::StateMachine), builder.subscribe(system::SafetyState));
@@ -188,19 +137,19 @@ fn a_robot_is_armed_by_its_command_and_executes_until_its_last_one_ends() -> Res
 }
 
 #[test]
-fn a_command_that_begins_where_it_is_started_has_the_time_of_its_start() -> Result<(), Box<dyn std::error::Error>> {
+fn a_command_that_begins_where_it_is_started_has_the_time_of_its_start() -> Result<(), Failure> {
     let _alone = alone();
     let mut simulation = Commanded::builder().simulate()?;
     simulation.arm().expect("it may be armed");
     simulation.run_until(at(200));
     let eager = simulation.command(commanded::command::eager, NoArguments)?;
     simulation.run_until(at(300));
-    assert_eq!(eager.try_result(), Some(Ok(at(250))));
+    assert_eq!(eager.try_result(), Some(Ok(())));
     Ok(())
 }
 
 #[test]
-fn a_command_may_name_the_next_state_if_it_is_declared() -> Result<(), Box<dyn std::error::Error>> {
+fn a_command_may_name_the_next_state_if_it_is_declared() -> Result<(), Failure> {
     let _alone = alone();
     let mut simulation = Commanded::builder().simulate()?;
     simulation.arm().expect("it may be armed");
@@ -218,13 +167,13 @@ fn a_command_may_name_the_next_state_if_it_is_declared() -> Result<(), Box<dyn s
 }
 
 #[test]
-fn a_command_fails_times_out_or_is_cancelled_and_each_is_told() -> Result<(), Box<dyn std::error::Error>> {
+fn a_command_fails_times_out_or_is_cancelled_and_each_is_told() -> Result<(), Failure> {
     let _alone = alone();
     let builder = Commanded::builder();
     let events = builder.subscribe(commanded::command::go);
     let mut simulation = builder.simulate()?;
     simulation.arm().expect("it may be armed");
-    let mut outcome = |target, cancelled_at: Option<i64>| -> Result<_, Box<dyn std::error::Error>> {
+    let mut outcome = |target, cancelled_at: Option<i64>| -> Result<_, Failure> {
         let start = simulation.clock().now();
         let execution = simulation.command(commanded::command::go, target)?;
         if let Some(millis) = cancelled_at {
@@ -250,7 +199,7 @@ fn a_command_fails_times_out_or_is_cancelled_and_each_is_told() -> Result<(), Bo
 }
 
 #[test]
-fn a_category_has_its_limit_and_its_pre_emption() -> Result<(), Box<dyn std::error::Error>> {
+fn a_category_has_its_limit_and_its_pre_emption() -> Result<(), Failure> {
     let _alone = alone();
     let mut simulation = Commanded::builder().simulate()?;
     simulation.arm().expect("it may be armed");
@@ -279,7 +228,7 @@ fn a_category_has_its_limit_and_its_pre_emption() -> Result<(), Box<dyn std::err
 }
 
 #[test]
-fn an_actuator_moves_only_while_armed_and_is_made_safe() -> Result<(), Box<dyn std::error::Error>> {
+fn an_actuator_moves_only_while_armed_and_is_made_safe() -> Result<(), Failure> {
     let _alone = alone();
     let builder = Commanded::builder();
     let mut simulation = builder.simulate()?;
@@ -305,7 +254,7 @@ fn an_actuator_moves_only_while_armed_and_is_made_safe() -> Result<(), Box<dyn s
 }
 
 #[test]
-fn what_cannot_be_made_safe_is_an_error_until_it_is_forced() -> Result<(), Box<dyn std::error::Error>> {
+fn what_cannot_be_made_safe_is_an_error_until_it_is_forced() -> Result<(), Failure> {
     let _alone = alone();
     let builder = Commanded::builder();
     let errors = builder.subscribe(system::SafetyErrors);
@@ -336,7 +285,7 @@ fn what_cannot_be_made_safe_is_an_error_until_it_is_forced() -> Result<(), Box<d
 }
 
 #[test]
-fn an_actuator_that_fails_is_restarted() -> Result<(), Box<dyn std::error::Error>> {
+fn an_actuator_that_fails_is_restarted() -> Result<(), Failure> {
     let _alone = alone();
     let mut simulation = Commanded::builder().simulate()?;
     let servo = commanded::actuator::base::pan::servo;
@@ -352,7 +301,7 @@ fn an_actuator_that_fails_is_restarted() -> Result<(), Box<dyn std::error::Error
 }
 
 #[test]
-fn controllers_and_bridges_run_and_reach_everything_by_path() -> Result<(), Box<dyn std::error::Error>> {
+fn controllers_and_bridges_run_and_reach_everything_by_path() -> Result<(), Failure> {
     let _alone = alone();
     let builder = Commanded::builder();
     let (follow, counts) =
@@ -361,26 +310,29 @@ fn controllers_and_bridges_run_and_reach_everything_by_path() -> Result<(), Box<
     simulation.run_until(at(150));
     simulation.arm().expect("it may be armed");
     simulation.run_until(at(350));
-    assert_eq!(follow.drain().map(|number| number.0).collect::<Vec<_>>(), [0.0, 0.0, 1.0, 1.0]);
-    assert_eq!(counts.drain().map(|number| number.0).collect::<Vec<_>>(), [1.0, 10.0, 10.0, 10.0]);
-    let mut builder = Commanded::builder();
-    for (path, message) in [
+    assert_eq!(numbers(&follow), [0.0, 0.0, 1.0, 1.0]);
+    assert_eq!(numbers(&counts), [1.0, 10.0, 10.0, 10.0]);
+    let rows: [(MakeUpdate, &str); 2] = [
         (
-            "sensor/base/pan/encodre",
+            |context| dashboard(context, "sensor/base/pan/encodre"),
             "nothing publishes at `sensor/base/pan/encodre`; did you mean `sensor/base/pan/encoder`?",
         ),
-        ("state_machine", "`state_machine` publishes `StateTransition`, not `Number`"),
-    ] {
-        builder.options(commanded::bridge::dashboard).path = path.into();
+        (
+            |context| dashboard(context, "state_machine"),
+            "`state_machine` publishes `StateTransition`, not `Number`",
+        ),
+    ];
+    for (init, message) in rows {
+        let mut builder = Commanded::builder();
+        builder.options(commanded::bridge::dashboard).init = init;
         let error = builder.simulate().expect_err("there is none").to_string();
         assert_eq!(error, format!("bridge/dashboard cannot start: {message}"));
-        builder = Commanded::builder();
     }
     Ok(())
 }
 
 #[test]
-fn commands_run_in_real_time_too_and_end_with_the_robot() -> Result<(), Box<dyn std::error::Error>> {
+fn commands_run_in_real_time_too_and_end_with_the_robot() -> Result<(), Failure> {
     let _alone = alone();
     let running = Commanded::builder().start()?;
     running.command(commanded::command::arm, NoArguments)?.wait()?;

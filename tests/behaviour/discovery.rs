@@ -1,6 +1,6 @@
 //! What tools learn of a running robot: its description as JSON, by path, and its picture.
 
-use crate::components::{CanEncoder, Counter, Scale};
+use crate::components::{CanEncoder, Counter, Failure, Scale, Task};
 use bb_core::component::{ComponentKind, JointPublisher};
 use bb_core::prelude::*;
 use bb_core::topology::GraphFormat;
@@ -9,22 +9,6 @@ use bb_estimators::simulation::{SimulatedActuatorOptions, SimulatedEncoderOption
 use bb_estimators::{SimulatedActuator, SimulatedEncoder};
 use serde_json::Value;
 use std::path::Path;
-
-type Failure = Box<dyn std::error::Error>;
-
-/// Does nothing.
-#[derive(Debug)]
-struct Halt;
-
-impl Command for Halt {
-    type Options = NoOptions;
-    type Arguments = NoArguments;
-    type Output = ();
-
-    async fn run(_: NoOptions, _: NoArguments, _: CommandContext) -> Result<Outcome<()>, Fault> {
-        Ok(Outcome::done(()))
-    }
-}
 
 robot! {
     robot Hoist;
@@ -42,7 +26,7 @@ robot! {
     commands {
         category motion { concurrency: 1; }
         go: MoveJoints(speed = 1.0) { category: motion; timeout: 2500 ms; allowed_states: [idle, lifting]; }
-        stop: Halt { cancel: [motion]; allowed_states: [idle, executing]; }
+        stop: Task { cancel: [motion]; allowed_states: [idle, executing]; }
     }
 
     controllers {
@@ -142,6 +126,8 @@ fn everything_is_found_by_path() -> Result<(), Failure> {
 #[test]
 fn the_graph_shows_actuators_services_commands_and_what_is_replaced() -> Result<(), Failure> {
     check_stored("graph.mmd", &Hoist::graph(GraphFormat::Mermaid))?;
+    let dot = Hoist::graph(GraphFormat::Dot);
+    assert!(dot.starts_with("digraph robot {") && dot.ends_with("}\n"), "{dot}");
     let running = simulated()?.bus().graph(GraphFormat::Mermaid);
     let declared = Hoist::graph(GraphFormat::Mermaid);
     assert_eq!(running.lines().count(), declared.lines().count());

@@ -1,13 +1,10 @@
 //! An input of all messages since the last run: each is in one run, whatever the driver does.
 
-use crate::components::{Number, at, within};
+use crate::components::{Failure, Number, at, within};
 use crate::gate::{Gate, wait_until};
-use crate::journals::Failure;
-use crate::replay::{Heard, Lines, Random, counts, hear, overflow, same};
+use crate::replay::{Random, overflow, same_again};
 use bb_core::prelude::*;
 use bb_core::run::DropReason;
-use bb_core::{Builder, Select};
-use std::sync::{Arc, PoisonError};
 
 /// A driver, and events.
 #[derive(Clone, Copy, Debug, Inputs)]
@@ -102,35 +99,51 @@ fn saw(subscription: &Subscription<SeenEvents>) -> Vec<(Vec<f64>, u64)> {
     subscription.drain().map(|seen| (seen.payload.first, seen.payload.lost)).collect()
 }
 
+/// Each row publishes numbers of the clock, `c`, and of the first and the second input, `f` and `s`, at the milliseconds that they
+/// name, and says what a run sees of them, or that there is none.
 #[test]
-fn messages_between_two_of_the_driver_are_all_seen_once_and_in_order() -> Result<(), StartError> {
-    let builder = Witnessed::builder();
-    let here = builder.subscribe(witnessed::estimator::base::here);
-    let mut run = builder.simulate()?;
-    for millis in 0..5 {
-        run.publish(witnessed::sensor::base::first, at(millis), Number(millis as f64));
+fn what_a_run_sees() -> Result<(), StartError> {
+    let [here, tolerant] = [witnessed::estimator::base::here, witnessed::estimator::base::tolerant];
+    let [required, driven] = [witnessed::estimator::base::required, witnessed::estimator::base::driven];
+    let rows = [
+        (
+            "messages between two of the driver are all seen, once and in order",
+            here,
+            "f0 f1 f2 f3 f4 c1000: f0 f1 f2 f3 f4; c1001: ; f1001 c1002: f1001",
+        ),
+        ("a tolerance leaves out none of them", tolerant, "s0 s1 s2 s3 s4 c5: s0 s1 s2 s3 s4; s5 c5: s5"),
+        (
+            "a required one drops the run, until it has arrived and when it is 11 ms old, and messages wait",
+            required,
+            "f1 f2 c3: none; s4 c5: f1 f2 s4; c13: none",
+        ),
+        ("as the driver it is one message a run", driven, "c0: none; f1: f1; f2: f2"),
+    ];
+    for (row, estimator, steps) in rows {
+        let builder = Witnessed::builder();
+        let seen = builder.subscribe(estimator);
+        let mut run = builder.simulate()?;
+        for step in steps.split("; ") {
+            let (publishes, expected) = step.split_once(':').expect("what is seen");
+            for publish in publishes.split(' ') {
+                let (sensor, millis) = publish.split_at(1);
+                let millis = millis.parse().expect("milliseconds");
+                let handle = match sensor {
+                    "c" => witnessed::sensor::base::clock,
+                    "f" => witnessed::sensor::base::first,
+                    _ => witnessed::sensor::base::second,
+                };
+                run.publish(handle, at(millis), Number(millis as f64));
+            }
+            let text = |name: &str, numbers: &[f64]| -> String {
+                numbers.iter().map(|number| format!(" {name}{number}")).collect()
+            };
+            let runs = seen.drain().map(|seen| text("f", &seen.first) + &text("s", &seen.second));
+            let runs: Vec<String> = runs.collect();
+            let expected = if expected == " none" { vec![] } else { vec![expected.trim_end()] };
+            assert_eq!(runs, expected, "{row}: {step}");
+        }
     }
-    run.publish(witnessed::sensor::base::clock, at(1000), Number(0.0));
-    run.publish(witnessed::sensor::base::clock, at(1001), Number(0.0));
-    run.publish(witnessed::sensor::base::first, at(1001), Number(7.0));
-    run.publish(witnessed::sensor::base::clock, at(1002), Number(0.0));
-    assert_eq!(saw(&here), [(vec![0.0, 1.0, 2.0, 3.0, 4.0], 0), (vec![], 0), (vec![7.0], 0)]);
-    Ok(())
-}
-
-#[test]
-fn a_tolerance_leaves_out_none_of_them() -> Result<(), StartError> {
-    let builder = Witnessed::builder();
-    let tolerant = builder.subscribe(witnessed::estimator::base::tolerant);
-    let mut run = builder.simulate()?;
-    for millis in 0..5 {
-        run.publish(witnessed::sensor::base::second, at(millis), Number(millis as f64));
-    }
-    run.publish(witnessed::sensor::base::clock, at(5), Number(0.0));
-    run.publish(witnessed::sensor::base::second, at(5), Number(5.0));
-    run.publish(witnessed::sensor::base::clock, at(5), Number(0.0));
-    let seen: Vec<_> = tolerant.drain().map(|seen| (seen.payload.second, seen.payload.lost)).collect();
-    assert_eq!(seen, [(vec![0.0, 1.0, 2.0, 3.0, 4.0], 0), (vec![5.0], 0)]);
     Ok(())
 }
 
@@ -151,38 +164,6 @@ fn what_the_driver_lets_wait_for_too_long_is_counted_and_told() -> Result<(), St
     let counts = report.estimator("estimator/base/here").expect("it is declared");
     let displaced: Vec<u64> = counts.inputs.iter().map(|input| input.dropped(DropReason::Displaced)).collect();
     assert_eq!(displaced, [0, 3, 0]);
-    Ok(())
-}
-
-#[test]
-fn a_required_one_drops_the_run_and_its_messages_wait() -> Result<(), StartError> {
-    let builder = Witnessed::builder();
-    let required = builder.subscribe(witnessed::estimator::base::required);
-    let mut run = builder.simulate()?;
-    run.publish(witnessed::sensor::base::first, at(1), Number(1.0));
-    run.publish(witnessed::sensor::base::first, at(2), Number(2.0));
-    run.publish(witnessed::sensor::base::clock, at(3), Number(0.0));
-    assert!(saw(&required).is_empty(), "the other has not arrived");
-    run.publish(witnessed::sensor::base::second, at(4), Number(0.0));
-    run.publish(witnessed::sensor::base::clock, at(5), Number(0.0));
-    assert_eq!(saw(&required), [(vec![1.0, 2.0], 0)]);
-    run.publish(witnessed::sensor::base::clock, at(13), Number(0.0));
-    assert!(saw(&required).is_empty(), "the last one is 11 ms old");
-    let report = run.report();
-    let counts = report.estimator("estimator/base/required").expect("it is declared");
-    assert_eq!(counts.inputs.iter().map(|input| input.dropped(DropReason::SyncMiss)).sum::<u64>(), 2);
-    Ok(())
-}
-
-#[test]
-fn as_the_driver_it_is_one_message_a_run() -> Result<(), StartError> {
-    let builder = Witnessed::builder();
-    let driven = builder.subscribe(witnessed::estimator::base::driven);
-    let mut run = builder.simulate()?;
-    run.publish(witnessed::sensor::base::clock, at(0), Number(0.0));
-    run.publish(witnessed::sensor::base::first, at(1), Number(1.0));
-    run.publish(witnessed::sensor::base::first, at(2), Number(2.0));
-    assert_eq!(saw(&driven), [(vec![1.0], 0), (vec![2.0], 0)]);
     Ok(())
 }
 
@@ -219,15 +200,6 @@ fn a_worker_that_is_held_up_sees_each_message_in_the_run_that_it_came_before() {
     });
 }
 
-fn builder() -> (Builder<Witnessed>, Lines) {
-    let mut builder = Witnessed::builder();
-    builder.supervision().max_restarts = 1_000_000;
-    let lines = Lines::default();
-    let sink = Arc::clone(&lines);
-    builder.journal(move |entry| sink.lock().unwrap_or_else(PoisonError::into_inner).push(entry));
-    (builder, lines)
-}
-
 /// The step from which on nothing fails.
 const HALF: u32 = 1000;
 
@@ -237,71 +209,64 @@ fn each_message_is_in_one_run_or_was_lost_with_a_failure() -> Result<(), Failure
     for seed in 0..20 {
         let mut random = Random::new(seed);
         let fails = seed % 2 == 1;
-        let (builder, lines) = builder();
-        let all = builder.subscribe_any(Select::All, None, overflow());
-        let seen = [
-            builder.subscribe_with(witnessed::estimator::base::here, overflow()),
-            builder.subscribe_with(witnessed::estimator::base::apart, overflow()),
-        ];
-        let mut run = builder.simulate()?;
-        let mut millis = 0;
-        let mut sent = [vec![], vec![]];
-        for step in 0..2 * HALF {
-            millis += random.below(3) as i64;
-            if step == HALF {
-                // Each is running again, and sees what waits.
-                for _ in 0..2 {
-                    millis += 100_000;
-                    run.publish(witnessed::sensor::base::clock, at(millis), Number(0.0));
+        let builder = || {
+            let mut builder = Witnessed::builder();
+            builder.supervision().max_restarts = 1_000_000;
+            builder
+        };
+        same_again(builder, |builder, _| {
+            let seen = [
+                builder.subscribe_with(witnessed::estimator::base::here, overflow()),
+                builder.subscribe_with(witnessed::estimator::base::apart, overflow()),
+            ];
+            let mut run = builder.simulate()?;
+            let mut millis = 0;
+            let mut sent = [vec![], vec![]];
+            for step in 0..2 * HALF {
+                millis += random.below(3) as i64;
+                if step == HALF {
+                    // Each is running again, and sees what waits.
+                    for _ in 0..2 {
+                        millis += 100_000;
+                        run.publish(witnessed::sensor::base::clock, at(millis), Number(0.0));
+                    }
+                }
+                let number = f64::from(step);
+                match random.below(8) {
+                    0..3 => {
+                        run.publish(witnessed::sensor::base::first, at(millis), Number(number));
+                        sent[0].push(number);
+                    }
+                    3..6 => {
+                        run.publish(witnessed::sensor::base::second, at(millis), Number(number));
+                        sent[1].push(number);
+                    }
+                    _ => {
+                        let panics = fails && step < HALF && random.below(20) == 0;
+                        let number = Number(if panics { PANICS } else { number });
+                        run.publish(witnessed::sensor::base::clock, at(millis), number);
+                    }
                 }
             }
-            let number = Number(f64::from(step));
-            match random.below(8) {
-                0..3 => {
-                    run.publish(witnessed::sensor::base::first, at(millis), number);
-                    sent[0].push(number.0);
+            run.publish(witnessed::sensor::base::clock, at(millis), Number(0.0));
+            for seen in seen {
+                let (mut first, mut second): (Vec<f64>, Vec<f64>) = Default::default();
+                for seen in seen.drain() {
+                    first.extend(&seen.first);
+                    second.extend(&seen.second);
                 }
-                3..6 => {
-                    run.publish(witnessed::sensor::base::second, at(millis), number);
-                    sent[1].push(number.0);
-                }
-                _ => {
-                    let number =
-                        if fails && step < HALF && random.below(20) == 0 { Number(PANICS) } else { number };
-                    run.publish(witnessed::sensor::base::clock, at(millis), number);
+                for (seen, sent) in [first, second].into_iter().zip(&sent) {
+                    assert!(seen.is_sorted_by(|before, after| before < after), "{seed}: in order, and none twice");
+                    let from = if fails { f64::from(HALF) } else { 0.0 };
+                    let later = |numbers: &[f64]| -> Vec<f64> {
+                        numbers.iter().copied().filter(|number| *number >= from).collect()
+                    };
+                    assert_eq!(later(&seen), later(sent), "{seed}");
+                    assert_eq!(fails, seen.len() < sent.len(), "{seed}: what waited at a failure is lost");
                 }
             }
-        }
-        run.publish(witnessed::sensor::base::clock, at(millis), Number(0.0));
-        for seen in seen {
-            let (mut first, mut second): (Vec<f64>, Vec<f64>) = Default::default();
-            for seen in seen.drain() {
-                first.extend(&seen.first);
-                second.extend(&seen.second);
-            }
-            for (seen, sent) in [first, second].into_iter().zip(&sent) {
-                assert!(seen.is_sorted_by(|before, after| before < after), "{seed}: in order, and none twice");
-                let from = if fails { f64::from(HALF) } else { 0.0 };
-                let later = |numbers: &[f64]| -> Vec<f64> {
-                    numbers.iter().copied().filter(|number| *number >= from).collect()
-                };
-                assert_eq!(later(&seen), later(sent), "{seed}");
-                assert_eq!(fails, seen.len() < sent.len(), "{seed}: what waited at a failure is lost");
-            }
-        }
-        let report = run.stop();
-        let mut first = Heard::new();
-        hear(&all, &mut first);
-        let (builder, _) = self::builder();
-        let all = builder.subscribe_any(Select::All, None, overflow());
-        let mut replay = builder.replay()?;
-        let lines = std::mem::take(&mut *lines.lock().unwrap_or_else(PoisonError::into_inner));
-        replay.play(lines)?;
-        let report_again = replay.stop();
-        let mut again = Heard::new();
-        hear(&all, &mut again);
-        same(&first, &again);
-        assert_eq!(counts(&report), counts(&report_again), "{seed}");
+            Ok(run.stop())
+        })?;
     }
     Ok(())
 }

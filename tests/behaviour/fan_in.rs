@@ -1,6 +1,6 @@
-//! Driver, last known inputs, tolerance, and what is dropped why.
+//! Driver, last known inputs, tolerance, and what is dropped why; sensors that other code feeds, from several threads.
 
-use crate::components::{Number, Snapshot, at};
+use crate::components::{Echo, Number, Read, Seen, Snapshot, Source, at, numbers};
 use bb_core::prelude::*;
 use bb_core::run::DropReason;
 
@@ -25,7 +25,7 @@ robot! {
     }
 }
 
-type Run = (Simulation<FanIn>, Subscription<crate::components::Seen>);
+type Run = (Simulation<FanIn>, Subscription<Seen>);
 
 fn start() -> Result<Run, StartError> {
     let builder = FanIn::builder();
@@ -39,61 +39,52 @@ fn dropped(run: &Run, input: &str, reason: DropReason) -> u64 {
     estimator.inputs.iter().find(|other| other.name == input).map_or(0, |input| input.dropped(reason))
 }
 
+/// Each row publishes numbers of `a`, the driver, of `b`, which is required, and of `c`, which is not, at the milliseconds that they
+/// name; and it says which of `b` and `c` the estimator sees then, with a `+` if it is new, or that it misses `b`.
 #[test]
-fn nothing_is_dispatched_before_every_required_input_has_arrived() -> Result<(), StartError> {
-    let mut run = start()?;
-    run.0.publish(fan_in::sensor::base::a, at(0), Number(1.0));
-    assert!(run.1.try_recv().is_none());
-    assert_eq!(dropped(&run, "second", DropReason::SyncMiss), 1);
-    run.0.publish(fan_in::sensor::base::b, at(1), Number(2.0));
-    assert!(run.1.try_recv().is_none(), "only the driver dispatches");
-    run.0.publish(fan_in::sensor::base::a, at(2), Number(3.0));
-    let seen = run.1.try_recv().expect("all inputs are there");
-    assert_eq!((seen.driver, seen.second, seen.second_is_new), (3.0, 2.0, true));
-    Ok(())
-}
-
-#[test]
-fn an_input_is_new_once() -> Result<(), StartError> {
-    let mut run = start()?;
-    run.0.publish(fan_in::sensor::base::b, at(0), Number(2.0));
-    run.0.publish(fan_in::sensor::base::c, at(0), Number(5.0));
-    for (millis, is_new) in [(1, true), (2, false)] {
-        run.0.publish(fan_in::sensor::base::a, at(millis), Number(1.0));
-        let seen = run.1.try_recv().expect("all inputs are there");
-        assert_eq!((seen.second_is_new, seen.third_is_new), (is_new, is_new));
+fn what_a_dispatch_sees() -> Result<(), StartError> {
+    let rows = [
+        ("nothing is dispatched before every required input has arrived", "a0: miss; b1; a2: b1+"),
+        ("an input is new once", "b0; c0; a1: b0+ c0+; a2: b0 c0; b3; a3: b3+ c0"),
+        ("a dropped dispatch leaves the inputs new", "c0; a0: miss; b1; a1: b1+ c0+"),
+        (
+            "10 ms are within 10 ms, 11 ms are not, and 300 ms newer are",
+            "b100; a110: b100+; a111: miss; b500; a200: b500+",
+        ),
+        (
+            "an optional one that is missing or too old, by its own tolerance, drops nothing",
+            "b0; a0: b0+; c0; b50; \
+            a50: b50+ c0+; b51; a51: b51+",
+        ),
+    ];
+    for (row, steps) in rows {
+        let mut run = start()?;
+        for step in steps.split("; ") {
+            let (publish, expected) = step.split_once(": ").unwrap_or((step, ""));
+            let (sensor, millis) = publish.split_at(1);
+            let millis = millis.parse().expect("milliseconds");
+            let handle = match sensor {
+                "a" => fan_in::sensor::base::a,
+                "b" => fan_in::sensor::base::b,
+                _ => fan_in::sensor::base::c,
+            };
+            let missed = dropped(&run, "second", DropReason::SyncMiss);
+            run.0.publish(handle, at(millis), Number(millis as f64));
+            let input =
+                |name: &str, number: f64, is_new: bool| format!("{name}{number}{}", if is_new { "+" } else { "" });
+            let seen: Vec<String> = run
+                .1
+                .drain()
+                .map(|seen| {
+                    let third = (seen.third >= 0.0).then(|| input(" c", seen.third, seen.third_is_new));
+                    input("b", seen.second, seen.second_is_new) + &third.unwrap_or_default()
+                })
+                .chain((missed < dropped(&run, "second", DropReason::SyncMiss)).then(|| "miss".to_owned()))
+                .collect();
+            assert_eq!(seen.join(", "), expected, "{row}: {step}");
+            assert_eq!(dropped(&run, "third", DropReason::SyncMiss), 0, "{row}: {step}");
+        }
     }
-    run.0.publish(fan_in::sensor::base::b, at(3), Number(2.0));
-    run.0.publish(fan_in::sensor::base::a, at(3), Number(1.0));
-    let seen = run.1.try_recv().expect("all inputs are there");
-    assert_eq!((seen.second_is_new, seen.third_is_new), (true, false));
-    Ok(())
-}
-
-#[test]
-fn a_dropped_dispatch_leaves_the_inputs_new() -> Result<(), StartError> {
-    let mut run = start()?;
-    run.0.publish(fan_in::sensor::base::c, at(0), Number(5.0));
-    run.0.publish(fan_in::sensor::base::a, at(0), Number(1.0));
-    run.0.publish(fan_in::sensor::base::b, at(1), Number(2.0));
-    run.0.publish(fan_in::sensor::base::a, at(1), Number(1.0));
-    let seen = run.1.try_recv().expect("all inputs are there");
-    assert!(seen.third_is_new, "the dispatch at 0 ms was dropped, and did not see it");
-    Ok(())
-}
-
-#[test]
-fn an_input_older_than_the_tolerance_drops_the_dispatch_and_a_newer_one_never_does() -> Result<(), StartError> {
-    let mut run = start()?;
-    run.0.publish(fan_in::sensor::base::b, at(100), Number(2.0));
-    run.0.publish(fan_in::sensor::base::a, at(110), Number(1.0));
-    assert!(run.1.try_recv().is_some(), "10 ms are within 10 ms");
-    run.0.publish(fan_in::sensor::base::a, at(111), Number(1.0));
-    assert!(run.1.try_recv().is_none());
-    assert_eq!(dropped(&run, "second", DropReason::SyncMiss), 1);
-    run.0.publish(fan_in::sensor::base::b, at(500), Number(2.0));
-    run.0.publish(fan_in::sensor::base::a, at(200), Number(1.0));
-    assert!(run.1.try_recv().is_some(), "it is 300 ms newer than the driver");
     Ok(())
 }
 
@@ -104,22 +95,6 @@ fn without_a_tolerance_any_age_will_do() -> Result<(), StartError> {
     simulation.publish(fan_in::sensor::base::b, at(0), Number(2.0));
     simulation.publish(fan_in::sensor::base::a, at(1_000_000), Number(1.0));
     assert_eq!(seen.try_recv().map(|seen| (seen.second, seen.third)), Some((2.0, -1.0)));
-    Ok(())
-}
-
-#[test]
-fn an_optional_input_that_is_missing_or_too_old_is_none_and_drops_nothing() -> Result<(), StartError> {
-    let mut run = start()?;
-    let third = |run: &mut Run, millis| {
-        run.0.publish(fan_in::sensor::base::b, at(millis), Number(2.0));
-        run.0.publish(fan_in::sensor::base::a, at(millis), Number(1.0));
-        run.1.try_recv().map(|seen| seen.third)
-    };
-    assert_eq!(third(&mut run, 0), Some(-1.0));
-    run.0.publish(fan_in::sensor::base::c, at(0), Number(7.0));
-    assert_eq!(third(&mut run, 50), Some(7.0), "within: 50 ms goes before sync_tolerance: 10 ms");
-    assert_eq!(third(&mut run, 51), Some(-1.0));
-    assert_eq!(dropped(&run, "third", DropReason::SyncMiss), 0);
     Ok(())
 }
 
@@ -154,28 +129,14 @@ fn absurd_stamps_are_survived() -> Result<(), StartError> {
     Ok(())
 }
 
-/// A sensor whose second stamp is far ahead of the clock.
-#[derive(Debug)]
-pub(crate) struct Skewed(i64);
-
-impl Sensor for Skewed {
-    type Options = NoOptions;
-    type Output = Number;
-
-    fn init(_: NoOptions, _: &SensorContext) -> Result<Self, Fault> {
-        Ok(Self(0))
-    }
-
-    fn read(&mut self, now: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        self.0 += 1;
-        let stamp = if self.0 == 2 { MonotonicTime::MAX } else { now };
-        Ok(Reading::at(stamp, Number(self.0 as f64)))
-    }
+/// The second stamp is far ahead of the clock.
+fn skewed(reading: u32, now: MonotonicTime) -> Read {
+    Ok(Reading::at(if reading == 2 { MonotonicTime::MAX } else { now }, Number(f64::from(reading))))
 }
 
 robot! {
     robot Skew;
-    link base { sensor skewed: Skewed() { rate: 10 Hz; estimator scaled: crate::components::Scale(factor = 1.0); } }
+    link base { sensor skewed: Source(read = skewed) { rate: 10 Hz; estimator scaled: Echo(); } }
 }
 
 #[test]
@@ -184,7 +145,7 @@ fn a_stamp_from_the_future_is_dropped_and_does_not_disable_the_input() -> Result
     let scaled = builder.subscribe(skew::sensor::base::skewed::scaled);
     let mut simulation = builder.simulate()?;
     simulation.run_until(at(350));
-    assert_eq!(scaled.drain().map(|number| number.0).collect::<Vec<_>>(), [1.0, 3.0, 4.0]);
+    assert_eq!(numbers(&scaled), [1.0, 3.0, 4.0]);
     let report = simulation.report();
     let input = &report.estimator("sensor/base/skewed/scaled").expect("it is declared").inputs[0];
     assert_eq!(input.dropped(DropReason::ClockSkew), 1);
@@ -218,5 +179,18 @@ fn what_is_derived_from_a_message_arrives_before_those_that_take_both() -> Resul
     simulation.run_to_end();
     let seen: Vec<_> = both.drain().map(|seen| (seen.driver, seen.second, seen.third, seen.third_is_new)).collect();
     assert_eq!(seen, [0.0, 1.0, 2.0, 3.0, 4.0].map(|number| (number, 10.0 * number, number, true)));
+    Ok(())
+}
+
+#[test]
+fn messages_carry_frame_origin_and_time() -> Result<(), StartError> {
+    let builder = FanIn::builder();
+    let a = builder.subscribe(fan_in::sensor::base::a);
+    let mut simulation = builder.simulate()?;
+    simulation.publish(fan_in::sensor::base::a, at(7), Number(1.0));
+    let message = a.try_recv().expect("it was published");
+    assert_eq!((message.frame.name(), message.origin.robot, message.monotonic_time), ("base", "FanIn", at(7)));
+    assert_eq!(message.wall_time.as_unix_nanos(), 7_000_000);
+    assert_eq!(simulation.clock().now(), at(7));
     Ok(())
 }

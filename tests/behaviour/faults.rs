@@ -1,73 +1,29 @@
 //! Components that fail: at the start, in a callback, by a panic. The others go on.
 
-use crate::components::{Counter, Number, Scale, at};
-use crate::gate::wait_until;
+use crate::components::{Counter, Echo, Number, OnNumber, Read, Replied, Scale, Source, at, numbers};
+use crate::gate::{Gate, wait_until};
 use bb_core::message::DecodeError;
 use bb_core::message::codec::{Reader, Shape, Writer};
 use bb_core::prelude::*;
 use bb_core::run::DropReason;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Options of [`Fragile`].
-#[derive(Clone, Debug, Options)]
-pub(crate) struct FragileOptions {
-    /// `init`, `error`, `panic` or `none`.
-    #[option(default = "none")]
-    pub(crate) fails_by: &'static str,
-}
-
-/// Fails at the third message.
-#[derive(Debug)]
-pub(crate) struct Fragile(FragileOptions, u32);
-
 static TERMINATED: AtomicUsize = AtomicUsize::new(0);
+static HERE: Gate = Gate::new();
 
-impl Estimator for Fragile {
-    type Options = FragileOptions;
-    type Input = Number;
-    type Output = Number;
-
-    fn init(options: FragileOptions, _: &Context) -> Result<Self, Fault> {
-        match options.fails_by {
-            "init" => Err(Fault::new("there is no map")),
-            "panic in init" => panic!("no map at all"),
-            _ => Ok(Self(options, 0)),
-        }
-    }
-
-    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
-        self.1 += 1;
-        match (self.1, self.0.fails_by) {
-            (3, "error") => Err(Fault::new("covariance is not positive definite")),
-            (3, "panic") => panic!("index out of bounds"),
-            _ => Ok(Reply::emit(number.payload).diverged("always")),
-        }
-    }
-
-    fn terminate(&mut self) {
-        TERMINATED.fetch_add(1, Ordering::SeqCst);
-    }
+/// Breaks at its second reading.
+fn break_down(reading: u32, _: MonotonicTime) -> Read {
+    if reading == 1 { Ok(Reading::now(Number(1.0))) } else { Err(Fault::new("no answer on the bus")) }
 }
 
-/// A sensor that breaks.
-#[derive(Debug)]
-pub(crate) struct Broken(bool);
+/// Passes on, and calls itself diverged; `then` is what its third message does.
+fn third(count: &mut f64, number: f64, then: fn() -> Replied) -> Replied {
+    *count += 1.0;
+    if *count == 3.0 { then() } else { Ok(Reply::emit(Number(number)).diverged("always")) }
+}
 
-impl Sensor for Broken {
-    type Options = NoOptions;
-    type Output = Number;
-
-    fn init(_: NoOptions, _: &SensorContext) -> Result<Self, Fault> {
-        Ok(Self(false))
-    }
-
-    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        if self.0 {
-            return Err(Fault::new("no answer on the bus"));
-        }
-        self.0 = true;
-        Ok(Reading::now(Number(1.0)))
-    }
+fn terminate() {
+    TERMINATED.fetch_add(1, Ordering::SeqCst);
 }
 
 robot! {
@@ -76,37 +32,52 @@ robot! {
     link base {
         sensor numbers: Counter(count = 6) {
             rate: 10 Hz;
-            estimator first: Fragile();
+            estimator first: Echo(terminate = terminate);
             estimator second: Scale();
         }
-        sensor broken: Broken() { rate: 10 Hz; }
+        sensor broken: Source(read = break_down) { rate: 10 Hz; }
+        sensor last: Source() { rate: 10 Hz; }
     }
 }
 
 #[test]
-fn a_component_that_cannot_start_is_named() {
-    for (fails_by, expected) in [
-        ("init", "sensor/base/numbers/first cannot start: there is no map"),
-        ("panic in init", "sensor/base/numbers/first cannot start: panicked: no map at all"),
-    ] {
+fn a_component_that_cannot_start_is_named_and_those_before_it_are_stopped() {
+    let before = TERMINATED.load(Ordering::SeqCst);
+    let refused = |change: fn(&mut bb_core::Builder<Patient>)| {
         let mut builder = Patient::builder();
-        builder.options(patient::sensor::base::numbers::first).fails_by = fails_by;
-        let error = builder.simulate().expect_err("it cannot start");
-        assert_eq!(error.to_string(), expected);
-    }
-    let mut builder = Patient::builder();
-    builder.options(patient::sensor::base::numbers::second).factor = f64::NAN;
-    let error = builder.start().expect_err("NaN is outside every range").to_string();
-    assert_eq!(error, "sensor/base/numbers/second cannot start: option `factor` is NaN, but must be in -1e3..=1e3");
+        change(&mut builder);
+        builder.simulate().expect_err("it cannot start").to_string()
+    };
+    assert_eq!(
+        refused(|builder| builder.options(patient::sensor::base::last).init = |_| Err(Fault::new("no device"))),
+        "sensor/base/last cannot start: no device"
+    );
+    assert_eq!(TERMINATED.load(Ordering::SeqCst), before + 1, "what had started is stopped in order");
+    assert_eq!(
+        refused(|builder| builder.options(patient::sensor::base::numbers::first).init =
+            |_| Err(Fault::new("there is no map"))),
+        "sensor/base/numbers/first cannot start: there is no map"
+    );
+    assert_eq!(
+        refused(|builder| builder.options(patient::sensor::base::numbers::first).init = |_| panic!("no map at all")),
+        "sensor/base/numbers/first cannot start: panicked: no map at all"
+    );
+    assert_eq!(
+        refused(|builder| builder.options(patient::sensor::base::numbers::second).factor = f64::NAN),
+        "sensor/base/numbers/second cannot start: option `factor` is NaN, but must be in -1e3..=1e3"
+    );
 }
 
 #[test]
 fn a_component_that_fails_is_restarted_alone_with_fresh_state() -> Result<(), StartError> {
-    for (fails_by, message) in
-        [("error", "covariance is not positive definite"), ("panic", "panicked: index out of bounds")]
-    {
+    let errs =
+        |count: &mut f64, number| third(count, number, || Err(Fault::new("covariance is not positive definite")));
+    let panics = |count: &mut f64, number| third(count, number, || panic!("index out of bounds"));
+    let rows: [(OnNumber, &str); 2] =
+        [(errs, "covariance is not positive definite"), (panics, "panicked: index out of bounds")];
+    for (input, message) in rows {
         let mut builder = Patient::builder();
-        builder.options(patient::sensor::base::numbers::first).fails_by = fails_by;
+        builder.options(patient::sensor::base::numbers::first).input = input;
         let (first, second) = (
             builder.subscribe(patient::sensor::base::numbers::first),
             builder.subscribe(patient::sensor::base::numbers::second),
@@ -114,9 +85,11 @@ fn a_component_that_fails_is_restarted_alone_with_fresh_state() -> Result<(), St
         let mut simulation = builder.simulate()?;
         // The sensor beside it breaks at 100 ms and, restarted, at 210 ms; the estimator at 200 ms.
         simulation.run_until(at(320));
-        assert_eq!(first.drain().map(|number| number.0).collect::<Vec<_>>(), [0.0, 1.0, 3.0], "the third kills it");
+        assert_eq!(numbers(&first), [0.0, 1.0, 3.0], "the third kills it");
         assert_eq!(second.drain().count(), 4, "its sibling misses nothing");
+        let before = TERMINATED.load(Ordering::SeqCst);
         let report = simulation.stop();
+        assert!(TERMINATED.load(Ordering::SeqCst) > before && first.recv().is_none(), "a stop ends both");
         let estimator = report.estimator("sensor/base/numbers/first").expect("it is declared");
         assert_eq!((estimator.restarts, estimator.diverged, estimator.stopped.as_deref()), (1, 3, None));
         assert_eq!(estimator.inputs[0].dropped(DropReason::Stopped), 0, "it was back before the next message");
@@ -133,14 +106,19 @@ fn a_component_that_fails_is_restarted_alone_with_fresh_state() -> Result<(), St
 }
 
 #[test]
-fn stopping_terminates_estimators_and_ends_subscriptions() -> Result<(), StartError> {
-    let builder = Patient::builder();
-    let first = builder.subscribe(patient::sensor::base::numbers::first);
-    let simulation = builder.simulate()?;
-    let before = TERMINATED.load(Ordering::SeqCst);
-    simulation.stop();
-    assert!(TERMINATED.load(Ordering::SeqCst) > before);
-    assert!(first.recv().is_none());
+fn a_report_does_not_wait_for_a_busy_estimator() -> Result<(), StartError> {
+    let mut builder = Patient::builder();
+    builder.options(patient::sensor::base::numbers::first).input = |_, _| {
+        HERE.pass("a message");
+        Ok(Reply::none())
+    };
+    HERE.close("a message");
+    let running = builder.start()?;
+    HERE.wait_for(1);
+    // Would never come back if it waited: the estimator goes on only after it.
+    let report = running.report();
+    assert_eq!(report.estimator("sensor/base/numbers/first").map(|busy| busy.dispatched), Some(1));
+    HERE.open();
     Ok(())
 }
 
@@ -171,30 +149,6 @@ impl Payload for Cursed {
     const NAME: &'static str = "Cursed";
 }
 
-static CURSE_TERMINATED: AtomicUsize = AtomicUsize::new(0);
-
-/// Publishes it, and says how often it was closed.
-#[derive(Debug)]
-pub(crate) struct Curse(u32);
-
-impl Sensor for Curse {
-    type Options = NoOptions;
-    type Output = Cursed;
-
-    fn init(_: NoOptions, _: &SensorContext) -> Result<Self, Fault> {
-        Ok(Self(0))
-    }
-
-    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Cursed>, Fault> {
-        self.0 += 1;
-        Ok(if self.0 > 5 { Reading::finished() } else { Reading::now(Cursed(self.0)) })
-    }
-
-    fn terminate(&mut self) {
-        CURSE_TERMINATED.fetch_add(1, Ordering::SeqCst);
-    }
-}
-
 /// Takes it.
 #[derive(Debug)]
 pub(crate) struct Taker;
@@ -208,109 +162,30 @@ impl Estimator for Taker {
         Ok(Self)
     }
 
-    fn handle_input(&mut self, cursed: &Stamped<Cursed>) -> Result<Reply<Number>, Fault> {
+    fn handle_input(&mut self, cursed: &Stamped<Cursed>) -> Replied {
         Ok(Reply::emit(Number(f64::from(cursed.0))))
     }
 }
 
 robot! {
     robot Haunted;
-    link base {
-        sensor curse: Curse() { rate: 1 kHz; estimator taker: Taker(); }
-        sensor late: Broken() { rate: 10 Hz; }
-        sensor never: Refusing();
-    }
-}
-
-/// Options of [`Refusing`].
-#[derive(Clone, Debug, Options)]
-pub(crate) struct RefusingOptions {
-    #[option(default = true)]
-    pub(crate) starts: bool,
-}
-
-/// A sensor that may not start.
-#[derive(Debug)]
-pub(crate) struct Refusing;
-
-impl Sensor for Refusing {
-    type Options = RefusingOptions;
-    type Output = Number;
-
-    fn init(options: RefusingOptions, _: &SensorContext) -> Result<Self, Fault> {
-        if options.starts { Ok(Self) } else { Err(Fault::new("no device")) }
-    }
-
-    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        Ok(Reading::finished())
-    }
+    link base { sensor curse: External<Cursed>() { estimator taker: Taker(); } }
 }
 
 #[test]
-fn a_payload_that_panics_fails_the_estimator_that_takes_it_and_not_its_sensor() -> Result<(), StartError> {
+fn a_payload_that_panics_fails_the_estimator_that_takes_it_and_not_its_publisher() -> Result<(), StartError> {
     let running = Haunted::builder().start()?;
-    // The sensor that breaks is restarted for as long as the robot runs; the cursed one ends.
-    wait_until("all that the cursed sensor publishes is taken", || {
+    for number in 1..=5 {
+        running.publish(haunted::sensor::base::curse, running.clock().now(), Cursed(number));
+    }
+    wait_until("all that is published is taken", || {
         let report = running.report();
-        let taker = report.estimator("sensor/base/curse/taker").expect("it is declared");
-        report.topic("sensor/base/curse").is_some_and(|topic| topic.published == 5)
-            && taker.inputs[0].received == 5
-            && report.faults.iter().any(|fault| fault.path == taker.path)
+        report.estimator("sensor/base/curse/taker").is_some_and(|taker| taker.inputs[0].received == 5)
     });
     let report = running.stop();
     let taker = report.estimator("sensor/base/curse/taker").expect("it is declared");
-    assert!(report.faults.iter().any(|fault| fault.path == taker.path && fault.message == "panicked: cursed"));
+    let faults: Vec<_> = report.faults.iter().map(|fault| (fault.path, fault.message.as_str())).collect();
+    assert_eq!(faults, [(taker.path, "panicked: cursed")]);
     assert_eq!((taker.emitted, taker.inputs[0].received), (2, 5));
-    assert_eq!(report.topic("sensor/base/curse").map(|topic| topic.published), Some(5));
-
-    // What had started when another component did not is stopped in order.
-    let before = CURSE_TERMINATED.load(Ordering::SeqCst);
-    let mut builder = Haunted::builder();
-    builder.options(haunted::sensor::base::never).starts = false;
-    let error = builder.simulate().expect_err("it does not start").to_string();
-    assert_eq!(error, "sensor/base/never cannot start: no device");
-    assert_eq!(CURSE_TERMINATED.load(Ordering::SeqCst), before + 1);
-    Ok(())
-}
-
-/// An estimator that takes its time.
-#[derive(Debug)]
-pub(crate) struct Busy;
-
-impl Estimator for Busy {
-    type Options = NoOptions;
-    type Input = Number;
-    type Output = Number;
-
-    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-
-    fn handle_input(&mut self, _: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
-        BUSY.store(1, Ordering::SeqCst);
-        while BUSY.load(Ordering::SeqCst) == 1 {
-            std::thread::sleep(Duration::from_millis(1));
-        }
-        Ok(Reply::none())
-    }
-}
-
-static BUSY: AtomicUsize = AtomicUsize::new(0);
-
-robot! {
-    robot Slow;
-    link base { sensor numbers: Counter() { rate: 1 kHz; estimator busy: Busy(); } }
-}
-
-#[test]
-fn a_report_does_not_wait_for_a_busy_estimator() -> Result<(), StartError> {
-    let running = Slow::builder().start()?;
-    while BUSY.load(Ordering::SeqCst) == 0 {
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    // Would never come back if it waited: the estimator goes on only after it.
-    let report = running.report();
-    assert_eq!(report.estimator("sensor/base/numbers/busy").map(|busy| busy.dispatched), Some(1));
-    BUSY.store(2, Ordering::SeqCst);
     Ok(())
 }

@@ -1,18 +1,18 @@
-//! The state estimator in a robot: where it starts, where its antenna is, and that a keyframe which takes long holds up nothing.
+//! The state estimator in a robot: where it starts, where its antenna is, and what its recorder holds.
 
-use crate::components::{at, within};
-use bb_core::nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3};
+use crate::components::{Failure, at};
+use bb_core::Builder;
+use bb_core::nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use bb_core::payload::{GeodeticPosition, GnssFix, GnssServices, GnssStatus};
 use bb_core::prelude::*;
 use bb_core::run::DropReason;
 use bb_estimators::StateEstimator;
 use bb_estimators::navigation::state_estimator::{
-    AttitudeReport, FlightEstimator, FlightEvents, FlightInputs, FlightOptions, FlightOutputs, GpsHealth,
-    GpsReport, Level, RelativePoseReading, WarmStartReport,
+    AttitudeReport, FlightEstimate, FlightEvent, FlightEvents, FlightHealth, FlightOptions, GpsHealth, GpsReport,
+    Level, WarmStartReport,
 };
 use bb_estimators::navigation::{Geodetic, LocalFrame};
 use bb_mcap::{Recorder, RecorderOptions, Recording};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 robot! {
     robot Surveying;
@@ -69,52 +69,99 @@ fn attitude() -> AttitudeReport {
     AttitudeReport { world_from_body: north(), tilt_deviation: 0.01, heading_deviation: 0.02 }
 }
 
+/// A flight that is simulated, and what its estimator says.
+struct Flight {
+    simulation: Simulation<Surveying>,
+    estimates: Subscription<FlightEstimate>,
+    health: Subscription<FlightHealth>,
+    events: Subscription<FlightEvents>,
+}
+
+impl Flight {
+    /// One whose origin is known, and whose attitude the flight controller tells at the start.
+    fn at_origin(strategy: &str) -> Result<Self, StartError> {
+        let mut flight = Self::start(Self::builder(strategy, true))?;
+        flight.attitude(at(0));
+        Ok(flight)
+    }
+
+    fn builder(strategy: &str, has_origin: bool) -> Builder<Surveying> {
+        let mut builder = Surveying::builder();
+        let options = builder.options(surveying::estimator::base::navigation);
+        options.strategy = strategy.to_owned();
+        if has_origin {
+            set_origin(options);
+        }
+        builder
+    }
+
+    fn start(builder: Builder<Surveying>) -> Result<Self, StartError> {
+        let estimates = builder.subscribe(surveying::estimator::base::navigation::estimate);
+        let health = builder.subscribe(surveying::estimator::base::navigation::health);
+        let events = builder.subscribe(surveying::estimator::base::navigation::events);
+        Ok(Self { simulation: builder.simulate()?, estimates, health, events })
+    }
+
+    fn attitude(&mut self, time: MonotonicTime) {
+        self.simulation.publish(surveying::sensor::base::attitude, time, attitude());
+    }
+
+    fn imu(&mut self, time: MonotonicTime, imu: Imu) {
+        self.simulation.publish(surveying::sensor::base::shelf::board::imu, time, imu);
+    }
+
+    fn gps(&mut self, time: MonotonicTime, health: GpsHealth) {
+        self.simulation.publish(surveying::sensor::base::gps_report, time, GpsReport { health });
+    }
+
+    /// A fix of the antenna.
+    fn fix(&mut self, time: MonotonicTime, position: [f64; 3], variance: f64) {
+        let fix = GnssFix {
+            status: GnssStatus::Fix,
+            services: GnssServices::default(),
+            position: Some(geodetic(position.into())),
+            position_covariance: Some(Matrix3::identity() * variance),
+        };
+        self.simulation.publish(surveying::sensor::base::mast::antenna::gps, time, fix);
+    }
+
+    /// The events since the last time.
+    fn events(&self) -> Vec<FlightEvent> {
+        self.events.drain().flat_map(|events| events.payload.events).collect()
+    }
+}
+
+const STRATEGIES: [&str; 2] = ["smoother", "eskf"];
+
 #[test]
 fn it_starts_from_the_flight_controller_and_knows_where_the_antenna_is() -> Result<(), StartError> {
-    for strategy in ["smoother", "eskf"] {
-        let mut builder = Surveying::builder();
-        builder.options(surveying::estimator::base::navigation).strategy = strategy.to_owned();
-        let estimates = builder.subscribe(surveying::estimator::base::navigation::estimate);
-        let events = builder.subscribe(surveying::estimator::base::navigation::events);
-        let mut simulation = builder.simulate()?;
-        simulation.publish(
-            surveying::sensor::base::state,
-            at(0),
-            WarmStartReport {
-                attitude: attitude(),
-                position: geodetic(Vector3::new(3.0, -2.0, 1.0)),
-                position_covariance: Matrix3::identity() * 4.0,
-                velocity: Vector3::zeros(),
-                velocity_covariance: Matrix3::identity() * 0.01,
-            },
-        );
+    for strategy in STRATEGIES {
+        let mut flight = Flight::start(Flight::builder(strategy, false))?;
+        let state = WarmStartReport {
+            attitude: attitude(),
+            position: geodetic(Vector3::new(3.0, -2.0, 1.0)),
+            position_covariance: Matrix3::identity() * 4.0,
+            velocity: Vector3::zeros(),
+            velocity_covariance: Matrix3::identity() * 0.01,
+        };
+        flight.simulation.publish(surveying::sensor::base::state, at(0), state);
         for step in 1..=600 {
             let time = at(5 * step);
             if step % 40 == 0 {
-                simulation.publish(
-                    surveying::sensor::base::gps_report,
-                    time,
-                    GpsReport { health: GpsHealth::Stable },
-                );
+                flight.gps(time, GpsHealth::Stable);
                 // From the IMU, the antenna is 1.5 m behind, 0.4 m to the left and 1 m above; it looks north.
-                let fix = GnssFix {
-                    status: GnssStatus::Fix,
-                    services: GnssServices::default(),
-                    position: Some(geodetic(Vector3::new(-0.4, -1.5, 1.0))),
-                    position_covariance: Some(Matrix3::identity() * 0.01),
-                };
-                simulation.publish(surveying::sensor::base::mast::antenna::gps, time, fix);
+                flight.fix(time, [-0.4, -1.5, 1.0], 0.01);
             }
-            simulation.publish(surveying::sensor::base::shelf::board::imu, time, at_rest());
+            flight.imu(time, at_rest());
         }
-        let started: Vec<_> = events
-            .drain()
-            .flat_map(|events| events.payload.events)
+        let started: Vec<_> = flight
+            .events()
+            .into_iter()
             .filter(|event| event.kind == "started")
             .filter_map(|event| event.from)
             .collect();
         assert_eq!(started, ["flight_controller"], "{strategy}: once");
-        let all: Vec<_> = estimates.drain().collect();
+        let all: Vec<_> = flight.estimates.drain().collect();
         let first = local(&all[0].position);
         assert!((first - Vector3::new(3.0, -2.0, 1.0)).norm() < 0.1, "{strategy}: {first}");
         let last = local(&all.last().expect("it runs").position);
@@ -125,19 +172,11 @@ fn it_starts_from_the_flight_controller_and_knows_where_the_antenna_is() -> Resu
 
 #[test]
 fn the_attitude_levels_the_start_at_the_origin() -> Result<(), StartError> {
-    for strategy in ["smoother", "eskf"] {
-        let mut builder = Surveying::builder();
-        let options = builder.options(surveying::estimator::base::navigation);
-        options.strategy = strategy.to_owned();
-        set_origin(options);
-        let estimates = builder.subscribe(surveying::estimator::base::navigation::estimate);
-        let mut simulation = builder.simulate()?;
-        simulation.publish(surveying::sensor::base::attitude, at(0), attitude());
-        (1..=100).for_each(|step| {
-            simulation.publish(surveying::sensor::base::shelf::board::imu, at(5 * step), at_rest());
-        });
+    for strategy in STRATEGIES {
+        let mut flight = Flight::at_origin(strategy)?;
+        (1..=100).for_each(|step| flight.imu(at(5 * step), at_rest()));
         // Rest would have to last for a second, and the options say that it looks east. An output comes every 200 ms.
-        let first = estimates.drain().next().expect("it starts at once");
+        let first = flight.estimates.drain().next().expect("it starts at once");
         assert!(first.time < at(250), "{strategy}: {:?}", first.time);
         assert!(first.world_from_body.angle_to(&north()) < 1e-3, "{strategy}");
     }
@@ -154,24 +193,15 @@ fn set_origin(options: &mut FlightOptions) {
 /// each of two outages.
 #[test]
 fn an_imu_that_stops_engages_the_fallback_and_its_return_recovers_it() -> Result<(), StartError> {
-    for strategy in ["smoother", "eskf"] {
-        let mut builder = Surveying::builder();
-        let options = builder.options(surveying::estimator::base::navigation);
-        options.strategy = strategy.to_owned();
-        set_origin(options);
-        let estimates = builder.subscribe(surveying::estimator::base::navigation::estimate);
-        let health = builder.subscribe(surveying::estimator::base::navigation::health);
-        let events = builder.subscribe(surveying::estimator::base::navigation::events);
-        let mut simulation = builder.simulate()?;
-        simulation.publish(surveying::sensor::base::attitude, at(0), attitude());
+    for strategy in STRATEGIES {
+        let mut flight = Flight::at_origin(strategy)?;
         let (mut told, mut engaged, mut times) = (Vec::new(), Vec::new(), Vec::new());
         // Samples for three seconds, and silence for seven.
         for step in (1..=4600).filter(|step| step % 2000 <= 600) {
-            simulation.publish(surveying::sensor::base::shelf::board::imu, at(5 * step), at_rest());
-            times.extend(estimates.drain().map(|estimate| estimate.time));
-            engaged.extend(health.drain().map(|health| (health.state, health.is_fallback_engaged)));
-            let fallbacks = events.drain().flat_map(|events| events.payload.events);
-            let fallbacks = fallbacks.filter(|event| event.kind.starts_with("fallback"));
+            flight.imu(at(5 * step), at_rest());
+            times.extend(flight.estimates.drain().map(|estimate| estimate.time));
+            engaged.extend(flight.health.drain().map(|health| (health.state, health.is_fallback_engaged)));
+            let fallbacks = flight.events().into_iter().filter(|event| event.kind.starts_with("fallback"));
             told.extend(fallbacks.map(|event| (event.time.as_nanos() / 1_000_000, event.level, event.kind)));
         }
         let expected = [
@@ -200,50 +230,38 @@ fn an_imu_that_stops_engages_the_fallback_and_its_return_recovers_it() -> Result
 
 /// What went to the recorder is in the file, though nothing is logged: no subscriber of `tracing` is set.
 #[test]
-fn the_recorder_holds_labels_the_gate_rejections_and_faults() -> Result<(), Box<dyn std::error::Error>> {
-    for strategy in ["smoother", "eskf"] {
+fn the_recorder_holds_labels_the_gate_rejections_and_faults() -> Result<(), Failure> {
+    for strategy in STRATEGIES {
         let file = std::env::temp_dir().join(format!("bb-flights-{strategy}-{}.mcap", std::process::id()));
-        let mut builder = Surveying::builder();
-        let options = builder.options(surveying::estimator::base::navigation);
-        options.strategy = strategy.to_owned();
-        set_origin(options);
-        let live = builder.subscribe(surveying::estimator::base::navigation::events);
+        let builder = Flight::builder(strategy, true);
         let path = Select::Path("estimator/base/navigation/events");
         let recorded = builder.subscribe_any(path, None, Overflow::default());
         let mut recorder = Recorder::new(&file, recorded, RecorderOptions::of::<Surveying>())?;
-        let mut simulation = builder.simulate()?;
-        simulation.publish(surveying::sensor::base::attitude, at(0), attitude());
+        let mut flight = Flight::start(builder)?;
+        flight.attitude(at(0));
         let mut expected = Vec::new();
         for step in 1..=1600 {
             let time = at(5 * step);
             // Stable, then spoofed from 3 s to 4 s, and stable again. No anchor lets the receiver in.
             if step % 40 == 0 {
-                let health = if (600..800).contains(&step) { GpsHealth::Spoofed } else { GpsHealth::Stable };
-                simulation.publish(surveying::sensor::base::gps_report, time, GpsReport { health });
-                let fix = GnssFix {
-                    status: GnssStatus::Fix,
-                    services: GnssServices::default(),
-                    // One is far off.
-                    position: Some(geodetic(Vector3::new(if step == 400 { 500.0 } else { -0.4 }, -1.5, 1.0))),
-                    position_covariance: Some(Matrix3::identity()),
-                };
-                simulation.publish(surveying::sensor::base::mast::antenna::gps, time, fix);
+                flight.gps(time, if (600..800).contains(&step) { GpsHealth::Spoofed } else { GpsHealth::Stable });
+                // One is far off.
+                flight.fix(time, [if step == 400 { 500.0 } else { -0.4 }, -1.5, 1.0], 1.0);
             }
             // The IMU breaks at 7 s, and leads the estimate away: 9 km/s within a second.
             let broken = Imu::new(Vector3::zeros(), Vector3::new(0.0, 0.0, 900.0));
-            let imu = if step <= 1400 { at_rest() } else { broken };
-            simulation.publish(surveying::sensor::base::shelf::board::imu, time, imu);
-            expected.extend(live.drain().flat_map(|events| events.payload.events));
+            flight.imu(time, if step <= 1400 { at_rest() } else { broken });
+            expected.extend(flight.events());
             recorder.drain()?;
         }
         // Samples of the broken sensor go on at five times the rate, until the estimate is lost.
         for step in 8001..=24_000 {
             let broken = Imu::new(Vector3::zeros(), Vector3::new(0.0, 0.0, 900.0));
-            simulation.publish(surveying::sensor::base::shelf::board::imu, at(step), broken);
-            expected.extend(live.drain().flat_map(|events| events.payload.events));
+            flight.imu(at(step), broken);
+            expected.extend(flight.events());
             recorder.drain()?;
         }
-        simulation.stop().ok()?;
+        flight.simulation.stop().ok()?;
         recorder.finish()?;
         let mut events = Vec::new();
         for message in Recording::open(&file)?.messages::<FlightEvents>("estimator/base/navigation/events")? {
@@ -282,35 +300,22 @@ fn the_recorder_holds_labels_the_gate_rejections_and_faults() -> Result<(), Box<
 #[test]
 fn the_attitude_of_the_flight_controller_ends_what_an_outage_of_the_imu_began() -> Result<(), StartError> {
     for has_attitude in [true, false] {
-        let mut builder = Surveying::builder();
-        let options = builder.options(surveying::estimator::base::navigation);
-        options.strategy = "eskf".to_owned();
-        set_origin(options);
-        let estimates = builder.subscribe(surveying::estimator::base::navigation::estimate);
-        let mut simulation = builder.simulate()?;
-        simulation.publish(surveying::sensor::base::attitude, at(0), attitude());
+        let mut flight = Flight::at_origin("eskf")?;
         let mut trusted = Vec::new();
         for step in 1..=2400 {
             let time = at(5 * step);
             if step % 40 == 0 {
-                let report = GpsReport { health: GpsHealth::Stable };
-                simulation.publish(surveying::sensor::base::gps_report, time, report);
-                let fix = GnssFix {
-                    status: GnssStatus::Fix,
-                    services: GnssServices::default(),
-                    position: Some(geodetic(Vector3::new(-1.5, 0.4, 1.0))),
-                    position_covariance: Some(Matrix3::identity()),
-                };
-                simulation.publish(surveying::sensor::base::mast::antenna::gps, time, fix);
+                flight.gps(time, GpsHealth::Stable);
+                flight.fix(time, [-1.5, 0.4, 1.0], 1.0);
                 if has_attitude {
-                    simulation.publish(surveying::sensor::base::attitude, time, attitude());
+                    flight.attitude(time);
                 }
             }
             // Silent from 4 s to 6 s.
             if !(800..1200).contains(&step) {
-                simulation.publish(surveying::sensor::base::shelf::board::imu, time, at_rest());
+                flight.imu(time, at_rest());
             }
-            let new = estimates.drain().filter(|estimate| !estimate.degraded);
+            let new = flight.estimates.drain().filter(|estimate| !estimate.degraded);
             trusted.extend(new.map(|estimate| estimate.emitted));
         }
         assert!(trusted.iter().any(|time| *time < at(4000)), "it has started");
@@ -326,154 +331,23 @@ fn the_attitude_of_the_flight_controller_ends_what_an_outage_of_the_imu_began() 
 fn a_report_of_spoofing_blocks_the_gate_however_soon_the_next_one_follows() -> Result<(), StartError> {
     // What is published after the IMU's sample at 3 s: how many reports that the receiver is stable follow, and over which time.
     let cases = [(1, 4), (20, 1000), (20, 5000), (2000, 4), (2000, 1900)];
-    for (strategy, (stable, millis)) in
-        ["smoother", "eskf"].into_iter().flat_map(|name| cases.map(|case| (name, case)))
-    {
-        let mut builder = Surveying::builder();
-        let options = builder.options(surveying::estimator::base::navigation);
-        options.strategy = strategy.to_owned();
-        set_origin(options);
-        let live = builder.subscribe(surveying::estimator::base::navigation::events);
-        let mut simulation = builder.simulate()?;
-        simulation.publish(surveying::sensor::base::attitude, at(0), attitude());
-        for step in 1..=600 {
-            simulation.publish(surveying::sensor::base::shelf::board::imu, at(5 * step), at_rest());
-        }
-        let report = |simulation: &mut Simulation<Surveying>, time, health| {
-            simulation.publish(surveying::sensor::base::gps_report, time, GpsReport { health });
-        };
-        report(&mut simulation, at(3000), GpsHealth::Spoofed);
+    for (strategy, (stable, millis)) in STRATEGIES.into_iter().flat_map(|name| cases.map(|case| (name, case))) {
+        let mut flight = Flight::at_origin(strategy)?;
+        (1..=600).for_each(|step| flight.imu(at(5 * step), at_rest()));
+        flight.gps(at(3000), GpsHealth::Spoofed);
         for number in 1..=stable {
-            let time = at(3000).plus_nanos(number * millis * 1_000_000 / stable);
-            report(&mut simulation, time, GpsHealth::Stable);
+            flight.gps(at(3000).plus_nanos(number * millis * 1_000_000 / stable), GpsHealth::Stable);
         }
-        simulation.publish(surveying::sensor::base::shelf::board::imu, at(3001 + millis), at_rest());
-        let events = live.drain().flat_map(|events| events.payload.events);
+        flight.imu(at(3001 + millis), at_rest());
+        let events = flight.events().into_iter();
         let gate: Vec<_> = events.filter(|event| event.kind == "gate").filter_map(|event| event.to).collect();
         // One that is more than 2 s old is refused, but blocks the gate up to the newest sample.
         let expected = if millis > 2000 { &["blocked"][..] } else { &["blocked", "dwelling"] };
         assert_eq!(gate, expected, "{strategy}: {stable} in {millis} ms");
-        let counts = simulation.report();
+        let counts = flight.simulation.report();
         let displaced: u64 =
             counts.estimators[0].inputs.iter().map(|input| input.dropped(DropReason::Displaced)).sum();
         assert_eq!(displaced, (stable as u64 + 1).saturating_sub(1024));
     }
     Ok(())
-}
-
-/// The state estimator, held up at each keyframe until it is let go.
-#[derive(Debug)]
-struct Slow(FlightEstimator);
-
-static HOLDS: AtomicBool = AtomicBool::new(true);
-static KEYFRAMES: AtomicUsize = AtomicUsize::new(0);
-
-impl Estimator for Slow {
-    type Options = FlightOptions;
-    type Input = FlightInputs<'static>;
-    type Output = FlightOutputs;
-
-    fn init(options: FlightOptions, context: &Context) -> Result<Self, Fault> {
-        FlightEstimator::init(options, context).map(Self)
-    }
-
-    fn handle_input(&mut self, inputs: FlightInputs<'_>) -> Result<Reply<FlightOutputs>, Fault> {
-        if !inputs.vio.is_empty() {
-            KEYFRAMES.fetch_add(1, Ordering::SeqCst);
-            while HOLDS.load(Ordering::SeqCst) {
-                std::thread::sleep(Duration::from_millis(1));
-            }
-        }
-        self.0.handle_input(inputs)
-    }
-}
-
-robot! {
-    robot Flying;
-
-    link base {
-        sensor imu: External<Imu>();
-        sensor camera: External<RelativePoseReading>();
-        estimator navigation: Slow() {
-            input imu: sensor::base::imu, driver;
-            input vio: sensor::base::camera, optional;
-            output estimate;
-            output health;
-            output events;
-            runs_on: worker;
-        }
-        estimator twin: StateEstimator(strategy = "eskf", output_rate = 200 Hz) {
-            input imu: sensor::base::imu, driver;
-            input vio: sensor::base::camera, optional;
-            output estimate;
-            output health;
-            output events;
-        }
-    }
-}
-
-const NAVIGATION: &str = "estimator/base/navigation";
-const TWIN: &str = "estimator/base/twin";
-
-/// A test that fails must not hang on what it holds up.
-struct LetsGo;
-
-impl Drop for LetsGo {
-    fn drop(&mut self) {
-        HOLDS.store(false, Ordering::SeqCst);
-    }
-}
-
-/// By counting, not by the clock: while the smoother is in a keyframe, its twin takes every sample.
-#[test]
-fn a_keyframe_that_takes_long_delays_no_sample_of_the_imu() {
-    within(60, || {
-        let mut builder = Flying::builder();
-        set_origin(builder.options(flying::estimator::base::navigation));
-        set_origin(builder.options(flying::estimator::base::twin));
-        let twin = builder.subscribe(flying::estimator::base::twin::estimate);
-        let slow = builder.subscribe(flying::estimator::base::navigation::estimate);
-        let running = builder.start().expect("it starts");
-        let lets_go = LetsGo;
-        // All of it is in the past, whatever the time it takes.
-        let stamp = |i: i64| MonotonicTime::from_nanos((i - 1000) * 5_000_000);
-        let sample = |i: i64| running.publish(flying::sensor::base::imu, stamp(i), at_rest());
-        let dispatched = |name: &str| {
-            let report = running.report();
-            let estimator = report.estimator(name).expect("it is declared");
-            assert!(DropReason::ALL.iter().all(|reason| estimator.inputs[0].dropped(*reason) == 0), "{name}");
-            estimator.dispatched
-        };
-        let until = |name: &str, count: u64| {
-            while dispatched(name) < count {
-                std::thread::sleep(Duration::from_millis(1));
-            }
-        };
-        // Both start after a second of rest.
-        (1..=240).for_each(sample);
-        until(TWIN, 240);
-        until(NAVIGATION, 240);
-        assert!(twin.drain().last().is_some_and(|estimate| estimate.time >= stamp(230)), "it has started");
-        let reading = RelativePoseReading {
-            from: stamp(220),
-            translation: Vector3::zeros(),
-            from_to: UnitQuaternion::identity(),
-            covariance: Matrix6::identity() * 1e-4,
-            accelerometer_bias: None,
-            gyroscope_bias: None,
-        };
-        running.publish(flying::sensor::base::camera, stamp(240), reading);
-        sample(241);
-        while KEYFRAMES.load(Ordering::SeqCst) == 0 {
-            std::thread::sleep(Duration::from_millis(1));
-        }
-        // It is in the keyframe now, and stays there.
-        (242..=641).for_each(sample);
-        until(TWIN, 641);
-        assert_eq!((dispatched(NAVIGATION), KEYFRAMES.load(Ordering::SeqCst)), (241, 1));
-        assert!(twin.drain().last().is_some_and(|estimate| estimate.time >= stamp(630)), "its estimates go on");
-        drop(lets_go);
-        until(NAVIGATION, 641);
-        assert!(slow.drain().last().is_some_and(|estimate| estimate.time >= stamp(600)), "and it has missed none");
-    });
 }

@@ -1,13 +1,12 @@
 //! Hardware is made safe whatever state the robot is in, and what guards it is neither lost nor kept for ever.
 
-use crate::components::{Number, at, within};
-use crate::replay::{Heard, Lines, hear, overflow, same};
+use crate::components::{Doing, Done, Failure, Pulse, Source, Task, Update, at, lock, within};
+use crate::gate::Gate;
+use crate::replay::{entries, journal, same_again};
 use bb_core::prelude::*;
 use bb_core::run::CommandError;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-
-type Failure = Box<dyn std::error::Error>;
+use std::sync::{Arc, Mutex, MutexGuard};
 
 static IS_ON: AtomicBool = AtomicBool::new(false);
 static FAILS: AtomicBool = AtomicBool::new(false);
@@ -17,7 +16,7 @@ static PORTS: AtomicU32 = AtomicU32::new(0);
 static ALONE: Mutex<()> = Mutex::new(());
 
 fn alone() -> MutexGuard<'static, ()> {
-    let guard = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let guard = lock(&ALONE);
     [&IS_ON, &FAILS, &IS_SKIPPED].into_iter().for_each(|flag| flag.store(false, Ordering::SeqCst));
     BRAKED.store(0, Ordering::SeqCst);
     guard
@@ -40,63 +39,32 @@ impl Drop for Port {
 }
 
 /// Starts its motor as it is made; the callback that stops it sets a parameter, and may fail then.
-#[derive(Debug)]
-pub(crate) struct Lidar;
-
-impl Service for Lidar {
-    type Options = NoOptions;
-    type Output = Number;
-
-    fn init(_: NoOptions, context: &ServiceContext) -> Result<Self, Fault> {
-        let (bus, port) = (context.bus(), Port::open());
-        context.on_disarm(move || {
-            let _ = (&port, bus.set_parameter("param/speed", 0.0));
-            if FAILS.load(Ordering::SeqCst) {
-                return Err(Fault::new("it turns on"));
-            }
-            IS_ON.store(false, Ordering::SeqCst);
-            Ok(())
-        });
-        IS_ON.store(true, Ordering::SeqCst);
-        Ok(Self)
-    }
-
-    fn update(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        Ok(Reading::nothing())
-    }
+fn lidar(context: &ServiceContext) -> Result<Update, Fault> {
+    let (bus, port) = (context.bus().clone(), Port::open());
+    context.on_disarm(move || {
+        let _ = (&port, bus.set_parameter("param/speed", 0.0));
+        if FAILS.load(Ordering::SeqCst) {
+            return Err(Fault::new("it turns on"));
+        }
+        IS_ON.store(false, Ordering::SeqCst);
+        Ok(())
+    });
+    IS_ON.store(true, Ordering::SeqCst);
+    Ok(Box::new(|_| Ok(Reading::nothing())))
 }
 
 /// Is left out, or not.
-#[derive(Debug)]
-pub(crate) struct Spare;
-
-impl Sensor for Spare {
-    type Options = NoOptions;
-    type Output = Number;
-
-    fn init(_: NoOptions, context: &SensorContext) -> Result<Self, Fault> {
-        if !IS_SKIPPED.load(Ordering::SeqCst) {
-            return Ok(Self);
-        }
-        context.on_disarm(|| Err(Fault::new("there is no such device")));
-        Err(Fault::skip("it is not plugged in"))
+fn spare(context: &SensorContext) -> Done {
+    if !IS_SKIPPED.load(Ordering::SeqCst) {
+        return Ok(());
     }
-
-    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        Ok(Reading::finished())
-    }
+    context.on_disarm(|| Err(Fault::new("there is no such device")));
+    Err(Fault::skip("it is not plugged in"))
 }
 
 /// Has a callback that holds the command's own context.
-#[derive(Debug)]
-pub(crate) struct Lift;
-
-impl Command for Lift {
-    type Options = NoOptions;
-    type Arguments = NoArguments;
-    type Output = ();
-
-    async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
+fn lift(context: CommandContext) -> Doing {
+    Box::pin(async move {
         let kept = context.clone();
         context.on_disarm(move || {
             let _ = kept.state();
@@ -104,39 +72,27 @@ impl Command for Lift {
             Ok(())
         });
         Ok(Outcome::done(()))
-    }
+    })
 }
 
-/// Blocks its thread for a while, whether it was cancelled or not.
-#[derive(Debug)]
-pub(crate) struct Block;
+static HERE: Gate = Gate::new();
 
-impl Command for Block {
-    type Options = NoOptions;
-    type Arguments = NoArguments;
-    type Output = ();
-
-    async fn run(_: NoOptions, _: NoArguments, _: CommandContext) -> Result<Outcome<()>, Fault> {
-        std::thread::sleep(Duration::from_millis(300));
+/// Blocks its thread while the gate is closed, whether it was cancelled or not.
+fn block(_: CommandContext) -> Doing {
+    Box::pin(async {
+        HERE.pass("a command");
         Ok(Outcome::done(()))
-    }
+    })
 }
 
 /// Has the robot armed on another thread.
-#[derive(Debug)]
-pub(crate) struct ArmLater;
-
-impl Command for ArmLater {
-    type Options = NoOptions;
-    type Arguments = NoArguments;
-    type Output = ();
-
-    async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
+fn arm_later(context: CommandContext) -> Doing {
+    Box::pin(async move {
         let bus = context.bus();
         std::thread::spawn(move || bus.arm());
         context.sleep(Duration::from_secs(60)).await;
         Ok(Outcome::done(()))
-    }
+    })
 }
 
 robot! {
@@ -148,14 +104,14 @@ robot! {
         category many { concurrency: 4; }
         arm: Arm;
         disarm: Disarm;
-        lift: Lift { category: many; allowed_states: [disarmed, idle, executing]; }
-        block: Block { category: many; allowed_states: [disarmed]; }
-        later: ArmLater { category: many; allowed_states: [disarmed]; }
+        lift: Task(run = lift) { category: many; allowed_states: [disarmed, idle, executing]; }
+        block: Task(run = block) { category: many; allowed_states: [disarmed]; }
+        later: Task(run = arm_later) { category: many; allowed_states: [disarmed]; }
     }
 
-    bridges { bridge lidar: Lidar() { rate: 10 Hz; } }
+    bridges { bridge lidar: Pulse(init = lidar) { rate: 10 Hz; } }
 
-    link base { sensor spare: Spare() { rate: 1 Hz; } }
+    link base { sensor spare: Source(init = spare, read = |_, _| Ok(Reading::finished())) { rate: 1 Hz; } }
 }
 
 fn is_on() -> bool {
@@ -181,30 +137,18 @@ fn a_callback_that_does_something_and_fails_does_so_in_a_replay() -> Result<(), 
     for (arms, stops) in [(true, false), (true, true), (false, true)] {
         let _alone = alone();
         FAILS.store(true, Ordering::SeqCst);
-        let mut builder = Guarded::builder();
-        let lines = Lines::default();
-        let sink = Arc::clone(&lines);
-        builder.journal(move |entry| sink.lock().unwrap_or_else(PoisonError::into_inner).push(entry));
-        let all = builder.subscribe_any(Select::All, None, overflow());
-        let mut simulation = builder.simulate()?;
-        if arms {
-            assert_eq!(simulation.arm(), Ok(()));
-        }
-        simulation.run_until(at(50));
-        if !stops {
-            assert!(simulation.disarm().is_err());
-        }
-        let report = simulation.stop();
+        let (_, report) = same_again(Guarded::builder, |builder, _| {
+            let mut simulation = builder.simulate()?;
+            if arms {
+                assert_eq!(simulation.arm(), Ok(()));
+            }
+            simulation.run_until(at(50));
+            if !stops {
+                assert!(simulation.disarm().is_err());
+            }
+            Ok(simulation.stop())
+        })?;
         assert_eq!(report.safety, Safety::Error);
-        let builder = Guarded::builder();
-        let all_again = builder.subscribe_any(Select::All, None, overflow());
-        let mut replay = builder.replay()?;
-        replay.play(std::mem::take(&mut *lines.lock().unwrap_or_else(PoisonError::into_inner)))?;
-        assert_eq!(replay.stop().safety, Safety::Error);
-        let (mut first, mut second) = (Heard::new(), Heard::new());
-        hear(&all, &mut first);
-        hear(&all_again, &mut second);
-        same(&first, &second);
     }
     Ok(())
 }
@@ -276,13 +220,15 @@ fn a_command_that_was_cancelled_while_it_waited_arms_nothing() {
     let _alone = alone();
     within(60, || {
         let running = Guarded::builder().start().expect("it starts");
+        HERE.close("a command");
         let block = running.command(guarded::command::block, NoArguments).expect("it is allowed");
-        std::thread::sleep(Duration::from_millis(50));
+        HERE.wait_for(1);
         block.cancel();
         let later = running.command(guarded::command::later, NoArguments).expect("it is allowed");
         std::thread::sleep(Duration::from_millis(50));
         later.cancel();
-        std::thread::sleep(Duration::from_millis(400));
+        HERE.open();
+        std::thread::sleep(Duration::from_millis(100));
         assert_eq!(running.safety(), Safety::Disarmed);
     });
 }
@@ -291,14 +237,11 @@ fn a_command_that_was_cancelled_while_it_waited_arms_nothing() {
 fn a_journal_of_other_budgets_is_refused() -> Result<(), Failure> {
     let _alone = alone();
     let mut builder = Guarded::builder();
-    let lines = Lines::default();
-    let sink = Arc::clone(&lines);
-    builder.journal(move |entry| sink.lock().unwrap_or_else(PoisonError::into_inner).push(entry));
+    let lines = journal(&mut builder);
     builder.simulate()?.stop();
     let mut other = Guarded::builder();
     other.supervision().max_restarts = 1_000_000;
-    let lines = std::mem::take(&mut *lines.lock().unwrap_or_else(PoisonError::into_inner));
-    let error = other.replay()?.play(lines).expect_err("panics would escalate later").to_string();
+    let error = other.replay()?.play(entries(&lines)).expect_err("panics would escalate later").to_string();
     assert!(error.contains("supervision: Supervision { max_restarts: 3,"), "{error}");
     Ok(())
 }

@@ -1,55 +1,24 @@
-//! Every row of the health table, on virtual time: what becomes of it, which command it starts, what is published.
+//! Every row of the health table, on virtual time: what becomes of it, which command it starts, what is published; and what counts as
+//! a good run of an estimator.
 
-use crate::components::{Number, Snapshot, at};
+use crate::components::{Ask, Doing, Done, Echo, Number, Replied, Snapshot, Task, at};
 use bb_core::HealthTransition;
 use bb_core::event::{CommandPhase, RefusalReason};
 use bb_core::prelude::*;
 use bb_core::run::DropReason;
 
 /// Passes numbers on; a negative one is a divergence.
-#[derive(Debug)]
-pub(crate) struct Watch;
-
-impl Estimator for Watch {
-    type Options = NoOptions;
-    type Input = Number;
-    type Output = Number;
-
-    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-
-    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
-        let reply = Reply::emit(number.payload);
-        Ok(if number.0 < 0.0 { reply.diverged("negative") } else { reply })
-    }
+fn watch(_: &mut f64, number: f64) -> Replied {
+    let reply = Reply::emit(Number(number));
+    Ok(if number < 0.0 { reply.diverged("negative") } else { reply })
 }
 
-macro_rules! commands {
-    ($($name:ident: $next:expr;)*) => { $(
-        #[derive(Debug)]
-        pub(crate) struct $name;
-
-        impl Command for $name {
-            type Options = NoOptions;
-            type Arguments = NoArguments;
-            type Output = Option<HealthTransition>;
-
-            async fn run(
-                _: NoOptions,
-                _: NoArguments,
-                context: CommandContext,
-            ) -> Result<Outcome<Option<HealthTransition>>, Fault> {
-                Ok(Outcome::done(context.health().copied()).next_state($next))
-            }
-        }
-    )* };
-}
-
-commands! {
-    SlowDown: "degraded";
-    Halt: "halted";
-    GoOn: "idle";
+/// Leads to a state, as the reaction to a change of health that it is told.
+fn enter(context: CommandContext, next: &'static str) -> Doing {
+    Box::pin(async move {
+        context.health().ok_or("no health has changed")?;
+        Ok(Outcome::done(()).next_state(next))
+    })
 }
 
 robot! {
@@ -58,14 +27,14 @@ robot! {
     states { degraded; halted; }
 
     commands {
-        slow_down: SlowDown;
-        halt: Halt { allowed_states: [idle, executing, degraded]; }
-        go_on: GoOn { allowed_states: [degraded, halted]; }
+        slow_down: Task(run = |context| enter(context, "degraded"));
+        halt: Task(run = |context| enter(context, "halted")) { allowed_states: [idle, executing, degraded]; }
+        go_on: Task(run = |context| enter(context, "idle")) { allowed_states: [degraded, halted]; }
     }
 
     link base {
         sensor number: External<Number>() {
-            estimator watch: Watch() {
+            estimator watch: Echo(input = watch) {
                 latency_budget: 1 ms;
                 lost_after: 100 ms;
                 recover_after: 2;
@@ -112,98 +81,95 @@ impl Run {
     fn changes(&self, estimator: &str) -> Vec<String> {
         let of = self.transitions.drain().filter(|transition| transition.estimator == estimator);
         of.map(|transition| {
-            let HealthTransition { from, to, reason, .. } = transition.payload;
-            format!("{from} -> {to}: {reason}")
+            let HealthTransition { from, to, reason, source, .. } = transition.payload;
+            let of = if source == "sensor/base/other" { format!(" of {source}") } else { String::new() };
+            format!("{from} -> {to}: {reason}{of}")
         })
         .collect()
     }
 }
 
+/// Each row says what happens, and what of it is seen: the changes of an estimator since the last time, and the robot's state.
 #[test]
-fn a_divergence_degrades_and_good_completions_recover() -> Result<(), StartError> {
-    let mut run = Run::start()?;
-    run.number(1.0);
-    assert_eq!(run.changes(WATCH), [""; 0]);
-    run.number(-1.0);
-    assert_eq!(run.changes(WATCH), ["healthy -> degraded: diverged"]);
-    assert_eq!(run.simulation.state(), "degraded");
-    // One is not enough, and a bad one sets the count back.
-    for number in [1.0, -1.0, 1.0] {
-        run.number(number);
+fn each_row_of_the_table() -> Result<(), StartError> {
+    let rows = [
+        (
+            "a divergence degrades; one good completion is not enough, and a bad one sets the count back",
+            "gets 1; watch; gets -1; watch healthy -> degraded: diverged; is degraded; gets 1; gets -1; gets 1; watch; \
+             gets 1; watch degraded -> healthy: recovered; is idle",
+        ),
+        (
+            "an overrun of the latency budget degrades",
+            "takes 2000 us; gets 1; watch healthy -> degraded: latency overrun; takes 999 us; gets 1; gets 1; \
+             watch degraded -> healthy: recovered",
+        ),
+        (
+            "a sync miss degrades with its input; `recover_after` is 1 unless declared, without a budget too",
+            "gets 1; pair healthy -> degraded: sync miss of sensor/base/other; other 15; gets 1; \
+             pair degraded -> healthy: recovered",
+        ),
+        (
+            "a driver that is old when it arrives degrades",
+            "other 10; until 16; at 10; pair healthy -> degraded: stale input",
+        ),
+        (
+            "silence is a loss, and the first input leads back without a command, and counts",
+            "gets 1; until 109; watch; until 110; watch healthy -> lost: lost; is halted; until 500; gets 1; \
+             watch lost -> degraded: recovered; is halted; gets 1; watch degraded -> healthy: recovered; is idle",
+        ),
+        (
+            "a degraded estimator is lost as well, a bad first input does not count, and the watch goes on",
+            "gets -1; until 110; watch healthy -> degraded: diverged, degraded -> lost: lost; until 500; gets -1; gets 1; \
+             watch lost -> degraded: recovered; gets 1; watch degraded -> healthy: recovered; until 1000; \
+             watch healthy -> lost: lost",
+        ),
+        ("an estimator that never gets anything is lost", "until 100; watch healthy -> lost: lost"),
+    ];
+    for (row, steps) in rows {
+        let mut run = Run::start()?;
+        for step in steps.split("; ") {
+            let (verb, rest) = step.split_once(' ').unwrap_or((step, ""));
+            let number = || rest.split(' ').next().and_then(|number| number.parse().ok()).expect("a number");
+            let expected = || rest.split(", ").filter(|change| !change.is_empty()).collect::<Vec<_>>();
+            match verb {
+                "gets" => run.number(number() as f64),
+                "until" => {
+                    run.now = number();
+                    run.simulation.run_until(at(run.now));
+                }
+                "at" => run.simulation.publish(watched::sensor::base::number, at(number()), Number(1.0)),
+                "other" => run.simulation.publish(watched::sensor::base::other, at(number()), Number(1.0)),
+                "takes" => {
+                    let latency = Duration::from_micros(number().unsigned_abs());
+                    run.simulation.pretend_latency(watched::sensor::base::number::watch, latency);
+                }
+                "watch" => assert_eq!(run.changes(WATCH), expected(), "{row}: {step}"),
+                "pair" => assert_eq!(run.changes(PAIR), expected(), "{row}: {step}"),
+                "is" => assert_eq!(run.simulation.state(), rest, "{row}: {step}"),
+                _ => panic!("{row}: what is `{step}`?"),
+            }
+        }
     }
-    assert_eq!(run.changes(WATCH), [""; 0]);
-    run.number(1.0);
-    assert_eq!(run.changes(WATCH), ["degraded -> healthy: recovered"]);
-    assert_eq!(run.simulation.state(), "idle");
     Ok(())
 }
 
 #[test]
-fn an_overrun_of_the_latency_budget_degrades() -> Result<(), StartError> {
+fn latencies_and_ages_of_messages_are_counted() -> Result<(), StartError> {
     let mut run = Run::start()?;
-    run.simulation.pretend_latency(watched::sensor::base::number::watch, Duration::from_millis(2));
-    run.number(1.0);
-    assert_eq!(run.changes(WATCH), ["healthy -> degraded: latency overrun"]);
-    run.simulation.pretend_latency(watched::sensor::base::number::watch, Duration::from_micros(999));
-    run.number(1.0);
-    run.number(1.0);
-    assert_eq!(run.changes(WATCH), ["degraded -> healthy: recovered"]);
-    let report = run.simulation.report();
-    let latency = report.estimator(WATCH).expect("it is declared").latency;
-    assert_eq!((latency.count, latency.longest), (3, Duration::from_millis(2)));
+    for micros in [2000, 999] {
+        run.simulation.pretend_latency(watched::sensor::base::number::watch, Duration::from_micros(micros));
+        run.number(1.0);
+    }
+    let of = |run: &Run| {
+        let report = run.simulation.report();
+        let watch = report.estimator(WATCH).expect("it is declared");
+        (watch.latency.count, watch.latency.longest, watch.inputs[0].age.count, watch.inputs[0].age.longest)
+    };
+    assert_eq!((of(&run).0, of(&run).1), (2, Duration::from_millis(2)));
     // A message that is old when it comes is older when its callback is over.
-    run.simulation.publish(watched::sensor::base::number, at(run.now), Number(1.0));
     run.simulation.run_until(at(run.now + 5));
     run.simulation.publish(watched::sensor::base::number, at(run.now), Number(1.0));
-    let report = run.simulation.report();
-    let age = report.estimator(WATCH).expect("it is declared").inputs[0].age;
-    assert_eq!((age.count, age.longest), (5, Duration::from_micros(5999)));
-    Ok(())
-}
-
-#[test]
-fn a_sync_miss_degrades_with_the_input_that_was_missed() -> Result<(), StartError> {
-    let mut run = Run::start()?;
-    run.number(1.0);
-    let transition = run.transitions.drain().find(|transition| transition.estimator == PAIR);
-    let transition = transition.expect("the other input has never come");
-    assert_eq!((transition.reason, transition.source), (HealthReason::SyncMiss, "sensor/base/other"));
-    run.simulation.publish(watched::sensor::base::other, at(run.now + 5), Number(1.0));
-    run.number(1.0);
-    assert_eq!(run.changes(PAIR), ["degraded -> healthy: recovered"], "recover_after is 1 unless declared");
-    Ok(())
-}
-
-#[test]
-fn a_driver_that_is_old_when_it_arrives_degrades() -> Result<(), StartError> {
-    let mut run = Run::start()?;
-    run.simulation.publish(watched::sensor::base::other, at(10), Number(1.0));
-    run.simulation.run_until(at(16));
-    // Measured at 10 ms, it comes at 16 ms.
-    run.simulation.publish(watched::sensor::base::number, at(10), Number(1.0));
-    assert_eq!(run.changes(PAIR), ["healthy -> degraded: stale input"]);
-    Ok(())
-}
-
-#[test]
-fn silence_is_a_loss_and_the_first_input_leads_back_without_a_command() -> Result<(), StartError> {
-    let mut run = Run::start()?;
-    run.number(1.0);
-    run.simulation.run_until(at(109));
-    assert_eq!(run.changes(WATCH), [""; 0], "99 ms of silence are none");
-    run.simulation.run_until(at(110));
-    assert_eq!(run.changes(WATCH), ["healthy -> lost: lost"]);
-    assert_eq!(run.simulation.state(), "halted");
-    let events = run.simulation.subscribe(watched::command::slow_down);
-    run.now = 500;
-    run.number(1.0);
-    // That completion counts: one more makes two.
-    assert_eq!(run.changes(WATCH), ["lost -> degraded: recovered"]);
-    assert_eq!(events.drain().count(), 0, "a way back is no reason to slow down");
-    assert_eq!(run.simulation.state(), "halted");
-    run.number(1.0);
-    assert_eq!(run.changes(WATCH), ["degraded -> healthy: recovered"]);
-    assert_eq!(run.simulation.state(), "idle");
+    assert_eq!((of(&run).2, of(&run).3), (3, Duration::from_micros(5999)));
     Ok(())
 }
 
@@ -231,44 +197,6 @@ fn a_loss_after_refused_messages_has_their_reason() -> Result<(), StartError> {
 }
 
 #[test]
-fn a_degraded_estimator_is_lost_as_well_and_a_bad_first_input_does_not_count() -> Result<(), StartError> {
-    let mut run = Run::start()?;
-    run.number(-1.0);
-    run.simulation.run_until(at(110));
-    assert_eq!(run.changes(WATCH), ["healthy -> degraded: diverged", "degraded -> lost: lost"]);
-    run.now = 500;
-    for number in [-1.0, 1.0] {
-        run.number(number);
-    }
-    assert_eq!(run.changes(WATCH), ["lost -> degraded: recovered"]);
-    run.number(1.0);
-    assert_eq!(run.changes(WATCH), ["degraded -> healthy: recovered"]);
-    // Lost again: the watch goes on after a recovery.
-    run.simulation.run_until(at(1000));
-    assert_eq!(run.changes(WATCH), ["healthy -> lost: lost"]);
-    Ok(())
-}
-
-#[test]
-fn an_estimator_that_never_gets_anything_is_lost() -> Result<(), StartError> {
-    let mut run = Run::start()?;
-    run.simulation.run_until(at(100));
-    assert_eq!(run.changes(WATCH), ["healthy -> lost: lost"]);
-    Ok(())
-}
-
-#[test]
-fn an_estimator_without_a_budget_recovers_as_well() -> Result<(), StartError> {
-    // The pair has neither a budget nor `lost_after`.
-    let mut run = Run::start()?;
-    run.number(1.0);
-    run.simulation.publish(watched::sensor::base::other, at(run.now + 5), Number(1.0));
-    run.number(1.0);
-    assert_eq!(run.simulation.report().estimator(PAIR).map(|pair| pair.health), Some(HealthState::Healthy));
-    Ok(())
-}
-
-#[test]
 fn a_command_gets_the_change_and_a_refused_one_is_counted_and_changes_nothing() -> Result<(), StartError> {
     let builder = Watched::builder();
     let events = builder.subscribe(watched::command::slow_down);
@@ -290,5 +218,97 @@ fn a_command_gets_the_change_and_a_refused_one_is_counted_and_changes_nothing() 
     let statistics = report.commands.iter().find(|command| command.name == "slow_down").expect("it is declared");
     assert_eq!((statistics.refused, statistics.started), (1, 0));
     assert!(report.to_string().contains("`slow_down` is refused"));
+    Ok(())
+}
+
+/// Ticks.
+fn tick(context: &Context) -> Done {
+    context.request(Request::Tick(Duration::from_millis(5)));
+    Ok(())
+}
+
+fn tick_again(_: &mut f64, _: Info) -> Replied {
+    Ok(Reply::emit(Number(0.0)).and(Request::Timer(1, Duration::from_millis(1))))
+}
+
+/// Passes on; a negative number is a divergence, or a fault below -10.
+fn work(kept: &mut f64, number: f64) -> Replied {
+    match number {
+        -10.0 => Err(Fault::new("told to")),
+        -20.0 => Err(Fault::permanent("told to stay so")),
+        _ => watch(kept, number),
+    }
+}
+
+robot! {
+    robot Industrious;
+    link base {
+        sensor number: External<Number>() {
+            estimator busy: Echo(init = tick, input = work, info = tick_again) { lost_after: 100 ms; recover_after: 2; }
+        }
+    }
+}
+
+const BUSY: &str = "sensor/base/number/busy";
+
+/// The changes of health, with their times in milliseconds.
+fn changes(health: &Subscription<bb_core::HealthTransition>) -> Vec<(i64, HealthState, HealthReason)> {
+    health.drain().map(|change| (change.time.as_nanos() / 1_000_000, change.to, change.reason)).collect()
+}
+
+/// Asks and tells it again and again, while it ticks.
+fn keep_busy(simulation: &mut Simulation<Industrious>, until: i64) {
+    while simulation.clock().now() < at(until) {
+        simulation.call(industrious::sensor::base::number::busy, Ask).expect("it answers");
+        simulation.cast(industrious::sensor::base::number::busy, Number(1.0)).expect("it has room");
+        simulation.run_for(Duration::from_millis(1));
+    }
+}
+
+#[test]
+fn neither_ticks_nor_requests_make_a_degraded_estimator_healthy() -> Result<(), StartError> {
+    let builder = Industrious::builder();
+    let health = builder.subscribe(system::Health);
+    let mut simulation = builder.simulate()?;
+    simulation.publish(industrious::sensor::base::number, at(10), Number(-1.0));
+    assert_eq!(changes(&health), [(10, HealthState::Degraded, HealthReason::Diverged)]);
+    keep_busy(&mut simulation, 100);
+    assert_eq!(changes(&health), [], "only runs on data count");
+    simulation.publish(industrious::sensor::base::number, at(100), Number(1.0));
+    simulation.publish(industrious::sensor::base::number, at(105), Number(1.0));
+    assert_eq!(changes(&health), [(105, HealthState::Healthy, HealthReason::Recovered)]);
+    Ok(())
+}
+
+#[test]
+fn neither_ticks_nor_requests_keep_an_estimator_without_data_from_being_lost() -> Result<(), StartError> {
+    let builder = Industrious::builder();
+    let health = builder.subscribe(system::Health);
+    let mut simulation = builder.simulate()?;
+    simulation.publish(industrious::sensor::base::number, at(10), Number(1.0));
+    keep_busy(&mut simulation, 500);
+    assert_eq!(changes(&health), [(110, HealthState::Lost, HealthReason::Lost)]);
+    Ok(())
+}
+
+#[test]
+fn an_estimator_that_stopped_for_good_says_so_is_lost_and_takes_no_requests() -> Result<(), StartError> {
+    let builder = Industrious::builder();
+    let health = builder.subscribe(system::Health);
+    let mut simulation = builder.simulate()?;
+    simulation.publish(industrious::sensor::base::number, at(10), Number(-20.0));
+    let told = changes(&health);
+    assert_eq!(told.iter().map(|(.., reason)| *reason).collect::<Vec<_>>(), [HealthReason::Stopped]);
+    for millis in 11..300 {
+        simulation.publish(industrious::sensor::base::number, at(millis), Number(1.0));
+    }
+    let report = simulation.report();
+    let busy = report.estimator(BUSY).expect("it is declared");
+    assert_eq!(busy.health, HealthState::Lost, "{told:?}, then {:?}", changes(&health));
+    assert_eq!(busy.stopped.as_deref(), Some("told to stay so"));
+    assert!(simulation.call(industrious::sensor::base::number::busy, Ask).is_err());
+    let refused =
+        simulation.cast(industrious::sensor::base::number::busy, Number(1.0)).expect_err("it does not run");
+    assert_eq!(refused.to_string(), format!("{BUSY} does not run any more: told to stay so"));
     Ok(())
 }

@@ -5,7 +5,7 @@ use crate::joints::{Pixel, joint};
 use bb_core::component::InputTransforms;
 use bb_core::prelude::*;
 
-/// The newest of both, however old.
+/// From the base, and from beyond the joint: the newest of both, however old.
 #[derive(Clone, Copy, Debug, Inputs)]
 pub(crate) struct Kept<'a> {
     #[allow(dead_code, reason = "it only drives")]
@@ -88,72 +88,29 @@ fn a_message_that_is_older_than_the_history_of_a_joint_stays_where_it_was_seen()
     Ok(())
 }
 
-/// From the base, and from beyond the joint.
-#[derive(Clone, Copy, Debug, Inputs)]
-pub(crate) struct Glances<'a> {
-    pub(crate) imu: Input<'a, Pixel>,
-    pub(crate) camera: Input<'a, Pixel>,
-}
-
-/// Needs both.
-#[derive(Debug)]
-pub(crate) struct Both;
-
-impl Estimator for Both {
-    type Options = NoOptions;
-    type Input = Glances<'static>;
-    type Output = Pixel;
-    const HANDLES_MOVING_JOINTS: bool = true;
-
-    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-
-    fn handle_transforms(&mut self, transforms: &InputTransforms<'_>) -> Result<(), Fault> {
-        transforms.frame_from_input("camera").map(drop)
-    }
-
-    fn handle_input(&mut self, glances: Glances<'_>) -> Result<Reply<Pixel>, Fault> {
-        Ok(Reply::emit(Pixel(glances.imu.0 + glances.camera.0)))
-    }
-}
-
-robot! {
-    robot Glance;
-    link base {
-        sensor imu: External<Pixel>();
-        estimator both: Both() { input imu: sensor::base::imu, driver; input camera: sensor::base::shoulder::arm::camera; }
-        joint shoulder: continuous {
-            axis: z;
-            sensor encoder: External<JointState>();
-            link arm { sensor camera: External<Pixel>(); }
-        }
-    }
-}
-
 /// A message that is stamped ahead of the clock is asked for where nobody knows yet, and those that follow are older:
 /// for a second at most, since one that is further ahead is refused.
 #[test]
 fn an_input_ahead_of_the_clock_costs_a_second_at_most() -> Result<(), StartError> {
     use bb_core::run::DropReason::{ClockSkew, NoTransform, OutOfOrder};
     for (ahead, resumes) in [(900, 1_000), (1_000, 1_100), (1_001, 200)] {
-        let builder = Glance::builder();
-        let seen = builder.subscribe(glance::estimator::base::both);
+        let builder = Lookout::builder();
+        let seen = builder.subscribe(lookout::estimator::base::keeper);
         let health = builder.subscribe(system::Health);
         let mut simulation = builder.simulate()?;
         for millis in (0..1500).step_by(10) {
-            simulation.publish(glance::sensor::base::shoulder::encoder, at(millis), joint(0.1));
+            simulation.publish(lookout::sensor::base::lift::encoder, at(millis), joint(0.1));
             let stamp = if millis == 200 { millis + ahead } else { millis };
-            simulation.live().publish(glance::sensor::base::shoulder::arm::camera, at(stamp), Pixel(1.0));
-            simulation.publish(glance::sensor::base::imu, at(millis), Pixel(0.0));
+            simulation.live().publish(lookout::sensor::base::lift::carriage::camera, at(stamp), Pixel(1.0));
+            simulation.publish(lookout::sensor::base::imu, at(millis), Pixel(0.0));
         }
         let times: Vec<_> = seen.drain().map(|seen| seen.monotonic_time).collect();
         let expected = (0..200).chain(resumes..1500).step_by(10).map(at);
         assert!(times.iter().copied().eq(expected), "{ahead} ms ahead: {times:?}");
         let changes: Vec<_> = health.drain().map(|change| (change.time, change.to)).collect();
         let report = simulation.stop();
-        let both = report.estimator("estimator/base/both").expect("it is declared");
-        let camera = &both.inputs[1];
+        let keeper = report.estimator("estimator/base/keeper").expect("it is declared");
+        let camera = &keeper.inputs[1];
         let (skew, missing) = (camera.dropped(ClockSkew), camera.dropped(NoTransform));
         if resumes == 200 {
             assert_eq!((skew, missing, camera.dropped(OutOfOrder), changes), (1, 0, 0, vec![]));

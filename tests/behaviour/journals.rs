@@ -1,21 +1,15 @@
 //! What may happen to a robot once, and happens again from its journal.
 
-use crate::components::{Number, at, within};
+use crate::components::{Done, Failure, Number, Replied, Servo, at, within};
 use crate::gate::Gate;
-use crate::replay::{Heard, Lines, counts, hear, overflow, same};
+use crate::replay::{Heard, hear, is_again, moves_of, same_again};
 use bb_core::prelude::*;
 use bb_core::run::CommandError;
 use bb_core::run::DropReason;
-use bb_core::{Builder, DynamicSubscription, Report, RequestCodec};
-use std::sync::atomic::{AtomicBool, Ordering};
+use bb_core::{Report, RequestCodec};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-pub(crate) type Failure = Box<dyn std::error::Error>;
-
 static HERE: Gate = Gate::new();
-
-/// Whether this is the first run, and not the one from its journal.
-pub(crate) static IS_FIRST: AtomicBool = AtomicBool::new(true);
 
 const PANICS: f64 = -2.0;
 const HANGS: f64 = -1000.0;
@@ -45,19 +39,19 @@ impl Estimator for Adder {
         Ok(Self { sum: context.now().as_nanos() as f64, gain: options.gain })
     }
 
-    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
+    fn handle_input(&mut self, number: &Stamped<Number>) -> Replied {
         match number.0 {
             PANICS => panic!("told to"),
             HANGS => HERE.pass("an adder"),
             // Only the first time: the run from the journal must know it from there.
-            IS_SLOW if IS_FIRST.load(Ordering::SeqCst) => std::thread::sleep(Duration::from_millis(5)),
+            IS_SLOW if !is_again() => std::thread::sleep(Duration::from_millis(5)),
             _ => {}
         }
         self.sum += self.gain * number.0;
         Ok(Reply::emit(Number(self.sum)))
     }
 
-    fn handle_info(&mut self, _: Info) -> Result<Reply<Number>, Fault> {
+    fn handle_info(&mut self, _: Info) -> Replied {
         self.sum *= 0.75;
         Ok(Reply::emit(Number(self.sum * self.gain)))
     }
@@ -85,7 +79,7 @@ impl HandleCall<Add> for Adder {
 impl HandleCast<Add> for Adder {
     const RECORD: Option<RequestCodec<Add>> = Some(RequestCodec::bytes());
 
-    fn handle_cast(&mut self, Add(number): Add) -> Result<Reply<Number>, Fault> {
+    fn handle_cast(&mut self, Add(number): Add) -> Replied {
         self.sum += number;
         Ok(Reply::none())
     }
@@ -95,36 +89,21 @@ impl HandleCast<Add> for Adder {
 pub(crate) struct Forget;
 
 impl HandleCast<Forget> for Adder {
-    fn handle_cast(&mut self, Forget: Forget) -> Result<Reply<Number>, Fault> {
+    fn handle_cast(&mut self, Forget: Forget) -> Replied {
         self.sum = 0.0;
         Ok(Reply::none())
     }
 }
 
-/// Moves, and may refuse to be made safe.
-#[derive(Debug)]
-pub(crate) struct Servo {
-    refuses: bool,
-}
-
+/// Is the last number before it cannot be made safe.
 const REFUSES: f64 = 99.0;
 
-impl Actuator for Servo {
-    type Options = NoOptions;
-    type Command = Number;
+fn moves(to: f64) -> Done {
+    if to < 0.0 { Err(Fault::new("it is at its end")) } else { Ok(()) }
+}
 
-    fn init(_: NoOptions, _: &ActuatorContext) -> Result<Self, Fault> {
-        Ok(Self { refuses: false })
-    }
-
-    fn handle_command(&mut self, command: &Stamped<Number>) -> Result<(), Fault> {
-        self.refuses = command.0 == REFUSES;
-        if command.0 < 0.0 { Err(Fault::new("it is at its end")) } else { Ok(()) }
-    }
-
-    fn disarm(&mut self) -> Result<(), Fault> {
-        if self.refuses { Err(Fault::new("no brake")) } else { Ok(()) }
-    }
+fn brakes(last: f64) -> Done {
+    if last == REFUSES { Err(Fault::new("no brake")) } else { Ok(()) }
 }
 
 /// How often a [`Drive`] moves, and what it does then.
@@ -174,7 +153,7 @@ robot! {
         joint pan: continuous {
             axis: z;
             sensor encoder: External<Number>() { estimator position: Adder(gain = param::gain); }
-            actuator servo: Servo();
+            actuator servo: Servo(command = moves, disarm = brakes);
             link head { }
         }
         sensor number: External<Number>() {
@@ -191,7 +170,7 @@ robot! {
     }
 }
 
-/// What hangs, and which run it is, is one for all.
+/// What hangs is one for all.
 static ALONE: Mutex<()> = Mutex::new(());
 
 pub(crate) fn alone() -> MutexGuard<'static, ()> {
@@ -199,73 +178,30 @@ pub(crate) fn alone() -> MutexGuard<'static, ()> {
     ALONE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A robot with its journal, and those who hear what it does.
-struct Journaled {
-    lines: Lines,
-    all: DynamicSubscription,
-}
-
-impl Journaled {
-    fn new() -> (Self, Builder<Again>) {
-        IS_FIRST.store(true, Ordering::SeqCst);
-        let mut builder = Again::builder();
-        let lines = Lines::default();
-        let sink = std::sync::Arc::clone(&lines);
-        builder.journal(move |entry| sink.lock().unwrap_or_else(PoisonError::into_inner).push(entry));
-        let all = builder.subscribe_any(Select::All, None, overflow());
-        (Self { lines, all }, builder)
-    }
-
-    /// Runs it again, which gives the same: what is published, counted, and how it ends.
-    fn expect_the_same_again(self, moves: &DynamicSubscription, report: &Report) -> Result<Heard, Failure> {
-        IS_FIRST.store(false, Ordering::SeqCst);
-        let mut first = Heard::new();
-        hear(&self.all, &mut first);
-        hear(moves, &mut first);
-        let builder = Again::builder();
-        let all = builder.subscribe_any(Select::All, None, overflow());
-        let mut replay = builder.replay()?;
-        let moves = moves_of(&replay);
-        let mut lines = std::mem::take(&mut *self.lines.lock().unwrap_or_else(PoisonError::into_inner));
-        lines.sort_by_key(|line| line.number);
-        // In parts, as from a file.
-        for part in lines.chunks(7) {
-            replay.play(part.to_vec())?;
-        }
-        let report_again = replay.stop();
-        let mut again = Heard::new();
-        hear(&all, &mut again);
-        hear(&moves, &mut again);
-        same(&first, &again);
-        assert_eq!(counts(report), counts(&report_again));
-        Ok(first)
-    }
-}
-
-fn moves_of(live: &bb_core::Live<Again>) -> DynamicSubscription {
-    live.subscribe_any(Select::Path("actuator/base/pan/servo"), None, overflow())
-}
-
 /// Runs it on virtual time as `script` has it, and again.
 fn again(script: impl FnOnce(&mut Simulation<Again>) -> Result<(), Failure>) -> Result<(Heard, Report), Failure> {
-    let (journaled, builder) = Journaled::new();
-    let mut simulation = builder.simulate()?;
-    let moves = moves_of(&simulation);
-    assert_eq!(simulation.arm(), Ok(()));
-    script(&mut simulation)?;
-    let report = simulation.stop();
-    Ok((journaled.expect_the_same_again(&moves, &report)?, report))
+    same_again(Again::builder, |builder, heard| {
+        let mut simulation = builder.simulate()?;
+        let moves = moves_of(&simulation);
+        assert_eq!(simulation.arm(), Ok(()));
+        script(&mut simulation)?;
+        let report = simulation.stop();
+        hear(&moves, heard);
+        Ok(report)
+    })
 }
 
 /// The same in real time.
 fn again_in_real_time(script: impl FnOnce(&Running<Again>)) -> Result<(Heard, Report), Failure> {
-    let (journaled, builder) = Journaled::new();
-    let running = builder.start()?;
-    let moves = moves_of(&running);
-    assert_eq!(running.arm(), Ok(()));
-    script(&running);
-    let report = running.stop();
-    Ok((journaled.expect_the_same_again(&moves, &report)?, report))
+    same_again(Again::builder, |builder, heard| {
+        let running = builder.start()?;
+        let moves = moves_of(&running);
+        assert_eq!(running.arm(), Ok(()));
+        script(&running);
+        let report = running.stop();
+        hear(&moves, heard);
+        Ok(report)
+    })
 }
 
 fn count(heard: &Heard, path: &str) -> usize {
@@ -281,7 +217,6 @@ fn feed(simulation: &mut Simulation<Again>, millis: std::ops::Range<i64>) {
 
 #[test]
 fn requests_that_a_journal_holds_are_made_again() -> Result<(), Failure> {
-    let _alone = alone();
     let (heard, _) = again(|simulation| {
         for round in 0..20 {
             feed(simulation, round * 10..round * 10 + 9);
@@ -296,7 +231,6 @@ fn requests_that_a_journal_holds_are_made_again() -> Result<(), Failure> {
 
 #[test]
 fn a_request_that_a_journal_does_not_hold_is_named_where_it_makes_a_difference() -> Result<(), Failure> {
-    let _alone = alone();
     let failed = again(|simulation| {
         feed(simulation, 1..20);
         simulation.cast(again::sensor::base::number::sum, Forget)?;
@@ -311,7 +245,6 @@ fn a_request_that_a_journal_does_not_hold_is_named_where_it_makes_a_difference()
 
 #[test]
 fn commands_that_drive_an_actuator_and_are_cancelled_or_time_out_do_so_again() -> Result<(), Failure> {
-    let _alone = alone();
     let (heard, report) = again(|simulation| {
         // Fed, so that it is not lost, which would start a command that cancels these.
         feed(simulation, 1..10);
@@ -337,7 +270,6 @@ fn commands_that_drive_an_actuator_and_are_cancelled_or_time_out_do_so_again() -
 
 #[test]
 fn parameters_that_are_set_and_estimators_that_are_lost_are_so_again() -> Result<(), Failure> {
-    let _alone = alone();
     let (heard, report) = again(|simulation| {
         for round in 0..10 {
             feed(simulation, round * 100..round * 100 + 20);
@@ -358,7 +290,6 @@ fn parameters_that_are_set_and_estimators_that_are_lost_are_so_again() -> Result
 
 #[test]
 fn panics_that_escalate_until_the_robot_is_disarmed_do_so_again() -> Result<(), Failure> {
-    let _alone = alone();
     let (heard, report) = again(|simulation| {
         for failure in 1..=12 {
             feed(simulation, failure * 300..failure * 300 + 3);
@@ -374,7 +305,6 @@ fn panics_that_escalate_until_the_robot_is_disarmed_do_so_again() -> Result<(), 
 
 #[test]
 fn a_stop_with_a_command_that_runs_and_a_disarm_that_fails_is_one_again() -> Result<(), Failure> {
-    let _alone = alone();
     let (heard, report) = again(|simulation| {
         feed(simulation, 1..20);
         simulation.command(again::command::drive, Way { steps: 3, tunes: false })?;
@@ -391,7 +321,6 @@ fn a_stop_with_a_command_that_runs_and_a_disarm_that_fails_is_one_again() -> Res
 
 #[test]
 fn an_actuator_that_fails_does_so_again() -> Result<(), Failure> {
-    let _alone = alone();
     let (heard, report) = again(|simulation| {
         for round in 1..5 {
             simulation.run_until(at(round * 200));
@@ -431,24 +360,6 @@ fn what_did_not_fit_in_a_full_inbox_does_not_fit_again() {
         .expect("it is the same");
         let sum = report.estimator("sensor/base/number/sum").expect("it is declared");
         assert!(sum.inputs[0].dropped(DropReason::Overflow) >= 1500 - 1024);
-    });
-}
-
-#[test]
-fn an_overrun_of_a_budget_is_one_again_though_the_code_is_fast_now() {
-    let _alone = alone();
-    within(120, || {
-        let (_, report) = again_in_real_time(|running| {
-            for round in 0..30 {
-                let number = if round % 3 == 0 { IS_SLOW } else { 1.0 };
-                running.publish(again::sensor::base::number, running.clock().now(), Number(number));
-                // An answer comes when what waited before is done.
-                running.call(again::sensor::base::number::sum, Add(0.0)).expect("it runs");
-            }
-        })
-        .expect("it is the same");
-        let sum = report.estimator("sensor/base/number/sum").expect("it is declared");
-        assert!(sum.transitions > 10, "it overruns and recovers: {}", sum.transitions);
     });
 }
 

@@ -1,7 +1,6 @@
 //! A simulated IMU on a moving link.
 
-use crate::components::at;
-use crate::journals::Failure;
+use crate::components::{Failure, at};
 use bb_core::kinematics::Kinematics;
 use bb_core::nalgebra::{Isometry3, Vector3};
 use bb_core::prelude::*;

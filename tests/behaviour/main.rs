@@ -1,6 +1,5 @@
 //! Whole robots: what a running one does, rule by rule of its documentation.
 
-mod absurd_fixes;
 mod attitude;
 mod bad_journals;
 mod budgets;
@@ -18,7 +17,6 @@ mod discovery;
 mod drivers;
 mod end;
 mod every_message;
-mod external;
 mod failed_starts;
 mod fan_in;
 mod faults;
@@ -31,7 +29,6 @@ mod fragile_readings;
 mod fragile_waiting;
 mod frames;
 mod gate;
-mod good_runs;
 mod guards;
 mod hanging_code;
 mod hardware;

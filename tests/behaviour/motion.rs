@@ -6,11 +6,8 @@ mod limits;
 mod replay;
 mod reports;
 
-use crate::components::{CanEncoder, at};
-use crate::journals::Failure;
+use crate::components::{CanEncoder, Failure, at};
 use bb_core::component::ActuatorError;
-use bb_core::journal::{Entry, JournalReader};
-use bb_core::message::codec::{decode, encode};
 use bb_core::payload::{ActuatorCommand, EndMotion, MotionEnd};
 use bb_core::prelude::*;
 use bb_core::run::{Bus, Execution};
@@ -21,8 +18,7 @@ use bb_estimators::motion::{
 };
 use bb_estimators::simulation::{SimulatedActuatorOptions, SimulatedEncoderOptions, SimulatedWorld};
 use bb_estimators::{SimulatedActuator, SimulatedEncoder};
-use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
 /// A driver of hardware that is not there.
 #[derive(Debug)]

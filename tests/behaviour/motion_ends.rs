@@ -1,13 +1,12 @@
 //! Motions that end because their actuator fails, and code of actuators and commands that panics or hangs.
 
-use crate::components::at;
+use crate::components::{Failure, at, lock};
 use crate::gate::Gate;
-use crate::journals::Failure;
 use bb_core::payload::{EndMotion, MotionEnd};
 use bb_core::prelude::*;
 use bb_core::run::{ActuatorError, ActuatorHandle};
 use bb_core::{DynamicSubscription, Exceeded, JointBounds, JointCommand, OutOfBounds};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
 /// What the driver does wrong, and whether it reports the end of its motion when it is disarmed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -29,11 +28,11 @@ struct Script(Arc<Mutex<(Fails, bool)>>);
 
 impl Script {
     fn set(&self, fails: Fails, reports_end: bool) {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = (fails, reports_end);
+        *lock(&self.0) = (fails, reports_end);
     }
 
     fn get(&self) -> (Fails, bool) {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        *lock(&self.0)
     }
 }
 

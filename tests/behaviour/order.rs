@@ -1,90 +1,20 @@
 //! What comes before what, on many threads; and code that the robot calls, which may call it back.
 
-use crate::components::{Number, within};
+use crate::components::{Ask, Done, Echo, Number, Replied, Servo, Source, lock, when_woken, within};
+use crate::gate::PATIENCE;
 use bb_core::prelude::*;
-use std::future::Future;
-use std::pin::pin;
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, mpsc};
-use std::task::{Context as Polled, Wake, Waker};
-
-const PATIENCE: Duration = Duration::from_secs(20);
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// Says whether what it asked for in `init` came before its first message.
-#[derive(Debug)]
-pub(crate) struct Prepared(bool);
-
-impl Estimator for Prepared {
-    type Options = NoOptions;
-    type Input = Number;
-    type Output = Number;
-
-    fn init(_: NoOptions, context: &Context) -> Result<Self, Fault> {
-        context.request(Request::Continue(1));
-        Ok(Self(false))
-    }
-
-    fn handle_continue(&mut self, _: u32) -> Result<Reply<Number>, Fault> {
-        self.0 = true;
-        Ok(Reply::none())
-    }
-
-    fn handle_input(&mut self, _: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
-        Ok(Reply::emit(Number(if self.0 { 1.0 } else { -1.0 })))
-    }
-}
-
-pub(crate) struct Ask;
-
-impl HandleCall<Ask> for Prepared {
-    type Response = bool;
-    fn handle_call(&mut self, Ask: Ask) -> Result<(bool, Reply<Number>), Fault> {
-        Ok((self.0, Reply::none()))
-    }
-}
-
-/// Always has something.
-#[derive(Debug)]
-pub(crate) struct Eager;
-
-impl Sensor for Eager {
-    type Options = NoOptions;
-    type Output = Number;
-
-    fn init(_: NoOptions, _: &SensorContext) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-
-    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        Ok(Reading::now(Number(1.0)))
-    }
-}
-
-/// Notes what it is told, in order.
-#[derive(Debug)]
-pub(crate) struct Obedient;
+use std::sync::{Arc, Mutex, OnceLock, mpsc};
 
 static DONE: Mutex<Vec<f64>> = Mutex::new(Vec::new());
 
-impl Actuator for Obedient {
-    type Options = NoOptions;
-    type Command = Number;
+fn prepare(context: &Context) -> Done {
+    context.request(Request::Continue(1));
+    Ok(())
+}
 
-    fn init(_: NoOptions, _: &ActuatorContext) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-
-    fn handle_command(&mut self, command: &Stamped<Number>) -> Result<(), Fault> {
-        lock(&DONE).push(command.0);
-        Ok(())
-    }
-
-    fn disarm(&mut self) -> Result<(), Fault> {
-        Ok(())
-    }
+fn is_prepared(kept: &mut f64, _: u32) -> Replied {
+    *kept = 1.0;
+    Ok(Reply::none())
 }
 
 robot! {
@@ -94,19 +24,23 @@ robot! {
     link base {
         joint pan: continuous {
             axis: z;
-            sensor encoder: External<Number>() { estimator position: Prepared(); }
-            actuator motor: Obedient();
+            sensor encoder: External<Number>() { estimator position: Echo(init = prepare, go_on = is_prepared, input = |kept, _| Ok(Reply::emit(Number(*kept)))); }
+            // Notes what it is told, in order.
+            actuator motor: Servo(command = |number| {
+                lock(&DONE).push(number);
+                Ok(())
+            });
             link head { }
         }
-        sensor eager: Eager() { rate: 1 kHz; estimator prepared: Prepared(); }
-        estimator apart: Prepared() { input number: sensor::base::eager; runs_on: worker; }
+        sensor eager: Source(read = |_, _| Ok(Reading::now(Number(1.0)))) { rate: 1 kHz; estimator prepared: Echo(init = prepare, go_on = is_prepared, input = |kept, _| Ok(Reply::emit(Number(*kept)))); }
+        estimator apart: Echo(init = prepare, go_on = is_prepared, input = |kept, _| Ok(Reply::emit(Number(*kept)))) { input number: sensor::base::eager; runs_on: worker; }
     }
 }
 
 #[test]
 fn what_is_asked_for_in_init_comes_before_the_first_message() {
     within(120, || {
-        for _ in 0..50 {
+        for _ in 0..20 {
             let builder = Orderly::builder();
             let near = builder.subscribe(orderly::sensor::base::eager::prepared);
             let apart = builder.subscribe(orderly::estimator::base::apart);
@@ -144,21 +78,6 @@ fn commands_to_an_actuator_are_published_in_the_order_in_which_it_carried_them_o
         let differs = numbers.iter().zip(&done).position(|(told, done)| told != done);
         assert_eq!(differs, None, "the first that was published at another place than it was carried out");
     });
-}
-
-/// Runs a function when it is woken.
-struct Wakes(Mutex<Box<dyn FnMut() + Send>>);
-
-impl Wake for Wakes {
-    fn wake(self: Arc<Self>) {
-        (lock(&self.0))();
-    }
-}
-
-fn when_woken<T: Payload>(subscription: &mut Subscription<T>, run: impl FnMut() + Send + 'static) {
-    let waker = Waker::from(Arc::new(Wakes(Mutex::new(Box::new(run)))));
-    let awaited = pin!(subscription.recv_async());
-    assert!(awaited.poll(&mut Polled::from_waker(&waker)).is_pending());
 }
 
 #[test]
@@ -236,6 +155,6 @@ fn a_subscriber_of_one_robot_may_ask_another_robot() {
             asked.send(answer.map_err(|fault| fault.to_string())).expect("the test waits for it");
         });
         running.publish(orderly::sensor::base::pan::encoder, running.clock().now(), Number(1.0));
-        assert_eq!(is_asked.recv_timeout(PATIENCE), Ok(Ok(true)));
+        assert_eq!(is_asked.recv_timeout(PATIENCE), Ok(Ok(1.0)));
     });
 }

@@ -1,11 +1,10 @@
 //! What commands, controllers and outside code publish at paths of their own.
 
-use crate::components::{Counter, Number};
+use crate::components::{Counter, Doing, Failure, Number, Pulse, Task, Update};
+use crate::replay::{entries, journal};
+use bb_core::DynamicSubscription;
 use bb_core::journal::Event;
 use bb_core::prelude::*;
-use bb_core::{DynamicSubscription, Publisher};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// How far a mission has come.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
@@ -15,46 +14,30 @@ pub(crate) struct Progress {
 }
 
 /// A controller that publishes more than its state.
-#[derive(Debug)]
-pub(crate) struct Planner(Publisher<Progress>);
-
-impl Service for Planner {
-    type Options = NoOptions;
-    type Output = Number;
-
-    fn init(_: NoOptions, context: &ServiceContext) -> Result<Self, Fault> {
-        Ok(Self(context.bus().publisher("mission/plan/progress")?))
-    }
-
-    fn update(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        self.0.publish(Progress { done: 0.5 });
+fn planner(context: &ServiceContext) -> Result<Update, Fault> {
+    let progress = context.bus().publisher("mission/plan/progress")?;
+    Ok(Box::new(move |_| {
+        progress.publish(Progress { done: 0.5 });
         Ok(Reading::nothing())
-    }
+    }))
 }
 
 /// A command that publishes how far it is.
-#[derive(Debug)]
-pub(crate) struct Drive;
-
-impl Command for Drive {
-    type Options = NoOptions;
-    type Arguments = NoArguments;
-    type Output = ();
-
-    async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
+fn drive(context: CommandContext) -> Doing {
+    Box::pin(async move {
         let progress = context.bus().publisher("mission/drive/progress")?;
         for step in 0..3 {
             progress.publish(Progress { done: f64::from(step) / 2.0 });
             context.sleep(Duration::from_millis(10)).await;
         }
         Ok(Outcome::done(()))
-    }
+    })
 }
 
 robot! {
     robot Missionary;
-    commands { arm: Arm; drive: Drive; }
-    controllers { controller planner: Planner() { rate: 10 Hz; } }
+    commands { arm: Arm; drive: Task(run = drive); }
+    controllers { controller planner: Pulse(init = planner) { rate: 10 Hz; } }
     link base { sensor counter: Counter(count = 3) { rate: 100 Hz; } }
 }
 
@@ -67,7 +50,7 @@ fn told(subscription: &DynamicSubscription) -> Vec<(&'static str, i64, f64)> {
 }
 
 #[test]
-fn a_subtree_is_heard_without_being_told_of_its_publishers() -> Result<(), Box<dyn std::error::Error>> {
+fn a_subtree_is_heard_without_being_told_of_its_publishers() -> Result<(), Failure> {
     let builder = Missionary::builder();
     let early = builder.subscribe_any(Select::Below("mission"), None, Overflow::default());
     let by_payload = builder.subscribe_any(Select::All, ["Progress", "Number"], Overflow::default());
@@ -87,7 +70,7 @@ fn a_subtree_is_heard_without_being_told_of_its_publishers() -> Result<(), Box<d
 }
 
 #[test]
-fn outside_code_publishes_and_is_listed() -> Result<(), Box<dyn std::error::Error>> {
+fn outside_code_publishes_and_is_listed() -> Result<(), Failure> {
     let mut simulation = Missionary::builder().simulate()?;
     let bus = simulation.bus();
     let all = simulation.subscribe_any(Select::Path("radio/link"), None, Overflow::default());
@@ -145,98 +128,20 @@ fn a_path_of_the_robot_is_refused() -> Result<(), StartError> {
     Ok(())
 }
 
-/// Publishes at a path of its own as fast as it can while the journal's sink is slow: how many messages it has got rid of.
-#[test]
-fn a_publisher_at_a_path_of_its_own_waits_for_a_journal_whose_sink_is_slow()
--> Result<(), Box<dyn std::error::Error>> {
-    const MESSAGES: u64 = 100_000;
-    let (is_slow, published) = (Arc::new(AtomicBool::new(true)), Arc::new(AtomicU64::new(0)));
-    let (lines, slow) = (Arc::new(AtomicU64::new(0)), Arc::clone(&is_slow));
-    let written = Arc::clone(&lines);
-    let mut builder = Missionary::builder();
-    builder.journal(move |line| {
-        if slow.load(Ordering::SeqCst) {
-            std::thread::sleep(Duration::from_millis(20));
-        }
-        written.fetch_add(u64::from(matches!(line.event, Event::Own { .. })), Ordering::SeqCst);
-    });
-    let running = builder.start()?;
-    let (radio, counted) = (running.bus().publisher::<Progress>("radio/link")?, Arc::clone(&published));
-    let publishes = std::thread::spawn(move || {
-        for _ in 0..MESSAGES {
-            radio.publish(Progress { done: 0.0 });
-            counted.fetch_add(1, Ordering::SeqCst);
-        }
-    });
-    let start = std::time::Instant::now();
-    while published.load(Ordering::SeqCst) < 65_000 {
-        assert!(start.elapsed() < Duration::from_secs(60));
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    // Time enough to publish the rest, for one that does not wait.
-    std::thread::sleep(Duration::from_millis(1000));
-    let before = published.load(Ordering::SeqCst);
-    is_slow.store(false, Ordering::SeqCst);
-    assert!(before < 70_000, "it did not wait: {before}");
-    publishes.join().expect("it does not panic");
-    let report = running.stop();
-    assert!(report.faults.is_empty(), "{:?}", report.faults);
-    // The planner's own message is one of them.
-    assert_eq!(
-        lines.load(Ordering::SeqCst),
-        MESSAGES + report.topic("mission/plan/progress").map_or(0, |topic| topic.published)
-    );
-    Ok(())
-}
-
 /// Topics of a report, and how much was published there.
 fn rows(report: &bb_core::Report) -> Vec<(&'static str, &'static str, u64)> {
     report.topics.iter().map(|topic| (topic.path, topic.payload, topic.published)).collect()
 }
 
-#[test]
-fn a_replay_reports_paths_at_which_nothing_was_published_too() -> Result<(), Box<dyn std::error::Error>> {
-    let lines = Arc::new(std::sync::Mutex::new(Vec::new()));
-    let sink = Arc::clone(&lines);
-    let mut builder = Missionary::builder();
-    builder.journal(move |line| sink.lock().expect("it does not panic").push(line));
-    let mut simulation = builder.simulate()?;
-    let bus = simulation.bus();
-    let _silent = bus.publisher::<Progress>("radio/silent")?;
-    let loud = bus.publisher::<Number>("radio/loud")?;
-    let _again = bus.publisher::<Progress>("radio/silent")?;
-    simulation.run_for(Duration::from_millis(5));
-    loud.publish(Number(1.0));
-    simulation.run_for(Duration::from_millis(5));
-    let report = simulation.stop();
-    let first = rows(&report);
-    for row in
-        [("radio/silent", "Progress", 0), ("radio/loud", "Number", 1), ("mission/plan/progress", "Progress", 1)]
-    {
-        assert!(first.contains(&row), "{first:?}");
-    }
-    let lines = std::mem::take(&mut *lines.lock().expect("it does not panic"));
-    let silent = |line: &&bb_core::journal::Entry| {
-        matches!(line.event, Event::OwnPublisher { path: "radio/silent", payload: "Progress" })
-    };
-    assert_eq!(lines.iter().filter(silent).count(), 1, "once");
-    let mut replay = Missionary::builder().replay()?;
-    replay.play(lines)?;
-    assert_eq!(rows(&replay.stop()), first);
-    Ok(())
-}
-
-/// More paths than a robot may have at once, those that nobody uses make room. A replay reports the same ones, with the same counts,
+/// What was published at nowhere is reported too. More paths than a robot may have at once, those that nobody uses make room. A replay reports the same ones, with the same counts,
 /// whether somebody uses them there or not.
 #[test]
-fn a_replay_reports_the_paths_that_made_room_no_more() -> Result<(), Box<dyn std::error::Error>> {
-    let lines = Arc::new(std::sync::Mutex::new(Vec::new()));
-    let sink = Arc::clone(&lines);
+fn a_replay_reports_the_paths_that_made_room_no_more() -> Result<(), Failure> {
     let mut builder = Missionary::builder();
-    builder.journal(move |line| sink.lock().expect("it does not panic").push(line));
+    let lines = journal(&mut builder);
     let simulation = builder.simulate()?;
     let bus = simulation.bus();
-    let _silent = bus.publisher::<Progress>("own/silent")?;
+    let _silent = [bus.publisher::<Progress>("own/silent")?, bus.publisher::<Progress>("own/silent")?];
     let back = bus.publisher::<Number>("own/back")?;
     (0..3).for_each(|_| back.publish(Number(1.0)));
     drop(back);
@@ -258,7 +163,11 @@ fn a_replay_reports_the_paths_that_made_room_no_more() -> Result<(), Box<dyn std
     }
     assert!(first.contains(&("many/7", "Number", 1)) && first.contains(&("many/2999", "Progress", 0)));
     assert!(!first.iter().any(|(path, ..)| *path == "many/0"));
-    let lines = std::mem::take(&mut *lines.lock().expect("it does not panic"));
+    let lines = entries(&lines);
+    let silent = |line: &&bb_core::journal::Entry| {
+        matches!(line.event, Event::OwnPublisher { path: "own/silent", payload: "Progress" })
+    };
+    assert_eq!(lines.iter().filter(silent).count(), 1, "once");
     for is_used in [false, true] {
         let mut replay = Missionary::builder().replay()?;
         let used = is_used.then(|| replay.bus().publisher::<Number>("own/back")).transpose()?;

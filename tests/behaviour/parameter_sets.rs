@@ -1,30 +1,22 @@
 //! Parameters that are set at once: all of them, or none.
 
-use crate::components::{Number, within};
-use crate::journals::Failure;
+use crate::components::{Doing, Failure, Number, Task, lock, within};
 use crate::parameters::{Bound, Which};
+use crate::replay::{entries, journal, read_back};
 use bb_core::EstimatorHandle;
 use bb_core::event::{ParameterChange, ParameterValue};
-use bb_core::journal::{Entry, Event, JournalReader};
-use bb_core::message::codec::{decode, encode};
+use bb_core::journal::Event;
 use bb_core::prelude::*;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
 
 /// Sets two parameters of which the second may be refused.
-#[derive(Debug)]
-pub(crate) struct SetBoth;
-
-impl Command for SetBoth {
-    type Options = NoOptions;
-    type Arguments = NoArguments;
-    type Output = ();
-
-    async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
+fn set_both(context: CommandContext) -> Doing {
+    Box::pin(async move {
         context.set_parameters([("param/gain", 7.0.into()), ("param/count", 7.into())])?;
         context.bus().set_parameters([("param/count", 8.into()), ("param/gain", 1e8.into())])?;
         Ok(Outcome::done(()))
-    }
+    })
 }
 
 robot! {
@@ -33,8 +25,10 @@ robot! {
         gain: f64 = 1.0, range: 0.0..=1000000000.0;
         count: i64 = 1;
         name: String = "one";
+        share: f64 = 0.25, range: -0.5..=0.75;
+        level: i64 = 1, range: -3..=4;
     }
-    commands { set_both: SetBoth() { allowed_states: [disarmed]; } }
+    commands { set_both: Task(run = set_both) { allowed_states: [disarmed]; } }
     link base {
         sensor number: External<Number>() { estimator bound: Bound(gain = param::gain, count = param::count); }
     }
@@ -162,10 +156,8 @@ fn a_set_is_seen_as_a_whole() {
 
 #[test]
 fn a_set_is_one_entry_of_the_journal_and_the_same_in_a_replay() -> Result<(), Failure> {
-    let lines = Arc::new(Mutex::new(Vec::<Entry>::new()));
     let mut builder = Mixer::builder();
-    let sink = Arc::clone(&lines);
-    builder.journal(move |entry| sink.lock().unwrap_or_else(PoisonError::into_inner).push(entry));
+    let lines = journal(&mut builder);
     let mut simulation = builder.simulate()?;
     let all = simulation.subscribe_any(Select::Below("param"), None, Overflow::default());
     simulation.run_for(Duration::from_millis(10));
@@ -177,56 +169,37 @@ fn a_set_is_one_entry_of_the_journal_and_the_same_in_a_replay() -> Result<(), Fa
     let first = changes(&all);
     assert_eq!(first.len(), 3);
 
-    let mut lines = std::mem::take(&mut *lines.lock().unwrap_or_else(PoisonError::into_inner));
-    lines.sort_by_key(|line| line.number);
+    let lines = entries(&lines);
     let sizes = lines.iter().filter_map(|line| match &line.event {
         Event::Parameters { changes } => Some(changes.len()),
         _ => None,
     });
     assert_eq!(sizes.collect::<Vec<_>>(), [2, 1]);
-    let reader = JournalReader::<Mixer>::default();
-    let read: Result<Vec<Entry>, Failure> = lines
-        .iter()
-        .map(|line| {
-            let mut bytes = Vec::new();
-            encode(line, &mut bytes);
-            Ok(reader.entry(&decode(&bytes)?)?)
-        })
-        .collect();
     let mut replay = Mixer::builder().replay()?;
     let all = replay.subscribe_any(Select::Below("param"), None, Overflow::default());
-    replay.play(read?)?;
+    replay.play(read_back::<Mixer>(&lines)?)?;
     assert_eq!(values(&replay), (4.0, 2, "one".to_owned()));
     assert_eq!(changes(&all), first);
     replay.stop();
     Ok(())
 }
 
-robot! {
-    robot Ranged;
-    parameters {
-        share: f64 = 0.25, range: -0.5..=0.75;
-        level: i64 = 1, range: -3..=4;
-    }
-    link base { sensor number: External<Number>(); }
-}
-
 /// A parameter may have each end of its range and not the next number beyond it, alone or among others.
 #[test]
 fn the_ends_of_a_range_belong_to_it() -> Result<(), Failure> {
-    let simulation = Ranged::builder().simulate()?;
-    let values = || (simulation.parameter(ranged::param::share), simulation.parameter(ranged::param::level));
+    let simulation = Mixer::builder().simulate()?;
+    let values = || (simulation.parameter(mixer::param::share), simulation.parameter(mixer::param::level));
     for (share, level) in [(-0.5, -3), (0.75, 4)] {
         simulation.set_parameters([("param/share", share.into()), ("param/level", level.into())])?;
         assert_eq!(values(), (share, level));
         let beyond: f64 = share.signum() * share.abs().next_up();
         for wrong in [beyond, f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-            assert!(simulation.set_parameter(ranged::param::share, wrong).is_err(), "{wrong}");
+            assert!(simulation.set_parameter(mixer::param::share, wrong).is_err(), "{wrong}");
             let set = [("param/level", 0.into()), ("param/share", wrong.into())];
             assert!(simulation.set_parameters(set).is_err(), "{wrong}");
         }
         for wrong in [level + level.signum(), i64::MIN, i64::MAX] {
-            assert!(simulation.set_parameter(ranged::param::level, wrong).is_err(), "{wrong}");
+            assert!(simulation.set_parameter(mixer::param::level, wrong).is_err(), "{wrong}");
             let set = [("param/share", 0.0.into()), ("param/level", wrong.into())];
             assert!(simulation.set_parameters(set).is_err(), "{wrong}");
         }
@@ -264,7 +237,7 @@ impl Sensor for Tuning {
     fn init(options: SlowOptions, context: &SensorContext) -> Result<Self, Fault> {
         let refused = context.bus().set_parameter("param/gain", 50.0).is_err();
         context.bus().set_parameter("param/gain", 5.0)?;
-        let mut tuned = TUNED.lock().map_err(|_| "it panicked")?;
+        let mut tuned = lock(&TUNED);
         *tuned = (vec![options.gain], Some(refused));
         Ok(Self)
     }
@@ -274,7 +247,7 @@ impl Sensor for Tuning {
     }
 
     fn handle_options(&mut self, options: SlowOptions, _: &SensorContext) -> Result<(), Fault> {
-        TUNED.lock().map_err(|_| "it panicked")?.0.push(options.gain);
+        lock(&TUNED).0.push(options.gain);
         Ok(())
     }
 }
@@ -289,10 +262,10 @@ static ALONE: Mutex<()> = Mutex::new(());
 
 #[test]
 fn what_a_sensor_sets_as_it_starts_reaches_its_own_options() -> Result<(), Failure> {
-    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let _alone = lock(&ALONE);
     let mut simulation = SelfTuned::builder().simulate()?;
     simulation.run_for(Duration::from_millis(50));
-    assert_eq!(*TUNED.lock().map_err(|_| "it panicked")?, (vec![1.0, 5.0], Some(true)));
+    assert_eq!(*lock(&TUNED), (vec![1.0, 5.0], Some(true)));
     simulation.stop().ok()?;
     Ok(())
 }
@@ -300,7 +273,7 @@ fn what_a_sensor_sets_as_it_starts_reaches_its_own_options() -> Result<(), Failu
 #[test]
 fn a_set_does_not_wait_for_an_end_of_sets_of_other_parameters() {
     within(60, || {
-        let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+        let _alone = lock(&ALONE);
         let running = SelfTuned::builder().start().expect("it starts");
         let is_over = AtomicBool::new(false);
         std::thread::scope(|scope| {

@@ -1,9 +1,8 @@
 //! Parameters that are set from everywhere at once.
 
-use crate::components::{Number, within};
+use crate::components::{Doing, Failure, Number, Pulse, Task, Update, within};
 use bb_core::event::ParameterValue;
 use bb_core::prelude::*;
-use bb_core::{Bus, DynamicSubscription};
 
 /// Options that a parameter can be bound to in every way.
 #[derive(Clone, Debug, Options)]
@@ -49,45 +48,30 @@ impl HandleCall<Which> for Bound {
 }
 
 /// Sets the gain a thousand times.
-#[derive(Debug)]
-pub(crate) struct Tune;
-
-impl Command for Tune {
-    type Options = NoOptions;
-    type Arguments = NoArguments;
-    type Output = ();
-
-    async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
+fn tune(context: CommandContext) -> Doing {
+    Box::pin(async move {
         for round in 0..1000 {
             context.set_parameter("param/gain", f64::from(round))?;
         }
         Ok(Outcome::done(()))
-    }
+    })
 }
 
 /// Sets the gain at every turn.
-pub(crate) struct Knob(Bus, f64);
-
-impl Service for Knob {
-    type Options = NoOptions;
-    type Output = Number;
-
-    fn init(_: NoOptions, context: &ServiceContext) -> Result<Self, Fault> {
-        Ok(Self(context.bus().clone(), 0.0))
-    }
-
-    fn update(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        self.1 += 1.0;
-        self.0.set_parameter("param/gain", self.1)?;
-        Ok(Reading::now(Number(self.1)))
-    }
+fn knob(context: &ServiceContext) -> Result<Update, Fault> {
+    let (bus, mut turns) = (context.bus().clone(), 0.0);
+    Ok(Box::new(move |_| {
+        turns += 1.0;
+        bus.set_parameter("param/gain", turns)?;
+        Ok(Reading::now(Number(turns)))
+    }))
 }
 
 robot! {
     robot Tuned;
     parameters { gain: f64 = 1.0; timeout: f64 = 0.5 s; count: i64 = 7; }
-    commands { tune: Tune { allowed_states: [disarmed]; } }
-    bridges { bridge knob: Knob() { rate: 1 kHz; } }
+    commands { tune: Task(run = tune) { allowed_states: [disarmed]; } }
+    bridges { bridge knob: Pulse(init = knob) { rate: 1 kHz; } }
     link base {
         sensor number: External<Number>() {
             estimator bound: Bound(gain = param::gain, timeout = param::timeout, count = param::count);
@@ -130,7 +114,7 @@ fn changes_are_published_in_their_order_and_the_last_one_holds() {
 }
 
 #[test]
-fn what_an_option_cannot_hold_becomes_the_nearest_it_can() -> Result<(), Box<dyn std::error::Error>> {
+fn what_an_option_cannot_hold_becomes_the_nearest_it_can() -> Result<(), Failure> {
     let simulation = Tuned::builder().simulate()?;
     let ask = |simulation: &Simulation<Tuned>| simulation.call(BOUND, Which).map_err(|fault| fault.to_string());
     assert_eq!(ask(&simulation)?, (1.0, Some(Duration::from_millis(500)), 7));
@@ -147,35 +131,4 @@ fn what_an_option_cannot_hold_becomes_the_nearest_it_can() -> Result<(), Box<dyn
     simulation.run_for(Duration::from_micros(10));
     assert_eq!((ask(&simulation)?.1, ask(&simulation)?.2), (Some(Duration::MAX), 0));
     Ok(())
-}
-
-#[test]
-fn subscribers_by_path_may_come_and_go_while_others_publish() {
-    within(60, || {
-        const EACH: u64 = 20_000;
-        let builder = Tuned::builder();
-        let path = tuned::sensor::base::number.path();
-        let slow = builder.subscribe_any(Select::Path(path), None, Overflow::DropOldest { capacity: 100 });
-        let running = builder.start().expect("it starts");
-        let tap = || running.subscribe_any(Select::All, None, Overflow::DropOldest { capacity: 10 });
-        std::thread::scope(|scope| {
-            for _ in 0..2 {
-                scope.spawn(|| {
-                    for number in 0..EACH {
-                        let time = running.clock().now();
-                        running.publish(tuned::sensor::base::number, time, Number(number as f64));
-                    }
-                });
-            }
-            let mut taps: Vec<DynamicSubscription> = Vec::new();
-            for round in 0..2000 {
-                taps.push(tap());
-                taps.drain(..if round % 5 == 4 { 5 } else { 0 }).for_each(drop);
-            }
-        });
-        assert_eq!(slow.drain().count() as u64 + slow.lagged(), 2 * EACH);
-        let report = running.stop();
-        let topic = report.topic(path).expect("it is declared");
-        assert_eq!((topic.published, topic.subscribers), (2 * EACH, 0));
-    });
 }

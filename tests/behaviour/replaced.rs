@@ -1,15 +1,14 @@
 //! Estimators that others take the place of: what stays, what is refused, and what a replay says to it.
 
-use crate::components::{Counter, Number, Scale, ScaleOptions, at};
+use crate::components::{
+    Ask, Counter, CounterOptions, Echo, Failure, Number, Pulse, PulseOptions, Scale, ScaleOptions, at, numbers,
+};
 use crate::joints::{Pixel, Spot, Spotter};
-use crate::replay::{Lines, overflow};
+use crate::replay::{entries, journal, overflow};
 use bb_core::Builder;
 use bb_core::component::InputTransforms;
 use bb_core::prelude::*;
 use bb_core::topology::GraphFormat;
-use std::sync::{Arc, PoisonError};
-
-type Failure = Box<dyn std::error::Error>;
 
 /// Options of [`Ramp`].
 #[derive(Clone, Debug, Options)]
@@ -101,67 +100,17 @@ impl Estimator for Fixed {
     }
 }
 
-/// Adds up, and takes requests.
-#[derive(Debug)]
-struct Asked;
-
-impl Estimator for Asked {
-    type Options = NoOptions;
-    type Input = Number;
-    type Output = Number;
-
-    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-
-    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
-        Ok(Reply::emit(number.payload))
-    }
-}
-
-struct Ask;
-
-impl HandleCall<Ask> for Asked {
-    type Response = u32;
-    fn handle_call(&mut self, Ask: Ask) -> Result<(u32, Reply<Number>), Fault> {
-        Ok((1, Reply::none()))
-    }
-}
-
-impl HandleCast<Ask> for Asked {
-    fn handle_cast(&mut self, Ask: Ask) -> Result<Reply<Number>, Fault> {
-        Ok(Reply::emit(Number(1.0)))
-    }
-}
-
-/// Publishes nothing.
-#[derive(Debug)]
-struct Quiet;
-
-impl Service for Quiet {
-    type Options = NoOptions;
-    type Output = Number;
-
-    fn init(_: NoOptions, _: &ServiceContext) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-
-    fn update(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        Ok(Reading::nothing())
-    }
-}
-
 robot! {
     robot Bench;
 
-    parameters { factor: f64 = 2.0, range: 0.0..=10.0; }
-    controllers { controller idle: Quiet() { rate: 10 Hz; } }
+    parameters { factor: f64 = 2.0, range: 0.0..=1000000.0; }
+    controllers { controller idle: Pulse() { rate: 10 Hz; } }
 
     link base {
         sensor count: Counter(count = 6) {
             rate: 100 Hz;
             estimator scaled: Scale(factor = param::factor) { lost_after: 20 ms; recover_after: 2; }
-            estimator asked: Asked();
+            estimator asked: Echo();
         }
         estimator last: Scale(factor = 10.0) { input number: sensor::base::count::scaled; }
     }
@@ -225,14 +174,14 @@ fn a_replacement_has_the_health_and_the_supervision_of_what_is_declared() -> Res
 fn requests_to_a_replaced_estimator_are_refused_and_do_not_fail_it() -> Result<(), Failure> {
     let mut builder = Bench::builder();
     builder.replace_estimator::<Scale>("sensor/base/count/asked", ScaleOptions { factor: 5.0 })?;
-    let numbers = builder.subscribe(bench::sensor::base::count::asked);
+    let asked_numbers = builder.subscribe(bench::sensor::base::count::asked);
     let mut simulation = builder.simulate()?;
     let refused = "sensor/base/count/asked is replaced, and its replacement takes no requests";
     let asked = bench::sensor::base::count::asked;
     assert_eq!(simulation.call(asked, Ask).expect_err("it is replaced").to_string(), refused);
-    assert_eq!(simulation.cast(asked, Ask).expect_err("it is replaced").to_string(), refused);
+    assert_eq!(simulation.cast(asked, Number(1.0)).expect_err("it is replaced").to_string(), refused);
     simulation.run_until(at(15));
-    assert_eq!(numbers.drain().map(|number| number.0).collect::<Vec<_>>(), [0.0, 5.0]);
+    assert_eq!(numbers(&asked_numbers), [0.0, 5.0]);
     simulation.stop().ok()?;
     Ok(())
 }
@@ -246,7 +195,7 @@ fn a_replacement_that_does_not_fit_keeps_the_robot_from_starting() -> Result<(),
         "no estimator is at `sensor/base/count/scald`; did you mean `sensor/base/count/scaled`?"
     );
     assert!(builder.replace_estimator::<Ramp>("sensor/base/count", RampOptions::defaults()).is_err());
-    assert!(builder.replace_sensor::<Counter>(SCALED, crate::components::CounterOptions::defaults()).is_err());
+    assert!(builder.replace_sensor::<Counter>(SCALED, CounterOptions::defaults()).is_err());
 
     builder.replace_estimator::<Fixed>(SCALED, NoOptions)?;
     let error = builder.simulate().expect_err("other payloads").to_string();
@@ -309,64 +258,27 @@ fn options_of_what_is_replaced_are_not_looked_at() -> Result<(), Failure> {
     assert_eq!(error, "sensor/base/device cannot start: there is no such device");
 
     let mut builder = Desk::builder();
-    builder.replace_sensor::<Counter>("sensor/base/device", crate::components::CounterOptions::defaults())?;
+    builder.replace_sensor::<Counter>("sensor/base/device", CounterOptions::defaults())?;
     builder.simulate()?.stop().ok()?;
 
     // A parameter that is out of range for them only: as the declared one's gain it is refused.
-    let simulation = Tuned::builder().simulate()?;
-    assert!(simulation.set_parameter(tuned::param::gain, 20.0).is_err());
+    let simulation = Bench::builder().simulate()?;
+    assert!(simulation.set_parameter(bench::param::factor, 2000.0).is_err());
     drop(simulation);
-    let mut builder = Tuned::builder();
-    builder.replace_estimator::<Ramp>("sensor/base/count/scaled", RampOptions::defaults())?;
+    let mut builder = Bench::builder();
+    builder.replace_estimator::<Ramp>(SCALED, RampOptions::defaults())?;
     let simulation = builder.simulate()?;
-    assert_eq!(simulation.set_parameter(tuned::param::gain, 20.0), Ok(()));
+    assert_eq!(simulation.set_parameter(bench::param::factor, 2000.0), Ok(()));
     simulation.stop().ok()?;
 
     // Also before the start.
-    let mut builder = Tuned::builder();
-    assert!(builder.set_parameter(tuned::param::gain, 20.0).is_err());
-    builder.replace_estimator::<Ramp>("sensor/base/count/scaled", RampOptions::defaults())?;
-    builder.set_parameter(tuned::param::gain, 20.0)?;
-    builder.set("param/gain", "30.0")?;
-    assert_eq!(builder.simulate()?.parameter(tuned::param::gain), 30.0);
+    let mut builder = Bench::builder();
+    assert!(builder.set_parameter(bench::param::factor, 2000.0).is_err());
+    builder.replace_estimator::<Ramp>(SCALED, RampOptions::defaults())?;
+    builder.set_parameter(bench::param::factor, 2000.0)?;
+    builder.set("param/factor", "3000.0")?;
+    assert_eq!(builder.simulate()?.parameter(bench::param::factor), 3000.0);
     Ok(())
-}
-
-/// Takes gains up to 10 only.
-#[derive(Clone, Debug, Options)]
-struct GainOptions {
-    /// Factor.
-    #[option(default = 1.0, range = 0.0..=10.0)]
-    gain: f64,
-}
-
-/// Multiplies by its gain.
-#[derive(Debug)]
-struct Gained(f64);
-
-impl Estimator for Gained {
-    type Options = GainOptions;
-    type Input = Number;
-    type Output = Number;
-
-    fn init(options: GainOptions, _: &Context) -> Result<Self, Fault> {
-        Ok(Self(options.gain))
-    }
-
-    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
-        Ok(Reply::emit(Number(number.0 * self.0)))
-    }
-}
-
-robot! {
-    robot Tuned;
-    parameters { gain: f64 = 2.0, range: 0.0..=100.0; }
-    link base {
-        sensor count: Counter(count = 6) {
-            rate: 100 Hz;
-            estimator scaled: Gained(gain = param::gain);
-        }
-    }
 }
 
 /// `robot!` checks that the declared estimator handles moving joints; of a replacement, the start does.
@@ -398,7 +310,7 @@ fn a_replacement_across_moving_joints_has_to_handle_them() -> Result<(), Failure
 #[test]
 fn replacements_are_marked_where_the_robot_is_described() -> Result<(), Failure> {
     let mut builder = replaced(RampOptions::defaults())?;
-    builder.replace_service::<Quiet>("controller/idle", NoOptions)?;
+    builder.replace_service::<Pulse>("controller/idle", PulseOptions::defaults())?;
     let simulation = builder.simulate()?;
     let bus = simulation.bus();
     let description = bus.description();
@@ -419,15 +331,13 @@ fn replacements_are_marked_where_the_robot_is_described() -> Result<(), Failure>
 #[test]
 fn a_journal_is_replayed_with_the_same_replacements_only() -> Result<(), Failure> {
     let options = || RampOptions { step: 0.5, fails_at: 4 };
-    let lines = Lines::default();
     let mut builder = replaced(options())?;
-    let sink = Arc::clone(&lines);
-    builder.journal(move |line| sink.lock().unwrap_or_else(PoisonError::into_inner).push(line));
+    let lines = journal(&mut builder);
     let all = builder.subscribe_any(Select::Below("sensor"), None, overflow());
     let mut simulation = builder.simulate()?;
     simulation.run_until(at(100));
     simulation.stop();
-    let entries = std::mem::take(&mut *lines.lock().unwrap_or_else(PoisonError::into_inner));
+    let entries = entries(&lines);
     let numbers = |all: &bb_core::DynamicSubscription| -> Vec<_> {
         let number = |message: bb_core::DynamicMessage| message.downcast::<Number>().map(|number| number.0);
         all.drain().map(|message| (message.path(), message.stamp(), number(message))).collect()

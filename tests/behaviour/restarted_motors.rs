@@ -1,10 +1,10 @@
 //! Hardware that a restart, or a change of options, starts while the robot is being disarmed.
 
-use crate::components::{Number, within};
-use crate::gate::{Brake, Brakes, Gate};
+use crate::components::{Done, Number, Servo, Source, lock, within};
+use crate::gate::{Gate, wait_until};
 use bb_core::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard};
 
 /// The devices of these tests are there once.
 static ALONE: Mutex<()> = Mutex::new(());
@@ -15,35 +15,11 @@ static MADE: AtomicU32 = AtomicU32::new(0);
 static CHANGED: AtomicU32 = AtomicU32::new(0);
 
 fn alone() -> MutexGuard<'static, ()> {
-    let alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let alone = lock(&ALONE);
     MADE.store(0, Ordering::SeqCst);
     CHANGED.store(0, Ordering::SeqCst);
     TURNS.store(false, Ordering::SeqCst);
     alone
-}
-
-/// Has its torque on from `init` on.
-#[derive(Debug)]
-pub(crate) struct Servo;
-
-impl Actuator for Servo {
-    type Options = NoOptions;
-    type Command = Number;
-
-    fn init(_: NoOptions, _: &ActuatorContext) -> Result<Self, Fault> {
-        TURNS.store(true, Ordering::SeqCst);
-        MADE.fetch_add(1, Ordering::SeqCst);
-        Ok(Self)
-    }
-
-    fn handle_command(&mut self, _: &Stamped<Number>) -> Result<(), Fault> {
-        Err(Fault::new("the cable is loose"))
-    }
-
-    fn disarm(&mut self) -> Result<(), Fault> {
-        TURNS.store(false, Ordering::SeqCst);
-        Ok(())
-    }
 }
 
 #[derive(Clone, Debug, Options)]
@@ -81,22 +57,37 @@ impl Sensor for Fan {
     }
 }
 
-/// Takes as long as the gate is closed.
-#[derive(Debug)]
-pub(crate) struct AtGate;
-
-impl Brakes for AtGate {
-    fn brake() -> Result<(), Fault> {
+/// A disarm callback takes as long as the gate is closed.
+fn brake(context: &SensorContext) -> Done {
+    context.on_disarm(|| {
         GATE.pass("brake");
         Ok(())
-    }
+    });
+    Ok(())
+}
+
+/// Has its torque on from here on.
+fn torque_on(_: &ActuatorContext) -> Done {
+    TURNS.store(true, Ordering::SeqCst);
+    MADE.fetch_add(1, Ordering::SeqCst);
+    Ok(())
+}
+
+fn torque_off(_: f64) -> Done {
+    TURNS.store(false, Ordering::SeqCst);
+    Ok(())
 }
 
 robot! {
     robot Stiff;
     link base {
-        sensor brake: Brake<AtGate>() { rate: 10 Hz; }
-        joint pan: continuous { axis: z; actuator servo: Servo(); sensor encoder: External<Number>(); link head {} }
+        sensor brake: Source(init = brake) { rate: 10 Hz; }
+        joint pan: continuous {
+            axis: z;
+            actuator servo: Servo(init = torque_on, command = |_| Err(Fault::new("the cable is loose")), disarm = torque_off);
+            sensor encoder: External<Number>();
+            link head {}
+        }
     }
 }
 
@@ -104,7 +95,7 @@ robot! {
     robot Windy;
     parameters { speed: f64 = 1.0, range: 0.0..=10.0; }
     link base {
-        sensor brake: Brake<AtGate>() { rate: 10 Hz; }
+        sensor brake: Source(init = brake) { rate: 10 Hz; }
         sensor fan: Fan(speed = param::speed) { rate: 100 Hz; }
     }
 }
@@ -121,9 +112,7 @@ fn an_actuator_that_restarts_while_the_robot_is_disarmed_is_disarmed_once_more()
         let disarms = std::thread::spawn(move || live.disarm());
         GATE.wait_for(1);
         // Its backoff is over: it is made again.
-        while MADE.load(Ordering::SeqCst) < 2 {
-            std::thread::sleep(Duration::from_millis(1));
-        }
+        wait_until("it is made again", || MADE.load(Ordering::SeqCst) == 2);
         GATE.open();
         assert_eq!(disarms.join().expect("it does not panic"), Ok(()));
         assert!(!TURNS.load(Ordering::SeqCst), "its torque is off");
@@ -142,12 +131,8 @@ fn what_a_change_of_options_starts_while_the_robot_is_disarmed_is_stopped() {
         // The callback runs while the options are changed, which is over after the disarming.
         assert_eq!(robot.disarm(), Ok(()));
         GATE.open();
-        while CHANGED.load(Ordering::SeqCst) == 0 {
-            std::thread::yield_now();
-        }
-        while TURNS.load(Ordering::SeqCst) {
-            std::thread::yield_now();
-        }
+        wait_until("its options are changed", || CHANGED.load(Ordering::SeqCst) == 1);
+        wait_until("it is stopped", || !TURNS.load(Ordering::SeqCst));
         assert_eq!(robot.stop().safety, Safety::Disarmed);
     });
 }

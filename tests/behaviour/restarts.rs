@@ -1,98 +1,70 @@
 //! What a restart leaves alone, what it resets, and what becomes of those who fail in an unusual way.
 
-use crate::components::{Counter, Number, at, within};
+use crate::components::{
+    Break, Counter, Done, Echo, Number, Read, Replied, Servo, Source, Task, at, lock, numbers, within,
+};
+use crate::gate::{Gate, PATIENCE};
 use bb_core::HealthTransition;
 use bb_core::prelude::*;
 use bb_core::run::DropReason;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Mutex, MutexGuard};
 
-const PATIENCE: Duration = Duration::from_secs(20);
-
-/// The device of these tests is there once.
-static ALONE: Mutex<()> = Mutex::new(());
-
+/// The devices of these tests are there once.
 fn alone() -> MutexGuard<'static, ()> {
-    ALONE.lock().unwrap_or_else(PoisonError::into_inner)
+    static ALONE: Mutex<()> = Mutex::new(());
+    lock(&ALONE)
 }
 
 /// Is unplugged from 0.5 s to 2 s.
-#[derive(Debug)]
-pub(crate) struct Plugged;
-
-impl Sensor for Plugged {
-    type Options = NoOptions;
-    type Output = Number;
-
-    fn init(_: NoOptions, _: &SensorContext) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-
-    fn read(&mut self, now: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        if (at(500)..at(2000)).contains(&now) {
-            return Err(Fault::new("unplugged"));
-        }
-        Ok(Reading::now(Number(1.0)))
-    }
+fn unplugged(_: u32, now: MonotonicTime) -> Read {
+    if (at(500)..at(2000)).contains(&now) { Err(Fault::new("unplugged")) } else { Ok(Reading::now(Number(1.0))) }
 }
 
 /// Counts its messages, and says how many there were.
-#[derive(Debug)]
-pub(crate) struct Tally(f64);
-
-impl Estimator for Tally {
-    type Options = NoOptions;
-    type Input = Number;
-    type Output = Number;
-
-    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
-        Ok(Self(0.0))
-    }
-
-    fn handle_input(&mut self, _: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
-        self.0 += 1.0;
-        Ok(Reply::emit(Number(self.0)))
-    }
-}
-
-/// Does nothing.
-#[derive(Debug)]
-pub(crate) struct Note;
-
-impl Command for Note {
-    type Options = NoOptions;
-    type Arguments = NoArguments;
-    type Output = ();
-
-    async fn run(_: NoOptions, _: NoArguments, _: CommandContext) -> Result<Outcome<()>, Fault> {
-        Ok(Outcome::done(()))
-    }
+fn tally(count: &mut f64, _: f64) -> Replied {
+    *count += 1.0;
+    Ok(Reply::emit(Number(*count)))
 }
 
 robot! {
-    robot Cable;
+    robot Workshop;
 
     commands {
-        alarm: Note { allowed_states: [disarmed, idle, executing]; }
-        calm: Note { allowed_states: [disarmed, idle, executing]; }
+        alarm: Task { allowed_states: [disarmed, idle, executing]; }
+        calm: Task { allowed_states: [disarmed, idle, executing]; }
     }
 
     link base {
-        sensor plugged: Plugged() {
+        sensor plugged: Source(read = unplugged) {
             rate: 100 Hz;
-            estimator pose: Tally() { lost_after: 100 ms; recover_after: 3; on_lost: alarm; on_recovered: calm; }
+            estimator pose: Echo(input = tally) { lost_after: 100 ms; recover_after: 3; on_lost: alarm; on_recovered: calm; }
         }
-        sensor beside: Counter(count = 100000) { rate: 100 Hz; estimator tally: Tally(); }
+        sensor startled: Source(starts_at = startled, read = |_, _| Ok(Reading::now(Number(1.0)))) { rate: 100 Hz; }
+        sensor beside: Counter(count = 100000) { rate: 100 Hz; estimator tally: Echo(input = tally); }
+        sensor number: External<Number>() { estimator panicky: Echo(input = panic); }
+        sensor near: External<Number>() { estimator near: Echo(input = fail); }
+        sensor other: External<Number>();
+        estimator apart: Echo(input = fail) { input number: sensor::base::other; runs_on: worker; }
+        joint pan: continuous {
+            axis: z;
+            sensor encoder: External<Number>();
+            actuator motor: Servo(disarm = |_| {
+                MADE_SAFE.fetch_add(1, Ordering::SeqCst);
+                Ok(())
+            });
+            link head { }
+        }
     }
 }
 
 #[test]
 fn a_device_that_is_unplugged_is_lost_once_and_found_again_and_nobody_else_notices() -> Result<(), StartError> {
-    let builder = Cable::builder();
+    let builder = Workshop::builder();
     let health = builder.subscribe(system::Health);
     let (pose, tally) = (
-        builder.subscribe(cable::sensor::base::plugged::pose),
-        builder.subscribe(cable::sensor::base::beside::tally),
+        builder.subscribe(workshop::sensor::base::plugged::pose),
+        builder.subscribe(workshop::sensor::base::beside::tally),
     );
     let mut simulation = builder.simulate()?;
     assert_eq!(simulation.arm(), Ok(()));
@@ -112,11 +84,10 @@ fn a_device_that_is_unplugged_is_lost_once_and_found_again_and_nobody_else_notic
         [(POSE, Healthy, Lost, 590), (POSE, Lost, Degraded, 2770), (POSE, Degraded, Healthy, 2790)],
     );
     // Neither lost its state.
-    let counted = |tally: &Subscription<Number>| tally.drain().map(|number| number.0).collect::<Vec<_>>();
-    let pose = counted(&pose);
+    let pose = numbers(&pose);
     assert_eq!(pose, (1..=pose.len()).map(|number| number as f64).collect::<Vec<_>>());
     assert_eq!(pose.len(), 50 + 224);
-    assert_eq!(counted(&tally), (1..=501).map(f64::from).collect::<Vec<_>>());
+    assert_eq!(numbers(&tally), (1..=501).map(f64::from).collect::<Vec<_>>());
     assert_eq!(simulation.safety(), Safety::Armed, "a fault of a driver disarms nobody");
     let report = simulation.stop();
     let started = |name| report.commands.iter().find(|command| command.name == name).map(|command| command.started);
@@ -127,175 +98,22 @@ fn a_device_that_is_unplugged_is_lost_once_and_found_again_and_nobody_else_notic
     Ok(())
 }
 
-/// Panics when it is dropped, on its own or as a payload of a panic.
-struct Bomb;
-
-impl Drop for Bomb {
-    fn drop(&mut self) {
-        panic!("a bomb");
-    }
-}
-
-/// Whether these are to throw a bomb the next time.
-static THROWS: [AtomicBool; 4] = [const { AtomicBool::new(false) }; 4];
-
-fn may_throw(number: usize) {
-    if THROWS[number].swap(false, Ordering::SeqCst) {
-        std::panic::panic_any(Bomb);
-    }
-}
-
-/// A sensor, an estimator, a command and an actuator that do.
-#[derive(Debug)]
-pub(crate) struct Thrower(f64);
-
-impl Sensor for Thrower {
-    type Options = NoOptions;
-    type Output = Number;
-
-    fn init(_: NoOptions, _: &SensorContext) -> Result<Self, Fault> {
-        Ok(Self(0.0))
-    }
-
-    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        may_throw(0);
-        Ok(Reading::now(Number(1.0)))
-    }
-}
-
-impl Estimator for Thrower {
-    type Options = NoOptions;
-    type Input = Number;
-    type Output = Number;
-
-    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
-        Ok(Self(0.0))
-    }
-
-    fn handle_input(&mut self, _: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
-        may_throw(1);
-        self.0 += 1.0;
-        Ok(Reply::emit(Number(self.0)))
-    }
-}
-
-impl Command for Thrower {
-    type Options = NoOptions;
-    type Arguments = NoArguments;
-    type Output = ();
-
-    async fn run(_: NoOptions, _: NoArguments, _: CommandContext) -> Result<Outcome<()>, Fault> {
-        may_throw(2);
-        Ok(Outcome::done(()))
-    }
-}
-
-impl Actuator for Thrower {
-    type Options = NoOptions;
-    type Command = Number;
-
-    fn init(_: NoOptions, _: &ActuatorContext) -> Result<Self, Fault> {
-        Ok(Self(0.0))
-    }
-
-    fn handle_command(&mut self, _: &Stamped<Number>) -> Result<(), Fault> {
-        may_throw(3);
-        Ok(())
-    }
-
-    fn disarm(&mut self) -> Result<(), Fault> {
-        Ok(())
-    }
-}
-
-robot! {
-    robot Minefield;
-
-    commands { throw: Thrower; }
-
-    link base {
-        joint pan: continuous { axis: z; sensor encoder: External<Number>(); actuator motor: Thrower(); link head { } }
-        sensor numbers: Thrower() { rate: 100 Hz; estimator sum: Thrower(); }
-        sensor beside: Counter(count = 100000) { rate: 100 Hz; estimator tally: Tally(); }
-    }
-}
-
-#[test]
-fn what_a_panic_throws_may_itself_panic_when_it_is_dropped() -> Result<(), StartError> {
-    let _alone = alone();
-    let builder = Minefield::builder();
-    let (sum, tally) = (
-        builder.subscribe(minefield::sensor::base::numbers::sum),
-        builder.subscribe(minefield::sensor::base::beside::tally),
-    );
-    let mut simulation = builder.simulate()?;
-    assert_eq!(simulation.arm(), Ok(()));
-    let motor = minefield::actuator::base::pan::motor;
-    for (number, millis) in [(0, 100), (1, 200), (2, 300), (3, 400)] {
-        simulation.run_until(at(millis));
-        THROWS[number].store(true, Ordering::SeqCst);
-        match number {
-            2 => {
-                let throwing = simulation.command(minefield::command::throw, NoArguments).expect("it is idle");
-                simulation.run_until(at(millis + 50));
-                assert!(throwing.try_result().is_some_and(|result| result.is_err()));
-            }
-            3 => assert!(simulation.actuate(motor, Number(1.0)).is_err()),
-            _ => {}
-        }
-        simulation.run_until(at(millis + 90));
-        assert!(!THROWS[number].load(Ordering::SeqCst), "it was thrown");
-        assert!(sum.drain().count() >= 8, "the robot goes on");
-    }
-    assert_eq!(simulation.actuate(motor, Number(1.0)), Ok(()));
-    assert_eq!(tally.drain().count(), 50);
-    assert_eq!(simulation.safety(), Safety::Armed);
-    let report = simulation.stop();
-    let paths: Vec<_> = report.faults.iter().map(|fault| fault.path).collect();
-    assert_eq!(paths, ["sensor/base/numbers", "sensor/base/numbers/sum", "actuator/base/pan/motor"]);
-    Ok(())
-}
-
-/// Panics when it is asked where it starts, as often as it is told.
-#[derive(Debug)]
-pub(crate) struct Startled;
-
 static STARTLES: AtomicU32 = AtomicU32::new(0);
 
-impl Sensor for Startled {
-    type Options = NoOptions;
-    type Output = Number;
-
-    fn init(_: NoOptions, _: &SensorContext) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-
-    fn starts_at(&self) -> Option<MonotonicTime> {
-        let left = STARTLES.fetch_update(Ordering::SeqCst, Ordering::SeqCst, |left| left.checked_sub(1));
-        assert!(left.is_err(), "no index");
-        None
-    }
-
-    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        Ok(Reading::now(Number(1.0)))
-    }
-}
-
-robot! {
-    robot Nervous;
-    link base {
-        sensor startled: Startled() { rate: 100 Hz; }
-        sensor beside: Counter(count = 100000) { rate: 100 Hz; }
-    }
+/// Panics as often as it is told.
+fn startled() -> Option<MonotonicTime> {
+    let left = STARTLES.fetch_update(Ordering::SeqCst, Ordering::SeqCst, |left| left.checked_sub(1));
+    assert!(left.is_err(), "no index");
+    None
 }
 
 #[test]
 fn a_sensor_that_panics_in_starts_at_is_restarted() -> Result<(), StartError> {
     let _alone = alone();
     STARTLES.store(2, Ordering::SeqCst);
-    let builder = Nervous::builder();
+    let builder = Workshop::builder();
     let (startled, beside) =
-        (builder.subscribe(nervous::sensor::base::startled), builder.subscribe(nervous::sensor::base::beside));
+        (builder.subscribe(workshop::sensor::base::startled), builder.subscribe(workshop::sensor::base::beside));
     let mut simulation = builder.simulate()?;
     simulation.run_until(at(195));
     assert_eq!(beside.drain().count(), 20, "the other one is read from the start");
@@ -305,8 +123,8 @@ fn a_sensor_that_panics_in_starts_at_is_restarted() -> Result<(), StartError> {
     assert_eq!(faults, ["sensor/base/startled failed: panicked: no index (2 times in 0.010 s)"]);
 
     STARTLES.store(1, Ordering::SeqCst);
-    let builder = Nervous::builder();
-    let startled = builder.subscribe(nervous::sensor::base::startled);
+    let builder = Workshop::builder();
+    let startled = builder.subscribe(workshop::sensor::base::startled);
     let running = builder.start()?;
     assert!(startled.recv_timeout(PATIENCE).is_some(), "in real time its thread goes on");
     let faults: Vec<_> = running.stop().faults.iter().map(ToString::to_string).collect();
@@ -314,121 +132,40 @@ fn a_sensor_that_panics_in_starts_at_is_restarted() -> Result<(), StartError> {
     Ok(())
 }
 
-/// Options of [`Exclusive`].
-#[derive(Clone, Debug, Options)]
-pub(crate) struct ExclusiveOptions {
-    #[option(default = 1.0)]
-    pub(crate) gain: f64,
+/// What has become of the instances of which component.
+static LOG: Mutex<Vec<(&str, String)>> = Mutex::new(Vec::new());
+
+fn log(who: &'static str, what: impl Into<String>) {
+    lock(&LOG).push((who, what.into()));
 }
 
-/// One that only one at a time can have open, closed by `terminate`.
-#[derive(Debug)]
-pub(crate) struct Exclusive {
-    generation: u32,
-    log: &'static Log,
+fn made(who: &'static str) -> Done {
+    log(who, "made");
+    Ok(())
 }
 
-/// What has become of the instances of a component.
-#[derive(Debug)]
-pub(crate) struct Log {
-    made: AtomicU32,
-    lines: Mutex<Vec<String>>,
+/// What has become of it since the last time.
+fn logged(who: &str) -> Vec<String> {
+    lock(&LOG).extract_if(.., |(of, _)| *of == who).map(|(_, what)| what).collect()
 }
 
-impl Log {
-    const fn new() -> Self {
-        Self { made: AtomicU32::new(0), lines: Mutex::new(Vec::new()) }
-    }
+static NUMBER: AtomicU32 = AtomicU32::new(0);
 
-    fn add(&self, line: String) {
-        self.lines.lock().unwrap_or_else(PoisonError::into_inner).push(line);
-    }
-
-    fn take(&self) -> Vec<String> {
-        self.made.store(0, Ordering::SeqCst);
-        std::mem::take(&mut *self.lines.lock().unwrap_or_else(PoisonError::into_inner))
-    }
-
-    fn make(&'static self, gain: f64) -> Exclusive {
-        let generation = self.made.fetch_add(1, Ordering::SeqCst);
-        self.add(format!("made {generation} with {gain}"));
-        Exclusive { generation, log: self }
-    }
+/// Sets a timer that has its number.
+fn make_estimator(context: &Context) -> Done {
+    context.request(Request::Timer(NUMBER.fetch_add(1, Ordering::SeqCst), Duration::from_millis(100)));
+    made("estimator")
 }
 
-impl Drop for Exclusive {
-    fn drop(&mut self) {
-        self.log.add(format!("dropped {}", self.generation));
-    }
+fn timer(_: &mut f64, info: Info) -> Replied {
+    let Info::Timer(of) = info else { return Err(Fault::new("it asked for none")) };
+    log("estimator", format!("timer {of}"));
+    Ok(Reply::none())
 }
 
-static OF_ESTIMATOR: Log = Log::new();
-static OF_SENSOR: Log = Log::new();
-static OF_ACTUATOR: Log = Log::new();
-
-impl Estimator for Exclusive {
-    type Options = ExclusiveOptions;
-    type Input = Number;
-    type Output = Number;
-
-    fn init(options: ExclusiveOptions, context: &Context) -> Result<Self, Fault> {
-        let this = OF_ESTIMATOR.make(options.gain);
-        context.request(Request::Timer(this.generation, Duration::from_millis(100)));
-        Ok(this)
-    }
-
-    fn handle_input(&mut self, _: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
-        Ok(Reply::none())
-    }
-
-    fn handle_info(&mut self, info: Info) -> Result<Reply<Number>, Fault> {
-        let Info::Timer(of) = info else { return Err(Fault::new("it asked for none")) };
-        self.log.add(format!("timer of {of} at {}", self.generation));
-        Ok(Reply::none())
-    }
-
-    fn terminate(&mut self) {
-        self.log.add(format!("closed {}", self.generation));
-    }
-}
-
-impl Sensor for Exclusive {
-    type Options = ExclusiveOptions;
-    type Output = Number;
-
-    fn init(options: ExclusiveOptions, _: &SensorContext) -> Result<Self, Fault> {
-        Ok(OF_SENSOR.make(options.gain))
-    }
-
-    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        Ok(Reading::now(Number(1.0)))
-    }
-
-    fn terminate(&mut self) {
-        self.log.add(format!("closed {}", self.generation));
-    }
-}
-
-impl Actuator for Exclusive {
-    type Options = ExclusiveOptions;
-    type Command = Number;
-
-    fn init(options: ExclusiveOptions, _: &ActuatorContext) -> Result<Self, Fault> {
-        Ok(OF_ACTUATOR.make(options.gain))
-    }
-
-    fn handle_command(&mut self, _: &Stamped<Number>) -> Result<(), Fault> {
-        Ok(())
-    }
-
-    fn disarm(&mut self) -> Result<(), Fault> {
-        self.log.add(format!("made {} safe", self.generation));
-        Ok(())
-    }
-
-    fn terminate(&mut self) {
-        self.log.add(format!("closed {}", self.generation));
-    }
+fn make_safe(_: f64) -> Done {
+    log("actuator", "made safe");
+    Ok(())
 }
 
 robot! {
@@ -440,12 +177,29 @@ robot! {
         joint pan: continuous {
             axis: z;
             sensor encoder: External<Number>();
-            actuator motor: Exclusive(gain = param::gain);
+            actuator motor: Servo(
+                gain = param::gain,
+                init = |_| made("actuator"),
+                disarm = make_safe,
+                terminate = || log("actuator", "closed"),
+                dropped = || log("actuator", "dropped"),
+            );
             link head { }
         }
-        sensor numbers: Exclusive(gain = param::gain) {
+        sensor numbers: Source(
+            gain = param::gain,
+            init = |_| made("sensor"),
+            terminate = || log("sensor", "closed"),
+            dropped = || log("sensor", "dropped"),
+        ) {
             rate: 100 Hz;
-            estimator only: Exclusive(gain = param::gain);
+            estimator only: Echo(
+                gain = param::gain,
+                init = make_estimator,
+                info = timer,
+                terminate = || log("estimator", "closed"),
+                dropped = || log("estimator", "dropped"),
+            );
         }
     }
 }
@@ -453,20 +207,18 @@ robot! {
 #[test]
 fn new_options_close_and_drop_the_old_instance_before_the_new_one_is_made() -> Result<(), StartError> {
     let _alone = alone();
-    let logs = [&OF_ESTIMATOR, &OF_SENSOR, &OF_ACTUATOR];
-    logs.iter().for_each(|log| drop(log.take()));
+    NUMBER.store(0, Ordering::SeqCst);
+    lock(&LOG).clear();
     let mut simulation = Single::builder().simulate()?;
     assert_eq!(simulation.arm(), Ok(()));
     simulation.run_until(at(55));
     simulation.set_parameter(single::param::gain, 2.0).expect("it is finite");
     simulation.run_until(at(154));
-    let mut expected = vec!["made 0 with 1", "closed 0", "dropped 0", "made 1 with 2"];
-    assert_eq!(OF_SENSOR.take(), expected);
-    assert_eq!(OF_ESTIMATOR.take(), expected, "the timer of the old one, due at 100 ms, is gone");
-    expected.insert(1, "made 0 safe");
-    assert_eq!(OF_ACTUATOR.take(), expected);
+    assert_eq!(logged("sensor"), ["made", "closed", "dropped", "made"]);
+    assert_eq!(logged("estimator"), ["made", "closed", "dropped", "made"], "the timer of the old one is gone");
+    assert_eq!(logged("actuator"), ["made", "made safe", "closed", "dropped", "made"]);
     simulation.run_until(at(160));
-    assert_eq!(OF_ESTIMATOR.take(), ["timer of 1 at 1"]);
+    assert_eq!(logged("estimator"), ["timer 1"]);
     Ok(())
 }
 
@@ -487,64 +239,32 @@ fn parameters_that_change_often_are_no_failures() -> Result<(), StartError> {
     Ok(())
 }
 
-/// Passes on; a negative number is a fault. Hangs at -1000 until it is let go.
-#[derive(Debug)]
-pub(crate) struct Fragile;
+const HANGS: f64 = -1000.0;
 
-static IS_INSIDE: AtomicBool = AtomicBool::new(false);
+static HERE: Gate = Gate::new();
 
-impl Estimator for Fragile {
-    type Options = NoOptions;
-    type Input = Number;
-    type Output = Number;
-
-    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
-        Ok(Self)
+/// Passes on; a negative number is a fault.
+fn fail(_: &mut f64, number: f64) -> Replied {
+    if number == HANGS {
+        HERE.pass("a message");
     }
-
-    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
-        if number.0 == -1000.0 {
-            IS_INSIDE.store(true, Ordering::SeqCst);
-            while IS_INSIDE.load(Ordering::SeqCst) {
-                std::thread::sleep(Duration::from_millis(1));
-            }
-        }
-        if number.0 < 0.0 { Err(Fault::new("negative")) } else { Ok(Reply::emit(number.payload)) }
-    }
-}
-
-pub(crate) struct Break;
-
-impl HandleCall<Break> for Fragile {
-    type Response = ();
-    fn handle_call(&mut self, Break: Break) -> Result<((), Reply<Number>), Fault> {
-        Err(Fault::new("asked to"))
-    }
-}
-
-robot! {
-    robot Patched;
-    link base {
-        sensor number: External<Number>() { estimator near: Fragile(); }
-        sensor other: External<Number>();
-        estimator apart: Fragile() { input number: sensor::base::other; runs_on: worker; }
-    }
+    if number < 0.0 { Err(Fault::new("negative")) } else { Ok(Reply::emit(Number(number))) }
 }
 
 #[test]
 fn messages_that_come_while_an_estimator_waits_for_its_restart_are_delivered_after_it() -> Result<(), StartError> {
-    let builder = Patched::builder();
-    let near = builder.subscribe(patched::sensor::base::number::near);
+    let builder = Workshop::builder();
+    let near = builder.subscribe(workshop::sensor::base::near::near);
     let mut simulation = builder.simulate()?;
-    simulation.publish(patched::sensor::base::number, at(100), Number(-1.0));
+    simulation.publish(workshop::sensor::base::near, at(100), Number(-1.0));
     for number in 1..=9 {
-        simulation.publish(patched::sensor::base::number, at(100 + number), Number(number as f64));
+        simulation.publish(workshop::sensor::base::near, at(100 + number), Number(number as f64));
     }
     assert_eq!(near.drain().count(), 0, "it is not back yet");
     simulation.run_until(at(200));
-    assert_eq!(near.drain().map(|number| number.0).collect::<Vec<_>>(), (1..=9).map(f64::from).collect::<Vec<_>>());
+    assert_eq!(numbers(&near), (1..=9).map(f64::from).collect::<Vec<_>>());
     let report = simulation.stop();
-    let near = report.estimator("sensor/base/number/near").expect("it is declared");
+    let near = report.estimator("sensor/base/near/near").expect("it is declared");
     assert_eq!((near.restarts, near.inputs[0].dropped(DropReason::Stopped)), (1, 0));
     Ok(())
 }
@@ -553,16 +273,16 @@ fn messages_that_come_while_an_estimator_waits_for_its_restart_are_delivered_aft
 fn messages_that_wait_for_a_worker_outlast_its_failure() {
     let _alone = alone();
     within(60, || {
-        let builder = Patched::builder();
-        let apart = builder.subscribe(patched::estimator::base::apart);
+        let builder = Workshop::builder();
+        let apart = builder.subscribe(workshop::estimator::base::apart);
         let running = builder.start().expect("it starts");
-        let publish = |number| running.publish(patched::sensor::base::other, running.clock().now(), Number(number));
-        publish(-1000.0);
-        while !IS_INSIDE.load(Ordering::SeqCst) {
-            std::thread::sleep(Duration::from_millis(1));
-        }
+        let publish =
+            |number| running.publish(workshop::sensor::base::other, running.clock().now(), Number(number));
+        HERE.close("a message");
+        publish(HANGS);
+        HERE.wait_for(1);
         (1..=500).map(f64::from).for_each(publish);
-        IS_INSIDE.store(false, Ordering::SeqCst);
+        HERE.open();
         let numbers: Vec<_> = (0..500).map_while(|_| apart.recv_timeout(PATIENCE)).map(|number| number.0).collect();
         assert_eq!(numbers, (1..=500).map(f64::from).collect::<Vec<_>>());
         let report = running.stop();
@@ -572,92 +292,43 @@ fn messages_that_wait_for_a_worker_outlast_its_failure() {
 
 #[test]
 fn one_stamp_far_ahead_does_not_outlast_a_restart() -> Result<(), StartError> {
-    let builder = Patched::builder();
-    let near = builder.subscribe(patched::sensor::base::number::near);
+    let builder = Workshop::builder();
+    let near = builder.subscribe(workshop::sensor::base::near::near);
     let mut simulation = builder.simulate()?;
     simulation.run_until(at(100));
     let live = simulation.live();
     // Less than a second ahead of the clock, so that it is let in; the next ones are out of order.
-    live.publish(patched::sensor::base::number, at(1000), Number(1.0));
-    simulation.publish(patched::sensor::base::number, at(110), Number(2.0));
-    assert!(live.call(patched::sensor::base::number::near, Break).is_err());
+    live.publish(workshop::sensor::base::near, at(1000), Number(1.0));
+    simulation.publish(workshop::sensor::base::near, at(110), Number(2.0));
+    assert!(live.call(workshop::sensor::base::near::near, Break).is_err());
     simulation.run_until(at(150));
-    simulation.publish(patched::sensor::base::number, at(160), Number(3.0));
-    assert_eq!(near.drain().map(|number| number.0).collect::<Vec<_>>(), [1.0, 3.0]);
+    simulation.publish(workshop::sensor::base::near, at(160), Number(3.0));
+    assert_eq!(numbers(&near), [1.0, 3.0]);
     Ok(())
 }
 
-/// Panics at a negative number.
-#[derive(Debug)]
-pub(crate) struct Panicky;
-
-impl Estimator for Panicky {
-    type Options = NoOptions;
-    type Input = Number;
-    type Output = Number;
-
-    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-
-    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
-        assert!(number.0 >= 0.0, "negative");
-        Ok(Reply::none())
-    }
-}
-
-/// Counts how often it was made safe.
-#[derive(Debug)]
-pub(crate) struct Careful;
-
 static MADE_SAFE: AtomicU32 = AtomicU32::new(0);
 
-impl Actuator for Careful {
-    type Options = NoOptions;
-    type Command = Number;
-
-    fn init(_: NoOptions, _: &ActuatorContext) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-
-    fn handle_command(&mut self, _: &Stamped<Number>) -> Result<(), Fault> {
-        Ok(())
-    }
-
-    fn disarm(&mut self) -> Result<(), Fault> {
-        MADE_SAFE.fetch_add(1, Ordering::SeqCst);
-        Ok(())
-    }
-}
-
-robot! {
-    robot Household;
-    link base {
-        joint pan: continuous {
-            axis: z;
-            sensor encoder: External<Number>();
-            actuator motor: Careful();
-            link head { }
-        }
-        sensor number: External<Number>() { estimator panicky: Panicky(); }
-        sensor beside: Counter(count = 100000) { rate: 100 Hz; estimator tally: Tally(); }
-    }
+/// Panics at a negative number.
+fn panic(_: &mut f64, number: f64) -> Replied {
+    assert!(number >= 0.0, "negative");
+    Ok(Reply::none())
 }
 
 #[test]
 fn a_sibling_that_is_restarted_from_above_says_so() -> Result<(), StartError> {
-    let builder = Household::builder();
+    let builder = Workshop::builder();
     let (health, tally) =
-        (builder.subscribe(system::Health), builder.subscribe(household::sensor::base::beside::tally));
+        (builder.subscribe(system::Health), builder.subscribe(workshop::sensor::base::beside::tally));
     let mut simulation = builder.simulate()?;
     for failure in 1..=4 {
-        simulation.publish(household::sensor::base::number, at(failure * 100 + 5), Number(-1.0));
+        simulation.publish(workshop::sensor::base::number, at(failure * 100 + 5), Number(-1.0));
     }
     let of_tally = |change: &Stamped<HealthTransition>| change.estimator == "sensor/base/beside/tally";
     let changes: Vec<_> = health.drain().filter(of_tally).map(|change| (change.to, change.reason)).collect();
     assert_eq!(changes, [(HealthState::Degraded, HealthReason::Restarted)]);
     simulation.run_until(at(500));
-    let numbers: Vec<_> = tally.drain().map(|number| number.0).collect();
+    let numbers = numbers(&tally);
     assert!(numbers.windows(2).any(|pair| pair[1] < pair[0]), "it has lost its state: {numbers:?}");
     Ok(())
 }
@@ -665,7 +336,7 @@ fn a_sibling_that_is_restarted_from_above_says_so() -> Result<(), StartError> {
 #[test]
 fn panics_that_use_up_the_budget_of_the_robot_have_it_made_safe() -> Result<(), StartError> {
     let _alone = alone();
-    let mut builder = Household::builder();
+    let mut builder = Workshop::builder();
     builder.supervision().max_restarts = 1;
     let mut simulation = builder.simulate()?;
     assert_eq!(simulation.arm(), Ok(()));
@@ -673,7 +344,7 @@ fn panics_that_use_up_the_budget_of_the_robot_have_it_made_safe() -> Result<(), 
     let mut failures = 0;
     while simulation.safety() == Safety::Armed && failures < 10 {
         failures += 1;
-        simulation.publish(household::sensor::base::number, at(failures * 300), Number(-1.0));
+        simulation.publish(workshop::sensor::base::number, at(failures * 300), Number(-1.0));
     }
     // One that its link allows, one that the robot does.
     assert_eq!((failures, simulation.safety()), (3, Safety::Error));

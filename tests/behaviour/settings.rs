@@ -102,16 +102,6 @@ robot! {
     }
 }
 
-robot! {
-    robot Narrow;
-    parameters {
-        gain: f64 = 0.5, range: 0.0..=2.0;
-    }
-    link base {
-        sensor source: External<Number>() { estimator every: Every(port = "/dev/null", gain = param::gain); }
-    }
-}
-
 fn options(builder: Builder<Set>) -> EveryOptions {
     let simulation = builder.simulate().expect("the robot starts");
     simulation.call(set::sensor::base::source::every, Which).expect("it answers")
@@ -240,19 +230,19 @@ fn values_out_of_their_range_are_refused_where_they_are_written() {
 
 #[test]
 fn a_parameter_is_held_against_the_options_that_are_bound_to_it() {
-    let mut builder = Narrow::builder();
+    let mut builder = Crowd::builder();
     let error = builder.set("param/gain", "1.5").expect_err("the option takes less").to_string();
     assert_eq!(
         error,
         "param/gain: sensor/base/source/every/gain is bound to it, and must be in 0.0..=1.0, found `1.5`"
     );
     let error =
-        builder.set_parameter(narrow::param::gain, 1.5).expect_err("it takes as much as in a file").to_string();
+        builder.set_parameter(crowd::param::gain, 1.5).expect_err("it takes as much as in a file").to_string();
     assert_eq!(
         error,
         "param/gain is not set: sensor/base/source/every/gain is bound to it, and must be in 0.0..=1.0, found `1.5`"
     );
-    builder.set_parameter(narrow::param::gain, 0.75).expect("the option takes it");
+    builder.set_parameter(crowd::param::gain, 0.75).expect("the option takes it");
     assert!(builder.settings().to_string().contains("gain = 0.75"));
 }
 
@@ -279,8 +269,9 @@ impl Sensor for Crowded {
 
 robot! {
     robot Crowd;
+    parameters { gain: f64 = 0.5, range: 0.0..=2.0; }
     link base {
-        sensor source: Crowded() { rate: 1 Hz; estimator every: Every(port = "/dev/null"); }
+        sensor source: Crowded() { rate: 1 Hz; estimator every: Every(port = "/dev/null", gain = param::gain); }
     }
 }
 
@@ -347,9 +338,6 @@ fn empty_tables_of_known_paths_are_taken() {
     let empty = "[sensor]\n[sensor.base.source.every]\n# port = 1\n[param]\n[param.tuning]\n";
     builder.set_from_toml("rover.toml", empty).expect("nothing is set");
     assert_eq!(builder.settings().to_string(), before);
-    let mut narrow = Narrow::builder();
-    let listed = narrow.settings().to_string();
-    narrow.set_from_toml("list", &listed).expect("what is listed is read");
 }
 
 #[test]

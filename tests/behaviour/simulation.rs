@@ -1,6 +1,6 @@
 //! Virtual time.
 
-use crate::components::{Counter, Number, Scale, at};
+use crate::components::{Counter, Number, Read, Scale, Source, at};
 use bb_core::prelude::*;
 
 robot! {
@@ -53,27 +53,15 @@ fn options_are_those_declared_unless_they_are_changed_before_the_start() -> Resu
     Ok(())
 }
 
-/// A sensor that forgets to say when to read it next.
-#[derive(Debug)]
-pub(crate) struct Restless;
-
-impl Sensor for Restless {
-    type Options = NoOptions;
-    type Output = Number;
-
-    fn init(_: NoOptions, _: &SensorContext) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-
-    fn read(&mut self, now: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        Ok(Reading::now(Number(0.0)).next_at(now))
-    }
+/// Forgets to say when to read it next.
+fn restless(_: u32, now: MonotonicTime) -> Read {
+    Ok(Reading::now(Number(0.0)).next_at(now))
 }
 
 robot! {
     robot Stuck;
     link base {
-        sensor restless: Restless();
+        sensor restless: Source(read = restless);
         sensor no_rate: Counter();
     }
 }
@@ -128,38 +116,19 @@ fn of_sensors_due_at_once_the_driver_is_read_last() -> Result<(), StartError> {
     Ok(())
 }
 
-/// Plays two messages with stamps of its own.
-#[derive(Debug)]
-pub(crate) struct Recording(u8);
-
 const MADE_AT: MonotonicTime = MonotonicTime::from_nanos(1_600_000_000_000_000_000);
 
-impl Sensor for Recording {
-    type Options = NoOptions;
-    type Output = Number;
-
-    fn init(_: NoOptions, _: &SensorContext) -> Result<Self, Fault> {
-        Ok(Self(0))
-    }
-
-    fn starts_at(&self) -> Option<MonotonicTime> {
-        Some(MADE_AT)
-    }
-
-    fn read(&mut self, now: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        self.0 += 1;
-        if self.0 > 2 {
-            return Ok(Reading::finished());
-        }
-        Ok(Reading::at(now, Number(f64::from(self.0))).next_at(now + Duration::from_millis(20)))
-    }
+/// Plays two messages with stamps of its own.
+fn recording(number: u32, now: MonotonicTime) -> Read {
+    let reading = Reading::at(now, Number(f64::from(number))).next_at(now + Duration::from_millis(20));
+    Ok(if number > 2 { Reading::finished() } else { reading })
 }
 
 robot! {
     robot Replay;
     link base {
         sensor rated: Counter(count = 3) { rate: 100 Hz; }
-        sensor recording: Recording() { estimator scaled: Scale(factor = 1.0); }
+        sensor recording: Source(read = recording, starts_at = || Some(MADE_AT)) { estimator scaled: Scale(factor = 1.0); }
     }
 }
 

@@ -1,17 +1,9 @@
 //! Who is restarted when something fails too often, and who is not.
 
-use crate::components::{Number, at, within};
+use crate::components::{Done, Echo, Number, Read, Replied, Source, at, lock, within};
 use bb_core::prelude::*;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, Ordering};
-
-/// Options of [`Sibling`] and [`Pulse`].
-#[derive(Clone, Debug, Options)]
-pub(crate) struct SiblingOptions {
-    /// The number under which it counts how often it was made.
-    #[option(default = 0, range = 0..=7)]
-    pub(crate) number: usize,
-}
 
 static MADE: [AtomicU32; 8] = [const { AtomicU32::new(0) }; 8];
 
@@ -19,68 +11,20 @@ fn made(number: usize) -> u32 {
     MADE[number].load(Ordering::SeqCst)
 }
 
-/// Hands on what it gets; its own clean-up fails.
-#[derive(Debug)]
-pub(crate) struct Sibling;
-
-impl Estimator for Sibling {
-    type Options = SiblingOptions;
-    type Input = Number;
-    type Output = Number;
-
-    fn init(options: SiblingOptions, _: &Context) -> Result<Self, Fault> {
-        MADE[options.number].fetch_add(1, Ordering::SeqCst);
-        Ok(Self)
-    }
-
-    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
-        Ok(Reply::emit(number.payload))
-    }
-
-    fn terminate(&mut self) {
-        panic!("cannot clean up");
-    }
-}
-
-/// A sensor that says how often it was made.
-#[derive(Debug)]
-pub(crate) struct Pulse;
-
-impl Sensor for Pulse {
-    type Options = SiblingOptions;
-    type Output = Number;
-
-    fn init(options: SiblingOptions, _: &SensorContext) -> Result<Self, Fault> {
-        MADE[options.number].fetch_add(1, Ordering::SeqCst);
-        Ok(Self)
-    }
-
-    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        Ok(Reading::now(Number(1.0)))
-    }
+/// Counts how often one is made under a number.
+fn count(number: usize) -> Done {
+    MADE[number].fetch_add(1, Ordering::SeqCst);
+    Ok(())
 }
 
 /// Fails as it is told by the number it gets: 1 panics, 2 is permanent, 3 is as if it had not been there, 4 is a fault.
-#[derive(Debug)]
-pub(crate) struct Failing;
-
-impl Estimator for Failing {
-    type Options = NoOptions;
-    type Input = Number;
-    type Output = Number;
-
-    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-
-    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
-        assert!(number.0 != 1.0, "no fix");
-        Err(match number.0 {
-            2.0 => Fault::permanent("the file is broken"),
-            3.0 => Fault::skip("not needed"),
-            _ => Fault::new("no fix"),
-        })
-    }
+fn fail(_: &mut f64, number: f64) -> Replied {
+    assert!(number != 1.0, "no fix");
+    Err(match number {
+        2.0 => Fault::permanent("the file is broken"),
+        3.0 => Fault::skip("not needed"),
+        _ => Fault::new("no fix"),
+    })
 }
 
 robot! {
@@ -89,11 +33,17 @@ robot! {
     commands { arm: Arm; }
 
     link base {
-        sensor base_pulse: Pulse(number = 0) { rate: 100 Hz; estimator cousin: Sibling(number = 1); }
+        sensor base_pulse: Source(init = |_| count(0), read = |_, _| Ok(Reading::now(Number(1.0)))) {
+            rate: 100 Hz;
+            estimator cousin: Echo(init = |_| count(1), terminate = || panic!("cannot clean up"));
+        }
         joint neck: fixed {
             link head {
-                sensor number: External<Number>() { estimator failing: Failing(); }
-                sensor head_pulse: Pulse(number = 2) { rate: 100 Hz; estimator brother: Sibling(number = 3); }
+                sensor number: External<Number>() { estimator failing: Echo(input = fail); }
+                sensor head_pulse: Source(init = |_| count(2), read = |_, _| Ok(Reading::now(Number(1.0)))) {
+                    rate: 100 Hz;
+                    estimator brother: Echo(init = |_| count(3), terminate = || panic!("cannot clean up"));
+                }
             }
         }
     }
@@ -171,38 +121,27 @@ fn what_does_not_heal_stays_as_it_is_and_nobody_else_suffers() -> Result<(), Sta
     Ok(())
 }
 
-/// A sensor that panics when it is read, and whenever it is made but the first time and the fourth.
-#[derive(Debug)]
-pub(crate) struct Flaky(u32);
+static FLAKY: Mutex<Vec<i64>> = Mutex::new(Vec::new());
 
-static FLAKY: AtomicU32 = AtomicU32::new(0);
-static READ: Mutex<Vec<i64>> = Mutex::new(Vec::new());
+/// Panics whenever it is made, but the first time and the fourth.
+fn plug_in(context: &SensorContext) -> Done {
+    let mut made = lock(&FLAKY);
+    made.push(context.clock().now().as_nanos() / 1_000_000);
+    assert!([1, 4].contains(&made.len()), "no device");
+    Ok(())
+}
 
-impl Sensor for Flaky {
-    type Options = NoOptions;
-    type Output = Number;
-
-    fn init(_: NoOptions, context: &SensorContext) -> Result<Self, Fault> {
-        READ.lock().expect("nobody panics with it").push(context.clock().now().as_nanos() / 1_000_000);
-        match FLAKY.fetch_add(1, Ordering::SeqCst) {
-            number @ (0 | 3) => Ok(Self(number)),
-            _ => panic!("no device"),
-        }
-    }
-
-    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        assert!(self.0 == 3, "unplugged");
-        Ok(Reading::now(Number(1.0)))
-    }
-
-    fn terminate(&mut self) {
-        panic!("cannot be closed");
-    }
+/// Panics before the fourth has been made.
+fn read(_: u32, _: MonotonicTime) -> Read {
+    assert!(lock(&FLAKY).len() == 4, "unplugged");
+    Ok(Reading::now(Number(1.0)))
 }
 
 robot! {
     robot Unplugged;
-    link base { sensor flaky: Flaky() { rate: 10 Hz; } }
+    link base {
+        sensor flaky: Source(init = plug_in, read = read, terminate = || panic!("cannot be closed")) { rate: 10 Hz; }
+    }
 }
 
 #[test]
@@ -213,7 +152,7 @@ fn a_sensor_that_panics_when_it_is_restarted_backs_off() {
         let mut simulation = builder.simulate().expect("it starts");
         simulation.run_until(at(1000));
         // 10 ms, 20 ms, and 40 ms after the one before.
-        assert_eq!(*READ.lock().expect("nobody panics with it"), [0, 10, 30, 70]);
+        assert_eq!(*lock(&FLAKY), [0, 10, 30, 70]);
         assert_eq!(numbers.drain().count(), 10);
         let report = simulation.stop();
         let messages: Vec<_> = report.faults.iter().map(|fault| (fault.message.as_str(), fault.count)).collect();

@@ -1,8 +1,8 @@
-//! What links weigh and look like, how joints resist; URDF in and out; the robot as a picture.
+//! What links weigh and look like, how joints resist; URDF in and out.
 
 use crate::components::{Counter, Scale, Snapshot};
 use bb_core::prelude::*;
-use bb_core::topology::{Dynamics, Geometry, GraphFormat, Mimic, Origin, Transmission};
+use bb_core::topology::{Dynamics, Geometry, Mimic, Origin, Transmission};
 
 /// A reduction of 50, and nothing else.
 const GEAR: Transmission = Transmission { reduction: 50.0, offset: 0.0, is_reversed: false };
@@ -52,14 +52,6 @@ robot! {
         joint mount: fixed { link camera; }
     }
     joint elbow { sensor encoder: Counter() { rate: 1 Hz; } }
-}
-
-mod real {
-    use bb_core::prelude::*;
-
-    robot! { pub(crate) robot Panda; topology: urdf("urdf/panda.urdf"); }
-    robot! { pub(crate) robot Ur5; topology: urdf("urdf/ur5_robot.urdf"); }
-    robot! { pub(crate) robot Anymal; topology: urdf("urdf/anymal.urdf"); }
 }
 
 #[test]
@@ -130,33 +122,4 @@ fn components_are_declared_onto_a_urdf() -> Result<(), StartError> {
         ("sensor/base_link/elbow/upper/flange/tool/imu", "sensor/base_link/elbow/encoder")
     );
     Ok(())
-}
-
-#[test]
-fn real_robots_are_read() {
-    let (panda, ur5, anymal) = (real::Panda::TOPOLOGY, real::Ur5::TOPOLOGY, real::Anymal::TOPOLOGY);
-    let moving = |topology: &bb_core::topology::Topology| {
-        topology.joints.iter().filter(|joint| joint.axis.is_some()).count()
-    };
-    assert_eq!((panda.links.len(), moving(panda)), (13, 9));
-    assert_eq!(moving(ur5), 6);
-    assert_eq!(moving(anymal), 12);
-    let finger = panda.joint("panda_finger_joint2").and_then(|finger| finger.mimic).expect("it follows the other");
-    assert_eq!(panda.joints[finger.joint].name, "panda_finger_joint1");
-}
-
-#[test]
-fn the_graph_shows_topology_and_dataflow() {
-    let mermaid = Gripper::graph(GraphFormat::Mermaid);
-    for expected in [
-        "flowchart LR",
-        "n_link__palm([\"palm\"])",
-        "n_link__palm ===|\"left: prismatic\"| n_link__left_finger",
-        "n_sensor__palm__load -->|\"load (driver)\"| n_sensor__palm__load__scaled",
-        "n_sensor__palm__load__scaled -->|\"driver (driver)\"| n_estimator__palm__both",
-    ] {
-        assert!(mermaid.contains(expected), "{expected} is not in\n{mermaid}");
-    }
-    let dot = Gripper::graph(GraphFormat::Dot);
-    assert!(dot.starts_with("digraph robot {") && dot.ends_with("}\n"), "{dot}");
 }

@@ -1,66 +1,47 @@
 //! Estimators with a thread of their own: they hang, fail, tick, are lost and stopped as any other, and hold nobody up.
 
-use crate::components::{Number, within};
+use crate::components::{Ask, Done, Echo, Number, Replied, within};
+use crate::gate::{Gate, PATIENCE, wait_until};
 use bb_core::prelude::*;
 use bb_core::run::DropReason;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-/// Hangs at -1 until it is let go, fails at -2; emits what it gets, and ticks.
-#[derive(Debug)]
-pub(crate) struct Heavy;
-
-static HANGS: AtomicBool = AtomicBool::new(false);
 static TERMINATED: AtomicUsize = AtomicUsize::new(0);
 static TICKS: AtomicUsize = AtomicUsize::new(0);
 
-impl Estimator for Heavy {
-    type Options = NoOptions;
-    type Input = Number;
-    type Output = Number;
+static HERE: Gate = Gate::new();
 
-    fn init(_: NoOptions, context: &Context) -> Result<Self, Fault> {
-        context.request(Request::Tick(Duration::from_millis(5)));
-        Ok(Self)
-    }
+const HANGS: f64 = -1.0;
+const PANICS: f64 = -2.0;
 
-    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
-        if number.0 == -1.0 {
-            HANGS.store(true, Ordering::SeqCst);
-            while HANGS.load(Ordering::SeqCst) {
-                std::thread::sleep(Duration::from_millis(1));
-            }
-        }
-        if number.0 == -2.0 {
-            panic!("asked to");
-        }
-        Ok(Reply::emit(number.payload))
-    }
-
-    fn handle_info(&mut self, _: Info) -> Result<Reply<Number>, Fault> {
-        TICKS.fetch_add(1, Ordering::SeqCst);
-        Ok(Reply::emit(Number(-10.0)))
-    }
-
-    fn terminate(&mut self) {
-        TERMINATED.fetch_add(1, Ordering::SeqCst);
-    }
+fn tick(context: &Context) -> Done {
+    context.request(Request::Tick(Duration::from_millis(5)));
+    Ok(())
 }
 
-pub(crate) struct Ask;
+fn ticks(_: &mut f64, _: Info) -> Replied {
+    TICKS.fetch_add(1, Ordering::SeqCst);
+    Ok(Reply::emit(Number(-10.0)))
+}
 
-impl HandleCall<Ask> for Heavy {
-    type Response = ();
-    fn handle_call(&mut self, Ask: Ask) -> Result<((), Reply<Number>), Fault> {
-        Ok(((), Reply::none()))
+fn work(_: &mut f64, number: f64) -> Replied {
+    if number == HANGS {
+        HERE.pass("a worker");
     }
+    assert!(number != PANICS, "asked to");
+    Ok(Reply::emit(Number(number)))
+}
+
+fn end() {
+    TERMINATED.fetch_add(1, Ordering::SeqCst);
 }
 
 robot! {
     robot Laden;
     link base {
         sensor number: External<Number>();
-        estimator heavy: Heavy() {
+        estimator heavy: Echo(init = tick, input = work, info = ticks, terminate = end) {
             input number: sensor::base::number;
             runs_on: worker;
             lost_after: 100 ms;
@@ -78,10 +59,9 @@ fn publish(running: &Running<Laden>, number: f64) {
 }
 
 fn hang(running: &Running<Laden>) {
-    publish(running, -1.0);
-    while !HANGS.load(Ordering::SeqCst) {
-        std::thread::sleep(Duration::from_millis(1));
-    }
+    HERE.close("a worker");
+    publish(running, HANGS);
+    HERE.wait_for(1);
 }
 
 #[test]
@@ -92,13 +72,12 @@ fn what_does_not_fit_while_it_hangs_is_counted_and_the_rest_comes_in_order() {
         let heavy = builder.subscribe_with(laden::estimator::base::heavy, Overflow::DropOldest { capacity: 4096 });
         let running = builder.start().expect("it starts");
         hang(&running);
-        let start = std::time::Instant::now();
+        // Nobody waits for it.
         (0..1500).for_each(|number| publish(&running, f64::from(number)));
-        assert!(start.elapsed() < Duration::from_secs(2), "nobody waits for it");
-        HANGS.store(false, Ordering::SeqCst);
+        HERE.open();
         let mut numbers = Vec::new();
         while numbers.last() != Some(&1499.0) {
-            let number = heavy.recv_timeout(Duration::from_secs(10)).expect("it goes on");
+            let number = heavy.recv_timeout(PATIENCE).expect("it goes on");
             numbers.extend((number.0 >= 0.0).then_some(number.0));
         }
         assert_eq!(numbers, (476..1500).map(f64::from).collect::<Vec<_>>(), "the oldest made room");
@@ -116,19 +95,18 @@ fn it_restarts_ticks_and_is_lost_as_any_other() {
         let heavy = builder.subscribe(laden::estimator::base::heavy);
         let health = builder.subscribe(system::Health);
         let running = builder.start().expect("it starts");
-        let next = || heavy.recv_timeout(Duration::from_secs(10)).expect("it goes on").0;
+        let next = || heavy.recv_timeout(PATIENCE).expect("it goes on").0;
         assert_eq!(next(), -10.0, "it ticks before anything has come");
-        publish(&running, -2.0);
-        let restarted = || running.report().estimator(HEAVY).is_some_and(|heavy| heavy.restarts == 1);
-        while !restarted() {
-            std::thread::sleep(Duration::from_millis(1));
-        }
+        publish(&running, PANICS);
+        wait_until("it is restarted", || {
+            running.report().estimator(HEAVY).is_some_and(|heavy| heavy.restarts == 1)
+        });
         heavy.drain().for_each(drop);
         assert_eq!(next(), -10.0, "it ticks again");
         publish(&running, 5.0);
         while next() != 5.0 {}
         let lost = |change: Stamped<HealthTransition>| change.to == HealthState::Lost;
-        while !lost(health.recv_timeout(Duration::from_secs(10)).expect("it is lost some time")) {}
+        while !lost(health.recv_timeout(PATIENCE).expect("it is lost some time")) {}
     });
 }
 
@@ -148,9 +126,7 @@ fn one_that_is_flooded_still_ticks_and_answers() {
                 running.call(laden::estimator::base::heavy, Ask).expect("it runs");
             }
             let before = TICKS.load(Ordering::SeqCst);
-            while TICKS.load(Ordering::SeqCst) < before + 3 {
-                std::thread::sleep(Duration::from_millis(1));
-            }
+            wait_until("it ticks", || TICKS.load(Ordering::SeqCst) >= before + 3);
             stop.store(true, Ordering::SeqCst);
         });
     });
@@ -167,7 +143,7 @@ fn a_robot_is_stopped_with_a_full_inbox_and_with_one_that_hangs() {
         let terminated = TERMINATED.load(Ordering::SeqCst);
         let stopping = std::thread::spawn(move || running.stop());
         std::thread::sleep(Duration::from_millis(100));
-        HANGS.store(false, Ordering::SeqCst);
+        HERE.open();
         let report = stopping.join().expect("it does not panic");
         assert!(report.ok().is_ok());
         assert_eq!(TERMINATED.load(Ordering::SeqCst), terminated + 1);

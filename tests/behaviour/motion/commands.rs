@@ -29,12 +29,12 @@ fn joints_move_through_points_and_arrive_together() -> Result<(), Failure> {
 }
 
 /// Where the joints are 2 s after what happened to the command 1 s after its start; they rest since.
-fn after(what: impl FnOnce(&Simulation<Crane>, &Execution<()>) -> Result<(), Failure>) -> Result<(), Failure> {
+fn after(what: fn(&Simulation<Crane>, &Execution<()>)) -> Result<(), Failure> {
     let mut simulation = ready()?;
     let ends = ends(&simulation.bus());
     let execution = simulation.command(crane::command::go, targets(&[[1.2, 1.9]]))?;
     simulation.run_for(Duration::from_secs(1));
-    what(&simulation, &execution)?;
+    what(&simulation, &execution);
     let (slew, reach) = (true_position(&simulation, "slew")?, true_position(&simulation, "reach")?);
     simulation.run_for(Duration::from_secs(2));
     let (slew_then, reach_then) = (true_position(&simulation, "slew")?, true_position(&simulation, "reach")?);
@@ -50,11 +50,9 @@ fn after(what: impl FnOnce(&Simulation<Crane>, &Execution<()>) -> Result<(), Fai
 }
 
 #[test]
-fn a_command_that_is_cancelled_stops_its_joints() -> Result<(), Failure> {
-    after(|_, execution| {
-        execution.cancel();
-        Ok(())
-    })
+fn a_command_that_is_cancelled_or_whose_robot_is_disarmed_stops_its_joints() -> Result<(), Failure> {
+    after(|_, execution| execution.cancel())?;
+    after(|simulation, _| assert_eq!(simulation.disarm(), Ok(())))
 }
 
 /// Before it has begun, on its first step, while its joints speed up, go on, slow down, and once it has ended; and once more
@@ -99,14 +97,6 @@ fn a_command_may_be_cancelled_in_each_phase_of_its_motion() -> Result<(), Failur
     assert_eq!((moved.first(), moved.last()), (Some(&(false, false)), Some(&(true, true))), "{phases:?}");
     assert!(moved.iter().filter(|phase| **phase == (false, true)).count() >= 6, "{phases:?}");
     Ok(())
-}
-
-#[test]
-fn joints_stop_when_the_robot_is_disarmed() -> Result<(), Failure> {
-    after(|simulation, _| {
-        assert_eq!(simulation.disarm(), Ok(()));
-        Ok(())
-    })
 }
 
 #[test]
@@ -167,22 +157,42 @@ fn a_joint_that_is_held_fails_the_command_and_stops_the_others() -> Result<(), F
     Ok(())
 }
 
-/// A motor that says at once that it is stuck.
+/// A motor that says at once that it is stuck, or that reports the end of a motion more often than it has any.
 #[derive(Debug)]
-struct Jammed(ActuatorContext);
+struct Odd {
+    context: ActuatorContext,
+    chats: bool,
+    now: MonotonicTime,
+}
 
-impl Actuator for Jammed {
-    type Options = NoOptions;
+#[derive(Clone, Debug, Options)]
+struct OddOptions {
+    #[option(default = false)]
+    chats: bool,
+}
+
+impl Actuator for Odd {
+    type Options = OddOptions;
     type Command = ActuatorCommand;
 
-    fn init(_: NoOptions, context: &ActuatorContext) -> Result<Self, Fault> {
-        Ok(Self(context.clone()))
+    fn init(options: OddOptions, context: &ActuatorContext) -> Result<Self, Fault> {
+        Ok(Self { context: context.clone(), chats: options.chats, now: MonotonicTime::ZERO })
     }
 
     fn handle_command(&mut self, command: &Stamped<ActuatorCommand>) -> Result<(), Fault> {
         if matches!(command.payload, ActuatorCommand::Trajectory(_)) {
-            self.0.end_motion(EndMotion { position: 0.0, end: MotionEnd::Stalled });
+            self.context.end_motion(EndMotion { position: 0.0, end: MotionEnd::Stalled });
         }
+        Ok(())
+    }
+
+    fn next_update(&self) -> Option<MonotonicTime> {
+        self.chats.then(|| self.now + Duration::from_millis(1))
+    }
+
+    fn update(&mut self, now: MonotonicTime) -> Result<(), Fault> {
+        self.now = now;
+        self.context.end_motion(EndMotion { position: 0.0, end: MotionEnd::Stopped });
         Ok(())
     }
 
@@ -192,30 +202,63 @@ impl Actuator for Jammed {
 }
 
 robot! {
-    robot Vice;
-    commands { close: MoveJoints(); }
+    robot Shop;
+    commands { go: MoveJoints(); wind: MoveJoints(speed = 1.0, acceleration = 2.0, jerk = 20.0); }
     link base {
         joint screw: revolute {
             axis: z;
             limit: { lower: -1 rad, upper: 1 rad, velocity: 1 rad/s, effort: 1 N*m };
-            actuator motor: Jammed();
+            actuator motor: Odd();
             sensor encoder: External<JointState>();
             link jaws;
         }
+        joint lift: prismatic {
+            axis: z;
+            limit: { lower: 0 m, upper: 1 m, velocity: 0.1 m/s, effort: 10 N };
+            actuator motor: SimulatedActuator();
+            sensor encoder: SimulatedEncoder() { rate: 100 Hz; }
+            link tray;
+        }
+        joint drum: continuous {
+            axis: z;
+            limit: { velocity: 1 rad/s, effort: 10 N*m };
+            actuator motor: SimulatedActuator();
+            sensor encoder: SimulatedEncoder(velocity_noise = 0.01) { rate: 1000 Hz; }
+            link rope;
+        }
+    }
+}
+
+/// Armed, 10 ms after its start.
+fn shop(mut change: impl FnMut(&mut bb_core::Builder<Shop>)) -> Result<Simulation<Shop>, Failure> {
+    let mut builder = Shop::builder();
+    change(&mut builder);
+    let mut simulation = builder.simulate()?;
+    simulation.run_until(at(20));
+    assert_eq!(simulation.arm(), Ok(()));
+    Ok(simulation)
+}
+
+fn target(joint: &str, position: f64) -> JointTargets {
+    JointTargets { joints: vec![joint.into()], points: vec![JointTarget { positions: vec![position] }] }
+}
+
+/// The next command that was sent, which is a trajectory.
+fn trajectory(sent: &DynamicSubscription) -> Result<JointTrajectory, Failure> {
+    let sent = sent.try_recv().ok_or("it is sent")?;
+    match sent.downcast::<ActuatorCommand>().map(|command| command.payload.clone()) {
+        Some(ActuatorCommand::Trajectory(trajectory)) => Ok(trajectory),
+        other => Err(format!("a trajectory, not {other:?}").into()),
     }
 }
 
 #[test]
 fn a_joint_that_is_stuck_from_the_start_fails_the_command() -> Result<(), Failure> {
-    let mut simulation = Vice::builder().simulate()?;
-    simulation.run_until(at(10));
+    let mut simulation = shop(|_| ())?;
     let state = JointState { position: 0.0, velocity: None, effort: None };
-    simulation.publish(vice::sensor::base::screw::encoder, simulation.clock().now(), state);
-    simulation.run_until(at(20));
-    assert_eq!(simulation.arm(), Ok(()));
-    let there = JointTarget { positions: vec![0.5] };
-    let targets = JointTargets { joints: vec!["screw".into()], points: vec![there] };
-    let execution = simulation.command(vice::command::close, targets)?;
+    simulation.publish(shop::sensor::base::screw::encoder, simulation.clock().now(), state);
+    simulation.run_until(at(30));
+    let execution = simulation.command(shop::command::go, target("screw", 0.5))?;
     simulation.run_for(Duration::from_secs(10));
     let error = execution.try_result().ok_or("it has ended")?.expect_err("it is stuck").to_string();
     assert!(error.contains("the joint `screw` has stalled at 0"), "{error}");
@@ -243,14 +286,8 @@ fn a_trajectory_starts_with_the_motion_of_the_joint() -> Result<(), Failure> {
             slowest = slowest.min(now.velocity * speed.signum());
         }
         assert!(slowest > 0.99 * speed.abs(), "it goes on: {slowest}");
-        let trajectory = sent.try_recv().ok_or("it is sent")?;
-        let Some(ActuatorCommand::Trajectory(trajectory)) =
-            trajectory.downcast::<ActuatorCommand>().map(|command| command.payload.clone())
-        else {
-            return Err("a trajectory".into());
-        };
         // The encoder was read at 200 Hz, 3 ms before.
-        let start = &trajectory.points[0];
+        let start = &trajectory(&sent)?.points[0];
         assert!((start.positions[0] - before.position).abs() < 1e-4, "{start:?} {before:?}");
         assert!((start.velocities[0] - before.velocity).abs() < 1e-6, "{start:?} {before:?}");
         simulation.run_for(Duration::from_secs(8));
@@ -261,131 +298,41 @@ fn a_trajectory_starts_with_the_motion_of_the_joint() -> Result<(), Failure> {
 
 #[test]
 fn a_joint_that_moves_out_of_its_range_is_planned_from_rest() -> Result<(), Failure> {
-    let mut simulation = Vice::builder().simulate()?;
-    simulation.run_until(at(10));
-    assert_eq!(simulation.arm(), Ok(()));
+    let mut simulation = shop(|_| ())?;
     let state = JointState { position: 1.0, velocity: Some(0.9), effort: None };
-    simulation.publish(vice::sensor::base::screw::encoder, simulation.clock().now(), state);
+    simulation.publish(shop::sensor::base::screw::encoder, simulation.clock().now(), state);
     let sent = simulation.subscribe_any(Select::Below("actuator"), "ActuatorCommand", Overflow::default());
-    let targets = JointTargets { joints: vec!["screw".into()], points: vec![JointTarget { positions: vec![0.0] }] };
-    let _execution = simulation.command(vice::command::close, targets)?;
+    let _execution = simulation.command(shop::command::go, target("screw", 0.0))?;
     simulation.run_for(Duration::from_millis(10));
-    let sent = sent.try_recv().ok_or("it is planned")?;
-    let Some(ActuatorCommand::Trajectory(trajectory)) =
-        sent.downcast::<ActuatorCommand>().map(|command| command.payload.clone())
-    else {
-        return Err("a trajectory".into());
-    };
+    let trajectory = trajectory(&sent)?;
     assert_eq!((trajectory.points[0].positions[0], trajectory.points[0].velocities[0]), (1.0, 0.0));
     assert!(trajectory.points.iter().all(|point| point.positions[0] <= 1.0));
     Ok(())
 }
 
-robot! {
-    robot Winch;
-    commands { wind: MoveJoints(speed = 1.0, acceleration = 2.0, jerk = 20.0); }
-    link base {
-        joint drum: continuous {
-            axis: z;
-            limit: { velocity: 1 rad/s, effort: 10 N*m };
-            actuator motor: SimulatedActuator();
-            sensor encoder: SimulatedEncoder(velocity_noise = 0.01) { rate: 1000 Hz; }
-            link rope;
-        }
-    }
-}
-
 /// The jerk is finite, so the acceleration that noise pretends would take the planned velocity above the limit.
 #[test]
 fn a_joint_at_its_largest_velocity_may_be_commanded_however_noisy_that_is() -> Result<(), Failure> {
-    let mut kept = 0;
-    for seed in 0..100 {
-        let mut builder = Winch::builder();
-        builder.options(winch::sensor::base::drum::encoder).seed = seed;
-        let mut simulation = builder.simulate()?;
-        simulation.run_until(at(10));
-        assert_eq!(simulation.arm(), Ok(()));
-        let motor = winch::actuator::base::drum::motor;
+    for seed in 0..25 {
+        let mut simulation = shop(|builder| builder.options(shop::sensor::base::drum::encoder).seed = seed)?;
+        let motor = shop::actuator::base::drum::motor;
         simulation.actuate(motor, VelocityCommand { velocity: 1.0, effort: None }.into())?;
         simulation.run_for(Duration::from_millis(1_000));
         let sent = simulation.subscribe_any(Select::Path(motor.path()), None, Overflow::default());
-        let targets =
-            JointTargets { joints: vec!["drum".into()], points: vec![JointTarget { positions: vec![5.0] }] };
-        let execution = simulation.command(winch::command::wind, targets)?;
+        let execution = simulation.command(shop::command::wind, target("drum", 5.0))?;
         simulation.run_for(Duration::from_secs(8));
         assert_eq!(execution.try_result(), Some(Ok(())), "seed {seed}");
-        let sent = sent.try_recv().ok_or("it is sent")?;
-        let Some(ActuatorCommand::Trajectory(trajectory)) =
-            sent.downcast::<ActuatorCommand>().map(|command| command.payload.clone())
-        else {
-            return Err("a trajectory".into());
-        };
-        kept += u32::from(trajectory.points[0].velocities[0] > 0.9);
+        let trajectory = trajectory(&sent)?;
+        assert!(trajectory.points[0].velocities[0] > 0.9, "seed {seed}: it goes on with its velocity");
     }
-    assert_eq!(kept, 100, "it goes on with its velocity");
     Ok(())
-}
-
-/// A motor that reports a motion more often than it has any.
-#[derive(Debug)]
-struct Chatty(ActuatorContext, MonotonicTime);
-
-impl Actuator for Chatty {
-    type Options = NoOptions;
-    type Command = ActuatorCommand;
-
-    fn init(_: NoOptions, context: &ActuatorContext) -> Result<Self, Fault> {
-        Ok(Self(context.clone(), MonotonicTime::ZERO))
-    }
-
-    fn handle_command(&mut self, _: &Stamped<ActuatorCommand>) -> Result<(), Fault> {
-        Ok(())
-    }
-
-    fn next_update(&self) -> Option<MonotonicTime> {
-        Some(self.1 + Duration::from_millis(1))
-    }
-
-    fn update(&mut self, now: MonotonicTime) -> Result<(), Fault> {
-        self.1 = now;
-        self.0.end_motion(EndMotion { position: 0.0, end: MotionEnd::Stopped });
-        Ok(())
-    }
-
-    fn disarm(&mut self) -> Result<(), Fault> {
-        Ok(())
-    }
-}
-
-robot! {
-    robot Shaker;
-    commands { go: MoveJoints(); }
-    link base {
-        joint sieve: prismatic {
-            axis: x;
-            limit: { lower: 0 m, upper: 1 m, velocity: 1 m/s, effort: 1 N };
-            actuator motor: Chatty();
-            sensor encoder: SimulatedEncoder() { rate: 100 Hz; }
-            link mesh;
-        }
-        joint lift: prismatic {
-            axis: z;
-            limit: { lower: 0 m, upper: 1 m, velocity: 0.1 m/s, effort: 10 N };
-            actuator motor: SimulatedActuator();
-            sensor encoder: SimulatedEncoder() { rate: 100 Hz; }
-            link tray;
-        }
-    }
 }
 
 #[test]
 fn progress_is_published_ten_times_a_second_however_much_is_reported() -> Result<(), Failure> {
-    let mut simulation = Shaker::builder().simulate()?;
-    simulation.run_until(at(20));
-    assert_eq!(simulation.arm(), Ok(()));
+    let mut simulation = shop(|builder| builder.options(shop::actuator::base::screw::motor).chats = true)?;
     let progress = simulation.subscribe_any(Select::Below("command/go"), "MotionProgress", Overflow::default());
-    let targets = JointTargets { joints: vec!["lift".into()], points: vec![JointTarget { positions: vec![0.5] }] };
-    let execution = simulation.command(shaker::command::go, targets)?;
+    let execution = simulation.command(shop::command::go, target("lift", 0.5))?;
     simulation.run_for(Duration::from_secs(5));
     let count = progress.drain().count();
     assert!(execution.try_result().is_none() && (49..=51).contains(&count), "{count}");

@@ -1,6 +1,8 @@
 //! Motions in a replay.
 
 use super::*;
+use crate::replay::{entries, journal, read_back};
+use std::collections::BTreeMap;
 
 /// What was published at each path below `actuator` and `command`.
 fn heard(all: &DynamicSubscription) -> BTreeMap<&'static str, Vec<String>> {
@@ -13,10 +15,8 @@ fn heard(all: &DynamicSubscription) -> BTreeMap<&'static str, Vec<String>> {
 
 #[test]
 fn motions_and_their_reports_are_the_same_in_a_replay() -> Result<(), Failure> {
-    let lines = Arc::new(Mutex::new(Vec::new()));
     let mut builder = simulated()?;
-    let sink = Arc::clone(&lines);
-    builder.journal(move |entry| sink.lock().unwrap_or_else(PoisonError::into_inner).push(entry));
+    let lines = journal(&mut builder);
     let mut simulation = builder.simulate()?;
     let selected = Select::AnyOf(&[Select::Below("actuator"), Select::Below("command")]);
     let all = simulation.subscribe_any(selected, None, Overflow::DropOldest { capacity: 1 << 16 });
@@ -35,19 +35,8 @@ fn motions_and_their_reports_are_the_same_in_a_replay() -> Result<(), Failure> {
         assert!(first.contains_key(path), "nothing at {path}");
     }
 
-    let mut lines = std::mem::take(&mut *lines.lock().unwrap_or_else(PoisonError::into_inner));
-    lines.sort_by_key(|line| line.number);
-    // What a file holds: the payloads are known by their paths alone.
-    let reader = JournalReader::<Crane>::default();
-    let read: Result<Vec<Entry>, Failure> = lines
-        .iter()
-        .map(|line| {
-            let mut bytes = Vec::new();
-            encode(line, &mut bytes);
-            Ok(reader.entry(&decode(&bytes)?)?)
-        })
-        .collect();
-    for lines in [lines, read?] {
+    let lines = entries(&lines);
+    for lines in [read_back::<Crane>(&lines)?, lines] {
         let mut replay = Crane::builder().replay()?;
         let progress = replay.bus().publisher::<MotionProgress>("command/go/progress")?;
         let all = replay.subscribe_any(selected, None, Overflow::DropOldest { capacity: 1 << 16 });
