@@ -107,15 +107,9 @@ pub trait Field: Finite + Sized {
     }
 }
 
-/// The bytes before the data: plain CDR, little endian.
-const HEADER: [u8; 4] = [0, 1, 0, 0];
-
-/// Writers may pad to a multiple of four bytes. If more is left over, it is another type.
-const PADDING: usize = 3;
-
 /// Appends `value` as CDR, with the four bytes before it that name the encoding.
 pub fn encode<T: Field>(value: &T, bytes: &mut Vec<u8>) {
-    encode_with(bytes, |writer| value.write(writer));
+    value.write(&mut Writer::of_message(bytes));
 }
 
 /// Reads a value that [`encode`] has written.
@@ -123,22 +117,10 @@ pub fn encode<T: Field>(value: &T, bytes: &mut Vec<u8>) {
 /// # Errors
 /// The field that is wrong, and what was expected there.
 pub fn decode<T: Field>(bytes: &[u8]) -> Result<T, DecodeError> {
-    decode_with(bytes, T::read)
-}
-
-fn encode_with<T>(bytes: &mut Vec<u8>, write: impl FnOnce(&mut Writer<'_>) -> T) -> T {
-    bytes.extend(HEADER);
-    write(&mut Writer::new(bytes))
-}
-
-fn decode_with<T>(
-    bytes: &[u8],
-    read: impl FnOnce(&mut Reader<'_>) -> Result<T, DecodeError>,
-) -> Result<T, DecodeError> {
     let mut reader = Reader::of_message(bytes)?;
-    let value = read(&mut reader)?;
-    match reader.left() {
-        0..=PADDING => Ok(value),
-        left => Err(reader.error("the end", format!("{left} more bytes"))),
+    let value = T::read(&mut reader)?;
+    match reader.end_message() {
+        Ok(()) => Ok(value),
+        Err(error) => Err(error),
     }
 }

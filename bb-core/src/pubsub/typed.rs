@@ -78,11 +78,7 @@ impl<T: Payload> AnyTopic for Topic<T> {
     }
 
     fn schemas(&self) -> fn() -> Vec<Schema> {
-        || {
-            let ros = Stamped::<T>::ros_schema();
-            let companion = Stamped::<T>::ros_companion().map(|(_, schema)| schema);
-            [Stamped::<T>::schema()].into_iter().chain(ros).chain(companion).collect()
-        }
+        Stamped::<T>::schemas
     }
 
     fn subscribers(&self) -> Vec<SubscriberStatistics> {

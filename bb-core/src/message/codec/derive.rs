@@ -37,13 +37,13 @@ impl<T: Field> FieldOf<T> {
         value.write(writer);
     }
 
-    /// Reads the field `name`.
+    /// Reads it.
     ///
     /// # Errors
-    /// The field's error, with its name.
+    /// The field's error.
     #[inline]
-    pub fn read(reader: &mut Reader<'_>, name: &'static str) -> Result<T, DecodeError> {
-        reader.field(name)
+    pub fn read(reader: &mut Reader<'_>) -> Result<T, DecodeError> {
+        T::read(reader)
     }
 }
 
@@ -67,8 +67,8 @@ pub trait NotField<T> {
     ///
     /// # Errors
     /// Always.
-    fn read(reader: &mut Reader<'_>, name: &'static str) -> Result<T, DecodeError> {
-        Err(reader.error("a field", "none").within(name))
+    fn read(reader: &mut Reader<'_>) -> Result<T, DecodeError> {
+        Err(reader.error("a field", "none"))
     }
 }
 

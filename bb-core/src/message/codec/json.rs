@@ -28,7 +28,8 @@ pub use schema::json_schema;
 pub(crate) use schema::{Definitions, document, member};
 pub use write::{bytes_to_json, to_json};
 
-use super::shape::{FieldShape, NOTHING};
+use super::shape::{FieldShape, NOTHING, Shape};
+use std::ops::RangeInclusive;
 
 /// The floats that JSON has no number for.
 const NAN: &str = "NaN";
@@ -40,7 +41,7 @@ enum Form {
     /// No fields: `{}`.
     Empty,
     /// One field without a name: that field.
-    Transparent(super::Shape),
+    Transparent(Shape),
     /// An object.
     Object(&'static [FieldShape]),
 }
@@ -53,4 +54,23 @@ impl Form {
             fields => Self::Object(fields),
         }
     }
+}
+
+/// The values of an integer's type.
+fn range(shape: Shape) -> Option<RangeInclusive<i128>> {
+    let (is_signed, bits) = match shape {
+        Shape::I8 => (true, 8),
+        Shape::I16 => (true, 16),
+        Shape::I32 => (true, 32),
+        Shape::I64 => (true, 64),
+        Shape::U8 => (false, 8),
+        Shape::U16 => (false, 16),
+        Shape::U32 => (false, 32),
+        Shape::U64 => (false, 64),
+        _ => return None,
+    };
+    Some(match is_signed {
+        true => -(1 << (bits - 1))..=(1 << (bits - 1)) - 1,
+        false => 0..=(1 << bits) - 1,
+    })
 }

@@ -1,10 +1,13 @@
 //! Reads plain CDR. Lengths are checked against the remaining bytes before anything is allocated.
 
-use super::{DecodeError, Field};
+use super::{DecodeError, Field, Shape, StructShape};
 
 /// Encoding identifiers: plain CDR.
 const BIG_ENDIAN: u16 = 0x0000;
 const LITTLE_ENDIAN: u16 = 0x0001;
+
+/// Writers may pad to a multiple of four bytes. If more is left over, it is another type.
+const PADDING: usize = 3;
 
 /// Reads values from bytes.
 #[derive(Clone, Debug)]
@@ -41,6 +44,17 @@ impl<'a> Reader<'a> {
             _ => "",
         };
         Err(DecodeError::new(0, "the encoding 0x0000 or 0x0001, plain CDR", format!("{encoding:#06x}{name}")))
+    }
+
+    /// The end of a message: nothing but padding is left.
+    ///
+    /// # Errors
+    /// More is left.
+    pub(super) fn end_message(&self) -> Result<(), DecodeError> {
+        match self.left() {
+            0..=PADDING => Ok(()),
+            left => Err(self.error("the end", format!("{left} more bytes"))),
+        }
     }
 
     /// The number of remaining bytes.
@@ -131,21 +145,35 @@ impl<'a> Reader<'a> {
         self.raw(1, "a byte").map(drop)
     }
 
-    /// The variant number of an enum.
+    /// The variant number of an enum of that shape, and what comes before the variant's fields: the empty lists of those
+    /// before it, and the length of its own.
     #[doc(hidden)]
-    pub fn variant(&mut self) -> Result<u32, DecodeError> {
-        self.number("the number of a variant").map(u32::from_le_bytes)
+    pub fn variant(&mut self, shape: &Shape) -> Result<u32, DecodeError> {
+        let number = u32::from_le_bytes(self.number("the number of a variant")?);
+        let (before, variant, _) = split(shape, number);
+        let Some(variant) = variant else { return Err(self.no_variant(number)) };
+        self.absent(with_fields(before))?;
+        match variant.fields.is_empty() || self.is_present()? {
+            true => Ok(number),
+            false => Err(self.error("the fields of the variant", "none")),
+        }
+    }
+
+    /// What comes after the fields of that variant: the empty lists of those after it.
+    #[doc(hidden)]
+    pub fn end_variant(&mut self, shape: &Shape, number: u32) -> Result<(), DecodeError> {
+        let (_, _, after) = split(shape, number);
+        self.absent(with_fields(after))
     }
 
     /// The error for a number without a variant.
     #[doc(hidden)]
-    pub fn no_variant<T>(&self, number: u32) -> Result<T, DecodeError> {
-        Err(self.error("the number of a variant", number.to_string()))
+    pub fn no_variant(&self, number: u32) -> DecodeError {
+        self.error("the number of a variant", number.to_string())
     }
 
     /// The empty lists of `count` other variants.
-    #[doc(hidden)]
-    pub fn absent(&mut self, count: usize) -> Result<(), DecodeError> {
+    pub(super) fn absent(&mut self, count: usize) -> Result<(), DecodeError> {
         for _ in 0..count {
             if self.is_present()? {
                 return Err(self.error("no fields of another variant", "some"));
@@ -154,16 +182,21 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// The list with the fields of the variant that is present.
-    #[doc(hidden)]
-    pub fn present(&mut self) -> Result<(), DecodeError> {
-        match self.is_present()? {
-            true => Ok(()),
-            false => Err(self.error("the fields of the variant", "none")),
-        }
-    }
-
     fn ends(&self, expected: &'static str) -> DecodeError {
         self.error(expected, "the end")
     }
+}
+
+/// The variants of an enum before that number, the one with it, and those after it.
+fn split(shape: &Shape, number: u32) -> (&[StructShape], Option<&StructShape>, &[StructShape]) {
+    let Shape::Enum(shape) = shape else { return (&[], None, &[]) };
+    match shape.variants.split_at_checked(number as usize) {
+        Some((before, [variant, after @ ..])) => (before, Some(variant), after),
+        _ => (shape.variants, None, &[]),
+    }
+}
+
+/// The variants that have a list.
+fn with_fields(variants: &[StructShape]) -> usize {
+    variants.iter().filter(|variant| !variant.fields.is_empty()).count()
 }

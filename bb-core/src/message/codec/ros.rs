@@ -185,6 +185,7 @@ pub struct RosLayout<T> {
     pub(crate) shape: Shape,
     pub(crate) write: fn(&Stamped<T>, &mut Writer<'_>),
     pub(crate) read: fn(&mut Reader<'_>) -> Result<(T, WallTime), DecodeError>,
+    pub(super) is_exact: fn(&Stamped<T>) -> bool,
     pub(crate) companion: Option<RosCompanion<T>>,
 }
 
@@ -194,6 +195,7 @@ impl<T: Payload + RosMessage> RosLayout<T> {
         shape: <T::Message as Field>::SHAPE,
         write: |message, writer| T::to_ros(message).write(writer),
         read: |reader| T::from_ros(T::Message::read(reader)?),
+        is_exact: super::stamped::reads_back,
         companion: T::COMPANION,
     };
 

@@ -1,8 +1,8 @@
 //! A shape as text for other programs: `ros2msg`, the message definitions of ROS 2.
 
-use super::Shape;
 use super::definitions::{Count, Definition, Element, definitions};
 use super::type_description::type_name;
+use super::{Shape, StructShape};
 use std::fmt::Write;
 
 /// The information a program needs to read the bytes of a type it does not know.
@@ -31,6 +31,11 @@ impl Schema {
             body(definition, &mut text);
         }
         Self { name: definitions.first().map_or(String::new(), |main| type_name(&main.name)), text }
+    }
+
+    /// Of a struct, under its own name.
+    pub(super) fn of(shape: &'static StructShape) -> Self {
+        Self::new(shape.name, Shape::Struct(shape))
     }
 }
 

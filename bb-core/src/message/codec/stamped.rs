@@ -1,53 +1,79 @@
 //! Whole messages: the exact layout, and that of ROS.
 
 use super::ros::Header;
-use super::{DecodeError, Field, FieldShape, Reader, Schema, Shape, StructShape, Writer, encode_with, type_hash};
+use super::{
+    DecodeError, Field, FieldShape, Reader, RosCompanion, RosLayout, Schema, Shape, StructShape, Writer, type_hash,
+};
 use crate::message::{Finite, Frame, Origin, Payload, Stamp, Stamped};
 use crate::time::WallTime;
 
 impl<T: Payload> Stamped<T> {
     /// The information a program needs to read a message in the exact layout without knowing the payload.
     pub fn schema() -> Schema {
-        // The name given to the derive, if any: two types with the same name need two.
-        let name = match T::SHAPE {
-            Shape::Struct(shape) => shape.name,
-            Shape::Enum(shape) => shape.name,
-            _ => T::NAME,
-        };
-        Schema::new(&format!("{name}Stamped"), Self::SHAPE)
+        exact_schema(T::NAME, T::SHAPE, Self::SHAPE)
     }
 
     /// ROS's definition of a message, if ROS has one for the payload.
     pub fn ros_schema() -> Option<Schema> {
-        T::ROS.and_then(|layout| match layout.shape {
-            Shape::Struct(shape) => Some(Schema::new(shape.name, layout.shape)),
-            _ => None,
-        })
+        ros_shape::<T>().map(Schema::of)
     }
 
     /// The name of ROS's message, `sensor_msgs/Imu`, if ROS has one for the payload.
     pub fn ros_name() -> Option<&'static str> {
-        T::ROS.and_then(|layout| match layout.shape {
-            Shape::Struct(shape) => Some(shape.name),
-            _ => None,
-        })
+        ros_shape::<T>().map(|shape| shape.name)
     }
 
     /// The last part of the topic and the definition of a second message, if ROS has two for the payload.
     pub fn ros_companion() -> Option<(&'static str, Schema)> {
-        let companion = T::ROS?.companion?;
-        match companion.shape {
-            Shape::Struct(shape) => Some((companion.topic, Schema::new(shape.name, companion.shape))),
-            _ => None,
-        }
+        const { ros_companion::<T>() }.map(|(topic, shape)| (topic, Schema::of(shape)))
+    }
+
+    /// The exact definition, and those of ROS.
+    pub(crate) fn schemas() -> Vec<Schema> {
+        let companion = const { ros_companion::<T>() }.map(|(_, shape)| shape);
+        all_schemas(exact_schema(T::NAME, T::SHAPE, Self::SHAPE), ros_shape::<T>(), companion)
     }
 
     /// The [`type_hash`] of ROS's message, if ROS has one for the payload.
     pub fn ros_type_hash() -> Option<String> {
-        T::ROS.and_then(|layout| match layout.shape {
-            Shape::Struct(shape) => Some(type_hash(shape.name, layout.shape)),
-            _ => None,
-        })
+        ros_shape::<T>().map(|shape| type_hash(shape.name, Shape::Struct(shape)))
+    }
+}
+
+/// The name of the definition is that given to the derive, if any: two types with the same name need two.
+fn exact_schema(name: &str, payload: Shape, message: Shape) -> Schema {
+    let name = match payload {
+        Shape::Struct(shape) => shape.name,
+        Shape::Enum(shape) => shape.name,
+        _ => name,
+    };
+    Schema::new(&format!("{name}Stamped"), message)
+}
+
+fn all_schemas(
+    exact: Schema,
+    ros: Option<&'static StructShape>,
+    companion: Option<&'static StructShape>,
+) -> Vec<Schema> {
+    let mut schemas = vec![exact];
+    schemas.extend(ros.map(Schema::of));
+    schemas.extend(companion.map(Schema::of));
+    schemas
+}
+
+const fn ros_shape<T: Payload>() -> Option<&'static StructShape> {
+    match &T::ROS {
+        Some(RosLayout { shape: Shape::Struct(shape), .. }) => Some(shape),
+        _ => None,
+    }
+}
+
+const fn ros_companion<T: Payload>() -> Option<(&'static str, &'static StructShape)> {
+    match &T::ROS {
+        Some(RosLayout { companion: Some(RosCompanion { topic, shape: Shape::Struct(shape), .. }), .. }) => {
+            Some((topic, shape))
+        }
+        _ => None,
     }
 }
 
@@ -77,38 +103,48 @@ impl<T: Payload> Field for Stamped<T> {
     }
 
     fn write(&self, writer: &mut Writer<'_>) {
+        self.stamp().write(writer);
+        self.payload.write(writer);
+    }
+
+    fn read(reader: &mut Reader<'_>) -> Result<Self, DecodeError> {
+        let stamp = Stamp::read(reader)?;
+        Ok(stamp.message(reader.field("payload")?))
+    }
+}
+
+impl Stamp {
+    fn write(&self, writer: &mut Writer<'_>) {
         Header::write_parts(self.wall_time, self.frame.name(), writer);
         self.monotonic_time.write(writer);
         self.wall_time.write(writer);
         writer.text(self.origin.robot);
         writer.text(self.origin.node);
-        self.payload.write(writer);
     }
 
     fn read(reader: &mut Reader<'_>) -> Result<Self, DecodeError> {
         let frame = Header::read_frame(reader).map_err(|error| error.within("header"))?;
-        let stamp = Stamp {
+        Ok(Self {
             frame: Frame::new(frame),
             monotonic_time: reader.field("monotonic_time")?,
             wall_time: reader.field("wall_time")?,
             origin: Origin { robot: reader.field("robot")?, node: reader.field("node")? },
-        };
-        Ok(stamp.message(reader.field("payload")?))
+        })
     }
 }
 
 /// Appends a message in ROS's layout; returns false and appends nothing if ROS has none for its payload.
 pub fn encode_as_ros<T: Payload>(message: &Stamped<T>, bytes: &mut Vec<u8>) -> bool {
-    let Some(layout) = T::ROS else { return false };
-    encode_with(bytes, |writer| (layout.write)(message, writer));
+    let Some(layout) = &T::ROS else { return false };
+    (layout.write)(message, &mut Writer::of_message(bytes));
     true
 }
 
 /// Appends the second message of a payload for which ROS has two; returns `false` and appends nothing if there is none.
 pub fn encode_companion<T: Payload>(message: &Stamped<T>, bytes: &mut Vec<u8>) -> bool {
-    let Some(companion) = T::ROS.and_then(|layout| layout.companion) else { return false };
+    let Some(RosLayout { companion: Some(companion), .. }) = &T::ROS else { return false };
     let start = bytes.len();
-    let is_there = encode_with(bytes, |writer| (companion.write)(message, writer));
+    let is_there = (companion.write)(message, &mut Writer::of_message(bytes));
     if !is_there {
         bytes.truncate(start);
     }
@@ -120,9 +156,11 @@ pub fn encode_companion<T: Payload>(message: &Stamped<T>, bytes: &mut Vec<u8>) -
 /// # Errors
 /// ROS has no second message for the payload, or the bytes are wrong.
 pub fn decode_companion<T: Payload>(payload: &mut T, bytes: &[u8]) -> Result<(), DecodeError> {
-    match T::ROS.and_then(|layout| layout.companion) {
-        Some(companion) => (companion.read)(payload, &mut Reader::of_message(bytes)?),
-        None => Err(DecodeError::new(0, "a payload that ROS has two messages for", T::NAME)),
+    match &T::ROS {
+        Some(RosLayout { companion: Some(companion), .. }) => {
+            (companion.read)(payload, &mut Reader::of_message(bytes)?)
+        }
+        _ => Err(DecodeError::new(0, "a payload that ROS has two messages for", T::NAME)),
     }
 }
 
@@ -132,7 +170,7 @@ pub fn decode_companion<T: Payload>(payload: &mut T, bytes: &[u8]) -> Result<(),
 /// # Errors
 /// ROS has no layout for the payload, or the bytes are wrong.
 pub fn decode_as_ros<T: Payload>(bytes: &[u8]) -> Result<(T, WallTime), DecodeError> {
-    match T::ROS {
+    match &T::ROS {
         // Bytes after the message are ignored: ROS counts padding for empty lists that it does not write, so some of
         // its own messages end with meaningless bytes.
         Some(layout) => (layout.read)(&mut Reader::of_message(bytes)?),
@@ -143,10 +181,16 @@ pub fn decode_as_ros<T: Payload>(bytes: &[u8]) -> Result<(T, WallTime), DecodeEr
 /// Whether payload and wall time of a message read back from ROS's layout bit for bit, including the second message
 /// if there is one.
 pub fn is_exact_as_ros<T: Payload>(message: &Stamped<T>) -> bool {
-    let mut bytes = Vec::new();
-    if !encode_as_ros(message, &mut bytes) {
-        return false;
+    // Through a pointer in the constant, so that it is compiled only for payloads that ROS has a message for.
+    match &T::ROS {
+        Some(layout) => (layout.is_exact)(message),
+        None => false,
     }
+}
+
+pub(super) fn reads_back<T: Payload>(message: &Stamped<T>) -> bool {
+    let mut bytes = Vec::new();
+    encode_as_ros(message, &mut bytes);
     let Ok((mut payload, wall_time)) = decode_as_ros::<T>(&bytes) else { return false };
     bytes.clear();
     if encode_companion(message, &mut bytes) && decode_companion(&mut payload, &bytes).is_err() {

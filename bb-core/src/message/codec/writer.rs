@@ -2,6 +2,9 @@
 
 use super::Field;
 
+/// The bytes before the data: plain CDR, little endian.
+const HEADER: [u8; 4] = [0, 1, 0, 0];
+
 /// Appends values to bytes.
 #[derive(Debug)]
 pub struct Writer<'a> {
@@ -15,6 +18,12 @@ impl<'a> Writer<'a> {
     pub fn new(bytes: &'a mut Vec<u8>) -> Self {
         let start = bytes.len();
         Self { bytes, start }
+    }
+
+    /// Appends a message to `bytes`: the four bytes that name the encoding, then the data.
+    pub(super) fn of_message(bytes: &'a mut Vec<u8>) -> Self {
+        bytes.extend_from_slice(&HEADER);
+        Self::new(bytes)
     }
 
     /// Appends a number aligned to a multiple of its size.

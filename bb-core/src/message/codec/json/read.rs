@@ -5,8 +5,8 @@
 
 use super::token::{float, integer, list, members, string, syntax, text_of};
 use super::wording::{Quoted, did_you_mean, expected, found, mismatch, unknown};
-use super::{Form, JsonError};
-use crate::message::codec::{EnumShape, Field, FieldShape, Shape, StructShape, Writer, decode, encode_with};
+use super::{Form, JsonError, range};
+use crate::message::codec::{EnumShape, Field, FieldShape, Shape, StructShape, Writer, decode};
 use serde_json::value::RawValue;
 
 /// A value from JSON, in the form that [`to_json`](super::to_json) writes.
@@ -46,13 +46,12 @@ pub fn from_json<T: Field>(text: &str) -> Result<T, JsonError> {
 /// As for [`from_json`].
 pub fn json_to_bytes(text: &str, shape: Shape) -> Result<Vec<u8>, JsonError> {
     let mut bytes = Vec::new();
-    encode_with(&mut bytes, |writer| match text.trim_ascii().is_empty() {
-        true => nothing(shape, writer),
-        false => {
-            let value: &RawValue = serde_json::from_str(text).map_err(syntax)?;
-            read(shape, value, writer)
-        }
-    })?;
+    let mut writer = Writer::of_message(&mut bytes);
+    if text.trim_ascii().is_empty() {
+        nothing(shape, &mut writer)?;
+    } else {
+        read(shape, serde_json::from_str(text).map_err(syntax)?, &mut writer)?;
+    }
     Ok(bytes)
 }
 
@@ -68,6 +67,16 @@ fn nothing(shape: Shape, writer: &mut Writer<'_>) -> Result<(), JsonError> {
 
 fn read(shape: Shape, value: &RawValue, writer: &mut Writer<'_>) -> Result<(), JsonError> {
     let token = value.get();
+    if let Some(range) = range(shape) {
+        let number = integer(range, shape, value)?;
+        match shape {
+            Shape::I8 | Shape::U8 => (number as u8).write(writer),
+            Shape::I16 | Shape::U16 => (number as u16).write(writer),
+            Shape::I32 | Shape::U32 => (number as u32).write(writer),
+            _ => (number as u64).write(writer),
+        }
+        return Ok(());
+    }
     match shape {
         Shape::Bool => match token {
             "true" => writer.raw(&[1]),
@@ -82,16 +91,7 @@ fn read(shape: Shape, value: &RawValue, writer: &mut Writer<'_>) -> Result<(), J
                 _ => return Err(mismatch(shape, value)),
             }
         }
-        Shape::I8 => integer::<i8>(shape, value)?.write(writer),
-        Shape::I16 => integer::<i16>(shape, value)?.write(writer),
-        Shape::I32 => integer::<i32>(shape, value)?.write(writer),
-        Shape::I64 => integer::<i64>(shape, value)?.write(writer),
-        Shape::U8 => integer::<u8>(shape, value)?.write(writer),
-        Shape::U16 => integer::<u16>(shape, value)?.write(writer),
-        Shape::U32 => integer::<u32>(shape, value)?.write(writer),
-        Shape::U64 => integer::<u64>(shape, value)?.write(writer),
         Shape::F32 => float::<f32>(shape, value)?.write(writer),
-        Shape::F64 => float::<f64>(shape, value)?.write(writer),
         Shape::Text => writer.text(&string(shape, value)?),
         Shape::Option(_) if token == "null" => writer.length(0),
         Shape::Option(of) => {
@@ -112,6 +112,8 @@ fn read(shape: Shape, value: &RawValue, writer: &mut Writer<'_>) -> Result<(), J
         }
         Shape::Struct(of) => object(of.fields, value, writer)?,
         Shape::Enum(of) => variant(of, value, writer)?,
+        // Integers are above.
+        _ => float::<f64>(shape, value)?.write(writer),
     }
     Ok(())
 }

@@ -1,8 +1,8 @@
 //! A shape as JSON Schema: the JSON that [`from_json`](super::from_json) accepts.
 
 use super::read::is_optional;
-use super::write::{number, text};
-use super::{Form, INFINITY, NAN, NEGATIVE_INFINITY};
+use super::write::text;
+use super::{Form, INFINITY, NAN, NEGATIVE_INFINITY, range};
 use crate::message::codec::{EnumShape, FieldShape, Shape, StructShape};
 
 /// The JSON Schema (draft 2020-12) of a shape: for forms, and for programs that check what they send.
@@ -79,21 +79,12 @@ pub(crate) struct Definitions {
 impl Definitions {
     /// The contents of a schema's braces.
     fn keywords(&mut self, shape: Shape) -> String {
+        if let Some(range) = range(shape) {
+            return format!(r#""type":"integer","minimum":{},"maximum":{}"#, range.start(), range.end());
+        }
         match shape {
             Shape::Bool => member("type", "boolean"),
             Shape::Char => r#""type":"string","minLength":1,"maxLength":1"#.into(),
-            Shape::I8 => integer(i8::MIN, i8::MAX),
-            Shape::I16 => integer(i16::MIN, i16::MAX),
-            Shape::I32 => integer(i32::MIN, i32::MAX),
-            Shape::I64 => integer(i64::MIN, i64::MAX),
-            Shape::U8 => integer(u8::MIN, u8::MAX),
-            Shape::U16 => integer(u16::MIN, u16::MAX),
-            Shape::U32 => integer(u32::MIN, u32::MAX),
-            Shape::U64 => integer(u64::MIN, u64::MAX),
-            Shape::F32 | Shape::F64 => {
-                let special = array([NAN, INFINITY, NEGATIVE_INFINITY]);
-                format!(r#""anyOf":[{{"type":"number"}},{{"enum":{special}}}]"#)
-            }
             Shape::Text => member("type", "string"),
             Shape::Option(of) => format!(r#""anyOf":[{},{{"type":"null"}}]"#, self.schema(*of)),
             Shape::List(of) => format!(r#""type":"array","items":{}"#, self.schema(*of)),
@@ -106,6 +97,11 @@ impl Definitions {
                 Form::Object(fields) => self.object(fields),
             },
             Shape::Enum(of) => self.variants(of),
+            // Integers are above.
+            _ => {
+                let special = array(&[NAN, INFINITY, NEGATIVE_INFINITY]);
+                format!(r#""anyOf":[{{"type":"number"}},{{"enum":{special}}}]"#)
+            }
         }
     }
 
@@ -154,8 +150,9 @@ impl Definitions {
             json.push(':');
             json.push_str(&self.schema(field.shape));
         }
-        let required = fields.iter().filter(|field| !is_optional(field.shape)).map(|field| field.name);
-        json.push_str(&format!(r#"}},"required":{},"additionalProperties":false"#, array(required)));
+        let is_required = |field: &&FieldShape| !is_optional(field.shape);
+        let required: Vec<_> = fields.iter().filter(is_required).map(|field| field.name).collect();
+        json.push_str(&format!(r#"}},"required":{},"additionalProperties":false"#, array(&required)));
         json
     }
 
@@ -166,12 +163,12 @@ impl Definitions {
             return match units.is_empty() {
                 // No value at all.
                 true => r#""not":{}"#.to_owned(),
-                false => format!(r#""enum":{}"#, array(units)),
+                false => format!(r#""enum":{}"#, array(&units)),
             };
         }
         let mut choices = Vec::new();
         if !units.is_empty() {
-            choices.push(format!(r#"{{"enum":{}}}"#, array(units)));
+            choices.push(format!(r#"{{"enum":{}}}"#, array(&units)));
         }
         for variant in of.variants.iter().filter(|variant| !variant.fields.is_empty()) {
             let fields = match Form::of(variant.fields) {
@@ -181,7 +178,7 @@ impl Definitions {
             };
             let mut choice = r#"{"type":"object","properties":{"#.to_owned();
             text(variant.name, &mut choice);
-            let required = array([variant.name]);
+            let required = array(&[variant.name]);
             choice.push_str(&format!(r#":{fields}}},"required":{required},"additionalProperties":false}}"#));
             choices.push(choice);
         }
@@ -197,17 +194,9 @@ pub(crate) fn member(keyword: &str, value: &str) -> String {
     json
 }
 
-fn integer<T: std::fmt::Display>(least: T, most: T) -> String {
-    let mut json = r#""type":"integer","minimum":"#.to_owned();
-    number(least, &mut json);
-    json.push_str(r#","maximum":"#);
-    number(most, &mut json);
-    json
-}
-
-fn array<'a>(texts: impl IntoIterator<Item = &'a str>) -> String {
+fn array(texts: &[&str]) -> String {
     let mut json = "[".to_owned();
-    for (index, item) in texts.into_iter().enumerate() {
+    for (index, item) in texts.iter().enumerate() {
         if index > 0 {
             json.push(',');
         }

@@ -6,11 +6,12 @@ use crate::message::codec::Shape;
 use serde_core::de::{Deserialize, Deserializer, MapAccess, Visitor};
 use serde_json::value::RawValue;
 use std::fmt;
+use std::ops::RangeInclusive;
 use std::str::FromStr;
 
-/// An integer of type `T`. JSON has one type of numbers, so `1.0` and `1e2` are integers too, as long as a double holds
+/// An integer in that range. JSON has one type of numbers, so `1.0` and `1e2` are integers too, as long as a double holds
 /// them exactly.
-pub(super) fn integer<T: TryFrom<i128>>(shape: Shape, value: &RawValue) -> Result<T, JsonError> {
+pub(super) fn integer(range: RangeInclusive<i128>, shape: Shape, value: &RawValue) -> Result<i128, JsonError> {
     /// 2⁵³. Below it every integer is a double, and no other decimal integer rounds to it.
     const EXACT: f64 = 9_007_199_254_740_992.0;
     let token = value.get();
@@ -23,7 +24,7 @@ pub(super) fn integer<T: TryFrom<i128>>(shape: Shape, value: &RawValue) -> Resul
             number.filter(|number| number.fract() == 0.0 && number.abs() < EXACT).map(|number| number as i128)
         }
     };
-    number.and_then(|number| T::try_from(number).ok()).ok_or_else(|| mismatch(shape, value))
+    number.filter(|number| range.contains(number)).ok_or_else(|| mismatch(shape, value))
 }
 
 pub(super) trait Float: FromStr {

@@ -1,7 +1,7 @@
 //! The words of errors: what was expected, what was found, and the nearest name.
 
 use super::write::text;
-use super::{Form, JsonError};
+use super::{Form, JsonError, range};
 use crate::message::codec::{FieldShape, Shape};
 use crate::message::nearest::nearest;
 use serde_json::value::RawValue;
@@ -29,19 +29,12 @@ pub(super) fn mismatch(shape: Shape, value: &RawValue) -> JsonError {
 
 /// As named in JSON.
 pub(super) fn expected(shape: Shape) -> String {
-    let range = |least: i128, most: i128| format!("an integer from {least} to {most}");
+    if let Some(range) = range(shape) {
+        return format!("an integer from {} to {}", range.start(), range.end());
+    }
     match shape {
         Shape::Bool => "true or false".into(),
         Shape::Char => "text of one character".into(),
-        Shape::I8 => range(i8::MIN.into(), i8::MAX.into()),
-        Shape::I16 => range(i16::MIN.into(), i16::MAX.into()),
-        Shape::I32 => range(i32::MIN.into(), i32::MAX.into()),
-        Shape::I64 => range(i64::MIN.into(), i64::MAX.into()),
-        Shape::U8 => range(0, u8::MAX.into()),
-        Shape::U16 => range(0, u16::MAX.into()),
-        Shape::U32 => range(0, u32::MAX.into()),
-        Shape::U64 => range(0, u64::MAX.into()),
-        Shape::F32 | Shape::F64 => "a number".into(),
         Shape::Text => "text".into(),
         Shape::Option(of) => format!("{} or null", expected(*of)),
         Shape::List(_) => "an array".into(),
@@ -58,6 +51,8 @@ pub(super) fn expected(shape: Shape) -> String {
                 names => format!("one of {}", names.join(", ")),
             }
         }
+        // Integers are above.
+        _ => "a number".into(),
     }
 }
 

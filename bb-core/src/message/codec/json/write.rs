@@ -1,7 +1,7 @@
 //! Bytes and their shape to JSON.
 
 use super::{Form, INFINITY, NAN, NEGATIVE_INFINITY};
-use crate::message::codec::{DecodeError, EnumShape, Field, FieldShape, Reader, Shape, Writer, decode_with};
+use crate::message::codec::{DecodeError, EnumShape, Field, FieldShape, Reader, Shape, Writer};
 use std::fmt::{Display, Write};
 
 /// A value as JSON. [`from_json`](super::from_json) reads it back.
@@ -19,11 +19,11 @@ pub fn to_json<T: Field>(value: &T) -> String {
 /// # Errors
 /// The bytes do not have this shape.
 pub fn bytes_to_json(bytes: &[u8], shape: Shape) -> Result<String, DecodeError> {
-    decode_with(bytes, |reader| {
-        let mut json = String::new();
-        write(shape, reader, &mut json)?;
-        Ok(json)
-    })
+    let mut reader = Reader::of_message(bytes)?;
+    let mut json = String::new();
+    write(shape, &mut reader, &mut json)?;
+    reader.end_message()?;
+    Ok(json)
 }
 
 fn write(shape: Shape, reader: &mut Reader<'_>, json: &mut String) -> Result<(), DecodeError> {
@@ -94,32 +94,23 @@ fn object(fields: &'static [FieldShape], reader: &mut Reader<'_>, json: &mut Str
     Ok(())
 }
 
-fn variant(of: &EnumShape, reader: &mut Reader<'_>, json: &mut String) -> Result<(), DecodeError> {
-    let number = reader.variant()?;
-    if usize::try_from(number).map_or(true, |number| number >= of.variants.len()) {
-        return reader.no_variant(number);
+fn variant(of: &'static EnumShape, reader: &mut Reader<'_>, json: &mut String) -> Result<(), DecodeError> {
+    let shape = Shape::Enum(of);
+    let number = reader.variant(&shape)?;
+    let Some(variant) = of.variants.get(number as usize) else { return Err(reader.no_variant(number)) };
+    if variant.fields.is_empty() {
+        text(variant.name, json);
+    } else {
+        json.push('{');
+        text(variant.name, json);
+        json.push(':');
+        object(variant.fields, reader, json)?;
+        json.push('}');
     }
-    for (index, variant) in of.variants.iter().enumerate() {
-        let is_this = usize::try_from(number) == Ok(index);
-        let has_fields = !variant.fields.is_empty() && reader.is_present()?;
-        match (is_this, has_fields) {
-            (true, true) => {
-                json.push('{');
-                text(variant.name, json);
-                json.push(':');
-                object(variant.fields, reader, json)?;
-                json.push('}');
-            }
-            (true, false) if variant.fields.is_empty() => text(variant.name, json),
-            (true, false) => return Err(reader.error("the fields of the variant", "none")),
-            (false, true) => return Err(reader.error("no fields of another variant", "some")),
-            (false, false) => {}
-        }
-    }
-    Ok(())
+    reader.end_variant(&shape, number)
 }
 
-pub(super) fn number(value: impl Display, json: &mut String) {
+fn number(value: impl Display, json: &mut String) {
     // Writing to a string cannot fail.
     let _ = write!(json, "{value}");
 }
