@@ -51,6 +51,7 @@ mod fault;
 mod lifecycle;
 mod node;
 mod schedule;
+mod sorted;
 mod stub;
 
 #[doc = include_str!("robot.md")]

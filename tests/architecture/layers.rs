@@ -5,7 +5,8 @@ use super::{code_below, code_of, root};
 use std::collections::BTreeSet;
 
 /// The folders of the runtime, from the bottom up.
-const LAYERS: [&str; 18] = [
+const LAYERS: [&str; 19] = [
+    "sorted",
     "fault",
     "time",
     "message",

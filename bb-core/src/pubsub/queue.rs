@@ -3,6 +3,7 @@
 use super::statistics::SubscriberStatistics;
 use super::wakers::{Wakers, discard};
 use crate::message::{Payload, Stamped};
+use std::any::Any;
 use std::collections::VecDeque;
 use std::mem::needs_drop;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -104,12 +105,28 @@ struct Entry<M> {
     bytes: usize,
 }
 
+/// What a topic does with a queue of its payload, apart from adding messages.
+pub(super) trait AnyQueue: Any + Send + Sync {
+    /// See [`Queue::close`].
+    fn close(&self) -> Option<Waker>;
+    fn statistics(&self) -> SubscriberStatistics;
+}
+
+impl<M: Send + 'static> AnyQueue for Queue<M> {
+    fn close(&self) -> Option<Waker> {
+        Queue::close(self)
+    }
+    fn statistics(&self) -> SubscriberStatistics {
+        Queue::statistics(self)
+    }
+}
+
 impl<M: Send + 'static> Queue<M> {
     /// Adds a message of `bytes` counted bytes. Returns how many of the oldest were dropped to make room for it.
     /// Wakers and dropped messages go to `wakers`.
     pub(super) fn push(&self, message: M, bytes: usize, wakers: &mut Wakers) -> u64 {
         let mut lost = 0;
-        let (state, evicted) = loop {
+        loop {
             let mut state = self.lock();
             let mut evicted = None;
             if !self.has_room(&state, bytes) {
@@ -118,40 +135,38 @@ impl<M: Send + 'static> Queue<M> {
                 lost += 1;
             }
             if self.has_room(&state, bytes) {
-                break (state, evicted);
+                // Under the lock, so that `abandon` takes out everything.
+                if self.is_abandoned() {
+                    drop(state);
+                    wakers.discard(message);
+                } else {
+                    state.bytes += bytes;
+                    state.messages.push_back(Entry { message, bytes });
+                    let (waker, is_awaited) = (state.waker.take(), state.waiting > 0);
+                    drop(state);
+                    if is_awaited {
+                        self.arrived.notify_one();
+                    }
+                    if let Some(waker) = waker {
+                        wakers.wake(waker);
+                    }
+                }
+                if let Some(evicted) = evicted {
+                    wakers.discard(evicted);
+                }
+                return lost;
             }
             // A message that needs the room of several evicts them one at a time: each is dropped without the lock.
             drop(state);
-            evicted.into_iter().for_each(|evicted| wakers.discard(evicted));
-        };
-        self.enqueue(state, Entry { message, bytes }, wakers);
-        evicted.into_iter().for_each(|evicted| wakers.discard(evicted));
-        lost
+            if let Some(evicted) = evicted {
+                wakers.discard(evicted);
+            }
+        }
     }
 
     fn has_room(&self, state: &State<M>, bytes: usize) -> bool {
         let has_bytes = || state.bytes.checked_add(bytes).is_some_and(|sum| sum <= self.bound.bytes);
         state.messages.is_empty() || state.messages.len() < self.bound.capacity && has_bytes()
-    }
-
-    fn enqueue(&self, mut state: MutexGuard<'_, State<M>>, entry: Entry<M>, wakers: &mut Wakers) {
-        // Under the lock, so that `abandon` takes out everything.
-        if self.is_abandoned() {
-            drop(state);
-            wakers.discard(entry.message);
-            return;
-        }
-        state.bytes += entry.bytes;
-        state.messages.push_back(entry);
-        let waker = state.waker.take();
-        let is_awaited = state.waiting > 0;
-        drop(state);
-        if is_awaited {
-            self.arrived.notify_one();
-        }
-        if let Some(waker) = waker {
-            wakers.wake(waker);
-        }
     }
 }
 
@@ -202,10 +217,10 @@ impl<M> Queue<M> {
         self.abandoned.load(Ordering::Acquire)
     }
 
-    pub(super) fn statistics(&self, is_typed: bool) -> SubscriberStatistics {
+    pub(super) fn statistics(&self) -> SubscriberStatistics {
         let state = self.lock();
         SubscriberStatistics {
-            is_typed,
+            is_typed: true,
             waiting: state.messages.len(),
             capacity: self.bound.capacity,
             bytes: state.bytes,

@@ -9,8 +9,8 @@ use super::statistics::TopicStatistics;
 use super::{DynamicSubscription, Overflow, Payloads, Select, Topic};
 use crate::message::Payload;
 use crate::message::codec::intern;
+use crate::sorted::Sorted;
 use std::any::{Any, type_name};
-use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::task::Waker;
@@ -28,9 +28,9 @@ pub(crate) struct Registry {
 
 #[derive(Default)]
 struct State {
-    topics: BTreeMap<&'static str, Made>,
+    topics: Sorted<&'static str, Made>,
     /// In a replay: paths that had a publisher, whose payload's type is not known before the first message.
-    expected: BTreeMap<&'static str, Expected>,
+    expected: Sorted<&'static str, Expected>,
     /// Topics that were made or expected so far.
     made: u64,
     selections: Selections,
@@ -94,8 +94,8 @@ impl Registry {
         overflow: Overflow,
     ) -> DynamicSubscription {
         let mut state = self.lock();
-        let made: Vec<_> = state.topics.values().map(|made| Arc::clone(&made.topic)).collect();
-        let topics: Vec<&dyn AnyTopic> = topics.iter().copied().chain(made.iter().map(|made| &**made)).collect();
+        let topics: Vec<&dyn AnyTopic> =
+            topics.iter().copied().chain(state.topics.iter().map(|(_, made)| &*made.topic)).collect();
         // Under the lock, so that a topic created meanwhile is subscribed to once.
         let subscription = DynamicSubscription::among(&topics, &self.declared, select, payloads, overflow);
         if !state.is_closed {
@@ -119,14 +119,14 @@ impl Registry {
         path: &str,
         note: &mut dyn FnMut(PathChange),
     ) -> Result<Arc<Topic<T>>, PathError> {
-        let found = self.find_or_make(path, |path| Arc::new(Topic::<T>::new(path)), note)?;
+        let found = self.find_or_make(path, &|path| Arc::new(Topic::<T>::new(path)), note)?;
         let topic: Arc<dyn Any + Send + Sync> = Arc::clone(&found) as _;
         topic.downcast().map_err(|_| PathError::other_payload(&*found, T::NAME, type_name::<T>()))
     }
 
     /// The topic at the path of a message, created for its payload if it does not exist.
     pub(crate) fn topic_of(&self, message: &DynamicMessage) -> Result<Arc<dyn AnyTopic>, PathError> {
-        let found = self.find_or_make(message.path(), |path| message.message().new_topic(path), &mut |_| ())?;
+        let found = self.find_or_make(message.path(), &|path| message.message().new_topic(path), &mut |_| ())?;
         if !message.message().fits(&*found) {
             let name = message.payload_name();
             return Err(PathError::other_payload(&*found, name, message.message().type_name()));
@@ -137,7 +137,7 @@ impl Registry {
     fn find_or_make(
         &self,
         path: &str,
-        make: impl FnOnce(&'static str) -> Arc<dyn AnyTopic>,
+        make: &dyn Fn(&'static str) -> Arc<dyn AnyTopic>,
         note: &mut dyn FnMut(PathChange),
     ) -> Result<Arc<dyn AnyTopic>, PathError> {
         if !is_path(path) {
@@ -190,26 +190,27 @@ impl Registry {
     /// The counts of all topics created here, by path.
     pub(crate) fn statistics(&self) -> Vec<TopicStatistics> {
         let state = self.lock();
-        let silent = |(path, expected): (&&'static str, &Expected)| {
-            (*path, TopicStatistics { path, payload: expected.payload, published: 0, lost: 0, subscribers: 0 })
-        };
-        let mut all: BTreeMap<_, _> = state.expected.iter().map(silent).collect();
-        let made = state.topics.values().filter(|made| !made.is_gone);
-        let made: Vec<_> = made.map(|made| (Arc::clone(&made.topic), made.before)).collect();
+        let mut all = Sorted::default();
+        for (path, expected) in state.expected.iter() {
+            let payload = expected.payload;
+            all.insert(path, TopicStatistics { path, payload, published: 0, lost: 0, subscribers: 0 });
+        }
+        let made = state.topics.iter().filter(|(_, made)| !made.is_gone);
+        let made: Vec<_> = made.map(|(_, made)| (Arc::clone(&made.topic), made.before)).collect();
         drop(state);
         // Subscriptions are asked for what they have counted without the lock.
-        all.extend(made.iter().map(|(topic, (published, lost))| {
+        for (topic, (published, lost)) in made {
             let mut counted = topic.statistics();
-            counted.published = counted.published.saturating_sub(*published);
-            counted.lost = counted.lost.saturating_sub(*lost);
-            (topic.path(), counted)
-        }));
-        all.into_values().collect()
+            counted.published = counted.published.saturating_sub(published);
+            counted.lost = counted.lost.saturating_sub(lost);
+            all.insert(topic.path(), counted);
+        }
+        all.iter().map(|(_, counted)| counted.clone()).collect()
     }
 
     /// All topics created here, by path.
     pub(crate) fn topics(&self) -> Vec<Arc<dyn AnyTopic>> {
-        self.lock().topics.values().map(|made| Arc::clone(&made.topic)).collect()
+        self.lock().topics.iter().map(|(_, made)| Arc::clone(&made.topic)).collect()
     }
 
     /// Tells the subscribers that no more will come. Returns the tasks to wake. No further topic is created.
@@ -238,7 +239,7 @@ impl State {
         unused.min_by_key(|(_, made)| made.number).map(|(path, _)| Room::Of(path))
     }
 
-    fn gone(&self) -> impl Iterator<Item = (&&'static str, &Made)> {
+    fn gone(&self) -> impl Iterator<Item = (&'static str, &Made)> {
         self.topics.iter().filter(|(_, made)| made.is_gone)
     }
 
@@ -255,7 +256,6 @@ impl State {
         if self.expected.len() > Registry::MAX_TOPICS
             && let Some((oldest, _)) = self.expected.iter().min_by_key(|(_, expected)| expected.number)
         {
-            let oldest = *oldest;
             self.expected.remove(oldest);
         }
         let made = self.topics.get_mut(path)?;
@@ -277,7 +277,6 @@ impl State {
         }
         let unused = self.gone().filter(|(_, made)| !made.is_used());
         let (oldest, _) = unused.min_by_key(|(_, made)| made.number)?;
-        let oldest = *oldest;
         self.topics.remove(oldest)
     }
 }

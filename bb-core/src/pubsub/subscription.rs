@@ -14,15 +14,11 @@ use std::time::Duration;
 pub struct Subscription<T> {
     path: &'static str,
     queue: Arc<Queue<Stamped<T>>>,
-    topic: Weak<Mutex<Subscribers<T>>>,
+    topic: Weak<Mutex<Subscribers>>,
 }
 
 impl<T> Subscription<T> {
-    pub(super) fn new(
-        path: &'static str,
-        queue: Arc<Queue<Stamped<T>>>,
-        topic: Weak<Mutex<Subscribers<T>>>,
-    ) -> Self {
+    pub(super) fn new(path: &'static str, queue: Arc<Queue<Stamped<T>>>, topic: Weak<Mutex<Subscribers>>) -> Self {
         Self { path, queue, topic }
     }
 
@@ -65,7 +61,7 @@ impl<T> Subscription<T> {
 
 impl<T> Drop for Subscription<T> {
     fn drop(&mut self) {
-        leave(&self.topic, &self.queue);
+        leave(&self.topic, Arc::as_ptr(&self.queue).cast());
         // A publisher may still hold the list with this queue.
         self.queue.abandon();
     }

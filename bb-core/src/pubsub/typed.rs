@@ -2,7 +2,6 @@
 
 use super::any::{AnyMessage, AnyTopic, DynamicMessage, Tap};
 use super::statistics::{SubscriberStatistics, TopicStatistics};
-use super::subscribers::lock;
 use super::topic::Topic;
 use crate::message::codec::{encode, encode_as_ros, encode_companion, is_exact_as_ros, to_json};
 use crate::message::{DecodeError, JointReading, Payload, Schema, Stamp, Stamped};
@@ -10,7 +9,6 @@ use crate::time::WallTime;
 use std::any::Any;
 use std::fmt;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 use std::task::Waker;
 
 impl<T: Payload> AnyMessage for Stamped<T> {
@@ -70,7 +68,7 @@ impl<T: Payload> AnyMessage for Stamped<T> {
 
 impl<T: Payload> AnyTopic for Topic<T> {
     fn path(&self) -> &'static str {
-        self.path
+        self.hub.path
     }
 
     fn payload_name(&self) -> &'static str {
@@ -82,25 +80,16 @@ impl<T: Payload> AnyTopic for Topic<T> {
     }
 
     fn subscribers(&self) -> Vec<SubscriberStatistics> {
-        let subscribers = lock(&self.subscribers);
-        let typed = subscribers.queues.iter().map(|queue| queue.statistics(true));
-        let taps = subscribers.taps.iter().filter(|tap| !tap.is_abandoned());
-        typed.chain(taps.map(|tap| tap.statistics(false))).collect()
+        self.hub.subscribers()
     }
 
     fn tap(&self, tap: &Tap) {
-        let mut subscribers = lock(&self.subscribers);
-        if !subscribers.closed {
-            // Dropped ones are also removed here: nothing may ever be published at this topic.
-            let others = subscribers.taps.iter().filter(|other| !other.is_abandoned());
-            subscribers.taps = others.chain([&tap.0]).map(Arc::clone).collect();
-            self.listening.store(subscribers.count(), Ordering::Release);
-        }
+        self.hub.tap(tap);
     }
 
     fn decode(&self, bytes: &[u8]) -> Result<DynamicMessage, DecodeError> {
         let message: Stamped<T> = crate::message::codec::decode(bytes)?;
-        Ok(DynamicMessage::of(self.path, message))
+        Ok(DynamicMessage::of(self.hub.path, message))
     }
 
     fn publish_dynamic(&self, message: &DynamicMessage) -> bool {
@@ -117,16 +106,10 @@ impl<T: Payload> AnyTopic for Topic<T> {
     }
 
     fn statistics(&self) -> TopicStatistics {
-        TopicStatistics {
-            path: self.path,
-            payload: T::NAME,
-            published: self.published.load(Ordering::Relaxed),
-            lost: self.lost.load(Ordering::Relaxed),
-            subscribers: self.subscribers().len(),
-        }
+        self.hub.statistics(T::NAME)
     }
 
     fn close(&self) -> Vec<Waker> {
-        self.close_all()
+        self.hub.close()
     }
 }

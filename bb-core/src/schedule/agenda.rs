@@ -1,8 +1,8 @@
 //! When to wake each island: for timers, ticks and restarts.
 
 use super::Bell;
+use crate::sorted::Sorted;
 use crate::time::MonotonicTime;
-use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Islands with something due, ordered by time and then by number, so the order is the same in every run.
@@ -15,7 +15,7 @@ pub(crate) struct Agenda {
 /// At most one entry per island, its earliest: an island that is woken says when to wake it next.
 #[derive(Debug, Default)]
 struct Entries {
-    by_time: BTreeSet<(MonotonicTime, usize)>,
+    by_time: Sorted<(MonotonicTime, usize), ()>,
     of: Vec<Option<MonotonicTime>>,
 }
 
@@ -40,8 +40,8 @@ impl Agenda {
         if let Some(later) = entries.of[island].replace(time) {
             entries.by_time.remove(&(later, island));
         }
-        entries.by_time.insert((time, island));
-        let is_first = entries.by_time.first() == Some(&(time, island));
+        entries.by_time.insert((time, island), ());
+        let is_first = entries.by_time.first() == Some((time, island));
         drop(entries);
         if is_first {
             self.bell.ring();
@@ -56,7 +56,7 @@ impl Agenda {
     pub(crate) fn take(&self, now: MonotonicTime) -> Option<usize> {
         let mut entries = self.lock();
         entries.next().filter(|time| *time <= now)?;
-        let (_, island) = entries.by_time.pop_first()?;
+        let ((_, island), ()) = entries.by_time.pop_first()?;
         if let Some(slot) = entries.of.get_mut(island) {
             *slot = None;
         }
@@ -70,7 +70,7 @@ impl Agenda {
 
 impl Entries {
     fn next(&self) -> Option<MonotonicTime> {
-        self.by_time.first().map(|(time, _)| *time)
+        self.by_time.first().map(|(time, _)| time)
     }
 }
 

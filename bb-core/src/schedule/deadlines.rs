@@ -1,8 +1,8 @@
 //! Deadlines by key, in the order of their times.
 
 use super::Bell;
+use crate::sorted::Sorted;
 use crate::time::MonotonicTime;
-use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// At most one deadline for each key; equal times are in the order of the keys.
@@ -14,13 +14,13 @@ pub(crate) struct Deadlines<K> {
 
 #[derive(Debug)]
 struct Entries<K> {
-    by_time: BTreeSet<(MonotonicTime, K)>,
-    of: BTreeMap<K, MonotonicTime>,
+    by_time: Sorted<(MonotonicTime, K), ()>,
+    of: Sorted<K, MonotonicTime>,
 }
 
 impl<K: Ord + Copy> Deadlines<K> {
     pub(crate) fn new(bell: Bell) -> Self {
-        Self { entries: Mutex::new(Entries { by_time: BTreeSet::new(), of: BTreeMap::new() }), bell }
+        Self { entries: Mutex::new(Entries { by_time: Sorted::default(), of: Sorted::default() }), bell }
     }
 
     /// Sets the deadline of `key`, in place of the one it had. The last instant never comes.
@@ -31,8 +31,8 @@ impl<K: Ord + Copy> Deadlines<K> {
             return;
         }
         entries.of.insert(key, time);
-        entries.by_time.insert((time, key));
-        let is_first = entries.by_time.first() == Some(&(time, key));
+        entries.by_time.insert((time, key), ());
+        let is_first = entries.by_time.first() == Some((time, key));
         drop(entries);
         if is_first {
             self.bell.ring();
@@ -44,13 +44,13 @@ impl<K: Ord + Copy> Deadlines<K> {
     }
 
     pub(crate) fn next(&self) -> Option<MonotonicTime> {
-        self.lock().by_time.first().map(|(time, _)| *time)
+        self.lock().by_time.first().map(|(time, _)| time)
     }
 
     /// Takes the first deadline that has come.
     pub(crate) fn take(&self, now: MonotonicTime) -> Option<(MonotonicTime, K)> {
         let mut entries = self.lock();
-        let (time, key) = *entries.by_time.first().filter(|(time, _)| *time <= now)?;
+        let (time, key) = entries.by_time.first().filter(|(time, _)| *time <= now)?;
         entries.remove(key);
         Some((time, key))
     }

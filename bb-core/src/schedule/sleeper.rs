@@ -1,8 +1,8 @@
 //! Futures that wait for a time, in the order of their times and then of their numbers.
 
 use super::{Bell, Lane};
+use crate::sorted::Sorted;
 use crate::time::MonotonicTime;
-use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::Waker;
 
@@ -17,7 +17,7 @@ pub(crate) struct Sleeper {
 
 #[derive(Debug, Default)]
 struct Alarms {
-    set: BTreeMap<Alarm, (Lane, Waker)>,
+    set: Sorted<Alarm, (Lane, Waker)>,
     next_number: u64,
 }
 
@@ -40,7 +40,7 @@ impl Sleeper {
         let alarm = set.unwrap_or((time, alarms.next_number));
         alarms.next_number += 1;
         let replaced = alarms.set.insert(alarm, (self.lane, waker));
-        let is_first = alarms.set.first_key_value().is_some_and(|(first, _)| *first == alarm);
+        let is_first = alarms.set.first() == Some(alarm);
         // The lock is released first: dropping a waker may run user code.
         drop(alarms);
         drop(replaced);
@@ -56,13 +56,14 @@ impl Sleeper {
     }
 
     pub(crate) fn next(&self) -> Option<MonotonicTime> {
-        self.lock().set.first_key_value().map(|((time, _), _)| *time)
+        self.lock().set.first().map(|(time, _)| time)
     }
 
     /// Takes the waker of the first alarm whose time has come.
     pub(crate) fn take(&self, now: MonotonicTime) -> Option<(Lane, Waker)> {
         let mut alarms = self.lock();
-        alarms.set.first_entry().filter(|first| first.key().0 <= now).map(|first| first.remove())
+        alarms.set.first().filter(|(time, _)| *time <= now)?;
+        alarms.set.pop_first().map(|(_, waker)| waker)
     }
 
     fn lock(&self) -> MutexGuard<'_, Alarms> {

@@ -195,7 +195,7 @@ impl<T: Payload + RosMessage> RosLayout<T> {
         shape: <T::Message as Field>::SHAPE,
         write: |message, writer| T::to_ros(message).write(writer),
         read: |reader| T::from_ros(T::Message::read(reader)?),
-        is_exact: super::stamped::reads_back,
+        is_exact: reads_back,
         companion: T::COMPANION,
     };
 
@@ -204,6 +204,27 @@ impl<T: Payload + RosMessage> RosLayout<T> {
     pub const fn of() -> Self {
         Self::OF
     }
+}
+
+/// Whether payload and wall time of a message are the same bit for bit after ROS's layout, with its second message if there is
+/// one.
+fn reads_back<T: Payload + RosMessage>(message: &Stamped<T>) -> bool {
+    let mut bytes = Vec::new();
+    T::to_ros(message).write(&mut Writer::new(&mut bytes));
+    let read = T::Message::read(&mut Reader::new(&bytes)).and_then(T::from_ros);
+    let Ok((mut payload, wall_time)) = read else { return false };
+    if let Some(companion) = T::COMPANION {
+        bytes.clear();
+        if (companion.write)(message, &mut Writer::new(&mut bytes))
+            && (companion.read)(&mut payload, &mut Reader::new(&bytes)).is_err()
+        {
+            return false;
+        }
+    }
+    let (mut read, mut written) = (Vec::new(), Vec::new());
+    payload.write(&mut Writer::new(&mut read));
+    message.payload.write(&mut Writer::new(&mut written));
+    wall_time == message.wall_time && read == written
 }
 
 impl<T> RosLayout<T> {

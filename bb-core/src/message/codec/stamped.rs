@@ -187,17 +187,3 @@ pub fn is_exact_as_ros<T: Payload>(message: &Stamped<T>) -> bool {
         None => false,
     }
 }
-
-pub(super) fn reads_back<T: Payload>(message: &Stamped<T>) -> bool {
-    let mut bytes = Vec::new();
-    encode_as_ros(message, &mut bytes);
-    let Ok((mut payload, wall_time)) = decode_as_ros::<T>(&bytes) else { return false };
-    bytes.clear();
-    if encode_companion(message, &mut bytes) && decode_companion(&mut payload, &bytes).is_err() {
-        return false;
-    }
-    let (mut read, mut written) = (Vec::new(), Vec::new());
-    payload.write(&mut Writer::new(&mut read));
-    message.payload.write(&mut Writer::new(&mut written));
-    wall_time == message.wall_time && read == written
-}

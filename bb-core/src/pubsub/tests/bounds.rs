@@ -169,7 +169,7 @@ proptest! {
                 }
                 Step::Pop => prop_assert_eq!(queue.pop(), model.pop_front().map(|(number, _)| number)),
             }
-            let statistics = queue.statistics(true);
+            let statistics = queue.statistics();
             prop_assert_eq!(statistics.waiting, model.len());
             prop_assert_eq!(statistics.bytes, model.iter().map(|(_, size)| size).sum::<usize>());
             prop_assert_eq!(statistics.lost, lost);
@@ -189,7 +189,7 @@ fn publishers_that_meet_at_a_full_queue_never_exceed_its_bound_and_count_every_l
                 // Sizes where one large message takes the room of many.
                 let size = if number % 7 == 0 { 150 } else { number % 20 };
                 queue.push((publisher, number), size, &mut wakers);
-                assert!(queue.statistics(true).bytes <= BYTES);
+                assert!(queue.statistics().bytes <= BYTES);
             }
         };
         let publishers: Vec<_> = (0..3).map(|publisher| scope.spawn(move || publish(publisher))).collect();
