@@ -6,10 +6,11 @@
 //! fn heap_bytes(&self) -> usize { match self { Self { rate: f0 } => 0 + FieldOf::<f64>::heap_bytes(f0) } }
 //! fn write(…) { match self { Self { rate: f0 } => { FieldOf::write(f0, writer); } } }
 //! fn read(…) {
-//!     let (error, field) = 'read: {
-//!         let value = Self { rate: match FieldOf::<f64>::read(reader) { Ok(f) => f, Err(e) => break 'read (e, "rate") } };
-//!         return Ok(value);
-//!     };
+//!     let (error, field);
+//!     'read: {
+//!         let rate = match FieldOf::<f64>::read(reader) { Ok(f) => f, Err(e) => { (error, field) = (e, "rate"); break 'read } };
+//!         return Ok(Self { rate });
+//!     }
 //!     Err(error.within(field))
 //! }
 //! ```
@@ -141,9 +142,10 @@ fn of_enum(data: &DataEnum, text: &TokenStream) -> Parts {
 /// The code that results in `read`, or breaks out of it with an error and the field that it is in.
 fn fallible(read: &TokenStream) -> TokenStream {
     quote! {
-        let (error, field): (::bb_core::__private::DecodeError, &'static str) = 'read: {
+        let (error, field): (::bb_core::__private::DecodeError, &'static str);
+        'read: {
             return { #read };
-        };
+        }
         ::core::result::Result::Err(error.within(field))
     }
 }
@@ -176,8 +178,11 @@ fn reads(fields: &Fields, within: &str) -> TokenStream {
     let reads = fields.iter().zip(fields.members()).map(|(field, member)| {
         let (path, kind) = (format!("{within}{}", text_of(&member)), &field.ty);
         quote!(#member: match FieldOf::<#kind>::read(reader) {
-            ::core::result::Result::Ok(field) => field,
-            ::core::result::Result::Err(error) => break 'read (error, #path),
+            ::core::result::Result::Ok(value) => value,
+            ::core::result::Result::Err(why) => {
+                (error, field) = (why, #path);
+                break 'read;
+            }
         },)
     });
     reads.collect()
