@@ -7,39 +7,33 @@
 //! collected as `Effects` and run without the lock, on their own threads or on those of the pool. Each may block
 //! forever without harming anything else.
 
-mod apart;
 mod arming;
 #[cfg(test)]
 mod bare;
 mod budgets;
-mod callback;
+mod callbacks;
 mod command;
 mod commands;
 mod effects;
 mod ending;
 mod execution;
 mod faults;
-mod hanging;
 mod health;
-mod hooks;
-mod inside;
 mod machine;
 #[cfg(all(test, loom))]
 mod model;
 mod parameters;
-mod starting;
+mod registering;
 mod step;
-mod stopping;
 mod system;
 mod task;
-mod topics;
 
+pub(crate) use callbacks::{Inside, is_in_actuator};
 pub use command::{CommandStatistics, Prepared};
+pub(crate) use commands::Hanging;
 pub use execution::{CommandError, Execution};
 pub use faults::ReportedFault;
-pub(crate) use hanging::Hanging;
-pub(crate) use inside::{Awaited, InActuator, is_in_actuator, waits_for};
-pub(crate) use topics::SystemTopics;
+pub(crate) use system::SystemTopics;
 
 use crate::component::{Host, Permit};
 use crate::declaration::{
@@ -54,13 +48,11 @@ use crate::schedule::{Bell, Deadlines, Pool, Sleeper, StopSignal};
 use crate::telemetry::Telemetry;
 use crate::time::{Clock, MonotonicTime};
 use crate::topology::Topology;
-use apart::Apart;
 use budgets::Budgets;
-use callback::Callback;
+use callbacks::{Apart, Callback, Hooks};
 use effects::Reporter;
 use execution::Slot;
 use faults::Faults;
-use hooks::Hooks;
 #[cfg(loom)]
 use loom::sync::{Condvar, Mutex as StateMutex, MutexGuard, atomic::AtomicU8};
 use machine::Machine;
@@ -123,8 +115,6 @@ struct Inner {
     limits: Deadlines<Limit>,
     pool: Pool,
     reporter: Reporter,
-    /// How many commands have begun at the last instant of virtual time at which one did.
-    begun: Mutex<(MonotonicTime, u32)>,
     /// Commands to be polled, on virtual time.
     ready: Mutex<VecDeque<Arc<Task>>>,
     /// Disarm callbacks to be run by the loop of a simulation.
@@ -175,8 +165,6 @@ enum Limit {
     Disarming(u64),
     /// The same for those that run outside of a disarming.
     Apart(Key),
-    /// When to look again whether the handles of a cancelled execution still act.
-    Gone(u64),
 }
 
 /// Names some callbacks that run together.
@@ -203,8 +191,8 @@ struct State {
     next_apart: u64,
     /// Commands that arm the robot, whose code has ended while something is being made safe.
     held: Vec<EndedCode>,
-    /// Cancelled commands that are gone since, which the former wait for.
-    held_gone: Vec<u64>,
+    /// Cancelled commands whose code has returned since, which others wait for that arm the robot.
+    held_lingering: Vec<u64>,
     /// The outcome of the last disarming.
     last_disarm: Result<(), DisarmError>,
     /// How often a disarming was requested. A caller that has been waiting to arm the robot since before then gives
@@ -232,8 +220,6 @@ struct RunningCommand {
     /// `None` in a replay.
     task: Option<Arc<Task>>,
     phase: Phase,
-    /// It was cancelled, and its code may have continued after the disarm callbacks had run.
-    lingers_on: bool,
 }
 
 /// The phase of an execution.

@@ -4,7 +4,6 @@
 pub(crate) mod actuator;
 mod bound;
 mod builder;
-mod closing;
 mod describe;
 mod discovery;
 mod ending;
@@ -16,7 +15,6 @@ mod keeper;
 mod live;
 mod machine;
 mod occupied;
-mod remains;
 mod replacing;
 mod replay;
 mod report;

@@ -17,23 +17,12 @@ pub(crate) enum Kind {
     Spin,
     /// Does not come back until it may.
     Block,
-    /// Panics when it is dropped.
-    Mine,
     /// Sleeps so long that it never ends.
     Endless,
 }
 
 static MAY_GO_ON: AtomicBool = AtomicBool::new(false);
 static BLOCKS: AtomicBool = AtomicBool::new(false);
-
-/// Panics when it is dropped.
-struct Mine;
-
-impl Drop for Mine {
-    fn drop(&mut self) {
-        panic!("a mine");
-    }
-}
 
 /// Does what it is told.
 #[derive(Debug)]
@@ -59,11 +48,6 @@ impl Command for Misbehave {
                 while !MAY_GO_ON.load(Ordering::SeqCst) {
                     std::thread::sleep(Duration::from_millis(1));
                 }
-            }
-            Kind::Mine => {
-                let _mine = Mine;
-                context.sleep(Duration::from_millis(10)).await;
-                std::mem::forget(_mine);
             }
             Kind::Endless => context.sleep(Duration::from_secs(3_600_000)).await,
         }
@@ -192,18 +176,6 @@ fn a_command_may_start_another_while_it_starts() {
         let report = simulation.stop();
         let statistics = report.commands.iter().find(|command| command.name == "nested").expect("it is declared");
         assert_eq!((statistics.started, statistics.succeeded), (2, 2));
-    });
-}
-
-#[test]
-fn a_future_that_panics_when_it_is_dropped_ends_as_it_would_have() {
-    within(60, || {
-        let mut simulation = Unruly::builder().simulate().expect("it starts");
-        let mine = simulation.command(unruly::command::patient, Kind::Mine).expect("it is allowed");
-        simulation.run_until(at(1));
-        mine.cancel();
-        simulation.run_until(at(2));
-        assert_eq!(mine.try_result(), Some(Err(CommandError::Cancelled)));
     });
 }
 

@@ -40,10 +40,6 @@ impl Gate {
         self.changed.notify_all();
     }
 
-    pub(crate) fn is_closed(&self) -> bool {
-        self.lock().0.is_some()
-    }
-
     pub(crate) fn open(&self) {
         self.lock().0 = None;
         self.changed.notify_all();

@@ -121,7 +121,7 @@ fn a_command_brakes_while_it_runs() -> Result<(), Failure> {
         assert_eq!(simulation.disarm(), Ok(()));
         assert_eq!(braked(), [1, 1], "it was running");
         simulation.run_until(at(6));
-        assert_eq!(braked(), [0, 1], "once more, as its future was dropped after that");
+        assert_eq!(braked(), [0, 0], "it is forgotten with its future");
         assert_eq!(simulation.arm(), Ok(()));
         simulation.command(hoist::command::lift, NoArguments)?;
         simulation.run_until(at(30));

@@ -4,11 +4,8 @@ use crate::components::Number;
 use crate::gate::{Gate, Place, Stuck};
 use bb_core::prelude::*;
 use bb_core::run::ActuatorError;
-use bb_core::{ComponentFault, DisarmError, Live, TelemetryEvent};
-use std::future::Future;
-use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
+use bb_core::{ComponentFault, DisarmError, Live, Running, TelemetryEvent};
 use std::sync::{Arc, Mutex, OnceLock, mpsc};
-use std::task::{Context as Polled, Wake, Waker};
 
 /// Longer than anything takes that does not hang, however busy the machine.
 const PATIENCE: Duration = Duration::from_secs(20);
@@ -156,73 +153,6 @@ mod sinks {
     }
 }
 
-mod wakers {
-    use super::*;
-
-    static HANG: Hangs = Hangs::new();
-
-    /// Ends when it is told to.
-    pub(crate) struct Go;
-
-    impl Command for Go {
-        type Options = NoOptions;
-        type Arguments = NoArguments;
-        type Output = ();
-
-        async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
-            context.sleep(Duration::from_millis(100)).await;
-            Ok(Outcome::done(()))
-        }
-    }
-
-    struct Hanging;
-
-    impl Wake for Hanging {
-        fn wake(self: Arc<Self>) {
-            HANG.0.pass("here");
-        }
-    }
-
-    struct Tell(mpsc::Sender<()>);
-
-    impl Wake for Tell {
-        fn wake(self: Arc<Self>) {
-            let _ = self.0.send(());
-        }
-    }
-
-    robot! {
-        robot Waking;
-        commands { go: Go { allowed_states: [idle]; } }
-        link base { sensor number: External<Number>(); }
-    }
-
-    #[test]
-    fn a_waker_that_hangs_keeps_no_other_from_being_woken() -> Result<(), Box<dyn std::error::Error>> {
-        let open = HANG.close();
-        let running = Waking::builder().start()?;
-        running.arm()?;
-        let execution = running.command(waking::command::go, NoArguments)?;
-        // Both are woken by the entry that ends the command.
-        let (hangs, (tell, told)) = (Waker::from(Arc::new(Hanging)), mpsc::channel());
-        let mut states = running.subscribe(system::StateMachine);
-        while running.state() != "executing" {
-            std::thread::yield_now();
-        }
-        states.drain().count();
-        let mut state = Box::pin(async move { states.recv_async().await.map(|state| state.to) });
-        assert!(state.as_mut().poll(&mut Polled::from_waker(&hangs)).is_pending());
-        let mut execution = Box::pin(execution);
-        let tell = Waker::from(Arc::new(Tell(tell)));
-        if execution.as_mut().poll(&mut Polled::from_waker(&tell)).is_pending() {
-            told.recv_timeout(PATIENCE)?;
-        }
-        drop(open);
-        running.stop().ok()?;
-        Ok(())
-    }
-}
-
 mod pools {
     use super::*;
 
@@ -317,6 +247,9 @@ mod pools {
 mod reentrance {
     use super::*;
 
+    /// Stopped by its own actuator.
+    static RUNNING: Mutex<Option<Running<Own>>> = Mutex::new(None);
+
     static LIVE: OnceLock<Mutex<Option<Live<Own>>>> = OnceLock::new();
 
     fn live() -> Option<Live<Own>> {
@@ -329,7 +262,7 @@ mod reentrance {
         }
     }
 
-    /// Sends to itself at 1, disarms the robot at 2, fails at 3.
+    /// Sends to itself at 1, disarms the robot at 2, fails at 3, stops the robot at 4.
     #[derive(Debug)]
     pub(crate) struct Servo;
 
@@ -350,6 +283,14 @@ mod reentrance {
                 assert_eq!(live.disarm(), Err(DisarmError::Callback));
             } else if number.0 == 3.0 {
                 return Err(Fault::new("stalls"));
+            } else if number.0 == 4.0 {
+                let running = RUNNING.lock().map_err(|_| "it panicked")?.take().ok_or("it does not run")?;
+                let start = std::time::Instant::now();
+                let report = running.stop();
+                assert!(start.elapsed() < Duration::from_millis(6500), "{:?}", start.elapsed());
+                assert_eq!(report.safety, Safety::Error, "nobody knows whether it is safe");
+                let paths: Vec<_> = report.faults.iter().map(|fault| fault.path).collect();
+                assert!(paths.contains(&"actuator/base/pan/servo"), "{paths:?}");
             }
             Ok(())
         }
@@ -398,6 +339,19 @@ mod reentrance {
     }
 
     #[test]
+    fn an_actuators_own_code_that_stops_the_robot_is_not_waited_for_beyond_the_limit() {
+        in_time(|| {
+            let running = Own::builder().start()?;
+            let live = running.live();
+            set_live(Some(live.clone()));
+            live.arm()?;
+            *RUNNING.lock().map_err(|_| "it panicked")? = Some(running);
+            live.actuate(own::actuator::base::pan::servo, Number(4.0))?;
+            Ok(())
+        });
+    }
+
+    #[test]
     fn the_same_on_virtual_time() {
         in_time(|| {
             let simulation = Own::builder().simulate()?;
@@ -432,126 +386,5 @@ mod reentrance {
             assert_eq!(simulation.safety(), Safety::Disarmed);
             Ok(())
         });
-    }
-}
-
-mod options {
-    use super::*;
-
-    static HANG: Hangs = Hangs::new();
-    static ARMED: AtomicBool = AtomicBool::new(false);
-
-    /// Options whose `clone` hangs once.
-    #[derive(Debug, Options)]
-    pub(crate) struct HangingOptions {
-        /// A number.
-        #[option(default = 1.0)]
-        x: f64,
-    }
-
-    impl Clone for HangingOptions {
-        fn clone(&self) -> Self {
-            if ARMED.swap(false, Ordering::SeqCst) {
-                HANG.0.pass("here");
-            }
-            Self { x: self.x }
-        }
-    }
-
-    /// Has them.
-    #[derive(Debug)]
-    pub(crate) struct Bound;
-
-    impl Estimator for Bound {
-        type Options = HangingOptions;
-        type Input = Number;
-        type Output = Number;
-
-        fn init(_: HangingOptions, _: &Context) -> Result<Self, Fault> {
-            Ok(Self)
-        }
-
-        fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
-            Ok(Reply::emit(number.payload))
-        }
-    }
-
-    robot! {
-        robot Cloning;
-        parameters { p: f64 = 1.0, range: 0.0..=2.0; }
-        link base { sensor number: External<Number>() { estimator bound: Bound(x = param::p); } }
-    }
-
-    #[test]
-    fn options_whose_clone_hangs_keep_nobody_else_who_sets_a_parameter() -> Result<(), Box<dyn std::error::Error>> {
-        let open = HANG.close();
-        let running = Cloning::builder().start()?;
-        ARMED.store(true, Ordering::SeqCst);
-        let (first, second) = (running.live(), running.live());
-        let first = std::thread::spawn(move || first.set_parameter(cloning::param::p, 0.5));
-        HANG.0.wait_for(1);
-        let (done, ended) = mpsc::channel();
-        let set = move || second.set_parameter(cloning::param::p, 0.7).map_err(|error| error.to_string());
-        std::thread::spawn(move || done.send(set()));
-        let message = ended.recv_timeout(PATIENCE)?.expect_err("nobody can say whether it fits");
-        assert!(message.contains("the code of its options has not returned"), "{message}");
-        drop(open);
-        first.join().expect("it does not panic")?;
-        running.set_parameter(cloning::param::p, 0.7)?;
-        running.stop().ok()?;
-        Ok(())
-    }
-}
-
-mod payloads {
-    use super::*;
-
-    static HANG: Hangs = Hangs::new();
-    static LEFT: AtomicI32 = AtomicI32::new(0);
-
-    /// The second copy of a 1 hangs: the first is the journal's.
-    #[derive(Debug, Payload)]
-    pub(crate) struct Slow {
-        /// A number.
-        x: f64,
-    }
-
-    impl Clone for Slow {
-        fn clone(&self) -> Self {
-            if self.x == 1.0 && LEFT.fetch_sub(1, Ordering::SeqCst) == 1 {
-                HANG.0.pass("here");
-            }
-            Self { x: self.x }
-        }
-    }
-
-    robot! {
-        robot Copying;
-        link base { sensor slow: External<Slow>(); }
-    }
-
-    #[test]
-    fn with_a_journal_a_payload_whose_clone_hangs_keeps_no_other_publisher()
-    -> Result<(), Box<dyn std::error::Error>> {
-        let open = HANG.close();
-        let mut builder = Copying::builder();
-        builder.journal(|_| {});
-        let numbers = builder.subscribe(copying::sensor::base::slow);
-        let running = builder.start()?;
-        LEFT.store(2, Ordering::SeqCst);
-        let (first, second) = (running.live(), running.live());
-        let publish = |live: Live<Copying>, x| {
-            move || live.publish(copying::sensor::base::slow, MonotonicTime::ZERO, Slow { x })
-        };
-        let first = std::thread::spawn(publish(first, 1.0));
-        HANG.0.wait_for(1);
-        let second = std::thread::spawn(publish(second, 2.0));
-        assert_eq!(numbers.recv_timeout(PATIENCE).map(|number| number.x), Some(2.0));
-        drop(open);
-        first.join().expect("it does not panic");
-        second.join().expect("it does not panic");
-        assert_eq!(numbers.recv_timeout(PATIENCE).map(|number| number.x), Some(1.0));
-        running.stop().ok()?;
-        Ok(())
     }
 }

@@ -313,21 +313,6 @@ impl Command for Check {
     }
 }
 
-/// Registers callbacks, over and over.
-#[derive(Debug)]
-pub(crate) struct Guards;
-
-impl Command for Guards {
-    type Options = NoOptions;
-    type Arguments = NoArguments;
-    type Output = ();
-
-    async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
-        (0..50).for_each(|_| context.on_disarm(|| Ok(())));
-        Ok(Outcome::done(()))
-    }
-}
-
 /// Where to go. It takes long to find out.
 #[derive(Clone, Debug, Payload)]
 pub(crate) struct Far {
@@ -380,7 +365,6 @@ robot! {
         category other { concurrency: 3; }
         check: Check;
         block: Stuck<Held> { allowed_states: [idle]; category: other; }
-        guards: Guards { allowed_states: [idle]; category: other; }
         go: Go { allowed_states: [idle, executing]; category: other; }
         mission: Mission { allowed_states: [idle]; category: other; }
     }
@@ -422,22 +406,6 @@ fn a_robot_that_was_disarmed_is_not_armed_by_what_began_before() -> Result<(), B
     assert_eq!(robot.safety(), Safety::Disarmed);
     assert!(check.try_result().is_some_and(|result| result.is_err()), "it was cancelled");
     Ok(())
-}
-
-#[test]
-fn a_command_may_register_callbacks_while_it_is_cancelled() {
-    let _alone = alone();
-    within(120, || {
-        let robot = Commanded::builder().start().expect("it starts");
-        assert_eq!(robot.arm(), Ok(()));
-        for round in 0..3_000_u32 {
-            if let Ok(running) = robot.command(commanded::command::guards, NoArguments) {
-                (0..(round % 64) * 20).for_each(|_| std::hint::spin_loop());
-                running.cancel();
-            }
-        }
-        assert_eq!(robot.safety(), Safety::Armed);
-    });
 }
 
 #[test]

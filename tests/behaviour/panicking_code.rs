@@ -5,133 +5,8 @@ use crate::components::Number;
 use bb_core::message::codec::{Reader, Shape, Writer};
 use bb_core::message::{DecodeError, Field, Finite};
 use bb_core::prelude::*;
-use std::future::Future;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use std::sync::{Arc, Mutex, OnceLock};
-use std::task::{Context as Polled, Wake, Waker};
-
-mod starts {
-    use super::*;
-
-    /// Which code of the options panics once the motor runs.
-    static PANICS: AtomicU32 = AtomicU32::new(0);
-    static MOTOR: AtomicBool = AtomicBool::new(false);
-    static TURN: Mutex<()> = Mutex::new(());
-
-    fn may_panic(code: u32) {
-        assert!(PANICS.load(Ordering::SeqCst) != code || !MOTOR.load(Ordering::SeqCst), "code {code}");
-    }
-
-    /// Options with code that panics.
-    #[derive(Options)]
-    pub(crate) struct Bad {
-        /// A number.
-        #[option(default = 1.0)]
-        x: f64,
-    }
-
-    impl Clone for Bad {
-        fn clone(&self) -> Self {
-            may_panic(1);
-            Self { x: self.x }
-        }
-    }
-
-    impl std::fmt::Debug for Bad {
-        fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-            may_panic(2);
-            write!(f, "{}", self.x)
-        }
-    }
-
-    /// Starts a motor in `init`.
-    #[derive(Debug)]
-    pub(crate) struct Motor;
-
-    impl Estimator for Motor {
-        type Options = NoOptions;
-        type Input = Number;
-        type Output = Number;
-
-        fn init(_: NoOptions, context: &Context) -> Result<Self, Fault> {
-            MOTOR.store(true, Ordering::SeqCst);
-            context.safety().on_disarm(|| {
-                MOTOR.store(false, Ordering::SeqCst);
-                Ok(())
-            });
-            Ok(Self)
-        }
-
-        fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
-            Ok(Reply::emit(number.payload))
-        }
-    }
-
-    /// Has these options.
-    #[derive(Debug)]
-    pub(crate) struct Watcher;
-
-    impl Sensor for Watcher {
-        type Options = Bad;
-        type Output = Number;
-
-        fn init(_: Bad, _: &SensorContext) -> Result<Self, Fault> {
-            Ok(Self)
-        }
-
-        fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-            Ok(Reading::nothing())
-        }
-    }
-
-    /// Has them too.
-    #[derive(Debug)]
-    pub(crate) struct Judge;
-
-    impl Estimator for Judge {
-        type Options = Bad;
-        type Input = Number;
-        type Output = Number;
-
-        fn init(_: Bad, _: &Context) -> Result<Self, Fault> {
-            Ok(Self)
-        }
-
-        fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
-            Ok(Reply::emit(number.payload))
-        }
-    }
-
-    robot! {
-        robot Moving;
-        link base {
-            sensor encoder: Watcher() { rate: 10 Hz; estimator motor: Motor(); estimator judge: Judge(); }
-        }
-    }
-
-    /// Who cannot start, with that code panicking.
-    fn refused(code: u32) -> &'static str {
-        let _turn = TURN.lock();
-        MOTOR.store(false, Ordering::SeqCst);
-        PANICS.store(code, Ordering::SeqCst);
-        let started = Moving::builder().start();
-        PANICS.store(0, Ordering::SeqCst);
-        let error = started.expect_err("it cannot start");
-        assert!(error.to_string().contains(&format!("panicked: code {code}")), "{error}");
-        assert!(!MOTOR.load(Ordering::SeqCst), "what was started is made safe");
-        error.path()
-    }
-
-    #[test]
-    fn options_whose_clone_panics_keep_the_robot_from_starting_and_motors_are_stopped() {
-        assert!(refused(1).starts_with("sensor/base/encoder"));
-    }
-
-    #[test]
-    fn options_whose_debug_panics_do_so_too() {
-        assert_eq!(refused(2), "sensor/base/encoder/judge");
-    }
-}
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, Mutex};
 
 mod outputs {
     use super::*;
@@ -302,92 +177,8 @@ mod outputs {
     }
 }
 
-mod bits {
-    use super::*;
-
-    /// Answers.
-    #[derive(Debug)]
-    pub(crate) struct Answer;
-
-    /// A question.
-    #[derive(Debug)]
-    pub(crate) struct Question;
-
-    impl Estimator for Answer {
-        type Options = NoOptions;
-        type Input = Number;
-        type Output = Number;
-
-        fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
-            Ok(Self)
-        }
-
-        fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
-            Ok(Reply::emit(number.payload))
-        }
-    }
-
-    impl HandleCall<Question> for Answer {
-        type Response = u32;
-
-        fn handle_call(&mut self, _: Question) -> Result<(u32, Reply<Number>), Fault> {
-            Ok((7, Reply::none()))
-        }
-    }
-
-    robot! {
-        robot Asked;
-        link base { sensor number: External<Number>() { estimator answer: Answer(); } }
-    }
-
-    static ASKED: OnceLock<bb_core::Live<Asked>> = OnceLock::new();
-
-    struct Ask(Mutex<Option<Result<u32, String>>>);
-
-    impl Wake for Ask {
-        fn wake(self: Arc<Self>) {
-            let asked = ASKED.get().expect("it is set").call(asked::sensor::base::number::answer, Question);
-            *self.0.lock().expect("it does not panic") = Some(asked.map_err(|fault| fault.to_string()));
-        }
-    }
-
-    #[test]
-    fn a_robot_may_be_asked_from_inside_another_one_however_many_there_were_between()
-    -> Result<(), Box<dyn std::error::Error>> {
-        let first = Asked::builder().simulate()?;
-        for _ in 1..64 {
-            Asked::builder().simulate()?;
-        }
-        let second = Asked::builder().start()?;
-        assert!(ASKED.set(second.live()).is_ok());
-        let mut first = first;
-        let mut numbers = first.subscribe(asked::sensor::base::number::answer);
-        let ask = Arc::new(Ask(Mutex::new(None)));
-        let waker = Waker::from(Arc::clone(&ask));
-        let mut next = Box::pin(async move { numbers.recv_async().await.is_some() });
-        assert!(next.as_mut().poll(&mut Polled::from_waker(&waker)).is_pending());
-        first.publish(asked::sensor::base::number, MonotonicTime::from_nanos(1), Number(1.0));
-        assert_eq!(*ask.0.lock().expect("it does not panic"), Some(Ok(7)));
-        Ok(())
-    }
-}
-
 mod instants {
     use super::*;
-
-    /// Starts itself again.
-    pub(crate) struct Again;
-
-    impl Command for Again {
-        type Options = NoOptions;
-        type Arguments = NoArguments;
-        type Output = ();
-
-        async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
-            context.bus().start_command("command/again", "")?;
-            Ok(Outcome::done(()))
-        }
-    }
 
     /// Is unplugged.
     #[derive(Debug)]
@@ -407,34 +198,12 @@ mod instants {
     }
 
     robot! {
-        robot Restless;
-        commands {
-            category many { concurrency: 2; }
-            again: Again { category: many; allowed_states: [idle, executing]; }
-        }
-        link base { sensor number: External<Number>(); }
-    }
-
-    #[test]
-    fn a_command_that_starts_itself_does_not_keep_virtual_time_from_going_on()
-    -> Result<(), Box<dyn std::error::Error>> {
-        let mut simulation = Restless::builder().simulate()?;
-        simulation.arm()?;
-        simulation.command(restless::command::again, NoArguments)?;
-        simulation.run_for(Duration::from_secs(1));
-        assert_eq!(simulation.state(), "idle", "it has ended");
-        let report = simulation.stop();
-        assert_eq!(report.commands[0].failed, 1, "{:?}", report.commands);
-        Ok(())
-    }
-
-    robot! {
         robot Failing;
         link base { sensor number: Unplugged() { rate: 10 Hz; } }
     }
 
     #[test]
-    fn a_backoff_of_zero_does_not_either() -> Result<(), Box<dyn std::error::Error>> {
+    fn a_backoff_of_zero_does_not_keep_virtual_time_from_going_on() -> Result<(), Box<dyn std::error::Error>> {
         let mut builder = Failing::builder();
         builder.supervision().first_backoff = Duration::ZERO;
         builder.supervision().longest_backoff = Duration::ZERO;

@@ -233,14 +233,15 @@ struct OwnPath {
 impl Gate for OwnPath {
     fn pass(&self, path: &'static str, publish: &mut dyn FnMut(Stamp) -> Option<Panic>) {
         self.host.while_open(&mut || {
-            // After what had to be waited for. Until the message is out, the command is not gone.
-            let Some(acting) = self.permit.act() else { return };
+            // After what had to be waited for.
+            if !self.permit.is_valid() {
+                return;
+            }
             let clock = self.host.clock();
             let monotonic_time = clock.now();
             let wall_time = clock.wall_at(monotonic_time);
             let stamp = Stamp { monotonic_time, wall_time, origin: self.host.origin(), ..Stamp::default() };
             let panic = publish(stamp);
-            drop(acting);
             if let Some(panic) = panic {
                 self.host.message_failed(path, of_panic(panic));
             }

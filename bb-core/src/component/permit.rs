@@ -2,19 +2,12 @@
 
 use super::Fault;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Given to a command with its context and revoked when it ends or is cancelled. Handles obtained through that
 /// context then refuse to act, even if the command's code still runs.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Permit(Option<Arc<AtomicUsize>>);
-
-/// Set once the permit is revoked; the bits below count the threads that are acting.
-const REVOKED: usize = 1 << (usize::BITS - 1);
-
-/// A handle acts until this is dropped.
-#[derive(Debug)]
-pub(crate) struct Acting<'a>(Option<&'a AtomicUsize>);
+pub(crate) struct Permit(Option<Arc<AtomicBool>>);
 
 impl Permit {
     /// Of a component, whose handles always work.
@@ -26,23 +19,9 @@ impl Permit {
     }
 
     pub(crate) fn revoke(&self) {
-        if let Some(state) = &self.0 {
-            state.fetch_or(REVOKED, Ordering::SeqCst);
+        if let Some(is_revoked) = &self.0 {
+            is_revoked.store(true, Ordering::SeqCst);
         }
-    }
-
-    /// Begins an action, which lasts until the returned value is dropped. Returns `None` if the permit was revoked;
-    /// otherwise the action has begun before any revocation.
-    pub(crate) fn act(&self) -> Option<Acting<'_>> {
-        let Some(state) = &self.0 else { return Some(Acting(None)) };
-        let acting = Acting(Some(state));
-        let before = state.fetch_add(1, Ordering::SeqCst);
-        (before & REVOKED == 0).then_some(acting)
-    }
-
-    /// Whether an action that began before the permit was revoked is still in progress.
-    pub(crate) fn is_acting(&self) -> bool {
-        self.0.as_ref().is_some_and(|state| state.load(Ordering::SeqCst) & !REVOKED > 0)
     }
 
     /// Whether both are of the same execution of a command.
@@ -60,14 +39,6 @@ impl Permit {
     }
 
     pub(crate) fn is_valid(&self) -> bool {
-        self.0.as_ref().is_none_or(|state| state.load(Ordering::SeqCst) & REVOKED == 0)
-    }
-}
-
-impl Drop for Acting<'_> {
-    fn drop(&mut self) {
-        if let Some(state) = self.0 {
-            state.fetch_sub(1, Ordering::SeqCst);
-        }
+        self.0.as_ref().is_none_or(|is_revoked| !is_revoked.load(Ordering::SeqCst))
     }
 }

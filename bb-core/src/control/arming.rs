@@ -1,15 +1,22 @@
-//! Arming, disarming, and the causes of the safety state `error`.
+//! Arming, disarming and stopping, and the causes of the safety state `error`.
+//!
+//! - **Disarming** changes the state first: actuators check it before every command, so nothing moves from then on. Then commands are
+//!   cancelled and all disarm callbacks run at once, each on its own thread. It ends when they have returned, or after
+//!   [`DISARM_WITHIN`]; one that has failed or has not returned is not safe, and the state is `error`.
+//! - **Arming** waits until the code of cancelled commands has returned and nothing is being made safe, [`ARM_WITHIN`] at most. A
+//!   disarming that is requested meanwhile wins.
+//! - **Stopping** disarms, whatever the state, and starts nothing any more. Sensors and services are told to stop once the robot is
+//!   safe or the time limit has passed. Nobody waits for longer than the limits, whatever hangs.
 
-use super::callback::Reason;
-use super::hooks::Hooks;
-use super::inside::{self, Awaited};
+use super::callbacks::{Reason, is_awaited};
 use super::machine::IDLE;
 use super::step::Step;
-use super::{Control, Disarming, Limit, Phase, State};
+use super::{Control, Disarming, Limit, Phase, RunningCommand, State};
 use crate::component::Permit;
 use crate::event::{ArmError, DisarmError, Safety, SafetyError};
 use crate::journal::Event;
 use crate::node::Mode;
+use crate::time::MonotonicTime;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -26,6 +33,11 @@ impl State {
     /// Whether the code of a cancelled command has not returned yet.
     pub(super) fn has_lingering(&self) -> bool {
         self.executions.iter().any(|execution| matches!(execution.phase, Phase::Lingering))
+    }
+
+    /// Whether the code of a command, or a disarm callback outside of a disarming, has not returned.
+    fn is_anything_inside(&self) -> bool {
+        !self.apart.is_empty() || self.executions.iter().any(RunningCommand::is_inside)
     }
 
     /// How many disarmings have ended.
@@ -48,8 +60,7 @@ impl State {
 }
 
 impl Control {
-    /// Arms the robot, unless it is in `error` or stopping. Waits until cancelled commands are gone, and until what was started on
-    /// the disarmed robot has been made safe.
+    /// Arms the robot, unless it is in `error` or stopping.
     pub(crate) fn arm(&self, permit: &Permit) -> Result<(), ArmError> {
         if self.0.mode == Mode::Replay {
             return Err(ArmError::Replay);
@@ -58,39 +69,29 @@ impl Control {
         if !permit.is_valid() {
             return Err(ArmError::Cancelled);
         }
-        let deadline = Instant::now() + ARM_WITHIN;
-        loop {
-            // Code that is itself waited for does not wait.
-            let waits = inside::waits_for(self.id());
-            if self.0.mode == Mode::Real {
-                let left = deadline.saturating_duration_since(Instant::now());
-                // If the wait fails, they are still there below.
-                self.wait_until(left, |state| {
-                    state.machine.safety != Safety::Disarmed
-                        || !(state.has_lingering() || state.is_making_safe() && waits.is_some())
-                        || state.is_stopping
-                        || state.disarms != disarms
-                });
-            } else {
-                self.drop_cancelled();
-            }
-            let step = self.step();
-            // The command may have been cancelled while this waited, or the robot disarmed.
-            if !permit.is_valid() || step.state.disarms != disarms {
-                return Err(ArmError::Cancelled);
-            }
-            let may_turn = step.state.machine.safety == Safety::Disarmed && step.state.is_making_safe();
-            if !may_turn || step.state.is_stopping {
-                step.line(Event::Arm);
-                return step.arm();
-            }
-            // A replay knows nothing of those callbacks, so there is no entry. A device that is unplugged is started again and
-            // again, so they may be those of another start.
-            let may_wait = self.0.mode == Mode::Real && waits.is_some() && !cfg!(loom);
-            if !may_wait || Instant::now() >= deadline {
-                return Err(ArmError::MakingSafe(step.state.being_made_safe()));
-            }
+        let may_wait = self.0.mode == Mode::Real && !is_awaited(self.id());
+        let longest = if may_wait { ARM_WITHIN } else { Duration::ZERO };
+        if self.0.mode == Mode::Virtual {
+            self.drop_cancelled();
         }
+        // If the wait fails, they are still there below.
+        let step = self.step_once(longest, |state| {
+            state.machine.safety != Safety::Disarmed
+                || !state.has_lingering() && state.apart.is_empty()
+                || state.is_stopping
+                || state.disarms != disarms
+        });
+        // The command may have been cancelled while this waited, or the robot disarmed.
+        if !permit.is_valid() || step.state.disarms != disarms {
+            return Err(ArmError::Cancelled);
+        }
+        if step.state.machine.safety == Safety::Disarmed && !step.state.is_stopping && !step.state.apart.is_empty()
+        {
+            // A replay knows nothing of those callbacks, so there is no entry.
+            return Err(ArmError::MakingSafe(step.state.being_made_safe().collect()));
+        }
+        step.line(Event::Arm);
+        step.arm()
     }
 
     /// In a replay: arming was requested.
@@ -123,10 +124,10 @@ impl Control {
             step.finish();
             return Ok(());
         };
-        // Before the callbacks begin: if robots disarm each other, the one that closes the cycle gets the error.
-        let waits = inside::waits_for(self.id());
         step.finish();
-        let Some(_waits) = waits else { return Err(DisarmError::Callback) };
+        if is_awaited(self.id()) {
+            return Err(DisarmError::Callback);
+        }
         if self.0.mode == Mode::Real {
             self.wait_until(DISARM_WITHIN + MARGIN, |state| !state.is_disarming(generation));
         } else {
@@ -144,27 +145,7 @@ impl Control {
         step.finish();
     }
 
-    /// Whether some caller waits for a callback to run for that reason.
-    pub(super) fn is_wanted(&self, reason: Reason, number: u64) -> bool {
-        let state = self.lock();
-        match reason {
-            Reason::Disarming(generation) => {
-                let disarming = state.disarming.as_ref().filter(|disarming| disarming.generation == generation);
-                disarming.is_some_and(|disarming| disarming.left.iter().any(|(other, _)| *other == number))
-            }
-            Reason::Apart(key) => state.is_apart(key, number),
-        }
-    }
-
-    /// A disarm callback has returned.
-    pub(super) fn callback_returned(&self, reason: Reason, number: u64, error: Option<SafetyError>) {
-        match reason {
-            Reason::Disarming(generation) => self.hook_returned(generation, Some(number), error),
-            Reason::Apart(key) => self.apart_returned(key, number, error),
-        }
-    }
-
-    /// The same for one that runs because the robot is disarmed; `None` if there was none to run.
+    /// A disarm callback has returned that ran because the robot is disarmed; `None` if there was none to run.
     pub(super) fn hook_returned(&self, generation: u64, number: Option<u64>, error: Option<SafetyError>) {
         let mut step = self.step();
         let Some(disarming) = step.state.disarming_of(generation) else { return };
@@ -175,10 +156,8 @@ impl Control {
         disarming.errors.extend(error);
         if disarming.left.is_empty() {
             let errors = std::mem::take(&mut disarming.errors);
-            return step.disarmed(errors);
+            step.disarmed(errors);
         }
-        // A stop may wait for all callbacks but the one that has called it.
-        step.finish();
     }
 
     /// The time limit of the disarm callbacks has passed: those that have not returned are not safe.
@@ -187,22 +166,8 @@ impl Control {
         let Some(disarming) = step.state.disarming_of(generation) else { return };
         let late = std::mem::take(&mut disarming.left).into_iter();
         let mut errors = std::mem::take(&mut disarming.errors);
-        let (robot, hooks) = (self.id(), &step.state.hooks);
-        errors.extend(late.map(|(number, path)| match is_caller_awaited(robot, hooks, number, path) {
-            true => own_code_at(path),
-            false => late_at(path),
-        }));
+        errors.extend(late.map(|(_, path)| late_at(path)));
         step.disarmed(errors);
-    }
-
-    /// Whether that disarming is over, or all callbacks that have not returned wait for the calling thread.
-    pub(super) fn is_disarmed_but_for_caller(&self, state: &State, generation: u64) -> bool {
-        let Some(disarming) = state.disarming.as_ref().filter(|disarming| disarming.generation == generation)
-        else {
-            return true;
-        };
-        let mut left = disarming.left.iter();
-        left.all(|(number, path)| is_caller_awaited(self.id(), &state.hooks, *number, path))
     }
 
     /// The disarm callbacks have returned, or their time limit has passed.
@@ -226,26 +191,105 @@ impl Control {
         step.finish();
     }
 
-    /// For a robot that has ended: the callbacks of all components. The caller drops them, so that the resources they
-    /// own are closed and their references no longer keep the robot alive. Callbacks of commands whose code has not
-    /// returned stay, and run once it has.
-    pub(crate) fn take_all_hooks(&self) -> Vec<(&'static str, impl Send + Sync + use<>)> {
-        let state = &mut *self.lock();
-        let lingering = state.executions.iter().filter(|execution| matches!(execution.phase, Phase::Lingering));
-        let lingering: Vec<_> = lingering.map(|execution| execution.id).collect();
-        let gone = state.hooks.take_but_of(&lingering).into_iter();
-        gone.map(|callback| (callback.path, callback)).collect()
+    /// For a robot that has ended: drops the callbacks of all components, so that the resources they own are closed and their references
+    /// no longer keep the robot alive.
+    pub(crate) fn drop_hooks(&self) {
+        let mut step = self.step();
+        let hooks = step.state.hooks.take_all();
+        step.forget(hooks);
+        step.finish();
     }
-}
 
-/// Whether a disarm callback waits for code of the calling thread.
-fn is_caller_awaited(robot: Awaited, hooks: &Hooks, number: u64, path: &'static str) -> bool {
-    inside::is_callback_waiting(robot, number, hooks.is_of_actuator(number).then_some(path))
-}
+    /// Disarms the robot and cancels its commands, without waiting. Nothing is started from now on. Sensors and services are
+    /// told to stop once the robot is safe or the time limit has passed.
+    pub(crate) fn begin_stop(&self) {
+        let mut step = self.step();
+        if step.state.is_stopping {
+            return;
+        }
+        step.line(Event::Stop);
+        step.begin_stop();
+        step.finish();
+        if self.0.mode == Mode::Virtual {
+            while self.run_pending_hooks() {}
+            self.drop_cancelled();
+        }
+    }
 
-/// The code of a component stops the robot, and its disarm callback waits for that code.
-fn own_code_at(path: &'static str) -> SafetyError {
-    SafetyError { path, message: "its own code stops the robot, and cannot wait for it to be disarmed".to_owned() }
+    /// In a replay: the robot was stopped.
+    pub(crate) fn replay_stop(&self) {
+        let mut step = self.step();
+        if step.state.is_stopping {
+            return;
+        }
+        step.begin_stop();
+        step.finish();
+    }
+
+    pub(crate) fn is_stopping(&self) -> bool {
+        self.lock().is_stopping
+    }
+
+    /// Waits until the disarm callbacks have returned or have timed out.
+    pub(crate) fn wait_until_disarmed(&self) {
+        if self.0.mode == Mode::Real {
+            let generation = self.lock().generation;
+            let is_over = |state: &State| !state.is_disarming(generation);
+            if !self.wait_until(DISARM_WITHIN + Duration::from_millis(500), is_over) {
+                // The timekeeper's thread is gone.
+                self.disarm_timeout(generation);
+            }
+            self.0.stop.set();
+        }
+    }
+
+    /// The paths of commands whose code has not returned at `deadline`, and of components whose disarm callbacks have not.
+    pub(crate) fn lingering(&self, deadline: Instant) -> Vec<&'static str> {
+        self.wait_until(deadline.saturating_duration_since(Instant::now()), |state| !state.is_anything_inside());
+        let state = self.lock();
+        let inside = state.executions.iter().filter(|execution| execution.is_inside());
+        let inside = inside.filter_map(|execution| self.0.declared.commands.get(execution.command));
+        inside.map(|declared| declared.path).chain(state.being_made_safe()).collect()
+    }
+
+    /// Enforces the time limits that have passed; returns true if there were any.
+    pub(crate) fn check_limits(&self, now: MonotonicTime) -> bool {
+        let Some((_, limit)) = self.0.limits.take(now) else { return false };
+        match limit {
+            Limit::Execution(id) => self.timed_out(id),
+            Limit::Arming => self.arm_timeout(),
+            Limit::Disarming(generation) => self.disarm_timeout(generation),
+            Limit::Apart(key) => self.apart_timeout(key),
+        }
+        true
+    }
+
+    /// Wakes a sleeper that is due. Returns true if there was one.
+    pub(crate) fn wake_sleepers(&self, now: MonotonicTime) -> bool {
+        let Some((lane, waker)) = self.0.sleeper.take(now) else { return false };
+        self.run_on_pool(lane, move || crate::fault::wake(waker));
+        true
+    }
+
+    /// Wakes `waker` at that time.
+    pub(crate) fn wake_at(&self, time: MonotonicTime, waker: std::task::Waker) {
+        self.0.sleeper.wake_at(time, None, waker);
+    }
+
+    /// When the watchdog checks next.
+    pub(crate) fn next_watch(&self) -> Option<MonotonicTime> {
+        self.0.watch.next()
+    }
+
+    /// When a command is to be woken next.
+    pub(crate) fn next_sleeper(&self) -> Option<MonotonicTime> {
+        self.0.sleeper.next()
+    }
+
+    /// When the next time limit passes.
+    pub(crate) fn next_limit(&self) -> Option<MonotonicTime> {
+        self.0.limits.next()
+    }
 }
 
 /// The disarm callback of a component did not return.
@@ -282,6 +326,20 @@ impl Step<'_> {
         }
     }
 
+    /// Disarms in any safety state: hardware started while the robot was disarmed may move as well.
+    fn begin_stop(&mut self) {
+        let was_in_error = self.state.machine.safety == Safety::Error;
+        if self.state.disarming.is_none() {
+            self.begin_disarming(None, None, false);
+        }
+        if let Some(disarming) = self.state.disarming.as_mut().filter(|_| was_in_error) {
+            disarming.to_error = true;
+        }
+        self.state.is_stopping = true;
+        self.cancel_all(None);
+        self.publish_machine(None);
+    }
+
     /// Whether the robot is armed or may be.
     fn may_arm(&self) -> Result<(), ArmError> {
         match self.state.machine.safety {
@@ -305,10 +363,6 @@ impl Step<'_> {
     pub(super) fn begin_disarming(&mut self, by: Option<u64>, name: Option<&'static str>, force: bool) -> u64 {
         // Includes the callbacks of commands, which end below.
         let hooks = if self.control.0.mode == Mode::Replay { Vec::new() } else { self.state.hooks.all() };
-        for execution in &mut self.state.executions {
-            let may_act = || execution.task.as_ref().is_some_and(|task| task.may_act());
-            execution.lingers_on |= matches!(execution.phase, Phase::Lingering) && may_act();
-        }
         self.state.machine.safety = Safety::Disarming;
         self.state.generation += 1;
         let generation = self.state.generation;
@@ -324,7 +378,7 @@ impl Step<'_> {
             outcome: Arc::default(),
         });
         if self.control.0.mode != Mode::Replay {
-            self.effects.hooks.push((generation, hooks));
+            self.effects.callbacks.push((Reason::Disarming(generation), hooks));
         }
         if self.control.0.mode == Mode::Real {
             self.control.0.limits.set(Limit::Disarming(generation), self.now + DISARM_WITHIN);

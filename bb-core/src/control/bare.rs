@@ -1,7 +1,6 @@
 //! A control state without a robot around it, for tests.
 
-use super::topics::SystemTopics;
-use super::{Control, Declared, Parts};
+use super::{Control, Declared, Parts, SystemTopics};
 use crate::declaration::{EstimatorDeclaration, ParameterValues};
 use crate::lifecycle::Supervision;
 use crate::message::Origin;

@@ -1,17 +1,39 @@
-//! Commands as callers see them: listing and starting them.
+//! Commands as callers see them: listing them, starting them, the reasons for refusing them, and those that hang.
 
 use super::command::Arguments;
+use super::effects::Log;
 use super::execution::{Execution, Slot, UntypedExecution};
 use super::step::Step;
-use super::task::Value;
-use super::{Control, Phase, RunningCommand};
-use crate::component::{CommandInfo, DynamicExecution, Permit};
+use super::task::{Task, Value};
+use super::{Control, Limit, Phase, RunningCommand};
+use crate::component::{CommandContext, CommandInfo, DynamicExecution, OwnHooks, Permit};
 use crate::declaration::{CommandDeclaration, Role};
-use crate::event::{CategoryDeclaration, Refusal};
+use crate::event::{
+    CategoryDeclaration, CommandEvent, CommandPhase, HealthTransition, Refusal, RefusalReason, Safety,
+};
 use crate::fault::Fault;
 use crate::journal::Event;
+use crate::node::Mode;
+use crate::schedule::Lane;
+use crate::time::MonotonicTime;
 use std::sync::{Arc, PoisonError};
 use std::time::Duration;
+
+/// Executions whose code has not returned.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Hanging {
+    /// The path of the command.
+    pub(crate) path: &'static str,
+    /// The number of the first of these executions.
+    pub(crate) first: u64,
+    /// How long its code has been running.
+    pub(crate) duration: Duration,
+}
+
+/// No further command starts while this many cancelled executions have not returned from their code, and while twice as many have not
+/// none that health starts. One that disarms always starts. The pool has as many threads for the latter two, and others for all other
+/// commands. Executions that are not cancelled are bounded by the concurrency of their categories.
+const MOST_LINGERING: usize = 256;
 
 impl Control {
     /// Checks that all commands can start with their current options. The error names the path of one that cannot, and why.
@@ -87,6 +109,21 @@ impl Control {
         infos.collect()
     }
 
+    /// For each command, the first execution whose code has been running for `longest` or longer.
+    pub(crate) fn hanging(&self, now: MonotonicTime, longest: Duration) -> Vec<Hanging> {
+        let state = self.lock();
+        let mut hanging: Vec<Hanging> = Vec::new();
+        for execution in &state.executions {
+            let Some(entered) = execution.task.as_ref().and_then(|task| task.entered_at()) else { continue };
+            let Some(declared) = self.0.declared.commands.get(execution.command) else { continue };
+            let duration = now.duration_since(entered);
+            if duration >= longest && hanging.iter().all(|other| other.path != declared.path) {
+                hanging.push(Hanging { path: declared.path, first: execution.id, duration });
+            }
+        }
+        hanging
+    }
+
     pub(super) fn result_json(&self, command: usize, result: Value) -> Result<String, Fault> {
         match self.0.commands.get(command) {
             Some(command) => command.0.result_json(result),
@@ -146,5 +183,134 @@ impl Step<'_> {
         let executions = self.state.executions.iter();
         let executions = executions.filter(|execution| !matches!(execution.phase, Phase::Lingering));
         executions.filter(|execution| fits(self, execution)).map(|execution| execution.id).collect()
+    }
+
+    /// Starts a command, or returns why it cannot be started.
+    pub(super) fn start(
+        &mut self,
+        number: usize,
+        arguments: Option<Arguments>,
+        health: Option<HealthTransition>,
+    ) -> Result<Arc<Slot>, Refusal> {
+        let Some(declared) = self.declared(number) else {
+            // Numbers and declarations come from one expansion.
+            let category = CategoryDeclaration { name: "", concurrency: 0 };
+            return Err(Refusal { command: "", reason: RefusalReason::Stopping, state: "", category });
+        };
+        let role = self.role(number);
+        if let Err(reason) = self.may_start(declared, role).and_then(|()| self.has_room(role, health.is_some())) {
+            let category = self.control.category(declared);
+            let refusal = Refusal { command: declared.name, reason, state: self.state.machine.state(), category };
+            self.effects.dropped.extend(arguments);
+            self.refuse(number, refusal.clone(), health);
+            return Err(refusal);
+        }
+        let cancelled: Vec<u64> = self.not_ended(|step, execution| {
+            step.declared(execution.command).is_some_and(|other| declared.cancel.includes(other.category))
+        });
+        for id in cancelled {
+            self.cancel_one(id);
+        }
+        let id = self.state.next_id;
+        self.state.next_id += 1;
+        self.state.machine.running += 1;
+        if let Some(statistics) = self.state.statistics.get_mut(number) {
+            statistics.started += 1;
+        }
+        let control = self.control.clone();
+        let slot = Arc::new(Slot::new(id, number, control.downgrade()));
+        let permit = Permit::revocable();
+        let is_for_safety = role == Role::Disarming || health.is_some();
+        let lane = if is_for_safety { Lane::Safety } else { Lane::Commands };
+        let task = (control.0.mode != Mode::Replay).then(|| {
+            let (permit, weak) = (permit.clone(), control.downgrade());
+            let starter = move || {
+                let gone = || Fault::new("the robot is gone");
+                let control = weak.upgrade().ok_or_else(gone)?;
+                let prepared = control.0.commands.get(number).ok_or_else(gone)?;
+                let host = control.host()?;
+                let context = CommandContext {
+                    name: declared.name,
+                    health,
+                    hooks: Arc::new(OwnHooks::new(declared.path, Arc::clone(&host) as _, id)),
+                    host,
+                    sleeper: control.0.sleeper.in_lane(lane),
+                    permit,
+                };
+                prepared.0.start(arguments, &control.parameters(), context)
+            };
+            Arc::new(Task::new(id, lane, control.downgrade(), Box::new(starter)))
+        });
+        self.effects.begun.extend(task.clone());
+        if let Some(timeout) = declared.timeout_nanos
+            && self.control.0.mode != Mode::Replay
+        {
+            self.control.0.limits.set(Limit::Execution(id), self.now.plus_nanos(timeout));
+        }
+        let execution = RunningCommand {
+            id,
+            command: number,
+            health,
+            slot: Arc::clone(&slot),
+            permit,
+            task,
+            phase: Phase::Running,
+        };
+        self.state.executions.push(execution);
+        self.publish_phase(number, id, CommandPhase::Started, health);
+        self.publish_machine(Some(declared.name));
+        Ok(slot)
+    }
+
+    fn may_start(&self, declared: &CommandDeclaration, role: Role) -> Result<(), RefusalReason> {
+        if self.state.is_stopping {
+            return Err(RefusalReason::Stopping);
+        }
+        if matches!(self.state.machine.safety, Safety::Error | Safety::Disarming) {
+            return Err(RefusalReason::Safety);
+        }
+        if !declared.allowed(role, self.state.machine.state()) {
+            return Err(RefusalReason::State);
+        }
+        let running = self.not_ended(|step, execution| {
+            step.declared(execution.command).is_some_and(|other| other.category == declared.category)
+        });
+        let concurrency = self.control.category(declared).concurrency;
+        if running.len() >= concurrency && !declared.cancel.includes(declared.category) {
+            return Err(RefusalReason::Busy);
+        }
+        Ok(())
+    }
+
+    /// Counts a refusal and publishes it.
+    fn refuse(&mut self, number: usize, refusal: Refusal, health: Option<HealthTransition>) {
+        if let Some(statistics) = self.state.statistics.get_mut(number) {
+            statistics.refused += 1;
+            statistics.last_refusal = Some(refusal.clone());
+        }
+        self.effects.log(Log::Refused(refusal.clone()));
+        self.publish_phase(number, 0, CommandPhase::Refused(refusal), health);
+    }
+
+    pub(super) fn publish_phase(
+        &mut self,
+        number: usize,
+        execution: u64,
+        phase: CommandPhase,
+        health: Option<HealthTransition>,
+    ) {
+        let control = self.control;
+        if let (Some(topic), Some(declared)) = (control.0.topics.commands.get(number), self.declared(number)) {
+            let event = CommandEvent { command: declared.name, execution, phase, health };
+            self.publish(topic, event, self.now);
+        }
+    }
+
+    /// Whether another command may start. A command that hangs leaves an execution running each time it is started and cancelled.
+    fn has_room(&self, role: Role, of_health: bool) -> Result<(), RefusalReason> {
+        let executions = self.state.executions.iter();
+        let lingering = executions.filter(|execution| matches!(execution.phase, Phase::Lingering)).count();
+        let most = if of_health { 2 * MOST_LINGERING } else { MOST_LINGERING };
+        if role == Role::Disarming || lingering < most { Ok(()) } else { Err(RefusalReason::Hanging) }
     }
 }

@@ -1,12 +1,10 @@
 //! The effects of a control-state entry that are user code. They run without the lock, on threads that nothing else
 //! waits for.
 
-use super::callback::{Callback, Reason};
-use super::execution::CommandError;
-use super::execution::Slot;
-use super::inside;
+use super::callbacks::{Callback, Reason, is_awaited};
+use super::execution::{CommandError, Slot};
 use super::task::{EndedCode, Task, Value};
-use super::{Control, Key, Wired};
+use super::{Control, Wired};
 use crate::event::{ComponentFault, HealthTransition, Refusal, Safety, SafetyError};
 use crate::fault::{discard, wake};
 use crate::node::Mode;
@@ -30,13 +28,10 @@ pub(super) struct Effects {
     /// Commands whose futures are to be dropped.
     pub(super) cancelled: Vec<Arc<Task>>,
     pub(super) results: Vec<(Arc<Slot>, Result<Value, CommandError>)>,
-    /// Disarm callbacks, for the disarming of that number.
-    pub(super) hooks: Vec<(u64, Vec<Arc<Callback>>)>,
-    /// Disarm callbacks that run outside of a disarming.
-    pub(super) apart: Vec<(Key, Vec<Arc<Callback>>)>,
+    /// Disarm callbacks to run.
+    pub(super) callbacks: Vec<(Reason, Vec<Arc<Callback>>)>,
+    /// Values of users.
     pub(super) dropped: Vec<Value>,
-    /// Disarm callbacks of commands that have ended.
-    pub(super) forgotten: Vec<Arc<Callback>>,
     /// References to the wiring, which may be the last ones.
     pub(super) wired: Vec<Wired>,
     /// Commands that arm the robot, whose code had ended while something was being made safe.
@@ -97,45 +92,31 @@ impl Effects {
     }
 
     pub(super) fn run(self, control: &Control) {
-        let Self {
-            wakers,
-            logs: _,
-            has_lines,
-            begun,
-            cancelled,
-            results,
-            hooks,
-            apart,
-            dropped,
-            forgotten,
-            wired,
-            ended,
-        } = self;
+        let Self { wakers, logs: _, has_lines, begun, cancelled, results, callbacks, dropped, wired, ended } = self;
         // Hardware comes first.
-        let hooks = hooks.into_iter().map(|(generation, callbacks)| {
-            (Reason::Disarming(generation), control.start_hooks(generation, callbacks))
-        });
-        let apart =
-            apart.into_iter().map(|(key, callbacks)| (Reason::Apart(key), control.start_apart(key, callbacks)));
-        let without_thread: Vec<_> = hooks.chain(apart).collect();
+        let here: Vec<_> =
+            callbacks.into_iter().map(|(reason, all)| (reason, control.start_callbacks(reason, all))).collect();
         // Before anything that may block: until then, no other thread writes lines.
         if has_lines {
             control.start_writing_logs();
         }
-        for (reason, callbacks) in without_thread {
-            // No thread could be started: better run late than never.
+        for (reason, callbacks) in here {
             callbacks.iter().for_each(|callback| callback.run(control, reason));
-            callbacks.into_iter().for_each(discard);
+            discard(callbacks);
         }
-        // Each of these may block forever, so each is a separate job.
-        wakers.into_wakers().for_each(|waker| control.run_on_pool(Lane::Wakers, move || wake(waker)));
-        for (slot, result) in results {
-            let (waker, late) = slot.set(result);
-            waker.into_iter().for_each(|waker| control.run_on_pool(Lane::Wakers, move || wake(waker)));
-            late.into_iter().for_each(|late| control.run_on_pool(Lane::Dropping, move || discard(late)));
+        if !wakers.is_empty() {
+            control.run_on_pool(Lane::User, move || wakers.run());
         }
-        dropped.into_iter().for_each(|value| control.run_on_pool(Lane::Dropping, move || discard(value)));
-        forgotten.into_iter().for_each(|hook| control.run_on_pool(Lane::Dropping, move || discard(hook)));
+        let results: Vec<_> = results.into_iter().map(|(slot, result)| slot.set(result)).collect();
+        if !(results.is_empty() && dropped.is_empty()) {
+            control.run_on_pool(Lane::User, move || {
+                for (waker, late) in results {
+                    waker.into_iter().for_each(wake);
+                    late.into_iter().for_each(discard);
+                }
+                dropped.into_iter().for_each(discard);
+            });
+        }
         drop(wired);
         for task in cancelled {
             task.cancel();
@@ -144,14 +125,14 @@ impl Effects {
             task.schedule();
         }
         for EndedCode { id, end, value } in ended {
-            control.process_end(id, end, value);
+            control.apply_outcome(id, end, value);
         }
     }
 }
 
 impl Control {
     /// Runs user code on a thread of the pool, where it delays nothing else; on virtual time, on the caller's thread.
-    fn run_on_pool(&self, lane: Lane, code: impl FnOnce() + Send + 'static) {
+    pub(crate) fn run_on_pool(&self, lane: Lane, code: impl FnOnce() + Send + 'static) {
         match self.0.mode {
             Mode::Real => self.0.pool.submit(lane, code),
             Mode::Virtual | Mode::Replay => code(),
@@ -166,23 +147,26 @@ impl Control {
         }
     }
 
-    /// Runs each disarm callback on its own thread, and returns those for which no thread could be started. On
-    /// virtual time, all of them wait for [`Self::run_pending_hooks`].
-    fn start_hooks(&self, generation: u64, all: Vec<Arc<Callback>>) -> Vec<Arc<Callback>> {
-        if self.0.mode != Mode::Real {
-            lock(&self.0.pending_hooks).push_back((generation, all));
-            return Vec::new();
+    /// Runs each disarm callback on its own thread, and returns those for which no thread could be started: better run late than
+    /// never. On virtual time those of a disarming wait for [`Self::run_pending_hooks`], and the caller runs the others.
+    fn start_callbacks(&self, reason: Reason, all: Vec<Arc<Callback>>) -> Vec<Arc<Callback>> {
+        match reason {
+            Reason::Disarming(generation) if self.0.mode != Mode::Real => {
+                lock(&self.0.pending_hooks).push_back((generation, all));
+                return Vec::new();
+            }
+            Reason::Disarming(generation) if all.is_empty() => self.hook_returned(generation, None, None),
+            // A model has room for few threads.
+            Reason::Apart(_) if self.0.mode != Mode::Real || cfg!(loom) => return all,
+            Reason::Disarming(_) | Reason::Apart(_) => {}
         }
-        if all.is_empty() {
-            self.hook_returned(generation, None, None);
-        }
-        all.into_iter().filter(|callback| !callback.start(self, Reason::Disarming(generation))).collect()
+        all.into_iter().filter(|callback| !callback.start(self, reason)).collect()
     }
 
     /// On virtual time: runs the waiting disarm callbacks in order on the calling thread, and returns true if there
     /// were any. None of them runs inside code that it would wait for.
     pub(crate) fn run_pending_hooks(&self) -> bool {
-        if inside::is_waited_for(self.id()) {
+        if is_awaited(self.id()) {
             return false;
         }
         let Some((generation, all)) = lock(&self.0.pending_hooks).pop_front() else { return false };
@@ -190,7 +174,7 @@ impl Control {
             self.hook_returned(generation, None, None);
         }
         all.iter().for_each(|callback| callback.run(self, Reason::Disarming(generation)));
-        all.into_iter().for_each(discard);
+        discard(all);
         true
     }
 

@@ -1,4 +1,10 @@
 //! How a command ends: by itself, cancelled, or timed out.
+//!
+//! - Its code returns ([`Control::code_returned`]): the outcome is written to the journal and applied. A command that disarms waits for
+//!   the disarming, one that arms waits for cancelled commands; any other is settled at once.
+//! - It is cancelled or times out ([`Control::cut_short`]): it is settled at once, and its handles are dead. Its execution lingers until
+//!   its code has returned and its future is dropped ([`Control::future_dropped`]). The robot is not armed before.
+//! - [`Step::settle`] gives the caller the result, whichever way it came.
 
 use super::arming::ARM_WITHIN;
 use super::execution::CommandError;
@@ -12,74 +18,70 @@ use crate::event::{CommandPhase, Safety};
 use crate::journal::{End, Event};
 use crate::node::Mode;
 use std::sync::Arc;
-use std::time::Duration;
-
-/// How often to check whether the handles of a command still act.
-const LOOK_AGAIN: Duration = Duration::from_millis(1);
 
 impl Control {
     /// Cancels an execution for its caller.
     pub(crate) fn cancel(&self, id: u64) {
-        self.end_early(id, Event::Cancel { execution: id }, CommandError::Cancelled);
+        self.cut_short(id, Event::Cancel { execution: id }, CommandError::Cancelled);
     }
 
     /// An execution has taken longer than its `timeout`.
     pub(crate) fn timed_out(&self, id: u64) {
-        self.end_early(id, Event::Timeout { execution: id }, CommandError::TimedOut);
+        self.cut_short(id, Event::Timeout { execution: id }, CommandError::TimedOut);
     }
 
-    fn end_early(&self, id: u64, event: Event, error: CommandError) {
+    fn cut_short(&self, id: u64, event: Event, error: CommandError) {
         let mut step = self.step();
         if let Some(index) = step.running(id) {
             step.line(event);
             let name = step.name_of(id);
-            step.end(index, Err(error), None);
+            step.settle(index, Err(error), None);
             step.publish_machine(name);
             step.finish();
         }
     }
 
-    /// The code of a command has ended.
-    pub(super) fn ended(&self, id: u64, ended: Ended) {
+    /// The code of a command has returned.
+    pub(super) fn code_returned(&self, id: u64, ended: Ended) {
         let (end, value) = match ended {
             Ok(Outcome { value, next_state }) => {
                 (End::Succeeded { next_state: next_state.map(str::to_owned) }, Some(value))
             }
             Err(fault) => (End::Failed { message: fault.to_string() }, None),
         };
-        self.process_end(id, end, value);
+        self.apply_outcome(id, end, value);
     }
 
     /// In a replay: the code of a command had ended.
     pub(crate) fn replay_end(&self, id: u64, end: End) {
-        self.process_end(id, end, None);
+        self.apply_outcome(id, end, None);
     }
 
-    pub(super) fn process_end(&self, id: u64, end: End, value: Option<Value>) {
+    pub(super) fn apply_outcome(&self, id: u64, end: End, value: Option<Value>) {
         let mut step = self.step();
-        // Callbacks that make safe what was started late must not run on an armed robot. A replay knows nothing of them, so the
-        // entry is written afterwards.
-        if step.state.is_making_safe() && step.is_arming(id) {
+        // What is being made safe must be so before the robot is armed. A replay knows nothing of it, so the entry is written
+        // afterwards.
+        if !step.state.apart.is_empty() && step.is_arming(id) {
             step.state.held.push(EndedCode { id, end, value });
             return step.finish();
         }
         let Some(index) = step.running(id) else {
             // It was cancelled meanwhile, or has timed out.
             step.effects.dropped.extend(value);
-            step.returned(id);
+            step.forget_lingering(id);
             return step.finish();
         };
         step.line(Event::Ended { execution: id, end: end.clone() });
         let name = step.name_of(id);
-        step.process_end(index, end, value);
+        step.apply_outcome(index, end, value);
         step.publish_machine(name);
         step.finish();
     }
 
     /// The future of a command that was cancelled has been dropped.
-    pub(crate) fn gone(&self, id: u64) {
+    pub(crate) fn future_dropped(&self, id: u64) {
         let mut step = self.step();
-        step.returned(id);
+        step.forget_lingering(id);
         step.finish();
     }
 
@@ -93,9 +95,16 @@ impl Control {
         step.line(Event::ArmTimeout);
         while let Some(index) = step.state.executions.iter().position(waiting) {
             let message = "commands that were cancelled have not returned".to_owned();
-            step.end(index, Err(CommandError::Failed(message)), None);
+            step.settle(index, Err(CommandError::Failed(message)), None);
         }
         step.finish();
+    }
+}
+
+impl RunningCommand {
+    /// Whether its code has not returned, or its future is to be dropped.
+    pub(super) fn is_inside(&self) -> bool {
+        self.task.as_ref().is_some_and(|task| task.may_act())
     }
 }
 
@@ -116,19 +125,19 @@ impl Step<'_> {
 
     pub(super) fn cancel_one(&mut self, id: u64) {
         if let Some(index) = self.running(id) {
-            self.end(index, Err(CommandError::Cancelled), None);
+            self.settle(index, Err(CommandError::Cancelled), None);
         }
     }
 
-    /// The code of the execution at `index` has ended.
-    fn process_end(&mut self, index: usize, end: End, value: Option<Value>) {
+    /// Applies the outcome of the execution at `index`.
+    fn apply_outcome(&mut self, index: usize, end: End, value: Option<Value>) {
         let Some(execution) = self.state.executions.get(index) else { return };
         let (id, command) = (execution.id, execution.command);
         let next_state = match end {
             End::Succeeded { next_state } => next_state,
             End::Failed { message } => {
                 self.effects.dropped.extend(value);
-                return self.end(index, Err(CommandError::Failed(message)), None);
+                return self.settle(index, Err(CommandError::Failed(message)), None);
             }
         };
         let next_state = match next_state.map(|name| self.state_named(&name).ok_or(name)).transpose() {
@@ -136,7 +145,7 @@ impl Step<'_> {
             Err(name) => {
                 self.effects.dropped.extend(value);
                 let message = format!("it names the next state `{name}`, which is not declared");
-                return self.end(index, Err(CommandError::Failed(message)), None);
+                return self.settle(index, Err(CommandError::Failed(message)), None);
             }
         };
         let name = self.declared(command).map(|declared| declared.name);
@@ -152,8 +161,13 @@ impl Step<'_> {
                 }
             }
             Role::Arming => self.arm_by(index, value, next_state),
-            Role::Plain | Role::Disarming => self.end(index, Ok(value), next_state),
+            Role::Plain | Role::Disarming => self.settle(index, Ok(value), next_state),
         }
+    }
+
+    fn forget_hooks(&mut self, execution: u64) {
+        let hooks = self.state.hooks.take_of_execution(execution);
+        self.forget(hooks);
     }
 
     /// Whether that execution is of a command that arms the robot.
@@ -177,11 +191,11 @@ impl Step<'_> {
             self.state.machine.resting = IDLE;
         }
         if self.state.machine.safety == Safety::Armed {
-            return self.end(index, Ok(value), next_state);
+            return self.settle(index, Ok(value), next_state);
         }
         self.effects.dropped.extend(value);
         let why = if self.state.is_stopping { "the robot stops".to_owned() } else { self.safety_text() };
-        self.end(index, Err(CommandError::Failed(format!("the robot was not armed: {why}"))), None);
+        self.settle(index, Err(CommandError::Failed(format!("the robot was not armed: {why}"))), None);
     }
 
     fn safety_text(&self) -> String {
@@ -197,9 +211,9 @@ impl Step<'_> {
             Phase::Disarming(value, _) if is_error => {
                 self.effects.dropped.extend(value);
                 let message = format!("not everything could be made safe: {}", self.safety_text());
-                self.end(index, Err(CommandError::Failed(message)), None);
+                self.settle(index, Err(CommandError::Failed(message)), None);
             }
-            Phase::Disarming(value, next_state) => self.end(index, Ok(value), next_state),
+            Phase::Disarming(value, next_state) => self.settle(index, Ok(value), next_state),
             phase => execution.phase = phase,
         }
     }
@@ -212,14 +226,13 @@ impl Step<'_> {
         self.control.0.declared.states.iter().copied().find(|state| *state == name)
     }
 
-    /// Ends the execution at `index`. The caller publishes the change of the operational state.
-    pub(super) fn end(
+    /// Gives the caller of the execution at `index` its result. This function's caller publishes the change of the operational state.
+    pub(super) fn settle(
         &mut self,
         index: usize,
         result: Result<Option<Value>, CommandError>,
         next_state: Option<&'static str>,
     ) {
-        let is_armed = self.state.machine.safety == Safety::Armed;
         let Some(execution) = self.state.executions.get_mut(index) else { return };
         let (id, command, health) = (execution.id, execution.command, execution.health);
         execution.permit.revoke();
@@ -232,7 +245,6 @@ impl Step<'_> {
             Phase::Running if goes_on => {
                 if let Some(task) = &execution.task {
                     task.mark_cancelled();
-                    execution.lingers_on |= task.may_act() && !is_armed;
                 }
                 self.effects.cancelled.extend(execution.task.clone());
             }
@@ -243,7 +255,7 @@ impl Step<'_> {
             Phase::Running | Phase::Lingering => drop(self.state.executions.remove(index)),
         }
         if !goes_on {
-            self.effects.forgotten.extend(self.state.hooks.take_of_execution(id));
+            self.forget_hooks(id);
         }
         self.control.0.limits.clear(Limit::Execution(id));
         self.state.machine.running = self.state.machine.running.saturating_sub(1);
@@ -274,38 +286,25 @@ impl Step<'_> {
         }
     }
 
-    /// The code of a cancelled execution has returned. Hardware it may have started since is made safe before it is
-    /// gone.
-    fn returned(&mut self, id: u64) {
-        let acts = |execution: &RunningCommand| execution.id == id && execution.permit.is_acting();
-        if self.control.0.mode == Mode::Real && self.state.executions.iter().any(acts) {
-            // A thread it has left running is about to publish, and must not do so once the robot is armed again.
-            return self.control.0.limits.set(Limit::Gone(id), self.now + LOOK_AGAIN);
-        }
-        if !self.makes_safe_after(id) {
-            self.gone(id);
-        }
-    }
-
-    /// A cancelled execution is gone.
-    pub(super) fn gone(&mut self, id: u64) {
+    /// The code of a cancelled execution has returned, and its future is dropped. Commands that arm the robot may have waited for
+    /// that.
+    pub(super) fn forget_lingering(&mut self, id: u64) {
         let lingering =
             |execution: &RunningCommand| execution.id == id && matches!(execution.phase, Phase::Lingering);
         let Some(index) = self.state.executions.iter().position(lingering) else { return };
         let arming = |execution: &RunningCommand| matches!(execution.phase, Phase::Arming(..));
-        if self.state.is_making_safe() && self.state.executions.iter().any(arming) {
-            // As in `process_end`: what waits for it would arm the robot.
-            return self.state.held_gone.push(id);
+        if !self.state.apart.is_empty() && self.state.executions.iter().any(arming) {
+            // As in `apply_outcome`: what waits for it would arm the robot.
+            return self.state.held_lingering.push(id);
         }
         self.line(Event::Gone { execution: id });
         self.state.executions.remove(index);
-        self.effects.forgotten.extend(self.state.hooks.take_of_execution(id));
+        self.forget_hooks(id);
         if self.state.has_lingering() {
             return;
         }
         self.control.0.limits.clear(Limit::Arming);
-        let waiting = |execution: &RunningCommand| matches!(execution.phase, Phase::Arming(..));
-        while let Some(index) = self.state.executions.iter().position(waiting) {
+        while let Some(index) = self.state.executions.iter().position(arming) {
             let Some(execution) = self.state.executions.get_mut(index) else { return };
             if let Phase::Arming(value, next_state) = std::mem::replace(&mut execution.phase, Phase::Running) {
                 // Its code has ended: it leaves the list at once.

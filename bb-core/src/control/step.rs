@@ -2,7 +2,7 @@
 
 use super::effects::{Effects, Log};
 use super::machine::Machine;
-use super::{Control, StateGuard};
+use super::{Control, State, StateGuard};
 use crate::event::{ComponentFault, SafetyError, SafetyTransition, StateTransition};
 use crate::journal::Event;
 use crate::message::{Payload, Stamp};
@@ -10,6 +10,7 @@ use crate::node::{Mode, NodeEntry};
 use crate::pubsub::Topic;
 use crate::time::{MonotonicTime, WallTime};
 use std::sync::atomic::Ordering;
+use std::time::Duration;
 
 /// The processing of one entry: the lock, the entry's time, and the effects once the lock is released. No user code
 /// may be called while it lives.
@@ -25,7 +26,15 @@ pub(super) struct Step<'a> {
 impl Control {
     /// Enters the control state.
     pub(super) fn step(&self) -> Step<'_> {
-        let state = self.lock();
+        self.step_in(self.lock())
+    }
+
+    /// Enters it once `holds`, or after `longest`.
+    pub(super) fn step_once(&self, longest: Duration, holds: impl Fn(&State) -> bool) -> Step<'_> {
+        self.step_in(self.locked_once(longest, &holds).0)
+    }
+
+    fn step_in<'a>(&'a self, state: StateGuard<'a>) -> Step<'a> {
         // Read under the lock, so that lines are in the order of their times.
         let now = self.0.clock.now();
         let wall_offset_nanos = self.0.clock.wall_offset_nanos();

@@ -1,23 +1,27 @@
-//! Creating and inspecting the control state.
+//! Creating and inspecting the control state, and its topics.
 
 use super::budgets::Budgets;
+use super::callbacks::Hooks;
 use super::command::CommandStatistics;
 use super::effects::Reporter;
-use super::hooks::Hooks;
 use super::machine::Machine;
-use super::topics::SystemTopics;
 use super::{
-    Awaited, ComponentOrder, Control, Health, Inner, Islands, Parts, State, StateGuard, StateMutex, Summary,
+    ComponentOrder, Control, Declared, Health, Inner, Islands, Parts, State, StateGuard, StateMutex, Summary,
     Supervised, WeakControl,
 };
 use crate::component::Host;
 use crate::declaration::{CommandDeclaration, Supervisor};
-use crate::event::Safety;
+use crate::event::{
+    CommandEvent, ComponentFault, HealthTransition, ParameterChange, Safety, SafetyError, SafetyTransition,
+    StateTransition,
+};
 use crate::fault::Fault;
+use crate::journal::JournalLine;
 use crate::message::Origin;
 use crate::node::Mode;
+use crate::pubsub::{AnyTopic, Registry, Topic};
 use crate::schedule::{Bell, Deadlines, Pool, Sleeper, StopSignal};
-use crate::time::{Clock, MonotonicTime};
+use crate::time::Clock;
 #[cfg(loom)]
 use loom::sync::{Condvar, atomic::AtomicU8};
 use std::fmt;
@@ -47,7 +51,7 @@ impl Control {
             apart: Vec::new(),
             next_apart: 0,
             held: Vec::new(),
-            held_gone: Vec::new(),
+            held_lingering: Vec::new(),
             last_disarm: Ok(()),
             disarms: 0,
             generation: 0,
@@ -77,7 +81,6 @@ impl Control {
             pool: Pool::new(move || alarm.ring()),
             bell,
             reporter: Reporter::default(),
-            begun: Mutex::new((MonotonicTime::MAX, 0)),
             ready: Mutex::default(),
             pending_hooks: Mutex::default(),
             reports: Mutex::default(),
@@ -105,7 +108,7 @@ impl Control {
     }
 
     /// Distinguishes it from other robots.
-    pub(crate) fn id(&self) -> Awaited {
+    pub(crate) fn id(&self) -> usize {
         Arc::as_ptr(&self.0).addr()
     }
 
@@ -119,25 +122,31 @@ impl Control {
     }
 
     /// Waits until `holds`, `longest` at most. Returns whether it holds.
-    #[cfg(not(loom))]
     pub(super) fn wait_until(&self, longest: Duration, holds: impl Fn(&State) -> bool) -> bool {
+        self.locked_once(longest, &holds).1
+    }
+
+    #[cfg(not(loom))]
+    pub(super) fn locked_once(&self, longest: Duration, holds: &dyn Fn(&State) -> bool) -> (StateGuard<'_>, bool) {
         let deadline = std::time::Instant::now() + longest;
         let mut state = self.lock();
-        while !holds(&state) {
+        loop {
             let left = deadline.saturating_duration_since(std::time::Instant::now());
-            if left.is_zero() {
-                return false;
+            match holds(&state) {
+                false if !left.is_zero() => {}
+                is_so => return (state, is_so),
             }
             state = self.0.changed.wait_timeout(state, left).unwrap_or_else(PoisonError::into_inner).0;
         }
-        true
     }
 
     /// A model has no time: other threads get one turn.
     #[cfg(loom)]
-    pub(super) fn wait_until(&self, _: Duration, holds: impl Fn(&State) -> bool) -> bool {
+    pub(super) fn locked_once(&self, _: Duration, holds: &dyn Fn(&State) -> bool) -> (StateGuard<'_>, bool) {
         loom::thread::yield_now();
-        holds(&self.lock())
+        let state = self.lock();
+        let holds = holds(&state);
+        (state, holds)
     }
 
     /// Adds a sensor, a service or an actuator to its supervisor.
@@ -247,5 +256,44 @@ impl WeakControl {
 impl fmt::Debug for Control {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Control").field("robot", &self.0.origin.robot).finish_non_exhaustive()
+    }
+}
+
+/// The topics that every robot has.
+#[derive(Debug)]
+pub struct SystemTopics {
+    pub(crate) state: Topic<StateTransition>,
+    pub(crate) safety: Topic<SafetyTransition>,
+    pub(crate) safety_error: Topic<SafetyError>,
+    pub(crate) health: Topic<HealthTransition>,
+    pub(crate) fault: Topic<ComponentFault>,
+    pub(crate) journal: Topic<JournalLine>,
+    pub(crate) commands: Box<[Topic<CommandEvent>]>,
+    pub(crate) parameters: Box<[Topic<ParameterChange>]>,
+    /// Topics created at run time.
+    pub(crate) registry: Registry,
+}
+
+impl SystemTopics {
+    pub(crate) fn new(declared: Declared) -> Self {
+        Self {
+            state: Topic::new("state_machine"),
+            safety: Topic::new("safety"),
+            safety_error: Topic::new("safety/error"),
+            health: Topic::new("health"),
+            fault: Topic::new("fault"),
+            journal: Topic::new("journal"),
+            commands: declared.commands.iter().map(|command| Topic::new(command.path)).collect(),
+            parameters: declared.parameters.iter().map(|parameter| Topic::new(parameter.path)).collect(),
+            registry: Registry::default(),
+        }
+    }
+
+    pub(crate) fn all(&self) -> Vec<&dyn AnyTopic> {
+        let fixed: [&dyn AnyTopic; 6] =
+            [&self.state, &self.safety, &self.safety_error, &self.health, &self.fault, &self.journal];
+        let commands = self.commands.iter().map(|topic| topic as &dyn AnyTopic);
+        let parameters = self.parameters.iter().map(|topic| topic as &dyn AnyTopic);
+        fixed.into_iter().chain(commands).chain(parameters).collect()
     }
 }

@@ -57,10 +57,6 @@ enum Code {
 /// Polls at one instant of virtual time before a command is taken to be stuck.
 const STUCK_AFTER: u32 = 1_000_000;
 
-/// Commands that may begin at one instant of virtual time: one that starts itself, or two that start each other,
-/// would keep time from advancing.
-pub(super) const MOST_AT_ONCE: u32 = 100_000;
-
 impl Task {
     pub(super) fn new(id: u64, lane: Lane, control: WeakControl, starter: Starter) -> Self {
         let state = State {
@@ -125,11 +121,6 @@ impl Task {
             state.entered = Some(control.clock().now());
         }
         drop(state);
-        if matches!(code, Code::New(_)) && !is_cancelled && control.begins_too_often() {
-            discard(code);
-            self.lock().code = Code::Done;
-            return control.ended(self.id, Err(too_often(control.clock().now())));
-        }
         let ended = match code {
             // A late wake: another thread is polling it, or it has ended.
             Code::Polled | Code::Done => {
@@ -146,7 +137,7 @@ impl Task {
                     Code::Polled | Code::Done => {}
                 }
                 self.lock().code = Code::Done;
-                return control.gone(self.id);
+                return control.future_dropped(self.id);
             }
             Code::New(starter) => match caught(starter) {
                 Ok(future) => self.poll(future),
@@ -157,7 +148,7 @@ impl Task {
         match ended {
             Some(ended) => {
                 self.lock().code = Code::Done;
-                control.ended(self.id, ended);
+                control.code_returned(self.id, ended);
             }
             None => {
                 let mut state = self.lock();
@@ -168,7 +159,7 @@ impl Task {
                     if let Code::Future(future) = code {
                         discard(future);
                     }
-                    return control.ended(self.id, Err(fault));
+                    return control.code_returned(self.id, Err(fault));
                 }
                 if is_due {
                     self.schedule();
@@ -216,19 +207,12 @@ impl Task {
 
     /// The lane of the pool that runs it, or drops its future.
     pub(super) fn lane(&self) -> Lane {
-        if self.lock().is_cancelled { Lane::Dropping } else { self.lane }
+        if self.lock().is_cancelled { Lane::User } else { self.lane }
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
-}
-
-fn too_often(now: MonotonicTime) -> Fault {
-    Fault::new(format!(
-        "{MOST_AT_ONCE} commands were started at {now}, and virtual time cannot go on: await `CommandContext::sleep` before \
-         one starts another"
-    ))
 }
 
 impl Wake for Task {

@@ -56,13 +56,6 @@ impl Wakers {
         drop(self);
     }
 
-    /// The wakers one by one, for callers that wake each separately; the messages are dropped here.
-    pub(crate) fn into_wakers(mut self) -> impl Iterator<Item = Waker> {
-        self.evicted.drain(..).for_each(discard);
-        let (first, more) = (std::mem::take(&mut self.first), std::mem::take(&mut self.more));
-        first.into_iter().flatten().chain(more)
-    }
-
     fn run_all(&mut self) {
         self.first.iter_mut().filter_map(Option::take).chain(self.more.drain(..)).for_each(wake);
         self.evicted.drain(..).for_each(discard);

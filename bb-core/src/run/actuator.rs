@@ -115,7 +115,6 @@ impl<A: Actuator> ActuatorNode<A> {
             host: assembly.host.clone(),
             state: Guarded::new(
                 robot,
-                declaration.path,
                 State {
                     slot,
                     is_unsafe: false,

@@ -1,14 +1,12 @@
 //! A robot before it starts.
 
 use super::bound::refused_by_bound;
-use super::closing::Closing;
 use super::describe::describe;
 use super::handle::{Configurable, ParameterHandle, Publisher};
 use super::host::{RobotHost, WiredIslands};
 use super::joints::known_joints;
 use super::keeper::{Keeper, Kept};
 use super::machine::Machine;
-use super::remains::Remains;
 use super::running::STOP_WITHIN;
 use super::source::Assembly;
 use super::{Replay, Robot, Running, Simulation, Source, StartError, Supervision};
@@ -25,7 +23,7 @@ use crate::lifecycle::HostHandle;
 use crate::message::{Origin, Stamp};
 use crate::node::{Environment, EnvironmentParts, Mode, SharedNode, contained};
 use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Payloads, Registry, Select, Subscription};
-use crate::schedule::Agenda;
+use crate::schedule::{Agenda, Lane};
 use crate::telemetry::{Telemetry, TelemetryEvent};
 use crate::time::{Clock, MonotonicTime};
 use std::collections::HashMap;
@@ -203,15 +201,6 @@ impl<R: Robot> Builder<R> {
 
     /// Dropping the result stops in order what has started.
     fn assemble(mut self, clock: Clock, mode: Mode) -> Result<Assembled<R>, StartError> {
-        let assembled = self.assembled(clock, mode);
-        // The declared options, whether the robot starts or not, and all else that it has not taken over.
-        drop(Remains::of(mode, Mutex::new(self)));
-        assembled
-    }
-
-    fn assembled(&mut self, clock: Clock, mode: Mode) -> Result<Assembled<R>, StartError> {
-        // If the robot does not start: dropped after everything declared below.
-        let mut _remains = None;
         let origin = Origin { robot: R::NAME, node: self.node };
         let journal = if mode == Mode::Replay { None } else { self.journal.take() };
         let wall_offset_nanos = clock.wall_offset_nanos();
@@ -233,7 +222,6 @@ impl<R: Robot> Builder<R> {
             telemetry: telemetry.clone(),
         });
         if let Err((path, message)) = control.check_commands() {
-            _remains = Remains::of(mode, (control.clone(), telemetry));
             return Err(StartError::component(path, Fault::new(message)));
         }
         let start = clock.now();
@@ -241,7 +229,6 @@ impl<R: Robot> Builder<R> {
         let joints: Joints = match joints {
             Ok(joints) => joints,
             Err(error) => {
-                _remains = Remains::of(mode, (control.clone(), telemetry));
                 return Err(StartError::component(R::NAME, Fault::from(error)));
             }
         };
@@ -295,13 +282,10 @@ impl<R: Robot> Builder<R> {
         let abandon = |path, fault| {
             control.begin_stop();
             control.wait_until_disarmed();
-            let mut dropping = Closing::default();
-            for (path, hook) in control.take_all_hooks() {
-                dropping.discard(&control, path, hook);
-            }
+            control.drop_hooks();
             control.pool().close();
-            // Callbacks that hang are left running. There is no report; the error says why the robot does not start.
-            dropping.wait(Instant::now() + STOP_WITHIN);
+            // What hangs is left running. There is no report; the error says why the robot does not start.
+            let _ = control.pool().left(Lane::User, Instant::now() + STOP_WITHIN);
             StartError::component(path, fault)
         };
         let topics = std::mem::replace(&mut self.topics, R::topics());
@@ -319,8 +303,6 @@ impl<R: Robot> Builder<R> {
         });
         if let Some(refusal) = environment.take_refusal() {
             let error = abandon(refusal.path, refusal.fault);
-            let wired = wired.map(|(wiring, sources)| (wiring, Mutex::new(sources))).ok();
-            _remains = Remains::of(mode, (wired, environment, control.clone(), host));
             return Err(error);
         }
         // Each component's code is guarded separately, with its path. This is for anything else.
@@ -328,7 +310,6 @@ impl<R: Robot> Builder<R> {
             Ok(wired) => wired,
             Err(failed) => {
                 let error = abandon(R::NAME, failed.fault);
-                _remains = Remains::of(mode, (environment, control.clone(), host));
                 return Err(error);
             }
         };
@@ -340,8 +321,6 @@ impl<R: Robot> Builder<R> {
                 && let Err(error) = journal.start()
             {
                 let error = abandon("journal", Fault::from(error));
-                let wired = (wiring, Mutex::new(sources));
-                _remains = Remains::of(mode, (wired, environment, control.clone(), host));
                 return Err(error);
             }
         }
@@ -355,8 +334,6 @@ impl<R: Robot> Builder<R> {
             Some(Ok(keeper)) => Some(keeper),
             Some(Err(fault)) => {
                 let error = abandon(super::keeper::PATH, fault);
-                let wired = (wiring, Mutex::new(sources));
-                _remains = Remains::of(mode, (wired, environment, control.clone(), host));
                 return Err(error);
             }
         };
@@ -369,7 +346,6 @@ impl<R: Robot> Builder<R> {
             has_ended: AtomicBool::new(false),
             last_report: OnceLock::new(),
             keeper: Mutex::new(keeper),
-            remains: None,
         };
         Ok((machine, sources))
     }

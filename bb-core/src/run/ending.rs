@@ -2,7 +2,6 @@
 //! components are closed. Every wait for user code here has a time limit.
 
 use super::Robot;
-use super::closing::Closing;
 use super::machine::Machine;
 use super::threads::since;
 use crate::fault::wake;
@@ -11,6 +10,7 @@ use crate::node::Replayed;
 use crate::pubsub::AnyTopic as _;
 use crate::schedule::Lane;
 use std::sync::atomic::Ordering;
+use std::sync::mpsc::channel;
 use std::sync::{Arc, PoisonError};
 use std::task::Waker;
 use std::time::{Duration, Instant};
@@ -54,19 +54,25 @@ impl<R: Robot> Machine<R> {
     /// running and reported.
     pub(super) fn terminate_actuators(self: &Arc<Self>, deadline: Instant) {
         let deadline = deadline.max(Instant::now() + LEAST_TO_STOP);
-        let mut closing = Closing::default();
-        for (number, actuator) in R::all_actuators(&self.wiring).into_iter().enumerate() {
-            let machine = Arc::clone(self);
-            closing.run(&self.control, actuator.path(), move || {
+        let (closed, closing) = channel();
+        let mut left: Vec<usize> = (0..R::ACTUATORS.len()).collect();
+        for number in 0..R::ACTUATORS.len() {
+            let (machine, closed) = (Arc::clone(self), closed.clone());
+            self.control.run_on_pool(Lane::Robot, move || {
                 let left = deadline.saturating_duration_since(Instant::now());
-                R::actuator(&machine.wiring, number).is_none_or(|actuator| actuator.terminate(left))
+                if R::actuator(&machine.wiring, number).is_none_or(|actuator| actuator.terminate(left)) {
+                    // Nobody listens any more after the deadline.
+                    let _ = closed.send(number);
+                }
             });
         }
-        let left = closing.wait(deadline);
-        let now = self.environment.clock().now();
-        for actuator in
-            R::all_actuators(&self.wiring).into_iter().filter(|actuator| left.contains(&actuator.path()))
+        while !left.is_empty()
+            && let Ok(number) = closing.recv_timeout(deadline.saturating_duration_since(Instant::now()))
         {
+            left.retain(|other| *other != number);
+        }
+        let now = self.environment.clock().now();
+        for actuator in left.into_iter().filter_map(|number| R::actuator(&self.wiring, number)) {
             let message = match actuator.entered_at() {
                 None => "did not come back from its command, or from disarming, in time".to_owned(),
                 entered => format!("did not return when the robot stopped{}", since(entered, now)),
@@ -112,23 +118,14 @@ impl<R: Robot> Machine<R> {
             }
         }
         let deadline = deadline.max(Instant::now() + LEAST_TO_CLOSE);
-        let mut dropping = Closing::default();
-        for (path, hook) in self.control.take_all_hooks() {
-            dropping.discard(&self.control, path, hook);
-        }
+        self.control.drop_hooks();
         let mut report = self.report_of(summary);
         if let Some(message) = self.environment.journal().and_then(|journal| hand_over(journal, deadline)) {
             report.add_fault(self.fault("journal", message));
         }
-        for path in dropping.wait(deadline) {
-            let message = "what its disarm callback owns was not dropped in time".to_owned();
-            report.add_fault(self.fault(path, message));
-        }
         let deadline = Instant::now() + LEAST_TO_CLOSE;
-        for lane in [Lane::Dropping, Lane::Wakers] {
-            if let Some(message) = self.control.pool().left(lane, deadline) {
-                report.add_fault(self.fault("pool", message));
-            }
+        if let Some(message) = self.control.pool().left(Lane::User, deadline) {
+            report.add_fault(self.fault("pool", message));
         }
         // It is set once.
         let _ = self.last_report.set(report);
@@ -139,14 +136,9 @@ impl<R: Robot> Machine<R> {
         self.control.pool().close();
     }
 
-    /// Each waker may block forever, so each is a separate job.
     fn wake_all(&self, wakers: Vec<Waker>) {
-        for waker in wakers {
-            if self.control.is_virtual() {
-                wake(waker);
-            } else {
-                self.control.pool().submit(Lane::Wakers, move || wake(waker));
-            }
+        if !wakers.is_empty() {
+            self.control.run_on_pool(Lane::User, move || wakers.into_iter().for_each(wake));
         }
     }
 }

@@ -2,7 +2,6 @@
 
 use super::handle::{ActuatorHandle, CommandHandle, ParameterHandle, Publisher};
 use super::keeper::Keeper;
-use super::remains::Remains;
 use super::source::SharedSource;
 use super::visit::Visitable;
 use super::{ActuatorError, Report, Robot, SensorHandle};
@@ -33,8 +32,6 @@ pub(super) struct Machine<R: Robot> {
     pub(super) last_report: OnceLock<Report>,
     /// Taken at the end.
     pub(super) keeper: Mutex<Option<Keeper>>,
-    /// Set in `drop`. The last field, since it is dropped last.
-    pub(super) remains: Option<Remains>,
 }
 
 /// How many one-way requests may wait for an estimator; further ones are refused.
@@ -251,12 +248,5 @@ impl<R: Robot> Machine<R> {
     pub(super) fn fault(&self, path: &'static str, message: String) -> ReportedFault {
         let now = self.control.note_fault_now(path, message.clone());
         ReportedFault { path, message, count: 1, first_time: now, last_time: now }
-    }
-}
-
-impl<R: Robot> Drop for Machine<R> {
-    fn drop(&mut self) {
-        let shared = (Arc::clone(&self.wiring), self.environment.clone(), self.control.clone());
-        self.remains = Remains::of(self.environment.mode(), (shared, Arc::clone(&self.host)));
     }
 }

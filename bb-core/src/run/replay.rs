@@ -297,7 +297,7 @@ impl<R: Robot> Replay<R> {
             Event::Ended { execution, end } => control.replay_end(execution, end),
             Event::Cancel { execution } => control.cancel(execution),
             Event::Timeout { execution } => control.timed_out(execution),
-            Event::Gone { execution } => control.gone(execution),
+            Event::Gone { execution } => control.future_dropped(execution),
             Event::Arm => control.replay_arm(),
             Event::Disarm { force } => {
                 control.replay_disarm(force);

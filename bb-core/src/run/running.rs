@@ -74,11 +74,8 @@ impl<R: Robot> Running<R> {
         machine.control.begin_stop();
         machine.control.wait_until_disarmed();
         let mut deadline = (start + STOP_WITHIN).max(Instant::now() + GRACE);
-        if machine.islands().any(|island| island.is_inside(&machine.wiring))
-            || machine.control.is_waiting_for_caller()
-        {
-            // An estimator's message has woken the caller, or an actuator or a disarm callback has called: they cannot stop before
-            // this call returns.
+        if machine.islands().any(|island| island.is_inside(&machine.wiring)) {
+            // An estimator's message has woken the caller: the estimator cannot stop before this call returns.
             deadline = Instant::now() + GRACE;
         }
         for (path, thread) in std::mem::take(&mut self.sources) {

@@ -22,44 +22,36 @@ pub(crate) type Job = Box<dyn FnOnce() + Send>;
 /// The purpose of a job. Lanes are served in this order, except for jobs that have waited for long.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Lane {
-    /// Commands that disarm the robot: no other code takes their threads.
-    Disarming,
-    /// Commands that a change of health has started.
-    Health,
+    /// Commands that disarm the robot, or that a change of health has started: no other code takes their threads.
+    Safety,
     /// Turns of islands, orders to actuators, lines for loggers: as many may block as the robot has components.
     Robot,
     /// All other commands.
     Commands,
-    /// Values that are dropped, among them the futures of cancelled commands.
-    Dropping,
-    /// Wakers.
-    Wakers,
+    /// Wakers, and values that are dropped, among them the futures of cancelled commands.
+    User,
 }
 
 impl Lane {
-    const ALL: [Self; 6] =
-        [Self::Disarming, Self::Health, Self::Robot, Self::Commands, Self::Dropping, Self::Wakers];
+    const ALL: [Self; 4] = [Self::Safety, Self::Robot, Self::Commands, Self::User];
 
     /// How many of its jobs may run at once; others wait until one returns.
     const fn most(self) -> usize {
         match self {
             // The model checker has room for few threads.
             Self::Commands if cfg!(loom) => 1,
-            Self::Disarming | Self::Health => 64,
             Self::Robot => usize::MAX,
-            Self::Commands | Self::Dropping | Self::Wakers => 512,
+            Self::Safety | Self::Commands | Self::User => 512,
         }
     }
 
     /// Its jobs, for a report.
     const fn jobs(self) -> &'static str {
         match self {
-            Self::Disarming => "commands that disarm",
-            Self::Health => "commands that health has started",
+            Self::Safety => "commands that disarm or that health has started",
             Self::Robot => "turns",
             Self::Commands => "commands",
-            Self::Dropping => "values that were dropped",
-            Self::Wakers => "wakers",
+            Self::User => "wakers and values that were dropped",
         }
     }
 }
@@ -295,10 +287,10 @@ mod tests {
     #[test]
     fn a_full_lane_is_reported_once_and_keeps_no_other_from_running() {
         let pool = Pool::new(|| {});
-        let release = block(&pool, Lane::Health, Lane::Health.most() + 3);
-        relieve_until(&pool, || pool.0.lock().is_full(Lane::Health));
+        let release = block(&pool, Lane::Commands, Lane::Commands.most() + 3);
+        relieve_until(&pool, || pool.0.lock().is_full(Lane::Commands));
         let (done, finished) = mpsc::channel();
-        for lane in [Lane::Disarming, Lane::Robot, Lane::Commands, Lane::Wakers] {
+        for lane in [Lane::Safety, Lane::Robot, Lane::User] {
             let done = done.clone();
             pool.submit(lane, move || done.send(lane).expect("the test waits"));
             relieve_until(&pool, || finished.try_recv() == Ok(lane));
@@ -309,7 +301,7 @@ mod tests {
             report = pool.report();
         }
         let report = report.expect("it is full");
-        assert!(report.starts_with("64 commands that health has started"), "{report}");
+        assert!(report.starts_with("512 commands have not returned"), "{report}");
         assert_eq!((pool.report(), pool.relieve()), (None, None), "nothing that a thread would help");
         drop(release);
         pool.close();
@@ -358,9 +350,9 @@ mod tests {
         let pool = Pool::new(|| {});
         let before = block(&pool, Lane::Commands, 10);
         pool.close();
-        let after = block(&pool, Lane::Wakers, 10);
+        let after = block(&pool, Lane::User, 10);
         let (done, finished) = mpsc::channel();
-        pool.submit(Lane::Wakers, move || done.send(()).expect("the test waits"));
+        pool.submit(Lane::User, move || done.send(()).expect("the test waits"));
         assert_eq!(finished.recv_timeout(LONG), Ok(()));
         drop((before, after));
     }

@@ -21,7 +21,7 @@ pub(super) enum Told {
 impl<A: Actuator> Inner<A> {
     pub(super) fn log(&self, state: &mut State<A>, write: impl FnOnce() + Send + 'static) {
         match self.environment.mode() {
-            Mode::Real => self.environment.pool().submit(Lane::Wakers, write),
+            Mode::Real => self.environment.pool().submit(Lane::User, write),
             Mode::Virtual | Mode::Replay => state.told.push(Told::Log(Box::new(write))),
         }
     }

@@ -137,10 +137,10 @@ impl Crew {
     }
 
     /// The lane whose first job is taken next: the first lane, unless a job of a later one has waited for too long.
-    /// Nothing overtakes the jobs that disarm the robot.
+    /// Nothing overtakes the jobs that make the robot safe.
     fn first(&self, now: Instant) -> Option<Lane> {
-        if self.front(Lane::Disarming).is_some() {
-            return Some(Lane::Disarming);
+        if self.front(Lane::Safety).is_some() {
+            return Some(Lane::Safety);
         }
         let waiting = || Lane::ALL.into_iter().filter_map(|lane| Some((self.front(lane)?, lane)));
         let oldest = waiting().min_by_key(|(since, _)| *since);
@@ -293,7 +293,7 @@ mod tests {
     fn a_flood_of_one_lane_does_not_keep_later_ones_from_being_served() {
         let start = Instant::now();
         let mut crew = Crew::default();
-        crew.add(Lane::Wakers, Box::new(|| {}), start);
+        crew.add(Lane::User, Box::new(|| {}), start);
         let mut taken = Vec::new();
         for millis in 0..100 {
             let now = start + Duration::from_millis(millis);
@@ -304,11 +304,11 @@ mod tests {
                 Next::Idle | Next::End => panic!("jobs wait"),
             }
         }
-        assert_eq!(taken, [(50, Lane::Wakers)]);
-        // Even an overdue job does not overtake the jobs that disarm the robot.
+        assert_eq!(taken, [(50, Lane::User)]);
+        // Even an overdue job does not overtake those that make the robot safe.
         let now = start + Duration::from_secs(1);
-        crew.add(Lane::Disarming, Box::new(|| {}), now);
-        assert!(matches!(crew.next(now), Next::Job(Lane::Disarming, _)));
+        crew.add(Lane::Safety, Box::new(|| {}), now);
+        assert!(matches!(crew.next(now), Next::Job(Lane::Safety, _)));
     }
 
     #[test]

@@ -106,7 +106,7 @@ fn check(preemptions: usize, failing: usize, run: fn(&Model)) {
 fn two_jobs_while_the_first_thread_starts() {
     check(3, 0, |model| {
         let other = model.clone();
-        let submits = thread::spawn(move || other.quick(Lane::Wakers));
+        let submits = thread::spawn(move || other.quick(Lane::User));
         model.quick(Lane::Robot);
         model.keep_time_until(2);
         submits.join().expect("it does not panic");
@@ -121,7 +121,7 @@ fn a_job_while_the_last_thread_without_work_goes_away() {
         // Another thread takes it, and ends after it has waited for long enough.
         model.quick(Lane::Robot);
         model.keep_time_until(1);
-        model.quick(Lane::Wakers);
+        model.quick(Lane::User);
         model.keep_time_until(2);
         model.end();
     });
@@ -135,7 +135,7 @@ fn a_job_from_another_thread_while_one_that_hangs_is_relieved() {
         model.quick(Lane::Robot);
         model.keep_time_until(1);
         submits.join().expect("it does not panic");
-        model.quick(Lane::Wakers);
+        model.quick(Lane::User);
         model.keep_time_until(2);
         model.end();
     });
@@ -146,7 +146,7 @@ fn jobs_while_no_thread_can_be_started() {
     check(2, 2, |model| {
         let other = model.clone();
         let submits = thread::spawn(move || other.quick(Lane::Robot));
-        model.quick(Lane::Wakers);
+        model.quick(Lane::User);
         model.keep_time_until(2);
         submits.join().expect("it does not panic");
         model.end();
@@ -171,7 +171,7 @@ fn jobs_around_the_end_while_a_thread_hangs() {
     check(2, 0, |model| {
         model.hanging(Lane::Robot);
         let other = model.clone();
-        let submits = thread::spawn(move || other.quick(Lane::Wakers));
+        let submits = thread::spawn(move || other.quick(Lane::User));
         model.pool.close();
         submits.join().expect("it does not panic");
         let mut told = model.told.0.lock().expect("nobody panicked");

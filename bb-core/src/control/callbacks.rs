@@ -1,0 +1,365 @@
+//! Disarm callbacks, which make hardware safe: how each runs, and who owns it.
+//!
+//! - A callback is user code. It runs on its own thread, and never on two at once: if it is asked for while it runs, that thread runs
+//!   it once more. On virtual time it runs on the caller's thread.
+//! - A disarming runs all of them: see [`arming`](super::arming). Some also run [`Apart`] from one: see
+//!   [`registering`](super::registering).
+//! - Code that a disarming waits for does not wait for that disarming: [`is_awaited`] tells the thread that runs it.
+
+use super::{Control, Key, State};
+use crate::component::DisarmHook;
+use crate::event::SafetyError;
+use crate::fault::caught;
+use std::cell::RefCell;
+use std::fmt;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// One disarm callback.
+pub(super) struct Callback {
+    /// Its number among all of the robot.
+    pub(super) number: u64,
+    /// The path of the component that registered it.
+    pub(super) path: &'static str,
+    code: DisarmHook,
+    runs: Mutex<Runs>,
+}
+
+#[derive(Default)]
+struct Runs {
+    is_running: bool,
+    /// Reasons to run once more, collected while it runs.
+    waiting: Vec<Reason>,
+}
+
+/// Why a callback runs, and who waits for it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Reason {
+    /// The disarming with that number.
+    Disarming(u64),
+    /// Outside of a disarming.
+    Apart(Key),
+}
+
+impl Callback {
+    fn new(number: u64, path: &'static str, code: DisarmHook) -> Self {
+        Self { number, path, code, runs: Mutex::default() }
+    }
+
+    /// Runs it on its own thread; returns false if no thread can be started.
+    pub(super) fn start(self: &Arc<Self>, control: &Control, reason: Reason) -> bool {
+        if !self.begin(reason) {
+            return true;
+        }
+        let (callback, robot) = (Arc::clone(self), control.clone());
+        let is_started = spawn(format!("disarm {}", self.path), move || callback.work(&robot, reason)).is_ok();
+        if !is_started {
+            self.runs().is_running = false;
+        }
+        is_started
+    }
+
+    /// Runs it on the calling thread.
+    pub(super) fn run(&self, control: &Control, reason: Reason) {
+        if self.begin(reason) {
+            self.work(control, reason);
+        }
+    }
+
+    /// Returns true if the caller is to run it. If it runs already, that thread runs it once more.
+    fn begin(&self, reason: Reason) -> bool {
+        let mut runs = self.runs();
+        let is_running = std::mem::replace(&mut runs.is_running, true);
+        if is_running {
+            runs.waiting.push(reason);
+        }
+        !is_running
+    }
+
+    fn work(&self, control: &Control, reason: Reason) {
+        let mut reasons = vec![reason];
+        while !reasons.is_empty() {
+            let failed = {
+                let _inside = Inside::callback(control.id());
+                caught(|| (self.code)()).err()
+            };
+            let error = failed.map(|failed| SafetyError {
+                path: self.path,
+                message: format!("disarming failed: {}", failed.fault),
+            });
+            let next = self.wanted(control);
+            for reason in std::mem::replace(&mut reasons, next) {
+                match reason {
+                    Reason::Disarming(generation) => {
+                        control.hook_returned(generation, Some(self.number), error.clone())
+                    }
+                    Reason::Apart(key) => control.apart_returned(key, self.number, error.clone()),
+                }
+            }
+        }
+    }
+
+    /// The reasons to run once more that somebody still waits for; if there are none, it is no longer running.
+    fn wanted(&self, control: &Control) -> Vec<Reason> {
+        loop {
+            let mut runs = self.runs();
+            let mut waiting = std::mem::take(&mut runs.waiting);
+            if waiting.is_empty() {
+                runs.is_running = false;
+                return waiting;
+            }
+            drop(runs);
+            let state = control.lock();
+            waiting.retain(|reason| state.is_wanted(*reason, self.number));
+            if !waiting.is_empty() {
+                return waiting;
+            }
+        }
+    }
+
+    fn runs(&self) -> MutexGuard<'_, Runs> {
+        self.runs.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(not(loom))]
+fn spawn(name: String, run: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
+    std::thread::Builder::new().name(name).spawn(run).map(drop)
+}
+
+#[cfg(loom)]
+fn spawn(_: String, run: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
+    loom::thread::spawn(run);
+    Ok(())
+}
+
+impl fmt::Debug for Callback {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Callback").field("number", &self.number).field("path", &self.path).finish_non_exhaustive()
+    }
+}
+
+/// The callbacks of all components, in the order in which they were registered.
+#[derive(Default)]
+pub(super) struct Hooks {
+    all: Vec<Hook>,
+    pub(super) next: u64,
+}
+
+struct Hook {
+    callback: Arc<Callback>,
+    owner: Owner,
+}
+
+/// The lifetime of a callback.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Owner {
+    /// Never forgotten: it is the actuator's own.
+    Actuator,
+    /// Forgotten when the component is created again.
+    Component,
+    /// Forgotten when the component is created again, or when a change of its options registers callbacks.
+    Options,
+    /// Forgotten when the code of that command execution has returned.
+    Execution(u64),
+    /// The `init` that registered it has failed. It is forgotten once it has made safe what that `init` had started.
+    FailedInit,
+}
+
+/// Callbacks that are to be dropped without the lock of the control state.
+pub(super) type Forgotten = Vec<Arc<Callback>>;
+
+impl Hooks {
+    /// Creates one that is not kept.
+    pub(super) fn make(&mut self, path: &'static str, code: DisarmHook) -> Arc<Callback> {
+        let number = self.next;
+        self.next += 1;
+        Arc::new(Callback::new(number, path, code))
+    }
+
+    pub(super) fn add(&mut self, path: &'static str, code: DisarmHook, owner: Owner) -> Arc<Callback> {
+        let callback = self.make(path, code);
+        self.all.push(Hook { callback: Arc::clone(&callback), owner });
+        callback
+    }
+
+    pub(super) fn all(&self) -> Vec<Arc<Callback>> {
+        self.all.iter().map(|hook| Arc::clone(&hook.callback)).collect()
+    }
+
+    /// The component at `path` was created, or has taken new options: callbacks from `first` on are new. Returns its current ones. A
+    /// change of options that registers none keeps those of the previous change, and any keeps those of its creation: with one
+    /// too many, the failure is loud; with one too few, it shows only when hardware burns.
+    pub(super) fn succeeded(&mut self, path: &str, first: u64, is_made: bool) -> (Vec<Arc<Callback>>, Forgotten) {
+        let has_new = self.give_new_to(path, first, if is_made { Owner::Component } else { Owner::Options });
+        let old = self.take(|hook| {
+            let is_replaced = match hook.owner {
+                Owner::Options => is_made || has_new,
+                Owner::Component | Owner::FailedInit => is_made,
+                Owner::Actuator | Owner::Execution(_) => false,
+            };
+            is_replaced && hook.callback.path == path && hook.callback.number < first
+        });
+        let is_own = |hook: &&Hook| matches!(hook.owner, Owner::Actuator | Owner::Component | Owner::Options);
+        let own = self.all.iter().filter(|hook| hook.callback.path == path).filter(is_own);
+        (own.map(|hook| Arc::clone(&hook.callback)).collect(), old)
+    }
+
+    /// The component at `path` could not be created. Returns the callbacks it had registered from `first` on; they replace those of
+    /// earlier failures.
+    pub(super) fn failed(&mut self, path: &str, first: u64) -> (Vec<Arc<Callback>>, Forgotten) {
+        let has_new = self.give_new_to(path, first, Owner::FailedInit);
+        let of_failed = |hook: &Hook| hook.callback.path == path && hook.owner == Owner::FailedInit;
+        let old = self.take(|hook| has_new && of_failed(hook) && hook.callback.number < first);
+        let new = self.all.iter().filter(|hook| of_failed(hook) && hook.callback.number >= first);
+        (new.map(|hook| Arc::clone(&hook.callback)).collect(), old)
+    }
+
+    /// Sets the owner of those that the component has registered from `first` on. Returns whether there are any.
+    fn give_new_to(&mut self, path: &str, first: u64, owner: Owner) -> bool {
+        let is_new = |hook: &&mut Hook| {
+            let of_component = matches!(hook.owner, Owner::Component | Owner::Options);
+            of_component && hook.callback.path == path && hook.callback.number >= first
+        };
+        self.all.iter_mut().filter(is_new).map(|hook| hook.owner = owner).count() > 0
+    }
+
+    /// Whether callbacks of a failed `init` of the component at `path` have not returned.
+    pub(super) fn hang(&self, path: &str) -> bool {
+        let mut failed =
+            self.all.iter().filter(|hook| hook.callback.path == path && hook.owner == Owner::FailedInit);
+        failed.any(|hook| hook.callback.runs().is_running)
+    }
+
+    fn take(&mut self, fits: impl Fn(&Hook) -> bool) -> Forgotten {
+        self.all.extract_if(.., |hook| fits(hook)).map(|hook| hook.callback).collect()
+    }
+
+    pub(super) fn take_one(&mut self, number: u64) -> Forgotten {
+        self.take(|hook| hook.callback.number == number)
+    }
+
+    pub(super) fn take_of_execution(&mut self, execution: u64) -> Forgotten {
+        self.take(|hook| hook.owner == Owner::Execution(execution))
+    }
+
+    /// Removes those of a component that is given up.
+    pub(super) fn take_failed(&mut self, path: &str) -> Forgotten {
+        self.take(|hook| hook.callback.path == path && hook.owner == Owner::FailedInit)
+    }
+
+    pub(super) fn take_all(&mut self) -> Forgotten {
+        self.take(|_| true)
+    }
+}
+
+/// Callbacks of a component that run together outside of a disarming.
+pub(super) struct Apart {
+    pub(super) key: Key,
+    pub(super) path: &'static str,
+    /// Its `init` has failed: an unplugged device is not dangerous. Each callback that succeeds is forgotten; one that fails is a
+    /// fault, and stays for the next disarming. Otherwise hardware was started on a disarmed robot, and one that fails is a hardware
+    /// error.
+    pub(super) is_failed_init: bool,
+    /// The numbers of those that have not returned.
+    pub(super) left: Vec<u64>,
+}
+
+impl State {
+    /// Whether somebody waits for a callback to run for that reason.
+    fn is_wanted(&self, reason: Reason, number: u64) -> bool {
+        match reason {
+            Reason::Disarming(generation) => {
+                let disarming = self.disarming.as_ref().filter(|disarming| disarming.generation == generation);
+                disarming.is_some_and(|disarming| disarming.left.iter().any(|(other, _)| *other == number))
+            }
+            Reason::Apart(key) => self.apart.iter().any(|apart| apart.key == key && apart.left.contains(&number)),
+        }
+    }
+
+    /// The paths of components that are made safe outside of a disarming.
+    pub(super) fn being_made_safe(&self) -> impl Iterator<Item = &'static str> {
+        self.apart.iter().map(|apart| apart.path)
+    }
+}
+
+thread_local! {
+    /// The code of robots that the calling thread is inside of and that their disarmings wait for.
+    static INSIDE: RefCell<Vec<Place>> = const { RefCell::new(Vec::new()) };
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Place {
+    /// The address of the robot's state.
+    robot: usize,
+    /// That of the actuator whose code it is; of a disarm callback if there is none.
+    actuator: Option<usize>,
+}
+
+/// Whether the calling thread runs code of `robot` that its disarming waits for: a disarm callback, or an actuator's code, which the
+/// actuator's callback waits for.
+pub(crate) fn is_awaited(robot: usize) -> bool {
+    is_inside(|place| place.robot == robot)
+}
+
+/// Whether the calling thread runs a disarm callback of `robot`.
+pub(super) fn is_callback(robot: usize) -> bool {
+    is_inside(|place| place.robot == robot && place.actuator.is_none())
+}
+
+/// Whether the calling thread is inside the actuator.
+pub(crate) fn is_in_actuator(actuator: usize) -> bool {
+    is_inside(|place| place.actuator == Some(actuator))
+}
+
+fn is_inside(fits: impl Fn(&Place) -> bool) -> bool {
+    INSIDE.with_borrow(|inside| inside.iter().any(fits))
+}
+
+/// The calling thread is inside such code until this is dropped.
+#[derive(Debug)]
+pub(crate) struct Inside(Place);
+
+impl Inside {
+    fn callback(robot: usize) -> Self {
+        Self::new(Place { robot, actuator: None })
+    }
+
+    /// `robot` is [`Control::id`].
+    pub(crate) fn actuator(robot: usize, actuator: usize) -> Self {
+        Self::new(Place { robot, actuator: Some(actuator) })
+    }
+
+    fn new(place: Place) -> Self {
+        INSIDE.with_borrow_mut(|inside| inside.push(place));
+        Self(place)
+    }
+}
+
+impl Drop for Inside {
+    fn drop(&mut self) {
+        INSIDE.with_borrow_mut(|inside| {
+            if let Some(index) = inside.iter().rposition(|place| *place == self.0) {
+                inside.remove(index);
+            }
+        });
+    }
+}
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thread_knows_whose_code_it_is_inside_of() {
+        const ROBOT: usize = usize::MAX;
+        const ACTUATOR: usize = usize::MAX - 2;
+        assert!(!is_awaited(ROBOT));
+        let callback = Inside::callback(ROBOT);
+        assert!(is_awaited(ROBOT) && !is_in_actuator(ACTUATOR));
+        let actuator = Inside::actuator(ROBOT, ACTUATOR);
+        drop(callback);
+        assert!(is_awaited(ROBOT) && is_in_actuator(ACTUATOR) && !is_awaited(ACTUATOR));
+        drop(actuator);
+        assert!(!is_awaited(ROBOT) && !is_in_actuator(ACTUATOR));
+    }
+}
