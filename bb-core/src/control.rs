@@ -36,10 +36,8 @@ pub use faults::ReportedFault;
 pub(crate) use system::SystemTopics;
 
 use crate::component::{Host, Permit};
-use crate::declaration::{
-    CommandDeclaration, EstimatorDeclaration, ParameterDeclaration, ParameterValues, Supervisor,
-};
-use crate::event::{CategoryDeclaration, DisarmError, HealthState, HealthTransition, Safety, SafetyError};
+use crate::declaration::{ParameterValues, RobotDeclaration, Supervisor};
+use crate::event::{DisarmError, HealthState, HealthTransition, Safety, SafetyError};
 use crate::journal::{Journal, ParameterEntry};
 use crate::lifecycle::Supervision;
 use crate::message::Origin;
@@ -47,7 +45,6 @@ use crate::node::{BindTarget, Check, Mode, NodeEntry, Report, SharedNode};
 use crate::schedule::{Bell, Deadlines, Pool, Sleeper, StopSignal};
 use crate::telemetry::Telemetry;
 use crate::time::{Clock, MonotonicTime};
-use crate::topology::Topology;
 use budgets::Budgets;
 use callbacks::{Apart, Callback, Hooks};
 use effects::Reporter;
@@ -63,20 +60,9 @@ use std::sync::{Arc, Mutex, OnceLock, Weak};
 use std::sync::{Condvar, Mutex as StateMutex, MutexGuard, atomic::AtomicU8};
 use task::{EndedCode, Task, Value};
 
-/// The parts of the declaration used here.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Declared {
-    pub(crate) topology: &'static Topology,
-    pub(crate) states: &'static [&'static str],
-    pub(crate) categories: &'static [CategoryDeclaration],
-    pub(crate) commands: &'static [CommandDeclaration],
-    pub(crate) parameters: &'static [ParameterDeclaration],
-    pub(crate) estimators: &'static [EstimatorDeclaration],
-}
-
 /// The arguments of [`Control::new`].
 pub(crate) struct Parts {
-    pub(crate) declared: Declared,
+    pub(crate) declared: &'static RobotDeclaration,
     pub(crate) mode: Mode,
     pub(crate) topics: Arc<SystemTopics>,
     pub(crate) clock: Clock,
@@ -94,7 +80,7 @@ pub(crate) struct Parts {
 pub(crate) struct Control(Arc<Inner>);
 
 struct Inner {
-    declared: Declared,
+    declared: &'static RobotDeclaration,
     mode: Mode,
     topics: Arc<SystemTopics>,
     clock: Clock,

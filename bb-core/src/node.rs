@@ -27,7 +27,7 @@ pub use island::{
     Act, Alone, Inlet, Island, IslandOf, IslandState, IslandWiring, Key, Member, Solo, act, alone, emit, enter,
     enter_alone, island as island_of, publish_to, receive, start, start_alone,
 };
-pub(crate) use island::{AnyIsland, CallError, Replayed};
+pub(crate) use island::{AnyIsland, CallError, Replayed, Visit, islands_in};
 pub use latency::LatencyStatistics;
 pub(crate) use requests::{know_calls, know_casts};
 pub(crate) use running::Next;

@@ -6,6 +6,7 @@ mod bound;
 mod builder;
 mod describe;
 mod discovery;
+mod draft;
 mod ending;
 mod error;
 mod handle;
@@ -25,6 +26,7 @@ pub(crate) mod source;
 mod threads;
 mod timekeeper;
 mod visit;
+mod wired;
 
 pub use crate::component::{ActuatorError, ActuatorLink, Bus};
 pub use crate::control::{CommandError, CommandStatistics, Execution, ReportedFault};
@@ -48,7 +50,7 @@ pub use running::Running;
 pub use settings::{SettingProblem, SettingsError, SettingsList};
 pub use simulation::Simulation;
 pub use source::SourceStatistics;
-pub(crate) use source::{Assembly, Source, Sources};
+pub(crate) use source::{Assembly, Sources};
 pub use visit::Visitable;
 
 use crate::component::OptionsList;
@@ -61,8 +63,9 @@ use crate::node::IslandOf;
 use crate::pubsub::AnyTopic;
 use crate::topology::{GraphFormat, Topology};
 use builder::MadeByNew;
-use discovery::graphed;
 use settings::settings_schema;
+use std::sync::Arc;
+use wired::declaration;
 
 /// A declared robot. `robot!` implements it for the type that it defines; users call [`Robot::builder`].
 pub trait Robot: Sized + Send + Sync + 'static {
@@ -99,7 +102,7 @@ pub trait Robot: Sized + Send + Sync + 'static {
     type Topics: Send + Sync;
     /// The topics and the running estimators.
     #[doc(hidden)]
-    type Wiring: Send + Sync;
+    type Wiring: Send + Sync + 'static;
 
     /// The options as declared.
     #[doc(hidden)]
@@ -111,7 +114,7 @@ pub trait Robot: Sized + Send + Sync + 'static {
     fn wire(topics: Self::Topics, options: &OptionsList, assembly: &Assembly) -> Self::Wiring;
     /// Its sensors and services.
     #[doc(hidden)]
-    fn sources() -> Sources<Self>;
+    fn sources(wiring: &Arc<Self::Wiring>) -> Sources;
     #[doc(hidden)]
     fn wired_topics(wiring: &Self::Wiring) -> &Self::Topics;
     /// The topic of that publisher; `None` beyond the last.
@@ -124,16 +127,6 @@ pub trait Robot: Sized + Send + Sync + 'static {
     #[doc(hidden)]
     fn commands(options: &OptionsList) -> Vec<Prepared>;
 
-    #[doc(hidden)]
-    fn all_topics(topics: &Self::Topics) -> Vec<&dyn AnyTopic> {
-        (0..).map_while(|publisher| Self::topic(topics, publisher)).collect()
-    }
-
-    #[doc(hidden)]
-    fn all_actuators(wiring: &Self::Wiring) -> Vec<&dyn AnyActuator> {
-        (0..).map_while(|actuator| Self::actuator(wiring, actuator)).collect()
-    }
-
     /// Its links and joints as a URDF file.
     fn to_urdf() -> String {
         Self::TOPOLOGY.to_urdf(Self::NAME)
@@ -143,13 +136,13 @@ pub trait Robot: Sized + Send + Sync + 'static {
     /// the joints that they move; controllers and bridges; commands, and the estimators whose health starts them.
     /// [`Bus::graph`] marks the components that were replaced in a run.
     fn graph(format: GraphFormat) -> String {
-        graph(format, &graphed::<Self>(), &|_| false)
+        graph(format, declaration::<Self>(), &|_| false)
     }
 
     /// The JSON Schema (draft 2020-12) of its settings, see [`Builder::set`]: options and parameters in nested objects, as a
     /// TOML file of them is nested.
     fn settings_schema() -> String {
-        settings_schema::<Self>()
+        settings_schema(declaration::<Self>(), Self::options())
     }
 
     /// Makes rustc explain how a robot is assembled where `new` is called.

@@ -203,7 +203,7 @@ macro_rules! __stub_robot {
             }
             fn topics() {}
             fn wire(_: (), _: &$crate::__private::OptionsList, _: &$crate::__private::Assembly) {}
-            fn sources() -> $crate::__private::Sources<Self> {
+            fn sources(_: &$crate::__private::Arc<()>) -> $crate::__private::Sources {
                 ::core::default::Default::default()
             }
             fn wired_topics(_: &()) -> &() {

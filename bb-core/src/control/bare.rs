@@ -1,7 +1,7 @@
 //! A control state without a robot around it, for tests.
 
-use super::{Control, Declared, Parts, SystemTopics};
-use crate::declaration::{EstimatorDeclaration, ParameterValues};
+use super::{Control, Parts, SystemTopics};
+use crate::declaration::{EstimatorDeclaration, ParameterValues, RobotDeclaration};
 use crate::lifecycle::Supervision;
 use crate::message::Origin;
 use crate::node::{Mode, SharedNode};
@@ -17,8 +17,19 @@ pub(super) fn control(
     estimators: &'static [EstimatorDeclaration],
     nodes: impl IntoIterator<Item = SharedNode>,
 ) -> Control {
-    let declared =
-        Declared { topology: &NOTHING, states: &[], categories: &[], commands: &[], parameters: &[], estimators };
+    let declared: &'static RobotDeclaration = Box::leak(Box::new(RobotDeclaration {
+        name: "robot",
+        topology: &NOTHING,
+        sensors: &[],
+        estimators,
+        actuators: &[],
+        services: &[],
+        states: &[],
+        categories: &[],
+        commands: &[],
+        parameters: &[],
+        bound_options: &[],
+    }));
     Control::new(Parts {
         declared,
         mode,

@@ -6,11 +6,11 @@ use super::command::CommandStatistics;
 use super::effects::Reporter;
 use super::machine::Machine;
 use super::{
-    ComponentOrder, Control, Declared, Health, Inner, Islands, Parts, State, StateGuard, StateMutex, Summary,
-    Supervised, WeakControl,
+    ComponentOrder, Control, Health, Inner, Islands, Parts, State, StateGuard, StateMutex, Summary, Supervised,
+    WeakControl,
 };
 use crate::component::Host;
-use crate::declaration::{CommandDeclaration, Supervisor};
+use crate::declaration::{CommandDeclaration, RobotDeclaration, Supervisor};
 use crate::event::{
     CommandEvent, ComponentFault, HealthTransition, ParameterChange, Safety, SafetyError, SafetyTransition,
     StateTransition,
@@ -275,7 +275,7 @@ pub struct SystemTopics {
 }
 
 impl SystemTopics {
-    pub(crate) fn new(declared: Declared) -> Self {
+    pub(crate) fn new(declared: &RobotDeclaration) -> Self {
         Self {
             state: Topic::new("state_machine"),
             safety: Topic::new("safety"),

@@ -1,23 +1,13 @@
 //! A robot as a graph: links and joints, the dataflow from sensors through estimators, what moves the joints, and the
 //! commands.
 
-use super::{ActuatorDeclaration, CommandDeclaration, EstimatorDeclaration, SensorDeclaration};
+use super::{EstimatorDeclaration, RobotDeclaration};
 use crate::topology::{GraphFormat, Topology};
 use std::fmt::Write;
 
-/// What a graph shows.
-pub(crate) struct Graphed {
-    pub(crate) topology: &'static Topology,
-    pub(crate) sensors: &'static [SensorDeclaration],
-    pub(crate) estimators: &'static [EstimatorDeclaration],
-    pub(crate) actuators: &'static [ActuatorDeclaration],
-    pub(crate) services: &'static [SensorDeclaration],
-    pub(crate) commands: &'static [CommandDeclaration],
-}
-
 /// Writes the topology (links, with the joints between them), the dataflow (what each estimator takes), actuators with
 /// their joints, controllers and bridges, and commands with the estimators whose health starts them.
-pub(crate) fn graph(format: GraphFormat, robot: &Graphed, is_replaced: &dyn Fn(&str) -> bool) -> String {
+pub(crate) fn graph(format: GraphFormat, robot: &RobotDeclaration, is_replaced: &dyn Fn(&str) -> bool) -> String {
     let mut graph = Graph { format, text: String::new() };
     graph.line(match format {
         GraphFormat::Mermaid => "flowchart LR",

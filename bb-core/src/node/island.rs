@@ -26,9 +26,10 @@ mod processing;
 mod waiting;
 
 pub use self::act::Act;
+pub(crate) use self::act::Visit;
 pub use self::alone::{Alone, Inlet, Solo, enter_alone, publish_to, start_alone};
 pub use self::any::IslandOf;
-pub(crate) use self::any::{AnyIsland, Replayed};
+pub(crate) use self::any::{AnyIsland, IslandIn, Replayed, islands_in};
 use self::inbox::Inbox;
 use self::inside::{Inside, Within};
 pub use self::member::{Member, act, alone, emit, enter, island, receive, start};

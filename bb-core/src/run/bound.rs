@@ -1,18 +1,8 @@
 //! Options of components by number, and those that are bound to parameters.
 
-use super::Robot;
 use crate::component::{OptionField, OptionsList};
+use crate::declaration::RobotDeclaration;
 use crate::event::ParameterValue;
-
-/// The paths of a robot's components, in the order of their options.
-pub(super) fn component_paths<R: Robot>() -> Vec<&'static str> {
-    let sensors = R::SENSORS.iter().map(|declared| declared.path);
-    let estimators = R::ESTIMATORS.iter().map(|declared| declared.path);
-    let actuators = R::ACTUATORS.iter().map(|declared| declared.path);
-    let services = R::SERVICES.iter().map(|declared| declared.path);
-    let commands = R::COMMANDS.iter().map(|declared| declared.path);
-    sensors.chain(estimators).chain(actuators).chain(services).chain(commands).collect()
-}
 
 /// The options of a component.
 pub(super) fn fields(options: &mut OptionsList, component: usize) -> &'static [OptionField] {
@@ -20,27 +10,28 @@ pub(super) fn fields(options: &mut OptionsList, component: usize) -> &'static [O
 }
 
 /// The path of the parameter that an option is bound to.
-pub(super) fn bound_to<R: Robot>(component: usize, path: &str) -> Option<&'static str> {
+pub(super) fn bound_to(robot: &RobotDeclaration, component: usize, path: &str) -> Option<&'static str> {
     let is_bound = |bound: &&(usize, &str, usize)| bound.0 == component && bound.1 == last(path);
-    let (_, _, parameter) = R::BOUND_OPTIONS.iter().find(is_bound)?;
-    Some(R::PARAMETERS.get(*parameter)?.path)
+    let (_, _, parameter) = robot.bound_options.iter().find(is_bound)?;
+    Some(robot.parameters.get(*parameter)?.path)
 }
 
 /// Why an option bound to this parameter would refuse its new value. Options of a component that is replaced refuse nothing.
-pub(super) fn refused_by_bound<R: Robot>(
+pub(super) fn refused_by_bound(
+    robot: &RobotDeclaration,
     options: &mut OptionsList,
-    is_replaced: impl Fn(&str) -> bool,
+    is_replaced: &dyn Fn(&str) -> bool,
     parameters: &[ParameterValue],
     path: &str,
 ) -> Option<String> {
-    let paths = component_paths::<R>();
-    let number = R::PARAMETERS.iter().position(|declared| declared.path == path)?;
+    let paths = robot.component_paths();
+    let number = robot.parameters.iter().position(|declared| declared.path == path)?;
     let value = match parameters.get(number)? {
         ParameterValue::Float(value) => *value,
         ParameterValue::Integer(value) => *value as f64,
         ParameterValue::Bool(_) | ParameterValue::Text(_) => return None,
     };
-    R::BOUND_OPTIONS.iter().filter(|bound| bound.2 == number).find_map(|(component, name, _)| {
+    robot.bound_options.iter().filter(|bound| bound.2 == number).find_map(|(component, name, _)| {
         let path = paths.get(*component).filter(|path| !is_replaced(path))?;
         let fields = fields(options, *component).iter();
         let range = fields.filter(|field| field.name == *name).find_map(|field| field.range)?;

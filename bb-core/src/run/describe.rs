@@ -1,15 +1,14 @@
 //! A robot's description, one fact a line. A journal begins with it, and a journal of another robot is refused.
 
-use super::Robot;
 use crate::control::Control;
+use crate::declaration::RobotDeclaration;
 use crate::pubsub::AnyTopic;
 
 /// The declaration, and the values of parameters.
-pub(super) fn describe<R: Robot>(topics: &R::Topics, control: &Control) -> Vec<String> {
-    let mut facts = vec![format!("robot {}", R::NAME)];
-    let topics: Vec<&dyn AnyTopic> = R::all_topics(topics);
+pub(super) fn describe(robot: &RobotDeclaration, topics: &[&dyn AnyTopic], control: &Control) -> Vec<String> {
+    let mut facts = vec![format!("robot {}", robot.name)];
     facts.extend(topics.iter().map(|topic| format!("{} publishes {}", topic.path(), topic.payload_name())));
-    for declared in R::ESTIMATORS {
+    for declared in robot.estimators {
         let inputs: Vec<_> =
             declared.inputs.iter().map(|input| (input.source, input.driver, input.optional)).collect();
         let tolerances: Vec<_> =
@@ -19,13 +18,17 @@ pub(super) fn describe<R: Robot>(topics: &R::Topics, control: &Control) -> Vec<S
             declared.path, declared.island, declared.supervisor, declared.health
         ));
     }
-    facts.extend(R::ACTUATORS.iter().map(|declared| format!("{} moves {}", declared.path, declared.joint)));
-    facts.push(format!("states {:?}", R::STATES));
-    facts.extend(R::CATEGORIES.iter().map(|category| format!("{category:?}")));
-    facts.extend(R::COMMANDS.iter().map(|declared| format!("{declared:?}")));
+    facts.extend(robot.actuators.iter().map(|declared| format!("{} moves {}", declared.path, declared.joint)));
+    facts.push(format!("states {:?}", robot.states));
+    facts.extend(robot.categories.iter().map(|category| format!("{category:?}")));
+    facts.extend(robot.commands.iter().map(|declared| format!("{declared:?}")));
     let parameters = control.parameters();
     facts.extend(
-        R::PARAMETERS.iter().zip(parameters.all()).map(|(declared, value)| format!("{} = {value}", declared.path)),
+        robot
+            .parameters
+            .iter()
+            .zip(parameters.all())
+            .map(|(declared, value)| format!("{} = {value}", declared.path)),
     );
     facts
 }

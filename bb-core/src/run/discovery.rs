@@ -1,37 +1,25 @@
 //! A robot's description, from its declaration and its state.
 
-use super::Robot;
 use crate::component::{
     CommandInfo, ComponentDescription, ComponentKind, Description, InputDescription, JointDescription,
     LinkDescription, ParameterDescription, TopicDescription,
 };
 use crate::declaration::schema::parameter_schema;
-use crate::declaration::{Graphed, SensorDeclaration};
+use crate::declaration::{RobotDeclaration, SensorDeclaration};
 use crate::event::ParameterValue;
 use crate::pubsub::AnyTopic;
 use std::time::Duration;
 
-/// What a graph of the robot shows.
-pub(super) fn graphed<R: Robot>() -> Graphed {
-    Graphed {
-        topology: R::TOPOLOGY,
-        sensors: R::SENSORS,
-        estimators: R::ESTIMATORS,
-        actuators: R::ACTUATORS,
-        services: R::SERVICES,
-        commands: R::COMMANDS,
-    }
-}
-
 /// The description of a robot with these topics, values of its parameters and commands.
-pub(super) fn discover<R: Robot>(
+pub(super) fn discover(
+    robot: &RobotDeclaration,
     topics: &[&dyn AnyTopic],
     values: &[ParameterValue],
     commands: Vec<CommandInfo>,
     is_replaced: &dyn Fn(&str) -> bool,
 ) -> Description {
     let paths: Vec<_> = topics.iter().map(|topic| topic.path()).collect();
-    let sources = R::SENSORS.iter().chain(R::SERVICES);
+    let sources = robot.sensors.iter().chain(robot.services);
     let sources = sources.map(|declared| ComponentDescription {
         path: declared.path,
         kind: kind(declared.path),
@@ -41,7 +29,7 @@ pub(super) fn discover<R: Robot>(
         topics: published(&paths, declared.path, &[]),
         is_replaced: is_replaced(declared.path),
     });
-    let estimators = R::ESTIMATORS.iter().map(|declared| ComponentDescription {
+    let estimators = robot.estimators.iter().map(|declared| ComponentDescription {
         path: declared.path,
         kind: ComponentKind::Estimator,
         frame: declared.frame.name(),
@@ -59,7 +47,7 @@ pub(super) fn discover<R: Robot>(
         topics: published(&paths, declared.path, declared.outputs),
         is_replaced: is_replaced(declared.path),
     });
-    let actuators = R::ACTUATORS.iter().map(|declared| ComponentDescription {
+    let actuators = robot.actuators.iter().map(|declared| ComponentDescription {
         path: declared.path,
         kind: ComponentKind::Actuator,
         frame: declared.joint,
@@ -75,14 +63,14 @@ pub(super) fn discover<R: Robot>(
         period: components.iter().find(|component| component.path == topic.path()).and_then(|found| found.period),
     });
     Description {
-        robot: R::NAME,
-        links: links::<R>(),
-        joints: joints::<R>(),
+        robot: robot.name,
+        links: links(robot),
+        joints: joints(robot),
         topics: topics.collect(),
         components,
-        parameters: parameters::<R>(values),
+        parameters: parameters(robot, values),
         commands,
-        states: ["disarmed", "idle", "executing"].into_iter().chain(R::STATES.iter().copied()).collect(),
+        states: ["disarmed", "idle", "executing"].into_iter().chain(robot.states.iter().copied()).collect(),
     }
 }
 
@@ -105,36 +93,37 @@ fn published(paths: &[&'static str], own: &'static str, outputs: &[&'static str]
     paths.iter().copied().filter(|path| *path == own || outputs.contains(path) || is_motion(path)).collect()
 }
 
-fn links<R: Robot>() -> Vec<LinkDescription> {
+fn links(robot: &RobotDeclaration) -> Vec<LinkDescription> {
     let describe = |link: &'static crate::topology::Link| LinkDescription {
-        path: R::TOPOLOGY.link_path(link),
+        path: robot.topology.link_path(link),
         name: link.name,
-        parent_joint: link.parent_joint.and_then(|joint| R::TOPOLOGY.joints.get(joint)).map(|joint| joint.name),
+        parent_joint: link.parent_joint.and_then(|joint| robot.topology.joints.get(joint)).map(|joint| joint.name),
         mass: link.inertial.map(|inertial| inertial.mass),
     };
-    R::TOPOLOGY.links.iter().map(describe).collect()
+    robot.topology.links.iter().map(describe).collect()
 }
 
-fn joints<R: Robot>() -> Vec<JointDescription> {
-    let link = |number: usize| R::TOPOLOGY.links.get(number).map_or("", |link| link.name);
+fn joints(robot: &RobotDeclaration) -> Vec<JointDescription> {
+    let link = |number: usize| robot.topology.links.get(number).map_or("", |link| link.name);
     let describe = |joint: &'static crate::topology::Joint| JointDescription {
-        path: R::TOPOLOGY.joint_path(joint),
+        path: robot.topology.joint_path(joint),
         name: joint.name,
         kind: joint.kind,
         parent: link(joint.parent),
         child: link(joint.child),
         limit: joint.limit,
-        mimics: joint.mimic.and_then(|mimic| R::TOPOLOGY.joints.get(mimic.joint)).map(|joint| joint.name),
-        actuators: R::ACTUATORS
+        mimics: joint.mimic.and_then(|mimic| robot.topology.joints.get(mimic.joint)).map(|joint| joint.name),
+        actuators: robot
+            .actuators
             .iter()
             .filter(|actuator| actuator.joint == joint.name)
             .map(|actuator| actuator.path)
             .collect(),
     };
-    R::TOPOLOGY.joints.iter().map(describe).collect()
+    robot.topology.joints.iter().map(describe).collect()
 }
 
-fn parameters<R: Robot>(values: &[ParameterValue]) -> Vec<ParameterDescription> {
+fn parameters(robot: &RobotDeclaration, values: &[ParameterValue]) -> Vec<ParameterDescription> {
     let describe = |(number, declared): (usize, &'static crate::declaration::ParameterDeclaration)| {
         let default = ParameterValue::from(declared.default);
         ParameterDescription {
@@ -146,5 +135,5 @@ fn parameters<R: Robot>(values: &[ParameterValue]) -> Vec<ParameterDescription> 
             schema: parameter_schema(declared),
         }
     };
-    R::PARAMETERS.iter().enumerate().map(describe).collect()
+    robot.parameters.iter().enumerate().map(describe).collect()
 }

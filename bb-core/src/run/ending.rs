@@ -1,7 +1,6 @@
 //! The end of a robot after its disarming: estimators and actuators stop, the journal and the last report are completed, and
 //! components are closed. Every wait for user code here has a time limit.
 
-use super::Robot;
 use super::machine::Machine;
 use super::threads::since;
 use crate::fault::wake;
@@ -23,15 +22,15 @@ const HAND_OVER_WITHIN: Duration = Duration::from_secs(1);
 const LEAST_TO_STOP: Duration = Duration::from_millis(100);
 const LEAST_TO_CLOSE: Duration = Duration::from_millis(200);
 
-impl<R: Robot> Machine<R> {
+impl Machine {
     /// Stops all estimators. Those that are busy until `deadline` are left running and reported.
     pub(super) fn retire_islands(&self, deadline: Instant) {
         let now = self.environment.clock().now();
         for island in self.islands() {
-            island.retire(&self.wiring, now);
+            island.retire(now);
         }
         self.environment.drain_posted();
-        self.environment.wait_for_retired(R::ISLANDS.len(), deadline);
+        self.environment.wait_for_retired(self.wired.islands.len(), deadline);
         for island in self.islands().filter(|island| !island.has_retired()) {
             let path = self.path_of_busy(island);
             let since = self.environment.clock().now().duration_since(island.entered_at());
@@ -46,7 +45,7 @@ impl<R: Robot> Machine<R> {
     pub(super) fn retire_quietly(&self) {
         let now = self.environment.clock().now();
         for island in self.islands() {
-            island.replay(&self.wiring, now, Replayed::Retire);
+            island.replay(now, Replayed::Retire);
         }
     }
 
@@ -55,12 +54,12 @@ impl<R: Robot> Machine<R> {
     pub(super) fn terminate_actuators(self: &Arc<Self>, deadline: Instant) {
         let deadline = deadline.max(Instant::now() + LEAST_TO_STOP);
         let (closed, closing) = channel();
-        let mut left: Vec<usize> = (0..R::ACTUATORS.len()).collect();
-        for number in 0..R::ACTUATORS.len() {
+        let mut left: Vec<usize> = (0..self.robot.actuators.len()).collect();
+        for number in 0..self.robot.actuators.len() {
             let (machine, closed) = (Arc::clone(self), closed.clone());
             self.control.run_on_pool(Lane::Robot, move || {
                 let left = deadline.saturating_duration_since(Instant::now());
-                if R::actuator(&machine.wiring, number).is_none_or(|actuator| actuator.terminate(left)) {
+                if machine.wired.actuator(number).is_none_or(|actuator| actuator.terminate(left)) {
                     // Nobody listens any more after the deadline.
                     let _ = closed.send(number);
                 }
@@ -72,7 +71,7 @@ impl<R: Robot> Machine<R> {
             left.retain(|other| *other != number);
         }
         let now = self.environment.clock().now();
-        for actuator in left.into_iter().filter_map(|number| R::actuator(&self.wiring, number)) {
+        for actuator in left.into_iter().filter_map(|number| self.wired.actuator(number)) {
             let message = match actuator.entered_at() {
                 None => "did not come back from its command, or from disarming, in time".to_owned(),
                 entered => format!("did not return when the robot stopped{}", since(entered, now)),
@@ -89,7 +88,7 @@ impl<R: Robot> Machine<R> {
             self.fault("journal", message.to_owned());
         }
         for island in self.islands().filter(|island| island.has_retired()) {
-            while !island.is_idle(&self.wiring) && Instant::now() < deadline {
+            while !island.is_idle() && Instant::now() < deadline {
                 std::thread::sleep(Duration::from_micros(100));
             }
         }

@@ -1,13 +1,14 @@
 //! The robot as its components see it, and the destination of entries for its estimators.
 
-use super::Robot;
 use super::actuator::AnyActuator;
-use super::discovery::{discover, graphed};
+use super::discovery::discover;
+use super::draft::Place;
+use super::wired::Wired as WiredRobot;
 use crate::component::replacement::{Replacement, Replacements};
 use crate::component::shared::SharedValues;
 use crate::component::{CommandInfo, Description, DisarmHook, DynamicExecution, Guardian, Host, Permit};
 use crate::control::{Control, Islands, Wired};
-use crate::declaration::{ParameterError, graph};
+use crate::declaration::{ParameterError, RobotDeclaration, graph};
 use crate::event::{ArmError, DisarmError, ParameterValue, Safety};
 use crate::fault::Fault;
 use crate::joints::Joints;
@@ -19,22 +20,23 @@ use crate::schedule::Door;
 use crate::time::{Clock, MonotonicTime};
 use crate::topology::{GraphFormat, Topology};
 use std::any::Any;
-use std::sync::{Arc, OnceLock, Weak};
+use std::sync::Arc;
 
 /// Weak, since components with a bus are part of the wiring.
-pub(super) struct RobotHost<R: Robot> {
+pub(super) struct RobotHost {
+    pub(super) robot: &'static RobotDeclaration,
     pub(super) control: Control,
     pub(super) journal: Option<Journal>,
     pub(super) door: Door,
     pub(super) joints: Joints,
     pub(super) shared: SharedValues,
     pub(super) replacements: Replacements,
-    pub(super) wiring: Arc<OnceLock<Weak<R::Wiring>>>,
+    pub(super) wired: Place,
 }
 
-impl<R: Robot> RobotHost<R> {
-    fn wiring(&self) -> Option<Arc<R::Wiring>> {
-        self.wiring.get()?.upgrade()
+impl RobotHost {
+    fn wired(&self) -> Option<Arc<WiredRobot>> {
+        self.wired.get()?.upgrade()
     }
 
     fn is_replaced(&self, path: &str) -> bool {
@@ -50,7 +52,7 @@ impl<R: Robot> RobotHost<R> {
     }
 }
 
-impl<R: Robot> Guardian for RobotHost<R> {
+impl Guardian for RobotHost {
     fn on_disarm(&self, path: &'static str, execution: Option<u64>, hook: DisarmHook) {
         self.control.on_disarm(path, execution, hook);
     }
@@ -60,7 +62,7 @@ impl<R: Robot> Guardian for RobotHost<R> {
     }
 }
 
-impl<R: Robot> Host for RobotHost<R> {
+impl Host for RobotHost {
     fn origin(&self) -> Origin {
         self.control.origin()
     }
@@ -74,7 +76,7 @@ impl<R: Robot> Host for RobotHost<R> {
     }
 
     fn topology(&self) -> &'static Topology {
-        R::TOPOLOGY
+        self.robot.topology
     }
 
     fn shared(&self) -> &SharedValues {
@@ -120,9 +122,9 @@ impl<R: Robot> Host for RobotHost<R> {
     fn with_topics(&self, call: &mut dyn FnMut(&[&dyn AnyTopic])) {
         let system = self.control.topics().all();
         // Before the robot is wired, and after it is gone, there are only the system's topics.
-        let Some(wiring) = self.wiring() else { return call(&system) };
-        let mut topics = R::all_topics(R::wired_topics(&wiring));
-        topics.extend(R::all_actuators(&wiring).into_iter().map(|actuator| actuator.any_topic()));
+        let Some(wired) = self.wired() else { return call(&system) };
+        let mut topics = wired.topics();
+        topics.extend(wired.actuators().into_iter().map(|actuator| actuator.any_topic()));
         topics.extend(system);
         call(&topics);
     }
@@ -160,18 +162,18 @@ impl<R: Robot> Host for RobotHost<R> {
     }
 
     fn actuator(&self, path: &str) -> Option<(&'static str, Box<dyn Any>)> {
-        let wiring = self.wiring()?;
-        let actuators = R::all_actuators(&wiring);
+        let wired = self.wired()?;
+        let actuators = wired.actuators();
         let actuator: &&dyn AnyActuator = actuators.iter().find(|actuator| actuator.path() == path)?;
         Some((actuator.command_name(), actuator.accepts()))
     }
 
     fn actuators(&self) -> Vec<&'static str> {
-        R::ACTUATORS.iter().map(|declared| declared.path).collect()
+        self.robot.actuators.iter().map(|declared| declared.path).collect()
     }
 
     fn actuated_joints(&self) -> Vec<(&'static str, &'static str)> {
-        R::ACTUATORS.iter().map(|declared| (declared.path, declared.joint)).collect()
+        self.robot.actuators.iter().map(|declared| (declared.path, declared.joint)).collect()
     }
 
     fn commands(&self) -> Vec<CommandInfo> {
@@ -185,13 +187,14 @@ impl<R: Robot> Host for RobotHost<R> {
             let own = self.registry().topics();
             all.extend(own.iter().map(|topic| topic.as_ref()));
             let values = self.control.parameters();
-            description = Some(discover::<R>(&all, values.all(), self.commands(), &|path| self.is_replaced(path)));
+            description =
+                Some(discover(self.robot, &all, values.all(), self.commands(), &|path| self.is_replaced(path)));
         });
-        description.unwrap_or_else(|| discover::<R>(&[], &[], Vec::new(), &|_| false))
+        description.unwrap_or_else(|| discover(self.robot, &[], &[], Vec::new(), &|_| false))
     }
 
     fn graph(&self, format: GraphFormat) -> String {
-        graph(format, &graphed::<R>(), &|path| self.is_replaced(path))
+        graph(format, self.robot, &|path| self.is_replaced(path))
     }
 
     fn start_command(&self, path: &str, arguments: &str, permit: &Permit) -> Result<DynamicExecution, Fault> {
@@ -199,14 +202,16 @@ impl<R: Robot> Host for RobotHost<R> {
     }
 }
 
-/// Where entries for the estimators of a robot `R` go.
-pub(super) struct WiredIslands<R: Robot>(pub(super) Arc<OnceLock<Weak<R::Wiring>>>);
+/// Where entries for estimators go.
+pub(super) struct WiredIslands {
+    pub(super) robot: &'static RobotDeclaration,
+    pub(super) wired: Place,
+}
 
-impl<R: Robot> Islands for WiredIslands<R> {
+impl Islands for WiredIslands {
     fn post(&self, estimator: usize, now: MonotonicTime, entry: NodeEntry) -> Option<Wired> {
-        let wiring = self.0.get()?.upgrade()?;
-        let find = R::ISLANDS.get(R::ESTIMATORS.get(estimator)?.island)?;
-        find(&wiring).post(&wiring, now, estimator, entry);
-        Some(wiring)
+        let wired = self.wired.get()?.upgrade()?;
+        wired.island(self.robot.estimators.get(estimator)?.island)?.post(now, estimator, entry);
+        Some(wired)
     }
 }

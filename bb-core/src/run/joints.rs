@@ -1,32 +1,32 @@
 //! The part of a robot that the joint store needs: the frames of its components, and the estimator inputs that span
 //! moving joints.
 
-use super::Robot;
-use crate::declaration::EstimatorDeclaration;
+use crate::declaration::{EstimatorDeclaration, RobotDeclaration};
 use crate::joints::{JointSettings, Joints, RouteOf};
 use crate::kinematics::KinematicsError;
 use crate::message::Frame;
+use crate::pubsub::AnyTopic;
 use crate::time::Clock;
 use std::collections::HashMap;
 
-pub(super) fn known_joints<R: Robot>(
-    topics: &R::Topics,
+pub(super) fn known_joints(
+    robot: &RobotDeclaration,
+    topics: &[&dyn AnyTopic],
     settings: JointSettings,
     clock: Clock,
 ) -> Result<Joints, KinematicsError> {
-    let sensors = R::SENSORS.iter().map(|declared| (declared.path, declared.frame));
-    let actuators = R::ACTUATORS.iter().map(|declared| (declared.path, Frame::new(declared.joint)));
-    let estimators = R::ESTIMATORS.iter().flat_map(|declared| {
+    let sensors = robot.sensors.iter().map(|declared| (declared.path, declared.frame));
+    let actuators = robot.actuators.iter().map(|declared| (declared.path, Frame::new(declared.joint)));
+    let estimators = robot.estimators.iter().flat_map(|declared| {
         let outputs = declared.outputs.iter().map(|path| (*path, declared.frame));
         [(declared.path, declared.frame)].into_iter().chain(outputs)
     });
     let frames: HashMap<&'static str, Frame> = sensors.chain(actuators).chain(estimators).collect();
-    let topics = R::all_topics(topics);
     let frameless = topics.iter().filter(|topic| !topic.depends_on_frame()).map(|topic| topic.path());
     let frameless: Vec<&'static str> = frameless.collect();
     let routes: Vec<Vec<RouteOf>> =
-        R::ESTIMATORS.iter().map(|declared| routes(declared, &frames, &frameless)).collect();
-    Joints::new(R::TOPOLOGY, settings, clock, frames, &routes)
+        robot.estimators.iter().map(|declared| routes(declared, &frames, &frameless)).collect();
+    Joints::new(robot.topology, settings, clock, frames, &routes)
 }
 
 /// The inputs across moving joints whose transforms are asked for.

@@ -43,8 +43,7 @@ pub(super) enum Keeper {
 
 impl Kept {
     /// Reads what the store has.
-    pub(super) fn load(store: impl ParameterStore) -> Result<Self, Fault> {
-        let mut store: Box<dyn ParameterStore> = Box::new(store);
+    pub(super) fn load(mut store: Box<dyn ParameterStore>) -> Result<Self, Fault> {
         let values = caught(|| store.load()).map_err(|failed| failed.fault)?;
         let (sender, woken) = sync_channel(1);
         Ok(Self { store, values, changed: Changed::default(), wake: Arc::new(Mutex::new(Some(sender))), woken })

@@ -4,42 +4,49 @@ use super::handle::{ActuatorHandle, CommandHandle, ParameterHandle, Publisher};
 use super::machine::Machine;
 use super::visit::Visitable;
 use super::{ActuatorError, Bus, Report, Robot, SensorHandle};
-use crate::component::{Actuator, Command, Fault, HandleCall, HandleCast, Permit, Sensor};
+use crate::component::{Actuator, Command, Fault, HandleCall, HandleCast, Permit, RequestCodec, Sensor};
 use crate::control::Execution;
 use crate::declaration::{ParameterError, ParameterType};
 use crate::event::{ArmError, DisarmError, ParameterValue, Refusal, Safety};
 use crate::joints::Joints;
+use crate::journal::{Event, ParameterEntry, RequestKind};
+use crate::message::Stamp;
+use crate::node::{Node, NodeEntry, Turn, contained_outside, know_calls, know_casts};
 use crate::pubsub::{DynamicSubscription, Overflow, Payloads, Select, Subscription};
 use crate::time::{Clock, MonotonicTime};
+use std::any::Any;
 use std::fmt;
 use std::sync::Arc;
 
 /// A running robot. [`Running`](super::Running) and [`Simulation`](super::Simulation) dereference to it. A clone may
 /// move to another thread, such as a driver's callback, and outlives the run.
-pub struct Live<R: Robot>(pub(super) Arc<Machine<R>>);
+pub struct Live<R: Robot> {
+    pub(super) machine: Arc<Machine>,
+    pub(super) wiring: Arc<R::Wiring>,
+}
 
 impl<R: Robot> Clone for Live<R> {
     fn clone(&self) -> Self {
-        Self(Arc::clone(&self.0))
+        Self { machine: Arc::clone(&self.machine), wiring: Arc::clone(&self.wiring) }
     }
 }
 
 impl<R: Robot> Live<R> {
     /// Its clock.
     pub fn clock(&self) -> &Clock {
-        self.0.environment.clock()
+        self.machine.environment.clock()
     }
 
     /// The states of the joints, and all frames at any time.
     pub fn joints(&self) -> Joints {
-        self.0.environment.joints().clone()
+        self.machine.environment.joints().clone()
     }
 
     /// A value shared by the components of this run, created by `make` if there is none yet; see
     /// [`ComponentContext::shared`](crate::component::ComponentContext::shared). For a simulated robot, it gives
     /// access to its world.
     pub fn shared<T: Send + Sync + 'static>(&self, make: impl FnOnce() -> T) -> Arc<T> {
-        self.0.host.shared().get(make)
+        self.machine.host.shared().get(make)
     }
 
     /// Subscribes from now on, with room for 1024 messages.
@@ -49,7 +56,7 @@ impl<R: Robot> Live<R> {
 
     /// Subscribes from now on; `overflow` determines what happens if the subscriber is slow.
     pub fn subscribe_with<P: Publisher<R>>(&self, publisher: P, overflow: Overflow) -> Subscription<P::Payload> {
-        self.0.subscribe(publisher, overflow)
+        publisher.topic(R::wired_topics(&self.wiring), self.machine.control.topics()).subscribe(overflow)
     }
 
     /// Subscribes from now on to messages of any payload, by path; with names of payload types, only to those.
@@ -59,12 +66,12 @@ impl<R: Robot> Live<R> {
         payloads: impl Into<Payloads<'a>>,
         overflow: Overflow,
     ) -> DynamicSubscription {
-        self.0.subscribe_any(select, payloads, overflow)
+        self.machine.subscribe_any(select, &payloads.into(), overflow)
     }
 
     /// Topics, actuators, parameters and states, by path: for code that does not know this robot's type.
     pub fn bus(&self) -> Bus {
-        self.0.bus()
+        self.machine.bus()
     }
 
     /// Sends a request to an estimator and waits for its answer. Outputs that it emits are published as usual.
@@ -80,7 +87,27 @@ impl<R: Robot> Live<R> {
     where
         V::Estimator: HandleCall<Q>,
     {
-        self.settled(|machine| machine.call(estimator, request))
+        self.settled(|machine| {
+            let number = estimator.number();
+            machine.check_requests(number)?;
+            know_calls::<V::Estimator, Q>();
+            let codec = <V::Estimator as HandleCall<Q>>::RECORD;
+            let recorded = RequestCodec::record(RequestKind::Call, codec, &request);
+            let is_unrecorded = recorded.bytes.is_none();
+            let mut request = Some(request);
+            let path = machine.environment.node(number).declaration().path;
+            let mut response = Err(Fault::new(format!("{path} has not answered")));
+            let mut call = |node: &mut dyn Any, turn: &Turn<'_>, emitted: &mut dyn Any| {
+                let node = node.downcast_mut::<Node<V::Estimator>>()?;
+                let emitted = emitted.downcast_mut()?;
+                let (answer, stamp) = node.call(request.take()?, is_unrecorded, turn, emitted);
+                response = answer;
+                stamp
+            };
+            let line = Event::Request { estimator: number, request: recorded };
+            machine.visit(number, line, &mut call)?;
+            response
+        })
     }
 
     /// Sends a one-way request to an estimator, which handles it when it is free. Does not wait.
@@ -92,7 +119,11 @@ impl<R: Robot> Live<R> {
         V::Estimator: HandleCast<Q>,
     {
         self.settled(|machine| {
-            machine.cast(estimator, request)?;
+            let number = estimator.number();
+            machine.check_requests(number)?;
+            know_casts::<V::Estimator, Q>();
+            let (request, handle) = Node::<V::Estimator>::cast(request);
+            machine.cast(number, NodeEntry::Cast { request, handle: Some(handle) })?;
             // On virtual time, nothing else would process it before the simulation continues.
             machine.environment.drain_posted();
             Ok(())
@@ -108,7 +139,7 @@ impl<R: Robot> Live<R> {
         command: CommandHandle<R, C>,
         arguments: C::Arguments,
     ) -> Result<Execution<C::Output>, Refusal> {
-        self.settled(|machine| machine.command(command, arguments))
+        self.settled(|machine| machine.control.execute(command.number(), Box::new(arguments)))
     }
 
     /// Sends a command to an actuator, and returns once it has been carried out.
@@ -120,12 +151,12 @@ impl<R: Robot> Live<R> {
         actuator: ActuatorHandle<R, A>,
         command: A::Command,
     ) -> Result<(), ActuatorError> {
-        self.settled(|machine| machine.actuate(actuator, command))
+        self.settled(|_| actuator.node(&self.wiring).send(command))
     }
 
     /// The value of a parameter.
     pub fn parameter<T: ParameterType>(&self, parameter: ParameterHandle<R, T>) -> T {
-        self.0.parameter(parameter)
+        self.machine.control.parameters().get(parameter.number())
     }
 
     /// Sets a parameter. The change is published and reaches the options bound to it.
@@ -137,7 +168,8 @@ impl<R: Robot> Live<R> {
         parameter: ParameterHandle<R, T>,
         value: T,
     ) -> Result<(), ParameterError> {
-        self.settled(|machine| machine.set_parameter(parameter, value))
+        let entry = ParameterEntry { parameter: parameter.number(), value: value.into_value() };
+        self.settled(|machine| machine.control.set_parameters(vec![entry], &Permit::UNLIMITED))
     }
 
     /// Sets parameters all at once: no reader sees a mixture of new and old values. If one of the values
@@ -170,12 +202,12 @@ impl<R: Robot> Live<R> {
 
     /// The operational state: `disarmed`, `idle`, `executing`, or a declared one.
     pub fn state(&self) -> &'static str {
-        self.0.control.state()
+        self.machine.control.state()
     }
 
     /// The safety state.
     pub fn safety(&self) -> Safety {
-        self.0.control.safety()
+        self.machine.control.safety()
     }
 
     /// Arms the robot, as a command would. A robot that is armed already stays so.
@@ -206,13 +238,25 @@ impl<R: Robot> Live<R> {
 
     /// A report of the run so far.
     pub fn report(&self) -> Report {
-        self.0.report()
+        self.machine.report()
     }
 
     /// Publishes as if `sensor` had measured `payload` at `time`. All estimators downstream run before this returns,
     /// except those that are busy on another thread or have their own.
     pub fn publish<S: Sensor>(&self, sensor: SensorHandle<R, S>, time: MonotonicTime, payload: S::Output) {
-        self.settled(|machine| machine.publish(sensor, time, payload));
+        self.settled(|machine| {
+            let environment = &machine.environment;
+            let Some(_inside) = environment.door().enter() else { return };
+            let clock = environment.clock();
+            let stamp = Stamp {
+                monotonic_time: time,
+                wall_time: clock.wall_at(time),
+                origin: environment.origin(),
+                ..Stamp::default()
+            };
+            let publish = || sensor.publish(&self.wiring, stamp, payload, clock.now());
+            contained_outside(environment, publish);
+        });
     }
 
     /// A separate handle, for another thread.
@@ -238,9 +282,9 @@ impl<R: Robot> Live<R> {
     }
 
     /// Performs an outside action; on virtual time, then passes the journal's lines to its sink.
-    fn settled<T>(&self, call: impl FnOnce(&Machine<R>) -> T) -> T {
-        let result = call(&self.0);
-        self.0.settle();
+    fn settled<T>(&self, call: impl FnOnce(&Machine) -> T) -> T {
+        let result = call(&self.machine);
+        self.machine.settle();
         result
     }
 }

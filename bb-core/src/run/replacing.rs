@@ -1,6 +1,8 @@
 //! Replacing declared components by path.
 
+use super::draft::Draft;
 use super::{Builder, Robot};
+use crate::component::replacement::Replacement;
 use crate::component::{Actuator, Estimator, Fault, Sensor, Service};
 use crate::lifecycle::{
     replacement_of_actuator, replacement_of_estimator, replacement_of_sensor, replacement_of_service,
@@ -19,10 +21,9 @@ impl<R: Robot> Builder<R> {
     where
         S::Options: Sync,
     {
-        let sensors = R::SENSORS.iter().map(|declared| declared.path).filter(|path| path.starts_with("sensor/"));
-        let path = declared_path("sensor", path, sensors)?;
-        self.replacements.insert(path, replacement_of_sensor::<S>(options));
-        Ok(())
+        let sensors = self.draft.robot.sensors.iter().map(|declared| declared.path);
+        let sensors = sensors.filter(|path| path.starts_with("sensor/")).collect();
+        self.draft.replace("sensor", sensors, path, replacement_of_sensor::<S>(options))
     }
 
     /// Replaces the actuator at `path`; `A` takes the same type of commands.
@@ -33,9 +34,8 @@ impl<R: Robot> Builder<R> {
     where
         A::Options: Sync,
     {
-        let path = declared_path("actuator", path, R::ACTUATORS.iter().map(|declared| declared.path))?;
-        self.replacements.insert(path, replacement_of_actuator::<A>(options));
-        Ok(())
+        let declared = self.draft.robot.actuators.iter().map(|declared| declared.path).collect();
+        self.draft.replace("actuator", declared, path, replacement_of_actuator::<A>(options))
     }
 
     /// Replaces the controller or the bridge at `path`; `S` publishes the same payload.
@@ -46,9 +46,8 @@ impl<R: Robot> Builder<R> {
     where
         S::Options: Sync,
     {
-        let path = declared_path("controller or bridge", path, R::SERVICES.iter().map(|declared| declared.path))?;
-        self.replacements.insert(path, replacement_of_service::<S>(options));
-        Ok(())
+        let declared = self.draft.robot.services.iter().map(|declared| declared.path).collect();
+        self.draft.replace("controller or bridge", declared, path, replacement_of_service::<S>(options))
     }
 
     /// Replaces the estimator at `path` with one of type `E`: another algorithm, a model of it, or one that plays back
@@ -64,21 +63,26 @@ impl<R: Robot> Builder<R> {
     where
         E::Options: Sync,
     {
-        let path = declared_path("estimator", path, R::ESTIMATORS.iter().map(|declared| declared.path))?;
-        self.replacements.insert(path, replacement_of_estimator::<E>(options));
-        Ok(())
+        let declared = self.draft.robot.estimators.iter().map(|declared| declared.path).collect();
+        self.draft.replace("estimator", declared, path, replacement_of_estimator::<E>(options))
     }
 }
 
-/// The declared path that `path` names.
-fn declared_path(
-    kind: &str,
-    path: &str,
-    declared: impl Iterator<Item = &'static str> + Clone,
-) -> Result<&'static str, Fault> {
-    declared.clone().find(|other| *other == path).ok_or_else(|| {
-        let near = nearest_path(path, declared);
-        let hint = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
-        Fault::new(format!("no {kind} is at `{path}`{hint}"))
-    })
+impl Draft {
+    /// Replaces the component whose path, one of `declared`, is `path`.
+    fn replace(
+        &mut self,
+        kind: &str,
+        declared: Vec<&'static str>,
+        path: &str,
+        replacement: Replacement,
+    ) -> Result<(), Fault> {
+        let Some(path) = declared.iter().find(|other| **other == path) else {
+            let near = nearest_path(path, declared.iter().copied());
+            let hint = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+            return Err(Fault::new(format!("no {kind} is at `{path}`{hint}")));
+        };
+        self.replacements.insert(path, replacement);
+        Ok(())
+    }
 }

@@ -25,9 +25,15 @@ use std::sync::Arc;
 
 /// A robot replayed from its journal, on the caller's thread. Subscribers receive the messages of that run.
 pub struct Replay<R: Robot> {
+    run: Replayer,
     live: Live<R>,
+}
+
+/// A run from a journal, without the type of its robot.
+struct Replayer {
+    machine: Arc<Machine>,
     /// The sensors and services, by publisher.
-    sources: HashMap<usize, Box<dyn AnySource<R>>>,
+    sources: HashMap<usize, Box<dyn AnySource>>,
     /// Lines not played yet: the line of a measured turn waits for the line with the durations of its callbacks.
     waiting: VecDeque<Entry>,
     measured: HashMap<u64, Vec<Callback>>,
@@ -54,20 +60,8 @@ pub struct ReplayError {
 }
 
 impl<R: Robot> Replay<R> {
-    pub(super) fn new(machine: Machine<R>) -> Self {
-        Self {
-            live: Live(Arc::new(machine)),
-            waiting: VecDeque::new(),
-            measured: HashMap::new(),
-            placed: HashMap::new(),
-            last: 0,
-            sources: R::sources().by_publisher(),
-            has_begun: false,
-            is_virtual: false,
-            unrecorded: HashMap::new(),
-            cut: Vec::new(),
-            refused: None,
-        }
+    pub(super) fn new(live: Live<R>) -> Self {
+        Self { run: Replayer::new(Arc::clone(&live.machine)), live }
     }
 
     /// Replays lines, in the order of their numbers. A journal may be handed over in parts. The last lines of a part
@@ -77,6 +71,53 @@ impl<R: Robot> Replay<R> {
     /// The first line that does not fit: the journal is of another robot, lines are missing, or an algorithm is not
     /// deterministic. Nothing is played after it: later calls return the same error, and it is among the faults of the last report.
     pub fn play(&mut self, entries: Vec<Entry>) -> Result<(), ReplayError> {
+        self.run.play(entries)
+    }
+
+    /// Lets calls of type `Q` to an estimator be repeated. Needed for journals of another process; requests made by
+    /// this process are known.
+    pub fn know_calls<V: Visitable<R>, Q>(&self, _: V)
+    where
+        V::Estimator: HandleCall<Q>,
+    {
+        know_calls::<V::Estimator, Q>();
+    }
+
+    /// The same for one-way requests.
+    pub fn know_casts<V: Visitable<R>, Q>(&self, _: V)
+    where
+        V::Estimator: HandleCast<Q>,
+    {
+        know_casts::<V::Estimator, Q>();
+    }
+
+    /// Plays the waiting lines, stops the robot, and returns the last report. Lines that do not fit are among its
+    /// faults. So is a line at which the journal is cut: the turn that it begins had not ended, and is replayed as
+    /// far as the journal goes.
+    pub fn stop(mut self) -> Report {
+        self.run.stop();
+        self.live.report()
+    }
+}
+
+impl Replayer {
+    fn new(machine: Arc<Machine>) -> Self {
+        Self {
+            waiting: VecDeque::new(),
+            measured: HashMap::new(),
+            placed: HashMap::new(),
+            last: 0,
+            sources: machine.wired.sources().by_publisher(),
+            has_begun: false,
+            is_virtual: false,
+            unrecorded: HashMap::new(),
+            cut: Vec::new(),
+            refused: None,
+            machine,
+        }
+    }
+
+    fn play(&mut self, entries: Vec<Entry>) -> Result<(), ReplayError> {
         if let Some(refused) = &self.refused {
             return Err(refused.clone());
         }
@@ -108,47 +149,26 @@ impl<R: Robot> Replay<R> {
         self.advance(false)
     }
 
-    /// Lets calls of type `Q` to an estimator be repeated. Needed for journals of another process; requests made by
-    /// this process are known.
-    pub fn know_calls<V: Visitable<R>, Q>(&self, _: V)
-    where
-        V::Estimator: HandleCall<Q>,
-    {
-        know_calls::<V::Estimator, Q>();
-    }
-
-    /// The same for one-way requests.
-    pub fn know_casts<V: Visitable<R>, Q>(&self, _: V)
-    where
-        V::Estimator: HandleCast<Q>,
-    {
-        know_casts::<V::Estimator, Q>();
-    }
-
-    /// Plays the waiting lines, stops the robot, and returns the last report. Lines that do not fit are among its
-    /// faults. So is a line at which the journal is cut: the turn that it begins had not ended, and is replayed as
-    /// far as the journal goes.
-    pub fn stop(mut self) -> Report {
+    fn stop(&mut self) {
         let refused = self.refused.take().or_else(|| self.advance(true).err());
         for error in self.cut.drain(..).chain(refused) {
-            self.live.0.fault("journal", error.to_string());
+            self.machine.fault("journal", error.to_string());
         }
-        let machine = &self.live.0;
+        let machine = &self.machine;
         machine.control.replay_stop();
         if machine.control.is_disarming() {
             machine.control.disarmed(Vec::new());
         }
         self.retire();
         machine.end(std::time::Instant::now());
-        self.live.report()
     }
 
     /// Stops the estimators that still run, in order.
     fn retire(&self) {
-        let machine = &self.live.0;
+        let machine = &self.machine;
         let now = machine.environment.clock().now();
         for island in machine.islands().filter(|island| !island.has_retired()) {
-            island.replay(&machine.wiring, now, Replayed::Retire);
+            island.replay(now, Replayed::Retire);
         }
     }
 
@@ -174,8 +194,8 @@ impl<R: Robot> Replay<R> {
     /// The estimator that a publisher belongs to, and its island.
     fn emitter(&self, publisher: usize) -> Option<(usize, usize)> {
         let path = self.path_of(publisher);
-        let number = R::ESTIMATORS.iter().position(|declared| declared.outputs.contains(&path))?;
-        Some((number, R::ESTIMATORS[number].island))
+        let number = self.machine.robot.estimators.iter().position(|declared| declared.outputs.contains(&path))?;
+        Some((number, self.machine.robot.estimators[number].island))
     }
 
     /// The island that processes a line.
@@ -190,7 +210,9 @@ impl<R: Robot> Replay<R> {
             | Event::GiveUp { estimator }
             | Event::OutputFailed { estimator, .. }
             | Event::Silence { estimator, .. }
-            | Event::Request { estimator, .. } => R::ESTIMATORS.get(*estimator).map(|declared| declared.island),
+            | Event::Request { estimator, .. } => {
+                self.machine.robot.estimators.get(*estimator).map(|declared| declared.island)
+            }
             _ => None,
         }
     }
@@ -205,7 +227,7 @@ impl<R: Robot> Replay<R> {
         let island = self.island_of(&event);
         let is_whole = island.is_none_or(|island| self.prepare(island, number));
         self.play_event(number, time, event)?;
-        match self.live.0.environment.replayed().take_missing() {
+        match self.machine.environment.replayed().take_missing() {
             None => Ok(()),
             Some(Missing { estimator, what }) if is_whole => {
                 // An estimator before it may have emitted something else, which is the cause.
@@ -226,7 +248,7 @@ impl<R: Robot> Replay<R> {
     }
 
     fn play_event(&mut self, number: u64, time: MonotonicTime, event: Event) -> Result<(), String> {
-        let machine = Arc::clone(&self.live.0);
+        let machine = Arc::clone(&self.machine);
         let control = &machine.control;
         machine.environment.clock().set_to(time);
         match event {
@@ -237,8 +259,7 @@ impl<R: Robot> Replay<R> {
                 machine.environment.set_replayed_line(number);
                 let mut is_fed = true;
                 let source = self.sources.get(&publisher);
-                let feed = |source: &dyn AnySource<R>| source.feed(&machine.wiring, &message, time);
-                handed_out(|| is_fed = source.is_some_and(|source| feed(&**source)));
+                handed_out(|| is_fed = source.is_some_and(|source| source.feed(&message, time)));
                 discard(message);
                 if !is_fed {
                     return Err("the robot has no such sensor, or one of another payload".to_owned());
@@ -280,7 +301,7 @@ impl<R: Robot> Replay<R> {
                         control.replay_report(estimator)
                     });
                 if !is_told {
-                    let path = R::ESTIMATORS.get(estimator).map_or("?", |declared| declared.path);
+                    let path = self.machine.robot.estimators.get(estimator).map_or("?", |declared| declared.path);
                     return Err(format!(
                         "`{path}` reported a change of health or a failure then, and does not now"
                     ));
@@ -317,7 +338,7 @@ impl<R: Robot> Replay<R> {
         let Event::Begin { declaration, wall_offset_nanos, is_virtual } = event else {
             return Err("a journal begins with a description of the robot, and this one does not".to_owned());
         };
-        let machine = &self.live.0;
+        let machine = &self.machine;
         if let Some(difference) = difference(&declaration, &machine.environment.all_facts()) {
             return Err(difference);
         }
@@ -325,7 +346,7 @@ impl<R: Robot> Replay<R> {
         self.is_virtual = is_virtual;
         machine.environment.clock().set_to(time);
         machine.environment.clock().set_wall_offset_nanos(wall_offset_nanos);
-        machine.islands().for_each(|island| island.begin_replay(&machine.wiring));
+        machine.islands().for_each(|island| island.begin_replay());
         match machine.environment.take_refusal() {
             Some(refusal) => Err(format!("{} cannot start: {}", refusal.path, refusal.fault)),
             None => Ok(()),
@@ -342,11 +363,11 @@ impl<R: Robot> Replay<R> {
 
     /// The same for an entry that belongs to the previous turn.
     fn go_on(&self, number: usize, time: MonotonicTime, entry: Replayed<'_>) -> Result<(), String> {
-        let machine = &self.live.0;
+        let machine = &self.machine;
         let island = machine.island(number).ok_or("the robot has no such island")?;
         // A panic in the code of an estimator's output, which ends the turn, has a line of its own.
         let mut is_known = true;
-        contained(&machine.environment, || is_known = island.replay(&machine.wiring, time, entry))
+        contained(&machine.environment, || is_known = island.replay(time, entry))
             .map_err(|failed| failed.fault.to_string())?;
         if is_known {
             return Ok(());
@@ -355,7 +376,7 @@ impl<R: Robot> Replay<R> {
     }
 
     fn node(&self, estimator: usize, time: MonotonicTime, entry: NodeEntry) -> Result<(), String> {
-        let declared = R::ESTIMATORS.get(estimator).ok_or("the robot has no such estimator")?;
+        let declared = self.machine.robot.estimators.get(estimator).ok_or("the robot has no such estimator")?;
         self.island(declared.island, time, Replayed::Node(estimator, entry))
     }
 
@@ -366,7 +387,7 @@ impl<R: Robot> Replay<R> {
         time: MonotonicTime,
         request: Request,
     ) -> Result<(), String> {
-        let declared = R::ESTIMATORS.get(estimator).ok_or("the robot has no such estimator")?;
+        let declared = self.machine.robot.estimators.get(estimator).ok_or("the robot has no such estimator")?;
         if request.bytes.is_none() {
             self.unrecorded.insert(declared.island, (line, request.name.clone()));
             // Its outputs come before anything else that was due in that turn.
@@ -388,7 +409,7 @@ impl<R: Robot> Replay<R> {
     }
 
     fn path_of(&self, publisher: usize) -> &'static str {
-        let topics = R::all_topics(R::wired_topics(&self.live.0.wiring));
+        let topics = self.machine.wired.topics();
         topics.get(publisher).map_or("?", |topic| topic.path())
     }
 }
@@ -422,6 +443,6 @@ impl<R: Robot> Publishers for R {
     }
 
     fn list_topics(topics: &R::Topics) -> Vec<&dyn AnyTopic> {
-        R::all_topics(topics)
+        (0..).map_while(|publisher| R::topic(topics, publisher)).collect()
     }
 }

@@ -1,8 +1,9 @@
 //! A run in real time: each sensor on a thread of its own.
 
 use super::machine::Machine;
+use super::source::Source;
 use super::threads::{self, Thread};
-use super::{Live, Report, Robot, Source, StartError};
+use super::{Live, Report, Robot, StartError};
 use std::fmt;
 use std::ops::Deref;
 use std::sync::Arc;
@@ -11,7 +12,14 @@ use std::time::{Duration, Instant};
 
 /// A robot that runs in real time. Dropping it stops it.
 pub struct Running<R: Robot> {
+    /// Dropped before `live`.
+    threads: Threads,
     live: Live<R>,
+}
+
+/// The threads of a run.
+struct Threads {
+    machine: Arc<Machine>,
     /// Of sensors and services.
     sources: Vec<Thread>,
 }
@@ -31,9 +39,28 @@ const BACK_WITHIN: Duration = Duration::from_millis(5800);
 const LINES_WITHIN: Duration = Duration::from_millis(150);
 
 impl<R: Robot> Running<R> {
-    pub(super) fn start(machine: Machine<R>, sources: Vec<Box<dyn Source>>) -> Result<Self, StartError> {
-        let mut running = Self { live: Live(Arc::new(machine)), sources: Vec::new() };
-        let machine = Arc::clone(&running.live.0);
+    pub(super) fn start(live: Live<R>, sources: Vec<Box<dyn Source>>) -> Result<Self, StartError> {
+        Ok(Self { threads: Threads::start(Arc::clone(&live.machine), sources)?, live })
+    }
+
+    /// Waits until every sensor and service has finished: at the end of recordings and simulated sensors, and after
+    /// [`Live::request_stop`].
+    pub fn wait(&mut self) {
+        self.threads.wait();
+    }
+
+    /// Disarms the robot and cancels commands at once, even if code hangs. Then stops sensors and services, then
+    /// estimators and actuators; ends the subscriptions, and returns the last report. Code that has not returned 5 s
+    /// after the call is left running and reported as a fault.
+    pub fn stop(mut self) -> Report {
+        self.threads.shut_down();
+        self.live.report()
+    }
+}
+
+impl Threads {
+    fn start(machine: Arc<Machine>, sources: Vec<Box<dyn Source>>) -> Result<Self, StartError> {
+        let mut running = Self { machine: Arc::clone(&machine), sources: Vec::new() };
         machine.control.pool().start();
         // On an error here, `running` is dropped, which stops what already runs, in order.
         threads::serve(&machine)?;
@@ -47,26 +74,16 @@ impl<R: Robot> Running<R> {
         Ok(running)
     }
 
-    /// Waits until every sensor and service has finished: at the end of recordings and simulated sensors, and after
-    /// [`Live::request_stop`].
-    pub fn wait(&mut self) {
+    fn wait(&mut self) {
         for (path, thread) in std::mem::take(&mut self.sources) {
             if let Err(message) = threads::join(thread, None) {
-                self.live.0.fault(path, message.to_owned());
+                self.machine.fault(path, message.to_owned());
             }
         }
     }
 
-    /// Disarms the robot and cancels commands at once, even if code hangs. Then stops sensors and services, then
-    /// estimators and actuators; ends the subscriptions, and returns the last report. Code that has not returned 5 s
-    /// after the call is left running and reported as a fault.
-    pub fn stop(mut self) -> Report {
-        self.shut_down();
-        self.live.0.report()
-    }
-
     fn shut_down(&mut self) {
-        let machine = Arc::clone(&self.live.0);
+        let machine = Arc::clone(&self.machine);
         if machine.has_ended.load(Ordering::Acquire) {
             return;
         }
@@ -74,7 +91,7 @@ impl<R: Robot> Running<R> {
         machine.control.begin_stop();
         machine.control.wait_until_disarmed();
         let mut deadline = (start + STOP_WITHIN).max(Instant::now() + GRACE);
-        if machine.islands().any(|island| island.is_inside(&machine.wiring)) {
+        if machine.islands().any(|island| island.is_inside()) {
             // An estimator's message has woken the caller: the estimator cannot stop before this call returns.
             deadline = Instant::now() + GRACE;
         }
@@ -106,7 +123,7 @@ impl<R: Robot> Deref for Running<R> {
     }
 }
 
-impl<R: Robot> Drop for Running<R> {
+impl Drop for Threads {
     fn drop(&mut self) {
         self.shut_down();
     }

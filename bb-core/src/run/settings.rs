@@ -27,6 +27,7 @@ pub use error::{SettingProblem, SettingsError};
 pub use list::SettingsList;
 pub(super) use schema::settings_schema;
 
+use super::draft::Draft;
 use super::{Builder, Robot};
 use assign::Assignment;
 use error::Place;
@@ -38,7 +39,7 @@ impl<R: Robot> Builder<R> {
     /// # Errors
     /// Why it was not set: an unknown path, with the nearest one, or what was expected.
     pub fn set(&mut self, path: &str, value: &str) -> Result<(), SettingsError> {
-        assign::assign(self, &[Assignment::from_text(Place::Code, path, value)])
+        assign::assign(&mut self.draft, &[Assignment::from_text(Place::Code, path, value)])
     }
 
     /// Applies the settings of a TOML file: all of them, or none if any is wrong.
@@ -47,10 +48,7 @@ impl<R: Robot> Builder<R> {
     /// All problems, each with its line and column.
     #[cfg(feature = "toml")]
     pub fn load_settings(&mut self, file: impl AsRef<std::path::Path>) -> Result<(), SettingsError> {
-        let file = file.as_ref();
-        let name = file.display().to_string();
-        let text = std::fs::read_to_string(file).map_err(|error| SettingsError::of_file(&name, &error))?;
-        self.set_from_toml(&name, &text)
+        self.draft.load_settings(file.as_ref())
     }
 
     /// The same for TOML text; errors name it `name`.
@@ -59,6 +57,24 @@ impl<R: Robot> Builder<R> {
     /// As [`Builder::load_settings`].
     #[cfg(feature = "toml")]
     pub fn set_from_toml(&mut self, name: &str, text: &str) -> Result<(), SettingsError> {
+        self.draft.set_from_toml(name, text)
+    }
+
+    /// All settings with their values: its `Display` is a TOML file that [`Builder::load_settings`] reads.
+    pub fn settings(&mut self) -> SettingsList {
+        list::list(&mut self.draft)
+    }
+}
+
+#[cfg(feature = "toml")]
+impl Draft {
+    fn load_settings(&mut self, file: &std::path::Path) -> Result<(), SettingsError> {
+        let name = file.display().to_string();
+        let text = std::fs::read_to_string(file).map_err(|error| SettingsError::of_file(&name, &error))?;
+        self.set_from_toml(&name, &text)
+    }
+
+    fn set_from_toml(&mut self, name: &str, text: &str) -> Result<(), SettingsError> {
         let names = assign::names(self);
         let assignments =
             file::read(name, text, |path| match (names.contains(path), assign::is_beginning(&names, path)) {
@@ -68,10 +84,5 @@ impl<R: Robot> Builder<R> {
                 (false, false) => file::Known::No,
             })?;
         assign::assign(self, &assignments)
-    }
-
-    /// All settings with their values: its `Display` is a TOML file that [`Builder::load_settings`] reads.
-    pub fn settings(&mut self) -> SettingsList {
-        list::list(self)
     }
 }

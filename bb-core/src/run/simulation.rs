@@ -1,10 +1,11 @@
 //! A run on virtual time, driven by its caller.
 
 use super::machine::Machine;
+use super::source::Source;
 use super::visit::Visitable;
-use super::{Live, Report, Robot, SensorHandle, Source};
+use super::{Live, Report, Robot, SensorHandle};
 use crate::component::Sensor;
-use crate::time::MonotonicTime;
+use crate::time::{Clock, MonotonicTime};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::fmt;
@@ -17,7 +18,14 @@ use std::time::Duration;
 /// declaration), on the caller's thread, as fast as the machine can, so every run gives the same outputs. Anything
 /// else due at the same time follows: timers, then the watchdog, then commands, then their time limits.
 pub struct Simulation<R: Robot> {
+    /// Dropped before `live`.
+    run: VirtualRun,
     live: Live<R>,
+}
+
+/// A run on virtual time, without the type of its robot.
+struct VirtualRun {
+    machine: Arc<Machine>,
     sources: Vec<Box<dyn Source>>,
     due: BinaryHeap<Reverse<(MonotonicTime, usize)>>,
 }
@@ -33,7 +41,62 @@ enum Kind {
 }
 
 impl<R: Robot> Simulation<R> {
-    pub(super) fn new(machine: Machine<R>, mut sources: Vec<Box<dyn Source>>) -> Self {
+    pub(super) fn new(live: Live<R>, sources: Vec<Box<dyn Source>>) -> Self {
+        Self { run: VirtualRun::new(Arc::clone(&live.machine), sources), live }
+    }
+
+    /// When the next sensor is due; `None` once all have finished.
+    pub fn next_due(&self) -> Option<MonotonicTime> {
+        self.run.next_due()
+    }
+
+    /// Moves time to the next due sensor and reads it, after anything else that is due before. Returns `false` once
+    /// all sensors have finished.
+    pub fn step(&mut self) -> bool {
+        self.run.step()
+    }
+
+    /// Runs everything that is due up to `time`, and moves time there.
+    pub fn run_until(&mut self, time: MonotonicTime) {
+        self.run.run_until(time);
+    }
+
+    /// Runs for `duration` of virtual time.
+    pub fn run_for(&mut self, duration: Duration) {
+        self.run.run_until(self.clock().now() + duration);
+    }
+
+    /// Runs until every sensor has finished: for recordings, and simulated sensors that end.
+    pub fn run_to_end(&mut self) {
+        while self.run.step() {}
+        self.run.run_until(self.clock().now());
+    }
+
+    /// Runs everything that is due up to `time`, moves time there, and publishes as if `sensor` had measured
+    /// `payload` then. All estimators downstream run before this returns. A `time` in the past does not move time:
+    /// the message is late.
+    pub fn publish<S: Sensor>(&mut self, sensor: SensorHandle<R, S>, time: MonotonicTime, payload: S::Output) {
+        self.run.run_until(time);
+        self.live.publish(sensor, time, payload);
+        self.run.catch_up();
+    }
+
+    /// Makes the callbacks of an estimator appear to take this long from now on, to test its `latency_budget`: on
+    /// virtual time, nothing takes time by itself.
+    pub fn pretend_latency<V: Visitable<R>>(&self, estimator: V, latency: Duration) {
+        let nanos = i64::try_from(latency.as_nanos()).unwrap_or(i64::MAX);
+        self.live.machine.environment.node(estimator.number()).pretend_latency(nanos);
+    }
+
+    /// Stops sensors, then estimators, ends the subscriptions, and returns the last report.
+    pub fn stop(mut self) -> Report {
+        self.run.shut_down();
+        self.live.report()
+    }
+}
+
+impl VirtualRun {
+    fn new(machine: Arc<Machine>, mut sources: Vec<Box<dyn Source>>) -> Self {
         // A simulation of a recording starts when the recording was made.
         if let Some(first) = sources.iter_mut().filter_map(|source| source.starts_at()).min() {
             machine.environment.clock().start_at(first);
@@ -47,19 +110,19 @@ impl<R: Robot> Simulation<R> {
         sources.iter_mut().for_each(|source| source.begin());
         let due = sources.iter().enumerate().filter_map(|(index, source)| Some(Reverse((source.due()?, index))));
         let due = due.collect();
-        let simulation = Self { live: Live(Arc::new(machine)), sources, due };
-        simulation.live.0.settle();
-        simulation
+        machine.settle();
+        Self { machine, sources, due }
     }
 
-    /// When the next sensor is due; `None` once all have finished.
-    pub fn next_due(&self) -> Option<MonotonicTime> {
+    fn clock(&self) -> &Clock {
+        self.machine.environment.clock()
+    }
+
+    fn next_due(&self) -> Option<MonotonicTime> {
         self.due.peek().map(|Reverse((time, _))| *time)
     }
 
-    /// Moves time to the next due sensor and reads it, after anything else that is due before. Returns `false` once
-    /// all sensors have finished.
-    pub fn step(&mut self) -> bool {
+    fn step(&mut self) -> bool {
         self.catch_up();
         loop {
             match self.next() {
@@ -73,53 +136,19 @@ impl<R: Robot> Simulation<R> {
         }
     }
 
-    /// Runs everything that is due up to `time`, and moves time there.
-    pub fn run_until(&mut self, time: MonotonicTime) {
+    fn run_until(&mut self, time: MonotonicTime) {
         self.catch_up();
         while let Some((due, kind)) = self.next().filter(|(due, _)| *due <= time) {
             self.fire(due, kind);
         }
         self.clock().advance_to(time);
-        self.live.0.settle();
-    }
-
-    /// Runs for `duration` of virtual time.
-    pub fn run_for(&mut self, duration: Duration) {
-        self.run_until(self.clock().now() + duration);
-    }
-
-    /// Runs until every sensor has finished: for recordings, and simulated sensors that end.
-    pub fn run_to_end(&mut self) {
-        while self.step() {}
-        self.run_until(self.clock().now());
-    }
-
-    /// Runs everything that is due up to `time`, moves time there, and publishes as if `sensor` had measured
-    /// `payload` then. All estimators downstream run before this returns. A `time` in the past does not move time:
-    /// the message is late.
-    pub fn publish<S: Sensor>(&mut self, sensor: SensorHandle<R, S>, time: MonotonicTime, payload: S::Output) {
-        self.run_until(time);
-        self.live.publish(sensor, time, payload);
-        self.catch_up();
-    }
-
-    /// Makes the callbacks of an estimator appear to take this long from now on, to test its `latency_budget`: on
-    /// virtual time, nothing takes time by itself.
-    pub fn pretend_latency<V: Visitable<R>>(&self, estimator: V, latency: Duration) {
-        let nanos = i64::try_from(latency.as_nanos()).unwrap_or(i64::MAX);
-        self.live.0.environment.node(estimator.number()).pretend_latency(nanos);
-    }
-
-    /// Stops sensors, then estimators, ends the subscriptions, and returns the last report.
-    pub fn stop(mut self) -> Report {
-        self.shut_down();
-        self.live.0.report()
+        self.machine.settle();
     }
 
     /// What is due next, and when; anything overdue is due now.
     fn next(&self) -> Option<(MonotonicTime, Kind)> {
         let now = self.clock().now();
-        let machine = &self.live.0;
+        let machine = &self.machine;
         let control = &machine.control;
         let source = self.next_due().map(|time| (time, Kind::Source));
         let at = |time: Option<MonotonicTime>, kind| time.map(|time| (time.max(now), kind));
@@ -134,7 +163,7 @@ impl<R: Robot> Simulation<R> {
     fn fire(&mut self, time: MonotonicTime, kind: Kind) {
         self.clock().advance_to(time);
         let now = self.clock().now();
-        let machine = Arc::clone(&self.live.0);
+        let machine = Arc::clone(&self.machine);
         match kind {
             Kind::Source => {
                 let Some(Reverse((_, index))) = self.due.pop() else { return };
@@ -148,7 +177,7 @@ impl<R: Robot> Simulation<R> {
                 if let Some(number) = machine.environment.agenda().take(now)
                     && let Some(island) = machine.island(number)
                 {
-                    island.wake(&machine.wiring, now);
+                    island.wake(now);
                 }
             }
             Kind::Watch => drop(machine.control.check_watch(now)),
@@ -163,7 +192,7 @@ impl<R: Robot> Simulation<R> {
 
     /// Handles the immediate consequences: posted entries, disarm callbacks, and orders to sensors.
     fn catch_up(&mut self) {
-        let machine = &self.live.0;
+        let machine = &self.machine;
         machine.environment.drain_posted();
         while machine.control.run_pending_hooks() {
             machine.environment.drain_posted();
@@ -171,10 +200,10 @@ impl<R: Robot> Simulation<R> {
         if machine.control.take_orders() {
             self.obey();
         }
-        if self.live.0.control.stop_signal().is_set() {
+        if self.machine.control.stop_signal().is_set() {
             self.stop_sources();
         }
-        self.live.0.settle();
+        self.machine.settle();
     }
 
     /// Lets sensors carry out their orders at once.
@@ -195,7 +224,7 @@ impl<R: Robot> Simulation<R> {
     }
 
     fn shut_down(&mut self) {
-        let machine = Arc::clone(&self.live.0);
+        let machine = Arc::clone(&self.machine);
         if machine.has_ended.load(Ordering::Acquire) {
             return;
         }
@@ -219,7 +248,7 @@ impl<R: Robot> Deref for Simulation<R> {
     }
 }
 
-impl<R: Robot> Drop for Simulation<R> {
+impl Drop for VirtualRun {
     fn drop(&mut self) {
         self.shut_down();
     }

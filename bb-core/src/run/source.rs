@@ -6,7 +6,6 @@ mod shared;
 use self::shared::Order;
 pub(super) use self::shared::SharedSource;
 pub use self::shared::SourceStatistics;
-use super::Robot;
 use crate::component::{Binding, Next, OptionsList};
 use crate::control::{ComponentOrder, Control};
 use crate::declaration::SensorDeclaration;
@@ -62,127 +61,94 @@ const FARTHEST_NANOS: i64 = 86_400_000_000_000;
 /// Readings at one instant of virtual time before the sensor is taken to be stuck.
 const STUCK_AFTER: u32 = 1_000_000;
 
-struct Running<R: Robot, S: Periodic, P> {
+struct Running<S: Periodic> {
     slot: Slot<S>,
     context: S::Context,
     declaration: &'static SensorDeclaration,
     control: Control,
     environment: Environment,
-    wiring: Arc<R::Wiring>,
-    publish: P,
+    publish: Publish<S::Output>,
     shared: SharedSource,
     due: Option<MonotonicTime>,
     at_one_instant: u32,
 }
 
-/// The sensors and services of a robot, in the order in which they are opened.
-#[allow(missing_debug_implementations)]
-pub struct Sources<R: Robot>(Vec<Box<dyn AnySource<R>>>);
+/// Publishes a reading and runs everything downstream.
+type Publish<T> = Arc<dyn Fn(&Stamped<T>, MonotonicTime) + Send + Sync>;
 
-impl<R: Robot> Sources<R> {
+/// The sensors and services of a robot before they are made, in the order in which they are opened.
+#[allow(missing_debug_implementations)]
+#[derive(Default)]
+pub struct Sources(Vec<Box<dyn AnySource>>);
+
+impl Sources {
     /// Adds one; its readings go to `publish`. `component` is the number of its options, and `publisher` that of its topic.
-    pub fn add<S: Periodic>(
+    pub fn add<S: Periodic, W: Send + Sync + 'static>(
         &mut self,
+        wiring: &Arc<W>,
         declaration: &'static SensorDeclaration,
         component: usize,
         publisher: usize,
         binding: Binding<S::Options>,
-        publish: impl Fn(&R::Wiring, &Stamped<S::Output>, MonotonicTime) + Copy + Send + 'static,
+        publish: fn(&W, &Stamped<S::Output>, MonotonicTime),
     ) {
-        self.0.push(Box::new(OfType::<S, _> { declaration, component, publisher, binding, publish }));
+        let wiring = Arc::clone(wiring);
+        let publish: Publish<S::Output> = Arc::new(move |message, now| publish(&wiring, message, now));
+        self.0.push(Box::new(OfType::<S> { declaration, component, publisher, binding, publish }));
     }
 
     /// Makes all of them.
-    pub(super) fn open(
-        &self,
-        wiring: &Arc<R::Wiring>,
-        options: &OptionsList,
-        assembly: &Assembly,
-    ) -> Vec<Box<dyn Source>> {
-        let mut sources = Vec::new();
-        for source in &self.0 {
-            source.open(wiring, options, assembly, &mut sources);
-        }
-        sources
+    pub(super) fn open(&self, options: &OptionsList, assembly: &Assembly) -> Vec<Box<dyn Source>> {
+        self.0.iter().filter_map(|source| source.open(options, assembly)).collect()
     }
 
     /// By the number of the publisher.
-    pub(super) fn by_publisher(self) -> HashMap<usize, Box<dyn AnySource<R>>> {
+    pub(super) fn by_publisher(self) -> HashMap<usize, Box<dyn AnySource>> {
         self.0.into_iter().map(|source| (source.publisher(), source)).collect()
     }
 }
 
-impl<R: Robot> Default for Sources<R> {
-    fn default() -> Self {
-        Self(Vec::new())
-    }
-}
-
 /// A sensor or a service before it is made, whatever its type.
-pub(super) trait AnySource<R: Robot>: Send {
+pub(super) trait AnySource: Send {
     /// The number of its publisher.
     fn publisher(&self) -> usize;
-    /// Makes it.
-    fn open(
-        &self,
-        wiring: &Arc<R::Wiring>,
-        options: &OptionsList,
-        assembly: &Assembly,
-        sources: &mut Vec<Box<dyn Source>>,
-    );
+    /// Makes it; `None` if it cannot start, or is left out.
+    fn open(&self, options: &OptionsList, assembly: &Assembly) -> Option<Box<dyn Source>>;
     /// Publishes a recorded message; returns `false` if it has another payload.
-    fn feed(&self, wiring: &R::Wiring, message: &DynamicMessage, now: MonotonicTime) -> bool;
+    fn feed(&self, message: &DynamicMessage, now: MonotonicTime) -> bool;
 }
 
-struct OfType<S: Periodic, P> {
+struct OfType<S: Periodic> {
     declaration: &'static SensorDeclaration,
     component: usize,
     publisher: usize,
     binding: Binding<S::Options>,
-    publish: P,
+    publish: Publish<S::Output>,
 }
 
-impl<R, S, P> AnySource<R> for OfType<S, P>
-where
-    R: Robot,
-    S: Periodic,
-    P: Fn(&R::Wiring, &Stamped<S::Output>, MonotonicTime) + Copy + Send + 'static,
-{
+impl<S: Periodic> AnySource for OfType<S> {
     fn publisher(&self) -> usize {
         self.publisher
     }
 
-    fn open(
-        &self,
-        wiring: &Arc<R::Wiring>,
-        options: &OptionsList,
-        assembly: &Assembly,
-        sources: &mut Vec<Box<dyn Source>>,
-    ) {
-        let options = options.of(self.component);
-        assembly.source::<R, S>(self.declaration, options, self.binding, wiring, self.publish, sources);
+    fn open(&self, options: &OptionsList, assembly: &Assembly) -> Option<Box<dyn Source>> {
+        assembly.source::<S>(self.declaration, options.of(self.component), self.binding, &self.publish)
     }
 
-    fn feed(&self, wiring: &R::Wiring, message: &DynamicMessage, now: MonotonicTime) -> bool {
-        let message = message.downcast();
-        message.map(|message| (self.publish)(wiring, message, now)).is_some()
+    fn feed(&self, message: &DynamicMessage, now: MonotonicTime) -> bool {
+        message.downcast().map(|message| (self.publish)(message, now)).is_some()
     }
 }
 
 impl Assembly {
-    /// Makes a sensor or a service and adds it to `sources`; its readings go to `publish`.
-    ///
-    /// The wiring is passed beside the function instead of in a closure. That the wiring is `Send` is known for every
-    /// robot, and need not be proven again for each of its sensors.
-    fn source<R: Robot, S: Periodic>(
+    /// Makes a sensor or a service; its readings go to `publish`.
+    fn source<S: Periodic>(
         &self,
         declaration: &'static SensorDeclaration,
         options: &S::Options,
         binding: Binding<S::Options>,
-        wiring: &Arc<R::Wiring>,
-        publish: impl Fn(&R::Wiring, &Stamped<S::Output>, MonotonicTime) + Send + 'static,
-        sources: &mut Vec<Box<dyn Source>>,
-    ) {
+        publish: &Publish<S::Output>,
+    ) -> Option<Box<dyn Source>> {
         let context = S::context(declaration, self.host.clone());
         let shared = SharedSource::new(declaration.path, declaration.period_nanos.is_some());
         let tell = {
@@ -204,7 +170,7 @@ impl Assembly {
             made.map_err(|failed| failed.fault)
         });
         if made.is_err() {
-            return;
+            return None;
         }
         self.control.look_after(declaration.path, declaration.supervisor, move |order| {
             tell(match order {
@@ -212,27 +178,21 @@ impl Assembly {
                 ComponentOrder::GiveUp => Order::GiveUp,
             });
         });
-        sources.push(Box::new(Running::<R, S, _> {
+        Some(Box::new(Running::<S> {
             slot,
             context,
             declaration,
             control: self.control.clone(),
             environment: self.environment.clone(),
-            wiring: Arc::clone(wiring),
-            publish,
+            publish: Arc::clone(publish),
             shared,
             due: None,
             at_one_instant: 0,
-        }));
+        }))
     }
 }
 
-impl<R, S, P> Running<R, S, P>
-where
-    R: Robot,
-    S: Periodic,
-    P: Fn(&R::Wiring, &Stamped<S::Output>, MonotonicTime) + Send,
-{
+impl<S: Periodic> Running<S> {
     fn clock(&self) -> &Clock {
         self.environment.clock()
     }
@@ -258,7 +218,7 @@ where
             *next = reading.next;
             // A source left running may return after the robot has stopped.
             if let Some(_inside) = self.environment.door().enter() {
-                (self.publish)(&self.wiring, &stamp.message(payload), now);
+                (self.publish)(&stamp.message(payload), now);
             }
         }
         self.next_due(reading.next, due, now)
@@ -360,12 +320,7 @@ fn next_on_grid(due: MonotonicTime, period: i64, now: MonotonicTime) -> (Monoton
     (next, (next.nanos_since(due) / period - 1).max(0).unsigned_abs())
 }
 
-impl<R, S, P> Source for Running<R, S, P>
-where
-    R: Robot,
-    S: Periodic,
-    P: Fn(&R::Wiring, &Stamped<S::Output>, MonotonicTime) + Send,
-{
+impl<S: Periodic> Source for Running<S> {
     fn path(&self) -> &'static str {
         self.declaration.path
     }

@@ -1,9 +1,10 @@
 //! The threads of a robot that runs in real time: one for each sensor and service, one for each estimator with
 //! `runs_on: worker`, and one that keeps time. The pool's threads run the rest.
 
+use super::StartError;
 use super::machine::Machine;
+use super::source::Source;
 use super::timekeeper::keep_time;
-use super::{Robot, Source, StartError};
 use crate::component::Fault;
 use crate::declaration::WorkerDeclaration;
 use crate::fault::guarded;
@@ -17,10 +18,9 @@ use std::time::{Duration, Instant};
 pub(super) type Thread = (&'static str, JoinHandle<()>);
 
 /// Starts the threads that run until the robot stops.
-pub(super) fn serve<R: Robot>(machine: &Arc<Machine<R>>) -> Result<(), StartError> {
-    for number in 0..R::ISLANDS.len() {
-        let Some(island) = machine.island(number) else { continue };
-        let Some(worker) = island.worker() else { continue };
+pub(super) fn serve(machine: &Arc<Machine>) -> Result<(), StartError> {
+    for (number, island) in machine.islands().enumerate() {
+        let Some(worker) = island.declaration().worker else { continue };
         let name = island.declaration().name;
         let served = Arc::clone(machine);
         island.give_to_worker();
@@ -30,7 +30,7 @@ pub(super) fn serve<R: Robot>(machine: &Arc<Machine<R>>) -> Result<(), StartErro
                 served.fault(name, format!("its thread runs as any other: {message}"));
             }
             while let Some(island) = served.island(number).filter(|island| !island.has_retired()) {
-                survive(&served, name, || island.serve(&served.wiring));
+                survive(&served, name, || island.serve());
             }
         })?;
     }
@@ -39,10 +39,7 @@ pub(super) fn serve<R: Robot>(machine: &Arc<Machine<R>>) -> Result<(), StartErro
     Ok(())
 }
 
-pub(super) fn source<R: Robot>(
-    mut source: Box<dyn Source>,
-    machine: &Arc<Machine<R>>,
-) -> Result<Thread, StartError> {
+pub(super) fn source(mut source: Box<dyn Source>, machine: &Machine) -> Result<Thread, StartError> {
     let environment = machine.environment.clone();
     let stop = machine.control.stop_signal().clone();
     let control = machine.control.clone();
@@ -106,7 +103,7 @@ fn spawn(path: &'static str, run: impl FnOnce() + Send + 'static) -> Result<Thre
 }
 
 /// A panic not caught for any component, for example in a payload's code, must not end a thread that serves others.
-fn survive<R: Robot>(machine: &Machine<R>, path: &'static str, run: impl FnOnce()) {
+fn survive(machine: &Machine, path: &'static str, run: impl FnOnce()) {
     let done = contained(&machine.environment, run);
     if let Err(failed) = done {
         machine.fault(path, failed.fault.to_string());

@@ -1,6 +1,5 @@
 //! The timekeeper's thread of a real run: it wakes what is due, watches what is overdue, and runs no user code.
 
-use super::Robot;
 use super::machine::Machine;
 use crate::control::Hanging;
 use crate::journal::Journal;
@@ -33,11 +32,11 @@ struct Seen {
 }
 
 /// Until the robot has ended.
-pub(super) fn keep_time<R: Robot>(machine: &Machine<R>) {
+pub(super) fn keep_time(machine: &Machine) {
     let clock = machine.environment.clock();
-    let mut seen = vec![Seen::default(); R::ISLANDS.len()];
+    let mut seen = vec![Seen::default(); machine.wired.islands.len()];
     let mut reported = vec![None; machine.shared_sources().len()];
-    let mut reported_actuators = vec![None; R::ACTUATORS.len()];
+    let mut reported_actuators = vec![None; machine.robot.actuators.len()];
     let mut reported_commands = Vec::new();
     let mut wall_read = Instant::now();
     let mut looked = Instant::now();
@@ -47,7 +46,7 @@ pub(super) fn keep_time<R: Robot>(machine: &Machine<R>) {
         while control.check_watch(now) {}
         while let Some(number) = machine.environment.agenda().take(now) {
             if let Some(island) = machine.island(number) {
-                island.wake(&machine.wiring, now);
+                island.wake(now);
             }
         }
         while control.wake_sleepers(now) {}
@@ -77,9 +76,9 @@ pub(super) fn keep_time<R: Robot>(machine: &Machine<R>) {
 }
 
 /// Reports estimators that hang, each time once.
-fn look<R: Robot>(machine: &Machine<R>, seen: &mut [Seen], now: MonotonicTime) {
+fn look(machine: &Machine, seen: &mut [Seen], now: MonotonicTime) {
     for (island, seen) in machine.islands().zip(seen) {
-        let turn = island.busy(&machine.wiring).map(|(turn, _)| turn);
+        let turn = island.busy().map(|(turn, _)| turn);
         if turn.is_none() || turn != seen.turn {
             *seen = Seen { turn, since: now, is_reported: false };
             continue;
@@ -96,7 +95,7 @@ fn look<R: Robot>(machine: &Machine<R>, seen: &mut [Seen], now: MonotonicTime) {
 
 /// The same for sensors and services. `reported`: for each source already reported as hanging, when its code was
 /// entered.
-fn look_at_sources<R: Robot>(machine: &Machine<R>, reported: &mut [Option<MonotonicTime>], now: MonotonicTime) {
+fn look_at_sources(machine: &Machine, reported: &mut [Option<MonotonicTime>], now: MonotonicTime) {
     for (source, reported) in machine.shared_sources().iter().zip(reported) {
         let longest = if source.has_rate() { HANGS_AFTER } else { WAITS_TOO_LONG };
         report_hanging(machine, source.path(), source.entered_at(), longest, reported, now);
@@ -104,14 +103,14 @@ fn look_at_sources<R: Robot>(machine: &Machine<R>, reported: &mut [Option<Monoto
 }
 
 /// The same for actuators.
-fn look_at_actuators<R: Robot>(machine: &Machine<R>, reported: &mut [Option<MonotonicTime>], now: MonotonicTime) {
-    for (actuator, reported) in R::all_actuators(&machine.wiring).into_iter().zip(reported) {
+fn look_at_actuators(machine: &Machine, reported: &mut [Option<MonotonicTime>], now: MonotonicTime) {
+    for (actuator, reported) in machine.actuators().into_iter().zip(reported) {
         report_hanging(machine, actuator.path(), actuator.entered_at(), HANGS_AFTER, reported, now);
     }
 }
 
 /// The same for commands: the first hanging execution of each. `reported`: those already reported.
-fn look_at_commands<R: Robot>(machine: &Machine<R>, reported: &mut Vec<u64>, now: MonotonicTime) {
+fn look_at_commands(machine: &Machine, reported: &mut Vec<u64>, now: MonotonicTime) {
     let hanging = machine.control.hanging(now, WAITS_TOO_LONG);
     for Hanging { path, first, duration } in &hanging {
         if !reported.contains(first) {
@@ -122,7 +121,7 @@ fn look_at_commands<R: Robot>(machine: &Machine<R>, reported: &mut Vec<u64>, now
 }
 
 /// Reports that the pool has no threads left for some jobs, and that the journal has ended.
-fn look_at_queues<R: Robot>(machine: &Machine<R>) {
+fn look_at_queues(machine: &Machine) {
     while let Some(message) = machine.control.pool().report() {
         machine.fault("pool", message);
     }
@@ -131,8 +130,8 @@ fn look_at_queues<R: Robot>(machine: &Machine<R>) {
     }
 }
 
-fn report_hanging<R: Robot>(
-    machine: &Machine<R>,
+fn report_hanging(
+    machine: &Machine,
     path: &'static str,
     entered: Option<MonotonicTime>,
     longest: Duration,

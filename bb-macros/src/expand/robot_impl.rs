@@ -25,11 +25,11 @@ pub(super) fn robot_impl(verified: &Verified<'_>, types: &Types<'_>) -> TokenStr
     // In groups: rustc takes longer for one function with all of them.
     let groups = sources.chunks(SIZE).enumerate().map(|(number, sources)| {
         let group = format_ident!("__sources_{number}");
-        quote!(fn #group(sources: &mut __private::Sources<#this>) { #(#sources)* })
+        quote!(fn #group(sources: &mut __private::Sources, wiring: &__private::Arc<__Wiring>) { #(#sources)* })
     });
     let add_sources = (0..sources.len().div_ceil(SIZE)).map(|number| {
         let group = format_ident!("__sources_{number}");
-        quote!(#group(&mut sources);)
+        quote!(#group(&mut sources, wiring);)
     });
     let states = control::states(robot);
     let bound = bound(robot);
@@ -75,7 +75,7 @@ pub(super) fn robot_impl(verified: &Verified<'_>, types: &Types<'_>) -> TokenStr
                 }
             }
 
-            fn sources() -> __private::Sources<Self> {
+            fn sources(wiring: &__private::Arc<__Wiring>) -> __private::Sources {
                 let mut sources = __private::Default::default();
                 #(#add_sources)*
                 sources
@@ -117,7 +117,8 @@ fn source(
     let (component, publish) = (part.position(types.model()), types.publisher(publisher));
     let (kind, binding) = (types.part(part), binding(types, part));
     quote! {
-        sources.add::<__private::#wrapper<#kind>>(
+        sources.add::<__private::#wrapper<#kind>, __Wiring>(
+            wiring,
             #declaration,
             #component,
             #publisher,

@@ -2,10 +2,11 @@
 
 use super::act::Visit;
 use super::{CallError, Key, NodeEntry};
-use crate::declaration::{IslandDeclaration, WorkerDeclaration};
+use crate::declaration::IslandDeclaration;
 use crate::journal::Event;
 use crate::pubsub::DynamicMessage;
 use crate::time::MonotonicTime;
+use std::sync::Arc;
 
 #[cfg(not(loom))]
 use super::{Island, IslandState, IslandWiring, RELAXED, inbox::Pending, inside::Inside, processing::for_all};
@@ -17,14 +18,12 @@ use std::{
 };
 
 /// Finds an island in a wiring.
-pub type IslandOf<W> = fn(&W) -> &dyn AnyIsland<W>;
+pub type IslandOf<W> = fn(&W) -> &dyn IslandIn<W>;
 
 /// The common interface of all islands of a robot with the wiring `W`.
-pub trait AnyIsland<W> {
+pub trait IslandIn<W> {
     /// The island as declared.
     fn declaration(&self) -> IslandDeclaration;
-    /// The numbers of its estimators.
-    fn estimators(&self) -> &'static [usize];
     /// Does any work that is due.
     fn wake(&self, wiring: &W, now: MonotonicTime);
     /// Adds an entry for an estimator.
@@ -35,8 +34,6 @@ pub trait AnyIsland<W> {
     fn retire(&self, wiring: &W, now: MonotonicTime);
     /// Processes waiting entries, unless another thread does.
     fn drain(&self, wiring: &W);
-    /// How its worker runs, if it has one.
-    fn worker(&self) -> Option<WorkerDeclaration>;
     /// Marks the island as served by a worker, see [`Self::serve`].
     fn give_to_worker(&self);
     /// Processes entries on the calling thread until its estimators have stopped.
@@ -67,6 +64,116 @@ pub trait AnyIsland<W> {
     fn replay(&self, wiring: &W, now: MonotonicTime, entry: Replayed<'_>) -> bool;
 }
 
+/// An island with its wiring: the interface used by a run, which knows no type of the robot. See [`IslandIn`] for its methods.
+pub(crate) trait AnyIsland: Send + Sync {
+    fn declaration(&self) -> IslandDeclaration;
+    fn wake(&self, now: MonotonicTime);
+    fn post(&self, now: MonotonicTime, estimator: usize, entry: NodeEntry);
+    fn start(&self, now: MonotonicTime);
+    fn retire(&self, now: MonotonicTime);
+    fn drain(&self);
+    fn give_to_worker(&self);
+    fn serve(&self);
+    fn visit(
+        &self,
+        now: MonotonicTime,
+        estimator: usize,
+        line: Event,
+        visit: &mut Visit<'_>,
+    ) -> Result<(), CallError>;
+    fn busy(&self) -> Option<(u64, usize)>;
+    fn entered_at(&self) -> MonotonicTime;
+    fn is_inside(&self) -> bool;
+    fn has_retired(&self) -> bool;
+    fn is_idle(&self) -> bool;
+    fn begin_replay(&self);
+    fn replay(&self, now: MonotonicTime, entry: Replayed<'_>) -> bool;
+}
+
+/// The islands of a wiring, in the order of their numbers.
+pub(crate) fn islands_in<W: Send + Sync + 'static>(
+    wiring: &Arc<W>,
+    islands: &'static [IslandOf<W>],
+) -> Box<[Box<dyn AnyIsland>]> {
+    let place = |find: &IslandOf<W>| -> Box<dyn AnyIsland> { Box::new(Placed(Arc::clone(wiring), *find)) };
+    islands.iter().map(place).collect()
+}
+
+/// A wiring, and where an island is in it.
+struct Placed<W>(Arc<W>, IslandOf<W>);
+
+impl<W: Send + Sync> AnyIsland for Placed<W> {
+    fn declaration(&self) -> IslandDeclaration {
+        (self.1)(&self.0).declaration()
+    }
+
+    fn wake(&self, now: MonotonicTime) {
+        (self.1)(&self.0).wake(&self.0, now);
+    }
+
+    fn post(&self, now: MonotonicTime, estimator: usize, entry: NodeEntry) {
+        (self.1)(&self.0).post(&self.0, now, estimator, entry);
+    }
+
+    fn start(&self, now: MonotonicTime) {
+        (self.1)(&self.0).start(&self.0, now);
+    }
+
+    fn retire(&self, now: MonotonicTime) {
+        (self.1)(&self.0).retire(&self.0, now);
+    }
+
+    fn drain(&self) {
+        (self.1)(&self.0).drain(&self.0);
+    }
+
+    fn give_to_worker(&self) {
+        (self.1)(&self.0).give_to_worker();
+    }
+
+    fn serve(&self) {
+        (self.1)(&self.0).serve(&self.0);
+    }
+
+    fn visit(
+        &self,
+        now: MonotonicTime,
+        estimator: usize,
+        line: Event,
+        visit: &mut Visit<'_>,
+    ) -> Result<(), CallError> {
+        (self.1)(&self.0).visit(&self.0, now, estimator, line, visit)
+    }
+
+    fn busy(&self) -> Option<(u64, usize)> {
+        (self.1)(&self.0).busy(&self.0)
+    }
+
+    fn entered_at(&self) -> MonotonicTime {
+        (self.1)(&self.0).entered_at()
+    }
+
+    fn is_inside(&self) -> bool {
+        (self.1)(&self.0).is_inside(&self.0)
+    }
+
+    fn has_retired(&self) -> bool {
+        (self.1)(&self.0).has_retired()
+    }
+
+    fn is_idle(&self) -> bool {
+        (self.1)(&self.0).is_idle(&self.0)
+    }
+
+    fn begin_replay(&self) {
+        (self.1)(&self.0).begin_replay(&self.0);
+    }
+
+    fn replay(&self, now: MonotonicTime, entry: Replayed<'_>) -> bool {
+        (self.1)(&self.0).replay(&self.0, now, entry)
+    }
+}
+
 /// An entry of an island in a journal.
 #[derive(Debug)]
 pub enum Replayed<'a> {
@@ -87,13 +194,9 @@ pub enum Replayed<'a> {
 }
 
 #[cfg(not(loom))]
-impl<S: IslandState> AnyIsland<S::Wiring> for Island<S> {
+impl<S: IslandState> IslandIn<S::Wiring> for Island<S> {
     fn declaration(&self) -> IslandDeclaration {
         S::DECLARATION
-    }
-
-    fn estimators(&self) -> &'static [usize] {
-        S::DECLARATION.estimators
     }
 
     fn wake(&self, wiring: &S::Wiring, now: MonotonicTime) {
@@ -116,10 +219,6 @@ impl<S: IslandState> AnyIsland<S::Wiring> for Island<S> {
         if !self.served.load(Ordering::Relaxed) {
             Self::drain(self, wiring);
         }
-    }
-
-    fn worker(&self) -> Option<WorkerDeclaration> {
-        S::DECLARATION.worker
     }
 
     fn give_to_worker(&self) {

@@ -2,12 +2,12 @@
 //! uses them is here, once for all estimators.
 
 use super::act::Act;
-use super::{Island, IslandState, IslandWiring as _, Key};
+use super::{Island, IslandIn, IslandState, IslandWiring as _, Key};
 use crate::component::{Binding, EmittedAt, Estimator, Inputs, OptionsList, Outputs, TakenAt};
 use crate::fault::of_panic;
 use crate::message::{Payload, Stamp, Stamped, copied};
 use crate::node::emission::copy_failed;
-use crate::node::{AnyIsland, Emitting, Next, Node, Turn};
+use crate::node::{Emitting, Next, Node, Turn};
 use crate::pubsub::{DynamicMessage, Topic};
 use crate::time::MonotonicTime;
 use std::panic::resume_unwind;
@@ -204,9 +204,9 @@ fn copy_for<S: IslandState, T: Payload>(
 }
 
 /// The type-erased form of an island of a wiring.
-pub fn island<S: IslandState + 'static>(wiring: &S::Wiring) -> &dyn AnyIsland<S::Wiring>
+pub fn island<S: IslandState + 'static>(wiring: &S::Wiring) -> &dyn IslandIn<S::Wiring>
 where
-    Island<S>: AnyIsland<S::Wiring>,
+    Island<S>: IslandIn<S::Wiring>,
 {
     S::find(wiring)
 }

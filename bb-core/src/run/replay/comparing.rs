@@ -1,13 +1,13 @@
 //! Comparing the outputs of a turn with those in the journal.
 
-use super::{Replay, Robot};
+use super::Replayer;
 use crate::journal::Event;
 
-impl<R: Robot> Replay<R> {
+impl Replayer {
     /// Compares an output with the recorded one.
     pub(super) fn compare(&self, island: usize, publisher: usize, checksum: u64) -> Result<(), String> {
         let path = self.path_of(publisher);
-        match self.live.0.environment.replayed().take(island) {
+        match self.machine.environment.replayed().take(island) {
             Some(again) if again == (publisher, checksum) => Ok(()),
             Some((other, _)) if other == publisher => Err(format!(
                 "`{path}` emits another message than it did: the algorithm is not deterministic{}",
@@ -34,7 +34,7 @@ impl<R: Robot> Replay<R> {
     }
 
     pub(super) fn no_more_outputs_of(&self, island: usize) -> Result<(), String> {
-        let Some((publisher, _)) = self.live.0.environment.replayed().take(island) else { return Ok(()) };
+        let Some((publisher, _)) = self.machine.environment.replayed().take(island) else { return Ok(()) };
         Err(format!("`{}` emits a message more than it did{}", self.path_of(publisher), self.hint(island)))
     }
 

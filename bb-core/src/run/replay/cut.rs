@@ -1,9 +1,9 @@
 //! Whether the journal holds the whole turn of a line.
 
-use super::{Replay, Robot};
+use super::Replayer;
 use crate::journal::{Callback, Entry, Event, Request};
 
-impl<R: Robot> Replay<R> {
+impl Replayer {
     /// Whether a line still lacks the durations of its callbacks, the places of its inputs, or the outputs emitted in
     /// reply to a request.
     pub(super) fn is_open(&self, entry: &Entry) -> bool {
@@ -18,18 +18,18 @@ impl<R: Robot> Replay<R> {
 
     /// Whether the lines are missing that an island writes when that line's turn has ended.
     pub(super) fn has_not_ended(&self, island: usize, line: u64) -> bool {
-        let island = self.live.0.island(island);
+        let island = self.machine.island(island);
         let is_measured = island.is_some_and(|island| island.declaration().is_measured);
-        let routes = self.live.0.environment.joints().routes();
-        let is_placed = island.is_some_and(|island| routes.has_any(island.estimators()));
+        let routes = self.machine.environment.joints().routes();
+        let is_placed = island.is_some_and(|island| routes.has_any(island.declaration().estimators));
         (is_measured && !self.measured.contains_key(&line)) || (is_placed && !self.placed.contains_key(&line))
     }
 
     /// Prepares the journal's data for the turn of a line; returns false if the journal ends before that turn does.
     pub(super) fn prepare(&mut self, island: usize, line: u64) -> bool {
         let is_whole = !self.has_not_ended(island, line);
-        let environment = &self.live.0.environment;
-        for estimator in self.live.0.island(island).map_or(&[][..], |island| island.estimators()) {
+        let environment = &self.machine.environment;
+        for estimator in self.machine.island(island).map_or(&[][..], |island| island.declaration().estimators) {
             environment.node(*estimator).begin_replayed_turn();
         }
         for Callback { estimator, nanos } in self.measured.remove(&line).unwrap_or_default() {

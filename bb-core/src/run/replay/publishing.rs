@@ -1,6 +1,6 @@
 //! Publishing recorded messages of others than estimators.
 
-use super::{Replay, Robot};
+use super::Replayer;
 use crate::fault::{discard, guarded};
 use crate::journal::{Recorded, decoded};
 use crate::node::Replayed;
@@ -8,7 +8,7 @@ use crate::pubsub::DynamicMessage;
 use crate::time::MonotonicTime;
 use std::sync::Arc;
 
-impl<R: Robot> Replay<R> {
+impl Replayer {
     /// Publishes an estimator's output in reply to a request that the journal does not hold.
     pub(super) fn emit(
         &self,
@@ -20,18 +20,18 @@ impl<R: Robot> Replay<R> {
         let message = self.message(publisher, message)?;
         let (number, island) = self.emitter(publisher).ok_or("the robot has no such publisher")?;
         if is_first {
-            self.live.0.environment.node(number).counters().emitted.increment();
+            self.machine.environment.node(number).counters().emitted.increment();
         }
         let played = self.island(island, time, Replayed::Emission(&message));
         discard(message);
         played?;
         // It matches the journal.
-        let _ = self.live.0.environment.replayed().take(island);
+        let _ = self.machine.environment.replayed().take(island);
         Ok(())
     }
 
     pub(super) fn actuated(&self, number: usize, message: Recorded) -> Result<(), String> {
-        let actuators = R::all_actuators(&self.live.0.wiring);
+        let actuators = self.machine.actuators();
         let actuator = actuators.get(number).ok_or("the robot has no such actuator")?;
         let message = decoded(actuator.any_topic(), message).map_err(|error| error.to_string())?;
         let mut is_known = true;
@@ -41,9 +41,9 @@ impl<R: Robot> Replay<R> {
     }
 
     pub(super) fn publish_own(&self, path: &'static str, message: Recorded) -> Result<(), String> {
-        let registry = &self.live.0.control.topics().registry;
+        let registry = &self.machine.control.topics().registry;
         if !registry.has(path) {
-            R::all_actuators(&self.live.0.wiring).iter().for_each(|actuator| actuator.announce(path));
+            self.machine.actuators().iter().for_each(|actuator| actuator.announce(path));
         }
         let topics = registry.topics();
         let topic = match (topics.iter().find(|topic| topic.path() == path), &message) {
@@ -64,7 +64,7 @@ impl<R: Robot> Replay<R> {
     }
 
     pub(super) fn message(&self, publisher: usize, message: Recorded) -> Result<DynamicMessage, String> {
-        let topics = R::all_topics(R::wired_topics(&self.live.0.wiring));
+        let topics = self.machine.wired.topics();
         let topic = topics.get(publisher).ok_or("the robot has no such publisher")?;
         decoded(*topic, message).map_err(|error| error.to_string())
     }

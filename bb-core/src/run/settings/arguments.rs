@@ -3,6 +3,9 @@
 use super::SettingsError;
 use super::assign::{Assignment, assign};
 use super::error::Place;
+use super::list::list;
+use super::schema::settings_schema;
+use crate::run::draft::Draft;
 use crate::run::{Builder, Robot};
 use std::ffi::OsString;
 use std::io::{ErrorKind, Write};
@@ -48,17 +51,26 @@ impl<R: Robot> Builder<R> {
         &mut self,
         arguments: impl IntoIterator<Item = OsString>,
     ) -> Result<Option<Vec<OsString>>, SettingsError> {
+        self.draft.take_arguments(&mut arguments.into_iter())
+    }
+}
+
+impl Draft {
+    fn take_arguments(
+        &mut self,
+        arguments: &mut dyn Iterator<Item = OsString>,
+    ) -> Result<Option<Vec<OsString>>, SettingsError> {
         let mut read = Arguments::default();
-        read.read(arguments.into_iter())?;
+        read.read(arguments)?;
         for file in &read.files {
             self.load_file(file.as_ref())?;
         }
         assign(self, &read.settings)?;
         if read.lists {
-            say(&self.settings().to_string())?;
+            say(&list(self).to_string())?;
         }
         if read.shows_schema {
-            say(&format!("{}\n", R::settings_schema()))?;
+            say(&format!("{}\n", settings_schema(self.robot, (self.declared_options)())))?;
         }
         Ok((!read.lists && !read.shows_schema).then_some(read.others))
     }
@@ -84,7 +96,7 @@ struct Arguments {
 }
 
 impl Arguments {
-    fn read(&mut self, mut arguments: impl Iterator<Item = OsString>) -> Result<(), SettingsError> {
+    fn read(&mut self, arguments: &mut dyn Iterator<Item = OsString>) -> Result<(), SettingsError> {
         while let Some(argument) = arguments.next() {
             let Some(text) = argument.to_str() else {
                 self.others.push(argument);
@@ -95,8 +107,8 @@ impl Arguments {
                 _ => (text, None),
             };
             match name {
-                "--config" => self.files.push(value_of(name, value, &mut arguments)?),
-                "--set" => self.settings.push(setting(value_of(name, value, &mut arguments)?)?),
+                "--config" => self.files.push(value_of(name, value, arguments)?),
+                "--set" => self.settings.push(setting(value_of(name, value, arguments)?)?),
                 "--list" => self.lists = true,
                 "--schema" => self.shows_schema = true,
                 "--" => {
@@ -114,7 +126,7 @@ impl Arguments {
 fn value_of(
     name: &str,
     value: Option<OsString>,
-    arguments: &mut impl Iterator<Item = OsString>,
+    arguments: &mut dyn Iterator<Item = OsString>,
 ) -> Result<OsString, SettingsError> {
     let example = if name == "--set" { "PATH=VALUE" } else { "FILE" };
     value.or_else(|| arguments.next()).ok_or_else(|| wrong(format!("`{name}` needs a value: `{name} {example}`")))

@@ -2,12 +2,12 @@
 
 use super::error::{Place, SettingProblem, SettingsError};
 use crate::component::{AnyOptions, OptionsList, quantity};
-use crate::declaration::{ParameterDeclaration, ParameterDefault, unit};
+use crate::declaration::{ParameterDeclaration, ParameterDefault, RobotDeclaration, unit};
 use crate::event::ParameterValue;
 use crate::message::codec::{from_json, to_json};
 use crate::message::nearest::{nearest, nearest_path};
-use crate::run::bound::{bound_to, component_paths, fields, refused_by_bound};
-use crate::run::{Builder, Robot};
+use crate::run::bound::{bound_to, fields, refused_by_bound};
+use crate::run::draft::Draft;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// How a file writes `None` for an option that may be `None`.
@@ -43,12 +43,13 @@ impl Assignment {
 }
 
 /// The paths of all settings.
-pub(super) fn names<R: Robot>(builder: &mut Builder<R>) -> BTreeSet<String> {
-    let paths = component_paths::<R>().into_iter().enumerate();
+pub(super) fn names(draft: &mut Draft) -> BTreeSet<String> {
+    let robot = draft.robot;
+    let paths = robot.component_paths().into_iter().enumerate();
     let options = paths.flat_map(|(component, path)| {
-        fields(&mut builder.options, component).iter().map(move |field| format!("{path}/{}", field.name))
+        fields(&mut draft.options, component).iter().map(move |field| format!("{path}/{}", field.name))
     });
-    options.chain(R::PARAMETERS.iter().map(|declared| declared.path.to_owned())).collect()
+    options.chain(robot.parameters.iter().map(|declared| declared.path.to_owned())).collect()
 }
 
 /// Whether a setting is below this path.
@@ -59,23 +60,24 @@ pub(super) fn is_beginning(names: &BTreeSet<String>, path: &str) -> bool {
 }
 
 /// Sets all of `assignments`, or none if one of them is wrong.
-pub(super) fn assign<R: Robot>(builder: &mut Builder<R>, assignments: &[Assignment]) -> Result<(), SettingsError> {
-    let names = names(builder);
-    let paths = component_paths::<R>();
+pub(super) fn assign(draft: &mut Draft, assignments: &[Assignment]) -> Result<(), SettingsError> {
+    let robot = draft.robot;
+    let names = names(draft);
+    let paths = robot.component_paths();
     let mut problems = Vec::new();
     let mut unknown_names = 0;
-    let mut parameters = builder.parameters.clone();
+    let mut parameters = draft.parameters.clone();
     // The changed options of a component, and what changed them.
     let mut changed: BTreeMap<usize, (Box<dyn AnyOptions>, Vec<&Assignment>)> = BTreeMap::new();
     for assignment in assignments {
-        let target = target::<R>(&paths, &mut builder.options, &assignment.path);
+        let target = target(robot, &paths, &mut draft.options, &assignment.path);
         let result = match target {
-            Some(Target::Parameter(number)) => parameter(&R::PARAMETERS[number], assignment).map(|value| {
+            Some(Target::Parameter(number)) => parameter(&robot.parameters[number], assignment).map(|value| {
                 parameters[number] = value;
             }),
-            Some(Target::Option { component, field }) => match bound_to::<R>(component, &assignment.path) {
+            Some(Target::Option { component, field }) => match bound_to(robot, component, &assignment.path) {
                 Some(bound) => Err(format!("is bound to `{bound}`; set that")),
-                None => match builder.options.any(component) {
+                None => match draft.options.any(component) {
                     Some(options) => {
                         let (copy, by) = changed.entry(component).or_insert_with(|| (options.copy(), Vec::new()));
                         by.push(assignment);
@@ -105,9 +107,10 @@ pub(super) fn assign<R: Robot>(builder: &mut Builder<R>, assignments: &[Assignme
             }
         }
         for assignment in assignments {
-            if let Some(message) = refused_by_bound::<R>(
-                &mut builder.options,
-                |path| builder.replacements.contains_key(path),
+            if let Some(message) = refused_by_bound(
+                robot,
+                &mut draft.options,
+                &|path| draft.replacements.contains_key(path),
                 &parameters,
                 &assignment.path,
             ) {
@@ -119,11 +122,11 @@ pub(super) fn assign<R: Robot>(builder: &mut Builder<R>, assignments: &[Assignme
         return Err(SettingsError::new(problems));
     }
     for (component, (copy, _)) in changed {
-        if let Some(options) = builder.options.any(component) {
+        if let Some(options) = draft.options.any(component) {
             options.replace(copy);
         }
     }
-    builder.parameters = parameters;
+    draft.parameters = parameters;
     Ok(())
 }
 
@@ -132,8 +135,8 @@ enum Target {
     Option { component: usize, field: usize },
 }
 
-fn target<R: Robot>(paths: &[&str], options: &mut OptionsList, path: &str) -> Option<Target> {
-    if let Some(number) = R::PARAMETERS.iter().position(|declared| declared.path == path) {
+fn target(robot: &RobotDeclaration, paths: &[&str], options: &mut OptionsList, path: &str) -> Option<Target> {
+    if let Some(number) = robot.parameters.iter().position(|declared| declared.path == path) {
         return Some(Target::Parameter(number));
     }
     let (component, name) = path.rsplit_once('/')?;

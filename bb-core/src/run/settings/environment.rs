@@ -4,6 +4,7 @@ use super::assign::{self, Assignment};
 use super::error::{Place, SettingProblem};
 use super::{SettingsError, assign::names};
 use crate::message::nearest::nearest;
+use crate::run::draft::Draft;
 use crate::run::{Builder, Robot};
 use std::collections::BTreeMap;
 use std::ffi::{OsStr, OsString};
@@ -49,8 +50,13 @@ impl<R: Robot> Builder<R> {
         variables: impl IntoIterator<Item = (N, V)>,
     ) -> Result<(), SettingsError> {
         // In the order of their names: that of the environment is arbitrary.
-        let variables: BTreeMap<OsString, OsString> =
-            variables.into_iter().map(|(name, value)| (name.into(), value.into())).collect();
+        let variables = variables.into_iter().map(|(name, value)| (name.into(), value.into()));
+        self.draft.load_environment(&variables.collect())
+    }
+}
+
+impl Draft {
+    fn load_environment(&mut self, variables: &BTreeMap<OsString, OsString>) -> Result<(), SettingsError> {
         if let Some(files) = variables.get(OsStr::new(CONFIG)) {
             for file in std::env::split_paths(files).filter(|file| !file.as_os_str().is_empty()) {
                 self.load_file(&file)?;
@@ -63,7 +69,7 @@ impl<R: Robot> Builder<R> {
         }
         let mut assignments: Vec<Assignment> = Vec::new();
         let mut problems = Vec::new();
-        for (name, value) in &variables {
+        for (name, value) in variables {
             let Some(name) = name.to_str() else { continue };
             let Some(suffix) = name.strip_prefix(SET) else { continue };
             let place = Place::Variable(name.into());

@@ -5,8 +5,8 @@ use crate::component::{OptionField, SettingKind};
 use crate::declaration::{Range, unit};
 use crate::event::ParameterValue;
 use crate::message::codec::to_json;
-use crate::run::bound::{bound_to, component_paths};
-use crate::run::{Builder, Robot};
+use crate::run::bound::bound_to;
+use crate::run::draft::Draft;
 use std::fmt;
 
 /// All settings of a robot with their values. Its `Display` is a TOML file, with the doc, the range and the unit of each.
@@ -32,8 +32,9 @@ struct Line {
     limits: String,
 }
 
-pub(super) fn list<R: Robot>(builder: &mut Builder<R>) -> SettingsList {
-    let names = names(builder);
+pub(super) fn list(draft: &mut Draft) -> SettingsList {
+    let robot = draft.robot;
+    let names = names(draft);
     // A table with the same name as a setting would define that name twice.
     let header = |path: &str| {
         let is_in_the_way =
@@ -45,10 +46,10 @@ pub(super) fn list<R: Robot>(builder: &mut Builder<R>) -> SettingsList {
         }
     };
     let mut tables = Vec::new();
-    let mut declared = R::options();
-    let paths = component_paths::<R>();
+    let mut declared = (draft.declared_options)();
+    let paths = robot.component_paths();
     for (number, path) in paths.into_iter().enumerate() {
-        let Some(options) = builder.options.any(number) else { continue };
+        let Some(options) = draft.options.any(number) else { continue };
         let mut declared = declared.any(number);
         let mut is_declared_none = |index| {
             let declared = declared.as_mut().and_then(|options| options.setting(index));
@@ -58,7 +59,7 @@ pub(super) fn list<R: Robot>(builder: &mut Builder<R>) -> SettingsList {
         let settings: Vec<Line> = fields
             .filter_map(|(index, field)| {
                 let mut setting = options.setting(index)?;
-                let value = match (bound_to::<R>(number, field.name), setting.kind(), setting.value()) {
+                let value = match (bound_to(robot, number, field.name), setting.kind(), setting.value()) {
                     (Some(parameter), ..) => Err(format!("is bound to {parameter}")),
                     (None, SettingKind::Code, _) => Err("can be set in code only".to_owned()),
                     (None, _, None) => Err("has a value that cannot be written".to_owned()),
@@ -81,7 +82,7 @@ pub(super) fn list<R: Robot>(builder: &mut Builder<R>) -> SettingsList {
             tables.push(Table { header: header(path), settings });
         }
     }
-    for (declared, value) in R::PARAMETERS.iter().zip(&builder.parameters) {
+    for (declared, value) in robot.parameters.iter().zip(&draft.parameters) {
         let (group, name) = declared.path.rsplit_once('/').unwrap_or(("", declared.path));
         let value = match value {
             ParameterValue::Float(value) if !declared.unit.is_empty() => format!("\"{value} {}\"", declared.unit),

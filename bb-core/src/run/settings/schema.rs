@@ -1,32 +1,31 @@
 //! The JSON Schema of a robot's settings: for editors, and for programs that write them.
 
-use crate::component::{OptionField, Setting, SettingKind};
+use crate::component::{OptionField, OptionsList, Setting, SettingKind};
+use crate::declaration::RobotDeclaration;
 use crate::declaration::schema::{number, parameter_schema, quantity, with_notes};
 use crate::declaration::unit::si_unit;
 use crate::message::codec::{Definitions, Shape, document, member, to_json};
-use crate::run::Robot;
-use crate::run::bound::{bound_to, component_paths};
+use crate::run::bound::bound_to;
 use std::collections::BTreeMap;
 
-pub(crate) fn settings_schema<R: Robot>() -> String {
+pub(crate) fn settings_schema(robot: &RobotDeclaration, mut options: OptionsList) -> String {
     let mut definitions = Definitions::default();
     let mut root = BTreeMap::new();
-    let mut options = R::options();
-    for (number, path) in component_paths::<R>().into_iter().enumerate() {
+    for (number, path) in robot.component_paths().into_iter().enumerate() {
         let Some(options) = options.any(number) else { continue };
         for (index, field) in options.fields().iter().enumerate() {
             let Some(setting) = options.setting(index) else { continue };
-            if bound_to::<R>(number, field.name).is_none()
+            if bound_to(robot, number, field.name).is_none()
                 && let Some(schema) = of_option(field, &*setting, &mut definitions)
             {
                 insert(&mut root, &format!("{path}/{}", field.name), schema);
             }
         }
     }
-    for declared in R::PARAMETERS {
+    for declared in robot.parameters {
         insert(&mut root, declared.path, parameter_schema(declared));
     }
-    document(&member("title", R::NAME), &object(&root), definitions)
+    document(&member("title", robot.name), &object(&root), definitions)
 }
 
 /// A setting, or a table of further ones.

@@ -3,7 +3,7 @@
 use crate::component::{Fault, ParameterStore};
 use crate::declaration::ParameterError;
 use crate::event::ParameterValue;
-use crate::run::bound::refused_by_bound;
+use crate::run::draft::Draft;
 use crate::run::keeper::Kept;
 use crate::run::{Builder, Robot};
 
@@ -25,6 +25,12 @@ impl<R: Robot> Builder<R> {
     /// # Errors
     /// The store cannot be read.
     pub fn keep_parameters(&mut self, store: impl ParameterStore) -> Result<Vec<ParameterError>, Fault> {
+        self.draft.keep_parameters(Box::new(store))
+    }
+}
+
+impl Draft {
+    fn keep_parameters(&mut self, store: Box<dyn ParameterStore>) -> Result<Vec<ParameterError>, Fault> {
         let kept = Kept::load(store)?;
         let values = kept.values().iter();
         let unused = values.filter_map(|(path, value)| self.take_stored(path, value).err()).collect();
@@ -33,20 +39,9 @@ impl<R: Robot> Builder<R> {
     }
 
     fn take_stored(&mut self, path: &str, value: &ParameterValue) -> Result<(), ParameterError> {
-        let refuse = |message: String| ParameterError { path: path.to_owned(), message };
-        let number = R::PARAMETERS.iter().position(|declared| declared.path == path);
-        let number = number.ok_or_else(|| refuse("no such parameter is declared".to_owned()))?;
-        R::PARAMETERS[number].check(value)?;
-        let mut parameters = self.parameters.clone();
-        if let Some(slot) = parameters.get_mut(number) {
-            *slot = value.clone();
-        }
-        if let Some(message) =
-            refused_by_bound::<R>(&mut self.options, |path| self.replacements.contains_key(path), &parameters, path)
-        {
-            return Err(refuse(message));
-        }
-        self.parameters = parameters;
-        Ok(())
+        let number = self.robot.parameters.iter().position(|declared| declared.path == path);
+        let refuse =
+            || ParameterError { path: path.to_owned(), message: "no such parameter is declared".to_owned() };
+        self.set_parameter(number.ok_or_else(refuse)?, value.clone())
     }
 }

@@ -1269,11 +1269,13 @@ const _: () = {
             }
         }
     }
-    fn __sources_0(sources: &mut __private::Sources<__Rover_2_11::Rover>) {
+    fn __sources_0(sources: &mut __private::Sources, wiring: &__private::Arc<__Wiring>) {
         sources
             .add::<
                 __private::AsSensor<__Rover_2_11__sensor_battery>,
+                __Wiring,
             >(
+                wiring,
                 &__SENSORS[0usize],
                 0usize,
                 0usize,
@@ -1283,7 +1285,9 @@ const _: () = {
         sources
             .add::<
                 __private::AsSensor<__Rover_2_11__sensor_base_pan_encoder>,
+                __Wiring,
             >(
+                wiring,
                 &__SENSORS[2usize],
                 2usize,
                 7usize,
@@ -1293,7 +1297,9 @@ const _: () = {
         sources
             .add::<
                 __private::AsSensor<__Rover_2_11__sensor_base_imu>,
+                __Wiring,
             >(
+                wiring,
                 &__SENSORS[1usize],
                 1usize,
                 3usize,
@@ -1303,7 +1309,9 @@ const _: () = {
         sources
             .add::<
                 __private::AsService<__Rover_2_11__controller_stability>,
+                __Wiring,
             >(
+                wiring,
                 &__SERVICES[0usize],
                 6usize,
                 1usize,
@@ -1313,7 +1321,9 @@ const _: () = {
         sources
             .add::<
                 __private::AsService<__Rover_2_11__bridge_ros>,
+                __Wiring,
             >(
+                wiring,
                 &__SERVICES[1usize],
                 7usize,
                 2usize,
@@ -1356,9 +1366,9 @@ const _: () = {
                 environment: __private::Clone::clone(assembly.environment()),
             }
         }
-        fn sources() -> __private::Sources<Self> {
+        fn sources(wiring: &__private::Arc<__Wiring>) -> __private::Sources {
             let mut sources = __private::Default::default();
-            __sources_0(&mut sources);
+            __sources_0(&mut sources, wiring);
             sources
         }
         fn wired_topics(wiring: &__Wiring) -> &__Topics {

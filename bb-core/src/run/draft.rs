@@ -1,0 +1,299 @@
+//! A robot before it starts, without its type: its settings, and how it is assembled from them.
+//!
+//! It is assembled in stages, each of which makes what the next ones need: [`Assembling::new`] the control state, the
+//! environment of the islands and the robot as components see it; [`Assembling::make`] the components, in whose `init` user
+//! code runs for the first time; then the journal begins, and the store of parameters. An error in any of them ends in
+//! [`Assembling::abandon`], which makes safe what components have started.
+
+use super::bound::refused_by_bound;
+use super::describe::describe;
+use super::host::{RobotHost, WiredIslands};
+use super::joints::known_joints;
+use super::keeper::{Keeper, Kept, PATH as KEEPER};
+use super::machine::Machine;
+use super::running::STOP_WITHIN;
+use super::source::{Assembly, Source};
+use super::wired::{Unwired, Wired};
+use super::{StartError, Supervision};
+use crate::component::replacement::{Replacement, Replacements};
+use crate::component::shared::SharedValues;
+use crate::component::{Fault, Host, OptionsList};
+use crate::control::{Control, Parts, SystemTopics};
+use crate::declaration::{ParameterError, ParameterValues, RobotDeclaration};
+use crate::event::ParameterValue;
+use crate::fault::caught;
+use crate::joints::JointSettings;
+use crate::journal::{Event, Journal, Sink};
+use crate::lifecycle::HostHandle;
+use crate::message::{Origin, Stamp};
+use crate::node::{Environment, EnvironmentParts, Mode, SharedNode, contained};
+use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Payloads, Registry, Select};
+use crate::schedule::{Agenda, Lane};
+use crate::telemetry::Telemetry;
+use crate::time::Clock;
+use std::collections::HashMap;
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex, OnceLock, Weak};
+use std::time::Instant;
+
+/// The settings of a robot that has not started.
+pub(super) struct Draft {
+    pub(super) robot: &'static RobotDeclaration,
+    /// The options as declared.
+    pub(super) declared_options: fn() -> OptionsList,
+    pub(super) options: OptionsList,
+    pub(super) system: Arc<SystemTopics>,
+    pub(super) parameters: Vec<ParameterValue>,
+    pub(super) supervision: Supervision,
+    pub(super) joints: JointSettings,
+    pub(super) journal: Option<Sink>,
+    pub(super) telemetry: Telemetry,
+    pub(super) replacements: HashMap<&'static str, Replacement>,
+    pub(super) kept: Option<Kept>,
+    pub(super) node: &'static str,
+}
+
+impl Draft {
+    pub(super) fn new(
+        robot: &'static RobotDeclaration,
+        declared_options: fn() -> OptionsList,
+        unwired: &dyn Unwired,
+    ) -> Self {
+        let mut system = SystemTopics::new(robot);
+        let topics = unwired.topics().into_iter().chain(system.all());
+        let paths: Vec<&'static str> = topics.map(|topic| topic.path()).collect();
+        system.registry =
+            Registry::new(paths.into_iter().chain(robot.actuators.iter().map(|actuator| actuator.path)));
+        Self {
+            robot,
+            declared_options,
+            options: declared_options(),
+            system: Arc::new(system),
+            parameters: robot.parameters.iter().map(|parameter| parameter.default.into()).collect(),
+            supervision: Supervision::default(),
+            joints: JointSettings::default(),
+            journal: None,
+            telemetry: Telemetry::default(),
+            replacements: HashMap::new(),
+            kept: None,
+            node: "local",
+        }
+    }
+
+    /// Sets the parameter with that number.
+    pub(super) fn set_parameter(&mut self, number: usize, value: ParameterValue) -> Result<(), ParameterError> {
+        let Some(declared) = self.robot.parameters.get(number) else { return Ok(()) };
+        declared.check(&value)?;
+        let mut parameters = self.parameters.clone();
+        if let Some(slot) = parameters.get_mut(number) {
+            *slot = value;
+        }
+        let is_replaced = |path: &str| self.replacements.contains_key(path);
+        let refused = refused_by_bound(self.robot, &mut self.options, &is_replaced, &parameters, declared.path);
+        if let Some(message) = refused {
+            return Err(ParameterError { path: declared.path.to_owned(), message });
+        }
+        self.parameters = parameters;
+        Ok(())
+    }
+
+    pub(super) fn publish_journal(&mut self) {
+        let system = Arc::clone(&self.system);
+        let origin = self.origin();
+        self.journal = Some(Arc::new(move |entry| {
+            let stamp = Stamp { monotonic_time: entry.time, origin, ..Stamp::default() };
+            system.journal.publish(&stamp.message(entry));
+        }));
+    }
+
+    /// Subscribes to `topics` and those that every robot has.
+    pub(super) fn subscribe_any<'a>(
+        &'a self,
+        mut topics: Vec<&'a dyn AnyTopic>,
+        select: Select<'_>,
+        payloads: &Payloads<'_>,
+        overflow: Overflow,
+    ) -> DynamicSubscription {
+        topics.extend(self.system.all());
+        self.system.registry.subscribe(&topics, select, payloads, overflow)
+    }
+
+    fn origin(&self) -> Origin {
+        Origin { robot: self.robot.name, node: self.node }
+    }
+
+    /// Makes the components. Dropping the result stops in order what has started.
+    pub(super) fn assemble(
+        mut self,
+        unwired: &mut dyn Unwired,
+        clock: Clock,
+        mode: Mode,
+    ) -> Result<(Machine, Vec<Box<dyn Source>>), StartError> {
+        let assembling = Assembling::new(&mut self, unwired, clock, mode)?;
+        let mut facts = describe(self.robot, &unwired.topics(), &assembling.control);
+        facts.push(format!("supervision: {:?}", self.supervision));
+        let kept = if mode == Mode::Replay { None } else { self.kept.take() };
+        if let Some(kept) = &kept {
+            kept.note(&assembling.control);
+        }
+        let (wired, sources) = assembling.make(unwired, &self.options)?;
+        if let Err((path, fault)) = assembling.begin_journal(&facts) {
+            return Err(assembling.abandon(path, fault));
+        }
+        for fact in facts {
+            assembling.environment.add_declared_fact(fact);
+        }
+        let keeper = match kept.map(|kept| Keeper::start(kept, &assembling.control)) {
+            Some(Err(fault)) => return Err(assembling.abandon(KEEPER, fault)),
+            keeper => keeper.and_then(Result::ok),
+        };
+        Ok((assembling.complete(wired, &sources, keeper), sources))
+    }
+}
+
+/// The state that components are made with.
+struct Assembling {
+    robot: &'static RobotDeclaration,
+    mode: Mode,
+    control: Control,
+    environment: Environment,
+    host: Arc<dyn Host>,
+    /// Weak, since components with a bus are part of the wiring.
+    place: Place,
+}
+
+/// Where the wiring is, once there is one.
+pub(super) type Place = Arc<OnceLock<Weak<Wired>>>;
+
+impl Assembling {
+    fn new(draft: &mut Draft, unwired: &dyn Unwired, clock: Clock, mode: Mode) -> Result<Self, StartError> {
+        let (robot, origin, supervision) = (draft.robot, draft.origin(), draft.supervision);
+        let sink = if mode == Mode::Replay { None } else { draft.journal.take() };
+        let journal = sink.map(|sink| Journal::new(sink, clock.wall_offset_nanos()));
+        let telemetry = (!draft.telemetry.is_empty()).then(|| std::mem::take(&mut draft.telemetry));
+        let nodes = robot.estimators.iter().enumerate();
+        let nodes: Box<[SharedNode]> = nodes.map(|(number, declared)| SharedNode::new(number, declared)).collect();
+        let control = Control::new(Parts {
+            declared: robot,
+            mode,
+            topics: Arc::clone(&draft.system),
+            clock: clock.clone(),
+            origin,
+            commands: unwired.commands(&draft.options),
+            parameters: ParameterValues::new(std::mem::take(&mut draft.parameters)),
+            supervision,
+            nodes: nodes.clone(),
+            journal: journal.clone(),
+            telemetry: telemetry.clone(),
+        });
+        if let Err((path, message)) = control.check_commands() {
+            return Err(StartError::component(path, Fault::new(message)));
+        }
+        let joints = known_joints(robot, &unwired.topics(), draft.joints, clock.clone())
+            .map_err(|error| StartError::component(robot.name, Fault::from(error)))?;
+        let replacements: Replacements = Arc::new(std::mem::take(&mut draft.replacements));
+        let parts = EnvironmentParts {
+            mode,
+            joints: joints.clone(),
+            replacements: Arc::clone(&replacements),
+            origin,
+            overseer: Arc::new(control.clone()),
+            supervision,
+            agenda: Agenda::new(control.bell().clone()),
+            pool: control.pool().clone(),
+            journal: journal.clone(),
+            telemetry,
+            start: clock.now(),
+            clock,
+        };
+        let environment = Environment::new(parts, nodes);
+        let place = Place::default();
+        let host: Arc<dyn Host> = Arc::new(RobotHost {
+            robot,
+            control: control.clone(),
+            journal,
+            door: environment.door().clone(),
+            joints,
+            shared: SharedValues::default(),
+            replacements,
+            wired: Arc::clone(&place),
+        });
+        control.set_host(&host);
+        control.set_islands(Box::new(WiredIslands { robot, wired: Arc::clone(&place) }));
+        let drained = Arc::clone(&place);
+        environment.set_drain(move |environment, island| {
+            let wired = drained.get().and_then(Weak::upgrade);
+            if let Some(island) = wired.as_ref().and_then(|wired| wired.island(island)) {
+                // The component is unknown, for example if the panic is in the code of a payload in an inbox.
+                if let Err(failed) = contained(environment, || island.drain()) {
+                    tracing::error!(fault = %failed.fault, "an island was left");
+                }
+            }
+        });
+        Ok(Self { robot, mode, control, environment, host, place })
+    }
+
+    /// Makes the components.
+    fn make(
+        &self,
+        unwired: &mut dyn Unwired,
+        options: &OptionsList,
+    ) -> Result<(Arc<Wired>, Vec<Box<dyn Source>>), StartError> {
+        let assembly = Assembly {
+            environment: self.environment.clone(),
+            control: self.control.clone(),
+            host: HostHandle(Arc::clone(&self.host)),
+        };
+        let made = caught(|| {
+            let wired = Arc::new(unwired.wire(options, &assembly));
+            // It is set once.
+            let _ = self.place.set(Arc::downgrade(&wired));
+            let is_replay = self.mode == Mode::Replay;
+            let sources = if is_replay { Vec::new() } else { wired.sources().open(options, &assembly) };
+            Ok((wired, sources))
+        });
+        if let Some(refusal) = self.environment.take_refusal() {
+            return Err(self.abandon(refusal.path, refusal.fault));
+        }
+        // Each component's code is guarded separately, with its path. This is for anything else.
+        made.map_err(|failed| self.abandon(self.robot.name, failed.fault))
+    }
+
+    /// Writes the first line of the journal, and lets its sink begin.
+    fn begin_journal(&self, facts: &[String]) -> Result<(), (&'static str, Fault)> {
+        let Some(journal) = self.environment.journal() else { return Ok(()) };
+        let declaration = facts.iter().cloned().chain(self.environment.facts()).collect();
+        let wall_offset_nanos = self.environment.clock().wall_offset_nanos();
+        let begin = Event::Begin { declaration, wall_offset_nanos, is_virtual: self.mode == Mode::Virtual };
+        journal.begin(self.environment.start(), begin);
+        match self.mode {
+            Mode::Real => journal.start().map_err(|error| ("journal", Fault::from(error))),
+            _ => Ok(()),
+        }
+    }
+
+    /// Makes safe what components have started in `init`; returns why the robot does not start.
+    fn abandon(&self, path: &'static str, fault: Fault) -> StartError {
+        self.control.begin_stop();
+        self.control.wait_until_disarmed();
+        self.control.drop_hooks();
+        self.control.pool().close();
+        // What hangs is left running. There is no report; the error says why the robot does not start.
+        let _ = self.control.pool().left(Lane::User, Instant::now() + STOP_WITHIN);
+        StartError::component(path, fault)
+    }
+
+    fn complete(self, wired: Arc<Wired>, sources: &[Box<dyn Source>], keeper: Option<Keeper>) -> Machine {
+        Machine {
+            robot: self.robot,
+            wired,
+            environment: self.environment,
+            control: self.control,
+            host: self.host,
+            sources: Mutex::new(sources.iter().map(|source| source.shared()).collect()),
+            has_ended: AtomicBool::new(false),
+            last_report: OnceLock::new(),
+            keeper: Mutex::new(keeper),
+        }
+    }
+}
