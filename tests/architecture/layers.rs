@@ -111,6 +111,16 @@ fn an_import_that_leads_up_is_found() {
     assert_eq!(upward_in(&with("use crate::prelude::*;")), ["message::codec imports from crate"]);
 }
 
+#[test]
+fn the_picture_of_the_layers_is_that_of_the_code() {
+    let text = std::fs::read_to_string(root().join("ARCHITECTURE.md")).expect("it is there");
+    let picture = text.split("## Layers").nth(1).and_then(|rest| rest.split("```").nth(1)).expect("a picture");
+    let named = picture.match_indices("[\"").filter_map(|(at, _)| picture[..at].split([' ', '\n']).next_back());
+    let drawn: Vec<&str> = named.filter(|name| picture.contains(&format!("{name}[\"{name}:"))).collect();
+    let layers: Vec<&str> = LAYERS.into_iter().rev().collect();
+    assert_eq!(drawn, layers);
+}
+
 /// The modules of the algorithms, from the bottom up.
 const ALGORITHMS: [&str; 7] =
     ["params", "moments", "attitude", "navigation", "calibration", "motion", "simulation"];

@@ -13,7 +13,7 @@ use super::keeper::{Keeper, Kept, PATH as KEEPER};
 use super::machine::Machine;
 use super::running::STOP_WITHIN;
 use super::source::{Assembly, Source};
-use super::wired::{Unwired, Wired};
+use super::wired::{Place, Unwired, Wired};
 use super::{StartError, Supervision};
 use crate::component::replacement::{Replacement, Replacements};
 use crate::component::shared::SharedValues;
@@ -161,9 +161,6 @@ struct Assembling {
     /// Weak, since components with a bus are part of the wiring.
     place: Place,
 }
-
-/// Where the wiring is, once there is one.
-pub(super) type Place = Arc<OnceLock<Weak<Wired>>>;
 
 impl Assembling {
     fn new(draft: &mut Draft, unwired: &dyn Unwired, clock: Clock, mode: Mode) -> Result<Self, StartError> {

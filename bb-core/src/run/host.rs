@@ -2,8 +2,7 @@
 
 use super::actuator::AnyActuator;
 use super::discovery::discover;
-use super::draft::Place;
-use super::wired::Wired as WiredRobot;
+use super::wired::{Place, Wired as WiredRobot};
 use crate::component::replacement::{Replacement, Replacements};
 use crate::component::shared::SharedValues;
 use crate::component::{CommandInfo, Description, DisarmHook, DynamicExecution, Guardian, Host, Permit};

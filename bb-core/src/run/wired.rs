@@ -12,7 +12,7 @@ use crate::control::Prepared;
 use crate::declaration::RobotDeclaration;
 use crate::node::{AnyIsland, islands_in};
 use crate::pubsub::AnyTopic;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock, Weak};
 
 /// The declaration of `R` as data.
 pub(super) fn declaration<R: Robot>() -> &'static RobotDeclaration {
@@ -80,6 +80,9 @@ impl<R: Robot> Unwired for Parts<R> {
         Wired { islands: islands_in(&wiring, R::ISLANDS), parts: Box::new(WiringOf::<R>(wiring)) }
     }
 }
+
+/// Where the wired robot is, once there is one. Weak, since components with a bus are part of it.
+pub(super) type Place = Arc<OnceLock<Weak<Wired>>>;
 
 /// A robot whose components have been made.
 pub(super) struct Wired {
