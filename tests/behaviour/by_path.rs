@@ -171,12 +171,10 @@ fn arguments_that_do_not_fit_are_refused_with_the_field() -> Result<(), StartErr
     let simulation = Open::builder().simulate()?;
     let bus = simulation.bus();
     assert_eq!(bus.arm(), Ok(()));
+    // The codec's own tests have the other ways.
     for (arguments, field) in [
         (r#"{"name": "dock", "stops": []}"#, "speed"),
-        (r#"{"name": "dock", "speed": "fast", "stops": []}"#, "speed"),
-        (r#"{"name": 3, "speed": 1, "stops": []}"#, "name"),
         (r#"{"name": "dock", "speed": 1, "stops": [1, 300]}"#, "stops[1]"),
-        (r#"{"name": "dock", "speed": 1, "stops": [], "haste": 1}"#, "haste"),
     ] {
         let error = refused(bus.start_command("command/go", arguments));
         assert!(error.contains(field), "{arguments}: {error}");

@@ -1,6 +1,6 @@
 //! Every callback of an estimator, what it may emit and ask for.
 
-use crate::components::{Break, Failure, Number, Replied, at};
+use crate::components::{Break, Echo, Failure, Number, Replied, at};
 use bb_core::event::ParameterValue;
 use bb_core::prelude::*;
 
@@ -16,8 +16,6 @@ pub(crate) struct SumOptions {
     /// What it asks for in `init`.
     #[option(default = "nothing")]
     pub(crate) asks: &'static str,
-    #[option(default = false)]
-    pub(crate) skipped: bool,
 }
 
 /// Sums up what it gets.
@@ -34,7 +32,6 @@ impl Estimator for Sum {
 
     fn init(options: SumOptions, context: &Context) -> Result<Self, Fault> {
         match options.asks {
-            _ if options.skipped => return Err(Fault::skip("not on this robot")),
             "a tick" => context.request(Request::Tick(Duration::from_millis(20))),
             "a timer" => context.request(Request::Timer(7, Duration::from_millis(30))),
             "a timeout" => context.request(Request::Timeout(Duration::from_millis(50))),
@@ -109,19 +106,20 @@ robot! {
         sensor number: External<Number>() {
             estimator sum: Sum(gain = param::sum::gain);
         }
-        sensor other: External<Number>() {
-            // Takes what it is given at the start.
-            estimator second: Sum();
-        }
+        sensor other: External<Number>() { estimator second: Echo(); }
     }
 }
 
-fn run(asks: &'static str, millis: i64) -> Result<Vec<(i64, f64)>, StartError> {
+/// Publishes numbers at milliseconds, and gives what is emitted until some more.
+fn run(asks: &'static str, published: &[(i64, f64)], until: i64) -> Result<Vec<(i64, f64)>, StartError> {
     let mut builder = Summing::builder();
     builder.options(summing::sensor::base::number::sum).asks = asks;
     let sums = builder.subscribe(summing::sensor::base::number::sum);
     let mut simulation = builder.simulate()?;
-    simulation.run_until(at(millis));
+    for (millis, number) in published {
+        simulation.publish(summing::sensor::base::number, at(*millis), Number(*number));
+    }
+    simulation.run_until(at(until));
     Ok(emitted(&sums))
 }
 
@@ -130,51 +128,20 @@ fn emitted(sums: &Subscription<Number>) -> Vec<(i64, f64)> {
 }
 
 #[test]
-fn what_is_asked_for_in_init_comes_at_its_time() -> Result<(), StartError> {
-    assert_eq!(run("a tick", 65)?, [(20, 1000.0), (40, 1000.0), (60, 1000.0)]);
-    assert_eq!(run("a timer", 100)?, [(30, 2007.0)]);
-    assert_eq!(run("a timeout", 200)?, [(50, 3000.0)]);
-    assert_eq!(run("to go on", 200)?, [(0, 4003.0)]);
-    Ok(())
-}
-
-#[test]
-fn a_timeout_is_put_off_by_whatever_happens() -> Result<(), StartError> {
-    let builder = Summing::builder();
-    let sums = builder.subscribe(summing::sensor::base::number::sum);
-    let mut simulation = builder.simulate()?;
-    simulation.publish(summing::sensor::base::number, at(10), Number(100.0));
-    simulation.publish(summing::sensor::base::number, at(40), Number(100.0));
-    simulation.run_until(at(89));
-    assert_eq!(emitted(&sums), []);
-    simulation.publish(summing::sensor::base::number, at(89), Number(1.0));
-    simulation.run_until(at(300));
-    assert_eq!(emitted(&sums), [], "the last message asked for none");
-    simulation.publish(summing::sensor::base::number, at(300), Number(100.0));
-    simulation.run_until(at(500));
-    assert_eq!(emitted(&sums), [(350, 3000.0)]);
-    Ok(())
-}
-
-#[test]
-fn work_goes_on_before_the_next_message() -> Result<(), StartError> {
-    let builder = Summing::builder();
-    let sums = builder.subscribe(summing::sensor::base::number::sum);
-    let mut simulation = builder.simulate()?;
-    simulation.publish(summing::sensor::base::number, at(10), Number(200.0));
-    assert_eq!(emitted(&sums), [(10, 400.0), (10, 4001.0), (10, 4002.0), (10, 4003.0)]);
-    Ok(())
-}
-
-#[test]
-fn a_tick_ends_on_request() -> Result<(), StartError> {
-    let mut builder = Summing::builder();
-    builder.options(summing::sensor::base::number::sum).asks = "a tick";
-    let sums = builder.subscribe(summing::sensor::base::number::sum);
-    let mut simulation = builder.simulate()?;
-    simulation.publish(summing::sensor::base::number, at(30), Number(300.0));
-    simulation.run_until(at(100));
-    assert_eq!(emitted(&sums), [(20, 1000.0)]);
+fn what_is_asked_for_comes_at_its_time() -> Result<(), StartError> {
+    // In `init`.
+    assert_eq!(run("a tick", &[], 65)?, [(20, 1000.0), (40, 1000.0), (60, 1000.0)]);
+    assert_eq!(run("a timer", &[], 100)?, [(30, 2007.0)]);
+    assert_eq!(run("a timeout", &[], 200)?, [(50, 3000.0)]);
+    assert_eq!(run("to go on", &[], 200)?, [(0, 4003.0)]);
+    // A timeout is put off by whatever happens, and for good by what asks for none.
+    assert_eq!(run("nothing", &[(10, 100.0), (40, 100.0)], 500)?, [(90, 3000.0)]);
+    assert_eq!(run("nothing", &[(10, 100.0), (40, 100.0), (89, 1.0)], 300)?, []);
+    // Work goes on before the next message; a tick ends on request.
+    let worked = [(10, 400.0), (10, 4001.0), (10, 4002.0), (10, 4003.0), (10, 800.0)];
+    let again = [(10, 4001.0), (10, 4002.0), (10, 4003.0)];
+    assert_eq!(run("nothing", &[(10, 200.0), (10, 200.0)], 10)?, [&worked[..], &again].concat());
+    assert_eq!(run("a tick", &[(30, 300.0)], 100)?, [(20, 1000.0)]);
     Ok(())
 }
 
@@ -232,7 +199,7 @@ fn a_parameter_reaches_the_options_bound_to_it() -> Result<(), Failure> {
 #[test]
 fn an_estimator_may_be_left_out() -> Result<(), StartError> {
     let mut builder = Summing::builder();
-    builder.options(summing::sensor::base::other::second).skipped = true;
+    builder.options(summing::sensor::base::other::second).init = |_| Err(Fault::skip("not on this robot"));
     let health = builder.subscribe(system::Health);
     let mut simulation = builder.simulate()?;
     simulation.publish(summing::sensor::base::other, at(5), Number(1.0));

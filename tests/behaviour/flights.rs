@@ -170,19 +170,6 @@ fn it_starts_from_the_flight_controller_and_knows_where_the_antenna_is() -> Resu
     Ok(())
 }
 
-#[test]
-fn the_attitude_levels_the_start_at_the_origin() -> Result<(), StartError> {
-    for strategy in STRATEGIES {
-        let mut flight = Flight::at_origin(strategy)?;
-        (1..=100).for_each(|step| flight.imu(at(5 * step), at_rest()));
-        // Rest would have to last for a second, and the options say that it looks east. An output comes every 200 ms.
-        let first = flight.estimates.drain().next().expect("it starts at once");
-        assert!(first.time < at(250), "{strategy}: {:?}", first.time);
-        assert!(first.world_from_body.angle_to(&north()) < 1e-3, "{strategy}");
-    }
-    Ok(())
-}
-
 fn set_origin(options: &mut FlightOptions) {
     let origin = *frame().origin();
     (options.origin_latitude, options.origin_longitude) = (origin.latitude, origin.longitude);
@@ -292,36 +279,6 @@ fn the_recorder_holds_labels_the_gate_rejections_and_faults() -> Result<(), Fail
             let is_for_ground = ["rejected", "gate", "label", "fatal", "fallback_engaged"].contains(&&*event.kind);
             assert!(event.status_text.is_some() || !is_for_ground, "{strategy}: {event:?}");
         }
-    }
-    Ok(())
-}
-
-/// After an outage of the IMU at rest, where fixes do not show the heading, the filter has it from the flight controller.
-#[test]
-fn the_attitude_of_the_flight_controller_ends_what_an_outage_of_the_imu_began() -> Result<(), StartError> {
-    for has_attitude in [true, false] {
-        let mut flight = Flight::at_origin("eskf")?;
-        let mut trusted = Vec::new();
-        for step in 1..=2400 {
-            let time = at(5 * step);
-            if step % 40 == 0 {
-                flight.gps(time, GpsHealth::Stable);
-                flight.fix(time, [-1.5, 0.4, 1.0], 1.0);
-                if has_attitude {
-                    flight.attitude(time);
-                }
-            }
-            // Silent from 4 s to 6 s.
-            if !(800..1200).contains(&step) {
-                flight.imu(time, at_rest());
-            }
-            let new = flight.estimates.drain().filter(|estimate| !estimate.degraded);
-            trusted.extend(new.map(|estimate| estimate.emitted));
-        }
-        assert!(trusted.iter().any(|time| *time < at(4000)), "it has started");
-        let again: Vec<_> = trusted.into_iter().filter(|time| *time > at(6000)).collect();
-        assert_eq!(again.is_empty(), !has_attitude);
-        assert!(again.first().is_none_or(|first| *first < at(10_800)), "{again:?}");
     }
     Ok(())
 }

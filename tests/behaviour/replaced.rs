@@ -1,14 +1,13 @@
 //! Estimators that others take the place of: what stays, what is refused, and what a replay says to it.
 
 use crate::components::{
-    Ask, Counter, CounterOptions, Echo, Failure, Number, Pulse, PulseOptions, Scale, ScaleOptions, at, numbers,
+    Ask, Counter, CounterOptions, Echo, Failure, Number, Pulse, Scale, ScaleOptions, at, numbers,
 };
 use crate::joints::{Pixel, Spot, Spotter};
 use crate::replay::{entries, journal, overflow};
 use bb_core::Builder;
 use bb_core::component::InputTransforms;
 use bb_core::prelude::*;
-use bb_core::topology::GraphFormat;
 
 /// Options of [`Ramp`].
 #[derive(Clone, Debug, Options)]
@@ -304,26 +303,6 @@ fn a_replacement_across_moving_joints_has_to_handle_them() -> Result<(), Failure
     let spots: Vec<_> = spots.drain().collect();
     assert_eq!(spots.len(), 1, "the joints were unknown at first");
     assert!((spots[0].at.z - 1.0).abs() < 1e-12 && (spots[0].at.norm() - 1.5_f64.hypot(1.0)).abs() < 1e-12);
-    Ok(())
-}
-
-#[test]
-fn replacements_are_marked_where_the_robot_is_described() -> Result<(), Failure> {
-    let mut builder = replaced(RampOptions::defaults())?;
-    builder.replace_service::<Pulse>("controller/idle", PulseOptions::defaults())?;
-    let simulation = builder.simulate()?;
-    let bus = simulation.bus();
-    let description = bus.description();
-    let replaced: Vec<_> =
-        description.components.iter().filter(|component| component.is_replaced).map(|found| found.path).collect();
-    assert_eq!(replaced, ["controller/idle", SCALED]);
-    for format in [GraphFormat::Mermaid, GraphFormat::Dot] {
-        let graph = bus.graph(format);
-        let marked: Vec<_> = graph.lines().filter(|line| line.contains("(replaced)")).collect();
-        assert_eq!(marked.len(), 2, "{graph}");
-        assert!(marked.iter().any(|line| line.contains("controller/idle (replaced)")), "{graph}");
-        assert!(marked.iter().any(|line| line.contains("sensor/base/count/scaled (replaced)")), "{graph}");
-    }
     Ok(())
 }
 

@@ -26,33 +26,6 @@ fn sensors_are_read_at_their_rates_and_stamped_with_virtual_time() -> Result<(),
     Ok(())
 }
 
-#[test]
-fn every_run_is_the_same() -> Result<(), StartError> {
-    let run = || -> Result<_, StartError> {
-        let builder = Clockwork::builder();
-        let scaled = builder.subscribe(clockwork::sensor::base::fast::scaled);
-        let mut simulation = builder.simulate()?;
-        simulation.run_to_end();
-        Ok((scaled.drain().collect::<Vec<_>>(), simulation.stop()))
-    };
-    let (first, second) = (run()?, run()?);
-    assert_eq!(first, second);
-    assert_eq!(first.0.len(), 1000);
-    Ok(())
-}
-
-#[test]
-fn options_are_those_declared_unless_they_are_changed_before_the_start() -> Result<(), StartError> {
-    let mut builder = Clockwork::builder();
-    assert_eq!(builder.options(clockwork::sensor::base::fast::scaled).factor, 3.0);
-    builder.options(clockwork::sensor::base::fast::scaled).factor = -1.0;
-    builder.options(clockwork::sensor::base::fast).start = 7.0;
-    let scaled = builder.subscribe(clockwork::sensor::base::fast::scaled);
-    builder.simulate()?.step();
-    assert_eq!(scaled.try_recv().map(|number| number.payload), Some(Number(-7.0)));
-    Ok(())
-}
-
 /// Forgets to say when to read it next.
 fn restless(_: u32, now: MonotonicTime) -> Read {
     Ok(Reading::now(Number(0.0)).next_at(now))

@@ -99,22 +99,6 @@ fn a_velocity_of_zero_is_no_motion_to_the_end_of_the_range() -> Result<(), Failu
 }
 
 #[test]
-fn an_effort_presses_until_something_else_is_commanded() -> Result<(), Failure> {
-    let mut simulation = ready()?;
-    let world = simulation.shared(|| SimulatedWorld::new(Crane::TOPOLOGY));
-    world.obstruct("slew", -0.3, 0.3, simulation.clock().now())?;
-    let motor = crane::actuator::base::slew::motor;
-    simulation.actuate(motor, EffortCommand { effort: 5.0 }.into())?;
-    simulation.run_for(Duration::from_secs(3));
-    assert_eq!(true_position(&simulation, "slew")?, 0.3);
-    world.obstruct("slew", -9.0, 9.0, simulation.clock().now())?;
-    simulation.run_for(Duration::from_secs(1));
-    assert!(true_position(&simulation, "slew")? > 1.0, "what held it is gone");
-    simulation.actuate(motor, ActuatorCommand::Hold)?;
-    Ok(())
-}
-
-#[test]
 fn a_joint_that_nothing_holds_is_not_stalled_however_short_it_may_be_held() -> Result<(), Failure> {
     let mut builder = simulated()?;
     builder.options(crane::actuator::base::slew::motor).stall_after = Duration::ZERO;
@@ -171,22 +155,5 @@ fn a_motion_without_a_target_is_reported_too() -> Result<(), Failure> {
     simulation.actuate(motor, EffortCommand { effort: 0.0 }.into())?;
     simulation.run_for(Duration::from_secs(1));
     assert_eq!((begun(), next_end(&ends)), (None, None));
-    Ok(())
-}
-
-#[test]
-fn a_stream_of_commands_does_not_hide_that_the_joint_is_held() -> Result<(), Failure> {
-    let mut simulation = ready()?;
-    let world = simulation.shared(|| SimulatedWorld::new(Crane::TOPOLOGY));
-    world.obstruct("slew", -0.1, 0.1, simulation.clock().now())?;
-    let ends = ends(&simulation.bus());
-    // Each millisecond, and the actuator checks its motion every five.
-    for _ in 0..1000 {
-        let motor = crane::actuator::base::slew::motor;
-        simulation.actuate(motor, VelocityCommand { velocity: 0.5, effort: None }.into())?;
-        simulation.run_for(Duration::from_millis(1));
-    }
-    let ended: Vec<_> = std::iter::from_fn(|| next_end(&ends)).map(|(_, end)| end).collect();
-    assert!(ended.contains(&MotionEnd::Stalled), "{ended:?}");
     Ok(())
 }
