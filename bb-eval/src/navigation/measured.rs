@@ -39,6 +39,7 @@ impl Sensor {
         }
     }
 
+    #[cfg_attr(not(feature = "plot"), expect(dead_code, reason = "for pictures"))]
     pub(crate) fn dimension(self) -> usize {
         match self {
             Self::Relative | Self::Anchor => 6,

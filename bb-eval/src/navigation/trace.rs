@@ -19,6 +19,7 @@ pub struct Trace {
 
 /// A keyframe.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(not(feature = "plot"), expect(dead_code, reason = "for pictures"))]
 pub(crate) struct Row {
     pub(crate) time_s: f64,
     pub(crate) position: Vector3<f64>,
@@ -30,6 +31,7 @@ pub(crate) struct Row {
 
 /// A measurement compared with its prediction.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(not(feature = "plot"), expect(dead_code, reason = "for pictures"))]
 pub(crate) struct Innovation {
     pub(crate) time_s: f64,
     pub(crate) sensor: Sensor,
