@@ -4,30 +4,45 @@ use strsim::osa_distance;
 
 /// The candidate nearest to `name`, if one is near enough to be meant.
 pub(crate) fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let limit = name.chars().count() / 3 + 1;
-    let near = candidates.into_iter().filter_map(|candidate| {
+    nearest_of(name, &mut candidates.into_iter())
+}
+
+fn nearest_of<'a>(name: &str, candidates: &mut dyn Iterator<Item = &'a str>) -> Option<&'a str> {
+    let length = name.chars().count();
+    let mut best = None;
+    for candidate in candidates {
         let distance = osa_distance(name, candidate);
-        let longest = name.chars().count().max(candidate.chars().count());
-        (distance <= limit && distance < longest).then_some((distance, candidate))
-    });
-    // Of two that are equally near, prefers one that differs only in case.
-    near.min_by_key(|(distance, candidate)| (*distance, !candidate.eq_ignore_ascii_case(name)))
-        .map(|(_, candidate)| candidate)
+        if distance > length / 3 + 1 || distance >= length.max(candidate.chars().count()) {
+            continue;
+        }
+        // Of two that are equally near, prefers one that differs only in case.
+        let rank = (distance, !candidate.eq_ignore_ascii_case(name));
+        if best.is_none_or(|(least, _)| rank < least) {
+            best = Some((rank, candidate));
+        }
+    }
+    best.map(|(_, candidate)| candidate)
 }
 
 /// A path whose names are all near to those of `path`; otherwise one with the same last name.
 pub(crate) fn nearest_path<'a>(path: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    nearest_path_of(path, &mut known.into_iter())
+}
+
+fn nearest_path_of<'a>(path: &str, known: &mut dyn Iterator<Item = &'a str>) -> Option<&'a str> {
     let names: Vec<&str> = path.split('/').collect();
-    let known: Vec<&str> = known.into_iter().collect();
-    let is_near = |candidate: &&str| {
-        let candidate: Vec<&str> = candidate.split('/').collect();
-        let mut pairs = names.iter().zip(&candidate);
-        names.len() == candidate.len()
-            && pairs.all(|(name, other)| name == other || nearest(name, [*other]).is_some())
-    };
-    let near = nearest(path, known.iter().copied().filter(is_near));
-    let has_same_name = |candidate: &&str| candidate.rsplit('/').next() == names.last().copied();
-    near.or_else(|| known.iter().copied().find(has_same_name))
+    let (mut near, mut same_last) = (Vec::new(), None);
+    for candidate in known {
+        let others: Vec<&str> = candidate.split('/').collect();
+        let is_near = |(name, other): (&&str, &&'a str)| name == other || nearest(name, [*other]).is_some();
+        if names.len() == others.len() && names.iter().zip(&others).all(is_near) {
+            near.push(candidate);
+        }
+        if others.last() == names.last() {
+            same_last = same_last.or(Some(candidate));
+        }
+    }
+    nearest(path, near).or(same_last)
 }
 
 #[cfg(test)]

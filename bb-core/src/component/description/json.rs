@@ -13,21 +13,21 @@ impl Description {
     /// One JSON object with the lists `links`, `joints`, `components`, `topics`, `parameters`, `commands` and `states`, whose
     /// elements have a `path`.
     pub fn to_json(&self) -> String {
-        object([
+        object(&[
             ("robot", text(self.robot)),
-            ("states", array(self.states.iter().map(|state| text(state)))),
-            ("links", array(self.links.iter().map(link))),
-            ("joints", array(self.joints.iter().map(joint))),
-            ("components", array(self.components.iter().map(component))),
-            ("topics", array(self.topics.iter().map(topic))),
-            ("parameters", array(self.parameters.iter().map(parameter))),
-            ("commands", array(self.commands.iter().map(command))),
+            ("states", array(&mut self.states.iter().map(|state| text(state)))),
+            ("links", array(&mut self.links.iter().map(link))),
+            ("joints", array(&mut self.joints.iter().map(joint))),
+            ("components", array(&mut self.components.iter().map(component))),
+            ("topics", array(&mut self.topics.iter().map(topic))),
+            ("parameters", array(&mut self.parameters.iter().map(parameter))),
+            ("commands", array(&mut self.commands.iter().map(command))),
         ])
     }
 }
 
 fn link(link: &LinkDescription) -> String {
-    object([
+    object(&[
         ("path", text(&link.path)),
         ("name", text(link.name)),
         ("parent_joint", optional(link.parent_joint, text)),
@@ -37,14 +37,14 @@ fn link(link: &LinkDescription) -> String {
 
 fn joint(joint: &JointDescription) -> String {
     let limit = joint.limit.map(|limit| {
-        object([
+        object(&[
             ("lower", optional(limit.lower, number)),
             ("upper", optional(limit.upper, number)),
             ("velocity", optional(limit.velocity, number)),
             ("effort", optional(limit.effort, number)),
         ])
     });
-    object([
+    object(&[
         ("path", text(&joint.path)),
         ("name", text(joint.name)),
         ("kind", text(joint.kind.name())),
@@ -52,24 +52,24 @@ fn joint(joint: &JointDescription) -> String {
         ("child", text(joint.child)),
         ("limit", limit.unwrap_or_else(null)),
         ("mimics", optional(joint.mimics, text)),
-        ("actuators", array(joint.actuators.iter().map(|path| text(path)))),
+        ("actuators", array(&mut joint.actuators.iter().map(|path| text(path)))),
     ])
 }
 
 fn component(component: &ComponentDescription) -> String {
-    object([
+    object(&[
         ("path", text(component.path)),
         ("kind", text(component.kind.name())),
         ("frame", text(component.frame)),
         ("rate_hz", rate(component.period)),
-        ("inputs", array(component.inputs.iter().map(input))),
-        ("topics", array(component.topics.iter().map(|path| text(path)))),
+        ("inputs", array(&mut component.inputs.iter().map(input))),
+        ("topics", array(&mut component.topics.iter().map(|path| text(path)))),
         ("replaced", component.is_replaced.to_string()),
     ])
 }
 
 fn input(input: &InputDescription) -> String {
-    object([
+    object(&[
         ("name", text(input.name)),
         ("source", text(input.source)),
         ("driver", input.is_driver.to_string()),
@@ -78,11 +78,11 @@ fn input(input: &InputDescription) -> String {
 }
 
 fn topic(topic: &TopicDescription) -> String {
-    object([("path", text(topic.path)), ("payload", text(topic.payload)), ("rate_hz", rate(topic.period))])
+    object(&[("path", text(topic.path)), ("payload", text(topic.payload)), ("rate_hz", rate(topic.period))])
 }
 
 fn parameter(parameter: &ParameterDescription) -> String {
-    object([
+    object(&[
         ("path", text(parameter.path)),
         ("doc", text(parameter.doc.trim())),
         ("type", text(parameter.default.type_name())),
@@ -94,8 +94,8 @@ fn parameter(parameter: &ParameterDescription) -> String {
 }
 
 fn command(command: &CommandInfo) -> String {
-    let states = command.allowed_states.map(|states| array(states.iter().map(|state| text(state))));
-    object([
+    let states = command.allowed_states.map(|states| array(&mut states.iter().map(|state| text(state))));
+    object(&[
         ("path", text(command.path)),
         ("category", text(command.category)),
         ("allowed_states", states.unwrap_or_else(null)),
@@ -134,11 +134,31 @@ fn optional<T>(value: Option<T>, write: impl FnOnce(T) -> String) -> String {
     value.map_or_else(null, write)
 }
 
-fn array(elements: impl Iterator<Item = String>) -> String {
-    format!("[{}]", elements.collect::<Vec<_>>().join(","))
+fn array(elements: &mut dyn Iterator<Item = String>) -> String {
+    let mut json = "[".to_owned();
+    for element in elements {
+        separate(&mut json);
+        json.push_str(&element);
+    }
+    json.push(']');
+    json
 }
 
-fn object<const N: usize>(members: [(&str, String); N]) -> String {
-    let members = members.map(|(name, value)| format!("{}:{value}", text(name)));
-    format!("{{{}}}", members.join(","))
+fn object(members: &[(&str, String)]) -> String {
+    let mut json = "{".to_owned();
+    for (name, value) in members {
+        separate(&mut json);
+        json.push_str(&text(name));
+        json.push(':');
+        json.push_str(value);
+    }
+    json.push('}');
+    json
+}
+
+/// A comma, but not before the first.
+fn separate(json: &mut String) {
+    if json.len() > 1 {
+        json.push(',');
+    }
 }

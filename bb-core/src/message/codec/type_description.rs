@@ -31,9 +31,13 @@ pub fn type_hash(name: &str, shape: Shape) -> String {
 pub fn type_description(name: &str, shape: Shape) -> String {
     let mut definitions = definitions(name, shape).into_iter();
     let main = definitions.next().map_or(String::new(), |main| individual(&main));
-    let mut referenced: Vec<_> = definitions.map(|definition| (type_name(&definition.name), definition)).collect();
-    referenced.sort_by(|(a, _), (b, _)| a.cmp(b));
-    let referenced: Vec<String> = referenced.iter().map(|(_, definition)| individual(definition)).collect();
+    let (mut names, mut referenced) = (Vec::new(), Vec::new());
+    for definition in definitions {
+        let name = type_name(&definition.name);
+        let index = names.partition_point(|other| *other <= name);
+        referenced.insert(index, individual(&definition));
+        names.insert(index, name);
+    }
     let referenced = referenced.join(", ");
     format!(r#"{{"type_description": {main}, "referenced_type_descriptions": [{referenced}]}}"#)
 }

@@ -2,7 +2,7 @@
 
 use super::{Form, INFINITY, NAN, NEGATIVE_INFINITY};
 use crate::message::codec::{DecodeError, EnumShape, Field, FieldShape, Reader, Shape, Writer};
-use std::fmt::{Display, Write};
+use std::fmt::Write as _;
 
 /// A value as JSON. [`from_json`](super::from_json) reads it back.
 pub fn to_json<T: Field>(value: &T) -> String {
@@ -28,16 +28,16 @@ pub fn bytes_to_json(bytes: &[u8], shape: Shape) -> Result<String, DecodeError> 
 
 fn write(shape: Shape, reader: &mut Reader<'_>, json: &mut String) -> Result<(), DecodeError> {
     match shape {
-        Shape::Bool => number(bool::read(reader)?, json),
+        Shape::Bool => json.push_str(if bool::read(reader)? { "true" } else { "false" }),
         Shape::Char => text(char::read(reader)?.encode_utf8(&mut [0; 4]), json),
-        Shape::I8 => number(i8::read(reader)?, json),
-        Shape::I16 => number(i16::read(reader)?, json),
-        Shape::I32 => number(i32::read(reader)?, json),
-        Shape::I64 => number(i64::read(reader)?, json),
-        Shape::U8 => number(u8::read(reader)?, json),
-        Shape::U16 => number(u16::read(reader)?, json),
-        Shape::U32 => number(u32::read(reader)?, json),
-        Shape::U64 => number(u64::read(reader)?, json),
+        Shape::I8 => number(i8::read(reader)?.into(), json),
+        Shape::I16 => number(i16::read(reader)?.into(), json),
+        Shape::I32 => number(i32::read(reader)?.into(), json),
+        Shape::I64 => number(i64::read(reader)?.into(), json),
+        Shape::U8 => number(u8::read(reader)?.into(), json),
+        Shape::U16 => number(u16::read(reader)?.into(), json),
+        Shape::U32 => number(u32::read(reader)?.into(), json),
+        Shape::U64 => number(u64::read(reader)?.into(), json),
         Shape::F32 => {
             let value = f32::read(reader)?;
             float(format!("{value:?}"), value.into(), json);
@@ -110,7 +110,7 @@ fn variant(of: &'static EnumShape, reader: &mut Reader<'_>, json: &mut String) -
     reader.end_variant(&shape, number)
 }
 
-fn number(value: impl Display, json: &mut String) {
+fn number(value: i128, json: &mut String) {
     // Writing to a string cannot fail.
     let _ = write!(json, "{value}");
 }
