@@ -13,14 +13,14 @@ impl<K, V> Default for Sorted<K, V> {
     }
 }
 
-impl<K: Ord + Copy, V> Sorted<K, V> {
+impl<K: Ord, V> Sorted<K, V> {
     pub(crate) fn len(&self) -> usize {
         self.0.len()
     }
 
     /// In the order of the keys.
-    pub(crate) fn iter(&self) -> impl Iterator<Item = (K, &V)> {
-        self.0.iter().rev().map(|(key, value)| (*key, value))
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (&K, &V)> {
+        self.0.iter().rev().map(|(key, value)| (key, value))
     }
 
     pub(crate) fn get<Q: Ord + ?Sized>(&self, key: &Q) -> Option<&V>
@@ -37,6 +37,15 @@ impl<K: Ord + Copy, V> Sorted<K, V> {
     {
         let index = self.find(key).ok()?;
         self.0.get_mut(index).map(|(_, value)| value)
+    }
+
+    /// The value of `key`, made if it has none.
+    pub(crate) fn get_or_insert(&mut self, key: K, make: impl FnOnce() -> V) -> &mut V {
+        let index = self.find(&key).unwrap_or_else(|index| {
+            self.0.insert(index, (key, make()));
+            index
+        });
+        &mut self.0[index].1
     }
 
     /// Sets the value of `key`, and returns the one it had.
@@ -59,8 +68,13 @@ impl<K: Ord + Copy, V> Sorted<K, V> {
     }
 
     /// The first key.
-    pub(crate) fn first(&self) -> Option<K> {
-        self.0.last().map(|(key, _)| *key)
+    pub(crate) fn first(&self) -> Option<&K> {
+        self.0.last().map(|(key, _)| key)
+    }
+
+    /// All entries, in the order of the keys.
+    pub(crate) fn into_entries(self) -> impl Iterator<Item = (K, V)> {
+        self.0.into_iter().rev()
     }
 
     pub(crate) fn pop_first(&mut self) -> Option<(K, V)> {
@@ -87,15 +101,16 @@ mod tests {
             let (mut sorted, mut map) = (Sorted::default(), BTreeMap::new());
             for (step, key, value) in steps {
                 match step {
-                    0 | 1 => prop_assert_eq!(sorted.insert(key, value), map.insert(key, value)),
+                    0 => prop_assert_eq!(*sorted.get_or_insert(key, || value), *map.entry(key).or_insert(value)),
+                    1 => prop_assert_eq!(sorted.insert(key, value), map.insert(key, value)),
                     2 => prop_assert_eq!(sorted.remove(&key), map.remove(&key)),
                     _ => prop_assert_eq!(sorted.pop_first(), map.pop_first()),
                 }
                 prop_assert_eq!(sorted.get(&key), map.get(&key));
                 prop_assert_eq!(sorted.get_mut(&key), map.get_mut(&key));
-                prop_assert_eq!((sorted.first(), sorted.len()), (map.keys().next().copied(), map.len()));
+                prop_assert_eq!((sorted.first(), sorted.len()), (map.keys().next(), map.len()));
             }
-            prop_assert!(sorted.iter().eq(map.iter().map(|(key, value)| (*key, value))));
+            prop_assert!(sorted.iter().eq(map.iter()) && sorted.clone().into_entries().eq(map.clone()));
         }
     }
 }

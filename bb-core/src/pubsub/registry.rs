@@ -193,7 +193,7 @@ impl Registry {
         let mut all = Sorted::default();
         for (path, expected) in state.expected.iter() {
             let payload = expected.payload;
-            all.insert(path, TopicStatistics { path, payload, published: 0, lost: 0, subscribers: 0 });
+            all.insert(*path, TopicStatistics { path, payload, published: 0, lost: 0, subscribers: 0 });
         }
         let made = state.topics.iter().filter(|(_, made)| !made.is_gone);
         let made: Vec<_> = made.map(|(_, made)| (Arc::clone(&made.topic), made.before)).collect();
@@ -239,7 +239,7 @@ impl State {
         unused.min_by_key(|(_, made)| made.number).map(|(path, _)| Room::Of(path))
     }
 
-    fn gone(&self) -> impl Iterator<Item = (&'static str, &Made)> {
+    fn gone(&self) -> impl Iterator<Item = (&&'static str, &Made)> {
         self.topics.iter().filter(|(_, made)| made.is_gone)
     }
 
@@ -256,6 +256,7 @@ impl State {
         if self.expected.len() > Registry::MAX_TOPICS
             && let Some((oldest, _)) = self.expected.iter().min_by_key(|(_, expected)| expected.number)
         {
+            let oldest = *oldest;
             self.expected.remove(oldest);
         }
         let made = self.topics.get_mut(path)?;
@@ -277,6 +278,7 @@ impl State {
         }
         let unused = self.gone().filter(|(_, made)| !made.is_used());
         let (oldest, _) = unused.min_by_key(|(_, made)| made.number)?;
+        let oldest = *oldest;
         self.topics.remove(oldest)
     }
 }

@@ -3,7 +3,7 @@
 use super::any::AnyTopic;
 use super::select::{Payloads, Select};
 use crate::message::nearest::{nearest, nearest_path};
-use std::collections::BTreeSet;
+use crate::sorted::Sorted;
 use std::fmt;
 
 /// A part of a subscription that matches nothing when the subscription is created: a path, a subtree or a payload's
@@ -108,8 +108,12 @@ fn add_paths(topics: &[&dyn AnyTopic], declared: &[&'static str], select: Select
             all.push(Unmatched::new(Part::Declared, above, None));
         }
         Select::Below(above) => {
-            let known: BTreeSet<&str> = topics.iter().flat_map(|topic| with_all_above(topic.path())).collect();
-            all.push(Unmatched::new(Part::Subtree, above, nearest_path(above, known)));
+            let mut known = Sorted::default();
+            for path in topics.iter().flat_map(|topic| with_all_above(topic.path())) {
+                known.insert(path, ());
+            }
+            let near = nearest_path(above, known.iter().map(|(path, ())| *path));
+            all.push(Unmatched::new(Part::Subtree, above, near));
         }
         Select::AnyOf(several) => several.iter().for_each(|one| add_paths(topics, declared, *one, all)),
     }

@@ -9,8 +9,7 @@ use crate::node::Replayed;
 use crate::pubsub::AnyTopic as _;
 use crate::schedule::Lane;
 use std::sync::atomic::Ordering;
-use std::sync::mpsc::channel;
-use std::sync::{Arc, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::task::Waker;
 use std::time::{Duration, Instant};
 
@@ -53,23 +52,22 @@ impl Machine {
     /// running and reported.
     pub(super) fn terminate_actuators(self: &Arc<Self>, deadline: Instant) {
         let deadline = deadline.max(Instant::now() + LEAST_TO_STOP);
-        let (closed, closing) = channel();
-        let mut left: Vec<usize> = (0..self.robot.actuators.len()).collect();
-        for number in 0..self.robot.actuators.len() {
-            let (machine, closed) = (Arc::clone(self), closed.clone());
+        let numbers = 0..self.robot.actuators.len();
+        let busy = Arc::new((Mutex::new(numbers.clone().collect::<Vec<_>>()), Condvar::new()));
+        for number in numbers {
+            let (machine, busy) = (Arc::clone(self), Arc::clone(&busy));
             self.control.run_on_pool(Lane::Robot, move || {
                 let left = deadline.saturating_duration_since(Instant::now());
                 if machine.wired.actuator(number).is_none_or(|actuator| actuator.terminate(left)) {
-                    // Nobody listens any more after the deadline.
-                    let _ = closed.send(number);
+                    busy.0.lock().unwrap_or_else(PoisonError::into_inner).retain(|other| *other != number);
+                    busy.1.notify_all();
                 }
             });
         }
-        while !left.is_empty()
-            && let Ok(number) = closing.recv_timeout(deadline.saturating_duration_since(Instant::now()))
-        {
-            left.retain(|other| *other != number);
-        }
+        let left = busy.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let longest = deadline.saturating_duration_since(Instant::now());
+        let left = busy.1.wait_timeout_while(left, longest, |left| !left.is_empty());
+        let left = left.unwrap_or_else(PoisonError::into_inner).0.clone();
         let now = self.environment.clock().now();
         for actuator in left.into_iter().filter_map(|number| self.wired.actuator(number)) {
             let message = match actuator.entered_at() {

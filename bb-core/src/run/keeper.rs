@@ -4,10 +4,10 @@ use crate::component::{Fault, ParameterStore};
 use crate::control::Control;
 use crate::event::ParameterValue;
 use crate::fault::{caught, discard, guarded};
+use crate::sorted::Sorted;
 use std::collections::BTreeMap;
 use std::fmt;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, channel, sync_channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// The path at which faults of a store are reported.
@@ -20,23 +20,44 @@ const STORED_WITHIN: Duration = Duration::from_secs(2);
 pub(super) struct Kept {
     store: Box<dyn ParameterStore>,
     values: BTreeMap<String, ParameterValue>,
-    changed: Changed,
-    wake: Arc<Mutex<Option<SyncSender<()>>>>,
-    woken: Receiver<()>,
+    desk: Arc<Desk>,
 }
 
-/// Values that were set since the last look, by the number of the parameter.
-type Changed = Arc<Mutex<BTreeMap<usize, ParameterValue>>>;
+/// What those who set parameters leave for the thread of the store.
+#[derive(Default)]
+pub(super) struct Desk {
+    state: Mutex<State>,
+    turned: Condvar,
+}
+
+#[derive(Default)]
+struct State {
+    /// Values that were set since the last look, by the number of the parameter.
+    changed: Sorted<usize, ParameterValue>,
+    /// The thread has yet to look.
+    is_due: bool,
+    /// The thread is to end.
+    is_closed: bool,
+    /// It has.
+    has_ended: bool,
+}
+
+impl Desk {
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Changes the state, and wakes those who wait for it.
+    fn turn(&self, change: impl FnOnce(&mut State)) {
+        change(&mut self.lock());
+        self.turned.notify_all();
+    }
+}
 
 /// A store at work.
 pub(super) enum Keeper {
     /// On a thread of its own.
-    Apart {
-        /// Wakes the thread; it ends once this is empty.
-        wake: Arc<Mutex<Option<SyncSender<()>>>>,
-        /// Closed when the thread has ended.
-        ended: Receiver<()>,
-    },
+    Apart(Arc<Desk>),
     /// On virtual time all user code runs on the caller's thread: everything is stored at the end.
     Here(Box<Work>),
 }
@@ -45,8 +66,7 @@ impl Kept {
     /// Reads what the store has.
     pub(super) fn load(mut store: Box<dyn ParameterStore>) -> Result<Self, Fault> {
         let values = caught(|| store.load()).map_err(|failed| failed.fault)?;
-        let (sender, woken) = sync_channel(1);
-        Ok(Self { store, values, changed: Changed::default(), wake: Arc::new(Mutex::new(Some(sender))), woken })
+        Ok(Self { store, values, desk: Arc::default() })
     }
 
     /// The stored values, by path.
@@ -56,13 +76,14 @@ impl Kept {
 
     /// Notes what is set from now on: components may set parameters in their first `init`.
     pub(super) fn note(&self, control: &Control) {
-        let (changed, wake) = (Arc::clone(&self.changed), Arc::clone(&self.wake));
+        let desk = Arc::clone(&self.desk);
         control.on_parameters(move |changes| {
-            lock(&changed).extend(changes.iter().map(|change| (change.parameter, change.value.clone())));
-            if let Some(sender) = &*lock(&wake) {
-                // If it is full, the thread has yet to look.
-                let _ = sender.try_send(());
-            }
+            desk.turn(|state| {
+                for change in changes {
+                    state.changed.insert(change.parameter, change.value.clone());
+                }
+                state.is_due = true;
+            });
         });
     }
 }
@@ -70,21 +91,21 @@ impl Kept {
 impl Keeper {
     /// Starts to keep what is set.
     pub(super) fn start(kept: Kept, control: &Control) -> Result<Self, Fault> {
-        let Kept { store, values, changed, wake, woken } = kept;
-        let work = Work { store, values, changed, control: control.clone() };
+        let Kept { store, values, desk } = kept;
+        let work = Work { store, values, desk: Arc::clone(&desk), control: control.clone() };
         if control.is_virtual() {
             return Ok(Self::Here(Box::new(work)));
         }
-        let (end, ended) = channel::<()>();
+        let watched = Arc::clone(&desk);
         let run = move || {
             // The store is closed with `work`.
-            if let Err(fault) = guarded(|| work.run(&woken)) {
+            if let Err(fault) = guarded(|| work.run()) {
                 tracing::error!(%fault, "the store of parameters failed as it was closed");
             }
-            drop(end);
+            watched.turn(|state| state.has_ended = true);
         };
         std::thread::Builder::new().name(PATH.to_owned()).spawn(run).map_err(Fault::from)?;
-        Ok(Self::Apart { wake, ended })
+        Ok(Self::Apart(desk))
     }
 
     /// Waits until everything is stored, at most until `deadline`.
@@ -94,10 +115,11 @@ impl Keeper {
                 let is_stored = work.store_rest(true);
                 work.store_rest(is_stored);
             }
-            Self::Apart { wake, ended } => {
-                drop(lock(wake).take());
+            Self::Apart(desk) => {
+                desk.turn(|state| state.is_closed = true);
                 let left = deadline.saturating_duration_since(Instant::now()).min(STORED_WITHIN);
-                if ended.recv_timeout(left) == Err(RecvTimeoutError::Timeout) {
+                let waited = desk.turned.wait_timeout_while(desk.lock(), left, |state| !state.has_ended);
+                if !waited.unwrap_or_else(PoisonError::into_inner).0.has_ended {
                     control.note_fault(PATH, "the store of parameters did not return in time".to_owned());
                 }
             }
@@ -107,10 +129,9 @@ impl Keeper {
 }
 
 impl Drop for Keeper {
-    /// The thread owns the control state, which owns the callback that wakes the thread.
     fn drop(&mut self) {
-        if let Self::Apart { wake, .. } = self {
-            drop(lock(wake).take());
+        if let Self::Apart(desk) = self {
+            desk.turn(|state| state.is_closed = true);
         }
     }
 }
@@ -119,14 +140,21 @@ impl Drop for Keeper {
 pub(super) struct Work {
     store: Box<dyn ParameterStore>,
     values: BTreeMap<String, ParameterValue>,
-    changed: Changed,
+    desk: Arc<Desk>,
     control: Control,
 }
 
 impl Work {
-    fn run(mut self, woken: &Receiver<()>) {
+    fn run(mut self) {
         let mut is_stored = true;
-        while woken.recv().is_ok() {
+        loop {
+            let idle = |state: &mut State| !state.is_due && !state.is_closed;
+            let desk = Arc::clone(&self.desk);
+            let mut state = desk.turned.wait_while(desk.lock(), idle).unwrap_or_else(PoisonError::into_inner);
+            if !std::mem::take(&mut state.is_due) {
+                break;
+            }
+            drop(state);
             is_stored = self.store();
         }
         self.store_rest(is_stored);
@@ -134,11 +162,12 @@ impl Work {
 
     /// Stores a change that came with the end, or one that was not stored before. Whether all is stored then.
     fn store_rest(&mut self, is_stored: bool) -> bool {
-        if is_stored && lock(&self.changed).is_empty() { true } else { self.store() }
+        if is_stored && self.desk.lock().changed.len() == 0 { true } else { self.store() }
     }
 
     fn store(&mut self) -> bool {
-        for (number, value) in std::mem::take(&mut *lock(&self.changed)) {
+        let changed = std::mem::take(&mut self.desk.lock().changed);
+        for (number, value) in changed.into_entries() {
             if let Some(path) = self.control.parameter_path(number) {
                 self.values.insert(path.to_owned(), value);
             }
@@ -164,8 +193,4 @@ impl fmt::Debug for Kept {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Kept").field("values", &self.values).finish_non_exhaustive()
     }
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -41,7 +41,7 @@ impl Agenda {
             entries.by_time.remove(&(later, island));
         }
         entries.by_time.insert((time, island), ());
-        let is_first = entries.by_time.first() == Some((time, island));
+        let is_first = entries.by_time.first() == Some(&(time, island));
         drop(entries);
         if is_first {
             self.bell.ring();
@@ -70,7 +70,7 @@ impl Agenda {
 
 impl Entries {
     fn next(&self) -> Option<MonotonicTime> {
-        self.by_time.first().map(|(time, _)| time)
+        self.by_time.first().map(|(time, _)| *time)
     }
 }
 

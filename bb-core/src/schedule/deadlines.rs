@@ -32,7 +32,7 @@ impl<K: Ord + Copy> Deadlines<K> {
         }
         entries.of.insert(key, time);
         entries.by_time.insert((time, key), ());
-        let is_first = entries.by_time.first() == Some((time, key));
+        let is_first = entries.by_time.first() == Some(&(time, key));
         drop(entries);
         if is_first {
             self.bell.ring();
@@ -44,13 +44,13 @@ impl<K: Ord + Copy> Deadlines<K> {
     }
 
     pub(crate) fn next(&self) -> Option<MonotonicTime> {
-        self.lock().by_time.first().map(|(time, _)| time)
+        self.lock().by_time.first().map(|(time, _)| *time)
     }
 
     /// Takes the first deadline that has come.
     pub(crate) fn take(&self, now: MonotonicTime) -> Option<(MonotonicTime, K)> {
         let mut entries = self.lock();
-        let (time, key) = entries.by_time.first().filter(|(time, _)| *time <= now)?;
+        let (time, key) = *entries.by_time.first().filter(|(time, _)| *time <= now)?;
         entries.remove(key);
         Some((time, key))
     }

@@ -40,7 +40,7 @@ impl Sleeper {
         let alarm = set.unwrap_or((time, alarms.next_number));
         alarms.next_number += 1;
         let replaced = alarms.set.insert(alarm, (self.lane, waker));
-        let is_first = alarms.set.first() == Some(alarm);
+        let is_first = alarms.set.first() == Some(&alarm);
         // The lock is released first: dropping a waker may run user code.
         drop(alarms);
         drop(replaced);
@@ -56,7 +56,7 @@ impl Sleeper {
     }
 
     pub(crate) fn next(&self) -> Option<MonotonicTime> {
-        self.lock().set.first().map(|(time, _)| time)
+        self.lock().set.first().map(|(time, _)| *time)
     }
 
     /// Takes the waker of the first alarm whose time has come.

@@ -8,7 +8,7 @@ use crate::message::codec::{from_json, to_json};
 use crate::message::nearest::{nearest, nearest_path};
 use crate::run::bound::{bound_to, fields, refused_by_bound};
 use crate::run::draft::Draft;
-use std::collections::{BTreeMap, BTreeSet};
+use crate::sorted::Sorted;
 
 /// How a file writes `None` for an option that may be `None`.
 pub(super) const NULL_TEXT: &str = "\"null\"";
@@ -43,20 +43,26 @@ impl Assignment {
 }
 
 /// The paths of all settings.
-pub(super) fn names(draft: &mut Draft) -> BTreeSet<String> {
+pub(super) fn names(draft: &mut Draft) -> Sorted<String, ()> {
     let robot = draft.robot;
     let paths = robot.component_paths().into_iter().enumerate();
-    let options = paths.flat_map(|(component, path)| {
-        fields(&mut draft.options, component).iter().map(move |field| format!("{path}/{}", field.name))
-    });
-    options.chain(robot.parameters.iter().map(|declared| declared.path.to_owned())).collect()
+    let mut names = Sorted::default();
+    for (component, path) in paths {
+        for field in fields(&mut draft.options, component) {
+            names.insert(format!("{path}/{}", field.name), ());
+        }
+    }
+    for declared in robot.parameters {
+        names.insert(declared.path.to_owned(), ());
+    }
+    names
 }
 
 /// Whether a setting is below this path.
 #[cfg(feature = "toml")]
-pub(super) fn is_beginning(names: &BTreeSet<String>, path: &str) -> bool {
+pub(super) fn is_beginning(names: &Sorted<String, ()>, path: &str) -> bool {
     let start = format!("{path}/");
-    names.range(start.clone()..).next().is_some_and(|name| name.starts_with(&start))
+    names.iter().any(|(name, ())| name.starts_with(&start))
 }
 
 /// Sets all of `assignments`, or none if one of them is wrong.
@@ -68,7 +74,7 @@ pub(super) fn assign(draft: &mut Draft, assignments: &[Assignment]) -> Result<()
     let mut unknown_names = 0;
     let mut parameters = draft.parameters.clone();
     // The changed options of a component, and what changed them.
-    let mut changed: BTreeMap<usize, (Box<dyn AnyOptions>, Vec<&Assignment>)> = BTreeMap::new();
+    let mut changed: Sorted<usize, (Box<dyn AnyOptions>, Vec<&Assignment>)> = Sorted::default();
     for assignment in assignments {
         let target = target(robot, &paths, &mut draft.options, &assignment.path);
         let result = match target {
@@ -79,7 +85,7 @@ pub(super) fn assign(draft: &mut Draft, assignments: &[Assignment]) -> Result<()
                 Some(bound) => Err(format!("is bound to `{bound}`; set that")),
                 None => match draft.options.any(component) {
                     Some(options) => {
-                        let (copy, by) = changed.entry(component).or_insert_with(|| (options.copy(), Vec::new()));
+                        let (copy, by) = changed.get_or_insert(component, || (options.copy(), Vec::new()));
                         by.push(assignment);
                         option(copy.as_mut(), field, assignment).and_then(|()| in_range(copy.as_mut(), field))
                     }
@@ -97,7 +103,7 @@ pub(super) fn assign(draft: &mut Draft, assignments: &[Assignment]) -> Result<()
         }
     }
     if problems.is_empty() {
-        for (component, (copy, by)) in &changed {
+        for (component, (copy, by)) in changed.iter() {
             // Ranges were checked above: this error is about options that contradict each other, or a value set by
             // code.
             if let Err(message) = copy.validate()
@@ -121,7 +127,7 @@ pub(super) fn assign(draft: &mut Draft, assignments: &[Assignment]) -> Result<()
     if !problems.is_empty() {
         return Err(SettingsError::new(problems));
     }
-    for (component, (copy, _)) in changed {
+    for (component, (copy, _)) in changed.into_entries() {
         if let Some(options) = draft.options.any(component) {
             options.replace(copy);
         }
@@ -197,10 +203,11 @@ fn parameter(declared: &ParameterDeclaration, assignment: &Assignment) -> Result
 }
 
 /// What is wrong with a path that names no setting.
-fn unknown(names: &BTreeSet<String>, paths: &[&str], path: &str) -> String {
+fn unknown(names: &Sorted<String, ()>, paths: &[&str], path: &str) -> String {
     let below = |component: &str| {
         let start = format!("{component}/");
-        let fields = names.iter().filter_map(|name| name.strip_prefix(&start)).filter(|name| !name.contains('/'));
+        let fields =
+            names.iter().filter_map(|(name, ())| name.strip_prefix(&start)).filter(|name| !name.contains('/'));
         fields.map(str::to_owned).collect::<Vec<_>>()
     };
     if paths.contains(&path) {
@@ -221,7 +228,7 @@ fn unknown(names: &BTreeSet<String>, paths: &[&str], path: &str) -> String {
             None => format!("there is no such option; the options of {component} are {}", options.join(", ")),
         };
     }
-    match nearest_path(path, names.iter().map(String::as_str)) {
+    match nearest_path(path, names.iter().map(|(name, ())| name.as_str())) {
         Some(near) => format!("there is no such setting; did you mean `{near}`?"),
         None => "there is no such setting; `--list` shows all".to_owned(),
     }

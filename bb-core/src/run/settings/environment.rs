@@ -6,6 +6,7 @@ use super::{SettingsError, assign::names};
 use crate::message::nearest::nearest;
 use crate::run::draft::Draft;
 use crate::run::{Builder, Robot};
+use crate::sorted::Sorted;
 use std::collections::BTreeMap;
 use std::ffi::{OsStr, OsString};
 
@@ -63,9 +64,9 @@ impl Draft {
             }
         }
         // Settings by the names of their variables in capitals.
-        let mut known: BTreeMap<String, Vec<String>> = BTreeMap::new();
-        for path in names(self) {
-            known.entry(variable(&path).to_uppercase()).or_default().push(path);
+        let mut known: Sorted<String, Vec<String>> = Sorted::default();
+        for (path, ()) in names(self).into_entries() {
+            known.get_or_insert(variable(&path).to_uppercase(), Vec::new).push(path);
         }
         let mut assignments: Vec<Assignment> = Vec::new();
         let mut problems = Vec::new();
@@ -95,10 +96,11 @@ fn variable(path: &str) -> String {
 }
 
 /// The setting that a variable means.
-fn path_of<'a>(known: &'a BTreeMap<String, Vec<String>>, suffix: &str) -> Result<&'a str, String> {
+fn path_of<'a>(known: &'a Sorted<String, Vec<String>>, suffix: &str) -> Result<&'a str, String> {
     let capitals = suffix.to_uppercase();
     let Some(paths) = known.get(&capitals) else {
-        let near = nearest(&capitals, known.keys().map(String::as_str)).and_then(|near| known.get(near)?.first());
+        let near = nearest(&capitals, known.iter().map(|(name, _)| name.as_str()))
+            .and_then(|near| known.get(near)?.first());
         let hint = near.map_or_else(
             || "; `--list` shows all".to_owned(),
             |near| format!("; did you mean `{SET}{}`?", variable(near)),

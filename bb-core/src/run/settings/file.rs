@@ -3,7 +3,7 @@
 use super::assign::Assignment;
 use super::error::{Place, SettingProblem, SettingsError};
 use crate::message::codec::to_json;
-use std::collections::BTreeSet;
+use crate::sorted::Sorted;
 use std::sync::Arc;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -38,10 +38,10 @@ pub(super) fn read(
     if reader.problems.is_empty() {
         reader.table("", table.get_ref());
     }
-    let mut seen = BTreeSet::new();
+    let mut seen = Sorted::default();
     reader.found.sort_by_key(|(start, _)| *start);
     for (_, assignment) in &reader.found {
-        if !seen.insert(assignment.path.as_str()) {
+        if seen.insert(assignment.path.as_str(), ()).is_some() {
             let message = "is set twice in this file";
             let problem = SettingProblem::new(assignment.place.clone(), &assignment.path, message);
             reader.problems.push(problem);

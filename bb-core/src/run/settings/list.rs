@@ -38,7 +38,7 @@ pub(super) fn list(draft: &mut Draft) -> SettingsList {
     // A table with the same name as a setting would define that name twice.
     let header = |path: &str| {
         let is_in_the_way =
-            path.match_indices('/').any(|(end, _)| names.contains(&path[..end])) || names.contains(path);
+            path.match_indices('/').any(|(end, _)| names.get(&path[..end]).is_some()) || names.get(path).is_some();
         if is_in_the_way {
             format!("[{}]", to_json(&path.to_owned()))
         } else {

@@ -6,11 +6,11 @@ use crate::declaration::schema::{number, parameter_schema, quantity, with_notes}
 use crate::declaration::unit::si_unit;
 use crate::message::codec::{Definitions, Shape, document, member, to_json};
 use crate::run::bound::bound_to;
-use std::collections::BTreeMap;
+use crate::sorted::Sorted;
 
 pub(crate) fn settings_schema(robot: &RobotDeclaration, mut options: OptionsList) -> String {
     let mut definitions = Definitions::default();
-    let mut root = BTreeMap::new();
+    let mut root = Sorted::default();
     for (number, path) in robot.component_paths().into_iter().enumerate() {
         let Some(options) = options.any(number) else { continue };
         for (index, field) in options.fields().iter().enumerate() {
@@ -31,18 +31,18 @@ pub(crate) fn settings_schema(robot: &RobotDeclaration, mut options: OptionsList
 /// A setting, or a table of further ones.
 enum Node {
     Setting(String),
-    Table(BTreeMap<String, Node>),
+    Table(Sorted<String, Node>),
 }
 
 /// Puts a schema in its place: `sensor/base/imu/rate` in the tables `sensor`, `base` and `imu`. If one of these is
 /// itself a setting, such as an option with the name of a nested estimator, the whole path is one name, as
 /// `SettingsList` writes it.
-fn insert(root: &mut BTreeMap<String, Node>, path: &str, schema: String) {
+fn insert(root: &mut Sorted<String, Node>, path: &str, schema: String) {
     let (above, last) = path.rsplit_once('/').unwrap_or(("", path));
     let above: Vec<&str> = if is_through_setting(root, above) { vec![above] } else { above.split('/').collect() };
     let mut table = root;
     for name in above {
-        let node = table.entry(name.to_owned()).or_insert_with(|| Node::Table(BTreeMap::new()));
+        let node = table.get_or_insert(name.to_owned(), || Node::Table(Sorted::default()));
         let Node::Table(inner) = node else { return };
         table = inner;
     }
@@ -50,7 +50,7 @@ fn insert(root: &mut BTreeMap<String, Node>, path: &str, schema: String) {
 }
 
 /// Whether a table at this path would collide with a setting.
-fn is_through_setting(root: &BTreeMap<String, Node>, path: &str) -> bool {
+fn is_through_setting(root: &Sorted<String, Node>, path: &str) -> bool {
     let mut table = root;
     for name in path.split('/') {
         match table.get(name) {
@@ -62,7 +62,7 @@ fn is_through_setting(root: &BTreeMap<String, Node>, path: &str) -> bool {
     false
 }
 
-fn object(table: &BTreeMap<String, Node>) -> String {
+fn object(table: &Sorted<String, Node>) -> String {
     let properties = table.iter().map(|(name, node)| {
         let schema = match node {
             Node::Setting(schema) => schema.clone(),
