@@ -2,7 +2,7 @@
 
 use super::draft::Draft;
 use super::handle::{Configurable, ParameterHandle, Publisher};
-use super::source::Source;
+use super::source::OpenSources;
 use super::wired::{Parts, declaration};
 use super::{Live, Replay, Robot, Running, Simulation, StartError, Supervision};
 use crate::declaration::{ParameterError, ParameterType};
@@ -134,7 +134,7 @@ impl<R: Robot> Builder<R> {
         Ok(Replay::new(live))
     }
 
-    fn assemble(self, clock: Clock, mode: Mode) -> Result<(Live<R>, Vec<Box<dyn Source>>), StartError> {
+    fn assemble(self, clock: Clock, mode: Mode) -> Result<(Live<R>, OpenSources), StartError> {
         let mut parts = Parts::<R>::new(self.topics);
         let (machine, sources) = self.draft.assemble(&mut parts, clock, mode)?;
         Ok((Live { machine: Arc::new(machine), wiring: parts.into_wiring()? }, sources))

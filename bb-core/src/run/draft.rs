@@ -12,7 +12,7 @@ use super::joints::known_joints;
 use super::keeper::{Keeper, Kept, PATH as KEEPER};
 use super::machine::Machine;
 use super::running::STOP_WITHIN;
-use super::source::{Assembly, Source};
+use super::source::{Assembly, OpenSources};
 use super::wired::{Place, Unwired, Wired};
 use super::{StartError, Supervision};
 use crate::component::replacement::{Replacement, Replacements};
@@ -128,7 +128,7 @@ impl Draft {
         unwired: &mut dyn Unwired,
         clock: Clock,
         mode: Mode,
-    ) -> Result<(Machine, Vec<Box<dyn Source>>), StartError> {
+    ) -> Result<(Machine, OpenSources), StartError> {
         let assembling = Assembling::new(&mut self, unwired, clock, mode)?;
         let mut facts = describe(self.robot, &unwired.topics(), &assembling.control);
         facts.push(format!("supervision: {:?}", self.supervision));
@@ -235,7 +235,7 @@ impl Assembling {
         &self,
         unwired: &mut dyn Unwired,
         options: &OptionsList,
-    ) -> Result<(Arc<Wired>, Vec<Box<dyn Source>>), StartError> {
+    ) -> Result<(Arc<Wired>, OpenSources), StartError> {
         let assembly = Assembly {
             environment: self.environment.clone(),
             control: self.control.clone(),
@@ -280,7 +280,7 @@ impl Assembling {
         StartError::component(path, fault)
     }
 
-    fn complete(self, wired: Arc<Wired>, sources: &[Box<dyn Source>], keeper: Option<Keeper>) -> Machine {
+    fn complete(self, wired: Arc<Wired>, sources: &OpenSources, keeper: Option<Keeper>) -> Machine {
         Machine {
             robot: self.robot,
             wired,

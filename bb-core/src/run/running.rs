@@ -1,7 +1,7 @@
 //! A run in real time: each sensor on a thread of its own.
 
 use super::machine::Machine;
-use super::source::Source;
+use super::source::OpenSources;
 use super::threads::{self, Thread};
 use super::{Live, Report, Robot, StartError};
 use std::fmt;
@@ -39,7 +39,7 @@ const BACK_WITHIN: Duration = Duration::from_millis(5800);
 const LINES_WITHIN: Duration = Duration::from_millis(150);
 
 impl<R: Robot> Running<R> {
-    pub(super) fn start(live: Live<R>, sources: Vec<Box<dyn Source>>) -> Result<Self, StartError> {
+    pub(super) fn start(live: Live<R>, sources: OpenSources) -> Result<Self, StartError> {
         Ok(Self { threads: Threads::start(Arc::clone(&live.machine), sources)?, live })
     }
 
@@ -59,7 +59,7 @@ impl<R: Robot> Running<R> {
 }
 
 impl Threads {
-    fn start(machine: Arc<Machine>, sources: Vec<Box<dyn Source>>) -> Result<Self, StartError> {
+    fn start(machine: Arc<Machine>, sources: OpenSources) -> Result<Self, StartError> {
         let mut running = Self { machine: Arc::clone(&machine), sources: Vec::new() };
         machine.control.pool().start();
         // On an error here, `running` is dropped, which stops what already runs, in order.

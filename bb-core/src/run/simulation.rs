@@ -1,7 +1,7 @@
 //! A run on virtual time, driven by its caller.
 
 use super::machine::Machine;
-use super::source::Source;
+use super::source::OpenSources;
 use super::visit::Visitable;
 use super::{Live, Report, Robot, SensorHandle};
 use crate::component::Sensor;
@@ -26,7 +26,7 @@ pub struct Simulation<R: Robot> {
 /// A run on virtual time, without the type of its robot.
 struct VirtualRun {
     machine: Arc<Machine>,
-    sources: Vec<Box<dyn Source>>,
+    sources: OpenSources,
     due: BinaryHeap<Reverse<(MonotonicTime, usize)>>,
 }
 
@@ -41,7 +41,7 @@ enum Kind {
 }
 
 impl<R: Robot> Simulation<R> {
-    pub(super) fn new(live: Live<R>, sources: Vec<Box<dyn Source>>) -> Self {
+    pub(super) fn new(live: Live<R>, sources: OpenSources) -> Self {
         Self { run: VirtualRun::new(Arc::clone(&live.machine), sources), live }
     }
 
@@ -96,7 +96,7 @@ impl<R: Robot> Simulation<R> {
 }
 
 impl VirtualRun {
-    fn new(machine: Arc<Machine>, mut sources: Vec<Box<dyn Source>>) -> Self {
+    fn new(machine: Arc<Machine>, mut sources: OpenSources) -> Self {
         // A simulation of a recording starts when the recording was made.
         if let Some(first) = sources.iter_mut().filter_map(|source| source.starts_at()).min() {
             machine.environment.clock().start_at(first);

@@ -55,6 +55,9 @@ pub(crate) trait Source: Send {
     fn shared(&self) -> SharedSource;
 }
 
+/// Sensors and services that have been made, in the order in which they are read.
+pub(super) type OpenSources = Vec<Box<dyn Source>>;
+
 /// A next reading of a real sensor further ahead is a mistake: a day.
 const FARTHEST_NANOS: i64 = 86_400_000_000_000;
 
@@ -98,7 +101,7 @@ impl Sources {
     }
 
     /// Makes all of them.
-    pub(super) fn open(&self, options: &OptionsList, assembly: &Assembly) -> Vec<Box<dyn Source>> {
+    pub(super) fn open(&self, options: &OptionsList, assembly: &Assembly) -> OpenSources {
         self.0.iter().filter_map(|source| source.open(options, assembly)).collect()
     }
 
