@@ -35,7 +35,7 @@ pub use execution::{CommandError, Execution};
 pub use faults::ReportedFault;
 pub(crate) use system::SystemTopics;
 
-use crate::component::{Host, Permit};
+use crate::component::{Caller, Host};
 use crate::declaration::{ParameterValues, RobotDeclaration, Supervisor};
 use crate::event::{DisarmError, HealthState, HealthTransition, Safety, SafetyError};
 use crate::journal::{Journal, ParameterEntry};
@@ -202,7 +202,7 @@ struct RunningCommand {
     command: usize,
     health: Option<HealthTransition>,
     slot: Arc<Slot>,
-    permit: Permit,
+    caller: Caller,
     /// `None` in a replay.
     task: Option<Arc<Task>>,
     phase: Phase,

@@ -5,6 +5,7 @@ mod command;
 mod fault;
 mod health;
 mod parameter;
+mod rights;
 mod safety;
 
 pub use arming::{ArmError, DisarmError};
@@ -12,4 +13,5 @@ pub use command::{CategoryDeclaration, CommandEvent, CommandPhase, Refusal, Refu
 pub use fault::ComponentFault;
 pub use health::{HealthReason, HealthState, HealthTransition};
 pub use parameter::{ParameterChange, ParameterValue};
+pub use rights::{Forbidden, Right, Rights};
 pub use safety::{Safety, SafetyError, SafetyTransition};

@@ -1,6 +1,6 @@
 //! Commands to an actuator by path.
 
-use super::Permit;
+use super::Caller;
 use crate::event::Safety;
 use crate::message::{OutOfBounds, Payload};
 use std::fmt;
@@ -13,12 +13,12 @@ use std::sync::Arc;
 /// carried out, and `T` has a stop command ([`JointCommand::stop`](crate::JointCommand::stop)).
 pub struct ActuatorLink<T: Payload> {
     accepts: Arc<dyn Accepts<T>>,
-    permit: Permit,
+    caller: Caller,
 }
 
 impl<T: Payload> ActuatorLink<T> {
-    pub(super) fn new(accepts: Arc<dyn Accepts<T>>, permit: Permit) -> Self {
-        Self { accepts, permit }
+    pub(super) fn new(accepts: Arc<dyn Accepts<T>>, caller: Caller) -> Self {
+        Self { accepts, caller }
     }
 
     /// Sends a command, and returns once it has been carried out.
@@ -36,21 +36,21 @@ impl<T: Payload> ActuatorLink<T> {
     /// # Errors
     /// As [`send`](Self::send).
     pub fn apply(&self, command: T) -> Result<T, ActuatorError> {
-        self.accepts.accept(command, &self.permit)
+        self.accepts.accept(command, &self.caller)
     }
 
     /// Stops the joint with [`JointCommand::stop`](crate::JointCommand::stop), if there is such a command and the last one that
     /// the actuator carried out was sent by the [`Command`](crate::Command) that obtained this link. What somebody else moves, or
     /// what a link obtained outside of commands has sent, goes on.
     pub fn stop(&self) {
-        self.accepts.stop_motion_of(&self.permit);
+        self.accepts.stop_motion_of(&self.caller);
     }
 }
 
 impl<T: Payload> Drop for ActuatorLink<T> {
     fn drop(&mut self) {
-        if !self.permit.is_valid() {
-            self.accepts.stop_motion_of(&self.permit);
+        if !self.caller.is_valid() {
+            self.accepts.stop_motion_of(&self.caller);
         }
     }
 }
@@ -115,7 +115,7 @@ impl From<OutOfBounds> for ActuatorError {
 /// An actuator that takes commands of type `T`.
 pub(crate) trait Accepts<T>: Send + Sync {
     /// Returns the command with the limits applied.
-    fn accept(&self, command: T, permit: &Permit) -> Result<T, ActuatorError>;
-    /// Stops the joint if the last command carried out came with that permit.
-    fn stop_motion_of(&self, permit: &Permit);
+    fn accept(&self, command: T, caller: &Caller) -> Result<T, ActuatorError>;
+    /// Stops the joint if the last command carried out came from that caller.
+    fn stop_motion_of(&self, caller: &Caller);
 }

@@ -1,9 +1,9 @@
 //! The robot by path, for code that does not know its type: commands, controllers, bridges, dashboards.
 
-use super::host::Host;
-use super::{Accepts, ActuatorLink, CommandInfo, Description, DynamicExecution, Fault, Permit};
+use super::host::{Controls, Host};
+use super::{Accepts, ActuatorLink, Caller, CommandInfo, Description, DynamicExecution, Fault};
 use crate::declaration::ParameterError;
-use crate::event::{ArmError, DisarmError, ParameterValue, Safety};
+use crate::event::{ArmError, DisarmError, Forbidden, ParameterValue, Right, Rights, Safety};
 use crate::fault::of_panic;
 use crate::joints::Joints;
 use crate::message::nearest::nearest_path;
@@ -17,23 +17,64 @@ use crate::topology::{GraphFormat, Topology};
 use std::fmt;
 use std::sync::Arc;
 
-/// Topics, actuators, parameters, commands and states, by path. Clones are the same.
+/// Topics, actuators, parameters, commands and states, by path, in the name of a caller and with its rights. Clones are the same.
+///
+/// [`Live`](crate::Live) and [`CommandContext`](crate::CommandContext) dereference to one. A program has all rights, and so have
+/// components and commands; a program gives fewer to those for whom it calls, such as the users of a page:
+///
+/// ```
+/// use bb_core::event::{Right, Rights};
+/// # use bb_core::prelude::*;
+/// # robot! { robot Rig; parameters { speed: f64 = 1.0; } link base; }
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let rig = Rig::builder().simulate()?;
+/// let page = rig.bus().for_caller("page", [Right::Read, Right::Parameters]);
+/// page.set_parameter("param/speed", 2.0)?;
+/// assert_eq!(page.arm().unwrap_err().to_string(), "the robot was not armed: `page` does not have the right `arm`");
+/// // Everybody may disarm it.
+/// rig.bus().for_caller("stop button", Rights::NONE).disarm()?;
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone)]
 pub struct Bus {
     host: Arc<dyn Host>,
-    permit: Permit,
+    pub(super) caller: Caller,
 }
 
 impl Bus {
-    pub(crate) fn new(host: Arc<dyn Host>, permit: Permit) -> Self {
-        Self { host, permit }
+    pub(crate) fn new(host: Arc<dyn Host>, caller: Caller) -> Self {
+        Self { host, caller }
+    }
+
+    /// The same for another caller, with those of `rights` that this one has. What it obtains from its bus, such as a link to an
+    /// actuator, acts in its name.
+    pub fn for_caller(&self, name: impl Into<String>, rights: impl Into<Rights>) -> Self {
+        Self { host: Arc::clone(&self.host), caller: self.caller.restricted(name.into(), rights.into()) }
+    }
+
+    /// The name of the caller: the path of a component or a command, or `program`.
+    pub fn caller(&self) -> &str {
+        self.caller.name()
+    }
+
+    /// The rights of the caller.
+    pub fn rights(&self) -> Rights {
+        self.caller.rights()
+    }
+
+    /// # Errors
+    /// The caller does not have the right.
+    pub fn check(&self, right: Right) -> Result<(), Forbidden> {
+        self.caller.check(right)
     }
 
     /// Subscribes to what is published at `path`.
     ///
     /// # Errors
-    /// Nothing is published there, or another payload is; the error names the nearest path.
+    /// Nothing is published there, or another payload is; the error names the nearest path. Or the caller may not read.
     pub fn subscribe<T: Payload>(&self, path: &str, overflow: Overflow) -> Result<Subscription<T>, Fault> {
+        self.check(Right::Read)?;
         let subscribed = self.with_topics(|topics| {
             let Some(topic) = topics.iter().find(|topic| topic.path() == path) else {
                 return Err(unmatched_at(path, topics, self.host.registry().declared()).into());
@@ -46,7 +87,8 @@ impl Bus {
         subscribed.unwrap_or_else(|| Err(Fault::new("the robot is gone")))
     }
 
-    /// Subscribes to messages of any payload; with names of payload types, only to those.
+    /// Subscribes from now on to messages of any payload, by path; with names of payload types, only to those. A caller that may not
+    /// read gets none.
     pub fn subscribe_any<'a>(
         &self,
         select: Select<'_>,
@@ -55,6 +97,9 @@ impl Bus {
     ) -> DynamicSubscription {
         let payloads = payloads.into();
         let mut subscribed = None;
+        if self.check(Right::Read).is_err() {
+            return DynamicSubscription::new([], select, payloads, overflow);
+        }
         self.host.with_topics(&mut |topics| {
             subscribed = Some(self.host.registry().subscribe(topics, select, &payloads, overflow));
         });
@@ -69,11 +114,13 @@ impl Bus {
     ///
     /// # Errors
     /// The path is that of a declared publisher or of a topic that every robot has, it has another payload already, it is
-    /// malformed, too many are in use, the robot has stopped, or the command that this bus belongs to has ended.
+    /// malformed, too many are in use, the robot has stopped, the command that this bus belongs to has ended, or the caller may
+    /// not publish.
     pub fn publisher<T: Payload>(&self, path: &str) -> Result<Publisher<T>, Fault> {
-        self.check_permit()?;
+        self.check(Right::Publish)?;
+        self.caller.check_valid()?;
         let topic = self.host.registry().topic_noted::<T>(path, &mut |change| self.host.note_path(change))?;
-        Ok(Publisher::new(topic, Arc::new(OwnPath { host: Arc::clone(&self.host), permit: self.permit.clone() })))
+        Ok(Publisher::new(topic, Arc::new(OwnPath { host: Arc::clone(&self.host), caller: self.caller.clone() })))
     }
 
     /// All paths with a publisher.
@@ -92,28 +139,29 @@ impl Bus {
     /// The actuator at `path`, which takes commands of type `T`.
     ///
     /// # Errors
-    /// No actuator is there, or one that takes other commands.
+    /// No actuator is there, or one that takes other commands, or the caller may not send to actuators.
     pub fn actuator<T: Payload>(&self, path: &str) -> Result<ActuatorLink<T>, Fault> {
+        self.check(Right::Actuators)?;
         let Some((takes, accepts)) = self.host.actuator(path) else {
-            let near = nearest_path(path, self.host.actuators());
+            let near = nearest_path(path, self.actuators());
             let hint = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
             return Err(Fault::new(format!("no actuator is at `{path}`{hint}")));
         };
         match accepts.downcast::<Arc<dyn Accepts<T>>>() {
-            Ok(accepts) => Ok(ActuatorLink::new(*accepts, self.permit.clone())),
+            Ok(accepts) => Ok(ActuatorLink::new(*accepts, self.caller.clone())),
             Err(_) => Err(Fault::new(format!("`{path}` takes commands of type `{takes}`, not `{}`", T::NAME))),
         }
     }
 
     /// The paths of all actuators.
     pub fn actuators(&self) -> Vec<&'static str> {
-        self.host.actuators()
+        self.host.actuators().into_iter().map(|(path, _)| path).collect()
     }
 
     /// The path of the actuator that moves a joint: the first declared one if there are several, `None` if there is
     /// none.
     pub fn actuator_of(&self, joint: &str) -> Option<&'static str> {
-        self.host.actuated_joints().into_iter().find(|(_, moved)| *moved == joint).map(|(path, _)| path)
+        self.host.actuators().into_iter().find(|(_, moved)| *moved == joint).map(|(path, _)| path)
     }
 
     /// The links and joints of the robot.
@@ -121,35 +169,64 @@ impl Bus {
         self.host.topology()
     }
 
-    /// The value of the parameter at `path`.
+    /// The value of the parameter at `path`; `None` also for a caller that may not read.
     pub fn parameter(&self, path: &str) -> Option<ParameterValue> {
-        self.host.parameter(path)
+        self.check(Right::Read).ok()?;
+        self.host.controls().parameter(path)
     }
 
     /// Sets the parameter at `path`.
     ///
     /// # Errors
-    /// The value is not accepted, or the command that this bus belongs to has been cancelled.
+    /// The value is not accepted, the command that this bus belongs to has been cancelled, or the caller may not set parameters.
     pub fn set_parameter(&self, path: &str, value: impl Into<ParameterValue>) -> Result<(), ParameterError> {
         self.set_parameters([(path, value.into())])
     }
 
-    /// Sets parameters by path, all at once: nobody sees some of them with the new value and others with the old one. If one of
-    /// the values is not accepted, none is set.
+    /// Sets parameters all at once: no reader sees a mixture of new and old values. If one of the values
+    /// is not accepted, none is set. [`ParameterHandle::to`](crate::ParameterHandle::to) checks the type of a value when it is
+    /// compiled; a path may also be written as text.
+    ///
+    /// ```
+    /// # use bb_core::prelude::*;
+    /// # robot! { robot Rig; parameters { gains { kp: f64 = 1.0, range: 0.0..=10.0; ki: f64 = 0.0; } } link base; }
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let rig = Rig::builder().simulate()?;
+    /// rig.set_parameters([rig::param::gains::kp.to(2.0), rig::param::gains::ki.to(0.5)])?;
+    /// // The first is out of range: the second is not set either.
+    /// assert!(rig.set_parameters([("param/gains/kp", 99.0.into()), ("param/gains/ki", 0.1.into())]).is_err());
+    /// assert_eq!((rig.parameter(rig::param::gains::kp), rig.parameter(rig::param::gains::ki)), (2.0, 0.5));
+    /// # Ok(())
+    /// # }
+    /// ```
     ///
     /// # Errors
-    /// The first value that is not accepted, or the command that this bus belongs to has been cancelled.
+    /// The first value that is not accepted: no such parameter, another type, out of its range, refused by a component that is
+    /// bound to it, or set twice. Or the command that this bus belongs to has been cancelled, or the caller may not set
+    /// parameters.
     pub fn set_parameters<P: Into<String>>(
         &self,
         values: impl IntoIterator<Item = (P, ParameterValue)>,
     ) -> Result<(), ParameterError> {
-        let changes = values.into_iter().map(|(path, value)| (path.into(), value)).collect();
-        self.host.set_parameters(changes, &self.permit)
+        self.set_all(values.into_iter().map(|(path, value)| (path.into(), value)).collect())
     }
 
-    /// The whole robot: links, joints, components, topics, parameters and commands, with their schemas.
+    fn set_all(&self, changes: Vec<(String, ParameterValue)>) -> Result<(), ParameterError> {
+        if let Err(forbidden) = self.check(Right::Parameters) {
+            let path = changes.into_iter().next().map_or_else(String::new, |(path, _)| path);
+            return Err(ParameterError { path, message: forbidden.to_string() });
+        }
+        self.settled(|robot| robot.set_parameters(changes, &self.caller))
+    }
+
+    /// The whole robot: links, joints, components, topics, parameters and commands, with their schemas. For a caller that may not
+    /// read, without the parameters.
     pub fn description(&self) -> Description {
-        self.host.description()
+        let mut description = self.host.description();
+        if self.check(Right::Read).is_err() {
+            description.parameters.clear();
+        }
+        description
     }
 
     /// The robot as a picture, like [`Robot::graph`](crate::run::Robot::graph), with replaced components marked.
@@ -159,56 +236,74 @@ impl Bus {
 
     /// All commands, with the shapes of their arguments and results.
     pub fn commands(&self) -> Vec<CommandInfo> {
-        self.host.commands()
+        self.host.controls().commands()
     }
 
     /// Starts the command at `path` with arguments from JSON; an empty string means the default arguments.
     ///
     /// # Errors
-    /// There is no such command, the arguments do not fit its shape, or it is refused.
+    /// There is no such command, the arguments do not fit its shape, it is refused, or the caller may not start commands.
     pub fn start_command(&self, path: &str, arguments: &str) -> Result<DynamicExecution, Fault> {
-        self.check_permit()?;
-        self.host.start_command(path, arguments, &self.permit)
+        self.check(Right::Commands)?;
+        self.caller.check_valid()?;
+        self.settled(|robot| robot.start_command(path, arguments, &self.caller))
     }
 
-    /// The operational state.
+    /// The operational state: `disarmed`, `idle`, `executing`, or a declared one.
     pub fn state(&self) -> &'static str {
-        self.host.state()
+        self.host.controls().state()
     }
 
     /// The safety state.
     pub fn safety(&self) -> Safety {
-        self.host.safety()
+        self.host.controls().safety()
     }
 
-    /// Arms the robot. See [`Live::arm`](crate::Live::arm).
+    /// Arms the robot, as a command would. A robot that is armed already stays so.
     ///
     /// # Errors
-    /// Why it is not armed.
+    /// Why it is not armed: it is in `error`, is being disarmed or stops, or the code of cancelled commands has not returned
+    /// within 5 s; or the caller may not arm it.
     pub fn arm(&self) -> Result<(), ArmError> {
-        self.host.arm(&self.permit)
+        self.check(Right::Arm).map_err(ArmError::Forbidden)?;
+        self.settled(|robot| robot.arm(&self.caller))
     }
 
-    /// Disarms the robot. See [`Live::disarm`](crate::Live::disarm).
+    /// Disarms the robot: commands are cancelled, and the owners of hardware make it safe, within 5 s. Every caller may.
     ///
     /// # Errors
-    /// Why it may not be safe.
+    /// What could not be made safe; the safety state is then `error`.
     pub fn disarm(&self) -> Result<(), DisarmError> {
-        self.host.disarm()
+        self.settled(|robot| robot.disarm(false))
     }
 
-    /// The states of the joints, and all frames at any time.
+    /// Leaves the safety state `error`, even if something still cannot be made safe; the caller must have checked
+    /// that.
+    ///
+    /// # Errors
+    /// What could not be made safe again. The safety state is `disarmed` nevertheless. Or the caller may not arm the robot.
+    pub fn force_disarm(&self) -> Result<(), DisarmError> {
+        self.check(Right::Arm).map_err(DisarmError::Forbidden)?;
+        self.settled(|robot| robot.disarm(true))
+    }
+
+    /// The states of the joints, and all frames at any time. Every caller may see where the robot is.
     pub fn joints(&self) -> Joints {
         self.host.joints()
     }
 
     /// The clock of the run.
     pub fn clock(&self) -> &Clock {
-        self.host.clock()
+        self.host.controls().clock()
     }
 
-    fn check_permit(&self) -> Result<(), Fault> {
-        self.permit.check()
+    /// Acts on the robot; for a caller from outside, what follows is settled on virtual time.
+    fn settled<T>(&self, act: impl FnOnce(&dyn Controls) -> T) -> T {
+        let result = act(self.host.controls());
+        if self.caller.is_outside() {
+            self.host.settle();
+        }
+        result
     }
 
     /// All topics; none if the robot is gone.
@@ -227,20 +322,21 @@ impl Bus {
 /// Publishes at a path of the caller's choice.
 struct OwnPath {
     host: Arc<dyn Host>,
-    permit: Permit,
+    caller: Caller,
 }
 
 impl Gate for OwnPath {
     fn pass(&self, path: &'static str, publish: &mut dyn FnMut(Stamp) -> Option<Panic>) {
         self.host.while_open(&mut || {
             // After what had to be waited for.
-            if !self.permit.is_valid() {
+            if !self.caller.is_valid() {
                 return;
             }
-            let clock = self.host.clock();
+            let robot = self.host.controls();
+            let clock = robot.clock();
             let monotonic_time = clock.now();
             let wall_time = clock.wall_at(monotonic_time);
-            let stamp = Stamp { monotonic_time, wall_time, origin: self.host.origin(), ..Stamp::default() };
+            let stamp = Stamp { monotonic_time, wall_time, origin: robot.origin(), ..Stamp::default() };
             let panic = publish(stamp);
             if let Some(panic) = panic {
                 self.host.message_failed(path, of_panic(panic));

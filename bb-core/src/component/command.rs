@@ -1,15 +1,15 @@
 //! The contract of a command.
 
 use super::guardian::OwnHooks;
-use super::host::Host;
-use super::{Bus, Fault, NoOptions, Options, Permit};
-use crate::declaration::{ParameterError, Role};
-use crate::event::{HealthTransition, ParameterValue};
+use super::{Bus, Fault, NoOptions, Options};
+use crate::declaration::Role;
+use crate::event::HealthTransition;
 use crate::message::Field;
 use crate::message::Payload;
 use crate::schedule::{Alarm, Sleeper};
 use crate::time::MonotonicTime;
 use std::future::Future;
+use std::ops::Deref;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll};
@@ -101,14 +101,14 @@ impl<T> Outcome<T> {
     }
 }
 
-/// The context of a running command, through which it reaches the robot.
+/// The context of a running command, through which it reaches the robot: it dereferences to its [`Bus`], which refuses to act once the
+/// command has ended or was cancelled.
 #[derive(Clone, Debug)]
 pub struct CommandContext {
     pub(crate) name: &'static str,
     pub(crate) health: Option<HealthTransition>,
-    pub(crate) host: Arc<dyn Host>,
+    pub(crate) bus: Bus,
     pub(crate) sleeper: Sleeper,
-    pub(crate) permit: Permit,
     pub(crate) hooks: Arc<OwnHooks>,
 }
 
@@ -125,28 +125,22 @@ impl CommandContext {
 
     /// The time now.
     pub fn now(&self) -> MonotonicTime {
-        self.host.clock().now()
+        self.bus.clock().now()
     }
 
     /// Waits on the robot's clock.
     pub fn sleep(&self, duration: Duration) -> Sleep {
-        Sleep {
-            until: self.now() + duration,
-            host: Arc::clone(&self.host),
-            sleeper: self.sleeper.clone(),
-            alarm: None,
-        }
+        Sleep { until: self.now() + duration, bus: self.bus.clone(), sleeper: self.sleeper.clone(), alarm: None }
     }
 
     /// Whether it was cancelled or has timed out. Anything it sends from then on is refused. A command that blocks
     /// its thread should check this from time to time.
     pub fn is_cancelled(&self) -> bool {
-        !self.permit.is_valid()
+        !self.bus.caller.is_valid()
     }
 
     /// Registers a callback that makes hardware safe when the robot is disarmed while this command runs. It is
-    /// removed when the command's code has returned. If the robot was disarmed in the meantime, it then runs once
-    /// more, for anything the code has started since. All callbacks run concurrently, each on its own thread, and
+    /// removed when the command's code has returned. All callbacks run concurrently, each on its own thread, and
     /// must return within 5 s. One that fails or takes longer leads to the safety state `error`.
     pub fn on_disarm(&self, hook: impl Fn() -> Result<(), Fault> + Send + Sync + 'static) {
         self.hooks.add(Arc::new(hook));
@@ -158,40 +152,16 @@ impl CommandContext {
         self.hooks.hardware_error(message.into());
     }
 
-    /// The operational state.
-    pub fn state(&self) -> &'static str {
-        self.host.state()
-    }
-
     /// Topics, actuators, parameters and commands, by path.
     pub fn bus(&self) -> Bus {
-        Bus::new(Arc::clone(&self.host), self.permit.clone())
+        self.bus.clone()
     }
+}
 
-    /// The value of the parameter at `path`: `param/imu/beta`.
-    pub fn parameter(&self, path: &str) -> Option<ParameterValue> {
-        self.host.parameter(path)
-    }
-
-    /// Sets the parameter at `path`.
-    ///
-    /// # Errors
-    /// The value is not accepted, or the command has been cancelled.
-    pub fn set_parameter(&self, path: &str, value: impl Into<ParameterValue>) -> Result<(), ParameterError> {
-        self.set_parameters([(path, value.into())])
-    }
-
-    /// Sets parameters by path, all at once: nobody sees some of them with the new value and others with the old one. If one of
-    /// the values is not accepted, none is set.
-    ///
-    /// # Errors
-    /// The first value that is not accepted, or the command has been cancelled.
-    pub fn set_parameters<P: Into<String>>(
-        &self,
-        values: impl IntoIterator<Item = (P, ParameterValue)>,
-    ) -> Result<(), ParameterError> {
-        let changes = values.into_iter().map(|(path, value)| (path.into(), value)).collect();
-        self.host.set_parameters(changes, &self.permit)
+impl Deref for CommandContext {
+    type Target = Bus;
+    fn deref(&self) -> &Bus {
+        &self.bus
     }
 }
 
@@ -199,7 +169,7 @@ impl CommandContext {
 #[derive(Debug)]
 pub struct Sleep {
     until: MonotonicTime,
-    host: Arc<dyn Host>,
+    bus: Bus,
     sleeper: Sleeper,
     alarm: Option<Alarm>,
 }
@@ -208,7 +178,7 @@ impl Future for Sleep {
     type Output = ();
 
     fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<()> {
-        if self.host.clock().now() >= self.until {
+        if self.bus.clock().now() >= self.until {
             return Poll::Ready(());
         }
         self.alarm = Some(self.sleeper.wake_at(self.until, self.alarm, context.waker().clone()));

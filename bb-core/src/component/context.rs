@@ -4,7 +4,7 @@ use super::guardian::Guardian;
 use super::host::Host;
 use super::motion_reports::{MotionReport, MotionReports};
 use super::replacement::Replacement;
-use super::{Bus, Fault, Permit, Request, SafetyLink};
+use super::{Bus, Caller, Fault, Request, SafetyLink};
 use crate::declaration::{ActuatorDeclaration, EstimatorDeclaration, InputDeclaration, SensorDeclaration};
 use crate::message::Frame;
 use crate::payload::{BeginMotion, EndMotion, MotionEnd};
@@ -177,7 +177,7 @@ impl ComponentContext {
 
     /// The robot's name.
     pub fn robot(&self) -> &'static str {
-        self.host.origin().robot
+        self.host.controls().origin().robot
     }
 
     /// The component's path: `sensor/base_link/imu`.
@@ -187,12 +187,12 @@ impl ComponentContext {
 
     /// The clock of the run.
     pub fn clock(&self) -> &Clock {
-        self.host.clock()
+        self.host.controls().clock()
     }
 
     /// Whether the robot is stopping: a component that waits for its device should then stop waiting.
     pub fn is_stopping(&self) -> bool {
-        self.host.is_stopping()
+        self.host.controls().is_stopping()
     }
 
     /// The links and joints of the robot.
@@ -207,6 +207,10 @@ impl ComponentContext {
         self.host.shared().get(make)
     }
 
+    fn bus(&self) -> Bus {
+        Bus::new(Arc::clone(&self.host), Caller::component(self.path))
+    }
+
     pub(crate) fn replacement(&self) -> Option<Replacement> {
         self.host.replacement(self.path)
     }
@@ -216,13 +220,13 @@ impl ComponentContext {
     /// fails or takes longer leads to the safety state `error`. A restart of the component replaces its earlier
     /// callbacks.
     pub fn on_disarm(&self, hook: impl Fn() -> Result<(), Fault> + Send + Sync + 'static) {
-        self.host.on_disarm(self.path, None, Arc::new(hook));
+        self.host.controls().on_disarm(self.path, None, Arc::new(hook));
     }
 
     /// Reports that hardware is in a dangerous state: the robot is disarmed, its safety state becomes `error`, and the error
     /// is published at `safety/error`.
     pub fn hardware_error(&self, message: impl Into<String>) {
-        self.host.hardware_error(self.path, message.into());
+        self.host.controls().hardware_error(self.path, message.into());
     }
 }
 
@@ -289,7 +293,7 @@ impl SensorContext {
     /// Topics, actuators, parameters and commands, by path: for a sensor whose readings are computed from what others
     /// publish. Messages read this way in `read` are not inputs: they are neither declared nor checked.
     pub fn bus(&self) -> Bus {
-        Bus::new(Arc::clone(&self.common.host), Permit::UNLIMITED)
+        self.common.bus()
     }
 
     /// Transforms points from the sensor's frame to the root link's: the product of the fixed joints between. `None`
@@ -307,7 +311,7 @@ impl ServiceContext {
 
     /// Topics, actuators, parameters and commands, by path.
     pub fn bus(&self) -> Bus {
-        Bus::new(Arc::clone(&self.common.host), Permit::UNLIMITED)
+        self.common.bus()
     }
 }
 

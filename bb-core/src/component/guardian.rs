@@ -1,6 +1,6 @@
 //! Safety functions for any component.
 
-use super::Fault;
+use super::{Fault, Host};
 use std::fmt;
 use std::sync::Arc;
 
@@ -56,22 +56,22 @@ impl fmt::Debug for SafetyLink {
 /// The disarm callbacks of one execution of a command: they are kept until its code has returned.
 pub(crate) struct OwnHooks {
     path: &'static str,
-    guardian: Arc<dyn Guardian>,
+    host: Arc<dyn Host>,
     execution: u64,
 }
 
 impl OwnHooks {
-    pub(crate) fn new(path: &'static str, guardian: Arc<dyn Guardian>, execution: u64) -> Self {
-        Self { path, guardian, execution }
+    pub(crate) fn new(path: &'static str, host: Arc<dyn Host>, execution: u64) -> Self {
+        Self { path, host, execution }
     }
 
-    /// Once the execution's code has returned, a callback is run at once, and not kept.
+    /// Once the execution's code has returned, a callback is dropped.
     pub(crate) fn add(&self, hook: DisarmHook) {
-        self.guardian.on_disarm(self.path, Some(self.execution), hook);
+        self.host.controls().on_disarm(self.path, Some(self.execution), hook);
     }
 
     pub(crate) fn hardware_error(&self, message: String) {
-        self.guardian.hardware_error(self.path, message);
+        self.host.controls().hardware_error(self.path, message);
     }
 }
 

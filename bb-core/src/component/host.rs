@@ -1,9 +1,9 @@
-//! The robot as its components see it.
+//! The robot as its callers see it: what the runtime implements for the [`Bus`](super::Bus).
 
 use super::guardian::Guardian;
 use super::replacement::Replacement;
 use super::shared::SharedValues;
-use super::{CommandInfo, Description, DynamicExecution, Fault, Permit};
+use super::{Caller, CommandInfo, Description, DynamicExecution, Fault};
 use crate::declaration::ParameterError;
 use crate::event::{ArmError, DisarmError, ParameterValue, Safety};
 use crate::joints::Joints;
@@ -14,25 +14,33 @@ use crate::topology::{GraphFormat, Topology};
 use std::any::Any;
 use std::fmt;
 
-/// The interface between components and the robot that runs them; the runtime implements it.
-pub(crate) trait Host: Guardian {
+/// The robot as a whole: its safety, states, parameters and commands. The caller has the rights that it needs.
+pub(crate) trait Controls: Guardian {
     fn origin(&self) -> Origin;
     fn clock(&self) -> &Clock;
+    /// Whether components are to stop.
+    fn is_stopping(&self) -> bool;
+    fn state(&self) -> &'static str;
+    fn safety(&self) -> Safety;
+    fn arm(&self, caller: &Caller) -> Result<(), ArmError>;
+    fn disarm(&self, force: bool) -> Result<(), DisarmError>;
+    fn parameter(&self, path: &str) -> Option<ParameterValue>;
+    /// Sets all of them, or none.
+    fn set_parameters(&self, changes: Vec<(String, ParameterValue)>, caller: &Caller)
+    -> Result<(), ParameterError>;
+    fn commands(&self) -> Vec<CommandInfo>;
+    fn start_command(&self, path: &str, arguments: &str, caller: &Caller) -> Result<DynamicExecution, Fault>;
+}
+
+/// A robot with its topics and components.
+pub(crate) trait Host: Send + Sync {
+    fn controls(&self) -> &dyn Controls;
     fn joints(&self) -> Joints;
     fn topology(&self) -> &'static Topology;
     /// Values shared by the components of this run.
     fn shared(&self) -> &SharedValues;
     /// The replacement of the component at `path`, if there is one.
     fn replacement(&self, path: &str) -> Option<Replacement>;
-    fn is_stopping(&self) -> bool;
-    fn state(&self) -> &'static str;
-    fn safety(&self) -> Safety;
-    fn arm(&self, permit: &Permit) -> Result<(), ArmError>;
-    fn disarm(&self) -> Result<(), DisarmError>;
-    fn parameter(&self, path: &str) -> Option<ParameterValue>;
-    /// Sets all of them, or none.
-    fn set_parameters(&self, changes: Vec<(String, ParameterValue)>, permit: &Permit)
-    -> Result<(), ParameterError>;
     /// The declared topics.
     fn with_topics(&self, call: &mut dyn FnMut(&[&dyn AnyTopic]));
     /// The topics created at run time.
@@ -50,17 +58,17 @@ pub(crate) trait Host: Guardian {
     fn message_failed(&self, path: &'static str, fault: Fault);
     /// The actuator at `path`: the name of the type of its commands, and an `Arc<dyn Accepts<T>>`.
     fn actuator(&self, path: &str) -> Option<(&'static str, Box<dyn Any>)>;
-    fn actuators(&self) -> Vec<&'static str>;
     /// The paths of all actuators, each with its joint.
-    fn actuated_joints(&self) -> Vec<(&'static str, &'static str)>;
-    fn commands(&self) -> Vec<CommandInfo>;
+    fn actuators(&self) -> Vec<(&'static str, &'static str)>;
     fn description(&self) -> Description;
     fn graph(&self, format: GraphFormat) -> String;
-    fn start_command(&self, path: &str, arguments: &str, permit: &Permit) -> Result<DynamicExecution, Fault>;
+    /// After a call from outside, on virtual time: runs disarm callbacks left by an actuator's own code, and hands lines of the
+    /// journal to its sink.
+    fn settle(&self);
 }
 
 impl fmt::Debug for dyn Host {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("Host").field(&self.origin().robot).finish()
+        f.debug_tuple("Host").field(&self.controls().origin().robot).finish()
     }
 }

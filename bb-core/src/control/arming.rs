@@ -12,7 +12,7 @@ use super::callbacks::{Reason, is_awaited};
 use super::machine::IDLE;
 use super::step::Step;
 use super::{Control, Disarming, Limit, Phase, RunningCommand, State};
-use crate::component::Permit;
+use crate::component::Caller;
 use crate::event::{ArmError, DisarmError, Safety, SafetyError};
 use crate::journal::Event;
 use crate::node::Mode;
@@ -61,12 +61,12 @@ impl State {
 
 impl Control {
     /// Arms the robot, unless it is in `error` or stopping.
-    pub(crate) fn arm(&self, permit: &Permit) -> Result<(), ArmError> {
+    pub(crate) fn arm(&self, caller: &Caller) -> Result<(), ArmError> {
         if self.0.mode == Mode::Replay {
             return Err(ArmError::Replay);
         }
         let disarms = self.lock().disarms;
-        if !permit.is_valid() {
+        if !caller.is_valid() {
             return Err(ArmError::Cancelled);
         }
         let may_wait = self.0.mode == Mode::Real && !is_awaited(self.id());
@@ -82,7 +82,7 @@ impl Control {
                 || state.disarms != disarms
         });
         // The command may have been cancelled while this waited, or the robot disarmed.
-        if !permit.is_valid() || step.state.disarms != disarms {
+        if !caller.is_valid() || step.state.disarms != disarms {
             return Err(ArmError::Cancelled);
         }
         if step.state.machine.safety == Safety::Disarmed && !step.state.is_stopping && !step.state.apart.is_empty()

@@ -6,7 +6,7 @@ use super::execution::{Execution, Slot, UntypedExecution};
 use super::step::Step;
 use super::task::{Task, Value};
 use super::{Control, Limit, Phase, RunningCommand};
-use crate::component::{CommandContext, CommandInfo, DynamicExecution, OwnHooks, Permit};
+use crate::component::{Bus, Caller, CommandContext, CommandInfo, DynamicExecution, OwnHooks};
 use crate::declaration::{CommandDeclaration, Role};
 use crate::event::{
     CategoryDeclaration, CommandEvent, CommandPhase, HealthTransition, Refusal, RefusalReason, Safety,
@@ -49,12 +49,12 @@ impl Control {
         self.request(self.step(), number, Some(arguments)).map(Execution::new)
     }
 
-    /// Starts the command at `path` with arguments from JSON, on behalf of the holder of the permit.
+    /// Starts the command at `path` with arguments from JSON, on behalf of the caller.
     pub(crate) fn execute_untyped(
         &self,
         path: &str,
         json: &str,
-        permit: &Permit,
+        caller: &Caller,
     ) -> Result<DynamicExecution, Fault> {
         let number = self.0.declared.commands.iter().position(|declared| declared.path == path);
         let Some((number, command)) = number.and_then(|number| Some((number, self.0.commands.get(number)?))) else {
@@ -65,7 +65,7 @@ impl Control {
         };
         let arguments = command.0.arguments(json)?;
         let step = self.step();
-        if let Err(fault) = permit.check() {
+        if let Err(fault) = caller.check_valid() {
             // It was cancelled while the arguments were created.
             drop(step);
             crate::fault::discard(arguments);
@@ -219,11 +219,11 @@ impl Step<'_> {
         }
         let control = self.control.clone();
         let slot = Arc::new(Slot::new(id, number, control.downgrade()));
-        let permit = Permit::revocable();
+        let caller = Caller::execution(declared.path);
         let is_for_safety = role == Role::Disarming || health.is_some();
         let lane = if is_for_safety { Lane::Safety } else { Lane::Commands };
         let task = (control.0.mode != Mode::Replay).then(|| {
-            let (permit, weak) = (permit.clone(), control.downgrade());
+            let (caller, weak) = (caller.clone(), control.downgrade());
             let starter = move || {
                 let gone = || Fault::new("the robot is gone");
                 let control = weak.upgrade().ok_or_else(gone)?;
@@ -232,10 +232,9 @@ impl Step<'_> {
                 let context = CommandContext {
                     name: declared.name,
                     health,
-                    hooks: Arc::new(OwnHooks::new(declared.path, Arc::clone(&host) as _, id)),
-                    host,
+                    hooks: Arc::new(OwnHooks::new(declared.path, Arc::clone(&host), id)),
+                    bus: Bus::new(host, caller),
                     sleeper: control.0.sleeper.in_lane(lane),
-                    permit,
                 };
                 prepared.0.start(arguments, &control.parameters(), context)
             };
@@ -252,7 +251,7 @@ impl Step<'_> {
             command: number,
             health,
             slot: Arc::clone(&slot),
-            permit,
+            caller,
             task,
             phase: Phase::Running,
         };

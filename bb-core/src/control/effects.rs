@@ -134,8 +134,9 @@ impl Control {
     /// Runs user code on a thread of the pool, where it delays nothing else; on virtual time, on the caller's thread.
     pub(crate) fn run_on_pool(&self, lane: Lane, code: impl FnOnce() + Send + 'static) {
         match self.0.mode {
-            Mode::Real => self.0.pool.submit(lane, code),
-            Mode::Virtual | Mode::Replay => code(),
+            // A model does not include the pool's threads.
+            Mode::Real if !cfg!(loom) => self.0.pool.submit(lane, code),
+            Mode::Real | Mode::Virtual | Mode::Replay => code(),
         }
     }
 

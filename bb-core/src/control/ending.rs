@@ -179,7 +179,7 @@ impl Step<'_> {
     fn set_phase(&mut self, index: usize, phase: Phase) {
         if let Some(execution) = self.state.executions.get_mut(index) {
             // Its code has ended: none of its handles may act any more.
-            execution.permit.revoke();
+            execution.caller.revoke();
             execution.phase = phase;
         }
     }
@@ -235,7 +235,7 @@ impl Step<'_> {
     ) {
         let Some(execution) = self.state.executions.get_mut(index) else { return };
         let (id, command, health) = (execution.id, execution.command, execution.health);
-        execution.permit.revoke();
+        execution.caller.revoke();
         let slot = Arc::clone(&execution.slot);
         // An execution whose code has ended is gone; another one's code has yet to notice.
         let previous = std::mem::replace(&mut execution.phase, Phase::Lingering);

@@ -4,7 +4,7 @@
 //! `error`, and an actuator does not move after it was made safe.
 
 use super::{Control, bare};
-use crate::component::{Guardian, Permit};
+use crate::component::{Caller, Controls, Guardian};
 use crate::event::Safety;
 use crate::fault::Fault;
 use crate::node::Mode;
@@ -62,7 +62,7 @@ fn check<const THREADS: usize>(threads: [Thread; THREADS], prepare: fn(&Control)
     checker.check(move || {
         let control = control();
         let motor = prepare(&control);
-        assert_eq!(control.arm(&Permit::UNLIMITED), Ok(()));
+        assert_eq!(control.arm(&Caller::PROGRAM), Ok(()));
         let spawned: Vec<_> = threads
             .iter()
             .map(|&run| {
@@ -87,7 +87,7 @@ const DISARMS: Thread = |control, _| {
 };
 const STOPS: Thread = |control, _| control.begin_stop();
 const ARMS: Thread = |control, _| {
-    let _ = control.arm(&Permit::UNLIMITED);
+    let _ = control.arm(&Caller::PROGRAM);
 };
 const BURNS: Thread = |control, _| control.hardware_error("motor", "it burns".to_owned());
 /// The first time that the robot is disarmed.
@@ -136,7 +136,7 @@ fn an_init_that_fails_while_the_robot_is_disarmed() {
     checker.preemption_bound = Some(2);
     checker.check(|| {
         let control = control();
-        assert_eq!(control.arm(&Permit::UNLIMITED), Ok(()));
+        assert_eq!(control.arm(&Caller::PROGRAM), Ok(()));
         let motor = Motor::default();
         let (starting, started) = (control.clone(), motor.clone());
         let starts = thread::spawn(move || {
@@ -171,7 +171,7 @@ fn a_callback_that_is_registered_while_the_robot_stops() {
     checker.preemption_bound = Some(2);
     checker.check(|| {
         let control = control();
-        assert_eq!(control.arm(&Permit::UNLIMITED), Ok(()));
+        assert_eq!(control.arm(&Caller::PROGRAM), Ok(()));
         let motor = Motor::default();
         let (stopped, started) = (control.clone(), motor.clone());
         let (starting, stops) = (control.clone(), thread::spawn(move || stopped.begin_stop()));

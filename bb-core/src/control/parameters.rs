@@ -2,7 +2,7 @@
 
 use super::step::Step;
 use super::{Bound, Control};
-use crate::component::Permit;
+use crate::component::Caller;
 use crate::declaration::{ParameterError, ParameterValues};
 use crate::event::{ParameterChange, ParameterValue};
 use crate::journal::{Event, ParameterEntry};
@@ -23,13 +23,13 @@ impl Control {
     pub(crate) fn set_parameters_at(
         &self,
         changes: Vec<(String, ParameterValue)>,
-        permit: &Permit,
+        caller: &Caller,
     ) -> Result<(), ParameterError> {
         let changes: Result<Vec<_>, _> = changes
             .into_iter()
             .map(|(path, value)| Ok(ParameterEntry { parameter: self.parameter_number(&path)?, value }))
             .collect();
-        self.set_parameters(changes?, permit)
+        self.set_parameters(changes?, caller)
     }
 
     /// The path of a parameter.
@@ -51,7 +51,7 @@ impl Control {
     pub(crate) fn set_parameters(
         &self,
         changes: Vec<ParameterEntry>,
-        permit: &Permit,
+        caller: &Caller,
     ) -> Result<(), ParameterError> {
         let Some(first) = changes.first() else { return Ok(()) };
         let path_of = |number: usize| self.0.declared.parameters.get(number).map_or("?", |declared| declared.path);
@@ -93,7 +93,7 @@ impl Control {
                 })?;
             }
             let mut step = self.step();
-            if !permit.is_valid() {
+            if !caller.is_valid() {
                 let message = "the command that sets it has ended or was cancelled";
                 return Err(refuse(first_path, message.to_owned()));
             }

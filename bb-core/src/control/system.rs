@@ -9,11 +9,11 @@ use super::{
     ComponentOrder, Control, Health, Inner, Islands, Parts, State, StateGuard, StateMutex, Summary, Supervised,
     WeakControl,
 };
-use crate::component::Host;
-use crate::declaration::{CommandDeclaration, RobotDeclaration, Supervisor};
+use crate::component::{Caller, CommandInfo, Controls, DynamicExecution, Host};
+use crate::declaration::{CommandDeclaration, ParameterError, RobotDeclaration, Supervisor};
 use crate::event::{
-    CommandEvent, ComponentFault, HealthTransition, ParameterChange, Safety, SafetyError, SafetyTransition,
-    StateTransition,
+    ArmError, CommandEvent, ComponentFault, DisarmError, HealthTransition, ParameterChange, ParameterValue, Safety,
+    SafetyError, SafetyTransition, StateTransition,
 };
 use crate::fault::Fault;
 use crate::journal::JournalLine;
@@ -169,15 +169,7 @@ impl Control {
         self.0.has_orders.swap(false, Ordering::AcqRel)
     }
 
-    pub(crate) fn state(&self) -> &'static str {
-        self.lock().machine.state()
-    }
-
-    pub(crate) fn safety(&self) -> Safety {
-        self.lock().machine.safety
-    }
-
-    /// The same without the lock: for actuators, which ask under their own lock before every command.
+    /// The safety state, without the lock: for actuators, which ask under their own lock before every command.
     pub(crate) fn safety_now(&self) -> Safety {
         match self.0.safety.load(Ordering::SeqCst) {
             safety if safety == Safety::Armed as u8 => Safety::Armed,
@@ -218,10 +210,6 @@ impl Control {
         &self.0.clock
     }
 
-    pub(crate) fn origin(&self) -> Origin {
-        self.0.origin
-    }
-
     pub(crate) fn topics(&self) -> &SystemTopics {
         &self.0.topics
     }
@@ -244,6 +232,56 @@ impl Control {
 
     pub(super) fn host(&self) -> Result<Arc<dyn Host>, Fault> {
         self.0.host.get().and_then(Weak::upgrade).ok_or_else(|| Fault::new("the robot is gone"))
+    }
+}
+
+impl Controls for Control {
+    fn origin(&self) -> Origin {
+        self.0.origin
+    }
+
+    fn clock(&self) -> &Clock {
+        &self.0.clock
+    }
+
+    fn is_stopping(&self) -> bool {
+        self.0.stop.is_set()
+    }
+
+    fn state(&self) -> &'static str {
+        self.lock().machine.state()
+    }
+
+    fn safety(&self) -> Safety {
+        self.lock().machine.safety
+    }
+
+    fn arm(&self, caller: &Caller) -> Result<(), ArmError> {
+        Self::arm(self, caller)
+    }
+
+    fn disarm(&self, force: bool) -> Result<(), DisarmError> {
+        Self::disarm(self, force)
+    }
+
+    fn parameter(&self, path: &str) -> Option<ParameterValue> {
+        self.parameter_at(path)
+    }
+
+    fn set_parameters(
+        &self,
+        changes: Vec<(String, ParameterValue)>,
+        caller: &Caller,
+    ) -> Result<(), ParameterError> {
+        self.set_parameters_at(changes, caller)
+    }
+
+    fn commands(&self) -> Vec<CommandInfo> {
+        self.infos()
+    }
+
+    fn start_command(&self, path: &str, arguments: &str, caller: &Caller) -> Result<DynamicExecution, Fault> {
+        self.execute_untyped(path, arguments, caller)
     }
 }
 

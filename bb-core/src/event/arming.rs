@@ -1,6 +1,6 @@
 //! Why a robot could not be armed or disarmed.
 
-use super::SafetyError;
+use super::{Forbidden, SafetyError};
 use std::fmt;
 
 /// Why a robot is not armed.
@@ -22,6 +22,8 @@ pub enum ArmError {
     Cancelled,
     /// The robot is replayed: its journal says when it is armed.
     Replay,
+    /// The caller may not arm it.
+    Forbidden(Forbidden),
 }
 
 /// Why a robot may not be safe.
@@ -33,13 +35,15 @@ pub enum DisarmError {
     /// The safety state is `error`, and this disarm was not forced, or hardware reported an error meanwhile.
     Error,
     /// A disarm callback or an actuator's own code called: the robot is being disarmed, and the caller would wait for
-    /// itself. The same applies to a disarm callback of another robot if disarming this one waits for that robot.
+    /// itself.
     Callback,
     /// The robot is still being disarmed: its time limit has not been enforced yet, or another thread of a simulation
     /// runs the callbacks.
     Unfinished,
     /// The robot is replayed: its journal says when it is disarmed.
     Replay,
+    /// The caller may not force it out of `error`.
+    Forbidden(Forbidden),
 }
 
 impl fmt::Display for ArmError {
@@ -57,6 +61,7 @@ impl fmt::Display for ArmError {
             }
             Self::Cancelled => f.write_str("it was disarmed meanwhile, or the command that arms it was cancelled"),
             Self::Replay => f.write_str("it is replayed"),
+            Self::Forbidden(forbidden) => write!(f, "{forbidden}"),
         }
     }
 }
@@ -77,6 +82,7 @@ impl fmt::Display for DisarmError {
             }
             Self::Unfinished => f.write_str("the robot is still being disarmed"),
             Self::Replay => f.write_str("the robot is replayed"),
+            Self::Forbidden(forbidden) => write!(f, "{forbidden}"),
         }
     }
 }

@@ -36,7 +36,7 @@ impl Default for JointSettings {
 
 /// The states of a robot's joints, and its frames at any time. See the [module](super). Clones share the same state.
 ///
-/// It is returned by [`Live::joints`](crate::Live::joints) and [`Bus::joints`](crate::Bus::joints).
+/// It is returned by [`Bus::joints`](crate::Bus::joints).
 #[derive(Clone)]
 pub struct Joints(Arc<Inner>);
 

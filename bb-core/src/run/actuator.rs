@@ -17,7 +17,7 @@ use self::telling::Told;
 use self::updating::Due;
 use super::occupied::Occupied;
 use super::source::Assembly;
-use crate::component::{Accepts, Actuator, ActuatorContext, ActuatorError, Binding, OptionsList, Permit};
+use crate::component::{Accepts, Actuator, ActuatorContext, ActuatorError, Binding, Caller, OptionsList};
 use crate::control::{ComponentOrder, Control};
 use crate::declaration::ActuatorDeclaration;
 use crate::fault::{Failed, Fault, caught};
@@ -61,7 +61,7 @@ struct State<A: Actuator> {
     /// Whether it was asked to carry out a command after it was last made safe.
     may_move: bool,
     /// The command execution that sent the last command to be carried out.
-    moved_by: Permit,
+    moved_by: Caller,
     /// The update time that is currently set as an alarm.
     alarm: Option<MonotonicTime>,
     /// On virtual time: changes to report to the control state once the lock is released. Loggers, telemetry handlers and
@@ -119,7 +119,7 @@ impl<A: Actuator> ActuatorNode<A> {
                     slot,
                     is_unsafe: false,
                     may_move: false,
-                    moved_by: Permit::UNLIMITED,
+                    moved_by: Caller::PROGRAM,
                     alarm: None,
                     told: Vec::new(),
                 },
@@ -163,7 +163,7 @@ impl<A: Actuator> ActuatorNode<A> {
     /// # Errors
     /// See [`ActuatorError`].
     pub fn send(&self, command: A::Command) -> Result<(), ActuatorError> {
-        self.0.accept(command, &Permit::UNLIMITED).map(drop)
+        self.0.accept(command, &Caller::PROGRAM).map(drop)
     }
 }
 

@@ -17,7 +17,7 @@ use super::wired::{Place, Unwired, Wired};
 use super::{StartError, Supervision};
 use crate::component::replacement::{Replacement, Replacements};
 use crate::component::shared::SharedValues;
-use crate::component::{Fault, Host, OptionsList};
+use crate::component::{Bus, Caller, Fault, Host, OptionsList};
 use crate::control::{Control, Parts, SystemTopics};
 use crate::declaration::{ParameterError, ParameterValues, RobotDeclaration};
 use crate::event::ParameterValue;
@@ -286,6 +286,7 @@ impl Assembling {
             wired,
             environment: self.environment,
             control: self.control,
+            bus: Bus::new(Arc::clone(&self.host), Caller::PROGRAM),
             host: self.host,
             sources: Mutex::new(sources.iter().map(|source| source.shared()).collect()),
             has_ended: AtomicBool::new(false),

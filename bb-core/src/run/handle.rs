@@ -188,7 +188,7 @@ impl<R: Robot, C: Command> Configurable<R> for CommandHandle<R, C> {
 }
 
 impl<R: Robot, T: ParameterType> ParameterHandle<R, T> {
-    /// A new value for it, for [`Live::set_parameters`](crate::Live::set_parameters).
+    /// A new value for it, for [`Bus::set_parameters`](crate::Bus::set_parameters).
     pub fn to(self, value: impl Into<T>) -> (&'static str, ParameterValue) {
         (self.path, value.into().into_value())
     }

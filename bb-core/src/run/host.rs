@@ -5,18 +5,16 @@ use super::discovery::discover;
 use super::wired::{Place, Wired as WiredRobot};
 use crate::component::replacement::{Replacement, Replacements};
 use crate::component::shared::SharedValues;
-use crate::component::{CommandInfo, Description, DisarmHook, DynamicExecution, Guardian, Host, Permit};
+use crate::component::{Controls, Description, Host};
 use crate::control::{Control, Islands, Wired};
-use crate::declaration::{ParameterError, RobotDeclaration, graph};
-use crate::event::{ArmError, DisarmError, ParameterValue, Safety};
+use crate::declaration::{RobotDeclaration, graph};
 use crate::fault::Fault;
 use crate::joints::Joints;
 use crate::journal::{Event, Journal, Recorded};
-use crate::message::Origin;
 use crate::node::{NodeEntry, Overseer};
 use crate::pubsub::{AnyTopic, DynamicMessage, PathChange, Registry};
 use crate::schedule::Door;
-use crate::time::{Clock, MonotonicTime};
+use crate::time::MonotonicTime;
 use crate::topology::{GraphFormat, Topology};
 use std::any::Any;
 use std::sync::Arc;
@@ -51,23 +49,9 @@ impl RobotHost {
     }
 }
 
-impl Guardian for RobotHost {
-    fn on_disarm(&self, path: &'static str, execution: Option<u64>, hook: DisarmHook) {
-        self.control.on_disarm(path, execution, hook);
-    }
-
-    fn hardware_error(&self, path: &'static str, message: String) {
-        Guardian::hardware_error(&self.control, path, message);
-    }
-}
-
 impl Host for RobotHost {
-    fn origin(&self) -> Origin {
-        self.control.origin()
-    }
-
-    fn clock(&self) -> &Clock {
-        self.control.clock()
+    fn controls(&self) -> &dyn Controls {
+        &self.control
     }
 
     fn joints(&self) -> Joints {
@@ -84,38 +68,6 @@ impl Host for RobotHost {
 
     fn replacement(&self, path: &str) -> Option<Replacement> {
         self.replacements.get(path).cloned()
-    }
-
-    fn is_stopping(&self) -> bool {
-        self.control.stop_signal().is_set()
-    }
-
-    fn state(&self) -> &'static str {
-        self.control.state()
-    }
-
-    fn safety(&self) -> Safety {
-        self.control.safety()
-    }
-
-    fn arm(&self, permit: &Permit) -> Result<(), ArmError> {
-        self.control.arm(permit)
-    }
-
-    fn disarm(&self) -> Result<(), DisarmError> {
-        self.control.disarm(false)
-    }
-
-    fn parameter(&self, path: &str) -> Option<ParameterValue> {
-        self.control.parameter_at(path)
-    }
-
-    fn set_parameters(
-        &self,
-        changes: Vec<(String, ParameterValue)>,
-        permit: &Permit,
-    ) -> Result<(), ParameterError> {
-        self.control.set_parameters_at(changes, permit)
     }
 
     fn with_topics(&self, call: &mut dyn FnMut(&[&dyn AnyTopic])) {
@@ -167,16 +119,8 @@ impl Host for RobotHost {
         Some((actuator.command_name(), actuator.accepts()))
     }
 
-    fn actuators(&self) -> Vec<&'static str> {
-        self.robot.actuators.iter().map(|declared| declared.path).collect()
-    }
-
-    fn actuated_joints(&self) -> Vec<(&'static str, &'static str)> {
+    fn actuators(&self) -> Vec<(&'static str, &'static str)> {
         self.robot.actuators.iter().map(|declared| (declared.path, declared.joint)).collect()
-    }
-
-    fn commands(&self) -> Vec<CommandInfo> {
-        self.control.infos()
     }
 
     fn description(&self) -> Description {
@@ -186,8 +130,9 @@ impl Host for RobotHost {
             let own = self.registry().topics();
             all.extend(own.iter().map(|topic| topic.as_ref()));
             let values = self.control.parameters();
-            description =
-                Some(discover(self.robot, &all, values.all(), self.commands(), &|path| self.is_replaced(path)));
+            description = Some(discover(self.robot, &all, values.all(), self.control.infos(), &|path| {
+                self.is_replaced(path)
+            }));
         });
         description.unwrap_or_else(|| discover(self.robot, &[], &[], Vec::new(), &|_| false))
     }
@@ -196,8 +141,14 @@ impl Host for RobotHost {
         graph(format, self.robot, &|path| self.is_replaced(path))
     }
 
-    fn start_command(&self, path: &str, arguments: &str, permit: &Permit) -> Result<DynamicExecution, Fault> {
-        self.control.execute_untyped(path, arguments, permit)
+    fn settle(&self) {
+        if !self.control.is_virtual() {
+            return;
+        }
+        while self.control.run_pending_hooks() {}
+        if let Some(journal) = &self.journal {
+            journal.flush();
+        }
     }
 }
 

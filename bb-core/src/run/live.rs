@@ -4,22 +4,23 @@ use super::handle::{ActuatorHandle, CommandHandle, ParameterHandle, Publisher};
 use super::machine::Machine;
 use super::visit::Visitable;
 use super::{ActuatorError, Bus, Report, Robot, SensorHandle};
-use crate::component::{Actuator, Command, Fault, HandleCall, HandleCast, Permit, RequestCodec, Sensor};
+use crate::component::{Actuator, Caller, Command, Fault, HandleCall, HandleCast, RequestCodec, Sensor};
 use crate::control::Execution;
 use crate::declaration::{ParameterError, ParameterType};
-use crate::event::{ArmError, DisarmError, ParameterValue, Refusal, Safety};
-use crate::joints::Joints;
+use crate::event::Refusal;
 use crate::journal::{Event, ParameterEntry, RequestKind};
 use crate::message::Stamp;
 use crate::node::{Node, NodeEntry, Turn, contained_outside, know_calls, know_casts};
-use crate::pubsub::{DynamicSubscription, Overflow, Payloads, Select, Subscription};
-use crate::time::{Clock, MonotonicTime};
+use crate::pubsub::{Overflow, Subscription};
+use crate::time::MonotonicTime;
 use std::any::Any;
 use std::fmt;
+use std::ops::Deref;
 use std::sync::Arc;
 
-/// A running robot. [`Running`](super::Running) and [`Simulation`](super::Simulation) dereference to it. A clone may
-/// move to another thread, such as a driver's callback, and outlives the run.
+/// A running robot, by handle. [`Running`](super::Running) and [`Simulation`](super::Simulation) dereference to it, and it dereferences to
+/// its [`Bus`], which has what needs no handle: states, arming, parameters by path. A clone may move to another thread, such as a driver's
+/// callback, and outlives the run.
 pub struct Live<R: Robot> {
     pub(super) machine: Arc<Machine>,
     pub(super) wiring: Arc<R::Wiring>,
@@ -32,16 +33,6 @@ impl<R: Robot> Clone for Live<R> {
 }
 
 impl<R: Robot> Live<R> {
-    /// Its clock.
-    pub fn clock(&self) -> &Clock {
-        self.machine.environment.clock()
-    }
-
-    /// The states of the joints, and all frames at any time.
-    pub fn joints(&self) -> Joints {
-        self.machine.environment.joints().clone()
-    }
-
     /// A value shared by the components of this run, created by `make` if there is none yet; see
     /// [`ComponentContext::shared`](crate::component::ComponentContext::shared). For a simulated robot, it gives
     /// access to its world.
@@ -59,19 +50,10 @@ impl<R: Robot> Live<R> {
         publisher.topic(R::wired_topics(&self.wiring), self.machine.control.topics()).subscribe(overflow)
     }
 
-    /// Subscribes from now on to messages of any payload, by path; with names of payload types, only to those.
-    pub fn subscribe_any<'a>(
-        &self,
-        select: Select<'_>,
-        payloads: impl Into<Payloads<'a>>,
-        overflow: Overflow,
-    ) -> DynamicSubscription {
-        self.machine.subscribe_any(select, &payloads.into(), overflow)
-    }
-
-    /// Topics, actuators, parameters and states, by path: for code that does not know this robot's type.
+    /// Topics, actuators, parameters, commands and states, by path: what this dereferences to, for code that does not know this robot's
+    /// type.
     pub fn bus(&self) -> Bus {
-        self.machine.bus()
+        self.machine.bus.clone()
     }
 
     /// Sends a request to an estimator and waits for its answer. Outputs that it emits are published as usual.
@@ -169,71 +151,7 @@ impl<R: Robot> Live<R> {
         value: T,
     ) -> Result<(), ParameterError> {
         let entry = ParameterEntry { parameter: parameter.number(), value: value.into_value() };
-        self.settled(|machine| machine.control.set_parameters(vec![entry], &Permit::UNLIMITED))
-    }
-
-    /// Sets parameters all at once: no reader sees a mixture of new and old values. If one of the values
-    /// is not accepted, none is set. [`ParameterHandle::to`] checks the type of a value when it is compiled; a path may also be
-    /// written as text.
-    ///
-    /// ```
-    /// # use bb_core::prelude::*;
-    /// # robot! { robot Rig; parameters { gains { kp: f64 = 1.0, range: 0.0..=10.0; ki: f64 = 0.0; } } link base; }
-    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-    /// let rig = Rig::builder().simulate()?;
-    /// rig.set_parameters([rig::param::gains::kp.to(2.0), rig::param::gains::ki.to(0.5)])?;
-    /// // The first is out of range: the second is not set either.
-    /// assert!(rig.set_parameters([("param/gains/kp", 99.0.into()), ("param/gains/ki", 0.1.into())]).is_err());
-    /// assert_eq!((rig.parameter(rig::param::gains::kp), rig.parameter(rig::param::gains::ki)), (2.0, 0.5));
-    /// # Ok(())
-    /// # }
-    /// ```
-    ///
-    /// # Errors
-    /// The first value that is not accepted: no such parameter, another type, out of its range, refused by a component that is
-    /// bound to it, or set twice.
-    pub fn set_parameters<P: Into<String>>(
-        &self,
-        values: impl IntoIterator<Item = (P, ParameterValue)>,
-    ) -> Result<(), ParameterError> {
-        let changes = values.into_iter().map(|(path, value)| (path.into(), value)).collect();
-        self.settled(|machine| machine.control.set_parameters_at(changes, &Permit::UNLIMITED))
-    }
-
-    /// The operational state: `disarmed`, `idle`, `executing`, or a declared one.
-    pub fn state(&self) -> &'static str {
-        self.machine.control.state()
-    }
-
-    /// The safety state.
-    pub fn safety(&self) -> Safety {
-        self.machine.control.safety()
-    }
-
-    /// Arms the robot, as a command would. A robot that is armed already stays so.
-    ///
-    /// # Errors
-    /// Why it is not armed: it is in `error`, is being disarmed or stops, or the code of cancelled commands has not returned
-    /// within 5 s.
-    pub fn arm(&self) -> Result<(), ArmError> {
-        self.settled(|machine| machine.control.arm(&Permit::UNLIMITED))
-    }
-
-    /// Disarms the robot: commands are cancelled, and the owners of hardware make it safe, within 5 s.
-    ///
-    /// # Errors
-    /// What could not be made safe; the safety state is then `error`.
-    pub fn disarm(&self) -> Result<(), DisarmError> {
-        self.settled(|machine| machine.control.disarm(false))
-    }
-
-    /// Leaves the safety state `error`, even if something still cannot be made safe; the caller must have checked
-    /// that.
-    ///
-    /// # Errors
-    /// What could not be made safe again. The safety state is `disarmed` nevertheless.
-    pub fn force_disarm(&self) -> Result<(), DisarmError> {
-        self.settled(|machine| machine.control.disarm(true))
+        self.settled(|machine| machine.control.set_parameters(vec![entry], &Caller::PROGRAM))
     }
 
     /// A report of the run so far.
@@ -286,6 +204,13 @@ impl<R: Robot> Live<R> {
         let result = call(&self.machine);
         self.machine.settle();
         result
+    }
+}
+
+impl<R: Robot> Deref for Live<R> {
+    type Target = Bus;
+    fn deref(&self) -> &Bus {
+        &self.machine.bus
     }
 }
 

@@ -5,12 +5,12 @@ use super::actuator::AnyActuator;
 use super::keeper::Keeper;
 use super::source::SharedSource;
 use super::wired::Wired;
-use crate::component::{Bus, Fault, Host, Permit};
+use crate::component::{Bus, Fault, Host};
 use crate::control::{Control, ReportedFault, Summary};
 use crate::declaration::RobotDeclaration;
 use crate::journal::Event;
 use crate::node::{AnyIsland, CallError, Environment, NodeEntry, Visit, contained_outside};
-use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Payloads, Select};
+use crate::pubsub::AnyTopic;
 use crate::time::MonotonicTime;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -22,6 +22,8 @@ pub(super) struct Machine {
     pub(super) environment: Environment,
     pub(super) control: Control,
     pub(super) host: Arc<dyn Host>,
+    /// The program's.
+    pub(super) bus: Bus,
     pub(super) sources: Mutex<Vec<SharedSource>>,
     /// The threads of the robot have no work left.
     pub(super) has_ended: AtomicBool,
@@ -35,15 +37,6 @@ pub(super) struct Machine {
 const MOST_CASTS: u32 = 1024;
 
 impl Machine {
-    pub(super) fn subscribe_any(
-        &self,
-        select: Select<'_>,
-        payloads: &Payloads<'_>,
-        overflow: Overflow,
-    ) -> DynamicSubscription {
-        self.control.topics().registry.subscribe(&self.topics(), select, payloads, overflow)
-    }
-
     pub(super) fn topics(&self) -> Vec<&dyn AnyTopic> {
         let actuators = self.actuators().into_iter().map(|actuator| actuator.any_topic());
         self.wired.topics().into_iter().chain(actuators).chain(self.control.topics().all()).collect()
@@ -51,10 +44,6 @@ impl Machine {
 
     pub(super) fn actuators(&self) -> Vec<&dyn AnyActuator> {
         self.wired.actuators()
-    }
-
-    pub(super) fn bus(&self) -> Bus {
-        Bus::new(Arc::clone(&self.host), Permit::UNLIMITED)
     }
 
     /// Visits an estimator as a caller that waits for an answer, after the line `line` of the journal. Why it was not visited is
@@ -130,16 +119,9 @@ impl Machine {
         running.map_or(island.declaration().name, |estimator| estimator.path)
     }
 
-    /// On virtual time, after an outside action: runs disarm callbacks left by an actuator's own code, and hands
-    /// lines of the journal to its sink.
+    /// See [`Host::settle`].
     pub(super) fn settle(&self) {
-        if !self.control.is_virtual() {
-            return;
-        }
-        while self.control.run_pending_hooks() {}
-        if let Some(journal) = self.environment.journal() {
-            journal.flush();
-        }
+        self.host.settle();
     }
 
     /// The report so far; the last report once it has ended.

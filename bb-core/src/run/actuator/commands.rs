@@ -3,7 +3,7 @@
 use super::limits::NotLimited;
 use super::telling::Told;
 use super::{Inner, State};
-use crate::component::{Accepts, Actuator, ActuatorError, Permit};
+use crate::component::{Accepts, Actuator, ActuatorError, Caller};
 use crate::event::Safety;
 use crate::fault::{caught, of_panic};
 use crate::journal::{Event, Recorded};
@@ -11,7 +11,7 @@ use crate::message::{Finite, Frame, Payload, Stamp, copied};
 use crate::pubsub::{DynamicMessage, Wakers};
 
 impl<A: Actuator> Accepts<A::Command> for Inner<A> {
-    fn accept(&self, command: A::Command, permit: &Permit) -> Result<A::Command, ActuatorError> {
+    fn accept(&self, command: A::Command, caller: &Caller) -> Result<A::Command, ActuatorError> {
         if !command.is_finite() {
             return Err(ActuatorError::NonFinite);
         }
@@ -19,12 +19,12 @@ impl<A: Actuator> Accepts<A::Command> for Inner<A> {
             journal.wait_for_room();
         }
         let mut wakers = Wakers::default();
-        let done = self.alone(|state| self.carry_out(state, command, permit, &mut wakers));
+        let done = self.alone(|state| self.carry_out(state, command, caller, &mut wakers));
         wakers.run();
         done.unwrap_or(Err(ActuatorError::Inside))
     }
 
-    fn stop_motion_of(&self, permit: &Permit) {
+    fn stop_motion_of(&self, caller: &Caller) {
         let stop = match caught(|| Ok(A::Command::stop_command())) {
             Ok(Some(stop)) => stop,
             Ok(None) => return,
@@ -35,9 +35,9 @@ impl<A: Actuator> Accepts<A::Command> for Inner<A> {
         };
         let mut wakers = Wakers::default();
         self.alone(|state| {
-            if state.moved_by.is_of_same(permit) {
+            if state.moved_by.is_of_same(caller) {
                 // Disarming has already stopped it, and a failing actuator is made safe.
-                let _ = self.carry_out(state, stop, &Permit::UNLIMITED, &mut wakers);
+                let _ = self.carry_out(state, stop, &Caller::PROGRAM, &mut wakers);
             }
         });
         wakers.run();
@@ -49,7 +49,7 @@ impl<A: Actuator> Inner<A> {
         &self,
         state: &mut State<A>,
         mut command: A::Command,
-        permit: &Permit,
+        caller: &Caller,
         wakers: &mut Wakers,
     ) -> Result<A::Command, ActuatorError> {
         self.obey(state);
@@ -58,7 +58,7 @@ impl<A: Actuator> Inner<A> {
         if safety != Safety::Armed {
             return Err(ActuatorError::NotArmed(safety));
         }
-        if !permit.is_valid() {
+        if !caller.is_valid() {
             return Err(ActuatorError::Cancelled);
         }
         let clock = self.environment.clock();
@@ -90,7 +90,7 @@ impl<A: Actuator> Inner<A> {
             self.fail(state, &failed, now);
             return Err(ActuatorError::Failed(text));
         }
-        state.moved_by = permit.clone();
+        state.moved_by = caller.clone();
         self.counts.carried_out();
         let mut panic = None;
         if let Some(journal) = self.environment.journal()

@@ -13,7 +13,7 @@ impl<R: Robot> Builder<R> {
     /// take precedence, and are not stored. `bb-redb` is a crash-safe store in a file.
     ///
     /// A change is stored on another thread, moments after it was made; changes that follow each other closely are stored
-    /// together. A set of [`Live::set_parameters`](crate::Live::set_parameters) is stored as a whole or not at all. In a
+    /// together. A set of [`Bus::set_parameters`](crate::Bus::set_parameters) is stored as a whole or not at all. In a
     /// simulation everything is stored as it ends. A replay does not change the store, but starts with its values, and refuses a
     /// journal that began with others: do not call this for a replay.
     ///

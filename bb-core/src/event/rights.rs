@@ -1,0 +1,96 @@
+//! What a caller may do with a robot.
+
+use std::fmt;
+
+/// Something that a caller may do with a robot. Everybody may disarm it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Right {
+    /// Subscribe to messages, and read parameters.
+    Read,
+    /// Set parameters.
+    Parameters,
+    /// Start commands.
+    Commands,
+    /// Arm the robot, and force it out of the safety state `error`.
+    Arm,
+    /// Send commands to actuators.
+    Actuators,
+    /// Publish at paths of its own.
+    Publish,
+}
+
+impl Right {
+    /// All of them.
+    pub const ALL: [Self; 6] =
+        [Self::Read, Self::Parameters, Self::Commands, Self::Arm, Self::Actuators, Self::Publish];
+
+    /// Its name: `parameters`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Read => "read",
+            Self::Parameters => "parameters",
+            Self::Commands => "commands",
+            Self::Arm => "arm",
+            Self::Actuators => "actuators",
+            Self::Publish => "publish",
+        }
+    }
+}
+
+impl fmt::Display for Right {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// A set of rights: `[Right::Read, Right::Commands].into()`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Rights(u8);
+
+impl Rights {
+    /// None but to disarm.
+    pub const NONE: Self = Self(0);
+    /// All.
+    pub const ALL: Self = Self((1 << Right::ALL.len()) - 1);
+
+    /// Whether this one is among them.
+    pub const fn contains(self, right: Right) -> bool {
+        self.0 & 1 << right as u8 != 0
+    }
+
+    /// Those that are also among the others.
+    pub(crate) const fn and(self, other: Self) -> Self {
+        Self(self.0 & other.0)
+    }
+}
+
+impl<const N: usize> From<[Right; N]> for Rights {
+    fn from(rights: [Right; N]) -> Self {
+        rights.into_iter().collect()
+    }
+}
+
+impl FromIterator<Right> for Rights {
+    fn from_iter<I: IntoIterator<Item = Right>>(rights: I) -> Self {
+        Self(rights.into_iter().fold(0, |all, right| all | 1 << right as u8))
+    }
+}
+
+/// A right that a caller does not have.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Forbidden {
+    /// Who has called.
+    pub caller: String,
+    /// What it lacks.
+    pub right: Right,
+}
+
+impl fmt::Display for Forbidden {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "`{}` does not have the right `{}`", self.caller, self.right)
+    }
+}
+
+impl std::error::Error for Forbidden {}

@@ -1,0 +1,111 @@
+//! What a caller may do: each verb of the bus needs its right, and everybody may disarm.
+
+use crate::components::Number;
+use bb_core::event::{Right, Rights};
+use bb_core::prelude::*;
+use bb_core::run::Bus;
+use bb_core::{ArmError, DisarmError};
+
+/// Moves at once.
+#[derive(Debug)]
+pub(crate) struct Servo;
+
+impl Actuator for Servo {
+    type Options = NoOptions;
+    type Command = Number;
+
+    fn init(_: NoOptions, _: &ActuatorContext) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+
+    fn handle_command(&mut self, _: &Stamped<Number>) -> Result<(), Fault> {
+        Ok(())
+    }
+
+    fn disarm(&mut self) -> Result<(), Fault> {
+        Ok(())
+    }
+}
+
+robot! {
+    robot Guarded;
+    parameters { speed: f64 = 1.0; }
+    commands { stop: Disarm { allowed_states: [disarmed, idle]; } }
+    link base {
+        joint pan: continuous { axis: z; actuator servo: Servo(); sensor encoder: External<Number>(); link head {} }
+    }
+}
+
+/// What a bus is asked for, and why it refuses.
+type Verb = fn(&Bus) -> Result<(), Box<dyn std::error::Error>>;
+
+const VERBS: [(Right, &str, Verb); 8] = [
+    (Right::Read, "subscribe", |bus| {
+        Ok(bus.subscribe::<Number>("sensor/base/pan/encoder", Overflow::default()).map(drop)?)
+    }),
+    (Right::Parameters, "set_parameter", |bus| Ok(bus.set_parameter("param/speed", 2.0)?)),
+    (Right::Parameters, "set_parameters", |bus| Ok(bus.set_parameters([("param/speed", 3.0.into())])?)),
+    (Right::Commands, "start_command", |bus| Ok(bus.start_command("command/stop", "").map(drop)?)),
+    (Right::Arm, "arm", |bus| Ok(bus.arm()?)),
+    (Right::Actuators, "actuator", |bus| Ok(bus.actuator::<Number>("actuator/base/pan/servo")?.send(Number(1.0))?)),
+    (Right::Arm, "force_disarm", |bus| Ok(bus.force_disarm()?)),
+    (Right::Publish, "publisher", |bus| Ok(bus.publisher::<Number>("page/number").map(drop)?)),
+];
+
+#[test]
+fn each_verb_needs_its_right_and_names_it_and_the_caller() -> Result<(), Box<dyn std::error::Error>> {
+    for bits in 0..1_u32 << Right::ALL.len() {
+        let of_bits = Right::ALL.into_iter().filter(|right| bits & 1 << *right as u32 != 0);
+        let rights: Rights = of_bits.collect();
+        let robot = Guarded::builder().simulate()?;
+        let page = robot.bus().for_caller("page", rights);
+        assert_eq!((page.caller(), page.rights()), ("page", rights));
+        for (right, verb, ask) in VERBS {
+            // Whether the robot is armed is not what is asked here.
+            robot.arm()?;
+            let told = ask(&page).map_err(|error| error.to_string());
+            assert_eq!(page.check(right).is_ok(), rights.contains(right), "{right}");
+            match told {
+                Ok(()) => assert!(rights.contains(right), "{rights:?} {verb}"),
+                Err(message) => {
+                    let refusal = format!("`page` does not have the right `{right}`");
+                    assert!(!rights.contains(right) && message.contains(&refusal), "{rights:?} {verb}: {message}");
+                }
+            }
+        }
+        robot.arm()?;
+        assert_eq!(page.disarm(), Ok(()), "everybody may");
+        assert_eq!((page.safety(), page.state()), (Safety::Disarmed, "disarmed"));
+    }
+    Ok(())
+}
+
+#[test]
+fn whoever_may_not_read_sees_no_values_and_no_messages() -> Result<(), Box<dyn std::error::Error>> {
+    let robot = Guarded::builder().simulate()?;
+    for (rights, may_read) in [(Rights::NONE, false), ([Right::Read].into(), true)] {
+        let page = robot.bus().for_caller("page", rights);
+        let all = page.subscribe_any(Select::All, None, Overflow::default());
+        robot.arm()?;
+        robot.disarm()?;
+        assert_eq!(all.drain().count() > 0, may_read);
+        assert_eq!(page.parameter("param/speed").is_some(), may_read);
+        assert_eq!(page.description().parameters.len(), usize::from(may_read));
+    }
+    Ok(())
+}
+
+#[test]
+fn a_caller_gives_no_rights_that_it_does_not_have() -> Result<(), Box<dyn std::error::Error>> {
+    let robot = Guarded::builder().simulate()?;
+    assert_eq!((robot.caller(), robot.rights()), ("program", Rights::ALL));
+    let page = robot.for_caller("page", [Right::Read, Right::Arm]);
+    let user = page.for_caller("user", [Right::Arm, Right::Commands]);
+    assert_eq!((user.caller(), user.rights()), ("user", [Right::Arm].into()));
+    assert_eq!(user.arm(), Ok(()));
+    let error = page.for_caller("guest", Rights::NONE).arm().expect_err("it may not");
+    assert!(matches!(&error, ArmError::Forbidden(why) if why.caller == "guest" && why.right == Right::Arm), "{error}");
+    let error = page.for_caller("guest", [Right::Read]).force_disarm().expect_err("it may not");
+    assert!(matches!(&error, DisarmError::Forbidden(why) if why.right == Right::Arm), "{error}");
+    Ok(())
+}
