@@ -38,6 +38,7 @@ pub use actuator_link::{ActuatorError, ActuatorLink};
 pub(crate) use binding::Binding;
 pub use bus::Bus;
 pub(crate) use caller::Caller;
+pub(crate) use command::OwnHooks;
 pub use command::{Arm, Command, CommandContext, Disarm, NoArguments, Outcome, Sleep};
 pub use context::{ActuatorContext, ComponentContext, Context, SensorContext, ServiceContext};
 pub use description::{
@@ -51,7 +52,7 @@ pub use external::External;
 pub(crate) use field::FromQuantity;
 pub use field::OptionField;
 pub use guardian::SafetyLink;
-pub(crate) use guardian::{DisarmHook, Guardian, OwnHooks};
+pub(crate) use guardian::{DisarmHook, Guardian};
 pub(crate) use host::{Controls, Host};
 pub use info::{Info, Request};
 pub(crate) use inputs::{At, FieldIndex, InputAt, SyncMiss, TakenAt};

@@ -1,6 +1,7 @@
 //! The contract of a command.
 
-use super::guardian::OwnHooks;
+use super::guardian::DisarmHook;
+use super::host::Host;
 use super::{Bus, Fault, NoOptions, Options};
 use crate::declaration::Role;
 use crate::event::HealthTransition;
@@ -8,6 +9,7 @@ use crate::message::Field;
 use crate::message::Payload;
 use crate::schedule::{Alarm, Sleeper};
 use crate::time::MonotonicTime;
+use std::fmt;
 use std::future::Future;
 use std::ops::Deref;
 use std::pin::Pin;
@@ -162,6 +164,34 @@ impl Deref for CommandContext {
     type Target = Bus;
     fn deref(&self) -> &Bus {
         &self.bus
+    }
+}
+
+/// The disarm callbacks of one execution of a command: they are kept until its code has returned.
+pub(crate) struct OwnHooks {
+    path: &'static str,
+    host: Arc<dyn Host>,
+    execution: u64,
+}
+
+impl OwnHooks {
+    pub(crate) fn new(path: &'static str, host: Arc<dyn Host>, execution: u64) -> Self {
+        Self { path, host, execution }
+    }
+
+    /// Once the execution's code has returned, a callback is dropped.
+    pub(crate) fn add(&self, hook: DisarmHook) {
+        self.host.controls().on_disarm(self.path, Some(self.execution), hook);
+    }
+
+    pub(crate) fn hardware_error(&self, message: String) {
+        self.host.controls().hardware_error(self.path, message);
+    }
+}
+
+impl fmt::Debug for OwnHooks {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("OwnHooks").field(&self.path).finish()
     }
 }
 

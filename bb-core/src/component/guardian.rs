@@ -1,6 +1,6 @@
 //! Safety functions for any component.
 
-use super::{Fault, Host};
+use super::Fault;
 use std::fmt;
 use std::sync::Arc;
 
@@ -50,33 +50,5 @@ impl SafetyLink {
 impl fmt::Debug for SafetyLink {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_tuple("SafetyLink").field(&self.path).finish()
-    }
-}
-
-/// The disarm callbacks of one execution of a command: they are kept until its code has returned.
-pub(crate) struct OwnHooks {
-    path: &'static str,
-    host: Arc<dyn Host>,
-    execution: u64,
-}
-
-impl OwnHooks {
-    pub(crate) fn new(path: &'static str, host: Arc<dyn Host>, execution: u64) -> Self {
-        Self { path, host, execution }
-    }
-
-    /// Once the execution's code has returned, a callback is dropped.
-    pub(crate) fn add(&self, hook: DisarmHook) {
-        self.host.controls().on_disarm(self.path, Some(self.execution), hook);
-    }
-
-    pub(crate) fn hardware_error(&self, message: String) {
-        self.host.controls().hardware_error(self.path, message);
-    }
-}
-
-impl fmt::Debug for OwnHooks {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("OwnHooks").field(&self.path).finish()
     }
 }
