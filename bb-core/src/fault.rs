@@ -3,6 +3,6 @@
 mod guard;
 mod value;
 
-pub(crate) use guard::{Failed, caught, discard, guarded, of_panic, retire, wake};
+pub(crate) use guard::{Failed, Panic, caught, discard, guarded, of_panic, retire, wake};
 pub use value::Fault;
 pub(crate) use value::Then;

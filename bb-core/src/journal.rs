@@ -8,6 +8,9 @@
 //! [`Builder::replay`](crate::Builder::replay) can therefore run the robot again on virtual time, without its
 //! sensors, services, actuators and commands.
 //!
+//! What subscribers do is no entry. If the code of a payload panics while an output is copied for them, its estimator is restarted,
+//! which a replay does not repeat: it stops at the first output that differs.
+//!
 //! The journal begins with a description of the robot; a journal of another robot is refused, naming the first
 //! difference. It holds a checksum of each output, so an algorithm that is not deterministic is named at the first
 //! message that differs.

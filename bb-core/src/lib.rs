@@ -148,7 +148,7 @@ pub mod __private {
     };
     pub use crate::node::{
         Act, Alone, Environment, Inlet, Island, IslandOf, IslandState, IslandWiring, Key, Member, Node, Solo, Turn,
-        act, alone, emit, enter, enter_alone, island_of, publish_to, receive, start, start_alone,
+        act, alone, emit, enter, enter_alone, hold, island_of, publish_to, receive, start, start_alone,
     };
     pub use crate::pubsub::{AnyTopic, DynamicMessage, Topic};
     pub use crate::run::actuator::{ActuatorNode, AnyActuator};

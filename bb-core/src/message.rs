@@ -1,7 +1,6 @@
 //! Messages: a payload with its time, its frame and its origin.
 
 pub mod codec;
-mod copy;
 mod finite;
 mod joint;
 mod joint_command;
@@ -10,7 +9,6 @@ mod stamped;
 
 pub use bb_macros::Payload;
 pub use codec::{DecodeError, Field, RosLayout, RosMessage, Schema};
-pub(crate) use copy::{Panic, copied, copy_to};
 pub use finite::Finite;
 pub use joint::{JointPositions, JointReading, JointSide};
 pub use joint_command::{Exceeded, JointBounds, JointCommand, LimitedQuantity, OutOfBounds};

@@ -1,16 +1,15 @@
 //! Running estimators (fan-in, health, timers and counters), and the islands in which they run.
 
+mod act;
 mod admission;
 mod backlog;
 mod count;
 mod counters;
-mod emission;
 mod entry;
 mod environment;
 mod health;
 mod island;
 mod latency;
-mod mark;
 mod requests;
 mod running;
 mod shared;
@@ -18,19 +17,20 @@ mod timers;
 mod timing;
 mod turn;
 
+pub use act::Act;
+pub(crate) use act::Visit;
 pub use counters::{DropReason, EstimatorStatistics, InputStatistics};
-pub(crate) use emission::{Emitting, blame, contained, contained_outside};
 pub(crate) use entry::{HealthReport, NodeEntry, Report};
 pub use environment::Environment;
 pub(crate) use environment::{BindTarget, Check, EnvironmentParts, Missing, Mode, Overseer};
 pub use island::{
-    Act, Alone, Inlet, Island, IslandOf, IslandState, IslandWiring, Key, Member, Solo, act, alone, emit, enter,
-    enter_alone, island as island_of, publish_to, receive, start, start_alone,
+    Alone, Inlet, Island, IslandOf, IslandState, IslandWiring, Key, Member, Solo, act, alone, emit, enter,
+    enter_alone, hold, island as island_of, publish_to, receive, start, start_alone,
 };
-pub(crate) use island::{AnyIsland, CallError, Replayed, Visit, islands_in};
+pub(crate) use island::{AnyIsland, CallError, Replayed, islands_in};
 pub use latency::LatencyStatistics;
 pub(crate) use requests::{know_calls, know_casts};
-pub(crate) use running::Next;
 pub use running::Node;
+pub(crate) use running::{Arrival, Next};
 pub(crate) use shared::SharedNode;
 pub use turn::Turn;

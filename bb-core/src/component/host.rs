@@ -54,8 +54,6 @@ pub(crate) trait Host: Send + Sync {
     fn note_path(&self, change: PathChange);
     /// A message is published at a path of one's own.
     fn note_own(&self, message: DynamicMessage);
-    /// The code of a message at `path`, a path of one's own, has failed.
-    fn message_failed(&self, path: &'static str, fault: Fault);
     /// The actuator at `path`: the name of the type of its commands, and an `Arc<dyn Accepts<T>>`.
     fn actuator(&self, path: &str) -> Option<(&'static str, Box<dyn Any>)>;
     /// The paths of all actuators, each with its joint.

@@ -21,23 +21,6 @@ impl Overseer for Control {
         self.process_report(estimator, report);
     }
 
-    fn output_failed(&self, estimator: usize, message: String) {
-        // In a replay, it is in the journal.
-        if self.0.mode != Mode::Replay
-            && let Some(islands) = self.0.islands.get()
-        {
-            drop(islands.post(estimator, self.0.clock.now(), NodeEntry::OutputFailed { message }));
-        }
-    }
-
-    fn message_failed(&self, path: &'static str, message: String) {
-        match self.0.mode {
-            Mode::Real | Mode::Virtual => self.note_fault(path, message),
-            // The journal contains the faults of the run.
-            Mode::Replay => tracing::error!(path, message, "a recorded message failed where it was copied"),
-        }
-    }
-
     fn bind(&self, path: &'static str, parameters: &'static [usize], check: Check, target: BindTarget) {
         self.bind_to(path, parameters, Arc::new(check), target);
     }

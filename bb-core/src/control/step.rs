@@ -61,8 +61,7 @@ impl Step<'_> {
         let wall_time = WallTime::from_unix_nanos(time.as_nanos().saturating_add(self.wall_offset_nanos));
         let origin = self.control.0.origin;
         let stamp = Stamp { monotonic_time: time, wall_time, origin, ..Stamp::default() };
-        // Payloads of this crate, whose `clone` does not panic.
-        topic.publish_deferred(&stamp.message(payload), &mut self.effects.wakers, &mut None);
+        topic.publish_deferred(&stamp.message(payload), &mut self.effects.wakers);
     }
 
     /// Publishes changes of safety and state since the step began or since the last call.

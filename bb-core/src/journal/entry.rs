@@ -240,13 +240,6 @@ pub enum Event {
     ArmTimeout,
     /// The robot was stopped.
     Stop,
-    /// An estimator failed: the code of one of its outputs panicked during delivery.
-    OutputFailed {
-        /// The estimator.
-        estimator: usize,
-        /// What happened.
-        message: String,
-    },
     /// The transforms of a line's inputs that span moving joints.
     Placed {
         /// The number of that line.

@@ -85,14 +85,6 @@ impl<E: Estimator> AsEstimator<E> {
         }
     }
 
-    #[inline]
-    pub(crate) fn handles_moving_joints(&self) -> bool {
-        match self {
-            Self::Declared(_) => E::HANDLES_MOVING_JOINTS,
-            Self::Replaced(other) => other.handles_moving_joints(),
-        }
-    }
-
     /// Hands the reply to `take` in each case by itself: joined to one value first, it would be copied, which costs more than the rest of
     /// a hop.
     #[inline]

@@ -19,7 +19,6 @@ type MakeActuator<T> = Make<ActuatorContext, Box<dyn StandIn<T>>>;
 
 /// An estimator that takes `I` and emits `O`.
 pub(crate) trait AnyEstimator<I: Inputs, O>: Send {
-    fn handles_moving_joints(&self) -> bool;
     fn handle_input(&mut self, input: I::View<'_>) -> Result<Reply<O>, Fault>;
     fn handle_transforms(&mut self, transforms: &InputTransforms<'_>) -> Result<(), Fault>;
     fn handle_info(&mut self, info: Info) -> Result<Reply<O>, Fault>;
@@ -154,10 +153,6 @@ fn takes_and_emits<I, O>() -> String {
 }
 
 impl<E: Estimator> AnyEstimator<E::Input, E::Output> for E {
-    fn handles_moving_joints(&self) -> bool {
-        E::HANDLES_MOVING_JOINTS
-    }
-
     fn handle_input(&mut self, input: <E::Input as Inputs>::View<'_>) -> Result<Reply<E::Output>, Fault> {
         Estimator::handle_input(self, input)
     }

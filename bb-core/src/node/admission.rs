@@ -6,7 +6,7 @@ use crate::message::Stamped;
 use crate::time::MonotonicTime;
 
 /// How far ahead of the clock a stamp may be, in nanoseconds: 1 s.
-const MAX_SKEW_NANOS: i64 = 1_000_000_000;
+pub(super) const MAX_SKEW_NANOS: i64 = 1_000_000_000;
 
 /// Remembers the time of the last message of each input.
 #[derive(Debug)]
@@ -26,19 +26,19 @@ impl Admission {
         self.last.get(input).copied().filter(|last| last.as_nanos() > i64::MIN)
     }
 
-    /// Accepts `message`, which arrived at `now`, or returns the reason for the drop. Equal times are in order.
+    /// Accepts `message`, unless its stamp is after `latest`, or returns the reason for the drop. Equal times are in order.
     #[inline]
     pub(super) fn admit<T: Payload>(
         &mut self,
         input: usize,
         message: &Stamped<T>,
-        now: MonotonicTime,
+        latest: MonotonicTime,
     ) -> Result<(), DropReason> {
         if !message.payload.is_finite() {
             return Err(DropReason::NonFinite);
         }
         let time = message.monotonic_time;
-        if time > now.plus_nanos(MAX_SKEW_NANOS) {
+        if time > latest {
             return Err(DropReason::ClockSkew);
         }
         if let Some(last) = self.last.get_mut(input) {

@@ -31,7 +31,7 @@ pub enum DropReason {
     Displaced,
 }
 
-/// Without a declared budget, one of this many callbacks is measured.
+/// Without a declared budget, one of this many callbacks is measured: a power of two.
 pub(super) const SAMPLED: u64 = 64;
 
 const REASONS: usize = DropReason::ALL.len();

@@ -31,11 +31,6 @@ pub enum NodeEntry {
         /// Handles the request. `None` in a replay of a journal that does not contain the request.
         handle: Option<Box<dyn Any + Send>>,
     },
-    /// The code of one of its outputs panicked while the output was passed on.
-    OutputFailed {
-        /// What happened.
-        message: String,
-    },
     /// The estimator stops.
     Retire,
 }
@@ -50,7 +45,6 @@ impl NodeEntry {
             Self::GiveUp => Event::GiveUp { estimator },
             Self::Silence { epoch, last_run } => Event::Silence { estimator, epoch: *epoch, last_run: *last_run },
             Self::Cast { request, .. } => Event::Request { estimator, request: request.clone() },
-            Self::OutputFailed { message } => Event::OutputFailed { estimator, message: message.clone() },
             Self::Retire => Event::Retire { island },
         }
     }
@@ -65,7 +59,6 @@ impl fmt::Debug for NodeEntry {
             Self::GiveUp => "GiveUp",
             Self::Silence { .. } => "Silence",
             Self::Cast { .. } => "Cast",
-            Self::OutputFailed { .. } => "OutputFailed",
             Self::Retire => "Retire",
         })
     }

@@ -4,23 +4,21 @@ mod comparison;
 
 pub(crate) use self::comparison::{Comparison, Missing};
 use super::entry::Report;
-use super::mark::{Mark, RobotMark};
 use super::shared::SharedNode;
 use crate::component::replacement::{Replacement, Replacements};
 use crate::component::{Binding, Guardian, Options, Template};
 use crate::declaration::{EstimatorDeclaration, ParameterValues};
-use crate::fault::{Failed, Fault, of_panic};
+use crate::fault::{Failed, Fault};
 use crate::joints::Joints;
 use crate::journal::{Event, Journal, Recorded};
 use crate::lifecycle::Supervision;
-use crate::message::{Origin, Payload, Stamped, copied};
+use crate::message::{Origin, Payload, Stamped};
 use crate::pubsub::{AnyTopic as _, DynamicMessage, Topic};
 use crate::schedule::{Agenda, Door, Lane, Pool};
 use crate::telemetry::Telemetry;
 use crate::time::{Clock, MonotonicTime, Stopwatch};
 use std::collections::VecDeque;
 use std::fmt;
-use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Instant;
@@ -28,10 +26,6 @@ use std::time::Instant;
 /// The robot as its estimators see it: the control state records their reports without blocking.
 pub(crate) trait Overseer: Guardian {
     fn report(&self, estimator: usize, report: Report);
-    /// Code of an output of that estimator panicked while the output was passed on: the estimator gets an entry.
-    fn output_failed(&self, estimator: usize, message: String);
-    /// Code of a sensor's or a service's message panicked in an island.
-    fn message_failed(&self, path: &'static str, message: String);
     /// Registers that the options of the component at `path` are bound to these parameters. An estimator receives new values as
     /// entries; other components receive them through their inbox.
     fn bind(&self, path: &'static str, parameters: &'static [usize], check: Check, target: BindTarget);
@@ -62,7 +56,7 @@ pub(crate) enum BindTarget {
 }
 
 /// Drains the island with that number.
-type Drain = Box<dyn Fn(&Environment, usize) + Send + Sync>;
+type Drain = Box<dyn Fn(usize) + Send + Sync>;
 
 /// How a robot runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,6 +68,10 @@ pub(crate) enum Mode {
     /// From a journal.
     Replay,
 }
+
+/// See [`Environment::robot`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct RobotId(pub(super) usize);
 
 /// The first component that could not start.
 #[derive(Debug)]
@@ -95,8 +93,6 @@ struct Inner {
     door: Door,
     /// The time that all components see in their first `init`.
     start: MonotonicTime,
-    /// Identifies the robot to threads that are inside its islands.
-    mark: RobotMark,
     has_journal: bool,
     has_telemetry: bool,
     /// The line of the journal that is being replayed.
@@ -199,7 +195,6 @@ impl Environment {
             origin,
             door: Door::new(has_journal),
             start,
-            mark: RobotMark::take(),
             has_journal,
             has_telemetry,
             replayed_line: AtomicU64::new(0),
@@ -284,7 +279,7 @@ impl Environment {
     }
 
     /// Sets the function that drains an island, once the robot is wired.
-    pub(crate) fn set_drain(&self, drain: impl Fn(&Self, usize) + Send + Sync + 'static) {
+    pub(crate) fn set_drain(&self, drain: impl Fn(usize) + Send + Sync + 'static) {
         // This is set only once.
         let _ = self.shared().drain.set(Box::new(drain));
     }
@@ -303,7 +298,7 @@ impl Environment {
 
     pub(crate) fn drain(&self, island: usize) {
         if let Some(drain) = self.shared().drain.get() {
-            drain(self, island);
+            drain(island);
         }
     }
 
@@ -397,9 +392,10 @@ impl Environment {
         self.0.start
     }
 
+    /// Identifies the robot, as long as it lives.
     #[inline]
-    pub(crate) fn mark(&self) -> Mark {
-        self.0.mark.mark()
+    pub(super) fn robot(&self) -> RobotId {
+        RobotId(Arc::as_ptr(&self.0) as usize)
     }
 
     #[inline]
@@ -427,8 +423,7 @@ impl Environment {
     }
 
     /// Passes a message of a sensor or a service to its subscribers and writes it to the journal, if there is one. Returns the line
-    /// number, or 0. If the payload's `Clone` panics, all of them get the message through its encoded form, and so will the islands:
-    /// the panic is a fault of the publisher.
+    /// number, or 0. A panic of the payload's `Clone` is left to the publisher's turn.
     #[inline]
     pub fn publish<T: Payload>(
         &self,
@@ -440,31 +435,18 @@ impl Environment {
         if T::TELLS_JOINT_POSITION {
             self.shared().joints.hear(message, now);
         }
-        let mut panic = None;
-        let line = match self.journal() {
+        match self.journal() {
             None => {
-                topic.publish_contained(message, &mut panic);
+                topic.publish(message);
                 self.0.replayed_line.load(Ordering::Relaxed)
             }
             Some(journal) => {
                 journal.wait_for_room();
-                match copied(message, &mut panic) {
-                    Some(copy) => {
-                        let recorded = Recorded::Message(DynamicMessage::of(topic.path(), copy));
-                        let event = Event::Message { publisher, message: recorded };
-                        topic.publish_as_written(message, &mut panic, || {
-                            journal.write(now, self.0.clock.wall_offset_nanos(), event)
-                        })
-                    }
-                    // Without a line, no island may get it. The publisher fails, as it would in its own code.
-                    None => panic.take().map_or(0, |panic| resume_unwind(panic)),
-                }
+                let recorded = Recorded::Message(DynamicMessage::new(topic.path(), message));
+                let event = Event::Message { publisher, message: recorded };
+                topic.publish_as_written(message, || journal.write(now, self.0.clock.wall_offset_nanos(), event))
             }
-        };
-        if let Some(panic) = panic {
-            self.shared().overseer.message_failed(topic.path(), format!("its message {}", of_panic(panic)));
         }
-        line
     }
 
     /// Counts a message that did not fit in the inbox of the estimator's island.

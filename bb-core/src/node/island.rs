@@ -14,7 +14,6 @@
 //! an answer, a publisher waiting for room) waits on a condition variable with a timeout. An estimator that hangs therefore
 //! blocks no other thread forever.
 
-mod act;
 mod alone;
 mod any;
 mod inbox;
@@ -25,15 +24,14 @@ mod model;
 mod processing;
 mod waiting;
 
-pub use self::act::Act;
-pub(crate) use self::act::Visit;
 pub use self::alone::{Alone, Inlet, Solo, enter_alone, publish_to, start_alone};
 pub use self::any::IslandOf;
 pub(crate) use self::any::{AnyIsland, IslandIn, Replayed, islands_in};
 use self::inbox::Inbox;
-use self::inside::{Inside, Within};
-pub use self::member::{Member, act, alone, emit, enter, island, receive, start};
+use self::inside::{Within, is_inside};
+pub use self::member::{Member, act, alone, emit, enter, hold, island, receive, start};
 use self::processing::{deliver, dropped};
+use super::act::Act;
 use super::environment::Environment;
 use super::{NodeEntry, Turn};
 use crate::declaration::{EstimatorDeclaration, IslandDeclaration};
@@ -164,8 +162,7 @@ pub struct Key {
 /// A waiting message.
 struct Keyed<M> {
     key: Key,
-    /// `None` if the message could not be copied: it keeps its place in the order, and is dropped when its turn comes.
-    message: Option<M>,
+    message: M,
 }
 
 /// Why a call was not made.
@@ -214,7 +211,7 @@ impl<S: IslandState> Island<S> {
         now: MonotonicTime,
         key: Key,
         direct: impl FnOnce(&mut S, &Turn<'_>),
-        message: impl FnOnce() -> Option<S::Message>,
+        message: impl FnOnce() -> S::Message,
     ) {
         if self.pending.load(Ordering::Relaxed) == 0
             && !self.served.load(Ordering::Relaxed)
@@ -256,7 +253,9 @@ impl<S: IslandState> Island<S> {
         drop(inbox);
         if let Some(dropped) = dropped {
             S::dropped(wiring, dropped.key);
-            crate::fault::discard(dropped);
+            self.attend(wiring);
+            // The message of another publisher, whose `Drop` may panic, is dropped last.
+            return drop(dropped);
         }
         self.attend(wiring);
     }
@@ -335,7 +334,7 @@ impl<S: IslandState> Island<S> {
         line: Event,
         call: impl FnOnce(&mut S, &Turn<'_>) -> T,
     ) -> Result<T, CallError> {
-        if Inside::is_here(wiring.environment().mark()) {
+        if is_inside(wiring.environment().robot()) {
             return Err(CallError::Inside);
         }
         let Some(mut state) = self.hold(wiring, LONGEST_CALL) else { return Err(CallError::Busy) };
@@ -356,7 +355,7 @@ impl<S: IslandState> Island<S> {
             Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
             Err(TryLockError::WouldBlock) => return None,
         };
-        Some(Within::new(state, wiring.environment().mark()))
+        Some(Within::new(state, wiring.environment().robot()))
     }
 
     /// Whether a thread holds the island. The caller does not want to enter.

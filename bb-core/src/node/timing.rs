@@ -32,7 +32,7 @@ pub(super) struct Measured {
 }
 
 impl Timing {
-    #[inline]
+    /// Begins a callback that is measured: when another one ended, if that was right before.
     pub(super) fn begin(&self, environment: &Environment) -> Begun {
         if let Some(ended) = self.ended.take() {
             return ended;

@@ -1,9 +1,9 @@
 //! One entry that an island processes.
 
-use super::emission::{copied_of, handed_on};
+use super::admission::MAX_SKEW_NANOS;
 use super::environment::{Environment, Mode};
 use super::timing::Timing;
-use crate::declaration::EstimatorDeclaration;
+use crate::declaration::{EstimatorDeclaration, IslandDeclaration};
 use crate::joints::PlacedInput;
 use crate::journal::{Callback, Event, Recorded, checksum};
 use crate::message::{Payload, Stamped};
@@ -16,6 +16,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 /// The processing of one entry: its time, its measurements, and its records for the journal.
 pub struct Turn<'a> {
     now: MonotonicTime,
+    /// The latest stamp that is accepted.
+    latest: MonotonicTime,
     wall_offset_nanos: i64,
     environment: &'a Environment,
     island: usize,
@@ -45,6 +47,7 @@ impl<'a> Turn<'a> {
     ) -> Self {
         Self {
             now,
+            latest: now.plus_nanos(MAX_SKEW_NANOS),
             wall_offset_nanos,
             environment,
             island,
@@ -65,6 +68,12 @@ impl<'a> Turn<'a> {
         self.now
     }
 
+    /// The latest stamp that a message may have: further ahead, its clock is wrong.
+    #[inline]
+    pub(super) fn latest(&self) -> MonotonicTime {
+        self.latest
+    }
+
     pub(super) fn wall_at(&self, time: MonotonicTime) -> WallTime {
         WallTime::from_unix_nanos(time.as_nanos().saturating_add(self.wall_offset_nanos))
     }
@@ -79,7 +88,7 @@ impl<'a> Turn<'a> {
         self.is_observed
     }
 
-    /// A callback of `estimator` begins.
+    /// A turn of `estimator` begins.
     #[inline]
     pub(super) fn enter(&self, estimator: u32) {
         self.running.store(estimator, Ordering::Relaxed);
@@ -118,6 +127,16 @@ impl<'a> Turn<'a> {
         self.placed.take()
     }
 
+    /// Writes what a turn of this island has found besides its outputs. `cause` is the number of its line.
+    pub(super) fn write_found(&self, cause: u64, island: &IslandDeclaration) {
+        if island.is_measured {
+            self.write(|turn| Event::Measured { cause, callbacks: turn.take_measured() });
+        }
+        if self.environment.joints().routes().has_any(island.estimators) {
+            self.write(|turn| Event::Placed { cause, inputs: turn.take_placed() });
+        }
+    }
+
     /// Writes a line of this turn, if there is a journal.
     pub(super) fn write(&self, line: impl FnOnce(&Self) -> Event) {
         if let Some(journal) = self.environment.journal() {
@@ -132,21 +151,20 @@ impl<'a> Turn<'a> {
     }
 
     /// Records that a callback has emitted nothing.
-    #[inline]
     pub(super) fn no_emission(&self) {
         self.answering.set(None);
     }
 
-    /// Records that a callback of `estimator` has emitted at one or more outputs. Callbacks of other estimators may run in between.
-    #[inline]
-    pub(super) fn begin_emission(&self, estimator: &'static EstimatorDeclaration) {
-        if self.is_observed {
-            if let Some(answering) = self.answering.take() {
-                self.unrecorded.set(Some(answering));
-                self.has_emitted.set(false);
-            } else if self.unrecorded.get().is_some_and(|unrecorded| unrecorded.path == estimator.path) {
-                self.unrecorded.set(None);
-            }
+    /// Records whether a callback of `estimator` has emitted at one or more outputs. Callbacks of other estimators may run before those
+    /// are published.
+    #[cold]
+    pub(super) fn note_reply(&self, estimator: &'static EstimatorDeclaration, has_emitted: bool) {
+        let answering = self.answering.take();
+        if has_emitted && answering.is_some() {
+            self.unrecorded.set(answering);
+            self.has_emitted.set(false);
+        } else if has_emitted && self.unrecorded.get().is_some_and(|unrecorded| unrecorded.path == estimator.path) {
+            self.unrecorded.set(None);
         }
     }
 
@@ -154,47 +172,35 @@ impl<'a> Turn<'a> {
     #[inline]
     pub fn emit<T: Payload>(&self, publisher: usize, topic: &Topic<T>, message: &Stamped<T>) {
         if T::TELLS_JOINT_POSITION || self.is_observed || topic.is_listened_to() {
-            // Copies for other subscribers may take longer than the next callback.
-            self.timing.interrupt();
-            let path = topic.path();
-            if T::TELLS_JOINT_POSITION {
-                handed_on(self.environment, path, || self.environment.joints().hear(message, self.now));
-            }
-            handed_on(self.environment, path, || {
-                if self.is_observed {
-                    self.follow(publisher, path, message);
-                }
-                topic.publish_alone(message);
-            });
+            self.hand_out(publisher, topic, message);
         } else {
             topic.count_alone();
         }
     }
 
-    /// Drops an emitted message. If its `Drop` panics, the estimator is charged, and the turn goes on.
-    #[inline]
-    pub fn release<T: Payload>(&self, topic: &Topic<T>, message: Stamped<T>) {
-        if std::mem::needs_drop::<Stamped<T>>() {
-            handed_on(self.environment, topic.path(), || drop(message));
+    #[cold]
+    fn hand_out<T: Payload>(&self, publisher: usize, topic: &Topic<T>, message: &Stamped<T>) {
+        // Copies for subscribers may take longer than the next callback.
+        self.timing.interrupt();
+        if T::TELLS_JOINT_POSITION {
+            self.environment.joints().hear(message, self.now);
         }
+        if self.is_observed {
+            self.follow(publisher, topic.path(), message);
+        }
+        topic.publish(message);
     }
 
-    #[cold]
     fn follow<T: Payload>(&self, publisher: usize, path: &'static str, message: &Stamped<T>) {
         if self.environment.journal().is_some() {
             let is_answer = self.unrecorded.get().is_some_and(|estimator| estimator.outputs.contains(&path));
             let event = if is_answer {
-                copied_of(self.environment, path, message).map(|message| {
-                    let is_first = !self.has_emitted.replace(true);
-                    let message = Recorded::Message(DynamicMessage::of(path, message));
-                    Event::Emission { publisher, is_first, message }
-                })
+                let message = Recorded::Message(DynamicMessage::new(path, message));
+                Event::Emission { publisher, is_first: !self.has_emitted.replace(true), message }
             } else {
-                Some(Event::Output { island: self.island, publisher, checksum: checksum(message) })
+                Event::Output { island: self.island, publisher, checksum: checksum(message) }
             };
-            if let Some(event) = event {
-                self.write(|_| event);
-            }
+            self.write(|_| event);
         }
         if self.environment.mode() == Mode::Replay {
             self.environment.replayed().add(self.island, publisher, checksum(message));

@@ -1,7 +1,7 @@
 //! Publishing at a path that the robot does not declare.
 
 use super::{AnyTopic as _, DynamicMessage, Topic};
-use crate::message::{Panic, Payload, Stamp, Stamped, copied};
+use crate::message::{Payload, Stamp, Stamped};
 use std::fmt;
 use std::sync::Arc;
 
@@ -14,9 +14,8 @@ pub struct Publisher<T> {
 
 /// The checks that a publisher passes on its way to its topic.
 pub(crate) trait Gate: Send + Sync {
-    /// Has `publish` called with the stamp of a payload that is published at `path` now; not once the publisher may not act any
-    /// more. A panic of the payload's `Clone` that it returns is a fault at `path`.
-    fn pass(&self, path: &'static str, publish: &mut dyn FnMut(Stamp) -> Option<Panic>);
+    /// Has `publish` called with the stamp of a payload that is published now; not once the publisher may not act any more.
+    fn pass(&self, publish: &mut dyn FnMut(Stamp));
     /// Whether messages are to be shown to [`Self::note`].
     fn is_noted(&self) -> bool;
     /// A message is about to be published.
@@ -30,29 +29,27 @@ impl<T: Payload> Publisher<T> {
 
     /// Publishes a payload measured now, in no frame. Once the command that made this publisher has ended, or the robot has
     /// stopped, nothing is published any more.
-    ///
-    /// If the payload's `Clone` panics, subscribers and the journal get it through its encoded form, and the panic is a fault at
-    /// the path.
     pub fn publish(&self, payload: T) {
         let mut payload = Some(payload);
-        self.gate.pass(self.path(), &mut |stamp| self.hand_out(&stamp.message(payload.take()?)));
+        self.gate.pass(&mut |stamp| {
+            if let Some(payload) = payload.take() {
+                self.hand_out(&stamp.message(payload));
+            }
+        });
     }
 
     /// Publishes a message with its own stamp, for messages forwarded from elsewhere.
     pub fn forward(&self, message: &Stamped<T>) {
-        self.gate.pass(self.path(), &mut |_| self.hand_out(message));
+        self.gate.pass(&mut |_| self.hand_out(message));
     }
 
-    fn hand_out(&self, message: &Stamped<T>) -> Option<Panic> {
-        let mut panic = None;
-        if !self.gate.is_noted() {
-            self.topic.publish_contained(message, &mut panic);
-        } else if let Some(noted) = copied(message, &mut panic) {
-            // One that a journal cannot hold is not published: a replay could not publish it either.
-            let noted = DynamicMessage::of(self.path(), noted);
-            self.topic.publish_as_written(message, &mut panic, || self.gate.note(noted));
+    fn hand_out(&self, message: &Stamped<T>) {
+        if self.gate.is_noted() {
+            let noted = DynamicMessage::new(self.path(), message);
+            self.topic.publish_as_written(message, || self.gate.note(noted));
+        } else {
+            self.topic.publish(message);
         }
-        panic
     }
 
     /// Its path.

@@ -5,12 +5,10 @@ use super::queue::{AnyQueue, Overflow, Queue, counted_bytes};
 use super::subscribers::{Hub, Listeners};
 use super::subscription::Subscription;
 use super::wakers::{Wakers, wake};
-use crate::message::Payload;
-use crate::message::{Panic, Stamped, copied};
+use crate::message::{Payload, Stamped};
 use std::any::Any;
 use std::fmt;
 use std::marker::PhantomData;
-use std::panic::resume_unwind;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, PoisonError};
 
@@ -35,31 +33,17 @@ impl<T: Payload> Topic<T> {
         Subscription::new(self.hub.path, queue, topic)
     }
 
-    /// Hands a clone of `message` to every subscriber.
+    /// Hands a clone of `message` to every subscriber. If the payload's `Clone` panics, those that come after do not get it.
     #[inline]
     pub fn publish(&self, message: &Stamped<T>) {
         self.hub.published.fetch_add(1, Ordering::Relaxed);
-        self.hand_out(message);
-    }
-
-    /// The same; a panic of the payload's `Clone` is kept in `panic`, unless there is one already.
-    #[inline]
-    pub(crate) fn publish_contained(&self, message: &Stamped<T>, panic: &mut Option<Panic>) {
-        self.hub.published.fetch_add(1, Ordering::Relaxed);
         if self.is_listened_to() {
-            self.deliver_and_wake(message, panic);
+            self.deliver_and_wake(message);
         }
     }
 
-    /// The same for a publisher that is alone, as an estimator is in its island: it need not fear that somebody else counts
-    /// at the same time.
-    #[inline]
-    pub fn publish_alone(&self, message: &Stamped<T>) {
-        self.count_alone();
-        self.hand_out(message);
-    }
-
-    /// The same for a message without subscribers.
+    /// Counts a message without subscribers, of a publisher that is alone, as an estimator is in its island: nobody else counts at the
+    /// same time.
     #[inline]
     pub(crate) fn count_alone(&self) {
         self.hub.published.store(self.hub.published.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
@@ -71,16 +55,10 @@ impl<T: Payload> Topic<T> {
         self.hub.listening.load(Ordering::Acquire) > 0
     }
 
-    /// The same for one of several publishers, of a message that `write` writes into a journal: subscribers receive messages
-    /// in the order of their lines. What `write` gives is returned. A panic of the payload's `Clone` is kept in `panic`, unless
-    /// there is one already.
-    pub(crate) fn publish_as_written<L>(
-        &self,
-        message: &Stamped<T>,
-        panic: &mut Option<Panic>,
-        write: impl FnOnce() -> L,
-    ) -> L {
-        if self.hub.listening.load(Ordering::Acquire) == 0 {
+    /// Publishes a message that `write` writes into a journal, of one of several publishers: subscribers receive messages in the order
+    /// of their lines. What `write` gives is returned.
+    pub(crate) fn publish_as_written<L>(&self, message: &Stamped<T>, write: impl FnOnce() -> L) -> L {
+        if !self.is_listened_to() {
             let line = write();
             // A subscription that begins meanwhile does not get it: it might already have received one with a later
             // line.
@@ -89,12 +67,12 @@ impl<T: Payload> Topic<T> {
         }
         let mut wakers = Wakers::default();
         // Copies are made before: the payload's `clone` is user code, and another publisher must not wait for it.
-        let mut copies = self.copies(message, panic);
+        let mut copies = self.copies(message);
         loop {
             let order = self.hub.order.lock().unwrap_or_else(PoisonError::into_inner);
             if !self.hub.has_still(&copies.listeners) {
                 drop(order);
-                copies = self.copies(message, panic);
+                copies = self.copies(message);
                 continue;
             }
             let line = write();
@@ -107,63 +85,49 @@ impl<T: Payload> Topic<T> {
     }
 
     /// Only enqueues `message`: what is to be woken and dropped goes to `wakers`. For a publisher that holds a lock. No user's
-    /// code runs here but the payload's `clone`, and that only if somebody listens; its panic is kept in `panic`, unless there is
-    /// one already.
+    /// code runs here but the payload's `clone`, and that only if somebody listens.
     #[inline]
-    pub(crate) fn publish_deferred(&self, message: &Stamped<T>, wakers: &mut Wakers, panic: &mut Option<Panic>) {
+    pub(crate) fn publish_deferred(&self, message: &Stamped<T>, wakers: &mut Wakers) {
         self.hub.published.fetch_add(1, Ordering::Relaxed);
-        if self.hub.listening.load(Ordering::Acquire) > 0 {
-            self.deliver(message, wakers, panic);
-        }
-    }
-
-    #[inline]
-    fn hand_out(&self, message: &Stamped<T>) {
         if self.is_listened_to() {
-            let mut panic = None;
-            self.deliver_and_wake(message, &mut panic);
-            if let Some(panic) = panic {
-                resume_unwind(panic);
-            }
+            self.deliver(message, wakers);
         }
     }
 
     #[cold]
-    fn deliver_and_wake(&self, message: &Stamped<T>, panic: &mut Option<Panic>) {
+    fn deliver_and_wake(&self, message: &Stamped<T>) {
         let mut wakers = Wakers::dropping_at_once();
-        self.deliver(message, &mut wakers, panic);
+        self.deliver(message, &mut wakers);
         wakers.run();
     }
 
-    /// Keeps a panic of the payload's `Clone`, if there is none yet; the message is handed to everybody all the same.
     #[cold]
-    fn deliver(&self, message: &Stamped<T>, wakers: &mut Wakers, panic: &mut Option<Panic>) {
+    fn deliver(&self, message: &Stamped<T>, wakers: &mut Wakers) {
         let Listeners { queues, taps } = self.hub.listeners();
         let bytes = counted_bytes(message);
         let mut lost = 0;
         for queue in &*queues {
-            lost += copied(message, panic).map_or(1, |copy| push(&**queue, copy, bytes, wakers));
+            lost += push(&**queue, message.clone(), bytes, wakers);
         }
         if !taps.is_empty() {
-            let copy = copied(message, panic).map(|copy| DynamicMessage::of(self.hub.path, copy));
-            lost += tap_all(&taps, copy, bytes, wakers);
+            lost += tap_all(&taps, DynamicMessage::new(self.hub.path, message), bytes, wakers);
         }
         self.hub.count_lost(lost);
     }
 
-    fn copies(&self, message: &Stamped<T>, panic: &mut Option<Panic>) -> Copies<T> {
+    fn copies(&self, message: &Stamped<T>) -> Copies<T> {
         let listeners = self.hub.listeners();
         let (mut first, mut more) = (None, Vec::new());
         for index in 0..listeners.queues.len() {
-            let copy = copied(message, panic);
+            let copy = message.clone();
             if index == 0 {
-                first = copy;
+                first = Some(copy);
             } else {
                 more.push(copy);
             }
         }
-        let untyped = if listeners.taps.is_empty() { None } else { copied(message, panic) };
-        let untyped = untyped.map(|copy| DynamicMessage::of(self.hub.path, copy));
+        let untyped =
+            if listeners.taps.is_empty() { None } else { Some(DynamicMessage::new(self.hub.path, message)) };
         Copies { bytes: counted_bytes(message), first, more, untyped, listeners }
     }
 
@@ -172,11 +136,14 @@ impl<T: Payload> Topic<T> {
         let Copies { listeners, mut first, more, untyped, bytes } = copies;
         let mut more = more.into_iter();
         let mut lost = 0;
-        for (index, queue) in listeners.queues.iter().enumerate() {
-            let copy = if index == 0 { first.take() } else { more.next().flatten() };
-            lost += copy.map_or(1, |copy| push(&**queue, copy, bytes, wakers));
+        for queue in &*listeners.queues {
+            if let Some(copy) = first.take().or_else(|| more.next()) {
+                lost += push(&**queue, copy, bytes, wakers);
+            }
         }
-        lost += tap_all(&listeners.taps, untyped, bytes, wakers);
+        if let Some(untyped) = untyped {
+            lost += tap_all(&listeners.taps, untyped, bytes, wakers);
+        }
         self.hub.count_lost(lost);
     }
 }
@@ -184,9 +151,9 @@ impl<T: Payload> Topic<T> {
 /// A copy of the message for each of them.
 struct Copies<T> {
     listeners: Listeners,
-    /// One subscriber alone needs no allocation. None of a message that cannot be copied.
+    /// One subscriber alone needs no allocation.
     first: Option<Stamped<T>>,
-    more: Vec<Option<Stamped<T>>>,
+    more: Vec<Stamped<T>>,
     untyped: Option<DynamicMessage>,
     bytes: usize,
 }
@@ -197,14 +164,8 @@ fn push<T: Payload>(queue: &dyn AnyQueue, message: Stamped<T>, bytes: usize, wak
     queue.map_or(0, |queue| queue.push(message, bytes, wakers))
 }
 
-/// Adds a message to all of them; they lose it if there is none, since it could not be copied.
-fn tap_all(
-    taps: &[Arc<Queue<DynamicMessage>>],
-    message: Option<DynamicMessage>,
-    bytes: usize,
-    wakers: &mut Wakers,
-) -> u64 {
-    let Some(message) = message else { return taps.len() as u64 };
+/// Adds a message to all of them. Returns how many were lost.
+fn tap_all(taps: &[Arc<Queue<DynamicMessage>>], message: DynamicMessage, bytes: usize, wakers: &mut Wakers) -> u64 {
     let Some((last, others)) = taps.split_last() else { return 0 };
     let lost: u64 = others.iter().map(|tap| tap.push(message.clone(), bytes, wakers)).sum();
     lost + last.push(message, bytes, wakers)

@@ -21,12 +21,12 @@ use crate::component::{Bus, Caller, Fault, Host, OptionsList};
 use crate::control::{Control, Parts, SystemTopics};
 use crate::declaration::{ParameterError, ParameterValues, RobotDeclaration};
 use crate::event::ParameterValue;
-use crate::fault::caught;
+use crate::fault::{caught, guarded};
 use crate::joints::JointSettings;
 use crate::journal::{Event, Journal, Sink};
 use crate::lifecycle::HostHandle;
 use crate::message::{Origin, Stamp};
-use crate::node::{Environment, EnvironmentParts, Mode, SharedNode, contained};
+use crate::node::{Environment, EnvironmentParts, Mode, SharedNode};
 use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Payloads, Registry, Select};
 use crate::schedule::{Agenda, Lane};
 use crate::telemetry::Telemetry;
@@ -218,12 +218,11 @@ impl Assembling {
         control.set_host(&host);
         control.set_islands(Box::new(WiredIslands { robot, wired: Arc::clone(&place) }));
         let drained = Arc::clone(&place);
-        environment.set_drain(move |environment, island| {
+        environment.set_drain(move |island| {
             let wired = drained.get().and_then(Weak::upgrade);
             if let Some(island) = wired.as_ref().and_then(|wired| wired.island(island)) {
-                // The component is unknown, for example if the panic is in the code of a payload in an inbox.
-                if let Err(failed) = contained(environment, || island.drain()) {
-                    tracing::error!(fault = %failed.fault, "an island was left");
+                if let Err(fault) = guarded(|| island.drain()) {
+                    tracing::error!(%fault, "an island was left");
                 }
             }
         });

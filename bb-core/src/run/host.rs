@@ -8,10 +8,9 @@ use crate::component::shared::SharedValues;
 use crate::component::{Controls, Description, Host};
 use crate::control::{Control, Islands, Wired};
 use crate::declaration::{RobotDeclaration, graph};
-use crate::fault::Fault;
 use crate::joints::Joints;
 use crate::journal::{Event, Journal, Recorded};
-use crate::node::{NodeEntry, Overseer};
+use crate::node::NodeEntry;
 use crate::pubsub::{AnyTopic, DynamicMessage, PathChange, Registry};
 use crate::schedule::Door;
 use crate::time::MonotonicTime;
@@ -106,10 +105,6 @@ impl Host for RobotHost {
 
     fn note_own(&self, message: DynamicMessage) {
         self.note(|| Event::Own { path: message.path(), message: Recorded::Message(message) });
-    }
-
-    fn message_failed(&self, path: &'static str, fault: Fault) {
-        Overseer::message_failed(&self.control, path, format!("its message {fault}"));
     }
 
     fn actuator(&self, path: &str) -> Option<(&'static str, Box<dyn Any>)> {

@@ -10,7 +10,7 @@ use crate::declaration::{ParameterError, ParameterType};
 use crate::event::Refusal;
 use crate::journal::{Event, ParameterEntry, RequestKind};
 use crate::message::Stamp;
-use crate::node::{Node, NodeEntry, Turn, contained_outside, know_calls, know_casts};
+use crate::node::{Node, NodeEntry, Turn, know_calls, know_casts};
 use crate::pubsub::{Overflow, Subscription};
 use crate::time::MonotonicTime;
 use std::any::Any;
@@ -78,17 +78,19 @@ impl<R: Robot> Live<R> {
             let is_unrecorded = recorded.bytes.is_none();
             let mut request = Some(request);
             let path = machine.environment.node(number).declaration().path;
-            let mut response = Err(Fault::new(format!("{path} has not answered")));
+            let mut response = None;
             let mut call = |node: &mut dyn Any, turn: &Turn<'_>, emitted: &mut dyn Any| {
                 let node = node.downcast_mut::<Node<V::Estimator>>()?;
                 let emitted = emitted.downcast_mut()?;
-                let (answer, stamp) = node.call(request.take()?, is_unrecorded, turn, emitted);
-                response = answer;
-                stamp
+                node.call(request.take()?, is_unrecorded, turn, emitted, &mut response)
             };
             let line = Event::Request { estimator: number, request: recorded };
             machine.visit(number, line, &mut call)?;
-            response
+            response.unwrap_or_else(|| {
+                let stopped = machine.environment.node(number).stopped();
+                let reason = stopped.map_or_else(String::new, |stopped| stopped.reason);
+                Err(Fault::new(format!("{path} failed at this call: {reason}")))
+            })
         })
     }
 
@@ -172,8 +174,7 @@ impl<R: Robot> Live<R> {
                 origin: environment.origin(),
                 ..Stamp::default()
             };
-            let publish = || sensor.publish(&self.wiring, stamp, payload, clock.now());
-            contained_outside(environment, publish);
+            sensor.publish(&self.wiring, stamp, payload, clock.now());
         });
     }
 

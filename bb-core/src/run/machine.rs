@@ -9,7 +9,7 @@ use crate::component::{Bus, Fault, Host};
 use crate::control::{Control, ReportedFault, Summary};
 use crate::declaration::RobotDeclaration;
 use crate::journal::Event;
-use crate::node::{AnyIsland, CallError, Environment, NodeEntry, Visit, contained_outside};
+use crate::node::{AnyIsland, CallError, Environment, NodeEntry, Visit};
 use crate::pubsub::AnyTopic;
 use crate::time::MonotonicTime;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -52,8 +52,7 @@ impl Machine {
         let now = self.environment.clock().now();
         let declaration = self.environment.node(estimator).declaration();
         let Some(island) = self.island(declaration.island) else { return Ok(()) };
-        let mut visited = Ok(());
-        contained_outside(&self.environment, || visited = island.visit(now, estimator, line, visit));
+        let visited = island.visit(now, estimator, line, visit);
         let path = declaration.path;
         visited.map_err(|error| {
             Fault::new(match error {

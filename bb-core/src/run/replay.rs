@@ -12,10 +12,10 @@ use super::visit::Visitable;
 use super::{Live, Report, Robot};
 use crate::component::{HandleCall, HandleCast};
 use crate::declaration::ParameterValues;
-use crate::fault::discard;
+use crate::fault::{caught, discard};
 use crate::joints::PlacedInput;
 use crate::journal::{Callback, Entry, Event, Publishers, Request};
-use crate::node::{Key, Missing, NodeEntry, Replayed, contained, know_calls, know_casts};
+use crate::node::{Key, Missing, NodeEntry, Replayed, know_calls, know_casts};
 use crate::pubsub::AnyTopic;
 use crate::time::MonotonicTime;
 use std::collections::{HashMap, VecDeque};
@@ -208,7 +208,6 @@ impl Replayer {
             Event::Options { estimator, .. }
             | Event::Restart { estimator }
             | Event::GiveUp { estimator }
-            | Event::OutputFailed { estimator, .. }
             | Event::Silence { estimator, .. }
             | Event::Request { estimator, .. } => {
                 self.machine.robot.estimators.get(*estimator).map(|declared| declared.island)
@@ -282,9 +281,6 @@ impl Replayer {
             }
             Event::Restart { estimator } => self.node(estimator, time, NodeEntry::Restart)?,
             Event::GiveUp { estimator } => self.node(estimator, time, NodeEntry::GiveUp)?,
-            Event::OutputFailed { estimator, message } => {
-                self.node(estimator, time, NodeEntry::OutputFailed { message })?;
-            }
             Event::Silence { estimator, epoch, last_run } => {
                 self.node(estimator, time, NodeEntry::Silence { epoch, last_run })?;
             }
@@ -365,11 +361,8 @@ impl Replayer {
     fn go_on(&self, number: usize, time: MonotonicTime, entry: Replayed<'_>) -> Result<(), String> {
         let machine = &self.machine;
         let island = machine.island(number).ok_or("the robot has no such island")?;
-        // A panic in the code of an estimator's output, which ends the turn, has a line of its own.
-        let mut is_known = true;
-        contained(&machine.environment, || is_known = island.replay(time, entry))
-            .map_err(|failed| failed.fault.to_string())?;
-        if is_known {
+        let replayed = caught(|| Ok(island.replay(time, entry)));
+        if replayed.map_err(|failed| failed.fault.to_string())? {
             return Ok(());
         }
         Err("no such message waits: it is of another robot, or lines are missing".to_owned())

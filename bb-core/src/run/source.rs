@@ -12,7 +12,7 @@ use crate::declaration::SensorDeclaration;
 use crate::fault::{Failed, Fault, Then, caught};
 use crate::lifecycle::{AfterFault, HostHandle, Periodic, Recipe, Slot};
 use crate::message::{Stamp, Stamped};
-use crate::node::{BindTarget, Environment, blame};
+use crate::node::{BindTarget, Environment};
 use crate::pubsub::DynamicMessage;
 use crate::time::{Clock, MonotonicTime};
 use std::collections::HashMap;
@@ -382,13 +382,7 @@ impl<S: Periodic> Source for Running<S> {
             return;
         }
         let mut next = Next::AtRate;
-        let read = match caught(|| self.read(due, &mut next)) {
-            Ok(read) => Ok(read),
-            // If another component's code has failed, the reading of this source still counts.
-            Err(failed) => blame(&self.environment, failed)
-                .and_then(|()| self.next_due(next, due, self.clock().now()).map_err(Failed::from)),
-        };
-        match read {
+        match caught(|| self.read(due, &mut next)) {
             Ok(next) => self.due = next,
             Err(failed) => self.fail(failed),
         }

@@ -8,7 +8,6 @@ use super::timekeeper::keep_time;
 use crate::component::Fault;
 use crate::declaration::WorkerDeclaration;
 use crate::fault::guarded;
-use crate::node::contained;
 use crate::time::MonotonicTime;
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -104,9 +103,8 @@ fn spawn(path: &'static str, run: impl FnOnce() + Send + 'static) -> Result<Thre
 
 /// A panic not caught for any component, for example in a payload's code, must not end a thread that serves others.
 fn survive(machine: &Machine, path: &'static str, run: impl FnOnce()) {
-    let done = contained(&machine.environment, run);
-    if let Err(failed) = done {
-        machine.fault(path, failed.fault.to_string());
+    if let Err(fault) = guarded(run) {
+        machine.fault(path, fault.to_string());
     }
 }
 

@@ -1,10 +1,8 @@
 //! All messages of an input since the last dispatch.
 
-use super::slot::{Slot, Stored};
+use super::slot::Slot;
 use crate::declaration::InputDeclaration;
-use crate::fault::discard;
-use crate::message::Payload;
-use crate::message::{Stamped, copy_to};
+use crate::message::{Payload, Stamped};
 use std::cell::Cell;
 use std::collections::VecDeque;
 use std::iter::Chain;
@@ -83,7 +81,7 @@ impl<'a, T> Every<'a, T> {
         Self { lost, ..self }
     }
 
-    /// The number of messages since the last run that were displaced by newer ones or could not be copied, and are not among these.
+    /// The number of messages since the last run that were displaced by newer ones, and are not among these.
     pub fn lost(&self) -> u64 {
         self.lost
     }
@@ -98,14 +96,11 @@ impl<'a, T> IntoIterator for Every<'a, T> {
     }
 }
 
-/// How many messages that have been seen are kept, once another arrives.
-const KEPT: usize = 8;
-
 /// The messages of one input since the last dispatch.
 #[doc(hidden)]
 #[derive(Debug)]
 pub struct EverySlot<T> {
-    /// Those that have been seen come first. Some are kept to be overwritten, so that nothing is allocated in the long run.
+    /// Those that have been seen come first, until another arrives.
     messages: VecDeque<Stamped<T>>,
     seen: Cell<usize>,
     lost: Cell<u64>,
@@ -118,30 +113,18 @@ impl<T> Default for EverySlot<T> {
     }
 }
 
-impl<T> Drop for EverySlot<T> {
-    /// One by one, since each may panic.
-    fn drop(&mut self) {
-        self.messages.drain(..).for_each(discard);
-    }
-}
-
 impl<T: Payload> Slot<T> for EverySlot<T> {
     fn declare(&mut self, declaration: &'static InputDeclaration) {
         self.declaration = Some(declaration);
     }
 
-    fn store(&mut self, message: &Stamped<T>) -> Stored {
-        let seen = self.seen.get();
+    fn store(&mut self, message: &Stamped<T>) -> bool {
+        let seen = self.seen.take();
         let has_displaced = seen == 0 && self.messages.len() >= Every::<T>::MOST;
-        let mut kept = if seen > 0 || has_displaced { self.messages.pop_front() } else { None };
-        let surplus = seen.saturating_sub(1 + KEPT);
-        (0..surplus).for_each(|_| discard(self.messages.pop_front()));
-        self.seen.set(seen.saturating_sub(1 + surplus));
-        let panic = copy_to(&mut kept, message).err();
-        let is_kept = kept.is_some();
-        self.messages.extend(kept);
-        self.lost.set(self.lost.get() + u64::from(has_displaced) + u64::from(!is_kept));
-        Stored { has_displaced, panic }
+        self.messages.drain(..if has_displaced { 1 } else { seen });
+        self.lost.set(self.lost.get() + u64::from(has_displaced));
+        self.messages.push_back(message.clone());
+        has_displaced
     }
 
     fn latest(&self) -> (Option<&'static InputDeclaration>, Option<&Stamped<T>>) {

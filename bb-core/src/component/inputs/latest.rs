@@ -1,10 +1,8 @@
 //! The latest message of an input.
 
-use super::slot::{Slot, Stored, SyncMiss};
+use super::slot::{Slot, SyncMiss};
 use crate::declaration::InputDeclaration;
-use crate::fault::discard;
-use crate::message::Payload;
-use crate::message::{Stamped, copy_to};
+use crate::message::{Payload, Stamped};
 use crate::time::MonotonicTime;
 use std::cell::Cell;
 use std::ops::Deref;
@@ -68,22 +66,16 @@ impl<T> Default for LatestSlot<T> {
     }
 }
 
-impl<T> Drop for LatestSlot<T> {
-    /// It may panic, and so may others that are dropped with it.
-    fn drop(&mut self) {
-        discard(self.message.take());
-    }
-}
-
 impl<T: Payload> Slot<T> for LatestSlot<T> {
     fn declare(&mut self, declaration: &'static InputDeclaration) {
         self.declaration = Some(declaration);
     }
 
     #[inline]
-    fn store(&mut self, message: &Stamped<T>) -> Stored {
+    fn store(&mut self, message: &Stamped<T>) -> bool {
+        self.message = Some(message.clone());
         self.is_new.set(true);
-        Stored { has_displaced: false, panic: copy_to(&mut self.message, message).err() }
+        false
     }
 
     fn latest(&self) -> (Option<&'static InputDeclaration>, Option<&Stamped<T>>) {

@@ -2,7 +2,7 @@
 
 use crate::declaration::InputDeclaration;
 use crate::message::Payload;
-use crate::message::{Panic, Stamped};
+use crate::message::Stamped;
 use crate::time::MonotonicTime;
 
 /// Keeps messages of one input until the driver arrives.
@@ -11,8 +11,8 @@ pub trait Slot<T: Payload> {
     /// Sets the declared input that fills it.
     fn declare(&mut self, declaration: &'static InputDeclaration);
 
-    /// Keeps a copy of `message`.
-    fn store(&mut self, message: &Stamped<T>) -> Stored;
+    /// Keeps a copy of `message`; returns whether one that no dispatch has seen was dropped to make room.
+    fn store(&mut self, message: &Stamped<T>) -> bool;
 
     /// The declared input, and its latest message.
     fn latest(&self) -> (Option<&'static InputDeclaration>, Option<&Stamped<T>>);
@@ -30,16 +30,6 @@ pub trait Slot<T: Payload> {
             .is_too_old(age_nanos)
             .then_some(SyncMiss { input: declaration.index, age_nanos: Some(age_nanos) })
     }
-}
-
-/// What came of keeping a message.
-#[doc(hidden)]
-#[derive(Debug, Default)]
-pub struct Stored {
-    /// A message that no dispatch has seen was dropped to make room.
-    pub(crate) has_displaced: bool,
-    /// The payload's `Clone` panicked.
-    pub(crate) panic: Option<Panic>,
 }
 
 /// The input because of which a dispatch was dropped.

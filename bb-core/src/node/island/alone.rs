@@ -1,13 +1,13 @@
 //! An estimator that is an island of its own, with one input: most are. The island's code is here, once for all of them; the
 //! expansion of `robot!` provides what differs.
 
-use super::act::Act;
 use super::member::{Member, OptionsOf, OutputOf, act, alone, emit, enter, receive};
 use super::{Environment, Island, IslandState, IslandWiring, Key};
 use crate::component::{Binding, EmittedAt, Estimator, OptionsList, TakenAt};
 use crate::declaration::IslandDeclaration;
 use crate::declaration::estimator::InletDeclaration;
 use crate::message::{Payload, Stamp, Stamped};
+use crate::node::act::Act;
 use crate::node::{Node, Turn};
 use crate::pubsub::{DynamicMessage, Topic};
 use crate::time::MonotonicTime;

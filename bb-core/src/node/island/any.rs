@@ -1,15 +1,17 @@
 //! A type-erased island: the interface used by the runtime.
 
-use super::act::Visit;
 use super::{CallError, Key, NodeEntry};
 use crate::declaration::IslandDeclaration;
 use crate::journal::Event;
+use crate::node::act::Visit;
 use crate::pubsub::DynamicMessage;
 use crate::time::MonotonicTime;
 use std::sync::Arc;
 
 #[cfg(not(loom))]
-use super::{Island, IslandState, IslandWiring, RELAXED, inbox::Pending, inside::Inside, processing::for_all};
+use super::{Island, IslandState, IslandWiring, RELAXED, inbox::Pending, inside::is_inside, processing::for_all};
+#[cfg(not(loom))]
+use crate::node::act::Act;
 #[cfg(not(loom))]
 use std::{
     sync::PoisonError,
@@ -263,7 +265,7 @@ impl<S: IslandState> IslandIn<S::Wiring> for Island<S> {
         visit: &mut Visit<'_>,
     ) -> Result<(), CallError> {
         self.call(wiring, now, line, |state, turn| {
-            state.act(wiring, estimator, super::act::Act::Visit(visit, turn));
+            state.act(wiring, estimator, Act::Visit(visit, turn));
         })
     }
 
@@ -276,7 +278,7 @@ impl<S: IslandState> IslandIn<S::Wiring> for Island<S> {
     }
 
     fn is_inside(&self, wiring: &S::Wiring) -> bool {
-        Inside::is_here(wiring.environment().mark())
+        is_inside(wiring.environment().robot())
     }
 
     fn has_retired(&self) -> bool {
@@ -311,10 +313,8 @@ impl<S: IslandState> IslandIn<S::Wiring> for Island<S> {
         let is_known = self.process_line(wiring, now, None, |turn| {
             match entry {
                 Replayed::Deliver(_) => {
-                    let Some(message) = message.as_ref().and_then(|keyed| keyed.message.as_ref()) else {
-                        return false;
-                    };
-                    state.deliver(wiring, message, turn);
+                    let Some(keyed) = &message else { return false };
+                    state.deliver(wiring, &keyed.message, turn);
                 }
                 Replayed::Drop(key) => S::dropped(wiring, key),
                 Replayed::Wake => state.wake(wiring, turn),

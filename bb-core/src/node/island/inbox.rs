@@ -23,8 +23,8 @@ pub(super) enum Entry<M> {
 /// Entries in order of arrival.
 ///
 /// Messages are bounded by the island's capacity. All other entries are bounded by their kind. There are at most two wakes. Each
-/// estimator has at most one start, one restart, one give-up, one loss and one panic of its outputs. It also has the one-way
-/// requests allowed for it and a few changes of options.
+/// estimator has at most one start, one restart, one give-up and one loss. It also has the one-way requests allowed for it and a few
+/// changes of options.
 pub(super) struct Inbox<M> {
     entries: VecDeque<Dated<M>>,
     messages: usize,
@@ -124,10 +124,7 @@ impl<M> Inbox<M> {
     pub(super) fn post(&mut self, now: MonotonicTime, estimator: usize, entry: NodeEntry) {
         let is_same = |other: &Entry<M>| match (other, &entry) {
             (Entry::Node(number, NodeEntry::Restart), NodeEntry::Restart)
-            | (Entry::Node(number, NodeEntry::GiveUp), NodeEntry::GiveUp)
-            | (Entry::Node(number, NodeEntry::OutputFailed { .. }), NodeEntry::OutputFailed { .. }) => {
-                *number == estimator
-            }
+            | (Entry::Node(number, NodeEntry::GiveUp), NodeEntry::GiveUp) => *number == estimator,
             _ => false,
         };
         if self.entries.iter().any(|(_, other)| is_same(other)) {

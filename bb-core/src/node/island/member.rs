@@ -1,16 +1,15 @@
 //! An estimator in its island. The expansion of `robot!` provides its location and the destinations of its outputs. The code that
 //! uses them is here, once for all estimators.
 
-use super::act::Act;
-use super::{Island, IslandIn, IslandState, IslandWiring as _, Key};
+use super::{Island, IslandIn, IslandState, Key};
 use crate::component::{Binding, EmittedAt, Estimator, Inputs, OptionsList, Outputs, TakenAt};
-use crate::fault::of_panic;
-use crate::message::{Payload, Stamp, Stamped, copied};
-use crate::node::emission::copy_failed;
-use crate::node::{Emitting, Next, Node, Turn};
+use crate::fault::Panic;
+use crate::message::{Payload, Stamp, Stamped};
+use crate::node::act::Act;
+use crate::node::{Arrival, Next, Node, Turn};
 use crate::pubsub::{DynamicMessage, Topic};
 use crate::time::MonotonicTime;
-use std::panic::resume_unwind;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
 type WiringOf<M> = <<M as Member>::State as IslandState>::Wiring;
 type InputOf<M> = <<M as Member>::Estimator as Estimator>::Input;
@@ -49,14 +48,9 @@ pub trait Member {
     }
 }
 
-/// Emits `message` alone at the output `F`. No publisher is charged if the payload's `Clone` panics: the message is a recorded one.
+/// Emits `message` alone at the output `F`.
 pub fn alone<F: EmittedAt<O>, O>(message: &DynamicMessage) -> Option<O> {
-    let mut panic = None;
-    let copy = copied(message.downcast::<F::Payload>()?, &mut panic);
-    if let Some(fault) = panic.map(of_panic) {
-        tracing::error!(%fault, "a recorded message failed where it was copied");
-    }
-    copy.map(|message| F::alone(message.payload))
+    message.downcast::<F::Payload>().map(|message| F::alone(message.payload.clone()))
 }
 
 /// Publishes the output `F` if it was emitted, and no estimator takes it.
@@ -69,9 +63,7 @@ pub fn emit<F: EmittedAt<O>, O>(
     topic: &Topic<F::Payload>,
 ) {
     if let Some(payload) = F::take(emitted) {
-        let emission = stamp.message(payload);
-        turn.emit(publisher, topic, &emission);
-        turn.release(topic, emission);
+        turn.emit(publisher, topic, &stamp.message(payload));
     }
 }
 
@@ -85,7 +77,10 @@ pub fn start<M: Member>(
     Node::new(M::NUMBER, options.of(component), binding, M::cache, environment)
 }
 
-/// Delivers a message to the estimator's input with that number, publishes its outputs, and lets it continue if it asks to.
+/// The turn of an estimator: delivers a message to its driver, the declared input with that number, publishes what it emits, and lets it
+/// continue if it asks to.
+///
+/// A panic in the turn, whatever in it panics, is one of the estimator. The turns of those that take its outputs catch their own.
 #[inline]
 pub fn receive<M: Member, F: TakenAt<InputOf<M>>>(
     island: &mut M::State,
@@ -94,16 +89,37 @@ pub fn receive<M: Member, F: TakenAt<InputOf<M>>>(
     message: &Stamped<F::Payload>,
     turn: &Turn<'_>,
 ) {
-    let mut emitted = None;
-    if let Some(stamp) = M::node(island).receive::<F>(input, message, turn, &mut emitted) {
-        publish::<M>(wiring, island, &mut emitted, stamp, turn);
+    let taken = catch_unwind(AssertUnwindSafe(|| {
+        let mut emitted = None;
+        let node = M::node(island);
+        if node.receive::<F>(input, message, Arrival::New, turn, &mut emitted) {
+            let stamp = node.stamp_like(message);
+            publish::<M>(wiring, island, &mut emitted, stamp, turn);
+        }
+    }));
+    if let Err(panic) = taken {
+        M::node(island).panicked(panic, turn);
     }
     if M::node(island).is_unfinished() {
-        take_turn::<M>(island, wiring, turn);
+        act::<M>(island, wiring, Act::Turn(turn));
     }
 }
 
-/// Publishes an estimator's outputs; a panic in one is attributed to that output.
+/// The turn of an estimator that gets a message of another input than the driver's.
+#[inline]
+pub fn hold<M: Member, F: TakenAt<InputOf<M>>>(
+    island: &mut M::State,
+    input: usize,
+    message: &Stamped<F::Payload>,
+    turn: &Turn<'_>,
+) {
+    let node = M::node(island);
+    if let Err(panic) = catch_unwind(AssertUnwindSafe(|| node.hold::<F>(input, message, Arrival::New, turn))) {
+        node.panicked(panic, turn);
+    }
+}
+
+/// Publishes an estimator's outputs.
 #[inline]
 fn publish<M: Member>(
     wiring: &WiringOf<M>,
@@ -112,54 +128,73 @@ fn publish<M: Member>(
     stamp: Stamp,
     turn: &Turn<'_>,
 ) {
-    let emitting = Emitting::new(M::NUMBER);
     M::publish(wiring, island, emitted, stamp, turn);
     // Other islands may have run, and the message was dropped: neither is charged to a later callback.
     turn.timing().interrupt();
-    emitting.done();
 }
 
-/// Performs an act on an estimator; returns `false` if it cannot emit that message.
+/// Performs an act on an estimator, and then all that is due; returns `false` if it cannot emit that message.
 #[cold]
 pub fn act<M: Member>(island: &mut M::State, wiring: &WiringOf<M>, act: Act<'_, '_>) -> bool {
-    match act {
-        Act::Turn(turn) => take_turn::<M>(island, wiring, turn),
-        Act::Handle(entry, turn) => {
-            let mut emitted = None;
-            if let Next::Emitted(stamp) = M::node(island).handle(entry, turn, &mut emitted) {
-                publish::<M>(wiring, island, &mut emitted, stamp, turn);
-            }
-            take_turn::<M>(island, wiring, turn);
-        }
-        Act::Visit(visit, turn) => {
-            let mut emitted: Option<OutputOf<M>> = None;
-            if let Some(stamp) = visit(M::node(island), turn, &mut emitted) {
-                publish::<M>(wiring, island, &mut emitted, stamp, turn);
-            }
-            take_turn::<M>(island, wiring, turn);
-        }
-        Act::BeginReplay => M::node(island).begin_replay(),
-        Act::Emit(message, turn) => {
-            let output = M::node(island).output_at(message.path());
-            let mut emitted = output.and_then(|output| M::emitted(output, message));
-            if emitted.is_none() {
-                return false;
-            }
-            publish::<M>(wiring, island, &mut emitted, message.stamp(), turn);
-        }
-    }
-    true
+    drive(&mut Seat::<M> { island, wiring }, act)
 }
 
-/// Does all that is due in an estimator.
-#[cold]
-fn take_turn<M: Member>(island: &mut M::State, wiring: &WiringOf<M>, turn: &Turn<'_>) {
+/// An estimator in its island, whatever its type.
+trait Steps {
+    /// Performs an act, or does one thing that is due, and publishes what the estimator emits.
+    fn step(&mut self, act: Option<Act<'_, '_>>, turn: &Turn<'_>) -> Next;
+    /// See [`Node::begin_replay`].
+    fn begin_replay(&mut self);
+    /// See [`Node::panicked`].
+    fn panicked(&mut self, panic: Panic, turn: &Turn<'_>);
+}
+
+struct Seat<'a, M: Member> {
+    island: &'a mut M::State,
+    wiring: &'a WiringOf<M>,
+}
+
+impl<M: Member> Steps for Seat<'_, M> {
+    fn step(&mut self, act: Option<Act<'_, '_>>, turn: &Turn<'_>) -> Next {
+        let Self { island, wiring } = self;
+        let (node, mut emitted) = (M::node(island), None);
+        let next = node.step(act, M::emitted, turn, &mut emitted);
+        if let Next::Emitted(stamp) = next {
+            publish::<M>(wiring, island, &mut emitted, stamp, turn);
+        }
+        next
+    }
+
+    fn begin_replay(&mut self) {
+        M::node(self.island).begin_replay();
+    }
+
+    fn panicked(&mut self, panic: Panic, turn: &Turn<'_>) {
+        M::node(self.island).panicked(panic, turn);
+    }
+}
+
+fn drive(member: &mut dyn Steps, act: Act<'_, '_>) -> bool {
+    let (turn, is_recorded) = match &act {
+        Act::Turn(turn) | Act::Handle(_, turn) | Act::Visit(_, turn) => (*turn, false),
+        Act::Emit(_, turn) => (*turn, true),
+        Act::BeginReplay => {
+            member.begin_replay();
+            return true;
+        }
+    };
+    let mut act = Some(act);
     loop {
-        let mut emitted = None;
-        match M::node(island).turn(turn, &mut emitted) {
-            Next::Idle => return,
-            Next::Quiet => {}
-            Next::Emitted(stamp) => publish::<M>(wiring, island, &mut emitted, stamp, turn),
+        let stepped = catch_unwind(AssertUnwindSafe(|| member.step(act.take(), turn)));
+        let next = stepped.unwrap_or_else(|panic| {
+            member.panicked(panic, turn);
+            Next::Quiet
+        });
+        match next {
+            Next::Idle => return !is_recorded,
+            // What is due is in the journal, too.
+            Next::Quiet | Next::Emitted(_) if is_recorded => return true,
+            Next::Quiet | Next::Emitted(_) => {}
         }
     }
 }
@@ -175,32 +210,7 @@ pub fn enter<S: IslandState, T: Payload>(
     keep: impl FnOnce(Stamped<T>) -> S::Message,
 ) {
     let direct = |state: &mut S, turn: &Turn<'_>| deliver(state, wiring, message, turn);
-    S::find(wiring).enter(wiring, now, key, direct, || copy_for::<S, T>(wiring, key.entry, message).map(keep));
-}
-
-/// Copies a message for an island that another thread holds. The publisher is charged if the payload's `Clone` panics; this island
-/// and those after it get the message all the same.
-#[cold]
-fn copy_for<S: IslandState, T: Payload>(
-    wiring: &S::Wiring,
-    entry: usize,
-    message: &Stamped<T>,
-) -> Option<Stamped<T>> {
-    let mut panic = None;
-    let copy = copied(message, &mut panic);
-    if let Some(panic) = panic {
-        let environment = wiring.environment();
-        let mut inlets = S::DECLARATION.inlets.iter().filter(|inlet| inlet.entry == entry);
-        let input = inlets.find_map(|inlet| inlet.inputs.first());
-        let source = input.and_then(|(estimator, input)| {
-            environment.node(*estimator).declaration().inputs.get(*input).map(|input| input.source)
-        });
-        match source {
-            Some(path) => copy_failed(environment, path, panic),
-            None => resume_unwind(panic),
-        }
-    }
-    copy
+    S::find(wiring).enter(wiring, now, key, direct, || keep(message.clone()));
 }
 
 /// The type-erased form of an island of a wiring.

@@ -4,7 +4,7 @@
 //! take effect, and nothing remains in the inbox. The lock's type ensures that only one thread at a time is inside. (The checker's
 //! locks order more than real ones do: the comments at the fences explain their purpose.)
 
-use super::{Act, EstimatorDeclaration, Island, IslandDeclaration, IslandState, IslandWiring, Key};
+use super::{EstimatorDeclaration, Island, IslandDeclaration, IslandState, IslandWiring, Key};
 use crate::component::{DisarmHook, Guardian};
 use crate::declaration::ParameterValues;
 use crate::fault::Failed;
@@ -12,6 +12,7 @@ use crate::joints::Joints;
 use crate::journal::Event;
 use crate::lifecycle::Supervision;
 use crate::message::Origin;
+use crate::node::act::Act;
 use crate::node::{BindTarget, Check, Environment, EnvironmentParts, Mode, NodeEntry, Overseer, Report, Turn};
 use crate::schedule::{Agenda, Bell, Pool};
 use crate::time::{Clock, MonotonicTime};
@@ -79,10 +80,6 @@ impl Overseer for Nobody {
     fn forget_hooks(&self, _: &'static str) {}
 
     fn report(&self, _: usize, _: Report) {}
-
-    fn output_failed(&self, _: usize, _: String) {}
-
-    fn message_failed(&self, _: &'static str, _: String) {}
 
     fn bind(&self, _: &'static str, _: &'static [usize], _: Check, _: BindTarget) {}
 
@@ -152,7 +149,7 @@ const KEY: Key = Key { entry: 0, line: 0 };
 type Thread<const CAPACITY: usize> = fn(&Island<Seen<CAPACITY>>, &Wiring);
 
 fn publish<const CAPACITY: usize>(island: &Island<Seen<CAPACITY>>, wiring: &Wiring, message: Message) {
-    island.enter(wiring, NOW, KEY, |seen, _| seen.see(message), || Some(message));
+    island.enter(wiring, NOW, KEY, |seen, _| seen.see(message), || message);
 }
 
 fn publish_twice<const PUBLISHER: usize, const CAPACITY: usize>(island: &Island<Seen<CAPACITY>>, wiring: &Wiring) {

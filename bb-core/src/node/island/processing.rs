@@ -2,30 +2,11 @@
 
 use super::inbox::{Entry, Taken};
 use super::{Island, IslandState, IslandWiring as _, Key, Keyed, RELAXED};
+use crate::fault::discard;
 use crate::journal::Event;
 use crate::node::{NodeEntry, Turn};
 use crate::time::MonotonicTime;
-use std::marker::PhantomData;
 use std::sync::atomic::Ordering;
-
-/// Writes a turn's findings to the journal when the turn ends, even if the code of a message panics.
-struct Ending<'a, 'b, S: IslandState> {
-    turn: &'a Turn<'b>,
-    /// The number of the turn's line.
-    cause: u64,
-    island: PhantomData<S>,
-}
-
-impl<S: IslandState> Drop for Ending<'_, '_, S> {
-    fn drop(&mut self) {
-        if S::DECLARATION.is_measured {
-            self.turn.write(|turn| Event::Measured { cause: self.cause, callbacks: turn.take_measured() });
-        }
-        if self.turn.environment().joints().routes().has_any(S::DECLARATION.estimators) {
-            self.turn.write(|turn| Event::Placed { cause: self.cause, inputs: turn.take_placed() });
-        }
-    }
-}
 
 impl<S: IslandState> Island<S> {
     /// Processes one entry: writes its line, runs it, and records how long measured callbacks took.
@@ -59,12 +40,15 @@ impl<S: IslandState> Island<S> {
             None => environment.clock().wall_offset_nanos(),
         };
         let turn = Turn::new(environment, S::DECLARATION.number, now, wall_offset_nanos, &self.running);
-        let _ending = line.map(|(cause, _)| Ending::<S> { turn: &turn, cause, island: PhantomData });
         // Only one thread writes at a time, so plain stores suffice instead of atomic additions. They are for the report of a turn
         // that hangs.
         self.entered_nanos.store(now.as_nanos(), RELAXED);
         self.turns.store(self.turns.load(RELAXED).wrapping_add(1), RELAXED);
-        run(&turn)
+        let result = run(&turn);
+        if let Some((cause, _)) = line {
+            turn.write_found(cause, &S::DECLARATION);
+        }
+        result
     }
 
     /// Takes the next entry and processes it; returns `false` if the inbox is empty.
@@ -88,11 +72,11 @@ impl<S: IslandState> Island<S> {
         let retires = matches!(taken, Taken::Retire(_));
         self.process_line(wiring, now, line, |turn| match taken {
             Taken::Retire(_) => for_all(state, wiring, turn, || NodeEntry::Retire),
-            Taken::Entry(_, Entry::Message(Keyed { message: Some(message), .. })) => {
+            Taken::Entry(_, Entry::Message(Keyed { message, .. })) => {
                 state.deliver(wiring, &message, turn);
-                crate::fault::discard(message);
+                // Its publisher is done with it, and those who got it are too: a panic in its `Drop` is nobody's.
+                discard(message);
             }
-            Taken::Entry(_, Entry::Message(Keyed { key, message: None })) => S::dropped(wiring, key),
             Taken::Entry(_, Entry::Wake) => state.wake(wiring, turn),
             Taken::Entry(_, Entry::Start) => for_all(state, wiring, turn, || NodeEntry::Start),
             Taken::Entry(_, Entry::Node(estimator, entry)) => state.handle(wiring, estimator, entry, turn),
@@ -120,8 +104,7 @@ pub(super) fn dropped<S: IslandState>(key: Key) -> Event {
 
 fn line_of<S: IslandState>(entry: &Entry<Keyed<S::Message>>) -> Event {
     match entry {
-        Entry::Message(Keyed { key, message: Some(_) }) => deliver::<S>(*key),
-        Entry::Message(Keyed { key, message: None }) => dropped::<S>(*key),
+        Entry::Message(Keyed { key, .. }) => deliver::<S>(*key),
         Entry::Wake => Event::Wake { island: S::DECLARATION.number },
         Entry::Start => Event::Start { island: S::DECLARATION.number },
         Entry::Node(estimator, entry) => entry.line(*estimator, S::DECLARATION.number),

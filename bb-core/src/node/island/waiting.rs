@@ -1,7 +1,7 @@
 //! Threads that wait for an island: callers, and publishers that wait for room in its inbox.
 
 use super::inbox::Pending;
-use super::inside::Inside;
+use super::inside::is_inside;
 use super::{Held, Island, IslandState, IslandWiring as _};
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -13,7 +13,7 @@ impl<S: IslandState> Island<S> {
     /// Back-pressure: waits until the holder drains the inbox. Returns `false` at once if the holder hangs or if this thread
     /// is inside an island of this robot.
     pub(super) fn wait_for_room(&self, wiring: &S::Wiring) -> bool {
-        if self.hangs.load(Ordering::Relaxed) || Inside::is_here(wiring.environment().mark()) {
+        if self.hangs.load(Ordering::Relaxed) || is_inside(wiring.environment().robot()) {
             return false;
         }
         self.waiting.fetch_add(1, Ordering::SeqCst);

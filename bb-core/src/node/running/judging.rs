@@ -1,8 +1,8 @@
 //! What follows from a run and from a message that was not used: counts, durations, telemetry and health.
 
-use super::Node;
-use crate::component::{Estimator, SyncMiss};
-use crate::declaration::InputDeclaration;
+use super::common::Common;
+use super::placing::Unplaced;
+use crate::component::SyncMiss;
 use crate::event::{HealthReason, HealthState, HealthTransition};
 use crate::message::Stamp;
 use crate::node::environment::{Missing, Mode};
@@ -13,32 +13,78 @@ use crate::node::{DropReason, HealthReport, Report};
 use crate::telemetry::TelemetryEvent;
 use crate::time::MonotonicTime;
 
-impl<E: Estimator> Node<E> {
-    /// `source` is the driver's publisher after a run on its message.
+impl Common {
+    /// Begins a run on a message of the driver, and the measurement of its duration if it is measured: all runs where a latency budget
+    /// is declared, else every 64th.
+    #[inline]
+    pub(super) fn begin(&self, turn: &Turn<'_>) -> Option<Begun> {
+        if self.shared.counters().dispatched.increment() & self.unmeasured == 0 {
+            return Some(turn.timing().begin(turn.environment()));
+        }
+        turn.timing().interrupt();
+        None
+    }
+
+    /// Begins any other callback.
+    pub(super) fn begin_other(&self, turn: &Turn<'_>) -> Option<Begun> {
+        let is_measured = self.declaration.health.latency_budget_nanos.is_some();
+        turn.timing().interrupt();
+        is_measured.then(|| turn.timing().begin(turn.environment()))
+    }
+
+    /// Completes a run on the driver's message of `time`, which came at that input.
     #[inline]
     pub(super) fn complete(
         &mut self,
+        input: usize,
+        time: MonotonicTime,
+        begun: Option<Begun>,
         diverged: Option<&'static str>,
-        has_asked: bool,
-        bad: Option<HealthReason>,
-        source: Option<&'static str>,
-        has_emitted: bool,
         turn: &Turn<'_>,
     ) {
-        if has_asked {
-            self.schedule();
+        self.shared.set_last_run(turn.now());
+        let mut bad = match begun {
+            Some(begun) => self.measure(begun, Some((input, time)), turn),
+            None => None,
+        };
+        if let Some(limit) = self.stale_after_nanos
+            && turn.now().nanos_since(time) > limit
+        {
+            bad = bad.or(Some(HealthReason::StaleInput));
         }
         if bad.is_some() || diverged.is_some() || self.health.state != HealthState::Healthy {
-            turn.timing().interrupt();
-            self.assess(bad, diverged, source, turn.now());
-        } else if source.is_some() {
+            self.assess(bad, diverged, Some(input), turn);
+        } else {
             self.was_good = true;
+        }
+    }
+
+    /// Completes any other callback; returns the stamp of what it has emitted.
+    pub(super) fn complete_other(
+        &mut self,
+        begun: Option<Begun>,
+        diverged: Option<&'static str>,
+        turn: &Turn<'_>,
+    ) -> Stamp {
+        let bad = begun.and_then(|begun| self.measure(begun, None, turn));
+        if bad.is_some() || diverged.is_some() {
+            self.assess(bad, diverged, None, turn);
+        }
+        let now = turn.now();
+        Stamp { monotonic_time: now, wall_time: turn.wall_at(now), ..self.template }
+    }
+
+    /// Schedules what a callback has asked for, and counts what it has emitted.
+    #[inline]
+    pub(super) fn settle(&mut self, has_asked: bool, has_emitted: bool, turn: &Turn<'_>) {
+        if has_asked {
+            self.wake_at(self.timers.next());
         }
         if has_emitted {
             self.shared.counters().emitted.increment();
-            turn.begin_emission(self.declaration);
-        } else {
-            turn.no_emission();
+        }
+        if turn.is_observed() {
+            turn.note_reply(self.declaration, has_emitted);
         }
     }
 
@@ -47,14 +93,17 @@ impl<E: Estimator> Node<E> {
         &mut self,
         bad: Option<HealthReason>,
         diverged: Option<&'static str>,
-        source: Option<&'static str>,
-        now: MonotonicTime,
+        driver: Option<usize>,
+        turn: &Turn<'_>,
     ) {
+        turn.timing().interrupt();
+        let now = turn.now();
         if let Some(reason) = diverged {
             self.shared.counters().diverge(reason);
             tracing::debug!(estimator = self.declaration.path, reason, "diverged");
         }
         let bad = bad.or(diverged.map(|_| HealthReason::Diverged));
+        let source = driver.and_then(|input| self.declaration.inputs.get(input)).map(|input| input.source);
         let path = source.unwrap_or(self.declaration.path);
         if source.is_some() {
             self.was_good = bad.is_none();
@@ -119,15 +168,19 @@ impl<E: Estimator> Node<E> {
     }
 
     #[cold]
-    pub(super) fn refuse(&self, input: &InputDeclaration, reason: DropReason, time_nanos: i64) {
-        self.shared.counters().drop(input.index, reason);
+    pub(super) fn refuse(&self, input: usize, reason: DropReason, time: MonotonicTime, turn: &Turn<'_>) {
+        turn.timing().interrupt();
+        self.shared.counters().drop(input, reason);
+        let Some(input) = self.declaration.inputs.get(input) else { return };
         let (estimator, input, reason) = (self.declaration.path, input.name, reason.name());
+        let time_nanos = time.as_nanos();
         tracing::debug!(estimator, input, reason, time_nanos, "message dropped");
         self.tell_drop(input, reason);
     }
 
     #[cold]
     pub(super) fn miss(&mut self, miss: SyncMiss, turn: &Turn<'_>) {
+        turn.timing().interrupt();
         self.shared.counters().drop(miss.input, DropReason::SyncMiss);
         let Some(input) = self.declaration.inputs.get(miss.input) else { return };
         let (age_nanos, tolerance_nanos) = (miss.age_nanos, input.tolerance_nanos);
@@ -154,5 +207,29 @@ impl<E: Estimator> Node<E> {
             let event = TelemetryEvent::Dropped { estimator: self.declaration.path, input, reason };
             telemetry.tell(self.environment.origin().robot, &event);
         }
+    }
+
+    /// Finds the transforms for a dispatch on a message of the driver; returns `false` if the dispatch is dropped.
+    pub(super) fn place(&mut self, driver_time: MonotonicTime, turn: &Turn<'_>) -> bool {
+        turn.timing().interrupt();
+        match self.placing.place(driver_time, &self.admission, turn) {
+            Ok(()) => true,
+            Err(unplaced) => {
+                self.note_unplaced(&unplaced, turn);
+                false
+            }
+        }
+    }
+
+    #[cold]
+    fn note_unplaced(&mut self, unplaced: &Unplaced, turn: &Turn<'_>) {
+        let Unplaced::Gap { input, error } = unplaced else { return };
+        self.shared.counters().drop(*input, DropReason::NoTransform);
+        let Some(input) = self.declaration.inputs.get(*input) else { return };
+        let (estimator, name) = (self.declaration.path, input.name);
+        tracing::debug!(estimator, input = name, %error, "dispatch dropped for want of a transform");
+        self.shared.set_last_gap(error.clone());
+        self.tell_drop(name, DropReason::NoTransform.name());
+        self.judge(Event::Bad(HealthReason::NoTransform), input.source, turn.now());
     }
 }

@@ -1,15 +1,11 @@
 //! Transforms of an estimator's inputs across moving joints, at the times of their messages.
 
-use super::Node;
 use crate::component::replacement::Replacement;
-use crate::component::{Estimator, Fault, InputTransform, InputTransforms};
+use crate::component::{Fault, InputTransform, InputTransforms};
 use crate::declaration::EstimatorDeclaration;
-use crate::event::HealthReason;
 use crate::joints::{Gap, InputRoute, LookupError, PlacedInput, Placement};
-use crate::node::DropReason;
 use crate::node::admission::Admission;
 use crate::node::environment::{Environment, Missing, Mode};
-use crate::node::health::Event;
 use crate::node::shared::SharedNode;
 use crate::node::turn::Turn;
 use crate::time::MonotonicTime;
@@ -133,18 +129,4 @@ fn find(
         placement: Placement::of(&found),
     });
     Some(found)
-}
-
-impl<E: Estimator> Node<E> {
-    #[cold]
-    pub(super) fn note_unplaced(&mut self, unplaced: &Unplaced, turn: &Turn<'_>) {
-        let Unplaced::Gap { input, error } = unplaced else { return };
-        self.shared.counters().drop(*input, DropReason::NoTransform);
-        let Some(input) = self.declaration.inputs.get(*input) else { return };
-        let (estimator, name) = (self.declaration.path, input.name);
-        tracing::debug!(estimator, input = name, %error, "dispatch dropped for want of a transform");
-        self.shared.set_last_gap(error.clone());
-        self.tell_drop(name, DropReason::NoTransform.name());
-        self.judge(Event::Bad(HealthReason::NoTransform), input.source, turn.now());
-    }
 }

@@ -1,77 +1,64 @@
 //! Creation, failure and restart of an estimator.
 
-use super::{Context, Node};
-use crate::component::Estimator;
+use super::Node;
+use super::common::Common;
+use crate::component::{Context, Estimator};
 use crate::event::HealthReason;
-use crate::fault::{Failed, Fault};
+use crate::fault::{Failed, Panic, of_panic};
 use crate::lifecycle::AfterFault;
+use crate::node::DropReason;
 use crate::node::admission::Admission;
-use crate::node::environment::Environment;
 use crate::node::health::Event;
 use crate::node::timers::Timers;
 use crate::node::turn::Turn;
-use crate::node::{DropReason, Report};
 use crate::time::MonotonicTime;
 
 impl<E: Estimator> Node<E> {
     /// Creates the estimator for the first time. A failure that prevents the robot from starting is stored in the environment.
     pub(super) fn make_first(&mut self, now: MonotonicTime) {
-        let context = self.context(now);
-        self.shared.set_last_run(now);
-        let (slot, parameters) = (&mut self.slot, &self.parameters);
-        let (environment, path) = (&self.environment, self.declaration.path);
-        let made = environment.make(path, || {
-            let made = replacing_hooks(environment, path, true, || slot.make(&context, parameters));
-            made.map_err(|failed| failed.fault)
-        });
-        match made {
-            Ok(()) => self.requested = context.into_requests(),
-            Err(skipped) => {
-                self.slot.stop();
-                let reason = skipped.unwrap_or_else(|| "the robot does not start".to_owned());
-                self.set_stopped(Some((reason, true)));
-            }
+        let Self { common, slot, .. } = self;
+        let context = common.context(now);
+        if common.make_first(now, &mut || slot.make(&context, &common.parameters)) {
+            self.common.requested = context.into_requests();
+        } else {
+            self.slot.stop();
         }
     }
 
     /// Starts the estimator; one that was left out is not healthy.
     pub(super) fn begin(&mut self, turn: &Turn<'_>) {
-        self.shared.set_last_run(turn.now());
-        if !self.slot.is_running() {
-            self.judge(Event::Bad(HealthReason::Stopped), self.declaration.path, turn.now());
-        }
-        for request in std::mem::take(&mut self.requested) {
-            self.timers.request(request, turn.now());
-        }
+        let is_running = self.slot.is_running();
+        self.common.begin_life(is_running, turn);
     }
 
     #[cold]
     pub(super) fn fail(&mut self, failed: Failed, turn: &Turn<'_>) {
-        self.report_failure(&failed);
+        turn.no_emission();
+        self.common.report_failure(&failed);
         let after = self.slot.fail(&failed, turn.now());
-        let for_good = after == AfterFault::Stopped;
-        self.set_stopped(Some((failed.fault.to_string(), for_good)));
-        let reason = if for_good { HealthReason::Stopped } else { HealthReason::Restarted };
-        if for_good {
+        if after == AfterFault::Stopped {
             self.drop_backlog();
         }
-        self.judge(Event::Bad(reason), self.declaration.path, turn.now());
+        self.common.note_failure(&failed, after, turn);
         self.schedule();
     }
 
-    pub(super) fn report_failure(&self, failed: &Failed) {
-        let Failed { fault, panicked } = failed;
-        let report = Report::Failed { message: fault.to_string(), panicked: *panicked };
-        self.environment.overseer().report(self.shared.number(), report);
+    /// Code of the estimator, or of a message that it emitted or kept, has panicked in its turn.
+    #[cold]
+    pub fn panicked(&mut self, panic: Panic, turn: &Turn<'_>) {
+        let failed = Failed { fault: of_panic(panic), panicked: true };
+        if self.slot.is_running() {
+            self.fail(failed, turn);
+        } else {
+            self.common.report_failure(&failed);
+        }
     }
 
     /// Restarts the estimator when its backoff is over or its supervisor requests it.
     pub(super) fn restart(&mut self, turn: &Turn<'_>) {
-        let context = self.context(turn.now());
-        let (slot, parameters) = (&mut self.slot, &self.parameters);
-        let made =
-            replacing_hooks(&self.environment, self.declaration.path, true, || slot.make(&context, parameters));
-        match made {
+        let Self { common, slot, .. } = self;
+        let context = common.context(turn.now());
+        match common.replacing_hooks(true, &mut || slot.make(&context, &common.parameters)) {
             Ok(()) => self.refresh(context, turn.now()),
             Err(failed) => self.fail(failed, turn),
         }
@@ -80,24 +67,26 @@ impl<E: Estimator> Node<E> {
     /// Restarts the estimator at its supervisor's request, though it has not failed.
     pub(super) fn restart_from_above(&mut self, turn: &Turn<'_>) {
         if self.slot.restart(turn.now()) {
-            self.judge(Event::Bad(HealthReason::Restarted), self.declaration.path, turn.now());
+            let source = self.common.declaration.path;
+            self.common.judge(Event::Bad(HealthReason::Restarted), source, turn.now());
         }
     }
 
     /// Applies new parameter values.
     pub(super) fn change_options(&mut self, turn: &Turn<'_>) {
-        let context = self.context(turn.now());
-        let (slot, parameters) = (&mut self.slot, &self.parameters);
-        let changed =
-            replacing_hooks(&self.environment, self.declaration.path, false, || slot.change(&context, parameters));
+        let Self { common, slot, .. } = self;
+        let context = common.context(turn.now());
+        let mut is_kept = true;
+        let changed = common.replacing_hooks(false, &mut || {
+            is_kept = slot.change(&context, &common.parameters)?;
+            Ok(())
+        });
         match changed {
-            Ok(true) => {
-                for request in context.into_requests() {
-                    self.timers.request(request, turn.now());
-                }
+            Ok(()) if is_kept => {
+                self.common.take_requests(context.into_requests(), turn.now());
                 self.schedule();
             }
-            Ok(false) => {
+            Ok(()) => {
                 self.restart_from_above(turn);
                 self.restart(turn);
             }
@@ -107,38 +96,60 @@ impl<E: Estimator> Node<E> {
 
     /// Resets everything but the backlog and the health.
     fn refresh(&mut self, context: Context, now: MonotonicTime) {
+        self.common.refresh(context, now);
+        self.schedule();
         self.cache = (self.make_cache)();
+    }
+
+    /// Counts waiting messages as dropped when the estimator stops for good.
+    pub(super) fn drop_backlog(&mut self) {
+        let counters = self.common.shared.counters();
+        self.backlog.clear().for_each(|input| counters.drop(input, DropReason::Stopped));
+    }
+}
+
+impl Common {
+    /// Makes the estimator by `make`; returns `false` if it does not run.
+    fn make_first(&self, now: MonotonicTime, make: &mut dyn FnMut() -> Result<(), Failed>) -> bool {
+        self.shared.set_last_run(now);
+        let made = self
+            .environment
+            .make(self.declaration.path, || self.replacing_hooks(true, make).map_err(|failed| failed.fault));
+        if let Err(skipped) = &made {
+            let reason = skipped.clone().unwrap_or_else(|| "the robot does not start".to_owned());
+            self.set_stopped(Some((reason, true)));
+        }
+        made.is_ok()
+    }
+
+    fn begin_life(&mut self, is_running: bool, turn: &Turn<'_>) {
+        self.shared.set_last_run(turn.now());
+        if !is_running {
+            self.judge(Event::Bad(HealthReason::Stopped), self.declaration.path, turn.now());
+        }
+        let requested = std::mem::take(&mut self.requested);
+        self.take_requests(requested, turn.now());
+    }
+
+    fn note_failure(&mut self, failed: &Failed, after: AfterFault, turn: &Turn<'_>) {
+        let for_good = after == AfterFault::Stopped;
+        self.set_stopped(Some((failed.fault.to_string(), for_good)));
+        let reason = if for_good { HealthReason::Stopped } else { HealthReason::Restarted };
+        self.judge(Event::Bad(reason), self.declaration.path, turn.now());
+    }
+
+    fn refresh(&mut self, context: Context, now: MonotonicTime) {
         self.admission = Admission::new(self.declaration.inputs.len());
         self.timers = Timers::default();
         self.continued = 0;
         self.shared.counters().restarts.increment();
         self.set_stopped(None);
         tracing::info!(estimator = self.declaration.path, "restarted");
-        for request in context.into_requests() {
-            self.timers.request(request, now);
-        }
-        self.schedule();
+        self.take_requests(context.into_requests(), now);
     }
 
-    /// Counts waiting messages as dropped when the estimator stops for good.
-    pub(super) fn drop_backlog(&mut self) {
-        let counters = self.shared.counters();
-        self.backlog.clear().for_each(|input| counters.drop(input, DropReason::Stopped));
+    /// Runs `make`; the disarm callbacks registered by `make` replace earlier ones.
+    fn replacing_hooks(&self, is_made: bool, make: &mut dyn FnMut() -> Result<(), Failed>) -> Result<(), Failed> {
+        self.environment.overseer().replacing_hooks(self.declaration.path, is_made, make)
     }
-}
-
-/// Runs `make`; the disarm callbacks registered by `make` replace earlier ones.
-fn replacing_hooks<T>(
-    environment: &Environment,
-    path: &'static str,
-    is_made: bool,
-    make: impl FnOnce() -> Result<T, Failed>,
-) -> Result<T, Failed> {
-    let (mut make, mut made) = (Some(make), None);
-    let not_made = || Failed::from(Fault::new("it was not made"));
-    environment.overseer().replacing_hooks(path, is_made, &mut || {
-        made = Some(make.take().ok_or_else(not_made)?()?);
-        Ok(())
-    })?;
-    made.ok_or_else(not_made)
 }

@@ -97,7 +97,7 @@ fn subscribers_receive_messages_in_the_order_of_their_lines() {
     let publish = |id: u32| {
         let joint = JointState { position: f64::from(id), velocity: None, effort: None };
         let message = Stamped::new(MonotonicTime::ZERO, joint);
-        topic.publish_as_written(&message, &mut None, || lines.lock().expect("nobody panics under it").push(id));
+        topic.publish_as_written(&message, || lines.lock().expect("nobody panics under it").push(id));
     };
     let received: Vec<Vec<u32>> = std::thread::scope(|scope| {
         let publishers = [0, EACH].map(|first| scope.spawn(move || (first..first + EACH).for_each(publish)));

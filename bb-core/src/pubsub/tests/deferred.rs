@@ -37,8 +37,8 @@ fn messages_are_there_before_anybody_is_woken() {
     }
     let mut wakers = Wakers::default();
     let lock = robot.lock().expect("nobody panics under it");
-    topic.publish_deferred(&message(1.0), &mut wakers, &mut None);
-    topic.publish_deferred(&message(2.0), &mut wakers, &mut None);
+    topic.publish_deferred(&message(1.0), &mut wakers);
+    topic.publish_deferred(&message(2.0), &mut wakers);
     assert_eq!(*lock, 0);
     assert!(awaited.iter().all(|subscription| subscription.drain().count() == 2));
     drop(lock);
@@ -53,7 +53,7 @@ fn a_thread_that_waits_is_notified_at_once() {
     let mut wakers = Wakers::default();
     std::thread::scope(|scope| {
         let waiting = scope.spawn(|| subscription.recv_timeout(Duration::from_secs(60)));
-        topic.publish_deferred(&message(1.0), &mut wakers, &mut None);
+        topic.publish_deferred(&message(1.0), &mut wakers);
         assert!(waiting.join().is_ok_and(|received| received.is_some()));
     });
     assert!(wakers.is_empty());

@@ -5,9 +5,9 @@ use super::telling::Told;
 use super::{Inner, State};
 use crate::component::{Accepts, Actuator, ActuatorError, Caller};
 use crate::event::Safety;
-use crate::fault::{caught, of_panic};
+use crate::fault::{caught, guarded};
 use crate::journal::{Event, Recorded};
-use crate::message::{Finite, Frame, Payload, Stamp, copied};
+use crate::message::{Finite, Frame, Payload, Stamp};
 use crate::pubsub::{DynamicMessage, Wakers};
 
 impl<A: Actuator> Accepts<A::Command> for Inner<A> {
@@ -92,18 +92,17 @@ impl<A: Actuator> Inner<A> {
         }
         state.moved_by = caller.clone();
         self.counts.carried_out();
-        let mut panic = None;
-        if let Some(journal) = self.environment.journal()
-            && let Some(copy) = copied(&message, &mut panic)
-        {
-            let message = Recorded::Message(DynamicMessage::of(self.declaration.path, copy));
-            journal.write(now, clock.wall_offset_nanos(), Event::Actuated { actuator: self.number, message });
-        }
-        // Under the lock, so that messages keep the order in which commands are carried out.
-        self.topic.publish_deferred(&message, wakers, &mut panic);
-        if let Some(panic) = panic {
+        let published = guarded(|| {
+            if let Some(journal) = self.environment.journal() {
+                let message = Recorded::Message(DynamicMessage::new(self.declaration.path, &message));
+                journal.write(now, clock.wall_offset_nanos(), Event::Actuated { actuator: self.number, message });
+            }
+            // Under the lock, so that messages keep the order in which commands are carried out.
+            self.topic.publish_deferred(&message, wakers);
+        });
+        if let Err(fault) = published {
             // The actuator has moved: neither it nor the sender fails.
-            self.tell_control(state, Told::MessageFailed(format!("its message {}", of_panic(panic))));
+            self.tell_control(state, Told::MessageFailed(format!("its message {fault}")));
         }
         Ok(message.payload)
     }

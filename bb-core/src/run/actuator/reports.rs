@@ -104,6 +104,5 @@ fn publish<T: Payload>(
         let offset = environment.clock().wall_offset_nanos();
         journal.write(message.monotonic_time, offset, Event::Own { path, message: recorded });
     }
-    // These payloads belong to this crate, and their `clone` does not panic.
-    topic.publish_deferred(message, wakers, &mut None);
+    topic.publish_deferred(message, wakers);
 }

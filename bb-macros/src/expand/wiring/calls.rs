@@ -72,7 +72,6 @@ impl Wiring<'_> {
                 let message = &emission;
                 turn.emit(#publisher, &wiring.topics.#topic, message);
                 #(#calls)*
-                turn.release(&wiring.topics.#topic, emission);
             }
         }
     }
@@ -112,10 +111,13 @@ impl Wiring<'_> {
 
     /// Hands a message to one estimator.
     pub(super) fn receive(&self, payload: &Named, consumer: &Consumer, island: &TokenStream) -> TokenStream {
-        let Consumer { estimator, input, .. } = consumer;
+        let Consumer { estimator, input, runs, .. } = consumer;
         let (member, Input { field, .. }) = (self.types.member(*estimator), self.input(*estimator, *input));
         let (feed, number) = (self.feed(payload, consumer, quote!((message))), input.unwrap_or_default());
-        quote!(__private::receive::<#member, #field>(#island, wiring, #number, #feed, turn);)
+        match runs {
+            true => quote!(__private::receive::<#member, #field>(#island, wiring, #number, #feed, turn);),
+            false => quote!(__private::hold::<#member, #field>(#island, #number, #feed, turn);),
+        }
     }
 
     /// `<Imu as Feeds<Imu, …>>::feed`, where rustc reports a payload mismatch.

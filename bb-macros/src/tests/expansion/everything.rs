@@ -977,7 +977,6 @@ const _: () = {
                     __Message_estimator_base_pose::sensor_base_imu_tilt__kept,
                 );
                 turn.left_for_another_island();
-                turn.release(&wiring.topics.g0.sensor_base_imu_tilt, emission);
             }
         }
     }
@@ -1169,12 +1168,11 @@ const _: () = {
             message: &__private::Stamped<__Rover_2_11__payload__sensor_base_imu_tilt>,
             turn: &__private::Turn<'_>,
         ) {
-            __private::receive::<
+            __private::hold::<
                 __member__estimator_base_pose,
                 __input__estimator_base_pose__tilt,
             >(
                 self,
-                wiring,
                 1usize,
                 <__Rover_2_11__payload__sensor_base_imu_tilt as __private::Feeds<
                     __taken__estimator_base_pose__tilt,
@@ -1190,12 +1188,11 @@ const _: () = {
             message: &__private::Stamped<__Rover_2_11__payload__sensor_base_pan_encoder>,
             turn: &__private::Turn<'_>,
         ) {
-            __private::receive::<
+            __private::hold::<
                 __member__estimator_base_pose,
                 __input__estimator_base_pose__wheel,
             >(
                 self,
-                wiring,
                 2usize,
                 <__Rover_2_11__payload__sensor_base_pan_encoder as __private::Feeds<
                     __taken__estimator_base_pose__wheel,
