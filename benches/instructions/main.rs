@@ -1,9 +1,10 @@
-//! Instructions of the estimators' steps, by callgrind, beside the figures that are stored in `steps.rs`.
+//! Instructions of the estimators' steps and of the hops between them, by callgrind, beside the figures that are stored in `steps.rs`.
 //!
 //! `cargo bench -p bb-benches --bench instructions` prints a line a step, and fails if one takes 2 % more than is stored. Without
 //! valgrind it says so, and passes. The figures hold for x86-64, the compiler of `rust-toolchain.toml` and glibc 2.36; whoever
 //! changes those, or makes a step cheaper, stores the new ones.
 
+mod hop;
 mod motion;
 mod steps;
 

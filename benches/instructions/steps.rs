@@ -1,5 +1,6 @@
 //! The steps, and what is stored for each.
 
+use crate::hop;
 use crate::motion::{Reading, readings};
 use crate::{LONG, SHORT};
 use bb_benches::overflight::{Overflight, Pilot, passed};
@@ -32,6 +33,10 @@ const KEYFRAMES: (usize, usize) = (60, 160);
 
 /// In `f64`. Those of `Eskf` have 15 states, those of the attitude filters read the orientation too.
 pub(crate) const STEPS: &[Step] = &[
+    Step { name: "hop/none", on: None, steps: USUAL, stored: 246.0, run: hop::direct },
+    // Sixteen hops each.
+    Step { name: "hop/chain_16", on: Some("hop/none"), steps: USUAL, stored: 3733.0, run: hop::chain },
+    Step { name: "hop/chain_16_measured", on: Some("hop/none"), steps: USUAL, stored: 6203.0, run: hop::measured },
     Step {
         name: "eskf/sample",
         on: None,

@@ -110,6 +110,9 @@ const EVERYTHING: &str = include_str!("expansion/everything.txt");
 /// Where its expansion is stored, so that a change of the macro can be reviewed as a change of its output.
 const EXPANDED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/src/tests/expansion/everything.rs");
 
+/// Lines of that file: every robot pays for them in its build. A change that raises the number says in its commit by how much and why.
+const LINES: usize = 1600;
+
 #[test]
 fn the_expansion_is_as_stored() {
     assert!(diagnostics(tokens(EVERYTHING)).is_empty(), "{:?}", super::faults(EVERYTHING));
@@ -127,6 +130,7 @@ fn the_expansion_is_as_stored() {
         stored == expanded,
         "read the difference, then renew it: UPDATE_EXPANSION=1 cargo test -p bb-macros expansion\n{difference:?}"
     );
+    assert_eq!(stored.lines().count(), LINES, "store the number of lines too");
 }
 
 /// Everything in the expansion is named by a path, a field or a role, so that its purpose is readable.
