@@ -41,14 +41,14 @@ pub(crate) const STEPS: &[Step] = &[
         name: "eskf/sample",
         on: None,
         steps: USUAL,
-        stored: 4993.0,
+        stored: 4830.0,
         run: |steps| eskf(steps, |_, _, _| Ok(())),
     },
     Step {
         name: "eskf/update_3_with_gate",
         on: Some("eskf/sample"),
         steps: USUAL,
-        stored: 6236.0,
+        stored: 5742.0,
         run: |steps| {
             eskf(steps, |filter, stream, reading| {
                 let fix = GnssPosition::new(reading.position, 1.0, 1.0);
@@ -60,7 +60,7 @@ pub(crate) const STEPS: &[Step] = &[
         name: "eskf/update_1_with_gate",
         on: Some("eskf/sample"),
         steps: USUAL,
-        stored: 2990.0,
+        stored: 3083.0,
         run: |steps| {
             eskf(steps, |filter, stream, reading| {
                 let height = Height { height: reading.position.z, deviation: 1.0 };
@@ -79,7 +79,7 @@ pub(crate) const STEPS: &[Step] = &[
         name: "planar/position_with_gate",
         on: Some("planar/sample"),
         steps: USUAL,
-        stored: 1866.0,
+        stored: 2144.0,
         run: |steps| {
             planar(steps, |filter, stream, reading| {
                 let fix = PlanarPosition::new(reading.position.xy(), 1.0);

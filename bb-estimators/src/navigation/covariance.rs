@@ -2,71 +2,19 @@
 
 #![allow(clippy::needless_range_loop, reason = "the indices are those of the equations")]
 
-use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector3};
+mod dense;
+mod innovation;
 
+use nalgebra::{Matrix2, Matrix3, SMatrix, Vector3};
+
+pub(in crate::navigation) use self::dense::Dense;
+use self::dense::is_regular;
+pub(in crate::navigation) use self::innovation::{Innovation, Room};
 use super::layout::Layout;
-use super::math::{ln, sqrt};
-
-/// The smallest ratio of the variance in a direction that one update may leave. The rounding error, 1e-16 of the variance
-/// before, stays far below the variance after.
-const LEAST_NOISE: f64 = 1e-10;
-
-/// The smallest ratio that several updates may leave of the variances of the measured terms. If a sum or difference is known even
-/// better relative to its terms, rounding would consume the rest.
-const LEAST_REST: f64 = 1e-13;
-
-/// If an update leaves less than this ratio of a variance, rounding may consume the rest, and the covariance is checked at once.
-const RISKY: f64 = 1e-8;
+use super::refusal::Refusal;
 
 /// Number of updates between two checks by a Cholesky decomposition.
 const CHECK_EVERY: u32 = 1024;
-
-/// The smallest eigenvalue of the correlations that a check accepts: above rounding, and below the noise that a sample adds.
-const LEAST: f64 = 1e-14;
-
-/// The relative amount by which variances are raised when a check fails.
-const REPAIR: f64 = 1e-12;
-
-/// Rounding error of a computed covariance, relative to the variances.
-const ROUNDING: f64 = 1e-9;
-
-/// Whether a matrix is a covariance: symmetric, and positive semi-definite up to rounding. The zero matrix, which describes
-/// exactly known errors, is valid.
-#[allow(clippy::neg_cmp_op_on_partial_ord, reason = "what is not a number is refused")]
-#[inline]
-pub(in crate::navigation) fn is_covariance<const D: usize>(noise: &SMatrix<f64, D, D>) -> bool {
-    let mut lower = [[0.0; D]; D];
-    let mut pivots = [0.0; D];
-    for i in 0..D {
-        let least = ROUNDING * noise[(i, i)];
-        for j in 0..i {
-            // Also rejects NaN.
-            let largest = ROUNDING * (noise[(i, i)] * noise[(j, j)]);
-            let apart = noise[(i, j)] - noise[(j, i)];
-            if !(apart * apart <= largest) {
-                return false;
-            }
-            let mut rest = noise[(i, j)];
-            for k in 0..j {
-                rest -= lower[i][k] * pivots[k] * lower[j][k];
-            }
-            if pivots[j] > 0.0 {
-                lower[i][j] = rest / pivots[j];
-            } else if !(rest * rest <= largest) {
-                return false;
-            }
-        }
-        let mut pivot = noise[(i, i)];
-        for k in 0..i {
-            pivot -= lower[i][k] * lower[i][k] * pivots[k];
-        }
-        if !(pivot >= -least) {
-            return false;
-        }
-        pivots[i] = if pivot > least { pivot } else { 0.0 };
-    }
-    true
-}
 
 /// Covariance of `N` errors, in the squares of their units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,43 +22,6 @@ pub(in crate::navigation) struct Covariance<const N: usize> {
     matrix: SMatrix<f64, N, N>,
     updates: u32,
     repairs: u64,
-}
-
-/// A decomposed innovation.
-#[derive(Clone, Copy, Debug)]
-pub(in crate::navigation) struct Innovation<const D: usize, const N: usize> {
-    /// `L⁻¹ H P`, with `L Lᵀ = H P Hᵀ + R`.
-    gain: [[f64; N]; D],
-    /// `L⁻¹` times the residual: standard normal if model and measurement agree.
-    pub(in crate::navigation) whitened: [f64; D],
-    /// `det S` to the power of -½.
-    density: f64,
-    /// Whether the update leaves next to nothing of a variance.
-    is_risky: bool,
-}
-
-impl<const D: usize, const N: usize> Innovation<D, N> {
-    /// Normalised innovation squared.
-    pub(in crate::navigation) fn nis(&self) -> f64 {
-        self.whitened.iter().map(|x| x * x).sum()
-    }
-
-    /// The conditional mean of the errors, given the residual.
-    #[inline]
-    pub(in crate::navigation) fn mean(&self) -> SVector<f64, N> {
-        let mut mean = SVector::<f64, N>::zeros();
-        for (gain, whitened) in self.gain.iter().zip(&self.whitened) {
-            for i in 0..N {
-                mean[i] += gain[i] * whitened;
-            }
-        }
-        mean
-    }
-
-    /// `-½ ln det S`.
-    pub(in crate::navigation) fn log_density(&self) -> f64 {
-        ln(self.density)
-    }
 }
 
 impl<const N: usize> Covariance<N> {
@@ -193,55 +104,17 @@ impl<const N: usize> Covariance<N> {
         p[state][state] += variance;
     }
 
-    /// Scales the covariance of a block of states and zeroes its correlations with all other states, so that neither carries
-    /// information about the other.
-    pub(in crate::navigation) fn raise(&mut self, layout: &Layout<N>, block: u8, factor: f64) {
-        let blocks = &layout.blocks;
-        for i in 0..N {
-            for j in 0..N {
-                match (blocks[i] == block, blocks[j] == block) {
-                    (true, true) => self.rows_mut()[i][j] *= factor,
-                    (false, false) => {}
-                    _ => self.rows_mut()[i][j] = 0.0,
-                }
-            }
-        }
-        self.bound(layout);
-    }
-
-    /// Scales the covariance of some states. Their correlation coefficients, also with other states, remain.
-    pub(in crate::navigation) fn scale(&mut self, layout: &Layout<N>, states: &[bool; N], factor: f64) {
-        let scales = states.map(|is_scaled| if is_scaled { sqrt(factor) } else { 1.0 });
-        for (row, scale) in self.rows_mut().iter_mut().zip(scales) {
-            row.iter_mut().zip(scales).for_each(|(x, other)| *x *= scale * other);
-        }
-        self.bound(layout);
-    }
-
     /// Clamps variances to bounds that amount to unknown, so that no number overflows.
     #[inline]
     pub(in crate::navigation) fn bound(&mut self, layout: &Layout<N>) {
         if self.is_lost(layout) {
-            self.shrink(&layout.largest);
+            self.dense().shrink(&layout.largest);
         }
     }
 
     #[inline]
     fn is_lost(&self, layout: &Layout<N>) -> bool {
         (0..N).any(|i| self.matrix[(i, i)] > layout.lost[i])
-    }
-
-    #[cold]
-    fn shrink(&mut self, limits: &[f64; N]) {
-        for (i, limit) in limits.iter().enumerate() {
-            let variance = self.matrix[(i, i)];
-            if variance > *limit {
-                self.decay(i, sqrt(limit / variance), 0.0);
-                // Rounding must not leave it above the bound.
-                self.rows_mut()[i][i] = *limit;
-            }
-        }
-        self.enforce();
     }
 
     /// Restores the covariances between those states that are held. The others keep what an update has made of them: together a covariance,
@@ -294,99 +167,26 @@ impl<const N: usize> Covariance<N> {
         }
     }
 
-    /// Computes `H P` row by row. Zeros, which make up most of the Jacobian, are skipped.
+    /// The innovation of a measurement whose noise is multiplied.
+    ///
+    /// # Errors
+    ///
+    /// Returns [`Refusal::NonFinite`] or [`Refusal::Noise`].
     #[inline]
-    pub(in crate::navigation) fn project<const D: usize>(&self, jacobian: &[[f64; N]; D]) -> [[f64; N]; D] {
-        let p = self.rows();
-        let mut product = [[0.0; N]; D];
-        for (row, factors) in product.iter_mut().zip(jacobian) {
-            for (k, factor) in factors.iter().enumerate() {
-                if *factor != 0.0 {
-                    for j in 0..N {
-                        row[j] += factor * p[k][j];
-                    }
-                }
-            }
-        }
-        product
-    }
-
-    /// Decomposes `S = H P Hᵀ + R`; `None` if it is not positive definite.
-    #[inline]
-    pub(in crate::navigation) fn innovation<const D: usize>(
+    pub(in crate::navigation) fn innovation<'a, const D: usize>(
         &self,
-        jacobian: &[[f64; N]; D],
-        projected: &[[f64; N]; D],
-        residual: &[f64; D],
-        noise: &SMatrix<f64, D, D>,
-    ) -> Option<Innovation<D, N>> {
-        let mut lower = [[0.0; D]; D];
-        let mut is_risky = false;
-        for i in 0..D {
-            for j in 0..=i {
-                let mut sum = 0.0;
-                for k in 0..N {
-                    sum += jacobian[i][k] * projected[j][k];
-                }
-                lower[i][j] = sum + noise[(i, j)];
-                if i == j {
-                    let mut terms = 0.0;
-                    for k in 0..N {
-                        terms += jacobian[i][k] * jacobian[i][k] * self.matrix[(k, k)];
-                    }
-                    let noise = noise[(i, i)].max(LEAST_NOISE * sum).max(LEAST_REST * terms);
-                    lower[i][i] = sum + noise;
-                    is_risky |= noise < RISKY * terms;
-                }
-            }
-        }
-        let mut gain = *projected;
-        let mut whitened = *residual;
-        for i in 0..D {
-            let variance = lower[i][i];
-            for j in 0..i {
-                for k in 0..j {
-                    lower[i][j] -= lower[i][k] * lower[j][k];
-                }
-                lower[i][j] *= lower[j][j];
-                let factor = lower[i][j];
-                lower[i][i] -= factor * factor;
-                whitened[i] -= factor * whitened[j];
-                let (above, below) = gain.split_at_mut(i);
-                for k in 0..N {
-                    below[0][k] -= factor * above[j][k];
-                }
-            }
-            // Also rejects NaN. The remaining steps use the reciprocal of the diagonal.
-            if !(lower[i][i] > 0.0 && lower[i][i].is_finite()) {
-                return None;
-            }
-            is_risky |= lower[i][i] < RISKY * variance;
-            lower[i][i] = 1.0 / sqrt(lower[i][i]);
-            whitened[i] *= lower[i][i];
-            for value in &mut gain[i] {
-                *value *= lower[i][i];
-            }
-        }
-        let density = (0..D).map(|i| lower[i][i]).product();
-        Some(Innovation { gain, whitened, density, is_risky })
+        room: &'a mut Room<D, N>,
+        noise_factor: f64,
+    ) -> Result<Innovation<'a>, Refusal> {
+        room.innovation(self.rows(), noise_factor)
     }
 
     /// `P ← P - Wᵀ W`: the update in the order of the decomposition, one scalar at a time.
     #[inline]
-    pub(in crate::navigation) fn update<const D: usize>(&mut self, innovation: &Innovation<D, N>) {
-        let p = self.rows_mut();
-        for gain in &innovation.gain {
-            for i in 0..N {
-                let factor = gain[i];
-                // Both halves use the same product, so they round alike.
-                for j in 0..N {
-                    p[i][j] -= factor * gain[j];
-                }
-            }
-        }
+    pub(in crate::navigation) fn update(&mut self, innovation: &Innovation<'_>) {
+        subtract(self.rows_mut(), innovation.gain());
         self.updates += 1;
-        if innovation.is_risky || (0..N).any(|i| self.matrix[(i, i)] <= 0.0) {
+        if innovation.is_risky() || (0..N).any(|i| self.matrix[(i, i)] <= 0.0) {
             self.updates = CHECK_EVERY;
         }
     }
@@ -401,58 +201,39 @@ impl<const N: usize> Covariance<N> {
 
     /// Whether a Cholesky decomposition exists.
     pub(in crate::navigation) fn is_positive_definite(&self) -> bool {
-        self.is_regular(0.0)
-    }
-
-    /// Whether every eigenvalue of the correlations is at least this large: whether a Cholesky decomposition exists after this
-    /// fraction of each variance is subtracted.
-    ///
-    /// The pivots alone are not enough. With three positions whose sum is known and a fourth state equal to that sum, each pivot
-    /// is a small fraction of the previous one, and the smallest eigenvalue is their product.
-    fn is_regular(&self, margin: f64) -> bool {
-        let mut lower = self.matrix;
-        for i in 0..N {
-            for j in 0..i {
-                let mut sum = lower[(i, j)];
-                for k in 0..j {
-                    sum -= lower[(i, k)] * lower[(j, k)];
-                }
-                lower[(i, j)] = sum / lower[(j, j)];
-            }
-            let mut pivot = self.matrix[(i, i)] * (1.0 - margin);
-            for k in 0..i {
-                pivot -= lower[(i, k)] * lower[(i, k)];
-            }
-            // Also rejects NaN.
-            if !(pivot > 0.0 && pivot.is_finite()) {
-                return false;
-            }
-            lower[(i, i)] = sqrt(pivot);
-        }
-        true
+        is_regular(N, self.rows().as_flattened(), 0.0)
     }
 
     /// Raises variances until the matrix is positive definite.
     #[cold]
     pub(in crate::navigation) fn enforce(&mut self) {
-        self.updates = 0;
-        let mut fraction = REPAIR;
-        while !self.is_regular(LEAST) {
-            self.repairs += 1;
-            if fraction > 1.0 {
-                // Only the variances are more than rounding here.
-                self.matrix = SMatrix::from_diagonal(&self.matrix.diagonal());
-            }
-            for i in 0..N {
-                let row = self.matrix.row(i);
-                // A covariance is at most the state's own variance, except for rounding.
-                let shared = (0..N).filter(|j| *j != i && self.matrix[(*j, *j)] > 0.0);
-                let shared = shared.map(|j| row[j] * row[j] / self.matrix[(j, j)]);
-                let least = shared.fold(f64::MIN_POSITIVE, f64::max);
-                let variance = self.matrix[(i, i)];
-                self.matrix[(i, i)] = if variance > 0.0 { variance * (1.0 + fraction) } else { least };
-            }
-            fraction *= 10.0;
-        }
+        self.dense().enforce();
     }
+
+    /// The same covariance for what is done rarely.
+    pub(in crate::navigation) fn dense(&mut self) -> Dense<'_> {
+        let Self { matrix, updates, repairs } = self;
+        Dense { n: N, p: matrix.data.0.as_flattened_mut(), updates, repairs }
+    }
+}
+
+/// `P - Wᵀ W`. Arguments of their own tell the compiler that they do not overlap.
+#[inline]
+fn subtract<const N: usize>(p: &mut [[f64; N]; N], gain: &[[f64; N]]) {
+    if let [gain] = gain {
+        p.iter_mut().zip(gain).for_each(|(row, factor)| subtract_row(row, *factor, gain));
+        return;
+    }
+    for (i, row) in p.iter_mut().enumerate() {
+        // In registers until all are subtracted.
+        let mut rest = *row;
+        gain.iter().for_each(|gain| subtract_row(&mut rest, gain[i], gain));
+        *row = rest;
+    }
+}
+
+/// Both halves of the matrix use the same product, so they round alike.
+#[inline]
+fn subtract_row<const N: usize>(row: &mut [f64; N], factor: f64, gain: &[f64; N]) {
+    row.iter_mut().zip(gain).for_each(|(x, other)| *x -= factor * other);
 }

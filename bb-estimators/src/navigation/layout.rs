@@ -9,8 +9,11 @@ use crate::attitude::{MAX_ANGULAR_VELOCITY, MAX_SPECIFIC_FORCE};
 /// A filter with a variance above this fraction of the largest is lost, and rounding may break its covariance.
 const LOST: f64 = 1e-4;
 
-/// The block of the heading in [`Layout::of_heading`]; the others have smaller numbers.
+/// The block of the heading in [`Quantities::of_heading`]; the others have smaller numbers.
 const OF_HEADING: u8 = 10;
+
+/// The number of blocks.
+pub(in crate::navigation) const BLOCKS: usize = OF_HEADING as usize + 1;
 
 /// The block of errors that explain no misfit.
 const NEVER_RAISED: u8 = u8::MAX;
@@ -93,13 +96,19 @@ impl<const N: usize> Layout<N> {
         layout
     }
 
-    /// The layout for a measurement that observes nothing of the attitude but its heading: it raises the heading alone.
-    pub(in crate::navigation) fn of_heading(&self) -> Self {
-        let mut layout = *self;
-        for (i, block) in layout.blocks.iter_mut().enumerate().filter(|(_, block)| **block == self.attitude) {
-            *block = if i == self.heading { OF_HEADING } else { NEVER_RAISED };
+    /// The same for what is compiled once for all filters.
+    pub(in crate::navigation) fn quantities(&self) -> Quantities<'_> {
+        let Self { blocks, motion, attitude, heading, most_jump, largest, lost } = self;
+        Quantities {
+            blocks,
+            motion: *motion,
+            attitude: *attitude,
+            heading: *heading,
+            most_jump,
+            largest,
+            lost,
+            is_of_heading: false,
         }
-        layout
     }
 
     /// Sets `(first, number)` errors.
@@ -118,5 +127,34 @@ impl<const N: usize> Layout<N> {
     pub(in crate::navigation) fn admits(&self, error: &nalgebra::SVector<f64, N>) -> bool {
         let most = MOST_DEVIATIONS * MOST_DEVIATIONS;
         error.iter().zip(&self.largest).all(|(error, largest)| error * error <= most * largest)
+    }
+}
+
+/// A [`Layout`] of any size.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::navigation) struct Quantities<'a> {
+    blocks: &'a [u8],
+    pub(in crate::navigation) motion: [u8; 2],
+    pub(in crate::navigation) attitude: u8,
+    pub(in crate::navigation) heading: usize,
+    pub(in crate::navigation) most_jump: &'a [f64],
+    pub(in crate::navigation) largest: &'a [f64],
+    pub(in crate::navigation) lost: &'a [f64],
+    is_of_heading: bool,
+}
+
+impl Quantities<'_> {
+    /// For a measurement that observes nothing of the attitude but its heading: it raises the heading alone.
+    pub(in crate::navigation) fn of_heading(&self) -> Self {
+        Self { is_of_heading: true, ..*self }
+    }
+
+    /// The block that an error belongs to.
+    pub(in crate::navigation) fn block(&self, error: usize) -> u8 {
+        match self.blocks[error] {
+            block if !self.is_of_heading || block != self.attitude => block,
+            _ if error == self.heading => OF_HEADING,
+            _ => NEVER_RAISED,
+        }
     }
 }

@@ -4,8 +4,8 @@ mod estimate;
 mod states;
 
 pub use estimate::{Estimate, Keyframe};
-pub(super) use states::distinct;
 pub use states::{
     ACCELEROMETER_BIAS, GYROSCOPE_BIAS, NAVIGATION, Navigation, Optional, POSITION, ROTATION, States, VELOCITY,
     Wheeled, offset,
 };
+pub(super) use states::{MOST_ERRORS, distinct};

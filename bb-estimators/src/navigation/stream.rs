@@ -218,7 +218,7 @@ impl Stream {
     }
 
     /// Decides how a measurement is fused, or rejects it.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn weigh(
         &self,
         nis: f64,

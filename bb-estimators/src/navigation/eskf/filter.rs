@@ -7,13 +7,13 @@ use super::propagation::Transition;
 use super::sample::{ImuMean, LONGEST_GAP_S, seconds_between};
 use super::start::Start;
 use crate::attitude::ParamsError;
-use crate::navigation::covariance::Covariance;
+use crate::navigation::covariance::{Covariance, Innovation, Room};
 use crate::navigation::fused::Fused;
-use crate::navigation::fusion::{Sight, Weighed, innovation, misfit, prepared};
+use crate::navigation::fusion::{Sight, Weighed, misfit};
 use crate::navigation::jump::{BiasJump, Moved, bounded};
 use crate::navigation::layout::Layout;
 use crate::navigation::math::{Integrals, exp, sqrt};
-use crate::navigation::measurement::{Linearised, Measurement};
+use crate::navigation::measurement::Measurement;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{
     Estimate, GYROSCOPE_BIAS, NAVIGATION, Navigation, Optional, POSITION, ROTATION, States, VELOCITY, distinct,
@@ -133,7 +133,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
     /// # Errors
     ///
     /// The same as [`propagate`](Self::propagate).
-    #[inline]
+    #[inline(never)]
     pub fn propagate_part(&mut self, sample: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
         let estimate = self.estimate.as_mut().ok_or(Refusal::NotStarted)?;
         sample.check()?;
@@ -227,12 +227,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
         stream: &mut Stream,
         measurement: &M,
     ) -> Result<Fused, Refusal> {
-        let result = self.fuse(stream, measurement, Gate::Closed);
-        stream.count(&result);
-        if let (Ok(_), Some(estimate)) = (&result, &self.estimate) {
-            stream.fused_at(estimate.time_ns);
-        }
-        result
+        self.update_at(stream, measurement, Gate::Closed)
     }
 
     /// Like [`update`](Self::update), but bypasses the gate.
@@ -241,7 +236,50 @@ impl<S: States, const N: usize> Eskf<S, N> {
         stream: &mut Stream,
         measurement: &M,
     ) -> Result<Fused, Refusal> {
-        let result = self.fuse(stream, measurement, Gate::Open);
+        self.update_at(stream, measurement, Gate::Open)
+    }
+
+    fn update_at<M: Measurement<D>, const D: usize>(
+        &mut self,
+        stream: &mut Stream,
+        measurement: &M,
+        gate: Gate,
+    ) -> Result<Fused, Refusal> {
+        let mut room = Room::new();
+        let innovation = self.innovation(stream, measurement, &mut room);
+        self.correct(stream, innovation, gate)
+    }
+
+    /// Whether a measurement fits the gate of `stream`, and would not only override it.
+    pub(crate) fn fits<M: Measurement<D>, const D: usize>(&self, stream: &Stream, measurement: &M) -> bool {
+        let mut room = Room::new();
+        self.innovation(stream, measurement, &mut room).is_ok_and(|innovation| {
+            let density = innovation.log_density();
+            let verdict = stream.weigh(innovation.nis(), innovation.dimension(), density, Gate::Closed);
+            verdict.is_ok_and(|verdict| verdict.raised <= 1.0)
+        })
+    }
+
+    #[inline]
+    fn innovation<'a, M: Measurement<D>, const D: usize>(
+        &self,
+        stream: &Stream,
+        measurement: &M,
+        room: &'a mut Room<D, N>,
+    ) -> Result<Innovation<'a>, Refusal> {
+        measurement.linearise::<S, N>(self.estimate.as_ref().ok_or(Refusal::NotStarted)?, &mut room.model)?;
+        self.covariance.innovation(room, stream.noise_factor())
+    }
+
+    /// Fuses a measurement of any dimension, and tells its stream.
+    #[inline(never)]
+    fn correct(
+        &mut self,
+        stream: &mut Stream,
+        innovation: Result<Innovation<'_>, Refusal>,
+        gate: Gate,
+    ) -> Result<Fused, Refusal> {
+        let result = innovation.and_then(|mut innovation| self.fuse(stream, &mut innovation, gate));
         stream.count(&result);
         if let (Ok(_), Some(estimate)) = (&result, &self.estimate) {
             stream.fused_at(estimate.time_ns);
@@ -249,25 +287,10 @@ impl<S: States, const N: usize> Eskf<S, N> {
         result
     }
 
-    /// Whether a measurement fits the gate of `stream`, and would not only override it.
-    pub(crate) fn fits<M: Measurement<D>, const D: usize>(&self, stream: &Stream, measurement: &M) -> bool {
-        let model = self.linearised(stream, measurement);
-        let innovation = model.and_then(|model| innovation(&self.covariance, &model));
-        innovation.is_ok_and(|innovation| {
-            let verdict = stream.weigh(innovation.nis(), D, innovation.log_density(), Gate::Closed);
-            verdict.is_ok_and(|verdict| verdict.raised <= 1.0)
-        })
-    }
-
-    fn fuse<M: Measurement<D>, const D: usize>(
-        &mut self,
-        stream: &Stream,
-        measurement: &M,
-        gate: Gate,
-    ) -> Result<Fused, Refusal> {
-        let model = self.linearised(stream, measurement)?;
-        let weighed = Weighed::new(&mut self.covariance, stream, &model, gate, &Self::LAYOUT, Self::sight)?;
-        let error = weighed.innovation.mean();
+    #[inline]
+    fn fuse(&mut self, stream: &Stream, innovation: &mut Innovation<'_>, gate: Gate) -> Result<Fused, Refusal> {
+        let weighed = Weighed::new(&mut self.covariance, stream, innovation, gate, &Self::LAYOUT, Self::sight)?;
+        let error = innovation.mean();
         if !Self::LAYOUT.admits(&error) {
             weighed.undo(&mut self.covariance);
             return Err(Refusal::OutOfRange);
@@ -276,8 +299,8 @@ impl<S: States, const N: usize> Eskf<S, N> {
         let error = if self.holds_attitude { Self::of_motion(&error) } else { error };
         let corrected = self.estimate.as_ref().ok_or(Refusal::NotStarted)?.corrected::<S>(&error);
         self.estimate = Some(corrected);
-        self.covariance.update(&weighed.innovation);
-        if Self::fixes_position(&model) {
+        self.covariance.update(innovation);
+        if Self::fixes_position(innovation) {
             self.upkeep.fixed_ns = corrected.time_ns;
         }
         match before {
@@ -290,22 +313,22 @@ impl<S: States, const N: usize> Eskf<S, N> {
             }
         }
         if weighed.is_raised() {
-            self.doubt(stream, &model, &error);
+            self.doubt(stream, innovation, &error);
         }
         self.covariance.settle(&Self::LAYOUT);
-        Ok(weighed.fused(&model, &Self::LAYOUT))
+        Ok(weighed.fused(innovation, &Self::LAYOUT))
     }
 
     /// A measurement that has overridden its gate corrected `error`, but the sensor may have been wrong. Raises what that made wrong
     /// and no later measurement of the same sensor can correct.
     #[cold]
     #[inline(never)]
-    fn doubt<const D: usize>(&mut self, stream: &Stream, model: &Linearised<D, N>, error: &SVector<f64, N>) {
-        if model.jacobian.iter().any(|row| row[GYROSCOPE_BIAS..GYROSCOPE_BIAS + 3].iter().any(|x| *x != 0.0)) {
+    fn doubt(&mut self, stream: &Stream, innovation: &Innovation<'_>, error: &SVector<f64, N>) {
+        if innovation.rows(N).any(|row| row[GYROSCOPE_BIAS..GYROSCOPE_BIAS + 3].iter().any(|x| *x != 0.0)) {
             self.doubt_bias(stream, error);
         }
-        if matches!(Self::sight(model), Sight::Relative) {
-            self.doubt_odometry(stream, &misfit(model, &Self::LAYOUT), error);
+        if matches!(Self::sight(innovation), Sight::Relative) {
+            self.doubt_odometry(stream, &misfit(innovation, &Self::LAYOUT), error);
         }
         self.covariance.bound(&Self::LAYOUT);
     }
@@ -361,22 +384,10 @@ impl<S: States, const N: usize> Eskf<S, N> {
         bounded(turned, variance)
     }
 
-    #[inline]
-    fn linearised<M: Measurement<D>, const D: usize>(
-        &self,
-        stream: &Stream,
-        measurement: &M,
-    ) -> Result<Linearised<D, N>, Refusal> {
-        let estimate = self.estimate.as_ref().ok_or(Refusal::NotStarted)?;
-        let mut model = Linearised::new();
-        measurement.linearise::<S, N>(estimate, &mut model)?;
-        prepared(model, stream)
-    }
-
     /// Whether a measurement observes a horizontal position in the world, rather than one relative to the keyframe.
-    fn fixes_position<const D: usize>(model: &Linearised<D, N>) -> bool {
+    fn fixes_position(innovation: &Innovation<'_>) -> bool {
         let keyframe = offset::<S>(Optional::Keyframe);
-        model.jacobian.iter().any(|row| {
+        innovation.rows(N).any(|row| {
             let sees = |first: usize| row[first] != 0.0 || row[first + 1] != 0.0;
             sees(POSITION) && !keyframe.is_some_and(sees)
         })
@@ -384,26 +395,22 @@ impl<S: States, const N: usize> Eskf<S, N> {
 
     /// What a measurement observes of the position.
     #[cold]
-    fn sight<const D: usize>(model: &Linearised<D, N>) -> Sight<N> {
-        let sees = |error: usize| model.jacobian.iter().any(|row| row[error] != 0.0);
-        if Self::fixes_position(model) {
+    fn sight(innovation: &Innovation<'_>) -> Sight {
+        let sees = |error: usize| innovation.rows(N).any(|row| row[error] != 0.0);
+        if Self::fixes_position(innovation) {
             return Sight::Position;
         }
         if offset::<S>(Optional::Keyframe).is_some_and(|first| (first..first + 3).any(sees)) {
             return Sight::Relative;
         }
         if !sees(POSITION + 2) {
-            let is_heading = D == 1 || (VELOCITY..ROTATION).any(sees);
+            let is_heading = innovation.dimension() == 1 || (VELOCITY..ROTATION).any(sees);
             return if is_heading && sees(ROTATION + 2) { Sight::Heading } else { Sight::Nothing };
         }
-        let mut motion = [false; N];
-        motion[POSITION + 2] = true;
-        motion[VELOCITY + 2] = true;
         // What a barometer measures is the sum of the height and its bias.
-        if let Some(bias) = offset::<S>(Optional::BarometerBias) {
-            motion[bias] = sees(bias);
-        }
-        Sight::Height(motion)
+        let bias = offset::<S>(Optional::BarometerBias).filter(|bias| sees(*bias));
+        let motion = [Some(POSITION + 2), Some(VELOCITY + 2), bias];
+        Sight::Height(motion.into_iter().flatten().fold(0, |motion, error| motion | 1 << error))
     }
 
     /// Resets the errors to the corrected rotation: `exp(θ) exp(-θ̂) ≈ exp(Γ1(θ̂) (θ - θ̂))`.

@@ -4,11 +4,13 @@ use super::filter::Filter;
 use super::input::Mounting;
 use super::world::World;
 use crate::navigation::math::skew;
-use crate::navigation::state::{GYROSCOPE_BIAS, Optional, POSITION, ROTATION, States, VELOCITY};
+use crate::navigation::state::{
+    Estimate, GYROSCOPE_BIAS, NAVIGATION, Optional, POSITION, ROTATION, States, VELOCITY,
+};
 use crate::navigation::stream::Counts;
 use bb_core::Payload;
 use bb_core::payload::{Odometry, Pose, Twist};
-use nalgebra::{Matrix3, Matrix6, Vector3};
+use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, UnitQuaternion, Vector3};
 
 /// Status of the filter, published with its odometry.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Payload)]
@@ -78,52 +80,69 @@ pub(super) fn odometry_of<S: States, const N: usize>(
     world: &World,
     mounting: &Mounting,
 ) -> Option<Odometry> {
-    let estimate = filter.estimate()?;
-    let covariance = filter.eskf().covariance();
-    let block = |row: usize, column: usize| covariance.fixed_view::<3, 3>(row, column).into_owned();
-    let rotation = estimate.rotation();
-    let link = mounting.link();
-    let arm = rotation * link;
-    // The link's origin: errors of the body's origin and of the rotated lever arm, θ × R l.
-    let from_rotation = -skew(&arm);
-    let position = block(POSITION, POSITION)
-        + block(POSITION, ROTATION) * from_rotation.transpose()
-        + from_rotation * block(ROTATION, POSITION)
-        + from_rotation * block(ROTATION, ROTATION) * from_rotation.transpose();
-    let position_rotation = block(POSITION, ROTATION) + from_rotation * block(ROTATION, ROTATION);
-    let first_from_frame = world.first_from_frame();
-    let turned = first_from_frame.rotation.to_rotation_matrix().into_inner();
-    let pose = Pose {
-        position: first_from_frame.transform_point(&(estimate.position + arm).into()).coords,
-        world_from_body: first_from_frame.rotation * estimate.world_from_body,
-        covariance: Some(symmetric(
-            turned * position * turned.transpose(),
-            turned * position_rotation * turned.transpose(),
-            turned * block(ROTATION, ROTATION) * turned.transpose(),
-        )),
-    };
-    let to_body = rotation.transpose();
-    // Rᵀ v + ω × l: errors of v, of R by Rᵀ [v]ₓ, and of the gyroscope's bias by [l]ₓ.
-    let of_rotation = to_body * skew(&estimate.velocity);
-    let of_bias = skew(&link);
-    let linear = to_body * block(VELOCITY, VELOCITY) * to_body.transpose()
-        + to_body * block(VELOCITY, ROTATION) * of_rotation.transpose()
-        + of_rotation * block(ROTATION, VELOCITY) * to_body.transpose()
-        + of_rotation * block(ROTATION, ROTATION) * of_rotation.transpose()
-        + to_body * block(VELOCITY, GYROSCOPE_BIAS) * of_bias.transpose()
-        + of_bias * block(GYROSCOPE_BIAS, VELOCITY) * to_body.transpose()
-        + of_rotation * block(ROTATION, GYROSCOPE_BIAS) * of_bias.transpose()
-        + of_bias * block(GYROSCOPE_BIAS, ROTATION) * of_rotation.transpose()
-        + of_bias * block(GYROSCOPE_BIAS, GYROSCOPE_BIAS) * of_bias.transpose();
-    let linear_angular = -(to_body * block(VELOCITY, GYROSCOPE_BIAS)
-        + of_rotation * block(ROTATION, GYROSCOPE_BIAS)
-        + of_bias * block(GYROSCOPE_BIAS, GYROSCOPE_BIAS));
-    let twist = Twist {
-        linear: to_body * estimate.velocity + estimate.angular_velocity.cross(&link),
-        angular: estimate.angular_velocity,
-        covariance: Some(symmetric(linear, linear_angular, block(GYROSCOPE_BIAS, GYROSCOPE_BIAS))),
-    };
-    Some(Odometry { pose, twist })
+    let Estimate { position, velocity, world_from_body, angular_velocity, .. } = *filter.estimate()?;
+    let covariance = filter.eskf().covariance().fixed_view::<NAVIGATION, NAVIGATION>(0, 0).into_owned();
+    let motion = Motion { position, velocity, world_from_body, angular_velocity, covariance };
+    Some(motion.of_link(&mounting.link(), world.first_from_frame()))
+}
+
+/// What a filter estimates of the body's motion, whatever else it estimates.
+struct Motion {
+    position: Vector3<f64>,
+    velocity: Vector3<f64>,
+    world_from_body: UnitQuaternion<f64>,
+    angular_velocity: Vector3<f64>,
+    /// That of the states that every filter has.
+    covariance: SMatrix<f64, NAVIGATION, NAVIGATION>,
+}
+
+impl Motion {
+    /// Pose and motion of a link whose origin is at `link` in the body, in another world.
+    #[inline(never)]
+    fn of_link(&self, link: &Vector3<f64>, first_from_frame: &Isometry3<f64>) -> Odometry {
+        let block = |row: usize, column: usize| self.covariance.fixed_view::<3, 3>(row, column).into_owned();
+        let rotation = self.world_from_body.to_rotation_matrix().into_inner();
+        let arm = rotation * link;
+        // The link's origin: errors of the body's origin and of the rotated lever arm, θ × R l.
+        let from_rotation = -skew(&arm);
+        let position = block(POSITION, POSITION)
+            + block(POSITION, ROTATION) * from_rotation.transpose()
+            + from_rotation * block(ROTATION, POSITION)
+            + from_rotation * block(ROTATION, ROTATION) * from_rotation.transpose();
+        let position_rotation = block(POSITION, ROTATION) + from_rotation * block(ROTATION, ROTATION);
+        let turned = first_from_frame.rotation.to_rotation_matrix().into_inner();
+        let pose = Pose {
+            position: first_from_frame.transform_point(&(self.position + arm).into()).coords,
+            world_from_body: first_from_frame.rotation * self.world_from_body,
+            covariance: Some(symmetric(
+                turned * position * turned.transpose(),
+                turned * position_rotation * turned.transpose(),
+                turned * block(ROTATION, ROTATION) * turned.transpose(),
+            )),
+        };
+        let to_body = rotation.transpose();
+        // Rᵀ v + ω × l: errors of v, of R by Rᵀ [v]ₓ, and of the gyroscope's bias by [l]ₓ.
+        let of_rotation = to_body * skew(&self.velocity);
+        let of_bias = skew(link);
+        let linear = to_body * block(VELOCITY, VELOCITY) * to_body.transpose()
+            + to_body * block(VELOCITY, ROTATION) * of_rotation.transpose()
+            + of_rotation * block(ROTATION, VELOCITY) * to_body.transpose()
+            + of_rotation * block(ROTATION, ROTATION) * of_rotation.transpose()
+            + to_body * block(VELOCITY, GYROSCOPE_BIAS) * of_bias.transpose()
+            + of_bias * block(GYROSCOPE_BIAS, VELOCITY) * to_body.transpose()
+            + of_rotation * block(ROTATION, GYROSCOPE_BIAS) * of_bias.transpose()
+            + of_bias * block(GYROSCOPE_BIAS, ROTATION) * of_rotation.transpose()
+            + of_bias * block(GYROSCOPE_BIAS, GYROSCOPE_BIAS) * of_bias.transpose();
+        let linear_angular = -(to_body * block(VELOCITY, GYROSCOPE_BIAS)
+            + of_rotation * block(ROTATION, GYROSCOPE_BIAS)
+            + of_bias * block(GYROSCOPE_BIAS, GYROSCOPE_BIAS));
+        let twist = Twist {
+            linear: to_body * self.velocity + self.angular_velocity.cross(link),
+            angular: self.angular_velocity,
+            covariance: Some(symmetric(linear, linear_angular, block(GYROSCOPE_BIAS, GYROSCOPE_BIAS))),
+        };
+        Odometry { pose, twist }
+    }
 }
 
 /// The remaining status of the filter.

@@ -15,6 +15,9 @@ pub const GYROSCOPE_BIAS: usize = 12;
 /// The number of states in every filter; optional states follow.
 pub const NAVIGATION: usize = 15;
 
+/// The number of errors of a filter that estimates every optional state.
+pub(in crate::navigation) const MOST_ERRORS: usize = NAVIGATION + dimension(&Optional::ALL);
+
 /// An optional state, or a group of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Optional {
@@ -37,6 +40,16 @@ pub enum Optional {
 }
 
 impl Optional {
+    const ALL: [Self; 7] = [
+        Self::Keyframe,
+        Self::RelativeScale,
+        Self::GnssLeverArm,
+        Self::GnssDelay,
+        Self::WheelScale,
+        Self::HardIron,
+        Self::BarometerBias,
+    ];
+
     /// The dimension of the state.
     pub const fn dimension(self) -> usize {
         match self {
