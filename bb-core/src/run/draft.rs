@@ -21,7 +21,7 @@ use crate::component::{Bus, Caller, Fault, Host, OptionsList};
 use crate::control::{Control, Parts, SystemTopics};
 use crate::declaration::{ParameterError, ParameterValues, RobotDeclaration};
 use crate::event::ParameterValue;
-use crate::fault::{caught, guarded};
+use crate::fault::{Failed, caught, discard, guarded};
 use crate::joints::JointSettings;
 use crate::journal::{Event, Journal, Sink};
 use crate::lifecycle::HostHandle;
@@ -136,15 +136,27 @@ impl Draft {
         if let Some(kept) = &kept {
             kept.note(&assembling.control);
         }
-        let (wired, sources) = assembling.make(unwired, &self.options)?;
+        let made = assembling.make(unwired, &self.options);
+        if let Some(refusal) = assembling.environment.take_refusal() {
+            return Err(assembling.abandon(refusal.path, refusal.fault, (made.ok(), unwired.take_wiring(), kept)));
+        }
+        let (wired, sources) = match made {
+            Ok(made) => made,
+            // Each component's code is guarded separately, with its path. This is for anything else.
+            Err(failed) => {
+                return Err(assembling.abandon(self.robot.name, failed.fault, (unwired.take_wiring(), kept)));
+            }
+        };
         if let Err((path, fault)) = assembling.begin_journal(&facts) {
-            return Err(assembling.abandon(path, fault));
+            return Err(assembling.abandon(path, fault, (wired, sources, unwired.take_wiring(), kept)));
         }
         for fact in facts {
             assembling.environment.add_declared_fact(fact);
         }
         let keeper = match kept.map(|kept| Keeper::start(kept, &assembling.control)) {
-            Some(Err(fault)) => return Err(assembling.abandon(KEEPER, fault)),
+            Some(Err(fault)) => {
+                return Err(assembling.abandon(KEEPER, fault, (wired, sources, unwired.take_wiring())));
+            }
             keeper => keeper.and_then(Result::ok),
         };
         Ok((assembling.complete(wired, &sources, keeper), sources))
@@ -220,39 +232,30 @@ impl Assembling {
         let drained = Arc::clone(&place);
         environment.set_drain(move |island| {
             let wired = drained.get().and_then(Weak::upgrade);
-            if let Some(island) = wired.as_ref().and_then(|wired| wired.island(island)) {
-                if let Err(fault) = guarded(|| island.drain()) {
-                    tracing::error!(%fault, "an island was left");
-                }
+            if let Some(island) = wired.as_ref().and_then(|wired| wired.island(island))
+                && let Err(fault) = guarded(|| island.drain())
+            {
+                tracing::error!(%fault, "an island was left");
             }
         });
         Ok(Self { robot, mode, control, environment, host, place })
     }
 
     /// Makes the components.
-    fn make(
-        &self,
-        unwired: &mut dyn Unwired,
-        options: &OptionsList,
-    ) -> Result<(Arc<Wired>, OpenSources), StartError> {
+    fn make(&self, unwired: &mut dyn Unwired, options: &OptionsList) -> Result<(Arc<Wired>, OpenSources), Failed> {
         let assembly = Assembly {
             environment: self.environment.clone(),
             control: self.control.clone(),
             host: HostHandle(Arc::clone(&self.host)),
         };
-        let made = caught(|| {
+        caught(|| {
             let wired = Arc::new(unwired.wire(options, &assembly));
             // It is set once.
             let _ = self.place.set(Arc::downgrade(&wired));
             let is_replay = self.mode == Mode::Replay;
             let sources = if is_replay { Vec::new() } else { wired.sources().open(options, &assembly) };
             Ok((wired, sources))
-        });
-        if let Some(refusal) = self.environment.take_refusal() {
-            return Err(self.abandon(refusal.path, refusal.fault));
-        }
-        // Each component's code is guarded separately, with its path. This is for anything else.
-        made.map_err(|failed| self.abandon(self.robot.name, failed.fault))
+        })
     }
 
     /// Writes the first line of the journal, and lets its sink begin.
@@ -268,11 +271,16 @@ impl Assembling {
         }
     }
 
-    /// Makes safe what components have started in `init`; returns why the robot does not start.
-    fn abandon(&self, path: &'static str, fault: Fault) -> StartError {
+    /// Makes safe what components have started in `init`, and closes and drops them and all else that was `made`; returns why the
+    /// robot does not start.
+    fn abandon(&self, path: &'static str, fault: Fault, made: impl Send + 'static) -> StartError {
         self.control.begin_stop();
         self.control.wait_until_disarmed();
         self.control.drop_hooks();
+        self.control.run_on_pool(Lane::User, move || discard(made));
+        if let Some(journal) = self.environment.journal() {
+            journal.close();
+        }
         self.control.pool().close();
         // What hangs is left running. There is no report; the error says why the robot does not start.
         let _ = self.control.pool().left(Lane::User, Instant::now() + STOP_WITHIN);

@@ -20,10 +20,13 @@ const HAND_OVER_WITHIN: Duration = Duration::from_secs(1);
 /// to drop their values, no matter how much time has been used up before.
 const LEAST_TO_STOP: Duration = Duration::from_millis(100);
 const LEAST_TO_CLOSE: Duration = Duration::from_millis(200);
+const LEAST_TO_RETIRE: Duration = Duration::from_millis(20);
 
 impl Machine {
     /// Stops all estimators. Those that are busy until `deadline` are left running and reported.
     pub(super) fn retire_islands(&self, deadline: Instant) {
+        // Workers that are idle need a moment, also if sensors have used up the time.
+        let deadline = deadline.max(Instant::now() + LEAST_TO_RETIRE);
         let now = self.environment.clock().now();
         for island in self.islands() {
             island.retire(now);

@@ -12,6 +12,7 @@ use crate::control::Prepared;
 use crate::declaration::RobotDeclaration;
 use crate::node::{AnyIsland, islands_in};
 use crate::pubsub::AnyTopic;
+use std::any::Any;
 use std::sync::{Arc, OnceLock, Weak};
 
 /// The declaration of `R` as data.
@@ -41,6 +42,8 @@ pub(super) trait Unwired {
     fn commands(&self, options: &OptionsList) -> Vec<Prepared>;
     /// Makes its estimators and actuators; errors are stored in `assembly`. Called once.
     fn wire(&mut self, options: &OptionsList, assembly: &Assembly) -> Wired;
+    /// Its hold on the wiring, which is dropped elsewhere if the robot does not start.
+    fn take_wiring(&mut self) -> Option<Arc<dyn Any + Send + Sync>>;
 }
 
 /// The topics of `R`, and its wiring once it is wired.
@@ -78,6 +81,10 @@ impl<R: Robot> Unwired for Parts<R> {
         let wiring = Arc::new(R::wire(topics, options, assembly));
         self.wiring = Some(Arc::clone(&wiring));
         Wired { islands: islands_in(&wiring, R::ISLANDS), parts: Box::new(WiringOf::<R>(wiring)) }
+    }
+
+    fn take_wiring(&mut self) -> Option<Arc<dyn Any + Send + Sync>> {
+        self.wiring.take().map(|wiring| wiring as _)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::slot::Slot;
 use crate::declaration::InputDeclaration;
+use crate::fault::discard;
 use crate::message::{Payload, Stamped};
 use std::cell::Cell;
 use std::collections::VecDeque;
@@ -121,7 +122,7 @@ impl<T: Payload> Slot<T> for EverySlot<T> {
     fn store(&mut self, message: &Stamped<T>) -> bool {
         let seen = self.seen.take();
         let has_displaced = seen == 0 && self.messages.len() >= Every::<T>::MOST;
-        self.messages.drain(..if has_displaced { 1 } else { seen });
+        self.drop_first(if has_displaced { 1 } else { seen });
         self.lost.set(self.lost.get() + u64::from(has_displaced));
         self.messages.push_back(message.clone());
         has_displaced
@@ -129,6 +130,21 @@ impl<T: Payload> Slot<T> for EverySlot<T> {
 
     fn latest(&self) -> (Option<&'static InputDeclaration>, Option<&Stamped<T>>) {
         (self.declaration, self.messages.back())
+    }
+}
+
+impl<T> EverySlot<T> {
+    /// Drops messages one by one: a second `Drop` that panics while the first one unwinds would abort the process.
+    fn drop_first(&mut self, count: usize) {
+        for message in (0..count).map_while(|_| self.messages.pop_front()) {
+            discard(message);
+        }
+    }
+}
+
+impl<T> Drop for EverySlot<T> {
+    fn drop(&mut self) {
+        self.drop_first(self.messages.len());
     }
 }
 
