@@ -5,8 +5,8 @@
 //!
 //! | what | where |
 //! |---|---|
-//! | messages: a payload with its time, frame and origin; as bytes | [`message`], [`payload`], [`message::codec`] |
 //! | time, real or virtual | [`time`] |
+//! | messages: a payload with its time, frame and origin; as bytes | [`message`], [`payload`], [`message::codec`] |
 //! | subscriptions | [`pubsub`] |
 //! | links, joints and the transforms between them | [`topology`] |
 //! | the poses and motions of a robot's links | [`kinematics`] |
@@ -64,8 +64,8 @@ pub use component::{
 };
 pub use declaration::{ParameterError, Role};
 pub use event::{
-    ArmError, ComponentFault, DisarmError, HealthReason, HealthState, HealthTransition, ParameterValue, Refusal,
-    Safety,
+    ArmError, ComponentFault, DisarmError, Forbidden, HealthReason, HealthState, HealthTransition, ParameterValue,
+    Refusal, Right, Rights, Safety,
 };
 pub use fault::Fault;
 pub use message::{
@@ -97,7 +97,7 @@ pub mod prelude {
         Sensor, SensorContext, Service, ServiceContext,
     };
     pub use crate::declaration::Role;
-    pub use crate::event::{HealthReason, HealthState, HealthTransition, Safety};
+    pub use crate::event::{HealthReason, HealthState, HealthTransition, Right, Rights, Safety};
     pub use crate::fault::Fault;
     pub use crate::message::{RosMessage, Stamped};
     pub use crate::payload::*;

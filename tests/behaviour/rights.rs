@@ -1,7 +1,6 @@
 //! What a caller may do: each verb of the bus needs its right, and everybody may disarm.
 
 use crate::components::Number;
-use bb_core::event::{Right, Rights};
 use bb_core::prelude::*;
 use bb_core::run::Bus;
 use bb_core::{ArmError, DisarmError};
@@ -30,7 +29,10 @@ impl Actuator for Servo {
 robot! {
     robot Guarded;
     parameters { speed: f64 = 1.0; }
-    commands { stop: Disarm { allowed_states: [disarmed, idle]; } }
+    commands {
+        stop: Disarm { allowed_states: [disarmed, idle]; }
+        go: Arm { allowed_states: [disarmed]; }
+    }
     link base {
         joint pan: continuous { axis: z; actuator servo: Servo(); sensor encoder: External<Number>(); link head {} }
     }
@@ -107,5 +109,28 @@ fn a_caller_gives_no_rights_that_it_does_not_have() -> Result<(), Box<dyn std::e
     assert!(matches!(&error, ArmError::Forbidden(why) if why.caller == "guest" && why.right == Right::Arm), "{error}");
     let error = page.for_caller("guest", [Right::Read]).force_disarm().expect_err("it may not");
     assert!(matches!(&error, DisarmError::Forbidden(why) if why.right == Right::Arm), "{error}");
+    Ok(())
+}
+
+#[test]
+fn a_command_that_arms_needs_the_right_to_arm_too() -> Result<(), Box<dyn std::error::Error>> {
+    for (rights, missing) in [
+        (vec![Right::Commands], Some(Right::Arm)),
+        (vec![Right::Arm], Some(Right::Commands)),
+        (vec![Right::Arm, Right::Commands], None),
+    ] {
+        let mut robot = Guarded::builder().simulate()?;
+        let page = robot.for_caller("page", rights.into_iter().collect::<Rights>());
+        let started = page.start_command("command/go", "").map(drop).map_err(|fault| fault.to_string());
+        robot.run_for(Duration::from_millis(1));
+        match missing {
+            None => assert_eq!((started, robot.safety()), (Ok(()), Safety::Armed)),
+            Some(right) => {
+                let message = started.expect_err("it may not");
+                assert!(message.contains(&format!("does not have the right `{right}`")), "{message}");
+                assert_eq!(robot.safety(), Safety::Disarmed);
+            }
+        }
+    }
     Ok(())
 }

@@ -9,7 +9,7 @@ use super::{Control, Limit, Phase, RunningCommand};
 use crate::component::{Bus, Caller, CommandContext, CommandInfo, DynamicExecution, OwnHooks};
 use crate::declaration::{CommandDeclaration, Role};
 use crate::event::{
-    CategoryDeclaration, CommandEvent, CommandPhase, HealthTransition, Refusal, RefusalReason, Safety,
+    CategoryDeclaration, CommandEvent, CommandPhase, HealthTransition, Refusal, RefusalReason, Right, Safety,
 };
 use crate::fault::Fault;
 use crate::journal::Event;
@@ -63,6 +63,9 @@ impl Control {
             let hint = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
             return Err(Fault::new(format!("no command is at `{path}`{hint}")));
         };
+        if command.0.role() == Role::Arming {
+            caller.check(Right::Arm)?;
+        }
         let arguments = command.0.arguments(json)?;
         let step = self.step();
         if let Err(fault) = caller.check_valid() {

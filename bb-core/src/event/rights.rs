@@ -45,8 +45,14 @@ impl fmt::Display for Right {
 }
 
 /// A set of rights: `[Right::Read, Right::Commands].into()`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Default, PartialEq, Eq)]
 pub struct Rights(u8);
+
+impl fmt::Debug for Rights {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_set().entries(Right::ALL.into_iter().filter(|right| self.contains(*right))).finish()
+    }
+}
 
 impl Rights {
     /// None but to disarm.
