@@ -1,9 +1,9 @@
 //! Filters by name, run on recordings and scored against the truth.
 //!
 //! Without features this is [`Chosen`], a filter of `bb-estimators` by its name and settings, and [`Score`] and [`Averages`],
-//! which define the errors. With the feature `recordings`, [`evaluate`](fn@evaluate) runs attitude filters on a
-//! [`Recording`], and [`evaluate_navigation`] navigation filters on a [`DataSet`], of CSV files or of a [`NavigationBag`]; with
-//! `plot`, [`plot_errors`] and [`plot_navigation`] draw the errors. `bb eval` is this library on the command line; its
+//! which define the errors. With the feature `recordings`, `evaluate` runs attitude filters on a
+//! `Recording`, and `evaluate_navigation` navigation filters on a `DataSet`, of CSV files or of a `NavigationBag`; with
+//! `plot`, `plot_errors` and `plot_navigation` draw the errors. `bb eval` is this library on the command line; its
 //! guide is `docs/evaluate.md`.
 
 // A robot must not stop because of an unexpected value.
