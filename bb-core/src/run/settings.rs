@@ -27,6 +27,7 @@ pub use error::{SettingProblem, SettingsError};
 pub use list::SettingsList;
 pub(super) use schema::settings_schema;
 
+#[cfg(feature = "toml")]
 use super::draft::Draft;
 use super::{Builder, Robot};
 use assign::Assignment;
