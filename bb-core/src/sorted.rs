@@ -18,7 +18,7 @@ impl<K: Ord, V> Sorted<K, V> {
         self.0.len()
     }
 
-    /// In the order of the keys.
+    /// The entries, in the order of their keys.
     pub(crate) fn iter(&self) -> impl Iterator<Item = (&K, &V)> {
         self.0.iter().rev().map(|(key, value)| (key, value))
     }

@@ -20,7 +20,7 @@ Options:
   -h, --help               Prints this
 ";
 
-/// What was asked for.
+/// The program's arguments.
 #[derive(Debug)]
 pub(crate) struct Arguments {
     filter: String,

@@ -46,7 +46,7 @@ impl Bus {
         Self { host, caller }
     }
 
-    /// The same for another caller, with those of `rights` that this one has. What it obtains from its bus, such as a link to an
+    /// A bus for another caller, with those of `rights` that this one has. What it obtains from its bus, such as a link to an
     /// actuator, acts in its name.
     pub fn for_caller(&self, name: impl Into<String>, rights: impl Into<Rights>) -> Self {
         Self { host: Arc::clone(&self.host), caller: self.caller.restricted(name.into(), rights.into()) }

@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub(crate) struct Caller {
     name: Cow<'static, str>,
     rights: Rights,
-    /// Of a command: whether it has ended or was cancelled. Its handles then refuse to act, even if its code still runs.
+    /// Flag of a command that has ended or was cancelled. Its handles then refuse to act, even if its code still runs.
     is_over: Option<Arc<AtomicBool>>,
     /// It calls from outside of the robot: on virtual time, what follows from its calls is settled before they return.
     is_outside: bool,
@@ -55,7 +55,7 @@ impl Caller {
         if self.rights.contains(right) { Ok(()) } else { Err(Forbidden { caller: self.name.to_string(), right }) }
     }
 
-    /// Its handles refuse to act from now on.
+    /// Makes its handles refuse to act from now on.
     pub(crate) fn revoke(&self) {
         if let Some(is_over) = &self.is_over {
             is_over.store(true, Ordering::SeqCst);

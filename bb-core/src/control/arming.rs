@@ -191,7 +191,7 @@ impl Control {
         step.finish();
     }
 
-    /// For a robot that has ended: drops the callbacks of all components, so that the resources they own are closed and their references
+    /// Drops, for a robot that has ended, the callbacks of all components, so that the resources they own are closed and their references
     /// no longer keep the robot alive.
     pub(crate) fn drop_hooks(&self) {
         let mut step = self.step();
@@ -216,7 +216,7 @@ impl Control {
         }
     }
 
-    /// In a replay: the robot was stopped.
+    /// Replays a stop of the robot.
     pub(crate) fn replay_stop(&self) {
         let mut step = self.step();
         if step.state.is_stopping {
@@ -276,17 +276,17 @@ impl Control {
         self.0.sleeper.wake_at(time, None, waker);
     }
 
-    /// When the watchdog checks next.
+    /// Time of the watchdog's next check.
     pub(crate) fn next_watch(&self) -> Option<MonotonicTime> {
         self.0.watch.next()
     }
 
-    /// When a command is to be woken next.
+    /// Time at which a command is to be woken next.
     pub(crate) fn next_sleeper(&self) -> Option<MonotonicTime> {
         self.0.sleeper.next()
     }
 
-    /// When the next time limit passes.
+    /// Time at which the next limit passes.
     pub(crate) fn next_limit(&self) -> Option<MonotonicTime> {
         self.0.limits.next()
     }

@@ -16,7 +16,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// One disarm callback.
 pub(super) struct Callback {
-    /// Its number among all of the robot.
+    /// Number among all callbacks of the robot.
     pub(super) number: u64,
     /// The path of the component that registered it.
     pub(super) path: &'static str,
@@ -31,7 +31,7 @@ struct Runs {
     waiting: Vec<Reason>,
 }
 
-/// Why a callback runs, and who waits for it.
+/// Reason for which a callback runs, and who waits for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Reason {
     /// The disarming with that number.
@@ -98,7 +98,7 @@ impl Callback {
         }
     }
 
-    /// The reasons to run once more that somebody still waits for; if there are none, it is no longer running.
+    /// The reasons to run once more that somebody still waits for; once no reason is left, it is no longer running.
     fn wanted(&self, control: &Control) -> Vec<Reason> {
         loop {
             let mut runs = self.runs();
@@ -291,7 +291,7 @@ thread_local! {
 struct Place {
     /// The address of the robot's state.
     robot: usize,
-    /// That of the actuator whose code it is; of a disarm callback if there is none.
+    /// Address of the actuator whose code it is; `None` for a disarm callback.
     actuator: Option<usize>,
 }
 

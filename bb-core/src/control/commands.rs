@@ -26,7 +26,7 @@ pub(crate) struct Hanging {
     pub(crate) path: &'static str,
     /// The number of the first of these executions.
     pub(crate) first: u64,
-    /// How long its code has been running.
+    /// Time for which its code has been running.
     pub(crate) duration: Duration,
 }
 
@@ -112,7 +112,7 @@ impl Control {
         infos.collect()
     }
 
-    /// For each command, the first execution whose code has been running for `longest` or longer.
+    /// The first execution of each command whose code has been running for `longest` or longer.
     pub(crate) fn hanging(&self, now: MonotonicTime, longest: Duration) -> Vec<Hanging> {
         let state = self.lock();
         let mut hanging: Vec<Hanging> = Vec::new();

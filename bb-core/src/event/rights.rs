@@ -25,7 +25,7 @@ impl Right {
     pub const ALL: [Self; 6] =
         [Self::Read, Self::Parameters, Self::Commands, Self::Arm, Self::Actuators, Self::Publish];
 
-    /// Its name: `parameters`.
+    /// Name in errors, such as `parameters`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Read => "read",
@@ -65,7 +65,7 @@ impl Rights {
         self.0 & 1 << right as u8 != 0
     }
 
-    /// Those that are also among the others.
+    /// The rights that are in both sets.
     pub(crate) const fn and(self, other: Self) -> Self {
         Self(self.0 & other.0)
     }
@@ -89,7 +89,7 @@ impl FromIterator<Right> for Rights {
 pub struct Forbidden {
     /// Who has called.
     pub caller: String,
-    /// What it lacks.
+    /// The right that it lacks.
     pub right: Right,
 }
 

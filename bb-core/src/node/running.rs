@@ -37,12 +37,12 @@ type Deliver<E> =
 /// How many times in a row an estimator may continue its work before it is considered stuck.
 const STUCK_AFTER: u32 = 1_000_000;
 
-/// Whether a message has just arrived, or has been counted and then waited for a restart.
+/// Arrival of a message: now, or before a restart that it has waited for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Arrival {
-    /// It has just arrived.
+    /// Just now.
     New,
-    /// It has waited.
+    /// Before a restart; it has been counted.
     Late,
 }
 

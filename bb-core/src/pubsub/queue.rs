@@ -105,7 +105,7 @@ struct Entry<M> {
     bytes: usize,
 }
 
-/// What a topic does with a queue of its payload, apart from adding messages.
+/// A queue of a topic, without its payload: all that is done with it but adding messages.
 pub(super) trait AnyQueue: Any + Send + Sync {
     /// See [`Queue::close`].
     fn close(&self) -> Option<Waker>;

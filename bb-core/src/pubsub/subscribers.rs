@@ -137,7 +137,7 @@ impl Hub {
     }
 }
 
-/// Those whose reader is not gone.
+/// The queues whose readers are not gone.
 fn live(taps: &Taps) -> impl Iterator<Item = &Arc<Queue<DynamicMessage>>> {
     taps.iter().filter(|tap| !tap.is_abandoned())
 }

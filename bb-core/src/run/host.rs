@@ -147,7 +147,7 @@ impl Host for RobotHost {
     }
 }
 
-/// Where entries for estimators go.
+/// The islands, as the destination of entries for estimators.
 pub(super) struct WiredIslands {
     pub(super) robot: &'static RobotDeclaration,
     pub(super) wired: Place,

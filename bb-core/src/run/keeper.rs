@@ -23,7 +23,7 @@ pub(super) struct Kept {
     desk: Arc<Desk>,
 }
 
-/// What those who set parameters leave for the thread of the store.
+/// Changed parameters, left for the thread of the store.
 #[derive(Default)]
 pub(super) struct Desk {
     state: Mutex<State>,
@@ -38,7 +38,7 @@ struct State {
     is_due: bool,
     /// The thread is to end.
     is_closed: bool,
-    /// It has.
+    /// The thread has ended.
     has_ended: bool,
 }
 

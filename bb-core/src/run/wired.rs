@@ -38,11 +38,11 @@ pub(super) fn declaration<R: Robot>() -> &'static RobotDeclaration {
 pub(super) trait Unwired {
     /// The topics of its publishers.
     fn topics(&self) -> Vec<&dyn AnyTopic>;
-    /// Its commands with their options.
+    /// The commands with their options.
     fn commands(&self, options: &OptionsList) -> Vec<Prepared>;
     /// Makes its estimators and actuators; errors are stored in `assembly`. Called once.
     fn wire(&mut self, options: &OptionsList, assembly: &Assembly) -> Wired;
-    /// Its hold on the wiring, which is dropped elsewhere if the robot does not start.
+    /// Takes its hold on the wiring, which is dropped elsewhere if the robot does not start.
     fn take_wiring(&mut self) -> Option<Arc<dyn Any + Send + Sync>>;
 }
 
@@ -88,13 +88,13 @@ impl<R: Robot> Unwired for Parts<R> {
     }
 }
 
-/// Where the wired robot is, once there is one. Weak, since components with a bus are part of it.
+/// A reference to the wired robot, once there is one. Weak, since components with a bus are part of it.
 pub(super) type Place = Arc<OnceLock<Weak<Wired>>>;
 
 /// A robot whose components have been made.
 pub(super) struct Wired {
     parts: Box<dyn Wiring>,
-    /// In the order of their numbers.
+    /// The islands, in the order of their numbers.
     pub(super) islands: Box<[Box<dyn AnyIsland>]>,
 }
 

@@ -33,7 +33,7 @@ impl Schema {
         Self { name: definitions.first().map_or(String::new(), |main| type_name(&main.name)), text }
     }
 
-    /// Of a struct, under its own name.
+    /// Schema of a struct, under its own name.
     pub(super) fn of(shape: &'static StructShape) -> Self {
         Self::new(shape.name, Shape::Struct(shape))
     }

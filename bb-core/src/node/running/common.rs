@@ -18,11 +18,11 @@ use std::sync::Arc;
 
 /// The declaration of an estimator, and all of its state but the estimator itself and its messages.
 pub(super) struct Common {
-    /// Its number among the robot's estimators.
+    /// Number among the robot's estimators.
     pub(super) number: u32,
     pub(super) declaration: &'static EstimatorDeclaration,
     pub(super) template: Stamp,
-    /// How old a message of the driver may be when it arrives.
+    /// Greatest age of a message of the driver when it arrives.
     pub(super) stale_after_nanos: Option<i64>,
     /// A run is not measured if its number has one of these bits.
     pub(super) unmeasured: u64,
@@ -34,14 +34,14 @@ pub(super) struct Common {
     /// The transforms of its inputs, if some of them span moving joints.
     pub(super) placing: Placing,
     pub(super) health: Health,
-    /// How many losses the estimator knows of.
+    /// Number of losses that the estimator knows of.
     pub(super) epoch: u32,
     /// Whether its last run was good.
     pub(super) was_good: bool,
     pub(super) timers: Timers,
     /// The latest time at which its island is woken for it.
     pub(super) scheduled: Option<MonotonicTime>,
-    /// How many times in a row it has continued its work.
+    /// Number of times in a row that it has continued its work.
     pub(super) continued: u32,
     /// The requests made in its first `init`, kept until it starts.
     pub(super) requested: Vec<Request>,

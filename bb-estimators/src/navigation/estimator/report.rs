@@ -86,13 +86,13 @@ pub(super) fn odometry_of<S: States, const N: usize>(
     Some(motion.of_link(&mounting.link(), world.first_from_frame()))
 }
 
-/// What a filter estimates of the body's motion, whatever else it estimates.
+/// A filter's estimate of the body's motion, whatever else it estimates.
 struct Motion {
     position: Vector3<f64>,
     velocity: Vector3<f64>,
     world_from_body: UnitQuaternion<f64>,
     angular_velocity: Vector3<f64>,
-    /// That of the states that every filter has.
+    /// Covariance of the states that every filter has.
     covariance: SMatrix<f64, NAVIGATION, NAVIGATION>,
 }
 

@@ -17,7 +17,7 @@ const FITS: f64 = 1.01;
 /// The largest normalised innovation squared, relative to its mean, that the motion explains: ten deviations a dimension.
 const COMMON: f64 = 100.0;
 
-/// How a quantity that has jumped is raised.
+/// Manner in which a quantity that has jumped is raised.
 #[derive(Clone, Copy, Debug)]
 enum Jump {
     /// As a whole, and its correlations are set to zero.
