@@ -188,6 +188,8 @@ struct State {
     generation: u64,
     /// The robot has started: a thread keeps time.
     has_begun: bool,
+    /// Sensors and services whose threads have not ended.
+    sources: usize,
     is_stopping: bool,
     /// The journal and the last report are complete: later entries are neither written nor published.
     has_ended: bool,

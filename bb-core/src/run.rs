@@ -21,6 +21,8 @@ mod replay;
 mod report;
 mod running;
 mod settings;
+#[cfg(feature = "signals")]
+mod signals;
 mod simulation;
 pub(crate) mod source;
 mod threads;

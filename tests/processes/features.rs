@@ -62,6 +62,140 @@ robot! {
     link base { sensor numbers: External<Number>() { estimator pass: Pass(); } }
 }
 
+/// Does not return once it is armed.
+#[derive(Debug)]
+struct Hangs(SensorContext);
+
+impl Sensor for Hangs {
+    type Options = NoOptions;
+    type Output = Number;
+
+    fn init(_: NoOptions, context: &SensorContext) -> Result<Self, Fault> {
+        Ok(Self(context.clone()))
+    }
+
+    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
+        if self.0.bus().safety() != Safety::Disarmed {
+            println!("it hangs");
+            loop {
+                std::thread::park();
+            }
+        }
+        Ok(Reading::nothing())
+    }
+}
+
+/// Takes its time to become safe, and says so.
+#[derive(Debug)]
+struct Motor;
+
+impl Actuator for Motor {
+    type Options = NoOptions;
+    type Command = Number;
+
+    fn init(_: NoOptions, _: &ActuatorContext) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+
+    fn handle_command(&mut self, _: &Stamped<Number>) -> Result<(), Fault> {
+        Ok(())
+    }
+
+    fn disarm(&mut self) -> Result<(), Fault> {
+        std::thread::sleep(Duration::from_millis(700));
+        println!("the motor is safe");
+        Ok(())
+    }
+}
+
+robot! {
+    robot Stuck;
+    link base {
+        sensor device: Hangs() { rate: 100 Hz; }
+        joint wheel: continuous { axis: z; sensor encoder: External<JointState>(); actuator motor: Motor(); link rim { } }
+    }
+}
+
+/// Runs `test` of this binary in another process, whose lines are returned as they come.
+fn child(test: &str) -> Result<(std::process::Child, impl Iterator<Item = String>), Box<dyn std::error::Error>> {
+    let mut child = Process::new(std::env::current_exe()?)
+        .args([test, "--exact", "--nocapture"])
+        .env("BB_TEST_SIGNAL", "1")
+        .stdout(Stdio::piped())
+        .spawn()?;
+    let lines = std::io::BufRead::lines(std::io::BufReader::new(child.stdout.take().ok_or("no output")?));
+    Ok((child, lines.map_while(Result::ok)))
+}
+
+/// Sends a signal by its name.
+fn signal(child: &std::process::Child, name: &str) -> std::io::Result<()> {
+    Process::new("kill").args([name, &child.id().to_string()]).status().map(drop)
+}
+
+fn run_stuck() -> Result<(), Box<dyn std::error::Error>> {
+    let mut running = Stuck::builder().start()?;
+    running.stop_on_signals()?;
+    running.arm()?;
+    running.wait();
+    println!("wait has returned");
+    let report = running.stop();
+    println!(
+        "it is {} with {:?}",
+        report.safety,
+        report.faults.iter().map(|fault| fault.to_string()).collect::<Vec<_>>()
+    );
+    Ok(())
+}
+
+#[test]
+fn after_a_signal_a_driver_that_hangs_keeps_neither_wait_nor_the_report() -> Result<(), Box<dyn std::error::Error>>
+{
+    const NAME: &str = "processes::features::after_a_signal_a_driver_that_hangs_keeps_neither_wait_nor_the_report";
+    if std::env::var_os("BB_TEST_SIGNAL").is_some() {
+        return run_stuck();
+    }
+    let (mut child, mut lines) = child(NAME)?;
+    assert!(lines.by_ref().any(|line| line.ends_with("it hangs")), "it is armed");
+    let start = std::time::Instant::now();
+    // Twice at once, as some parents do: that is one signal.
+    signal(&child, "-INT")?;
+    signal(&child, "-INT")?;
+    assert!(lines.by_ref().any(|line| line.ends_with("the motor is safe")), "disarmed first");
+    assert!(lines.by_ref().any(|line| line.ends_with("wait has returned")), "wait returns");
+    let waited = start.elapsed();
+    assert!((4.9..6.0).contains(&waited.as_secs_f64()), "{waited:?}");
+    let report = lines.by_ref().find(|line| line.starts_with("it is disarmed")).ok_or("no report")?;
+    assert!(report.contains("sensor/base/device failed: did not come back from its read"), "{report}");
+    assert!(child.wait()?.success());
+    let stopped = start.elapsed() - waited;
+    assert!(stopped.as_secs_f64() < 2.0, "stop has waited again: {stopped:?}");
+    Ok(())
+}
+
+#[cfg(unix)]
+#[test]
+fn a_second_signal_ends_the_process_once_the_robot_is_safe() -> Result<(), Box<dyn std::error::Error>> {
+    use std::os::unix::process::ExitStatusExt as _;
+    const NAME: &str = "processes::features::a_second_signal_ends_the_process_once_the_robot_is_safe";
+    const SIGTERM: i32 = 15;
+    if std::env::var_os("BB_TEST_SIGNAL").is_some() {
+        return run_stuck();
+    }
+    let (mut child, mut lines) = child(NAME)?;
+    assert!(lines.by_ref().any(|line| line.ends_with("it hangs")), "it is armed");
+    let start = std::time::Instant::now();
+    signal(&child, "-INT")?;
+    std::thread::sleep(Duration::from_millis(550));
+    signal(&child, "-TERM")?;
+    assert_eq!(child.wait()?.signal(), Some(SIGTERM));
+    let ended = start.elapsed();
+    assert!((0.69..4.0).contains(&ended.as_secs_f64()), "{ended:?}");
+    let said: Vec<_> = lines.collect();
+    assert!(said.iter().any(|line| line == "the motor is safe"), "{said:?}");
+    assert!(!said.iter().any(|line| line == "wait has returned"), "{said:?}");
+    Ok(())
+}
+
 /// This test runs itself as another process, which gets the signal.
 #[test]
 fn a_signal_disarms_and_stops() -> Result<(), Box<dyn std::error::Error>> {
@@ -75,15 +209,10 @@ fn a_signal_disarms_and_stops() -> Result<(), Box<dyn std::error::Error>> {
         println!("it is {}", running.stop().safety);
         return Ok(());
     }
-    let mut child = Process::new(std::env::current_exe()?)
-        .args([NAME, "--exact", "--nocapture"])
-        .env("BB_TEST_SIGNAL", "1")
-        .stdout(Stdio::piped())
-        .spawn()?;
-    let mut lines = std::io::BufRead::lines(std::io::BufReader::new(child.stdout.take().ok_or("no output")?));
-    assert!(lines.by_ref().any(|line| line.is_ok_and(|line| line.ends_with("it is armed"))), "it is armed");
-    Process::new("kill").args(["-TERM", &child.id().to_string()]).status()?;
-    assert!(lines.any(|line| line.is_ok_and(|line| line.ends_with("it is disarmed"))), "it is disarmed");
+    let (mut child, mut lines) = child(NAME)?;
+    assert!(lines.by_ref().any(|line| line.ends_with("it is armed")), "it is armed");
+    signal(&child, "-TERM")?;
+    assert!(lines.any(|line| line.ends_with("it is disarmed")), "it is disarmed");
     assert!(child.wait()?.success());
     Ok(())
 }

@@ -26,6 +26,9 @@ pub(crate) const DISARM_WITHIN: Duration = Duration::from_secs(5);
 /// How long arming waits for the code of cancelled commands to return.
 pub(super) const ARM_WITHIN: Duration = Duration::from_secs(5);
 
+/// The longest wait in one piece.
+const LONGEST_WAIT: Duration = Duration::from_secs(3600);
+
 /// How long [`Control::disarm`] waits beyond the callbacks' limit.
 const MARGIN: Duration = Duration::from_secs(1);
 
@@ -241,6 +244,25 @@ impl Control {
             }
             self.0.stop.set();
         }
+    }
+
+    /// As many sensors and services have threads of their own.
+    pub(crate) fn begin_sources(&self, sources: usize) {
+        self.lock().sources = sources;
+    }
+
+    /// The thread of one of them ends.
+    pub(crate) fn end_source(&self) {
+        let mut state = self.lock();
+        state.sources = state.sources.saturating_sub(1);
+        drop(state);
+        self.0.changed.notify_all();
+    }
+
+    /// Waits until all of them have ended, or the robot is told to stop. Returns whether they have ended.
+    pub(crate) fn wait_for_sources(&self) -> bool {
+        while !self.wait_until(LONGEST_WAIT, |state| state.sources == 0 || state.is_stopping) {}
+        self.lock().sources == 0
     }
 
     /// The paths of commands whose code has not returned at `deadline`, and of components whose disarm callbacks have not.

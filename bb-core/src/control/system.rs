@@ -56,6 +56,7 @@ impl Control {
             disarms: 0,
             generation: 0,
             has_begun: false,
+            sources: 0,
             is_stopping: false,
             has_ended: false,
             parameters_are_final: false,

@@ -189,15 +189,19 @@ impl<R: Robot> Live<R> {
     }
 
     /// Makes Ctrl-C, and on Unix the signals `SIGTERM` and `SIGHUP`, call [`Self::request_stop`]. The robot is
-    /// disarmed before anything else, even if other code hangs, and [`Running::wait`](super::Running::wait) returns.
-    /// A process has one such handler.
+    /// disarmed before anything else, even if other code hangs, and [`Running::wait`](super::Running::wait) returns
+    /// within 6 s.
+    ///
+    /// Another signal, half a second later or more, ends the process: as soon as the disarm callbacks have returned or their
+    /// 5 s have passed. On Unix the process dies of that signal, which a shell shows as 130 for Ctrl-C and 143 for
+    /// `SIGTERM`; elsewhere it exits with 130. What [`Running::stop`](super::Running::stop) would still have done is
+    /// lost: `terminate`, the report, the last lines of the journal, the end of a recording (it is readable up to there).
     ///
     /// # Errors
-    /// The process has a handler already, or the system refuses one.
+    /// The system refuses a handler or the thread that waits for signals. Except on Unix, a process has one such handler.
     #[cfg(feature = "signals")]
     pub fn stop_on_signals(&self) -> std::io::Result<()> {
-        let live = self.clone();
-        ctrlc::set_handler(move || live.request_stop()).map_err(std::io::Error::other)
+        super::signals::stop_on_signals(self.clone())
     }
 
     /// Performs an outside action; on virtual time, then passes the journal's lines to its sink.

@@ -11,6 +11,11 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 /// A robot that runs in real time. Dropping it stops it.
+///
+/// A process that ends without dropping it disarms nothing. So own it in `main`, return from `main` rather than calling
+/// [`std::process::exit`], and give other threads a [`Live`]: if one of them owns the `Running` while `main` returns, it is not
+/// dropped. Nor is it after `mem::forget`, in a `static`, or when the process aborts (`panic = "abort"`, a panic while another
+/// unwinds, a stack overflow, no memory) or is killed. Hardware that must be safe then needs its own watchdog.
 pub struct Running<R: Robot> {
     /// Dropped before `live`.
     threads: Threads,
@@ -22,6 +27,8 @@ struct Threads {
     machine: Arc<Machine>,
     /// Of sensors and services.
     sources: Vec<Thread>,
+    /// [`Running::wait`] has waited for the limit of a stop in vain: what is left has had its time.
+    has_waited: bool,
 }
 
 /// How long user code may take to return after the robot was told to stop.
@@ -44,7 +51,8 @@ impl<R: Robot> Running<R> {
     }
 
     /// Waits until every sensor and service has finished: at the end of recordings and simulated sensors, and after
-    /// [`Live::request_stop`].
+    /// [`Live::request_stop`]. Those that have not returned 5 s after that are left running and reported as faults; then
+    /// [`stop`](Self::stop) waits for other code as if those 5 s had been its own.
     pub fn wait(&mut self) {
         self.threads.wait();
     }
@@ -60,7 +68,7 @@ impl<R: Robot> Running<R> {
 
 impl Threads {
     fn start(machine: Arc<Machine>, sources: OpenSources) -> Result<Self, StartError> {
-        let mut running = Self { machine: Arc::clone(&machine), sources: Vec::new() };
+        let mut running = Self { machine: Arc::clone(&machine), sources: Vec::new(), has_waited: false };
         machine.control.pool().start();
         // On an error here, `running` is dropped, which stops what already runs, in order.
         threads::serve(&machine)?;
@@ -68,6 +76,7 @@ impl Threads {
         machine.control.begin_watch(now);
         // Before any message can arrive, since requests of `init` come first.
         machine.start_islands(now);
+        machine.control.begin_sources(sources.len());
         for source in sources {
             running.sources.push(threads::source(source, &machine)?);
         }
@@ -75,10 +84,35 @@ impl Threads {
     }
 
     fn wait(&mut self) {
+        let have_finished = self.machine.control.wait_for_sources();
+        let start = Instant::now();
+        if !have_finished {
+            self.machine.control.wait_until_disarmed();
+        }
+        self.join(self.deadline(start));
+    }
+
+    /// When user code should have returned that was told to stop at `start`.
+    fn deadline(&self, start: Instant) -> Instant {
+        // An estimator's message may have woken the caller: then the estimator cannot stop before the call returns.
+        if self.has_waited || self.machine.islands().any(|island| island.is_inside()) {
+            return Instant::now() + GRACE;
+        }
+        (start + STOP_WITHIN).max(Instant::now() + GRACE)
+    }
+
+    /// Joins the threads of sensors and services. Those that run at `deadline` are left running and reported.
+    fn join(&mut self, deadline: Instant) {
+        let machine = &self.machine;
         for (path, thread) in std::mem::take(&mut self.sources) {
-            if let Err(message) = threads::join(thread, None) {
-                self.machine.fault(path, message.to_owned());
-            }
+            let Err(message) = threads::join(thread, deadline) else { continue };
+            self.has_waited = true;
+            let sources = machine.sources.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+            let entered =
+                sources.iter().find(|source| source.path() == path).and_then(|source| source.entered_at());
+            drop(sources);
+            let since = threads::since(entered, machine.environment.clock().now());
+            machine.fault(path, format!("{message}{since}"));
         }
     }
 
@@ -90,21 +124,8 @@ impl Threads {
         let start = Instant::now();
         machine.control.begin_stop();
         machine.control.wait_until_disarmed();
-        let mut deadline = (start + STOP_WITHIN).max(Instant::now() + GRACE);
-        if machine.islands().any(|island| island.is_inside()) {
-            // An estimator's message has woken the caller: the estimator cannot stop before this call returns.
-            deadline = Instant::now() + GRACE;
-        }
-        for (path, thread) in std::mem::take(&mut self.sources) {
-            if let Err(message) = threads::join(thread, Some(deadline)) {
-                let sources = machine.sources.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-                let entered =
-                    sources.iter().find(|source| source.path() == path).and_then(|source| source.entered_at());
-                drop(sources);
-                let since = threads::since(entered, machine.environment.clock().now());
-                machine.fault(path, format!("{message}{since}"));
-            }
-        }
+        let deadline = self.deadline(start);
+        self.join(deadline);
         machine.retire_islands(deadline);
         for path in machine.control.lingering(deadline) {
             machine.fault(path, "did not come back when the robot stopped".to_owned());

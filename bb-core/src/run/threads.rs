@@ -6,6 +6,7 @@ use super::machine::Machine;
 use super::source::Source;
 use super::timekeeper::keep_time;
 use crate::component::Fault;
+use crate::control::Control;
 use crate::declaration::WorkerDeclaration;
 use crate::fault::guarded;
 use crate::time::MonotonicTime;
@@ -43,6 +44,7 @@ pub(super) fn source(mut source: Box<dyn Source>, machine: &Machine) -> Result<T
     let stop = machine.control.stop_signal().clone();
     let control = machine.control.clone();
     spawn(source.path(), move || {
+        let _finished = Finished(control.clone());
         source.shared().adopt();
         stop.register();
         let path = source.path();
@@ -71,14 +73,21 @@ pub(super) fn source(mut source: Box<dyn Source>, machine: &Machine) -> Result<T
     })
 }
 
+/// Counts a sensor or service as finished when its thread ends, however that ends.
+struct Finished(Control);
+
+impl Drop for Finished {
+    fn drop(&mut self) {
+        self.0.end_source();
+    }
+}
+
 /// Waits for the thread until `deadline`; the error says what went wrong.
-pub(super) fn join(thread: JoinHandle<()>, deadline: Option<Instant>) -> Result<(), &'static str> {
+pub(super) fn join(thread: JoinHandle<()>, deadline: Instant) -> Result<(), &'static str> {
     if thread.thread().id() == std::thread::current().id() {
         return Err("has stopped the robot itself, and cannot be waited for");
     }
-    while let Some(deadline) = deadline
-        && !thread.is_finished()
-    {
+    while !thread.is_finished() {
         if Instant::now() >= deadline {
             return Err("did not come back from its read, or from an estimator downstream, in time");
         }
