@@ -268,7 +268,7 @@ fn factor(input: ParseStream<'_>, name: &str, place: Span) -> syn::Result<Unit> 
                 format!("a product is written with `*`: `{first}*{second}`")
             }
             (_, Some(near)) => format!("did you mean `{near}`?"),
-            (_, None) => "units are symbols, as in `m`, `s`, `deg` or `Hz`".to_owned(),
+            (_, None) => "units are symbols, as in `m`, `s`, `deg` or `Hz`, and a count has none".to_owned(),
         };
         return Err(syn::Error::new(place, format!("unknown unit `{name}`; {hint}")));
     };

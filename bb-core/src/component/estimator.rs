@@ -202,6 +202,13 @@ impl<O> Reply<O> {
     }
 }
 
+impl<O> From<O> for Reply<O> {
+    /// [`Reply::emit`].
+    fn from(output: O) -> Self {
+        Self::emit(output)
+    }
+}
+
 impl<O> From<Option<O>> for Reply<O> {
     fn from(output: Option<O>) -> Self {
         Self { output, diverged: None, request: None }

@@ -24,7 +24,8 @@ use crate::message::Payload;
 #[diagnostic::on_unimplemented(
     message = "`{Self}` cannot be the output of an estimator",
     label = "neither a payload nor a struct of outputs",
-    note = "name a payload, or derive a struct of several: `#[derive(Outputs)]`"
+    note = "a message of one's own derives `Payload`: `#[derive(Clone, Debug, Payload)]`; a struct of several outputs \
+            derives `Outputs`"
 )]
 pub trait Outputs: Sized + Send + 'static {
     /// The outputs by name; empty if the output is a single payload, whose name is `out`.

@@ -109,7 +109,9 @@ pub struct BothKnown<const KNOWN: bool>;
 /// The wiring names it at every `input`, where a mismatch is reported. `K` is a [`BothKnown`].
 #[diagnostic::on_unimplemented(
     message = "this publishes `{Self}`, but the estimator's input takes `{T}`",
-    label = "publishes `{Self}`, not `{T}`"
+    label = "publishes `{Self}`, not `{T}`",
+    note = "an estimator that takes several kinds of messages names the one here, as in `Mekf<Marg>`; other messages \
+            come from another sensor, or from an estimator that converts them"
 )]
 pub trait Feeds<T: Payload, K>: Payload {
     /// The same message.

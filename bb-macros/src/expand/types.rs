@@ -86,9 +86,9 @@ pub(super) fn imports(types: &Types<'_>) -> TokenStream {
     let payloads = outputs.map(|id| &types.naming.publisher(id).payload);
     let items = parts.chain(payloads);
     let (marker, kind, this) = (marker(name), robot_type(name), ident(ROBOT));
-    let imports = quote!(pub use super::{#marker as _, #kind as #this, #(#items),*};);
-    let imports = respan(imports, name.span());
-    quote!(#[doc(hidden)] #[allow(unused_imports)] #imports)
+    let items = respan(quote!(#marker as _, #kind as #this, #(#items),*), name.span());
+    // `super` has another place: rustc names an import up to the first word at the place of the error.
+    quote!(#[doc(hidden)] #[allow(unused_imports)] pub use super::{#items};)
 }
 
 fn without_span(name: &Ident) -> Ident {

@@ -24,6 +24,7 @@ const PI: [&str; 6] = ["pi", "PI", "M_PI", "math", "np", "std"];
 /// Spellings of a setting that does not apply.
 const NO_NUMBER: [&str; 9] = ["None", "none", "null", "nil", "inf", "infinity", "infinite", "never", "unlimited"];
 const ANGLES: &str = "expected a number with its unit; nothing is computed here, write `90 deg` for π / 2";
+const NAMES: &str = "expected a number with its unit; write it out, the value of a name is not known here";
 
 impl Quantity {
     /// Whether a number starts here.
@@ -53,12 +54,13 @@ impl Quantity {
             1.0
         };
         let place = input.span();
-        let is_pi = input.fork().call(Ident::parse_any).is_ok_and(|word| PI.contains(&&*word.to_string()));
-        let is_none = input.fork().call(Ident::parse_any).is_ok_and(|word| NO_NUMBER.contains(&&*word.to_string()));
-        let expected = match (is_pi, is_none) {
-            (true, _) => ANGLES,
-            (_, true) => "expected a number with its unit; leave the setting out to have its default",
-            _ => "expected a number with its unit",
+        let expected = match input.fork().call(Ident::parse_any).map(|word| word.to_string()) {
+            Ok(word) if PI.contains(&&*word) => ANGLES,
+            Ok(word) if NO_NUMBER.contains(&&*word) => {
+                "expected a number with its unit; leave the setting out to have its default"
+            }
+            Ok(_) => NAMES,
+            Err(_) => "expected a number with its unit",
         };
         let literal: Lit = input.parse().map_err(|_| syn::Error::new(place, expected))?;
         let (digits, suffix) = match &literal {

@@ -126,14 +126,18 @@ fn numbers() {
     for (number, place, message) in [
         ("200 hz", "hz", "unknown unit `hz`; did you mean `Hz`?"),
         ("200hz", "200hz", "unknown unit `hz`; did you mean `Hz`?"),
-        ("200 degrees", "degrees", "unknown unit `degrees`; units are symbols, as in `m`, `s`, `deg` or `Hz`"),
+        (
+            "200 degrees",
+            "degrees",
+            "unknown unit `degrees`; units are symbols, as in `m`, `s`, `deg` or `Hz`, and a count has none",
+        ),
         ("0x20 Hz", "0x20", "a number in hexadecimal, octal or binary takes no unit; write it in decimal"),
         ("1 m/", ";", "expected a unit, as in `m` or `deg/s`"),
         ("1 m^x", "x", "expected an exponent from 1 to 9"),
         ("1 m^10", "10", "expected an exponent from 1 to 9"),
         ("1e999 Hz", "1e999", "this number is too large"),
         ("1e308 kHz", "1e308", "this number is too large"),
-        ("fast", "fast", "expected a number with its unit"),
+        ("fast", "fast", "expected a number with its unit; write it out, the value of a name is not known here"),
         ("\"5 Hz\"", "\"5 Hz\"", "expected a number with its unit"),
         ("", ";", "expected a number with its unit"),
     ] {

@@ -2,6 +2,7 @@
 //!
 //! Right: `Madgwick(beta = param::imu::beta)` where `parameters` has `imu { beta: f64 = 0.1; }`
 //! Wrong: `Madgwick(beta = param::imu::gain)`
+//! Wrong: `Madgwick(beta = imu::beta)`
 //! Wrong: `Madgwick(beta = 2.0 * param::imu::beta)`, since it is bound, not read
 
 use crate::diagnostics::{Diagnostics, Place};
@@ -10,6 +11,7 @@ use crate::names::{declare, nearest_path, some_of};
 use crate::parse::OptionValue;
 use proc_macro2::{Spacing, TokenStream, TokenTree};
 use quote::ToTokens;
+use syn::{Expr, ExprPath};
 
 pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     // Unread items may have declared the missing ones.
@@ -21,6 +23,11 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
         let path = match &option.value {
             OptionValue::Parameter(path) => path,
             OptionValue::Expression { expression, .. } => {
+                if let Some(path) = bare(expression, &known) {
+                    let message = format!("a parameter is named by its whole path; write `{path}`");
+                    diagnostics.error(expression, message);
+                    continue;
+                }
                 if let Some(place) = inside(expression.to_token_stream()) {
                     let message = "an option is bound to a parameter as it is, and a parameter is not a value that can be \
                                    computed with; compute in the component, or declare a parameter of its own";
@@ -49,6 +56,14 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
         };
         diagnostics.at(path.place(), message);
     }
+}
+
+/// The parameter that an expression names, without `param::`. Constants of Rust are in upper case.
+fn bare<'a>(expression: &Expr, known: &'a [String]) -> Option<&'a String> {
+    let Expr::Path(ExprPath { qself: None, path, .. }) = expression else { return None };
+    let names: Vec<String> = path.segments.iter().map(|segment| crate::names::text(&segment.ident)).collect();
+    let name = format!("param::{}", names.join("::"));
+    known.iter().find(|parameter| **parameter == name)
 }
 
 /// The first path that starts with `param::` in an expression.

@@ -4,7 +4,7 @@
 //! Wrong: `link base { sensor imu: A(); sensor imu: B(); }`
 
 use crate::diagnostics::{Diagnostics, Place};
-use crate::model::{Home, JointId, LinkId, Mount, ParameterGroupId, Robot, SensorId};
+use crate::model::{Home, JointId, Link, LinkId, Mount, ParameterGroupId, Robot, SensorId};
 use crate::names::{module_name, snake_case};
 use crate::parse::ServiceKind;
 use proc_macro2::Ident;
@@ -23,8 +23,14 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
         diagnostics.error(name, message);
     }
     let mut bodies = Names::new("the links and joints of the robot");
-    for name in robot.links.iter().map(|link| &link.name).chain(robot.joints.iter().map(|joint| &joint.name)) {
-        bodies.add(name, diagnostics);
+    for link in &robot.links {
+        match closed_loop(robot, link) {
+            Some(message) => diagnostics.error(&link.name, message),
+            None => bodies.add(&link.name, diagnostics),
+        }
+    }
+    for joint in &robot.joints {
+        bodies.add(&joint.name, diagnostics);
     }
     let mut siblings: HashMap<Siblings, Names> = HashMap::new();
     // Joints are siblings of the sensors and estimators of their link, links of the sensors of their joint, and the
@@ -55,6 +61,22 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     for (place, name) in sensors.chain(actuators).chain(estimators).chain(of_robot) {
         siblings.entry(place).or_insert_with(Names::of_siblings).add(name, diagnostics);
     }
+}
+
+/// The error for a link that is declared below itself.
+fn closed_loop(robot: &Robot, link: &Link) -> Option<String> {
+    let mut above = link.joint.map(|joint| robot.joints[joint].parent);
+    while let Some(parent) = above.map(|parent| &robot.links[parent]) {
+        if parent.name == link.name {
+            let (name, line) = (&link.name, Place::from(parent.name.span()).line());
+            return Some(format!(
+                "the link `{name}` is declared on line {line}, above this joint: links and joints form a tree, without \
+                 loops; leave out one joint of the loop"
+            ));
+        }
+        above = parent.joint.map(|joint| robot.joints[joint].parent);
+    }
+    None
 }
 
 /// The scope of siblings.

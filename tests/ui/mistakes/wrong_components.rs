@@ -1,4 +1,5 @@
-//! Components whose code rustc refuses: a payload without its stamp, and a field that cannot cross threads.
+//! Components whose code rustc refuses: a payload without its stamp, a payload for a reply, an output that is no
+//! payload, and a field that cannot cross threads.
 
 use bb_core::prelude::*;
 use std::rc::Rc;
@@ -16,6 +17,45 @@ impl Estimator for Level {
     }
 
     fn handle_input(&mut self, _: &Imu) -> Result<Reply<Orientation>, Fault> {
+        Ok(Reply::none())
+    }
+}
+
+#[derive(Debug)]
+struct Copy;
+
+impl Estimator for Copy {
+    type Options = NoOptions;
+    type Input = Orientation;
+    type Output = Orientation;
+
+    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+
+    fn handle_input(&mut self, input: &Stamped<Orientation>) -> Result<Reply<Orientation>, Fault> {
+        Ok(input.payload.clone())
+    }
+}
+
+#[derive(Clone, Debug)]
+struct Slope {
+    _angle: f64,
+}
+
+#[derive(Debug)]
+struct Inclinometer;
+
+impl Estimator for Inclinometer {
+    type Options = NoOptions;
+    type Input = Imu;
+    type Output = Slope;
+
+    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+
+    fn handle_input(&mut self, _: &Stamped<Imu>) -> Result<Reply<Slope>, Fault> {
         Ok(Reply::none())
     }
 }

@@ -5,7 +5,7 @@ use crate::parse::name::whole;
 use crate::parse::quantity::decimal_comma;
 use crate::parse::tokens::place_since;
 use crate::parse::{Path, Quantity};
-use proc_macro2::Ident;
+use proc_macro2::{Ident, TokenStream};
 use syn::parse::ParseStream;
 use syn::{Expr, Token};
 
@@ -83,6 +83,11 @@ fn elsewhere(input: ParseStream<'_>) -> Option<syn::Error> {
     let (start, place) = (input.cursor(), input.span());
     if is_function(&input.fork()) {
         return Some(syn::Error::new(place, "a function is written as a closure of Rust, as in `|x| 2.0 * x`"));
+    }
+    if input.peek(Token![/]) || input.peek(Token![~]) || input.peek(Token![.]) && !input.peek(Token![..]) {
+        let path = input.parse::<TokenStream>().map(|tokens| tokens.to_string()).unwrap_or_default();
+        let path: String = path.split(',').next().unwrap_or_default().split_whitespace().collect();
+        return Some(syn::Error::new(place, format!("text is written in quotes: `\"{path}\"`")));
     }
     if input.peek(Token![$]) {
         return Some(syn::Error::new(place, "a value is Rust, or a parameter, as in `param::beta`"));
