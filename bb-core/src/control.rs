@@ -42,7 +42,7 @@ use crate::journal::{Journal, ParameterEntry};
 use crate::lifecycle::Supervision;
 use crate::message::Origin;
 use crate::node::{BindTarget, Check, Mode, NodeEntry, Report, SharedNode};
-use crate::schedule::{Bell, Deadlines, Pool, Sleeper, StopSignal};
+use crate::schedule::{Bell, Deadlines, Pool, Reserve, Reserved, Sleeper, StopSignal};
 use crate::telemetry::Telemetry;
 use crate::time::{Clock, MonotonicTime};
 use budgets::Budgets;
@@ -100,6 +100,10 @@ struct Inner {
     watch: Deadlines<usize>,
     limits: Deadlines<Limit>,
     pool: Pool,
+    /// The threads of disarm callbacks.
+    reserve: Reserve,
+    /// The one for callbacks of commands.
+    place: OnceLock<Reserved>,
     reporter: Reporter,
     /// Commands to be polled, on virtual time.
     ready: Mutex<VecDeque<Arc<Task>>>,

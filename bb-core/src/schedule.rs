@@ -5,6 +5,7 @@ mod bell;
 mod deadlines;
 mod door;
 mod pool;
+mod reserve;
 mod sleeper;
 mod stop;
 
@@ -13,5 +14,6 @@ pub(crate) use bell::Bell;
 pub(crate) use deadlines::Deadlines;
 pub(crate) use door::Door;
 pub(crate) use pool::{Lane, Pool};
+pub(crate) use reserve::{Reserve, Reserved};
 pub(crate) use sleeper::{Alarm, Sleeper};
 pub(crate) use stop::StopSignal;

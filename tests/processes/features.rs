@@ -1,7 +1,10 @@
-//! What optional features do: real-time priorities of workers, and signals that stop a robot.
+//! What optional features do: real-time priorities of workers, and signals that stop a robot. Beside them a process in which no thread
+//! can be started.
 
 use bb_core::prelude::*;
 use std::process::{Command as Process, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 /// A number.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
@@ -121,6 +124,7 @@ fn child(test: &str) -> Result<(std::process::Child, impl Iterator<Item = String
     let mut child = Process::new(std::env::current_exe()?)
         .args([test, "--exact", "--nocapture"])
         .env("BB_TEST_SIGNAL", "1")
+        .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .spawn()?;
     let lines = std::io::BufRead::lines(std::io::BufReader::new(child.stdout.take().ok_or("no output")?));
@@ -214,5 +218,88 @@ fn a_signal_disarms_and_stops() -> Result<(), Box<dyn std::error::Error>> {
     signal(&child, "-TERM")?;
     assert!(lines.any(|line| line.ends_with("it is disarmed")), "it is disarmed");
     assert!(child.wait()?.success());
+    Ok(())
+}
+
+/// When the devices were safe.
+static SAFE: Mutex<Vec<std::time::Instant>> = Mutex::new(Vec::new());
+static DEVICES: AtomicU32 = AtomicU32::new(0);
+
+/// Takes its time to become safe; the first one hangs.
+#[derive(Debug)]
+struct Device;
+
+impl Sensor for Device {
+    type Options = NoOptions;
+    type Output = Number;
+
+    fn init(_: NoOptions, context: &SensorContext) -> Result<Self, Fault> {
+        let is_first = DEVICES.fetch_add(1, Ordering::SeqCst) == 0;
+        context.on_disarm(move || {
+            while is_first {
+                std::thread::park();
+            }
+            std::thread::sleep(Duration::from_millis(400));
+            SAFE.lock().unwrap_or_else(PoisonError::into_inner).push(std::time::Instant::now());
+            Ok(())
+        });
+        Ok(Self)
+    }
+
+    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
+        Ok(Reading::finished())
+    }
+}
+
+robot! {
+    robot Crowded;
+    link base {
+        sensor a: Device() { rate: 1 Hz; }
+        sensor b: Device() { rate: 1 Hz; }
+        sensor c: Device() { rate: 1 Hz; }
+        sensor d: Device() { rate: 1 Hz; }
+        sensor e: Device() { rate: 1 Hz; }
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn where_no_thread_can_be_started_all_are_made_safe_at_once() -> Result<(), Box<dyn std::error::Error>> {
+    use std::io::Write as _;
+    const NAME: &str = "processes::features::where_no_thread_can_be_started_all_are_made_safe_at_once";
+    if std::env::var_os("BB_TEST_SIGNAL").is_some() {
+        return stop_without_threads();
+    }
+    let (mut child, mut lines) = child(NAME)?;
+    assert!(lines.by_ref().any(|line| line.ends_with("it runs")), "it starts");
+    let status = std::fs::read_to_string(format!("/proc/{}/status", child.id()))?;
+    let size = status.lines().find_map(|line| line.strip_prefix("VmSize:")).ok_or("no size")?;
+    let kilobytes: u64 = size.trim().trim_end_matches(" kB").parse()?;
+    // Less than the stack of a thread.
+    let limit = format!("--as={}", (kilobytes + 1024) * 1024);
+    assert!(Process::new("prlimit").args(["--pid", &child.id().to_string(), &limit]).status()?.success());
+    writeln!(child.stdin.take().ok_or("no input")?, "go on")?;
+    let said: Vec<_> = lines.collect();
+    assert!(child.wait()?.success(), "{said:?}");
+    Ok(())
+}
+
+fn stop_without_threads() -> Result<(), Box<dyn std::error::Error>> {
+    let running = Crowded::builder().start()?;
+    println!("it runs");
+    std::io::stdin().read_line(&mut String::new())?;
+    // The stacks of threads that have ended may be used again.
+    let is_full = (0..100).any(|_| std::thread::Builder::new().spawn(std::thread::park).is_err());
+    assert!(is_full, "threads can be started");
+    let start = std::time::Instant::now();
+    running.request_stop();
+    let returned = start.elapsed();
+    assert!(returned < Duration::from_millis(200), "the caller was kept for {returned:?}");
+    while SAFE.lock().unwrap_or_else(PoisonError::into_inner).len() < 4 {
+        assert!(start.elapsed() < Duration::from_millis(1500), "one after the other takes 1.6 s");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    // The one that hangs would keep it for five seconds.
+    std::mem::forget(running);
     Ok(())
 }

@@ -1,7 +1,8 @@
 //! Disarm callbacks, which make hardware safe: how each runs, and who owns it.
 //!
-//! - A callback is user code. It runs on its own thread, and never on two at once: if it is asked for while it runs, that thread runs
-//!   it once more. On virtual time it runs on the caller's thread.
+//! - A callback is user code. It runs on a thread of the [`Reserve`](crate::schedule::Reserve) that nothing else uses meanwhile, and
+//!   never on two at once: if it is asked for while it runs, that thread runs it once more. On virtual time it runs on the caller's
+//!   thread.
 //! - A disarming runs all of them: see [`arming`](super::arming). Some also run [`Apart`] from one: see
 //!   [`registering`](super::registering).
 //! - Code that a disarming waits for does not wait for that disarming: [`is_awaited`] tells the thread that runs it.
@@ -10,6 +11,7 @@ use super::{Control, Key, State};
 use crate::component::DisarmHook;
 use crate::event::SafetyError;
 use crate::fault::caught;
+use crate::schedule::Reserved;
 use std::cell::RefCell;
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -22,6 +24,8 @@ pub(super) struct Callback {
     pub(super) path: &'static str,
     code: DisarmHook,
     runs: Mutex<Runs>,
+    /// Its thread.
+    place: Option<Reserved>,
 }
 
 #[derive(Default)]
@@ -41,21 +45,12 @@ pub(super) enum Reason {
 }
 
 impl Callback {
-    fn new(number: u64, path: &'static str, code: DisarmHook) -> Self {
-        Self { number, path, code, runs: Mutex::default() }
-    }
-
-    /// Runs it on its own thread; returns false if no thread can be started.
-    pub(super) fn start(self: &Arc<Self>, control: &Control, reason: Reason) -> bool {
-        if !self.begin(reason) {
-            return true;
+    /// Runs it on its own thread.
+    pub(super) fn start(self: &Arc<Self>, control: &Control, reason: Reason) {
+        if self.begin(reason) {
+            let (callback, robot) = (Arc::clone(self), control.clone());
+            control.0.reserve.run(Box::new(move || callback.work(&robot, reason)));
         }
-        let (callback, robot) = (Arc::clone(self), control.clone());
-        let is_started = spawn(format!("disarm {}", self.path), move || callback.work(&robot, reason)).is_ok();
-        if !is_started {
-            self.runs().is_running = false;
-        }
-        is_started
     }
 
     /// Runs it on the calling thread.
@@ -121,17 +116,6 @@ impl Callback {
     }
 }
 
-#[cfg(not(loom))]
-fn spawn(name: String, run: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
-    std::thread::Builder::new().name(name).spawn(run).map(drop)
-}
-
-#[cfg(loom)]
-fn spawn(_: String, run: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
-    loom::thread::spawn(run);
-    Ok(())
-}
-
 impl fmt::Debug for Callback {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Callback").field("number", &self.number).field("path", &self.path).finish_non_exhaustive()
@@ -170,20 +154,28 @@ pub(super) type Forgotten = Vec<Arc<Callback>>;
 
 impl Hooks {
     /// Creates one that is not kept.
-    pub(super) fn make(&mut self, path: &'static str, code: DisarmHook) -> Arc<Callback> {
+    pub(super) fn make(&mut self, path: &'static str, code: DisarmHook, place: Option<Reserved>) -> Arc<Callback> {
         let number = self.next;
         self.next += 1;
-        Arc::new(Callback::new(number, path, code))
+        Arc::new(Callback { number, path, code, runs: Mutex::default(), place })
     }
 
-    pub(super) fn add(&mut self, path: &'static str, code: DisarmHook, owner: Owner) -> Arc<Callback> {
-        let callback = self.make(path, code);
-        self.all.push(Hook { callback: Arc::clone(&callback), owner });
-        callback
+    pub(super) fn add(&mut self, callback: Arc<Callback>, owner: Owner) {
+        self.all.push(Hook { callback, owner });
     }
 
+    /// Those that have a thread come first.
     pub(super) fn all(&self) -> Vec<Arc<Callback>> {
-        self.all.iter().map(|hook| Arc::clone(&hook.callback)).collect()
+        let (with, without): (Vec<_>, Vec<_>) =
+            self.all.iter().map(|hook| Arc::clone(&hook.callback)).partition(|callback| callback.place.is_some());
+        [with, without].concat()
+    }
+
+    /// The path of a component whose callback has no thread.
+    pub(super) fn without_thread(&self) -> Option<&'static str> {
+        let of_component = |hook: &&Hook| !matches!(hook.owner, Owner::Execution(_));
+        let mut without = self.all.iter().filter(of_component).filter(|hook| hook.callback.place.is_none());
+        without.next().map(|hook| hook.callback.path)
     }
 
     /// The component at `path` was created, or has taken new options: callbacks from `first` on are new. Returns its current ones. A

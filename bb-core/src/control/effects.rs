@@ -148,8 +148,8 @@ impl Control {
         }
     }
 
-    /// Runs each disarm callback on its own thread, and returns those for which no thread could be started: better run late than
-    /// never. On virtual time those of a disarming wait for [`Self::run_pending_hooks`], and the caller runs the others.
+    /// Runs each disarm callback on its own thread. On virtual time those of a disarming wait for [`Self::run_pending_hooks`], and the
+    /// caller runs the others, which are returned.
     fn start_callbacks(&self, reason: Reason, all: Vec<Arc<Callback>>) -> Vec<Arc<Callback>> {
         match reason {
             Reason::Disarming(generation) if self.0.mode != Mode::Real => {
@@ -161,7 +161,9 @@ impl Control {
             Reason::Apart(_) if self.0.mode != Mode::Real || cfg!(loom) => return all,
             Reason::Disarming(_) | Reason::Apart(_) => {}
         }
-        all.into_iter().filter(|callback| !callback.start(self, reason)).collect()
+        all.iter().for_each(|callback| callback.start(self, reason));
+        all.into_iter().for_each(discard);
+        Vec::new()
     }
 
     /// On virtual time: runs the waiting disarm callbacks in order on the calling thread, and returns true if there

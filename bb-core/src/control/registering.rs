@@ -16,6 +16,7 @@ use crate::event::{Safety, SafetyError};
 use crate::fault::{Failed, Fault, discard};
 use crate::journal::Event;
 use crate::node::Mode;
+use crate::schedule::Reserved;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -28,6 +29,7 @@ impl Control {
     /// Registers a callback. While the robot is being disarmed, it is run as well; after the last disarming, at once. One of a command
     /// whose code has returned is dropped.
     fn register(&self, path: &'static str, owner: Owner, code: DisarmHook) {
+        let place = self.place_for(path, owner);
         let mut step = self.step();
         let is_known = match owner {
             Owner::Execution(id) => step.state.executions.iter().any(|execution| execution.id == id),
@@ -41,10 +43,10 @@ impl Control {
             return discard(code);
         }
         // After the end, nothing is kept: it would keep the robot alive.
-        let callback = match step.state.has_ended {
-            true => step.state.hooks.make(path, code),
-            false => step.state.hooks.add(path, code, owner),
-        };
+        let callback = step.state.hooks.make(path, code, place);
+        if !step.state.has_ended {
+            step.state.hooks.add(Arc::clone(&callback), owner);
+        }
         let mut key = None;
         if is_last {
             key = step.run_apart(path, vec![callback], false);
@@ -53,6 +55,30 @@ impl Control {
         }
         step.finish();
         self.wait_apart(key);
+    }
+
+    /// A thread for a callback of a component, so that it never has to wait for others. There may be any number of commands: theirs
+    /// get threads when they run.
+    fn place_for(&self, path: &'static str, owner: Owner) -> Option<Reserved> {
+        if self.0.mode != Mode::Real || matches!(owner, Owner::Execution(_)) {
+            return None;
+        }
+        match self.0.reserve.place() {
+            Ok(place) => Some(place),
+            Err(error) => {
+                self.note_fault(path, format!("its disarm callback has no thread of its own: {error}"));
+                None
+            }
+        }
+    }
+
+    /// Keeps a thread for the callbacks of commands. The error names the component without a thread for its own.
+    pub(crate) fn start_reserve(&self) -> Result<(), (&'static str, Fault)> {
+        let place = self.0.reserve.place().map_err(|error| ("disarm", error.into()))?;
+        // It is set once.
+        let _ = self.0.place.set(place);
+        let without = self.lock().hooks.without_thread();
+        without.map_or(Ok(()), |path| Err((path, Fault::new("no thread can be started for its disarm callback"))))
     }
 
     /// Runs `make`, which creates the component at `path` or changes its options. Once it has succeeded, the callbacks it registered

@@ -20,7 +20,7 @@ use crate::journal::JournalLine;
 use crate::message::Origin;
 use crate::node::Mode;
 use crate::pubsub::{AnyTopic, Registry, Topic};
-use crate::schedule::{Bell, Deadlines, Pool, Sleeper, StopSignal};
+use crate::schedule::{Bell, Deadlines, Pool, Reserve, Sleeper, StopSignal};
 use crate::time::Clock;
 #[cfg(loom)]
 use loom::sync::{Condvar, atomic::AtomicU8};
@@ -80,6 +80,8 @@ impl Control {
             watch: Deadlines::new(bell.clone()),
             limits: Deadlines::new(bell.clone()),
             pool: Pool::new(move || alarm.ring()),
+            reserve: Reserve::default(),
+            place: OnceLock::new(),
             bell,
             reporter: Reporter::default(),
             ready: Mutex::default(),

@@ -70,6 +70,7 @@ impl Threads {
     fn start(machine: Arc<Machine>, sources: OpenSources) -> Result<Self, StartError> {
         let mut running = Self { machine: Arc::clone(&machine), sources: Vec::new(), has_waited: false };
         machine.control.pool().start();
+        machine.control.start_reserve().map_err(|(path, fault)| StartError::component(path, fault))?;
         // On an error here, `running` is dropped, which stops what already runs, in order.
         threads::serve(&machine)?;
         let now = machine.environment.clock().now();
