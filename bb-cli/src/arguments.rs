@@ -2,6 +2,7 @@
 
 use crate::calibrate::Calibrate;
 use crate::commands;
+use crate::families::{self, FamiliesArguments};
 use crate::navigation::{self, NavigationArguments};
 use crate::noise::{self, NoiseArguments};
 use bb_estimators::attitude::FilterParams;
@@ -45,6 +46,9 @@ enum Eval {
     /// Runs attitude filters on recordings and prints their errors against the truth.
     #[command(after_help = EXAMPLES)]
     Attitude(Box<AttitudeArguments>),
+    /// Compares attitude filters on families of motions, fields and faults, recorded and simulated, with VQF.
+    #[command(after_help = families::EXAMPLES)]
+    Families(Box<FamiliesArguments>),
     /// Runs navigation filters on drives and flights and prints their errors against the truth.
     #[command(after_help = navigation::EXAMPLES)]
     Navigation(Box<NavigationArguments>),
@@ -124,6 +128,7 @@ struct AttitudeArguments {
 #[derive(Debug)]
 pub(crate) enum Job {
     Attitude(Box<Attitude>),
+    Families(Box<FamiliesArguments>),
     Navigation(Box<NavigationArguments>),
     Noise(Box<NoiseArguments>),
     Calibrate(Calibrate),
@@ -150,6 +155,7 @@ pub(crate) fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Job
     };
     let arguments = match what {
         Eval::Attitude(arguments) => arguments,
+        Eval::Families(arguments) => return Ok(Job::Families(arguments)),
         Eval::Navigation(arguments) => return Ok(Job::Navigation(arguments)),
         Eval::Noise(arguments) => return Ok(Job::Noise(arguments)),
     };

@@ -7,6 +7,7 @@
 mod arguments;
 mod calibrate;
 mod commands;
+mod families;
 mod navigation;
 mod noise;
 mod periods;
@@ -32,6 +33,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     };
     let done = match &job {
         Job::Attitude(attitude) => eval_attitude(attitude),
+        Job::Families(families) => families.run().and_then(|(text, is_whole)| Ok(say(&text)? && is_whole)),
         Job::Navigation(navigation) => navigation.run().and_then(|(text, is_whole)| Ok(say(&text)? && is_whole)),
         Job::Noise(noise) => noise.run().and_then(|(text, is_whole)| Ok(say(&text)? && is_whole)),
         Job::Print(text) => say(text),

@@ -21,7 +21,7 @@ use std::time::{Duration, Instant};
 const BLOCK: usize = 1024;
 
 /// Headings are checked against two sigma, and truths for other conventions, once per this many samples.
-const ASKED: usize = 64;
+pub(crate) const ASKED: usize = 64;
 
 /// The length of the progress bar for one recording.
 const BAR: u64 = 1000;
@@ -265,10 +265,10 @@ impl Player {
         let Some(estimate) = self.estimates.last().copied().flatten() else { return };
         let (Some(truth), true) = recording.truth.at(sample.time_ns) else { return };
         self.truths.add(&estimate, &truth);
-        let Some(deviation) = self.filter.heading_deviation() else { return };
+        let Some(deviations) = self.filter.deviations() else { return };
         let Some(error) = OrientationError::between(&estimate, &truth) else { return };
         self.within_two_sigma.0 += 1;
-        self.within_two_sigma.1 += u64::from(error.heading <= 2.0 * deviation);
+        self.within_two_sigma.1 += u64::from(error.heading <= 2.0 * deviations.heading);
     }
 
     fn refusals(&self, played: u64) -> Option<String> {

@@ -107,10 +107,20 @@ pub trait Running {
     /// Processes samples, and appends the orientation after each: `None` if there is none yet, or the sample was refused.
     fn run(&mut self, samples: &[ImuSample], estimates: &mut Vec<Option<UnitQuaternion<f64>>>) -> Refused;
 
-    /// The standard deviation of the heading in rad, if the filter reports it.
-    fn heading_deviation(&self) -> Option<f64> {
+    /// The standard deviations, if the filter reports them.
+    fn deviations(&self) -> Option<Deviations> {
         None
     }
+}
+
+/// Standard deviations of an orientation, rad.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Deviations {
+    /// The deviation of the heading.
+    pub heading: f64,
+    /// The deviation of the inclination: the root of the sum of the variances about the two horizontal axes, which is
+    /// the expected root mean square of the angle.
+    pub inclination: f64,
 }
 
 /// The samples that a filter refused.
@@ -138,10 +148,13 @@ impl<F: AttitudeFilter> Running for F {
         refused
     }
 
-    fn heading_deviation(&self) -> Option<f64> {
+    fn deviations(&self) -> Option<Deviations> {
         let world_from_body = self.world_from_body()?.to_rotation_matrix();
         let variance = world_from_body * self.orientation_uncertainty()? * world_from_body.transpose();
-        Some(variance[(2, 2)].max(0.0).sqrt())
+        Some(Deviations {
+            heading: variance[(2, 2)].max(0.0).sqrt(),
+            inclination: (variance[(0, 0)] + variance[(1, 1)]).max(0.0).sqrt(),
+        })
     }
 }
 

@@ -15,6 +15,8 @@ mod error_plot;
 #[cfg(feature = "recordings")]
 mod evaluate;
 #[cfg(feature = "recordings")]
+mod families;
+#[cfg(feature = "recordings")]
 pub mod files;
 pub mod filters;
 #[cfg(feature = "recordings")]
@@ -39,7 +41,12 @@ pub use averages::Averages;
 pub use error_plot::plot_errors;
 #[cfg(feature = "recordings")]
 pub use evaluate::{Evaluation, Evaluator, Run, evaluate, evaluate_all, evaluate_variant};
-pub use filters::{Axes, Chosen, Refused, Running, Setting};
+#[cfg(feature = "recordings")]
+pub use families::{
+    FAMILIES, Family, FamilyScore, Half, Measure, Share, families_json, families_list, families_table,
+    score_families,
+};
+pub use filters::{Axes, Chosen, Deviations, Refused, Running, Setting};
 #[cfg(feature = "recordings")]
 pub use navigation::{
     BagOptions, BiasDeviation, DataSet, FromBag, Inertial, Mount, NAVIGATION_FILTERS, NavigationBag,

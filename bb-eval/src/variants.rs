@@ -298,7 +298,7 @@ fn count(text: &str) -> Result<u32, String> {
 }
 
 /// FNV-1a of a file's name, so that a recording has the same variants, whichever others are evaluated.
-fn hash(file: &Path) -> u64 {
+pub(crate) fn hash(file: &Path) -> u64 {
     let name = file.file_name().unwrap_or(file.as_os_str());
     let bytes = name.as_encoded_bytes().iter();
     bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3))
@@ -307,10 +307,10 @@ fn hash(file: &Path) -> u64 {
 /// SplitMix64. It is kept although other code uses a crate's generator: the tables of `docs/attitude.md` were
 /// measured with its numbers, and a recording has the same variants in every version.
 #[derive(Debug)]
-struct Random(u64);
+pub(crate) struct Random(u64);
 
 impl Random {
-    fn new(seeds: [u64; 4]) -> Self {
+    pub(crate) fn new(seeds: [u64; 4]) -> Self {
         let mut random = Self(0);
         for seed in seeds {
             random.0 = random.next() ^ seed;
@@ -326,16 +326,25 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    fn uniform(&mut self, (from, to): (f64, f64)) -> f64 {
+    pub(crate) fn uniform(&mut self, (from, to): (f64, f64)) -> f64 {
         from + (to - from) * (self.next() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
     /// Uniform on the sphere: a cylinder's surface has the same area between two heights.
-    fn direction(&mut self) -> Vector3<f64> {
+    pub(crate) fn direction(&mut self) -> Vector3<f64> {
         let height = self.uniform((-1.0, 1.0));
         let angle = self.uniform((0.0, std::f64::consts::TAU));
         let radius = (1.0 - height * height).sqrt();
         Vector3::new(radius * angle.cos(), radius * angle.sin(), height)
+    }
+
+    /// Three independent standard normal numbers, by the method of Box and Muller.
+    pub(crate) fn normal(&mut self) -> Vector3<f64> {
+        Vector3::from_fn(|_, _| {
+            // Above zero, which has no logarithm.
+            let radius = (-2.0 * (1.0 - self.uniform((0.0, 1.0))).ln()).sqrt();
+            radius * self.uniform((0.0, std::f64::consts::TAU)).cos()
+        })
     }
 }
 
