@@ -67,7 +67,8 @@ pub trait Sensor: Sized + Send + 'static {
     fn read(&mut self, now: MonotonicTime) -> Result<Reading<Self::Output>, Fault>;
 
     /// The time of its first reading; `None` means at once. A recording returns the stamp of its first message:
-    /// virtual time starts at the earliest of all.
+    /// virtual time starts at the earliest of all. Stamps of more than a year are taken for nanoseconds since 1970: the run then has
+    /// that date.
     fn starts_at(&self) -> Option<MonotonicTime> {
         None
     }

@@ -21,6 +21,18 @@ pub struct JournalLine {
     pub event: Event,
 }
 
+impl JournalLine {
+    /// Wall time minus monotonic time from this line on, in nanoseconds, if the line says so: the first one does, which gives the date
+    /// at which the run began, and each at which the machine's date was set.
+    pub fn wall_offset_nanos(&self) -> Option<i64> {
+        match self.event {
+            Event::Begin { wall_offset_nanos, .. } => Some(wall_offset_nanos),
+            Event::WallClock { offset_nanos } => Some(offset_nanos),
+            _ => None,
+        }
+    }
+}
+
 /// The same type, under a name for code that handles many of them.
 pub type Entry = JournalLine;
 
@@ -32,7 +44,7 @@ pub enum Event {
     Begin {
         /// The robot and its settings, one fact per line.
         declaration: Vec<String>,
-        /// Wall time minus monotonic time, in nanoseconds.
+        /// Wall time minus monotonic time, in nanoseconds. With the line's time, it gives the date at which the run began.
         wall_offset_nanos: i64,
         /// Whether the run was on virtual time.
         is_virtual: bool,

@@ -3,7 +3,6 @@
 use super::queue::Queue;
 use super::statistics::{SubscriberStatistics, TopicStatistics};
 use crate::message::{DecodeError, JointReading, Payload, Schema, Stamp, Stamped};
-use crate::time::WallTime;
 use std::any::Any;
 use std::fmt;
 use std::sync::Arc;
@@ -32,7 +31,6 @@ pub(super) trait AnyMessage: Send + Sync {
     fn ros_schema(&self) -> Option<Schema>;
     fn encode_companion(&self, bytes: &mut Vec<u8>) -> bool;
     fn ros_companion(&self) -> Option<(&'static str, Schema)>;
-    fn at_wall_time(&self, time: WallTime) -> Arc<dyn AnyMessage>;
     fn is_exact_as_ros(&self) -> bool;
     fn to_json(&self) -> String;
     /// A topic for its payload.
@@ -116,11 +114,6 @@ impl DynamicMessage {
     /// The last part of the topic and the definition of a second message, if ROS has two for its payload.
     pub fn ros_companion(&self) -> Option<(&'static str, Schema)> {
         self.message.ros_companion()
-    }
-
-    /// A copy with another wall time.
-    pub fn at_wall_time(&self, time: WallTime) -> Self {
-        Self { message: self.message.at_wall_time(time), ..*self }
     }
 
     /// Whether payload and wall time can be read back from ROS's layout bit for bit.

@@ -2,6 +2,7 @@
 
 use super::{AnyTopic as _, DynamicMessage, Topic};
 use crate::message::{Payload, Stamp, Stamped};
+use crate::time::WallTime;
 use std::fmt;
 use std::sync::Arc;
 
@@ -38,9 +39,17 @@ impl<T: Payload> Publisher<T> {
         });
     }
 
-    /// Publishes a message with its own stamp, for messages forwarded from elsewhere.
+    /// Publishes a message with its own stamp, for messages forwarded from elsewhere. One without a wall time, such as
+    /// [`Stamped::new`] makes, gets that of the robot's clock at its monotonic time.
     pub fn forward(&self, message: &Stamped<T>) {
-        self.gate.pass(&mut |_| self.hand_out(message));
+        self.gate.pass(&mut |now| {
+            if message.wall_time != WallTime::default() {
+                return self.hand_out(message);
+            }
+            let age = now.monotonic_time.nanos_since(message.monotonic_time);
+            let nanos = now.wall_time.as_unix_nanos().saturating_sub(age);
+            self.hand_out(&Stamped { wall_time: WallTime::from_unix_nanos(nanos), ..message.clone() });
+        });
     }
 
     fn hand_out(&self, message: &Stamped<T>) {

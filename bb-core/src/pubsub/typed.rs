@@ -5,7 +5,6 @@ use super::statistics::{SubscriberStatistics, TopicStatistics};
 use super::topic::Topic;
 use crate::message::codec::{encode, encode_as_ros, encode_companion, is_exact_as_ros, to_json};
 use crate::message::{DecodeError, JointReading, Payload, Schema, Stamp, Stamped};
-use crate::time::WallTime;
 use std::any::Any;
 use std::fmt;
 use std::sync::Arc;
@@ -48,9 +47,6 @@ impl<T: Payload> AnyMessage for Stamped<T> {
     }
     fn ros_companion(&self) -> Option<(&'static str, Schema)> {
         Self::ros_companion()
-    }
-    fn at_wall_time(&self, wall_time: WallTime) -> Arc<dyn AnyMessage> {
-        Arc::new(Self { wall_time, ..self.clone() })
     }
     fn is_exact_as_ros(&self) -> bool {
         is_exact_as_ros(self)

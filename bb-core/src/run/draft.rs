@@ -30,9 +30,9 @@ use crate::node::{Environment, EnvironmentParts, Mode, SharedNode};
 use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Payloads, Registry, Select};
 use crate::schedule::{Agenda, Lane};
 use crate::telemetry::Telemetry;
-use crate::time::Clock;
+use crate::time::{Clock, WallTime};
 use std::collections::HashMap;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, Weak};
 use std::time::Instant;
 
@@ -100,8 +100,14 @@ impl Draft {
     pub(super) fn publish_journal(&mut self) {
         let system = Arc::clone(&self.system);
         let origin = self.origin();
+        let wall_offset_nanos = AtomicI64::new(0);
         self.journal = Some(Arc::new(move |entry| {
-            let stamp = Stamp { monotonic_time: entry.time, origin, ..Stamp::default() };
+            if let Some(nanos) = entry.wall_offset_nanos() {
+                wall_offset_nanos.store(nanos, Ordering::Relaxed);
+            }
+            let nanos = entry.time.as_nanos().saturating_add(wall_offset_nanos.load(Ordering::Relaxed));
+            let wall_time = WallTime::from_unix_nanos(nanos);
+            let stamp = Stamp { monotonic_time: entry.time, wall_time, origin, ..Stamp::default() };
             system.journal.publish(&stamp.message(entry));
         }));
     }

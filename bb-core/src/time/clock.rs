@@ -40,6 +40,8 @@ enum Kind {
 /// The smallest change of the measured offset that is adopted: more than preemption between two reads causes, less
 /// than shows in a recording.
 const WALL_STEP_NANOS: u64 = 1_000_000;
+/// No clock that counts from its start is at a later time.
+const YEAR_NANOS: i64 = 365 * 86_400_000_000_000;
 
 impl Clock {
     /// The machine's clock. All real clocks of a process share one zero.
@@ -55,10 +57,19 @@ impl Clock {
         }
     }
 
-    /// A virtual clock at `start`, with the Unix epoch at its zero.
+    /// The date of a virtual clock's zero: 1 January 2001, 00:00 UTC. It is the same for every run, so that a simulation has the same
+    /// stamps each time, and viewers of its recording show how long it has run.
+    pub const VIRTUAL_ZERO: WallTime = WallTime::from_unix_nanos(978_307_200_000_000_000);
+
+    /// A virtual clock at `start`, with [`VIRTUAL_ZERO`](Self::VIRTUAL_ZERO) at its zero.
     pub fn virtual_at(start: MonotonicTime) -> Self {
         let nanos = || Arc::new(AtomicI64::new(start.as_nanos()));
-        Self { kind: Kind::Virtual(nanos()), wall_offset_nanos: Arc::new(AtomicI64::new(0)), start_nanos: nanos() }
+        let offset = Self::VIRTUAL_ZERO.as_unix_nanos();
+        Self {
+            kind: Kind::Virtual(nanos()),
+            wall_offset_nanos: Arc::new(AtomicI64::new(offset)),
+            start_nanos: nanos(),
+        }
     }
 
     /// The current time.
@@ -131,11 +142,17 @@ impl Clock {
         }
     }
 
-    /// Advances a virtual clock to the beginning of the run.
+    /// Advances a virtual clock to the beginning of the run, which a recording determines: see [`Sensor::starts_at`]. Stamps of more
+    /// than a year are dates, counted from 1970, as those of bags are.
+    ///
+    /// [`Sensor::starts_at`]: crate::Sensor::starts_at
     pub(crate) fn start_at(&self, time: MonotonicTime) {
         self.advance_to(time);
         if self.is_virtual() {
             self.start_nanos.store(self.now().as_nanos(), Ordering::Release);
+        }
+        if time.as_nanos() > YEAR_NANOS {
+            self.set_wall_offset_nanos(0);
         }
     }
 

@@ -19,7 +19,7 @@ use crate::layout::{Description, Layout, Shared};
 use bb_core::message::codec::encode;
 use bb_core::message::codec::ros::{Text, TransformsMessage};
 use bb_core::message::{Schema, Stamp};
-use bb_core::{DynamicMessage, DynamicSubscription, WallTime};
+use bb_core::{DynamicMessage, DynamicSubscription};
 use frames::Frames;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{McapError, Writer};
@@ -29,7 +29,7 @@ use std::collections::hash_map::Entry;
 use std::fs::File;
 use std::io::{self, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 use viewers::{describe, latched, view};
 pub(crate) use viewers::{nanos, view_as};
 
@@ -290,15 +290,6 @@ impl Recorder {
             Some(clock) => clock,
             None => self.begin(&stamp, writer)?,
         };
-        let wall_time = clock.recorded(stamp.wall_time);
-        let dated;
-        let message = match wall_time == stamp.wall_time {
-            true => message,
-            false => {
-                dated = message.at_wall_time(wall_time);
-                &dated
-            }
-        };
         let channel = match self.channels.entry(message.path()) {
             Entry::Occupied(entry) => entry.into_mut(),
             Entry::Vacant(entry) => {
@@ -325,7 +316,7 @@ impl Recorder {
         if main.len() + beside.len() + companion.len() > LARGEST {
             return Ok(false);
         }
-        let (sequence, log_time) = (channel.sequence, nanos(wall_time));
+        let (sequence, log_time) = (channel.sequence, nanos(clock.logged(&stamp)));
         channel.sequence = sequence.wrapping_add(1);
         let header = |channel_id| MessageHeader { channel_id, sequence, log_time, publish_time: log_time };
         for (layout, id, bytes) in
@@ -353,12 +344,10 @@ impl Recorder {
 
     /// Writes the data that precedes the first message, with its time.
     fn begin(&mut self, first: &Stamp, writer: &mut FileWriter) -> Result<Clock, WriteFault> {
-        let today = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-        let today = WallTime::from_unix_nanos(i64::try_from(today.as_nanos()).unwrap_or(0));
-        let clock = *self.clock.insert(Clock::of(first, today));
+        let clock = *self.clock.insert(Clock::of(first));
         writer.write_metadata(&Metadata { name: CLOCK.to_owned(), metadata: clock.to_metadata() })?;
         let Some(robot) = &self.options.robot else { return Ok(clock) };
-        let time = clock.recorded(first.wall_time);
+        let time = first.wall_time;
         latched(writer, "/robot_description", time, &Text { data: robot.urdf.clone() })?;
         latched(writer, "/tf_static", time, &TransformsMessage::fixed(robot.topology, time))?;
         if let Some(frames) = &self.frames {

@@ -1,6 +1,7 @@
 //! Runs of a small robot, recorded and read back.
 
 mod damage;
+mod dates;
 mod kill;
 mod moving;
 mod played;

@@ -88,6 +88,17 @@ fn virtual_time_moves_only_forward_and_only_when_told() {
 }
 
 #[test]
+fn virtual_time_begins_on_a_fixed_date_and_stamps_that_are_dates_keep_it() {
+    let seconds = |count: i64| MonotonicTime::from_nanos(count * 1_000_000_000);
+    let clock = Clock::virtual_at(MonotonicTime::ZERO);
+    assert_eq!(clock.wall_at(seconds(5)).as_unix_nanos(), 978_307_205_000_000_000);
+    clock.start_at(seconds(90));
+    assert_eq!(clock.wall_at(seconds(90)).as_unix_nanos(), 978_307_290_000_000_000, "it counts from its start");
+    clock.start_at(seconds(1_700_000_000));
+    assert_eq!(clock.wall_at(clock.now()).as_unix_nanos(), 1_700_000_000_000_000_000);
+}
+
+#[test]
 fn a_new_real_clock_has_the_date_of_the_machine() {
     let clock = Clock::real();
     let wall = clock.wall_at(clock.now()).as_unix_nanos();
@@ -140,7 +151,7 @@ fn a_date_before_1970_is_negative() {
 fn a_virtual_clock_has_the_offset_that_it_is_given() {
     let clock = Clock::virtual_at(MonotonicTime::from_nanos(5));
     let reader = clock.clone();
-    assert_eq!(reader.wall_at(clock.now()).as_unix_nanos(), 5);
+    assert_eq!(reader.wall_at(clock.now()).as_unix_nanos(), Clock::VIRTUAL_ZERO.as_unix_nanos() + 5);
     clock.set_wall_offset_nanos(1_000);
     assert_eq!(reader.wall_offset_nanos(), 1_000);
     assert_eq!(reader.wall_at(clock.now()).as_unix_nanos(), 1_005);

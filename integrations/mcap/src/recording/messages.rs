@@ -19,7 +19,8 @@ use std::sync::Arc;
 pub struct RecordedMessage {
     /// The path it was published at.
     pub channel: Arc<RecordedChannel>,
-    /// Its wall time, as published; a time before 1970 becomes the epoch.
+    /// When it was published, by the recording's clock: the wall time, unless the machine's date was set after the first message. A time
+    /// before 1970 becomes the epoch.
     pub time: WallTime,
     /// Encoded according to the channel's definition.
     pub data: Vec<u8>,
