@@ -110,6 +110,8 @@ pub(super) trait AnyQueue: Any + Send + Sync {
     /// See [`Queue::close`].
     fn close(&self) -> Option<Waker>;
     fn statistics(&self) -> SubscriberStatistics;
+    /// Whether its reader is gone.
+    fn is_abandoned(&self) -> bool;
 }
 
 impl<M: Send + 'static> AnyQueue for Queue<M> {
@@ -118,6 +120,9 @@ impl<M: Send + 'static> AnyQueue for Queue<M> {
     }
     fn statistics(&self) -> SubscriberStatistics {
         Queue::statistics(self)
+    }
+    fn is_abandoned(&self) -> bool {
+        Queue::is_abandoned(self)
     }
 }
 

@@ -5,34 +5,68 @@ use super::any::{DynamicMessage, Tap};
 use super::queue::{AnyQueue, Queue};
 use super::statistics::{SubscriberStatistics, TopicStatistics};
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::Waker;
 
-/// The subscriber list of a topic.
-pub(super) struct Subscribers {
-    /// Replaced as a whole: a publisher takes a list along and holds no lock while it wakes subscribers, which may
-    /// subscribe and unsubscribe on that thread. A queue dropped with its list has been abandoned, and so runs no
-    /// user code.
-    queues: Queues,
+/// The subscribers of a topic.
+struct Subscribers {
+    /// Of the topic's payload.
+    queues: List<dyn AnyQueue>,
     /// Untyped subscribers.
-    taps: Taps,
+    taps: List<Queue<DynamicMessage>>,
     closed: bool,
 }
 
-/// Queues of the topic's payload.
-type Queues = Arc<[Arc<dyn AnyQueue>]>;
-type Taps = Arc<[Arc<Queue<DynamicMessage>>]>;
-
 impl Subscribers {
     fn count(&self) -> usize {
-        self.queues.len() + self.taps.len()
+        self.queues.all.len() + self.taps.all.len()
+    }
+}
+
+/// The queues of some subscribers. Those whose readers are gone are removed at the next message, or once they are as many as the others:
+/// nothing may ever be published at a topic. A queue dropped with its list has been abandoned, and so runs no user code.
+struct List<Q: ?Sized> {
+    /// A publisher takes the list along and holds no lock while it wakes subscribers, which may subscribe and unsubscribe on that
+    /// thread. So it is copied if it changes meanwhile.
+    all: Taken<Q>,
+    /// How many there may be before the next cleaning: twice the number left by the last one.
+    clean_at: usize,
+}
+
+type Taken<Q> = Arc<Vec<Arc<Q>>>;
+
+impl<Q: AnyQueue + ?Sized> List<Q> {
+    const FEW: usize = 16;
+
+    fn add(&mut self, queue: Arc<Q>) {
+        if self.all.len() >= self.clean_at {
+            self.clean();
+            self.clean_at = (2 * self.all.len()).max(Self::FEW);
+        }
+        Arc::make_mut(&mut self.all).push(queue);
+    }
+
+    fn clean(&mut self) {
+        if self.all.iter().any(|queue| queue.is_abandoned()) {
+            Arc::make_mut(&mut self.all).retain(|queue| !queue.is_abandoned());
+        }
+    }
+
+    fn statistics(&self) -> impl Iterator<Item = SubscriberStatistics> {
+        self.all.iter().filter(|queue| !queue.is_abandoned()).map(|queue| queue.statistics())
+    }
+}
+
+impl<Q: ?Sized> Default for List<Q> {
+    fn default() -> Self {
+        Self { all: Arc::default(), clean_at: 0 }
     }
 }
 
 /// The subscribers at one time.
 pub(super) struct Listeners {
-    pub(super) queues: Queues,
-    pub(super) taps: Taps,
+    pub(super) queues: Taken<dyn AnyQueue>,
+    pub(super) taps: Taken<Queue<DynamicMessage>>,
 }
 
 /// A topic without its payload.
@@ -43,73 +77,70 @@ pub(super) struct Hub {
     lost: AtomicU64,
     /// The number of subscribers: read before the lock, so that publishing to nobody costs next to nothing.
     pub(super) listening: AtomicUsize,
-    subscribers: Arc<Mutex<Subscribers>>,
+    subscribers: Mutex<Subscribers>,
     /// Held while a message is written to a journal and enqueued, so that both have the same order.
     pub(super) order: Mutex<()>,
 }
 
 impl Hub {
     pub(super) fn new(path: &'static str) -> Self {
-        let subscribers = Subscribers { queues: Arc::new([]), taps: Arc::new([]), closed: false };
+        let subscribers = Subscribers { queues: List::default(), taps: List::default(), closed: false };
         Self {
             path,
             published: AtomicU64::new(0),
             lost: AtomicU64::new(0),
             listening: AtomicUsize::new(0),
-            subscribers: Arc::new(Mutex::new(subscribers)),
+            subscribers: Mutex::new(subscribers),
             order: Mutex::default(),
         }
     }
 
-    /// Adds a subscriber; closes its queue if no more messages will come. Gives the list that it is on.
-    pub(super) fn add(&self, queue: Arc<dyn AnyQueue>) -> Weak<Mutex<Subscribers>> {
-        let mut subscribers = lock(&self.subscribers);
+    /// Adds a subscriber; closes its queue if no more messages will come.
+    pub(super) fn add(&self, queue: Arc<dyn AnyQueue>) {
+        let mut subscribers = self.lock();
         if subscribers.closed {
             drop(subscribers);
             // Nobody waits for it yet.
             drop(queue.close());
         } else {
-            subscribers.queues = subscribers.queues.iter().cloned().chain([queue]).collect();
+            subscribers.queues.add(queue);
             self.listening.store(subscribers.count(), Ordering::Release);
         }
-        Arc::downgrade(&self.subscribers)
     }
 
     pub(super) fn tap(&self, tap: &Tap) {
-        let mut subscribers = lock(&self.subscribers);
+        let mut subscribers = self.lock();
         if !subscribers.closed {
-            // Dropped ones are also removed here: nothing may ever be published at this topic.
-            subscribers.taps = live(&subscribers.taps).chain([&tap.0]).map(Arc::clone).collect();
+            subscribers.taps.add(Arc::clone(&tap.0));
             self.listening.store(subscribers.count(), Ordering::Release);
         }
     }
 
     /// The tasks to wake.
     pub(super) fn close(&self) -> Vec<Waker> {
-        let mut subscribers = lock(&self.subscribers);
+        let mut subscribers = self.lock();
         subscribers.closed = true;
-        subscribers.taps = Arc::new([]);
-        let queues = std::mem::replace(&mut subscribers.queues, Arc::new([]));
+        subscribers.taps = List::default();
+        let queues = std::mem::take(&mut subscribers.queues);
         self.listening.store(0, Ordering::Release);
         drop(subscribers);
-        queues.iter().filter_map(|queue| queue.close()).collect()
+        queues.all.iter().filter_map(|queue| queue.close()).collect()
     }
 
     /// The current subscribers.
     pub(super) fn listeners(&self) -> Listeners {
-        let mut subscribers = lock(&self.subscribers);
-        if subscribers.taps.iter().any(|tap| tap.is_abandoned()) {
-            subscribers.taps = live(&subscribers.taps).map(Arc::clone).collect();
-        }
-        // Dropped subscriptions have removed themselves from the list; the count is updated here.
+        let mut subscribers = self.lock();
+        subscribers.queues.clean();
+        subscribers.taps.clean();
         self.listening.store(subscribers.count(), Ordering::Release);
-        Listeners { queues: Arc::clone(&subscribers.queues), taps: Arc::clone(&subscribers.taps) }
+        Listeners { queues: Arc::clone(&subscribers.queues.all), taps: Arc::clone(&subscribers.taps.all) }
     }
 
     /// Whether these are still all of them.
     pub(super) fn has_still(&self, listeners: &Listeners) -> bool {
-        let subscribers = lock(&self.subscribers);
-        Arc::ptr_eq(&listeners.queues, &subscribers.queues) && Arc::ptr_eq(&listeners.taps, &subscribers.taps)
+        let subscribers = self.lock();
+        Arc::ptr_eq(&listeners.queues, &subscribers.queues.all)
+            && Arc::ptr_eq(&listeners.taps, &subscribers.taps.all)
     }
 
     pub(super) fn count_lost(&self, lost: u64) {
@@ -119,11 +150,9 @@ impl Hub {
     }
 
     pub(super) fn subscribers(&self) -> Vec<SubscriberStatistics> {
-        let subscribers = lock(&self.subscribers);
-        let typed = subscribers.queues.iter().map(|queue| queue.statistics());
-        let untyped =
-            live(&subscribers.taps).map(|tap| SubscriberStatistics { is_typed: false, ..tap.statistics() });
-        typed.chain(untyped).collect()
+        let subscribers = self.lock();
+        let untyped = subscribers.taps.statistics().map(|tap| SubscriberStatistics { is_typed: false, ..tap });
+        subscribers.queues.statistics().chain(untyped).collect()
     }
 
     pub(super) fn statistics(&self, payload: &'static str) -> TopicStatistics {
@@ -135,22 +164,8 @@ impl Hub {
             subscribers: self.subscribers().len(),
         }
     }
-}
 
-/// The queues whose readers are not gone.
-fn live(taps: &Taps) -> impl Iterator<Item = &Arc<Queue<DynamicMessage>>> {
-    taps.iter().filter(|tap| !tap.is_abandoned())
-}
-
-/// Removes the queue at that address from the list of its topic, if the topic still exists.
-pub(super) fn leave(topic: &Weak<Mutex<Subscribers>>, queue: *const ()) {
-    if let Some(subscribers) = topic.upgrade() {
-        let mut subscribers = lock(&subscribers);
-        let others = subscribers.queues.iter().filter(|other| Arc::as_ptr(other).cast() != queue).cloned();
-        subscribers.queues = others.collect();
+    fn lock(&self) -> MutexGuard<'_, Subscribers> {
+        self.subscribers.lock().unwrap_or_else(PoisonError::into_inner)
     }
-}
-
-fn lock(subscribers: &Mutex<Subscribers>) -> MutexGuard<'_, Subscribers> {
-    subscribers.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,12 +1,11 @@
 //! The subscriber's end.
 
 use super::queue::Queue;
-use super::subscribers::{Subscribers, leave};
 use crate::message::Stamped;
 use std::fmt;
 use std::future::Future;
 use std::pin::Pin;
-use std::sync::{Arc, Mutex, Weak};
+use std::sync::Arc;
 use std::task::{Context, Poll};
 use std::time::Duration;
 
@@ -14,12 +13,11 @@ use std::time::Duration;
 pub struct Subscription<T> {
     path: &'static str,
     queue: Arc<Queue<Stamped<T>>>,
-    topic: Weak<Mutex<Subscribers>>,
 }
 
 impl<T> Subscription<T> {
-    pub(super) fn new(path: &'static str, queue: Arc<Queue<Stamped<T>>>, topic: Weak<Mutex<Subscribers>>) -> Self {
-        Self { path, queue, topic }
+    pub(super) fn new(path: &'static str, queue: Arc<Queue<Stamped<T>>>) -> Self {
+        Self { path, queue }
     }
 
     /// The path of the publisher.
@@ -61,8 +59,7 @@ impl<T> Subscription<T> {
 
 impl<T> Drop for Subscription<T> {
     fn drop(&mut self) {
-        leave(&self.topic, Arc::as_ptr(&self.queue).cast());
-        // A publisher may still hold the list with this queue.
+        // Its topic releases it at its next message.
         self.queue.abandon();
     }
 }

@@ -29,8 +29,8 @@ impl<T: Payload> Topic<T> {
     /// Subscribes from now on, until the subscription is dropped.
     pub fn subscribe(&self, overflow: Overflow) -> Subscription<T> {
         let queue = Arc::new(Queue::new(overflow));
-        let topic = self.hub.add(Arc::clone(&queue) as Arc<dyn AnyQueue>);
-        Subscription::new(self.hub.path, queue, topic)
+        self.hub.add(Arc::clone(&queue) as Arc<dyn AnyQueue>);
+        Subscription::new(self.hub.path, queue)
     }
 
     /// Hands a clone of `message` to every subscriber. If the payload's `Clone` panics, those that come after do not get it.
