@@ -33,7 +33,7 @@ pub use command::{CommandStatistics, Prepared};
 pub(crate) use commands::Hanging;
 pub use execution::{CommandError, Execution};
 pub use faults::ReportedFault;
-pub(crate) use system::SystemTopics;
+pub(crate) use system::{ActuatorTopics, SystemTopics};
 
 use crate::component::{Caller, Host};
 use crate::declaration::{ParameterValues, RobotDeclaration, Supervisor};

@@ -56,7 +56,7 @@ pub(crate) fn robot(verified: &Verified<'_>) -> TokenStream {
     let aliases = types::aliases(&types);
     let checks = checks::checks(verified, &types);
     let islands = islands::Islands::of(verified);
-    let declarations = declarations::declarations(verified, &islands);
+    let declarations = declarations::declarations(verified, &types, &islands);
     let options = options::options(&types);
     let wiring = wiring::wiring(verified, &types, &islands);
     let implementation = robot_impl::robot_impl(verified, &types);

@@ -79,7 +79,7 @@ fn what_comes_after_the_end_is_neither_published_nor_counted() {
     within(120, || {
         let mut round = 0;
         while round < 8 {
-            let run = same_again(Ending::builder, |builder, _| {
+            let run = same_again(Ending::builder, |builder| {
                 let running = builder.start()?;
                 let live = running.live();
                 let callers: Vec<_> = (0..3)

@@ -214,7 +214,7 @@ fn each_message_is_in_one_run_or_was_lost_with_a_failure() -> Result<(), Failure
             builder.supervision().max_restarts = 1_000_000;
             builder
         };
-        same_again(builder, |builder, _| {
+        same_again(builder, |builder| {
             let seen = [
                 builder.subscribe_with(witnessed::estimator::base::here, overflow()),
                 builder.subscribe_with(witnessed::estimator::base::apart, overflow()),

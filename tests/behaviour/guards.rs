@@ -82,7 +82,7 @@ fn alone() -> MutexGuard<'static, ()> {
 /// Runs it as `script` has it, and again from its journal, which gives the same and moves nothing.
 fn again(script: impl FnOnce(&mut Simulation<Hoist>) -> Result<(), Failure>) -> Result<(), Failure> {
     let _alone = alone();
-    same_again(Hoist::builder, |builder, _| {
+    same_again(Hoist::builder, |builder| {
         let mut simulation = builder.simulate()?;
         script(&mut simulation)?;
         let report = simulation.stop();

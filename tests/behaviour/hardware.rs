@@ -137,7 +137,7 @@ fn a_callback_that_does_something_and_fails_does_so_in_a_replay() -> Result<(), 
     for (arms, stops) in [(true, false), (true, true), (false, true)] {
         let _alone = alone();
         FAILS.store(true, Ordering::SeqCst);
-        let (_, report) = same_again(Guarded::builder, |builder, _| {
+        let (_, report) = same_again(Guarded::builder, |builder| {
             let mut simulation = builder.simulate()?;
             if arms {
                 assert_eq!(simulation.arm(), Ok(()));

@@ -83,7 +83,7 @@ fn cascade(max_restarts: u32) -> impl Fn() -> Builder<Cascade> {
 
 #[test]
 fn an_estimator_that_is_given_up_as_its_command_starts() -> Result<(), Failure> {
-    let (heard, report) = same_again(cascade(0), |builder, _| {
+    let (heard, report) = same_again(cascade(0), |builder| {
         let mut simulation = builder.simulate()?;
         simulation.arm()?;
         simulation.publish(cascade::sensor::base::shoulder::arm::number, at(10), Number(PANICS));
@@ -97,7 +97,7 @@ fn an_estimator_that_is_given_up_as_its_command_starts() -> Result<(), Failure> 
 
 #[test]
 fn changes_of_health_at_one_instant_start_their_commands_in_order() -> Result<(), Failure> {
-    let (heard, report) = same_again(cascade(3), |builder, _| {
+    let (heard, report) = same_again(cascade(3), |builder| {
         let mut simulation = builder.simulate()?;
         simulation.arm()?;
         simulation.run_until(at(10));
@@ -118,7 +118,7 @@ fn changes_of_health_at_one_instant_start_their_commands_in_order() -> Result<()
 
 #[test]
 fn a_panic_downstream_that_restarts_what_is_upstream_in_the_middle_of_its_work() -> Result<(), Failure> {
-    let (_, report) = same_again(cascade(1), |builder, _| {
+    let (_, report) = same_again(cascade(1), |builder| {
         let mut simulation = builder.simulate()?;
         for (round, number) in [3.0, 1.0, 3.0, 1.0, 2.0, 3.0, 4.0].into_iter().enumerate() {
             let time = at(50 * (round as i64 + 1));
@@ -133,7 +133,7 @@ fn a_panic_downstream_that_restarts_what_is_upstream_in_the_middle_of_its_work()
 
 #[test]
 fn messages_that_wait_for_a_worker_as_the_robot_stops() -> Result<(), Failure> {
-    let (_, report) = same_again(cascade(3), |builder, _| {
+    let (_, report) = same_again(cascade(3), |builder| {
         let running = builder.start()?;
         for number in 0..200 {
             let number = Number(10.0 + f64::from(number));
@@ -149,7 +149,7 @@ fn messages_that_wait_for_a_worker_as_the_robot_stops() -> Result<(), Failure> {
 #[test]
 fn one_of_several_callbacks_of_a_message_that_overruns() -> Result<(), Failure> {
     let overrunning = ["sensor/base/number/first", "estimator/base/late"];
-    let (heard, _) = same_again(Budgeted::builder, |builder, _| {
+    let (heard, _) = same_again(Budgeted::builder, |builder| {
         let running = builder.start()?;
         let overrun_twice = |path: &&str| running.report().estimator(path).is_some_and(|now| now.transitions >= 4);
         let mut round = 0;

@@ -1,5 +1,7 @@
 //! Subscriptions to typed handles.
 
+mod same;
+
 use crate::components::{Counter, Number, Scale};
 use bb_core::prelude::*;
 use bb_core::{DynamicSubscription, Unmatched};

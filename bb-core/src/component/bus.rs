@@ -76,7 +76,7 @@ impl Bus {
         self.check(Right::Read)?;
         let subscribed = self.with_topics(|topics| {
             let Some(topic) = topics.iter().find(|topic| topic.path() == path) else {
-                return Err(unmatched_at(path, topics, self.host.registry().declared()).into());
+                return Err(unmatched_at(path, topics).into());
             };
             let typed = topic.as_any().downcast_ref::<Topic<T>>().ok_or_else(|| {
                 Fault::new(format!("`{path}` publishes `{}`, not `{}`", topic.payload_name(), T::NAME))

@@ -10,20 +10,22 @@ use super::{
     WeakControl,
 };
 use crate::component::{Caller, CommandInfo, Controls, DynamicExecution, Host};
-use crate::declaration::{CommandDeclaration, ParameterError, RobotDeclaration, Supervisor};
+use crate::declaration::{ActuatorDeclaration, CommandDeclaration, ParameterError, RobotDeclaration, Supervisor};
 use crate::event::{
     ArmError, CommandEvent, ComponentFault, DisarmError, HealthTransition, ParameterChange, ParameterValue, Safety,
     SafetyError, SafetyTransition, StateTransition,
 };
 use crate::fault::Fault;
 use crate::journal::JournalLine;
-use crate::message::Origin;
+use crate::message::{Origin, Payload};
 use crate::node::Mode;
+use crate::payload::{BeginMotion, EndMotion};
 use crate::pubsub::{AnyTopic, Registry, Topic};
 use crate::schedule::{Bell, Deadlines, Pool, Reserve, Sleeper, StopSignal};
 use crate::time::Clock;
 #[cfg(loom)]
 use loom::sync::{Condvar, atomic::AtomicU8};
+use std::any::Any;
 use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError, Weak};
@@ -300,7 +302,7 @@ impl fmt::Debug for Control {
     }
 }
 
-/// The topics that every robot has.
+/// The topics that every robot has, and those of its commands, parameters and actuators.
 #[derive(Debug)]
 pub struct SystemTopics {
     pub(crate) state: Topic<StateTransition>,
@@ -311,8 +313,37 @@ pub struct SystemTopics {
     pub(crate) journal: Topic<JournalLine>,
     pub(crate) commands: Box<[Topic<CommandEvent>]>,
     pub(crate) parameters: Box<[Topic<ParameterChange>]>,
+    pub(crate) actuators: Box<[ActuatorTopics]>,
     /// Topics created at run time.
     pub(crate) registry: Registry,
+}
+
+/// The topics of one actuator.
+pub(crate) struct ActuatorTopics {
+    commands: Arc<dyn AnyTopic>,
+    pub(crate) begin_motion: Topic<BeginMotion>,
+    pub(crate) end_motion: Topic<EndMotion>,
+}
+
+impl ActuatorTopics {
+    fn new(declared: &ActuatorDeclaration) -> Self {
+        let [begin_motion, end_motion] = declared.motions;
+        Self {
+            commands: (declared.new_topic)(declared.path),
+            begin_motion: Topic::new(begin_motion),
+            end_motion: Topic::new(end_motion),
+        }
+    }
+
+    fn all(&self) -> [&dyn AnyTopic; 3] {
+        [&*self.commands, &self.begin_motion, &self.end_motion]
+    }
+}
+
+impl fmt::Debug for ActuatorTopics {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("ActuatorTopics").field(&self.commands.path()).finish()
+    }
 }
 
 impl SystemTopics {
@@ -326,6 +357,7 @@ impl SystemTopics {
             journal: Topic::new("journal"),
             commands: declared.commands.iter().map(|command| Topic::new(command.path)).collect(),
             parameters: declared.parameters.iter().map(|parameter| Topic::new(parameter.path)).collect(),
+            actuators: declared.actuators.iter().map(ActuatorTopics::new).collect(),
             registry: Registry::default(),
         }
     }
@@ -335,6 +367,13 @@ impl SystemTopics {
             [&self.state, &self.safety, &self.safety_error, &self.health, &self.fault, &self.journal];
         let commands = self.commands.iter().map(|topic| topic as &dyn AnyTopic);
         let parameters = self.parameters.iter().map(|topic| topic as &dyn AnyTopic);
-        fixed.into_iter().chain(commands).chain(parameters).collect()
+        let actuators = self.actuators.iter().flat_map(ActuatorTopics::all);
+        actuators.chain(fixed).chain(commands).chain(parameters).collect()
+    }
+
+    /// The topic of the commands of the actuator with that number, if they are of type `T`.
+    pub(crate) fn of_commands<T: Payload>(&self, number: usize) -> Option<Arc<Topic<T>>> {
+        let topic: Arc<dyn Any + Send + Sync> = Arc::clone(&self.actuators.get(number)?.commands) as _;
+        topic.downcast().ok()
     }
 }

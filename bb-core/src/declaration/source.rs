@@ -1,7 +1,9 @@
 //! Sensors, services and actuators as declared.
 
 use crate::message::Frame;
+use crate::pubsub::AnyTopic;
 use crate::topology::Transform;
+use std::sync::Arc;
 
 /// The number of a supervisor: 0 for the robot, then the links, then the joints, in the order of the topology.
 pub type Supervisor = usize;
@@ -28,6 +30,11 @@ pub struct ActuatorDeclaration {
     pub path: &'static str,
     /// The joint that it moves, which is the frame of its commands.
     pub joint: &'static str,
+    /// The paths of its reports that a motion begins, and that it ends.
+    pub motions: [&'static str; 2],
     /// The number of its supervisor.
     pub supervisor: Supervisor,
+    /// Makes the topic of its commands at a path.
+    #[doc(hidden)]
+    pub new_topic: fn(&'static str) -> Arc<dyn AnyTopic>,
 }

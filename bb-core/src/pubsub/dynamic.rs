@@ -31,15 +31,14 @@ impl DynamicSubscription {
         overflow: Overflow,
     ) -> Self {
         let topics: Vec<_> = topics.into_iter().collect();
-        let subscription = Self::among(&topics, &[], select, &payloads.into(), overflow);
+        let subscription = Self::among(&topics, select, &payloads.into(), overflow);
         subscription.warn();
         subscription
     }
 
-    /// The same without a warning for the paths in `declared`, which have a publisher while the robot runs.
+    /// The same without the log.
     pub(super) fn among(
         topics: &[&dyn AnyTopic],
-        declared: &[&'static str],
         select: Select<'_>,
         payloads: &Payloads<'_>,
         overflow: Overflow,
@@ -54,7 +53,7 @@ impl DynamicSubscription {
                 schemas.push(topic.schemas());
             }
         }
-        let unmatched = unmatched(topics, declared, select, payloads);
+        let unmatched = unmatched(topics, select, payloads);
         Self { queue, paths, schemas, unmatched }
     }
 

@@ -21,7 +21,7 @@ use std::task::Waker;
 /// It is bounded: at most [`MAX_TOPICS`](Self::MAX_TOPICS) topics, and only live subscriptions.
 #[derive(Default)]
 pub(crate) struct Registry {
-    /// The paths of all other topics of the robot.
+    /// The paths of all other topics of the robot, which exist from its builder on.
     declared: Box<[&'static str]>,
     state: Mutex<State>,
 }
@@ -80,11 +80,6 @@ impl Registry {
         Self { declared: declared.into_iter().collect(), state: Mutex::default() }
     }
 
-    /// The paths that the robot declares.
-    pub(crate) fn declared(&self) -> &[&'static str] {
-        &self.declared
-    }
-
     /// Subscribes to the selected ones of `topics`, of the topics created here, and of those created later.
     pub(crate) fn subscribe(
         &self,
@@ -97,7 +92,7 @@ impl Registry {
         let topics: Vec<&dyn AnyTopic> =
             topics.iter().copied().chain(state.topics.iter().map(|(_, made)| &*made.topic)).collect();
         // Under the lock, so that a topic created meanwhile is subscribed to once.
-        let subscription = DynamicSubscription::among(&topics, &self.declared, select, payloads, overflow);
+        let subscription = DynamicSubscription::among(&topics, select, payloads, overflow);
         if !state.is_closed {
             state.selections.add(Selection::new(select, payloads, subscription.tap()));
         }
@@ -172,11 +167,6 @@ impl Registry {
         drop(state);
         drop(evicted);
         Ok(topic)
-    }
-
-    /// Whether there is a topic at `path` that has not made room for others.
-    pub(crate) fn has(&self, path: &str) -> bool {
-        self.lock().topics.get(path).is_some_and(|made| !made.is_gone)
     }
 
     /// In a replay: somebody could publish at `path` from now on; no more if the name of the payload is empty.
@@ -379,7 +369,7 @@ impl OwnedSelect {
             Self::All => Select::All.includes(path),
             Self::Path(selected) => Select::Path(selected).includes(path),
             Self::Below(above) => Select::Below(above).includes(path),
-            Self::AnyOf(several) => several.iter().any(|select| select.includes(path)),
+            Self::AnyOf(several) => several.is_empty() || several.iter().any(|select| select.includes(path)),
         }
     }
 }

@@ -1,15 +1,23 @@
 //! The selection of an untyped subscription: paths and payloads.
 
-/// Which paths to subscribe to.
+/// Which paths to subscribe to. In a path, `*` stands for any one name; an empty list selects everything, as in [`Payloads`].
+///
+/// ```
+/// use bb_core::Select;
+///
+/// let encoders = Select::Path("sensor/*/encoder");
+/// assert!(encoders.includes("sensor/wrist/encoder") && !encoders.includes("sensor/arm/wrist/encoder"));
+/// assert!(Select::Below("sensor/*/camera").includes("sensor/mast/camera/features"));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Select<'a> {
     /// All of them.
     All,
     /// One.
     Path(&'a str),
-    /// One, and everything below it: `sensor/base_link`.
+    /// One, and everything below it: `sensor/base_link`. Everything is below the empty path.
     Below(&'a str),
-    /// The union of these.
+    /// The union of these; everything if there are none.
     AnyOf(&'a [Select<'a>]),
 }
 
@@ -18,16 +26,26 @@ impl Select<'_> {
     pub fn includes(self, path: &str) -> bool {
         match self {
             Self::All => true,
-            Self::Path(selected) => path == selected,
-            Self::Below(above) => {
-                path.strip_prefix(above).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
-            }
-            Self::AnyOf(several) => several.iter().any(|select| select.includes(path)),
+            Self::Path(pattern) => names_below(pattern, path) == Some(0),
+            Self::Below(above) => above.is_empty() || names_below(above, path).is_some(),
+            Self::AnyOf(several) => several.is_empty() || several.iter().any(|select| select.includes(path)),
         }
     }
 }
 
-/// Which payloads to subscribe to, by the names of their types. `None` converts to all of them; a name, `Some` of a
+/// How many names `path` has below `pattern`, if it is there.
+fn names_below(pattern: &str, path: &str) -> Option<usize> {
+    let mut names = path.split('/');
+    for wanted in pattern.split('/') {
+        names.next().filter(|name| wanted == ANY_NAME || wanted == *name)?;
+    }
+    Some(names.count())
+}
+
+/// In a pattern: any one name.
+pub(super) const ANY_NAME: &str = "*";
+
+/// Which payloads to subscribe to, by the names of their types. `None` and an empty list convert to all of them; a name, `Some` of a
 /// name, an array or a slice of names to only these.
 ///
 /// ```
@@ -69,19 +87,19 @@ impl<'a> From<Option<&'a str>> for Payloads<'a> {
 
 impl<'a> From<&[&'a str]> for Payloads<'a> {
     fn from(names: &[&'a str]) -> Self {
-        Self(Some(names.to_vec()))
+        Self((!names.is_empty()).then(|| names.to_vec()))
     }
 }
 
 impl<'a, const N: usize> From<&[&'a str; N]> for Payloads<'a> {
     fn from(names: &[&'a str; N]) -> Self {
-        Self(Some(names.to_vec()))
+        Self::from(names.as_slice())
     }
 }
 
 impl<'a, const N: usize> From<[&'a str; N]> for Payloads<'a> {
     fn from(names: [&'a str; N]) -> Self {
-        Self(Some(names.to_vec()))
+        Self::from(names.as_slice())
     }
 }
 
@@ -101,7 +119,32 @@ mod tests {
     fn several_are_selected_at_once() {
         let several = Select::AnyOf(&[Select::Path("health"), Select::Below("command")]);
         assert!(several.includes("health") && several.includes("command/stop"));
-        assert!(!several.includes("sensor/base/imu") && !Select::AnyOf(&[]).includes("health"));
+        assert!(!several.includes("sensor/base/imu"));
+    }
+
+    #[test]
+    fn an_empty_list_is_no_filter() {
+        for everything in [Select::AnyOf(&[]), Select::AnyOf(&[Select::AnyOf(&[])]), Select::Below("")] {
+            assert!(everything.includes("health") && everything.includes("sensor/base/imu"), "{everything:?}");
+        }
+        assert!(!Select::Path("").includes("health"));
+    }
+
+    #[test]
+    fn a_star_stands_for_one_whole_name() {
+        let includes = |select: Select<'_>| {
+            ["sensor/arm/encoder", "sensor/arm/hand/encoder", "sensor/arm", "sensor/arm/encoder/raw"]
+                .map(|path| select.includes(path))
+        };
+        assert_eq!(includes(Select::Path("sensor/*/encoder")), [true, false, false, false]);
+        assert_eq!(includes(Select::Path("*/*/*")), [true, false, false, false]);
+        assert_eq!(includes(Select::Path("sensor/*")), [false, false, true, false]);
+        assert_eq!(includes(Select::Below("*/arm/encoder")), [true, false, false, true]);
+        assert_eq!(includes(Select::Below("sensor/*")), [true; 4]);
+        for other in ["sensor/**", "sensor/a*/encoder", "sensor/*encoder", "**"] {
+            assert_eq!(includes(Select::Path(other)), [false; 4], "{other}");
+            assert_eq!(includes(Select::Below(other)), [false; 4], "{other}");
+        }
     }
 
     #[test]
@@ -114,7 +157,8 @@ mod tests {
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         let array = &["Imu"];
         assert_eq!(includes(None), [true, true]);
-        assert_eq!(includes([]), [false, false]);
+        assert_eq!(includes([]), [true, true]);
+        assert_eq!(includes(&[] as &[&str]), [true, true]);
         assert_eq!(includes(["Imu", "Pose"]), [true, true]);
         for one in [includes("Imu"), includes(Some("Imu")), includes(["Imu"]), includes(array), includes(&*names)] {
             assert_eq!(one, [true, false]);

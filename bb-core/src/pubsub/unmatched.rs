@@ -1,7 +1,7 @@
 //! Parts of a subscription that match no publisher.
 
 use super::any::AnyTopic;
-use super::select::{Payloads, Select};
+use super::select::{ANY_NAME, Payloads, Select};
 use crate::message::nearest::{nearest, nearest_path};
 use crate::sorted::Sorted;
 use std::fmt;
@@ -20,9 +20,9 @@ enum Part {
     Path,
     /// Nothing publishes there, but something does below it.
     PathAbove,
-    /// The robot declares it, but does not run.
-    Declared,
     Subtree,
+    /// It has a `*` that is no whole name.
+    Pattern,
     Payload,
 }
 
@@ -48,8 +48,12 @@ impl fmt::Display for Unmatched {
         match self.part {
             Part::Path => write!(f, "nothing publishes at `{name}`"),
             Part::PathAbove => write!(f, "nothing publishes at `{name}` itself, only below it"),
-            Part::Declared => write!(f, "nothing publishes at `{name}` now; subscribe while the robot runs"),
             Part::Subtree => write!(f, "nothing publishes at or below `{name}`"),
+            Part::Pattern => write!(
+                f,
+                "nothing publishes at `{name}`: a `*` stands for one whole name between `/`; `Select::Below` selects all \
+                 below a path"
+            ),
             Part::Payload => write!(f, "nothing that is selected publishes `{name}`"),
         }?;
         match &self.nearest {
@@ -62,27 +66,38 @@ impl fmt::Display for Unmatched {
 impl std::error::Error for Unmatched {}
 
 /// Why nothing can be subscribed to at `path`.
-pub(crate) fn unmatched_at(path: &str, topics: &[&dyn AnyTopic], declared: &[&'static str]) -> Unmatched {
-    if declared.contains(&path) {
-        return Unmatched::new(Part::Declared, path, None);
+pub(crate) fn unmatched_at(path: &str, topics: &[&dyn AnyTopic]) -> Unmatched {
+    if has_odd_star(path) {
+        return Unmatched::new(Part::Pattern, path, None);
     }
     if !path.is_empty() && topics.iter().any(|topic| Select::Below(path).includes(topic.path())) {
         return Unmatched::new(Part::PathAbove, path, None);
     }
-    let near = nearest_path(path, topics.iter().map(|topic| topic.path()));
-    Unmatched::new(Part::Path, path, near)
+    let near = nearest_pattern(path, topics.iter().map(|topic| topic.path()));
+    Unmatched::new(Part::Path, path, near.as_deref())
 }
 
-/// The parts of a subscription to `topics` that match none of them. The paths in `declared` have a publisher while
-/// the robot runs.
-pub(super) fn unmatched(
-    topics: &[&dyn AnyTopic],
-    declared: &[&'static str],
-    select: Select<'_>,
-    payloads: &Payloads<'_>,
-) -> Vec<Unmatched> {
+fn has_odd_star(path: &str) -> bool {
+    path.split('/').any(|name| name.contains(ANY_NAME) && name != ANY_NAME)
+}
+
+/// The known path nearest to `path`, with the same names left open.
+fn nearest_pattern<'a>(path: &str, known: impl Iterator<Item = &'a str>) -> Option<String> {
+    let known: Vec<String> = known.map(|known| opened(known, path)).collect();
+    nearest_path(path, known.iter().map(String::as_str)).map(str::to_owned)
+}
+
+/// `path` with a `*` where `pattern` has one.
+fn opened(path: &str, pattern: &str) -> String {
+    let mut wanted = pattern.split('/');
+    let open = |name| if wanted.next() == Some(ANY_NAME) { ANY_NAME } else { name };
+    path.split('/').map(open).collect::<Vec<_>>().join("/")
+}
+
+/// The parts of a subscription to `topics` that match none of them.
+pub(super) fn unmatched(topics: &[&dyn AnyTopic], select: Select<'_>, payloads: &Payloads<'_>) -> Vec<Unmatched> {
     let mut all = Vec::new();
-    add_paths(topics, declared, select, &mut all);
+    add_paths(topics, select, &mut all);
     let selected = || topics.iter().filter(|topic| select.includes(topic.path()));
     // If no path matches, a payload is at fault only if nothing at all publishes it.
     let is_any_selected = selected().next().is_some();
@@ -97,25 +112,23 @@ pub(super) fn unmatched(
     all
 }
 
-fn add_paths(topics: &[&dyn AnyTopic], declared: &[&'static str], select: Select<'_>, all: &mut Vec<Unmatched>) {
+fn add_paths(topics: &[&dyn AnyTopic], select: Select<'_>, all: &mut Vec<Unmatched>) {
     if topics.iter().any(|topic| select.includes(topic.path())) && !matches!(select, Select::AnyOf(_)) {
         return;
     }
     match select {
         Select::All => {}
-        Select::Path(path) => all.push(unmatched_at(path, topics, declared)),
-        Select::Below(above) if declared.iter().any(|path| select.includes(path)) => {
-            all.push(Unmatched::new(Part::Declared, above, None));
-        }
+        Select::Path(path) => all.push(unmatched_at(path, topics)),
+        Select::Below(above) if has_odd_star(above) => all.push(Unmatched::new(Part::Pattern, above, None)),
         Select::Below(above) => {
             let mut known = Sorted::default();
             for path in topics.iter().flat_map(|topic| with_all_above(topic.path())) {
                 known.insert(path, ());
             }
-            let near = nearest_path(above, known.iter().map(|(path, ())| *path));
-            all.push(Unmatched::new(Part::Subtree, above, near));
+            let near = nearest_pattern(above, known.iter().map(|(path, ())| *path));
+            all.push(Unmatched::new(Part::Subtree, above, near.as_deref()));
         }
-        Select::AnyOf(several) => several.iter().for_each(|one| add_paths(topics, declared, *one, all)),
+        Select::AnyOf(several) => several.iter().for_each(|one| add_paths(topics, *one, all)),
     }
 }
 
@@ -140,7 +153,7 @@ mod tests {
         let encoder = Topic::<JointState>::new("sensor/arm/encoder");
         let tilt = Topic::<Orientation>::new("estimator/base/tilt");
         let topics: [&dyn AnyTopic; 3] = [&imu, &encoder, &tilt];
-        let unmatched = unmatched(&topics, &["actuator/base/wheel"], select, &payloads);
+        let unmatched = unmatched(&topics, select, &payloads);
         unmatched.iter().map(Unmatched::to_string).collect()
     }
 
@@ -149,7 +162,33 @@ mod tests {
         for select in [Select::All, Select::Path("sensor/base/imu"), Select::Below("sensor/base")] {
             assert_eq!(told(select, Payloads::from(["Imu"])), [""; 0]);
         }
-        assert_eq!(told(Select::AnyOf(&[]), Payloads::ALL), [""; 0]);
+        for select in
+            [Select::AnyOf(&[]), Select::Path("sensor/*/encoder"), Select::Below("*/base"), Select::Below("")]
+        {
+            assert_eq!(told(select, Payloads::ALL), [""; 0]);
+        }
+    }
+
+    #[test]
+    fn a_pattern_names_the_nearest_pattern() {
+        let path = |path| told(Select::Path(path), Payloads::ALL);
+        assert_eq!(
+            path("sensor/*/encodr"),
+            ["nothing publishes at `sensor/*/encodr`; did you mean `sensor/*/encoder`?"]
+        );
+        assert_eq!(path("sensor/*"), ["nothing publishes at `sensor/*` itself, only below it"]);
+        assert_eq!(path("*"), ["nothing publishes at `*` itself, only below it"]);
+        assert_eq!(
+            told(Select::Below("senser/*"), Payloads::ALL),
+            ["nothing publishes at or below `senser/*`; did you mean `sensor/*`?"]
+        );
+        for odd in ["sensor/**", "sensor/*/enc*"] {
+            let expected = format!(
+                "nothing publishes at `{odd}`: a `*` stands for one whole name between `/`; `Select::Below` selects all below a \
+                 path"
+            );
+            assert_eq!([told(Select::Below(odd), Payloads::ALL), path(odd)].concat(), [&*expected; 2]);
+        }
     }
 
     #[test]
@@ -162,8 +201,6 @@ mod tests {
         assert_eq!(path("gnss"), ["nothing publishes at `gnss`"]);
         assert_eq!(path(""), ["nothing publishes at ``"]);
         assert_eq!(path("sensor/base"), ["nothing publishes at `sensor/base` itself, only below it"]);
-        let wheel = "nothing publishes at `actuator/base/wheel` now; subscribe while the robot runs";
-        assert_eq!(path("actuator/base/wheel"), [wheel]);
 
         let below = |path| told(Select::Below(path), Payloads::ALL);
         assert_eq!(below("sensro"), ["nothing publishes at or below `sensro`; did you mean `sensor`?"]);
@@ -171,7 +208,6 @@ mod tests {
             below("sensor/bsae"),
             ["nothing publishes at or below `sensor/bsae`; did you mean `sensor/base`?"]
         );
-        assert_eq!(below("actuator"), ["nothing publishes at `actuator` now; subscribe while the robot runs"]);
     }
 
     #[test]

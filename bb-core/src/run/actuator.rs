@@ -12,7 +12,7 @@ pub use self::any::AnyActuator;
 use self::held::{Guarded, Held};
 pub use self::limits::ActuatorStatistics;
 use self::limits::Counts;
-use self::reports::Reports;
+use self::reports::publish_reports;
 use self::telling::Told;
 use self::updating::Due;
 use super::occupied::Occupied;
@@ -21,11 +21,10 @@ use crate::component::{Accepts, Actuator, ActuatorContext, ActuatorError, Bindin
 use crate::control::{ComponentOrder, Control};
 use crate::declaration::ActuatorDeclaration;
 use crate::fault::{Failed, Fault, caught};
-use crate::lifecycle::{AfterFault, AsActuator, HostHandle, Recipe, Slot};
-use crate::message::Payload;
+use crate::lifecycle::{AfterFault, AsActuator, Recipe, Slot};
 use crate::node::{BindTarget, Environment, Mode};
 use crate::payload::MotionEnd;
-use crate::pubsub::{Topic, Wakers};
+use crate::pubsub::{AnyTopic, Topic, Wakers};
 use crate::schedule::Lane;
 use crate::time::MonotonicTime;
 use std::fmt;
@@ -42,14 +41,13 @@ struct Inner<A: Actuator> {
     context: ActuatorContext,
     environment: Environment,
     control: Control,
-    topic: Topic<A::Command>,
+    /// Of its commands; it is one of the robot's topics.
+    topic: Arc<Topic<A::Command>>,
     /// Orders from its supervisor and parameter changes.
     orders: Mutex<Vec<Order>>,
     /// The time at which its code was entered.
     occupied: Occupied,
     counts: Counts,
-    reports: Reports,
-    host: HostHandle,
     /// Held while its code runs. Anything that must not wait for user code must not take this lock.
     state: Guarded<State<A>>,
 }
@@ -100,6 +98,8 @@ impl<A: Actuator> ActuatorNode<A> {
             });
         }
         let robot = control.id();
+        let topic = control.topics().of_commands(number);
+        let topic = topic.unwrap_or_else(|| Arc::new(Topic::new(declaration.path)));
         let inner = Arc::new_cyclic(|this| Inner {
             this: Weak::clone(this),
             number,
@@ -107,12 +107,10 @@ impl<A: Actuator> ActuatorNode<A> {
             context,
             environment,
             control,
-            topic: Topic::new(declaration.path),
+            topic,
             orders: Mutex::default(),
             occupied: Occupied::new(),
             counts: Counts::default(),
-            reports: Reports::default(),
-            host: assembly.host.clone(),
             state: Guarded::new(
                 robot,
                 State {
@@ -125,10 +123,6 @@ impl<A: Actuator> ActuatorNode<A> {
                 },
             ),
         });
-        // Also in a replay: the topic decodes messages read from a file.
-        if A::Command::COMMANDS_JOINT {
-            inner.reports.announce(&inner.context, &*inner.host.0);
-        }
         // The actuator may have work to do from the start.
         if inner.environment.mode() != Mode::Replay {
             inner.alone(|_| ());
@@ -153,9 +147,9 @@ impl<A: Actuator> ActuatorNode<A> {
         Self(inner)
     }
 
-    /// The topic on which its commands are published.
-    pub fn topic(&self) -> &Topic<A::Command> {
-        &self.0.topic
+    /// The topic of its commands at `path`, which exists before the actuator does.
+    pub fn new_topic(path: &'static str) -> Arc<dyn AnyTopic> {
+        Arc::new(Topic::<A::Command>::new(path))
     }
 
     /// Carries out a command from an outside caller.
@@ -181,10 +175,8 @@ impl<A: Actuator> Inner<A> {
     fn leave(&self, mut state: Held<'_, State<A>>) {
         self.schedule_update(&mut state);
         let mut wakers = Wakers::default();
-        self.reports.publish(&self.context, &*self.host.0, &self.environment, &mut wakers);
-        for error in self.reports.take_refusals() {
-            let component = self.declaration.path;
-            self.log(&mut state, move || tracing::warn!(component, error, "its motions are not published"));
+        if let Some(topics) = self.control.topics().actuators.get(self.number) {
+            publish_reports(topics, &self.context, &self.environment, &mut wakers);
         }
         let told = std::mem::take(&mut state.told);
         drop(state);

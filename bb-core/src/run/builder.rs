@@ -93,8 +93,8 @@ impl<R: Robot> Builder<R> {
         publisher.topic(&self.topics, &self.draft.system).subscribe(overflow)
     }
 
-    /// Subscribes to messages of any payload, by path; with names of payload types, only to those. (Commands to
-    /// actuators can be subscribed to once the robot runs.)
+    /// Subscribes to messages of any payload, by path; with names of payload types, only to those. It gets what the same
+    /// subscription made on the running robot gets, from the first message on.
     pub fn subscribe_any<'a>(
         &self,
         select: Select<'_>,

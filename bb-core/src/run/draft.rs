@@ -62,8 +62,7 @@ impl Draft {
         let mut system = SystemTopics::new(robot);
         let topics = unwired.topics().into_iter().chain(system.all());
         let paths: Vec<&'static str> = topics.map(|topic| topic.path()).collect();
-        system.registry =
-            Registry::new(paths.into_iter().chain(robot.actuators.iter().map(|actuator| actuator.path)));
+        system.registry = Registry::new(paths);
         Self {
             robot,
             declared_options,

@@ -74,7 +74,6 @@ impl Host for RobotHost {
         // Before the robot is wired, and after it is gone, there are only the system's topics.
         let Some(wired) = self.wired() else { return call(&system) };
         let mut topics = wired.topics();
-        topics.extend(wired.actuators().into_iter().map(|actuator| actuator.any_topic()));
         topics.extend(system);
         call(&topics);
     }

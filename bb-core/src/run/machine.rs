@@ -38,8 +38,7 @@ const MOST_CASTS: u32 = 1024;
 
 impl Machine {
     pub(super) fn topics(&self) -> Vec<&dyn AnyTopic> {
-        let actuators = self.actuators().into_iter().map(|actuator| actuator.any_topic());
-        self.wired.topics().into_iter().chain(actuators).chain(self.control.topics().all()).collect()
+        self.wired.topics().into_iter().chain(self.control.topics().all()).collect()
     }
 
     pub(super) fn actuators(&self) -> Vec<&dyn AnyActuator> {

@@ -2,20 +2,22 @@
 
 use super::islands::Islands;
 use super::literal::{nanos, option, transform};
+use super::part::Part;
 use super::table::array;
 use super::topology::{self, root_from};
+use super::types::Types;
 use super::{control, path_text};
-use crate::model::{Actuator, EstimatorId, Health, Home, Id as _, Mount, Robot, Sensor, Service, Timing};
+use crate::model::{ActuatorId, EstimatorId, Health, Home, Id as _, Mount, Robot, Sensor, Service, Timing};
 use crate::verify::Verified;
 use proc_macro2::TokenStream;
 use quote::quote;
 
 /// `static __SENSORS`, `__ESTIMATORS` and `__TOPOLOGY`.
-pub(super) fn declarations(verified: &Verified<'_>, islands: &Islands) -> TokenStream {
+pub(super) fn declarations(verified: &Verified<'_>, types: &Types<'_>, islands: &Islands) -> TokenStream {
     let robot = verified.robot;
     let sensors = robot.sensors.iter().map(|sensor| sensor_declaration(robot, sensor)).collect();
     let estimators = robot.estimators.ids().map(|id| estimator_declaration(verified, islands, id)).collect();
-    let actuators = robot.actuators.iter().map(|actuator| actuator_declaration(robot, actuator)).collect();
+    let actuators = robot.actuators.ids().map(|id| actuator_declaration(types, id)).collect();
     let services = robot.services.iter().map(service_declaration).collect();
     let arrays = [
         array("__SENSORS", quote!(__private::SensorDeclaration), sensors),
@@ -113,11 +115,21 @@ fn period(period_s: Option<f64>) -> TokenStream {
     }))
 }
 
-fn actuator_declaration(robot: &Robot, actuator: &Actuator) -> TokenStream {
+fn actuator_declaration(types: &Types<'_>, id: ActuatorId) -> TokenStream {
+    let robot = types.model();
+    let actuator = &robot.actuators[id];
     let path = path_text(&actuator.path);
     let joint = &robot.joints[actuator.joint].label;
+    let motions = ["begin_motion", "end_motion"].map(|report| format!("{path}/{report}"));
     let supervisor = supervisor(robot, Mount::Joint(actuator.joint));
-    quote!(__private::ActuatorDeclaration { path: #path, joint: #joint, supervisor: #supervisor })
+    let kind = types.part(Part::Actuator(id));
+    quote!(__private::ActuatorDeclaration {
+        path: #path,
+        joint: #joint,
+        motions: [#(#motions),*],
+        supervisor: #supervisor,
+        new_topic: __private::ActuatorNode::<#kind>::new_topic,
+    })
 }
 
 fn service_declaration(service: &Service) -> TokenStream {

@@ -17,7 +17,8 @@ pub trait AnyActuator {
     fn path(&self) -> &'static str;
     /// The name of its command type.
     fn command_name(&self) -> &'static str;
-    /// The topic on which its commands are published.
+    /// The topic of its commands.
+    #[doc(hidden)]
     fn any_topic(&self) -> &dyn AnyTopic;
     /// An `Arc<dyn Accepts<T>>`, where `T` is the type of its commands.
     #[doc(hidden)]
@@ -25,9 +26,6 @@ pub trait AnyActuator {
     /// In a replay: publishes a command that it carried out; returns `false` if the command has another type.
     #[doc(hidden)]
     fn replay(&self, message: &DynamicMessage) -> bool;
-    /// In a replay: creates the topic of its reports at `path`, if `path` is one of them.
-    #[doc(hidden)]
-    fn announce(&self, path: &str);
     /// Stops the actuator once it is free; returns `false` if it is still busy after `timeout`.
     #[doc(hidden)]
     fn terminate(&self, timeout: Duration) -> bool;
@@ -49,7 +47,7 @@ impl<A: Actuator> AnyActuator for ActuatorNode<A> {
     }
 
     fn any_topic(&self) -> &dyn AnyTopic {
-        &self.0.topic
+        &*self.0.topic
     }
 
     fn accepts(&self) -> Box<dyn Any> {
@@ -59,10 +57,6 @@ impl<A: Actuator> AnyActuator for ActuatorNode<A> {
 
     fn replay(&self, message: &DynamicMessage) -> bool {
         message.downcast::<A::Command>().map(|message| self.0.topic.publish(message)).is_some()
-    }
-
-    fn announce(&self, path: &str) {
-        self.0.reports.announce_at(path, &self.0.context, &*self.0.host.0);
     }
 
     fn terminate(&self, timeout: Duration) -> bool {

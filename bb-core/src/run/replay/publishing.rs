@@ -4,7 +4,7 @@ use super::Replayer;
 use crate::fault::{discard, guarded};
 use crate::journal::{Recorded, decoded};
 use crate::node::Replayed;
-use crate::pubsub::DynamicMessage;
+use crate::pubsub::{AnyTopic, DynamicMessage};
 use crate::time::MonotonicTime;
 use std::sync::Arc;
 
@@ -41,26 +41,24 @@ impl Replayer {
     }
 
     pub(super) fn publish_own(&self, path: &'static str, message: Recorded) -> Result<(), String> {
-        let registry = &self.machine.control.topics().registry;
-        if !registry.has(path) {
-            self.machine.actuators().iter().for_each(|actuator| actuator.announce(path));
+        // An actuator reports its motions at topics of its own.
+        let declared = self.machine.control.topics().all().into_iter().find(|topic| topic.path() == path);
+        match declared {
+            Some(topic) => publish(topic, message),
+            None => publish(&*self.own_topic(path, &message)?, message),
         }
-        let topics = registry.topics();
-        let topic = match (topics.iter().find(|topic| topic.path() == path), &message) {
-            (Some(topic), _) => Arc::clone(topic),
-            (None, Recorded::Message(message)) => registry.topic_of(message).map_err(|error| error.to_string())?,
-            (None, Recorded::Bytes(_)) => {
-                return Err(format!(
-                    "something was published at `{path}`, a path made at run time, and the payload is not known: make a \
-                     publisher there first, `replay.bus().publisher::<T>(\"{path}\")`"
-                ));
-            }
-        };
-        let message = decoded(&*topic, message).map_err(|error| error.to_string())?;
-        let mut is_known = true;
-        handed_out(|| is_known = topic.publish_dynamic(&message));
-        discard(message);
-        if is_known { Ok(()) } else { Err(format!("`{path}` has another payload")) }
+    }
+
+    fn own_topic(&self, path: &str, message: &Recorded) -> Result<Arc<dyn AnyTopic>, String> {
+        let registry = &self.machine.control.topics().registry;
+        match (registry.topics().into_iter().find(|topic| topic.path() == path), message) {
+            (Some(topic), _) => Ok(topic),
+            (None, Recorded::Message(message)) => registry.topic_of(message).map_err(|error| error.to_string()),
+            (None, Recorded::Bytes(_)) => Err(format!(
+                "something was published at `{path}`, a path made at run time, and the payload is not known: make a \
+                 publisher there first, `replay.bus().publisher::<T>(\"{path}\")`"
+            )),
+        }
     }
 
     pub(super) fn message(&self, publisher: usize, message: Recorded) -> Result<DynamicMessage, String> {
@@ -68,6 +66,14 @@ impl Replayer {
         let topic = topics.get(publisher).ok_or("the robot has no such publisher")?;
         decoded(*topic, message).map_err(|error| error.to_string())
     }
+}
+
+fn publish(topic: &dyn AnyTopic, message: Recorded) -> Result<(), String> {
+    let message = decoded(topic, message).map_err(|error| error.to_string())?;
+    let mut is_known = true;
+    handed_out(|| is_known = topic.publish_dynamic(&message));
+    discard(message);
+    if is_known { Ok(()) } else { Err(format!("`{}` has another payload", topic.path())) }
 }
 
 /// Hands a recorded message to the current subscribers. If its code panics for one of them, the message and its

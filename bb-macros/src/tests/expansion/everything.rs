@@ -476,7 +476,14 @@ const _: () = {
         __private::ActuatorDeclaration {
             path: "actuator/base/pan/servo",
             joint: "pan",
+            motions: [
+                "actuator/base/pan/servo/begin_motion",
+                "actuator/base/pan/servo/end_motion",
+            ],
             supervisor: 3usize,
+            new_topic: __private::ActuatorNode::<
+                __Rover_2_11__actuator_base_pan_servo,
+            >::new_topic,
         },
     ];
     static __SERVICES: [__private::SensorDeclaration; 2usize] = [

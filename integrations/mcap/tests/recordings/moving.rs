@@ -3,9 +3,11 @@
 use super::robot::Temporary;
 use bb_core::message::codec::ros::TransformsMessage;
 use bb_core::nalgebra::Isometry3;
+use bb_core::payload::{EndMotion, MotionEnd};
 use bb_core::prelude::*;
 use bb_core::{JointPositions, JointReading};
-use bb_mcap::{Bag, Recorder, RecorderOptions};
+use bb_estimators::{SimulatedActuator, SimulatedEncoder};
+use bb_mcap::{Bag, Recorder, RecorderOptions, Recording};
 use std::collections::HashMap;
 
 /// Where a platform has driven: x, y, m; heading, rad.
@@ -113,5 +115,47 @@ fn viewers_see_the_robot_where_it_knows_itself() -> Result<(), Box<dyn std::erro
         joints.between("world_link", "tip")?.latest()?.transform.translation.vector.norm() > 1.0,
         "it has moved"
     );
+    Ok(())
+}
+
+robot! {
+    robot Lifter;
+    commands { arm: Arm; }
+    link base {
+        joint turn: revolute {
+            axis: z;
+            limit: { lower: -90 deg, upper: 90 deg, velocity: 2 rad/s, effort: 10 N*m };
+            actuator motor: SimulatedActuator(acceleration = 10.0);
+            sensor encoder: SimulatedEncoder() { rate: 100 Hz; }
+            link hand;
+        }
+    }
+}
+
+#[test]
+fn a_recorder_of_the_builder_has_what_an_arm_is_told_and_reports() -> Result<(), Box<dyn std::error::Error>> {
+    let file = Temporary::new("arm");
+    let builder = Lifter::builder();
+    let all = builder.subscribe_any(Select::All, None, Overflow::DropOldest { capacity: 10_000 });
+    let recorder = Recorder::new(&file, all, RecorderOptions::of::<Lifter>())?;
+    let mut simulation = builder.simulate()?;
+    simulation.command(lifter::command::arm, NoArguments)?;
+    let there = PositionCommand { position: 0.5, ..Default::default() };
+    simulation.actuate(lifter::actuator::base::turn::motor, there.into())?;
+    simulation.run_for(Duration::from_secs(2));
+    simulation.stop();
+    recorder.finish()?;
+
+    let recording = Recording::open(&file)?;
+    let count = |path: &str| {
+        recording.channels().iter().find(|channel| channel.path == path).map(|channel| channel.messages)
+    };
+    assert_eq!(count("actuator/base/turn/motor"), Some(1));
+    assert_eq!(count("actuator/base/turn/motor/begin_motion"), Some(1));
+    assert_eq!(count("actuator/base/turn/motor/end_motion"), Some(1));
+    assert_eq!(count("command/arm"), Some(2));
+    let end =
+        recording.messages::<EndMotion>("actuator/base/turn/motor/end_motion")?.next().ok_or("it ended")??;
+    assert_eq!((end.frame.name(), &end.end), ("turn", &MotionEnd::Reached));
     Ok(())
 }
