@@ -140,6 +140,7 @@ fn a_recorder_of_the_builder_has_what_an_arm_is_told_and_reports() -> Result<(),
     let recorder = Recorder::new(&file, all, RecorderOptions::of::<Lifter>())?;
     let mut simulation = builder.simulate()?;
     simulation.command(lifter::command::arm, NoArguments)?;
+    simulation.run_for(Duration::ZERO);
     let there = PositionCommand { position: 0.5, ..Default::default() };
     simulation.actuate(lifter::actuator::base::turn::motor, there.into())?;
     simulation.run_for(Duration::from_secs(2));
