@@ -14,6 +14,6 @@ mod text;
 pub use estimator::{check_estimator, check_nested};
 pub use find::{find_input, find_output};
 pub use names::{check_dynamic, check_input, check_optional, check_output};
-pub use options::{check_number, check_quantity, check_required};
+pub use options::{check_compared, check_number, check_quantity, check_required};
 pub use positions::check_position;
 pub use roles::{check_reachable, check_role};

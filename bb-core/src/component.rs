@@ -8,6 +8,7 @@ mod bus;
 mod caller;
 mod command;
 mod context;
+mod counter;
 mod description;
 mod estimator;
 mod execution;
@@ -22,7 +23,9 @@ mod motion_reports;
 pub(crate) mod options;
 pub(crate) mod outputs;
 mod parameter_store;
+mod reaction;
 mod record;
+pub(crate) mod reference;
 pub(crate) mod replacement;
 mod sensor;
 mod service;
@@ -41,6 +44,8 @@ pub(crate) use caller::Caller;
 pub(crate) use command::OwnHooks;
 pub use command::{Arm, Command, CommandContext, Disarm, NoArguments, Outcome, Sleep};
 pub use context::{ActuatorContext, ComponentContext, Context, SensorContext, ServiceContext};
+pub use counter::Counter;
+pub(crate) use counter::Counts;
 pub use description::{
     ComponentDescription, ComponentKind, Description, InputDescription, JointDescription, LinkDescription,
     ParameterDescription, TopicDescription,
@@ -64,7 +69,9 @@ pub use options::{NoOptions, Options};
 pub use outputs::Outputs;
 pub(crate) use outputs::{EmittedAt, OutputAt};
 pub use parameter_store::ParameterStore;
+pub use reaction::{Reaction, ReactionEvent, ReactionOptions, ReactionState};
 pub use record::RequestCodec;
+pub use reference::{CommandPath, Number, TopicField};
 pub use sensor::{Next, Reading, Sensor};
 pub use service::Service;
 pub(crate) use setting::{Setting, SettingKind, quantity};

@@ -206,6 +206,8 @@ struct RunningCommand {
     id: u64,
     /// The number of the command.
     command: usize,
+    /// The name of the caller who asked for it, for its events.
+    asked_by: String,
     health: Option<HealthTransition>,
     slot: Arc<Slot>,
     caller: Caller,

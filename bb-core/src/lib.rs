@@ -93,8 +93,8 @@ pub use nalgebra;
 pub mod prelude {
     pub use crate::component::{
         Actuator, ActuatorContext, Arm, Command, CommandContext, Context, Disarm, Estimator, Every, External,
-        HandleCall, HandleCast, Info, Input, NoArguments, NoOptions, Outcome, Reading, Reply, Request, SafetyLink,
-        Sensor, SensorContext, Service, ServiceContext,
+        HandleCall, HandleCast, Info, Input, NoArguments, NoOptions, Outcome, Reaction, Reading, Reply, Request,
+        SafetyLink, Sensor, SensorContext, Service, ServiceContext,
     };
     pub use crate::declaration::Role;
     pub use crate::event::{HealthReason, HealthState, HealthTransition, Right, Rights, Safety};
@@ -116,18 +116,20 @@ pub mod prelude {
 pub mod __private {
     pub use crate::__stub_robot as stub_robot;
     pub use crate::check::{
-        check_dynamic, check_estimator, check_input, check_nested, check_number, check_optional, check_output,
-        check_position, check_quantity, check_reachable, check_required, check_role, find_input, find_output,
+        check_compared, check_dynamic, check_estimator, check_input, check_nested, check_number, check_optional,
+        check_output, check_position, check_quantity, check_reachable, check_required, check_role, find_input,
+        find_output,
     };
     pub use crate::component::binding::{Binding, FromParameter};
-    pub use crate::component::field::{FromQuantity, FromText};
+    pub use crate::component::field::{FromPath, FromQuantity, FromText};
     pub use crate::component::inputs::{
         At, EverySlot, FieldIndex, InputAt, LatestSlot, Slot, SyncMiss, TakenAt, declare,
     };
     pub use crate::component::options::OptionsList;
     pub use crate::component::outputs::{EmittedAt, OutputAt};
+    pub use crate::component::reference::number_of;
     pub use crate::component::setting::{ByCode, ByText, ByValue, Setting, SettingOf, WithUnit};
-    pub use crate::component::{Command, Every, Input, InputField, OptionField};
+    pub use crate::component::{Command, CommandPath, Every, Input, InputField, OptionField, TopicField};
     pub use crate::control::Prepared;
     pub use crate::declaration::estimator::{InletDeclaration, IslandDeclaration};
     pub use crate::declaration::join::join;
@@ -140,7 +142,7 @@ pub mod __private {
     pub use crate::lifecycle::{AsSensor, AsService, Periodic};
     pub use crate::message::codec::derive::{FieldOf, NotField, is_any, is_finite};
     pub use crate::message::codec::{
-        DecodeError, EnumShape, FieldShape, Reader, RosLayout, Shape, StructShape, Writer,
+        DecodeError, EnumShape, FieldShape, FieldUnit, Reader, RosLayout, Shape, StructShape, Writer,
     };
     pub use crate::message::{
         BothKnown, Exceeded, Feeds, Finite, Frame, JointBounds, JointCommand, JointPositions, JointReading,

@@ -49,14 +49,15 @@ fn pipeline(tokens: proc_macro2::TokenStream) -> proc_macro2::TokenStream {
 /// Makes a struct or an enum the payload of messages; `#[payload(ros)]` if ROS has a message for it,
 /// `#[payload(name = "package/Name")]` for the name of its definition, `#[payload(joint_position)]` if it tells the position
 /// of the joint at which it is measured, `#[payload(no_frame)]` if it is the same from every frame. `#[payload(non_finite)]` on a field that may hold
-/// NaN and infinities. See the trait.
+/// NaN and infinities; `#[payload(unit = "V")]` for the unit of its numbers, in SI. See the trait.
 #[proc_macro_derive(Payload, attributes(payload))]
 pub fn payload(tokens: TokenStream) -> TokenStream {
     derive::derive(tokens.into(), derive::payload).into()
 }
 
 /// Makes a struct the options of a component: `#[option(default = …, range = a..=b, unit = "…")]` or
-/// `#[option(required)]` on each field. See the trait. (`#[options]` is accepted as an attribute so that the derive can report it.)
+/// `#[option(required)]` on each field; `compared_with = "when"` on a number in the unit of the field of messages that the option
+/// `when` names, `one_of = "bounds"` on options of which at least one must be given. See the trait. (`#[options]` is accepted as an attribute so that the derive can report it.)
 #[proc_macro_derive(Options, attributes(option, options))]
 pub fn options(tokens: TokenStream) -> TokenStream {
     derive::derive(tokens.into(), derive::options).into()

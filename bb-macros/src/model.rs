@@ -191,7 +191,24 @@ pub(crate) enum From {
     Service(ServiceId),
 }
 
+/// What an option names by its path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Target {
+    Publisher(PublisherId),
+    Actuator(ActuatorId),
+    Command(CommandId),
+}
+
 impl Robot {
+    /// What has this whole path.
+    pub(crate) fn target(&self, path: &Path) -> Option<Target> {
+        let names: Vec<String> = path.0.iter().map(crate::names::text).collect();
+        let publisher = || self.publishers.position(|publisher| publisher.path == names).map(Target::Publisher);
+        let actuator = || self.actuators.position(|actuator| actuator.path == names).map(Target::Actuator);
+        let command = || self.commands.position(|command| command.path == names).map(Target::Command);
+        publisher().or_else(actuator).or_else(command)
+    }
+
     /// The frame in which a publisher's messages are.
     pub(crate) fn mount_of(&self, publisher: PublisherId) -> Mount {
         match self.publishers[publisher].from {

@@ -30,7 +30,7 @@ mod topology;
 pub(crate) use crate::language::JointKind;
 pub(crate) use actuator::Actuator;
 pub(crate) use commands::{Cancelled, Category, Command, CommandSettings, Commands};
-pub(crate) use component::{Component, ComponentOption, OptionValue};
+pub(crate) use component::{Component, ComponentOption, OptionValue, Reference};
 pub(crate) use estimator::Estimator;
 pub(crate) use health::{Reaction, Reactions};
 pub(crate) use input::Input;

@@ -8,6 +8,7 @@ mod declared_categories;
 mod declared_commands;
 mod declared_parameters;
 mod declared_publishers;
+mod declared_references;
 mod declared_states;
 mod dimensions;
 mod distinct_paths;
@@ -54,6 +55,7 @@ const RULES: &[Rule] = &[
     declared_publishers::check,
     no_cycles::check,
     declared_commands::check,
+    declared_references::check,
     reachable_reactions::check,
     positive_values::check,
     input_periods::check,

@@ -45,6 +45,7 @@ mod panicking_code;
 mod parameter_sets;
 mod parameter_store;
 mod parameters;
+mod reactions;
 mod real_time;
 mod replaced;
 mod replay;

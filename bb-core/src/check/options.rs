@@ -3,6 +3,8 @@
 use super::text::{Text, contains, equal};
 use crate::component::{OptionField, Options};
 use crate::declaration::Dimension;
+use crate::message::Payload;
+use crate::message::codec::{FieldUnit, Shape};
 
 /// Checks the range of an option given as a number without a unit, and that it has none. Unknown names are left to rustc.
 ///
@@ -36,7 +38,9 @@ const fn check_given(
     while index < fields.len() {
         let field = &fields[index];
         if equal(field.name, name) {
-            check_dimension(component, field, dimension.as_ref());
+            if field.compared_with.is_empty() {
+                check_dimension(component, field, dimension.as_ref());
+            }
             check_range(component, field, number);
             return;
         }
@@ -44,12 +48,158 @@ const fn check_given(
     }
 }
 
-/// Checks that every required option is given.
+/// Checks that an option, if it is to be compared with the messages' field that the option `of` names, has the unit of that field.
+#[track_caller]
+pub const fn check_compared<O: Options, P: Payload, const N: usize>(
+    component: &str,
+    name: &str,
+    of: &str,
+    names: [&str; N],
+    has_unit: bool,
+    exponents: [i8; 6],
+    dimension: &'static str,
+) {
+    let mut index = 0;
+    while index < O::FIELDS.len() {
+        let field = &O::FIELDS[index];
+        if equal(field.name, name) && equal(field.compared_with, of) {
+            let given = if has_unit { Some(Dimension { exponents, name: dimension }) } else { None };
+            if let Some(units) = units_of(&P::SHAPE, &names) {
+                check_units(component, name, P::NAME, &names, units, given);
+            }
+        }
+        index += 1;
+    }
+}
+
+/// The units of a field, or of the nearest around it that states any. `None` if the payload has no such field, which rustc reports.
+const fn units_of(shape: &Shape, names: &[&str]) -> Option<&'static [FieldUnit]> {
+    let mut shape = *shape;
+    let mut depth = 0;
+    while depth < names.len() {
+        let Shape::Struct(inner) = shape else { break };
+        let (mut index, mut found) = (0, false);
+        while index < inner.fields.len() {
+            let field = &inner.fields[index];
+            if equal(field.name, names[depth]) {
+                if !field.units.is_empty() {
+                    return Some(field.units);
+                }
+                shape = field.shape;
+                found = true;
+            }
+            index += 1;
+        }
+        if !found {
+            break;
+        }
+        depth += 1;
+    }
+    if depth == 0 { None } else { Some(&[]) }
+}
+
+#[track_caller]
+const fn check_units(
+    component: &str,
+    name: &str,
+    payload: &str,
+    names: &[&str],
+    units: &[FieldUnit],
+    given: Option<Dimension>,
+) {
+    let mut index = 0;
+    while index < units.len() {
+        if let Some(given) = &given
+            && given.equals(&Dimension { exponents: units[index].exponents, name: "" })
+        {
+            return;
+        }
+        index += 1;
+    }
+    let text = match (units, given) {
+        ([], None) => return,
+        ([], Some(given)) => {
+            let text = Text::new("found ").push(given.name).push(", and ");
+            let text = path(text, names).push(" of ").name(payload);
+            let text = text.push(
+                " states no unit; leave the unit out, or state that of the field: `#[payload(unit = \"…\")]`",
+            );
+            text
+        }
+        ([first, ..], given) => {
+            let text = Text::new("expected ").push(first.dimension);
+            let text = match units {
+                [_, second, ..] => text.push(" or ").push(second.dimension),
+                _ => text,
+            };
+            match given {
+                Some(given) => {
+                    let text =
+                        text.push(", found ").push(given.name).push("; ").name(name).push(" of ").name(component);
+                    let text = path(text.push(" is compared with "), names).push(" of ").name(payload);
+                    text.push(", which is in ").push(first.symbol)
+                }
+                None => {
+                    let text = text.push(", found a number without a unit; write it with one, as in `1 ");
+                    text.push(first.symbol).push("`")
+                }
+            }
+        }
+    };
+    panic!("{}", text.as_str())
+}
+
+/// Appends `` `angular_velocity.x` ``.
+const fn path(text: Text, names: &[&str]) -> Text {
+    let (mut text, mut index) = (text.push("`"), 0);
+    while index < names.len() {
+        text = if index > 0 { text.push(".") } else { text };
+        text = text.push(names[index]);
+        index += 1;
+    }
+    text.push("`")
+}
+
+/// Checks that every required option is given, and one of each group.
 #[track_caller]
 pub const fn check_required<O: Options, const N: usize>(component: &str, given: [&str; N]) {
     if let Some(field) = missing_option(O::FIELDS, &given) {
         panic!("{}", describe_missing(Text::new(""), component, field).as_str())
     }
+    let mut index = 0;
+    while index < O::FIELDS.len() {
+        let group = O::FIELDS[index].one_of;
+        if !group.is_empty() && !has_one_of(O::FIELDS, group, &given) {
+            let text = Text::new("").name(component).push(" needs one of the options ");
+            panic!("{}", names_of_group(text, O::FIELDS, group).as_str())
+        }
+        index += 1;
+    }
+}
+
+/// Whether an option of the group is given.
+const fn has_one_of(fields: &[OptionField], group: &str, given: &[&str]) -> bool {
+    let mut index = 0;
+    while index < fields.len() {
+        if equal(fields[index].one_of, group) && contains(given, fields[index].name) {
+            return true;
+        }
+        index += 1;
+    }
+    false
+}
+
+const fn names_of_group(mut text: Text, fields: &[OptionField], group: &str) -> Text {
+    let (mut index, mut is_first) = (0, true);
+    while index < fields.len() {
+        if equal(fields[index].one_of, group) {
+            text = if is_first { text } else { text.push(", ") };
+            text = text.name(fields[index].name);
+            is_first = false;
+        }
+        index += 1;
+    }
+    text
 }
 
 /// The first required option that is not given.

@@ -4,7 +4,7 @@ use super::guardian::Guardian;
 use super::host::Host;
 use super::motion_reports::{MotionReport, MotionReports};
 use super::replacement::Replacement;
-use super::{Bus, Caller, Fault, Request, SafetyLink};
+use super::{Bus, Caller, Counter, Counts, Fault, Request, SafetyLink};
 use crate::declaration::{ActuatorDeclaration, EstimatorDeclaration, InputDeclaration, SensorDeclaration};
 use crate::message::Frame;
 use crate::payload::{BeginMotion, EndMotion, MotionEnd};
@@ -237,11 +237,23 @@ macro_rules! component_context {
         pub struct $name {
             common: ComponentContext,
             declaration: &'static $declaration,
+            counters: Counts,
         }
 
         impl $name {
             pub(crate) fn new(declaration: &'static $declaration, host: Arc<dyn Host>) -> Self {
-                Self { common: ComponentContext::new(declaration.path, host), declaration }
+                let common = ComponentContext::new(declaration.path, host);
+                Self { common, declaration, counters: Counts::default() }
+            }
+
+            pub(crate) fn counters(&self) -> &Counts {
+                &self.counters
+            }
+
+            /// The component's count of that name, for the report ([`SourceStatistics`](crate::run::SourceStatistics)) and the
+            /// metrics. It goes on when the component is restarted.
+            pub fn counter(&self, name: &'static str) -> Counter {
+                self.counters.get(name)
             }
         }
 

@@ -18,6 +18,10 @@ pub struct OptionField {
     pub unit: &'static str,
     /// The numbers accepted, in SI.
     pub range: Option<Range>,
+    /// The option that names the field of messages whose unit it has; empty if it has its own.
+    pub compared_with: &'static str,
+    /// The group of options of which at least one must be given; empty if it belongs to none.
+    pub one_of: &'static str,
 }
 
 /// The type of an option that can be given as a string: any that is `From<&'static str>`, such as `String` and
@@ -26,6 +30,23 @@ pub struct OptionField {
 pub trait FromText {
     /// Converts the text.
     fn from_text(text: &'static str) -> Self;
+}
+
+/// The type of an option that can be given as the path of something that the robot declares: any that is `From<&'static str>`.
+#[diagnostic::on_unimplemented(
+    message = "expected `{Self}`, found a path",
+    label = "a path; to name a field of its messages, write it after the path, as in `sensor::battery.voltage`"
+)]
+pub trait FromPath {
+    /// Converts the path.
+    fn from_path(path: &'static str) -> Self;
+}
+
+#[diagnostic::do_not_recommend]
+impl<T: From<&'static str>> FromPath for T {
+    fn from_path(path: &'static str) -> Self {
+        path.into()
+    }
 }
 
 #[diagnostic::do_not_recommend]

@@ -46,7 +46,8 @@ impl Control {
 
     /// Starts a command for a caller who knows the type of its result.
     pub(crate) fn execute<T: 'static>(&self, number: usize, arguments: Arguments) -> Result<Execution<T>, Refusal> {
-        self.request(self.step(), number, Some(arguments)).map(Execution::new)
+        let caller = Caller::PROGRAM.name().to_owned();
+        self.request(self.step(), number, Some(arguments), caller).map(Execution::new)
     }
 
     /// Starts the command at `path` with arguments from JSON, on behalf of the caller.
@@ -74,14 +75,14 @@ impl Control {
             crate::fault::discard(arguments);
             return Err(fault);
         }
-        let slot = self.request(step, number, Some(arguments))?;
+        let slot = self.request(step, number, Some(arguments), caller.name().to_owned())?;
         Ok(DynamicExecution::new(UntypedExecution(slot)))
     }
 
     /// In a replay: a command was requested.
-    pub(crate) fn replay_command(&self, number: usize) {
+    pub(crate) fn replay_command(&self, number: usize, caller: String) {
         // A command that was refused is refused again.
-        let _ = self.request(self.step(), number, None);
+        let _ = self.request(self.step(), number, None, caller);
     }
 
     fn request(
@@ -89,9 +90,10 @@ impl Control {
         mut step: Step<'_>,
         number: usize,
         arguments: Option<Arguments>,
+        caller: String,
     ) -> Result<Arc<Slot>, Refusal> {
-        step.line(Event::Command { command: number });
-        let started = step.start(number, arguments, None);
+        step.line(Event::Command { command: number, caller: caller.clone() });
+        let started = step.start(number, arguments, caller, None);
         step.finish();
         started
     }
@@ -193,6 +195,7 @@ impl Step<'_> {
         &mut self,
         number: usize,
         arguments: Option<Arguments>,
+        asked_by: String,
         health: Option<HealthTransition>,
     ) -> Result<Arc<Slot>, Refusal> {
         let Some(declared) = self.declared(number) else {
@@ -205,7 +208,7 @@ impl Step<'_> {
             let category = self.control.category(declared);
             let refusal = Refusal { command: declared.name, reason, state: self.state.machine.state(), category };
             self.effects.dropped.extend(arguments);
-            self.refuse(number, refusal.clone(), health);
+            self.refuse(number, refusal.clone(), asked_by, health);
             return Err(refusal);
         }
         let cancelled: Vec<u64> = self.not_ended(|step, execution| {
@@ -252,6 +255,7 @@ impl Step<'_> {
         let execution = RunningCommand {
             id,
             command: number,
+            asked_by: asked_by.clone(),
             health,
             slot: Arc::clone(&slot),
             caller,
@@ -259,7 +263,7 @@ impl Step<'_> {
             phase: Phase::Running,
         };
         self.state.executions.push(execution);
-        self.publish_phase(number, id, CommandPhase::Started, health);
+        self.publish_phase(number, id, CommandPhase::Started, asked_by, health);
         self.publish_machine(Some(declared.name));
         Ok(slot)
     }
@@ -285,13 +289,13 @@ impl Step<'_> {
     }
 
     /// Counts a refusal and publishes it.
-    fn refuse(&mut self, number: usize, refusal: Refusal, health: Option<HealthTransition>) {
+    fn refuse(&mut self, number: usize, refusal: Refusal, asked_by: String, health: Option<HealthTransition>) {
         if let Some(statistics) = self.state.statistics.get_mut(number) {
             statistics.refused += 1;
             statistics.last_refusal = Some(refusal.clone());
         }
         self.effects.log(Log::Refused(refusal.clone()));
-        self.publish_phase(number, 0, CommandPhase::Refused(refusal), health);
+        self.publish_phase(number, 0, CommandPhase::Refused(refusal), asked_by, health);
     }
 
     pub(super) fn publish_phase(
@@ -299,11 +303,12 @@ impl Step<'_> {
         number: usize,
         execution: u64,
         phase: CommandPhase,
+        caller: String,
         health: Option<HealthTransition>,
     ) {
         let control = self.control;
         if let (Some(topic), Some(declared)) = (control.0.topics.commands.get(number), self.declared(number)) {
-            let event = CommandEvent { command: declared.name, execution, phase, health };
+            let event = CommandEvent { command: declared.name, execution, phase, caller, health };
             self.publish(topic, event, self.now);
         }
     }

@@ -235,6 +235,7 @@ impl Step<'_> {
     ) {
         let Some(execution) = self.state.executions.get_mut(index) else { return };
         let (id, command, health) = (execution.id, execution.command, execution.health);
+        let asked_by = std::mem::take(&mut execution.asked_by);
         execution.caller.revoke();
         let slot = Arc::clone(&execution.slot);
         // An execution whose code has ended is gone; another one's code has yet to notice.
@@ -277,7 +278,7 @@ impl Step<'_> {
                 CommandPhase::Started | CommandPhase::Refused(_) => {}
             }
         }
-        self.publish_phase(command, id, phase, health);
+        self.publish_phase(command, id, phase, asked_by, health);
         match result {
             Ok(Some(value)) => self.effects.results.push((slot, Ok(value))),
             // A replay has no value, and no caller waits for one.

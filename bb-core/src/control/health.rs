@@ -208,7 +208,7 @@ impl Step<'_> {
         let command = declared.and_then(|declared| declared.health.command(transition.from, transition.to));
         if let Some(command) = command {
             // A refusal is counted and published.
-            let _ = self.start(command, None, Some(transition));
+            let _ = self.start(command, None, transition.estimator.to_owned(), Some(transition));
         }
     }
 

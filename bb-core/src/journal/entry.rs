@@ -213,6 +213,8 @@ pub enum Event {
     Command {
         /// The command.
         command: usize,
+        /// Who asked for it.
+        caller: String,
     },
     /// The code of a command has ended.
     Ended {

@@ -4,8 +4,8 @@ use super::stand_in::{
     AnyEstimator, AnySensor, AnyService, StandIn, make_actuator, make_estimator, make_sensor, make_service,
 };
 use crate::component::{
-    Actuator, ActuatorContext, Context, Estimator, Info, InputTransforms, Inputs, Options, Reading, Reply, Sensor,
-    SensorContext, Service, ServiceContext,
+    Actuator, ActuatorContext, Context, Counts, Estimator, Info, InputTransforms, Inputs, Options, Reading, Reply,
+    Sensor, SensorContext, Service, ServiceContext,
 };
 use crate::declaration::SensorDeclaration;
 use crate::fault::Fault;
@@ -47,6 +47,9 @@ pub trait Periodic: Component {
     /// Its context.
     #[doc(hidden)]
     fn context(declaration: &'static SensorDeclaration, host: HostHandle) -> Self::Context;
+    /// What it counts.
+    #[doc(hidden)]
+    fn counters(context: &Self::Context) -> &Counts;
     /// Takes one reading.
     ///
     /// # Errors
@@ -310,6 +313,10 @@ impl<S: Sensor> Periodic for AsSensor<S> {
         SensorContext::new(declaration, host.0)
     }
 
+    fn counters(context: &SensorContext) -> &Counts {
+        context.counters()
+    }
+
     fn read(&mut self, now: MonotonicTime) -> Result<Reading<S::Output>, Fault> {
         match self {
             Self::Declared(sensor) => sensor.read(now),
@@ -330,6 +337,10 @@ impl<S: Service> Periodic for AsService<S> {
 
     fn context(declaration: &'static SensorDeclaration, host: HostHandle) -> ServiceContext {
         ServiceContext::new(declaration, host.0)
+    }
+
+    fn counters(context: &ServiceContext) -> &Counts {
+        context.counters()
     }
 
     fn read(&mut self, now: MonotonicTime) -> Result<Reading<S::Output>, Fault> {

@@ -46,7 +46,7 @@ pub use json::{JsonError, bytes_to_json, from_json, json_schema, json_to_bytes, 
 pub use reader::Reader;
 pub use ros::{RosCompanion, RosLayout, RosMessage};
 pub use schema::Schema;
-pub use shape::{EnumShape, FieldShape, Shape, StructShape};
+pub use shape::{EnumShape, FieldShape, FieldUnit, Shape, StructShape};
 pub use stamped::{decode_as_ros, decode_companion, encode_as_ros, encode_companion, is_exact_as_ros};
 pub use type_description::{type_description, type_hash};
 pub use writer::Writer;

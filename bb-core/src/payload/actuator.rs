@@ -28,10 +28,13 @@ pub enum ActuatorCommand {
 #[payload(ros, joint_command)]
 pub struct PositionCommand {
     /// Angle in rad of a revolute or continuous joint; displacement in m of a prismatic one.
+    #[payload(unit = "rad", unit = "m")]
     pub position: f64,
     /// Velocity at the target; for an actuator that only takes a speed, the speed of the motion. rad/s or m/s.
+    #[payload(unit = "rad/s", unit = "m/s")]
     pub velocity: Option<f64>,
     /// Effort to add to the actuator's own control: N·m or N.
+    #[payload(unit = "N*m", unit = "N")]
     pub effort: Option<f64>,
 }
 
@@ -40,8 +43,10 @@ pub struct PositionCommand {
 #[payload(ros, joint_command)]
 pub struct VelocityCommand {
     /// rad/s or m/s.
+    #[payload(unit = "rad/s", unit = "m/s")]
     pub velocity: f64,
     /// Effort to add to the actuator's own control: N·m or N.
+    #[payload(unit = "N*m", unit = "N")]
     pub effort: Option<f64>,
 }
 
@@ -50,6 +55,7 @@ pub struct VelocityCommand {
 #[payload(ros, joint_command)]
 pub struct EffortCommand {
     /// Torque in N·m or force in N.
+    #[payload(unit = "N*m", unit = "N")]
     pub effort: f64,
 }
 
@@ -57,13 +63,17 @@ pub struct EffortCommand {
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 pub struct BeginMotion {
     /// Position at the start, rad or m.
+    #[payload(unit = "rad", unit = "m")]
     pub initial_position: f64,
     /// Position at the end, rad or m; `None` if the motion goes on until another command, as that of a velocity or an effort
     /// on a joint without an end of its range.
+    #[payload(unit = "rad", unit = "m")]
     pub target_position: Option<f64>,
     /// Velocity, if one is commanded, rad/s or m/s; negative if it leads to smaller positions.
+    #[payload(unit = "rad/s", unit = "m/s")]
     pub velocity: Option<f64>,
     /// Speed of the motion, if known, rad/s or m/s; never negative.
+    #[payload(unit = "rad/s", unit = "m/s")]
     pub speed: Option<f64>,
     /// When the joint is expected to arrive.
     pub expected_arrival: Option<MonotonicTime>,
@@ -73,6 +83,7 @@ pub struct BeginMotion {
 #[derive(Clone, Debug, PartialEq, Payload)]
 pub struct EndMotion {
     /// Position at the end, measured or assumed, rad or m.
+    #[payload(unit = "rad", unit = "m")]
     pub position: f64,
     /// Why the motion ended.
     pub end: MotionEnd,

@@ -25,6 +25,7 @@ impl Orientation {
 #[payload(ros)]
 pub struct Pose {
     /// The body's origin in the world, m.
+    #[payload(unit = "m")]
     pub position: Vector3<f64>,
     /// Rotates vectors of the body to the world.
     pub world_from_body: UnitQuaternion<f64>,

@@ -9,6 +9,7 @@ use nalgebra::{Matrix6, UnitQuaternion, Vector3};
 #[payload(ros)]
 pub struct PoseWithCovariance {
     /// The body's origin in the world, m.
+    #[payload(unit = "m")]
     pub position: Vector3<f64>,
     /// Rotates vectors of the body to the world.
     pub world_from_body: UnitQuaternion<f64>,
@@ -37,8 +38,10 @@ impl From<PoseWithCovariance> for Pose {
 #[payload(ros)]
 pub struct TwistWithCovariance {
     /// Velocity of the body's origin, in the body's frame, m/s.
+    #[payload(unit = "m/s")]
     pub linear: Vector3<f64>,
     /// Angular velocity, in the body's frame, rad/s.
+    #[payload(unit = "rad/s")]
     pub angular: Vector3<f64>,
     /// Covariance: linear (m²/s²), then angular (rad²/s²).
     pub covariance: Matrix6<f64>,
@@ -64,8 +67,10 @@ impl From<TwistWithCovariance> for Twist {
 #[payload(ros)]
 pub struct Accel {
     /// Acceleration of the body's origin, without gravity, m/s².
+    #[payload(unit = "m/s^2")]
     pub linear: Vector3<f64>,
     /// Angular acceleration, rad/s².
+    #[payload(unit = "rad/s^2")]
     pub angular: Vector3<f64>,
     /// Covariance: linear (m²/s⁴), then angular (rad²/s⁴).
     pub covariance: Option<Matrix6<f64>>,
@@ -76,7 +81,9 @@ pub struct Accel {
 #[payload(ros)]
 pub struct Wrench {
     /// Force, N.
+    #[payload(unit = "N")]
     pub force: Vector3<f64>,
     /// Torque about the frame's origin, N·m.
+    #[payload(unit = "N*m")]
     pub torque: Vector3<f64>,
 }

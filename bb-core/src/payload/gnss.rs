@@ -23,10 +23,13 @@ pub struct GnssFix {
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 pub struct GeodeticPosition {
     /// Latitude, rad; positive to the north.
+    #[payload(unit = "rad")]
     pub latitude_rad: f64,
     /// Longitude, rad; positive to the east.
+    #[payload(unit = "rad")]
     pub longitude_rad: f64,
     /// Height above the ellipsoid (not above sea level), m, if known.
+    #[payload(unit = "m")]
     pub altitude: Option<f64>,
 }
 

@@ -9,10 +9,13 @@ use std::sync::Arc;
 #[payload(ros, joint_position)]
 pub struct JointState {
     /// Angle in rad of a revolute or continuous joint; displacement in m of a prismatic one.
+    #[payload(unit = "rad", unit = "m")]
     pub position: f64,
     /// rad/s or m/s.
+    #[payload(unit = "rad/s", unit = "m/s")]
     pub velocity: Option<f64>,
     /// Torque in N·m or force in N.
+    #[payload(unit = "N*m", unit = "N")]
     pub effort: Option<f64>,
 }
 
@@ -22,10 +25,13 @@ pub struct JointState {
 #[payload(joint_position)]
 pub struct MotorState {
     /// Angle of the motor in rad.
+    #[payload(unit = "rad")]
     pub position: f64,
     /// rad/s.
+    #[payload(unit = "rad/s")]
     pub velocity: Option<f64>,
     /// Torque of the motor in N·m.
+    #[payload(unit = "N*m")]
     pub effort: Option<f64>,
 }
 

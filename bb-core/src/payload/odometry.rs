@@ -9,8 +9,10 @@ use nalgebra::{Matrix6, Vector3};
 #[payload(ros)]
 pub struct Twist {
     /// Velocity of the body's origin, in the body's frame, m/s.
+    #[payload(unit = "m/s")]
     pub linear: Vector3<f64>,
     /// Angular velocity, in the body's frame, rad/s.
+    #[payload(unit = "rad/s")]
     pub angular: Vector3<f64>,
     /// Covariance: linear (m²/s²), then angular (rad²/s²).
     pub covariance: Option<Matrix6<f64>>,

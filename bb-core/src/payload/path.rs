@@ -19,6 +19,7 @@ pub struct PathPose {
     /// When the body is there; the Unix epoch if a path has no times.
     pub time: WallTime,
     /// The body's origin in the world, m.
+    #[payload(unit = "m")]
     pub position: Vector3<f64>,
     /// Rotates vectors of the body to the world.
     pub world_from_body: UnitQuaternion<f64>,
@@ -32,6 +33,7 @@ pub struct RelativePose {
     /// The later time.
     pub end: MonotonicTime,
     /// The body's origin at the end, in its frame at the start, m.
+    #[payload(unit = "m")]
     pub position: Vector3<f64>,
     /// Rotates vectors of the body's frame at the end to its frame at the start.
     pub start_from_end: UnitQuaternion<f64>,

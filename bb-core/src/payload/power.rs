@@ -9,16 +9,22 @@ use crate::message::Payload;
 #[payload(ros, no_frame)]
 pub struct BatteryState {
     /// V
+    #[payload(unit = "V")]
     pub voltage: f64,
     /// K
+    #[payload(unit = "K")]
     pub temperature: Option<f64>,
     /// A; negative while discharging.
+    #[payload(unit = "A")]
     pub current: Option<f64>,
     /// Remaining charge, coulomb.
+    #[payload(unit = "A*s")]
     pub charge: Option<f64>,
     /// Its charge when it was last full, coulomb.
+    #[payload(unit = "A*s")]
     pub capacity: Option<f64>,
     /// Its charge when full, as designed, coulomb.
+    #[payload(unit = "A*s")]
     pub design_capacity: Option<f64>,
     /// Remaining charge as a fraction of the capacity, from 0 to 1.
     pub percentage: Option<f64>,
@@ -111,11 +117,15 @@ pub struct PowerState {
     /// Whether it is switched on.
     pub is_on: bool,
     /// V
+    #[payload(unit = "V")]
     pub voltage: Option<f64>,
     /// A; positive to the load.
+    #[payload(unit = "A")]
     pub current: Option<f64>,
     /// W; positive to the load.
+    #[payload(unit = "W")]
     pub power: Option<f64>,
     /// J to the load since it was switched on.
+    #[payload(unit = "J")]
     pub energy: Option<f64>,
 }

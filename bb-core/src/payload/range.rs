@@ -10,15 +10,19 @@ pub struct Range {
     /// The kind of radiation.
     pub radiation: Radiation,
     /// The full angle of the cone, rad.
+    #[payload(unit = "rad")]
     pub field_of_view: f32,
     /// The smallest measurable distance, m.
+    #[payload(unit = "m")]
     pub min_range: f32,
     /// The largest measurable distance, m.
+    #[payload(unit = "m")]
     pub max_range: f32,
     /// Distance, m. A sensor that only detects presence reports −∞ for an object and +∞ for none (REP 117).
-    #[payload(non_finite)]
+    #[payload(non_finite, unit = "m")]
     pub range: f32,
     /// Variance of the distance, m².
+    #[payload(unit = "m^2")]
     pub variance: Option<f32>,
 }
 
@@ -38,18 +42,25 @@ pub enum Radiation {
 #[payload(ros)]
 pub struct LaserScan {
     /// Angle of the first beam, rad: from x, positive to y.
+    #[payload(unit = "rad")]
     pub angle_min: f32,
     /// Angle of the last beam, rad.
+    #[payload(unit = "rad")]
     pub angle_max: f32,
     /// Angle from beam to beam, rad; negative clockwise.
+    #[payload(unit = "rad")]
     pub angle_increment: f32,
     /// Time from beam to beam, s.
+    #[payload(unit = "s")]
     pub time_increment: f32,
     /// Time from scan to scan, s.
+    #[payload(unit = "s")]
     pub scan_time: f32,
     /// The smallest measurable distance, m.
+    #[payload(unit = "m")]
     pub range_min: f32,
     /// The largest measurable distance, m.
+    #[payload(unit = "m")]
     pub range_max: f32,
     /// Distances, m: −∞ if too near, +∞ if nothing was hit, NaN if the measurement failed (REP 117).
     #[payload(non_finite)]

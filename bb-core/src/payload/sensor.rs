@@ -8,8 +8,10 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 #[payload(ros)]
 pub struct Imu {
     /// Angular velocity, rad/s.
+    #[payload(unit = "rad/s")]
     pub angular_velocity: Vector3<f64>,
     /// Specific force, m/s²: the measurement of an accelerometer; at rest +9.81 along the axis that points up.
+    #[payload(unit = "m/s^2")]
     pub linear_acceleration: Vector3<f64>,
     /// The device's own orientation, `world_from_body`, if it has one.
     pub orientation: Option<UnitQuaternion<f64>>,
@@ -40,6 +42,7 @@ impl Imu {
 #[payload(ros)]
 pub struct MagneticField {
     /// The field, tesla.
+    #[payload(unit = "T")]
     pub magnetic_field: Vector3<f64>,
     /// Its covariance, T².
     pub covariance: Option<Matrix3<f64>>,
@@ -68,7 +71,9 @@ pub struct Marg {
 #[payload(ros)]
 pub struct FluidPressure {
     /// Absolute pressure, Pa.
+    #[payload(unit = "Pa")]
     pub fluid_pressure: f64,
     /// Its variance, Pa².
+    #[payload(unit = "Pa^2")]
     pub variance: Option<f64>,
 }

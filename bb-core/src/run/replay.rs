@@ -310,7 +310,7 @@ impl Replayer {
             Event::Noted { path, message } => control.note_fault(path, message),
             Event::HardwareError { path, message } => control.note_hardware_error(path, message),
             Event::Parameters { changes } => control.replay_parameters(changes),
-            Event::Command { command } => control.replay_command(command),
+            Event::Command { command, caller } => control.replay_command(command, caller),
             Event::Ended { execution, end } => control.replay_end(execution, end),
             Event::Cancel { execution } => control.cancel(execution),
             Event::Timeout { execution } => control.timed_out(execution),

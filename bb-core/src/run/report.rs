@@ -48,6 +48,11 @@ impl Report {
         self.estimators.iter().find(|estimator| estimator.path == path)
     }
 
+    /// The sensor, controller or bridge of that path.
+    pub fn source(&self, path: &str) -> Option<&SourceStatistics> {
+        self.sources.iter().find(|source| source.path == path)
+    }
+
     /// The actuator of that path.
     pub fn actuator(&self, path: &str) -> Option<&ActuatorStatistics> {
         self.actuators.iter().find(|actuator| actuator.path == path)
@@ -101,6 +106,11 @@ impl fmt::Display for Report {
         }
         for source in self.sources.iter().filter(|source| source.skipped > 0) {
             writeln!(f, "{}: {} readings, {} skipped", source.path, source.readings, source.skipped)?;
+        }
+        for source in &self.sources {
+            for (name, count) in source.counts.iter().filter(|(_, count)| *count > 0) {
+                writeln!(f, "{}: {name} {count} times", source.path)?;
+            }
         }
         let has_exceeded = |actuator: &&ActuatorStatistics| {
             let mut quantities = LimitedQuantity::ALL.iter().copied();

@@ -153,7 +153,8 @@ impl Assembly {
         publish: &Publish<S::Output>,
     ) -> Option<Box<dyn Source>> {
         let context = S::context(declaration, self.host.clone());
-        let shared = SharedSource::new(declaration.path, declaration.period_nanos.is_some());
+        let shared =
+            SharedSource::new(declaration.path, declaration.period_nanos.is_some(), S::counters(&context).clone());
         let tell = {
             let (told, control) = (shared.clone(), self.control.downgrade());
             move |order| {

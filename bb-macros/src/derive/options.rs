@@ -77,6 +77,7 @@ impl Attribute {
             })),
             None => quote!(::core::option::Option::None),
         };
+        let (compared_with, one_of) = (&self.compared_with, &self.one_of);
         quote!(::bb_core::__private::OptionField {
             name: #name,
             doc: #doc,
@@ -84,6 +85,8 @@ impl Attribute {
             dimension: #dimension,
             unit: #unit,
             range: #range,
+            compared_with: #compared_with,
+            one_of: #one_of,
         },)
     }
 

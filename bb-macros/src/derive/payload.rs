@@ -3,6 +3,7 @@
 mod codec;
 
 use crate::diagnostics::Diagnostics;
+use crate::units::Unit;
 use proc_macro2::{Ident, TokenStream};
 use quote::{ToTokens, format_ident, quote, quote_spanned};
 use syn::spanned::Spanned;
@@ -154,7 +155,7 @@ fn arm(head: &TokenStream, fields: &Fields, diagnostics: &mut Diagnostics) -> To
     for (index, field) in fields.iter().enumerate() {
         let bound = format_ident!("f{index}");
         let kind = &field.ty;
-        let check = match may_be_non_finite(field, diagnostics) {
+        let check = match attributes_of(field, diagnostics).is_any {
             true => quote!(is_any),
             false => quote!(is_finite),
         };
@@ -164,22 +165,39 @@ fn arm(head: &TokenStream, fields: &Fields, diagnostics: &mut Diagnostics) -> To
     quote!(#head { #patterns } => #checks,)
 }
 
-/// Whether `#[payload(non_finite)]` is on a field.
-fn may_be_non_finite(field: &Field, diagnostics: &mut Diagnostics) -> bool {
-    let mut may_be = false;
+/// The contents of `#[payload(…)]` on a field.
+#[derive(Default)]
+struct FieldAttributes {
+    /// It may hold NaN and infinities.
+    is_any: bool,
+    /// The units of its numbers, each as it was written too.
+    units: Vec<(Unit, String)>,
+}
+
+fn attributes_of(field: &Field, diagnostics: &mut Diagnostics) -> FieldAttributes {
+    let mut attributes = FieldAttributes::default();
     for attribute in field.attrs.iter().filter(|attribute| attribute.path().is_ident("payload")) {
-        let parsed = attribute.parse_nested_meta(|meta| match meta.path.is_ident("non_finite") {
-            true => {
-                may_be = true;
-                Ok(())
+        let parsed = attribute.parse_nested_meta(|meta| {
+            if meta.path.is_ident("non_finite") {
+                attributes.is_any = true;
+            } else if meta.path.is_ident("unit") {
+                let text: LitStr = meta.value()?.parse()?;
+                let unit = text.parse_with(Unit::parse)?;
+                if unit.factor != 1.0 {
+                    let message = format!("payloads are in SI; write `unit = \"{}\"`", unit.dimension.unit());
+                    return Err(syn::Error::new(text.span(), message));
+                }
+                attributes.units.push((unit, text.value()));
+            } else {
+                return Err(meta.error("expected `non_finite` or `unit = \"m/s\"`"));
             }
-            false => Err(meta.error("expected `non_finite`")),
+            Ok(())
         });
         if let Err(error) = parsed {
             diagnostics.syntax(&error);
         }
     }
-    may_be
+    attributes
 }
 
 /// `a: f0, b: f1,`

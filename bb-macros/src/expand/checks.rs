@@ -5,7 +5,7 @@ use super::literal::spanned_call;
 use super::part::Part;
 use super::types::{Named, Types, type_name};
 use crate::diagnostics::Place;
-use crate::model::{EstimatorId, Robot};
+use crate::model::{EstimatorId, Robot, Target};
 use crate::parse::{Component, ComponentOption, OptionValue, Value};
 use crate::units::Dimension;
 use crate::verify::Verified;
@@ -21,6 +21,7 @@ pub(super) fn checks(verified: &Verified<'_>, types: &Types<'_>) -> TokenStream 
             _ => required(part.component(robot), &types.options(part)),
         });
         checks.extend(options(robot, part.component(robot), &types.options(part)));
+        checks.extend(compared(types, part.component(robot), &types.options(part)));
     }
     for id in robot.estimators.ids() {
         checks.extend(inputs(robot, types, id));
@@ -84,6 +85,35 @@ fn options(robot: &Robot, component: &Component, options: &Named) -> TokenStream
     checks
 }
 
+/// Numbers that are compared with a field of messages have its unit.
+fn compared(types: &Types<'_>, component: &Component, options: &Named) -> TokenStream {
+    let (robot, name) = (types.model(), type_name(component));
+    let mut checks = TokenStream::new();
+    for field in &component.options {
+        let OptionValue::Reference(reference) = &field.value else { continue };
+        let (Some(Target::Publisher(id)), false) = (robot.target(&reference.path), reference.fields.is_empty())
+        else {
+            continue;
+        };
+        let (payload, of) = (types.payload(id), crate::names::text(&field.name));
+        let names = reference.names();
+        let count = names.len();
+        for option in &component.options {
+            let Some((place, dimension, _)) = given_number(robot, option) else { continue };
+            let (option, start) = (crate::names::text(&option.name), place.start);
+            let payload = payload.at(start);
+            let (Dimension(exponents), dimension, has_unit) = match dimension {
+                Some(dimension) => (dimension, dimension.name(), true),
+                None => (Dimension::NONE, String::new(), false),
+            };
+            let arguments = quote!(#name, #option, #of, [#(#names),*], #has_unit, [#(#exponents),*], #dimension);
+            let generics = quote_spanned!(start=> ::<#options, #payload, #count>);
+            checks.extend(spanned_call(place, ("check_compared", generics), arguments));
+        }
+    }
+    checks
+}
+
 /// A literal number: its place, its dimension if it has a unit, and its value in SI.
 fn given_number(robot: &Robot, given: &ComponentOption) -> Option<(Place, Option<Dimension>, f64)> {
     match &given.value {
@@ -101,6 +131,7 @@ fn given_number(robot: &Robot, given: &ComponentOption) -> Option<(Place, Option
                 Value::Integer(_) | Value::Bool(_) | Value::Text(_) => None,
             }
         }
+        OptionValue::Reference(_) => None,
         OptionValue::Expression { expression, number } => Some((Place::of(&**expression), None, (*number)?)),
     }
 }

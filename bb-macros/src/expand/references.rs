@@ -6,7 +6,7 @@
 //! ```
 
 use super::literal::ident;
-use crate::model::{CategoryId, Robot};
+use crate::model::{CategoryId, Robot, Target};
 use crate::parse::{OptionValue, Path};
 use crate::verify::Verified;
 use proc_macro2::{Ident, TokenStream};
@@ -15,7 +15,7 @@ use quote::quote;
 pub(super) fn references(verified: &Verified<'_>) -> TokenStream {
     let robot = verified.robot;
     let module = ident(&verified.module);
-    let paths: Vec<Vec<Ident>> = inputs(robot).chain(parameters(robot)).chain(control(robot)).collect();
+    let paths: Vec<Vec<Ident>> = inputs(robot).chain(options(robot)).chain(control(robot)).collect();
     let names = robot.estimators.enumerate().map(|(id, estimator)| {
         let names = estimator.inputs.iter().map(|input| &input.name);
         quote!({ #(let #names = #id;)* })
@@ -43,11 +43,16 @@ fn inputs(robot: &Robot) -> impl Iterator<Item = Vec<Ident>> + '_ {
     })
 }
 
-/// The parameters that options are bound to.
-fn parameters(robot: &Robot) -> impl Iterator<Item = Vec<Ident>> + '_ {
+/// What options name or are bound to.
+fn options(robot: &Robot) -> impl Iterator<Item = Vec<Ident>> + '_ {
     let options = robot.components().flat_map(|component| &component.options);
     options.filter_map(|option| match &option.value {
         OptionValue::Parameter(path) => Some(spelt(&robot.parameters[robot.parameter(path)?].path, path)),
+        OptionValue::Reference(reference) => match robot.target(&reference.path)? {
+            Target::Publisher(id) => Some(spelt(&robot.publishers[id].path, &reference.path)),
+            Target::Actuator(id) => Some(spelt(&robot.actuators[id].path, &reference.path)),
+            Target::Command(id) => Some(spelt(&robot.commands[id].path, &reference.path)),
+        },
         OptionValue::Quantity(_) | OptionValue::Expression { .. } => None,
     })
 }

@@ -3,7 +3,7 @@
 mod mistaken;
 mod options;
 
-pub(crate) use options::{ComponentOption, OptionValue};
+pub(crate) use options::{ComponentOption, OptionValue, Reference};
 
 use super::Notes;
 use super::block::{Head, colon, opened, semicolon};

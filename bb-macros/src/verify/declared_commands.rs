@@ -12,13 +12,18 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     if !robot.complete {
         return;
     }
-    let declared: Vec<String> = robot.commands.iter().map(|command| text(&command.name)).collect();
     for reaction in robot.estimators.iter().flat_map(|estimator| estimator.reactions.all()) {
         let name = &reaction.command;
         if robot.command(name).is_some() {
             continue;
         }
-        let way_out = way_out(&text(name), declared.iter().map(String::as_str), "commands");
-        diagnostics.error(name, format!("there is no command `{name}`; {way_out}"));
+        diagnostics.error(name, no_command(robot, &text(name)));
     }
+}
+
+/// The message for a command that is not declared.
+pub(super) fn no_command(robot: &Robot, name: &str) -> String {
+    let declared: Vec<String> = robot.commands.iter().map(|command| text(&command.name)).collect();
+    let way_out = way_out(name, declared.iter().map(String::as_str), "commands");
+    format!("there is no command `{name}`; {way_out}")
 }

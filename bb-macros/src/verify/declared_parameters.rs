@@ -35,7 +35,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
                 }
                 continue;
             }
-            OptionValue::Quantity(_) => continue,
+            OptionValue::Quantity(_) | OptionValue::Reference(_) => continue,
         };
         if robot.parameter(path).is_some() {
             continue;

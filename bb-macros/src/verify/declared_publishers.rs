@@ -31,20 +31,24 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
         let is_other = |from| !matches!(from, From::Estimator(own, _) if own == id);
         let others = robot.publishers.iter().filter(|publisher| is_other(publisher.from));
         let known: Vec<String> = others.map(|publisher| publisher.path.join("::")).collect();
-        let message = match nearest_path(&path, &known) {
-            Some(near) => format!("nothing publishes at `{path}`; did you mean `{near}`?"),
-            None if known.is_empty() => format!("nothing publishes at `{path}`, nor elsewhere; declare a sensor"),
-            None => {
-                let known: Vec<&str> = known.iter().map(String::as_str).collect();
-                format!("nothing publishes at `{path}`; declared are {}", some_of(&known))
-            }
-        };
-        diagnostics.at(input.path.place(), message);
+        diagnostics.at(input.path.place(), nothing_at(&path, &known));
+    }
+}
+
+/// The message for a path without a publisher.
+pub(super) fn nothing_at(path: &str, known: &[String]) -> String {
+    match nearest_path(path, known) {
+        Some(near) => format!("nothing publishes at `{path}`; did you mean `{near}`?"),
+        None if known.is_empty() => format!("nothing publishes at `{path}`, nor elsewhere; declare a sensor"),
+        None => {
+            let known: Vec<&str> = known.iter().map(String::as_str).collect();
+            format!("nothing publishes at `{path}`; declared are {}", some_of(&known))
+        }
     }
 }
 
 /// The message for a path below an estimator: the output may be undeclared or misspelt, which only its type can tell.
-fn undeclared_output(robot: &Robot, path: &Path) -> Option<String> {
+pub(super) fn undeclared_output(robot: &Robot, path: &Path) -> Option<String> {
     let (output, above) = path.0.split_last()?;
     let above: Vec<String> = above.iter().map(text).collect();
     let is_below = |path: &[String]| !above.is_empty() && path.ends_with(&above);

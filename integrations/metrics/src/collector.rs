@@ -126,6 +126,14 @@ fn sources(families: &mut Families<'_>, sources: &[SourceStatistics]) -> fmt::Re
             sources.iter().try_for_each(|source| family.count(&[("source", source.path)], count(source)))
         })?;
     }
+    families.counter("source_events", "What a sensor or a service counts itself", |family| {
+        for source in sources {
+            for (event, count) in &source.counts {
+                family.count(&[("source", source.path), ("event", event)], *count)?;
+            }
+        }
+        Ok(())
+    })?;
     families.gauge("source_running", "0 if it has stopped or waits for its restart", None, |family| {
         sources
             .iter()

@@ -20,6 +20,7 @@
 //! | `bb_source_readings_total` | `source` | readings of a sensor, updates of a service |
 //! | `bb_source_readings_skipped_total` | `source` | readings at its rate for which it came too late |
 //! | `bb_source_restarts_total` | `source` | times it was restarted |
+//! | `bb_source_events_total` | `source`, `event` | what a sensor or a service counts itself, such as the silences of a `Reaction` |
 //! | `bb_source_running` | `source` | 0 if it has stopped or waits for its restart |
 //! | `bb_topic_messages_published_total` | `topic`, `payload` | messages |
 //! | `bb_topic_messages_lost_total` | `topic`, `payload` | messages that slow subscribers lost |

@@ -82,7 +82,7 @@ impl Known {
         let fields = match source {
             Source::Message(Shape::Struct(shape)) | Source::Variant(shape) => self.fields(shape.name, shape.fields),
             Source::Message(Shape::Enum(shape)) => self.variants(shape, &mut constants),
-            Source::Message(shape) => self.fields(&name, &[FieldShape { name: "data", shape }]),
+            Source::Message(shape) => self.fields(&name, &[FieldShape::new("data", shape)]),
         };
         Definition { name, constants, fields }
     }

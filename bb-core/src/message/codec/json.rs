@@ -50,7 +50,7 @@ impl Form {
     fn of(fields: &'static [FieldShape]) -> Self {
         match fields {
             [] | [FieldShape { name: NOTHING, .. }] => Self::Empty,
-            [FieldShape { name: "0", shape }] => Self::Transparent(*shape),
+            [FieldShape { name: "0", shape, .. }] => Self::Transparent(*shape),
             fields => Self::Object(fields),
         }
     }

@@ -57,6 +57,20 @@ pub struct FieldShape {
     pub name: &'static str,
     /// What its bytes mean.
     pub shape: Shape,
+    /// The unit of its numbers, if the field states one: `#[payload(unit = "V")]`. Several if that depends, as for the
+    /// position of a joint: rad or m.
+    pub units: &'static [FieldUnit],
+}
+
+/// The unit of a field's numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FieldUnit {
+    /// Exponents of metre, kilogram, second, ampere, kelvin and radian.
+    pub exponents: [i8; 6],
+    /// The dimension with its article: "a voltage".
+    pub dimension: &'static str,
+    /// Its symbol: `V`.
+    pub symbol: &'static str,
 }
 
 /// See [`Shape::Enum`].
@@ -74,10 +88,16 @@ pub(super) const NOTHING: &str = "structure_needs_at_least_one_member";
 impl FieldShape {
     /// A field.
     pub const fn new(name: &'static str, shape: Shape) -> Self {
-        Self { name, shape }
+        Self { name, shape, units: &[] }
+    }
+
+    /// The same, in one of these units.
+    pub const fn in_units(mut self, units: &'static [FieldUnit]) -> Self {
+        self.units = units;
+        self
     }
 
     /// The content of a struct without fields.
     #[doc(hidden)]
-    pub const NOTHING: Self = Self { name: NOTHING, shape: Shape::U8 };
+    pub const NOTHING: Self = Self::new(NOTHING, Shape::U8);
 }

@@ -238,7 +238,8 @@ fn events_are_read_back() {
         CommandPhase::TimedOut,
         CommandPhase::Refused(refusal),
     ] {
-        let event = CommandEvent { command: "stop", execution: 7, phase, health: Some(health) };
+        let event =
+            CommandEvent { command: "stop", execution: 7, phase, caller: "program".into(), health: Some(health) };
         assert_eq!(decode::<CommandEvent>(&bytes_of(&event)), Ok(event));
     }
     for value in [1.5.into(), 7i64.into(), true.into(), ParameterValue::Text("a".into())] {

@@ -1,6 +1,7 @@
 //! The part of a source that other threads reach.
 
 use super::lock;
+use crate::component::Counts;
 use crate::run::occupied::{Entered, Occupied};
 use crate::time::{Clock, MonotonicTime};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -22,6 +23,7 @@ struct Shared {
     restarts: AtomicU64,
     occupied: Occupied,
     stopped: Mutex<Option<String>>,
+    counters: Counts,
 }
 
 #[derive(Debug, Default)]
@@ -52,10 +54,19 @@ pub struct SourceStatistics {
     pub restarts: u64,
     /// Why it does not run, if it does not.
     pub stopped: Option<String>,
+    /// What it counts itself, by name, see [`ServiceContext::counter`](crate::ServiceContext::counter).
+    pub counts: Vec<(&'static str, u64)>,
+}
+
+impl SourceStatistics {
+    /// A count of its own; 0 if it has none of that name.
+    pub fn count(&self, name: &str) -> u64 {
+        self.counts.iter().find(|(known, _)| *known == name).map_or(0, |(_, count)| *count)
+    }
 }
 
 impl SharedSource {
-    pub(super) fn new(path: &'static str, has_rate: bool) -> Self {
+    pub(super) fn new(path: &'static str, has_rate: bool, counters: Counts) -> Self {
         Self(Arc::new(Shared {
             path,
             has_rate,
@@ -65,6 +76,7 @@ impl SharedSource {
             restarts: AtomicU64::new(0),
             occupied: Occupied::new(),
             stopped: Mutex::default(),
+            counters,
         }))
     }
 
@@ -111,6 +123,7 @@ impl SharedSource {
             skipped: self.0.skipped.load(Ordering::Relaxed),
             restarts: self.0.restarts.load(Ordering::Relaxed),
             stopped: lock(&self.0.stopped).clone(),
+            counts: self.0.counters.all(),
         }
     }
 

@@ -12,7 +12,7 @@ use syn::parse::ParseStream;
 use syn::{Expr, ExprRange, Field, LitStr, RangeLimits, Token, Type};
 
 /// The words of an option's attribute.
-const WORDS: [&str; 4] = ["default", "required", "range", "unit"];
+const WORDS: [&str; 6] = ["default", "required", "range", "unit", "compared_with", "one_of"];
 
 /// The contents of `#[option(…)]`.
 #[derive(Default)]
@@ -21,6 +21,10 @@ pub(super) struct Attribute {
     pub(super) default: Option<Expr>,
     pub(super) range: Option<(Expr, Expr, String)>,
     pub(super) unit: Option<(Unit, String)>,
+    /// The option with the field of messages whose unit it has.
+    pub(super) compared_with: String,
+    /// The group of options of which at least one is to be given.
+    pub(super) one_of: String,
     /// Whether it has an error, so that missing parts are not reported as well.
     pub(super) is_mistaken: bool,
 }
@@ -79,6 +83,14 @@ impl Attribute {
                     .parse()
                     .map_err(|_| syn::Error::new(place, "a unit is written as a text, as in `unit = \"m\"`"))?;
                 self.unit = Some((text.parse_with(Unit::parse)?, text.value()));
+            }
+            "compared_with" => {
+                value(meta, "\"when\"")?;
+                self.compared_with = meta.input.parse::<LitStr>()?.value();
+            }
+            "one_of" => {
+                value(meta, "\"condition\"")?;
+                self.one_of = meta.input.parse::<LitStr>()?.value();
             }
             "min" | "max" => {
                 return Err(meta.error("bounds are written as a range: `range = 0.0..=1.0`"));

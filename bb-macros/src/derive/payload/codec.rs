@@ -18,7 +18,8 @@
 //! `read` is the largest function of a payload. One exit that names the field, in place of a `?` and a `map_err` for each,
 //! is a third of the code that is compiled.
 
-use super::patterns;
+use super::{attributes_of, patterns};
+use crate::diagnostics::Diagnostics;
 use proc_macro2::TokenStream;
 use quote::{format_ident, quote};
 use syn::{Data, DataEnum, DeriveInput, Field, Fields, Member};
@@ -40,7 +41,9 @@ pub(super) fn field(item: &DeriveInput, text: &TokenStream) -> TokenStream {
     quote! {
         const _: () = {
             #[allow(unused_imports)]
-            use ::bb_core::__private::{EnumShape, FieldOf, FieldShape, NotField as _, Reader, Shape, StructShape, Writer};
+            use ::bb_core::__private::{
+                EnumShape, FieldOf, FieldShape, FieldUnit, NotField as _, Reader, Shape, StructShape, Writer,
+            };
 
             #[automatically_derived]
             impl #generics ::bb_core::Field for #name #arguments #bounds {
@@ -153,7 +156,17 @@ fn fallible(read: &TokenStream) -> TokenStream {
 fn struct_shape(fields: &Fields, text: &TokenStream) -> TokenStream {
     let shapes = fields.iter().zip(fields.members()).map(|(field, member)| {
         let (name, kind) = (text_of(&member), &field.ty);
-        quote!(FieldShape::new(#name, FieldOf::<#kind>::SHAPE),)
+        // Errors in the attributes have been reported.
+        let units = attributes_of(field, &mut Diagnostics::default()).units;
+        let units: Vec<TokenStream> = units
+            .into_iter()
+            .map(|(unit, symbol)| {
+                let (crate::units::Dimension(exponents), dimension) = (unit.dimension, unit.dimension.name());
+                quote!(FieldUnit { exponents: [#(#exponents),*], dimension: #dimension, symbol: #symbol })
+            })
+            .collect();
+        let in_units = (!units.is_empty()).then(|| quote!(.in_units(&[#(#units),*])));
+        quote!(FieldShape::new(#name, FieldOf::<#kind>::SHAPE) #in_units,)
     });
     let shapes: TokenStream = if fields.is_empty() { quote!(FieldShape::NOTHING) } else { shapes.collect() };
     quote!(StructShape { name: #text, fields: &[#shapes] })

@@ -1,13 +1,15 @@
 //! The options of a component: `beta = 0.1`, `gain = param::gain`.
 
+use crate::diagnostics::Place;
 use crate::parse::literal::capitalized;
-use crate::parse::name::whole;
+use crate::parse::name::{is_keyword, whole};
 use crate::parse::quantity::decimal_comma;
 use crate::parse::tokens::place_since;
 use crate::parse::{Path, Quantity};
 use proc_macro2::{Ident, TokenStream};
+use syn::ext::IdentExt;
 use syn::parse::ParseStream;
-use syn::{Expr, Token};
+use syn::{Expr, Member, Token};
 
 /// `beta = 0.1`
 #[derive(Clone, Debug)]
@@ -22,16 +24,30 @@ pub(crate) enum OptionValue {
     Quantity(Quantity),
     /// `param::imu::beta`: the current value of the parameter.
     Parameter(Path),
+    /// `sensor::battery.voltage`, `command::land`: something that the robot declares, by its whole path.
+    Reference(Reference),
     /// Any expression; with its number if it is a literal.
     Expression { expression: Box<Expr>, number: Option<f64> },
 }
 
+/// The path of a command, an actuator or a publisher; or, after it, a field of the publisher's messages.
+#[derive(Clone, Debug)]
+pub(crate) struct Reference {
+    pub(crate) path: Path,
+    pub(crate) fields: Vec<Member>,
+}
+
+/// The first names of the paths of what an option can name. An output may be published elsewhere, so that a path with a field may
+/// start with any name.
+const ROOTS: [&str; 6] = ["sensor", "estimator", "controller", "bridge", "actuator", "command"];
+
 impl ComponentOption {
     pub(super) fn parse(input: ParseStream<'_>) -> syn::Result<Self> {
         let place = input.span();
-        let name: Ident =
-            input.parse().map_err(|_| syn::Error::new(place, "expected an option, as in `name = value`"))?;
+        let expected = || syn::Error::new(place, "expected an option, as in `name = value`");
+        let name = input.call(Ident::parse_any).map_err(|_| expected())?;
         whole(input, &name)?;
+        let name = if is_keyword(&name) { raw(&name).ok_or_else(expected)? } else { name };
         let place = input.span();
         let equals: syn::Result<Token![=]> = input.parse();
         equals
@@ -45,6 +61,9 @@ impl OptionValue {
     fn parse(input: ParseStream<'_>) -> syn::Result<Self> {
         if let Some(parameter) = Self::parameter(input)? {
             return Ok(parameter);
+        }
+        if let Some(reference) = Reference::whole(input) {
+            return Ok(Self::Reference(reference));
         }
         elsewhere(&input.fork()).map_or(Ok(()), Err)?;
         if !Quantity::peek(input) {
@@ -76,6 +95,54 @@ impl OptionValue {
         }
         Path::parse(input, EXPECTED).map(|path| Some(Self::Parameter(path)))
     }
+}
+
+impl Reference {
+    /// Reads one if it is all of the value. A path of constants of Rust, `sensor::RATE`, is an expression.
+    fn whole(input: ParseStream<'_>) -> Option<Self> {
+        let ahead = input.fork();
+        let path = Path::parse(&ahead, "").ok()?;
+        let mut fields = Vec::new();
+        while ahead.peek(Token![.]) {
+            ahead.parse::<Token![.]>().ok()?;
+            fields.push(ahead.parse::<Member>().ok()?);
+        }
+        let is_path =
+            path.0.len() > 1 && path.0.iter().all(|name| !name.to_string().starts_with(char::is_uppercase));
+        let is_whole = ahead.is_empty() || ahead.peek(Token![,]);
+        let is_named =
+            !fields.is_empty() || path.0.first().is_some_and(|root| ROOTS.iter().any(|name| root == name));
+        if !(is_path && is_whole && is_named) {
+            return None;
+        }
+        syn::parse::discouraged::Speculative::advance_to(input, &ahead);
+        Some(Self { path, fields })
+    }
+
+    /// The names after the path: `angular_velocity`, `x`.
+    pub(crate) fn names(&self) -> Vec<String> {
+        let names = self.fields.iter().map(|field| match field {
+            Member::Named(name) => crate::names::text(name),
+            Member::Unnamed(index) => index.index.to_string(),
+        });
+        names.collect()
+    }
+
+    /// `angular_velocity.x`
+    pub(crate) fn field(&self) -> String {
+        self.names().join(".")
+    }
+
+    /// Where the names after the path are.
+    pub(crate) fn field_place(&self) -> Option<Place> {
+        Some(Place { start: Place::of(self.fields.first()?).start, end: Place::of(self.fields.last()?).end })
+    }
+}
+
+/// The keyword as a name of Rust, `r#for`; `None` for those that cannot be one.
+fn raw(keyword: &Ident) -> Option<Ident> {
+    let cannot = ["_", "self", "Self", "super", "crate"].iter().any(|word| keyword == word);
+    (!cannot).then(|| Ident::new_raw(&keyword.to_string(), keyword.span()))
 }
 
 /// The error for a value in the syntax of Python or of a launch file: `True`, `param.imu.beta`, `$(arg beta)`.

@@ -1,0 +1,319 @@
+//! Reactions: a condition on a field of a topic starts a command.
+
+use crate::components::{Failure, Move, Target, at};
+use crate::replay::{entries, journal, read_back};
+use bb_core::component::{ReactionEvent, ReactionState};
+use bb_core::event::{CommandEvent, CommandPhase};
+use bb_core::prelude::*;
+use bb_core::run::Report;
+use bb_core::{DynamicMessage, Stamped};
+
+/// Takes half a second.
+#[derive(Debug)]
+struct Land;
+
+impl Command for Land {
+    type Options = NoOptions;
+    type Arguments = NoArguments;
+    type Output = ();
+
+    async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
+        context.sleep(Duration::from_millis(500)).await;
+        Ok(Outcome::done(()))
+    }
+}
+
+robot! {
+    robot Drone;
+    parameters { battery { low: f64 = 11 V, range: 5 V..=15 V; } }
+    commands {
+        land: Land { allowed_states: [idle, executing]; cancel: all; }
+        go: Move { allowed_states: [idle, executing]; }
+    }
+    sensors { sensor battery: External<BatteryState>(); }
+    controllers {
+        controller low: Reaction(
+            when = sensor::battery.voltage, below = param::battery::low, for = 2 s, run = command::land, cooldown = 3 s,
+        );
+        controller hot: Reaction(
+            when = sensor::battery.temperature, below = 250 K, above = 330 K, run = command::land, stale_after = 1500 ms,
+        ) { rate: 5 Hz; }
+    }
+    link base;
+}
+
+/// What happened at a controller or to its command, by the second.
+type Happened = Vec<(i64, String)>;
+
+/// Flies: `(decisecond, voltage)` for each message.
+struct Flight {
+    simulation: Simulation<Drone>,
+    states: Subscription<ReactionState>,
+    commands: Subscription<CommandEvent>,
+}
+
+impl Flight {
+    fn new(is_armed: bool) -> Result<Self, Failure> {
+        Self::of(Drone::builder().simulate()?, is_armed)
+    }
+
+    fn of(simulation: Simulation<Drone>, is_armed: bool) -> Result<Self, Failure> {
+        if is_armed {
+            simulation.arm()?;
+        }
+        let states = simulation.subscribe(drone::controller::low);
+        let commands = simulation.subscribe(drone::command::land);
+        Ok(Self { simulation, states, commands })
+    }
+
+    fn measure(&mut self, deciseconds: i64, battery: BatteryState) {
+        self.simulation.run_until(at(100 * deciseconds));
+        self.simulation.publish(drone::sensor::battery, at(100 * deciseconds), battery);
+        self.simulation.run_for(Duration::from_millis(20));
+    }
+
+    fn voltage(&mut self, deciseconds: i64, voltage: f64) {
+        self.measure(deciseconds, BatteryState { voltage, ..Default::default() });
+    }
+
+    /// The states of the controller in order, by decisecond.
+    fn states(&self) -> Happened {
+        let states = self.states.drain().map(|state| (deciseconds(&state), of_state(&state)));
+        states.collect()
+    }
+
+    fn count(&self, name: &str) -> u64 {
+        count(&self.simulation.report(), "controller/low", name)
+    }
+}
+
+fn deciseconds<T>(message: &Stamped<T>) -> i64 {
+    message.monotonic_time.as_nanos() / 100_000_000
+}
+
+fn of_state(state: &ReactionState) -> String {
+    match &state.event {
+        ReactionEvent::Fulfilled => "fulfilled".into(),
+        ReactionEvent::NotFulfilled => "not fulfilled".into(),
+        ReactionEvent::Started => "started".into(),
+        ReactionEvent::Refused(why) => why.clone(),
+        other => format!("{other:?}"),
+    }
+}
+
+fn count(report: &Report, path: &str, name: &str) -> u64 {
+    report.source(path).map_or(0, |source| source.count(name))
+}
+
+/// A message each half second from a decisecond to another.
+fn each_half_second(from: i64, to: i64, voltage: f64) -> Vec<(i64, f64)> {
+    (from..=to).step_by(5).map(|time| (time, voltage)).collect()
+}
+
+const REFUSED: &str = "`land` is refused: it is not allowed in the state `disarmed`";
+
+#[test]
+fn a_command_starts_when_the_condition_has_held_by_the_stamps() -> Result<(), Failure> {
+    type Case = (&'static str, bool, Vec<Vec<(i64, f64)>>, &'static [(i64, &'static str)], [u64; 2]);
+    let low = each_half_second;
+    let (nan, ok) = (f64::NAN, 12.0);
+    let cases: [Case; 10] = [
+        ("never low", true, vec![low(10, 60, ok)], &[], [0, 0]),
+        ("at the bound", true, vec![low(10, 60, 11.0)], &[], [0, 0]),
+        ("once after `for`", true, vec![low(10, 35, 10.0)], &[(10, "fulfilled"), (30, "started")], [0, 0]),
+        (
+            "again after the end, 0.5 s later, and the cooldown of 3 s",
+            true,
+            vec![low(10, 70, 10.0)],
+            &[(10, "fulfilled"), (30, "started"), (70, "started")],
+            [0, 0],
+        ),
+        (
+            "chatter",
+            true,
+            vec![low(10, 25, 10.0), vec![(28, ok)], low(30, 50, 10.0)],
+            &[(10, "fulfilled"), (28, "not fulfilled"), (30, "fulfilled"), (50, "started")],
+            [0, 0],
+        ),
+        (
+            "NaN",
+            true,
+            vec![low(10, 25, 10.0), vec![(28, nan), (29, nan)], low(30, 50, 10.0)],
+            &[(10, "fulfilled"), (28, "not fulfilled"), (30, "fulfilled"), (50, "started")],
+            [2, 0],
+        ),
+        (
+            "silence",
+            true,
+            vec![low(10, 20, 10.0), low(41, 61, 10.0)],
+            &[(10, "fulfilled"), (40, "not fulfilled"), (41, "fulfilled"), (61, "started")],
+            [0, 1],
+        ),
+        ("silence from the start", true, vec![low(45, 50, ok)], &[], [0, 1]),
+        (
+            "disarmed: refused, and tried again after the cooldown",
+            false,
+            vec![low(10, 65, 10.0)],
+            &[(10, "fulfilled"), (30, REFUSED), (60, REFUSED)],
+            [0, 0],
+        ),
+        (
+            "recovered before the cooldown is over",
+            true,
+            vec![low(10, 35, 10.0), low(40, 65, ok), low(70, 90, 10.0)],
+            &[(10, "fulfilled"), (30, "started"), (40, "not fulfilled"), (70, "fulfilled"), (90, "started")],
+            [0, 0],
+        ),
+    ];
+    for (name, is_armed, messages, expected, [not_numbers, silences]) in cases {
+        let mut flight = Flight::new(is_armed)?;
+        for (time, voltage) in messages.concat() {
+            flight.voltage(time, voltage);
+        }
+        let expected: Happened = expected.iter().map(|(time, event)| (*time, (*event).to_owned())).collect();
+        assert_eq!(flight.states(), expected, "{name}");
+        assert_eq!([flight.count("not a number"), flight.count("silent")], [not_numbers, silences], "{name}");
+        let started = expected.iter().filter(|(_, event)| event == "started").count();
+        let refused = expected.iter().filter(|(_, event)| event == REFUSED).count();
+        let report = flight.simulation.report();
+        let counts = &report.commands[0];
+        assert_eq!((counts.started, counts.refused), (started as u64, refused as u64), "{name}");
+        assert!(flight.commands.drain().all(|event| event.caller == "controller/low"), "{name}");
+    }
+    Ok(())
+}
+
+#[test]
+fn messages_that_come_late_or_twice_neither_start_nor_end_anything() -> Result<(), Failure> {
+    let mut flight = Flight::new(true)?;
+    flight.voltage(10, 10.0);
+    for (now, stamp, voltage) in [(15, 15, 10.0), (20, 12, 12.0), (21, 15, 12.0), (25, 25, 10.0)] {
+        flight.simulation.run_until(at(100 * now));
+        let battery = BatteryState { voltage, ..Default::default() };
+        flight.simulation.publish(drone::sensor::battery, at(100 * stamp), battery);
+    }
+    flight.voltage(30, 10.0);
+    assert_eq!(flight.states(), [(10, "fulfilled".into()), (30, "started".into())]);
+    Ok(())
+}
+
+#[test]
+fn an_optional_field_outside_of_two_bounds_at_the_rate_of_the_controller() -> Result<(), Failure> {
+    let mut flight = Flight::new(true)?;
+    let states = flight.simulation.subscribe(drone::controller::hot);
+    for (time, temperature) in
+        [(11, Some(300.0)), (21, None), (31, Some(240.0)), (41, Some(340.0)), (51, Some(300.0))]
+    {
+        flight.measure(time, BatteryState { voltage: 12.0, temperature, ..Default::default() });
+    }
+    flight.simulation.run_until(at(6000));
+    let states: Vec<_> = states.drain().map(|state| (deciseconds(&state), of_state(&state), state.value)).collect();
+    // At 5 Hz; the command takes 0.5 s, and the cooldown is 1 s: at 4.2 s it has not passed.
+    let expected = [(32, "started".to_owned(), Some(240.0)), (52, "not fulfilled".to_owned(), Some(300.0))];
+    assert_eq!(states, expected);
+    assert_eq!(count(&flight.simulation.report(), "controller/hot", "not a number"), 1);
+    Ok(())
+}
+
+#[test]
+fn the_command_cancels_what_runs_and_a_bound_follows_its_parameter() -> Result<(), Failure> {
+    let mut flight = Flight::new(true)?;
+    let going = flight.simulation.command(drone::command::go, Target { millis: 60_000, does: None })?;
+    each_half_second(10, 20, 10.0).into_iter().for_each(|(time, voltage)| flight.voltage(time, voltage));
+    flight.simulation.set_parameter(drone::param::battery::low, 9.0)?;
+    each_half_second(25, 40, 10.0).into_iter().for_each(|(time, voltage)| flight.voltage(time, voltage));
+    assert_eq!(flight.states(), [(10, "fulfilled".into())], "the new bound starts `for` anew");
+    flight.simulation.set_parameter(drone::param::battery::low, 10.5)?;
+    each_half_second(45, 65, 10.0).into_iter().for_each(|(time, voltage)| flight.voltage(time, voltage));
+    assert_eq!(flight.states(), [(45, "fulfilled".into()), (65, "started".into())]);
+    assert_eq!(going.try_result(), Some(Err(bb_core::run::CommandError::Cancelled)));
+    Ok(())
+}
+
+/// A run with a start, a refusal and a recovery.
+#[test]
+fn a_replay_gives_the_same_events_with_the_same_caller() -> Result<(), Failure> {
+    fn seen(message: DynamicMessage) -> String {
+        let what = message.downcast::<CommandEvent>().map(|event| format!("{event:?}"));
+        let state = || message.downcast::<ReactionState>().map(|state| format!("{state:?}"));
+        what.or_else(state).unwrap_or_else(|| message.to_json())
+    }
+    let select =
+        Select::AnyOf(&[Select::Below("command"), Select::Below("controller"), Select::Path("state_machine")]);
+    let mut builder = Drone::builder();
+    let lines = journal(&mut builder);
+    let first = builder.subscribe_any(select, None, Overflow::default());
+    let mut flight = Flight::of(builder.simulate()?, false)?;
+    each_half_second(10, 40, 10.0).into_iter().for_each(|(time, voltage)| flight.voltage(time, voltage));
+    flight.simulation.arm()?;
+    each_half_second(45, 80, 10.0).into_iter().for_each(|(time, voltage)| flight.voltage(time, voltage));
+    flight.simulation.stop().ok()?;
+    let first: Vec<_> = first.drain().map(seen).collect();
+    let callers = first.iter().filter(|event| event.contains("caller: \"controller/low\"")).count();
+    assert_eq!(callers, 3, "refused, started, succeeded: {first:#?}");
+    assert!(first.iter().any(|event| event.contains("phase: Refused")), "{first:#?}");
+
+    let builder = Drone::builder();
+    let again = builder.subscribe_any(select, None, Overflow::default());
+    let mut replay = builder.replay()?;
+    replay.play(read_back::<Drone>(&entries(&lines))?)?;
+    replay.stop().ok()?;
+    assert_eq!(again.drain().map(seen).collect::<Vec<_>>(), first);
+    Ok(())
+}
+
+#[test]
+fn callers_are_named_by_whoever_asked() -> Result<(), Failure> {
+    let mut simulation = Drone::builder().simulate()?;
+    simulation.arm()?;
+    let events = simulation.subscribe(drone::command::land);
+    simulation.command(drone::command::land, NoArguments)?;
+    simulation.run_for(Duration::from_secs(1));
+    simulation.bus().for_caller("page", [Right::Commands]).start_command("command/land", "")?;
+    simulation.run_for(Duration::from_secs(1));
+    let events: Vec<_> = events.drain().map(|event| (event.caller.clone(), event.phase.clone())).collect();
+    let (started, succeeded) = (CommandPhase::Started, CommandPhase::Succeeded);
+    let expected = ["program", "page"]
+        .map(|caller| [started.clone(), succeeded.clone()].map(|phase| (caller.to_owned(), phase)));
+    assert_eq!(events, expected.concat());
+    Ok(())
+}
+
+#[test]
+fn in_real_time_it_reacts_to_a_message_at_once() -> Result<(), Failure> {
+    let builder = Drone::builder();
+    let states = builder.subscribe(drone::controller::low);
+    let running = builder.start()?;
+    running.arm()?;
+    let voltage = |voltage: f64| {
+        let battery = BatteryState { voltage, ..Default::default() };
+        running.publish(drone::sensor::battery, running.clock().now(), battery);
+    };
+    voltage(10.0);
+    let state = states.recv_timeout(Duration::from_secs(10)).ok_or("it was low")?;
+    assert_eq!(state.event, ReactionEvent::Fulfilled);
+    voltage(12.0);
+    let state = states.recv_timeout(Duration::from_secs(10)).ok_or("it is no longer low")?;
+    assert_eq!(state.event, ReactionEvent::NotFulfilled);
+    running.stop().ok()?;
+    Ok(())
+}
+
+/// What the declaration of a reaction cannot say at compile time is said when the robot starts.
+#[test]
+fn options_that_can_never_work_keep_the_robot_from_starting() -> Result<(), Failure> {
+    use bb_core::component::ReactionOptions;
+    type Change = fn(&mut ReactionOptions);
+    let cases: [(Change, &str); 3] = [
+        (|options| options.above = 9.0, "`below` is 11, but must be less than `above`, 9"),
+        (|options| options.run = Default::default(), "no command is at ``"),
+        (|options| options.when = Default::default(), "nothing is published at ``"),
+    ];
+    for (change, message) in cases {
+        let mut builder = Drone::builder();
+        change(builder.options(drone::controller::low));
+        let error = builder.simulate().expect_err(message);
+        assert_eq!(error.to_string(), format!("controller/low cannot start: {message}"));
+    }
+    Ok(())
+}
