@@ -7,7 +7,9 @@
 mod attitude;
 mod bags;
 mod command;
+mod families;
 mod known;
+mod known_families;
 mod navigation;
 mod single;
 mod variants;

@@ -5,6 +5,9 @@
 #[allow(dead_code)]
 #[path = "accuracy/known.rs"]
 mod known;
+#[allow(dead_code)]
+#[path = "accuracy/known_families.rs"]
+mod known_families;
 
 use bb_estimators::attitude::{AnyFilter, AnyParams, AttitudeFilter, FilterParams, ImuSample};
 use bb_estimators::navigation::planar::{PlanarOptions, PlanarParams};
@@ -15,6 +18,7 @@ use known::{Errors, Row};
 use std::error::Error;
 use std::fmt::Write;
 use std::path::Path;
+use std::sync::{Mutex, PoisonError};
 
 fn filters() -> impl Iterator<Item = FilterParams> {
     FilterParams::ALL.iter().map(|default| default())
@@ -22,6 +26,9 @@ fn filters() -> impl Iterator<Item = FilterParams> {
 
 /// What is between `<!-- NAME -->` and `<!-- end -->` is `table`, or becomes it.
 fn hold(file: &str, name: &str, table: &str) {
+    // Several tables of one file are renewed at the same time.
+    static ONE: Mutex<()> = Mutex::new(());
+    let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(file);
     let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{file}: {error}"));
     let start = format!("<!-- {name} -->\n");
@@ -104,6 +111,52 @@ fn what_filters_reach() -> Result<(), Box<dyn Error>> {
         }
     }
     hold("docs/attitude.md", "accuracy", &table);
+    Ok(())
+}
+
+#[test]
+fn what_filters_reach_on_families() -> Result<(), Box<dyn Error>> {
+    let rows = known_families::rows()?;
+    let measured = |row: &known_families::Row| match &*row.angle {
+        "inclination" => row.errors[2],
+        "heading" => row.errors[1],
+        _ => row.errors[0],
+    };
+    let of = |family: &str, filter: &str| rows.iter().find(|row| (&*row.family, &*row.filter) == (family, filter));
+    let others: Vec<_> =
+        filters().map(|filter| filter.name()).filter(|name| !["vqf", "tilt"].contains(name)).collect();
+    let mut table = String::from("| family | half | angle | `vqf` |");
+    for filter in &others {
+        let _ = write!(table, " `{filter}` |");
+    }
+    table += " `mekf` in 2σ |\n|---|---|---|---|---|";
+    table += &"---|".repeat(others.len());
+    table += "\n";
+    let mut logs = vec![[(0.0, 0); 2]; others.len()];
+    for vqf in rows.iter().filter(|row| row.filter == "vqf") {
+        let _ = write!(table, "| {} | {} | {} | {:.2}° |", vqf.family, vqf.half, vqf.angle, measured(vqf));
+        for (filter, logs) in others.iter().zip(&mut logs) {
+            let row = of(&vqf.family, filter).ok_or_else(|| format!("{filter}: no figure on {}", vqf.family))?;
+            let ratio = measured(row) / measured(vqf);
+            let _ = write!(table, " {ratio:.2} |");
+            if let Some(half) = ["A", "B"].iter().position(|half| *half == vqf.half) {
+                logs[half].0 += ratio.ln();
+                logs[half].1 += 1;
+            }
+        }
+        let mekf = of(&vqf.family, "mekf").ok_or("mekf is a filter")?;
+        let share = |share: f64| if share.is_nan() { "–".into() } else { format!("{:.0} %", 100.0 * share) };
+        let _ = writeln!(table, " {}, {} |", share(mekf.shares[0]), share(mekf.shares[1]));
+    }
+    for (half, name) in ["A", "B"].iter().enumerate() {
+        let _ = write!(table, "| geometric mean | {name} | | |");
+        for logs in &logs {
+            let (sum, count) = logs[half];
+            let _ = write!(table, " {:.2} |", (sum / f64::from(count)).exp());
+        }
+        table += " |\n";
+    }
+    hold("docs/attitude.md", "families", &table);
     Ok(())
 }
 

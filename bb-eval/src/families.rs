@@ -130,11 +130,13 @@ impl Unit {
         let mut scores = Vec::new();
         for &index in &self.families {
             let Some(family) = families.get(index) else { continue };
-            let changed = family.change.applied(&whole);
-            let trial = changed.as_ref().unwrap_or(&whole);
-            for (number, filter) in filters.iter().enumerate() {
-                let mut running = filter.on(family.axes)?.start()?;
-                scores.push((index, number, score(&mut *running, trial, family.axes)));
+            for part in 0..family.change.trials() {
+                let changed = family.change.applied(&whole, part);
+                let trial = changed.as_ref().unwrap_or(&whole);
+                for (number, filter) in filters.iter().enumerate() {
+                    let mut running = filter.on(family.axes)?.start()?;
+                    scores.push((index, number, score(&mut *running, trial, family.axes)));
+                }
             }
         }
         Ok(scores)

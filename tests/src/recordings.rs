@@ -6,6 +6,9 @@ use std::path::{Path, PathBuf};
 /// How many trials of BROAD the bounds are for.
 pub const TRIALS: usize = 10;
 
+/// How many recordings of phones there are.
+pub const PHONES: usize = 66;
+
 /// How many data sets of navigation there are; one is left out, as it has the samples of another.
 pub const SETS: usize = 7;
 
@@ -15,6 +18,19 @@ pub const SETS: usize = 7;
 /// `BB_DATA` is not set, or the folder has not as many bags as the bounds are for.
 pub fn broad() -> Result<Vec<PathBuf>, String> {
     broad_in(std::env::var_os("BB_DATA").map(PathBuf::from).as_deref())
+}
+
+/// The folder of all recordings that the families of attitude filters are made of.
+///
+/// # Errors
+/// `BB_DATA` is not set, or the folder has not as many recordings as the bounds are for.
+pub fn families() -> Result<PathBuf, String> {
+    let data = std::env::var_os("BB_DATA").map(PathBuf::from);
+    broad_in(data.as_deref())?;
+    navigation_in(data.as_deref())?;
+    let (phones, files) = folder(data.as_deref(), "phones")?;
+    expect(&phones, PHONES, files.len())?;
+    Ok(data.unwrap_or_default())
 }
 
 /// The folder of the data sets of navigation.

@@ -121,9 +121,9 @@ pub const FAMILIES: [&Family; 33] = [
         B,
         NEXUS,
         Change::Gaps(&[(10.0, 0.3), (1.0, 0.02)]),
-        "Nexus 5, 0.3 s missing every 10 s, and 20 ms every second",
+        "Nexus 5, 0.3 s missing every 10 s and 20 ms every second, in four phases",
     ),
-    &changed("gaps-1s", A, NEXUS, Change::Gaps(&[(20.0, 1.0)]), "Nexus 5, 1 s missing every 20 s"),
+    &changed("gaps-1s", A, NEXUS, Change::Gaps(&[(20.0, 1.0)]), "Nexus 5, 1 s missing every 20 s, in four phases"),
     &changed("offset-10", A, PHONES, Change::Offset(10.0 * MICROTESLA), "phones, 10 µT added to the magnetometer"),
     &changed("offset-22", B, PHONES, Change::Offset(22.0 * MICROTESLA), "phones, 22 µT added"),
     &changed("offset-47", A, PHONES, Change::Offset(47.0 * MICROTESLA), "phones, 47 µT added"),
@@ -167,5 +167,22 @@ impl Family {
     /// Whether it needs recordings.
     pub fn is_recorded(&self) -> bool {
         matches!(self.source, Source::Recordings { .. })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_unique_and_halves_are_even() {
+        for (index, family) in FAMILIES.iter().enumerate() {
+            let named = FAMILIES.iter().position(|other| other.name == family.name);
+            assert_eq!(named, Some(index), "{}", family.name);
+        }
+        let of = |half| FAMILIES.iter().filter(|family| family.half == half).count();
+        assert!(of(A).abs_diff(of(B)) <= 1, "{} and {}", of(A), of(B));
+        // Parts of another family.
+        assert_eq!(of(None), 4);
     }
 }

@@ -177,3 +177,74 @@ fn align(estimates: &mut [Option<UnitQuaternion<f64>>], trial: &Trial) {
         *estimate = back * *estimate;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::families::trial::Truth;
+    use crate::filters::{Deviations, Refused};
+    use bb_estimators::attitude::ImuSample;
+
+    /// A filter that is wrong by a known angle about the vertical and about a level axis.
+    struct Wrong {
+        heading: f64,
+        inclination: f64,
+        deviations: Deviations,
+        played: u32,
+    }
+
+    fn true_at(index: u32) -> UnitQuaternion<f64> {
+        let turned = f64::from(index) * 0.01;
+        UnitQuaternion::from_euler_angles(0.3 * turned.sin(), 0.5 * turned.cos(), turned)
+    }
+
+    impl Running for Wrong {
+        fn run(&mut self, samples: &[ImuSample], estimates: &mut Vec<Option<UnitQuaternion<f64>>>) -> Refused {
+            for _ in samples {
+                let wrong = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.heading)
+                    * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), self.inclination);
+                estimates.push(Some(wrong * true_at(self.played)));
+                self.played += 1;
+            }
+            Refused::default()
+        }
+
+        fn deviations(&self) -> Option<Deviations> {
+            Some(self.deviations)
+        }
+    }
+
+    fn scored(axes: Axes) -> TrialScore {
+        let mut trial = Trial::default();
+        for index in 0..6_400_u32 {
+            let sample = ImuSample {
+                time_ns: i64::from(index),
+                angular_velocity: Vector3::zeros(),
+                specific_force: Vector3::zeros(),
+                magnetic_field: None,
+            };
+            let truth = Truth { world_from_body: Some(true_at(index)), is_moving: index >= 3_200 };
+            trial.push(sample, truth);
+        }
+        let deviations = Deviations { heading: 0.26, inclination: 0.04 };
+        let mut wrong = Wrong { heading: 0.5, inclination: 0.1, deviations, played: 0 };
+        score(&mut wrong, &trial, axes)
+    }
+
+    #[test]
+    fn errors_and_deviations_are_those_in_motion() {
+        let score = scored(Axes::Nine);
+        assert!((score.errors.heading.to_radians() - 0.5).abs() < 1e-9, "{:?}", score.errors);
+        assert!((score.errors.inclination.to_radians() - 0.1).abs() < 1e-9);
+        assert_eq!((score.heading, score.tilt), (Share { within: 50, of: 50 }, Share { within: 0, of: 50 }));
+        assert!(score.deviations.iter().all(|deviation| (deviation.to_radians() - 0.26).abs() < 1e-12));
+    }
+
+    #[test]
+    fn with_six_axes_the_heading_is_aligned() {
+        let score = scored(Axes::Six);
+        assert!(score.errors.heading < 1e-9, "{:?}", score.errors);
+        assert!((score.errors.inclination.to_radians() - 0.1).abs() < 1e-9);
+        assert_eq!((score.heading.fraction(), score.tilt.of), (None, 50));
+    }
+}

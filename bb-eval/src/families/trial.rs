@@ -131,14 +131,25 @@ impl Trial {
     }
 
     fn random(&self, part: u64) -> Random {
-        // The first three numbers of `bb eval attitude --offset`, whose directions these are too.
+        // As `bb eval attitude --offset` has them, so that the directions are the same.
         Random::new([1, hash(Path::new(&self.name)), part, 0])
     }
 }
 
+/// Gaps hit or miss a quick turn by chance, so each recording is played with gaps at so many phases.
+const PHASES: u32 = 4;
+
 impl Change {
-    /// The changed trial; `None` if nothing changes.
-    pub(super) fn applied(self, trial: &Trial) -> Option<Trial> {
+    /// How many trials are made of one.
+    pub(super) fn trials(self) -> u32 {
+        match self {
+            Self::Gaps(_) => PHASES,
+            _ => 1,
+        }
+    }
+
+    /// The changed trial of an index below [`trials`](Self::trials); `None` if nothing changes.
+    pub(super) fn applied(self, trial: &Trial, index: u32) -> Option<Trial> {
         let start_ns = trial.samples.first()?.time_ns;
         Some(match self {
             Self::None => return None,
@@ -147,12 +158,14 @@ impl Change {
                 let from_ns = trial.samples.get(first)?.time_ns.saturating_sub(nanoseconds(seconds));
                 trial.only(|_, sample| sample.time_ns >= from_ns)
             }
-            Self::Gaps(gaps) => trial.only(|_, sample| {
-                let since_ns = sample.time_ns.saturating_sub(start_ns);
-                gaps.iter().all(|(period, length)| {
+            Self::Gaps(gaps) => {
+                let longest = gaps.iter().fold(0.0, |longest: f64, (period, _)| longest.max(*period));
+                let first_ns = start_ns - nanoseconds(longest * f64::from(index) / f64::from(PHASES));
+                let is_sampled = |since_ns: i64, (period, length): &(f64, f64)| {
                     since_ns.rem_euclid(nanoseconds(*period)) < nanoseconds(period - length)
-                })
-            }),
+                };
+                trial.only(|_, sample| gaps.iter().all(|gap| is_sampled(sample.time_ns - first_ns, gap)))
+            }
             Self::Offset(size) => {
                 let offset = trial.random(2).direction() * size;
                 trial.each(|sample| sample.magnetic_field = sample.magnetic_field.map(|field| field + offset))
@@ -179,4 +192,99 @@ impl Change {
 
 fn nanoseconds(seconds: f64) -> i64 {
     (seconds * 1e9).round() as i64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bb_core::nalgebra::Vector3;
+
+    /// Half a minute at 100 Hz, a field with every odd sample; it moves from 5 s on.
+    fn trial() -> Trial {
+        let mut trial = Trial { name: "walk".into(), ..Trial::default() };
+        for index in 0..3_000_i64 {
+            let sample = ImuSample {
+                time_ns: 1_000 + index * 10_000_000,
+                angular_velocity: Vector3::zeros(),
+                specific_force: Vector3::z() * 9.81,
+                magnetic_field: (index % 2 == 1).then(|| Vector3::y() * index as f64),
+            };
+            trial.push(sample, Truth { world_from_body: None, is_moving: index >= 500 });
+        }
+        trial
+    }
+
+    fn changed(change: Change) -> Trial {
+        change.applied(&trial(), 0).expect("it changes")
+    }
+
+    #[test]
+    fn starts_are_relative_to_the_first_motion() {
+        assert_eq!(changed(Change::StartBeforeMotion(2.0)).samples.len(), 2_700);
+        let late = changed(Change::StartBeforeMotion(-20.0));
+        assert_eq!((late.samples.len(), late.truth.len()), (500, 500));
+        assert!(late.truth.iter().all(|truth| truth.is_moving));
+    }
+
+    #[test]
+    fn gaps_are_as_long_and_as_often_as_declared_in_every_phase() {
+        const GAPS: Change = Change::Gaps(&[(10.0, 0.3), (1.0, 0.02)]);
+        let mut starts = Vec::new();
+        for phase in 0..GAPS.trials() {
+            let left = GAPS.applied(&trial(), phase).expect("it has gaps");
+            let steps = left.samples.windows(2).map(|pair| pair[1].time_ns - pair[0].time_ns);
+            let [mut short, mut long] = [0, 0];
+            for step in steps {
+                match step {
+                    10_000_000 => {}
+                    30_000_000 => short += 1,
+                    310_000_000 => long += 1,
+                    other => panic!("a step of {other} ns"),
+                }
+            }
+            // Those at the beginning and the end of the trial are no steps.
+            assert!((26..=27).contains(&short) && (2..=3).contains(&long), "phase {phase}: {short}, {long}");
+            starts.push(left.samples.windows(2).position(|pair| pair[1].time_ns - pair[0].time_ns > 100_000_000));
+        }
+        starts.sort_unstable();
+        starts.dedup();
+        assert_eq!(starts.len(), 4, "each phase has its own");
+    }
+
+    #[test]
+    fn offset_and_bias_have_their_size_and_the_directions_of_the_trial() {
+        let (plain, offset, bias) = (trial(), changed(Change::Offset(22e-6)), changed(Change::Bias(0.07)));
+        for index in 0..plain.samples.len() {
+            let added = match (offset.samples[index].magnetic_field, plain.samples[index].magnetic_field) {
+                (Some(with), Some(without)) => with - without,
+                (with, without) => {
+                    assert_eq!(with, without);
+                    continue;
+                }
+            };
+            assert!((added.norm() - 22e-6).abs() < 1e-10);
+        }
+        assert!((bias.samples[7].angular_velocity.norm() - 0.07).abs() < 1e-15);
+        assert_ne!(bias.samples[7].angular_velocity.normalize(), offset.random(2).direction());
+    }
+
+    #[test]
+    fn stamps_are_off_by_at_most_their_bound() {
+        let (plain, jittered) = (trial(), changed(Change::Jitter(2e-3)));
+        let off = plain.samples.iter().zip(&jittered.samples).map(|(a, b)| (a.time_ns - b.time_ns).abs());
+        let most = off.clone().max().expect("samples");
+        assert!((1_900_000..=2_000_000).contains(&most), "{most}");
+        assert!(off.sum::<i64>() / 3_000 > 900_000, "uniform");
+    }
+
+    #[test]
+    fn half_of_the_samples_keep_all_readings_of_the_magnetometer() {
+        let half = changed(Change::EverySecond);
+        assert_eq!((half.samples.len(), half.truth.len()), (1_500, 1_500));
+        let fields = half.samples.iter().filter_map(|sample| sample.magnetic_field);
+        assert_eq!(
+            fields.map(|field| field.y as i64).collect::<Vec<_>>(),
+            (1..2_998).step_by(2).collect::<Vec<_>>()
+        );
+    }
 }

@@ -12,6 +12,9 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 /// A function of time in s.
 type Of<T> = Box<dyn Fn(f64) -> T>;
 
+/// A field by place.
+type Disturbance = Box<dyn Fn(&Vector3<f64>) -> Vector3<f64>>;
+
 /// The motion of a body, and what shakes and disturbs its sensors.
 pub(super) struct Motion {
     /// Samples a second.
@@ -23,12 +26,12 @@ pub(super) struct Motion {
     pub(super) rotation: Of<UnitQuaternion<f64>>,
     /// m/s², without gravity.
     pub(super) acceleration: Of<Vector3<f64>>,
-    /// m/s.
-    pub(super) velocity: Of<Vector3<f64>>,
+    /// m/s; `None` of a body that stays near its place.
+    pub(super) velocity: Option<Of<Vector3<f64>>>,
     /// The standard deviation of the vibration on each axis of the accelerometer, m/s².
     pub(super) vibration: f64,
     /// The field of iron at a place of the world, T.
-    pub(super) disturbance: Box<dyn Fn(&Vector3<f64>) -> Vector3<f64>>,
+    pub(super) disturbance: Disturbance,
     /// The drift of the gyroscope's bias, rad/s.
     pub(super) bias: Of<f64>,
 }
@@ -80,7 +83,7 @@ impl Course {
                 UnitQuaternion::from_euler_angles(roll, pitch, self.direction(time_s))
             }),
             acceleration: Box::new(move |time_s| other.acceleration(time_s)),
-            velocity: Box::new(move |time_s| third.velocity(time_s)),
+            velocity: Some(Box::new(move |time_s| third.velocity(time_s))),
             vibration: 0.0,
             disturbance: Box::new(|_| Vector3::zeros()),
             bias: Box::new(|_| 0.0),
@@ -204,7 +207,7 @@ pub(super) fn boat(random: &mut Random) -> Motion {
             let along = Vector3::new(surge.at(time_s), sway.at(time_s), heave.at(time_s));
             UnitQuaternion::from_axis_angle(&Vector3::z_axis(), heading) * along * begun
         }),
-        velocity: Box::new(|_| Vector3::zeros()),
+        velocity: None,
         vibration: 0.1,
         disturbance: Box::new(|_| Vector3::zeros()),
         bias: Box::new(|_| 0.0),
@@ -237,7 +240,7 @@ pub(super) fn drone(random: &mut Random) -> Motion {
                 * UnitQuaternion::from_euler_angles(roll, pitch, 0.0)
         }),
         acceleration: Box::new(acceleration),
-        velocity: Box::new(|_| Vector3::zeros()),
+        velocity: None,
         vibration: 0.5,
         disturbance: Box::new(|_| Vector3::zeros()),
         bias: Box::new(|_| 0.0),
@@ -277,7 +280,7 @@ pub(super) fn walker(random: &mut Random) -> Motion {
             let (ahead, aside) = (forward.at(time_s), left.at(time_s));
             Vector3::new(ahead * cos - aside * sin, ahead * sin + aside * cos, up.at(time_s))
         }),
-        velocity: Box::new(|_| Vector3::zeros()),
+        velocity: None,
         vibration: 0.0,
         disturbance: Box::new(|_| Vector3::zeros()),
         bias: Box::new(|_| 0.0),
