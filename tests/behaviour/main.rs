@@ -58,4 +58,5 @@ mod subscriptions;
 mod supervision;
 mod timing;
 mod topology;
+mod transitions;
 mod workers;

@@ -2,7 +2,7 @@
 
 use super::guardian::DisarmHook;
 use super::host::Host;
-use super::{Bus, Fault, NoOptions, Options};
+use super::{Bus, Caller, Fault, NoOptions, Options};
 use crate::declaration::Role;
 use crate::event::HealthTransition;
 use crate::message::Field;
@@ -86,12 +86,13 @@ pub struct Outcome<T> {
 }
 
 impl<T> Outcome<T> {
-    /// Ends with that value; the robot returns to its previous state.
+    /// Ends with that value; the operational state stays as it is.
     pub fn done(value: T) -> Self {
         Self { value, next_state: None }
     }
 
-    /// Names the state that follows: `idle` or a declared one. Another name fails the command.
+    /// Names the state that follows: `idle` or a declared one. Another name fails the command. To change the state before the end, use
+    /// [`CommandContext::transition`].
     pub fn next_state(mut self, state: &'static str) -> Self {
         self.next_state = Some(state);
         self
@@ -141,6 +142,18 @@ impl CommandContext {
         !self.bus.caller.is_valid()
     }
 
+    /// Changes the operational state while the command runs, to `idle` or a declared state: a phase of its work, in which other
+    /// commands are allowed or not. Commands that start from now on see the new state.
+    ///
+    /// The state stays until something else changes it, whether the command succeeds, fails, times out or is cancelled: only its code
+    /// knows what it has done to the robot. [`Outcome::next_state`] names another one at the end. Disarming leaves it.
+    ///
+    /// # Errors
+    /// No such state is declared, the robot is not armed, or the command was cancelled or has timed out.
+    pub fn transition(&self, state: &str) -> Result<(), Fault> {
+        self.hooks.transition(state, &self.bus.caller)
+    }
+
     /// Registers a callback that makes hardware safe when the robot is disarmed while this command runs. It is
     /// removed when the command's code has returned. All callbacks run concurrently, each on its own thread, and
     /// must return within 5 s. One that fails or takes longer leads to the safety state `error`.
@@ -182,6 +195,10 @@ impl OwnHooks {
     /// Once the execution's code has returned, a callback is dropped.
     pub(crate) fn add(&self, hook: DisarmHook) {
         self.host.controls().on_disarm(self.path, Some(self.execution), hook);
+    }
+
+    fn transition(&self, state: &str, caller: &Caller) -> Result<(), Fault> {
+        self.host.controls().transition(self.execution, state, caller)
     }
 
     pub(crate) fn hardware_error(&self, message: String) {

@@ -29,6 +29,8 @@ pub(crate) trait Controls: Guardian {
     fn set_parameters(&self, changes: Vec<(String, ParameterValue)>, caller: &Caller)
     -> Result<(), ParameterError>;
     fn commands(&self) -> Vec<CommandInfo>;
+    /// The execution of that number, whose caller it is, changes the operational state.
+    fn transition(&self, execution: u64, state: &str, caller: &Caller) -> Result<(), Fault>;
     fn start_command(&self, path: &str, arguments: &str, caller: &Caller) -> Result<DynamicExecution, Fault>;
 }
 

@@ -12,10 +12,12 @@ use super::machine::IDLE;
 use super::step::Step;
 use super::task::{Ended, EndedCode, Value};
 use super::{Control, Limit, Phase, RunningCommand};
-use crate::component::Outcome;
+use crate::component::{Caller, Outcome};
 use crate::declaration::Role;
 use crate::event::{CommandPhase, Safety};
+use crate::fault::Fault;
 use crate::journal::{End, Event};
+use crate::message::nearest::nearest;
 use crate::node::Mode;
 use std::sync::Arc;
 
@@ -26,6 +28,28 @@ impl Control {
     }
 
     /// An execution has taken longer than its `timeout`.
+    /// The execution of that number, whose caller it is, changes the operational state.
+    pub(crate) fn transition_by(&self, id: u64, name: &str, caller: &Caller) -> Result<(), Fault> {
+        let mut step = self.step();
+        let state = step.may_become(name).and_then(|state| caller.check_valid().map(|()| state));
+        if let Ok(state) = state {
+            step.line(Event::Transition { execution: id, state: state.to_owned() });
+            step.become_by(id, state);
+        }
+        step.finish();
+        state.map(drop)
+    }
+
+    /// In a replay: an execution changed the operational state.
+    pub(crate) fn replay_transition(&self, id: u64, name: &str) {
+        let mut step = self.step();
+        if let Ok(state) = step.may_become(name) {
+            step.line(Event::Transition { execution: id, state: state.to_owned() });
+            step.become_by(id, state);
+        }
+        step.finish();
+    }
+
     pub(crate) fn timed_out(&self, id: u64) {
         self.cut_short(id, Event::Timeout { execution: id }, CommandError::TimedOut);
     }
@@ -216,6 +240,27 @@ impl Step<'_> {
             Phase::Disarming(value, next_state) => self.settle(index, Ok(value), next_state),
             phase => execution.phase = phase,
         }
+    }
+
+    /// The state of that name, if the operational state can be it now.
+    fn may_become(&self, name: &str) -> Result<&'static str, Fault> {
+        let Some(state) = self.state_named(name) else {
+            let states = self.control.0.declared.states.iter().copied().chain([IDLE]);
+            let near = nearest(name, states);
+            let hint = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+            return Err(Fault::new(format!("no state `{name}` is declared{hint}")));
+        };
+        match self.state.machine.safety {
+            Safety::Armed => Ok(state),
+            _ => Err(Fault::new(format!("the robot is not armed: {}", self.safety_text()))),
+        }
+    }
+
+    /// An execution changes the operational state.
+    fn become_by(&mut self, id: u64, state: &'static str) {
+        self.state.machine.resting = state;
+        let name = self.name_of(id);
+        self.publish_machine(name);
     }
 
     /// A built-in or declared state.

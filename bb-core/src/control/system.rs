@@ -285,6 +285,10 @@ impl Controls for Control {
         self.infos()
     }
 
+    fn transition(&self, execution: u64, state: &str, caller: &Caller) -> Result<(), Fault> {
+        self.transition_by(execution, state, caller)
+    }
+
     fn start_command(&self, path: &str, arguments: &str, caller: &Caller) -> Result<DynamicExecution, Fault> {
         self.execute_untyped(path, arguments, caller)
     }

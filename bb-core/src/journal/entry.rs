@@ -261,6 +261,13 @@ pub enum Event {
         /// Each, in order.
         inputs: Vec<PlacedInput>,
     },
+    /// A command changed the operational state while it ran.
+    Transition {
+        /// The number of the execution.
+        execution: u64,
+        /// The new state.
+        state: String,
+    },
     /// A command, a service or other code may publish at a path of its choice.
     OwnPublisher {
         /// The path.

@@ -1,0 +1,197 @@
+//! Commands that change the operational state while they run.
+
+use crate::components::{Doing, Failure, Task, at, lock};
+use crate::replay::{entries, journal, read_back};
+use bb_core::event::{RefusalReason, StateTransition};
+use bb_core::prelude::*;
+use bb_core::run::CommandError;
+use std::sync::Mutex;
+
+/// What those who asked for a transition were told.
+static TOLD: Mutex<Vec<String>> = Mutex::new(Vec::new());
+
+fn told<T>(result: Result<T, Fault>) {
+    lock(&TOLD).push(result.map_or_else(|fault| fault.to_string(), |_| "done".to_owned()));
+}
+
+/// Asks once more when the command is over.
+struct Last(CommandContext);
+
+impl Drop for Last {
+    fn drop(&mut self) {
+        told(self.0.transition("idle"));
+    }
+}
+
+/// Drives for 100 ms, docks for 200 ms, and charges.
+fn dock(context: CommandContext) -> Doing {
+    Box::pin(async move {
+        context.sleep(Duration::from_millis(100)).await;
+        context.transition(harbour::state::docking)?;
+        let last = Last(context.clone());
+        context.sleep(Duration::from_millis(200)).await;
+        drop(last);
+        context.transition(harbour::state::docking)?;
+        Ok(Outcome::done(()).next_state("charging"))
+    })
+}
+
+/// Docks and fails.
+fn fail(context: CommandContext) -> Doing {
+    Box::pin(async move {
+        context.transition("docking")?;
+        Err(Fault::new("no harbour"))
+    })
+}
+
+fn wrong(context: CommandContext) -> Doing {
+    Box::pin(async move {
+        for name in ["dokking", "executing", "disarmed", ""] {
+            told(context.transition(name));
+        }
+        Ok(Outcome::done(()))
+    })
+}
+
+fn early(context: CommandContext) -> Doing {
+    Box::pin(async move {
+        told(context.transition("docking"));
+        Ok(Outcome::done(()))
+    })
+}
+
+fn nothing(_: CommandContext) -> Doing {
+    Box::pin(async { Ok(Outcome::done(())) })
+}
+
+robot! {
+    robot Harbour;
+    states { docking; charging; }
+    commands {
+        category signal { concurrency: 4; }
+        dock: Task(run = dock);
+        fail: Task(run = fail);
+        wrong: Task(run = wrong);
+        early: Task(run = early) { allowed_states: [disarmed]; category: signal; }
+        horn: Task(run = nothing) { allowed_states: [docking]; category: signal; }
+        wave: Task(run = nothing) { allowed_states: [idle, executing]; category: signal; }
+        stop: Task(run = nothing) { allowed_states: [executing, docking]; cancel: all; }
+    }
+    link base;
+}
+
+/// The tests share what was told.
+fn alone() -> std::sync::MutexGuard<'static, ()> {
+    static ALONE: Mutex<()> = Mutex::new(());
+    let guard = lock(&ALONE);
+    lock(&TOLD).clear();
+    guard
+}
+
+fn take_told() -> Vec<String> {
+    std::mem::take(&mut *lock(&TOLD))
+}
+
+fn changes(states: &Subscription<StateTransition>) -> Vec<(i64, &'static str, &'static str, Option<&'static str>)> {
+    let changes = states.drain();
+    changes
+        .map(|change| (change.monotonic_time.as_nanos() / 1_000_000, change.from, change.to, change.command))
+        .collect()
+}
+
+#[test]
+fn other_commands_follow_a_transition_at_once() -> Result<(), Failure> {
+    let _alone = alone();
+    let mut simulation = Harbour::builder().simulate()?;
+    simulation.arm()?;
+    let states = simulation.subscribe(system::StateMachine);
+    let docking = simulation.command(harbour::command::dock, NoArguments)?;
+    simulation.run_until(at(99));
+    let refused = simulation.command(harbour::command::horn, NoArguments).expect_err("it is not docking");
+    assert_eq!((refused.reason, refused.state), (RefusalReason::State, "executing"));
+    simulation.command(harbour::command::wave, NoArguments)?;
+    simulation.run_until(at(100));
+    simulation.command(harbour::command::horn, NoArguments)?;
+    let refused = simulation.command(harbour::command::wave, NoArguments).expect_err("it is docking");
+    assert_eq!((refused.reason, refused.state), (RefusalReason::State, "docking"));
+    simulation.run_until(at(400));
+    assert_eq!(docking.try_result(), Some(Ok(())));
+    let dock = Some("dock");
+    let expected = [
+        (0, "idle", "executing", dock),
+        (100, "executing", "docking", dock),
+        (300, "docking", "executing", dock),
+        (300, "executing", "docking", dock),
+        (300, "docking", "charging", dock),
+    ];
+    assert_eq!(changes(&states), expected);
+    assert_eq!(take_told(), ["done"]);
+    Ok(())
+}
+
+#[test]
+fn the_state_stays_when_the_command_is_cancelled_or_fails_and_goes_when_it_is_disarmed() -> Result<(), Failure> {
+    let _alone = alone();
+    let mut simulation = Harbour::builder().simulate()?;
+    simulation.arm()?;
+    let docking = simulation.command(harbour::command::dock, NoArguments)?;
+    simulation.run_until(at(150));
+    simulation.command(harbour::command::stop, NoArguments)?;
+    simulation.run_until(at(400));
+    assert_eq!(docking.try_result(), Some(Err(CommandError::Cancelled)));
+    assert_eq!(simulation.state(), "docking");
+    assert_eq!(take_told(), ["the command that asks for this has ended or was cancelled"]);
+    simulation.disarm()?;
+    simulation.arm()?;
+    assert_eq!(simulation.state(), "idle");
+    let failing = simulation.command(harbour::command::fail, NoArguments)?;
+    simulation.run_until(at(500));
+    assert_eq!(failing.try_result(), Some(Err(CommandError::Failed("no harbour".into()))));
+    assert_eq!(simulation.state(), "docking");
+    Ok(())
+}
+
+#[test]
+fn a_state_that_is_not_declared_is_refused_and_so_is_any_of_a_robot_that_is_not_armed() -> Result<(), Failure> {
+    let _alone = alone();
+    let mut simulation = Harbour::builder().simulate()?;
+    simulation.command(harbour::command::early, NoArguments)?;
+    simulation.run_until(at(10));
+    assert_eq!(take_told(), ["the robot is not armed: its safety state is `disarmed`"]);
+    simulation.arm()?;
+    let wrong = simulation.command(harbour::command::wrong, NoArguments)?;
+    simulation.run_until(at(20));
+    assert_eq!(wrong.try_result(), Some(Ok(())));
+    let [misspelt, others @ ..] = &take_told()[..] else { return Err("it asked".into()) };
+    assert_eq!(misspelt, "no state `dokking` is declared; did you mean `docking`?");
+    assert!(others.iter().all(|told| told.starts_with("no state `")), "{others:?}");
+    assert_eq!(simulation.state(), "idle");
+    Ok(())
+}
+
+#[test]
+fn a_replay_goes_through_the_same_states() -> Result<(), Failure> {
+    let _alone = alone();
+    let mut builder = Harbour::builder();
+    let lines = journal(&mut builder);
+    let first = builder.subscribe(system::StateMachine);
+    let mut simulation = builder.simulate()?;
+    simulation.arm()?;
+    simulation.command(harbour::command::dock, NoArguments)?;
+    simulation.run_until(at(150));
+    // Allowed by the transition alone.
+    simulation.command(harbour::command::horn, NoArguments)?;
+    simulation.command(harbour::command::stop, NoArguments)?;
+    simulation.run_until(at(400));
+    simulation.stop().ok()?;
+    let first = changes(&first);
+    assert!(first.contains(&(100, "executing", "docking", Some("dock"))), "{first:?}");
+
+    let builder = Harbour::builder();
+    let again = builder.subscribe(system::StateMachine);
+    let mut replay = builder.replay()?;
+    replay.play(read_back::<Harbour>(&entries(&lines))?)?;
+    replay.stop().ok()?;
+    assert_eq!(changes(&again), first);
+    Ok(())
+}
