@@ -99,7 +99,7 @@ pub mod prelude {
     pub use crate::declaration::Role;
     pub use crate::event::{HealthReason, HealthState, HealthTransition, Right, Rights, Safety};
     pub use crate::fault::Fault;
-    pub use crate::message::{RosMessage, Stamped};
+    pub use crate::message::{JointSide, RosMessage, Stamped};
     pub use crate::payload::*;
     pub use crate::pubsub::{Overflow, Select, Subscription};
     pub use crate::robot;

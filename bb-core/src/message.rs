@@ -10,7 +10,7 @@ mod stamped;
 pub use bb_macros::Payload;
 pub use codec::{DecodeError, Field, RosLayout, RosMessage, Schema};
 pub use finite::Finite;
-pub use joint::{JointPositions, JointReading, JointSide};
+pub use joint::{JointPositions, JointReading, JointSide, Transmission};
 pub use joint_command::{Exceeded, JointBounds, JointCommand, LimitedQuantity, OutOfBounds};
 pub use stamped::{BothKnown, Feeds, Frame, Origin, Stamp, Stamped};
 
@@ -97,6 +97,13 @@ pub trait Payload: Clone + std::fmt::Debug + Send + Sync + Field + 'static {
     /// The command that stops a joint, see [`JointCommand`].
     #[doc(hidden)]
     fn stop_command() -> Option<Self> {
+        None
+    }
+
+    /// The command to the motor of a joint, see [`JointCommand`].
+    #[doc(hidden)]
+    fn command_at_motor(&self, joint: &str, transmission: &Transmission) -> Option<Self> {
+        let _ = (joint, transmission);
         None
     }
 

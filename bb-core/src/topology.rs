@@ -7,6 +7,7 @@ mod urdf;
 pub use body::{Collision, Geometry, Inertial, Material, Visual};
 
 use crate::message::Frame;
+pub use crate::message::Transmission;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
 /// The format of a graph.
@@ -87,39 +88,6 @@ pub struct Mimic {
     pub multiplier: f64,
     /// Its position where the other's is 0; rad or m.
     pub offset: f64,
-}
-
-/// A gear between a motor and a joint.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Transmission {
-    /// Turns of the motor per turn of the joint.
-    pub reduction: f64,
-    /// The joint's position when the motor is at 0; rad or m.
-    pub offset: f64,
-    /// Whether the joint turns the other way than the motor.
-    pub is_reversed: bool,
-}
-
-impl Transmission {
-    /// The motor's motion per unit of the joint's; negative if it is reversed.
-    fn ratio(&self) -> f64 {
-        if self.is_reversed { -self.reduction } else { self.reduction }
-    }
-
-    /// The position of the joint for that of the motor in rad; rad or m.
-    pub fn joint_position(&self, motor: f64) -> f64 {
-        motor / self.ratio() + self.offset
-    }
-
-    /// The velocity of the joint for that of the motor in rad/s; rad/s or m/s.
-    pub fn joint_velocity(&self, motor: f64) -> f64 {
-        motor / self.ratio()
-    }
-
-    /// The torque or force at the joint for the torque of the motor in N·m, without losses; N·m or N.
-    pub fn joint_effort(&self, motor: f64) -> f64 {
-        motor * self.ratio()
-    }
 }
 
 /// How a joint moves (URDF's types).

@@ -5,6 +5,7 @@ mod controllers;
 mod limits;
 mod replay;
 mod reports;
+mod transmissions;
 
 use crate::components::{CanEncoder, Failure, at};
 use bb_core::component::ActuatorError;

@@ -1,7 +1,7 @@
 //! The contract of an actuator.
 
 use super::{ActuatorContext, Fault, Options};
-use crate::message::{Payload, Stamped};
+use crate::message::{JointSide, Payload, Stamped};
 use crate::time::MonotonicTime;
 
 /// Moves a joint.
@@ -58,6 +58,11 @@ pub trait Actuator: Sized + Send + 'static {
     type Options: Options;
     /// The commands it takes.
     type Command: Payload;
+
+    /// The side of the joint's `transmission` that it speaks of. With [`JointSide::Motor`], the runtime converts commands, after the
+    /// limits of the joint are applied, and [`ActuatorContext::limit`] to the motor's side, and the motions that it reports to the
+    /// joint's. All else speaks of the joint: what is sent, published and recorded. Without a transmission, both are the same.
+    const SIDE: JointSide = JointSide::Joint;
 
     /// Opens the device, without moving anything.
     ///

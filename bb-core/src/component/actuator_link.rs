@@ -76,6 +76,8 @@ pub enum ActuatorError {
     /// The code that applies the limits of the joint to the command ([`JointCommand::limit`](crate::JointCommand::limit))
     /// has panicked.
     NotLimited(String),
+    /// The command could not be converted to the motor's side of the joint's transmission.
+    NotConverted(String),
     /// The actuator has failed and does not run.
     Stopped,
     /// The actuator has failed at this command.
@@ -94,6 +96,9 @@ impl fmt::Display for ActuatorError {
             Self::OutOfBounds(message) => f.write_str(message),
             Self::NotLimited(message) => {
                 write!(f, "the limits of the joint could not be applied to the command: {message}")
+            }
+            Self::NotConverted(message) => {
+                write!(f, "the command could not be converted to the motor of the joint: {message}")
             }
             Self::Stopped => f.write_str("the actuator has failed and does not run"),
             Self::Failed(message) => write!(f, "the actuator failed: {message}"),

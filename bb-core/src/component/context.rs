@@ -6,10 +6,10 @@ use super::motion_reports::{MotionReport, MotionReports};
 use super::replacement::Replacement;
 use super::{Bus, Caller, Counter, Counts, Fault, Request, SafetyLink};
 use crate::declaration::{ActuatorDeclaration, EstimatorDeclaration, InputDeclaration, SensorDeclaration};
-use crate::message::Frame;
+use crate::message::{Frame, JointSide};
 use crate::payload::{BeginMotion, EndMotion, MotionEnd};
 use crate::time::{Clock, MonotonicTime};
-use crate::topology::{Topology, Transform};
+use crate::topology::{Limit, Topology, Transform, Transmission};
 use nalgebra::Isometry3;
 use std::cell::RefCell;
 use std::ops::Deref;
@@ -282,6 +282,8 @@ pub struct ActuatorContext {
     common: ComponentContext,
     declaration: &'static ActuatorDeclaration,
     reports: Arc<Mutex<MotionReports>>,
+    /// What is between the joint and what the actuator speaks of.
+    gear: Option<Transmission>,
 }
 
 impl Deref for ActuatorContext {
@@ -328,9 +330,27 @@ impl ServiceContext {
 }
 
 impl ActuatorContext {
-    pub(crate) fn new(declaration: &'static ActuatorDeclaration, host: Arc<dyn Host>) -> Self {
+    pub(crate) fn new(declaration: &'static ActuatorDeclaration, host: Arc<dyn Host>, side: JointSide) -> Self {
         let common = ComponentContext::new(declaration.path, host);
-        Self { common, declaration, reports: Arc::default() }
+        let joint = common.topology().joint(declaration.joint);
+        let gear = joint.and_then(|joint| joint.transmission).filter(|_| side == JointSide::Motor);
+        Self { common, declaration, reports: Arc::default(), gear }
+    }
+
+    /// What is between the joint and what the actuator speaks of; `None` if that is the joint.
+    pub(crate) fn gear(&self) -> Option<&Transmission> {
+        self.gear.as_ref()
+    }
+
+    /// The limits of the joint, on the side that the actuator speaks of ([`Actuator::SIDE`](super::Actuator::SIDE)): of its motor, they
+    /// are rad, rad/s and N·m.
+    pub fn limit(&self) -> Option<Limit> {
+        let limit = self.topology().joint(self.joint())?.limit?;
+        let Some(gear) = &self.gear else { return Some(limit) };
+        let [lower, upper] = [limit.lower, limit.upper].map(|end| end.map(|end| gear.motor_position(end)));
+        let (lower, upper) = if gear.ratio() < 0.0 { (upper, lower) } else { (lower, upper) };
+        let velocity = limit.velocity.map(|velocity| gear.motor_velocity(velocity).abs());
+        Some(Limit { lower, upper, velocity, effort: limit.effort.map(|effort| gear.motor_effort(effort).abs()) })
     }
 
     /// The joint that it moves.
@@ -342,11 +362,13 @@ impl ActuatorContext {
     /// published once the current call of its code has returned. Reports from its own threads wait for the next call
     /// of its code.
     pub fn begin_motion(&self, motion: BeginMotion) {
+        let motion = self.gear.map_or(motion, |gear| motion.at_joint(&gear));
         lock(&self.reports).begin(motion);
     }
 
     /// The same at `end_motion`, for the end of a motion.
-    pub fn end_motion(&self, motion: EndMotion) {
+    pub fn end_motion(&self, mut motion: EndMotion) {
+        motion.position = self.gear.map_or(motion.position, |gear| gear.joint_position(motion.position));
         lock(&self.reports).end(motion);
     }
 

@@ -1,5 +1,6 @@
 //! The replacement of a declared component.
 
+use crate::message::JointSide;
 use std::any::Any;
 use std::collections::HashMap;
 use std::fmt;
@@ -13,6 +14,8 @@ pub(crate) struct Replacement {
     does: String,
     /// Of an estimator.
     estimator: Option<OfEstimator>,
+    /// Of an actuator: the side of the joint's transmission that it speaks of.
+    side: JointSide,
 }
 
 /// What the runtime has to know of an estimator before it is created.
@@ -25,7 +28,7 @@ struct OfEstimator {
 
 impl Replacement {
     pub(crate) fn new(make: impl Any + Send + Sync, does: String) -> Self {
-        Self { make: Arc::new(make), does, estimator: None }
+        Self { make: Arc::new(make), does, estimator: None, side: JointSide::Joint }
     }
 
     /// The same, of an estimator; `shown` writes its type and its options.
@@ -36,6 +39,16 @@ impl Replacement {
     ) -> Self {
         let estimator = Some(OfEstimator { handles_moving_joints, shown: Arc::new(shown) });
         Self { estimator, ..self }
+    }
+
+    /// The same, of an actuator.
+    pub(crate) fn of_actuator(self, side: JointSide) -> Self {
+        Self { side, ..self }
+    }
+
+    /// The side of the joint's transmission that the actuator speaks of.
+    pub(crate) fn side(&self) -> JointSide {
+        self.side
     }
 
     /// The constructor, if it is an `M`.

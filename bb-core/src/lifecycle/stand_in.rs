@@ -96,7 +96,7 @@ where
         options.validate().map_err(Fault::permanent)?;
         Ok(Box::new(A::init(options.clone(), context)?))
     });
-    Replacement::new(make, takes::<A::Command>())
+    Replacement::new(make, takes::<A::Command>()).of_actuator(A::SIDE)
 }
 
 /// Creates the replacement of an estimator that takes `I` and emits `O`.

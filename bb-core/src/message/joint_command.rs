@@ -1,5 +1,6 @@
 //! Commands to the actuator of a joint, and the limits applied to them.
 
+use super::Transmission;
 use std::fmt;
 
 /// The bounds applied to a joint's commands, and the joint's position. Rad, rad/s and N·m where it turns; m, m/s and
@@ -100,6 +101,14 @@ pub trait JointCommand: Sized {
     /// [`EffortCommand`](crate::payload::EffortCommand) have one. [`PositionCommand`](crate::payload::PositionCommand) and
     /// [`JointTrajectory`](crate::payload::JointTrajectory) have none: the joint goes on to the last target, and rests there.
     fn stop() -> Option<Self> {
+        None
+    }
+
+    /// The same command to the motor of `joint`, on the other side of its transmission: for an actuator with
+    /// [`SIDE`](crate::Actuator::SIDE)` = JointSide::Motor`. `None`, the default, if that is not defined: the actuator then cannot be at a
+    /// joint with a transmission.
+    fn at_motor(&self, joint: &str, transmission: &Transmission) -> Option<Self> {
+        let _ = (joint, transmission);
         None
     }
 }

@@ -2,7 +2,7 @@
 
 use super::JointTrajectory;
 use crate::message::Payload;
-use crate::message::{Exceeded, JointBounds, JointCommand, OutOfBounds};
+use crate::message::{Exceeded, JointBounds, JointCommand, OutOfBounds, Transmission};
 use crate::time::MonotonicTime;
 
 /// A command to an actuator that takes all standard commands. The limits of the joint are applied before it gets one.
@@ -89,6 +89,19 @@ pub struct EndMotion {
     pub end: MotionEnd,
 }
 
+impl BeginMotion {
+    /// The motion of the joint, from that of its motor.
+    pub(crate) fn at_joint(self, transmission: &Transmission) -> Self {
+        Self {
+            initial_position: transmission.joint_position(self.initial_position),
+            target_position: self.target_position.map(|target| transmission.joint_position(target)),
+            velocity: self.velocity.map(|velocity| transmission.joint_velocity(velocity)),
+            speed: self.speed.map(|speed| transmission.joint_velocity(speed).abs()),
+            expected_arrival: self.expected_arrival,
+        }
+    }
+}
+
 /// Why a motion ended.
 #[derive(Clone, Debug, PartialEq, Eq, Payload)]
 pub enum MotionEnd {
@@ -120,6 +133,17 @@ impl JointCommand for ActuatorCommand {
     fn stop() -> Option<Self> {
         Some(Self::Hold)
     }
+
+    fn at_motor(&self, joint: &str, transmission: &Transmission) -> Option<Self> {
+        Some(match self {
+            Self::Position(command) => Self::Position(command.at_motor(joint, transmission)?),
+            Self::Velocity(command) => Self::Velocity(command.at_motor(joint, transmission)?),
+            Self::Effort(command) => Self::Effort(command.at_motor(joint, transmission)?),
+            Self::Trajectory(command) => Self::Trajectory(command.at_motor(joint, transmission)?),
+            Self::Hold => Self::Hold,
+            Self::Stop => Self::Stop,
+        })
+    }
 }
 
 impl JointCommand for PositionCommand {
@@ -131,6 +155,14 @@ impl JointCommand for PositionCommand {
         self.velocity.iter_mut().for_each(|velocity| bounds.hold_velocity(velocity, &mut exceeded));
         self.effort.iter_mut().for_each(|effort| bounds.hold_effort(effort, &mut exceeded));
         Ok(exceeded)
+    }
+
+    fn at_motor(&self, _: &str, transmission: &Transmission) -> Option<Self> {
+        Some(Self {
+            position: transmission.motor_position(self.position),
+            velocity: self.velocity.map(|velocity| transmission.motor_velocity(velocity)),
+            effort: self.effort.map(|effort| transmission.motor_effort(effort)),
+        })
     }
 }
 
@@ -145,6 +177,13 @@ impl JointCommand for VelocityCommand {
     fn stop() -> Option<Self> {
         Some(Self::default())
     }
+
+    fn at_motor(&self, _: &str, transmission: &Transmission) -> Option<Self> {
+        Some(Self {
+            velocity: transmission.motor_velocity(self.velocity),
+            effort: self.effort.map(|effort| transmission.motor_effort(effort)),
+        })
+    }
 }
 
 impl JointCommand for EffortCommand {
@@ -152,6 +191,10 @@ impl JointCommand for EffortCommand {
         let mut exceeded = Exceeded::default();
         bounds.hold_effort(&mut self.effort, &mut exceeded);
         Ok(exceeded)
+    }
+
+    fn at_motor(&self, _: &str, transmission: &Transmission) -> Option<Self> {
+        Some(Self { effort: transmission.motor_effort(self.effort) })
     }
 
     /// No effort: the joint is left to itself, which is safer than the last effort for ever.

@@ -1,7 +1,7 @@
 //! Trajectories of joints.
 
 use crate::message::Payload;
-use crate::message::{Exceeded, JointBounds, JointCommand, OutOfBounds};
+use crate::message::{Exceeded, JointBounds, JointCommand, OutOfBounds, Transmission};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -47,6 +47,23 @@ impl JointCommand for JointTrajectory {
             check_column(&self.points, column, bounds)?;
         }
         Ok(Exceeded::default())
+    }
+
+    /// The columns of other joints stay as they are.
+    fn at_motor(&self, joint: &str, transmission: &Transmission) -> Option<Self> {
+        let mut points = self.points.to_vec();
+        for (column, _) in self.joint_names.iter().enumerate().filter(|(_, name)| *name == joint) {
+            for point in &mut points {
+                let convert = |numbers: &mut Vec<f64>, of: fn(&Transmission, f64) -> f64| {
+                    numbers.get_mut(column).into_iter().for_each(|number| *number = of(transmission, *number));
+                };
+                convert(&mut point.positions, Transmission::motor_position);
+                convert(&mut point.velocities, Transmission::motor_velocity);
+                convert(&mut point.accelerations, Transmission::motor_velocity);
+                convert(&mut point.efforts, Transmission::motor_effort);
+            }
+        }
+        Some(Self { joint_names: self.joint_names.clone(), points: points.into() })
     }
 }
 

@@ -152,9 +152,15 @@ impl Xml {
         let Some(transmission) = &joint.transmission else { return };
         self.open(&format!("transmission name={}", quoted(&format!("{}_transmission", joint.name))));
         self.line("<type>transmission_interface/SimpleTransmission</type>");
-        self.empty(&format!("joint name={}", quoted(joint.name)));
+        if transmission.offset == 0.0 {
+            self.empty(&format!("joint name={}", quoted(joint.name)));
+        } else {
+            self.open(&format!("joint name={}", quoted(joint.name)));
+            self.line(&format!("<offset>{}</offset>", transmission.offset));
+            self.close("joint");
+        }
         self.open(&format!("actuator name={}", quoted(&format!("{}_motor", joint.name))));
-        self.line(&format!("<mechanicalReduction>{}</mechanicalReduction>", transmission.reduction));
+        self.line(&format!("<mechanicalReduction>{}</mechanicalReduction>", transmission.ratio()));
         self.close("actuator");
         self.close("transmission");
     }

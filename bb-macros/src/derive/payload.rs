@@ -77,6 +77,13 @@ pub(crate) fn payload(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Toke
             fn stop_command() -> ::core::option::Option<Self> {
                 <Self as ::bb_core::__private::JointCommand>::stop()
             }
+            fn command_at_motor(
+                &self,
+                joint: &str,
+                transmission: &::bb_core::__private::Transmission,
+            ) -> ::core::option::Option<Self> {
+                ::bb_core::__private::JointCommand::at_motor(self, joint, transmission)
+            }
         )
     });
     let frame = (attributes.has_no_frame || attributes.tells_position).then(|| {

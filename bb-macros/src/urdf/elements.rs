@@ -126,7 +126,7 @@ impl<'a, 'input> Reader<'a, 'input> {
                 limits,
                 dynamics,
                 mimics,
-                transmissions: self.transmissions(robot, &label),
+                transmissions: self.transmissions(robot, &label, position),
             },
             sensors: Vec::new(),
             actuators: Vec::new(),
@@ -158,23 +158,26 @@ impl<'a, 'input> Reader<'a, 'input> {
         Axis { word: self.word("axis"), direction, components: Vec::new(), place: self.place }
     }
 
-    fn transmissions(&mut self, robot: Node<'_, '_>, joint: &str) -> Vec<Transmission> {
+    fn transmissions(&mut self, robot: Node<'_, '_>, joint: &str, position: Dimension) -> Vec<Transmission> {
         let of_joint = |transmission: &Node<'_, '_>| {
             let mut joints = transmission.children().filter(|node| node.tag_name().name() == "joint");
             joints.any(|node| node.attribute("name") == Some(joint))
         };
         let transmissions: Vec<_> = self.children(robot, "transmission").into_iter().filter(of_joint).collect();
         let reductions = transmissions.into_iter().map(|transmission| {
-            let written = transmission.descendants().find(|node| node.tag_name().name() == "mechanicalReduction");
-            let reduction = match written {
-                Some(node) => node.text().and_then(|text| text.trim().parse().ok()).unwrap_or_else(|| {
+            let mut number = |name: &str, default: f64| {
+                let Some(node) = transmission.descendants().find(|node| node.tag_name().name() == name) else {
+                    return default;
+                };
+                node.text().and_then(|text| text.trim().parse().ok()).unwrap_or_else(|| {
                     self.fault(node, "expected a number");
-                    1.0
-                }),
-                None => 1.0,
+                    default
+                })
             };
-            let reduction = Some(self.quantity(reduction, Dimension::NONE));
-            Transmission { reduction, offset: None, reversed: false }
+            let (reduction, offset) = (number("mechanicalReduction", 1.0), number("offset", 0.0));
+            let reversed = reduction < 0.0;
+            let reduction = Some(self.quantity(reduction.abs(), Dimension::NONE));
+            Transmission { reduction, offset: Some(self.quantity(offset, position)), reversed }
         });
         // A joint has one; further ones for other interfaces repeat it.
         reductions.take(1).collect()

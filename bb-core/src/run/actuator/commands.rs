@@ -7,7 +7,7 @@ use crate::component::{Accepts, Actuator, ActuatorError, Caller};
 use crate::event::Safety;
 use crate::fault::{caught, guarded};
 use crate::journal::{Event, Recorded};
-use crate::message::{Finite, Frame, Payload, Stamp};
+use crate::message::{Finite, Frame, Payload, Stamp, Stamped};
 use crate::pubsub::{DynamicMessage, Wakers};
 
 impl<A: Actuator> Accepts<A::Command> for Inner<A> {
@@ -79,11 +79,12 @@ impl<A: Actuator> Inner<A> {
             origin: self.environment.origin(),
         };
         let message = stamp.message(command);
+        let at_motor = self.at_motor(state, &message)?;
         let Some(actuator) = state.slot.running() else { return Err(ActuatorError::Stopped) };
         state.may_move = true;
         let handled = {
             let _entered = self.occupied.enter(clock);
-            caught(|| actuator.handle_command(&message))
+            caught(|| actuator.handle_command(at_motor.as_ref().unwrap_or(&message)))
         };
         if let Err(failed) = handled {
             let text = failed.fault.to_string();
@@ -105,6 +106,31 @@ impl<A: Actuator> Inner<A> {
             self.tell_control(state, Told::MessageFailed(format!("its message {fault}")));
         }
         Ok(message.payload)
+    }
+
+    /// The command to the motor, if the actuator speaks of that and there is a transmission between it and the joint.
+    fn at_motor(
+        &self,
+        state: &mut State<A>,
+        message: &Stamped<A::Command>,
+    ) -> Result<Option<Stamped<A::Command>>, ActuatorError> {
+        let Some(gear) = self.context.gear() else { return Ok(None) };
+        let converted = {
+            let _entered = self.occupied.enter(self.environment.clock());
+            caught(|| Ok(message.payload.command_at_motor(self.declaration.joint, gear)))
+        };
+        match converted {
+            Ok(Some(command)) => Ok(Some(message.stamp().message(command))),
+            Ok(None) => Err(ActuatorError::NotConverted(format!(
+                "`{}` does not define `JointCommand::at_motor`",
+                A::Command::NAME
+            ))),
+            Err(failed) => {
+                let message = failed.fault.to_string();
+                self.tell_control(state, Told::MessageFailed(format!("the conversion of its command {message}")));
+                Err(ActuatorError::NotConverted(message))
+            }
+        }
     }
 
     /// Applies the limits of the joint to a command.
