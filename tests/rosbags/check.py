@@ -217,7 +217,28 @@ def compare(name, files, bag):
     print(f"rosbags: {name} gives the figures of its files: {', '.join(said)}")
 
 
+def same(folder, converted):
+    """Whether two bags hold the same messages, byte for byte."""
+    import itertools
+
+    from rosbags.highlevel import AnyReader
+
+    def messages(bag):
+        with AnyReader([pathlib.Path(bag)]) as reader:
+            for connection, time, data in reader.messages():
+                yield connection.topic, connection.msgtype, time, data
+
+    count = 0
+    for before, after in itertools.zip_longest(messages(folder), messages(converted)):
+        if before != after:
+            sys.exit(f"rosbags: message {count} of {folder} became another: {before} {after}")
+        count += 1
+    print(f"rosbags: {count} messages are the same after ROS 1")
+
+
 if sys.argv[1] == "make":
     make(sys.argv[2], sys.argv[3])
+elif sys.argv[1] == "same":
+    same(sys.argv[2], sys.argv[3])
 else:
     compare(*sys.argv[2:])

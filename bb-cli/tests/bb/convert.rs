@@ -1,8 +1,8 @@
-//! `bb convert`: CSV as bags that the other commands read.
+//! `bb convert`: recordings of other programs as bags that the other commands read.
 
 use crate::common::{bb, file};
 use bb_core::nalgebra::{UnitQuaternion, Vector3};
-use bb_core::payload::{Imu, MagneticField, Pose};
+use bb_core::payload::{GnssFix, GnssStatus, Imu, MagneticField, Pose};
 use bb_mcap::Bag;
 use serde_json::Value;
 use std::fmt::Write;
@@ -116,9 +116,8 @@ fn truth_may_have_a_file_of_its_own() {
         .unzip();
     let (input, truth) = (csv("imu.csv", &imu.join("\n")), csv("truth.csv", &truth.join("\n")));
     let out = bag("truth.mcap");
-    let truth = truth.to_str().expect("is text");
-    let arguments =
-        [&["--columns"], &MAP[..3], &["--truth", truth, "--truth-columns", "time=1:us", "quat=2-5", "moving=6"]];
+    let with = format!("{} time=1:us quat=2-5 moving=6", truth.display());
+    let arguments = [&["--columns"], &MAP[..3], &["--with", &with]];
     let output = convert(&input, &out, &arguments.concat());
     assert_eq!((output.code, &*output.err), (Some(0), ""));
     let score =
@@ -185,7 +184,7 @@ fn what_is_wrong_is_told_by_line_and_column() {
     let input = csv("bad_map.csv", &format!("{head}0,1,2,3,4,5,6\n"));
     for (map, code, fault) in [
         ("time=t gyr=gx,gy,gzz acc=5-7", 1, "no column `gzz`; did you mean `gz`?"),
-        ("gyr=2-4 acc=5-7", 1, "--columns: time is needed, as time=1:us, or --rate"),
+        ("gyr=2-4 acc=5-7", 1, "columns: time is needed, as time=1:us, or --rate"),
         ("time=t gyr=2-4", 1, "--columns: gyr and acc are needed"),
         ("time=t gyr=2-4:rpm acc=5-7", 2, "no unit `rpm`; there are rad/s, deg/s, dps"),
         ("time=t gyro=2-4 acc=5-7", 2, "no quantity `gyro`; did you mean `gyr`?"),
@@ -234,5 +233,212 @@ fn a_pipe_is_read_once() {
     assert!(piped("-", "pipe.mcap").ends_with(counts));
     if cfg!(unix) {
         assert!(piped("/dev/stdin", "pipe_by_name.mcap").ends_with(counts));
+    }
+}
+
+/// As phones log them: each sensor with a file, a rate and times of its own.
+#[test]
+fn sensors_with_files_of_their_own_are_joined() {
+    let rows = |step: f64, offset: f64, count: u32, value: fn(f64) -> [f64; 3]| {
+        let row = |index: u32| {
+            let time = 100.0 + offset + step * f64::from(index);
+            let [x, y, z] = value(time);
+            format!("{time:.4}\t{x}\t{y}\t{z}\n")
+        };
+        (0..count).map(row).collect::<String>()
+    };
+    // The specific force grows linearly, so that interpolation is exact.
+    let gyroscope = csv("gyroscope.txt", &rows(0.01, 0.0, 100, |t| [0.0, 0.0, t]));
+    let accelerometer = csv("accelerometer.txt", &rows(0.008, 0.003, 100, |t| [t, 2.0 * t, 9.8]));
+    let field = csv("magnetometer.txt", &rows(0.02, 0.0, 50, |_| [0.0, 20.0, -40.0]));
+    let out = bag("joined.mcap");
+    let with =
+        [format!("{} time=1 acc=2-4", accelerometer.display()), format!("{} time=1 mag=2-4:uT", field.display())];
+    let arguments = ["--columns", "time=1 gyr=2-4", "--with", &with[0], "--with", &with[1]];
+    let output = convert(&gyroscope, &out, &arguments);
+    assert_eq!((output.code, &*output.err), (Some(0), ""));
+    // Forces are known from 100.003 to 100.795.
+    let said = "79 on /imu, 50 on /mag, 21 angular velocities without a specific force within 0.1 s left out\n";
+    assert_eq!(output.out, format!("{}: {said}", out.display()));
+    let opened = Bag::open(&out).expect("opens");
+    for message in opened.messages(&["/imu"]).expect("is there") {
+        let (imu, time) = message.expect("is whole").payload::<Imu>().expect("is one");
+        let time = time.as_unix_nanos() as f64 * 1e-9;
+        let wanted = Vector3::new(time, 2.0 * time, 9.8);
+        assert!((imu.linear_acceleration - wanted).norm() < 1e-6, "{time}: {imu:?}");
+        assert!((imu.angular_velocity.z - time).abs() < 1e-9);
+    }
+    let times = opened.messages(&["/imu", "/mag"]).expect("are there");
+    assert!(times.map(|message| message.expect("is whole").log_time_ns).is_sorted());
+
+    let description = csv(
+        "phone.toml",
+        "[[file]]\npath = \"gyroscope.txt\"\ncolumns = \"time=1 gyr=2-4\"\n\
+         [[file]]\npath = \"accelerometer.txt\"\ncolumns = \"time=1 acc=2-4\"\n\
+         [[file]]\npath = \"magnetometer.txt\"\ncolumns = \"time=1 mag=2-4:uT\"\n",
+    );
+    let described = bag("described.mcap");
+    let output = convert(&description, &described, &[]);
+    assert_eq!((output.code, &*output.err), (Some(0), ""));
+    assert_eq!(output.out, format!("{}: {said}", described.display()));
+    assert_eq!(std::fs::read(&described).expect("reads"), std::fs::read(&out).expect("reads"));
+}
+
+#[test]
+fn a_description_is_checked() {
+    for (name, text, fault) in [
+        ("key", "[[file]]\npath = \"a\"\ncolumn = \"time=1\"\n", "unknown field `column`"),
+        ("path", "[[file]]\nrate = 5.0\n", "missing field `path`"),
+        ("map", "[[file]]\npath = \"a.csv\"\ncolumns = \"gyro=1-3\"\n", "a.csv: columns: no quantity `gyro`"),
+        ("rate", "[[file]]\npath = \"a.csv\"\nrate = -1.0\n", "a.csv: rate: must be above 0"),
+        ("none", "", "missing field `file`"),
+        ("gone", "[[file]]\npath = \"not_there.csv\"\n", "not_there.csv: cannot be read"),
+    ] {
+        let out = bag("undescribed.mcap");
+        let output = convert(&csv(&format!("description_{name}.toml"), text), &out, &[]);
+        assert_eq!(output.code, Some(1), "{name}");
+        assert!(output.err.contains(fault), "{name}: {}", output.err);
+        assert!(!out.exists(), "{name}");
+    }
+    let output = convert(&csv("columns.txt", "0,1,2,3\n"), &bag("columns.mcap"), &[]);
+    assert!(
+        output.err.contains("columns.txt: what its columns contain is not said; name them with --columns"),
+        "{}",
+        output.err
+    );
+}
+
+/// With the checksum of a sentence.
+fn sentence(text: &str) -> String {
+    let sum = text.bytes().fold(0, |sum, byte| sum ^ byte);
+    format!("${text}*{sum:02X}\r\n")
+}
+
+#[test]
+fn sentences_of_a_receiver_are_fixes() {
+    // Over midnight: the date comes a second after the first fix.
+    let text = [
+        sentence("GPGGA,235959.50,4807.0380,N,01131.0000,E,1,08,0.9,545.4,M,46.9,M,,"),
+        sentence("GPRMC,000000.00,A,4807.0380,N,01131.0000,E,022.4,084.4,240624,003.1,W"),
+        sentence("GNGST,000000.00,1.2,,,,0.8,0.6,1.5"),
+        sentence("GPGGA,000000.00,4807.0380,N,01131.0000,E,4,08,0.9,545.4,M,46.9,M,,"),
+        sentence("GPGGA,000000.50,,,,,0,00,,,M,,M,,"),
+        "$GPGGA,000001.00,4807.0380,N,01131.0000,E,1,08,0.9,545.4,M,46.9,M,,*00\r\n".to_owned(),
+        sentence("PUBX,41,1,0007,0003,19200,0"),
+    ];
+    let (input, out) = (csv("drive.nmea", &text.concat()), bag("nmea.mcap"));
+    let output = convert(&input, &out, &[]);
+    assert_eq!((output.code, &*output.err), (Some(0), ""));
+    let said = "3 on /fix, 1 lines are no sentence with the right checksum";
+    assert_eq!(output.out, format!("{}: {said}\n", out.display()));
+    let fixes = fixes(&out, "/fix");
+    // 2024-06-24T00:00:00Z
+    let midnight = 1_719_187_200_000_000_000;
+    let times: Vec<_> = fixes.iter().map(|(_, time)| time - midnight).collect();
+    assert_eq!(times, [-500_000_000, 0, 500_000_000]);
+    let place = fixes[1].0.position.expect("is known");
+    assert!((place.latitude_rad.to_degrees() - (48.0 + 7.038 / 60.0)).abs() < 1e-9);
+    // Above the ellipsoid.
+    assert!((place.altitude.expect("is known") - 592.3).abs() < 1e-3);
+    assert_eq!(fixes[0].0.position_covariance, None);
+    let covariance = fixes[1].0.position_covariance.expect("is known");
+    assert!((covariance[(0, 0)] - 0.36).abs() < 1e-6 && (covariance[(1, 1)] - 0.64).abs() < 1e-6);
+    assert_eq!((fixes[2].0.status, fixes[2].0.position), (GnssStatus::NoFix, None));
+    let undated = csv("undated.nmea", &text[0]);
+    let output = convert(&undated, &bag("undated.mcap"), &[]);
+    assert!(output.err.contains("no RMC or ZDA sentence says the date"), "{}", output.err);
+}
+
+fn fixes(file: &Path, topic: &str) -> Vec<(GnssFix, i64)> {
+    let bag = Bag::open(file).expect("opens");
+    let messages = bag.messages(&[topic]).expect("is there");
+    let fix = |message: Result<bb_mcap::BagMessage, _>| {
+        let (fix, time) = message.expect("is whole").payload::<GnssFix>().expect("is one");
+        (fix, time.as_unix_nanos())
+    };
+    messages.map(fix).collect()
+}
+
+#[test]
+fn solutions_of_rtklib_are_fixes() {
+    let head = "% program   : RTKPOST\n% inp file  : rover.obs\n%  GPST                  latitude(deg) longitude(deg)  height(m)   \
+                Q  ns   sdn(m)   sde(m)   sdu(m)  sdne(m)  sdeu(m)  sdun(m) age(s)  ratio\n";
+    let row = "2019/05/01 07:26:19.000   48.137000000   11.575000000   520.0000   1   9   0.0200   0.0100   0.0500   \
+               0.0000   0.0000   0.0000   0.50    3.0\n";
+    let (solution, out) = (csv("reference.pos", &format!("{head}{row}")), bag("pos.mcap"));
+    let imu = csv("pos_imu.csv", "1556695561.0,0,0,0,0,0,9.8\n1556695561.5,0,0,0,0,0,9.8\n");
+    let with = format!("{} topic=/rtk", solution.display());
+    let output = convert(&imu, &out, &["--columns", "time=1 gyr=2-4 acc=5-7", "--with", &with]);
+    assert_eq!((output.code, &*output.err), (Some(0), ""));
+    assert_eq!(output.out, format!("{}: 2 on /imu, 1 on /rtk\n", out.display()));
+    let fixes = fixes(&out, "/rtk");
+    // GPS time is 18 s ahead.
+    assert_eq!(fixes[0].1, 1_556_695_561_000_000_000);
+    assert!((fixes[0].0.position.expect("is known").longitude_rad.to_degrees() - 11.575).abs() < 1e-12);
+    let cut = csv("cut.pos", &format!("{head}2019/05/01 07:26:19.000   48.1\n"));
+    let output = convert(&cut, &bag("cut.mcap"), &[]);
+    assert!(output.err.contains("cut.pos: line 4: 3 columns are too few"), "{}", output.err);
+}
+
+/// A file of `tests/data`.
+fn data(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)
+}
+
+/// Figures of `pyulog` 1.3.0, read from the same file.
+#[test]
+fn logs_of_px4_are_in_the_axes_of_ros() {
+    let out = bag("px4.mcap");
+    let output = convert(&data("px4.ulg"), &out, &[]);
+    assert_eq!((output.code, &*output.err), (Some(0), ""));
+    assert_eq!(output.out, format!("{}: 419 on /imu, 104 on /mag, 15 on /fix\n", out.display()));
+    let opened = Bag::open(&out).expect("opens");
+    let first =
+        |topic: &str| opened.messages(&[topic]).expect("is there").next().expect("is one").expect("is whole");
+    // The receiver's clock at its first fix is 2021-04-21T06:30:58.600345 UTC, 20.471648 s after boot.
+    let boot_ns = 1_618_986_658_600_345_000 - 20_471_648_000;
+    let (imu, time) = first("/imu").payload::<Imu>().expect("is one");
+    assert_eq!(time.as_unix_nanos() / 1000, (boot_ns + 20_326_716_000) / 1000);
+    let close = |found: Vector3<f64>, wanted: [f64; 3]| {
+        assert!((found - Vector3::from(wanted)).norm() < 1e-6 * found.norm(), "{found}")
+    };
+    close(imu.linear_acceleration, [0.001_245_805_6, 0.154_344_98, 9.634_243]);
+    close(imu.angular_velocity, [0.002_968_383_5, -0.003_646_239_9, -0.000_942_496_1]);
+    let (field, _) = first("/mag").payload::<MagneticField>().expect("is one");
+    close(field.magnetic_field, [4.291_782_7e-5, 1.141_843_7e-5, 5.181_336e-6]);
+    let (fix, _) = first("/fix").payload::<GnssFix>().expect("is one");
+    let place = fix.position.expect("is known");
+    assert!((place.latitude_rad.to_degrees() - 63.417_062_2).abs() < 1e-9);
+    assert!((place.altitude.expect("is known") - 106.766).abs() < 1e-9);
+    let covariance = fix.position_covariance.expect("is known");
+    assert!((covariance[(0, 0)].sqrt() - 3.26).abs() < 1e-6 && (covariance[(2, 2)].sqrt() - 6.984).abs() < 1e-6);
+}
+
+/// Written by Python's `rosbags` 0.11, packed with bzip2.
+#[test]
+fn bags_of_ros_1_keep_their_topics() {
+    let out = bag("ros1.mcap");
+    let output = convert(&data("ros1.bag"), &out, &[]);
+    assert_eq!((output.code, &*output.err), (Some(0), ""));
+    assert_eq!(output.out, format!("{}: 20 on /imu/data, 2 on /pose, 2 on /camera/info\n", out.display()));
+    let opened = Bag::open(&out).expect("opens");
+    for (index, message) in opened.messages(&["/imu/data"]).expect("is there").enumerate() {
+        let (imu, time) = message.expect("is whole").payload::<Imu>().expect("is one");
+        assert_eq!(time.as_unix_nanos(), 1_600_000_000_000_000_000 + 10_000_000 * index as i64);
+        assert_eq!((imu.orientation, imu.angular_velocity.z), (None, 0.1 * index as f64));
+    }
+    let text = out.to_str().expect("is text");
+    let camera = bb(&["echo", text, "/camera/info", "--limit", "1", "--json"]);
+    let line: Value = serde_json::from_str(&camera.out).expect("is JSON");
+    assert_eq!(line["message"]["d"], serde_json::json!([0.1, 0.2]));
+    assert_eq!(line["message"]["distortion_model"], "plumb_bob");
+
+    let whole = std::fs::read(data("ros1.bag")).expect("reads");
+    for length in [20, 3000, 5000] {
+        let out = bag("cut_ros1.mcap");
+        let output = convert(&file("cut_ros1.bag", &whole[..length]), &out, &[]);
+        assert_eq!(output.code, Some(1), "{length}");
+        assert!(output.err.contains("rosbag reindex"), "{length}: {}", output.err);
+        assert!(!out.exists());
     }
 }

@@ -30,6 +30,21 @@ fn scratch(name: &str) -> PathBuf {
         std::fs::create_dir_all(file.parent().expect("has one")).expect("makes");
         std::fs::write(file, text).expect("writes");
     }
+    let tests = root().join("bb-cli/tests/data");
+    for (from, to) in [("ros1.bag", "drive.bag"), ("px4.ulg", "flight.ulg")] {
+        std::fs::copy(tests.join(from), folder.join(to)).expect("copies");
+    }
+    for (name, columns) in
+        [("gyroscope.txt", "0,0,0.1"), ("accelerometer.txt", "0,0,9.81"), ("magnetometer.txt", "0,20,-43")]
+    {
+        let time = |index| 1_556_695_561.0 + index as f64 * 0.01;
+        std::fs::write(folder.join(name), rest(|index| format!("{:.2},{columns}", time(index)))).expect("writes");
+    }
+    let head = "%  GPST latitude(deg) longitude(deg) height(m) Q ns sdn(m) sde(m) sdu(m) sdne(m) sdeu(m) sdun(m) age(s) ratio\n";
+    let fix = "2019/05/01 07:26:19.500 48.137 11.575 520.0 1 9 0.02 0.01 0.05 0 0 0 0.5 3.0\n";
+    for name in ["rover.pos", "reference.pos"] {
+        std::fs::write(folder.join(name), [head, fix].concat()).expect("writes");
+    }
     folder
 }
 
@@ -78,7 +93,14 @@ fn chip() -> String {
 
 /// What a line of a shell prints, of `bb` and of the few others that the guides need. With `is_right` it must end well.
 fn run(line: &str, folder: &Path, is_right: bool) -> String {
-    let words: Vec<&str> = line.split_whitespace().collect();
+    // Words in single quotes are one.
+    let parts = line.split('\'').enumerate();
+    let words: Vec<&str> = parts
+        .flat_map(|(index, part)| match index % 2 {
+            0 => part.split_whitespace().collect(),
+            _ => vec![part],
+        })
+        .collect();
     match words[..] {
         ["bb", ..] => {
             let output = Command::new(env!("CARGO_BIN_EXE_bb"))
@@ -139,12 +161,17 @@ fn check(guide: &str) {
     let is_update = std::env::var_os("UPDATE_GUIDES").is_some();
     for (index, &(start, end, language)) in blocks.iter().enumerate() {
         // A file is named on the line before it.
+        if language == "toml" && lines[start] == "[[file]]" {
+            std::fs::write(folder.join("phone.toml"), lines[start..end].join("\n") + "\n").expect("writes");
+            run("bb convert phone.toml described.mcap", &folder, true);
+        }
         if language == "csv" {
             let name = lines[start - 3].trim_matches(['`', ':']);
             std::fs::write(folder.join(name), lines[start..end].join("\n") + "\n").expect("writes");
         }
-        let commands: Vec<&str> =
-            lines[start..end].iter().map(|line| line.split("   #").next().unwrap_or("")).collect();
+        let commands = lines[start..end].iter().map(|line| line.split("   #").next().unwrap_or(""));
+        let commands = commands.collect::<Vec<_>>().join("\n").replace("\\\n", " ");
+        let commands: Vec<&str> = commands.lines().collect();
         if language != "sh" || !commands.iter().any(|line| line.starts_with("bb ")) {
             continue;
         }

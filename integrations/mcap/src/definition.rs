@@ -6,8 +6,10 @@
 mod known;
 mod parse;
 mod read;
+mod ros1;
 mod value;
 
+pub use ros1::Ros1Definition;
 pub use value::Value;
 
 use bb_core::message::{DecodeError, Schema};

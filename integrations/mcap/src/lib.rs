@@ -9,6 +9,7 @@
 //! | play back a recorded IMU as the sensor of a robot, or read its samples | [`BagImu`], [`MargSamples`] |
 //! | read messages of any type, by the definition in the file | [`MessageDefinition`], [`Value`] |
 //! | write payloads as ROS messages | [`BagWriter`] |
+//! | messages of ROS 1 as those of ROS 2 | [`Ros1Definition`] |
 //! | the true orientation in a bag | [`Truth`] |
 //! | save the part of a damaged file before the break | [`recover`] |
 //!
@@ -85,7 +86,7 @@ pub use bag::{
     Bag, BagImu, BagImuOptions, BagMessage, BagMessages, Bool, IMU, MAGNETIC_FIELD, MOVING, MargSamples, ODOMETRY,
     POSE, Topic, Truth,
 };
-pub use definition::{MessageDefinition, Value};
+pub use definition::{MessageDefinition, Ros1Definition, Value};
 pub use error::{RecordingError, RecordingErrorKind};
 pub use played::{PlayedEstimator, PlayedOptions, PlayedSensor};
 pub use recorder::{BackgroundRecorder, Compression, Recorder, RecorderOptions, RecorderReport};

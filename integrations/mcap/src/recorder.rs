@@ -30,8 +30,8 @@ use std::fs::File;
 use std::io::{self, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
+pub(crate) use viewers::{channel_of, nanos};
 use viewers::{describe, latched, view};
-pub(crate) use viewers::{nanos, view_as};
 
 /// The destination of a recording.
 pub(crate) trait Output: Write + Seek + Send {}

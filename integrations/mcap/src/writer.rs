@@ -1,8 +1,9 @@
 //! Writes bags of payloads, for measurements from other programs.
 
 use crate::error::{RecordingError, create_error, write_error};
-use crate::recorder::{FileWriter, nanos, view_as};
+use crate::recorder::{FileWriter, channel_of, nanos};
 use crate::{RecorderOptions, RecordingErrorKind};
+use bb_core::message::Schema;
 use bb_core::message::codec::{Field, Shape, encode, encode_as_ros};
 use bb_core::{Payload, Stamped, WallTime};
 use mcap::records::MessageHeader;
@@ -27,7 +28,7 @@ pub struct BagWriter {
 struct Channel {
     id: u16,
     /// ROS's name of the type.
-    name: &'static str,
+    name: String,
     sequence: u32,
 }
 
@@ -55,7 +56,7 @@ impl BagWriter {
         if !encode_as_ros(message, &mut self.bytes) {
             return Err(self.other_type(topic, T::NAME, "a payload that ROS has a message for"));
         }
-        self.write(topic, shape, message.wall_time)
+        self.write_shape(topic, shape, message.wall_time)
     }
 
     /// Writes a type with ROS's fields and, by `#[payload(name = "package/Name")]`, ROS's name.
@@ -70,7 +71,23 @@ impl BagWriter {
     ) -> Result<(), RecordingError> {
         self.bytes.clear();
         encode(message, &mut self.bytes);
-        self.write(topic, M::SHAPE, log_time)
+        self.write_shape(topic, M::SHAPE, log_time)
+    }
+
+    /// Writes a message that is encoded already, in CDR.
+    ///
+    /// # Errors
+    /// The topic has another type, or the file can no longer be written.
+    pub fn encoded(
+        &mut self,
+        topic: &str,
+        schema: &Schema,
+        log_time: WallTime,
+        message: &[u8],
+    ) -> Result<(), RecordingError> {
+        self.bytes.clear();
+        self.bytes.extend(message);
+        self.write(topic, &schema.name, || schema.clone(), log_time)
     }
 
     /// Writes the end of the file. Returns the number of messages.
@@ -86,20 +103,30 @@ impl BagWriter {
         Ok(messages)
     }
 
-    /// Writes the bytes.
-    fn write(&mut self, topic: &str, shape: Shape, time: WallTime) -> Result<(), RecordingError> {
+    fn write_shape(&mut self, topic: &str, shape: Shape, time: WallTime) -> Result<(), RecordingError> {
         let name = match shape {
             Shape::Struct(shape) => shape.name,
             _ => "",
         };
+        self.write(topic, name, || Schema::new(name, shape), time)
+    }
+
+    /// Writes the bytes, of the type `name`.
+    fn write(
+        &mut self,
+        topic: &str,
+        name: &str,
+        schema: impl FnOnce() -> Schema,
+        time: WallTime,
+    ) -> Result<(), RecordingError> {
         if !self.channels.contains_key(topic) {
-            let id = view_as(&mut self.writer, topic, name, shape, "").map_err(|error| self.fail(error))?;
-            self.channels.insert(topic.to_owned(), Channel { id, name, sequence: 0 });
+            let id = channel_of(&mut self.writer, topic, &schema(), "").map_err(|error| self.fail(error))?;
+            self.channels.insert(topic.to_owned(), Channel { id, name: name.to_owned(), sequence: 0 });
         }
         let Some(channel) = self.channels.get_mut(topic) else { return Ok(()) };
         if channel.name != name {
-            let known = channel.name;
-            return Err(self.other_type(topic, name, known));
+            let known = channel.name.clone();
+            return Err(self.other_type(topic, name, &known));
         }
         let (log_time, sequence) = (nanos(time), channel.sequence);
         channel.sequence = channel.sequence.wrapping_add(1);

@@ -1,10 +1,14 @@
 //! The rows of a CSV as quantities in SI.
 
 use super::columns::{Column, Columns, Quantity, What};
+use super::entry::{Entry, FIX, What as Content};
 use super::source::{LONGEST_HEAD, Source, is_number};
+use bb_core::nalgebra::{Matrix3, Vector3};
+use bb_core::payload::{GeodeticPosition, GnssFix, GnssServices, GnssStatus};
 use bb_eval::filters::near;
 use csv::StringRecord;
 use std::path::Path;
+use std::sync::Arc;
 
 /// The last time of a ROS stamp, whose seconds have 32 bits, nanoseconds.
 const LAST_NS: i64 = i32::MAX as i64 * 1_000_000_000 + 999_999_999;
@@ -19,19 +23,63 @@ pub(super) enum Times {
 
 /// The contents of a row.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Row {
-    pub(super) time_ns: i64,
+struct Row {
+    time_ns: i64,
     /// rad/s
-    pub(super) angular_velocity: Option<[f64; 3]>,
+    angular_velocity: Option<[f64; 3]>,
     /// m/s²
-    pub(super) specific_force: Option<[f64; 3]>,
+    specific_force: Option<[f64; 3]>,
     /// T
-    pub(super) magnetic_field: Option<[f64; 3]>,
+    magnetic_field: Option<[f64; 3]>,
     /// w, x, y, z; NaN if unknown.
-    pub(super) orientation: Option<[f64; 4]>,
+    orientation: Option<[f64; 4]>,
     /// m; NaN if unknown.
-    pub(super) position: Option<[f64; 3]>,
-    pub(super) moving: Option<bool>,
+    position: Option<[f64; 3]>,
+    moving: Option<bool>,
+    /// Latitude and longitude, rad, and height, m; NaN if unknown.
+    fix: Option<[f64; 3]>,
+    /// Horizontal and vertical, m; NaN if unknown.
+    deviations: Option<[f64; 2]>,
+}
+
+impl Row {
+    fn entries(self, topic: &Arc<str>) -> Vec<Entry> {
+        let moving = self.moving.map(Content::Moving);
+        let inertial = match (self.angular_velocity, self.specific_force) {
+            (Some(angular_velocity), Some(specific_force)) => {
+                Some(Content::Imu { angular_velocity, specific_force })
+            }
+            (Some(rate), None) => Some(Content::AngularVelocity(rate)),
+            (None, Some(force)) => Some(Content::SpecificForce(force)),
+            (None, None) => None,
+        };
+        let field = self.magnetic_field.map(Content::MagneticField);
+        let truth = (self.orientation.is_some() || self.position.is_some()).then(|| Content::Truth {
+            orientation: self.orientation.unwrap_or([f64::NAN; 4]),
+            position: self.position.unwrap_or([f64::NAN; 3]),
+        });
+        let fix = self.fix.map(|place| fix(place, self.deviations));
+        let fix = fix.map(|fix| Content::Fix { topic: Arc::clone(topic), fix });
+        let all = [moving, inertial, field, truth, fix].into_iter().flatten();
+        all.map(|what| Entry { time_ns: self.time_ns, what }).collect()
+    }
+}
+
+fn fix([latitude_rad, longitude_rad, height]: [f64; 3], deviations: Option<[f64; 2]>) -> GnssFix {
+    let is_known = latitude_rad.is_finite() && longitude_rad.is_finite();
+    let position = is_known.then(|| GeodeticPosition {
+        latitude_rad,
+        longitude_rad,
+        altitude: Some(height).filter(|height| height.is_finite()),
+    });
+    let deviations = deviations.filter(|deviations| deviations.iter().all(|x| x.is_finite() && *x > 0.0));
+    let covariance = deviations.map(|[h, v]| Matrix3::from_diagonal(&Vector3::new(h * h, h * h, v * v)));
+    GnssFix {
+        status: if is_known { GnssStatus::Fix } else { GnssStatus::NoFix },
+        services: GnssServices::default(),
+        position,
+        position_covariance: covariance,
+    }
 }
 
 /// A CSV being read.
@@ -44,11 +92,13 @@ pub(super) struct Table {
     first: Option<(u64, StringRecord)>,
     /// The number of rows returned.
     rows: u64,
+    /// Where fixes go.
+    topic: Arc<str>,
 }
 
 impl Table {
     /// Reads the header, and finds the columns. A file `-` is the standard input.
-    pub(super) fn open(file: &Path, columns: &Columns, times: Times) -> Result<Self, String> {
+    pub(super) fn open(file: &Path, columns: &Columns, times: Times, topic: Option<&str>) -> Result<Self, String> {
         let mut source = Source::open(file)?;
         let mut head: Vec<StringRecord> = Vec::new();
         let first = loop {
@@ -72,7 +122,8 @@ impl Table {
             Ok((quantity.clone(), indices))
         });
         let quantities = quantities.collect::<Result<_, String>>()?;
-        Ok(Self { source, times, quantities, head: head.len(), first: Some(first), rows: 0 })
+        let topic = topic.unwrap_or(FIX).into();
+        Ok(Self { source, times, quantities, head: head.len(), first: Some(first), rows: 0, topic })
     }
 
     /// The length of the file; `None` for a pipe.
@@ -90,8 +141,8 @@ impl Table {
         self.head
     }
 
-    /// The next row; an error names its line and column.
-    pub(super) fn next(&mut self) -> Result<Option<Row>, String> {
+    /// The entries of the next row; an error names its line and column.
+    pub(super) fn next(&mut self) -> Result<Option<Vec<Entry>>, String> {
         let first = self.first.take();
         let Some((line, record)) = first.map_or_else(|| self.source.next(), |first| Ok(Some(first)))? else {
             return Ok(None);
@@ -104,7 +155,7 @@ impl Table {
             take(&record, quantity, indices, &mut row).map_err(|fault| format!("line {line}, {fault}"))?;
         }
         self.rows += 1;
-        Ok(Some(row))
+        Ok(Some(row.entries(&self.topic)))
     }
 }
 
@@ -145,6 +196,11 @@ fn take(record: &StringRecord, quantity: &Quantity, indices: &[usize], row: &mut
         }
         What::Orientation => row.orientation = Some(cells.known_or_nan()?),
         What::Position => row.position = Some(cells.known_or_nan()?),
+        What::Fix => {
+            let [latitude, longitude, height] = cells.known_or_nan()?;
+            row.fix = Some([latitude.to_radians(), longitude.to_radians(), height]);
+        }
+        What::Deviations => row.deviations = Some(cells.known_or_nan()?),
         What::Moving => row.moving = Some(cells.number(0)? != 0.0),
     }
     Ok(())

@@ -15,9 +15,13 @@ pub(super) enum What {
     Orientation,
     Position,
     Moving,
+    /// Latitude and longitude in degrees, and height.
+    Fix,
+    /// Of a fix, horizontal and vertical.
+    Deviations,
 }
 
-const WHATS: [(&str, What); 7] = [
+const WHATS: [(&str, What); 9] = [
     ("time", What::Time),
     ("gyr", What::AngularVelocity),
     ("acc", What::SpecificForce),
@@ -25,6 +29,8 @@ const WHATS: [(&str, What); 7] = [
     ("quat", What::Orientation),
     ("pos", What::Position),
     ("moving", What::Moving),
+    ("fix", What::Fix),
+    ("dev", What::Deviations),
 ];
 
 impl What {
@@ -33,6 +39,8 @@ impl What {
         match self {
             Self::Time | Self::Moving => &[""],
             Self::Orientation => &["w", "x", "y", "z"],
+            Self::Fix => &["lat", "lon", "alt"],
+            Self::Deviations => &["h", "v"],
             _ => &["x", "y", "z"],
         }
     }
@@ -43,8 +51,8 @@ impl What {
             Self::AngularVelocity => units::RATE,
             Self::SpecificForce => units::FORCE,
             Self::MagneticField => units::FIELD,
-            Self::Position => units::LENGTH,
-            Self::Orientation | Self::Moving => &[],
+            Self::Position | Self::Deviations => units::LENGTH,
+            Self::Orientation | Self::Moving | Self::Fix => &[],
         }
     }
 }
@@ -115,7 +123,7 @@ impl FromStr for Quantity {
                 1.0
             }
             (What::Orientation, Some(other)) => return Err(format!("no order `{other}`; there are wxyz, xyzw")),
-            (What::Moving, Some(_)) => return Err("`moving` has no unit".into()),
+            (What::Moving | What::Fix, Some(_)) => return Err(format!("`{name}` has no unit to choose")),
             (_, Some(unit)) => units::factor(unit, what.units())?,
         };
         Ok(Self { what, columns, factor })
@@ -168,14 +176,11 @@ impl Columns {
     fn has(&self, what: What) -> bool {
         self.quantities.iter().any(|quantity| quantity.what == what)
     }
+}
 
-    pub(super) fn has_imu(&self) -> bool {
-        self.has(What::AngularVelocity) && self.has(What::SpecificForce)
-    }
-
-    pub(super) fn has_truth(&self) -> bool {
-        self.has(What::Orientation) || self.has(What::Position)
-    }
+/// Whether one of these quantities is among the columns.
+pub(super) fn has(quantities: &[Quantity], what: What) -> bool {
+    quantities.iter().any(|quantity| quantity.what == what)
 }
 
 #[cfg(test)]

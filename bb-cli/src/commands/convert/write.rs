@@ -1,6 +1,6 @@
-//! Rows as the messages of a bag.
+//! Entries as the messages of a bag.
 
-use super::cells::Row;
+use super::entry::{Entry, FIX, What};
 use bb_core::message::Frame;
 use bb_core::nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use bb_core::payload::{Imu, MagneticField, Pose};
@@ -12,6 +12,9 @@ use std::path::Path;
 
 /// The frame of the measurements, and that of the truth.
 const IMU: Frame = Frame::new("imu");
+const GNSS: Frame = Frame::new("gnss");
+
+const NAMED: [&str; 5] = ["/imu", "/mag", FIX, "/truth", "/moving"];
 
 /// A bag being written.
 pub(super) struct Bag {
@@ -21,14 +24,9 @@ pub(super) struct Bag {
     moving: Option<bool>,
 }
 
-/// The number of messages of each kind.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Counts {
-    imu: u64,
-    mag: u64,
-    truth: u64,
-    moving: u64,
-}
+/// The number of messages on each topic, in the order of their first.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Counts(Vec<(String, u64)>);
 
 impl Bag {
     pub(super) fn create(file: &Path) -> Result<Self, String> {
@@ -38,42 +36,51 @@ impl Bag {
         Ok(Self { writer, counts: Counts::default(), moving: None })
     }
 
-    pub(super) fn row(&mut self, row: &Row) -> Result<(), String> {
-        let time_ns = row.time_ns;
-        if let Some(data) = row.moving.filter(|moving| Some(*moving) != self.moving) {
-            self.moving = Some(data);
-            let time = WallTime::from_unix_nanos(time_ns);
-            self.writer.message("/moving", time, &Bool { data }).map_err(|error| error.to_string())?;
-            self.counts.moving += 1;
+    pub(super) fn entry(&mut self, Entry { time_ns, what }: Entry) -> Result<(), String> {
+        match what {
+            What::Moving(data) => {
+                if self.moving.replace(data) == Some(data) {
+                    return Ok(());
+                }
+                let time = WallTime::from_unix_nanos(time_ns);
+                self.writer.message("/moving", time, &Bool { data }).map_err(|error| error.to_string())?;
+                self.counts.add("/moving");
+                Ok(())
+            }
+            What::Imu { angular_velocity, specific_force } => {
+                let imu = Imu::new(Vector3::from(angular_velocity), Vector3::from(specific_force));
+                self.write("/imu", time_ns, IMU, imu)
+            }
+            // Joined before.
+            What::AngularVelocity(_) | What::SpecificForce(_) => Ok(()),
+            What::MagneticField(field) => {
+                self.write("/mag", time_ns, IMU, MagneticField::new(Vector3::from(field)))
+            }
+            What::Truth { orientation: [w, x, y, z], position } => {
+                let pose = Pose {
+                    position: Vector3::from(position),
+                    world_from_body: UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z)),
+                    covariance: None,
+                };
+                self.write("/truth", time_ns, IMU, pose)
+            }
+            What::Fix { topic, fix } => self.write(&topic, time_ns, GNSS, fix),
+            What::Encoded { topic, schema, data } => {
+                let time = WallTime::from_unix_nanos(time_ns);
+                self.writer.encoded(&topic, &schema, time, &data).map_err(|error| error.to_string())?;
+                self.counts.add(&topic);
+                Ok(())
+            }
         }
-        if let (Some(rate), Some(force)) = (row.angular_velocity, row.specific_force) {
-            let imu = Imu::new(Vector3::from(rate), Vector3::from(force));
-            self.write("/imu", time_ns, imu)?;
-            self.counts.imu += 1;
-        }
-        if let Some(field) = row.magnetic_field {
-            let field = MagneticField::new(Vector3::from(field));
-            self.write("/mag", time_ns, field)?;
-            self.counts.mag += 1;
-        }
-        if row.orientation.is_some() || row.position.is_some() {
-            let [w, x, y, z] = row.orientation.unwrap_or([f64::NAN; 4]);
-            let pose = Pose {
-                position: Vector3::from(row.position.unwrap_or([f64::NAN; 3])),
-                world_from_body: UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z)),
-                covariance: None,
-            };
-            self.write("/truth", time_ns, pose)?;
-            self.counts.truth += 1;
-        }
-        Ok(())
     }
 
-    fn write<T: Payload>(&mut self, topic: &str, time_ns: i64, payload: T) -> Result<(), String> {
+    fn write<T: Payload>(&mut self, topic: &str, time_ns: i64, frame: Frame, payload: T) -> Result<(), String> {
         let mut message = Stamped::new(MonotonicTime::from_nanos(time_ns), payload);
         message.wall_time = WallTime::from_unix_nanos(time_ns);
-        message.frame = IMU;
-        self.writer.payload(topic, &message).map_err(|error| error.to_string())
+        message.frame = frame;
+        self.writer.payload(topic, &message).map_err(|error| error.to_string())?;
+        self.counts.add(topic);
+        Ok(())
     }
 
     pub(super) fn finish(self) -> Result<Counts, String> {
@@ -82,11 +89,22 @@ impl Bag {
     }
 }
 
+impl Counts {
+    fn add(&mut self, topic: &str) {
+        match self.0.iter_mut().find(|(known, _)| known == topic) {
+            Some((_, count)) => *count += 1,
+            None => self.0.push((topic.to_owned(), 1)),
+        }
+    }
+}
+
 impl fmt::Display for Counts {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let counts = [("/imu", self.imu), ("/mag", self.mag), ("/truth", self.truth), ("/moving", self.moving)];
-        let counts =
-            counts.iter().filter(|(_, count)| *count > 0).map(|(topic, count)| format!("{count} on {topic}"));
-        f.write_str(&counts.collect::<Vec<_>>().join(", "))
+        // What `bb` gives names to comes first.
+        let rank = |topic: &str| NAMED.iter().position(|named| *named == topic).unwrap_or(NAMED.len());
+        let mut counts = self.0.clone();
+        counts.sort_by_key(|(topic, _)| rank(topic));
+        let counts: Vec<_> = counts.iter().map(|(topic, count)| format!("{count} on {topic}")).collect();
+        f.write_str(&counts.join(", "))
     }
 }

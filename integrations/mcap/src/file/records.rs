@@ -243,18 +243,12 @@ const OTHERS: [(&[u8], &str); 10] = [
         "it is an SQLite database; if it is a ROS 2 bag, build with the feature `sqlite`, or convert it with `ros2 bag \
          convert`, or with `rosbags-convert --src BAG --dst NEW --dst-storage mcap`",
     ),
-    (
-        b"#ROSBAG",
-        "it is a ROS 1 bag; convert it with `rosbags-convert --src BAG --dst NEW --dst-storage mcap` of `pip install rosbags`",
-    ),
+    (b"#ROSBAG", "it is a ROS 1 bag; convert it with `bb convert BAG NEW.mcap`"),
     (&[0x28, 0xb5, 0x2f, 0xfd], "it is packed as a whole with zstd; unpack it with `zstd -d`"),
     (&[0x1f, 0x8b], "it is packed as a whole with gzip; unpack it with `gunzip`"),
     (&[0x04, 0x22, 0x4d, 0x18], "it is packed as a whole with lz4; unpack it with `lz4 -d`"),
     (b"PK\x03\x04", "it is a zip archive; unpack it"),
-    (
-        b"ULog",
-        "it is a log of PX4; make CSV of it with `ulog2csv` of `pyulog`, and a bag of that with `bb convert`",
-    ),
+    (b"ULog", "it is a log of PX4; convert it with `bb convert LOG NEW.mcap`"),
     (b"MATLAB", "it is a MATLAB file; make CSV of it, and a bag of that with `bb convert`"),
     (b"\x89HDF", "it is an HDF5 file; make CSV of it, and a bag of that with `bb convert`"),
     (b"version https://", "it is a pointer of Git LFS; fetch the file itself with `git lfs pull`"),

@@ -29,18 +29,11 @@ pub(super) fn view<T: Field>(writer: &mut FileWriter, topic: &str, qos: &str) ->
         Shape::Struct(shape) => shape.name,
         _ => "",
     };
-    view_as(writer, topic, name, T::SHAPE, qos)
+    channel_of(writer, topic, &Schema::new(name, T::SHAPE), qos)
 }
 
-/// A channel of a type of this name and shape.
-pub(crate) fn view_as(
-    writer: &mut FileWriter,
-    topic: &str,
-    name: &str,
-    shape: Shape,
-    qos: &str,
-) -> McapResult<u16> {
-    let schema = Schema::new(name, shape);
+/// A channel of messages in CDR.
+pub(crate) fn channel_of(writer: &mut FileWriter, topic: &str, schema: &Schema, qos: &str) -> McapResult<u16> {
     // ROS's player requires it.
     let metadata = BTreeMap::from([("offered_qos_profiles".to_owned(), qos.to_owned())]);
     let schema = writer.add_schema(&schema.name, Schema::ENCODING, schema.text.as_bytes())?;
