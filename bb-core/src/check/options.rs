@@ -121,10 +121,7 @@ const fn check_units(
         ([], Some(given)) => {
             let text = Text::new("found ").push(given.name).push(", and ");
             let text = path(text, names).push(" of ").name(payload);
-            let text = text.push(
-                " states no unit; leave the unit out, or state that of the field: `#[payload(unit = \"…\")]`",
-            );
-            text
+            text.push(" states no unit; leave the unit out, or state that of the field: `#[payload(unit = \"…\")]`")
         }
         ([first, ..], given) => {
             let text = Text::new("expected ").push(first.dimension);

@@ -13,8 +13,11 @@ use std::sync::Arc;
 pub struct TopicField {
     path: &'static str,
     field: &'static str,
-    read: Option<Arc<dyn Fn(&DynamicMessage) -> Option<f64> + Send + Sync>>,
+    read: Option<Arc<Read>>,
 }
+
+/// Reads the number in a message.
+type Read = dyn Fn(&DynamicMessage) -> Option<f64> + Send + Sync;
 
 impl TopicField {
     /// The field `field` of the messages at `path`, which `number` reads.
