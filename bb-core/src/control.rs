@@ -7,6 +7,7 @@
 //! collected as `Effects` and run without the lock, on their own threads or on those of the pool. Each may block
 //! forever without harming anything else.
 
+mod alarms;
 mod arming;
 #[cfg(test)]
 mod bare;

@@ -73,7 +73,7 @@ pub use message::{
     LimitedQuantity, Origin, OutOfBounds, Payload, Stamped,
 };
 pub use pubsub::{
-    DynamicMessage, DynamicSubscription, Overflow, Payloads, Publisher, Select, Subscription, Unmatched,
+    Delivery, DynamicMessage, DynamicSubscription, Overflow, Payloads, Publisher, Select, Subscription, Unmatched,
 };
 pub use run::{
     ActuatorHandle, Builder, CommandHandle, EstimatorHandle, EstimatorOfSeveralHandle, Execution, Live,

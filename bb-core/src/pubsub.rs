@@ -1,6 +1,7 @@
 //! Publish and subscribe. A slow subscriber never slows a publisher and never grows without bound.
 
 mod any;
+mod delivery;
 mod dynamic;
 mod publisher;
 mod queue;
@@ -11,20 +12,22 @@ mod subscribers;
 mod subscription;
 #[cfg(test)]
 mod tests;
+mod timer;
 mod topic;
 mod typed;
 mod unmatched;
 mod wakers;
 
 pub use any::{AnyTopic, DynamicMessage};
+pub use delivery::{Delivery, Overflow};
 pub use dynamic::{DynamicSubscription, RecvDynamic};
 pub(crate) use publisher::Gate;
 pub use publisher::Publisher;
-pub use queue::Overflow;
 pub(crate) use registry::{PathChange, Registry};
 pub use select::{Payloads, Select};
 pub use statistics::{SubscriberStatistics, TopicStatistics};
 pub use subscription::{RecvAsync, Subscription};
+pub(crate) use timer::Alarms;
 pub use topic::Topic;
 pub use unmatched::Unmatched;
 pub(crate) use unmatched::unmatched_at;

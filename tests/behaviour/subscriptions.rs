@@ -1,5 +1,6 @@
 //! Subscriptions to typed handles.
 
+mod rates;
 mod same;
 
 use crate::components::{Counter, Number, Scale};

@@ -8,7 +8,7 @@ use crate::joints::Joints;
 use crate::message::nearest::nearest_path;
 use crate::message::{Payload, Stamp};
 use crate::pubsub::{
-    AnyTopic, DynamicMessage, DynamicSubscription, Gate, Overflow, Payloads, Publisher, Select,
+    AnyTopic, Delivery, DynamicMessage, DynamicSubscription, Gate, Payloads, Publisher, Select,
     SubscriberStatistics, Subscription, Topic, unmatched_at,
 };
 use crate::time::Clock;
@@ -72,8 +72,13 @@ impl Bus {
     ///
     /// # Errors
     /// Nothing is published there, or another payload is; the error names the nearest path. Or the caller may not read.
-    pub fn subscribe<T: Payload>(&self, path: &str, overflow: Overflow) -> Result<Subscription<T>, Fault> {
+    pub fn subscribe<T: Payload>(
+        &self,
+        path: &str,
+        delivery: impl Into<Delivery>,
+    ) -> Result<Subscription<T>, Fault> {
         self.check(Right::Read)?;
+        let (delivery, timer) = (delivery.into(), self.host.registry().timer());
         let subscribed = self.with_topics(|topics| {
             let Some(topic) = topics.iter().find(|topic| topic.path() == path) else {
                 return Err(unmatched_at(path, topics).into());
@@ -81,7 +86,7 @@ impl Bus {
             let typed = topic.as_any().downcast_ref::<Topic<T>>().ok_or_else(|| {
                 Fault::new(format!("`{path}` publishes `{}`, not `{}`", topic.payload_name(), T::NAME))
             })?;
-            Ok(typed.subscribe(overflow))
+            Ok(typed.subscribe_on(delivery, timer))
         });
         subscribed.unwrap_or_else(|| Err(Fault::new("the robot is gone")))
     }
@@ -92,17 +97,17 @@ impl Bus {
         &self,
         select: Select<'_>,
         payloads: impl Into<Payloads<'a>>,
-        overflow: Overflow,
+        delivery: impl Into<Delivery>,
     ) -> DynamicSubscription {
-        let payloads = payloads.into();
+        let (payloads, delivery) = (payloads.into(), delivery.into());
         let mut subscribed = None;
         if self.check(Right::Read).is_err() {
-            return DynamicSubscription::new([], select, payloads, overflow);
+            return DynamicSubscription::new([], select, payloads, delivery);
         }
         self.host.with_topics(&mut |topics| {
-            subscribed = Some(self.host.registry().subscribe(topics, select, &payloads, overflow));
+            subscribed = Some(self.host.registry().subscribe(topics, select, &payloads, delivery));
         });
-        subscribed.unwrap_or_else(|| DynamicSubscription::new([], select, payloads, overflow))
+        subscribed.unwrap_or_else(|| DynamicSubscription::new([], select, payloads, delivery))
     }
 
     /// Returns a publisher at a path of the caller's choice, such as `mission/progress`: names of letters, digits,

@@ -1,8 +1,10 @@
 //! Messages of any payload, by path: for loggers, dashboards, recorders.
 
 use super::any::{AnyTopic, DynamicMessage, Tap};
-use super::queue::{Overflow, Queue};
+use super::delivery::Delivery;
+use super::queue::Queue;
 use super::select::{Payloads, Select};
+use super::timer::Timer;
 use super::unmatched::{Unmatched, unmatched};
 use crate::message::Schema;
 use std::future::Future;
@@ -23,15 +25,16 @@ pub struct DynamicSubscription {
 
 impl DynamicSubscription {
     /// Subscribes to the selected `topics` whose payload is one of `payloads`. Parts of the selection that match none
-    /// of them are logged as a warning, and kept in [`unmatched`](Self::unmatched).
+    /// of them are logged as a warning, and kept in [`unmatched`](Self::unmatched). (A highest rate needs the clock of a robot, and is
+    /// ignored here.)
     pub fn new<'a, 'b>(
         topics: impl IntoIterator<Item = &'a dyn AnyTopic>,
         select: Select<'_>,
         payloads: impl Into<Payloads<'b>>,
-        overflow: Overflow,
+        delivery: impl Into<Delivery>,
     ) -> Self {
         let topics: Vec<_> = topics.into_iter().collect();
-        let subscription = Self::among(&topics, select, &payloads.into(), overflow);
+        let subscription = Self::among(&topics, select, &payloads.into(), delivery.into(), &Timer::default());
         subscription.warn();
         subscription
     }
@@ -41,9 +44,10 @@ impl DynamicSubscription {
         topics: &[&dyn AnyTopic],
         select: Select<'_>,
         payloads: &Payloads<'_>,
-        overflow: Overflow,
+        delivery: Delivery,
+        timer: &Timer,
     ) -> Self {
-        let queue = Arc::new(Queue::new(overflow));
+        let queue = Queue::shared(delivery, timer);
         let mut paths = Vec::new();
         let mut schemas = Vec::new();
         for topic in topics {
@@ -137,6 +141,7 @@ impl Drop for DynamicSubscription {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Overflow;
     use super::*;
 
     #[test]

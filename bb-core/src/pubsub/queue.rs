@@ -1,69 +1,24 @@
 //! The bounded queue between a topic and one subscriber.
 
+mod by_path;
+
+use self::by_path::{ByPath, Dropped, Paths};
+use super::delivery::{Bound, Delivery, Overflow};
 use super::statistics::SubscriberStatistics;
-use super::wakers::{Wakers, discard};
+use super::timer::Timer;
+use super::wakers::{Wakers, discard, wake};
 use crate::message::{Payload, Stamped};
+use crate::time::MonotonicTime;
 use std::any::Any;
 use std::collections::VecDeque;
 use std::mem::needs_drop;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
 use std::time::{Duration, Instant};
 
-/// What happens to a subscriber that is slower than its publisher.
-///
-/// A subscription is bounded in messages and in bytes. The bytes of a message are those its payload holds on the heap
-/// ([`Field::heap_bytes`](crate::Field::heap_bytes)), plus the message itself if that is larger than 1 KiB; smaller
-/// ones are bounded only by their number. One message is always kept, however large it is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Overflow {
-    /// Keeps this many messages, and at most [`Overflow::DEFAULT_BYTES`]. Beyond that, the oldest is dropped, and the
-    /// loss is counted.
-    DropOldest {
-        /// How many are kept: at least one, and at most [`Overflow::MAX_CAPACITY`].
-        capacity: usize,
-    },
-    /// The same with its own bound in bytes.
-    DropOldestWithin {
-        /// How many are kept: at least one, and at most [`Overflow::MAX_CAPACITY`].
-        capacity: usize,
-        /// Total bytes of the kept messages; `usize::MAX` for no bound.
-        bytes: usize,
-    },
-    /// Keeps only the newest message; the loss of the others is counted.
-    KeepLatest,
-}
-
-impl Default for Overflow {
-    fn default() -> Self {
-        Self::DropOldest { capacity: 1024 }
-    }
-}
-
-impl Overflow {
-    /// The largest capacity of a subscription, in messages.
-    pub const MAX_CAPACITY: usize = 1 << 20;
-
-    /// Default bound on the total bytes of a subscription's messages: 64 MiB.
-    pub const DEFAULT_BYTES: usize = 64 << 20;
-
-    fn bound(self) -> Bound {
-        let (capacity, bytes) = match self {
-            Self::DropOldest { capacity } => (capacity, Self::DEFAULT_BYTES),
-            Self::DropOldestWithin { capacity, bytes } => (capacity, bytes),
-            Self::KeepLatest => (1, usize::MAX),
-        };
-        Bound { capacity: capacity.clamp(1, Self::MAX_CAPACITY), bytes }
-    }
-}
-
-/// The bounds of a queue.
-#[derive(Clone, Copy, Debug)]
-struct Bound {
-    capacity: usize,
-    bytes: usize,
-}
+/// Paths for whose messages a queue that keeps one of each reserves memory.
+const USUAL_PATHS: usize = 64;
 
 /// Memory that a queue reserves in advance, in bytes; beyond it, memory is allocated when messages first need it.
 const ROOM_IN_ADVANCE: usize = 1 << 20;
@@ -83,6 +38,7 @@ pub(super) struct Queue<M> {
     state: Mutex<State<M>>,
     arrived: Condvar,
     bound: Bound,
+    by_path: Option<Box<ByPath>>,
     /// Its reader is gone.
     abandoned: AtomicBool,
 }
@@ -97,6 +53,7 @@ struct State<M> {
     waker: Option<Waker>,
     /// Waiting threads: notifying nobody would cost a system call.
     waiting: usize,
+    paths: Paths<M>,
 }
 
 #[derive(Debug)]
@@ -127,9 +84,20 @@ impl<M: Send + 'static> AnyQueue for Queue<M> {
 }
 
 impl<M: Send + 'static> Queue<M> {
+    /// Memory for the usual number of messages is reserved here, so publishing allocates nothing.
+    pub(super) fn shared(delivery: Delivery, timer: &Timer) -> Arc<Self> {
+        Arc::new_cyclic(|queue| {
+            let by_path = ByPath::of(delivery, timer, queue).map(Box::new);
+            Self::with(delivery.overflow, by_path)
+        })
+    }
+
     /// Adds a message of `bytes` counted bytes. Returns how many of the oldest were dropped to make room for it.
     /// Wakers and dropped messages go to `wakers`.
-    pub(super) fn push(&self, message: M, bytes: usize, wakers: &mut Wakers) -> u64 {
+    pub(super) fn push(&self, path: &'static str, message: M, bytes: usize, wakers: &mut Wakers) -> u64 {
+        if let Some(by_path) = &self.by_path {
+            return self.push_by_path(by_path, path, Entry { message, bytes }, wakers);
+        }
         let mut lost = 0;
         loop {
             let mut state = self.lock();
@@ -169,17 +137,37 @@ impl<M: Send + 'static> Queue<M> {
         }
     }
 
-    fn has_room(&self, state: &State<M>, bytes: usize) -> bool {
-        let has_bytes = || state.bytes.checked_add(bytes).is_some_and(|sum| sum <= self.bound.bytes);
-        state.messages.is_empty() || state.messages.len() < self.bound.capacity && has_bytes()
+    fn push_by_path(&self, by: &ByPath, path: &'static str, entry: Entry<M>, wakers: &mut Wakers) -> u64 {
+        let mut state = self.lock();
+        // Under the lock, so that `abandon` takes out everything.
+        if self.is_abandoned() {
+            drop(state);
+            wakers.discard(entry.message);
+            return 0;
+        }
+        let dropped = self.arrive(by, &mut state, path, entry);
+        match self.woken(&mut state) {
+            Some(waker) => wakers.wake(waker),
+            // It sets the alarm once no lock is held.
+            None if state.is_awaited() && state.paths.needs_alarm() => wakers.wake(by.waker()),
+            None => {}
+        }
+        drop(state);
+        dropped.messages.into_iter().for_each(|message| wakers.discard(message));
+        dropped.lost
     }
 }
 
 impl<M> Queue<M> {
-    /// Memory for the usual number of messages is reserved here, so publishing allocates nothing.
+    #[cfg(test)]
     pub(super) fn new(overflow: Overflow) -> Self {
+        Self::with(overflow, None)
+    }
+
+    fn with(overflow: Overflow, by_path: Option<Box<ByPath>>) -> Self {
         let bound = overflow.bound();
-        let in_advance = bound.capacity.min(ROOM_IN_ADVANCE / size_of::<Entry<M>>());
+        let usual = if overflow == Overflow::LatestPerPath { USUAL_PATHS } else { bound.capacity };
+        let in_advance = usual.min(ROOM_IN_ADVANCE / size_of::<Entry<M>>());
         let state = State {
             messages: VecDeque::with_capacity(in_advance),
             bytes: 0,
@@ -187,8 +175,83 @@ impl<M> Queue<M> {
             closed: false,
             waker: None,
             waiting: 0,
+            paths: Paths::default(),
         };
-        Self { state: Mutex::new(state), arrived: Condvar::new(), bound, abandoned: AtomicBool::new(false) }
+        let abandoned = AtomicBool::new(false);
+        Self { state: Mutex::new(state), arrived: Condvar::new(), bound, by_path, abandoned }
+    }
+
+    fn has_room(&self, state: &State<M>, bytes: usize) -> bool {
+        let has_bytes = || state.bytes.checked_add(bytes).is_some_and(|sum| sum <= self.bound.bytes);
+        state.messages.is_empty() || state.messages.len() < self.bound.capacity && has_bytes()
+    }
+
+    /// Wakes a waiting thread if there is a message, and gives the task to wake.
+    fn woken(&self, state: &mut State<M>) -> Option<Waker> {
+        if state.messages.is_empty() {
+            return None;
+        }
+        if state.waiting > 0 {
+            self.arrived.notify_one();
+        }
+        state.waker.take()
+    }
+
+    /// Delivers what has waited for its time until now. What is dropped for it is returned.
+    fn refresh(&self, state: &mut State<M>) -> Vec<M> {
+        let mut dropped = Dropped::default();
+        if let Some(by) = &self.by_path
+            && let Some(now) = by.now()
+        {
+            self.release(by, state, now, &mut dropped);
+        }
+        dropped.messages
+    }
+
+    /// The same while it is read.
+    fn refreshed<T>(&self, read: impl FnOnce(&mut State<M>) -> T) -> T {
+        let mut state = self.lock();
+        let dropped = self.refresh(&mut state);
+        let result = read(&mut state);
+        drop(state);
+        dropped.into_iter().for_each(discard);
+        result
+    }
+
+    /// The time of an alarm has come, or one is to be set.
+    fn ring(&self) {
+        let Some(by) = &self.by_path else { return };
+        let mut state = self.lock();
+        if let Some(now) = by.now() {
+            state.paths.rang(now);
+        }
+        let dropped = self.refresh(&mut state);
+        let waker = self.woken(&mut state);
+        let alarm = if state.is_awaited() { state.paths.arm() } else { None };
+        drop(state);
+        alarm.into_iter().for_each(|time| by.wake_at(time));
+        waker.into_iter().for_each(wake);
+        dropped.into_iter().for_each(discard);
+    }
+
+    /// Delivers all that waits for its time, and has nothing wait any more. Returns the task to wake.
+    #[must_use = "to wake a task is user code, which the caller runs where it harms nobody"]
+    pub(super) fn hurry(&self) -> Option<Waker> {
+        let mut state = self.lock();
+        let dropped = self.end_waiting(&mut state);
+        let waker = self.woken(&mut state);
+        drop(state);
+        dropped.into_iter().for_each(discard);
+        waker
+    }
+
+    fn end_waiting(&self, state: &mut State<M>) -> Vec<M> {
+        let mut dropped = Dropped::default();
+        if let Some(by) = &self.by_path {
+            self.release(by, state, MonotonicTime::MAX, &mut dropped);
+            state.paths.end();
+        }
+        dropped.messages
     }
 
     /// Tells the reader that no more will come. Returns the task to wake.
@@ -196,8 +259,10 @@ impl<M> Queue<M> {
     pub(super) fn close(&self) -> Option<Waker> {
         let mut state = self.lock();
         state.closed = true;
+        let dropped = self.end_waiting(&mut state);
         let waker = state.waker.take();
         drop(state);
+        dropped.into_iter().for_each(discard);
         // Several threads may wait for the same subscription, and none of them will get another message.
         self.arrived.notify_all();
         waker
@@ -209,13 +274,20 @@ impl<M> Queue<M> {
         self.abandoned.store(true, Ordering::Release);
         let mut state = self.lock();
         let messages = std::mem::take(&mut state.messages);
+        let held = state.paths.clear();
         state.bytes = 0;
         let waker = state.waker.take();
         drop(state);
+        held.for_each(discard);
         if needs_drop::<M>() {
             messages.into_iter().for_each(|entry| discard(entry.message));
         }
         waker.into_iter().for_each(discard);
+    }
+
+    #[cfg(test)]
+    pub(super) fn paths_known(&self) -> usize {
+        self.lock().paths.len()
     }
 
     pub(super) fn is_abandoned(&self) -> bool {
@@ -234,11 +306,11 @@ impl<M> Queue<M> {
     }
 
     pub(super) fn pop(&self) -> Option<M> {
-        self.lock().pop()
+        self.refreshed(State::pop)
     }
 
     pub(super) fn len(&self) -> usize {
-        self.lock().messages.len()
+        self.refreshed(|state| state.messages.len())
     }
 
     pub(super) fn lagged(&self) -> u64 {
@@ -250,8 +322,17 @@ impl<M> Queue<M> {
         let deadline = timeout.and_then(|timeout| Instant::now().checked_add(timeout));
         let mut state = self.lock();
         loop {
+            let dropped = self.refresh(&mut state);
             if let Some(next) = state.ready() {
+                drop(state);
+                dropped.into_iter().for_each(discard);
                 return next;
+            }
+            if let Some((by, alarm)) = self.by_path.as_ref().zip(state.paths.arm()) {
+                drop(state);
+                by.wake_at(alarm);
+                state = self.lock();
+                continue;
             }
             state.waiting += 1;
             state = match deadline {
@@ -271,11 +352,14 @@ impl<M> Queue<M> {
 
     pub(super) fn poll(&self, context: &mut Context<'_>) -> Poll<Option<M>> {
         let mut state = self.lock();
+        let dropped = self.refresh(&mut state);
         if let Some(ready) = state.ready() {
+            drop(state);
+            dropped.into_iter().for_each(discard);
             return Poll::Ready(ready);
         }
         if state.waker.as_ref().is_some_and(|waker| waker.will_wake(context.waker())) {
-            return Poll::Pending;
+            return self.pending(state);
         }
         drop(state);
         let waker = context.waker().clone();
@@ -287,8 +371,18 @@ impl<M> Queue<M> {
             return Poll::Ready(ready);
         }
         let before = state.waker.replace(waker);
-        drop(state);
+        let pending = self.pending(state);
         before.into_iter().for_each(discard);
+        pending
+    }
+
+    /// Has the reader woken when the time of a message comes.
+    fn pending(&self, mut state: MutexGuard<'_, State<M>>) -> Poll<Option<M>> {
+        let alarm = state.paths.arm();
+        drop(state);
+        if let Some((by, alarm)) = self.by_path.as_ref().zip(alarm) {
+            by.wake_at(alarm);
+        }
         Poll::Pending
     }
 
@@ -298,9 +392,15 @@ impl<M> Queue<M> {
 }
 
 impl<M> State<M> {
+    /// Whether somebody waits for a message.
+    fn is_awaited(&self) -> bool {
+        self.waiting > 0 || self.waker.is_some()
+    }
+
     fn pop(&mut self) -> Option<M> {
         let Entry { message, bytes } = self.messages.pop_front()?;
         self.bytes -= bytes;
+        self.paths.take();
         Some(message)
     }
 

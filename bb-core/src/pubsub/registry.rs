@@ -6,7 +6,8 @@ mod tests;
 use super::any::{AnyTopic, DynamicMessage, Tap};
 use super::queue::Queue;
 use super::statistics::TopicStatistics;
-use super::{DynamicSubscription, Overflow, Payloads, Select, Topic};
+use super::timer::Timer;
+use super::{Delivery, DynamicSubscription, Payloads, Select, Topic};
 use crate::message::Payload;
 use crate::message::codec::intern;
 use crate::sorted::Sorted;
@@ -24,6 +25,7 @@ pub(crate) struct Registry {
     /// The paths of all other topics of the robot, which exist from its builder on.
     declared: Box<[&'static str]>,
     state: Mutex<State>,
+    timer: Timer,
 }
 
 #[derive(Default)]
@@ -77,7 +79,12 @@ impl Registry {
 
     /// For a robot that declares these paths.
     pub(crate) fn new(declared: impl IntoIterator<Item = &'static str>) -> Self {
-        Self { declared: declared.into_iter().collect(), state: Mutex::default() }
+        Self { declared: declared.into_iter().collect(), ..Self::default() }
+    }
+
+    /// The clock of the run, for subscriptions with a highest rate.
+    pub(crate) fn timer(&self) -> &Timer {
+        &self.timer
     }
 
     /// Subscribes to the selected ones of `topics`, of the topics created here, and of those created later.
@@ -86,13 +93,13 @@ impl Registry {
         topics: &[&dyn AnyTopic],
         select: Select<'_>,
         payloads: &Payloads<'_>,
-        overflow: Overflow,
+        delivery: Delivery,
     ) -> DynamicSubscription {
         let mut state = self.lock();
         let topics: Vec<&dyn AnyTopic> =
             topics.iter().copied().chain(state.topics.iter().map(|(_, made)| &*made.topic)).collect();
         // Under the lock, so that a topic created meanwhile is subscribed to once.
-        let subscription = DynamicSubscription::among(&topics, select, payloads, overflow);
+        let subscription = DynamicSubscription::among(&topics, select, payloads, delivery, &self.timer);
         if !state.is_closed {
             state.selections.add(Selection::new(select, payloads, subscription.tap()));
         }
@@ -208,9 +215,12 @@ impl Registry {
     pub(crate) fn close(&self) -> Vec<Waker> {
         let mut state = self.lock();
         state.is_closed = true;
-        state.selections = Selections::default();
+        let selections = std::mem::take(&mut state.selections);
         drop(state);
-        self.topics().iter().flat_map(|topic| topic.close()).collect()
+        let closed = self.topics().into_iter().flat_map(|topic| topic.close());
+        // Nothing waits for its time any more.
+        let queues = selections.all.iter().filter_map(|selection| selection.queue.upgrade());
+        closed.chain(queues.filter_map(|queue| queue.hurry())).collect()
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {

@@ -169,3 +169,25 @@ impl Hub {
         self.subscribers.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::Overflow;
+    use super::*;
+
+    #[test]
+    fn a_list_grows_in_place_unless_a_publisher_has_it() {
+        let queues: Vec<_> = (0..1000).map(|_| Arc::new(Queue::<u8>::new(Overflow::KeepLatest))).collect();
+        let mut list = List::default();
+        list.add(Arc::clone(&queues[0]));
+        let place = Arc::as_ptr(&list.all);
+        queues.iter().skip(1).for_each(|queue| list.add(Arc::clone(queue)));
+        assert_eq!(Arc::as_ptr(&list.all), place);
+        let taken = Arc::clone(&list.all);
+        list.add(Arc::clone(&queues[0]));
+        assert_eq!((taken.len(), list.all.len()), (1000, 1001));
+        queues.iter().skip(1).for_each(|queue| queue.abandon());
+        list.clean();
+        assert_eq!((taken.len(), list.all.len()), (1000, 2));
+    }
+}

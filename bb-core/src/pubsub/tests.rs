@@ -3,4 +3,5 @@
 mod bounds;
 mod concurrent;
 mod deferred;
+mod rates;
 mod reentrant;

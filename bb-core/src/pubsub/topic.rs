@@ -1,9 +1,11 @@
 //! The publisher's end of a topic.
 
 use super::any::DynamicMessage;
-use super::queue::{AnyQueue, Overflow, Queue, counted_bytes};
+use super::delivery::Delivery;
+use super::queue::{AnyQueue, Queue, counted_bytes};
 use super::subscribers::{Hub, Listeners};
 use super::subscription::Subscription;
+use super::timer::Timer;
 use super::wakers::{Wakers, wake};
 use crate::message::{Payload, Stamped};
 use std::any::Any;
@@ -26,9 +28,14 @@ impl<T> Topic<T> {
 }
 
 impl<T: Payload> Topic<T> {
-    /// Subscribes from now on, until the subscription is dropped.
-    pub fn subscribe(&self, overflow: Overflow) -> Subscription<T> {
-        let queue = Arc::new(Queue::new(overflow));
+    /// Subscribes from now on, until the subscription is dropped. (A highest rate needs the clock of a robot, and is ignored here.)
+    pub fn subscribe(&self, delivery: impl Into<Delivery>) -> Subscription<T> {
+        self.subscribe_on(delivery.into(), &Timer::default())
+    }
+
+    /// The same on the clock of a run.
+    pub(crate) fn subscribe_on(&self, delivery: Delivery, timer: &Timer) -> Subscription<T> {
+        let queue = Queue::shared(delivery, timer);
         self.hub.add(Arc::clone(&queue) as Arc<dyn AnyQueue>);
         Subscription::new(self.hub.path, queue)
     }
@@ -107,7 +114,7 @@ impl<T: Payload> Topic<T> {
         let bytes = counted_bytes(message);
         let mut lost = 0;
         for queue in &*queues {
-            lost += push(&**queue, message.clone(), bytes, wakers);
+            lost += push(&**queue, self.hub.path, message.clone(), bytes, wakers);
         }
         if !taps.is_empty() {
             lost += tap_all(&taps, DynamicMessage::new(self.hub.path, message), bytes, wakers);
@@ -138,7 +145,7 @@ impl<T: Payload> Topic<T> {
         let mut lost = 0;
         for queue in &*listeners.queues {
             if let Some(copy) = first.take().or_else(|| more.next()) {
-                lost += push(&**queue, copy, bytes, wakers);
+                lost += push(&**queue, self.hub.path, copy, bytes, wakers);
             }
         }
         if let Some(untyped) = untyped {
@@ -159,16 +166,23 @@ struct Copies<T> {
 }
 
 /// Adds a message to a queue of its payload. Returns how many were lost.
-fn push<T: Payload>(queue: &dyn AnyQueue, message: Stamped<T>, bytes: usize, wakers: &mut Wakers) -> u64 {
+fn push<T: Payload>(
+    queue: &dyn AnyQueue,
+    path: &'static str,
+    message: Stamped<T>,
+    bytes: usize,
+    wakers: &mut Wakers,
+) -> u64 {
     let queue: Option<&Queue<Stamped<T>>> = (queue as &dyn Any).downcast_ref();
-    queue.map_or(0, |queue| queue.push(message, bytes, wakers))
+    queue.map_or(0, |queue| queue.push(path, message, bytes, wakers))
 }
 
 /// Adds a message to all of them. Returns how many were lost.
 fn tap_all(taps: &[Arc<Queue<DynamicMessage>>], message: DynamicMessage, bytes: usize, wakers: &mut Wakers) -> u64 {
     let Some((last, others)) = taps.split_last() else { return 0 };
-    let lost: u64 = others.iter().map(|tap| tap.push(message.clone(), bytes, wakers)).sum();
-    lost + last.push(message, bytes, wakers)
+    let path = message.path();
+    let lost: u64 = others.iter().map(|tap| tap.push(path, message.clone(), bytes, wakers)).sum();
+    lost + last.push(path, message, bytes, wakers)
 }
 
 impl<T> Drop for Topic<T> {

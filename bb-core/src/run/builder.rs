@@ -9,7 +9,7 @@ use crate::declaration::{ParameterError, ParameterType};
 use crate::joints::JointSettings;
 use crate::journal::Entry;
 use crate::node::Mode;
-use crate::pubsub::{DynamicSubscription, Overflow, Payloads, Select, Subscription};
+use crate::pubsub::{Delivery, DynamicSubscription, Overflow, Payloads, Select, Subscription};
 use crate::telemetry::TelemetryEvent;
 use crate::time::{Clock, MonotonicTime};
 use std::fmt;
@@ -88,9 +88,15 @@ impl<R: Robot> Builder<R> {
         self.subscribe_with(publisher, Overflow::default())
     }
 
-    /// Subscribes, with `overflow` for a subscriber that is slow.
-    pub fn subscribe_with<P: Publisher<R>>(&self, publisher: P, overflow: Overflow) -> Subscription<P::Payload> {
-        publisher.topic(&self.topics, &self.draft.system).subscribe(overflow)
+    /// Subscribes with an [`Overflow`], for a subscriber that is slow, or with a highest rate,
+    /// [`Overflow::at_most_every`].
+    pub fn subscribe_with<P: Publisher<R>>(
+        &self,
+        publisher: P,
+        delivery: impl Into<Delivery>,
+    ) -> Subscription<P::Payload> {
+        let system = &self.draft.system;
+        publisher.topic(&self.topics, system).subscribe_on(delivery.into(), system.registry.timer())
     }
 
     /// Subscribes to messages of any payload, by path; with names of payload types, only to those. It gets what the same
@@ -99,10 +105,10 @@ impl<R: Robot> Builder<R> {
         &self,
         select: Select<'_>,
         payloads: impl Into<Payloads<'a>>,
-        overflow: Overflow,
+        delivery: impl Into<Delivery>,
     ) -> DynamicSubscription {
         let topics = (0..).map_while(|publisher| R::topic(&self.topics, publisher)).collect();
-        self.draft.subscribe_any(topics, select, &payloads.into(), overflow)
+        self.draft.subscribe_any(topics, select, &payloads.into(), delivery.into())
     }
 
     /// Starts the robot in real time, with one thread per sensor.

@@ -27,7 +27,7 @@ use crate::journal::{Event, Journal, Sink};
 use crate::lifecycle::HostHandle;
 use crate::message::{Origin, Stamp};
 use crate::node::{Environment, EnvironmentParts, Mode, SharedNode};
-use crate::pubsub::{AnyTopic, DynamicSubscription, Overflow, Payloads, Registry, Select};
+use crate::pubsub::{AnyTopic, Delivery, DynamicSubscription, Payloads, Registry, Select};
 use crate::schedule::{Agenda, Lane};
 use crate::telemetry::Telemetry;
 use crate::time::{Clock, WallTime};
@@ -117,10 +117,10 @@ impl Draft {
         mut topics: Vec<&'a dyn AnyTopic>,
         select: Select<'_>,
         payloads: &Payloads<'_>,
-        overflow: Overflow,
+        delivery: Delivery,
     ) -> DynamicSubscription {
         topics.extend(self.system.all());
-        self.system.registry.subscribe(&topics, select, payloads, overflow)
+        self.system.registry.subscribe(&topics, select, payloads, delivery)
     }
 
     fn origin(&self) -> Origin {
@@ -200,6 +200,7 @@ impl Assembling {
             journal: journal.clone(),
             telemetry: telemetry.clone(),
         });
+        draft.system.registry.timer().set(control.alarms());
         if let Err((path, message)) = control.check_commands() {
             return Err(StartError::component(path, Fault::new(message)));
         }

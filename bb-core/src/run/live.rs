@@ -11,7 +11,7 @@ use crate::event::Refusal;
 use crate::journal::{Event, ParameterEntry, RequestKind};
 use crate::message::Stamp;
 use crate::node::{Node, NodeEntry, Turn, know_calls, know_casts};
-use crate::pubsub::{Overflow, Subscription};
+use crate::pubsub::{Delivery, Overflow, Subscription};
 use crate::time::MonotonicTime;
 use std::any::Any;
 use std::fmt;
@@ -45,9 +45,17 @@ impl<R: Robot> Live<R> {
         self.subscribe_with(publisher, Overflow::default())
     }
 
-    /// Subscribes from now on; `overflow` determines what happens if the subscriber is slow.
-    pub fn subscribe_with<P: Publisher<R>>(&self, publisher: P, overflow: Overflow) -> Subscription<P::Payload> {
-        publisher.topic(R::wired_topics(&self.wiring), self.machine.control.topics()).subscribe(overflow)
+    /// Subscribes from now on, with an [`Overflow`], for a subscriber that is slow, or with a highest rate,
+    /// [`Overflow::at_most_every`].
+    pub fn subscribe_with<P: Publisher<R>>(
+        &self,
+        publisher: P,
+        delivery: impl Into<Delivery>,
+    ) -> Subscription<P::Payload> {
+        let system = self.machine.control.topics();
+        publisher
+            .topic(R::wired_topics(&self.wiring), system)
+            .subscribe_on(delivery.into(), system.registry.timer())
     }
 
     /// Topics, actuators, parameters, commands and states, by path: what this dereferences to, for code that does not know this robot's

@@ -250,6 +250,8 @@ impl Replayer {
         let machine = Arc::clone(&self.machine);
         let control = &machine.control;
         machine.environment.clock().set_to(time);
+        // Subscribers wait for messages of the run at the same times.
+        while control.wake_sleepers(time) {}
         match event {
             Event::Begin { .. } => return Err("the journal begins again".to_owned()),
             Event::WallClock { offset_nanos } => machine.environment.clock().set_wall_offset_nanos(offset_nanos),

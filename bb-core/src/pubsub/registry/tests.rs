@@ -1,4 +1,4 @@
-use super::super::Subscription;
+use super::super::{Overflow, Subscription};
 use super::*;
 use crate::message::Stamped;
 use crate::payload::{Imu, JointState};
@@ -13,7 +13,7 @@ fn registry() -> Registry {
 }
 
 fn listen(registry: &Registry, select: Select<'_>) -> DynamicSubscription {
-    registry.subscribe(&[], select, &Payloads::ALL, Overflow::default())
+    registry.subscribe(&[], select, &Payloads::ALL, Overflow::default().into())
 }
 
 fn refusal(registry: &Registry, path: &str) -> String {
@@ -26,7 +26,7 @@ fn those_who_subscribed_earlier_receive_what_they_selected() {
     let all = listen(&registry, Select::All);
     let below = listen(&registry, Select::AnyOf(&[Select::Below("mission"), Select::Path("other")]));
     let elsewhere = listen(&registry, Select::Below("sensor"));
-    let filtered = registry.subscribe(&[], Select::All, &Payloads::from(["Imu"]), Overflow::default());
+    let filtered = registry.subscribe(&[], Select::All, &Payloads::from(["Imu"]), Overflow::default().into());
     let progress = registry.topic("mission/progress").expect("it is free");
     progress.publish(&state(1.0));
     let late = listen(&registry, Select::Path("mission/progress"));

@@ -164,7 +164,7 @@ proptest! {
                         expected += 1;
                     }
                     model.push_back((number, size));
-                    prop_assert_eq!(queue.push(number, size, &mut wakers), expected);
+                    prop_assert_eq!(queue.push("", number, size, &mut wakers), expected);
                     lost += expected;
                 }
                 Step::Pop => prop_assert_eq!(queue.pop(), model.pop_front().map(|(number, _)| number)),
@@ -188,7 +188,7 @@ fn publishers_that_meet_at_a_full_queue_never_exceed_its_bound_and_count_every_l
             for number in 0..EACH {
                 // Sizes where one large message takes the room of many.
                 let size = if number % 7 == 0 { 150 } else { number % 20 };
-                queue.push((publisher, number), size, &mut wakers);
+                queue.push("", (publisher, number), size, &mut wakers);
                 assert!(queue.statistics().bytes <= BYTES);
             }
         };

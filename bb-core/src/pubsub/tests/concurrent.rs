@@ -32,7 +32,7 @@ fn publish(registry: &Registry, publisher: usize) {
 
 fn subscribe(registry: &Registry) -> DynamicSubscription {
     let roomy = Overflow::DropOldest { capacity: 1 << 17 };
-    registry.subscribe(&[], Select::All, &Payloads::from(["JointState"]), roomy)
+    registry.subscribe(&[], Select::All, &Payloads::from(["JointState"]), roomy.into())
 }
 
 /// The number of messages received. Checks that those of each path and publisher have no gap and no repetition, from

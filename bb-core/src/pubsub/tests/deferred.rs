@@ -72,7 +72,7 @@ fn an_evicted_message_is_dropped_with_the_wakers() {
     let mut wakers = Wakers::default();
     let mut lost = 0;
     for _ in 0..3 {
-        lost += queue.push(Count(Arc::clone(&dropped)), 0, &mut wakers);
+        lost += queue.push("", Count(Arc::clone(&dropped)), 0, &mut wakers);
     }
     assert_eq!((lost, dropped.load(Ordering::SeqCst)), (2, 0));
     wakers.run();

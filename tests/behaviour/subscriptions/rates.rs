@@ -1,0 +1,106 @@
+//! Subscriptions with a highest rate: on virtual time, in real time and in a replay.
+
+use crate::components::{Counter, Doing, Failure, Number, Task, numbers};
+use crate::replay::{entries, journal};
+use bb_core::prelude::*;
+use bb_core::{Builder, Delivery, DynamicMessage};
+
+/// At most ten a second of each path.
+fn slowly(overflow: Overflow) -> Delivery {
+    overflow.at_most_every(Duration::from_millis(100))
+}
+
+/// Repeats what it is delivered until it has seen the last number.
+fn watch(context: CommandContext) -> Doing {
+    Box::pin(async move {
+        let bus = context.bus();
+        let mut numbers = bus.subscribe::<Number>("sensor/base/numbers", slowly(Overflow::KeepLatest))?;
+        let seen = bus.publisher("watch/seen")?;
+        while let Some(number) = numbers.recv_async().await {
+            seen.publish(number.payload);
+            if number.0 == 449.0 {
+                break;
+            }
+        }
+        Ok(Outcome::done(()))
+    })
+}
+
+robot! {
+    robot Sampled;
+    commands { arm: Arm; watch: Task(run = watch); }
+    link base { sensor numbers: Counter(count = 450) { rate: 1 kHz; } }
+}
+
+const SLOW: [f64; 6] = [0.0, 99.0, 199.0, 299.0, 399.0, 449.0];
+
+#[test]
+fn a_slow_display_gets_the_newest_at_its_rate_and_so_it_does_in_a_replay() -> Result<(), Failure> {
+    let subscribe = |builder: &Builder<Sampled>| {
+        let typed = builder.subscribe_with(sampled::sensor::base::numbers, slowly(Overflow::default()));
+        let all = builder.subscribe_any(Select::Below("sensor"), None, slowly(Overflow::LatestPerPath));
+        (typed, all)
+    };
+    let mut builder = Sampled::builder();
+    let lines = journal(&mut builder);
+    let (typed, all) = subscribe(&builder);
+    let mut simulation = builder.simulate()?;
+    simulation.run_for(Duration::from_millis(449));
+    // The newest is held until its time has come.
+    assert_eq!(all.drain().map(|message| number(&message)).collect::<Vec<_>>(), [399.0]);
+    simulation.run_for(Duration::from_millis(51));
+    assert_eq!(numbers(&typed), SLOW);
+    assert_eq!(all.try_recv().map(|message| number(&message)), Some(449.0));
+    simulation.stop();
+
+    let builder = Sampled::builder();
+    let (typed, all) = subscribe(&builder);
+    let mut replay = builder.replay()?;
+    replay.play(entries(&lines))?;
+    replay.stop();
+    assert_eq!(numbers(&typed), SLOW);
+    assert_eq!(all.try_recv().map(|message| number(&message)), Some(449.0));
+    Ok(())
+}
+
+fn number(message: &DynamicMessage) -> f64 {
+    message.downcast::<Number>().map_or(f64::NAN, |number| number.0)
+}
+
+#[test]
+fn a_command_is_woken_at_the_rate_on_virtual_time() -> Result<(), Failure> {
+    let builder = Sampled::builder();
+    let seen = builder.subscribe_any(Select::Path("watch/seen"), None, Overflow::default());
+    let mut simulation = builder.simulate()?;
+    simulation.command(sampled::command::arm, NoArguments)?;
+    let watch = simulation.command(sampled::command::watch, NoArguments);
+    assert!(watch.is_err(), "it is armed when the simulation runs");
+    simulation.run_for(Duration::ZERO);
+    let watch = simulation.command(sampled::command::watch, NoArguments)?;
+    simulation.run_for(Duration::from_secs(1));
+    let millis = |message: &DynamicMessage| message.stamp().monotonic_time.as_nanos() / 1_000_000;
+    let seen: Vec<_> = seen.drain().map(|message| (millis(&message), number(&message))).collect();
+    // The first number was published before.
+    assert_eq!(seen, [(1, 1.0), (101, 100.0), (201, 200.0), (301, 300.0), (401, 400.0), (501, 449.0)]);
+    assert!(watch.try_result().is_some_and(|result| result.is_ok()));
+    Ok(())
+}
+
+#[test]
+fn a_display_is_delivered_no_more_than_its_rate_in_real_time_and_the_last_at_the_end() -> Result<(), Failure> {
+    let builder = Sampled::builder();
+    let display = builder.subscribe_with(sampled::sensor::base::numbers, slowly(Overflow::default()));
+    let mut running = builder.start()?;
+    let begin = running.clock().now();
+    // A thread that waits is woken when the time of a message comes: the last number is delivered while the robot runs.
+    let mut got = vec![];
+    while got.last() != Some(&449.0) {
+        got.push(display.recv_timeout(Duration::from_secs(20)).ok_or("it is published")?.0);
+    }
+    let periods = running.clock().now().duration_since(begin).as_secs_f64() / 0.1;
+    assert!(got.len() as f64 <= periods + 2.0 && got.len() >= 3, "{got:?} in {periods} periods");
+    running.wait();
+    running.stop();
+    assert_eq!(display.drain().count(), 0);
+    Ok(())
+}
