@@ -69,7 +69,7 @@ fn follow(context: &ServiceContext) -> Result<Update, Fault> {
 
 /// Counts what there is; one of the topics is of the right type, or an error names what is wrong.
 fn dashboard(context: &ServiceContext, path: &str) -> Result<Update, Fault> {
-    context.bus().subscribe::<Number>(path, Overflow::default())?;
+    context.bus().subscribe::<Number>(path, Overflow::default())?.matched()?;
     let all = context.bus().subscribe_any(Select::Below("sensor"), None, Overflow::default());
     Ok(Box::new(move |_| Ok(Reading::now(Number(all.drain().count() as f64)))))
 }

@@ -75,7 +75,15 @@ fn outside_code_publishes_and_is_listed() -> Result<(), Failure> {
     let bus = simulation.bus();
     let all = simulation.subscribe_any(Select::Path("radio/link"), None, Overflow::default());
     assert_eq!(all.unmatched().len(), 1);
-    assert!(bus.subscribe::<Progress>("radio/link", Overflow::default()).is_err());
+    let early = bus.subscribe::<Progress>("radio/link", Overflow::default())?;
+    assert!(early.unmatched().is_some() && !bus.paths().contains(&"radio/link"));
+    assert_eq!(bus.subscribers("radio/link").len(), 2);
+    let other = bus.publisher::<Number>("radio/link").map(drop).map_err(|error| error.to_string());
+    let taken = "cannot publish `Number` at `radio/link`: it is subscribed to as `Progress`; choose another path";
+    assert_eq!(other, Err(taken.into()));
+    let wrong = bus.subscribe::<Number>("radio/link", Overflow::default()).map(drop);
+    let taken = "`radio/link` is subscribed to as `Progress`, not `Number`";
+    assert_eq!(wrong.map_err(|error| error.to_string()), Err(taken.into()));
 
     let radio = bus.publisher::<Progress>("radio/link")?;
     let typed = bus.subscribe::<Progress>("radio/link", Overflow::default())?;
@@ -84,21 +92,23 @@ fn outside_code_publishes_and_is_listed() -> Result<(), Failure> {
     let message = Stamped::new(MonotonicTime::from_nanos(3_000_000), Progress { done: 0.5 });
     radio.clone().forward(&message);
     assert_eq!(told(&all), [("radio/link", 7, 0.25), ("radio/link", 3, 0.5)]);
-    assert_eq!(typed.drain().map(|message| message.origin.robot).collect::<Vec<_>>(), ["Missionary", ""]);
+    for typed in [&early, &typed] {
+        assert_eq!(typed.drain().map(|message| message.origin.robot).collect::<Vec<_>>(), ["Missionary", ""]);
+    }
 
     assert!(bus.paths().contains(&"radio/link") && bus.paths().contains(&"mission/plan/progress"));
     let listed: Vec<_> = bus.subscribers("radio/link").iter().map(|one| one.is_typed).collect();
-    assert_eq!(listed, [true, false]);
+    assert_eq!(listed, [true, true, false]);
     let report = simulation.report();
     let topic = report.topic("radio/link").ok_or("it is in the report")?;
-    assert_eq!((topic.payload, topic.published, topic.subscribers), ("Progress", 2, 2));
+    assert_eq!((topic.payload, topic.published, topic.subscribers), ("Progress", 2, 3));
 
     let wrong = bus.subscribe::<Number>("radio/link", Overflow::default()).map(drop);
     assert_eq!(
         wrong.map_err(|error| error.to_string()),
         Err("`radio/link` publishes `Progress`, not `Number`".into())
     );
-    let typo = bus.subscribe::<Progress>("radio/lnik", Overflow::default()).map(drop);
+    let typo = bus.subscribe::<Progress>("radio/lnik", Overflow::default())?.matched().map(drop);
     let near = "nothing publishes at `radio/lnik`; did you mean `radio/link`?";
     assert_eq!(typo.map_err(|error| error.to_string()), Err(near.into()));
 

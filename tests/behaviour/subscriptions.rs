@@ -2,8 +2,9 @@
 
 mod rates;
 mod same;
+mod seeds;
 
-use crate::components::{Counter, Number, Scale};
+use crate::components::{Counter, Failure, Number, Scale};
 use bb_core::prelude::*;
 use bb_core::{DynamicSubscription, Unmatched};
 
@@ -104,7 +105,7 @@ fn a_filter_takes_several_payload_types() -> Result<(), StartError> {
 }
 
 #[test]
-fn a_selection_that_matches_nothing_names_the_nearest() -> Result<(), StartError> {
+fn a_selection_that_matches_nothing_names_the_nearest() -> Result<(), Failure> {
     let builder = Diverse::builder();
     let typo = builder.subscribe_any(Select::Path("sensor/base/imuu"), None, Overflow::default());
     let told: Vec<_> = typo.unmatched().iter().map(Unmatched::to_string).collect();
@@ -128,10 +129,11 @@ fn a_selection_that_matches_nothing_names_the_nearest() -> Result<(), StartError
 
     let error =
         |path| simulation.bus().subscribe::<Imu>(path, Overflow::default()).map_err(|error| error.to_string());
-    assert_eq!(
-        error("sensor/base/imuu").err().as_deref(),
-        Some("nothing publishes at `sensor/base/imuu`; did you mean `sensor/base/imu`?")
-    );
+    let near = "nothing publishes at `sensor/base/imuu`; did you mean `sensor/base/imu`?";
+    let typo = error("sensor/base/imuu")?;
+    assert_eq!(typo.unmatched().map(Unmatched::to_string).as_deref(), Some(near));
+    assert_eq!(typo.matched().map(drop).map_err(|error| error.to_string()), Err(near.into()));
+    assert!(error("sensor/base/imu")?.matched()?.unmatched().is_none());
     assert_eq!(
         error("sensor/base/field").err().as_deref(),
         Some("`sensor/base/field` publishes `MagneticField`, not `Imu`")

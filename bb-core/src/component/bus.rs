@@ -68,27 +68,41 @@ impl Bus {
         self.caller.check(right)
     }
 
-    /// Subscribes to what is published at `path`.
+    /// Subscribes to what is published at `path`. A path of your own may be subscribed to before its publisher is created; if that
+    /// publishes another payload, it is refused. Because such a path may be a misspelt one, it is logged as a warning and noted in
+    /// [`Subscription::unmatched`]; [`Subscription::matched`] makes it an error.
     ///
     /// # Errors
-    /// Nothing is published there, or another payload is; the error names the nearest path. Or the caller may not read.
+    /// Another payload is published there, the path is malformed, the robot has stopped, or the caller may not read.
     pub fn subscribe<T: Payload>(
         &self,
         path: &str,
         delivery: impl Into<Delivery>,
     ) -> Result<Subscription<T>, Fault> {
         self.check(Right::Read)?;
-        let (delivery, timer) = (delivery.into(), self.host.registry().timer());
-        let subscribed = self.with_topics(|topics| {
-            let Some(topic) = topics.iter().find(|topic| topic.path() == path) else {
-                return Err(unmatched_at(path, topics).into());
-            };
-            let typed = topic.as_any().downcast_ref::<Topic<T>>().ok_or_else(|| {
-                Fault::new(format!("`{path}` publishes `{}`, not `{}`", topic.payload_name(), T::NAME))
-            })?;
-            Ok(typed.subscribe_on(delivery, timer))
+        let (delivery, registry) = (delivery.into(), self.host.registry());
+        let mut declared = None;
+        self.host.with_topics(&mut |topics| {
+            declared = topics.iter().find(|topic| topic.path() == path).map(|topic| {
+                let typed = topic.as_any().downcast_ref::<Topic<T>>();
+                let typed = typed.map(|typed| typed.subscribe_on(delivery, registry.timer()));
+                typed.ok_or_else(|| {
+                    Fault::new(format!("`{path}` publishes `{}`, not `{}`", topic.payload_name(), T::NAME))
+                })
+            });
         });
-        subscribed.unwrap_or_else(|| Err(Fault::new("the robot is gone")))
+        if let Some(declared) = declared {
+            return declared;
+        }
+        let (topic, is_published) = registry.awaited::<T>(path)?;
+        let subscription = topic.subscribe_on(delivery, registry.timer());
+        if is_published {
+            return Ok(subscription);
+        }
+        match self.with_topics(|topics| Some(unmatched_at(path, topics))) {
+            Some(unmatched) => Ok(subscription.noting(unmatched)),
+            None => Ok(subscription),
+        }
     }
 
     /// Subscribes from now on to messages of any payload, by path; with names of payload types, only to those. A caller that may not
@@ -129,15 +143,17 @@ impl Bus {
 
     /// All paths with a publisher.
     pub fn paths(&self) -> Vec<&'static str> {
-        self.with_topics(|topics| topics.iter().map(|topic| topic.path()).collect()).unwrap_or_default()
+        self.with_topics(|topics| topics.iter().map(|topic| topic.path()).collect())
     }
 
-    /// The subscribers at `path`; empty where nothing is published.
+    /// The subscribers at `path`.
     pub fn subscribers(&self, path: &str) -> Vec<SubscriberStatistics> {
+        if let Some(own) = self.host.registry().topics().iter().find(|topic| topic.path() == path) {
+            return own.subscribers();
+        }
         self.with_topics(|topics| {
             topics.iter().find(|topic| topic.path() == path).map_or_else(Vec::new, |topic| topic.subscribers())
         })
-        .unwrap_or_default()
     }
 
     /// The actuator at `path`, which takes commands of type `T`.
@@ -310,16 +326,16 @@ impl Bus {
         result
     }
 
-    /// All topics; none if the robot is gone.
-    fn with_topics<T>(&self, call: impl FnOnce(&[&dyn AnyTopic]) -> T) -> Option<T> {
-        let made = self.host.registry().topics();
+    /// All topics with a publisher.
+    fn with_topics<T: Default>(&self, call: impl FnOnce(&[&dyn AnyTopic]) -> T) -> T {
+        let made = self.host.registry().published_topics();
         let mut call = Some(call);
         let mut result = None;
         self.host.with_topics(&mut |topics| {
             let all: Vec<&dyn AnyTopic> = topics.iter().copied().chain(made.iter().map(|topic| &**topic)).collect();
             result = call.take().map(|call| call(&all));
         });
-        result
+        result.unwrap_or_default()
     }
 }
 

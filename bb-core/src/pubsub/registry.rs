@@ -5,6 +5,7 @@ mod tests;
 
 use super::any::{AnyTopic, DynamicMessage, Tap};
 use super::queue::Queue;
+use super::select::ANY_NAME;
 use super::statistics::TopicStatistics;
 use super::timer::Timer;
 use super::{Delivery, DynamicSubscription, Payloads, Select, Topic};
@@ -46,14 +47,33 @@ enum Room {
     Of(&'static str),
 }
 
+/// The type of a payload.
+struct Kind<'a> {
+    name: &'static str,
+    type_name: &'static str,
+    make: &'a dyn Fn(&'static str) -> Arc<dyn AnyTopic>,
+    fits: &'a dyn Fn(&dyn AnyTopic) -> bool,
+}
+
+impl Kind<'_> {
+    fn of<T: Payload>() -> Self {
+        Self {
+            name: T::NAME,
+            type_name: type_name::<T>(),
+            make: &|path| Arc::new(Topic::<T>::new(path)),
+            fits: &|topic| topic.as_any().is::<Topic<T>>(),
+        }
+    }
+}
+
 /// A topic, and its index in the order of creation.
 struct Made {
     number: u64,
     topic: Arc<dyn AnyTopic>,
-    /// In a replay: in the run it has made room for another one. It is kept for those who use it in the replay, and because it
-    /// knows the type of the payload.
-    is_gone: bool,
-    /// What it had published and lost when it went.
+    /// Whether it has, or had, a publisher. Others are kept for their subscribers: topics of paths that are subscribed to before
+    /// anything publishes there, and in a replay those that have made room in the run.
+    is_published: bool,
+    /// What had been published and lost there before.
     before: (u64, u64),
 }
 
@@ -97,11 +117,15 @@ impl Registry {
     ) -> DynamicSubscription {
         let mut state = self.lock();
         let topics: Vec<&dyn AnyTopic> =
-            topics.iter().copied().chain(state.topics.iter().map(|(_, made)| &*made.topic)).collect();
+            topics.iter().copied().chain(state.published().map(|made| &*made.topic)).collect();
         // Under the lock, so that a topic created meanwhile is subscribed to once.
         let subscription = DynamicSubscription::among(&topics, select, payloads, delivery, &self.timer);
+        let selection = Selection::new(select, payloads, subscription.tap());
+        for made in state.waiting().filter(|made| selection.includes(&*made.topic)) {
+            made.topic.tap(&subscription.tap());
+        }
         if !state.is_closed {
-            state.selections.add(Selection::new(select, payloads, subscription.tap()));
+            state.selections.add(selection);
         }
         drop(state);
         subscription.warn();
@@ -121,44 +145,65 @@ impl Registry {
         path: &str,
         note: &mut dyn FnMut(PathChange),
     ) -> Result<Arc<Topic<T>>, PathError> {
-        let found = self.find_or_make(path, &|path| Arc::new(Topic::<T>::new(path)), note)?;
-        let topic: Arc<dyn Any + Send + Sync> = Arc::clone(&found) as _;
-        topic.downcast().map_err(|_| PathError::other_payload(&*found, T::NAME, type_name::<T>()))
+        Ok(typed(self.published(path, &Kind::of::<T>(), note)?))
+    }
+
+    /// The topic at `path` for a subscriber, made if it is not there: its publisher may come later. Also whether it has one.
+    pub(crate) fn awaited<T: Payload>(&self, path: &str) -> Result<(Arc<Topic<T>>, bool), PathError> {
+        let kind = Kind::of::<T>();
+        let refused = |reason| PathError::new(Act::Subscribe, path, reason);
+        self.check(path).map_err(refused)?;
+        let mut state = self.lock();
+        if state.is_closed {
+            return Err(refused(Reason::Stopped));
+        }
+        let (found, stale) = state.find(path, &kind).map_err(refused)?;
+        if let Some((topic, is_published)) = found {
+            return Ok((typed(topic), is_published));
+        }
+        let mut unused = None;
+        if state.waiting().count() >= Self::MAX_TOPICS {
+            unused = Some(state.remove_unused().ok_or_else(|| refused(Reason::TooMany))?);
+        }
+        let path = intern(path).ok_or_else(|| refused(Reason::TooMany))?;
+        let topic = state.make(path, &kind, false);
+        drop(state);
+        drop((stale, unused));
+        Ok((typed(topic), false))
     }
 
     /// The topic at the path of a message, created for its payload if it does not exist.
     pub(crate) fn topic_of(&self, message: &DynamicMessage) -> Result<Arc<dyn AnyTopic>, PathError> {
-        let found = self.find_or_make(message.path(), &|path| message.message().new_topic(path), &mut |_| ())?;
-        if !message.message().fits(&*found) {
-            let name = message.payload_name();
-            return Err(PathError::other_payload(&*found, name, message.message().type_name()));
-        }
-        Ok(found)
+        let erased = message.message();
+        let kind = Kind {
+            name: message.payload_name(),
+            type_name: erased.type_name(),
+            make: &|path| erased.new_topic(path),
+            fits: &|topic| erased.fits(topic),
+        };
+        self.published(message.path(), &kind, &mut |_| ())
     }
 
-    fn find_or_make(
+    fn published(
         &self,
         path: &str,
-        make: &dyn Fn(&'static str) -> Arc<dyn AnyTopic>,
+        kind: &Kind<'_>,
         note: &mut dyn FnMut(PathChange),
     ) -> Result<Arc<dyn AnyTopic>, PathError> {
-        if !is_path(path) {
-            return Err(PathError::Malformed(path.into()));
-        }
-        if self.declared.contains(&path) {
-            return Err(PathError::Declared(path.into()));
-        }
+        let refused = |reason| PathError::new(Act::Publish, path, reason);
+        self.check(path).map_err(refused)?;
         let mut state = self.lock();
         if state.is_closed {
-            return Err(PathError::Stopped(path.into()));
+            return Err(refused(Reason::Stopped));
         }
-        if let Some(made) = state.topics.get_mut(path) {
-            made.is_gone = false;
-            return Ok(Arc::clone(&made.topic));
+        let (found, stale) = state.find(path, kind).map_err(refused)?;
+        if let Some((topic, true)) = found {
+            return Ok(topic);
         }
-        let room = state.room().ok_or_else(|| PathError::TooMany(path.into()))?;
+        let room = state.room().ok_or_else(|| refused(Reason::TooMany))?;
         // Last, since an interned name stays.
-        let path = intern(path).ok_or_else(|| PathError::TooMany(path.into()))?;
+        let known = found.as_ref().map(|(topic, _)| topic.path());
+        let path = known.or_else(|| intern(path)).ok_or_else(|| refused(Reason::TooMany))?;
         let evicted = match room {
             Room::Free => None,
             Room::Of(unused) => {
@@ -166,14 +211,22 @@ impl Registry {
                 state.topics.remove(unused)
             }
         };
-        let topic = make(path);
-        state.selections.tap(&*topic);
+        let topic = match found {
+            Some((topic, _)) => state.publish(path, topic),
+            None => state.make(path, kind, true),
+        };
         note(PathChange::Made { path, payload: topic.payload_name() });
-        let number = state.next_number();
-        state.topics.insert(path, Made { number, topic: Arc::clone(&topic), is_gone: false, before: (0, 0) });
         drop(state);
-        drop(evicted);
+        drop((stale, evicted));
         Ok(topic)
+    }
+
+    fn check(&self, path: &str) -> Result<(), Reason> {
+        match is_path(path) {
+            false => Err(Reason::Malformed),
+            true if self.declared.contains(&path) => Err(Reason::Declared),
+            true => Ok(()),
+        }
     }
 
     /// In a replay: somebody could publish at `path` from now on; no more if the name of the payload is empty.
@@ -181,6 +234,16 @@ impl Registry {
         let mut state = self.lock();
         let dropped = if payload.is_empty() { state.forget(path) } else { state.expect(path, payload) };
         drop(state);
+        if let Some(Made { topic, .. }) = &dropped
+            && topic.subscribers().iter().any(|one| one.is_typed)
+        {
+            tracing::error!(
+                path,
+                payload,
+                "subscriptions to `{}` end: the run has published another payload",
+                topic.payload_name()
+            );
+        }
         drop(dropped);
     }
 
@@ -192,8 +255,7 @@ impl Registry {
             let payload = expected.payload;
             all.insert(*path, TopicStatistics { path, payload, published: 0, lost: 0, subscribers: 0 });
         }
-        let made = state.topics.iter().filter(|(_, made)| !made.is_gone);
-        let made: Vec<_> = made.map(|(_, made)| (Arc::clone(&made.topic), made.before)).collect();
+        let made: Vec<_> = state.published().map(|made| (Arc::clone(&made.topic), made.before)).collect();
         drop(state);
         // Subscriptions are asked for what they have counted without the lock.
         for (topic, (published, lost)) in made {
@@ -205,7 +267,12 @@ impl Registry {
         all.iter().map(|(_, counted)| counted.clone()).collect()
     }
 
-    /// All topics created here, by path.
+    /// The topics created here that have, or had, a publisher, by path.
+    pub(crate) fn published_topics(&self) -> Vec<Arc<dyn AnyTopic>> {
+        self.lock().published().map(|made| Arc::clone(&made.topic)).collect()
+    }
+
+    /// All topics created here, by path: also those that have subscribers alone.
     pub(crate) fn topics(&self) -> Vec<Arc<dyn AnyTopic>> {
         self.lock().topics.iter().map(|(_, made)| Arc::clone(&made.topic)).collect()
     }
@@ -228,19 +295,69 @@ impl Registry {
     }
 }
 
+/// A topic, and whether it has a publisher.
+type Found = (Arc<dyn AnyTopic>, bool);
+
+/// The topic, whose payload is a `T`.
+fn typed<T: Payload>(topic: Arc<dyn AnyTopic>) -> Arc<Topic<T>> {
+    let path = topic.path();
+    let topic: Arc<dyn Any + Send + Sync> = topic;
+    topic.downcast().unwrap_or_else(|_| Arc::new(Topic::new(path)))
+}
+
 impl State {
-    /// Finds room for another topic. An untyped subscription to a removed topic loses nothing: if the topic is
-    /// created again, it is subscribed to again.
-    fn room(&self) -> Option<Room> {
-        if self.topics.len() - self.gone().count() < Registry::MAX_TOPICS {
-            return Some(Room::Free);
+    /// The topic at `path`, and whether it has a publisher. One of another payload that nobody uses is removed, to be dropped without
+    /// the lock.
+    fn find(&mut self, path: &str, kind: &Kind<'_>) -> Result<(Option<Found>, Option<Made>), Reason> {
+        let Some(made) = self.topics.get(path) else { return Ok((None, None)) };
+        if (kind.fits)(&*made.topic) {
+            return Ok((Some((Arc::clone(&made.topic), made.is_published)), None));
         }
-        let unused = self.topics.iter().filter(|(_, made)| !made.is_used());
-        unused.min_by_key(|(_, made)| made.number).map(|(path, _)| Room::Of(path))
+        if made.is_published || made.is_used() {
+            return Err(Reason::other_payload(made, kind));
+        }
+        Ok((None, self.topics.remove(path)))
     }
 
-    fn gone(&self) -> impl Iterator<Item = (&&'static str, &Made)> {
-        self.topics.iter().filter(|(_, made)| made.is_gone)
+    fn make(&mut self, path: &'static str, kind: &Kind<'_>, is_published: bool) -> Arc<dyn AnyTopic> {
+        let topic = (kind.make)(path);
+        self.selections.tap(&*topic);
+        let number = self.next_number();
+        self.topics.insert(path, Made { number, topic: Arc::clone(&topic), is_published, before: (0, 0) });
+        topic
+    }
+
+    /// A topic gets a publisher.
+    fn publish(&mut self, path: &'static str, topic: Arc<dyn AnyTopic>) -> Arc<dyn AnyTopic> {
+        let number = self.next_number();
+        if let Some(made) = self.topics.get_mut(path) {
+            (made.number, made.is_published) = (number, true);
+        }
+        topic
+    }
+
+    /// Finds room for another topic with a publisher. An untyped subscription to a removed topic loses nothing: if the topic is
+    /// created again, it is subscribed to again.
+    fn room(&self) -> Option<Room> {
+        if self.published().count() < Registry::MAX_TOPICS {
+            return Some(Room::Free);
+        }
+        oldest_unused(self.published()).map(Room::Of)
+    }
+
+    fn published(&self) -> impl Iterator<Item = &Made> {
+        self.topics.iter().map(|(_, made)| made).filter(|made| made.is_published)
+    }
+
+    /// The topics without a publisher.
+    fn waiting(&self) -> impl Iterator<Item = &Made> {
+        self.topics.iter().map(|(_, made)| made).filter(|made| !made.is_published)
+    }
+
+    /// Removes the oldest topic without a publisher that nobody uses.
+    fn remove_unused(&mut self) -> Option<Made> {
+        let oldest = oldest_unused(self.waiting())?;
+        self.topics.remove(oldest)
     }
 
     fn next_number(&mut self) -> u64 {
@@ -260,10 +377,10 @@ impl State {
             self.expected.remove(oldest);
         }
         let made = self.topics.get_mut(path)?;
-        if made.is_gone && made.topic.payload_name() != payload {
+        if !made.is_published && made.topic.payload_name() != payload {
             return self.topics.remove(path);
         }
-        made.is_gone = false;
+        made.is_published = true;
         None
     }
 
@@ -272,15 +389,17 @@ impl State {
         self.expected.remove(path);
         let made = self.topics.get_mut(path)?;
         let counted = made.topic.statistics();
-        (made.is_gone, made.before) = (true, (counted.published, counted.lost));
-        if self.gone().count() <= Registry::MAX_TOPICS {
+        (made.is_published, made.before) = (false, (counted.published, counted.lost));
+        if self.waiting().count() <= Registry::MAX_TOPICS {
             return None;
         }
-        let unused = self.gone().filter(|(_, made)| !made.is_used());
-        let (oldest, _) = unused.min_by_key(|(_, made)| made.number)?;
-        let oldest = *oldest;
-        self.topics.remove(oldest)
+        self.remove_unused()
     }
+}
+
+/// The path of the oldest of them that nobody uses.
+fn oldest_unused<'a>(made: impl Iterator<Item = &'a Made>) -> Option<&'static str> {
+    made.filter(|made| !made.is_used()).min_by_key(|made| made.number).map(|made| made.topic.path())
 }
 
 impl Made {
@@ -396,46 +515,81 @@ fn is_path(path: &str) -> bool {
     path.len() <= MAX_PATH_BYTES && path.split('/').all(is_name)
 }
 
-/// Why nothing can be published at a path of the caller's choice.
+/// Why a path of the caller's choice is refused.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum PathError {
-    Malformed(String),
-    Declared(String),
-    OtherPayload { path: &'static str, payload: String, wanted: String },
-    TooMany(String),
-    Stopped(String),
+pub(crate) struct PathError {
+    act: Act,
+    path: String,
+    reason: Reason,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Act {
+    Publish,
+    Subscribe,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum Reason {
+    Malformed,
+    Declared,
+    /// It has another payload, and whether that is published there or only subscribed to.
+    OtherPayload {
+        payload: &'static str,
+        is_published: bool,
+        wanted: &'static str,
+    },
+    TooMany,
+    Stopped,
+}
+
+impl Reason {
+    fn other_payload(made: &Made, kind: &Kind<'_>) -> Self {
+        let payload = made.topic.payload_name();
+        // Two types may have the same name.
+        let wanted = if payload == kind.name { kind.type_name } else { kind.name };
+        Self::OtherPayload { payload, is_published: made.is_published, wanted }
+    }
 }
 
 impl PathError {
-    fn other_payload(topic: &dyn AnyTopic, name: &str, type_name: &str) -> Self {
-        let payload = topic.payload_name();
-        // Two types may have the same name.
-        let wanted = if payload == name { type_name } else { name };
-        Self::OtherPayload { path: topic.path(), payload: payload.into(), wanted: wanted.into() }
+    fn new(act: Act, path: &str, reason: Reason) -> Self {
+        Self { act, path: path.to_owned(), reason }
     }
 }
 
 impl fmt::Display for PathError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Malformed(path) => write!(
+        let Self { act, path, reason } = self;
+        if let Reason::OtherPayload { payload, is_published, wanted } = reason {
+            let has = if *is_published { "publishes" } else { "is subscribed to as" };
+            return match act {
+                Act::Publish => {
+                    write!(f, "cannot publish `{wanted}` at `{path}`: it {has} `{payload}`; choose another path")
+                }
+                Act::Subscribe => write!(f, "`{path}` {has} `{payload}`, not `{wanted}`"),
+            };
+        }
+        match act {
+            Act::Publish => write!(f, "cannot publish at `{path}`: "),
+            Act::Subscribe => write!(f, "cannot subscribe to `{path}`: "),
+        }?;
+        match reason {
+            Reason::Malformed if *act == Act::Subscribe && path.contains(ANY_NAME) => {
+                f.write_str("a typed subscription is to one path; `subscribe_any(Select::Path(…), …)` takes a `*`")
+            }
+            Reason::Malformed => write!(
                 f,
-                "cannot publish at `{path}`: a path is names of letters, digits, `_`, `-` and `.` with `/` between \
-                 them, at most {MAX_PATH_BYTES} bytes"
+                "a path is names of letters, digits, `_`, `-` and `.` with `/` between them, at most {MAX_PATH_BYTES} bytes"
             ),
-            Self::Declared(path) => {
-                write!(f, "cannot publish at `{path}`: only its own publisher does; choose another path")
-            }
-            Self::OtherPayload { path, payload, wanted } => {
-                write!(f, "cannot publish `{wanted}` at `{path}`: it publishes `{payload}`; choose another path")
-            }
-            Self::TooMany(path) => write!(
+            Reason::Declared if *act == Act::Subscribe => f.write_str("the robot is gone"),
+            Reason::Declared => f.write_str("only its own publisher does; choose another path"),
+            Reason::TooMany => write!(
                 f,
-                "cannot publish at `{path}`: {} other paths are in use, or their names fill the memory for names; \
-                 publish at fewer paths",
+                "{} other paths are in use, or their names fill the memory for names; use fewer paths",
                 Registry::MAX_TOPICS
             ),
-            Self::Stopped(path) => write!(f, "cannot publish at `{path}`: the robot has stopped"),
+            Reason::Stopped | Reason::OtherPayload { .. } => f.write_str("the robot has stopped"),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! The subscriber's end.
 
 use super::queue::Queue;
+use super::unmatched::Unmatched;
 use crate::message::Stamped;
 use std::fmt;
 use std::future::Future;
@@ -13,11 +14,36 @@ use std::time::Duration;
 pub struct Subscription<T> {
     path: &'static str,
     queue: Arc<Queue<Stamped<T>>>,
+    unmatched: Option<Box<Unmatched>>,
 }
 
 impl<T> Subscription<T> {
     pub(super) fn new(path: &'static str, queue: Arc<Queue<Stamped<T>>>) -> Self {
-        Self { path, queue }
+        Self { path, queue, unmatched: None }
+    }
+
+    /// Notes and logs that nothing publishes at its path. No lock may be held: it runs the user's `tracing` subscriber.
+    pub(crate) fn noting(mut self, unmatched: Unmatched) -> Self {
+        tracing::warn!("{unmatched}");
+        self.unmatched = Some(Box::new(unmatched));
+        self
+    }
+
+    /// Says so, with the nearest path, if nothing published at its path when it was created. It is a path of your own, whose publisher may
+    /// come later, or it is misspelt.
+    pub fn unmatched(&self) -> Option<&Unmatched> {
+        self.unmatched.as_deref()
+    }
+
+    /// For a path whose publisher must exist.
+    ///
+    /// # Errors
+    /// Nothing published there when it was created.
+    pub fn matched(mut self) -> Result<Self, Unmatched> {
+        match self.unmatched.take() {
+            Some(unmatched) => Err(*unmatched),
+            None => Ok(self),
+        }
     }
 
     /// The path of the publisher.

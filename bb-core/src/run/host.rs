@@ -121,7 +121,7 @@ impl Host for RobotHost {
         let mut description = None;
         self.with_topics(&mut |topics| {
             let mut all = topics.to_vec();
-            let own = self.registry().topics();
+            let own = self.registry().published_topics();
             all.extend(own.iter().map(|topic| topic.as_ref()));
             let values = self.control.parameters();
             description = Some(discover(self.robot, &all, values.all(), self.control.infos(), &|path| {

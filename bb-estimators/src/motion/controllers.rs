@@ -115,7 +115,7 @@ impl Service for PidController {
             return Err(Fault::permanent("it runs at a rate; declare one, as in `rate: 100 Hz;`"));
         }
         let bus = context.bus();
-        let measurement = bus.subscribe(options.measurement, Overflow::KeepLatest)?;
+        let measurement = bus.subscribe(options.measurement, Overflow::KeepLatest)?.matched()?;
         let actuator = bus.actuator(options.actuator)?;
         let pid = Pid::new(options.params());
         Ok(Self { options, pid, measurement, actuator, latest: None, last_step: None, is_driving: false })
@@ -262,7 +262,7 @@ impl Service for ThresholdController {
             return Err(Fault::permanent("it runs at a rate; declare one, as in `rate: 10 Hz;`"));
         }
         let bus = context.bus();
-        let measurement = bus.subscribe(options.measurement, Overflow::KeepLatest)?;
+        let measurement = bus.subscribe(options.measurement, Overflow::KeepLatest)?.matched()?;
         let actuator = bus.actuator(options.actuator)?;
         let threshold = options.threshold()?;
         Ok(Self { options, threshold, measurement, actuator, commanded: None })

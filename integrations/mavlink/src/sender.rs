@@ -71,7 +71,7 @@ impl Service for MavlinkSender {
         let source = Source::subscribe(&bus, &options.source, kind.takes_odometry())?;
         let texts = match options.texts.as_str() {
             "" => None,
-            path => Some(bus.subscribe(path, Overflow::default())?),
+            path => Some(bus.subscribe(path, Overflow::default())?.matched()?),
         };
         let link = Link::open(&options.link)?;
         Ok(Self {

@@ -189,3 +189,103 @@ fn subscriptions_that_were_dropped_vanish() {
     assert_eq!(count(), kept.len());
     drop(topic);
 }
+
+#[test]
+fn a_path_may_be_subscribed_to_before_its_publisher() {
+    let registry = registry();
+    let changes = std::cell::RefCell::new(Vec::new());
+    let publisher =
+        |path| registry.topic_noted::<JointState>(path, &mut |change| changes.borrow_mut().push(change));
+    let await_at = |path| {
+        let (topic, is_published) = registry.awaited::<JointState>(path).expect("it is free");
+        (topic.subscribe(Overflow::default()), is_published)
+    };
+    let (early, is_published) = await_at("mission/progress");
+    assert!(!is_published);
+    // Nobody publishes there: it is no topic of the robot, and selections do not match it, but get what comes.
+    let below = listen(&registry, Select::Below("mission"));
+    assert_eq!((below.unmatched().len(), below.paths().len()), (1, 0));
+    assert_eq!((rows(&registry), registry.published_topics().len(), changes.borrow().len()), (vec![], 0, 0));
+    publisher("mission/progress").expect("it has the same payload").publish(&state(1.0));
+    publisher("mission/progress").expect("it is there").publish(&state(2.0));
+    let (late, is_published) = await_at("mission/progress");
+    assert!(is_published);
+    publisher("mission/progress").expect("it is there").publish(&state(3.0));
+    assert_eq!([early.drain().count(), late.drain().count(), below.drain().count()], [3, 1, 3]);
+    assert_eq!(rows(&registry), [("mission/progress", "JointState", 3)]);
+    assert_eq!(*changes.borrow(), [PathChange::Made { path: "mission/progress", payload: "JointState" }]);
+    drop(registry.close());
+    assert!(early.recv().is_none());
+    let stopped = registry.awaited::<Imu>("other").map(drop).map_err(|error| error.to_string());
+    assert_eq!(stopped, Err("cannot subscribe to `other`: the robot has stopped".into()));
+}
+
+#[test]
+fn the_second_payload_at_a_path_is_refused_while_somebody_has_the_first() {
+    let registry = registry();
+    let publish = |path| registry.topic::<Imu>(path).map(drop).map_err(|error| error.to_string());
+    let subscribe = |path| registry.awaited::<Imu>(path).map(drop).map_err(|error| error.to_string());
+    let (topic, _) = registry.awaited::<JointState>("a").expect("it is free");
+    let subscription = topic.subscribe(Overflow::default());
+    drop(topic);
+    assert_eq!(
+        publish("a"),
+        Err("cannot publish `Imu` at `a`: it is subscribed to as `JointState`; choose another path".into())
+    );
+    assert_eq!(subscribe("a"), Err("`a` is subscribed to as `JointState`, not `Imu`".into()));
+    drop(subscription);
+    assert_eq!((subscribe("a"), publish("a")), (Ok(()), Ok(())));
+    drop(registry.topic::<JointState>("b").expect("it is free"));
+    assert_eq!(subscribe("b"), Err("`b` publishes `JointState`, not `Imu`".into()));
+    let pattern = "cannot subscribe to `sensor/*/imu`: a typed subscription is to one path; `subscribe_any(Select::Path(…), …)` takes a `*`";
+    assert_eq!(subscribe("sensor/*/imu"), Err(pattern.into()));
+    assert!(subscribe("a//b").is_err_and(|error| error.starts_with("cannot subscribe to `a//b`: a path is names")));
+}
+
+#[test]
+fn paths_that_are_only_awaited_are_bounded_and_take_no_room_of_publishers() {
+    let registry = registry();
+    let awaited = |number: usize| registry.awaited::<JointState>(&format!("bounded/{number}"));
+    let held: Vec<_> = (0..Registry::MAX_TOPICS)
+        .map(|number| awaited(number).expect("there is room").0.subscribe(Overflow::default()))
+        .collect();
+    let refused = awaited(Registry::MAX_TOPICS).map(drop).map_err(|error| error.to_string());
+    assert!(refused.is_err_and(|error| error.starts_with("cannot subscribe to `bounded/1024`: 1024 other paths")));
+    assert_eq!(refusal(&registry, "published"), "accepted");
+    drop(held);
+    for number in 0..3 * Registry::MAX_TOPICS {
+        awaited(number % 2000).map(drop).expect("an unused one makes room");
+    }
+    assert_eq!(registry.topics().len(), Registry::MAX_TOPICS + 1);
+}
+
+#[test]
+fn a_replay_has_the_payload_of_its_run_at_a_path_whatever_is_subscribed_to() {
+    let registry = registry();
+    let (topic, _) = registry.awaited::<Imu>("a").expect("it is free");
+    let other = topic.subscribe(Overflow::default());
+    drop(topic);
+    registry.expect("a", "JointState");
+    assert!(other.recv().is_none());
+    let (topic, _) = registry.awaited::<JointState>("b").expect("it is free");
+    let same = topic.subscribe(Overflow::default());
+    registry.expect("b", "JointState");
+    topic.publish(&state(1.0));
+    assert_eq!((same.drain().count(), rows(&registry).len()), (1, 2));
+}
+
+/// So it costs the same however many paths there are, and there is no broker in the middle.
+#[test]
+fn a_publish_takes_nothing_that_topics_share() {
+    let registry = registry();
+    let all = listen(&registry, Select::All);
+    let others: Vec<_> = (0..1000)
+        .map(|number| registry.topic::<JointState>(&format!("bounded/{number}")).expect("there is room"))
+        .collect();
+    let topic = registry.topic("mission/progress").expect("it is free");
+    let held = registry.lock();
+    topic.publish(&state(1.0));
+    topic.publish_as_written(&state(2.0), || ());
+    drop(held);
+    assert_eq!((all.drain().count(), others.len()), (2, 1000));
+}

@@ -23,12 +23,12 @@ pub(super) enum Estimate {
 impl Source {
     /// Subscribes to flight estimates, or otherwise to odometry if that is sufficient.
     pub(super) fn subscribe(bus: &Bus, path: &str, takes_odometry: bool) -> Result<Self, Fault> {
-        let flight = bus.subscribe(path, Overflow::KeepLatest).map(Self::Flight);
+        let flight = bus.subscribe(path, Overflow::KeepLatest).map(|flight| flight.matched().map(Self::Flight));
         if flight.is_ok() || !takes_odometry {
-            return flight;
+            return Ok(flight??);
         }
-        // Its message names the nearest path, or the payload that is needed.
-        bus.subscribe(path, Overflow::KeepLatest).map(Self::Odometry)
+        // Its message names the payload that is needed.
+        Ok(Self::Odometry(bus.subscribe(path, Overflow::KeepLatest)?.matched()?))
     }
 
     /// The newest estimate since the last call.
