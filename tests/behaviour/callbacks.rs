@@ -196,10 +196,34 @@ fn a_parameter_reaches_the_options_bound_to_it() -> Result<(), Failure> {
     Ok(())
 }
 
+robot! {
+    robot Partial;
+    states { halted; }
+    commands { halt: Task(run = |_| Box::pin(async { Ok(Outcome::done(()).next_state("halted")) })); }
+    link base {
+        sensor number: External<Number>() {
+            estimator absent: Echo(init = |_| Err(Fault::skip("not on this robot"))) {
+                lost_after: 50 ms;
+                on_degraded: halt;
+                on_lost: halt;
+            }
+        }
+        estimator driven: Echo() {
+            input number: sensor::base::number::absent;
+            lost_after: 100 ms;
+        }
+        estimator pair: Snapshot() {
+            input driver: sensor::base::number, driver;
+            input second: sensor::base::number::absent;
+            sync_tolerance: 10 ms;
+        }
+    }
+}
+
+/// It is as if it were not there; those that take its outputs have an input that never comes.
 #[test]
 fn an_estimator_may_be_left_out() -> Result<(), StartError> {
-    let mut builder = Summing::builder();
-    builder.options(summing::sensor::base::other::second).init = |_| Err(Fault::skip("not on this robot"));
+    let builder = Partial::builder();
     let health = builder.subscribe(system::Health);
     let mut simulation = builder.simulate()?;
     simulation.publish(summing::sensor::base::other, at(5), Number(1.0));

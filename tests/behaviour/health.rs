@@ -123,6 +123,10 @@ fn each_row_of_the_table() -> Result<(), StartError> {
              watch lost -> degraded: recovered; gets 1; watch degraded -> healthy: recovered; until 1000; \
              watch healthy -> lost: lost",
         ),
+        (
+            "inputs that are not the driver's keep no estimator from being lost",
+            "other 10; gets 1; other 50; other 90; other 105; other 109; pair; until 110; pair healthy -> lost: lost",
+        ),
         ("an estimator that never gets anything is lost", "until 100; watch healthy -> lost: lost"),
     ];
     for (row, steps) in rows {
@@ -304,7 +308,7 @@ fn an_estimator_that_stopped_for_good_says_so_is_lost_and_takes_no_requests() ->
     }
     let report = simulation.report();
     let busy = report.estimator(BUSY).expect("it is declared");
-    assert_eq!(busy.health, HealthState::Lost, "{told:?}, then {:?}", changes(&health));
+    assert_eq!(busy.health, Some(HealthState::Lost), "{told:?}, then {:?}", changes(&health));
     assert_eq!(busy.stopped.as_deref(), Some("told to stay so"));
     assert!(simulation.call(industrious::sensor::base::number::busy, Ask).is_err());
     let refused =

@@ -55,8 +55,8 @@ pub trait Estimator: Sized + Send + 'static {
     /// Creates it, at the start and at every restart.
     ///
     /// # Errors
-    /// At the start, any error keeps the robot from starting, except [`Fault::skip`], which leaves the estimator out.
-    /// At a restart, it is tried again later.
+    /// At the start, any error keeps the robot from starting, except [`Fault::skip`], which leaves the estimator out. At a
+    /// restart, it is tried again later; an estimator that is left out only then stays stopped.
     fn init(options: Self::Options, context: &Context) -> Result<Self, Fault>;
 
     /// Handles one message, or the snapshot of all inputs when the driver has arrived.

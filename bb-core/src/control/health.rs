@@ -112,7 +112,9 @@ impl Control {
     pub(crate) fn begin_watch(&self, now: MonotonicTime) {
         self.lock().has_begun = true;
         for (number, declared) in self.0.declared.estimators.iter().enumerate() {
-            if let (Some(after), Some(node)) = (declared.health.lost_after_nanos, self.0.nodes.get(number)) {
+            if let (Some(after), Some(node)) = (declared.health.lost_after_nanos, self.0.nodes.get(number))
+                && node.health().is_some()
+            {
                 node.set_last_run(now);
                 self.0.watch.set(number, now.plus_nanos(after));
             }
@@ -280,9 +282,9 @@ mod tests {
             control.report(0, Report::Health(HealthReport { transition, epoch: 0 }));
         };
         report(HealthState::Degraded);
-        assert_eq!((node.statistics().transitions, node.health()), (1, HealthState::Degraded));
+        assert_eq!((node.statistics().transitions, node.health()), (1, Some(HealthState::Degraded)));
         control.end(drop);
         report(HealthState::Healthy);
-        assert_eq!((node.statistics().transitions, node.health()), (1, HealthState::Degraded));
+        assert_eq!((node.statistics().transitions, node.health()), (1, Some(HealthState::Degraded)));
     }
 }

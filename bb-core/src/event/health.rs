@@ -58,12 +58,8 @@ pub struct HealthTransition {
 }
 
 impl HealthState {
-    pub(crate) fn from_index(index: u8) -> Self {
-        match index {
-            0 => Self::Healthy,
-            1 => Self::Degraded,
-            _ => Self::Lost,
-        }
+    pub(crate) fn from_index(index: u8) -> Option<Self> {
+        [Self::Healthy, Self::Degraded, Self::Lost].get(usize::from(index)).copied()
     }
 }
 

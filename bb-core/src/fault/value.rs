@@ -46,7 +46,9 @@ impl Fault {
         Self { error: error.into(), then: Then::Stay }
     }
 
-    /// From `init`: the component is not needed in this robot, which runs without it.
+    /// From `init`: the component is not needed in this robot, which runs without it. An estimator that is left out at the
+    /// start has no health and is never lost; those that take its outputs have an input that never comes. After the start
+    /// others rely on the component: left out by a later `init`, it stays stopped, and an estimator is lost in time.
     pub fn skip(reason: impl Into<String>) -> Self {
         Self { error: reason.into().into(), then: Then::Skip }
     }

@@ -141,7 +141,7 @@ impl Counters {
     pub(super) fn statistics(
         &self,
         declaration: &EstimatorDeclaration,
-        health: HealthState,
+        health: Option<HealthState>,
         stopped: Option<String>,
         last_gap: Option<LookupError>,
     ) -> EstimatorStatistics {

@@ -275,7 +275,10 @@ impl<E: Estimator> Node<E> {
     ) {
         let counters = self.common.shared.counters();
         if !self.slot.is_running() && self.slot.restart_at().is_none() {
-            return counters.drop(input, DropReason::Stopped);
+            if self.common.shared.health().is_some() {
+                counters.drop(input, DropReason::Stopped);
+            }
+            return;
         }
         let message = message.clone();
         let deliver: Deliver<E> = Box::new(move |node, turn, emitted| deliver(node, &message, turn, emitted));

@@ -19,7 +19,7 @@ struct Inner {
     number: usize,
     declaration: &'static EstimatorDeclaration,
     counters: Counters,
-    /// The health last published by the control state.
+    /// The health last published by the control state, or [`LEFT_OUT`].
     health: AtomicU8,
     /// When the message of the last completed run arrived, for the watchdog.
     last_run_nanos: AtomicI64,
@@ -35,6 +35,9 @@ struct Inner {
     /// The recorded transforms of its inputs, in a replay.
     replayed_placements: Mutex<VecDeque<PlacedInput>>,
 }
+
+/// Stands for the health of an estimator that was left out.
+const LEFT_OUT: u8 = u8::MAX;
 
 /// Why an estimator is not running.
 #[derive(Clone, Debug)]
@@ -86,8 +89,14 @@ impl SharedNode {
         self.0.counters.statistics(self.0.declaration, self.health(), stopped, last_gap)
     }
 
-    pub(crate) fn health(&self) -> HealthState {
+    /// Its health; `None` if it was left out.
+    pub(crate) fn health(&self) -> Option<HealthState> {
         HealthState::from_index(self.0.health.load(Ordering::Relaxed))
+    }
+
+    /// It is not part of this robot: it has no health, and is not watched.
+    pub(super) fn leave_out(&self) {
+        self.0.health.store(LEFT_OUT, Ordering::Relaxed);
     }
 
     pub(crate) fn set_health(&self, state: HealthState) {

@@ -100,9 +100,15 @@ impl fmt::Display for Report {
                 }
             }
         }
-        for estimator in self.estimators.iter().filter(|estimator| estimator.transitions > 0) {
-            let (path, health, transitions) = (estimator.path, estimator.health, estimator.transitions);
-            writeln!(f, "{path}: {health} after {transitions} changes of health, {} restarts", estimator.restarts)?;
+        for estimator in &self.estimators {
+            let (path, transitions, restarts) = (estimator.path, estimator.transitions, estimator.restarts);
+            match estimator.health {
+                None => writeln!(f, "{path}: left out: {}", estimator.stopped.as_deref().unwrap_or_default())?,
+                Some(health) if transitions > 0 => {
+                    writeln!(f, "{path}: {health} after {transitions} changes of health, {restarts} restarts")?;
+                }
+                Some(_) => {}
+            }
         }
         for source in self.sources.iter().filter(|source| source.skipped > 0) {
             writeln!(f, "{}: {} readings, {} skipped", source.path, source.readings, source.skipped)?;

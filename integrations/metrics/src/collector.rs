@@ -25,7 +25,9 @@ impl<R: Robot> fmt::Debug for Counts<R> {
 
 impl<R: Robot> Collector for Counts<R> {
     fn encode(&self, encoder: DescriptorEncoder<'_>) -> fmt::Result {
-        let report = self.0.report();
+        let mut report = self.0.report();
+        // One that was left out is not part of the robot.
+        report.estimators.retain(|estimator| estimator.health.is_some());
         let mut families = Families(encoder);
         inputs(&mut families, &report.estimators)?;
         estimators(&mut families, &report.estimators)?;
@@ -80,7 +82,7 @@ fn estimators(families: &mut Families<'_>, estimators: &[EstimatorStatistics]) -
         for estimator in estimators {
             for state in [HealthState::Healthy, HealthState::Degraded, HealthState::Lost] {
                 let labels = [("estimator", estimator.path), ("state", &state.to_string())];
-                family.gauge(&labels, one_if(estimator.health == state))?;
+                family.gauge(&labels, one_if(estimator.health == Some(state)))?;
             }
         }
         Ok(())

@@ -10,13 +10,29 @@ use std::sync::{Mutex, PoisonError};
 /// Forwards its input; fails, or reports divergence, when told to.
 struct Judge;
 
-impl Estimator for Judge {
+/// Is left out.
+struct Absent;
+
+impl Estimator for Absent {
     type Options = NoOptions;
     type Input = Imu;
     type Output = Imu;
 
     fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
-        Ok(Self)
+        Err(Fault::skip("not on this robot"))
+    }
+    fn handle_input(&mut self, _: &Stamped<Imu>) -> Result<Reply<Imu>, Fault> {
+        Ok(Reply::none())
+    }
+}
+
+impl Estimator for Judge {
+    type Options = NoOptions;
+    type Input = Imu;
+    type Output = Imu;
+
+    fn init(_: NoOptions, context: &Context) -> Result<Self, Fault> {
+        Ok(Self(context.safety()))
     }
     fn handle_input(&mut self, imu: &Stamped<Imu>) -> Result<Reply<Imu>, Fault> {
         match imu.angular_velocity.x {
@@ -50,7 +66,9 @@ robot! {
         hasty: Wait { allowed_states: [idle, rested]; timeout: 10 ms; }
     }
     link base {
-        sensor imu: External<Imu>() { estimator judge: Judge() { latency_budget: 10 ms; lost_after: 10 s; } }
+        sensor imu: External<Imu>() { estimator judge: Judge() { latency_budget: 10 ms; lost_after: 10 s; }
+            estimator absent: Absent() { lost_after: 10 ms; }
+        }
     }
 }
 

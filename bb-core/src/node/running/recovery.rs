@@ -25,12 +25,6 @@ impl<E: Estimator> Node<E> {
         }
     }
 
-    /// Starts the estimator; one that was left out is not healthy.
-    pub(super) fn begin(&mut self, turn: &Turn<'_>) {
-        let is_running = self.slot.is_running();
-        self.common.begin_life(is_running, turn);
-    }
-
     #[cold]
     pub(super) fn fail(&mut self, failed: Failed, turn: &Turn<'_>) {
         turn.no_emission();
@@ -116,13 +110,17 @@ impl Common {
             .environment
             .make(self.declaration.path, || self.replacing_hooks(true, make).map_err(|failed| failed.fault));
         if let Err(skipped) = &made {
+            if skipped.is_some() {
+                self.shared.leave_out();
+            }
             let reason = skipped.clone().unwrap_or_else(|| "the robot does not start".to_owned());
             self.set_stopped(Some((reason, true)));
         }
         made.is_ok()
     }
 
-    fn begin_life(&mut self, is_running: bool, turn: &Turn<'_>) {
+    /// Begins when the robot has started.
+    pub(super) fn begin_life(&mut self, turn: &Turn<'_>) {
         self.shared.set_last_run(turn.now());
         if !is_running {
             self.judge(Event::Bad(HealthReason::Stopped), self.declaration.path, turn.now());

@@ -39,7 +39,7 @@ impl<E: Estimator> Node<E> {
     /// Handles an entry. Anything that becomes due is left to [`Self::turn`].
     fn handle(&mut self, entry: NodeEntry, turn: &Turn<'_>, emitted: &mut Option<E::Output>) -> Next {
         match entry {
-            NodeEntry::Start => self.begin(turn),
+            NodeEntry::Start => self.common.begin_life(turn),
             NodeEntry::Options(values) => {
                 self.common.parameters = values;
                 self.change_options(turn);
