@@ -34,7 +34,7 @@ pub(crate) mod shared;
 mod template;
 mod transforms;
 
-pub(crate) use crate::fault::Fault;
+pub(crate) use crate::fault::{Fault, Termination};
 pub use actuator::Actuator;
 pub(crate) use actuator_link::Accepts;
 pub use actuator_link::{ActuatorError, ActuatorLink};

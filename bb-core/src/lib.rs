@@ -67,7 +67,7 @@ pub use event::{
     ArmError, ComponentFault, DisarmError, Forbidden, HealthReason, HealthState, HealthTransition, ParameterValue,
     Refusal, Right, Rights, Safety,
 };
-pub use fault::Fault;
+pub use fault::{Fault, Termination};
 pub use message::{
     Exceeded, Field, Finite, Frame, JointBounds, JointCommand, JointPositions, JointReading, JointSide,
     LimitedQuantity, Origin, OutOfBounds, Payload, Stamped,

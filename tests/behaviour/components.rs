@@ -45,8 +45,8 @@ pub(crate) struct SourceOptions {
     pub(crate) read: fn(u32, MonotonicTime) -> Read,
     #[option(default = || None)]
     pub(crate) starts_at: fn() -> Option<MonotonicTime>,
-    #[option(default = || ())]
-    pub(crate) terminate: fn(),
+    #[option(default = |_| ())]
+    pub(crate) terminate: fn(Termination<'_>),
     #[option(default = || ())]
     pub(crate) dropped: fn(),
     /// Another one is made when it changes.
@@ -76,8 +76,8 @@ impl Sensor for Source {
         (self.0.read)(self.1, now)
     }
 
-    fn terminate(&mut self) {
-        (self.0.terminate)();
+    fn terminate(&mut self, reason: Termination<'_>) {
+        (self.0.terminate)(reason);
     }
 }
 
@@ -99,8 +99,8 @@ pub(crate) struct EchoOptions {
     pub(crate) info: fn(&mut f64, Info) -> Replied,
     #[option(default = |_, _| Ok(Reply::none()))]
     pub(crate) go_on: fn(&mut f64, u32) -> Replied,
-    #[option(default = || ())]
-    pub(crate) terminate: fn(),
+    #[option(default = |_| ())]
+    pub(crate) terminate: fn(Termination<'_>),
     #[option(default = || ())]
     pub(crate) dropped: fn(),
     /// Another one is made when it changes.
@@ -134,8 +134,8 @@ impl Estimator for Echo {
         (self.0.go_on)(&mut self.1, step)
     }
 
-    fn terminate(&mut self) {
-        (self.0.terminate)();
+    fn terminate(&mut self, reason: Termination<'_>) {
+        (self.0.terminate)(reason);
     }
 }
 
@@ -183,8 +183,8 @@ pub(crate) struct ServoOptions {
     /// What it does with the last number when it is disarmed.
     #[option(default = |_| Ok(()))]
     pub(crate) disarm: fn(f64) -> Done,
-    #[option(default = || ())]
-    pub(crate) terminate: fn(),
+    #[option(default = |_| ())]
+    pub(crate) terminate: fn(Termination<'_>),
     #[option(default = || ())]
     pub(crate) dropped: fn(),
     /// Another one is made when it changes.
@@ -214,8 +214,8 @@ impl Actuator for Servo {
         (self.0.disarm)(self.1)
     }
 
-    fn terminate(&mut self) {
-        (self.0.terminate)();
+    fn terminate(&mut self, reason: Termination<'_>) {
+        (self.0.terminate)(reason);
     }
 }
 

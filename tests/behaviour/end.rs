@@ -11,7 +11,7 @@ robot! {
     link base {
         sensor number: External<Number>() { estimator echo: Echo(); }
         // Fails when it is closed.
-        sensor port: Source(terminate = || panic!("the port does not close")) { rate: 100 Hz; }
+        sensor port: Source(terminate = |_| panic!("the port does not close")) { rate: 100 Hz; }
         estimator apart: Echo() { input number: sensor::base::number; runs_on: worker; }
     }
 }

@@ -22,7 +22,7 @@ fn third(count: &mut f64, number: f64, then: fn() -> Replied) -> Replied {
     if *count == 3.0 { then() } else { Ok(Reply::emit(Number(number)).diverged("always")) }
 }
 
-fn terminate() {
+fn terminate(_: Termination<'_>) {
     TERMINATED.fetch_add(1, Ordering::SeqCst);
 }
 

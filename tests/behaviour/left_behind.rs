@@ -36,7 +36,7 @@ impl Actuator for Clinging {
         Ok(())
     }
 
-    fn terminate(&mut self) {
+    fn terminate(&mut self, _: Termination<'_>) {
         HERE.pass("here");
     }
 }

@@ -181,15 +181,22 @@ robot! {
                 gain = param::gain,
                 init = |_| made("actuator"),
                 disarm = make_safe,
-                terminate = || log("actuator", "closed"),
+                terminate = |reason| log("actuator", format!("closed: {reason}")),
                 dropped = || log("actuator", "dropped"),
             );
             link head { }
         }
+        sensor faulty: External<Number>() {
+            estimator faulty: Echo(
+                input = |_, _| panic!("a bug"),
+                terminate = |reason| log("faulty", format!("closed: {reason}")),
+                dropped = || log("faulty", "dropped"),
+            );
+        }
         sensor numbers: Source(
             gain = param::gain,
             init = |_| made("sensor"),
-            terminate = || log("sensor", "closed"),
+            terminate = |reason| log("sensor", format!("closed: {reason}")),
             dropped = || log("sensor", "dropped"),
         ) {
             rate: 100 Hz;
@@ -197,7 +204,7 @@ robot! {
                 gain = param::gain,
                 init = make_estimator,
                 info = timer,
-                terminate = || log("estimator", "closed"),
+                terminate = |reason| log("estimator", format!("closed: {reason}")),
                 dropped = || log("estimator", "dropped"),
             );
         }
@@ -214,11 +221,41 @@ fn new_options_close_and_drop_the_old_instance_before_the_new_one_is_made() -> R
     simulation.run_until(at(55));
     simulation.set_parameter(single::param::gain, 2.0).expect("it is finite");
     simulation.run_until(at(154));
-    assert_eq!(logged("sensor"), ["made", "closed", "dropped", "made"]);
-    assert_eq!(logged("estimator"), ["made", "closed", "dropped", "made"], "the timer of the old one is gone");
-    assert_eq!(logged("actuator"), ["made", "made safe", "closed", "dropped", "made"]);
+    let closed = "closed: new options";
+    assert_eq!(logged("sensor"), ["made", closed, "dropped", "made"]);
+    assert_eq!(logged("estimator"), ["made", closed, "dropped", "made"], "the timer of the old one is gone");
+    assert_eq!(logged("actuator"), ["made", "made safe", closed, "dropped", "made"]);
     simulation.run_until(at(160));
     assert_eq!(logged("estimator"), ["timer 1"]);
+    Ok(())
+}
+
+#[test]
+fn each_component_is_told_why_it_ends() -> Result<(), StartError> {
+    let _alone = alone();
+    let mut simulation = Single::builder().simulate()?;
+    lock(&LOG).clear();
+    // A panic ends the instance without a word; too many in its link restart what is there, but for what is below its joint.
+    for panic in 1..=4 {
+        simulation.publish(single::sensor::base::faulty, at(200 * panic), Number(1.0));
+    }
+    simulation.run_until(at(1000));
+    let closed = "closed: restarted by its supervisor";
+    assert_eq!(logged("faulty"), ["dropped"; 4]);
+    assert_eq!(logged("sensor"), [closed, "dropped", "made"]);
+    assert_eq!(logged("estimator").iter().filter(|line| *line == closed).count(), 1);
+    assert_eq!(logged("actuator"), ["made safe", closed, "dropped", "made"], "its joint is below the link");
+    // An error, which is told with its text.
+    simulation.call(single::sensor::base::numbers::only, Break).expect_err("it breaks");
+    simulation.run_until(at(1050));
+    assert_eq!(logged("estimator"), ["closed: it failed: broken on request", "dropped", "made"]);
+    simulation.stop();
+    let closed = "closed: the robot stops";
+    assert_eq!(
+        [logged("sensor"), logged("estimator"), logged("faulty")].concat(),
+        [closed, "dropped", closed, "dropped", closed, "dropped"]
+    );
+    assert_eq!(logged("actuator"), ["made safe", closed, "dropped"]);
     Ok(())
 }
 

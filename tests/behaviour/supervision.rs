@@ -35,14 +35,14 @@ robot! {
     link base {
         sensor base_pulse: Source(init = |_| count(0), read = |_, _| Ok(Reading::now(Number(1.0)))) {
             rate: 100 Hz;
-            estimator cousin: Echo(init = |_| count(1), terminate = || panic!("cannot clean up"));
+            estimator cousin: Echo(init = |_| count(1), terminate = |_| panic!("cannot clean up"));
         }
         joint neck: fixed {
             link head {
                 sensor number: External<Number>() { estimator failing: Echo(input = fail); }
                 sensor head_pulse: Source(init = |_| count(2), read = |_, _| Ok(Reading::now(Number(1.0)))) {
                     rate: 100 Hz;
-                    estimator brother: Echo(init = |_| count(3), terminate = || panic!("cannot clean up"));
+                    estimator brother: Echo(init = |_| count(3), terminate = |_| panic!("cannot clean up"));
                 }
             }
         }
@@ -140,7 +140,7 @@ fn read(_: u32, _: MonotonicTime) -> Read {
 robot! {
     robot Unplugged;
     link base {
-        sensor flaky: Source(init = plug_in, read = read, terminate = || panic!("cannot be closed")) { rate: 10 Hz; }
+        sensor flaky: Source(init = plug_in, read = read, terminate = |_| panic!("cannot be closed")) { rate: 10 Hz; }
     }
 }
 

@@ -33,7 +33,7 @@ fn work(_: &mut f64, number: f64) -> Replied {
     Ok(Reply::emit(Number(number)))
 }
 
-fn end() {
+fn end(_: Termination<'_>) {
     TERMINATED.fetch_add(1, Ordering::SeqCst);
 }
 

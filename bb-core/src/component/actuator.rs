@@ -1,6 +1,6 @@
 //! The contract of an actuator.
 
-use super::{ActuatorContext, Fault, Options};
+use super::{ActuatorContext, Fault, Options, Termination};
 use crate::message::{JointSide, Payload, Stamped};
 use crate::time::MonotonicTime;
 
@@ -108,5 +108,7 @@ pub trait Actuator: Sized + Send + 'static {
     }
 
     /// Closes the device before the actuator stops or is restarted; not called after a panic.
-    fn terminate(&mut self) {}
+    fn terminate(&mut self, reason: Termination<'_>) {
+        let _ = reason;
+    }
 }

@@ -1,6 +1,6 @@
 //! The contract of an estimator.
 
-use super::{Context, Fault, Info, InputTransforms, Inputs, Options, Outputs, Request, RequestCodec};
+use super::{Context, Fault, Info, InputTransforms, Inputs, Options, Outputs, Request, RequestCodec, Termination};
 
 /// Consumes messages and emits derived state. See the crate's README for one from scratch.
 ///
@@ -105,8 +105,11 @@ pub trait Estimator: Sized + Send + 'static {
         Err(Fault::remake())
     }
 
-    /// Cleans up before it stops or is restarted, also after an error; not called after a panic.
-    fn terminate(&mut self) {}
+    /// Cleans up before it stops or is restarted, also after an error; not called after a panic, when its state may be
+    /// inconsistent.
+    fn terminate(&mut self, reason: Termination<'_>) {
+        let _ = reason;
+    }
 }
 
 /// An estimator that answers requests of type `Q`; one may implement it for several.

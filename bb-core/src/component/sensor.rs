@@ -1,6 +1,6 @@
 //! The contract of a sensor.
 
-use super::{Fault, Options, SensorContext};
+use super::{Fault, Options, SensorContext, Termination};
 use crate::message::Payload;
 use crate::time::MonotonicTime;
 
@@ -85,7 +85,9 @@ pub trait Sensor: Sized + Send + 'static {
 
     /// Closes the device before the sensor stops or is restarted; not called after a panic. When the robot stops, it
     /// has already been disarmed.
-    fn terminate(&mut self) {}
+    fn terminate(&mut self, reason: Termination<'_>) {
+        let _ = reason;
+    }
 }
 
 /// The result of one [`Sensor::read`], and when to read next.

@@ -1,6 +1,6 @@
 //! The contract of controllers and bridges, which run beside the dataflow of sensors and estimators.
 
-use super::{Fault, Options, Reading, ServiceContext};
+use super::{Fault, Options, Reading, ServiceContext, Termination};
 use crate::message::Payload;
 use crate::time::MonotonicTime;
 
@@ -43,5 +43,7 @@ pub trait Service: Sized + Send + 'static {
     }
 
     /// Cleans up before it stops or is restarted; not called after a panic.
-    fn terminate(&mut self) {}
+    fn terminate(&mut self, reason: Termination<'_>) {
+        let _ = reason;
+    }
 }

@@ -8,7 +8,7 @@ use crate::component::{
     Sensor, SensorContext, Service, ServiceContext,
 };
 use crate::declaration::SensorDeclaration;
-use crate::fault::Fault;
+use crate::fault::{Fault, Termination};
 use crate::message::{Payload, Stamped};
 use crate::time::MonotonicTime;
 use std::fmt;
@@ -36,7 +36,7 @@ pub trait Component: Sized + Send + 'static {
         context: &Self::Context,
     ) -> Result<(), Fault>;
     /// Closes it.
-    fn close(&mut self);
+    fn close(&mut self, reason: Termination<'_>);
 }
 
 /// A component that is called at a rate and publishes its readings: a sensor or a service.
@@ -135,8 +135,8 @@ impl<E: Estimator> Component for AsEstimator<E> {
         }
     }
 
-    fn close(&mut self) {
-        whichever!(self, own => own.terminate(), other => other.terminate());
+    fn close(&mut self, reason: Termination<'_>) {
+        whichever!(self, own => own.terminate(reason), other => other.terminate(reason));
     }
 }
 
@@ -188,10 +188,10 @@ impl<S: Sensor> Component for AsSensor<S> {
         }
     }
 
-    fn close(&mut self) {
+    fn close(&mut self, reason: Termination<'_>) {
         match self {
-            Self::Declared(sensor) => sensor.terminate(),
-            Self::Replaced(StandInSensor(sensor)) => sensor.terminate(),
+            Self::Declared(sensor) => sensor.terminate(reason),
+            Self::Replaced(StandInSensor(sensor)) => sensor.terminate(reason),
         }
     }
 }
@@ -246,10 +246,10 @@ impl<S: Service> Component for AsService<S> {
         }
     }
 
-    fn close(&mut self) {
+    fn close(&mut self, reason: Termination<'_>) {
         match self {
-            Self::Declared(service) => service.terminate(),
-            Self::Replaced(StandInService(service)) => service.terminate(),
+            Self::Declared(service) => service.terminate(reason),
+            Self::Replaced(StandInService(service)) => service.terminate(reason),
         }
     }
 }
@@ -301,8 +301,8 @@ impl<A: Actuator> Component for AsActuator<A> {
         }
     }
 
-    fn close(&mut self) {
-        whichever!(self, own => own.terminate(), other => other.terminate());
+    fn close(&mut self, reason: Termination<'_>) {
+        whichever!(self, own => own.terminate(reason), other => other.terminate(reason));
     }
 }
 

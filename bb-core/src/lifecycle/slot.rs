@@ -4,7 +4,7 @@ use super::backoff::{Failures, Supervision};
 use super::{Component, backoff};
 use crate::component::{Binding, Options};
 use crate::declaration::ParameterValues;
-use crate::fault::{Failed, Fault, Then, caught, discard, retire};
+use crate::fault::{Failed, Fault, Termination, Then, caught, discard, retire};
 use crate::time::MonotonicTime;
 
 /// The options and the context from which a component is created, at the start and at every restart.
@@ -80,11 +80,11 @@ impl<C: Component> Slot<C> {
         }
     }
 
-    /// Creates it, after retiring the previous one. After an error it is vacant, and the caller either calls
+    /// Creates it; the previous one has been retired. After an error it is vacant, and the caller either calls
     /// [`Self::fail`] or prevents the robot from starting.
     pub(crate) fn make(&mut self, context: &C::Context, parameters: &ParameterValues) -> Result<(), Failed> {
-        // An error while the previous one closes does not concern the next one.
-        let _ = self.retire();
+        debug_assert!(!self.is_running(), "a component is retired before the next one is created");
+        self.state = State::Vacant;
         let made = caught(|| C::make(|| self.recipe.bound(parameters), context))?;
         self.state = State::Running(made);
         Ok(())
@@ -106,7 +106,8 @@ impl<C: Component> Slot<C> {
         let previous = std::mem::replace(&mut self.state, State::Stopped);
         if let State::Running(component) = previous {
             // The fault is known; later errors follow from it.
-            let _ = retire(component, failed.panicked, C::close);
+            let _ =
+                retire(component, failed.panicked, |component| component.close(Termination::Fault(&failed.fault)));
         }
         match failed.fault.then {
             Then::Restart | Then::Remake => {
@@ -118,12 +119,13 @@ impl<C: Component> Slot<C> {
         }
     }
 
-    /// Its supervisor restarts it, though it has not failed; false if it did not run.
-    pub(crate) fn restart(&mut self, now: MonotonicTime) -> bool {
+    /// Retires it for a restart, though it has not failed; false if it did not run.
+    pub(crate) fn restart(&mut self, now: MonotonicTime, reason: Termination<'_>) -> bool {
         if !self.is_running() {
             return false;
         }
-        let _ = self.retire();
+        // An error while it closes does not concern the next one.
+        let _ = self.retire(reason);
         self.state = State::Waiting(now);
         true
     }
@@ -141,9 +143,9 @@ impl<C: Component> Slot<C> {
     }
 
     /// Closes and drops it; returns what went wrong.
-    pub(crate) fn retire(&mut self) -> Option<Fault> {
+    pub(crate) fn retire(&mut self, reason: Termination<'_>) -> Option<Fault> {
         match std::mem::replace(&mut self.state, State::Vacant) {
-            State::Running(component) => retire(component, false, C::close),
+            State::Running(component) => retire(component, false, |component| component.close(reason)),
             _ => None,
         }
     }
@@ -152,7 +154,7 @@ impl<C: Component> Slot<C> {
 impl<C: Component> Drop for Slot<C> {
     /// For a robot that did not start. The `Drop` of the options is code of the user, too.
     fn drop(&mut self) {
-        let _ = self.retire();
+        let _ = self.retire(Termination::Stop);
         discard(std::mem::replace(&mut self.recipe.options, Err(String::new())));
     }
 }

@@ -5,7 +5,7 @@ use crate::component::{
     Actuator, ActuatorContext, Context, Estimator, Info, InputTransforms, Inputs, Options, Outputs, Reading, Reply,
     Sensor, SensorContext, Service, ServiceContext,
 };
-use crate::fault::Fault;
+use crate::fault::{Fault, Termination};
 use crate::message::{Payload, Stamped};
 use crate::time::MonotonicTime;
 use std::any::type_name;
@@ -23,20 +23,20 @@ pub(crate) trait AnyEstimator<I: Inputs, O>: Send {
     fn handle_transforms(&mut self, transforms: &InputTransforms<'_>) -> Result<(), Fault>;
     fn handle_info(&mut self, info: Info) -> Result<Reply<O>, Fault>;
     fn handle_continue(&mut self, step: u32) -> Result<Reply<O>, Fault>;
-    fn terminate(&mut self);
+    fn terminate(&mut self, reason: Termination<'_>);
 }
 
 /// A sensor that publishes `T`.
 pub(crate) trait AnySensor<T>: Send {
     fn read(&mut self, now: MonotonicTime) -> Result<Reading<T>, Fault>;
     fn starts_at(&self) -> Option<MonotonicTime>;
-    fn terminate(&mut self);
+    fn terminate(&mut self, reason: Termination<'_>);
 }
 
 /// A service that publishes `T`.
 pub(crate) trait AnyService<T>: Send {
     fn update(&mut self, now: MonotonicTime) -> Result<Reading<T>, Fault>;
-    fn terminate(&mut self);
+    fn terminate(&mut self, reason: Termination<'_>);
 }
 
 /// An actuator that takes commands of type `T`.
@@ -45,7 +45,7 @@ pub(crate) trait StandIn<T>: Send {
     fn next_update(&self) -> Option<MonotonicTime>;
     fn update(&mut self, now: MonotonicTime) -> Result<(), Fault>;
     fn disarm(&mut self) -> Result<(), Fault>;
-    fn terminate(&mut self);
+    fn terminate(&mut self, reason: Termination<'_>);
 }
 
 /// An estimator of type `E`, with options, to replace another one.
@@ -169,8 +169,8 @@ impl<E: Estimator> AnyEstimator<E::Input, E::Output> for E {
         Estimator::handle_continue(self, step)
     }
 
-    fn terminate(&mut self) {
-        Estimator::terminate(self);
+    fn terminate(&mut self, reason: Termination<'_>) {
+        Estimator::terminate(self, reason);
     }
 }
 
@@ -183,8 +183,8 @@ impl<S: Sensor> AnySensor<S::Output> for S {
         Sensor::starts_at(self)
     }
 
-    fn terminate(&mut self) {
-        Sensor::terminate(self);
+    fn terminate(&mut self, reason: Termination<'_>) {
+        Sensor::terminate(self, reason);
     }
 }
 
@@ -193,8 +193,8 @@ impl<S: Service> AnyService<S::Output> for S {
         Service::update(self, now)
     }
 
-    fn terminate(&mut self) {
-        Service::terminate(self);
+    fn terminate(&mut self, reason: Termination<'_>) {
+        Service::terminate(self, reason);
     }
 }
 
@@ -215,7 +215,7 @@ impl<A: Actuator> StandIn<A::Command> for A {
         Actuator::disarm(self)
     }
 
-    fn terminate(&mut self) {
-        Actuator::terminate(self);
+    fn terminate(&mut self, reason: Termination<'_>) {
+        Actuator::terminate(self, reason);
     }
 }

@@ -20,7 +20,7 @@ use super::source::Assembly;
 use crate::component::{Accepts, Actuator, ActuatorContext, ActuatorError, Binding, Caller, OptionsList};
 use crate::control::{ComponentOrder, Control};
 use crate::declaration::ActuatorDeclaration;
-use crate::fault::{Failed, Fault, caught};
+use crate::fault::{Failed, Fault, Termination, caught};
 use crate::lifecycle::{AfterFault, AsActuator, Recipe, Slot};
 use crate::node::{BindTarget, Environment, Mode};
 use crate::payload::MotionEnd;
@@ -226,11 +226,11 @@ impl<A: Actuator> Inner<A> {
                     };
                     match changed {
                         Ok(true) => {}
-                        Ok(false) => self.remake(state, now),
+                        Ok(false) => self.remake(state, Termination::NewOptions, now),
                         Err(failed) => self.fail(state, &failed, now),
                     }
                 }
-                Order::Restart if state.slot.is_running() => self.remake(state, now),
+                Order::Restart if state.slot.is_running() => self.remake(state, Termination::Supervisor, now),
                 Order::Restart => {}
                 Order::GiveUp => state.slot.give_up(),
             }
@@ -238,11 +238,15 @@ impl<A: Actuator> Inner<A> {
     }
 
     /// Makes the actuator safe, then creates it again.
-    fn remake(&self, state: &mut State<A>, now: MonotonicTime) {
+    fn remake(&self, state: &mut State<A>, why: Termination<'_>, now: MonotonicTime) {
         let reason = "the actuator is restarted";
         self.context.set_failing(reason);
         self.make_safe(state);
         self.end_motion(MotionEnd::Failed(reason.to_owned()));
+        {
+            let _entered = self.occupied.enter(self.environment.clock());
+            state.slot.restart(now, why);
+        }
         self.make(state, now);
     }
 

@@ -9,7 +9,7 @@ pub use self::shared::SourceStatistics;
 use crate::component::{Binding, Next, OptionsList};
 use crate::control::{ComponentOrder, Control};
 use crate::declaration::SensorDeclaration;
-use crate::fault::{Failed, Fault, Then, caught};
+use crate::fault::{Failed, Fault, Termination, Then, caught};
 use crate::lifecycle::{AfterFault, HostHandle, Periodic, Recipe, Slot};
 use crate::message::{Stamp, Stamped};
 use crate::node::{BindTarget, Environment};
@@ -280,6 +280,17 @@ impl<S: Periodic> Running<S> {
         self.control.component_failed(path, supervisor, message, failed.panicked);
     }
 
+    /// Retires it and creates it again, though it has not failed.
+    fn restart_from_above(&mut self, reason: Termination<'_>) {
+        let was_running = {
+            let _entered = self.shared.enter(self.environment.clock());
+            self.slot.restart(self.environment.clock().now(), reason)
+        };
+        if was_running {
+            self.restart();
+        }
+    }
+
     /// Creates it again; its first reading is due at once.
     fn restart(&mut self) {
         let path = self.declaration.path;
@@ -308,7 +319,7 @@ impl<S: Periodic> Running<S> {
         };
         match changed {
             Ok(true) => {}
-            Ok(false) => self.restart(),
+            Ok(false) => self.restart_from_above(Termination::NewOptions),
             Err(failed) => self.fail(failed),
         }
     }
@@ -360,11 +371,7 @@ impl<S: Periodic> Source for Running<S> {
         for order in self.shared.take_orders() {
             match order {
                 Order::Options => self.change_options(),
-                Order::Restart => {
-                    if self.slot.restart(self.clock().now()) {
-                        self.restart();
-                    }
-                }
+                Order::Restart => self.restart_from_above(Termination::Supervisor),
                 Order::GiveUp => {
                     self.slot.give_up();
                     self.due = None;
@@ -393,7 +400,7 @@ impl<S: Periodic> Source for Running<S> {
         self.due = None;
         let fault = {
             let _entered = self.shared.enter(self.environment.clock());
-            self.slot.retire()
+            self.slot.retire(Termination::Stop)
         };
         if let Some(fault) = fault {
             self.control.note_fault(self.declaration.path, fault.to_string());

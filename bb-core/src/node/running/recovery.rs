@@ -4,7 +4,7 @@ use super::Node;
 use super::common::Common;
 use crate::component::{Context, Estimator};
 use crate::event::HealthReason;
-use crate::fault::{Failed, Panic, of_panic};
+use crate::fault::{Failed, Panic, Termination, of_panic};
 use crate::lifecycle::AfterFault;
 use crate::node::DropReason;
 use crate::node::admission::Admission;
@@ -58,9 +58,9 @@ impl<E: Estimator> Node<E> {
         }
     }
 
-    /// Restarts the estimator at its supervisor's request, though it has not failed.
-    pub(super) fn restart_from_above(&mut self, turn: &Turn<'_>) {
-        if self.slot.restart(turn.now()) {
+    /// Restarts the estimator, though it has not failed.
+    pub(super) fn restart_from_above(&mut self, reason: Termination<'_>, turn: &Turn<'_>) {
+        if self.slot.restart(turn.now(), reason) {
             let source = self.common.declaration.path;
             self.common.judge(Event::Bad(HealthReason::Restarted), source, turn.now());
         }
@@ -81,7 +81,7 @@ impl<E: Estimator> Node<E> {
                 self.schedule();
             }
             Ok(()) => {
-                self.restart_from_above(turn);
+                self.restart_from_above(Termination::NewOptions, turn);
                 self.restart(turn);
             }
             Err(failed) => self.fail(failed, turn),

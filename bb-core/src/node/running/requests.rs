@@ -3,7 +3,7 @@
 use super::common::Common;
 use super::{Next, Node, Turn};
 use crate::component::{Estimator, HandleCall, HandleCast, Reply, RequestCodec};
-use crate::fault::{Failed, Fault};
+use crate::fault::{Failed, Fault, Termination};
 use crate::journal::{Request, RequestKind};
 use crate::message::Stamp;
 use crate::node::act::Act;
@@ -44,7 +44,7 @@ impl<E: Estimator> Node<E> {
                 self.common.parameters = values;
                 self.change_options(turn);
             }
-            NodeEntry::Restart => self.restart_from_above(turn),
+            NodeEntry::Restart => self.restart_from_above(Termination::Supervisor, turn),
             NodeEntry::GiveUp => {
                 self.slot.give_up();
                 if self.slot.restart_at().is_none() && !self.slot.is_running() {
@@ -78,7 +78,7 @@ impl<E: Estimator> Node<E> {
 
     /// Stops the estimator for good, and drops the messages that it keeps.
     fn retire(&mut self) {
-        if let Some(fault) = self.slot.retire() {
+        if let Some(fault) = self.slot.retire(Termination::Stop) {
             let failed = Failed::from(fault);
             self.common.report_failure(&failed);
             self.common.set_stopped(Some((failed.fault.to_string(), true)));

@@ -3,6 +3,7 @@
 use super::held::{Guarded, Held};
 use super::{ActuatorNode, ActuatorStatistics};
 use crate::component::{Accepts, Actuator};
+use crate::fault::Termination;
 use crate::message::Payload as _;
 use crate::payload::MotionEnd;
 use crate::pubsub::{AnyTopic, DynamicMessage};
@@ -67,7 +68,7 @@ impl<A: Actuator> AnyActuator for ActuatorNode<A> {
                 // Its disarm callback still waits: code of this actuator was late, or has stopped the robot.
                 self.0.make_safe(&mut state);
             }
-            state.slot.retire()
+            state.slot.retire(Termination::Stop)
         };
         state.slot.stop();
         self.0.end_motion(MotionEnd::Stopped);
