@@ -7,6 +7,11 @@ use bb_core::prelude::*;
 /// What it can be told and asked.
 pub(crate) struct Add(f64);
 pub(crate) struct HowMuch;
+/// Asks, and wants a timeout or more work after the answer.
+pub(crate) struct HowMuchAnd(Request);
+/// Asks for the last time.
+#[derive(Clone, Copy, Debug, Payload)]
+pub(crate) struct Leave {}
 
 /// Options of [`Sum`].
 #[derive(Clone, Debug, Options)]
@@ -76,6 +81,22 @@ impl HandleCall<HowMuch> for Sum {
     type Response = f64;
     fn handle_call(&mut self, HowMuch: HowMuch) -> Result<(f64, Reply<Number>), Fault> {
         Ok((self.sum, Reply::emit(Number(self.sum))))
+    }
+}
+
+impl HandleCall<HowMuchAnd> for Sum {
+    type Response = f64;
+    fn handle_call(&mut self, HowMuchAnd(request): HowMuchAnd) -> Result<(f64, Reply<Number>), Fault> {
+        Ok((self.sum, Reply::none().and(request)))
+    }
+}
+
+impl HandleCall<Leave> for Sum {
+    type Response = f64;
+    const RECORD: Option<RequestCodec<Leave>> = Some(RequestCodec::bytes());
+
+    fn handle_call(&mut self, _: Leave) -> Result<(f64, Reply<Number>), Fault> {
+        Ok((self.sum, Reply::emit(Number(self.sum)).and(Request::Restart("told to leave"))))
     }
 }
 
@@ -162,6 +183,67 @@ fn calls_are_answered_and_casts_are_taken() -> Result<(), Failure> {
     assert_eq!(error, "sensor/base/number/sum does not run");
     simulation.run_until(at(100));
     assert_eq!(simulation.call(sum, HowMuch)?, 0.0, "it is as new");
+    Ok(())
+}
+
+#[test]
+fn an_answer_may_ask_for_more() -> Result<(), Failure> {
+    let sum = summing::sensor::base::number::sum;
+    let builder = Summing::builder();
+    let sums = builder.subscribe(sum);
+    let mut simulation = builder.simulate()?;
+    simulation.run_until(at(10));
+    assert_eq!(simulation.call(sum, HowMuchAnd(Request::Timeout(Duration::from_millis(50))))?, 0.0);
+    assert_eq!(
+        simulation.call(sum, HowMuchAnd(Request::Continue(3)))?,
+        0.0,
+        "it ends the timeout, as anything does"
+    );
+    simulation.run_until(at(200));
+    assert_eq!(emitted(&sums), [(10, 4003.0)]);
+    assert_eq!(simulation.call(sum, HowMuchAnd(Request::Timeout(Duration::from_millis(50))))?, 0.0);
+    simulation.run_until(at(500));
+    assert_eq!(emitted(&sums), [(250, 3000.0)]);
+    Ok(())
+}
+
+/// The caller has its answer, subscribers have the output, and then it is made again.
+#[test]
+fn an_estimator_may_answer_and_stop() -> Result<(), Failure> {
+    let sum = summing::sensor::base::number::sum;
+    same_again(Summing::builder, |builder| {
+        let sums = builder.subscribe(sum);
+        let health = builder.subscribe(system::Health);
+        let mut simulation = builder.simulate()?;
+        simulation.publish(summing::sensor::base::number, at(5), Number(21.0));
+        assert_eq!(simulation.call(sum, Leave {})?, 42.0);
+        assert_eq!(emitted(&sums), [(5, 42.0)]);
+        let change = health.try_recv().map(|change| (change.payload.to, change.payload.reason));
+        assert_eq!(change, Some((HealthState::Degraded, HealthReason::Restarted)));
+        assert!(simulation.call(sum, HowMuch).is_err(), "it waits for its restart");
+        simulation.run_until(at(100));
+        assert_eq!(simulation.call(sum, Leave {})?, 0.0, "it is as new");
+        let report = simulation.stop();
+        assert_eq!(
+            report.faults[0].to_string(),
+            "sensor/base/number/sum failed: told to leave (2 times in 0.095 s)"
+        );
+        Ok(report)
+    })?;
+    Ok(())
+}
+
+#[test]
+fn an_estimator_that_refuses_new_options_is_made_again_with_them() -> Result<(), Failure> {
+    let mut simulation = Summing::builder().simulate()?;
+    let sum = summing::sensor::base::number::sum;
+    simulation.publish(summing::sensor::base::number, at(5), Number(1.0));
+    simulation.set_parameter(summing::param::sum::gain, 9.0)?;
+    assert!(simulation.call(sum, HowMuch).is_err(), "it has failed");
+    simulation.publish(summing::sensor::base::number, at(50), Number(1.0));
+    assert_eq!(simulation.call(sum, HowMuch)?, 9.0, "fresh state, and the gain in force");
+    let report = simulation.stop();
+    assert_eq!(report.faults[0].to_string(), "sensor/base/number/sum failed: no such gain");
     Ok(())
 }
 

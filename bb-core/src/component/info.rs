@@ -17,6 +17,9 @@ pub enum Request {
     Timer(u32, Duration),
     /// [`Info::Tick`] at a fixed rate from now on; a period of zero ends it.
     Tick(Duration),
+    /// A restart with fresh state, for this reason, once the outputs of the reply are published and, in reply to a call,
+    /// with the answer on its way to the caller. Otherwise as if the callback had returned the reason as a [`Fault`](super::Fault).
+    Restart(&'static str),
 }
 
 /// Why [`handle_info`](super::Estimator::handle_info) is called.

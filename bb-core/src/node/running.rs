@@ -12,6 +12,7 @@ mod requests;
 use super::DropReason;
 use super::backlog::Backlog;
 use super::environment::{BindTarget, Environment, Mode};
+use super::timers::Continuation;
 use super::turn::Turn;
 use crate::component::inputs;
 use crate::component::{Binding, Estimator, Inputs, Reply, TakenAt};
@@ -211,8 +212,13 @@ impl<E: Estimator> Node<E> {
             self.schedule();
             return Next::Idle;
         }
-        if let Some(step) = self.common.timers.continue_with.take() {
-            return self.go_on(step, turn, emitted);
+        match self.common.timers.continue_with.take() {
+            Some(Continuation::Step(step)) => return self.go_on(step, turn, emitted),
+            Some(Continuation::Fail(reason)) => {
+                self.fail(Failed::from(Fault::new(reason)), turn);
+                return Next::Quiet;
+            }
+            None => {}
         }
         self.common.continued = 0;
         if let Some(deliver) = self.backlog.pop() {

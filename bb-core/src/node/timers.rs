@@ -7,10 +7,19 @@ use std::time::Duration;
 /// The requests made by an estimator.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Timers {
-    pub(super) continue_with: Option<u32>,
+    pub(super) continue_with: Option<Continuation>,
     timeout: Option<MonotonicTime>,
     tick: Option<(Duration, MonotonicTime)>,
     timers: Vec<(u32, MonotonicTime)>,
+}
+
+/// What an estimator does before anything else happens to it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Continuation {
+    /// It continues with this number.
+    Step(u32),
+    /// It fails for this reason, after its reply.
+    Fail(&'static str),
 }
 
 /// The most timers that one estimator may have running; one more replaces the latest.
@@ -26,7 +35,8 @@ impl Timers {
     pub(super) fn request(&mut self, request: Request, now: MonotonicTime) {
         let after = |duration: Duration| now + duration.max(SHORTEST);
         match request {
-            Request::Continue(step) => self.continue_with = Some(step),
+            Request::Continue(step) => self.continue_with = Some(Continuation::Step(step)),
+            Request::Restart(reason) => self.continue_with = Some(Continuation::Fail(reason)),
             Request::Timeout(duration) => self.timeout = Some(after(duration)),
             Request::Tick(Duration::ZERO) => self.tick = None,
             Request::Tick(period) => self.tick = Some((period.max(SHORTEST), after(period))),
