@@ -1,8 +1,10 @@
-//! Events for handlers that a user attaches: every input, output, latency, drop and transition.
+//! Events for handlers that a user attaches: every input, output, callback, drop, change of health and fault.
 
+use crate::declaration::EstimatorDeclaration;
 use crate::event::{ComponentFault, HealthTransition};
 use crate::fault::guarded;
 use crate::message::{Payload, Stamp, Stamped};
+use crate::sorted::Sorted;
 use crate::time::MonotonicTime;
 use std::fmt;
 use std::sync::Arc;
@@ -23,14 +25,20 @@ pub enum TelemetryEvent {
     },
     /// An estimator emitted a message.
     Output {
+        /// The path of the estimator.
+        estimator: &'static str,
+        /// The name of the output: `out` unless one is declared.
+        output: &'static str,
+        /// The name of the payload's type.
+        payload: &'static str,
         /// The path it was published at.
         path: &'static str,
         /// The message's stamp.
         stamp: Stamp,
-        /// From the stamp, which is that of the driver's message, to the emission.
+        /// From the stamp, which is that of the driver's message unless it is [`Timed`](crate::Timed), to the emission.
         age: Duration,
     },
-    /// A callback returned; measured where a `latency_budget` is declared, else for every 64th callback.
+    /// A callback returned.
     Latency {
         /// The path of the estimator.
         estimator: &'static str,
@@ -56,21 +64,27 @@ pub enum TelemetryEvent {
 pub type Handler = Arc<dyn Fn(&'static str, &TelemetryEvent) + Send + Sync>;
 
 /// The handlers of one run.
-#[derive(Clone, Default)]
-pub(crate) struct Telemetry(Vec<Handler>);
+#[derive(Clone)]
+pub(crate) struct Telemetry {
+    handlers: Vec<Handler>,
+    /// The estimator and the output that publish at a path.
+    outputs: Sorted<&'static str, (&'static str, &'static str)>,
+}
 
 impl Telemetry {
-    pub(crate) fn add(&mut self, handler: Handler) {
-        self.0.push(handler);
-    }
-
-    pub(crate) fn is_empty(&self) -> bool {
-        self.0.is_empty()
+    pub(crate) fn new(handlers: Vec<Handler>, estimators: &[EstimatorDeclaration]) -> Self {
+        let mut outputs = Sorted::default();
+        for estimator in estimators {
+            for (path, name) in estimator.outputs.iter().zip(estimator.output_names) {
+                outputs.insert(*path, (estimator.path, *name));
+            }
+        }
+        Self { handlers, outputs }
     }
 
     #[cold]
     pub(crate) fn tell(&self, robot: &'static str, event: &TelemetryEvent) {
-        for handler in &self.0 {
+        for handler in &self.handlers {
             if let Err(fault) = guarded(|| handler(robot, event)) {
                 tracing::error!(%fault, "a handler of telemetry failed");
             }
@@ -84,13 +98,15 @@ impl Telemetry {
         message: &Stamped<T>,
         now: MonotonicTime,
     ) {
+        let (estimator, output) = self.outputs.get(path).copied().unwrap_or_default();
+        let (payload, stamp) = (T::NAME, message.stamp());
         let age = now.duration_since(message.monotonic_time);
-        self.tell(robot, &TelemetryEvent::Output { path, stamp: message.stamp(), age });
+        self.tell(robot, &TelemetryEvent::Output { estimator, output, payload, path, stamp, age });
     }
 }
 
 impl fmt::Debug for Telemetry {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("Telemetry").field(&self.0.len()).finish()
+        f.debug_tuple("Telemetry").field(&self.handlers.len()).finish()
     }
 }

@@ -235,8 +235,12 @@ fn handlers_of_telemetry_are_told_of_everything_and_may_panic() -> Result<(), St
     let count = |is: fn(&TelemetryEvent) -> bool| told.iter().filter(|event| is(event)).count();
     const DOUBLE: &str = "sensor/base/number/double";
     assert!(count(|event| matches!(event, TelemetryEvent::Input { estimator: DOUBLE, input: "number", .. })) >= 3);
-    assert_eq!(count(|event| matches!(event, TelemetryEvent::Output { path: DOUBLE, .. })), 2);
-    assert!(count(|event| matches!(event, TelemetryEvent::Latency { estimator: DOUBLE, .. })) >= 2);
+    let emits = |event: &TelemetryEvent| {
+        let TelemetryEvent::Output { estimator, output, payload, path, .. } = event else { return false };
+        *path == DOUBLE && (*estimator, *output, *payload) == (DOUBLE, "out", Number::NAME)
+    };
+    assert_eq!(count(emits), 2);
+    assert_eq!(count(|event| matches!(event, TelemetryEvent::Latency { estimator: DOUBLE, .. })), 2);
     assert_eq!(count(|event| matches!(event, TelemetryEvent::Dropped { reason: "non-finite", .. })), 1);
     assert_eq!(count(|event| matches!(event, TelemetryEvent::Fault(fault) if fault.path == DOUBLE)), 1);
     let degrades =

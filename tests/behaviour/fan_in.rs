@@ -3,6 +3,8 @@
 use crate::components::{Echo, Number, Read, Seen, Snapshot, Source, at, numbers};
 use bb_core::prelude::*;
 use bb_core::run::DropReason;
+use bb_core::telemetry::TelemetryEvent;
+use std::sync::{Arc, Mutex};
 
 robot! {
     robot FanIn;
@@ -85,6 +87,36 @@ fn what_a_dispatch_sees() -> Result<(), StartError> {
             assert_eq!(dropped(&run, "third", DropReason::SyncMiss), 0, "{row}: {step}");
         }
     }
+    Ok(())
+}
+
+const SNAPSHOT: &str = "estimator/base/snapshot";
+
+#[test]
+fn a_dropped_dispatch_is_told_to_handlers_of_telemetry() -> Result<(), StartError> {
+    let told: Arc<Mutex<Vec<TelemetryEvent>>> = Arc::default();
+    let mut builder = FanIn::builder();
+    let tell = Arc::clone(&told);
+    builder.telemetry(move |_, event| {
+        if let TelemetryEvent::Dropped { estimator: SNAPSHOT, .. }
+        | TelemetryEvent::Latency { estimator: SNAPSHOT, .. } = event
+        {
+            lock(&tell).push(event.clone());
+        }
+    });
+    let mut simulation = builder.simulate()?;
+    let dropped = |input| TelemetryEvent::Dropped { estimator: SNAPSHOT, input, reason: "sync miss" };
+    simulation.publish(fan_in::sensor::base::a, at(0), Number(1.0));
+    assert_eq!(std::mem::take(&mut *lock(&told)), [dropped("second")], "it is missing");
+    simulation.publish(fan_in::sensor::base::b, at(1), Number(1.0));
+    simulation.publish(fan_in::sensor::base::a, at(11), Number(1.0));
+    // Without a budget, and for the first run of many.
+    let ran = || TelemetryEvent::Latency { estimator: SNAPSHOT, duration: Duration::ZERO };
+    assert_eq!(std::mem::take(&mut *lock(&told)), [ran()]);
+    simulation.publish(fan_in::sensor::base::a, at(11), Number(1.0));
+    assert_eq!(std::mem::take(&mut *lock(&told)), [ran()], "each run is told of");
+    simulation.publish(fan_in::sensor::base::a, at(12), Number(1.0));
+    assert_eq!(std::mem::take(&mut *lock(&told)), [dropped("second")], "it is too old");
     Ok(())
 }
 

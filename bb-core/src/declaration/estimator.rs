@@ -15,6 +15,8 @@ pub struct EstimatorDeclaration {
     pub inputs: &'static [InputDeclaration],
     /// The paths it publishes at: one per declared output, or its own.
     pub outputs: &'static [&'static str],
+    /// The names of its outputs, in the same order: `out` for one that is not declared.
+    pub output_names: &'static [&'static str],
     /// The number of the island that it runs in.
     pub island: usize,
     /// The number of its supervisor, see [`Supervisor`](super::Supervisor).
@@ -37,6 +39,7 @@ impl EstimatorDeclaration {
         frame: Frame::NONE,
         inputs: &[],
         outputs: &[],
+        output_names: &[],
         island: 0,
         supervisor: 0,
         health: HealthDeclaration::NONE,

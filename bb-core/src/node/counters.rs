@@ -31,7 +31,7 @@ pub enum DropReason {
     Displaced,
 }
 
-/// Without a declared budget, one of this many callbacks is measured: a power of two.
+/// Without a declared budget or a handler of telemetry, one of this many callbacks is measured: a power of two.
 pub(super) const SAMPLED: u64 = 64;
 
 const REASONS: usize = DropReason::ALL.len();
@@ -83,7 +83,8 @@ pub(crate) struct Counters {
     pub(super) diverged: Count,
     pub(super) restarts: Count,
     pub(super) transitions: Count,
-    /// Durations of callbacks, in nanoseconds: all callbacks where a latency budget is declared, else every 64th run.
+    /// Durations of callbacks, in nanoseconds: all callbacks where a latency budget is declared or a telemetry handler listens, else
+    /// every 64th run.
     pub(super) latency: Latency,
     pub(super) last_divergence: Mutex<Option<&'static str>>,
     /// See [`Self::set_last_drop`]; 0 if nothing was dropped.
@@ -189,9 +190,10 @@ pub struct EstimatorStatistics {
     pub restarts: u64,
     /// How many times its health has changed.
     pub transitions: u64,
-    /// Its health.
-    pub health: HealthState,
-    /// Durations of its callbacks: all callbacks where a `latency_budget` is declared, else every 64th run.
+    /// Its health; `None` if it was left out by [`Fault::skip`](crate::Fault::skip), for the reason in `stopped`.
+    pub health: Option<HealthState>,
+    /// Durations of its callbacks: all callbacks where a `latency_budget` is declared or a handler of telemetry listens, else every
+    /// 64th run.
     pub latency: LatencyStatistics,
     /// The reason of its last divergence.
     pub last_divergence: Option<&'static str>,

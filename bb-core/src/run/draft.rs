@@ -29,7 +29,7 @@ use crate::message::{Origin, Stamp};
 use crate::node::{Environment, EnvironmentParts, Mode, SharedNode};
 use crate::pubsub::{AnyTopic, Delivery, DynamicSubscription, Payloads, Registry, Select};
 use crate::schedule::{Agenda, Lane};
-use crate::telemetry::Telemetry;
+use crate::telemetry::{Handler, Telemetry};
 use crate::time::{Clock, WallTime};
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
@@ -47,7 +47,7 @@ pub(super) struct Draft {
     pub(super) supervision: Supervision,
     pub(super) joints: JointSettings,
     pub(super) journal: Option<Sink>,
-    pub(super) telemetry: Telemetry,
+    pub(super) telemetry: Vec<Handler>,
     pub(super) replacements: HashMap<&'static str, Replacement>,
     pub(super) kept: Option<Kept>,
     pub(super) node: &'static str,
@@ -72,7 +72,7 @@ impl Draft {
             supervision: Supervision::default(),
             joints: JointSettings::default(),
             journal: None,
-            telemetry: Telemetry::default(),
+            telemetry: Vec::new(),
             replacements: HashMap::new(),
             kept: None,
             node: "local",
@@ -184,7 +184,8 @@ impl Assembling {
         let (robot, origin, supervision) = (draft.robot, draft.origin(), draft.supervision);
         let sink = if mode == Mode::Replay { None } else { draft.journal.take() };
         let journal = sink.map(|sink| Journal::new(sink, clock.wall_offset_nanos()));
-        let telemetry = (!draft.telemetry.is_empty()).then(|| std::mem::take(&mut draft.telemetry));
+        let handlers = std::mem::take(&mut draft.telemetry);
+        let telemetry = (!handlers.is_empty()).then(|| Telemetry::new(handlers, robot.estimators));
         let nodes = robot.estimators.iter().enumerate();
         let nodes: Box<[SharedNode]> = nodes.map(|(number, declared)| SharedNode::new(number, declared)).collect();
         let control = Control::new(Parts {

@@ -87,11 +87,16 @@ fn estimator_declaration(verified: &Verified<'_>, islands: &Islands, id: Estimat
         });
     let inputs = nested.into_iter().chain(declared);
     let outputs = estimator.publishers.iter().map(|publisher| path_text(&robot.publishers[*publisher].path));
+    let names = match &*estimator.outputs {
+        [] => vec!["out".to_owned()],
+        outputs => outputs.iter().map(|output| crate::names::text(&output.name)).collect(),
+    };
     quote!(__private::EstimatorDeclaration {
         path: #path,
         frame: __private::Frame::new(#frame),
         inputs: &[#(#inputs),*],
         outputs: &[#(#outputs),*],
+        output_names: &[#(#names),*],
         island: #island,
         supervisor: #supervisor,
         health: #health,

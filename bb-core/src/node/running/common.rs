@@ -77,7 +77,10 @@ impl Common {
             declaration,
             template: Stamp { frame: declaration.frame, origin: environment.origin(), ..Stamp::default() },
             stale_after_nanos: declaration.driver().and_then(|driver| driver.stale_after_nanos),
-            unmeasured: if declaration.health.latency_budget_nanos.is_some() { 0 } else { SAMPLED - 1 },
+            unmeasured: match declaration.health.latency_budget_nanos {
+                None if environment.telemetry().is_none() => SAMPLED - 1,
+                _ => 0,
+            },
             handles_moving_joints: replacement
                 .map_or(handles_moving_joints, |replacement| replacement.handles_moving_joints()),
             shared,

@@ -15,7 +15,7 @@ use crate::time::MonotonicTime;
 
 impl Common {
     /// Begins a run on a message of the driver, and the measurement of its duration if it is measured: all runs where a latency budget
-    /// is declared, else every 64th.
+    /// is declared or a telemetry handler listens, else every 64th.
     #[inline]
     pub(super) fn begin(&self, turn: &Turn<'_>) -> Option<Begun> {
         if self.shared.counters().dispatched.increment() & self.unmeasured == 0 {
@@ -27,9 +27,8 @@ impl Common {
 
     /// Begins any other callback.
     pub(super) fn begin_other(&self, turn: &Turn<'_>) -> Option<Begun> {
-        let is_measured = self.declaration.health.latency_budget_nanos.is_some();
         turn.timing().interrupt();
-        is_measured.then(|| turn.timing().begin(turn.environment()))
+        (self.unmeasured == 0).then(|| turn.timing().begin(turn.environment()))
     }
 
     /// Completes a run on the driver's message of `time`, which came at that input.

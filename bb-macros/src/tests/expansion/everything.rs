@@ -407,6 +407,7 @@ const _: () = {
             frame: __private::Frame::new("base"),
             inputs: &[__private::InputDeclaration::nested("imu", "sensor/base/imu")],
             outputs: &["sensor/base/imu/tilt"],
+            output_names: &["out"],
             island: 0usize,
             supervisor: 1usize,
             health: __private::HealthDeclaration {
@@ -463,6 +464,7 @@ const _: () = {
                 },
             ],
             outputs: &["estimator/base/pose/pose", "nav/velocity"],
+            output_names: &["pose", "velocity"],
             island: 1usize,
             supervisor: 1usize,
             health: __private::HealthDeclaration::NONE,
