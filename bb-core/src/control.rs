@@ -33,7 +33,7 @@ pub(crate) use callbacks::{Inside, is_in_actuator};
 pub use command::{CommandStatistics, Prepared};
 pub(crate) use commands::Hanging;
 pub use execution::{CommandError, Execution};
-pub use faults::ReportedFault;
+pub use faults::{ReportedFault, ReportedSafetyError};
 pub(crate) use system::{ActuatorTopics, SystemTopics};
 
 use crate::component::{Caller, Host};
@@ -50,7 +50,7 @@ use budgets::Budgets;
 use callbacks::{Apart, Callback, Hooks};
 use effects::Reporter;
 use execution::Slot;
-use faults::Faults;
+use faults::{Faults, SafetyErrors};
 #[cfg(loom)]
 use loom::sync::{Condvar, Mutex as StateMutex, MutexGuard, atomic::AtomicU8};
 use machine::Machine;
@@ -113,6 +113,7 @@ struct Inner {
     /// Reports of islands in a replay, until the journal says that they were processed.
     reports: Mutex<HashMap<usize, VecDeque<Report>>>,
     faults: Mutex<Faults>,
+    safety_errors: Mutex<SafetyErrors>,
     /// A sensor or a service got an order, on virtual time.
     has_orders: AtomicBool,
     /// Tells sensors and services to stop.
@@ -134,6 +135,7 @@ pub(crate) struct Summary {
     /// The newest faults.
     pub(crate) faults: Vec<ReportedFault>,
     pub(crate) all_faults: u64,
+    pub(crate) safety_errors: Vec<ReportedSafetyError>,
 }
 
 /// The destination of entries for estimators.

@@ -14,4 +14,4 @@ pub use fault::ComponentFault;
 pub use health::{HealthReason, HealthState, HealthTransition};
 pub use parameter::{ParameterChange, ParameterValue};
 pub use rights::{Forbidden, Right, Rights};
-pub use safety::{Safety, SafetyError, SafetyTransition};
+pub use safety::{HardwareError, HardwareErrorKind, Quantity, Safety, SafetyError, SafetyTransition};

@@ -64,8 +64,8 @@ pub use component::{
 };
 pub use declaration::{ParameterError, Role};
 pub use event::{
-    ArmError, ComponentFault, DisarmError, Forbidden, HealthReason, HealthState, HealthTransition, ParameterValue,
-    Refusal, Right, Rights, Safety,
+    ArmError, ComponentFault, DisarmError, Forbidden, HardwareError, HardwareErrorKind, HealthReason, HealthState,
+    HealthTransition, ParameterValue, Refusal, Right, Rights, Safety,
 };
 pub use fault::{Fault, Termination};
 pub use message::{
@@ -97,8 +97,10 @@ pub mod prelude {
         SafetyLink, Sensor, SensorContext, Service, ServiceContext,
     };
     pub use crate::declaration::Role;
-    pub use crate::event::{HealthReason, HealthState, HealthTransition, Right, Rights, Safety};
-    pub use crate::fault::Fault;
+    pub use crate::event::{
+        HardwareError, HardwareErrorKind, HealthReason, HealthState, HealthTransition, Right, Rights, Safety,
+    };
+    pub use crate::fault::{Fault, Termination};
     pub use crate::message::{JointSide, RosMessage, Stamped};
     pub use crate::payload::*;
     pub use crate::pubsub::{Overflow, Select, Subscription};

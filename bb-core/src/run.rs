@@ -31,7 +31,7 @@ mod visit;
 mod wired;
 
 pub use crate::component::{ActuatorError, ActuatorLink, Bus};
-pub use crate::control::{CommandError, CommandStatistics, Execution, ReportedFault};
+pub use crate::control::{CommandError, CommandStatistics, Execution, ReportedFault, ReportedSafetyError};
 pub use crate::event::ComponentFault;
 pub use crate::lifecycle::Supervision;
 pub use crate::node::{DropReason, EstimatorStatistics, InputStatistics, LatencyStatistics};

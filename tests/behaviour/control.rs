@@ -267,7 +267,7 @@ fn what_cannot_be_made_safe_is_an_error_until_it_is_forced() -> Result<(), Failu
     assert_eq!((simulation.state(), simulation.safety()), ("disarmed", Safety::Error));
     let error = errors.try_recv().expect("it is published");
     assert_eq!(
-        (error.path, error.message.as_str()),
+        (error.path, error.error.message.as_str()),
         ("actuator/base/pan/servo", "disarming failed: the brake does not close")
     );
     assert_eq!(

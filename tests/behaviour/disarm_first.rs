@@ -481,7 +481,7 @@ fn an_actuator_that_fails_and_cannot_be_made_safe_leads_to_error() -> Result<(),
     assert!(simulation.actuate(crane::actuator::base::hook::winch, Number(-1.0)).is_err());
     simulation.run_until(at(5));
     assert_eq!(simulation.safety(), Safety::Error);
-    let error = errors.try_recv().map(|error| (error.path, error.payload.message));
+    let error = errors.try_recv().map(|error| (error.path, error.payload.error.message));
     let message = "it has failed and could not be made safe: the brake does not answer";
     assert_eq!(error, Some(("actuator/base/hook/winch", message.to_owned())));
     // Nor later, when it was made again.
@@ -587,7 +587,7 @@ fn a_component_that_reports_a_hardware_error_has_the_robot_disarmed() -> Result<
     simulation.run_until(at(100));
     assert_eq!(simulation.safety(), Safety::Error);
     assert_eq!(MADE_SAFE.load(Ordering::SeqCst), made_safe + 1);
-    let error = errors.try_recv().map(|error| (error.path, error.payload.message));
+    let error = errors.try_recv().map(|error| (error.path, error.payload.error.message));
     assert_eq!(error, Some(("sensor/base/thermometer", "it burns".to_owned())));
     assert!(simulation.arm().is_err());
     // A robot that is disarmed is in `error` as well.

@@ -2,6 +2,7 @@
 
 use crate::components::{Doing, Done, Failure, Number, Source, Task, at, lock};
 use crate::replay::same_again;
+use bb_core::event::Quantity;
 use bb_core::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard};
@@ -38,7 +39,8 @@ impl Estimator for LoadGuard {
             return Err(Fault::new("no such load"));
         }
         if load.0 > TOO_MUCH {
-            self.0.hardware_error(format!("a load of {} kg", load.0));
+            let error = HardwareError::new(HardwareErrorKind::Overload, "the load");
+            self.0.hardware_error(error.with_quantity(load.0, "kg"));
         }
         Ok(Reply::emit(load.payload))
     }
@@ -104,9 +106,19 @@ fn an_estimator_brakes_and_reports_a_hardware_error() -> Result<(), Failure> {
         simulation.publish(hoist::sensor::base::load, at(1), Number(WRONG));
         simulation.publish(hoist::sensor::base::load, at(50), Number(TOO_MUCH));
         assert_eq!((simulation.safety(), braked()), (Safety::Armed, [0, 0]));
+        let errors = simulation.subscribe(system::SafetyErrors);
         simulation.publish(hoist::sensor::base::load, at(51), Number(TOO_MUCH + 1.0));
         assert_eq!((simulation.safety(), braked()), (Safety::Error, [1, 0]));
-        assert_eq!(simulation.report().estimator("sensor/base/load/guard").map(|guard| guard.restarts), Some(1));
+        let report = simulation.report();
+        assert_eq!(report.estimator("sensor/base/load/guard").map(|guard| guard.restarts), Some(1));
+        // For programs, by its kind and its value.
+        let error = errors.try_recv().expect("it is published").payload;
+        assert_eq!((error.path, error.error.kind), ("sensor/base/load/guard", HardwareErrorKind::Overload));
+        assert_eq!(error.error.quantity, Some(Quantity { value: TOO_MUCH + 1.0, unit: "kg" }));
+        // For people, with what a sensor said as it was made.
+        let lines: Vec<_> = report.safety_errors.iter().map(ToString::to_string).collect();
+        let load = "sensor/base/load/guard was unsafe: the load (overload: 101 kg)";
+        assert_eq!(lines, ["sensor/base/burnt was unsafe: it is burnt", load]);
         Ok(())
     })
 }

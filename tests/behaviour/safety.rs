@@ -136,7 +136,7 @@ fn a_disarm_that_panics_leads_to_error_and_the_next_one_may_succeed() -> Result<
         "not everything could be made safe: `actuator/base/pan/motor`: disarming failed: panicked: no brake"
     );
     assert_eq!(running.safety(), Safety::Error);
-    let message = errors.try_recv().map(|error| error.payload.message);
+    let message = errors.try_recv().map(|error| error.payload.error.message);
     assert_eq!(message.as_deref(), Some("disarming failed: panicked: no brake"));
     assert!(running.force_disarm().is_err(), "it still cannot");
     assert_eq!(running.safety(), Safety::Disarmed);

@@ -4,7 +4,7 @@ use super::guardian::DisarmHook;
 use super::host::Host;
 use super::{Bus, Caller, Fault, NoOptions, Options};
 use crate::declaration::Role;
-use crate::event::HealthTransition;
+use crate::event::{HardwareError, HealthTransition};
 use crate::message::Field;
 use crate::message::Payload;
 use crate::schedule::{Alarm, Sleeper};
@@ -162,9 +162,9 @@ impl CommandContext {
     }
 
     /// Reports that hardware is in a dangerous state: the robot is disarmed, its safety state becomes `error`, and the error
-    /// is published at `safety/error`.
-    pub fn hardware_error(&self, message: impl Into<String>) {
-        self.hooks.hardware_error(message.into());
+    /// is published at `safety/error`. Give a text, or a [`HardwareError`] with a kind and a quantity.
+    pub fn hardware_error(&self, error: impl Into<HardwareError>) {
+        self.hooks.hardware_error(error.into());
     }
 
     /// Topics, actuators, parameters and commands, by path.
@@ -201,8 +201,8 @@ impl OwnHooks {
         self.host.controls().transition(self.execution, state, caller)
     }
 
-    pub(crate) fn hardware_error(&self, message: String) {
-        self.host.controls().hardware_error(self.path, message);
+    pub(crate) fn hardware_error(&self, error: HardwareError) {
+        self.host.controls().hardware_error(self.path, error);
     }
 }
 

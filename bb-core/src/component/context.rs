@@ -6,6 +6,7 @@ use super::motion_reports::{MotionReport, MotionReports};
 use super::replacement::Replacement;
 use super::{Bus, Caller, Counter, Counts, Fault, Request, SafetyLink};
 use crate::declaration::{ActuatorDeclaration, EstimatorDeclaration, InputDeclaration, SensorDeclaration};
+use crate::event::HardwareError;
 use crate::message::{Frame, JointSide};
 use crate::payload::{BeginMotion, EndMotion, MotionEnd};
 use crate::time::{Clock, MonotonicTime};
@@ -124,8 +125,8 @@ impl Context {
     }
 
     /// Reports that hardware is in a dangerous state; see [`SafetyLink::hardware_error`].
-    pub fn hardware_error(&self, message: impl Into<String>) {
-        self.safety.hardware_error(message);
+    pub fn hardware_error(&self, error: impl Into<HardwareError>) {
+        self.safety.hardware_error(error);
     }
 
     /// A link with the same functions, to keep for later callbacks.
@@ -224,9 +225,9 @@ impl ComponentContext {
     }
 
     /// Reports that hardware is in a dangerous state: the robot is disarmed, its safety state becomes `error`, and the error
-    /// is published at `safety/error`.
-    pub fn hardware_error(&self, message: impl Into<String>) {
-        self.host.controls().hardware_error(self.path, message.into());
+    /// is published at `safety/error`. Give a text, or a [`HardwareError`] with a kind and a quantity.
+    pub fn hardware_error(&self, error: impl Into<HardwareError>) {
+        self.host.controls().hardware_error(self.path, error.into());
     }
 }
 

@@ -1,6 +1,7 @@
 //! Safety functions for any component.
 
 use super::Fault;
+use crate::event::HardwareError;
 use std::fmt;
 use std::sync::Arc;
 
@@ -11,7 +12,7 @@ pub(crate) type DisarmHook = Arc<dyn Fn() -> Result<(), Fault> + Send + Sync>;
 pub(crate) trait Guardian: Send + Sync {
     /// Adds a callback of the component at `path`, or of that execution of the command there.
     fn on_disarm(&self, path: &'static str, execution: Option<u64>, hook: DisarmHook);
-    fn hardware_error(&self, path: &'static str, message: String);
+    fn hardware_error(&self, path: &'static str, error: HardwareError);
 }
 
 /// Registers disarm callbacks and reports hardware errors, for a component whose later calls get no context: an
@@ -39,10 +40,10 @@ impl SafetyLink {
     }
 
     /// Reports that hardware is in a dangerous state: the robot is disarmed, its safety state becomes `error`, and the error
-    /// is published at `safety/error`.
-    pub fn hardware_error(&self, message: impl Into<String>) {
+    /// is published at `safety/error`. Give a text, or a [`HardwareError`] with a kind and a quantity.
+    pub fn hardware_error(&self, error: impl Into<HardwareError>) {
         if let Some(guardian) = &self.guardian {
-            guardian.hardware_error(self.path, message.into());
+            guardian.hardware_error(self.path, error.into());
         }
     }
 }

@@ -13,7 +13,7 @@ use super::machine::IDLE;
 use super::step::Step;
 use super::{Control, Disarming, Limit, Phase, RunningCommand, State};
 use crate::component::Caller;
-use crate::event::{ArmError, DisarmError, Safety, SafetyError};
+use crate::event::{ArmError, DisarmError, HardwareError, HardwareErrorKind, Safety, SafetyError};
 use crate::journal::Event;
 use crate::node::Mode;
 use crate::time::MonotonicTime;
@@ -187,10 +187,10 @@ impl Control {
     }
 
     /// Hardware is in a dangerous state: the robot is disarmed, and in `error`.
-    pub(crate) fn note_hardware_error(&self, path: &'static str, message: String) {
+    pub(crate) fn note_hardware_error(&self, path: &'static str, error: HardwareError) {
         let mut step = self.step();
-        step.line(Event::HardwareError { path, message: message.clone() });
-        step.hardware_error(SafetyError { path, message });
+        step.line(Event::HardwareError { path, error: error.clone() });
+        step.hardware_error(SafetyError { path, error });
         step.finish();
     }
 
@@ -316,7 +316,8 @@ impl Control {
 
 /// The disarm callback of a component did not return.
 pub(super) fn late_at(path: &'static str) -> SafetyError {
-    SafetyError { path, message: "did not come back from disarming in time".to_owned() }
+    let message = "did not come back from disarming in time";
+    SafetyError { path, error: HardwareError::new(HardwareErrorKind::NotMadeSafe, message) }
 }
 
 impl Step<'_> {

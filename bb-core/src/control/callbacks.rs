@@ -9,7 +9,7 @@
 
 use super::{Control, Key, State};
 use crate::component::DisarmHook;
-use crate::event::SafetyError;
+use crate::event::{HardwareError, HardwareErrorKind, SafetyError};
 use crate::fault::caught;
 use crate::schedule::Reserved;
 use std::cell::RefCell;
@@ -79,7 +79,10 @@ impl Callback {
             };
             let error = failed.map(|failed| SafetyError {
                 path: self.path,
-                message: format!("disarming failed: {}", failed.fault),
+                error: HardwareError::new(
+                    HardwareErrorKind::NotMadeSafe,
+                    format!("disarming failed: {}", failed.fault),
+                ),
             });
             let next = self.wanted(control);
             for reason in std::mem::replace(&mut reasons, next) {

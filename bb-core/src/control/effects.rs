@@ -181,6 +181,10 @@ impl Control {
         true
     }
 
+    pub(super) fn keep_safety_error(&self, error: SafetyError, now: MonotonicTime) {
+        lock(&self.0.safety_errors).add(error, now);
+    }
+
     pub(super) fn keep_fault(&self, fault: ComponentFault, now: MonotonicTime) {
         lock(&self.0.faults).add(fault, now);
     }
@@ -240,8 +244,10 @@ fn write_log(log: &Log) {
         }
         Log::Safety { from, to } => tracing::info!(%from, %to, "safety changed"),
         Log::State { from, to, command } => tracing::info!(from, to, command, "state changed"),
-        Log::SafetyError(SafetyError { path, message }) => {
-            tracing::error!(component = path, error = message, "safety error");
+        Log::SafetyError(SafetyError { path, error }) => {
+            let quantity = error.quantity.map(tracing::field::display);
+            let (text, kind) = (error.message.as_str(), error.kind.name());
+            tracing::error!(component = path, error = text, kind, quantity, "safety error");
             if is_plain {
                 eprintln!("safety error at {path}: {message}");
             }

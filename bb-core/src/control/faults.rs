@@ -1,6 +1,6 @@
 //! The faults that a report lists.
 
-use crate::event::ComponentFault;
+use crate::event::{ComponentFault, SafetyError};
 use crate::time::MonotonicTime;
 use std::collections::VecDeque;
 use std::fmt;
@@ -40,6 +40,46 @@ impl fmt::Display for ReportedFault {
             write!(f, " ({count} times in {:.3} s)", Duration::from_nanos(nanos).as_secs_f64())?;
         }
         Ok(())
+    }
+}
+
+/// The errors of one kind of a component that have made the safety state `error`.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct ReportedSafetyError {
+    /// The last of them.
+    pub last: SafetyError,
+    /// How many there were.
+    pub count: u64,
+    /// When the last occurred.
+    pub last_time: MonotonicTime,
+}
+
+impl fmt::Display for ReportedSafetyError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { last: SafetyError { path, error }, count, .. } = self;
+        write!(f, "{path} was unsafe: {error}")?;
+        if *count > 1 { write!(f, " ({count} times)") } else { Ok(()) }
+    }
+}
+
+/// Errors that have made the safety state `error`, by component and kind, in the order in which they occurred first.
+#[derive(Debug, Default)]
+pub(super) struct SafetyErrors(Vec<ReportedSafetyError>);
+
+impl SafetyErrors {
+    pub(super) fn add(&mut self, error: SafetyError, now: MonotonicTime) {
+        let key = |error: &SafetyError| (error.path, error.error.kind);
+        let has_room = self.0.len() < KEPT;
+        match self.0.iter_mut().find(|known| key(&known.last) == key(&error)) {
+            Some(known) => *known = ReportedSafetyError { last: error, count: known.count + 1, last_time: now },
+            None if has_room => self.0.push(ReportedSafetyError { last: error, count: 1, last_time: now }),
+            None => {}
+        }
+    }
+
+    pub(super) fn all(&self) -> Vec<ReportedSafetyError> {
+        self.0.clone()
     }
 }
 

@@ -5,7 +5,7 @@ use super::effects::Log;
 use super::step::Step;
 use super::{ComponentOrder, Control};
 use crate::declaration::{ParameterValues, Supervisor};
-use crate::event::{HealthReason, HealthState, HealthTransition, SafetyError};
+use crate::event::{HardwareError, HardwareErrorKind, HealthReason, HealthState, HealthTransition, SafetyError};
 use crate::fault::Failed;
 use crate::journal::Event;
 use crate::node::{BindTarget, Check, HealthReport, Mode, NodeEntry, Overseer, Report};
@@ -250,8 +250,9 @@ impl Step<'_> {
                         own.for_each(|component| (component.order)(ComponentOrder::GiveUp));
                     }
                 }
-                let message = "panicked too often, and is not restarted any more".to_owned();
-                self.hardware_error(SafetyError { path, message });
+                let message = "panicked too often, and is not restarted any more";
+                let error = HardwareError::new(HardwareErrorKind::Panics, message);
+                self.hardware_error(SafetyError { path, error });
             }
         }
     }

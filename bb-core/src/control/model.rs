@@ -89,7 +89,7 @@ const STOPS: Thread = |control, _| control.begin_stop();
 const ARMS: Thread = |control, _| {
     let _ = control.arm(&Caller::PROGRAM);
 };
-const BURNS: Thread = |control, _| control.hardware_error("motor", "it burns".to_owned());
+const BURNS: Thread = |control, _| control.hardware_error("motor", "it burns".into());
 /// The first time that the robot is disarmed.
 const TIME_IS_OVER: Thread = |control, _| control.disarm_timeout(1);
 

@@ -12,7 +12,7 @@ use super::callbacks::{Apart, Callback, Forgotten, Owner, Reason, is_awaited, is
 use super::step::Step;
 use super::{Control, Key, Limit, State};
 use crate::component::{DisarmHook, Guardian};
-use crate::event::{Safety, SafetyError};
+use crate::event::{HardwareError, Safety, SafetyError};
 use crate::fault::{Failed, Fault, discard};
 use crate::journal::Event;
 use crate::node::Mode;
@@ -215,12 +215,12 @@ impl Step<'_> {
         Some(key)
     }
 
-    fn was_not_safe(&mut self, is_failed_init: bool, SafetyError { path, message }: SafetyError) {
+    fn was_not_safe(&mut self, is_failed_init: bool, SafetyError { path, error }: SafetyError) {
         if is_failed_init {
             return self.note_fault(path, message);
         }
-        self.line(Event::HardwareError { path, message: message.clone() });
-        self.hardware_error(SafetyError { path, message });
+        self.line(Event::HardwareError { path, error: error.clone() });
+        self.hardware_error(SafetyError { path, error });
     }
 
     fn end_apart(&mut self, key: Key) {
@@ -251,9 +251,9 @@ impl Guardian for Control {
         }
     }
 
-    fn hardware_error(&self, path: &'static str, message: String) {
+    fn hardware_error(&self, path: &'static str, error: HardwareError) {
         if self.0.mode != Mode::Replay {
-            self.note_hardware_error(path, message);
+            self.note_hardware_error(path, error);
         }
     }
 }

@@ -84,6 +84,7 @@ impl Step<'_> {
 
     pub(super) fn publish_safety_error(&mut self, error: SafetyError) {
         self.effects.log(Log::SafetyError(error.clone()));
+        self.control.keep_safety_error(error.clone(), self.now);
         self.publish(&self.control.0.topics.safety_error, error, self.now);
     }
 

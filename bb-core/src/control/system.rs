@@ -90,6 +90,7 @@ impl Control {
             pending_hooks: Mutex::default(),
             reports: Mutex::default(),
             faults: Mutex::default(),
+            safety_errors: Mutex::default(),
             has_orders: AtomicBool::new(false),
             stop: StopSignal::default(),
             islands: OnceLock::new(),
@@ -208,6 +209,7 @@ impl Control {
             safety: state.machine.safety,
             faults,
             all_faults,
+            safety_errors: self.0.safety_errors.lock().unwrap_or_else(PoisonError::into_inner).all(),
         }
     }
 

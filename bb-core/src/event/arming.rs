@@ -27,7 +27,7 @@ pub enum ArmError {
 }
 
 /// Why a robot may not be safe.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum DisarmError {
     /// These disarm callbacks failed or did not return in time.
@@ -71,8 +71,8 @@ impl fmt::Display for DisarmError {
         match self {
             Self::Failed(errors) => {
                 f.write_str("not everything could be made safe")?;
-                for (index, SafetyError { path, message }) in errors.iter().enumerate() {
-                    write!(f, "{}`{path}`: {message}", if index == 0 { ": " } else { "; " })?;
+                for (index, SafetyError { path, error }) in errors.iter().enumerate() {
+                    write!(f, "{}`{path}`: {}", if index == 0 { ": " } else { "; " }, error.message)?;
                 }
                 Ok(())
             }

@@ -38,10 +38,147 @@ pub struct SafetyTransition {
 }
 
 /// Why the safety state is `error`, published at `safety/error`.
-#[derive(Clone, Debug, PartialEq, Eq, Payload)]
+#[derive(Clone, Debug, PartialEq, Payload)]
 pub struct SafetyError {
     /// The component.
     pub path: &'static str,
     /// What happened.
+    pub error: HardwareError,
+}
+
+impl fmt::Display for SafetyError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "`{}`: {}", self.path, self.error)
+    }
+}
+
+/// What is dangerous about hardware: a kind and a quantity for programs, a text for people. A text alone converts to one.
+///
+/// ```
+/// use bb_core::event::{HardwareError, HardwareErrorKind, Quantity};
+///
+/// let plain = HardwareError::from("the bus is silent");
+/// assert_eq!((plain.kind, plain.quantity), (HardwareErrorKind::Unspecified, None));
+///
+/// let hot = HardwareError::new(HardwareErrorKind::Overheating, "the winding").with_quantity(85.0, "degC");
+/// assert_eq!(hot.to_string(), "the winding (overheating: 85 degC)");
+/// match (hot.kind, hot.quantity) {
+///     (HardwareErrorKind::Overheating, Some(Quantity { value, .. })) => assert!(value > 80.0),
+///     _ => unreachable!(),
+/// }
+/// ```
+#[derive(Clone, Debug, PartialEq, Payload)]
+#[non_exhaustive]
+pub struct HardwareError {
+    /// What kind of danger it is.
+    pub kind: HardwareErrorKind,
+    /// The quantity that shows it.
+    pub quantity: Option<Quantity>,
+    /// What happened, for people.
     pub message: String,
+}
+
+impl HardwareError {
+    /// An error of that kind.
+    pub fn new(kind: HardwareErrorKind, message: impl Into<String>) -> Self {
+        Self { kind, quantity: None, message: message.into() }
+    }
+
+    /// The same with the quantity that shows it; `unit` is a text, such as `degC`, or empty.
+    pub fn with_quantity(self, value: f64, unit: &'static str) -> Self {
+        Self { quantity: Some(Quantity { value, unit }), ..self }
+    }
+}
+
+impl<T: Into<String>> From<T> for HardwareError {
+    fn from(message: T) -> Self {
+        Self::new(HardwareErrorKind::Unspecified, message)
+    }
+}
+
+impl fmt::Display for HardwareError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { kind, quantity, message } = self;
+        f.write_str(message)?;
+        match (kind, quantity) {
+            (HardwareErrorKind::Unspecified, None) => Ok(()),
+            (HardwareErrorKind::Unspecified, Some(quantity)) => write!(f, " ({quantity})"),
+            (kind, None) => write!(f, " ({kind})"),
+            (kind, Some(quantity)) => write!(f, " ({kind}: {quantity})"),
+        }
+    }
+}
+
+/// A kind of danger, to match on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Payload)]
+#[non_exhaustive]
+pub enum HardwareErrorKind {
+    /// Only a text says what it is.
+    #[default]
+    Unspecified,
+    /// It is too hot.
+    Overheating,
+    /// Too much current flows.
+    Overcurrent,
+    /// The voltage is too high.
+    Overvoltage,
+    /// The voltage is too low.
+    Undervoltage,
+    /// The load, force or torque is too great.
+    Overload,
+    /// It does not move, or not as it was told.
+    Blocked,
+    /// It has left its range, or a limit switch was hit.
+    OutOfRange,
+    /// It does not answer, or what it says makes no sense.
+    Communication,
+    /// A disarm callback failed or did not return in time.
+    NotMadeSafe,
+    /// Its code panicked too often.
+    Panics,
+    /// A kind of the component's own.
+    Other(&'static str),
+}
+
+impl HardwareErrorKind {
+    /// Its name: `overheating`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Unspecified => "unspecified",
+            Self::Overheating => "overheating",
+            Self::Overcurrent => "overcurrent",
+            Self::Overvoltage => "overvoltage",
+            Self::Undervoltage => "undervoltage",
+            Self::Overload => "overload",
+            Self::Blocked => "blocked",
+            Self::OutOfRange => "out of range",
+            Self::Communication => "communication",
+            Self::NotMadeSafe => "not made safe",
+            Self::Panics => "panics",
+            Self::Other(name) => name,
+        }
+    }
+}
+
+impl fmt::Display for HardwareErrorKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// A number with its unit.
+#[derive(Clone, Copy, Debug, PartialEq, Payload)]
+pub struct Quantity {
+    /// The number.
+    pub value: f64,
+    /// The unit; empty without one.
+    pub unit: &'static str,
+}
+
+impl fmt::Display for Quantity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { value, unit } = self;
+        write!(f, "{value}")?;
+        if unit.is_empty() { Ok(()) } else { write!(f, " {unit}") }
+    }
 }

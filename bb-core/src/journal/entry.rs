@@ -1,6 +1,6 @@
 //! The lines of a journal.
 
-use crate::event::{ParameterValue, SafetyError};
+use crate::event::{HardwareError, ParameterValue, SafetyError};
 use crate::joints::PlacedInput;
 use crate::message::Payload;
 use crate::message::codec::{Reader, Shape, Writer};
@@ -202,7 +202,7 @@ pub enum Event {
         /// By which component.
         path: &'static str,
         /// What happened.
-        message: String,
+        error: HardwareError,
     },
     /// Parameters were set, all at once.
     Parameters {

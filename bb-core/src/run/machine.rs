@@ -135,7 +135,7 @@ impl Machine {
         let estimators: Vec<_> = self.environment.nodes().iter().map(|node| node.statistics()).collect();
         let made = self.control.topics().registry.statistics();
         let sources = self.sources.lock().unwrap_or_else(PoisonError::into_inner);
-        let Summary { commands, state, safety, faults, all_faults } = control;
+        let Summary { commands, state, safety, faults, all_faults, safety_errors } = control;
         Report {
             topics: topics.iter().map(|topic| topic.statistics()).chain(made).collect(),
             estimators,
@@ -147,6 +147,7 @@ impl Machine {
             safety,
             faults,
             all_faults,
+            safety_errors,
         }
     }
 

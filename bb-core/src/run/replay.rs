@@ -310,7 +310,7 @@ impl Replayer {
                 control.component_failed(path, supervisor, message, panicked);
             }
             Event::Noted { path, message } => control.note_fault(path, message),
-            Event::HardwareError { path, message } => control.note_hardware_error(path, message),
+            Event::HardwareError { path, error } => control.note_hardware_error(path, error),
             Event::Parameters { changes } => control.replay_parameters(changes),
             Event::Command { command, caller } => control.replay_command(command, caller),
             Event::Ended { execution, end } => control.replay_end(execution, end),

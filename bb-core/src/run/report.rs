@@ -2,7 +2,7 @@
 
 use super::SourceStatistics;
 use super::actuator::ActuatorStatistics;
-use crate::control::{CommandStatistics, ReportedFault};
+use crate::control::{CommandStatistics, ReportedFault, ReportedSafetyError};
 use crate::event::{ComponentFault, Safety};
 use crate::joints::{JointRefusal, JointStatistics};
 use crate::message::LimitedQuantity;
@@ -35,6 +35,8 @@ pub struct Report {
     pub faults: Vec<ReportedFault>,
     /// How many faults there were, with those that were repeated.
     pub all_faults: u64,
+    /// Errors that have made the safety state `error`, by component and kind: at most 256.
+    pub safety_errors: Vec<ReportedSafetyError>,
 }
 
 impl Report {
@@ -138,6 +140,9 @@ impl fmt::Display for Report {
         }
         for fault in &self.faults {
             writeln!(f, "{fault}")?;
+        }
+        for error in &self.safety_errors {
+            writeln!(f, "{error}")?;
         }
         Ok(())
     }

@@ -1,5 +1,6 @@
 //! A report as metrics, one family after the other: the text format requires each family to be contiguous.
 
+use bb_core::event::SafetyError;
 use bb_core::pubsub::TopicStatistics;
 use bb_core::run::CommandStatistics;
 use bb_core::run::SourceStatistics;
@@ -190,7 +191,13 @@ fn robot(families: &mut Families<'_>, report: &Report, declared_states: &[&str])
             .chain(declared_states)
             .try_for_each(|state| family.gauge(&[("state", state)], one_if(report.state == *state)))
     })?;
-    families.counter("faults", "Faults of components", |family| family.count(&[], report.all_faults))
+    families.counter("faults", "Faults of components", |family| family.count(&[], report.all_faults))?;
+    families.counter("safety_errors", "Errors that made the safety state `error`", |family| {
+        report.safety_errors.iter().try_for_each(|reported| {
+            let SafetyError { path, error } = &reported.last;
+            family.count(&[("component", path), ("kind", error.kind.name())], reported.count)
+        })
+    })
 }
 
 fn one_if(condition: bool) -> f64 {

@@ -31,6 +31,7 @@
 //! | `bb_safety_state` | `state` | 1 for the one that it is in |
 //! | `bb_operational_state` | `state` | 1 for the one that it is in |
 //! | `bb_faults_total` | | faults of components |
+//! | `bb_safety_errors_total` | `component`, `kind` | errors that made the safety state `error` |
 //!
 //! Counters are exported at 0 from the first scrape on, so that the first increment is seen as one.
 

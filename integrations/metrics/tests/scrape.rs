@@ -37,7 +37,10 @@ impl Estimator for Judge {
     fn handle_input(&mut self, imu: &Stamped<Imu>) -> Result<Reply<Imu>, Fault> {
         match imu.angular_velocity.x {
             1.0 => Ok(Reply::none().diverged("told so")),
-            2.0 => Err(Fault::new("told so")),
+            2.0 => {
+                self.0.hardware_error(HardwareError::new(HardwareErrorKind::Overheating, "the winding"));
+                Err(Fault::new("told so"))
+            }
             _ => Ok(Reply::emit(imu.payload)),
         }
     }
@@ -172,6 +175,12 @@ fn counters_are_right_from_the_first_scrape_on() {
     publish(&mut simulation, 1001, 2.0);
     let third = scrape(&server);
     assert_eq!((third[&judge("running", "")], third["bb_faults_total{}"]), (0.0, 1.0));
+    let hot = "bb_safety_errors_total{component=\"sensor/base/imu/judge\",kind=\"overheating\"}";
+    assert_eq!(third[hot], 1.0);
+    assert!(
+        third.keys().all(|name| !name.contains("imu/absent\"") || name.starts_with("bb_topic")),
+        "it is left out"
+    );
     simulation.run_for(Duration::from_secs(2));
     let fourth = scrape(&server);
     assert_eq!((fourth[&judge("running", "")], fourth[&judge("restarts_total", "")]), (1.0, 1.0));

@@ -7,6 +7,7 @@
 use super::{EstimatorDeclaration, Island, IslandDeclaration, IslandState, IslandWiring, Key};
 use crate::component::{DisarmHook, Guardian};
 use crate::declaration::ParameterValues;
+use crate::event::HardwareError;
 use crate::fault::Failed;
 use crate::joints::Joints;
 use crate::journal::Event;
@@ -64,7 +65,7 @@ struct Nobody;
 impl Guardian for Nobody {
     fn on_disarm(&self, _: &'static str, _: Option<u64>, _: DisarmHook) {}
 
-    fn hardware_error(&self, _: &'static str, _: String) {}
+    fn hardware_error(&self, _: &'static str, _: HardwareError) {}
 }
 
 impl Overseer for Nobody {

@@ -3,6 +3,7 @@
 use super::{Inner, State};
 use crate::component::Actuator;
 use crate::declaration::ActuatorDeclaration;
+use crate::event::{HardwareError, HardwareErrorKind};
 use crate::node::Mode;
 use crate::schedule::Lane;
 
@@ -39,7 +40,10 @@ impl<A: Actuator> Inner<A> {
             Told::Failed { message, panicked } => {
                 self.control.component_failed(path, supervisor, message, panicked)
             }
-            Told::Unsafe(message) => self.control.note_hardware_error(path, message),
+            Told::Unsafe(message) => {
+                let error = HardwareError::new(HardwareErrorKind::NotMadeSafe, message);
+                self.control.note_hardware_error(path, error);
+            }
             Told::MessageFailed(message) => self.control.note_fault(path, message),
             Told::Log(write) => write(),
         }
