@@ -60,7 +60,7 @@ pub use bb_macros::{Inputs, Options, Outputs};
 pub use component::{
     Actuator, ActuatorContext, Bus, Command, CommandContext, Context, Estimator, Every, HandleCall, HandleCast,
     Info, Input, Inputs, Options, Outcome, Outputs, Reading, Reply, Request, RequestCodec, SafetyLink, Sensor,
-    SensorContext, Service, ServiceContext,
+    SensorContext, Service, ServiceContext, Timed,
 };
 pub use declaration::{ParameterError, Role};
 pub use event::{
@@ -94,7 +94,7 @@ pub mod prelude {
     pub use crate::component::{
         Actuator, ActuatorContext, Arm, Command, CommandContext, Context, Disarm, Estimator, Every, External,
         HandleCall, HandleCast, Info, Input, NoArguments, NoOptions, Outcome, Reaction, Reading, Reply, Request,
-        SafetyLink, Sensor, SensorContext, Service, ServiceContext,
+        SafetyLink, Sensor, SensorContext, Service, ServiceContext, Timed,
     };
     pub use crate::declaration::Role;
     pub use crate::event::{
@@ -128,7 +128,7 @@ pub mod __private {
         At, EverySlot, FieldIndex, InputAt, LatestSlot, Slot, SyncMiss, TakenAt, declare,
     };
     pub use crate::component::options::OptionsList;
-    pub use crate::component::outputs::{EmittedAt, OutputAt};
+    pub use crate::component::outputs::{EmittedAt, OutputAt, OutputField};
     pub use crate::component::reference::number_of;
     pub use crate::component::setting::{ByCode, ByText, ByValue, Setting, SettingOf, WithUnit};
     pub use crate::component::{Command, CommandPath, Every, Input, InputField, OptionField, TopicField};

@@ -308,13 +308,27 @@ fn an_estimator_may_be_left_out() -> Result<(), StartError> {
     let builder = Partial::builder();
     let health = builder.subscribe(system::Health);
     let mut simulation = builder.simulate()?;
-    simulation.publish(summing::sensor::base::other, at(5), Number(1.0));
+    simulation.arm().expect("it may be armed");
+    simulation.publish(partial::sensor::base::number, at(5), Number(1.0));
+    simulation.run_until(at(500));
+    assert_eq!(simulation.state(), "idle", "no command has run");
+    let absent = "sensor/base/number/absent";
+    let changes: Vec<_> = health
+        .drain()
+        .map(|change| (change.monotonic_time, change.estimator, change.to, change.reason, change.source))
+        .collect();
+    let expected = [
+        (at(5), "estimator/base/pair", HealthState::Degraded, HealthReason::SyncMiss, absent),
+        (at(100), "estimator/base/driven", HealthState::Lost, HealthReason::Lost, absent),
+    ];
+    assert_eq!(changes, expected);
     let report = simulation.stop();
-    let second = report.estimator("sensor/base/other/second").expect("it is declared");
-    assert_eq!(second.stopped.as_deref(), Some("not on this robot"));
-    assert_eq!(second.health, HealthState::Degraded);
-    let changes: Vec<_> = health.drain().map(|change| (change.payload.estimator, change.payload.reason)).collect();
-    assert_eq!(changes, [("sensor/base/other/second", HealthReason::Stopped)]);
+    let statistics = report.estimator(absent).expect("it is declared");
+    assert_eq!((statistics.health, statistics.stopped.as_deref()), (None, Some("not on this robot")));
+    assert_eq!(statistics.inputs[0].dropped(DropReason::Stopped), 0, "nothing is lost that it should have had");
+    let lines = report.to_string();
+    let lines: Vec<_> = lines.lines().filter(|line| line.starts_with(absent) && line.contains(':')).collect();
+    assert_eq!(lines, [format!("{absent}: left out: not on this robot")]);
     assert!(report.ok().is_ok(), "that is no fault");
     Ok(())
 }

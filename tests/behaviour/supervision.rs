@@ -84,6 +84,39 @@ fn panics_go_up_link_joint_robot_and_restart_exactly_what_is_below() -> Result<(
     Ok(())
 }
 
+/// Nested in a sensor at a joint, an estimator belongs to the joint; nested in one of the robot, to the robot.
+#[test]
+fn an_estimator_is_restarted_by_the_supervisor_of_its_sensor() -> Result<(), StartError> {
+    let _alone = ALONE.lock();
+    let mut builder = Family::builder();
+    builder.supervision().longest_backoff = Duration::from_millis(250);
+    let mut simulation = builder.simulate()?;
+    simulation.arm().expect("it may be armed");
+    let start: Vec<_> = (0..6).map(made).collect();
+    let since = || (0..6).map(|number| made(number) - start[number]).collect::<Vec<_>>();
+    for failure in 1..=4 {
+        simulation.publish(family::sensor::base::neck::gauge, at(300 * failure), Number(1.0));
+        simulation.run_until(at(300 * failure + 290));
+        // In the base: its sensor and that one's estimator; in the head: the same; of the robot; at the joint.
+        let head = u32::from(failure == 4);
+        assert_eq!(since(), [0, 0, head, head, 0, failure as u32], "after {failure} failures at the joint");
+    }
+    let before = since();
+    for failure in 1..=4 {
+        let time = at(20_000 + 300 * failure);
+        simulation.publish(family::sensor::clock, time, Number(1.0));
+        simulation.run_until(time + Duration::from_millis(290));
+        let own = failure.min(3) as u32;
+        assert_eq!(
+            since(),
+            [&before[..4], &[own], &before[5..]].concat(),
+            "after {failure} failures of the robot's"
+        );
+        assert_eq!(simulation.safety() == Safety::Error, failure == 4, "there is nobody above");
+    }
+    Ok(())
+}
+
 #[test]
 fn a_fault_never_touches_another_component_however_often_it_comes() -> Result<(), StartError> {
     let _alone = ALONE.lock();

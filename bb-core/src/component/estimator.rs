@@ -45,7 +45,7 @@ pub trait Estimator: Sized + Send + 'static {
     type Options: Options;
     /// A payload, or a struct of several inputs.
     type Input: Inputs; // of a struct: `type Input = Pair<'static>;`
-    /// A payload, or a struct of several outputs.
+    /// A payload, or a struct of several outputs; [`Outputs`] lists the forms, among them several messages at once.
     type Output: Outputs;
 
     /// Whether it handles changing transforms, with [`handle_transforms`](Self::handle_transforms), so its inputs may
@@ -77,7 +77,8 @@ pub trait Estimator: Sized + Send + 'static {
         Ok(())
     }
 
-    /// Handles a timer, a tick or a timeout that it has asked for. Outputs are stamped with the current time.
+    /// Handles a timer, a tick or a timeout that it has asked for. Outputs are stamped with the current time, unless they
+    /// are [`Timed`](super::Timed).
     ///
     /// # Errors
     /// As for [`handle_input`](Self::handle_input).
@@ -127,7 +128,8 @@ pub trait HandleCall<Q>: Estimator {
     /// that derives [`Payload`](crate::message::Payload). By default, the journal holds only the outputs that they caused.
     const RECORD: Option<RequestCodec<Q>> = None;
 
-    /// Answers, and may emit outputs as well.
+    /// Answers, and may emit outputs as well. With [`Request::Restart`] in the reply, the estimator answers and then
+    /// stops, to be made again.
     ///
     /// # Errors
     /// As for [`handle_input`](Estimator::handle_input); the caller gets the error as well.

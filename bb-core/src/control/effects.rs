@@ -249,7 +249,7 @@ fn write_log(log: &Log) {
             let (text, kind) = (error.message.as_str(), error.kind.name());
             tracing::error!(component = path, error = text, kind, quantity, "safety error");
             if is_plain {
-                eprintln!("safety error at {path}: {message}");
+                eprintln!("safety error at {path}: {error}");
             }
         }
         Log::Fault(fault) => {

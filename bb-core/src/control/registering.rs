@@ -217,7 +217,7 @@ impl Step<'_> {
 
     fn was_not_safe(&mut self, is_failed_init: bool, SafetyError { path, error }: SafetyError) {
         if is_failed_init {
-            return self.note_fault(path, message);
+            return self.note_fault(path, error.message);
         }
         self.line(Event::HardwareError { path, error: error.clone() });
         self.hardware_error(SafetyError { path, error });

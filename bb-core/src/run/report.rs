@@ -11,7 +11,7 @@ use crate::pubsub::TopicStatistics;
 use std::fmt;
 
 /// Counts since the start. `Display` prints them as a table.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Report {
     /// Every publisher.

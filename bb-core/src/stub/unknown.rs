@@ -8,7 +8,7 @@ use crate::component::{
     ServiceContext, SyncMiss,
 };
 use crate::message::codec::{Reader, Shape, Writer};
-use crate::message::{DecodeError, Field, Finite, Payload, Stamped};
+use crate::message::{DecodeError, Field, Finite, Payload, Stamp, Stamped};
 use crate::time::MonotonicTime;
 
 /// A payload, sensor, estimator and so on, used wherever the real one is not known.
@@ -156,11 +156,9 @@ impl<I: Inputs> InputAt<UNKNOWN_INDEX> for I {
 impl<O: Outputs> OutputAt<UNKNOWN_INDEX> for O {
     type Payload = Unknown;
 
-    fn take(_: &mut Option<O>) -> Option<Unknown> {
-        stub()
-    }
+    fn each(_: &mut Option<O>, _: Stamp, _: impl FnMut(&Stamped<Unknown>)) {}
 
-    fn alone(_: Unknown) -> O {
+    fn alone(_: &Stamped<Unknown>) -> O {
         stub()
     }
 }

@@ -4,7 +4,7 @@ use super::fields;
 use crate::diagnostics::Diagnostics;
 use proc_macro2::TokenStream;
 use quote::{ToTokens, quote};
-use syn::DeriveInput;
+use syn::{DeriveInput, Type};
 
 pub(crate) fn outputs(item: &DeriveInput, diagnostics: &mut Diagnostics) -> TokenStream {
     let Some(named) = fields::named(item, "Outputs", diagnostics) else {
@@ -16,21 +16,26 @@ pub(crate) fn outputs(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Toke
     let (mut names, mut takes) = (Vec::new(), TokenStream::new());
     for (index, field) in named.iter().enumerate() {
         let Some(field_name) = &field.ident else { continue };
-        let mut payload = fields::wrapped(&field.ty, "Option").map(ToTokens::to_token_stream);
-        let mut take = quote!(emitted.as_mut()?.#field_name.take());
-        if payload.is_none() {
-            diagnostics.error(&field.ty, "expected `Option<Payload>`: `None` when there is nothing to emit".into());
-            // The field still exists, so that this is the only error.
-            payload = Some(quote!(::bb_core::__private::Unknown));
-            take = quote!(::bb_core::__private::stub());
-        }
         names.push(crate::names::text(field_name));
         let others = all.iter().filter(|other| **other != field_name);
-        let others = quote!(#(#others: ::core::option::Option::None,)*);
-        // A field that is not an option was reported.
-        let alone = match fields::wrapped(&field.ty, "Option") {
-            Some(_) => quote!(Self { #field_name: ::core::option::Option::Some(payload), #others }),
-            None => quote!(::bb_core::__private::stub()),
+        let others = quote!(#(#others: ::core::default::Default::default(),)*);
+        let (payload, each, alone) = match payload(&field.ty) {
+            Some(payload) => (
+                payload.to_token_stream(),
+                quote! {
+                    if let ::core::option::Option::Some(emitted) = emitted {
+                        ::bb_core::__private::OutputField::each(&mut emitted.#field_name, stamp, publish);
+                    }
+                },
+                quote!(Self { #field_name: ::bb_core::__private::OutputField::alone(message), #others }),
+            ),
+            None => {
+                let message = "expected `Option<Payload>`, which is `None` when there is nothing to emit, or \
+                               `Vec<Payload>` for any number of messages";
+                diagnostics.error(&field.ty, message.into());
+                // The field still exists, so that this is the only error.
+                (quote!(::bb_core::__private::Unknown), quote!(), quote!(::bb_core::__private::stub()))
+            }
         };
         takes.extend(quote! {
             #[automatically_derived]
@@ -39,12 +44,16 @@ pub(crate) fn outputs(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Toke
 
                 #[inline]
                 #[allow(unused_variables)]
-                fn take(emitted: &mut ::core::option::Option<Self>) -> ::core::option::Option<#payload> {
-                    #take
+                fn each(
+                    emitted: &mut ::core::option::Option<Self>,
+                    stamp: ::bb_core::__private::Stamp,
+                    publish: impl ::core::ops::FnMut(&::bb_core::__private::Stamped<#payload>),
+                ) {
+                    #each
                 }
 
                 #[allow(unused_variables)]
-                fn alone(payload: #payload) -> Self {
+                fn alone(message: &::bb_core::__private::Stamped<#payload>) -> Self {
                     #alone
                 }
             }
@@ -58,4 +67,10 @@ pub(crate) fn outputs(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Toke
         }
         #takes
     }
+}
+
+/// The payload of a field of the type `Option<T>` or `Vec<T>`, where `T` may be a `Timed` payload.
+fn payload(field: &Type) -> Option<&Type> {
+    let emitted = fields::wrapped(field, "Option").or_else(|| fields::wrapped(field, "Vec"))?;
+    fields::wrapped(emitted, "Timed").or(Some(emitted))
 }

@@ -111,7 +111,7 @@ const EVERYTHING: &str = include_str!("expansion/everything.txt");
 const EXPANDED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/src/tests/expansion/everything.rs");
 
 /// Lines of that file: every robot pays for them in its build. A change that raises the number says in its commit by how much and why.
-const LINES: usize = 1607;
+const LINES: usize = 1611;
 
 #[test]
 fn the_expansion_is_as_stored() {

@@ -8,7 +8,7 @@ use std::net::{SocketAddr, TcpStream};
 use std::sync::{Mutex, PoisonError};
 
 /// Forwards its input; fails, or reports divergence, when told to.
-struct Judge;
+struct Judge(SafetyLink);
 
 /// Is left out.
 struct Absent;

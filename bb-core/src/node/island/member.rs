@@ -50,10 +50,10 @@ pub trait Member {
 
 /// Emits `message` alone at the output `F`.
 pub fn alone<F: EmittedAt<O>, O>(message: &DynamicMessage) -> Option<O> {
-    message.downcast::<F::Payload>().map(|message| F::alone(message.payload.clone()))
+    message.downcast::<F::Payload>().map(F::alone)
 }
 
-/// Publishes the output `F` if it was emitted, and no estimator takes it.
+/// Publishes what was emitted at the output `F`, which no estimator takes.
 #[inline]
 pub fn emit<F: EmittedAt<O>, O>(
     emitted: &mut Option<O>,
@@ -62,9 +62,7 @@ pub fn emit<F: EmittedAt<O>, O>(
     publisher: usize,
     topic: &Topic<F::Payload>,
 ) {
-    if let Some(payload) = F::take(emitted) {
-        turn.emit(publisher, topic, &stamp.message(payload));
-    }
+    F::each(emitted, stamp, |message| turn.emit(publisher, topic, message));
 }
 
 /// Creates an estimator, whose options are those of the component with that number.

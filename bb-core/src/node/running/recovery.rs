@@ -122,9 +122,6 @@ impl Common {
     /// Begins when the robot has started.
     pub(super) fn begin_life(&mut self, turn: &Turn<'_>) {
         self.shared.set_last_run(turn.now());
-        if !is_running {
-            self.judge(Event::Bad(HealthReason::Stopped), self.declaration.path, turn.now());
-        }
         let requested = std::mem::take(&mut self.requested);
         self.take_requests(requested, turn.now());
     }

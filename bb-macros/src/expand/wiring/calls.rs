@@ -65,14 +65,10 @@ impl Wiring<'_> {
             quote!(#enter turn.left_for_another_island();)
         });
         quote! {
-            if let __private::Some(payload) =
-                <#field as __private::EmittedAt<_>>::take(emitted)
-            {
-                let emission = stamp.message(payload);
-                let message = &emission;
+            <#field as __private::EmittedAt<_>>::each(emitted, stamp, |message| {
                 turn.emit(#publisher, &wiring.topics.#topic, message);
                 #(#calls)*
-            }
+            });
         }
     }
 

@@ -965,28 +965,30 @@ const _: () = {
             stamp: __private::Stamp,
             turn: &__private::Turn<'_>,
         ) {
-            if let __private::Some(payload) = <<<__Rover_2_11__sensor_base_imu_tilt as ::bb_core::Estimator>::Output as ::bb_core::Outputs>::Only as __private::EmittedAt<
+            <<<__Rover_2_11__sensor_base_imu_tilt as ::bb_core::Estimator>::Output as ::bb_core::Outputs>::Only as __private::EmittedAt<
                 _,
-            >>::take(emitted) {
-                let emission = stamp.message(payload);
-                let message = &emission;
-                turn.emit(4usize, &wiring.topics.g0.sensor_base_imu_tilt, message);
-                __private::enter::<
-                    __Island_estimator_base_pose,
-                    _,
-                >(
-                    wiring,
-                    turn.now(),
-                    __private::Key {
-                        entry: 8usize,
-                        line: 0,
-                    },
-                    message,
-                    __Island_estimator_base_pose::sensor_base_imu_tilt__kept,
-                    __Message_estimator_base_pose::sensor_base_imu_tilt__kept,
-                );
-                turn.left_for_another_island();
-            }
+            >>::each(
+                emitted,
+                stamp,
+                |message| {
+                    turn.emit(4usize, &wiring.topics.g0.sensor_base_imu_tilt, message);
+                    __private::enter::<
+                        __Island_estimator_base_pose,
+                        _,
+                    >(
+                        wiring,
+                        turn.now(),
+                        __private::Key {
+                            entry: 8usize,
+                            line: 0,
+                        },
+                        message,
+                        __Island_estimator_base_pose::sensor_base_imu_tilt__kept,
+                        __Message_estimator_base_pose::sensor_base_imu_tilt__kept,
+                    );
+                    turn.left_for_another_island();
+                },
+            );
         }
     }
     type __input__estimator_base_pose__imu = ::bb_core::__private::At<
