@@ -1,8 +1,11 @@
 //! Every callback of an estimator, what it may emit and ask for.
 
-use crate::components::{Break, Echo, Failure, Number, Replied, at};
+use crate::components::{Break, Echo, Failure, Number, Replied, Snapshot, Task, at};
+use crate::replay::same_again;
+use bb_core::RequestCodec;
 use bb_core::event::ParameterValue;
 use bb_core::prelude::*;
+use bb_core::run::DropReason;
 
 /// What it can be told and asked.
 pub(crate) struct Add(f64);
@@ -72,6 +75,9 @@ impl Estimator for Sum {
     }
 
     fn handle_options(&mut self, options: SumOptions, _: &Context) -> Result<(), Fault> {
+        if options.gain == 9.0 {
+            return Err(Fault::new("no such gain"));
+        }
         self.options = options;
         Ok(())
     }
@@ -127,7 +133,6 @@ robot! {
         sensor number: External<Number>() {
             estimator sum: Sum(gain = param::sum::gain);
         }
-        sensor other: External<Number>() { estimator second: Echo(); }
     }
 }
 

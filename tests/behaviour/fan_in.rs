@@ -1,6 +1,6 @@
 //! Driver, last known inputs, tolerance, and what is dropped why; sensors that other code feeds, from several threads.
 
-use crate::components::{Echo, Number, Read, Seen, Snapshot, Source, at, numbers};
+use crate::components::{Echo, Number, Read, Seen, Snapshot, Source, at, lock, numbers};
 use bb_core::prelude::*;
 use bb_core::run::DropReason;
 use bb_core::telemetry::TelemetryEvent;

@@ -1,9 +1,10 @@
 //! Frames of outputs, transforms of inputs, and the topology as data.
 
-use crate::components::{Counter, Number};
+use crate::components::{Counter, Done, Echo, Number, lock};
 use bb_core::nalgebra::Vector3;
 use bb_core::prelude::*;
 use bb_core::topology::JointKind;
+use std::sync::Mutex;
 
 /// Where the inputs' origins are in the frame of the output, m.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
@@ -150,4 +151,39 @@ fn the_topology_is_data() {
     let limit = pan.limit.expect("it is declared");
     assert_eq!((limit.lower, limit.effort), (None, Some(5.0)));
     assert!((limit.velocity.unwrap_or(0.0) - 60f64.to_radians()).abs() < 1e-15);
+}
+
+/// What estimators are told of where they are, in the order in which they are made.
+static TOLD: Mutex<Vec<[&str; 3]>> = Mutex::new(Vec::new());
+
+fn note(context: &Context) -> Done {
+    lock(&TOLD).push([context.robot(), context.path(), context.frame().name()]);
+    Ok(())
+}
+
+robot! {
+    robot Placed;
+    sensors { sensor clock: External<Number>() { estimator of_the_robot: Echo(init = note); } }
+    link base {
+        sensor imu: External<Number>() { estimator at_a_link: Echo(init = note); }
+        joint pan: fixed {
+            sensor encoder: External<Number>() { estimator at_a_joint: Echo(init = note); }
+            link head { estimator of_a_link: Echo(init = note) { input number: sensor::clock; } }
+        }
+    }
+}
+
+#[test]
+fn an_estimator_is_told_its_robot_its_path_and_its_frame() -> Result<(), StartError> {
+    Placed::builder().simulate()?;
+    let mut told = std::mem::take(&mut *lock(&TOLD));
+    told.sort_unstable();
+    let expected = [
+        ["Placed", "estimator/base/pan/head/of_a_link", "head"],
+        ["Placed", "sensor/base/imu/at_a_link", "base"],
+        ["Placed", "sensor/base/pan/encoder/at_a_joint", "pan"],
+        ["Placed", "sensor/clock/of_the_robot", ""],
+    ];
+    assert_eq!(told, expected);
+    Ok(())
 }

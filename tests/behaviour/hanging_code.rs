@@ -388,3 +388,41 @@ mod reentrance {
         });
     }
 }
+
+mod calls {
+    use super::*;
+    use crate::components::{Ask, Echo, Replied};
+
+    static HANG: Hangs = Hangs::new();
+
+    fn hang(_: &mut f64, number: f64) -> Replied {
+        HANG.0.pass("here");
+        Ok(Reply::emit(Number(number)))
+    }
+
+    robot! {
+        robot Absent;
+        link base { sensor number: External<Number>() { estimator absent: Echo(input = hang); } }
+    }
+
+    /// The caller waits for 5 s, which real time takes: there is no other thread on virtual time.
+    #[test]
+    fn a_call_of_an_estimator_that_hangs_ends_in_time() -> Result<(), Box<dyn std::error::Error>> {
+        let running = Absent::builder().start()?;
+        let open = HANG.close();
+        let live = running.live();
+        let publishing =
+            std::thread::spawn(move || live.publish(absent::sensor::base::number, live.clock().now(), Number(1.0)));
+        HANG.0.wait_for(1);
+        let start = std::time::Instant::now();
+        let error = running.call(absent::sensor::base::number::absent, Ask).expect_err("it hangs").to_string();
+        let waited = start.elapsed();
+        assert_eq!(error, "sensor/base/number/absent has been busy for 5 s and has not answered");
+        assert!(waited >= Duration::from_secs(5) && waited < Duration::from_secs(5) + PATIENCE, "{waited:?}");
+        drop(open);
+        publishing.join().expect("it publishes");
+        assert_eq!(running.call(absent::sensor::base::number::absent, Ask)?, 0.0, "it goes on");
+        running.stop();
+        Ok(())
+    }
+}

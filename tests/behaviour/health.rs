@@ -48,6 +48,7 @@ robot! {
             input driver: sensor::base::number, driver, within: 5 ms;
             input second: sensor::base::other;
             sync_tolerance: 10 ms;
+            lost_after: 100 ms;
         }
     }
 }

@@ -60,6 +60,7 @@ robot! {
 
 #[test]
 fn a_device_that_is_unplugged_is_lost_once_and_found_again_and_nobody_else_notices() -> Result<(), StartError> {
+    let _alone = alone();
     let builder = Workshop::builder();
     let health = builder.subscribe(system::Health);
     let (pose, tally) = (
@@ -290,6 +291,7 @@ fn fail(_: &mut f64, number: f64) -> Replied {
 
 #[test]
 fn messages_that_come_while_an_estimator_waits_for_its_restart_are_delivered_after_it() -> Result<(), StartError> {
+    let _alone = alone();
     let builder = Workshop::builder();
     let near = builder.subscribe(workshop::sensor::base::near::near);
     let mut simulation = builder.simulate()?;
@@ -329,6 +331,7 @@ fn messages_that_wait_for_a_worker_outlast_its_failure() {
 
 #[test]
 fn one_stamp_far_ahead_does_not_outlast_a_restart() -> Result<(), StartError> {
+    let _alone = alone();
     let builder = Workshop::builder();
     let near = builder.subscribe(workshop::sensor::base::near::near);
     let mut simulation = builder.simulate()?;

@@ -32,12 +32,15 @@ robot! {
 
     commands { arm: Arm; }
 
+    sensors { sensor clock: External<Number>() { estimator high: Echo(input = fail, init = |_| count(4)); } }
+
     link base {
         sensor base_pulse: Source(init = |_| count(0), read = |_, _| Ok(Reading::now(Number(1.0)))) {
             rate: 100 Hz;
             estimator cousin: Echo(init = |_| count(1), terminate = |_| panic!("cannot clean up"));
         }
         joint neck: fixed {
+            sensor gauge: External<Number>() { estimator strain: Echo(input = fail, init = |_| count(5)); }
             link head {
                 sensor number: External<Number>() { estimator failing: Echo(input = fail); }
                 sensor head_pulse: Source(init = |_| count(2), read = |_, _| Ok(Reading::now(Number(1.0)))) {
