@@ -236,8 +236,10 @@ impl Sensor for Device {
     fn init(_: NoOptions, context: &SensorContext) -> Result<Self, Fault> {
         let is_first = DEVICES.fetch_add(1, Ordering::SeqCst) == 0;
         context.on_disarm(move || {
-            while is_first {
-                std::thread::park();
+            if is_first {
+                loop {
+                    std::thread::park();
+                }
             }
             std::thread::sleep(Duration::from_millis(400));
             SAFE.lock().unwrap_or_else(PoisonError::into_inner).push(std::time::Instant::now());
