@@ -246,12 +246,12 @@ impl Control {
         }
     }
 
-    /// As many sensors and services have threads of their own.
+    /// Sets the number of sensors and services, each of which has a thread of its own.
     pub(crate) fn begin_sources(&self, sources: usize) {
         self.lock().sources = sources;
     }
 
-    /// The thread of one of them ends.
+    /// Counts one of them less: its thread ends.
     pub(crate) fn end_source(&self) {
         let mut state = self.lock();
         state.sources = state.sources.saturating_sub(1);

@@ -209,7 +209,8 @@ impl<R: Robot> Live<R> {
     /// The system refuses a handler or the thread that waits for signals. Except on Unix, a process has one such handler.
     #[cfg(feature = "signals")]
     pub fn stop_on_signals(&self) -> std::io::Result<()> {
-        super::signals::stop_on_signals(self.clone())
+        let (live, control) = (self.clone(), self.machine.control.clone());
+        super::signals::stop_on_signals(move || live.request_stop(), move || control.wait_until_disarmed())
     }
 
     /// Performs an outside action; on virtual time, then passes the journal's lines to its sink.

@@ -93,7 +93,7 @@ impl Threads {
         self.join(self.deadline(start));
     }
 
-    /// When user code should have returned that was told to stop at `start`.
+    /// Returns the time by which user code that was told to stop at `start` should have returned.
     fn deadline(&self, start: Instant) -> Instant {
         // An estimator's message may have woken the caller: then the estimator cannot stop before the call returns.
         if self.has_waited || self.machine.islands().any(|island| island.is_inside()) {

@@ -1,20 +1,23 @@
 //! Signals that stop a robot.
 
-use super::{Live, Robot};
 use std::time::{Duration, Instant};
 
 /// Signals that arrive within this time are one: some parents send each twice, to the process and to its group.
 const SAME_SIGNAL: Duration = Duration::from_millis(500);
 
-/// See [`Live::stop_on_signals`]. The thread that waits for signals runs no user code.
+/// Has the first signal call `stop`, and a later one end the process once `wait_until_safe` has returned. The thread that waits for
+/// signals runs no user code.
 #[cfg(unix)]
-pub(super) fn stop_on_signals<R: Robot>(live: Live<R>) -> std::io::Result<()> {
+pub(super) fn stop_on_signals(
+    stop: impl Fn() + Send + 'static,
+    wait_until_safe: impl Fn() + Send + 'static,
+) -> std::io::Result<()> {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
     let mut signals = signal_hook::iterator::Signals::new([SIGINT, SIGTERM, SIGHUP])?;
     let run = move || {
         let mut stopping = Stopping::default();
         for signal in &mut signals {
-            if stopping.signal(&live) {
+            if stopping.signal(&stop, &wait_until_safe) {
                 // It does not return: by default these signals end a process.
                 let _ = signal_hook::low_level::emulate_default_handler(signal);
             }
@@ -24,33 +27,36 @@ pub(super) fn stop_on_signals<R: Robot>(live: Live<R>) -> std::io::Result<()> {
 }
 
 #[cfg(not(unix))]
-pub(super) fn stop_on_signals<R: Robot>(live: Live<R>) -> std::io::Result<()> {
+pub(super) fn stop_on_signals(
+    stop: impl Fn() + Send + 'static,
+    wait_until_safe: impl Fn() + Send + 'static,
+) -> std::io::Result<()> {
     /// The exit code after Ctrl-C, by convention.
     const INTERRUPTED: i32 = 130;
     let mut stopping = Stopping::default();
     let handle = move || {
-        if stopping.signal(&live) {
+        if stopping.signal(&stop, &wait_until_safe) {
             std::process::exit(INTERRUPTED);
         }
     };
     ctrlc::set_handler(handle).map_err(std::io::Error::other)
 }
 
-/// Since when the robot stops because of a signal.
+/// The time of the first signal, from which on the robot stops.
 #[derive(Default)]
 struct Stopping(Option<Instant>);
 
 impl Stopping {
-    /// A signal has arrived. Returns whether the process is to end now.
-    fn signal<R: Robot>(&mut self, live: &Live<R>) -> bool {
+    /// Takes a signal. Returns whether the process is to end now.
+    fn signal(&mut self, stop: &dyn Fn(), wait_until_safe: &dyn Fn()) -> bool {
         let first = *self.0.get_or_insert_with(|| {
-            live.request_stop();
+            stop();
             Instant::now()
         });
         if first.elapsed() < SAME_SIGNAL {
             return false;
         }
-        live.machine.control.wait_until_disarmed();
+        wait_until_safe();
         true
     }
 }

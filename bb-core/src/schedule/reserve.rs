@@ -5,6 +5,7 @@
 //! further threads when they are submitted; if none can be started, they wait for the next thread that becomes free.
 
 use crate::fault::guarded;
+#[cfg(not(loom))]
 use std::collections::VecDeque;
 use std::fmt;
 use std::sync::Arc;
@@ -40,7 +41,7 @@ struct State {
     free: usize,
 }
 
-/// Keeps one thread.
+/// A thread that is kept for one callback.
 pub(crate) struct Reserved(Reserve);
 
 #[cfg(not(loom))]
