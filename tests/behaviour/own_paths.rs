@@ -1,7 +1,7 @@
 //! What commands, controllers and outside code publish at paths of their own.
 
 use crate::components::{Counter, Doing, Failure, Number, Pulse, Task, Update};
-use crate::replay::{entries, journal};
+use crate::replay::{entries, journal, same_again};
 use bb_core::DynamicSubscription;
 use bb_core::journal::Event;
 use bb_core::prelude::*;
@@ -34,9 +34,24 @@ fn drive(context: CommandContext) -> Doing {
     })
 }
 
+/// A command that publishes how far it is, with little ceremony.
+fn climb(context: CommandContext) -> Doing {
+    Box::pin(async move {
+        context.progress(Progress { done: 0.25 })?;
+        context.sleep(Duration::from_millis(10)).await;
+        context.progress(Progress { done: 0.75 })?;
+        let other = context.progress(Number(1.0)).map_err(|error| error.to_string());
+        let refusal =
+            "cannot publish `Number` at `command/climb/progress`: it publishes `Progress`; choose another path";
+        assert_eq!(other, Err(refusal.to_owned()));
+        context.sleep(Duration::from_secs(10)).await;
+        Ok(Outcome::done(()))
+    })
+}
+
 robot! {
     robot Missionary;
-    commands { arm: Arm; drive: Task(run = drive); }
+    commands { arm: Arm; drive: Task(run = drive); climb: Task(run = climb) { timeout: 20 ms; } }
     controllers { controller planner: Pulse(init = planner) { rate: 10 Hz; } }
     link base { sensor counter: Counter(count = 3) { rate: 100 Hz; } }
 }
@@ -66,6 +81,22 @@ fn a_subtree_is_heard_without_being_told_of_its_publishers() -> Result<(), Failu
     expected.extend(progress);
     assert_eq!(told(&early), expected);
     assert_eq!(by_payload.drain().count(), 3 + expected.len());
+    Ok(())
+}
+
+#[test]
+fn a_command_publishes_its_progress_below_its_path_which_a_replay_publishes_again() -> Result<(), Failure> {
+    let (heard, _) = same_again(Missionary::builder, |builder| {
+        let commands = builder.subscribe_any(Select::Below("command/climb"), "Progress", Overflow::default());
+        let mut simulation = builder.simulate()?;
+        simulation.arm()?;
+        simulation.command(missionary::command::climb, NoArguments)?;
+        simulation.run_for(Duration::from_millis(50));
+        let path = "command/climb/progress";
+        assert_eq!(told(&commands), [(path, 0, 0.25), (path, 10, 0.75)]);
+        Ok(simulation.stop())
+    })?;
+    assert_eq!(heard.get("command/climb/progress").map(Vec::len), Some(2));
     Ok(())
 }
 

@@ -136,6 +136,56 @@ impl CommandContext {
         Sleep { until: self.now() + duration, bus: self.bus.clone(), sleeper: self.sleeper.clone(), alarm: None }
     }
 
+    /// Publishes how far it has come at `command/<name>/progress`, where subscriptions to `command` or to everything receive it. A command
+    /// publishes one type there.
+    ///
+    /// ```
+    /// use bb_core::prelude::*;
+    ///
+    /// /// How much of a map has been seen.
+    /// #[derive(Clone, Debug, Payload)]
+    /// struct Seen {
+    ///     /// From 0 to 1.
+    ///     share: f64,
+    /// }
+    ///
+    /// struct Explore;
+    ///
+    /// impl Command for Explore {
+    ///     type Options = NoOptions;
+    ///     type Arguments = NoArguments;
+    ///     type Output = ();
+    ///
+    ///     async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
+    ///         for part in 1..=4 {
+    ///             context.sleep(Duration::from_millis(250)).await;
+    ///             context.progress(Seen { share: f64::from(part) / 4.0 })?;
+    ///         }
+    ///         Ok(Outcome::done(()))
+    ///     }
+    /// }
+    ///
+    /// robot! { robot Scout; commands { arm: Arm; explore: Explore; } link base; }
+    ///
+    /// fn main() -> Result<(), Box<dyn std::error::Error>> {
+    ///     let mut simulation = Scout::builder().simulate()?;
+    ///     let progress = simulation.subscribe_any(Select::Path("command/explore/progress"), None, Overflow::default());
+    ///     simulation.arm()?;
+    ///     simulation.command(scout::command::explore, NoArguments)?;
+    ///     simulation.run_for(Duration::from_secs(1));
+    ///     let shares = progress.drain().filter_map(|message| message.downcast::<Seen>().map(|seen| seen.share));
+    ///     assert_eq!(shares.collect::<Vec<_>>(), [0.25, 0.5, 0.75, 1.0]);
+    ///     Ok(())
+    /// }
+    /// ```
+    ///
+    /// # Errors
+    /// It has published another type there before, or it was cancelled.
+    pub fn progress<T: Payload>(&self, progress: T) -> Result<(), Fault> {
+        self.bus.publisher::<T>(&format!("{}/progress", self.hooks.path))?.publish(progress);
+        Ok(())
+    }
+
     /// Whether it was cancelled or has timed out. Anything it sends from then on is refused. A command that blocks
     /// its thread should check this from time to time.
     pub fn is_cancelled(&self) -> bool {

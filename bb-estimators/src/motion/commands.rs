@@ -109,7 +109,6 @@ impl MoveJoints {
         let trajectory = planned(&bus, joints, points, options, context.now())?;
         let mut motion = Motion::new(&bus, joints, context.now())?;
         let duration = trajectory.points.last().map_or(Duration::ZERO, |last| last.time_from_start);
-        let progress = bus.publisher::<MotionProgress>(&format!("command/{}/progress", context.name()))?;
         motion.start(&trajectory)?;
         let deadline = motion.start + duration + options.patience;
         let mut next_progress = motion.start;
@@ -117,7 +116,7 @@ impl MoveJoints {
             let now = context.now();
             let has_reached = motion.has_reached();
             if has_reached || now >= next_progress {
-                progress.publish(motion.progress(now, duration));
+                context.progress(motion.progress(now, duration))?;
                 next_progress = now + PROGRESS_PERIOD;
             }
             if has_reached {
