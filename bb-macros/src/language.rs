@@ -210,6 +210,7 @@ language! {
             Driver = DRIVER,
             Optional = OPTIONAL,
             Within = WITHIN,
+            External = EXTERNAL,
         }
         RunsOnField in "`runs_on`" {
             Priority = PRIORITY,

@@ -104,7 +104,10 @@ pub(crate) struct Sensor {
     pub(crate) attributes: Vec<Attribute>,
     pub(crate) name: Ident,
     pub(crate) mount: Mount,
+    /// Its type; of an external input, its path.
     pub(crate) component: Component,
+    /// The first input that takes it, if it is not declared as a sensor: other code publishes there, with the payload of that input.
+    pub(crate) external: Option<(EstimatorId, usize)>,
     /// The time between two calls of `read`, in s; `None` without a rate.
     pub(crate) period_s: Option<f64>,
     pub(crate) publisher: PublisherId,
@@ -166,6 +169,8 @@ pub(crate) struct Input {
     pub(crate) word: Ident,
     pub(crate) name: Ident,
     pub(crate) path: Path,
+    /// The word `external`: other code publishes there, not the robot.
+    pub(crate) external: Option<Ident>,
     pub(crate) driver: Option<Ident>,
     pub(crate) optional: Option<Ident>,
     pub(crate) within: Option<Quantity>,
@@ -220,7 +225,8 @@ impl Robot {
 
     /// Everything declared with a type of the user's.
     pub(crate) fn components(&self) -> impl Iterator<Item = &Component> {
-        let sensors = self.sensors.iter().map(|sensor| &sensor.component);
+        let sensors =
+            self.sensors.iter().filter(|sensor| sensor.external.is_none()).map(|sensor| &sensor.component);
         let estimators = self.estimators.iter().map(|estimator| &estimator.component);
         let actuators = self.actuators.iter().map(|actuator| &actuator.component);
         let services = self.services.iter().map(|service| &service.component);
@@ -262,7 +268,7 @@ impl Estimator {
 
 impl std::convert::From<parse::Input> for Input {
     fn from(input: parse::Input) -> Self {
-        let parse::Input { word, name, path, driver, optional, within } = input;
-        Self { word, name, path, driver, optional, within, source: None, candidates: Vec::new() }
+        let parse::Input { word, name, path, external, driver, optional, within } = input;
+        Self { word, name, path, external, driver, optional, within, source: None, candidates: Vec::new() }
     }
 }

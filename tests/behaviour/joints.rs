@@ -1,6 +1,7 @@
 //! States of joints, and the transforms across them.
 
 use crate::components::{Failure, at};
+use crate::replay::same_again;
 use bb_core::SensorHandle;
 use bb_core::component::{InputTransforms, JointPublisher};
 use bb_core::joints::{JointRefusal, LookupError};
@@ -315,6 +316,38 @@ fn a_motor_is_seen_through_its_transmission() -> Result<(), Failure> {
     // A joint-side encoder needs none.
     simulation.publish(SHOULDER, at(1), joint(0.25));
     assert_eq!(simulation.joints().status("shoulder").map(|shoulder| shoulder.position), Some(vec![0.25]));
+    Ok(())
+}
+
+/// As those of declared sensors, also in a replay.
+#[test]
+fn states_at_a_path_of_ones_own_below_sensor_are_kept() -> Result<(), Failure> {
+    let states = |names: &[&str], positions: &[f64]| JointStates {
+        names: names.iter().map(|name| (*name).to_owned()).collect(),
+        positions: positions.to_vec(),
+        ..JointStates::default()
+    };
+    let (heard, report) = same_again(Reach::builder, |builder| {
+        let mut simulation = builder.simulate()?;
+        let seen = simulation.bus().publisher("sensor/vision/arm")?;
+        simulation.run_until(at(10));
+        seen.publish(states(&["shoulder", "base/shoulder/arm/lift"], &[FRAC_PI_2, 1.5]));
+        seen.publish(states(&["elbow"], &[0.1]));
+        simulation.publish(CAMERA, at(10), Pixel(1.0));
+        // Not below `sensor`, and of no joint.
+        simulation.bus().publisher("vision/arm")?.publish(states(&["lift"], &[0.5]));
+        simulation.bus().publisher("sensor/extra")?.publish(joint(0.3));
+        assert_eq!(simulation.joints().status("lift").map(|lift| lift.position), Some(vec![1.5]));
+        let at_top = simulation.joints().between("base", "carriage")?.latest()?.transform;
+        assert!((at_top.translation.vector - Vector3::new(0.0, 1.5, 0.0)).norm() < 1e-12);
+        Ok(simulation.stop())
+    })?;
+    assert_eq!(heard.get("estimator/base/spot").map(Vec::len), Some(1), "the camera was placed");
+    let count = |name: &str| {
+        report.joints.iter().find(|joint| joint.joint == name).map(|joint| (joint.states, joint.unknown))
+    };
+    assert_eq!([count("shoulder"), count("lift")], [Some((1, 0)), Some((1, 0))]);
+    assert_eq!([count("elbow"), count("sensor/extra")], [Some((0, 1)), Some((0, 1))]);
     Ok(())
 }
 

@@ -16,6 +16,7 @@ mod discovery;
 mod drivers;
 mod end;
 mod every_message;
+mod external_inputs;
 mod failed_starts;
 mod fan_in;
 mod faults;

@@ -155,7 +155,9 @@ def check_times(path):
 def check_moving_arm(path):
     """What a recording of everything holds of an arm that moves."""
     topics = check_times(path)
-    for topic in ["journal", "safety", "param/pace", "command/go", "mission/note", "sensor/base/elbow/position"]:
+    servo = [f"actuator/base/elbow/servo{part}" for part in ("", "/begin_motion", "/end_motion")]
+    others = ["journal", "safety", "param/pace", "command/go", "mission/note", "sensor/base/elbow/position"]
+    for topic in servo + others:
         if f"/{topic}" not in topics:
             raise Mismatch(f"/{topic} is not in the recording, which has {sorted(topics)}")
     return len(topics)

@@ -27,6 +27,7 @@ right! {
     declared_commands_right_names: "declared_commands/right_names.rs";
     declared_commands_right_none: "declared_commands/right_none.rs";
     declared_parameters_right_paths: "declared_parameters/right_paths.rs";
+    declared_publishers_right_external: "declared_publishers/right_external.rs";
     declared_publishers_right_paths: "declared_publishers/right_paths.rs";
     declared_references_right_paths: "declared_references/right_paths.rs";
     declared_states_right_allowed: "declared_states/right_allowed.rs";

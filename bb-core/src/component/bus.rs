@@ -1,6 +1,6 @@
 //! The robot by path, for code that does not know its type: commands, controllers, bridges, dashboards.
 
-use super::host::{Controls, Host};
+use super::host::{Controls, ExternalSensor, Host};
 use super::{Accepts, ActuatorLink, Caller, CommandInfo, Description, DynamicExecution, Fault};
 use crate::declaration::ParameterError;
 use crate::event::{ArmError, DisarmError, Forbidden, ParameterValue, Right, Rights, Safety};
@@ -8,13 +8,13 @@ use crate::joints::Joints;
 use crate::message::nearest::nearest_path;
 use crate::message::{Payload, Stamp};
 use crate::pubsub::{
-    AnyTopic, Delivery, DynamicMessage, DynamicSubscription, Gate, Payloads, Publisher, Select,
-    SubscriberStatistics, Subscription, Topic, unmatched_at,
+    AnyTopic, Delivery, DynamicMessage, DynamicSubscription, Enter, Gate, Payloads, Publisher, Select,
+    SubscriberStatistics, Subscription, Tell, Topic, unmatched_at,
 };
-use crate::time::Clock;
+use crate::time::{Clock, MonotonicTime};
 use crate::topology::{GraphFormat, Topology};
 use std::fmt;
-use std::sync::Arc;
+use std::sync::{Arc, Weak};
 
 /// Topics, actuators, parameters, commands and states, by path, in the name of a caller and with its rights. Clones are the same.
 ///
@@ -128,17 +128,40 @@ impl Bus {
     /// `_`, `-` and `.`, separated by `/`. Existing subscriptions to everything, or to a subtree with this path,
     /// receive its messages. A second publisher at the same path shares it.
     ///
-    /// A robot has at most 1024 such paths; a new one replaces the oldest that is no longer used.
+    /// A robot has at most 1024 such paths; a new one replaces the oldest that is no longer used. Names of paths are kept for as long as
+    /// the process lives, at most 1 MiB of them: what changes without end, such as the number of a request, belongs in the payload.
+    /// The path may also be that of an
+    /// `external` input of an estimator, or of a sensor declared as [`External`](crate::component::External): everything downstream then runs before
+    /// `publish` returns, as for messages of a sensor.
+    ///
+    /// Payloads that name joints, such as [`JointStates`](crate::payload::JointStates), update the [joints](Self::joints) if the path is
+    /// below `sensor/`.
     ///
     /// # Errors
-    /// The path is that of a declared publisher or of a topic that every robot has, it has another payload already, it is
+    /// The path is that of another declared publisher or of a topic that every robot has, it has another payload already, it is
     /// malformed, too many are in use, the robot has stopped, the command that this bus belongs to has ended, or the caller may
     /// not publish.
     pub fn publisher<T: Payload>(&self, path: &str) -> Result<Publisher<T>, Fault> {
         self.check(Right::Publish)?;
         self.caller.check_valid()?;
+        let gate = || Arc::new(OwnPath { host: Arc::clone(&self.host), caller: self.caller.clone() });
+        if let Some(ExternalSensor { path, frame, payload, enter }) = self.host.external(path) {
+            return match enter.downcast::<Weak<Enter<T>>>() {
+                Ok(enter) => Ok(Publisher::of_sensor(path, frame, *enter, gate())),
+                Err(_) => Err(self.other_payload(path, payload, T::NAME)),
+            };
+        }
         let topic = self.host.registry().topic_noted::<T>(path, &mut |change| self.host.note_path(change))?;
-        Ok(Publisher::new(topic, Arc::new(OwnPath { host: Arc::clone(&self.host), caller: self.caller.clone() })))
+        Ok(Publisher::new(topic, gate()))
+    }
+
+    /// The error for a payload that is not that of an external input or sensor.
+    fn other_payload(&self, path: &str, taken: &str, offered: &str) -> Fault {
+        let takers = self.host.takers(path);
+        let takers = takers.iter().map(|(estimator, input)| format!("the input `{input}` of `{estimator}`"));
+        let takers = takers.collect::<Vec<_>>().join(" and ");
+        let takers = if takers.is_empty() { "the robot".to_owned() } else { takers };
+        Fault::new(format!("cannot publish `{offered}` at `{path}`: {takers} takes `{taken}`"))
     }
 
     /// All paths with a publisher.
@@ -359,14 +382,21 @@ impl Gate for OwnPath {
             let stamp = Stamp { monotonic_time, wall_time, origin: robot.origin(), ..Stamp::default() };
             publish(stamp);
         });
+        if self.caller.is_outside() {
+            self.host.settle();
+        }
     }
 
     fn is_noted(&self) -> bool {
         self.host.is_journaled()
     }
 
-    fn note(&self, message: DynamicMessage) {
-        self.host.note_own(message);
+    fn note(&self, message: DynamicMessage, now: MonotonicTime) {
+        self.host.note_own(message, now);
+    }
+
+    fn hear(&self, path: &str, stamp: Stamp, now: MonotonicTime, tell: &Tell<'_>) {
+        self.host.joints().hear_at(path, stamp, now, tell);
     }
 }
 

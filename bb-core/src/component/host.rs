@@ -7,9 +7,9 @@ use super::{Caller, CommandInfo, Description, DynamicExecution, Fault};
 use crate::declaration::ParameterError;
 use crate::event::{ArmError, DisarmError, ParameterValue, Safety};
 use crate::joints::Joints;
-use crate::message::Origin;
+use crate::message::{Frame, Origin};
 use crate::pubsub::{AnyTopic, DynamicMessage, PathChange, Registry};
-use crate::time::Clock;
+use crate::time::{Clock, MonotonicTime};
 use crate::topology::{GraphFormat, Topology};
 use std::any::Any;
 use std::fmt;
@@ -34,6 +34,16 @@ pub(crate) trait Controls: Guardian {
     fn start_command(&self, path: &str, arguments: &str, caller: &Caller) -> Result<DynamicExecution, Fault>;
 }
 
+/// A sensor whose messages other code publishes.
+pub(crate) struct ExternalSensor {
+    pub(crate) path: &'static str,
+    pub(crate) frame: Frame,
+    /// The name of its payload.
+    pub(crate) payload: &'static str,
+    /// A `Weak<Enter<T>>`, since a component of the robot may keep it.
+    pub(crate) enter: Box<dyn Any>,
+}
+
 /// A robot with its topics and components.
 pub(crate) trait Host: Send + Sync {
     fn controls(&self) -> &dyn Controls;
@@ -55,7 +65,11 @@ pub(crate) trait Host: Send + Sync {
     /// Something may be published at a path of one's own, or no more.
     fn note_path(&self, change: PathChange);
     /// A message is published at a path of one's own.
-    fn note_own(&self, message: DynamicMessage);
+    fn note_own(&self, message: DynamicMessage, now: MonotonicTime);
+    /// The sensor at `path`, if other code publishes its messages.
+    fn external(&self, path: &str) -> Option<ExternalSensor>;
+    /// The inputs at `path`, each as its estimator and its name.
+    fn takers(&self, path: &str) -> Vec<(&'static str, &'static str)>;
     /// The actuator at `path`: the name of the type of its commands, and an `Arc<dyn Accepts<T>>`.
     fn actuator(&self, path: &str) -> Option<(&'static str, Box<dyn Any>)>;
     /// The paths of all actuators, each with its joint.

@@ -73,6 +73,10 @@ pub trait Sensor: Sized + Send + 'static {
         None
     }
 
+    /// Whether other code publishes its messages, by path too: see [`External`](crate::component::External).
+    #[doc(hidden)]
+    const IS_EXTERNAL: bool = false;
+
     /// Takes new options, validated, after a parameter that they are bound to has changed. The default restarts the
     /// sensor with them: it is terminated and dropped before the new one is made.
     ///

@@ -8,6 +8,7 @@ use super::states::{SharedStates, States};
 use super::status::{JointStatistics, JointStatus, REFUSALS};
 use crate::kinematics::{Kinematics, KinematicsError};
 use crate::message::{Frame, JointReading, Payload, Stamp, Stamped};
+use crate::pubsub::{Select, Tell};
 use crate::time::{Clock, MonotonicTime, nanos_of};
 use crate::topology::{JointKind, Topology};
 use nalgebra::Isometry3;
@@ -88,6 +89,19 @@ impl Joints {
             // The payload's code runs without holding the lock.
             message.payload.tell_joints(&mut |reading| self.keep(message.stamp(), &reading, now));
         }
+    }
+
+    /// Stores the joint readings of a message at a path that the robot does not declare, if it is below `sensor`. A reading without a
+    /// joint, in no frame, is one of an unknown joint of that path.
+    pub(crate) fn hear_at(&self, path: &str, stamp: Stamp, now: MonotonicTime, tell: &Tell<'_>) {
+        if !Select::Below("sensor").includes(path) {
+            return;
+        }
+        tell(&mut |reading| {
+            let is_named = reading.joint.is_some() || !stamp.frame.name().is_empty();
+            let reading = if is_named { reading } else { reading.of(path) };
+            self.keep(stamp, &reading, now);
+        });
     }
 
     fn keep(&self, stamp: Stamp, reading: &JointReading<'_>, now: MonotonicTime) {

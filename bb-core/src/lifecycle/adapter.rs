@@ -57,6 +57,9 @@ pub trait Periodic: Component {
     fn read(&mut self, now: MonotonicTime) -> Result<Reading<Self::Output>, Fault>;
     /// When it wants to be read first.
     fn starts_at(&self) -> Option<MonotonicTime>;
+    /// Whether other code publishes its messages.
+    #[doc(hidden)]
+    const IS_EXTERNAL: bool = false;
 }
 
 /// The robot, for contexts.
@@ -308,6 +311,7 @@ impl<A: Actuator> Component for AsActuator<A> {
 
 impl<S: Sensor> Periodic for AsSensor<S> {
     type Output = S::Output;
+    const IS_EXTERNAL: bool = S::IS_EXTERNAL;
 
     fn context(declaration: &'static SensorDeclaration, host: HostHandle) -> SensorContext {
         SensorContext::new(declaration, host.0)

@@ -1,17 +1,31 @@
 //! Publishing at a path that the robot does not declare.
 
 use super::{AnyTopic as _, DynamicMessage, Topic};
-use crate::message::{Payload, Stamp, Stamped};
-use crate::time::WallTime;
+use crate::message::{Frame, JointReading, Payload, Stamp, Stamped};
+use crate::time::{MonotonicTime, WallTime};
 use std::fmt;
-use std::sync::Arc;
+use std::sync::{Arc, Weak};
 
 /// Publishes payloads of type `T` at a path that the robot does not declare: see [`Bus::publisher`](crate::Bus::publisher).
 /// Clones publish at the same path. The path remains when the last of them is dropped.
 pub struct Publisher<T> {
-    topic: Arc<Topic<T>>,
+    target: Target<T>,
     gate: Arc<dyn Gate>,
 }
+
+/// Where its messages go.
+enum Target<T> {
+    /// To the subscribers of a path of the caller's choice.
+    Topic(Arc<Topic<T>>),
+    /// To a sensor of the robot whose messages other code publishes, at `path`, in `frame` unless they have one.
+    Sensor { path: &'static str, frame: Frame, enter: Weak<Enter<T>> },
+}
+
+/// Publishes a message and runs everything downstream.
+pub(crate) type Enter<T> = dyn Fn(&Stamped<T>, MonotonicTime) + Send + Sync;
+
+/// Calls a listener with what a message tells of joints.
+pub(crate) type Tell<'a> = dyn Fn(&mut dyn FnMut(JointReading<'_>)) + 'a;
 
 /// The checks that a publisher passes on its way to its topic.
 pub(crate) trait Gate: Send + Sync {
@@ -19,13 +33,19 @@ pub(crate) trait Gate: Send + Sync {
     fn pass(&self, publish: &mut dyn FnMut(Stamp));
     /// Whether messages are to be shown to [`Self::note`].
     fn is_noted(&self) -> bool;
-    /// A message is about to be published.
-    fn note(&self, message: DynamicMessage);
+    /// A message is about to be published, at this time.
+    fn note(&self, message: DynamicMessage, now: MonotonicTime);
+    /// A message that tells of joints is about to be published at `path`.
+    fn hear(&self, path: &str, stamp: Stamp, now: MonotonicTime, tell: &Tell<'_>);
 }
 
 impl<T: Payload> Publisher<T> {
     pub(crate) fn new(topic: Arc<Topic<T>>, gate: Arc<dyn Gate>) -> Self {
-        Self { topic, gate }
+        Self { target: Target::Topic(topic), gate }
+    }
+
+    pub(crate) fn of_sensor(path: &'static str, frame: Frame, enter: Weak<Enter<T>>, gate: Arc<dyn Gate>) -> Self {
+        Self { target: Target::Sensor { path, frame, enter }, gate }
     }
 
     /// Publishes a payload measured now, in no frame. Once the command that made this publisher has ended, or the robot has
@@ -34,7 +54,7 @@ impl<T: Payload> Publisher<T> {
         let mut payload = Some(payload);
         self.gate.pass(&mut |stamp| {
             if let Some(payload) = payload.take() {
-                self.hand_out(&stamp.message(payload));
+                self.hand_out(&Stamp { frame: self.frame(), ..stamp }.message(payload), stamp.monotonic_time);
             }
         });
     }
@@ -43,33 +63,72 @@ impl<T: Payload> Publisher<T> {
     /// [`Stamped::new`] makes, gets that of the robot's clock at its monotonic time.
     pub fn forward(&self, message: &Stamped<T>) {
         self.gate.pass(&mut |now| {
-            if message.wall_time != WallTime::default() {
-                return self.hand_out(message);
+            let mut stamp = message.stamp();
+            if stamp.wall_time == WallTime::default() {
+                let age = now.monotonic_time.nanos_since(stamp.monotonic_time);
+                stamp.wall_time = WallTime::from_unix_nanos(now.wall_time.as_unix_nanos().saturating_sub(age));
             }
-            let age = now.monotonic_time.nanos_since(message.monotonic_time);
-            let nanos = now.wall_time.as_unix_nanos().saturating_sub(age);
-            self.hand_out(&Stamped { wall_time: WallTime::from_unix_nanos(nanos), ..message.clone() });
+            if stamp.frame == Frame::NONE {
+                stamp.frame = self.frame();
+            }
+            match stamp == message.stamp() {
+                true => self.hand_out(message, now.monotonic_time),
+                false => self.hand_out(&stamp.message(message.payload.clone()), now.monotonic_time),
+            }
         });
     }
 
-    fn hand_out(&self, message: &Stamped<T>) {
-        if self.gate.is_noted() {
-            let noted = DynamicMessage::new(self.path(), message);
-            self.topic.publish_as_written(message, || self.gate.note(noted));
-        } else {
-            self.topic.publish(message);
+    fn hand_out(&self, message: &Stamped<T>, now: MonotonicTime) {
+        if let Target::Topic(topic) = &self.target
+            && T::TELLS_JOINT_POSITION
+        {
+            self.gate.hear(topic.path(), message.stamp(), now, &|listener| {
+                message.payload.tell_joints(&mut |reading| listener(reading));
+            });
+        }
+        match &self.target {
+            Target::Topic(topic) if self.gate.is_noted() => {
+                let noted = DynamicMessage::new(topic.path(), message);
+                topic.publish_as_written(message, || self.gate.note(noted, now));
+            }
+            Target::Topic(topic) => topic.publish(message),
+            Target::Sensor { enter, .. } => {
+                if let Some(enter) = enter.upgrade() {
+                    enter(message, now);
+                }
+            }
+        }
+    }
+
+    /// That of a message without one.
+    fn frame(&self) -> Frame {
+        match &self.target {
+            Target::Topic(_) => Frame::NONE,
+            Target::Sensor { frame, .. } => *frame,
         }
     }
 
     /// Its path.
     pub fn path(&self) -> &'static str {
-        self.topic.path()
+        match &self.target {
+            Target::Topic(topic) => topic.path(),
+            Target::Sensor { path, .. } => path,
+        }
     }
 }
 
 impl<T> Clone for Publisher<T> {
     fn clone(&self) -> Self {
-        Self { topic: Arc::clone(&self.topic), gate: Arc::clone(&self.gate) }
+        Self { target: self.target.clone(), gate: Arc::clone(&self.gate) }
+    }
+}
+
+impl<T> Clone for Target<T> {
+    fn clone(&self) -> Self {
+        match self {
+            Self::Topic(topic) => Self::Topic(Arc::clone(topic)),
+            Self::Sensor { path, frame, enter } => Self::Sensor { path, frame: *frame, enter: Weak::clone(enter) },
+        }
     }
 }
 

@@ -5,7 +5,7 @@ use super::discovery::discover;
 use super::wired::{Place, Wired as WiredRobot};
 use crate::component::replacement::{Replacement, Replacements};
 use crate::component::shared::SharedValues;
-use crate::component::{Controls, Description, Host};
+use crate::component::{Controls, Description, ExternalSensor, Host};
 use crate::control::{Control, Islands, Wired};
 use crate::declaration::{RobotDeclaration, graph};
 use crate::joints::Joints;
@@ -102,8 +102,22 @@ impl Host for RobotHost {
         });
     }
 
-    fn note_own(&self, message: DynamicMessage) {
-        self.note(|| Event::Own { path: message.path(), message: Recorded::Message(message) });
+    fn note_own(&self, message: DynamicMessage, now: MonotonicTime) {
+        if let Some(journal) = &self.journal {
+            let event = Event::Own { path: message.path(), message: Recorded::Message(message) };
+            journal.write(now, self.control.clock().wall_offset_nanos(), event);
+        }
+    }
+
+    fn external(&self, path: &str) -> Option<ExternalSensor> {
+        self.wired()?.external(path)
+    }
+
+    fn takers(&self, path: &str) -> Vec<(&'static str, &'static str)> {
+        let estimators = self.robot.estimators.iter();
+        let inputs =
+            estimators.flat_map(|declared| declared.inputs.iter().map(move |input| (declared.path, input)));
+        inputs.filter(|(_, input)| input.source == path).map(|(path, input)| (path, input.name)).collect()
     }
 
     fn actuator(&self, path: &str) -> Option<(&'static str, Box<dyn Any>)> {

@@ -10,7 +10,7 @@ use crate::lifecycle::{
 use crate::message::nearest::nearest_path;
 
 impl<R: Robot> Builder<R> {
-    /// Replaces the sensor at `path` with one of type `S`: a driver with a simulated sensor, or with one that plays
+    /// Replaces the sensor at `path`, or the other code at the path of an `external` input, with one of type `S`: a driver with a simulated sensor, or with one that plays
     /// back a recording. The path, frame, rate and supervision stay, and components downstream do not notice. Options
     /// that are declared, set or bound to parameters belong to the replaced driver and are not used. If the
     /// replacement publishes another payload than the declared one, the robot does not start.
@@ -21,8 +21,7 @@ impl<R: Robot> Builder<R> {
     where
         S::Options: Sync,
     {
-        let sensors = self.draft.robot.sensors.iter().map(|declared| declared.path);
-        let sensors = sensors.filter(|path| path.starts_with("sensor/")).collect();
+        let sensors = self.draft.robot.sensors.iter().map(|declared| declared.path).collect();
         self.draft.replace("sensor", sensors, path, replacement_of_sensor::<S>(options))
     }
 

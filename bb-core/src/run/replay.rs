@@ -266,7 +266,7 @@ impl Replayer {
                     return Err("the robot has no such sensor, or one of another payload".to_owned());
                 }
             }
-            Event::Own { path, message } => self.publish_own(path, message)?,
+            Event::Own { path, message } => self.publish_own(path, time, message)?,
             Event::OwnPublisher { path, payload } => control.topics().registry.expect(path, payload),
             Event::Actuated { actuator, message } => self.actuated(actuator, message)?,
             Event::Deliver { island, entry, message } => {

@@ -6,14 +6,14 @@ mod shared;
 use self::shared::Order;
 pub(super) use self::shared::SharedSource;
 pub use self::shared::SourceStatistics;
-use crate::component::{Binding, Next, OptionsList};
+use crate::component::{Binding, ExternalSensor, Next, OptionsList};
 use crate::control::{ComponentOrder, Control};
 use crate::declaration::SensorDeclaration;
 use crate::fault::{Failed, Fault, Termination, Then, caught};
 use crate::lifecycle::{AfterFault, HostHandle, Periodic, Recipe, Slot};
-use crate::message::{Stamp, Stamped};
+use crate::message::{Payload as _, Stamp, Stamped};
 use crate::node::{BindTarget, Environment};
-use crate::pubsub::DynamicMessage;
+use crate::pubsub::{DynamicMessage, Enter};
 use crate::time::{Clock, MonotonicTime};
 use std::collections::HashMap;
 use std::fmt;
@@ -77,7 +77,7 @@ struct Running<S: Periodic> {
 }
 
 /// Publishes a reading and runs everything downstream.
-type Publish<T> = Arc<dyn Fn(&Stamped<T>, MonotonicTime) + Send + Sync>;
+type Publish<T> = Arc<Enter<T>>;
 
 /// The sensors and services of a robot before they are made, in the order in which they are opened.
 #[allow(missing_debug_implementations)]
@@ -105,20 +105,39 @@ impl Sources {
         self.0.iter().filter_map(|source| source.open(options, assembly)).collect()
     }
 
+    /// Those whose messages other code publishes.
+    pub(super) fn external(self) -> ExternalSensors {
+        ExternalSensors(self.0.into_iter().filter(|source| source.is_external()).collect())
+    }
+
     /// By the number of the publisher.
     pub(super) fn by_publisher(self) -> HashMap<usize, Box<dyn AnySource>> {
         self.0.into_iter().map(|source| (source.publisher(), source)).collect()
     }
 }
 
+/// The sensors whose messages other code publishes.
+pub(super) struct ExternalSensors(Vec<Box<dyn AnySource>>);
+
+impl ExternalSensors {
+    /// The one at `path`.
+    pub(super) fn at(&self, path: &str) -> Option<ExternalSensor> {
+        self.0.iter().map(|source| source.as_external()).find(|sensor| sensor.path == path)
+    }
+}
+
 /// A sensor or a service before it is made, whatever its type.
-pub(super) trait AnySource: Send {
+pub(super) trait AnySource: Send + Sync {
     /// The number of its publisher.
     fn publisher(&self) -> usize;
     /// Makes it; `None` if it cannot start, or is left out.
     fn open(&self, options: &OptionsList, assembly: &Assembly) -> Option<Box<dyn Source>>;
     /// Publishes a recorded message; returns `false` if it has another payload.
     fn feed(&self, message: &DynamicMessage, now: MonotonicTime) -> bool;
+    /// Whether other code publishes its messages.
+    fn is_external(&self) -> bool;
+    /// Itself for that code.
+    fn as_external(&self) -> ExternalSensor;
 }
 
 struct OfType<S: Periodic> {
@@ -136,6 +155,15 @@ impl<S: Periodic> AnySource for OfType<S> {
 
     fn open(&self, options: &OptionsList, assembly: &Assembly) -> Option<Box<dyn Source>> {
         assembly.source::<S>(self.declaration, options.of(self.component), self.binding, &self.publish)
+    }
+
+    fn is_external(&self) -> bool {
+        S::IS_EXTERNAL
+    }
+
+    fn as_external(&self) -> ExternalSensor {
+        let SensorDeclaration { path, frame, .. } = *self.declaration;
+        ExternalSensor { path, frame, payload: S::Output::NAME, enter: Box::new(Arc::downgrade(&self.publish)) }
     }
 
     fn feed(&self, message: &DynamicMessage, now: MonotonicTime) -> bool {

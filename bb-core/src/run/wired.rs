@@ -5,9 +5,9 @@
 //! [`Wired`] is one whose components have been made.
 
 use super::actuator::AnyActuator;
-use super::source::{Assembly, Sources};
+use super::source::{Assembly, ExternalSensors, Sources};
 use super::{Robot, StartError};
-use crate::component::{Fault, OptionsList};
+use crate::component::{ExternalSensor, Fault, OptionsList};
 use crate::control::Prepared;
 use crate::declaration::RobotDeclaration;
 use crate::node::{AnyIsland, islands_in};
@@ -80,7 +80,8 @@ impl<R: Robot> Unwired for Parts<R> {
         let topics = std::mem::replace(&mut self.topics, R::topics());
         let wiring = Arc::new(R::wire(topics, options, assembly));
         self.wiring = Some(Arc::clone(&wiring));
-        Wired { islands: islands_in(&wiring, R::ISLANDS), parts: Box::new(WiringOf::<R>(wiring)) }
+        let islands = islands_in(&wiring, R::ISLANDS);
+        Wired { islands, parts: Box::new(WiringOf::<R>(wiring)), external: OnceLock::new() }
     }
 
     fn take_wiring(&mut self) -> Option<Arc<dyn Any + Send + Sync>> {
@@ -96,6 +97,8 @@ pub(super) struct Wired {
     parts: Box<dyn Wiring>,
     /// The islands, in the order of their numbers.
     pub(super) islands: Box<[Box<dyn AnyIsland>]>,
+    /// The sensors whose messages other code publishes, once it does.
+    external: OnceLock<ExternalSensors>,
 }
 
 impl Wired {
@@ -117,6 +120,11 @@ impl Wired {
     /// The island with that number.
     pub(super) fn island(&self, number: usize) -> Option<&dyn AnyIsland> {
         self.islands.get(number).map(|island| &**island)
+    }
+
+    /// The sensor at `path`, if other code publishes its messages.
+    pub(super) fn external(&self, path: &str) -> Option<ExternalSensor> {
+        self.external.get_or_init(|| self.sources().external()).at(path)
     }
 
     /// The sensors and services, not made yet.

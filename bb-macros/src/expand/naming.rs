@@ -68,8 +68,9 @@ impl Naming {
             let own = item("probed__", &name, call_site);
             let tokens = kind.to_token_stream().to_string();
             let own = (number, own, name.clone());
-            let (first, probed, named) = match tokens.contains('$') {
-                // `$crate` of two macros may be two crates.
+            let is_external = matches!(part, Part::Sensor(id) if robot.sensors[id].external.is_some());
+            let (first, probed, named) = match is_external || tokens.contains('$') {
+                // The path of an external input is no type, and `$crate` of two macros may be two crates.
                 true => own,
                 false => probed.entry((std::mem::discriminant(&part), tokens)).or_insert(own).clone(),
             };

@@ -22,7 +22,7 @@ use syn::Token;
 pub(super) fn aliases(types: &Types<'_>) -> TokenStream {
     let (robot, name) = (types.robot, types.name);
     let parts = Part::all(robot).enumerate().map(|(number, part)| {
-        let kind = &part.component(robot).kind;
+        let kind = types.given(part);
         let PartNames { alias, given, probed, first, options, given_options, .. } = types.names(part);
         let mut aliases = vec![(without_span(given), quote!(#kind))];
         if *first == number {
@@ -163,6 +163,21 @@ impl<'a> Types<'a> {
 
     fn named(&self, name: &Ident) -> Named {
         Named { above: self.depth.saturating_sub(1), name: name.clone() }
+    }
+
+    /// The type of a part as the user wrote it; of an external input, a sensor of the payload that the input takes.
+    fn given(&self, part: Part) -> TokenStream {
+        let external = match part {
+            Part::Sensor(id) => self.robot.sensors[id].external,
+            _ => None,
+        };
+        match external {
+            None => part.component(self.robot).kind.to_token_stream(),
+            Some((estimator, input)) => {
+                let (field, taken) = (self.input_field(estimator, Some(input)), self.estimator_input(estimator));
+                quote!(::bb_core::prelude::External<<#field as ::bb_core::__private::TakenAt<#taken>>::Payload>)
+            }
+        }
     }
 
     /// The name of a part.

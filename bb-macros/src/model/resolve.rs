@@ -1,14 +1,14 @@
 //! Resolves the tree to lists: every part gets its number and its path, every input its publisher.
 
 use super::{
-    Actuator, Estimator, From, Home, Input, Joint, JointId, Link, LinkId, Mount, Publisher, PublisherId, Robot,
-    Sensor, Service, Table, Timing, Worker,
+    Actuator, Estimator, EstimatorId, From, Home, Input, Joint, JointId, Link, LinkId, Mount, Publisher,
+    PublisherId, Robot, Sensor, Service, Table, Timing, Worker,
 };
 use crate::language::{SensorSetting, ServiceSetting};
 use crate::names::text;
-use crate::parse::{self, Quantity};
+use crate::parse::{self, Path, Quantity};
 use crate::units::Dimension;
-use proc_macro2::Ident;
+use proc_macro2::{Ident, Span};
 use std::collections::HashMap;
 use syn::Visibility;
 
@@ -125,7 +125,7 @@ impl Robot {
             }
         }
         let publisher = self.add_publisher(path.clone(), From::Sensor(id));
-        self.sensors.push(Sensor { attributes, name, mount, component, period_s, publisher });
+        self.sensors.push(Sensor { attributes, name, mount, component, external: None, period_s, publisher });
         for estimator in estimators {
             let mut own = path.clone();
             own.push(text(&estimator.name));
@@ -193,15 +193,51 @@ impl Robot {
                 by_path.entry(publisher.path[start..].join("::")).or_default().push(id);
             }
         }
-        for input in self.estimators.iter_mut().flat_map(|estimator| &mut estimator.inputs) {
-            let path = input.path.text();
-            let candidates = by_path.get(&path).map_or(&[][..], Vec::as_slice);
-            input.source = match (whole.get(&path), candidates) {
-                (Some(id), _) | (None, [id]) => Some(*id),
-                _ => None,
-            };
-            input.candidates = if input.source.is_none() { candidates.to_vec() } else { Vec::new() };
+        let mut external: Vec<(EstimatorId, usize, Path)> = Vec::new();
+        for (id, estimator) in self.estimators.ids().zip(self.estimators.iter_mut()) {
+            for (number, input) in estimator.inputs.iter_mut().enumerate() {
+                let path = input.path.text();
+                if input.external.is_some() {
+                    // That of a declared publisher is reported by a rule.
+                    input.source = whole.get(&path).copied();
+                    if input.source.is_none() {
+                        external.push((id, number, input.path.clone()));
+                    }
+                    continue;
+                }
+                let candidates = by_path.get(&path).map_or(&[][..], Vec::as_slice);
+                input.source = match (whole.get(&path), candidates) {
+                    (Some(id), _) | (None, [id]) => Some(*id),
+                    _ => None,
+                };
+                input.candidates = if input.source.is_none() { candidates.to_vec() } else { Vec::new() };
+            }
         }
+        let mut made: HashMap<String, PublisherId> = HashMap::new();
+        for (estimator, number, path) in external {
+            let publisher =
+                *made.entry(path.text()).or_insert_with(|| self.add_external(&path, (estimator, number)));
+            self.estimators[estimator].inputs[number].source = Some(publisher);
+        }
+    }
+
+    /// A path at which other code publishes.
+    fn add_external(&mut self, path: &Path, first: (EstimatorId, usize)) -> PublisherId {
+        let publisher = self.add_publisher(path.0.iter().map(text).collect(), From::Sensor(self.sensors.next_id()));
+        let name = path.0.last().map_or_else(|| Ident::new("external", Span::call_site()), Clone::clone);
+        // Not a type of the user's: it names no type, and is at the place of the path for errors.
+        let segments = path.0.iter().cloned().map(syn::PathSegment::from).collect();
+        let kind = syn::Path { leading_colon: None, segments };
+        self.sensors.push(Sensor {
+            attributes: Vec::new(),
+            name,
+            mount: Mount::Robot,
+            component: parse::Component { kind, options: Vec::new() },
+            external: Some(first),
+            period_s: None,
+            publisher,
+        });
+        publisher
     }
 }
 

@@ -16,7 +16,9 @@ pub(crate) struct Input {
     pub(crate) word: Ident,
     pub(crate) name: Ident,
     pub(crate) path: Path,
-    /// The word `driver`; repeating it is harmless, as is repeating `optional`.
+    /// The word `external`: other code publishes there, not the robot.
+    pub(crate) external: Option<Ident>,
+    /// The word `driver`; repeating it is harmless, as is repeating the other words.
     pub(crate) driver: Option<Ident>,
     pub(crate) optional: Option<Ident>,
     pub(crate) within: Option<Quantity>,
@@ -28,10 +30,12 @@ impl Input {
         let name = name(input, &head.word)?;
         colon(input, &name, "the path of a publisher")?;
         let path = Path::parse_publisher(input)?;
-        let mut parsed = Self { word: head.word, name, path, driver: None, optional: None, within: None };
+        let mut parsed =
+            Self { word: head.word, name, path, external: None, driver: None, optional: None, within: None };
         properties(input, notes, |field, word, ident, input, notes| {
             match field {
                 InputField::Driver => parsed.driver = Some(ident.clone()),
+                InputField::External => parsed.external = Some(ident.clone()),
                 InputField::Optional => parsed.optional = Some(ident.clone()),
                 InputField::Within => {
                     if parsed.within.replace(notes.number(word, input)?).is_some() {

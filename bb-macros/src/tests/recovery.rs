@@ -115,7 +115,7 @@ fn declarations() {
         &[
             (";", "expected the path of a publisher, as in `sensor::base_link::imu`"),
             (",", "expected the path of a publisher, as in `sensor::base_link::imu`"),
-            ("fast", "expected `driver`, `optional` or `within: …`"),
+            ("fast", "expected `driver`, `optional`, `within: …` or `external`"),
             ("[]", "expected a path in brackets, as in `[nav, velocity]`; the algorithm gives the type"),
         ],
     );

@@ -239,6 +239,49 @@ fn declared_publishers() {
 }
 
 #[test]
+fn external_inputs() {
+    let arm = |input: &str| {
+        format!(
+            "robot R; parameters {{ gain: f64 = 1.0; }} commands {{ go: Go; }}
+             link base {{
+                 sensor imu: A();
+                 estimator several: T() {{ input imu: imu; output x; output y; }}
+                 estimator t: T() {{ {input} }}
+                 joint pan: continuous {{ axis: z; sensor e: E(); actuator servo: S(); link head; }}
+             }}"
+        )
+    };
+    // A second input at the path takes the same messages; names of sensors are no obstacle.
+    right(&arm("input a: slam::imu, external, driver; input b: slam::imu, external, within: 1 s;"));
+    right(&arm("input a: command::go::progress, external;"));
+    right(&arm("input a: sensor::head::imu, external;"));
+    wrong(
+        &arm("input a: slam::imu;"),
+        &[("slam::imu", "nothing publishes at `slam::imu`; did you mean `sensor::base::imu`?")],
+    );
+    wrong(
+        &arm("input a: vision::landmarks;"),
+        &[(
+            "vision::landmarks",
+            "nothing publishes at `vision::landmarks`; declared are `sensor::base::imu`, `estimator::base::several::x`, \
+         `estimator::base::several::y`, `sensor::base::pan::e`; if other code publishes there, add `, external`",
+        )],
+    );
+    let declared = "`sensor::base::imu` is a publisher of the robot; leave out `external`";
+    wrong(&arm("input a: sensor::base::imu, external;"), &[("external", declared)]);
+    let of_actuator = "the actuator `servo` publishes at `actuator::base::pan::servo::end_motion`, not other code";
+    let path = "actuator::base::pan::servo::end_motion";
+    wrong(&arm(&format!("input a: {path}, external;")), &[(path, of_actuator)]);
+    for path in ["health", "safety::error", "param::gain", "command::go", "estimator::base::several"] {
+        let message = format!("the robot itself publishes at `{path}`; choose another path");
+        wrong(&arm(&format!("input a: {path}, external;")), &[(path, &message)]);
+    }
+    let nested = "sensor imu: A() { estimator t: T() { input a: slam::pose, external; } }";
+    let message = "an estimator in a sensor takes that sensor, `imu`, and no `input`; leave it out, or declare the estimator on the link";
+    wrong(&base(nested), &[("input", message)]);
+}
+
+#[test]
 fn no_cycles() {
     right(&sensing(
         "estimator a: T() { input i: sensor::base::imu; } estimator b: T() { input i: estimator::base::a; }

@@ -2,9 +2,14 @@
 //!
 //! Right: `input imu: sensor::base::imu;` or `input imu: imu;` where `base` has the only sensor `imu`
 //! Wrong: `input imu: sensor::base::inu;`
+//!
+//! An external input has a path of which the robot declares and publishes nothing.
+//!
+//! Right: `input pose: slam::pose, external;`
+//! Wrong: `input imu: sensor::base::imu, external;`
 
 use crate::diagnostics::Diagnostics;
-use crate::model::{From, Robot};
+use crate::model::{From, PublisherId, Robot};
 use crate::names::{nearest, nearest_path, some_of, text};
 use crate::parse::Path;
 
@@ -31,8 +36,15 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
         let is_other = |from| !matches!(from, From::Estimator(own, _) if own == id);
         let others = robot.publishers.iter().filter(|publisher| is_other(publisher.from));
         let known: Vec<String> = others.map(|publisher| publisher.path.join("::")).collect();
-        diagnostics.at(input.path.place(), nothing_at(&path, &known));
+        let message = nothing_at(&path, &known);
+        let hint = if may_be_external(&input.path, &known) {
+            "; if other code publishes there, add `, external`"
+        } else {
+            ""
+        };
+        diagnostics.at(input.path.place(), message + hint);
     }
+    external(robot, diagnostics);
 }
 
 /// The message for a path without a publisher.
@@ -45,6 +57,43 @@ pub(super) fn nothing_at(path: &str, known: &[String]) -> String {
             format!("nothing publishes at `{path}`; declared are {}", some_of(&known))
         }
     }
+}
+
+/// Whether a path is like none of the robot's: of several names, and not below what it declares.
+fn may_be_external(path: &Path, known: &[String]) -> bool {
+    let Some((root, [_, ..])) = path.0.split_first() else { return false };
+    let root = text(root);
+    nearest_path(&path.text(), known).is_none()
+        && !known.is_empty()
+        && !known.iter().any(|known| known.split("::").next() == Some(&*root))
+}
+
+/// The paths at which every robot publishes.
+const SYSTEM: [&str; 6] = ["fault", "health", "journal", "safety", "safety::error", "state_machine"];
+
+fn external(robot: &Robot, diagnostics: &mut Diagnostics) {
+    let estimators = robot.estimators.iter().filter(|estimator| !estimator.is_nested());
+    for input in estimators.flat_map(|estimator| &estimator.inputs) {
+        let (Some(word), path) = (&input.external, input.path.text()) else { continue };
+        let is_declared = input.source.is_some_and(|source| !is_external(robot, source));
+        let names: Vec<String> = input.path.0.iter().map(text).collect();
+        let actuator = robot.actuators.iter().find(|actuator| names.starts_with(&actuator.path));
+        let mut others = robot.parameters.iter().map(|it| &it.path).chain(robot.commands.iter().map(|it| &it.path));
+        let is_other = others.any(|path| *path == names) || robot.estimators.iter().any(|it| it.path == names);
+        if is_declared {
+            diagnostics.error(word, format!("`{path}` is a publisher of the robot; leave out `external`"));
+        } else if let Some(actuator) = actuator {
+            let message = format!("the actuator `{}` publishes at `{path}`, not other code", actuator.name);
+            diagnostics.at(input.path.place(), message);
+        } else if is_other || SYSTEM.contains(&&*path) {
+            let message = format!("the robot itself publishes at `{path}`; choose another path");
+            diagnostics.at(input.path.place(), message);
+        }
+    }
+}
+
+fn is_external(robot: &Robot, publisher: PublisherId) -> bool {
+    matches!(robot.publishers[publisher].from, From::Sensor(id) if robot.sensors[id].external.is_some())
 }
 
 /// The message for a path below an estimator: the output may be undeclared or misspelt, which only its type can tell.

@@ -48,7 +48,8 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
             .or_insert_with(Names::of_siblings)
             .add(&group.name, diagnostics);
     }
-    let sensors = robot.sensors.iter().map(|sensor| (Siblings::of_mount(sensor.mount), &sensor.name));
+    let declared = robot.sensors.iter().filter(|sensor| sensor.external.is_none());
+    let sensors = declared.map(|sensor| (Siblings::of_mount(sensor.mount), &sensor.name));
     let estimators = robot.estimators.iter().map(|estimator| (Siblings::of_home(estimator.home), &estimator.name));
     let actuators = robot.actuators.iter().map(|actuator| (Siblings::Joint(actuator.joint), &actuator.name));
     let services = robot.services.iter().map(|service| (Siblings::Services(service.kind), &service.name));

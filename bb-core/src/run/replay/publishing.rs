@@ -40,12 +40,20 @@ impl Replayer {
         if is_known { Ok(()) } else { Err("the actuator takes other commands".to_owned()) }
     }
 
-    pub(super) fn publish_own(&self, path: &'static str, message: Recorded) -> Result<(), String> {
+    pub(super) fn publish_own(
+        &self,
+        path: &'static str,
+        time: MonotonicTime,
+        message: Recorded,
+    ) -> Result<(), String> {
         // An actuator reports its motions at topics of its own.
         let declared = self.machine.control.topics().all().into_iter().find(|topic| topic.path() == path);
         match declared {
-            Some(topic) => publish(topic, message),
-            None => publish(&*self.own_topic(path, &message)?, message),
+            Some(topic) => publish(topic, message, |_| ()),
+            None => publish(&*self.own_topic(path, &message)?, message, |message| {
+                let joints = self.machine.environment.joints();
+                joints.hear_at(path, message.stamp(), time, &|listener| message.tell_joints(listener));
+            }),
         }
     }
 
@@ -68,10 +76,14 @@ impl Replayer {
     }
 }
 
-fn publish(topic: &dyn AnyTopic, message: Recorded) -> Result<(), String> {
+/// Publishes a message after `before`.
+fn publish(topic: &dyn AnyTopic, message: Recorded, before: impl FnOnce(&DynamicMessage)) -> Result<(), String> {
     let message = decoded(topic, message).map_err(|error| error.to_string())?;
     let mut is_known = true;
-    handed_out(|| is_known = topic.publish_dynamic(&message));
+    handed_out(|| {
+        before(&message);
+        is_known = topic.publish_dynamic(&message);
+    });
     discard(message);
     if is_known { Ok(()) } else { Err(format!("`{}` has another payload", topic.path())) }
 }

@@ -106,7 +106,17 @@ fn every_message_of_a_moving_arm_has_the_date_at_which_it_was_published() -> Res
     for (path, time) in &times {
         assert!(run.contains(time), "{path}: {time} is not in {run:?}");
     }
-    for expected in ["journal", "safety", "param/pace", "mission/note", "sensor/base/elbow/position/count"] {
+    for expected in [
+        "actuator/base/elbow/servo",
+        "actuator/base/elbow/servo/begin_motion",
+        "actuator/base/elbow/servo/end_motion",
+        "command/go",
+        "journal",
+        "safety",
+        "param/pace",
+        "mission/note",
+        "sensor/base/elbow/position/count",
+    ] {
         assert!(times.iter().any(|(path, _)| path == expected), "{expected} is missing");
     }
     Ok(())
