@@ -10,9 +10,13 @@ use super::Real;
 /// The turn is `e = a × Rᵀẑ + m × Rᵀb`, with the measured unit vectors `a` and `m`, `R` taking body to world, and
 /// the field's reference `b = (0, √(h_x² + h_y²), h_z)`, `h = R m`: the measured field itself, its horizontal part
 /// turned north. Source: section 3.4 of Madgwick's report for `b`; equation (32c) of Mahony, Hamel, Pflimlin for e.
+///
+/// `world_from_body` may have any norm, the square of which is `norm`: the vertical is then that times as long, and the turn
+/// with a field the square of that.
 #[inline]
 pub(super) fn misalignment<T: Real>(
-    world_from_body: &UnitQuaternion<T>,
+    world_from_body: &Quaternion<T>,
+    norm: T,
     up: &Vector3<T>,
     field: Option<&Vector3<T>>,
 ) -> (Vector3<T>, Vector3<T>) {
@@ -20,18 +24,18 @@ pub(super) fn misalignment<T: Real>(
     let (x2, y2, z2) = (x + x, y + y, z + z);
     let (wx, wy, xx, xz, yy, yz) = (w * x2, w * y2, x * x2, x * z2, y * y2, y * z2);
     // Rᵀẑ, the third row of R.
-    let world_up = Vector3::new(xz - wy, yz + wx, T::ONE - xx - yy);
+    let world_up = Vector3::new(xz - wy, yz + wx, norm - xx - yy);
     let Some(field) = field else {
         return (up.cross(&world_up), world_up);
     };
     let (wz, xy, zz) = (w * z2, x * y2, z * z2);
-    let world_north = Vector3::new(xy + wz, T::ONE - xx - zz, yz - wx);
+    let world_north = Vector3::new(xy + wz, norm - xx - zz, yz - wx);
     let vertical = world_up.dot(field);
-    // Both are unit vectors up to rounding.
-    let squared = T::ONE - vertical * vertical;
+    // The field is a unit vector up to rounding, and the vertical as long as `norm`.
+    let squared = norm * norm - vertical * vertical;
     let horizontal = if squared > T::ZERO { squared.sqrt() } else { T::ZERO };
     // a × Rᵀẑ + m × (b_n Rᵀŷ + b_z Rᵀẑ), with the products by Rᵀẑ in one.
-    let error = (up + field * vertical).cross(&world_up) + field.cross(&(world_north * horizontal));
+    let error = (up * norm + field * vertical).cross(&world_up) + field.cross(&(world_north * horizontal));
     (error, world_up)
 }
 

@@ -162,6 +162,13 @@ impl<T: Real> ImuSample<T> {
     }
 }
 
+/// The direction of a field that is within the range of sensors, if it has one.
+#[inline(always)]
+pub(super) fn usual_field<T: Real>(field: &Vector3<T>) -> Option<Vector3<T>> {
+    let squared = field.norm_squared();
+    if squared <= square(MAX_MAGNETIC_FIELD) { direction(field, squared, T::LEAST_SQUARE) } else { None }
+}
+
 fn check<T: Real>(quantity: Quantity, value: &Vector3<T>, limit: f64) -> Result<(), SampleError> {
     if !value.iter().all(|component| component.is_finite()) {
         return Err(SampleError::NonFinite { quantity });

@@ -4,7 +4,7 @@ use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3};
 
 use super::initial::heading_error;
 use super::rotation::{normalised, turn_heading, turn_upright};
-use super::sample::Directions;
+use super::sample::{Directions, usual_field};
 use super::{ImuSample, Quantity, Real, SampleError};
 
 /// The longest time between two samples that a filter integrates over, seconds.
@@ -22,6 +22,16 @@ pub(super) struct AttitudeState<T: Real> {
     previous_ns: Option<i64>,
     world_from_body: Option<UnitQuaternion<T>>,
     heading_known: bool,
+}
+
+/// An ordinary sample: it shows which way is up, and comes soon after the one before.
+pub(super) struct Usual<T> {
+    /// Time since the previous sample, s.
+    pub(super) dt_s: T,
+    /// The orientation at the previous sample.
+    pub(super) world_from_body: UnitQuaternion<T>,
+    /// Direction of the magnetic field in the body frame, if there is one to use; the heading is then known.
+    pub(super) field: Option<Vector3<T>>,
 }
 
 /// The remaining work for an accepted sample.
@@ -42,14 +52,15 @@ impl<T: Real> AttitudeState<T> {
         Self { magnetometer, previous_ns: None, world_from_body: None, heading_known: false }
     }
 
-    /// The time since the previous sample, s, and the orientation then, for an ordinary sample without a field to
-    /// use: with six axes, that is nearly every one. `None` for all others, which are left to [`admit`](Self::admit).
+    /// An ordinary sample: nearly every one. `None` for all others, which are left to [`admit`](Self::admit).
     #[inline(always)]
-    pub(super) fn admit_usual(&mut self, sample: &ImuSample<T>) -> Option<(T, UnitQuaternion<T>)> {
-        if sample.magnetic_field.is_some() && self.magnetometer {
-            return None;
-        }
+    pub(super) fn admit_usual(&mut self, sample: &ImuSample<T>) -> Option<Usual<T>> {
         let world_from_body = self.world_from_body?;
+        let field = match &sample.magnetic_field {
+            // The first field sets the heading.
+            Some(field) if self.magnetometer => Some(usual_field(field).filter(|_| self.heading_known)?),
+            _ => None,
+        };
         let previous_ns = self.previous_ns.as_mut()?;
         if sample.time_ns <= *previous_ns {
             return None;
@@ -60,7 +71,7 @@ impl<T: Real> AttitudeState<T> {
             return None;
         }
         *previous_ns = sample.time_ns;
-        Some((T::seconds(dt_ns), world_from_body))
+        Some(Usual { dt_s: T::seconds(dt_ns), world_from_body, field })
     }
 
     /// Checks a sample. `None` if the state has started or restarted with it, so there is no step.

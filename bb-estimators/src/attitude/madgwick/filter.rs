@@ -6,7 +6,7 @@ use super::MadgwickParams;
 use crate::attitude::directions::{expected_up, horizontal_axis, misalignment};
 use crate::attitude::rotation::{SERIES_SQUARED_ANGLE, tangent_of_half, turn, turn_by_tangent};
 use crate::attitude::sample::Directions;
-use crate::attitude::state::AttitudeState;
+use crate::attitude::state::{AttitudeState, Usual};
 use crate::attitude::{AttitudeFilter, ImuSample, ParamsError, Real, SampleError};
 use crate::params::Params as _;
 
@@ -35,7 +35,12 @@ impl<T: Real> AttitudeFilter<T> for MadgwickFilter<T> {
     #[inline]
     fn update(&mut self, sample: &ImuSample<T>) -> Result<(), SampleError> {
         match self.state.admit_usual(sample) {
-            Some((dt_s, before)) => self.step_to_gravity(&before, dt_s, sample),
+            Some(Usual { dt_s, world_from_body, field: None }) => {
+                self.step_to_gravity(&world_from_body, dt_s, sample)
+            }
+            Some(Usual { dt_s, world_from_body, field: Some(field) }) => {
+                self.step_to_field(&world_from_body, dt_s, sample, &field);
+            }
             None => return self.update_any(sample),
         }
         Ok(())
@@ -55,7 +60,7 @@ impl<T: Real> AttitudeFilter<T> for MadgwickFilter<T> {
 }
 
 impl<T: Real> MadgwickFilter<T> {
-    #[inline]
+    #[cold]
     fn update_any(&mut self, sample: &ImuSample<T>) -> Result<(), SampleError> {
         if let Some(step) = self.state.admit(sample)? {
             self.step(&step.world_from_body, step.dt_s, sample, step.up, step.field);
@@ -101,12 +106,32 @@ impl<T: Real> MadgwickFilter<T> {
         }
     }
 
+    /// The same with a field, whose direction is given.
+    #[inline(always)]
+    fn step_to_field(&mut self, before: &UnitQuaternion<T>, dt_s: T, sample: &ImuSample<T>, field: &Vector3<T>) {
+        let squared_angle = sample.angular_velocity.norm_squared() * (dt_s * dt_s);
+        let rotation = sample.angular_velocity * (dt_s * tangent_of_half(squared_angle));
+        let predicted = turn_by_tangent(before, &rotation);
+        let force = &sample.specific_force;
+        let up = force * (T::ONE / force.norm_squared().sqrt());
+        let (error, _) = misalignment(&predicted, T::ONE + rotation.norm_squared(), &up, Some(field));
+        let squared = error.norm_squared();
+        let least = T::above_rounding(NO_GRADIENT);
+        if squared_angle < T::of(SERIES_SQUARED_ANGLE) && squared > least * least {
+            let tangent = self.tangent(dt_s) / squared.sqrt();
+            self.state.store(&turn_by_tangent(&predicted, &(error * tangent)), Some(*field));
+        } else {
+            self.step_far(dt_s, sample);
+        }
+    }
+
     /// A rotation that is not small, or an orientation that agrees exactly or not at all.
     #[cold]
     fn step_far(&mut self, dt_s: T, sample: &ImuSample<T>) {
-        if let (Some(before), Ok(Directions { up, .. })) = (self.state.world_from_body(), sample.directions(false))
+        if let (Some(before), Ok(Directions { up, field })) =
+            (self.state.world_from_body(), sample.directions(self.params.magnetometer))
         {
-            self.step(&before, dt_s, sample, up, None);
+            self.step(&before, dt_s, sample, up, field);
         }
     }
 
@@ -135,7 +160,7 @@ fn descent<T: Real>(
     up: &Vector3<T>,
     field: Option<&Vector3<T>>,
 ) -> Vector3<T> {
-    let (error, world_up) = misalignment(world_from_body, up, field);
+    let (error, world_up) = misalignment(world_from_body, T::ONE, up, field);
     let squared = error.norm_squared();
     let least = T::above_rounding(NO_GRADIENT);
     if squared > least * least {

@@ -6,7 +6,7 @@ use super::MahonyParams;
 use crate::attitude::directions::{horizontal_axis, misalignment};
 use crate::attitude::rotation::{SERIES_SQUARED_ANGLE, renormalised, turn, turn_little};
 use crate::attitude::sample::Directions;
-use crate::attitude::state::AttitudeState;
+use crate::attitude::state::{AttitudeState, Usual};
 use crate::attitude::{AttitudeFilter, ImuSample, ParamsError, Real, SampleError};
 use crate::params::Params as _;
 
@@ -43,12 +43,15 @@ impl<T: Real> AttitudeFilter<T> for MahonyFilter<T> {
 
     #[inline]
     fn update(&mut self, sample: &ImuSample<T>) -> Result<(), SampleError> {
-        let Some((dt_s, before)) = self.state.admit_usual(sample) else {
+        let Some(Usual { dt_s, world_from_body: before, field }) = self.state.admit_usual(sample) else {
             return self.update_any(sample);
         };
         let force = &sample.specific_force;
         let up = force * (T::ONE / force.norm_squared().sqrt());
-        self.correct(&before, dt_s, sample, &up, None);
+        match &field {
+            Some(field) => self.correct(&before, dt_s, sample, &up, Some(field)),
+            None => self.correct(&before, dt_s, sample, &up, None),
+        }
         Ok(())
     }
 
@@ -74,18 +77,13 @@ impl<T: Real> AttitudeFilter<T> for MahonyFilter<T> {
 }
 
 impl<T: Real> MahonyFilter<T> {
-    #[inline(never)]
+    #[cold]
     fn update_any(&mut self, sample: &ImuSample<T>) -> Result<(), SampleError> {
         let Some(step) = self.state.admit(sample)? else {
             self.error = Vector3::zeros();
             return Ok(());
         };
-        match (&step.up, &step.field) {
-            (Some(up), Some(field)) if self.state.heading_is_known() => {
-                self.correct(&step.world_from_body, step.dt_s, sample, up, Some(field));
-            }
-            _ => self.turn_far(sample, step.dt_s),
-        }
+        self.turn_far(sample, step.dt_s);
         Ok(())
     }
 
@@ -145,7 +143,7 @@ impl<T: Real> MahonyFilter<T> {
     /// ḃ = -k_I ω_mes, and ω_mes for the next sample.
     #[inline(always)]
     fn compare(&mut self, orientation: UnitQuaternion<T>, dt_s: T, up: &Vector3<T>, field: Option<&Vector3<T>>) {
-        let (mut error, world_up) = misalignment(&orientation, up, field);
+        let (mut error, world_up) = misalignment(&orientation, T::ONE, up, field);
         if error.x.abs() < T::of(NO_ERROR) && error.norm() < T::of(NO_ERROR) && up.dot(&world_up) < T::ZERO {
             error = horizontal_axis(world_up);
         }
