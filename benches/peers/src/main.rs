@@ -7,6 +7,7 @@ mod peers;
 
 use bb_eval::{Averages, Chosen, Degrees, End, Recording, Running, Score, Setting, Topics};
 use bb_estimators::attitude::ImuSample;
+use nalgebra::UnitQuaternion;
 use pairs::{PAIRS, Pair};
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -76,10 +77,11 @@ fn mean(pair: &Pair, side: Side, files: &[PathBuf]) -> Result<Degrees, Box<dyn E
         while let End::NotYet = recording.read(&mut samples, usize::MAX)? {}
         let mut estimates = Vec::with_capacity(samples.len());
         start(pair, side)?.run(&samples, &mut estimates);
+        let enu_from_world = if side == Side::Ours { UnitQuaternion::identity() } else { (pair.peer)().enu_from_world };
         let mut score = Score::default();
         for (sample, estimate) in samples.iter().zip(&estimates) {
             if let Some(estimate) = estimate {
-                score.add_at(&recording.truth, sample.time_ns, estimate);
+                score.add_at(&recording.truth, sample.time_ns, &(enu_from_world * estimate));
             }
         }
         let name = file.display();
@@ -91,7 +93,7 @@ fn mean(pair: &Pair, side: Side, files: &[PathBuf]) -> Result<Degrees, Box<dyn E
 fn start(pair: &Pair, side: Side) -> Result<Box<dyn Running>, Box<dyn Error>> {
     match side {
         Side::Ours => Ok(ours(pair)?.start()?),
-        Side::Peer => Ok((pair.peer)()),
+        Side::Peer => Ok((pair.peer)().running),
     }
 }
 

@@ -1,7 +1,7 @@
 //! What is compared with what.
 
-use crate::peers;
-use bb_eval::{Axes, Running};
+use crate::peers::{self, Beside};
+use bb_eval::Axes;
 
 /// One of our filters and a peer, each with its parameters.
 pub struct Pair {
@@ -11,7 +11,7 @@ pub struct Pair {
     /// As `--set` takes them.
     pub settings: &'static [&'static str],
     pub axes: Axes,
-    pub peer: fn() -> Box<dyn Running>,
+    pub peer: fn() -> Beside,
 }
 
 impl Pair {

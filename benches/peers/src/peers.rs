@@ -1,4 +1,5 @@
-//! The peers: each takes the samples as its own documentation has it, and gives `world_from_body` in ENU.
+//! The peers: each takes the samples as its own documentation has it, and gives `world_from_body` in its own world, so that no
+//! conversion is counted as its work.
 
 use ahrs::Ahrs;
 use bb_eval::{Refused, Running};
@@ -12,6 +13,12 @@ use std::f64::consts::FRAC_1_SQRT_2;
 const PERIOD_S: f64 = 3.5e-3;
 
 const STANDARD_GRAVITY: f64 = 9.80665;
+
+/// A peer that runs, and its world.
+pub struct Beside {
+    pub running: Box<dyn Running>,
+    pub enu_from_world: UnitQuaternion<f64>,
+}
 
 /// A peer, made with the first sample.
 struct Peer<F> {
@@ -32,8 +39,8 @@ impl<F> Running for Peer<F> {
     }
 }
 
-pub fn madgwick(beta: f64) -> Box<dyn Running> {
-    Box::new(Peer {
+pub fn madgwick(beta: f64) -> Beside {
+    in_nwu(Peer {
         make: |first, [beta, ..]| ahrs::Madgwick::new_with_quat(PERIOD_S, beta, nwu_start(first)),
         parameters: [beta, 0.0, 0.0],
         step: step_of_ahrs,
@@ -41,8 +48,8 @@ pub fn madgwick(beta: f64) -> Box<dyn Running> {
     })
 }
 
-pub fn mahony(kp: f64, ki: f64) -> Box<dyn Running> {
-    Box::new(Peer {
+pub fn mahony(kp: f64, ki: f64) -> Beside {
+    in_nwu(Peer {
         make: |first, [kp, ki, _]| ahrs::Mahony::new_with_quat(PERIOD_S, kp, ki, nwu_start(first)),
         parameters: [kp, ki, 0.0],
         step: step_of_ahrs,
@@ -50,8 +57,8 @@ pub fn mahony(kp: f64, ki: f64) -> Box<dyn Running> {
     })
 }
 
-pub fn vqf() -> Box<dyn Running> {
-    Box::new(Peer {
+pub fn vqf() -> Beside {
+    in_enu(Peer {
         make: |_, _| vqf_rs::VQF::new(PERIOD_S, None, None, None),
         parameters: [0.0; 3],
         step: |vqf, sample| {
@@ -65,20 +72,20 @@ pub fn vqf() -> Box<dyn Running> {
 }
 
 /// The settings of the example in the library's documentation.
-pub fn fusion_published() -> Box<dyn Running> {
+pub fn fusion_published() -> Beside {
     fusion([0.5, 10.0, 10.0])
 }
 
 /// The best settings of a search on BROAD itself: gain 0.02 to 0.5, rejection of acceleration 0 to 40°, of the field 0 to
 /// 20°.
-pub fn fusion_best() -> Box<dyn Running> {
+pub fn fusion_best() -> Beside {
     fusion([0.1, 40.0, 20.0])
 }
 
 /// With the correction of the gyroscope's bias that comes with it; gain, and rejection of acceleration and field in
 /// degrees.
-fn fusion(parameters: [f64; 3]) -> Box<dyn Running> {
-    Box::new(Peer {
+fn fusion(parameters: [f64; 3]) -> Beside {
+    in_enu(Peer {
         make: |_, [gain, acceleration, magnetic]| {
             let sample_rate = (1.0 / PERIOD_S) as f32;
             let bias = fusion_ahrs::BiasSettings { sample_rate, ..fusion_ahrs::BiasSettings::default() };
@@ -110,6 +117,15 @@ fn fusion(parameters: [f64; 3]) -> Box<dyn Running> {
     })
 }
 
+fn in_enu(peer: impl Running + 'static) -> Beside {
+    Beside { running: Box::new(peer), enu_from_world: UnitQuaternion::identity() }
+}
+
+/// The world of `ahrs`, whose x points north.
+fn in_nwu(peer: impl Running + 'static) -> Beside {
+    Beside { running: Box::new(peer), enu_from_world: enu_from_nwu() }
+}
+
 fn step_of_ahrs<F: Ahrs<f64>>(filter: &mut F, sample: &ImuSample) -> UnitQuaternion<f64> {
     let vector = |vector: Vector3<f64>| na::Vector3::new(vector.x, vector.y, vector.z);
     let (gyroscope, accelerometer) = (vector(sample.angular_velocity), vector(sample.specific_force));
@@ -118,7 +134,7 @@ fn step_of_ahrs<F: Ahrs<f64>>(filter: &mut F, sample: &ImuSample) -> UnitQuatern
         None => filter.update_imu(&gyroscope, &accelerometer),
     };
     // No sample of the recordings has a norm of zero.
-    updated.map_or_else(|_| UnitQuaternion::identity(), |q| enu_from_nwu() * quaternion(q.w, q.i, q.j, q.k))
+    updated.map_or_else(|_| UnitQuaternion::identity(), |q| quaternion(q.w, q.i, q.j, q.k))
 }
 
 /// The orientation that the first sample shows, in the world of `ahrs`, whose x points north.
