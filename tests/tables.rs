@@ -187,8 +187,11 @@ fn section(text: &mut String, title: &str, params: &dyn Params) {
     let _ = write!(text, "\n## {title}\n\n| parameter | default | range | unit | |\n|---|---|---|---|---|\n");
     for row in params.parameters() {
         let value = params.get(row.name).expect("it is there");
-        let range =
-            if matches!(row.kind, Kind::Switch | Kind::Count) { String::new() } else { row.range.to_string() };
+        let range = match row.kind {
+            Kind::Switch | Kind::Count => String::new(),
+            Kind::Choice(names) => names.join(", "),
+            Kind::Number | Kind::Process => row.range.to_string(),
+        };
         let summary = row.summary().split_whitespace().collect::<Vec<_>>().join(" ");
         // Links are those of the code's documentation.
         let summary = summary.replace("[`", "`").replace("`]", "`");

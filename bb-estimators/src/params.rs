@@ -62,7 +62,7 @@ impl Parameter {
             if range.has(value) { Ok(()) } else { Err(error) }
         };
         match value {
-            Value::Switch(_) => Ok(()),
+            Value::Switch(_) | Value::Choice(_) => Ok(()),
             Value::Count(count) => accept(f64::from(count), self.range, self.unit),
             Value::Number(number) => accept(number, self.range, self.unit),
             Value::Process { deviation, time_s } => {

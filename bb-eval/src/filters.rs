@@ -9,7 +9,7 @@ pub use settings::{Setting, near};
 use bb_core::nalgebra::UnitQuaternion;
 use bb_estimators::attitude::{self, AttitudeFilter, FilterParams, ImuSample, SampleError};
 use bb_estimators::attitude_filters;
-use bb_estimators::params::Params;
+use bb_estimators::params::{Params, Value};
 use std::str::FromStr;
 
 /// The parameter that every nine-axis filter has.
@@ -77,7 +77,7 @@ impl Chosen {
     pub fn on(&self, axes: Axes) -> Result<Self, String> {
         let mut params = self.params;
         if axes == Axes::Six && params.get(MAGNETOMETER).is_some() {
-            params.set(MAGNETOMETER, "false").map_err(|error| format!("{}: {error}", self.name()))?;
+            params.set(MAGNETOMETER, without(&params)).map_err(|error| format!("{}: {error}", self.name()))?;
         }
         Ok(Self { params })
     }
@@ -99,6 +99,14 @@ impl Chosen {
         }
         let params = self.params;
         attitude_filters!(started!(params,)).map_err(|error| error.to_string())
+    }
+}
+
+/// The value of `magnetometer` with which a filter uses none.
+fn without(filter: &FilterParams) -> &'static str {
+    match filter.get(MAGNETOMETER) {
+        Some(Value::Choice(_)) => "none",
+        _ => "false",
     }
 }
 

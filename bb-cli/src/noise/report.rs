@@ -47,11 +47,6 @@ impl Axis {
     }
 }
 
-/// The options of each filter; in rad/s, m/s² and roots of Hz or s.
-const ESKF: [&str; 4] =
-    ["gyroscope_noise", "accelerometer_noise", "gyroscope_bias_walk", "accelerometer_bias_walk"];
-const MEKF: [&str; 2] = ["gyroscope_noise", "bias_drift"];
-
 /// Options of the filters: those of the worst axis.
 struct Options {
     gyroscope_noise: Option<f64>,
@@ -81,14 +76,13 @@ impl Options {
         }
     }
 
-    /// By the names of the options of `Eskf` and `Mekf`.
-    fn named(&self) -> [(&'static str, Option<f64>); 5] {
+    /// By the names of the options of `Eskf`; in rad/s, m/s² and roots of Hz.
+    fn named(&self) -> [(&'static str, Option<f64>); 4] {
         [
             ("gyroscope_noise", self.gyroscope_noise),
             ("accelerometer_noise", self.accelerometer_noise),
             ("gyroscope_bias_walk", self.gyroscope_walk),
             ("accelerometer_bias_walk", self.accelerometer_walk),
-            ("bias_drift", self.gyroscope_walk),
         ]
     }
 }
@@ -155,12 +149,9 @@ pub(super) fn text(found: &[Noise]) -> String {
             );
         }
         text += "\n# of the worst axis; on a robot that moves, noise is a few times as much\n";
-        for (filter, names) in [("Eskf", &ESKF[..]), ("Mekf", &MEKF)] {
-            let options = Options::of(noise).named();
-            let known = options.iter().filter(|(name, _)| names.contains(name));
-            let written = known.filter_map(|(name, value)| Some(format!("{name} = {:.2e}", (*value)?)));
-            let _ = writeln!(text, "{filter}({})", written.collect::<Vec<_>>().join(", "));
-        }
+        let options = Options::of(noise).named();
+        let written = options.iter().filter_map(|(name, value)| Some(format!("{name} = {:.2e}", (*value)?)));
+        let _ = writeln!(text, "Eskf({})", written.collect::<Vec<_>>().join(", "));
         text.push('\n');
     }
     text

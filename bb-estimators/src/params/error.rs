@@ -78,6 +78,18 @@ impl fmt::Display for SetError<'_> {
                 write!(f, "`{name}` is `{text}`: ")?;
                 match kind {
                     Kind::Switch => f.write_str("write `true` or `false`"),
+                    Kind::Choice(names) => {
+                        f.write_str("write ")?;
+                        for (index, name) in names.iter().enumerate() {
+                            let separator = match names.len() - index {
+                                _ if index == 0 => "",
+                                1 => " or ",
+                                _ => ", ",
+                            };
+                            write!(f, "{separator}`{name}`")?;
+                        }
+                        Ok(())
+                    }
                     Kind::Count => f.write_str("write a whole number from 0"),
                     Kind::Number => write!(f, "write a number {range}{unit}"),
                     Kind::Process => {

@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 
 use super::{Kind, Params, SetError, Value};
-use crate::attitude::{FilterParams, MadgwickParams, MekfParams};
+use crate::attitude::{FilterParams, MadgwickParams, VqfParams};
 use crate::navigation::planar::PlanarParams;
 use crate::navigation::{AlignmentParams, EskfParams, StreamParams};
 
@@ -44,7 +44,7 @@ fn a_value_just_outside_its_range_is_refused_and_changes_nothing() {
             let with = |number: f64| match before {
                 Value::Number(_) => Some(Value::Number(number)),
                 Value::Process { time_s, .. } => Some(Value::Process { deviation: number, time_s }),
-                Value::Switch(_) | Value::Count(_) => None,
+                Value::Switch(_) | Value::Choice(_) | Value::Count(_) => None,
             };
             let (min, max) = (row.range.min, row.range.max);
             for (inside, outside) in [(min, min.next_down()), (max, max.next_up()), (max, f64::NAN)] {
@@ -107,18 +107,19 @@ proptest! {
 
 #[test]
 fn an_error_names_parameter_value_range_and_unit() {
-    let fault = |name, text| MekfParams::default().set(name, text).unwrap_err().to_string();
-    assert_eq!(fault("velocity", "0"), "`velocity` is 0 m/s: choose a value from 0.001 to 1000 m/s");
-    assert_eq!(fault("velocity", "fast"), "`velocity` is `fast`: write a number from 0.001 to 1000 m/s");
+    let fault = |name, text| VqfParams::default().set(name, text).unwrap_err().to_string();
+    let name = "motion_bias_deviation";
+    assert_eq!(fault(name, "0"), "`motion_bias_deviation` is 0 rad/s: choose a value from 1e-6 to 10 rad/s");
+    assert_eq!(fault(name, "fast"), "`motion_bias_deviation` is `fast`: write a number from 1e-6 to 10 rad/s");
     assert_eq!(
-        fault("velocity", "5 m"),
-        "`velocity` is `5 m`: its unit is m/s; choose a value from 0.001 to 1000 m/s"
+        fault(name, "5 m"),
+        "`motion_bias_deviation` is `5 m`: its unit is rad/s; choose a value from 1e-6 to 10 rad/s"
     );
     assert_eq!(
-        fault("calibration_error", "5 m"),
-        "`calibration_error` is `5 m`: it has no unit; choose a value from 0 to 0.5"
+        fault("vertical_forgetting_factor", "5 m"),
+        "`vertical_forgetting_factor` is `5 m`: it has no unit; choose a value from 0 to 1"
     );
-    assert_eq!(fault("force_is_mean", "1"), "`force_is_mean` is `1`: write `true` or `false`");
+    assert_eq!(fault("rest_bias", "1"), "`rest_bias` is `1`: write `true` or `false`");
     let fault = |name, text| StreamParams::default().set(name, text).unwrap_err().to_string();
     assert_eq!(fault("patience", "-1"), "`patience` is `-1`: write a whole number from 0");
     assert_eq!(fault("delay", "1"), {

@@ -13,6 +13,9 @@ pub(super) fn parse<'t>(
     let no_value = || SetError::NoValue { parameter, text };
     match parameter.kind {
         Kind::Switch => text.parse().map(Value::Switch).map_err(|_| no_value()),
+        Kind::Choice(names) => {
+            names.iter().find(|name| **name == text).map(|name| Value::Choice(name)).ok_or_else(no_value)
+        }
         Kind::Count => text.parse().map(Value::Count).map_err(|_| no_value()),
         Kind::Number => number(parameter, text, text).map(Value::Number),
         Kind::Process => {

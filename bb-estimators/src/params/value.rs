@@ -8,6 +8,8 @@ use core::ops::RangeInclusive;
 pub enum Kind {
     /// On or off.
     Switch,
+    /// One of these names.
+    Choice(&'static [&'static str]),
     /// A natural number.
     Count,
     /// A real number, in SI.
@@ -21,6 +23,8 @@ pub enum Kind {
 pub enum Value {
     /// Of a [`Kind::Switch`].
     Switch(bool),
+    /// Of a [`Kind::Choice`].
+    Choice(&'static str),
     /// Of a [`Kind::Count`].
     Count(u32),
     /// Of a [`Kind::Number`], in the parameter's unit.
@@ -39,6 +43,7 @@ impl fmt::Display for Value {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Switch(switch) => write!(f, "{switch}"),
+            Self::Choice(name) => f.write_str(name),
             Self::Count(count) => write!(f, "{count}"),
             Self::Number(number) => fmt_number(*number, f),
             Self::Process { deviation, time_s } => {

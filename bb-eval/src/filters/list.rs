@@ -2,7 +2,7 @@
 
 use super::MAGNETOMETER;
 use bb_estimators::attitude::FilterParams;
-use bb_estimators::params::{Kind, Params};
+use bb_estimators::params::{Kind, Params, Value};
 use std::fmt::Write;
 
 /// Each filter with its purpose, for `--help`.
@@ -21,7 +21,8 @@ pub fn listed(filters: &[FilterParams]) -> String {
         let about = filter.about();
         let separator = if text.is_empty() { "" } else { "\n" };
         let _ = writeln!(text, "{separator}{}: {}\n  {}", filter.name(), about.when, about.idea);
-        text += &parameters(filter, |name| name != MAGNETOMETER);
+        text +=
+            &parameters(filter, |name| name != MAGNETOMETER || matches!(filter.get(name), Some(Value::Choice(_))));
     }
     text
 }
@@ -35,6 +36,7 @@ pub fn parameters(params: &dyn Params, is_asked: impl Fn(&str) -> bool) -> Strin
         let unit = if row.unit.is_empty() { String::new() } else { format!(" {}", row.unit) };
         let range = match row.kind {
             Kind::Number | Kind::Process => format!(", {}{unit}", row.range),
+            Kind::Choice(names) => format!(", of {}", names.join(", ")),
             Kind::Switch | Kind::Count => String::new(),
         };
         let unit = if row.kind == Kind::Number { &*unit } else { "" };

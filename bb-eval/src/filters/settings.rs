@@ -45,10 +45,7 @@ impl Chosen {
             for setting in settings.iter().filter(|setting| setting.is_of(filter)) {
                 params.set(&setting.name, &setting.value).map_err(fault)?;
             }
-            if params.get(MAGNETOMETER).is_some() {
-                params.set(MAGNETOMETER, if axes == Axes::Nine { "true" } else { "false" }).map_err(fault)?;
-            }
-            Ok(Self { params })
+            Self { params }.on(axes)
         });
         chosen.collect()
     }
@@ -71,9 +68,9 @@ impl Setting {
     }
 
     fn check(&self, filters: &[FilterParams]) -> Result<(), String> {
-        let Self { filter, name, .. } = self;
-        if name == MAGNETOMETER {
-            return Err("--set magnetometer is not for the command line; choose --axes six or nine".into());
+        let Self { filter, name, value } = self;
+        if name == MAGNETOMETER && matches!(value.as_str(), "true" | "false" | "none") {
+            return Err("--set magnetometer does not choose the axes; choose --axes six or nine".into());
         }
         if filters.iter().any(|filter| self.is_of(filter)) {
             return Ok(());
@@ -122,8 +119,8 @@ mod tests {
     #[test]
     fn a_setting_reaches_the_filters_that_have_it() {
         assert_eq!(fault(&["beta=0.2"], &["madgwick", "mekf"]), "");
-        assert_eq!(fault(&["madgwick.beta = 0.2", "mekf.velocity=0.3"], &["madgwick", "mekf"]), "");
-        assert_eq!(fault(&["force_is_mean=false"], &["mekf"]), "");
+        assert_eq!(fault(&["madgwick.beta = 0.2", "mekf.declination=3 deg"], &["madgwick", "mekf"]), "");
+        assert_eq!(fault(&["magnetometer=calibrated"], &["mekf"]), "");
     }
 
     #[test]
@@ -155,7 +152,11 @@ mod tests {
         );
         assert_eq!(fault(&["beta=5 deg/s"], &["madgwick"]), "");
         assert!(fault(&["beta=5 deg"], &["madgwick"]).contains("`beta` is `5 deg`: its unit is rad/s"));
-        assert_eq!(fault(&["force_is_mean=1"], &["mekf"]), "mekf: `force_is_mean` is `1`: write `true` or `false`");
+        assert_eq!(fault(&["rest_bias=1"], &["vqf"]), "vqf: `rest_bias` is `1`: write `true` or `false`");
+        assert_eq!(
+            fault(&["magnetometer=good"], &["mekf"]),
+            "mekf: `magnetometer` is `good`: write `auto`, `calibrated`, `uncalibrated` or `none`"
+        );
         assert!(fault(&["beta=-1"], &["madgwick"]).ends_with("choose a value from 0 to 1000 rad/s"));
         assert!(fault(&["beta=nan"], &["madgwick"]).ends_with("choose a value from 0 to 1000 rad/s"));
         assert!(fault(&["magnetometer=false"], &["madgwick"]).contains("--axes six"));

@@ -1,189 +1,162 @@
-//! The error state: its mean, its covariance, and the two operations of a Kalman filter.
+//! The state of the filter: what it estimates, with its covariance.
 
-use core::cmp::Ordering;
+use nalgebra::{Matrix3, Vector3};
 
-use nalgebra::Matrix3;
-
-use super::states::{BIAS, CALIBRATION, FORCE_LATENCY, ROTATION, STATES, VELOCITY};
 use super::window::Window;
 use crate::attitude::Real;
 
-/// Bias and calibration, which the rotation error integrates.
-const GYROSCOPE: usize = CALIBRATION + 9 - BIAS;
+/// Rotation error in the world, rad. Its value is moved into the orientation at the end of each window.
+pub(super) const ROTATION: usize = 0;
+/// About the vertical.
+pub(super) const HEADING: usize = ROTATION + 2;
+/// Bias of the gyroscope in the body frame, rad/s.
+pub(super) const BIAS: usize = 3;
+/// Horizontal velocity, m/s.
+pub(super) const VELOCITY: usize = 6;
+/// Lag of the magnetometer behind the gyroscope, s.
+pub(super) const LAG: usize = 8;
 
-/// A variance never falls below this fraction of its value after one update: rounding cannot make it negative.
-const ROUNDING: f64 = 1e-6;
+const STATES: usize = 9;
 
-/// Mean and covariance of the error state. The covariance is kept symmetric to the last bit.
+/// Those that a heading does not correct: its error is not white, and gravity knows them better.
+const UNTOUCHED_BY_FIELDS: [bool; STATES] = [true, true, false, false, false, false, true, true, false];
+
+/// A smaller variance is rounding.
+const LEAST_VARIANCE: f64 = 1e-16;
+
+/// Values and their covariance.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Errors<T> {
-    pub(super) mean: [T; STATES],
+pub(super) struct Errors<T: Real> {
+    pub(super) value: [T; STATES],
     covariance: [[T; STATES]; STATES],
 }
 
-/// Variances that grow with time, per second or per window.
-#[derive(Clone, Copy, Debug)]
+/// Variances that a window adds.
 pub(super) struct ProcessNoise<T> {
-    /// rad².
+    /// About each axis, rad².
     pub(super) rotation: T,
     /// (rad/s)².
     pub(super) bias: T,
-    /// (m/s)².
-    pub(super) velocity: T,
 }
 
 impl<T: Real> Errors<T> {
-    /// Zero mean and covariance.
     pub(super) fn new() -> Self {
-        Self { mean: [T::ZERO; STATES], covariance: [[T::ZERO; STATES]; STATES] }
-    }
-
-    /// Resets `COUNT` states from `first` on, and their correlations with all others.
-    pub(super) fn forget<const COUNT: usize>(&mut self, first: usize, variance: T) {
-        for i in first..first + COUNT {
-            for j in 0..STATES {
-                self.covariance[i][j] = T::ZERO;
-                self.covariance[j][i] = T::ZERO;
-            }
-            self.covariance[i][i] = variance;
-        }
-    }
-
-    /// Increases a state's variance.
-    pub(super) fn doubt(&mut self, state: usize, variance: T) {
-        self.covariance[state][state] += variance;
+        Self { value: [T::ZERO; STATES], covariance: [[T::ZERO; STATES]; STATES] }
     }
 
     pub(super) fn variance(&self, state: usize) -> T {
         self.covariance[state][state]
     }
 
-    /// Covariance of the three states from `first` on; of the rotation error in world axes, rad².
+    pub(super) fn vector(&self, first: usize) -> Vector3<T> {
+        Vector3::new(self.value[first], self.value[first + 1], self.value[first + 2])
+    }
+
+    /// The covariance of three states.
     pub(super) fn block(&self, first: usize) -> Matrix3<T> {
-        Matrix3::from_fn(|i, k| self.covariance[first + i][first + k])
+        Matrix3::from_fn(|row, column| self.covariance[first + row][first + column])
     }
 
-    /// Whether every mean and variance is usable.
-    pub(super) fn are_sane(&self) -> bool {
-        let variances = (0..STATES).all(|i| (T::ZERO..T::of(1e12)).contains(&self.covariance[i][i]));
-        variances && self.mean.iter().all(|mean| mean.abs() < T::of(1e9))
+    /// Adds to the variance of a state.
+    pub(super) fn doubt(&mut self, state: usize, variance: T) {
+        self.covariance[state][state] += variance;
     }
 
-    /// Propagates the errors over a window: `x ← Φ x`, `P ← Φ P Φᵀ + Q`.
+    /// Makes states independent of the others, with this variance.
+    pub(super) fn forget(&mut self, states: core::ops::Range<usize>, variance: T) {
+        for state in states {
+            for other in 0..STATES {
+                self.covariance[state][other] = T::ZERO;
+                self.covariance[other][state] = T::ZERO;
+            }
+            self.covariance[state][state] = variance;
+        }
+    }
+
+    /// Moves the rotation error out of the state.
+    pub(super) fn take_rotation(&mut self) -> Vector3<T> {
+        let rotation = self.vector(ROTATION);
+        self.value[ROTATION..ROTATION + 3].fill(T::ZERO);
+        rotation
+    }
+
+    /// Propagates over a window: `θ -= ∫R dt b`, `v += ∫R f dt + g_z θ × z`.
     ///
-    /// With F the integral of the specific force in the world frame, R that of the rotation and W that of
-    /// rotation times angular velocity, all of them of the window:
-    ///
-    /// * velocity: `v ← v + F + θ × F - τ F'`, horizontally, with F' the integral of rotation times ω × f,
-    /// * rotation: `θ ← θ - R δb - W δE`.
+    /// Heading does not enter the velocity: it would let accelerations correct the heading, and through it the bias about
+    /// the vertical.
     pub(super) fn propagate(&mut self, window: &Window<T>, noise: &ProcessNoise<T>) {
-        let force = &window.force;
-        let turned = [[T::ZERO, force.z, -force.y], [-force.z, T::ZERO, force.x]];
-        let lagged = [[-window.force_rate.x], [-window.force_rate.y]];
-        let integrated = window.gyroscope_integrals();
-        self.mix::<2, 3>(VELOCITY, ROTATION, &turned);
-        self.mix::<2, 1>(VELOCITY, FORCE_LATENCY, &lagged);
-        self.mean[VELOCITY] += force.x;
-        self.mean[VELOCITY + 1] += force.y;
-        self.mix::<3, GYROSCOPE>(ROTATION, BIAS, &integrated);
-        for i in 0..3 {
-            self.covariance[ROTATION + i][ROTATION + i] += noise.rotation;
-            self.covariance[BIAS + i][BIAS + i] += noise.bias;
+        self.value[VELOCITY] += window.force.x;
+        self.value[VELOCITY + 1] += window.force.y;
+        let (turn, lift) = (&window.rotation, window.force.z);
+        // From the left and, the matrix being symmetric, from the right: rows and columns in turn.
+        for is_column in [false, true] {
+            for other in 0..STATES {
+                let at = |state: usize| {
+                    if is_column { self.covariance[other][state] } else { self.covariance[state][other] }
+                };
+                let bias = Vector3::new(at(BIAS), at(BIAS + 1), at(BIAS + 2));
+                let rotation = Vector3::new(at(ROTATION), at(ROTATION + 1), at(ROTATION + 2)) - turn * bias;
+                let east = at(VELOCITY) + lift * at(ROTATION + 1);
+                let north = at(VELOCITY + 1) - lift * at(ROTATION);
+                let mut set = |state: usize, value| {
+                    let (row, column) = if is_column { (other, state) } else { (state, other) };
+                    self.covariance[row][column] = value;
+                };
+                set(ROTATION, rotation.x);
+                set(ROTATION + 1, rotation.y);
+                set(ROTATION + 2, rotation.z);
+                set(VELOCITY, east);
+                set(VELOCITY + 1, north);
+            }
         }
-        for i in 0..2 {
-            self.covariance[VELOCITY + i][VELOCITY + i] += noise.velocity;
+        for axis in 0..3 {
+            self.doubt(ROTATION + axis, noise.rotation);
+            self.doubt(BIAS + axis, noise.bias);
+        }
+        for row in 1..STATES {
+            for column in 0..row {
+                let mean = T::HALF * (self.covariance[row][column] + self.covariance[column][row]);
+                self.covariance[row][column] = mean;
+                self.covariance[column][row] = mean;
+            }
         }
     }
 
-    /// Adds `factor` times the states from `source` on to those from `target` on; the two do not overlap.
-    fn mix<const ROWS: usize, const COLUMNS: usize>(
+    /// Corrects the state by a scalar that depends on it by `slopes`: by how much it is more than expected, with which
+    /// variance.
+    pub(super) fn correct<const N: usize>(
         &mut self,
-        target: usize,
-        source: usize,
-        factor: &[[T; COLUMNS]; ROWS],
-    ) {
-        for (i, factor) in factor.iter().enumerate() {
-            let mut row = self.covariance[target + i];
-            for (k, factor) in factor.iter().enumerate() {
-                self.mean[target + i] += *factor * self.mean[source + k];
-                for (sum, value) in row.iter_mut().zip(&self.covariance[source + k]) {
-                    *sum += *factor * *value;
-                }
-            }
-            self.covariance[target + i] = row;
-        }
-        // So far the rows of Φ P. The block on the diagonal is multiplied by Φᵀ as well; the other columns mirror the
-        // rows.
-        for i in 0..ROWS {
-            let row = self.covariance[target + i];
-            for (j, factor) in factor.iter().enumerate().skip(i) {
-                let sum: T = factor.iter().zip(&row[source..]).map(|(factor, value)| *factor * *value).sum();
-                self.covariance[target + i][target + j] = row[target + j] + sum;
-            }
-        }
-        for i in 0..ROWS {
-            for j in 0..STATES {
-                if (target..target + i).contains(&j) {
-                    self.covariance[target + i][j] = self.covariance[j][target + i];
-                } else if !(target..target + ROWS).contains(&j) {
-                    self.covariance[j][target + i] = self.covariance[target + i][j];
-                }
-            }
-        }
-    }
-
-    /// Rotates the world about the vertical by an angle given by cosine and sine.
-    pub(super) fn turn_heading(&mut self, [cos, sin]: [T; 2]) {
-        let turned = |x: T, y: T| (cos * x - sin * y, sin * x + cos * y);
-        for first in [ROTATION, VELOCITY] {
-            (self.mean[first], self.mean[first + 1]) = turned(self.mean[first], self.mean[first + 1]);
-            for j in 0..STATES {
-                let (x, y) = turned(self.covariance[first][j], self.covariance[first + 1][j]);
-                self.covariance[first][j] = x;
-                self.covariance[first + 1][j] = y;
-            }
-            for row in &mut self.covariance {
-                (row[first], row[first + 1]) = turned(row[first], row[first + 1]);
-            }
-        }
-        // The two halves were rounded differently.
-        for i in 0..STATES {
-            for j in 0..i {
-                self.covariance[i][j] = self.covariance[j][i];
-            }
-        }
-    }
-
-    /// One scalar measurement: `measured` equals the states times `observation`, up to `variance`.
-    pub(super) fn update<const COUNT: usize>(
-        &mut self,
-        observation: [(usize, T); COUNT],
-        measured: T,
+        slopes: [(usize, T); N],
+        residual: T,
         variance: T,
+        is_field: bool,
     ) {
-        let mut gain = [T::ZERO; STATES];
-        let mut expected = T::ZERO;
-        for (state, factor) in observation {
-            expected += factor * self.mean[state];
-            for (gain, value) in gain.iter_mut().zip(&self.covariance[state]) {
-                *gain += factor * *value;
-            }
+        let mut shared = [T::ZERO; STATES];
+        for (one, row) in shared.iter_mut().zip(&self.covariance) {
+            *one = slopes.iter().map(|(state, slope)| row[*state] * *slope).sum();
         }
-        let total: T = variance + observation.iter().map(|(state, factor)| *factor * gain[*state]).sum::<T>();
-        // Also rejects NaN.
-        if !matches!(total.partial_cmp(&T::ZERO), Some(Ordering::Greater)) {
+        let expected: T = slopes.iter().map(|(state, slope)| shared[*state] * *slope).sum();
+        let total = expected + variance;
+        // Rounding, or absurd samples.
+        if total <= T::ZERO || !total.is_finite() {
             return;
         }
-        let scale = T::ONE / total;
-        let step = (measured - expected) * scale;
-        for i in 0..STATES {
-            self.mean[i] += gain[i] * step;
-            let least = self.covariance[i][i] * T::of(ROUNDING);
-            for j in 0..STATES {
-                // In this order, both halves round alike.
-                self.covariance[i][j] -= (gain[i] * gain[j]) * scale;
+        let inverse = T::ONE / total;
+        for row in 0..STATES {
+            let gain = shared[row] * inverse;
+            let is_fixed = is_field && UNTOUCHED_BY_FIELDS[row];
+            if !is_fixed {
+                self.value[row] += gain * residual;
             }
-            self.covariance[i][i] = self.covariance[i][i].max(least);
+            for column in row..STATES {
+                // Of two states that are both left alone, the covariance stays.
+                if !(is_fixed && UNTOUCHED_BY_FIELDS[column]) {
+                    let covariance = self.covariance[row][column] - gain * shared[column];
+                    self.covariance[row][column] = covariance;
+                    self.covariance[column][row] = covariance;
+                }
+            }
+            self.covariance[row][row] = self.covariance[row][row].max(T::of(LEAST_VARIANCE));
         }
     }
 }

@@ -1,64 +1,50 @@
-//! One step of the Kalman filter: strapdown integration with every sample, errors once per window.
-
-mod heading;
-mod start;
-mod windows;
+//! One step of the filter: strapdown integration with every sample, errors once per window.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-use super::INITIAL_TILT;
-use super::errors::Errors;
-use super::field::FieldReference;
-use super::iron::{Adoption, HardIron};
-use super::measurement::Measurements;
+use super::errors::{BIAS, Errors, HEADING, LAG, ProcessNoise, ROTATION, VELOCITY};
+use super::field::{Field, effective_horizontal};
+use super::numbers::*;
+use super::offset::{Change, HardIron};
 use super::params::MekfParams;
 use super::rest::Rest;
-use super::states::{BIAS, ROTATION};
-use super::vertical::Vertical;
-use super::window::Window;
+use super::window::{MeanField, Window};
 use crate::attitude::initial::heading_error;
-use crate::attitude::rotation::{turn, turn_heading};
+use crate::attitude::rotation::{turn, turn_heading, turn_upright};
 use crate::attitude::state::AttitudeState;
 use crate::attitude::{AttitudeFilter, ImuSample, ParamsError, Real, SampleError};
 use crate::params::Params as _;
-
-/// Standard deviation of a given orientation, about every axis, rad.
-const GIVEN: f64 = 0.087;
-
-/// Standard deviation of the heading from one magnetic sample indoors, rad.
-const INITIAL_HEADING: f64 = 1.0;
-
-/// A faster angular velocity is a rotation, rad/s: 2°/s, as in the detection of rest.
-const TURNING: f64 = 0.035;
-
-/// A heading known up to this standard deviation is trusted, rad: 10°.
-const TRUSTED_HEADING: f64 = 0.175;
 
 /// The self-calibrating error-state Kalman filter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MekfFilter<T: Real = f64> {
     params: MekfParams,
     state: AttitudeState<T>,
-    heading_known: bool,
-    /// rad/s.
-    bias: Vector3<T>,
-    /// Correction of `angular_velocity` beyond the bias, as a fraction of itself.
-    calibration: Matrix3<T>,
     /// `world_from_body` after the last sample.
     rotation: Matrix3<T>,
     errors: Errors<T>,
     window: Window<T>,
-    measurements: Measurements<T>,
     rest: Rest<T>,
-    field: Option<FieldReference<T>>,
-    iron: HardIron<T>,
-    /// Shown by the last window; takes effect with the next sample, since the end of a window is work enough.
-    adoption: Option<Adoption<T>>,
-    last_field: Vector3<T>,
-    /// Whether the body has turned since that was measured.
-    last_field_is_stale: bool,
+    /// Angular velocity of the last sample, rad/s.
+    rate: Vector3<T>,
+    /// Means of late of the squares of the angular velocity, rad²/s², of the acceleration, m²/s⁴, and of the horizontal
+    /// velocity, m²/s².
+    squared_rate: T,
     squared_acceleration: T,
-    vertical: Vertical<T>,
+    squared_velocity: T,
+    /// Mean of late of the specific force in the world, m/s², and over which time, s.
+    force: Vector3<T>,
+    force_s: T,
+    /// Mean of late of what the field says the heading is off by, rad.
+    missed: T,
+    is_north_known: bool,
+    last_field: Vector3<T>,
+    field: Option<Field<T>>,
+    iron: HardIron<T>,
+}
+
+fn square<T: Real>(number: f64) -> T {
+    T::of(number * number)
 }
 
 impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
@@ -66,27 +52,29 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
 
     fn new(params: MekfParams) -> Result<Self, ParamsError> {
         params.check()?;
-        let mut filter = Self {
+        let mut errors = Errors::new();
+        let bias = if params.magnetometer.is_used() { INITIAL_BIAS } else { INITIAL_BIAS_WITHOUT_FIELD };
+        errors.forget(BIAS..BIAS + 3, square(bias));
+        errors.forget(LAG..LAG + 1, square(MAGNETOMETER_LAG));
+        Ok(Self {
             params,
-            state: AttitudeState::new(params.magnetometer),
-            heading_known: false,
-            bias: Vector3::zeros(),
-            calibration: Matrix3::zeros(),
+            state: AttitudeState::new(params.magnetometer.is_used()),
             rotation: Matrix3::identity(),
-            errors: Errors::new(),
+            errors,
             window: Window::new(),
-            measurements: Measurements::none(),
             rest: Rest::new(&Vector3::zeros(), &Vector3::zeros()),
-            field: None,
-            iron: HardIron::new(params.magnetometer_latency),
-            adoption: None,
-            last_field: Vector3::zeros(),
-            last_field_is_stale: false,
+            rate: Vector3::zeros(),
+            squared_rate: T::ONE,
             squared_acceleration: T::ZERO,
-            vertical: Vertical::new(false),
-        };
-        filter.forget_sensors();
-        Ok(filter)
+            squared_velocity: T::ZERO,
+            force: Vector3::zeros(),
+            force_s: T::ZERO,
+            missed: T::ZERO,
+            is_north_known: false,
+            last_field: Vector3::zeros(),
+            field: None,
+            iron: HardIron::new(params.magnetometer),
+        })
     }
 
     fn params(&self) -> &MekfParams {
@@ -98,53 +86,46 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
             self.restart(sample);
             return Ok(());
         };
-        let previous = match self.adoption.take() {
-            Some(adoption) => self.adopt(step.world_from_body, &adoption),
-            None => step.world_from_body,
-        };
+        let (mut dt, mut orientation) = (step.dt_s, step.world_from_body);
         let measured = &sample.angular_velocity;
-        let rate = measured - self.bias - self.calibration * measured;
-        let mut orientation = turn(&previous, &(rate * step.dt_s));
-
-        let bias_deviation = self.errors.variance(BIAS).max(T::ZERO).sqrt();
-        self.rest.add(step.dt_s, measured, &sample.specific_force, &self.bias, bias_deviation);
-        self.last_field_is_stale |= rate.norm_squared() > T::of(TURNING * TURNING);
+        if dt > T::of(GAP_S) {
+            orientation = self.bridge(dt, orientation, measured);
+            dt = T::ZERO;
+        }
+        let bias = self.errors.vector(BIAS);
+        let rate = measured - bias;
+        orientation = turn(&orientation, &(rate * dt));
+        self.rate = rate;
         let before = core::mem::replace(&mut self.rotation, *orientation.to_rotation_matrix().matrix());
-        let middle = (before + self.rotation) * T::HALF;
-        self.window.add_rate(step.dt_s, &middle, measured);
-        let rotation = if self.params.force_is_mean { &middle } else { &self.rotation };
-        self.window.add_force(step.dt_s, rotation, &rate, &sample.specific_force);
+        let squared_rate = rate.norm_squared();
+        self.squared_rate += (squared_rate - self.squared_rate) * (dt / T::of(BRIEF_S)).min(T::ONE);
+        let deviation = (self.errors.block(BIAS).trace() / T::of(3.0)).sqrt();
+        self.rest.add(dt, measured, &sample.specific_force, &bias, deviation);
+        let window = &mut self.window;
+        window.duration += dt;
+        window.rotation += (before + self.rotation) * (T::HALF * dt);
+        window.force += self.rotation * sample.specific_force * dt;
+        window.measured_turn += measured * dt;
+        window.squared_rate += squared_rate * dt;
+        self.iron.age(step.dt_s);
         if step.field.is_some()
             && let Some(field) = sample.magnetic_field
-            && self.is_present(&field)
+            && (self.rest.is_detected() || field != self.last_field)
         {
-            self.window.add_field(&self.rotation, &rate, &field, &self.iron.offset);
+            self.last_field = field;
+            orientation = self.add_field(orientation, &rate, &field);
         }
-
-        if self.window.is_full() {
+        if self.window.duration >= T::of(WINDOW_S) {
             orientation = self.close_window(orientation);
-        } else {
-            self.measurements.take(&mut self.errors);
         }
-        if !self.heading_known
-            && let Some(direction) = step.field
-            && let Some(error) = heading_error(&(orientation * direction))
-        {
-            orientation = turn_heading(&orientation, error);
-            self.begin(&orientation, T::of(INITIAL_TILT), T::of(INITIAL_HEADING));
-            self.heading_known = true;
-        }
-        self.state.store(&orientation, step.field);
+        self.state.store(&orientation.into_inner(), None);
         Ok(())
     }
 
     fn start_at(&mut self, time_ns: i64, world_from_body: UnitQuaternion<T>) -> Result<(), SampleError> {
         self.state.start_at(time_ns, world_from_body)?;
-        self.heading_known = true;
-        if let Some(orientation) = self.state.world_from_body() {
-            self.begin(&orientation, T::of(GIVEN), T::of(GIVEN));
-            self.iron.begin(false);
-        }
+        self.is_north_known = true;
+        self.begin();
         Ok(())
     }
 
@@ -153,34 +134,25 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
     }
 
     fn gyroscope_bias(&self) -> Option<Vector3<T>> {
-        Some(self.bias)
+        Some(self.errors.vector(BIAS))
     }
 
-    /// At the end of the last window, at most 0.1 s ago. Without a magnetometer, the heading's own variance is 0: it
-    /// is right by definition at the start, and its drift since then is included. With one, the variance of the heading
-    /// includes an unknown offset of the magnetometer and, as far as norm and dip show it, a slow drift of the field.
     fn orientation_uncertainty(&self) -> Option<Matrix3<T>> {
         self.state.world_from_body()?;
-        let mut in_world = self.errors.block(ROTATION);
-        in_world[(2, 2)] += self.field_heading_variance();
-        Some(self.rotation.transpose() * in_world * self.rotation)
+        Some(self.rotation.transpose() * self.errors.block(ROTATION) * self.rotation)
     }
 
     fn is_at_rest(&self) -> Option<bool> {
         Some(self.rest.is_detected())
     }
 
-    /// By norm and dip: a field that differs from the reference by more than a tenth of its norm.
     fn is_magnetically_disturbed(&self) -> Option<bool> {
-        self.params.magnetometer.then(|| self.field.as_ref().is_some_and(FieldReference::is_disturbed))
+        self.params.magnetometer.is_used().then(|| self.field.as_ref().is_some_and(Field::is_disturbed))
     }
 
-    /// Up to a standard deviation of 10°. An unknown offset of the magnetometer is part of it: a sensor that has not
-    /// turned since the start has no heading to be trusted.
     fn is_heading_trusted(&self) -> Option<bool> {
-        let variance = self.errors.variance(ROTATION + 2) + self.field_heading_variance();
-        let is_trusted = self.heading_known && variance < T::of(TRUSTED_HEADING * TRUSTED_HEADING);
-        self.params.magnetometer.then_some(is_trusted)
+        let is_trusted = self.is_north_known && self.errors.variance(HEADING) < square(TRUSTED);
+        self.params.magnetometer.is_used().then_some(is_trusted)
     }
 
     fn reset(&mut self) {
@@ -191,47 +163,206 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
 }
 
 impl<T: Real> MekfFilter<T> {
-    /// Whether a field is one of the present orientation. A driver that is faster than the magnetometer repeats the last
-    /// value, and so does a magnetometer that hangs; at rest, a value that was measured since the last turn may repeat.
-    fn is_present(&mut self, field: &Vector3<T>) -> bool {
-        if *field != self.last_field {
-            self.last_field = *field;
-            self.last_field_is_stale = false;
-            return true;
-        }
-        self.rest.is_detected() && !self.last_field_is_stale
-    }
-
-    /// The gyroscope's scale and misalignment errors: its reading is `(1 + E)` times the angular velocity and the
-    /// bias, for small E.
-    pub fn gyroscope_calibration(&self) -> Matrix3<T> {
-        self.calibration
-    }
-
     /// The offset of the magnetometer's reading from the field, caused by iron on the body, in the body frame and the
-    /// field's unit. Zero until there is evidence for another value.
+    /// field's unit. Zero until there is evidence for one.
     pub fn magnetometer_offset(&self) -> Vector3<T> {
-        self.iron.offset
+        self.iron.offset()
     }
 
-    /// Covariance of the offset in the body frame, the field's unit squared, from the data since the offset or the
-    /// field last changed.
-    pub fn magnetometer_offset_uncertainty(&self) -> Matrix3<T> {
-        self.iron.offset_covariance()
+    /// After a start from a sample, the first one or the one after a gap.
+    #[cold]
+    fn restart(&mut self, sample: &ImuSample<T>) {
+        let Some(orientation) = self.state.world_from_body() else { return };
+        self.is_north_known = self.state.heading_is_known();
+        if self.is_north_known && self.params.declination != 0.0 {
+            let orientation = turn_heading(&orientation, -T::of(self.params.declination));
+            self.state.store(&orientation.into_inner(), None);
+        }
+        self.rest = Rest::new(&sample.angular_velocity, &sample.specific_force);
+        self.begin();
+        if self.is_north_known && let Some(field) = sample.magnetic_field {
+            self.iron.observe(&self.rotation, &field);
+        }
     }
 
-    /// How much the magnetometer lags the gyroscope, s.
-    pub fn magnetometer_latency(&self) -> T {
-        self.iron.lag()
+    /// Doubts the orientation, and forgets what was in relation to it. What is known of the sensors stays.
+    fn begin(&mut self) {
+        let Some(orientation) = self.state.world_from_body() else { return };
+        self.rotation = *orientation.to_rotation_matrix().matrix();
+        self.errors.forget(ROTATION..ROTATION + 3, square(UNKNOWN));
+        // Without a magnetometer there is no north to be off from.
+        if !self.params.magnetometer.is_used() {
+            self.errors.forget(HEADING..HEADING + 1, T::ZERO);
+        } else if !self.is_north_known {
+            self.errors.forget(HEADING..HEADING + 1, T::of(ANY_ANGLE));
+        }
+        self.errors.forget(VELOCITY..VELOCITY + 2, square(INITIAL_VELOCITY));
+        self.errors.value[VELOCITY..VELOCITY + 2].fill(T::ZERO);
+        self.window = Window::new();
+        (self.force, self.force_s) = (Vector3::zeros(), T::ZERO);
+        self.missed = T::ZERO;
+        self.iron.interrupt();
     }
 
-    /// Variance of that, s².
-    pub fn magnetometer_latency_variance(&self) -> T {
-        self.iron.lag_variance()
+    /// Turns the body over a gap of `dt` seconds, by a rate that fades from those before and after it, and doubts the
+    /// orientation by all that it may have turned besides.
+    #[cold]
+    fn bridge(&mut self, dt: T, orientation: UnitQuaternion<T>, measured: &Vector3<T>) -> UnitQuaternion<T> {
+        let orientation = if self.window.duration > T::ZERO { self.close_window(orientation) } else { orientation };
+        let mean = (self.rate + measured - self.errors.vector(BIAS)) * T::HALF;
+        let lasting = T::of(BRIEF_S) * (T::ONE - (-dt / T::of(BRIEF_S)).exp());
+        let orientation = turn(&orientation, &(mean * lasting));
+        self.rotation = *orientation.to_rotation_matrix().matrix();
+        let turned = (self.squared_rate * dt * dt).min(T::of(ANY_ANGLE));
+        for axis in 0..3 {
+            self.errors.doubt(ROTATION + axis, turned);
+        }
+        for state in [VELOCITY, VELOCITY + 1] {
+            self.errors.doubt(state, dt * dt);
+        }
+        self.iron.interrupt();
+        self.rest.interrupt();
+        orientation
     }
 
-    /// Covariance of the gyroscope's bias, body frame, (rad/s)².
-    pub fn gyroscope_bias_uncertainty(&self) -> Matrix3<T> {
-        self.errors.block(BIAS)
+    fn add_field(&mut self, orientation: UnitQuaternion<T>, rate: &Vector3<T>, field: &Vector3<T>) -> UnitQuaternion<T> {
+        match self.iron.observe(&self.rotation, field) {
+            None => {}
+            Some(Change::Found) => {
+                self.errors.doubt(HEADING, square(UNKNOWN));
+                self.forget_field();
+            }
+            Some(Change::Refuted) => {
+                self.is_north_known = false;
+                self.forget_field();
+            }
+            Some(Change::Sharper(deviation)) => {
+                let horizontal = self.field.as_ref().map_or(T::ZERO, Field::horizontal).max(T::of(0.1) * self.iron.scale());
+                let ratio = deviation / horizontal;
+                self.errors.doubt(HEADING, (ratio * ratio).min(T::ONE));
+                self.forget_field();
+            }
+        }
+        let field = field - self.iron.offset();
+        let in_world = self.rotation * field;
+        if self.is_north_known {
+            self.window.add_field(&in_world, &(self.rotation * rate.cross(&field)));
+            return orientation;
+        }
+        let Some(error) = heading_error(&in_world.normalize()) else { return orientation };
+        let orientation = turn_heading(&orientation, error - T::of(self.params.declination));
+        self.rotation = *orientation.to_rotation_matrix().matrix();
+        self.errors.forget(HEADING..HEADING + 1, square(UNKNOWN));
+        self.is_north_known = true;
+        self.window = Window::new();
+        self.iron.interrupt();
+        orientation
+    }
+
+    fn forget_field(&mut self) {
+        self.field = None;
+        self.window.forget_fields();
+    }
+
+    /// Ends a window: propagates the errors, and corrects them by what it tells.
+    fn close_window(&mut self, orientation: UnitQuaternion<T>) -> UnitQuaternion<T> {
+        let window = core::mem::replace(&mut self.window, Window::new());
+        let dt = window.duration;
+        let noise = ProcessNoise {
+            rotation: square::<T>(GYROSCOPE_NOISE) * dt + square::<T>(TURN_NOISE) * window.squared_rate,
+            bias: square::<T>(BIAS_DRIFT) * dt,
+        };
+        self.errors.propagate(&window, &noise);
+        let force = window.force / dt;
+        if self.is_overturned(dt, &force) {
+            return self.level(orientation);
+        }
+        let acceleration = force - Vector3::z() * T::of(GRAVITY);
+        let [east, north] = [self.errors.value[VELOCITY], self.errors.value[VELOCITY + 1]];
+        let part = (dt / T::of(SHORT_S)).min(T::ONE);
+        self.squared_acceleration += (acceleration.norm_squared() - self.squared_acceleration) * part;
+        self.squared_velocity += (east * east + north * north - self.squared_velocity) * part;
+        let squared = square::<T>(VELOCITY_OF_ALL)
+            + self.squared_velocity
+            + square::<T>(ACCELERATION_LASTS_S) * self.squared_acceleration;
+        let variance = T::TWO * T::of(VELOCITY_LASTS_S) * squared / dt;
+        for state in [VELOCITY, VELOCITY + 1] {
+            let value = self.errors.value[state];
+            self.errors.correct([(state, T::ONE)], -value, variance, false);
+        }
+        if self.rest.is_detected() {
+            self.fuse_rest(dt, &(window.measured_turn / dt));
+        }
+        if self.is_north_known && let Some(mean) = window.mean_field() {
+            self.fuse_field(dt, &mean, window.squared_rate / dt);
+        }
+        let orientation = turn(&UnitQuaternion::identity(), &self.errors.take_rotation()) * orientation;
+        self.rotation = *orientation.to_rotation_matrix().matrix();
+        orientation
+    }
+
+    /// On average a body does not fall: what holds it points up, or the tilt is wrong.
+    fn is_overturned(&mut self, dt: T, force: &Vector3<T>) -> bool {
+        self.force_s = (self.force_s + dt).min(T::of(SHORT_S));
+        self.force += (force - self.force) * (dt / self.force_s);
+        let norm = self.force.norm();
+        norm > T::of(0.5 * GRAVITY) && self.force.z < T::of(OVERTURNED) * norm
+    }
+
+    #[cold]
+    fn level(&mut self, orientation: UnitQuaternion<T>) -> UnitQuaternion<T> {
+        let orientation = turn_upright(&orientation, &self.force);
+        self.state.store(&orientation.into_inner(), None);
+        self.is_north_known = false;
+        let (norm, force_s) = (self.force.norm(), self.force_s);
+        self.begin();
+        (self.force, self.force_s) = (Vector3::z() * norm, force_s);
+        self.forget_field();
+        orientation
+    }
+
+    /// At rest, the gyroscope reads its bias.
+    fn fuse_rest(&mut self, dt: T, mean: &Vector3<T>) {
+        let residual = mean - self.errors.vector(BIAS);
+        let known = self.errors.block(BIAS).trace() + T::of(3.0) * square::<T>(REST_BIAS);
+        let doubt = (T::of(3.0) * residual.norm_squared() / (known * square::<T>(OUTLIER))).max(T::ONE);
+        for axis in 0..3 {
+            let residual = mean[axis] - self.errors.value[BIAS + axis];
+            self.errors.correct([(BIAS + axis, T::ONE)], residual, square::<T>(REST_BIAS) / dt * doubt, false);
+        }
+    }
+
+    /// The angle of the field to north.
+    fn fuse_field(&mut self, dt: T, mean: &MeanField<T>, squared_rate: T) {
+        let MeanField { field, rate } = mean;
+        let reference = self.field.get_or_insert_with(|| Field::new(field));
+        let verdict = reference.observe(dt, field, squared_rate);
+        if verdict.is_new {
+            self.errors.doubt(HEADING, square(UNKNOWN));
+        }
+        let horizontal = effective_horizontal(field);
+        let (east, north) = (field.x / horizontal, field.y / horizontal);
+        let dip = field.z / horizontal;
+        let slopes = [
+            (ROTATION + 2, T::ONE),
+            (ROTATION + 1, -north * dip),
+            (ROTATION, -east * dip),
+            (LAG, (north * rate.x - east * rate.y) / horizontal),
+        ];
+        let expected: T = slopes.iter().map(|(state, slope)| self.errors.value[*state] * *slope).sum();
+        let mut residual = field.x.atan2(field.y) - T::of(self.params.declination) - expected;
+        residual = residual.sin().atan2(residual.cos());
+        let offset = square::<T>(DISTURBANCE) * self.iron.variance() / (horizontal * horizontal);
+        let noise = verdict.noise + offset;
+        // A heading that the field has contradicted for long is not known.
+        self.missed += (residual - self.missed) * (dt / T::of(SHORT_S)).min(T::ONE);
+        let squared = self.missed * self.missed;
+        if squared > square::<T>(CONTRADICTION) + square::<T>(OUTLIER) * self.errors.variance(HEADING) {
+            self.errors.doubt(HEADING, squared);
+            self.missed = T::ZERO;
+            self.forget_field();
+            return;
+        }
+        self.errors.correct(slopes, residual, noise / dt, true);
     }
 }

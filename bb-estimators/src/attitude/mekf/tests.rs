@@ -1,51 +1,33 @@
 //! Tests of the Kalman filter alone; the laws of all filters are also checked here for it.
 
-mod slow;
-mod start;
-mod trust;
+use nalgebra::{UnitQuaternion, Vector3};
 
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
-
-use super::{MekfFilter, MekfParams};
-use crate::attitude::laws::{FIELD, UP, at_rest, attitude_laws};
-use crate::attitude::{AttitudeFilter, ImuSample, OrientationError, Real, SampleError};
+use super::{Magnetometer, MekfFilter, MekfParams};
+use crate::attitude::laws::{FIELD, UP, attitude_laws};
+use crate::attitude::{AttitudeFilter, ImuSample, OrientationError, Real};
 
 fn filter<T: Real>(magnetometer: bool) -> MekfFilter<T> {
-    // The samples of these tests are of their instant.
-    MekfFilter::new(MekfParams { magnetometer, force_is_mean: false, ..MekfParams::default() }).unwrap()
+    let magnetometer = if magnetometer { Magnetometer::Auto } else { Magnetometer::None };
+    MekfFilter::new(MekfParams { magnetometer, ..MekfParams::default() }).unwrap()
 }
 
 attitude_laws!(nine_axes: filter(true), six_axes: filter(false));
 
-/// A body that is waved about at 100 Hz, with the sensor errors that the filter estimates.
+/// A body that is waved about at 100 Hz.
 struct World {
     i: i64,
     truth: UnitQuaternion<f64>,
     bias: Vector3<f64>,
-    calibration: Matrix3<f64>,
     /// In the world, T.
     field: Vector3<f64>,
     /// A magnet on the body, T.
     magnet: Vector3<f64>,
-    /// How many samples the magnetometer is late, and how often it gives a new one.
-    late: usize,
-    every: i64,
-    fields: Vec<Vector3<f64>>,
 }
 
 impl World {
     fn new() -> Self {
-        Self {
-            i: 0,
-            truth: UnitQuaternion::identity(),
-            bias: Vector3::zeros(),
-            calibration: Matrix3::zeros(),
-            field: FIELD,
-            magnet: Vector3::zeros(),
-            late: 0,
-            every: 1,
-            fields: Vec::new(),
-        }
+        let (truth, bias) = (UnitQuaternion::identity(), Vector3::zeros());
+        Self { i: 0, truth, bias, field: FIELD, magnet: Vector3::zeros() }
     }
 
     fn sample(&mut self, moving: bool) -> ImuSample {
@@ -56,13 +38,11 @@ impl World {
         let acceleration = Vector3::new(2.0 * (3.0 * t).sin(), 1.5 * (2.3 * t).cos(), (4.0 * t).sin()) * motion;
         self.truth *= UnitQuaternion::from_scaled_axis(rate * 0.01);
         let body_from_world = self.truth.inverse();
-        self.fields.push(body_from_world * self.field + self.magnet);
-        let field = self.fields[self.fields.len().saturating_sub(1 + self.late)];
         ImuSample {
             time_ns: self.i * 10_000_000,
-            angular_velocity: rate + self.calibration * rate + self.bias,
+            angular_velocity: rate + self.bias,
             specific_force: body_from_world * (UP + acceleration),
-            magnetic_field: (self.i % self.every == 0).then_some(field),
+            magnetic_field: Some(body_from_world * self.field + self.magnet),
         }
     }
 
@@ -83,161 +63,123 @@ impl World {
     }
 }
 
+/// Standard deviations of tilt and heading, degrees.
+fn deviations(filter: &MekfFilter) -> (f64, f64) {
+    let rotation = filter.world_from_body().unwrap().to_rotation_matrix();
+    let in_world = rotation * filter.orientation_uncertainty().unwrap() * rotation.transpose();
+    let tilt = (in_world[(0, 0)] + in_world[(1, 1)]).sqrt();
+    (tilt.to_degrees(), in_world[(2, 2)].sqrt().to_degrees())
+}
+
 #[test]
 fn rest_shows_the_bias() {
     for magnetometer in [true, false] {
         let (mut world, mut filter) = (World::new(), filter(magnetometer));
         world.bias = Vector3::new(0.01, -0.02, 0.015);
         world.run(&mut filter, 20, false);
-        assert!(
-            (filter.gyroscope_bias().unwrap() - world.bias).norm() < 1e-4,
-            "{}",
-            filter.gyroscope_bias().unwrap()
-        );
-        assert!(world.error_of(&filter).inclination < 0.1);
+        let left = filter.gyroscope_bias().unwrap() - world.bias;
+        assert!(left.norm() < 1e-3, "{left}");
+        assert_eq!(filter.is_at_rest(), Some(true));
+        assert!(world.error_of(&filter).inclination < 0.2);
     }
-}
-
-#[test]
-fn the_uncertainty_is_that_of_the_body_and_of_the_size_of_the_errors() {
-    let (mut world, mut filter) = (World::new(), filter(true));
-    assert_eq!(filter.orientation_uncertainty(), None, "before the start");
-    world.truth = UnitQuaternion::from_euler_angles(1.2, -0.4, 2.0);
-    world.run(&mut filter, 60, true);
-    assert_eq!((filter.is_at_rest(), filter.is_magnetically_disturbed()), (Some(false), Some(false)));
-    let rotation = filter.world_from_body().unwrap().to_rotation_matrix();
-    let in_world = rotation * filter.orientation_uncertainty().unwrap() * rotation.transpose();
-    let deviation = in_world.diagonal().map(|variance| variance.sqrt().to_degrees());
-    assert!(
-        deviation.z > deviation.x && deviation.z > deviation.y,
-        "gravity shows more than the field: {deviation}"
-    );
-    assert!(deviation.x < 1.0 && deviation.z < 3.0, "{deviation}");
-    let error = world.error_of(&filter);
-    assert!(error.inclination < 5.0 * deviation.x && error.heading < 4.0 * deviation.z, "{error:?} {deviation}");
-}
-
-#[test]
-fn motion_shows_the_bias_and_the_calibration() {
-    let (mut world, mut filter) = (World::new(), filter(true));
-    world.bias = Vector3::new(0.005, -0.003, 0.004);
-    world.calibration = Matrix3::new(0.006, 0.002, 0.0, -0.003, -0.005, 0.0, 0.001, 0.002, 0.004);
-    world.run(&mut filter, 300, true);
-    // Scale first; misalignment takes motion about all axes at once for longer.
-    let left = filter.gyroscope_calibration() - world.calibration;
-    assert!(left.diagonal().norm() < 0.1 * world.calibration.diagonal().norm(), "{left}");
-    assert!(left.norm() < 0.7 * world.calibration.norm(), "{left}");
-    assert!((filter.gyroscope_bias().unwrap() - world.bias).norm() < 0.2 * world.bias.norm());
-    assert!(world.error_of(&filter).total < 1.0, "{:?}", world.error_of(&filter));
-}
-
-#[test]
-fn a_magnet_on_the_body_is_recognised() {
-    let (mut world, mut filter) = (World::new(), filter(true));
-    world.run(&mut filter, 30, false);
-    world.magnet = Vector3::new(30e-6, -20e-6, 10e-6);
-    world.run(&mut filter, 60, true);
-    assert!(world.error_of(&filter).heading.abs() < 3.0, "{:?}", world.error_of(&filter));
-    world.magnet = Vector3::zeros();
-    world.run(&mut filter, 60, true);
-    assert!(world.error_of(&filter).total < 1.0, "{:?}", world.error_of(&filter));
-}
-
-#[test]
-fn a_new_field_that_lasts_is_believed() {
-    let (mut world, mut filter) = (World::new(), filter(true));
-    world.run(&mut filter, 30, true);
-    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.7);
-    world.field = turn * Vector3::new(0.0, 30e-6, -35e-6);
-    world.run(&mut filter, 10, true);
-    assert!(world.error_of(&filter).heading.abs() < 5.0, "too soon: {:?}", world.error_of(&filter));
-    world.run(&mut filter, 170, true);
-    let error = world.error_of(&filter);
-    assert!((error.heading.abs() - 0.7_f64.to_degrees()).abs() < 3.0, "{error:?}");
-}
-
-#[test]
-fn a_magnetometer_may_be_absent() {
-    let (mut world, mut filter) = (World::new(), filter(true));
-    world.bias = Vector3::new(0.005, -0.003, 0.004);
-    world.run(&mut filter, 30, false);
-    world.run(&mut filter, 30, true);
-    world.every = i64::MAX;
-    world.run(&mut filter, 60, true);
-    assert!(world.error_of(&filter).total < 1.0, "{:?}", world.error_of(&filter));
-    world.every = 7;
-    world.run(&mut filter, 30, true);
-    assert!(world.error_of(&filter).total < 1.0, "{:?}", world.error_of(&filter));
-}
-
-#[test]
-fn the_magnetometers_lag_is_found() {
-    let (mut world, mut filter) = (World::new(), filter(true));
-    (world.late, world.every) = (2, 2);
-    world.run(&mut filter, 300, true);
-    assert!((filter.magnetometer_latency() - 0.02).abs() < 0.005, "{}", filter.magnetometer_latency());
-    assert!(world.error_of(&filter).total < 1.0, "{:?}", world.error_of(&filter));
 }
 
 #[test]
 fn an_offset_is_found_and_its_heading_with_it() {
-    let directions = [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [0.6, 0.6, -0.5]];
-    for (axis, yaw) in directions.into_iter().zip([0.0, 1.0, 2.0, -2.5]) {
-        for rest_s in [0, 20] {
-            let (mut world, mut filter) = (World::new(), filter(true));
-            world.truth = UnitQuaternion::from_euler_angles(0.2, -0.1, yaw);
-            world.magnet = Vector3::from(axis) * 30e-6;
-            world.run(&mut filter, rest_s, false);
-            assert_ne!(filter.is_heading_trusted(), Some(true), "before it has turned");
-            world.run(&mut filter, 20, true);
-            let error = world.error_of(&filter);
-            assert!(error.total < 2.3, "{axis:?}, rest of {rest_s} s: {error:?}");
-            assert!(
-                (filter.magnetometer_offset() - world.magnet).norm() < 2e-6,
-                "{}",
-                filter.magnetometer_offset()
-            );
-            let deviation = filter.magnetometer_offset_uncertainty().trace().sqrt();
-            assert!(deviation < 5e-6, "{deviation}");
-            assert_eq!(filter.is_heading_trusted(), Some(true));
+    for (axis, yaw) in [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [0.6, 0.6, -0.5]].into_iter().zip(0..) {
+        let (mut world, mut filter) = (World::new(), filter(true));
+        world.truth = UnitQuaternion::from_euler_angles(0.2, -0.1, f64::from(yaw));
+        world.magnet = Vector3::from(axis) * 30e-6;
+        world.run(&mut filter, 20, true);
+        assert!(world.error_of(&filter).total < 4.0, "{axis:?}: {:?}", world.error_of(&filter));
+        let left = filter.magnetometer_offset() - world.magnet;
+        assert!(left.norm() < 3e-6, "{left}");
+        world.magnet = Vector3::zeros();
+        world.run(&mut filter, 90, true);
+        assert!(world.error_of(&filter).total < 4.0, "{axis:?}, taken off: {:?}", world.error_of(&filter));
+    }
+}
+
+#[test]
+fn a_calibrated_magnetometer_is_not_doubted() {
+    let params = MekfParams { magnetometer: Magnetometer::Calibrated, ..MekfParams::default() };
+    let (mut world, mut filter) = (World::new(), MekfFilter::<f64>::new(params).unwrap());
+    world.magnet = Vector3::new(30e-6, 0.0, 0.0);
+    world.run(&mut filter, 20, true);
+    assert_eq!(filter.magnetometer_offset(), Vector3::zeros());
+}
+
+#[test]
+fn an_uncalibrated_magnetometer_has_its_offset_at_once() {
+    let params = MekfParams { magnetometer: Magnetometer::Uncalibrated, ..MekfParams::default() };
+    let (mut world, mut filter) = (World::new(), MekfFilter::<f64>::new(params).unwrap());
+    world.magnet = Vector3::new(3e-6, -2e-6, 0.0);
+    world.run(&mut filter, 20, true);
+    let left = filter.magnetometer_offset() - world.magnet;
+    assert!(left.norm() < 2e-6, "{left}");
+}
+
+#[test]
+fn north_is_turned_by_the_declination() {
+    let params = MekfParams { declination: 0.2, ..MekfParams::default() };
+    let (mut world, mut turned) = (World::new(), MekfFilter::<f64>::new(params).unwrap());
+    world.field = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -0.2) * FIELD;
+    turned.update(&world.sample(false)).unwrap();
+    assert!(world.error_of(&turned).total < 1e-6, "{:?}", world.error_of(&turned));
+    world.run(&mut turned, 20, true);
+    assert!(world.error_of(&turned).total < 1.0, "{:?}", world.error_of(&turned));
+}
+
+/// What a plane does: the specific force stays where it is in the body, and only the velocity tells that it is not the weight.
+#[test]
+fn a_long_turn_is_no_rest() {
+    let (mut filter, rate, speed) = (filter(true), 0.4, 20.0);
+    let (mut told, mut within, mut squared) = (0, 0, 0.0);
+    for i in 1..=12_000_i64 {
+        let t = i as f64 * 0.01;
+        let part = ((t - 10.0) / 10.0).clamp(0.0, 1.0);
+        let heading = rate * (t - 15.0).max(0.0) * part;
+        let bank = (speed * rate * part / UP.z).atan();
+        let truth = |heading: f64, bank: f64| UnitQuaternion::from_euler_angles(0.0, -bank, heading);
+        let before_part = ((t - 10.01) / 10.0).clamp(0.0, 1.0);
+        let before = truth(rate * (t - 15.01).max(0.0) * before_part, (speed * rate * before_part / UP.z).atan());
+        let now = truth(heading, bank);
+        let to_centre = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), heading) * -Vector3::x();
+        let force = UP + to_centre * (speed * rate * part);
+        let sample = ImuSample {
+            time_ns: i * 10_000_000,
+            angular_velocity: (before.inverse() * now).scaled_axis() * 100.0 + Vector3::new(0.003, -0.002, 0.002),
+            specific_force: now.inverse() * force,
+            magnetic_field: Some(now.inverse() * FIELD),
+        };
+        filter.update(&sample).unwrap();
+        if t > 30.0 {
+            let error = OrientationError::between(&filter.world_from_body().unwrap(), &now).unwrap();
+            let inclination = error.inclination.to_degrees();
+            told += 1;
+            within += i32::from(inclination <= 2.0 * deviations(&filter).0);
+            squared += inclination * inclination;
         }
     }
+    let inclination = (squared / f64::from(told)).sqrt();
+    assert!(inclination < 4.0, "{inclination}");
+    assert!(f64::from(within) > 0.9 * f64::from(told), "{within} of {told}");
 }
 
 #[test]
-fn a_disturbance_of_the_world_is_no_offset() {
+fn a_gap_is_bridged_and_doubted() {
     let (mut world, mut filter) = (World::new(), filter(true));
-    world.run(&mut filter, 5, false);
-    world.run(&mut filter, 20, true);
-    for pulse in 0..20 {
-        let angle = f64::from(pulse) * 2.4;
-        world.field = FIELD + Vector3::new(angle.sin(), angle.cos(), (3.0 * angle).sin()) * 20e-6;
-        world.run(&mut filter, 2, true);
-        assert!(filter.magnetometer_offset().norm() < 10e-6, "pulse {pulse}: {}", filter.magnetometer_offset());
-        world.field = FIELD;
-        world.run(&mut filter, 4, true);
-        assert!(world.error_of(&filter).total < 3.0, "pulse {pulse}: {:?}", world.error_of(&filter));
+    world.run(&mut filter, 30, true);
+    let (tilt, heading) = deviations(&filter);
+    for _ in 0..50 {
+        world.sample(true);
     }
-}
-
-#[test]
-fn a_bias_that_steps_at_rest_is_followed() {
-    let (mut world, mut filter) = (World::new(), filter(true));
-    world.run(&mut filter, 60, false);
-    world.bias = Vector3::new(0.02, 0.0, -0.02);
-    world.run(&mut filter, 10, false);
-    assert!((filter.gyroscope_bias().unwrap() - world.bias).norm() < 2e-3, "{}", filter.gyroscope_bias().unwrap());
-    world.run(&mut filter, 60, false);
-    assert!(world.error_of(&filter).inclination < 0.2, "{:?}", world.error_of(&filter));
-}
-
-#[test]
-fn a_bias_that_steps_in_motion_is_followed() {
-    let (mut world, mut filter) = (World::new(), filter(true));
-    world.run(&mut filter, 60, true);
-    world.bias = Vector3::new(0.005, 0.0, -0.005);
-    world.run(&mut filter, 120, true);
-    assert!(world.error_of(&filter).total < 2.0, "{:?}", world.error_of(&filter));
+    filter.update(&world.sample(true)).unwrap();
+    let doubted = deviations(&filter);
+    assert!(doubted.0 > 5.0 * tilt && doubted.1 > 3.0 * heading, "{doubted:?} after {tilt}, {heading}");
+    assert!(world.error_of(&filter).total < 2.0 * doubted.0.hypot(doubted.1));
+    world.run(&mut filter, 10, true);
+    assert!(world.error_of(&filter).total < 3.0, "{:?}", world.error_of(&filter));
 }
 
 #[test]
@@ -248,43 +190,7 @@ fn absurd_but_finite_samples_pass() {
         let sample = world.sample(true);
         let absurd = Vector3::new(-1e3, 9e2, 1e3) * f64::from(i % 3 - 1);
         filter.update(&ImuSample { angular_velocity: absurd, specific_force: absurd * 1e3, ..sample }).unwrap();
-        let nan = ImuSample { time_ns: i64::MAX, specific_force: absurd * f64::NAN, ..sample };
-        assert!(matches!(filter.update(&nan), Err(SampleError::NonFinite { .. })));
     }
     world.run(&mut filter, 200, true);
-    assert!(world.error_of(&filter).total < 3.0, "{:?}", world.error_of(&filter));
-}
-
-#[test]
-fn rates_and_missing_samples_do_not_matter() {
-    for keep in [|i: i64| i % 5 == 0, |i: i64| i % 7 != 3 && i % 400 > 30] {
-        let (mut world, mut filter) = (World::new(), filter(true));
-        for i in 0..6_000 {
-            let sample = world.sample(i > 1_000);
-            if keep(i) {
-                filter.update(&sample).unwrap();
-            }
-        }
-        let error = world.error_of(&filter);
-        assert!(error.total < 6.3, "{error:?}");
-    }
-}
-
-#[test]
-fn still_time_is_refused_and_gravity_needs_no_turn() {
-    let mut filter = filter(false);
-    let sample = at_rest(0, &UnitQuaternion::identity());
-    filter.update(&sample).unwrap();
-    assert!(matches!(filter.update(&sample), Err(SampleError::TimeNotIncreasing { .. })));
-    filter.update(&at_rest(1, &UnitQuaternion::identity())).unwrap();
-    assert!(filter.world_from_body().unwrap().angle() < 1e-12);
-}
-
-#[test]
-fn parameters_out_of_range_are_named() {
-    let error = MekfFilter::<f64>::new(MekfParams { velocity: 0.0, ..MekfParams::default() }).unwrap_err();
-    assert_eq!(error.to_string(), "`velocity` is 0 m/s: choose a value from 0.001 to 1000 m/s");
-    let error =
-        MekfFilter::<f64>::new(MekfParams { field_disturbance: f64::NAN, ..MekfParams::default() }).unwrap_err();
-    assert_eq!(error.parameter, "field_disturbance");
+    assert!(world.error_of(&filter).total < 5.0, "{:?}", world.error_of(&filter));
 }

@@ -1,0 +1,113 @@
+//! All numbers of the filter, each with its unit and its reason. `docs/attitude-filter.md` has the ablation: what the errors
+//! are without a part, or with another value.
+
+use core::f64::consts::PI;
+
+const DEGREE: f64 = PI / 180.0;
+
+// The gyroscope.
+
+/// White noise, rad/√s: ten times that of a data sheet, for the bandwidth and the vibration of a body that moves.
+pub(super) const GYROSCOPE_NOISE: f64 = 1e-3;
+/// Error per root of turned angle and rate, √s: scale and misalignment of 0.1 to 1 %, and the sampling of a changing rate.
+pub(super) const TURN_NOISE: f64 = 1e-2;
+/// Standard deviation of the bias at the start, rad/s: 1.1°/s, of a sensor that nobody has calibrated.
+pub(super) const INITIAL_BIAS: f64 = 2e-2;
+/// The same without a magnetometer, rad/s: nothing then corrects the bias about the vertical, and the heading drifts with
+/// what accelerations seem to tell of it.
+pub(super) const INITIAL_BIAS_WITHOUT_FIELD: f64 = 1e-2;
+/// Growth of the bias, rad/s/√s: 0.1°/s in an hour.
+pub(super) const BIAS_DRIFT: f64 = 3e-5;
+
+// How bodies move.
+
+/// Horizontal velocity of any body, m/s, beyond what it has shown: a hand.
+pub(super) const VELOCITY_OF_ALL: f64 = 0.3;
+/// How long a velocity lasts, s: a step.
+pub(super) const VELOCITY_LASTS_S: f64 = 1.0;
+/// How long an acceleration lasts, s, before the opposite one follows.
+pub(super) const ACCELERATION_LASTS_S: f64 = 0.2;
+/// Standard deviation of the velocity at the start, m/s: a pedestrian.
+pub(super) const INITIAL_VELOCITY: f64 = 1.0;
+/// Variance of an angle of which nothing is known, rad²: evenly around.
+pub(super) const ANY_ANGLE: f64 = 3.0;
+/// Cosine of the largest angle between the vertical and the mean specific force of some seconds: 60°, twice the weight.
+pub(super) const OVERTURNED: f64 = 0.5;
+/// Standard gravity, m/s².
+pub(super) const GRAVITY: f64 = 9.80665;
+
+// Memory.
+
+/// What is gone at once, s: a disturbance that the body has passed, an angular velocity, the shaking before rest.
+pub(super) const BRIEF_S: f64 = 0.3;
+/// What counts as some seconds, s.
+pub(super) const SHORT_S: f64 = 5.0;
+/// What counts as long, s.
+pub(super) const LONG_S: f64 = 20.0;
+/// Length of a window, s: at most, a hand turns by a tenth of a radian in it.
+pub(super) const WINDOW_S: f64 = 0.03;
+/// A longer time between samples is a gap, s: several periods of the slowest sensors.
+pub(super) const GAP_S: f64 = 0.08;
+
+// Doubt.
+
+/// So many standard deviations are no chance.
+pub(super) const OUTLIER: f64 = 4.0;
+
+/// Standard deviation of an orientation from one sample in motion, rad.
+pub(super) const UNKNOWN: f64 = 1.0;
+
+// Rest, as VQF detects it.
+
+/// How long a sensor must be still, s.
+pub(super) const REST_TIME_S: f64 = 1.5;
+/// The angular velocity that is still, beyond the bias and from its own mean, rad/s.
+pub(super) const REST_RATE: f64 = 2.0 * DEGREE;
+/// The change of the specific force that is still, m/s².
+pub(super) const REST_FORCE: f64 = 0.5;
+/// The bias as the mean of a second at rest tells it, rad/s.
+pub(super) const REST_BIAS: f64 = 2e-3;
+
+// The field.
+
+/// The heading as the field of a second tells it, rad: 14°, since errors of a place last longer.
+pub(super) const HEADING_NOISE: f64 = 0.245;
+/// Growth of that with the distance of norm and dip from the reference, as a fraction of the norm.
+pub(super) const DISTURBANCE: f64 = 2.45;
+/// Lag of the magnetometer behind the gyroscope, standard deviation, s: a period at 66 Hz.
+pub(super) const MAGNETOMETER_LAG: f64 = 0.015;
+/// Fields whose norm and dip differ by less than this fraction are the same.
+pub(super) const SAME_FIELD: f64 = 0.1;
+/// Time constant of the mean of another field, s.
+pub(super) const NEW_FIELD_S: f64 = 2.0;
+/// The angular velocity of a body that leaves its place, rad/s.
+pub(super) const FAST: f64 = 20.0 * DEGREE;
+/// Part that time without it counts for.
+pub(super) const AT_REST: f64 = 0.1;
+/// What the field says of the heading for seconds contradicts it from this on, rad.
+pub(super) const CONTRADICTION: f64 = 0.75;
+/// A heading is trusted up to this standard deviation, rad: 10°.
+pub(super) const TRUSTED: f64 = 0.175;
+
+// The offset of the magnetometer, in units of the field.
+
+/// Degrees of freedom of Student's distribution of the field's steps from pose to pose.
+pub(super) const TAILS: f64 = 4.0;
+/// Standard deviation of an offset, if there is one: some fields, as of iron in a phone.
+pub(super) const ANY_OFFSET: f64 = 4.2;
+/// Standard deviation of what calibration leaves: 2 µT.
+pub(super) const CALIBRATED: f64 = 0.04;
+/// Scale of the steps, and of the errors of the magnetometer, before any was seen: 3 µT.
+pub(super) const FIELD_WALK: f64 = 0.0625;
+/// The least scale: 0.5 µT.
+pub(super) const LEAST_WALK: f64 = 0.01;
+/// How many poses that first scale counts for.
+pub(super) const FIRST_POSES: f64 = 5.0;
+/// Turn from pose to pose, rad.
+pub(super) const POSE_TURN: f64 = 0.07;
+/// Turn in all, rad, after which the norm of the field is known.
+pub(super) const SCALE_TURN: f64 = 0.1;
+/// Logarithm of the odds against an offset at the start.
+pub(super) const ODDS: f64 = 5.0;
+/// Part to which the deviation of the offset falls until the heading by the previous one is doubted.
+pub(super) const SHARPER: f64 = 0.4;

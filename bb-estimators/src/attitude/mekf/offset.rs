@@ -1,0 +1,233 @@
+//! The offset of the magnetometer, by iron on the body, as a hypothesis against none.
+
+use nalgebra::{Matrix3, SMatrix, Vector3};
+
+use super::numbers::{
+    ANY_OFFSET, CALIBRATED, FIELD_WALK, FIRST_POSES, LEAST_WALK, ODDS, POSE_TURN, SCALE_TURN, SHARPER, SHORT_S, TAILS,
+};
+use super::params::Magnetometer;
+use crate::attitude::Real;
+
+/// One hypothesis: the world's field walks from pose to pose, with the steps of Student's distribution, and the body
+/// adds an offset. In units of the field.
+#[derive(Clone, Debug, PartialEq)]
+struct Hypothesis<T: Real> {
+    field: Vector3<T>,
+    offset: Vector3<T>,
+    /// Of field and offset.
+    covariance: SMatrix<T, 6, 6>,
+    /// Scale of a step, squared, as learnt.
+    step: T,
+    poses: T,
+}
+
+impl<T: Real> Hypothesis<T> {
+    fn new(deviation: f64) -> Self {
+        let mut covariance = SMatrix::<T, 6, 6>::zeros();
+        covariance.fixed_view_mut::<3, 3>(3, 3).fill_diagonal(T::of(deviation * deviation));
+        let step = T::of(FIELD_WALK * FIELD_WALK);
+        Self { field: Vector3::zeros(), offset: Vector3::zeros(), covariance, step, poses: T::ZERO }
+    }
+
+    fn of_offset(&self) -> Matrix3<T> {
+        self.covariance.fixed_view::<3, 3>(3, 3).into_owned()
+    }
+
+    /// Begins with a pose: nothing is known of the world's field but what this field tells.
+    fn begin(&mut self, rotation: &Matrix3<T>, measured: &Vector3<T>) {
+        self.field = measured - rotation * self.offset;
+        let of_offset = self.of_offset();
+        let across = rotation * of_offset;
+        let of_field = across * rotation.transpose() + Matrix3::from_diagonal_element(self.step);
+        self.covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&of_field);
+        self.covariance.fixed_view_mut::<3, 3>(0, 3).copy_from(&-across);
+        self.covariance.fixed_view_mut::<3, 3>(3, 0).copy_from(&-across.transpose());
+    }
+
+    /// Adds the next pose, with the field measured in it in the world frame. Returns the logarithm of its likelihood.
+    fn observe(&mut self, rotation: &Matrix3<T>, measured: &Vector3<T>) -> T {
+        let residual = measured - self.field - rotation * self.offset;
+        // A step and an error of the magnetometer have one scale.
+        let (walk, white) = (self.step, self.step);
+        let shared = |covariance: &SMatrix<T, 6, 6>| {
+            covariance.fixed_columns::<3>(0) + covariance.fixed_columns::<3>(3) * rotation.transpose()
+        };
+        let expected = |shared: &SMatrix<T, 6, 3>| {
+            shared.fixed_rows::<3>(0)
+                + rotation * shared.fixed_rows::<3>(3)
+                + Matrix3::from_diagonal_element(white)
+        };
+        let mut with = shared(&self.covariance);
+        let total = expected(&with) + Matrix3::from_diagonal_element(walk);
+        let Some(inverse) = total.try_inverse() else { return T::ZERO };
+        let squared = residual.dot(&(inverse * residual));
+        let (tails, freedom) = (T::of(TAILS), T::of(TAILS + 3.0));
+        let likelihood =
+            -T::HALF * total.determinant().ln() - T::HALF * freedom * (squared / tails).ln_1p();
+        let weight = freedom / (tails + squared);
+        self.poses += T::ONE;
+        let learnt = weight * squared / T::of(3.0) - T::ONE;
+        self.step *= T::ONE + learnt / (self.poses + T::of(FIRST_POSES));
+        self.step = self.step.max(T::of(LEAST_WALK * LEAST_WALK));
+        // A step that is too large for the scale is one, rather than an error of the sensor.
+        let walked = walk / weight.min(T::ONE);
+        for axis in 0..3 {
+            self.covariance[(axis, axis)] += walked;
+            with[(axis, axis)] += walked;
+        }
+        let Some(inverse) = expected(&with).try_inverse() else { return T::ZERO };
+        let gain = with * inverse;
+        let correction = gain * residual;
+        self.field += correction.fixed_rows::<3>(0);
+        self.offset += correction.fixed_rows::<3>(3);
+        let covariance = self.covariance - gain * with.transpose();
+        self.covariance = (covariance + covariance.transpose()) * T::HALF;
+        likelihood
+    }
+
+    fn variance(&self) -> T {
+        self.of_offset().trace() / T::of(3.0)
+    }
+}
+
+/// A pose with the field measured in it, body frame.
+#[derive(Clone, Debug, PartialEq)]
+struct Pose<T: Real> {
+    rotation: Matrix3<T>,
+    field: Vector3<T>,
+    age_s: T,
+}
+
+/// Both hypotheses, and which of them is believed.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct HardIron<T: Real> {
+    none: Hypothesis<T>,
+    some: Hypothesis<T>,
+    /// Logarithm of the odds of `some` against `none`.
+    odds: T,
+    is_believed: bool,
+    /// Whether the user has said it.
+    is_given: bool,
+    /// Deviation of the offset when the heading was last doubted for it.
+    doubted: T,
+    /// The last pose, and sums of how much the field changed and the body turned from pose to pose, squared.
+    pose: Option<Pose<T>>,
+    changed: T,
+    turned: T,
+    /// The norm of the field, once the body has turned enough to know it: an offset does not turn with the world.
+    scale: Option<T>,
+}
+
+/// What a new pose tells.
+pub(super) enum Change<T> {
+    /// There is an offset.
+    Found,
+    /// There is none.
+    Refuted,
+    /// The offset is known much better than when the heading was last doubted, with this deviation.
+    Sharper(T),
+}
+
+impl<T: Real> HardIron<T> {
+    pub(super) fn new(magnetometer: Magnetometer) -> Self {
+        Self {
+            none: Hypothesis::new(CALIBRATED),
+            some: Hypothesis::new(ANY_OFFSET),
+            odds: -T::of(ODDS),
+            is_believed: magnetometer == Magnetometer::Uncalibrated,
+            is_given: magnetometer != Magnetometer::Auto,
+            doubted: T::of(ANY_OFFSET),
+            pose: None,
+            changed: T::ZERO,
+            turned: T::ZERO,
+            scale: None,
+        }
+    }
+
+    /// The offset to take off, body frame.
+    pub(super) fn offset(&self) -> Vector3<T> {
+        match self.scale {
+            Some(scale) if self.is_believed => self.some.offset * scale,
+            _ => Vector3::zeros(),
+        }
+    }
+
+    /// Variance of the offset along an axis, if there is one.
+    pub(super) fn variance(&self) -> T {
+        match self.scale {
+            Some(scale) if self.is_believed => self.some.variance() * scale * scale,
+            _ => T::ZERO,
+        }
+    }
+
+    /// The norm of the world's field, zero before it is known.
+    pub(super) fn scale(&self) -> T {
+        self.scale.unwrap_or(T::ZERO)
+    }
+
+    /// The next pose is not compared with those before.
+    pub(super) fn interrupt(&mut self) {
+        self.pose = None;
+    }
+
+    /// Time passes.
+    pub(super) fn age(&mut self, dt: T) {
+        if let Some(pose) = &mut self.pose {
+            pose.age_s += dt;
+        }
+    }
+
+    /// Adds a field. Poses in one field show an offset by how it turns, whatever the heading.
+    pub(super) fn observe(&mut self, rotation: &Matrix3<T>, field: &Vector3<T>) -> Option<Change<T>> {
+        let Some(pose) = &self.pose else {
+            self.begin(rotation, field);
+            return None;
+        };
+        // Twice the versine of the angle between the poses, for a small angle its square.
+        let squared_turn = T::of(3.0) - rotation.dot(&pose.rotation);
+        if pose.age_s > T::of(SHORT_S) {
+            self.begin(rotation, field);
+            return None;
+        }
+        if squared_turn < T::of(POSE_TURN * POSE_TURN) {
+            return None;
+        }
+        let Some(scale) = self.scale else {
+            // Of a field in any direction, two thirds turn.
+            self.changed += (field - pose.field).norm_squared();
+            self.turned += squared_turn * T::of(2.0 / 3.0);
+            if self.turned > T::of(SCALE_TURN * SCALE_TURN) && self.changed > T::ZERO {
+                self.scale = Some((self.changed / self.turned).sqrt());
+            }
+            self.begin(rotation, field);
+            return None;
+        };
+        self.pose = Some(Pose { rotation: *rotation, field: *field, age_s: T::ZERO });
+        let measured = rotation * (field / scale);
+        let none = self.none.observe(rotation, &measured);
+        self.odds += self.some.observe(rotation, &measured) - none;
+        let deviation = self.some.variance().sqrt();
+        if !self.is_believed {
+            if self.odds > T::ZERO && !self.is_given {
+                self.is_believed = true;
+                self.doubted = deviation;
+                return Some(Change::Found);
+            }
+        } else if self.odds <= -T::of(ODDS) && !self.is_given {
+            self.is_believed = false;
+            return Some(Change::Refuted);
+        } else if deviation < T::of(SHARPER) * self.doubted {
+            return Some(Change::Sharper(scale * core::mem::replace(&mut self.doubted, deviation)));
+        }
+        None
+    }
+
+    fn begin(&mut self, rotation: &Matrix3<T>, field: &Vector3<T>) {
+        self.pose = Some(Pose { rotation: *rotation, field: *field, age_s: T::ZERO });
+        if let Some(scale) = self.scale {
+            let measured = rotation * (field / scale);
+            self.none.begin(rotation, &measured);
+            self.some.begin(rotation, &measured);
+        }
+    }
+}
