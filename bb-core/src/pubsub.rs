@@ -1,6 +1,7 @@
 //! Publish and subscribe. A slow subscriber never slows a publisher and never grows without bound.
 
 mod any;
+mod bound;
 mod delivery;
 mod dynamic;
 mod publisher;
@@ -19,6 +20,7 @@ mod unmatched;
 mod wakers;
 
 pub use any::{AnyTopic, DynamicMessage};
+pub(crate) use bound::{Bound, Held, counted_bytes, is_counted};
 pub use delivery::{Delivery, Overflow};
 pub use dynamic::{DynamicSubscription, RecvDynamic};
 pub use publisher::Publisher;

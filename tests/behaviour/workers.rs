@@ -154,3 +154,104 @@ fn a_robot_is_stopped_with_a_full_inbox_and_with_one_that_hangs() {
         assert_eq!(heavy.dispatched + input.dropped(DropReason::Stopped), 1025, "what it did not take is counted");
     });
 }
+
+/// An image of 1920 × 1080.
+#[derive(Clone, Debug, Payload)]
+struct Frame {
+    pixels: Vec<u8>,
+}
+
+/// Does not return from its first frame, or fails at it.
+#[derive(Debug)]
+struct Eye<const HANGS: bool>;
+
+impl<const HANGS: bool> Estimator for Eye<HANGS> {
+    type Options = NoOptions;
+    type Input = Frame;
+    type Output = Number;
+
+    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+
+    fn handle_input(&mut self, _: &Stamped<Frame>) -> Result<Reply<Number>, Fault> {
+        if HANGS {
+            HERE.pass("an eye");
+            return Ok(Reply::none());
+        }
+        Err(Fault::new("it is blind"))
+    }
+}
+
+/// All frames since the last page.
+#[derive(Clone, Copy, Debug, Inputs)]
+struct Pages<'a> {
+    page: Input<'a, Number>,
+    frames: Every<'a, Frame>,
+}
+
+/// Says how many there were.
+#[derive(Debug)]
+struct Album;
+
+impl Estimator for Album {
+    type Options = NoOptions;
+    type Input = Pages<'static>;
+    type Output = Number;
+
+    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+
+    fn handle_input(&mut self, pages: Pages<'_>) -> Result<Reply<Number>, Fault> {
+        Ok(Reply::emit(Number(pages.page.0 + pages.frames.len() as f64)))
+    }
+}
+
+robot! {
+    robot Watching;
+    link base {
+        sensor camera: External<Frame>() { estimator blind: Eye<false>(); }
+        sensor page: External<Number>();
+        estimator hung: Eye<true>() { input frame: sensor::base::camera; runs_on: worker; }
+        estimator album: Album() {
+            input page: sensor::base::page, driver;
+            input frames: sensor::base::camera, optional;
+        }
+    }
+}
+
+/// In an inbox, for a restart and for a driver: as many bytes as a subscription keeps.
+#[test]
+fn large_messages_that_wait_are_bounded_in_bytes() {
+    const SIZE: usize = 1920 * 1080 * 3;
+    const FIT: u64 = (Overflow::DEFAULT_BYTES / SIZE) as u64;
+    const SENT: u64 = 30;
+    let _alone = ALONE.lock();
+    within(60, || {
+        let mut builder = Watching::builder();
+        builder.supervision().first_backoff = Duration::from_secs(600);
+        builder.supervision().longest_backoff = Duration::from_secs(600);
+        let album = builder.subscribe(watching::estimator::base::album);
+        let running = builder.start().expect("it starts");
+        let publish = || {
+            let frame = Frame { pixels: vec![0; SIZE] };
+            running.publish(watching::sensor::base::camera, running.clock().now(), frame);
+        };
+        HERE.close("an eye");
+        publish();
+        HERE.wait_for(1);
+        (0..SENT).for_each(|_| publish());
+        let dropped = |path: &str, input: &str, reason| {
+            let report = running.report();
+            let estimator = report.estimator(path).expect("it is declared");
+            estimator.inputs.iter().find(|other| other.name == input).map(|input| input.dropped(reason))
+        };
+        assert_eq!(dropped("estimator/base/hung", "frame", DropReason::Overflow), Some(SENT - FIT));
+        assert_eq!(dropped("sensor/base/camera/blind", "camera", DropReason::Stopped), Some(SENT - FIT));
+        assert_eq!(dropped("estimator/base/album", "frames", DropReason::Displaced), Some(SENT + 1 - FIT));
+        running.publish(watching::sensor::base::page, running.clock().now(), Number(0.0));
+        assert_eq!(album.recv_timeout(PATIENCE).map(|count| count.0), Some(FIT as f64));
+        HERE.open();
+    });
+}

@@ -1,38 +1,61 @@
 //! Messages that wait until an estimator is restarted.
 
+use crate::pubsub::{Bound, Held};
 use std::collections::VecDeque;
 
-/// Deliveries in order of arrival, each with the number of its input.
-pub(super) struct Backlog<D>(VecDeque<(usize, D)>);
+/// Deliveries in order of arrival.
+pub(super) struct Backlog<D> {
+    waiting: VecDeque<Waiting<D>>,
+    held: Held,
+}
 
-/// The capacity of an inbox.
-const CAPACITY: usize = 1024;
+struct Waiting<D> {
+    /// The number of its input.
+    input: usize,
+    delivery: D,
+    /// The counted bytes of its message.
+    bytes: usize,
+}
+
+/// The bound of an inbox.
+const BOUND: Bound = Bound::of_estimator(1024);
 
 impl<D> Backlog<D> {
     pub(super) fn new() -> Self {
-        Self(VecDeque::new())
+        Self { waiting: VecDeque::new(), held: Held::default() }
     }
 
     #[inline]
     pub(super) fn is_empty(&self) -> bool {
-        self.0.is_empty()
+        self.waiting.is_empty()
     }
 
-    /// Keeps a delivery. Returns the input of the oldest one if that was dropped to make room.
-    pub(super) fn push(&mut self, input: usize, delivery: D) -> Option<usize> {
-        let dropped = if self.0.len() == CAPACITY { self.0.pop_front() } else { None };
-        self.0.push_back((input, delivery));
-        dropped.map(|(input, _)| input)
+    /// Takes out the oldest delivery, with its input, if one of `bytes` counted bytes does not fit beside it.
+    pub(super) fn make_room(&mut self, bytes: usize) -> Option<(usize, D)> {
+        if BOUND.has_room(self.held, bytes) { None } else { self.take() }
+    }
+
+    /// Keeps a delivery, for which there is room.
+    pub(super) fn push(&mut self, input: usize, delivery: D, bytes: usize) {
+        self.held.add(bytes);
+        self.waiting.push_back(Waiting { input, delivery, bytes });
     }
 
     /// Takes the oldest delivery.
     pub(super) fn pop(&mut self) -> Option<D> {
-        self.0.pop_front().map(|(_, delivery)| delivery)
+        self.take().map(|(_, delivery)| delivery)
     }
 
     /// Drops all deliveries; returns the input of each.
     pub(super) fn clear(&mut self) -> impl Iterator<Item = usize> + '_ {
-        self.0.drain(..).map(|(input, _)| input)
+        self.held = Held::default();
+        self.waiting.drain(..).map(|waiting| waiting.input)
+    }
+
+    fn take(&mut self) -> Option<(usize, D)> {
+        let Waiting { input, delivery, bytes } = self.waiting.pop_front()?;
+        self.held.remove(bytes);
+        Some((input, delivery))
     }
 }
 
@@ -43,10 +66,17 @@ mod tests {
     #[test]
     fn the_oldest_make_room_and_all_are_told() {
         let mut backlog = Backlog::new();
-        for input in 0..CAPACITY + 3 {
-            assert_eq!(backlog.push(input, ()), input.checked_sub(CAPACITY));
+        for input in 0..BOUND.capacity + 3 {
+            let oldest = backlog.make_room(0).map(|(input, ())| input);
+            assert_eq!(oldest, input.checked_sub(BOUND.capacity));
+            backlog.push(input, (), 0);
         }
-        assert!(backlog.clear().eq(3..CAPACITY + 3));
+        assert!(backlog.clear().eq(3..BOUND.capacity + 3));
         assert!(backlog.is_empty());
+        // A large one takes the room of several.
+        let third = BOUND.bytes / 3;
+        (0..3).for_each(|input| backlog.push(input, (), third));
+        let displaced: Vec<_> = std::iter::from_fn(|| backlog.make_room(2 * third)).collect();
+        assert_eq!((displaced, backlog.held.bytes), (vec![(0, ()), (1, ())], third));
     }
 }

@@ -188,7 +188,7 @@ impl<S: IslandState> Island<S> {
     pub fn new(state: S) -> Self {
         Self {
             state: Mutex::new(state),
-            inbox: Mutex::new(Inbox::new()),
+            inbox: Mutex::new(Inbox::new(S::CAPACITY)),
             pending: AtomicUsize::new(0),
             waiting: AtomicUsize::new(0),
             hangs: AtomicBool::new(false),
@@ -203,7 +203,8 @@ impl<S: IslandState> Island<S> {
         }
     }
 
-    /// Runs `direct` if the island is free and no entry is waiting; otherwise leaves `message` in the inbox.
+    /// Runs `direct` if the island is free and no entry is waiting; otherwise leaves `message`, with its counted bytes, in the
+    /// inbox.
     #[inline]
     pub fn enter(
         &self,
@@ -211,7 +212,7 @@ impl<S: IslandState> Island<S> {
         now: MonotonicTime,
         key: Key,
         direct: impl FnOnce(&mut S, &Turn<'_>),
-        message: impl FnOnce() -> S::Message,
+        message: impl FnOnce() -> (S::Message, usize),
     ) {
         if self.pending.load(Ordering::Relaxed) == 0
             && !self.served.load(Ordering::Relaxed)
@@ -220,21 +221,22 @@ impl<S: IslandState> Island<S> {
             self.process(wiring, now, || deliver::<S>(key), |turn| direct(&mut state, turn));
             return self.leave(wiring, state);
         }
-        self.enqueue(wiring, now, Keyed { key, message: message() });
+        let (message, bytes) = message();
+        self.enqueue(wiring, now, Keyed { key, message }, bytes);
     }
 
     /// Puts a message into the inbox and ensures that a thread processes it.
     #[cold]
-    fn enqueue(&self, wiring: &S::Wiring, now: MonotonicTime, message: Keyed<S::Message>) {
+    fn enqueue(&self, wiring: &S::Wiring, now: MonotonicTime, message: Keyed<S::Message>, bytes: usize) {
         let mut inbox = self.inbox();
         // Allocated only once, when the first message has to wait.
-        inbox.reserve(S::CAPACITY);
+        inbox.reserve();
         if self.replayed.load(Ordering::Relaxed) {
-            return inbox.push(now, message);
+            return inbox.push(now, message, bytes);
         }
-        while !inbox.has_room(S::CAPACITY) && !self.served.load(Ordering::Relaxed) {
+        while !inbox.has_room(bytes) && !self.served.load(Ordering::Relaxed) {
             drop(inbox);
-            let may_have_room = self.wait_for_room(wiring);
+            let may_have_room = self.wait_for_room(wiring, bytes);
             self.attend(wiring);
             inbox = self.inbox();
             // Otherwise another publisher may have taken the last slot.
@@ -242,22 +244,26 @@ impl<S: IslandState> Island<S> {
                 break;
             }
         }
-        let dropped = if inbox.has_room(S::CAPACITY) { None } else { inbox.pop_message() };
-        if let Some(dropped) = &dropped
-            && let Some(journal) = wiring.environment().journal()
+        // A large message takes the room of several.
+        let mut dropped = Vec::new();
+        while !inbox.has_room(bytes)
+            && let Some(oldest) = inbox.pop_message()
         {
-            journal.write(now, wiring.environment().clock().wall_offset_nanos(), self::dropped::<S>(dropped.key));
+            if let Some(journal) = wiring.environment().journal() {
+                let offset = wiring.environment().clock().wall_offset_nanos();
+                journal.write(now, offset, self::dropped::<S>(oldest.key));
+            }
+            dropped.push(oldest);
         }
-        inbox.push(now, message);
+        inbox.push(now, message, bytes);
         self.pending.store(inbox.pending().0, Ordering::Relaxed);
         drop(inbox);
-        if let Some(dropped) = dropped {
+        for dropped in &dropped {
             S::dropped(wiring, dropped.key);
-            self.attend(wiring);
-            // The message of another publisher, whose `Drop` may panic, is dropped last.
-            return drop(dropped);
         }
         self.attend(wiring);
+        // The messages of other publishers, whose `Drop` may panic, are dropped last.
+        drop(dropped);
     }
 
     /// Adds a control entry.

@@ -16,9 +16,10 @@ use super::timers::Continuation;
 use super::turn::Turn;
 use crate::component::inputs;
 use crate::component::{Binding, Estimator, Inputs, Reply, TakenAt};
-use crate::fault::{Failed, Fault};
+use crate::fault::{Failed, Fault, discard};
 use crate::lifecycle::{AsEstimator, Recipe, Slot};
 use crate::message::{Payload, Stamp, Stamped};
+use crate::pubsub::counted_bytes;
 use common::Common;
 use std::fmt;
 
@@ -166,10 +167,12 @@ impl<E: Estimator> Node<E> {
         turn.enter(self.common.number);
         turn.timing().interrupt();
         match self.common.admission.admit(input, message, turn.latest()) {
-            Ok(()) if F::slot(&mut self.cache).is_some_and(|slot| inputs::Slot::store(slot, message)) => {
-                self.common.shared.counters().drop(input, DropReason::Displaced);
+            Ok(()) => {
+                let displaced = F::slot(&mut self.cache).map_or(0, |slot| inputs::Slot::store(slot, message));
+                for _ in 0..displaced {
+                    self.common.shared.counters().drop(input, DropReason::Displaced);
+                }
             }
-            Ok(()) => {}
             Err(reason) => self.common.refuse(input, reason, message.monotonic_time, turn),
         }
     }
@@ -286,11 +289,14 @@ impl<E: Estimator> Node<E> {
             }
             return;
         }
-        let message = message.clone();
+        let (message, bytes) = (message.clone(), counted_bytes(message));
         let deliver: Deliver<E> = Box::new(move |node, turn, emitted| deliver(node, &message, turn, emitted));
-        if let Some(oldest) = self.backlog.push(input, deliver) {
+        // Each is dropped by itself, since its `Drop` may panic.
+        while let Some((oldest, dropped)) = self.backlog.make_room(bytes) {
             counters.drop(oldest, DropReason::Stopped);
+            discard(dropped);
         }
+        self.backlog.push(input, deliver, bytes);
     }
 
     /// Schedules the next wake-up of the island.

@@ -1,5 +1,6 @@
 //! The options of a subscription: what it keeps, and how often it gets something.
 
+use super::bound::{Bound, DEFAULT_BYTES};
 use std::time::Duration;
 
 /// What happens to a subscriber that is slower than its publisher.
@@ -40,7 +41,7 @@ impl Overflow {
     pub const MAX_CAPACITY: usize = 1 << 20;
 
     /// Default bound on the total bytes of a subscription's messages: 64 MiB.
-    pub const DEFAULT_BYTES: usize = 64 << 20;
+    pub const DEFAULT_BYTES: usize = DEFAULT_BYTES;
 
     /// Adds a highest rate, for a display: of each path at most one message in each `period`. Of those that come sooner, the newest is
     /// delivered once the period is over, so the last one of a burst is not lost, and a subscriber is woken only for what it gets. The
@@ -98,11 +99,4 @@ impl From<Overflow> for Delivery {
     fn from(overflow: Overflow) -> Self {
         Self { overflow, period: Duration::ZERO }
     }
-}
-
-/// The bounds of a queue.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Bound {
-    pub(super) capacity: usize,
-    pub(super) bytes: usize,
 }

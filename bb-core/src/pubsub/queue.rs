@@ -3,11 +3,11 @@
 mod by_path;
 
 use self::by_path::{ByPath, Dropped, Paths};
-use super::delivery::{Bound, Delivery, Overflow};
+use super::bound::{Bound, Held};
+use super::delivery::{Delivery, Overflow};
 use super::statistics::SubscriberStatistics;
 use super::timer::Timer;
 use super::wakers::{Wakers, discard, wake};
-use crate::message::{Payload, Stamped};
 use crate::time::MonotonicTime;
 use std::any::Any;
 use std::collections::VecDeque;
@@ -19,18 +19,6 @@ use std::time::{Duration, Instant};
 
 /// Paths for whose messages a queue that keeps one of each reserves memory.
 const USUAL_PATHS: usize = 64;
-
-/// Memory that a queue reserves in advance, in bytes; beyond it, memory is allocated when messages first need it.
-const ROOM_IN_ADVANCE: usize = 1 << 20;
-
-/// A message's own size up to which it does not count towards the bytes of its subscription.
-const UNCOUNTED_BYTES: usize = 1 << 10;
-
-/// The bytes of a message that count towards the bound of a subscription.
-pub(super) fn counted_bytes<T: Payload>(message: &Stamped<T>) -> usize {
-    let own = const { if size_of::<Stamped<T>>() > UNCOUNTED_BYTES { size_of::<Stamped<T>>() } else { 0 } };
-    if T::IS_INLINE { own } else { own.saturating_add(message.payload.heap_bytes()) }
-}
 
 /// No user code runs under its lock: messages are dropped, and wakers cloned, woken and dropped, without it.
 #[derive(Debug)]
@@ -166,8 +154,8 @@ impl<M> Queue<M> {
 
     fn with(overflow: Overflow, by_path: Option<Box<ByPath>>) -> Self {
         let bound = overflow.bound();
-        let usual = if overflow == Overflow::LatestPerPath { USUAL_PATHS } else { bound.capacity };
-        let in_advance = usual.min(ROOM_IN_ADVANCE / size_of::<Entry<M>>());
+        let usual = if overflow == Overflow::LatestPerPath { bound.capacity.min(USUAL_PATHS) } else { bound.capacity };
+        let in_advance = Bound { capacity: usual, ..bound }.in_advance::<Entry<M>>();
         let state = State {
             messages: VecDeque::with_capacity(in_advance),
             bytes: 0,
@@ -182,8 +170,8 @@ impl<M> Queue<M> {
     }
 
     fn has_room(&self, state: &State<M>, bytes: usize) -> bool {
-        let has_bytes = || state.bytes.checked_add(bytes).is_some_and(|sum| sum <= self.bound.bytes);
-        state.messages.is_empty() || state.messages.len() < self.bound.capacity && has_bytes()
+        let held = Held { messages: state.messages.len(), bytes: state.bytes };
+        self.bound.has_room(held, bytes)
     }
 
     /// Wakes a waiting thread if there is a message, and gives the task to wake.

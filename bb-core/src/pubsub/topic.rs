@@ -1,8 +1,9 @@
 //! The publisher's end of a topic.
 
 use super::any::DynamicMessage;
+use super::bound::counted_bytes;
 use super::delivery::Delivery;
-use super::queue::{AnyQueue, Queue, counted_bytes};
+use super::queue::{AnyQueue, Queue};
 use super::subscribers::{Hub, Listeners};
 use super::subscription::Subscription;
 use super::timer::Timer;

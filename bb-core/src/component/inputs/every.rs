@@ -4,6 +4,7 @@ use super::slot::Slot;
 use crate::declaration::InputDeclaration;
 use crate::fault::discard;
 use crate::message::{Payload, Stamped};
+use crate::pubsub::{Bound, Held, counted_bytes, is_counted};
 use std::cell::Cell;
 use std::collections::VecDeque;
 use std::iter::Chain;
@@ -19,7 +20,8 @@ mod tests;
 /// tolerance, as for any other input, and the messages wait for the next run. Across moving joints, the transform of the input is that at
 /// the time of its last message.
 ///
-/// While the driver is silent, up to [`MOST`](Self::MOST) messages wait for it. Further ones displace the oldest, which is counted as
+/// While the driver is silent, up to [`MOST`](Self::MOST) messages wait for it, and no more than
+/// [`Overflow::DEFAULT_BYTES`](crate::Overflow::DEFAULT_BYTES). Further ones displace the oldest, which is counted as
 /// [`DropReason::Displaced`](crate::run::DropReason::Displaced), and [`lost`](Self::lost) tells how many. Messages that wait when the
 /// estimator is restarted are lost with its state. Messages that a full inbox drops do not arrive here; they are counted there.
 #[derive(Debug)]
@@ -103,6 +105,9 @@ impl<'a, T> IntoIterator for Every<'a, T> {
 pub struct EverySlot<T> {
     /// Those that have been seen come first, until another arrives.
     messages: VecDeque<Stamped<T>>,
+    /// The counted bytes of each, for a payload of which they count.
+    sizes: VecDeque<usize>,
+    held: Held,
     seen: Cell<usize>,
     lost: Cell<u64>,
     declaration: Option<&'static InputDeclaration>,
@@ -110,7 +115,14 @@ pub struct EverySlot<T> {
 
 impl<T> Default for EverySlot<T> {
     fn default() -> Self {
-        Self { messages: VecDeque::new(), seen: Cell::new(0), lost: Cell::new(0), declaration: None }
+        Self {
+            messages: VecDeque::new(),
+            sizes: VecDeque::new(),
+            held: Held::default(),
+            seen: Cell::new(0),
+            lost: Cell::new(0),
+            declaration: None,
+        }
     }
 }
 
@@ -119,13 +131,23 @@ impl<T: Payload> Slot<T> for EverySlot<T> {
         self.declaration = Some(declaration);
     }
 
-    fn store(&mut self, message: &Stamped<T>) -> bool {
-        let seen = self.seen.take();
-        let has_displaced = seen == 0 && self.messages.len() >= Every::<T>::MOST;
-        self.drop_first(if has_displaced { 1 } else { seen });
-        self.lost.set(self.lost.get() + u64::from(has_displaced));
+    fn store(&mut self, message: &Stamped<T>) -> u64 {
+        let bound = const { Bound::of_estimator(Every::<T>::MOST) };
+        let bytes = counted_bytes(message);
+        self.drop_first(self.seen.get());
+        self.seen.set(0);
+        let mut displaced = 0;
+        while !bound.has_room(self.held, bytes) {
+            self.drop_first(1);
+            displaced += 1;
+        }
+        self.lost.set(self.lost.get() + displaced);
         self.messages.push_back(message.clone());
-        has_displaced
+        self.held.add(bytes);
+        if const { is_counted::<T>() } {
+            self.sizes.push_back(bytes);
+        }
+        displaced
     }
 
     fn latest(&self) -> (Option<&'static InputDeclaration>, Option<&Stamped<T>>) {
@@ -137,6 +159,7 @@ impl<T> EverySlot<T> {
     /// Drops messages one by one: a second `Drop` that panics while the first one unwinds would abort the process.
     fn drop_first(&mut self, count: usize) {
         for message in (0..count).map_while(|_| self.messages.pop_front()) {
+            self.held.remove(self.sizes.pop_front().unwrap_or(0));
             discard(message);
         }
     }

@@ -72,10 +72,10 @@ impl<T: Payload> Slot<T> for LatestSlot<T> {
     }
 
     #[inline]
-    fn store(&mut self, message: &Stamped<T>) -> bool {
+    fn store(&mut self, message: &Stamped<T>) -> u64 {
         self.message = Some(message.clone());
         self.is_new.set(true);
-        false
+        0
     }
 
     fn latest(&self) -> (Option<&'static InputDeclaration>, Option<&Stamped<T>>) {

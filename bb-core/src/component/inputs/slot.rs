@@ -11,8 +11,8 @@ pub trait Slot<T: Payload> {
     /// Sets the declared input that fills it.
     fn declare(&mut self, declaration: &'static InputDeclaration);
 
-    /// Keeps a copy of `message`; returns whether one that no dispatch has seen was dropped to make room.
-    fn store(&mut self, message: &Stamped<T>) -> bool;
+    /// Keeps a copy of `message`; returns how many that no dispatch has seen were dropped to make room.
+    fn store(&mut self, message: &Stamped<T>) -> u64;
 
     /// The declared input, and its latest message.
     fn latest(&self) -> (Option<&'static InputDeclaration>, Option<&Stamped<T>>);

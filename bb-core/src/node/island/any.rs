@@ -224,7 +224,7 @@ impl<S: IslandState> IslandIn<S::Wiring> for Island<S> {
     }
 
     fn give_to_worker(&self) {
-        self.inbox().reserve(S::CAPACITY);
+        self.inbox().reserve();
         self.served.store(true, Ordering::SeqCst);
     }
 

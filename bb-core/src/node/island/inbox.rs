@@ -2,6 +2,7 @@
 
 use crate::declaration::ParameterValues;
 use crate::node::NodeEntry;
+use crate::pubsub::{Bound, Held};
 use crate::time::MonotonicTime;
 use std::collections::VecDeque;
 
@@ -10,8 +11,8 @@ pub(super) type Dated<M> = (MonotonicTime, Entry<M>);
 
 /// An entry that can wait.
 pub(super) enum Entry<M> {
-    /// A message.
-    Message(M),
+    /// A message, and its counted bytes.
+    Message(M, usize),
     /// Something is due.
     Wake,
     /// All estimators start.
@@ -22,12 +23,13 @@ pub(super) enum Entry<M> {
 
 /// Entries in order of arrival.
 ///
-/// Messages are bounded by the island's capacity. All other entries are bounded by their kind. There are at most two wakes. Each
+/// Messages are bounded in number and in bytes. All other entries are bounded by their kind. There are at most two wakes. Each
 /// estimator has at most one start, one restart, one give-up and one loss. It also has the one-way requests allowed for it and a few
 /// changes of options.
 pub(super) struct Inbox<M> {
     entries: VecDeque<Dated<M>>,
-    messages: usize,
+    bound: Bound,
+    held: Held,
     wakes: u8,
     /// If set, the estimators stop before any other waiting entry is processed.
     retires: Option<MonotonicTime>,
@@ -48,36 +50,34 @@ const SHIFT: u32 = usize::BITS / 2;
 
 impl Pending {
     pub(super) const NOTHING: Self = Self(0);
-
-    pub(super) fn has_room(self, capacity: usize) -> bool {
-        self.0 >> SHIFT < capacity
-    }
 }
 
 impl<M> Inbox<M> {
-    pub(super) fn new() -> Self {
-        Self { entries: VecDeque::new(), messages: 0, wakes: 0, retires: None }
+    pub(super) fn new(capacity: usize) -> Self {
+        let bound = Bound::of_estimator(capacity);
+        Self { entries: VecDeque::new(), bound, held: Held::default(), wakes: 0, retires: None }
     }
 
-    /// Allocates room for the inbox's capacity.
-    pub(super) fn reserve(&mut self, capacity: usize) {
+    /// Allocates room in advance.
+    pub(super) fn reserve(&mut self) {
         if self.entries.capacity() == 0 {
-            self.entries.reserve_exact(capacity);
+            self.entries.reserve_exact(self.bound.in_advance::<Dated<M>>());
         }
     }
 
     pub(super) fn pending(&self) -> Pending {
-        let others = self.entries.len() - self.messages + usize::from(self.retires.is_some());
-        Pending((self.messages << SHIFT) | others)
+        let others = self.entries.len() - self.held.messages + usize::from(self.retires.is_some());
+        Pending((self.held.messages << SHIFT) | others)
     }
 
-    pub(super) fn has_room(&self, capacity: usize) -> bool {
-        self.messages < capacity
+    /// Returns whether a message of that many counted bytes fits.
+    pub(super) fn has_room(&self, bytes: usize) -> bool {
+        self.bound.has_room(self.held, bytes)
     }
 
-    pub(super) fn push(&mut self, now: MonotonicTime, message: M) {
-        self.messages += 1;
-        self.entries.push_back((now, Entry::Message(message)));
+    pub(super) fn push(&mut self, now: MonotonicTime, message: M, bytes: usize) {
+        self.held.add(bytes);
+        self.entries.push_back((now, Entry::Message(message, bytes)));
     }
 
     /// Takes the oldest message to make room for another one.
@@ -88,12 +88,12 @@ impl<M> Inbox<M> {
     /// Takes the first message that matches `is_wanted`.
     pub(super) fn take_message(&mut self, is_wanted: impl Fn(&M) -> bool) -> Option<M> {
         let position = self.entries.iter().position(|(_, entry)| match entry {
-            Entry::Message(message) => is_wanted(message),
+            Entry::Message(message, _) => is_wanted(message),
             _ => false,
         })?;
         match self.entries.remove(position) {
-            Some((_, Entry::Message(message))) => {
-                self.messages -= 1;
+            Some((_, Entry::Message(message, bytes))) => {
+                self.held.remove(bytes);
                 Some(message)
             }
             _ => None,
@@ -154,7 +154,7 @@ impl<M> Inbox<M> {
         }
         let (now, entry) = self.entries.pop_front()?;
         match entry {
-            Entry::Message(_) => self.messages -= 1,
+            Entry::Message(_, bytes) => self.held.remove(bytes),
             Entry::Wake => self.wakes -= 1,
             Entry::Start | Entry::Node(..) => {}
         }
@@ -178,7 +178,7 @@ mod tests {
 
     fn taken(inbox: &mut Inbox<char>) -> String {
         let text = |taken: Taken<char>| match taken {
-            Taken::Entry(_, Entry::Message(message)) => message.to_string(),
+            Taken::Entry(_, Entry::Message(message, _)) => message.to_string(),
             Taken::Entry(time, Entry::Wake) => time.as_nanos().to_string(),
             Taken::Entry(_, Entry::Start) => "S".to_owned(),
             Taken::Entry(_, Entry::Node(number, entry)) => format!("[{number} {entry:?}]"),
@@ -189,26 +189,42 @@ mod tests {
 
     #[test]
     fn everything_keeps_its_place_but_the_end() {
-        let mut inbox = Inbox::new();
+        let mut inbox = Inbox::new(2);
         inbox.start(at(0));
-        inbox.push(at(0), 'a');
+        inbox.push(at(0), 'a', 0);
         inbox.wake(at(1));
-        inbox.push(at(2), 'b');
+        inbox.push(at(2), 'b', 0);
         inbox.post(at(2), 7, NodeEntry::Restart);
         inbox.post(at(2), 7, NodeEntry::Restart);
         inbox.wake(at(3));
-        inbox.push(at(4), 'c');
+        inbox.push(at(4), 'c', 0);
         inbox.wake(at(5));
         assert_eq!(inbox.pop_message(), Some('a'), "one is dropped to make room");
-        assert!(!inbox.has_room(2) && inbox.has_room(3) && inbox.pending().has_room(3));
+        assert!(!inbox.has_room(0));
         inbox.retire(at(6));
         assert_eq!(taken(&mut inbox), "RS1b[7 Restart]3c");
-        assert!(inbox.pending() == Pending::NOTHING);
+        assert!(inbox.pending() == Pending::NOTHING && inbox.has_room(0));
+    }
+
+    #[test]
+    fn bytes_make_it_full_too_but_one_message_always_fits() {
+        const HALF: usize = crate::pubsub::Overflow::DEFAULT_BYTES / 2;
+        let mut inbox = Inbox::new(1024);
+        assert!(inbox.has_room(3 * HALF), "however large");
+        inbox.push(at(0), 'a', HALF);
+        inbox.wake(at(0));
+        assert!(inbox.has_room(HALF) && !inbox.has_room(HALF + 1));
+        inbox.push(at(0), 'b', HALF);
+        assert!(inbox.has_room(0) && !inbox.has_room(1));
+        assert_eq!(inbox.take_message(|message| *message == 'b'), Some('b'));
+        assert!(inbox.has_room(HALF) && !inbox.has_room(HALF + 1));
+        assert_eq!(inbox.pop_message(), Some('a'));
+        assert_eq!((inbox.held, inbox.has_room(3 * HALF)), (Held::default(), true));
     }
 
     #[test]
     fn options_that_nobody_takes_do_not_grow_for_ever() {
-        let mut inbox = Inbox::<char>::new();
+        let mut inbox = Inbox::<char>::new(1024);
         for _ in 0..1000 {
             inbox.post(at(0), 1, NodeEntry::Options(ParameterValues::new(vec![])));
             inbox.post(at(0), 2, NodeEntry::Options(ParameterValues::new(vec![])));

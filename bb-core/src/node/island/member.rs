@@ -7,7 +7,7 @@ use crate::fault::Panic;
 use crate::message::{Payload, Stamp, Stamped};
 use crate::node::act::Act;
 use crate::node::{Arrival, Next, Node, Turn};
-use crate::pubsub::{DynamicMessage, Topic};
+use crate::pubsub::{DynamicMessage, Topic, counted_bytes};
 use crate::time::MonotonicTime;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -208,7 +208,7 @@ pub fn enter<S: IslandState, T: Payload>(
     keep: impl FnOnce(Stamped<T>) -> S::Message,
 ) {
     let direct = |state: &mut S, turn: &Turn<'_>| deliver(state, wiring, message, turn);
-    S::find(wiring).enter(wiring, now, key, direct, || keep(message.clone()));
+    S::find(wiring).enter(wiring, now, key, direct, || (keep(message.clone()), counted_bytes(message)));
 }
 
 /// The type-erased form of an island of a wiring.

@@ -150,7 +150,7 @@ const KEY: Key = Key { entry: 0, line: 0 };
 type Thread<const CAPACITY: usize> = fn(&Island<Seen<CAPACITY>>, &Wiring);
 
 fn publish<const CAPACITY: usize>(island: &Island<Seen<CAPACITY>>, wiring: &Wiring, message: Message) {
-    island.enter(wiring, NOW, KEY, |seen, _| seen.see(message), || message);
+    island.enter(wiring, NOW, KEY, |seen, _| seen.see(message), || (message, 0));
 }
 
 fn publish_twice<const PUBLISHER: usize, const CAPACITY: usize>(island: &Island<Seen<CAPACITY>>, wiring: &Wiring) {

@@ -72,7 +72,7 @@ impl<S: IslandState> Island<S> {
         let retires = matches!(taken, Taken::Retire(_));
         self.process_line(wiring, now, line, |turn| match taken {
             Taken::Retire(_) => for_all(state, wiring, turn, || NodeEntry::Retire),
-            Taken::Entry(_, Entry::Message(Keyed { message, .. })) => {
+            Taken::Entry(_, Entry::Message(Keyed { message, .. }, _)) => {
                 state.deliver(wiring, &message, turn);
                 // Its publisher is done with it, and those who got it are too: a panic in its `Drop` is nobody's.
                 discard(message);
@@ -104,7 +104,7 @@ pub(super) fn dropped<S: IslandState>(key: Key) -> Event {
 
 fn line_of<S: IslandState>(entry: &Entry<Keyed<S::Message>>) -> Event {
     match entry {
-        Entry::Message(Keyed { key, .. }) => deliver::<S>(*key),
+        Entry::Message(Keyed { key, .. }, _) => deliver::<S>(*key),
         Entry::Wake => Event::Wake { island: S::DECLARATION.number },
         Entry::Start => Event::Start { island: S::DECLARATION.number },
         Entry::Node(estimator, entry) => entry.line(*estimator, S::DECLARATION.number),

@@ -1,6 +1,5 @@
 //! Threads that wait for an island: callers, and publishers that wait for room in its inbox.
 
-use super::inbox::Pending;
 use super::inside::is_inside;
 use super::{Held, Island, IslandState, IslandWiring as _};
 use std::sync::atomic::Ordering;
@@ -11,14 +10,13 @@ const LONGEST_WAIT: Duration = Duration::from_millis(500);
 
 impl<S: IslandState> Island<S> {
     /// Back-pressure: waits until the holder drains the inbox. Returns `false` at once if the holder hangs or if this thread
-    /// is inside an island of this robot.
-    pub(super) fn wait_for_room(&self, wiring: &S::Wiring) -> bool {
+    /// is inside an island of this robot. `bytes` are those of the message that is to be added.
+    pub(super) fn wait_for_room(&self, wiring: &S::Wiring, bytes: usize) -> bool {
         if self.hangs.load(Ordering::Relaxed) || is_inside(wiring.environment().robot()) {
             return false;
         }
         self.waiting.fetch_add(1, Ordering::SeqCst);
-        let has_room = |pending: usize| Pending(pending).has_room(S::CAPACITY);
-        let in_time = self.wait(LONGEST_WAIT, || has_room(self.pending.load(Ordering::Relaxed)) || self.is_free());
+        let in_time = self.wait(LONGEST_WAIT, || self.inbox().has_room(bytes) || self.is_free());
         if !in_time {
             self.hangs.store(true, Ordering::Relaxed);
         }

@@ -28,9 +28,9 @@ proptest! {
         for messages in steps {
             let mut lost = 0;
             for _ in 0..messages {
-                let has_displaced = slot.store(&message(number, number as i64));
-                prop_assert_eq!(has_displaced, waiting.len() == Every::<Number>::MOST);
-                if has_displaced {
+                let displaced = slot.store(&message(number, number as i64));
+                prop_assert_eq!(displaced, u64::from(waiting.len() == Every::<Number>::MOST));
+                if displaced > 0 {
                     waiting.pop_front();
                     lost += 1;
                 }
@@ -50,6 +50,24 @@ proptest! {
         slot.store(&message(number, number as i64));
         prop_assert_eq!(slot.messages.len(), 1);
     }
+}
+
+/// An image.
+#[derive(Clone, Debug, DerivePayload)]
+struct Pixels(Vec<u8>);
+
+#[test]
+fn large_ones_displace_several() {
+    const MIB: usize = 1 << 20;
+    let mut slot = EverySlot::default();
+    let mut store = |mebibytes| slot.store(&Stamped::new(at(0), Pixels(vec![0; mebibytes * MIB])));
+    assert_eq!([store(30), store(30), store(4)], [0, 0, 0], "64 MiB fit");
+    assert_eq!(store(31), 2);
+    assert_eq!(store(100), 2, "one is always kept");
+    let every = slot.take();
+    assert_eq!((every.len(), every.lost(), every.last().map(|message| message.0.len())), (1, 4, Some(100 * MIB)));
+    assert_eq!(slot.store(&Stamped::new(at(0), Pixels(vec![0; MIB]))), 0, "it was seen");
+    assert_eq!((slot.held, slot.sizes.len()), (Held { messages: 1, bytes: MIB }, 1));
 }
 
 #[test]
