@@ -55,7 +55,7 @@ use faults::{Faults, SafetyErrors};
 use loom::sync::{Condvar, Mutex as StateMutex, MutexGuard, atomic::AtomicU8};
 use machine::Machine;
 use std::collections::{HashMap, VecDeque};
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, AtomicU64};
 use std::sync::{Arc, Mutex, OnceLock, Weak};
 #[cfg(not(loom))]
 use std::sync::{Condvar, Mutex as StateMutex, MutexGuard, atomic::AtomicU8};
@@ -106,6 +106,9 @@ struct Inner {
     /// The one for callbacks of commands.
     place: OnceLock<Reserved>,
     reporter: Reporter,
+    /// How often loggers panicked, and wakers that the control state has woken.
+    logger_panics: AtomicU64,
+    waker_panics: AtomicU64,
     /// Commands to be polled, on virtual time.
     ready: Mutex<VecDeque<Arc<Task>>>,
     /// Disarm callbacks to be run by the loop of a simulation.
@@ -136,6 +139,8 @@ pub(crate) struct Summary {
     pub(crate) faults: Vec<ReportedFault>,
     pub(crate) all_faults: u64,
     pub(crate) safety_errors: Vec<ReportedSafetyError>,
+    pub(crate) logger_panics: u64,
+    pub(crate) waker_panics: u64,
 }
 
 /// The destination of entries for estimators.

@@ -2,12 +2,13 @@
 
 use crate::declaration::EstimatorDeclaration;
 use crate::event::{ComponentFault, HealthTransition};
-use crate::fault::guarded;
+use crate::fault::{guarded, log_panic};
 use crate::message::{Payload, Stamp, Stamped};
 use crate::sorted::Sorted;
 use crate::time::MonotonicTime;
 use std::fmt;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 /// Something that happened while a robot runs.
@@ -67,6 +68,8 @@ pub type Handler = Arc<dyn Fn(&'static str, &TelemetryEvent) + Send + Sync>;
 #[derive(Clone)]
 pub(crate) struct Telemetry {
     handlers: Vec<Handler>,
+    /// How often they panicked.
+    panics: Arc<AtomicU64>,
     /// The estimator and the output that publish at a path.
     outputs: Sorted<&'static str, (&'static str, &'static str)>,
 }
@@ -79,16 +82,21 @@ impl Telemetry {
                 outputs.insert(*path, (estimator.path, *name));
             }
         }
-        Self { handlers, outputs }
+        Self { handlers, panics: Arc::default(), outputs }
     }
 
     #[cold]
     pub(crate) fn tell(&self, robot: &'static str, event: &TelemetryEvent) {
         for handler in &self.handlers {
             if let Err(fault) = guarded(|| handler(robot, event)) {
-                tracing::error!(%fault, "a handler of telemetry failed");
+                self.panics.fetch_add(1, Ordering::Relaxed);
+                log_panic("a handler of telemetry failed", &fault);
             }
         }
+    }
+
+    pub(crate) fn panics(&self) -> u64 {
+        self.panics.load(Ordering::Relaxed)
     }
 
     pub(crate) fn output<T: Payload>(

@@ -214,10 +214,19 @@ fn a_waker_that_panics_harms_nobody() {
         let mut ordered = builder.subscribe(crowded::estimator::base::ordered);
         let behind = builder.subscribe(crowded::estimator::base::behind);
         let running = builder.start().expect("it starts");
+        let mut safety = running.subscribe(system::SafetyState);
         when_woken(&mut ordered, || panic!("a waker of a subscriber"));
+        when_woken(&mut safety, || panic!("one that a thread of the pool wakes"));
         running.publish(crowded::sensor::base::a, running.clock().now(), Number(1.0));
         assert_eq!(behind.recv_timeout(Duration::from_secs(5)).map(|number| number.0), Some(1.0));
-        assert!(running.stop().ok().is_ok());
+        assert_eq!(
+            (running.report().panics.wakers, running.report().topic(ORDERED).map(|topic| topic.panics)),
+            (1, Some(1))
+        );
+        let report = running.stop();
+        assert_eq!(report.panics.wakers, 2);
+        assert!(report.to_string().contains("wakers: 2 panics"), "{report}");
+        assert!(report.ok().is_ok());
     });
 }
 

@@ -104,16 +104,21 @@ fn what_is_not_safe_is_logged() -> Result<(), Box<dyn std::error::Error>> {
 }
 
 #[test]
-fn a_logger_that_panics_takes_no_telemetry_with_it() -> Result<(), Box<dyn std::error::Error>> {
-    super::alone("processes::loggers::a_logger_that_panics_takes_no_telemetry_with_it", telemetry_goes_on)
+fn loggers_handlers_and_sinks_that_panic_harm_nobody_and_are_counted() -> Result<(), Box<dyn std::error::Error>> {
+    super::alone(
+        "processes::loggers::loggers_handlers_and_sinks_that_panic_harm_nobody_and_are_counted",
+        the_rest_goes_on,
+    )
 }
 
-fn telemetry_goes_on() -> Result<(), Box<dyn std::error::Error>> {
+fn the_rest_goes_on() -> Result<(), Box<dyn std::error::Error>> {
     tracing::subscriber::set_global_default(Slow)?;
     PANICS.store(true, Ordering::SeqCst);
     let heard = Arc::new(AtomicU32::new(0));
     let hears = Arc::clone(&heard);
     let mut builder = Told::builder();
+    builder.telemetry(|_, event| assert!(!matches!(event, TelemetryEvent::Transition(_)), "a handler that panics"));
+    builder.journal(|line| assert!(!format!("{line:?}").contains("Silence"), "a sink that panics"));
     builder.telemetry(move |_, event| {
         if matches!(event, TelemetryEvent::Transition(_)) {
             hears.fetch_add(1, Ordering::SeqCst);
@@ -122,6 +127,10 @@ fn telemetry_goes_on() -> Result<(), Box<dyn std::error::Error>> {
     let mut simulation = builder.simulate()?;
     simulation.run_for(Duration::from_millis(20));
     assert_eq!(heard.load(Ordering::SeqCst), 1, "the estimator was lost");
+    let report = simulation.report();
+    // Its change of health is one line for loggers.
+    let panics = (report.panics.loggers, report.panics.telemetry, report.panics.journal, report.panics.wakers);
+    assert_eq!(panics, (1, 1, 1, 0), "{report}");
     PANICS.store(false, Ordering::SeqCst);
     Ok(())
 }

@@ -289,7 +289,8 @@ impl Control {
     /// Wakes a sleeper that is due. Returns true if there was one.
     pub(crate) fn wake_sleepers(&self, now: MonotonicTime) -> bool {
         let Some((lane, waker)) = self.0.sleeper.take(now) else { return false };
-        self.run_on_pool(lane, move || crate::fault::wake(waker));
+        let control = self.clone();
+        self.run_on_pool(lane, move || control.wake(waker));
         true
     }
 

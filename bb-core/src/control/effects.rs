@@ -6,13 +6,14 @@ use super::execution::{CommandError, Slot};
 use super::task::{EndedCode, Task, Value};
 use super::{Control, Wired};
 use crate::event::{ComponentFault, HealthTransition, Refusal, Safety, SafetyError};
-use crate::fault::{discard, wake};
+use crate::fault::discard;
 use crate::node::Mode;
 use crate::pubsub::Wakers;
 use crate::schedule::Lane;
 use crate::telemetry::TelemetryEvent;
 use crate::time::MonotonicTime;
 use std::collections::VecDeque;
+use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -105,13 +106,15 @@ impl Effects {
             discard(callbacks);
         }
         if !wakers.is_empty() {
-            control.run_on_pool(Lane::User, move || wakers.run());
+            let counted = control.clone();
+            control.run_on_pool(Lane::User, move || counted.count_waker_panics(wakers.run()));
         }
         let results: Vec<_> = results.into_iter().map(|(slot, result)| slot.set(result)).collect();
         if !(results.is_empty() && dropped.is_empty()) {
+            let woken_by = control.clone();
             control.run_on_pool(Lane::User, move || {
                 for (waker, late) in results {
-                    waker.into_iter().for_each(wake);
+                    waker.into_iter().for_each(|waker| woken_by.wake(waker));
                     late.into_iter().for_each(discard);
                 }
                 dropped.into_iter().for_each(discard);
@@ -216,13 +219,16 @@ impl Control {
             };
             let skipped = std::mem::take(&mut reports.skipped);
             drop(reports);
-            // A panic of the logger itself cannot be reported.
-            let _ = crate::fault::guarded(|| {
+            // A panic of the logger itself cannot be logged.
+            let logged = crate::fault::guarded(|| {
                 if skipped > 0 {
                     tracing::warn!(skipped, "lines of this log were dropped: the logger blocked");
                 }
                 write_log(&log);
             });
+            if logged.is_err() {
+                self.0.logger_panics.fetch_add(1, Ordering::Relaxed);
+            }
             if let Some(telemetry) = &self.0.telemetry {
                 let robot = self.0.origin.robot;
                 match log {

@@ -15,7 +15,7 @@ use crate::event::{
     ArmError, CommandEvent, ComponentFault, DisarmError, HealthTransition, ParameterChange, ParameterValue, Safety,
     SafetyError, SafetyTransition, StateTransition,
 };
-use crate::fault::Fault;
+use crate::fault::{Fault, wake};
 use crate::journal::JournalLine;
 use crate::message::{Origin, Payload};
 use crate::node::Mode;
@@ -27,10 +27,11 @@ use crate::time::Clock;
 use loom::sync::{Condvar, atomic::AtomicU8};
 use std::any::Any;
 use std::fmt;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError, Weak};
 #[cfg(not(loom))]
 use std::sync::{Condvar, atomic::AtomicU8};
+use std::task::Waker;
 use std::time::Duration;
 
 impl Control {
@@ -86,6 +87,8 @@ impl Control {
             place: OnceLock::new(),
             bell,
             reporter: Reporter::default(),
+            logger_panics: AtomicU64::new(0),
+            waker_panics: AtomicU64::new(0),
             ready: Mutex::default(),
             pending_hooks: Mutex::default(),
             reports: Mutex::default(),
@@ -210,7 +213,19 @@ impl Control {
             faults,
             all_faults,
             safety_errors: self.0.safety_errors.lock().unwrap_or_else(PoisonError::into_inner).all(),
+            logger_panics: self.0.logger_panics.load(Ordering::Relaxed),
+            waker_panics: self.0.waker_panics.load(Ordering::Relaxed),
         }
+    }
+
+    /// Counts wakers that panicked.
+    pub(crate) fn count_waker_panics(&self, panics: u64) {
+        self.0.waker_panics.fetch_add(panics, Ordering::Relaxed);
+    }
+
+    /// Wakes a task, and counts a panic of its waker.
+    pub(crate) fn wake(&self, waker: Waker) {
+        self.count_waker_panics(u64::from(!wake(waker)));
     }
 
     pub(crate) fn clock(&self) -> &Clock {

@@ -39,18 +39,26 @@ pub(crate) fn guarded(call: impl FnOnce()) -> Result<(), Fault> {
     called.map_err(|failed| failed.fault)
 }
 
+/// Logs a panic of code that no component is charged with. The logger may panic as well.
+pub(crate) fn log_panic(what: &'static str, fault: &Fault) {
+    // There is nobody else to tell.
+    let _ = guarded(|| tracing::error!(%fault, "{what}"));
+}
+
 /// Drops a user's value and catches a panic of its `Drop`.
 pub(crate) fn discard<T>(value: T) {
     if let Err(fault) = guarded(|| drop(value)) {
-        tracing::error!(%fault, "a value panicked when it was dropped");
+        log_panic("a value panicked when it was dropped", &fault);
     }
 }
 
-/// Wakes a task. A panic in a user's waker must not end the thread that wakes it.
-pub(crate) fn wake(waker: Waker) {
-    if let Err(fault) = guarded(|| waker.wake()) {
-        tracing::error!(%fault, "a waker failed");
+/// Wakes a task. A panic in a user's waker must not end the thread that wakes it; then this returns false.
+pub(crate) fn wake(waker: Waker) -> bool {
+    let woken = guarded(|| waker.wake());
+    if let Err(fault) = &woken {
+        log_panic("a waker failed", fault);
     }
+    woken.is_ok()
 }
 
 /// Closes and drops a component; one that has panicked is dropped without being closed. Returns what went wrong.

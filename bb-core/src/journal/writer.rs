@@ -2,7 +2,7 @@
 
 use super::queue::{Ended, LONGEST_WAIT, Queue, bytes_of};
 use super::{Entry, Event};
-use crate::fault::{discard, guarded};
+use crate::fault::{discard, guarded, log_panic};
 use crate::time::MonotonicTime;
 use std::fmt;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -26,6 +26,8 @@ struct Inner {
     is_full: AtomicBool,
     /// How many lines the sink has taken, to see whether it makes progress.
     taken: AtomicU64,
+    /// How often the sink panicked.
+    panics: AtomicU64,
     arrived: Condvar,
     room: Condvar,
 }
@@ -59,6 +61,7 @@ impl Journal {
             state: Mutex::new(state),
             is_full: AtomicBool::new(false),
             taken: AtomicU64::new(0),
+            panics: AtomicU64::new(0),
             arrived: Condvar::new(),
             room: Condvar::new(),
         }))
@@ -135,6 +138,11 @@ impl Journal {
         self.0.lock().queue.ended.is_some()
     }
 
+    /// How often the sink panicked.
+    pub(crate) fn panics(&self) -> u64 {
+        self.0.panics.load(Ordering::Relaxed)
+    }
+
     /// Checks whether the sink hangs while no lines are written. Returns the error once; the journal has then ended.
     pub(crate) fn look(&self) -> Option<String> {
         let mut state = self.0.lock();
@@ -195,7 +203,8 @@ impl Inner {
             drop(state);
             for line in batch.lines.drain(..) {
                 if let Err(fault) = guarded(|| sink(line)) {
-                    tracing::error!(%fault, "the journal's sink failed");
+                    self.panics.fetch_add(1, Ordering::Relaxed);
+                    log_panic("the journal's sink failed", &fault);
                 }
                 // Only one thread at a time gets here: a plain store instead of an atomic addition.
                 self.taken.store(self.taken.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);

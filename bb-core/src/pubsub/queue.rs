@@ -7,7 +7,7 @@ use super::bound::{Bound, Held};
 use super::delivery::{Delivery, Overflow};
 use super::statistics::SubscriberStatistics;
 use super::timer::Timer;
-use super::wakers::{Wakers, discard, wake};
+use super::wakers::{Wakers, discard};
 use crate::time::MonotonicTime;
 use std::any::Any;
 use std::collections::VecDeque;
@@ -218,8 +218,11 @@ impl<M> Queue<M> {
         let alarm = if state.is_awaited() { state.paths.arm() } else { None };
         drop(state);
         alarm.into_iter().for_each(|time| by.wake_at(time));
-        waker.into_iter().for_each(wake);
         dropped.into_iter().for_each(discard);
+        // Who rings wakes a task as well, and counts its panic.
+        if let Some(waker) = waker {
+            waker.wake();
+        }
     }
 
     /// Delivers all that waits for its time, and has nothing wait any more. Returns the task to wake.

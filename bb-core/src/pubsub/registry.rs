@@ -253,7 +253,7 @@ impl Registry {
         let mut all = Sorted::default();
         for (path, expected) in state.expected.iter() {
             let payload = expected.payload;
-            all.insert(*path, TopicStatistics { path, payload, published: 0, lost: 0, subscribers: 0 });
+            all.insert(*path, TopicStatistics { path, payload, published: 0, lost: 0, panics: 0, subscribers: 0 });
         }
         let made: Vec<_> = state.published().map(|made| (Arc::clone(&made.topic), made.before)).collect();
         drop(state);

@@ -28,6 +28,8 @@ pub struct TopicStatistics {
     pub published: u64,
     /// Messages that subscribers lost because they were slow, or read only after more had arrived than they keep.
     pub lost: u64,
+    /// Wakers of subscriptions that panicked when they were woken by a publisher.
+    pub panics: u64,
     /// Current subscriptions.
     pub subscribers: usize,
 }

@@ -75,6 +75,8 @@ pub(super) struct Hub {
     pub(super) published: AtomicU64,
     /// Messages that slow subscribers did not get.
     lost: AtomicU64,
+    /// Wakers of subscribers that panicked on a publisher's thread.
+    panics: AtomicU64,
     /// The number of subscribers: read before the lock, so that publishing to nobody costs next to nothing.
     pub(super) listening: AtomicUsize,
     subscribers: Mutex<Subscribers>,
@@ -89,6 +91,7 @@ impl Hub {
             path,
             published: AtomicU64::new(0),
             lost: AtomicU64::new(0),
+            panics: AtomicU64::new(0),
             listening: AtomicUsize::new(0),
             subscribers: Mutex::new(subscribers),
             order: Mutex::default(),
@@ -149,6 +152,13 @@ impl Hub {
         }
     }
 
+    #[inline]
+    pub(super) fn count_panics(&self, panics: u64) {
+        if panics > 0 {
+            self.panics.fetch_add(panics, Ordering::Relaxed);
+        }
+    }
+
     pub(super) fn subscribers(&self) -> Vec<SubscriberStatistics> {
         let subscribers = self.lock();
         let untyped = subscribers.taps.statistics().map(|tap| SubscriberStatistics { is_typed: false, ..tap });
@@ -161,6 +171,7 @@ impl Hub {
             payload,
             published: self.published.load(Ordering::Relaxed),
             lost: self.lost.load(Ordering::Relaxed),
+            panics: self.panics.load(Ordering::Relaxed),
             subscribers: self.subscribers().len(),
         }
     }

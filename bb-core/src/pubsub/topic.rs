@@ -87,7 +87,7 @@ impl<T: Payload> Topic<T> {
             self.hub.published.fetch_add(1, Ordering::Relaxed);
             self.enqueue(copies, &mut wakers);
             drop(order);
-            wakers.run();
+            self.hub.count_panics(wakers.run());
             return line;
         }
     }
@@ -106,7 +106,7 @@ impl<T: Payload> Topic<T> {
     fn deliver_and_wake(&self, message: &Stamped<T>) {
         let mut wakers = Wakers::dropping_at_once();
         self.deliver(message, &mut wakers);
-        wakers.run();
+        self.hub.count_panics(wakers.run());
     }
 
     #[cold]
@@ -188,7 +188,9 @@ fn tap_all(taps: &[Arc<Queue<DynamicMessage>>], message: DynamicMessage, bytes: 
 
 impl<T> Drop for Topic<T> {
     fn drop(&mut self) {
-        self.hub.close().into_iter().for_each(wake);
+        for waker in self.hub.close() {
+            wake(waker);
+        }
     }
 }
 

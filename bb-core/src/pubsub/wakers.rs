@@ -6,7 +6,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::task::Waker;
 
 /// Wakers to wake and messages to drop, collected while locks may be held. Call [`run`](Self::run) when none is held;
-/// dropping it does the same. A panic in one of them is logged and does not prevent the others from running.
+/// dropping it does the same. A panic in one of them is logged, and does not prevent the others from running.
 #[derive(Default)]
 pub(crate) struct Wakers {
     /// The first few need no allocation.
@@ -51,14 +51,18 @@ impl Wakers {
         self.first[0].is_none() && self.evicted.is_empty()
     }
 
-    /// Wakes the tasks in the order in which their messages were enqueued, then drops the messages.
-    pub(crate) fn run(self) {
-        drop(self);
+    /// Wakes the tasks in the order in which their messages were enqueued, then drops the messages. Returns how many wakers
+    /// panicked.
+    #[inline]
+    pub(crate) fn run(mut self) -> u64 {
+        if self.is_empty() { 0 } else { self.run_all() }
     }
 
-    fn run_all(&mut self) {
-        self.first.iter_mut().filter_map(Option::take).chain(self.more.drain(..)).for_each(wake);
+    fn run_all(&mut self) -> u64 {
+        let wakers = self.first.iter_mut().filter_map(Option::take).chain(self.more.drain(..));
+        let panicked = wakers.map(wake).filter(|is_awake| !is_awake).count() as u64;
         self.evicted.drain(..).for_each(discard);
+        panicked
     }
 }
 
@@ -71,9 +75,9 @@ impl Drop for Wakers {
     }
 }
 
-/// Wakes a task. A panic in its waker is logged.
-pub(super) fn wake(waker: Waker) {
-    contain("a waker", || waker.wake());
+/// Wakes a task. A panic in its waker is logged; then this returns false.
+pub(super) fn wake(waker: Waker) -> bool {
+    contain("a waker", || waker.wake())
 }
 
 /// Drops a message or a waker. A panic in its `Drop` is logged.
@@ -84,23 +88,27 @@ pub(super) fn discard<M>(value: M) {
     }
 }
 
-/// Runs user code that must not end the calling thread.
+/// Runs user code that must not end the calling thread; returns whether it has not panicked.
 #[inline]
-fn contain(what: &'static str, call: impl FnOnce()) {
-    if let Err(panic) = catch_unwind(AssertUnwindSafe(call)) {
+fn contain(what: &'static str, call: impl FnOnce()) -> bool {
+    let called = catch_unwind(AssertUnwindSafe(call));
+    let has_returned = called.is_ok();
+    if let Err(panic) = called {
         log(what, panic);
     }
+    has_returned
 }
 
 #[cold]
 fn log(what: &'static str, panic: Box<dyn Any + Send>) {
     let message = panic.downcast_ref::<&str>().copied();
     let message = message.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
-    tracing::error!(panic = message.unwrap_or("no message"), "{what} panicked");
-    // The value carried by a panic may itself panic when dropped. The value of that second panic is leaked.
-    if let Err(again) = catch_unwind(AssertUnwindSafe(|| drop(panic))) {
-        forget(again);
-    }
+    let logged = catch_unwind(AssertUnwindSafe(|| {
+        tracing::error!(panic = message.unwrap_or("no message"), "{what} panicked");
+    }));
+    // The logger may panic, and so may the value carried by a panic when dropped. The value of such a second panic is leaked.
+    let dropped = catch_unwind(AssertUnwindSafe(|| drop(panic)));
+    logged.err().into_iter().chain(dropped.err()).for_each(forget);
 }
 
 #[cfg(test)]
@@ -150,7 +158,7 @@ mod tests {
         }
         assert!(!wakers.is_empty());
         assert_eq!((woken.load(Ordering::SeqCst), dropped.load(Ordering::SeqCst)), (0, 0));
-        wakers.run();
+        assert_eq!(wakers.run(), 7);
         assert_eq!((woken.load(Ordering::SeqCst), dropped.load(Ordering::SeqCst)), (7, 7));
     }
 

@@ -182,7 +182,7 @@ impl<A: Actuator> Inner<A> {
         }
         let told = std::mem::take(&mut state.told);
         drop(state);
-        wakers.run();
+        self.control.count_waker_panics(wakers.run());
         told.into_iter().for_each(|told| self.tell_now(told));
     }
 

@@ -3,7 +3,6 @@
 
 use super::machine::Machine;
 use super::threads::since;
-use crate::fault::wake;
 use crate::journal::Journal;
 use crate::node::Replayed;
 use crate::pubsub::AnyTopic as _;
@@ -123,6 +122,7 @@ impl Machine {
         if let Some(message) = self.environment.journal().and_then(|journal| hand_over(journal, deadline)) {
             report.add_fault(self.fault("journal", message));
         }
+        report.panics = self.panics(&report.topics, &self.control.between_entries(|summary| summary));
         let deadline = Instant::now() + LEAST_TO_CLOSE;
         if let Some(message) = self.control.pool().left(Lane::User, deadline) {
             report.add_fault(self.fault("pool", message));
@@ -138,7 +138,8 @@ impl Machine {
 
     fn wake_all(&self, wakers: Vec<Waker>) {
         if !wakers.is_empty() {
-            self.control.run_on_pool(Lane::User, move || wakers.into_iter().for_each(wake));
+            let control = self.control.clone();
+            self.control.run_on_pool(Lane::User, move || wakers.into_iter().for_each(|waker| control.wake(waker)));
         }
     }
 }

@@ -1,16 +1,17 @@
 //! What all kinds of run share: the wiring and the operations on it.
 
-use super::Report;
 use super::actuator::AnyActuator;
 use super::keeper::Keeper;
 use super::source::SharedSource;
 use super::wired::Wired;
+use super::{Panics, Report};
 use crate::component::{Bus, Fault, Host};
 use crate::control::{Control, ReportedFault, Summary};
 use crate::declaration::RobotDeclaration;
-use crate::journal::Event;
+use crate::journal::{Event, Journal};
 use crate::node::{AnyIsland, CallError, Environment, NodeEntry, Visit};
-use crate::pubsub::AnyTopic;
+use crate::pubsub::{AnyTopic, TopicStatistics};
+use crate::telemetry::Telemetry;
 use crate::time::MonotonicTime;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -135,9 +136,11 @@ impl Machine {
         let estimators: Vec<_> = self.environment.nodes().iter().map(|node| node.statistics()).collect();
         let made = self.control.topics().registry.statistics();
         let sources = self.sources.lock().unwrap_or_else(PoisonError::into_inner);
-        let Summary { commands, state, safety, faults, all_faults, safety_errors } = control;
+        let topics: Vec<_> = topics.iter().map(|topic| topic.statistics()).chain(made).collect();
+        let panics = self.panics(&topics, &control);
+        let Summary { commands, state, safety, faults, all_faults, safety_errors, .. } = control;
         Report {
-            topics: topics.iter().map(|topic| topic.statistics()).chain(made).collect(),
+            topics,
             estimators,
             sources: sources.iter().map(SharedSource::statistics).collect(),
             actuators: self.actuators().into_iter().map(|actuator| actuator.statistics()).collect(),
@@ -148,6 +151,17 @@ impl Machine {
             faults,
             all_faults,
             safety_errors,
+            panics,
+        }
+    }
+
+    /// Panics of code that no component is charged with.
+    pub(super) fn panics(&self, topics: &[TopicStatistics], control: &Summary) -> Panics {
+        Panics {
+            wakers: topics.iter().map(|topic| topic.panics).sum::<u64>() + control.waker_panics,
+            loggers: control.logger_panics,
+            telemetry: self.environment.telemetry().map_or(0, Telemetry::panics),
+            journal: self.environment.journal().map_or(0, Journal::panics),
         }
     }
 

@@ -37,6 +37,22 @@ pub struct Report {
     pub all_faults: u64,
     /// Errors that have made the safety state `error`, by component and kind: at most 256.
     pub safety_errors: Vec<ReportedSafetyError>,
+    /// Panics of code that no component is charged with. Each is logged as well.
+    pub panics: Panics,
+}
+
+/// How often code panicked that the robot calls beside its components, by kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Panics {
+    /// Wakers of subscriptions, of commands' results and of commands.
+    pub wakers: u64,
+    /// Loggers, when they were given the lines of health, safety, faults and refusals.
+    pub loggers: u64,
+    /// Handlers of telemetry.
+    pub telemetry: u64,
+    /// The sink of the journal.
+    pub journal: u64,
 }
 
 impl Report {
@@ -143,6 +159,16 @@ impl fmt::Display for Report {
         }
         for error in &self.safety_errors {
             writeln!(f, "{error}")?;
+        }
+        let Panics { wakers, loggers, telemetry, journal } = self.panics;
+        let kinds = [
+            ("wakers", wakers),
+            ("loggers", loggers),
+            ("telemetry handlers", telemetry),
+            ("the journal's sink", journal),
+        ];
+        for (kind, panics) in kinds.into_iter().filter(|(_, panics)| *panics > 0) {
+            writeln!(f, "{kind}: {panics} panics")?;
         }
         Ok(())
     }

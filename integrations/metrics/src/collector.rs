@@ -197,6 +197,16 @@ fn robot(families: &mut Families<'_>, report: &Report, declared_states: &[&str])
             let SafetyError { path, error } = &reported.last;
             family.count(&[("component", path), ("kind", error.kind.name())], reported.count)
         })
+    })?;
+    families.counter("panics", "Panics of code that no component is charged with", |family| {
+        let panics = report.panics;
+        let kinds = [
+            ("wakers", panics.wakers),
+            ("loggers", panics.loggers),
+            ("telemetry", panics.telemetry),
+            ("journal", panics.journal),
+        ];
+        kinds.into_iter().try_for_each(|(kind, count)| family.count(&[("kind", kind)], count))
     })
 }
 

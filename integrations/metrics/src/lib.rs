@@ -32,6 +32,7 @@
 //! | `bb_operational_state` | `state` | 1 for the one that it is in |
 //! | `bb_faults_total` | | faults of components |
 //! | `bb_safety_errors_total` | `component`, `kind` | errors that made the safety state `error` |
+//! | `bb_panics_total` | `kind` | panics of code that no component is charged with: `wakers`, `loggers`, `telemetry`, `journal` |
 //!
 //! Counters are exported at 0 from the first scrape on, so that the first increment is seen as one.
 

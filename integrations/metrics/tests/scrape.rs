@@ -153,7 +153,7 @@ fn counters_are_right_from_the_first_scrape_on() {
     assert_eq!(first[&input("input_age_seconds", ",quantile=\"1\"")], 0.0, "on virtual time nothing waits");
     assert_eq!(first["bb_source_readings_skipped_total{source=\"sensor/base/imu\"}"], 0.0);
     assert_eq!(first["bb_source_running{source=\"sensor/base/imu\"}"], 1.0);
-    assert_eq!(first["bb_faults_total{}"], 0.0);
+    assert_eq!((first["bb_faults_total{}"], first["bb_panics_total{kind=\"journal\"}"]), (0.0, 0.0));
 
     let _subscribed = simulation.subscribe(watched::sensor::base::imu);
     simulation.pretend_latency(watched::sensor::base::imu::judge, Duration::from_millis(2));

@@ -124,6 +124,8 @@ fn wakers_are_replaced_woken_and_dropped_without_a_lock() {
         let next = pin!(subscription.recv_async());
         assert!(matches!(next.poll(&mut Context::from_waker(&nosy())), Poll::Pending));
     }
-    AnyTopic::close(topic).into_iter().for_each(crate::pubsub::wakers::wake);
+    for waker in AnyTopic::close(topic) {
+        crate::pubsub::wakers::wake(waker);
+    }
     assert_eq!(woken.load(Ordering::SeqCst), 10);
 }

@@ -20,7 +20,7 @@ impl<A: Actuator> Accepts<A::Command> for Inner<A> {
         }
         let mut wakers = Wakers::default();
         let done = self.alone(|state| self.carry_out(state, command, caller, &mut wakers));
-        wakers.run();
+        self.control.count_waker_panics(wakers.run());
         done.unwrap_or(Err(ActuatorError::Inside))
     }
 
@@ -40,7 +40,7 @@ impl<A: Actuator> Accepts<A::Command> for Inner<A> {
                 let _ = self.carry_out(state, stop, &Caller::PROGRAM, &mut wakers);
             }
         });
-        wakers.run();
+        self.control.count_waker_panics(wakers.run());
     }
 }
 
