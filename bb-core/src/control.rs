@@ -29,7 +29,7 @@ mod step;
 mod system;
 mod task;
 
-pub(crate) use callbacks::{Inside, is_in_actuator};
+pub(crate) use callbacks::{Inside, is_in_actuator, is_in_command};
 pub use command::{CommandStatistics, Prepared};
 pub(crate) use commands::Hanging;
 pub use execution::{CommandError, Execution};
@@ -174,6 +174,7 @@ type StateGuard<'a> = MutexGuard<'a, State>;
 
 struct State {
     machine: Machine,
+    /// In the order of their numbers.
     executions: Vec<RunningCommand>,
     statistics: Vec<CommandStatistics>,
     next_id: u64,

@@ -1,9 +1,9 @@
 //! Code that hangs, or calls back where it would wait for itself, harms itself alone, and is reported while the robot runs.
 
-use crate::components::Number;
+use crate::components::{Doing, Number, Task};
 use crate::gate::{Gate, Place, Stuck};
 use bb_core::prelude::*;
-use bb_core::run::ActuatorError;
+use bb_core::run::{ActuatorError, Report};
 use bb_core::{ComponentFault, DisarmError, Live, Running, TelemetryEvent};
 use std::sync::{Arc, Mutex, OnceLock, mpsc};
 
@@ -300,8 +300,22 @@ mod reentrance {
         }
     }
 
+    /// Stops the robot, which knows that it cannot wait for this.
+    fn stop(_: CommandContext) -> Doing {
+        Box::pin(async {
+            let running = RUNNING.lock().map_err(|_| "it panicked")?.take().ok_or("it does not run")?;
+            let start = std::time::Instant::now();
+            let report = running.stop();
+            STOPPED.set((start.elapsed(), report)).map_err(|_| "it has stopped twice")?;
+            Ok(Outcome::done(()))
+        })
+    }
+
+    static STOPPED: OnceLock<(Duration, Report)> = OnceLock::new();
+
     robot! {
         robot Own;
+        commands { stop: Task(run = stop) { allowed_states: [disarmed]; } }
         link base {
             joint pan: continuous { axis: z; actuator servo: Servo(); sensor encoder: External<Number>(); link head {} }
         }
@@ -347,6 +361,27 @@ mod reentrance {
             live.arm()?;
             *RUNNING.lock().map_err(|_| "it panicked")? = Some(running);
             live.actuate(own::actuator::base::pan::servo, Number(4.0))?;
+            Ok(())
+        });
+    }
+
+    #[test]
+    fn a_command_that_stops_the_robot_is_not_waited_for() {
+        in_time(|| {
+            let running = Own::builder().start()?;
+            let live = running.live();
+            *RUNNING.lock().map_err(|_| "it panicked")? = Some(running);
+            live.command(own::command::stop, NoArguments)?;
+            let start = std::time::Instant::now();
+            while STOPPED.get().is_none() {
+                assert!(start.elapsed() < PATIENCE, "it does not return");
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            let Some((after, report)) = STOPPED.get() else { return Err("it has not stopped".into()) };
+            assert!(*after < Duration::from_secs(3), "it has waited for itself: {after:?}");
+            assert_eq!(report.safety, Safety::Disarmed);
+            let said: Vec<_> = report.faults.iter().map(|fault| fault.to_string()).collect();
+            assert_eq!(said, ["command/stop failed: did not come back when the robot stopped"]);
             Ok(())
         });
     }

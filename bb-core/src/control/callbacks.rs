@@ -5,7 +5,8 @@
 //!   thread.
 //! - A disarming runs all of them: see [`arming`](super::arming). Some also run [`Apart`] from one: see
 //!   [`registering`](super::registering).
-//! - Code that a disarming waits for does not wait for that disarming: [`is_awaited`] tells the thread that runs it.
+//! - Code that a disarming waits for does not wait for that disarming: [`is_awaited`] tells the thread that runs it. The same list of
+//!   what a thread is inside of tells a command that stops its robot.
 
 use super::{Control, Key, State};
 use crate::component::DisarmHook;
@@ -278,7 +279,7 @@ impl State {
 }
 
 thread_local! {
-    /// The code of robots that the calling thread is inside of and that their disarmings wait for.
+    /// The code of robots that the calling thread is inside of.
     static INSIDE: RefCell<Vec<Place>> = const { RefCell::new(Vec::new()) };
 }
 
@@ -286,24 +287,36 @@ thread_local! {
 struct Place {
     /// The address of the robot's state.
     robot: usize,
-    /// Address of the actuator whose code it is; `None` for a disarm callback.
-    actuator: Option<usize>,
+    code: Code,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Code {
+    Callback,
+    /// The code of the actuator at that address.
+    Actuator(usize),
+    Command,
 }
 
 /// Whether the calling thread runs code of `robot` that its disarming waits for: a disarm callback, or an actuator's code, which the
 /// actuator's callback waits for.
 pub(crate) fn is_awaited(robot: usize) -> bool {
-    is_inside(|place| place.robot == robot)
+    is_inside(|place| place.robot == robot && place.code != Code::Command)
 }
 
 /// Whether the calling thread runs a disarm callback of `robot`.
 pub(super) fn is_callback(robot: usize) -> bool {
-    is_inside(|place| place.robot == robot && place.actuator.is_none())
+    is_inside(|place| place.robot == robot && place.code == Code::Callback)
+}
+
+/// Returns whether the calling thread runs code of a command of `robot`.
+pub(crate) fn is_in_command(robot: usize) -> bool {
+    is_inside(|place| place.robot == robot && place.code == Code::Command)
 }
 
 /// Whether the calling thread is inside the actuator.
 pub(crate) fn is_in_actuator(actuator: usize) -> bool {
-    is_inside(|place| place.actuator == Some(actuator))
+    is_inside(|place| place.code == Code::Actuator(actuator))
 }
 
 fn is_inside(fits: impl Fn(&Place) -> bool) -> bool {
@@ -316,12 +329,16 @@ pub(crate) struct Inside(Place);
 
 impl Inside {
     fn callback(robot: usize) -> Self {
-        Self::new(Place { robot, actuator: None })
+        Self::new(Place { robot, code: Code::Callback })
+    }
+
+    pub(super) fn command(robot: usize) -> Self {
+        Self::new(Place { robot, code: Code::Command })
     }
 
     /// `robot` is [`Control::id`].
     pub(crate) fn actuator(robot: usize, actuator: usize) -> Self {
-        Self::new(Place { robot, actuator: Some(actuator) })
+        Self::new(Place { robot, code: Code::Actuator(actuator) })
     }
 
     fn new(place: Place) -> Self {

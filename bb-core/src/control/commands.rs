@@ -171,15 +171,19 @@ impl Step<'_> {
         self.control.0.commands.get(command).map_or(Role::Plain, |command| command.0.role())
     }
 
+    /// The position of an execution. Disarming asks for each that it cancels, so it must not be looked for from the beginning.
+    pub(super) fn position(&self, id: u64) -> Option<usize> {
+        self.state.executions.binary_search_by_key(&id, |execution| execution.id).ok()
+    }
+
     /// The position of an execution that has not ended.
     pub(super) fn running(&self, id: u64) -> Option<usize> {
-        let mut executions = self.state.executions.iter();
-        executions.position(|execution| execution.id == id && !matches!(execution.phase, Phase::Lingering))
+        self.position(id).filter(|index| !matches!(self.state.executions[*index].phase, Phase::Lingering))
     }
 
     /// The name of an execution's command.
     pub(super) fn name_of(&self, id: u64) -> Option<&'static str> {
-        let execution = self.state.executions.iter().find(|execution| execution.id == id)?;
+        let execution = self.state.executions.get(self.position(id)?)?;
         self.declared(execution.command).map(|declared| declared.name)
     }
 
@@ -262,7 +266,9 @@ impl Step<'_> {
             task,
             phase: Phase::Running,
         };
-        self.state.executions.push(execution);
+        // At the end, unless a damaged journal is replayed.
+        let index = self.state.executions.partition_point(|other| other.id < id);
+        self.state.executions.insert(index, execution);
         self.publish_phase(number, id, CommandPhase::Started, asked_by, health);
         self.publish_machine(Some(declared.name));
         Ok(slot)

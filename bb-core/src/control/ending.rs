@@ -196,7 +196,7 @@ impl Step<'_> {
 
     /// Whether that execution is of a command that arms the robot.
     fn is_arming(&self, id: u64) -> bool {
-        let execution = self.state.executions.iter().find(|execution| execution.id == id);
+        let execution = self.position(id).and_then(|index| self.state.executions.get(index));
         execution.is_some_and(|execution| self.role(execution.command) == Role::Arming)
     }
 
@@ -335,9 +335,10 @@ impl Step<'_> {
     /// The code of a cancelled execution has returned, and its future is dropped. Commands that arm the robot may have waited for
     /// that.
     pub(super) fn forget_lingering(&mut self, id: u64) {
-        let lingering =
-            |execution: &RunningCommand| execution.id == id && matches!(execution.phase, Phase::Lingering);
-        let Some(index) = self.state.executions.iter().position(lingering) else { return };
+        let Some(index) = self.position(id) else { return };
+        if !matches!(self.state.executions[index].phase, Phase::Lingering) {
+            return;
+        }
         let arming = |execution: &RunningCommand| matches!(execution.phase, Phase::Arming(..));
         if !self.state.apart.is_empty() && self.state.executions.iter().any(arming) {
             // As in `apply_outcome`: what waits for it would arm the robot.

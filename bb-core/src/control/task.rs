@@ -1,6 +1,7 @@
 //! The future of one execution of a command: polled by the pool, or by the loop of a simulation.
 
 use super::WeakControl;
+use super::callbacks::Inside;
 use crate::component::Outcome;
 use crate::fault::{Fault, caught, discard};
 use crate::journal::End;
@@ -121,6 +122,7 @@ impl Task {
             state.entered = Some(control.clock().now());
         }
         drop(state);
+        let inside = Inside::command(control.id());
         let ended = match code {
             // A late wake: another thread is polling it, or it has ended.
             Code::Polled | Code::Done => {
@@ -136,6 +138,7 @@ impl Task {
                     Code::Future(future) => discard(future),
                     Code::Polled | Code::Done => {}
                 }
+                drop(inside);
                 self.lock().code = Code::Done;
                 return control.future_dropped(self.id);
             }
@@ -145,6 +148,7 @@ impl Task {
             },
             Code::Future(future) => self.poll(future),
         };
+        drop(inside);
         match ended {
             Some(ended) => {
                 self.lock().code = Code::Done;

@@ -4,6 +4,7 @@ use super::machine::Machine;
 use super::source::OpenSources;
 use super::threads::{self, Thread};
 use super::{Live, Report, Robot, StartError};
+use crate::control::is_in_command;
 use std::fmt;
 use std::ops::Deref;
 use std::sync::Arc;
@@ -95,8 +96,10 @@ impl Threads {
 
     /// Returns the time by which user code that was told to stop at `start` should have returned.
     fn deadline(&self, start: Instant) -> Instant {
-        // An estimator's message may have woken the caller: then the estimator cannot stop before the call returns.
-        if self.has_waited || self.machine.islands().any(|island| island.is_inside()) {
+        let machine = &self.machine;
+        // The caller may be a command, or woken by an estimator's message: then that cannot end before this call returns.
+        let is_inside = is_in_command(machine.control.id()) || machine.islands().any(|island| island.is_inside());
+        if self.has_waited || is_inside {
             return Instant::now() + GRACE;
         }
         (start + STOP_WITHIN).max(Instant::now() + GRACE)
