@@ -95,6 +95,15 @@ impl HandleCast<Forget> for Adder {
     }
 }
 
+/// Another one, which only makes it unsure.
+pub(crate) struct Doubt;
+
+impl HandleCast<Doubt> for Adder {
+    fn handle_cast(&mut self, Doubt: Doubt) -> Replied {
+        Ok(Reply::none().diverged("in doubt"))
+    }
+}
+
 /// Is the last number before it cannot be made safe.
 const REFUSES: f64 = 99.0;
 
@@ -234,6 +243,16 @@ fn a_request_that_a_journal_does_not_hold_is_named_where_it_makes_a_difference()
     let error = failed.err().ok_or("it is not the same")?.to_string();
     assert!(error.contains("`sensor/base/number/sum` emits another message than it did"), "{error}");
     assert!(error.contains("Forget` in line") && error.contains("set `RECORD` for it"), "{error}");
+
+    let failed = again(|simulation| {
+        feed(simulation, 1..20);
+        simulation.cast(again::sensor::base::number::sum, Doubt)?;
+        feed(simulation, 20..30);
+        Ok(())
+    });
+    let error = failed.err().ok_or("its health is not the same")?.to_string();
+    assert!(error.contains("`sensor/base/number/sum` reported a change of health"), "{error}");
+    assert!(error.contains("Doubt` in line") && error.contains("set `RECORD` for it"), "{error}");
     Ok(())
 }
 

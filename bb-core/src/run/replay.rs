@@ -299,9 +299,11 @@ impl Replayer {
                         control.replay_report(estimator)
                     });
                 if !is_told {
-                    let path = self.machine.robot.estimators.get(estimator).map_or("?", |declared| declared.path);
+                    let declared = self.machine.robot.estimators.get(estimator);
+                    let path = declared.map_or("?", |declared| declared.path);
+                    let hint = declared.map_or_else(String::new, |declared| self.hint(declared.island));
                     return Err(format!(
-                        "`{path}` reported a change of health or a failure then, and does not now"
+                        "`{path}` reported a change of health or a failure then, and does not now{hint}"
                     ));
                 }
             }
