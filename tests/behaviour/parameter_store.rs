@@ -279,6 +279,14 @@ fn the_environment_sets_what_it_names() -> Result<(), Failure> {
     );
     assert!(refused(&mut builder, "BB_SET_param__limit", "80").contains("expected a length"));
     assert!(refused(&mut builder, "BB_CONFIG", "/there/is/none.toml").contains("cannot be read"));
+    #[cfg(unix)]
+    {
+        use std::os::unix::ffi::OsStringExt as _;
+        let name = std::ffi::OsString::from_vec(b"BB_SET_\xff".to_vec());
+        let other = std::ffi::OsString::from_vec(b"OTHER_\xff".to_vec());
+        let error = builder.load_environment([(other, "1"), (name, "1")]).expect_err("it is no text").to_string();
+        assert_eq!(error, "environment variable BB_SET_\u{fffd}: its name is not UTF-8");
+    }
     // None of them has set the other.
     assert_eq!(builder.simulate()?.parameter(rig::param::gains::ki), 0.1);
     Ok(())

@@ -71,7 +71,13 @@ impl Draft {
         let mut assignments: Vec<Assignment> = Vec::new();
         let mut problems = Vec::new();
         for (name, value) in variables {
-            let Some(name) = name.to_str() else { continue };
+            let Some(name) = name.to_str() else {
+                if name.as_encoded_bytes().starts_with(SET.as_bytes()) {
+                    let place = Place::Variable(name.to_string_lossy().into());
+                    problems.push(SettingProblem::new(place, "", "its name is not UTF-8"));
+                }
+                continue;
+            };
             let Some(suffix) = name.strip_prefix(SET) else { continue };
             let place = Place::Variable(name.into());
             match (path_of(&known, suffix), value.to_str()) {

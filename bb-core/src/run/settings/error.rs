@@ -3,12 +3,17 @@
 use std::fmt;
 use std::sync::Arc;
 
-/// All that is wrong with the settings of a robot, a line each. `Debug` prints the same as `Display`, since a `main`
+/// What is wrong with the settings of a robot, a line each: the first hundred problems, and how many more there are. `Debug` prints the same as `Display`, since a `main`
 /// that returns it shows `Debug`.
 #[derive(Clone, PartialEq, Eq)]
 pub struct SettingsError {
     problems: Vec<SettingProblem>,
+    /// How many there are besides.
+    more: usize,
 }
+
+/// How many problems are kept.
+const MOST: usize = 100;
 
 /// One setting that is wrong.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -37,8 +42,10 @@ pub(super) enum Place {
 }
 
 impl SettingsError {
-    pub(super) fn new(problems: Vec<SettingProblem>) -> Self {
-        Self { problems }
+    pub(super) fn new(mut problems: Vec<SettingProblem>) -> Self {
+        let more = problems.len().saturating_sub(MOST);
+        problems.truncate(MOST);
+        Self { problems, more }
     }
 
     pub(super) fn one(place: Place, path: &str, message: impl Into<String>) -> Self {
@@ -50,7 +57,7 @@ impl SettingsError {
         Self::one(Place::File { name: name.into(), position: None }, "", format!("cannot be read: {error}"))
     }
 
-    /// Each of them, in the order in which they were written.
+    /// The first hundred, in the order in which they were written.
     pub fn problems(&self) -> &[SettingProblem] {
         &self.problems
     }
@@ -103,6 +110,9 @@ impl fmt::Display for SettingsError {
                 f.write_str("\n")?;
             }
             problem.fmt(f)?;
+        }
+        if self.more > 0 {
+            write!(f, "\nand {} more problems", self.more)?;
         }
         Ok(())
     }

@@ -3,7 +3,7 @@
 use super::assign::Assignment;
 use super::error::{Place, SettingProblem, SettingsError};
 use crate::message::codec::to_json;
-use crate::sorted::Sorted;
+use std::collections::HashSet;
 use std::sync::Arc;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -30,40 +30,75 @@ pub(super) fn read(
 ) -> Result<Vec<Assignment>, SettingsError> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let (table, errors) = DeTable::parse_recoverable(text);
-    let mut reader = Reader { name: name.into(), text, is_known, found: Vec::new(), problems: Vec::new() };
-    for error in errors {
-        let place = reader.place(error.span().map_or(0, |span| span.start));
-        reader.problems.push(SettingProblem::new(place, "", error.message()));
+    let mut places = Places { name: name.into(), rest: text, at: 0, line: 1, column: 1 };
+    if !errors.is_empty() {
+        let errors = errors.iter().map(|error| (error.span().map_or(0, |span| span.start), error));
+        let mut errors: Vec<_> = errors.collect();
+        errors.sort_by_key(|(start, _)| *start);
+        let problem = |(start, error): (usize, &toml::de::Error)| {
+            SettingProblem::new(places.next(start), "", error.message())
+        };
+        return Err(SettingsError::new(errors.into_iter().map(problem).collect()));
     }
-    if reader.problems.is_empty() {
-        reader.table("", table.get_ref());
-    }
-    let mut seen = Sorted::default();
-    reader.found.sort_by_key(|(start, _)| *start);
-    for (_, assignment) in &reader.found {
-        if seen.insert(assignment.path.as_str(), ()).is_some() {
-            let message = "is set twice in this file";
-            let problem = SettingProblem::new(assignment.place.clone(), &assignment.path, message);
-            reader.problems.push(problem);
+    let mut reader = Reader { is_known, found: Vec::new() };
+    reader.table("", table.get_ref());
+    let mut found = reader.found;
+    found.sort_by_key(|found| found.start);
+    let mut problems = Vec::new();
+    let mut seen = HashSet::new();
+    for Found { path, start, .. } in &found {
+        if !seen.insert(path) {
+            problems.push((*start, path));
         }
     }
-    if reader.problems.is_empty() {
-        Ok(reader.found.into_iter().map(|(_, assignment)| assignment).collect())
-    } else {
-        Err(SettingsError::new(reader.problems))
+    if !problems.is_empty() {
+        let problem = |(start, path): (usize, &String)| {
+            SettingProblem::new(places.next(start), path, "is set twice in this file")
+        };
+        return Err(SettingsError::new(problems.into_iter().map(problem).collect()));
+    }
+    let assignment = |Found { start, path, json }| Assignment { place: places.next(start), path, json, text: None };
+    Ok(found.into_iter().map(assignment).collect())
+}
+
+/// A setting, and its place in the text.
+struct Found {
+    start: usize,
+    path: String,
+    json: String,
+}
+
+/// Finds lines and columns, in the order of the text: a file may have hundreds of thousands of settings.
+struct Places<'a> {
+    name: Arc<str>,
+    /// The text from `at` on.
+    rest: &'a str,
+    at: usize,
+    line: usize,
+    column: usize,
+}
+
+impl Places<'_> {
+    /// The place of a byte that is not before the last one.
+    fn next(&mut self, at: usize) -> Place {
+        if let Some((between, rest)) = at.checked_sub(self.at).and_then(|length| self.rest.split_at_checked(length))
+        {
+            let lines = between.matches('\n').count();
+            let last = between.rsplit('\n').next().unwrap_or("").chars().count();
+            self.line += lines;
+            self.column = if lines > 0 { 1 } else { self.column } + last;
+            (self.rest, self.at) = (rest, at);
+        }
+        Place::File { name: Arc::clone(&self.name), position: Some((self.line, self.column)) }
     }
 }
 
-struct Reader<'a, F> {
-    name: Arc<str>,
-    text: &'a str,
+struct Reader<F> {
     is_known: F,
-    /// With the place in the text.
-    found: Vec<(usize, Assignment)>,
-    problems: Vec<SettingProblem>,
+    found: Vec<Found>,
 }
 
-impl<F: Fn(&str) -> Known> Reader<'_, F> {
+impl<F: Fn(&str) -> Known> Reader<F> {
     fn table(&mut self, above: &str, table: &DeTable<'_>) {
         for (key, value) in table {
             let path = match above {
@@ -87,17 +122,7 @@ impl<F: Fn(&str) -> Known> Reader<'_, F> {
         // An error about a name points at the name, and an error about a value at the value.
         let is_name_known = matches!((self.is_known)(&path), Known::Setting | Known::Both);
         let start = if is_name_known { value.span().start } else { start };
-        let place = self.place(start);
-        let json = json(value.get_ref());
-        self.found.push((start, Assignment { place, path, json, text: None }));
-    }
-
-    /// The line and the column of a byte.
-    fn place(&self, at: usize) -> Place {
-        let before = self.text.get(..at).unwrap_or(self.text);
-        let line = before.matches('\n').count() + 1;
-        let column = before.rsplit('\n').next().unwrap_or("").chars().count() + 1;
-        Place::File { name: Arc::clone(&self.name), position: Some((line, column)) }
+        self.found.push(Found { start, path, json: json(value.get_ref()) });
     }
 }
 
