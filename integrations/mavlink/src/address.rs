@@ -15,7 +15,8 @@ use std::str::FromStr;
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Address {
-    /// `udpin:HOST:PORT`: waits there, and answers the sender of the newest frame.
+    /// `udpin:HOST:PORT`: waits there, and answers the sender of the newest frame of a system and component that a driver listens
+    /// to; without drivers, of any.
     UdpIn {
         /// Address of this machine, and port.
         local: String,

@@ -40,7 +40,7 @@ pub(crate) enum Writer {
 pub(crate) enum Peer {
     /// The socket is connected.
     Known,
-    /// The sender of the newest frame.
+    /// The sender of the newest frame of a peer.
     Newest(Arc<Mutex<Option<SocketAddr>>>),
 }
 
@@ -106,7 +106,7 @@ impl Reader {
         matches!(self, Self::Udp { .. })
     }
 
-    /// The last bytes read contained a frame: its sender will be answered.
+    /// The last bytes read contained a frame of a peer: its sender will be answered.
     pub(crate) fn accept_peer(&self) {
         if let Self::Udp { from: Some(from), peer: Some(peer), .. } = self {
             *peer.lock().unwrap_or_else(PoisonError::into_inner) = Some(*from);

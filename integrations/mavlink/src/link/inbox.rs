@@ -39,6 +39,11 @@ impl Inbox {
         Self { peer, ids: ids.to_vec(), capacity, waiting: Mutex::new(waiting), changed: Condvar::new() }
     }
 
+    /// Returns whether it listens to that sender.
+    pub(super) fn hears(&self, header: MavHeader) -> bool {
+        self.peer.is(header)
+    }
+
     /// Adds a copy of a message if it is wanted. Returns whether the oldest had to be dropped for it.
     pub(super) fn offer(&self, header: MavHeader, id: u32, message: &MavMessage, arrival: MonotonicTime) -> bool {
         if !self.ids.contains(&id) || !self.peer.is(header) {

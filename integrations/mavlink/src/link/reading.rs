@@ -39,10 +39,7 @@ pub(super) fn read(shared: &Shared, mut reader: Reader) {
 fn take(shared: &Shared, reader: &Reader, framer: &mut Framer, bytes: &[u8]) {
     let arrival = shared.clock().now();
     let mut has_peer = false;
-    let mut deliver = |item: Item| {
-        has_peer |= matches!(item, Item::Message(..));
-        shared.deliver(item, arrival);
-    };
+    let mut deliver = |item: Item| has_peer |= shared.deliver(item, arrival);
     // Incomplete bytes are discarded if nothing follows, or if a datagram begins with a frame of its own.
     if bytes.is_empty() || reader.is_datagrams() && framer.is_waiting() && begins_with_message(bytes) {
         std::iter::from_fn(|| framer.next_at_end()).for_each(&mut deliver);

@@ -133,7 +133,8 @@ impl Shared {
         sent.map_err(|error| LinkError::Failed { address: self.address.clone(), source: Arc::new(error) })
     }
 
-    pub(super) fn deliver(&self, item: Item, arrival: MonotonicTime) {
+    /// Returns whether its sender is to be answered: it sent a message, and a driver listens to it, or there is no driver.
+    pub(super) fn deliver(&self, item: Item, arrival: MonotonicTime) -> bool {
         let mut state = self.state();
         match item {
             Item::Message(header, message) => {
@@ -143,17 +144,20 @@ impl Shared {
                 if id == HEARTBEAT_DATA::ID {
                     heard.heartbeat = Some(arrival);
                 }
-                let inboxes = state.inboxes.iter().filter_map(Weak::upgrade);
-                let dropped = inboxes.filter(|inbox| inbox.offer(header, id, &message, arrival)).count();
+                let inboxes: Vec<_> = state.inboxes.iter().filter_map(Weak::upgrade).collect();
+                let dropped = inboxes.iter().filter(|inbox| inbox.offer(header, id, &message, arrival)).count();
                 state.statistics.dropped += dropped as u64;
+                inboxes.is_empty() || inboxes.iter().any(|inbox| inbox.hears(header))
             }
             Item::Unknown(header) => {
                 state.statistics.unknown += 1;
                 state.hear(header);
+                false
             }
             Item::Invalid(header) => {
                 state.statistics.invalid += 1;
                 state.hear(header);
+                false
             }
         }
     }

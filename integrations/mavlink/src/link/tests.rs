@@ -104,22 +104,24 @@ fn a_port_can_be_opened_again_at_once() {
 }
 
 #[test]
-fn a_link_that_waits_answers_whoever_speaks() {
+fn a_link_that_waits_answers_the_one_that_drivers_listen_to() {
     let free = UdpSocket::bind("127.0.0.1:0").and_then(|socket| socket.local_addr()).expect("a port is free");
     let link = Link::open(&format!("udpin:{free}")).expect("it opens");
-    let inbox = link.listen(ANY, &[SYSTEM_TIME_DATA::ID], 8);
+    let inbox = link.listen(Peer { system_id: 1, component_id: 0 }, &[SYSTEM_TIME_DATA::ID], 8);
     let (mut other, _) = Other::new();
     other.socket.connect(free).expect("it is on the loopback device");
     other.send(1, &time(7));
     assert_eq!(times(&inbox), Some(7));
-    // Noise makes nobody a peer.
-    let (stranger, _) = Other::new();
-    stranger.socket.send_to(b"hello", free).expect("it is on the loopback device");
+    // Neither noise nor a system that no driver listens to makes anybody a peer.
+    let (mut stranger, _) = Other::new();
+    stranger.socket.connect(free).expect("it is on the loopback device");
+    stranger.send(77, &time(9));
+    stranger.socket.send(b"hello").expect("it is on the loopback device");
     let deadline = link.now() + LONG;
     while link.statistics().bytes_skipped < 5 && link.now() < deadline {
         std::thread::sleep(Duration::from_millis(1));
     }
-    assert_eq!(link.statistics().bytes_skipped, 5);
+    assert_eq!((link.statistics().messages, link.statistics().bytes_skipped), (2, 5));
     let voice = link.voice(3, 4);
     let mut buffer = [0; 300];
     loop {
