@@ -60,12 +60,21 @@ impl RedbStore {
     /// Opens the store, or creates it. The folder must exist.
     ///
     /// # Errors
-    /// The file cannot be opened, is not such a store, or is open in another program.
+    /// The file cannot be opened, is not such a store, or is open in another program. An empty file is no store: what it held is
+    /// lost, and it has to be removed to begin anew.
     pub fn open(file: impl AsRef<Path>) -> Result<Self, Fault> {
         let file = file.as_ref();
         let name = file.display().to_string();
-        if !file.exists() {
-            create(file).map_err(|error| fault(&name, error))?;
+        match std::fs::metadata(file) {
+            Ok(data) if data.is_file() && data.len() == 0 => {
+                let message =
+                    "the file is empty: if there is nothing to recover, remove it to begin with default values";
+                return Err(fault(&name, message));
+            }
+            Err(error) if error.kind() == ErrorKind::NotFound => {
+                create(file).map_err(|error| fault(&name, error))?
+            }
+            _ => {}
         }
         let mut builder = Database::builder();
         // Without the check, a damaged file may cause a panic later.
