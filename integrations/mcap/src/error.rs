@@ -208,6 +208,17 @@ pub enum RecordingErrorKind {
         /// Why.
         cause: io::Error,
     },
+    /// Another program has removed or truncated the file while it was written.
+    #[error(
+        "was {change} by another program, and none of the {messages} messages is certain to be in it; record to a file \
+         that no other program cleans up"
+    )]
+    Taken {
+        /// Messages that had been written.
+        messages: u64,
+        /// `removed` or `truncated`.
+        change: &'static str,
+    },
     /// An earlier write failed.
     #[error("was given up at an earlier error")]
     GivenUp,

@@ -64,8 +64,8 @@ pub struct Recorder {
     path: PathBuf,
     /// `None` once the file is complete, or after an error.
     writer: Option<Box<FileWriter>>,
-    /// The same file, to wait for the disk.
-    to_sync: Option<File>,
+    /// The same file, to look after it.
+    file: Option<Watched>,
     /// The first is waited for, the others are polled.
     subscriptions: Vec<DynamicSubscription>,
     options: RecorderOptions,
@@ -78,6 +78,13 @@ pub struct Recorder {
     clock: Option<Clock>,
     transforms: Option<Viewed>,
     bytes: Bytes,
+}
+
+/// The file that is written.
+pub(crate) struct Watched {
+    file: File,
+    /// How long it was at the last look.
+    length: u64,
 }
 
 struct Channel {
@@ -121,8 +128,8 @@ impl Recorder {
         let path = path.as_ref();
         let create = |cause: io::Error| RecordingError::new(path, create_error(cause));
         let file = File::create_new(path).map_err(create)?;
-        let to_sync = if options.sync { Some(file.try_clone().map_err(create)?) } else { None };
-        let recorder = Self::on(path, Box::new(file), to_sync, subscription, options);
+        let watched = Watched { file: file.try_clone().map_err(create)?, length: 0 };
+        let recorder = Self::on(path, Box::new(file), Some(watched), subscription, options);
         recorder.inspect_err(|_| {
             // It is empty, and another attempt needs its name.
             let _ = std::fs::remove_file(path);
@@ -130,23 +137,23 @@ impl Recorder {
     }
 
     pub(crate) fn on(
-        file: &Path,
+        path: &Path,
         output: Box<dyn Output>,
-        to_sync: Option<File>,
+        file: Option<Watched>,
         subscription: DynamicSubscription,
         options: RecorderOptions,
     ) -> Result<Self, RecordingError> {
-        let fail = |error| RecordingError::new(file, write_error(0, error));
+        let fail = |error| RecordingError::new(path, write_error(0, error));
         let mut names = Names::default();
-        take_names(&mut names, &subscription).map_err(|kind| RecordingError::new(file, kind))?;
+        take_names(&mut names, &subscription).map_err(|kind| RecordingError::new(path, kind))?;
         let robot = options.robot.as_ref().filter(|_| options.transforms);
         let frames = robot.map(|robot| Frames::new(robot.topology, options.body.clone()));
         let mut writer = options.mcap().create(BufWriter::new(output)).map_err(fail)?;
         describe(&mut writer, &options).and_then(|()| writer.flush()).map_err(fail)?;
         Ok(Self {
-            path: file.to_owned(),
+            path: path.to_owned(),
             writer: Some(Box::new(writer)),
-            to_sync,
+            file,
             subscriptions: vec![subscription],
             options,
             channels: HashMap::new(),
@@ -197,14 +204,17 @@ impl Recorder {
     /// Hands everything that was written to the operating system.
     ///
     /// # Errors
-    /// Writing failed.
+    /// Writing failed, or another program has removed or truncated the file.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         self.guarded(|recorder, writer| {
+            recorder.look()?;
             writer.flush()?;
-            if let Some(file) = &recorder.to_sync {
-                file.sync_data()?;
+            if recorder.options.sync
+                && let Some(watched) = &recorder.file
+            {
+                watched.file.sync_data()?;
             }
-            Ok(())
+            recorder.look()
         })?;
         self.report.flushed = self.report.messages;
         self.last_flush = Instant::now();
@@ -220,7 +230,7 @@ impl Recorder {
     /// Writes the waiting messages and the end of the file.
     ///
     /// # Errors
-    /// Writing failed.
+    /// Writing failed, or another program has removed or truncated the file.
     pub fn finish(mut self) -> Result<RecorderReport, RecordingError> {
         self.end()?;
         Ok(self.report())
@@ -276,11 +286,16 @@ impl Recorder {
                 self.writer = Some(writer);
                 Ok(value)
             }
-            Err(WriteFault::File(error)) => {
-                Err(RecordingError::new(&self.path, write_error(self.report.flushed, error)))
-            }
-            Err(WriteFault::Message(kind)) => Err(RecordingError::new(&self.path, kind)),
+            Err(fault) => Err(self.failed(fault)),
         }
+    }
+
+    fn failed(&self, fault: WriteFault) -> RecordingError {
+        let kind = match fault {
+            WriteFault::File(error) => write_error(self.report.flushed, error),
+            WriteFault::Message(kind) => kind,
+        };
+        RecordingError::new(&self.path, kind)
     }
 
     /// Writes a message, and the derived messages for viewers; returns false and writes nothing if it is too large.
@@ -382,10 +397,30 @@ impl Recorder {
         Ok(writer.write_to_known_channel(&header, &self.bytes.main)?)
     }
 
+    /// Checks that the file is still there, with all that was in it at the last look.
+    fn look(&mut self) -> Result<(), WriteFault> {
+        let Some(watched) = &mut self.file else { return Ok(()) };
+        let found = watched.file.metadata()?;
+        #[cfg(unix)]
+        let is_removed = std::os::unix::fs::MetadataExt::nlink(&found) == 0;
+        #[cfg(not(unix))]
+        let is_removed = false;
+        let change = match (is_removed, found.len() < watched.length) {
+            (true, _) => "removed",
+            (false, true) => "truncated",
+            (false, false) => {
+                watched.length = found.len();
+                return Ok(());
+            }
+        };
+        Err(WriteFault::Message(RecordingErrorKind::Taken { messages: self.report.messages, change }))
+    }
+
     fn end(&mut self) -> Result<(), RecordingError> {
         self.drain()?;
         let report = self.report();
-        self.guarded(|_, writer| {
+        self.guarded(|recorder, writer| {
+            recorder.look()?;
             let counts = [("messages", report.messages), ("lost", report.lost), ("too_large", report.too_large)];
             let metadata = counts.map(|(key, count)| (key.to_owned(), count.to_string())).into();
             writer.write_metadata(&Metadata { name: END.to_owned(), metadata })?;
@@ -394,10 +429,12 @@ impl Recorder {
         })?;
         let Some(writer) = self.writer.take() else { return Ok(()) };
         let mut file = writer.into_inner();
-        let ended = file.flush().and_then(|()| self.to_sync.as_ref().map_or(Ok(()), File::sync_all));
+        let to_sync = self.file.as_ref().filter(|_| self.options.sync);
+        let ended = file.flush().and_then(|()| to_sync.map_or(Ok(()), |watched| watched.file.sync_all()));
         ended.map_err(|cause| {
             RecordingError::new(&self.path, RecordingErrorKind::Write { messages: report.flushed, cause })
         })?;
+        self.look().map_err(|fault| self.failed(fault))?;
         self.report.flushed = report.messages;
         Ok(())
     }

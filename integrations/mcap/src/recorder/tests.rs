@@ -101,6 +101,38 @@ fn a_disk_that_is_full_at_the_end_of_the_file_is_told() {
     assert!(failed_at_the_end > 10);
 }
 
+#[cfg(unix)]
+#[test]
+fn a_file_that_another_program_removes_or_truncates_is_told() {
+    type Change = fn(&Path) -> io::Result<()>;
+    let remove: Change = |path| std::fs::remove_file(path);
+    let truncate: Change = |path| File::create(path).map(drop);
+    for (change, wording) in [(remove, "removed"), (truncate, "truncated")] {
+        // At a flush, and at the end.
+        for flushes in [true, false] {
+            let topic = Topic::<JointState>::new("sensor/arm/encoder");
+            let all = DynamicSubscription::new([&topic as &dyn AnyTopic], Select::All, None, Overflow::default());
+            let path =
+                std::env::temp_dir().join(format!("bb-mcap-{wording}-{flushes}-{}.mcap", std::process::id()));
+            let interval = Duration::from_secs(3600);
+            let options = RecorderOptions { flush_interval: interval, ..RecorderOptions::default() };
+            let mut recorder = Recorder::new(&path, all, options).expect("there is room");
+            publish(&topic, 10);
+            recorder.drain().and_then(|_| recorder.flush()).expect("it is there");
+            change(&path).expect("it is there");
+            publish(&topic, 2);
+            recorder.drain().expect("it is not flushed yet");
+            let error = if flushes { recorder.flush().err() } else { recorder.finish().err() };
+            let error = error.expect("the file is not what was written").to_string();
+            assert!(
+                error.contains(&format!("was {wording} by another program, and none of the 12 messages")),
+                "{error}"
+            );
+            let _ = std::fs::remove_file(&path);
+        }
+    }
+}
+
 #[test]
 fn a_recorder_on_a_thread_says_when_it_has_failed() {
     let topic = Topic::<JointState>::new("sensor/arm/encoder");
