@@ -87,7 +87,6 @@ fn densities_are_found() {
     let option = |name: &str| number(&found, &format!("/options/{name}"));
     assert!((option("gyroscope_noise") / GYROSCOPE - 1.0).abs() < bound);
     assert!((option("gyroscope_bias_walk") / WALK - 1.0).abs() < 0.6);
-    assert_eq!(option("bias_drift"), option("gyroscope_bias_walk"));
 }
 
 /// The options are taken by the filters that they are for.
