@@ -52,6 +52,7 @@ mod replaced;
 mod replay;
 mod restarted_motors;
 mod restarts;
+mod rights;
 mod safety;
 mod settings;
 mod simulation;

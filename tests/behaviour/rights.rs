@@ -49,7 +49,9 @@ const VERBS: [(Right, &str, Verb); 8] = [
     (Right::Parameters, "set_parameters", |bus| Ok(bus.set_parameters([("param/speed", 3.0.into())])?)),
     (Right::Commands, "start_command", |bus| Ok(bus.start_command("command/stop", "").map(drop)?)),
     (Right::Arm, "arm", |bus| Ok(bus.arm()?)),
-    (Right::Actuators, "actuator", |bus| Ok(bus.actuator::<Number>("actuator/base/pan/servo")?.send(Number(1.0))?)),
+    (Right::Actuators, "actuator", |bus| {
+        Ok(bus.actuator::<Number>("actuator/base/pan/servo")?.send(Number(1.0))?)
+    }),
     (Right::Arm, "force_disarm", |bus| Ok(bus.force_disarm()?)),
     (Right::Publish, "publisher", |bus| Ok(bus.publisher::<Number>("page/number").map(drop)?)),
 ];
@@ -106,7 +108,10 @@ fn a_caller_gives_no_rights_that_it_does_not_have() -> Result<(), Box<dyn std::e
     assert_eq!((user.caller(), user.rights()), ("user", [Right::Arm].into()));
     assert_eq!(user.arm(), Ok(()));
     let error = page.for_caller("guest", Rights::NONE).arm().expect_err("it may not");
-    assert!(matches!(&error, ArmError::Forbidden(why) if why.caller == "guest" && why.right == Right::Arm), "{error}");
+    assert!(
+        matches!(&error, ArmError::Forbidden(why) if why.caller == "guest" && why.right == Right::Arm),
+        "{error}"
+    );
     let error = page.for_caller("guest", [Right::Read]).force_disarm().expect_err("it may not");
     assert!(matches!(&error, DisarmError::Forbidden(why) if why.right == Right::Arm), "{error}");
     Ok(())

@@ -47,8 +47,9 @@ impl Overflow {
     /// delivered once the period is over, so the last one of a burst is not lost, and a subscriber is woken only for what it gets. The
     /// others are not counted as lost. When the robot stops, messages that wait for their time are delivered at once.
     ///
-    /// The clock is that of the run. So on virtual time a message arrives when its time has come there, and a replay delivers the
-    /// messages that its run has delivered.
+    /// The clock is that of the run. So on virtual time a message arrives when its time has come there, and a replay delivers what
+    /// its run has delivered. In a replay of a run in real time the clock is that of the journal's lines, so at the end of a period
+    /// another message may be the newest.
     ///
     /// ```
     /// use bb_core::prelude::*;

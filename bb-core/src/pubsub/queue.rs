@@ -154,7 +154,8 @@ impl<M> Queue<M> {
 
     fn with(overflow: Overflow, by_path: Option<Box<ByPath>>) -> Self {
         let bound = overflow.bound();
-        let usual = if overflow == Overflow::LatestPerPath { bound.capacity.min(USUAL_PATHS) } else { bound.capacity };
+        let usual =
+            if overflow == Overflow::LatestPerPath { bound.capacity.min(USUAL_PATHS) } else { bound.capacity };
         let in_advance = Bound { capacity: usual, ..bound }.in_advance::<Entry<M>>();
         let state = State {
             messages: VecDeque::with_capacity(in_advance),
