@@ -71,8 +71,7 @@ impl<T: Real> Field<T> {
         }
         // A field that is off by its norm tells nothing more.
         squared = squared.min(T::ONE);
-        let faded = self.disturbance
-            + (squared - self.disturbance) * (dt / T::of(BRIEF_S)).min(T::ONE);
+        let faded = self.disturbance + (squared - self.disturbance) * (dt / T::of(BRIEF_S)).min(T::ONE);
         self.disturbance = squared.max(faded);
         let known_s = self.seen_s + T::of(0.1);
         let squared_norm = field.norm_squared();

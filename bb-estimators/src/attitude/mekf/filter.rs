@@ -180,7 +180,9 @@ impl<T: Real> MekfFilter<T> {
         }
         self.rest = Rest::new(&sample.angular_velocity, &sample.specific_force);
         self.begin();
-        if self.is_north_known && let Some(field) = sample.magnetic_field {
+        if self.is_north_known
+            && let Some(field) = sample.magnetic_field
+        {
             self.iron.observe(&self.rotation, &field);
         }
     }
@@ -225,7 +227,12 @@ impl<T: Real> MekfFilter<T> {
         orientation
     }
 
-    fn add_field(&mut self, orientation: UnitQuaternion<T>, rate: &Vector3<T>, field: &Vector3<T>) -> UnitQuaternion<T> {
+    fn add_field(
+        &mut self,
+        orientation: UnitQuaternion<T>,
+        rate: &Vector3<T>,
+        field: &Vector3<T>,
+    ) -> UnitQuaternion<T> {
         match self.iron.observe(&self.rotation, field) {
             None => {}
             Some(Change::Found) => {
@@ -237,7 +244,8 @@ impl<T: Real> MekfFilter<T> {
                 self.forget_field();
             }
             Some(Change::Sharper(deviation)) => {
-                let horizontal = self.field.as_ref().map_or(T::ZERO, Field::horizontal).max(T::of(0.1) * self.iron.scale());
+                let horizontal =
+                    self.field.as_ref().map_or(T::ZERO, Field::horizontal).max(T::of(0.1) * self.iron.scale());
                 let ratio = deviation / horizontal;
                 self.errors.doubt(HEADING, (ratio * ratio).min(T::ONE));
                 self.forget_field();
@@ -293,7 +301,9 @@ impl<T: Real> MekfFilter<T> {
         if self.rest.is_detected() {
             self.fuse_rest(dt, &(window.measured_turn / dt));
         }
-        if self.is_north_known && let Some(mean) = window.mean_field() {
+        if self.is_north_known
+            && let Some(mean) = window.mean_field()
+        {
             self.fuse_field(dt, &mean, window.squared_rate / dt);
         }
         let orientation = turn(&UnitQuaternion::identity(), &self.errors.take_rotation()) * orientation;

@@ -3,7 +3,8 @@
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use super::numbers::{
-    ANY_OFFSET, CALIBRATED, FIELD_WALK, FIRST_POSES, LEAST_WALK, ODDS, POSE_TURN, SCALE_TURN, SHARPER, SHORT_S, TAILS,
+    ANY_OFFSET, CALIBRATED, FIELD_WALK, FIRST_POSES, LEAST_WALK, ODDS, POSE_TURN, SCALE_TURN, SHARPER, SHORT_S,
+    TAILS,
 };
 use super::params::Magnetometer;
 use crate::attitude::Real;
@@ -53,17 +54,14 @@ impl<T: Real> Hypothesis<T> {
             covariance.fixed_columns::<3>(0) + covariance.fixed_columns::<3>(3) * rotation.transpose()
         };
         let expected = |shared: &SMatrix<T, 6, 3>| {
-            shared.fixed_rows::<3>(0)
-                + rotation * shared.fixed_rows::<3>(3)
-                + Matrix3::from_diagonal_element(white)
+            shared.fixed_rows::<3>(0) + rotation * shared.fixed_rows::<3>(3) + Matrix3::from_diagonal_element(white)
         };
         let mut with = shared(&self.covariance);
         let total = expected(&with) + Matrix3::from_diagonal_element(walk);
         let Some(inverse) = total.try_inverse() else { return T::ZERO };
         let squared = residual.dot(&(inverse * residual));
         let (tails, freedom) = (T::of(TAILS), T::of(TAILS + 3.0));
-        let likelihood =
-            -T::HALF * total.determinant().ln() - T::HALF * freedom * (squared / tails).ln_1p();
+        let likelihood = -T::HALF * total.determinant().ln() - T::HALF * freedom * (squared / tails).ln_1p();
         let weight = freedom / (tails + squared);
         self.poses += T::ONE;
         let learnt = weight * squared / T::of(3.0) - T::ONE;

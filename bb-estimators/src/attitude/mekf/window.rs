@@ -58,6 +58,7 @@ impl<T: Real> Window<T> {
     }
 
     pub(super) fn mean_field(&self) -> Option<MeanField<T>> {
-        (self.fields > T::ZERO).then(|| MeanField { field: self.field / self.fields, rate: self.field_rate / self.fields })
+        (self.fields > T::ZERO)
+            .then(|| MeanField { field: self.field / self.fields, rate: self.field_rate / self.fields })
     }
 }
