@@ -12,7 +12,7 @@ pub(crate) const EXAMPLES: &str = "Exit code: 0; 1 if a family could not be scor
 
 Examples:
   bb eval families recordings/
-  bb eval families recordings/ --filter mekf,vqf --half A --set mekf.velocity=0.4
+  bb eval families recordings/ --filter mekf,vqf --half A --set mekf.magnetometer=calibrated
   bb eval families --family car,boat";
 
 #[derive(Debug, Args)]

@@ -21,6 +21,8 @@ pub struct CommandInfo {
     pub category: &'static str,
     /// How long it may take.
     pub timeout: Option<Duration>,
+    /// How many of its executions have not ended.
+    pub running: usize,
 }
 
 /// A command that was started by path. Dropping it lets the command run on.

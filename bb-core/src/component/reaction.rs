@@ -64,6 +64,8 @@ pub struct Reaction {
     waits: bool,
     is_periodic: bool,
     stale_after: Duration,
+    /// Of the topic, if it is declared.
+    period: Option<Duration>,
     /// The stamp of the newest message, and when it was received.
     last: Option<MonotonicTime>,
     heard: MonotonicTime,
@@ -73,6 +75,7 @@ pub struct Reaction {
     ready: Option<MonotonicTime>,
     not_numbers: Counter,
     silences: Counter,
+    refused_options: Counter,
 }
 
 /// Options of [`Reaction`].
@@ -186,6 +189,7 @@ impl Service for Reaction {
             waits: !is_periodic && !context.clock().is_virtual(),
             is_periodic,
             stale_after,
+            period: topic.period,
             last: None,
             heard: context.clock().now(),
             is_silent: false,
@@ -194,6 +198,7 @@ impl Service for Reaction {
             ready: None,
             not_numbers: context.counter("not a number"),
             silences: context.counter("silent"),
+            refused_options: context.counter("refused options"),
             options,
             bus,
         })
@@ -206,7 +211,6 @@ impl Service for Reaction {
             self.cool_down(now);
         }
         while let Some(message) = next {
-            self.heard = now;
             if let Some(state) = self.receive(&message, now) {
                 // What else waits is processed at the same time.
                 return Ok(Reading::now(state).next_at(now));
@@ -222,7 +226,15 @@ impl Service for Reaction {
         if (&options.when, options.run) != (&self.options.when, self.options.run) {
             return Err(Fault::remake());
         }
-        options.check()?;
+        // Parameters are set one by one, and a reaction must not end because of values between: it goes on with the old ones.
+        self.stale_after = match options.check().and_then(|()| options.silence(self.period)) {
+            Ok(stale_after) => stale_after,
+            Err(fault) => {
+                tracing::warn!(%fault, "a reaction keeps its options");
+                self.refused_options.add();
+                return Ok(());
+            }
+        };
         if (options.below, options.above) != (self.options.below, self.options.above) {
             self.fulfilled_since = None;
         }
@@ -242,6 +254,8 @@ impl Reaction {
             self.note_silence();
             self.fulfilled_since = None;
         }
+        // An older stamp is nothing heard: a clock that was set back shows as silence.
+        self.heard = now;
         self.is_silent = false;
         self.last = Some(time);
         let value = self.options.when.number_in(message).filter(|value| !value.is_nan());
@@ -257,7 +271,8 @@ impl Reaction {
         let is_first = self.fulfilled_since.is_none();
         let since = *self.fulfilled_since.get_or_insert(time);
         let holds = time.duration_since(since) >= self.options.r#for;
-        let event = if holds && self.execution.is_none() && self.ready.is_none_or(|ready| now >= ready) {
+        let may = holds && self.execution.is_none() && self.ready.is_none_or(|ready| now >= ready);
+        let event = if may && !self.runs() {
             self.start(now)
         } else if is_first {
             ReactionEvent::Fulfilled
@@ -265,6 +280,11 @@ impl Reaction {
             return None;
         };
         Some(ReactionState { event, value })
+    }
+
+    /// Whether somebody else has started the command: a second start might cancel the first.
+    fn runs(&self) -> bool {
+        self.bus.commands().iter().any(|command| command.path == self.options.run.path() && command.running > 0)
     }
 
     fn start(&mut self, now: MonotonicTime) -> ReactionEvent {

@@ -99,8 +99,12 @@ impl Control {
     }
 
     pub(crate) fn infos(&self) -> Vec<CommandInfo> {
+        let state = self.lock();
+        let running = state.executions.iter().filter(|execution| !matches!(execution.phase, Phase::Lingering));
+        let running: Vec<usize> = running.map(|execution| execution.command).collect();
+        drop(state);
         let declared = self.0.declared.commands.iter();
-        let infos = declared.zip(&self.0.commands).map(|(declared, command)| {
+        let infos = declared.zip(&self.0.commands).enumerate().map(|(number, (declared, command))| {
             let (arguments, output) = command.0.shapes();
             CommandInfo {
                 path: declared.path,
@@ -109,6 +113,7 @@ impl Control {
                 allowed_states: declared.allowed_states,
                 category: self.category(declared).name,
                 timeout: declared.timeout_nanos.map(|nanos| Duration::from_nanos(nanos.max(0).unsigned_abs())),
+                running: running.iter().filter(|command| **command == number).count(),
             }
         });
         infos.collect()

@@ -206,11 +206,13 @@ impl<R: Robot> Live<R> {
     /// lost: `terminate`, the report, the last lines of the journal, the end of a recording (it is readable up to there).
     ///
     /// # Errors
-    /// The system refuses a handler or the thread that waits for signals. Except on Unix, a process has one such handler.
+    /// The system refuses a handler or the thread that waits for signals. A process has one, which stops all its robots: another
+    /// signal ends it when all of them are safe.
     #[cfg(feature = "signals")]
     pub fn stop_on_signals(&self) -> std::io::Result<()> {
-        let (live, control) = (self.clone(), self.machine.control.clone());
-        super::signals::stop_on_signals(move || live.request_stop(), move || control.wait_until_disarmed())
+        let (live, control, machine) = (self.clone(), self.machine.control.clone(), Arc::clone(&self.machine));
+        let stop = move || live.request_stop();
+        super::signals::stop_on_signals(stop, move || control.wait_until_disarmed(), move || machine.has_ended())
     }
 
     /// Performs an outside action; on virtual time, then passes the journal's lines to its sink.

@@ -123,6 +123,12 @@ impl Machine {
         self.host.settle();
     }
 
+    /// Returns whether it has given its last report.
+    #[cfg(feature = "signals")]
+    pub(super) fn has_ended(&self) -> bool {
+        self.last_report.get().is_some()
+    }
+
     /// The report so far; the last report once it has ended.
     pub(super) fn report(&self) -> Report {
         match self.last_report.get() {

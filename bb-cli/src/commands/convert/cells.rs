@@ -11,7 +11,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// The last time of a ROS stamp, whose seconds have 32 bits, nanoseconds.
-const LAST_NS: i64 = i32::MAX as i64 * 1_000_000_000 + 999_999_999;
+pub(super) const LAST_NS: i64 = i32::MAX as i64 * 1_000_000_000 + 999_999_999;
 
 /// The source of the rows' times.
 #[derive(Clone, Copy, Debug)]

@@ -77,7 +77,7 @@ impl Input {
         Ok(match start {
             _ if start.starts_with(b"#ROSBAG") => Format::Ros1,
             _ if start.starts_with(b"ULog") => Format::Ulog,
-            [b'$' | b'!', b'A'..=b'Z', ..] => Format::Nmea,
+            [b'$', b'A'..=b'Z', ..] => Format::Nmea,
             [b'%', ..] => Format::Rtklib,
             _ => Format::Csv,
         })
@@ -148,7 +148,8 @@ impl Source {
                 source.waiting = entries.into();
                 source.notes.extend(broken.map(|broken| format!("not read to its end: {broken}")));
             }
-            Format::Csv | Format::Ros1 | Format::Description => {
+            Format::Description => return Err("a description does not name another".into()),
+            Format::Csv | Format::Ros1 => {
                 if input.columns.is_empty() {
                     return Err(
                         "what its columns contain is not said; name them with --columns, as time=1:ns gyr=2-4 \

@@ -1,10 +1,12 @@
 //! Sentences of a receiver, NMEA 0183: a fix for each GGA, with the date of RMC or ZDA and the deviations of GST.
 
+use super::cells::LAST_NS;
 use super::entry::{Entry, FIX, What};
 use bb_core::nalgebra::{Matrix3, Vector3};
 use bb_core::payload::{GeodeticPosition, GnssFix, GnssServices, GnssStatus};
 use nmea::ParseResult;
 use nmea::sentences::FixType;
+use nmea::sentences::rmc::RmcStatusOfFix;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -51,6 +53,8 @@ struct Fixes {
 impl Fixes {
     fn sentence(&mut self, sentence: &ParseResult) {
         match sentence {
+            // Without a fix the date may be any.
+            ParseResult::RMC(rmc) if rmc.status_of_fix == RmcStatusOfFix::Invalid => {}
             ParseResult::RMC(rmc) => self.date(rmc.fix_date, rmc.fix_time),
             ParseResult::ZDA(zda) => self.date(zda.utc_date(), zda.utc_time),
             ParseResult::GST(gst) => {
@@ -96,6 +100,10 @@ impl Fixes {
     fn date(&mut self, date: Option<chrono::NaiveDate>, time: Option<chrono::NaiveTime>) {
         let (Some(date), Some(time)) = (date, time) else { return };
         let day = i64::from(date.to_epoch_days());
+        // Stamps of ROS end in 2038, and no receiver is older than 2000.
+        if !(10_957..=LAST_NS / (DAY_S * 1_000_000_000)).contains(&day) {
+            return;
+        }
         let time_ns = of_day(time);
         self.day = Some((day, time_ns));
         if !self.dated {

@@ -1,6 +1,7 @@
 //! Solutions of RTKLIB, `.pos`: latitude, longitude and height in degrees and metres, with deviations.
 //! The format: RTKLIB manual 2.4.2, appendix B.1.
 
+use super::cells::LAST_NS;
 use super::entry::{Entry, FIX, What};
 use bb_core::nalgebra::Matrix3;
 use bb_core::payload::{GeodeticPosition, GnssFix, GnssServices, GnssStatus};
@@ -9,8 +10,14 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// By how much GPS time is ahead of UTC, since 2017, s; and before, by the time of each leap second.
-const LEAP_SECONDS: [(i64, i64); 5] =
-    [(1_483_228_800, 18), (1_435_708_800, 17), (1_341_100_800, 16), (1_230_768_000, 15), (1_136_073_600, 14)];
+const LEAP_SECONDS: [(i64, i64); 6] = [
+    (1_483_228_800, 18),
+    (1_435_708_800, 17),
+    (1_341_100_800, 16),
+    (1_230_768_000, 15),
+    (1_136_073_600, 14),
+    (915_148_800, 13),
+];
 
 /// 1980-01-06, the beginning of GPS time, s since 1970.
 const GPS_EPOCH_S: i64 = 315_964_800;
@@ -24,12 +31,21 @@ struct Head {
 
 /// The fixes of a file.
 pub(super) fn read(file: &Path, topic: Option<&str>) -> Result<Vec<Entry>, String> {
-    let text = std::fs::read_to_string(file).map_err(|error| format!("cannot be read: {error}"))?;
+    let bytes = std::fs::read(file).map_err(|error| format!("cannot be read: {error}"))?;
+    // Names of files in its head may be in any encoding.
+    let text = String::from_utf8_lossy(&bytes);
     let topic: Arc<str> = topic.unwrap_or(FIX).into();
     let mut head = None;
     let mut entries = Vec::new();
     for (index, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
         if let Some(words) = line.strip_prefix('%') {
+            if words.contains("/geodetic") || words.contains("=Tokyo") {
+                return Err(
+                    "its heights are not above the ellipsoid of WGS 84; write it with `out-height =ellipsoidal, \
+                            out-datum =wgs84`"
+                        .into(),
+                );
+            }
             if words.contains("latitude") || words.contains("x-ecef") || words.contains("e-baseline") {
                 head = Some(columns(words)?);
             }
@@ -117,6 +133,9 @@ fn time(head: &Head, first: &str, second: &str) -> Result<i64, String> {
         let (clock, part) = second.split_once('.').unwrap_or((second, "0"));
         let clock = chrono::NaiveTime::parse_from_str(clock, "%H:%M:%S").map_err(|_| fault())?;
         let whole = NaiveDateTime::new(date, clock).and_utc().timestamp();
+        if !part.bytes().all(|byte| byte.is_ascii_digit()) {
+            return Err(fault());
+        }
         let part: f64 = format!("0.{part}").parse().map_err(|_| fault())?;
         whole.checked_mul(1_000_000_000).map(|whole| whole + (part * 1e9).round() as i64)
     } else {
@@ -127,7 +146,7 @@ fn time(head: &Head, first: &str, second: &str) -> Result<i64, String> {
         }
         Some((GPS_EPOCH_S + week * 604_800) * 1_000_000_000 + (seconds * 1e9).round() as i64)
     };
-    let ns = ns.filter(|ns| *ns >= GPS_EPOCH_S * 1_000_000_000).ok_or_else(fault)?;
+    let ns = ns.filter(|ns| (GPS_EPOCH_S * 1_000_000_000..=LAST_NS).contains(ns)).ok_or_else(fault)?;
     let leap = LEAP_SECONDS.iter().find(|(from, ahead)| ns / 1_000_000_000 - ahead >= *from);
     let ahead = leap.filter(|_| head.is_gps_time).map_or(0, |(_, ahead)| *ahead);
     Ok(ns - ahead * 1_000_000_000)

@@ -39,7 +39,8 @@ pub(super) fn read(file: &Path, topic: Option<&str>) -> Result<(Vec<Entry>, Opti
     }
     if let Some(gnss) = Columns::of(&log, &["vehicle_gps_position", "sensor_gps"]) {
         let topic: Arc<str> = topic.unwrap_or(FIX).into();
-        let us = gnss.all(&["timestamp_sample", "timestamp"])?;
+        // Most drivers leave `timestamp_sample` of a receiver at zero.
+        let us = gnss.all(&["timestamp"])?;
         for ((us, fix), topic) in us.iter().zip(fixes(&gnss)?).zip(std::iter::repeat(topic)) {
             entries.push(Entry { time_ns: time(*us), what: What::Fix { topic, fix } });
         }

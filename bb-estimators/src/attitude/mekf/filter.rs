@@ -25,6 +25,8 @@ pub struct MekfFilter<T: Real = f64> {
     errors: Errors<T>,
     window: Window<T>,
     rest: Rest<T>,
+    /// Mean of late of the time between samples, s.
+    period: T,
     /// Angular velocity of the last sample, rad/s.
     rate: Vector3<T>,
     /// Means of late of the squares of the angular velocity, rad²/s², of the acceleration, m²/s⁴, and of the horizontal
@@ -64,6 +66,7 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
             window: Window::new(),
             rest: Rest::new(&Vector3::zeros(), &Vector3::zeros()),
             rate: Vector3::zeros(),
+            period: T::ZERO,
             squared_rate: T::ONE,
             squared_acceleration: T::ZERO,
             squared_velocity: T::ZERO,
@@ -88,7 +91,12 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
         };
         let (mut dt, mut orientation) = (step.dt_s, step.world_from_body);
         let measured = &sample.angular_velocity;
-        if dt > T::of(GAP_S) {
+        if self.period == T::ZERO {
+            self.period = dt;
+        }
+        let longest = self.period * T::of(OUTLIER);
+        self.period += (dt.min(longest) - self.period) * T::of(PERIOD_GAIN);
+        if dt > T::of(GAP_S).max(longest) {
             orientation = self.bridge(dt, orientation, measured);
             dt = T::ZERO;
         }

@@ -54,6 +54,9 @@ pub(super) const GAP_S: f64 = 0.08;
 /// So many standard deviations are no chance.
 pub(super) const OUTLIER: f64 = 4.0;
 
+/// Part of the mean period of the samples that each sample counts for. A time of `OUTLIER` periods is a gap as well: it is the
+/// longer one where a sensor is slow.
+pub(super) const PERIOD_GAIN: f64 = 0.0625;
 /// Standard deviation of an orientation from one sample in motion, rad.
 pub(super) const UNKNOWN: f64 = 1.0;
 

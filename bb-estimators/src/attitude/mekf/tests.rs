@@ -71,6 +71,31 @@ fn deviations(filter: &MekfFilter) -> (f64, f64) {
     (tilt.to_degrees(), in_world[(2, 2)].sqrt().to_degrees())
 }
 
+/// At 10 and 5 Hz, slower than what is a gap elsewhere: it corrects as at 100 Hz.
+#[test]
+fn a_slow_sensor_is_no_sensor_with_gaps() {
+    for every in [10, 20] {
+        let mut world = World::new();
+        world.bias = Vector3::new(0.01, -0.01, 0.01);
+        let mut filter: MekfFilter = filter(true);
+        let mut mean = Vector3::zeros();
+        for i in 1..=120 * 100 {
+            let sample = world.sample(false);
+            mean += sample.angular_velocity / f64::from(every);
+            if i % every == 0 {
+                filter.update(&ImuSample { angular_velocity: mean, ..sample }).unwrap();
+                mean = Vector3::zeros();
+            }
+        }
+        let error = world.error_of(&filter);
+        assert!(error.total < 0.5, "{every}: {error:?}");
+        let bias = (filter.gyroscope_bias().unwrap() - world.bias).norm();
+        assert!(bias < 1e-3, "{every}: {bias}");
+        let (tilt, heading) = deviations(&filter);
+        assert!(tilt < 3.0 && heading < 10.0, "{every}: {tilt} {heading}");
+    }
+}
+
 #[test]
 fn rest_shows_the_bias() {
     for magnetometer in [true, false] {
