@@ -266,6 +266,8 @@ robot! {
 
 #[cfg(target_os = "linux")]
 #[test]
+// By name: under the limit of memory a thread that has just started may lack the room for its signal stack, which ends it.
+#[ignore = "by name, since the limit of memory may end a thread of its own"]
 fn where_no_thread_can_be_started_all_are_made_safe_at_once() -> Result<(), Box<dyn std::error::Error>> {
     use std::io::Write as _;
     const NAME: &str = "processes::features::where_no_thread_can_be_started_all_are_made_safe_at_once";
