@@ -106,7 +106,7 @@ struct Inner {
     /// The one for callbacks of commands.
     place: OnceLock<Reserved>,
     reporter: Reporter,
-    /// How often loggers panicked, and wakers that the control state has woken.
+    /// Numbers of panics of loggers, and of wakers that the control state has woken.
     logger_panics: AtomicU64,
     waker_panics: AtomicU64,
     /// Commands to be polled, on virtual time.

@@ -68,7 +68,7 @@ pub type Handler = Arc<dyn Fn(&'static str, &TelemetryEvent) + Send + Sync>;
 #[derive(Clone)]
 pub(crate) struct Telemetry {
     handlers: Vec<Handler>,
-    /// How often they panicked.
+    /// Number of their panics.
     panics: Arc<AtomicU64>,
     /// The estimator and the output that publish at a path.
     outputs: Sorted<&'static str, (&'static str, &'static str)>,

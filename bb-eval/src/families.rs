@@ -88,7 +88,7 @@ pub fn score_families(
     Ok(rows)
 }
 
-/// What has to be read or simulated, each once.
+/// Lists the recordings to read and the bodies to simulate, each once.
 fn units(data: Option<&Path>, families: &[&'static Family]) -> Result<Vec<Unit>, String> {
     let mut units: Vec<Unit> = Vec::new();
     for (index, family) in families.iter().enumerate() {

@@ -104,7 +104,7 @@ pub(crate) struct Sensor {
     pub(crate) attributes: Vec<Attribute>,
     pub(crate) name: Ident,
     pub(crate) mount: Mount,
-    /// Its type; of an external input, its path.
+    /// Type; of an external input, the path.
     pub(crate) component: Component,
     /// The first input that takes it, if it is not declared as a sensor: other code publishes there, with the payload of that input.
     pub(crate) external: Option<(EstimatorId, usize)>,
@@ -196,7 +196,7 @@ pub(crate) enum From {
     Service(ServiceId),
 }
 
-/// What an option names by its path.
+/// Target of an option that names something by its path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Target {
     Publisher(PublisherId),
@@ -205,7 +205,7 @@ pub(crate) enum Target {
 }
 
 impl Robot {
-    /// What has this whole path.
+    /// Finds what has this whole path.
     pub(crate) fn target(&self, path: &Path) -> Option<Target> {
         let names: Vec<String> = path.0.iter().map(crate::names::text).collect();
         let publisher = || self.publishers.position(|publisher| publisher.path == names).map(Target::Publisher);

@@ -29,7 +29,7 @@ fn row(score: &FamilyScore) -> Result<Row, Box<dyn Error>> {
     })
 }
 
-/// Whether figures are those that are stored. Without one, there is none on either side.
+/// Compares a figure with the stored one; either both are absent, or both are there.
 fn is_near(measured: &Row, known: &Row) -> bool {
     let by_part = |measured: f64, known: f64, part: f64| {
         (measured.is_nan() && known.is_nan()) || (measured / known - 1.0).abs() < part

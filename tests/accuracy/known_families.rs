@@ -1,4 +1,4 @@
-//! What each filter reaches on each family of trials: `families.csv`, which the test is held against and the guide's table is
+//! Errors of each filter on each family of trials: `families.csv`, which the test is held against and the guide's table is
 //! made from. `UPDATE_ACCURACY=1` renews it.
 
 use std::error::Error;

@@ -153,7 +153,7 @@ fn the_topology_is_data() {
     assert!((limit.velocity.unwrap_or(0.0) - 60f64.to_radians()).abs() < 1e-15);
 }
 
-/// What estimators are told of where they are, in the order in which they are made.
+/// Contexts of estimators, in the order in which they are made.
 static TOLD: Mutex<Vec<[&str; 3]>> = Mutex::new(Vec::new());
 
 fn note(context: &Context) -> Done {

@@ -42,7 +42,7 @@ robot! {
     link base;
 }
 
-/// What happened at a controller or to its command, by the second.
+/// Events at a controller or at its command, by the second.
 type Happened = Vec<(i64, String)>;
 
 /// Flies: `(decisecond, voltage)` for each message.
@@ -299,7 +299,7 @@ fn in_real_time_it_reacts_to_a_message_at_once() -> Result<(), Failure> {
     Ok(())
 }
 
-/// What the declaration of a reaction cannot say at compile time is said when the robot starts.
+/// Declarations of reactions that cannot be refused at compile time are refused when the robot starts.
 #[test]
 fn options_that_can_never_work_keep_the_robot_from_starting() -> Result<(), Failure> {
     use bb_core::component::ReactionOptions;

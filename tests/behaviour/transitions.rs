@@ -7,7 +7,7 @@ use bb_core::prelude::*;
 use bb_core::run::CommandError;
 use std::sync::Mutex;
 
-/// What those who asked for a transition were told.
+/// Answers to those who asked for a transition.
 static TOLD: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
 fn told<T>(result: Result<T, Fault>) {

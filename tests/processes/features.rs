@@ -1,4 +1,4 @@
-//! What optional features do: real-time priorities of workers, and signals that stop a robot. Beside them a process in which no thread
+//! Optional features: real-time priorities of workers, and signals that stop a robot. Beside them a process in which no thread
 //! can be started.
 
 use bb_core::prelude::*;
@@ -221,7 +221,7 @@ fn a_signal_disarms_and_stops() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// When the devices were safe.
+/// Times at which the devices were safe.
 static SAFE: Mutex<Vec<std::time::Instant>> = Mutex::new(Vec::new());
 static DEVICES: AtomicU32 = AtomicU32::new(0);
 

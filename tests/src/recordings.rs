@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 /// How many trials of BROAD the bounds are for.
 pub const TRIALS: usize = 10;
 
-/// How many recordings of phones there are.
+/// Number of recordings of phones.
 pub const PHONES: usize = 66;
 
 /// How many data sets of navigation there are; one is left out, as it has the samples of another.

@@ -174,7 +174,7 @@ pub const fn check_required<O: Options, const N: usize>(component: &str, given: 
     }
 }
 
-/// Whether an option of the group is given.
+/// Returns whether an option of the group is given.
 const fn has_one_of(fields: &[OptionField], group: &str, given: &[&str]) -> bool {
     let mut index = 0;
     while index < fields.len() {

@@ -283,7 +283,7 @@ pub struct ActuatorContext {
     common: ComponentContext,
     declaration: &'static ActuatorDeclaration,
     reports: Arc<Mutex<MotionReports>>,
-    /// What is between the joint and what the actuator speaks of.
+    /// Transmission between the joint and the side that the actuator speaks of.
     gear: Option<Transmission>,
 }
 
@@ -338,7 +338,7 @@ impl ActuatorContext {
         Self { common, declaration, reports: Arc::default(), gear }
     }
 
-    /// What is between the joint and what the actuator speaks of; `None` if that is the joint.
+    /// Transmission between the joint and the side that the actuator speaks of; `None` if that is the joint.
     pub(crate) fn gear(&self) -> Option<&Transmission> {
         self.gear.as_ref()
     }

@@ -1,4 +1,4 @@
-//! What a sensor or a service counts itself.
+//! Counters of a sensor or a service.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};

@@ -21,7 +21,7 @@ pub struct CommandInfo {
     pub category: &'static str,
     /// How long it may take.
     pub timeout: Option<Duration>,
-    /// How many of its executions have not ended.
+    /// Number of its executions that have not ended.
     pub running: usize,
 }
 

@@ -96,9 +96,9 @@ pub trait Outputs: Sized + Send + 'static {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Timed<T> {
-    /// When it was measured, or is estimated for.
+    /// Time of the measurement or the estimate.
     pub time: MonotonicTime,
-    /// What is published.
+    /// Message to publish.
     pub payload: T,
 }
 
@@ -112,13 +112,13 @@ impl<T> Timed<T> {
 /// One emitted message: a payload, or one with a time of its own.
 #[doc(hidden)]
 pub trait Emitted: Send + 'static {
-    /// Its payload.
+    /// Payload that it publishes.
     type Payload: Payload;
 
     /// The message; `stamp` is that of the reply.
     fn stamped(self, stamp: Stamp) -> Stamped<Self::Payload>;
 
-    /// What emits that message.
+    /// Value that emits that message.
     fn of(message: &Stamped<Self::Payload>) -> Self;
 }
 
@@ -160,7 +160,7 @@ pub trait OutputField: Default {
     /// Takes them, and hands each to `publish`.
     fn each(&mut self, stamp: Stamp, publish: impl FnMut(&Stamped<Self::Payload>));
 
-    /// What emits only that message.
+    /// Value that emits only that message.
     fn alone(message: &Stamped<Self::Payload>) -> Self;
 }
 

@@ -45,7 +45,7 @@ use std::time::Duration;
 /// ```
 ///
 /// - The condition is *fulfilled* by a message whose value is less than `below` or greater than `above`. It must be fulfilled by all
-///   messages for `for`, by their stamps; one that does not fulfil it starts `for` anew.
+///   messages for `for`, by their stamps; one that does not fulfil it restarts `for`.
 /// - A value that is missing or NaN does not fulfil it, nor does silence: no message for `stale_after`. Both are counted, as
 ///   `not a number` and `silent` ([`SourceStatistics::counts`](crate::run::SourceStatistics::counts)).
 /// - The command runs with its default arguments. Its events name this controller as the caller. When it has ended, it runs again
@@ -60,11 +60,11 @@ pub struct Reaction {
     options: ReactionOptions,
     bus: Bus,
     messages: DynamicSubscription,
-    /// Whether it waits for messages itself: it has no rate, and time is real.
+    /// True if it waits for messages itself: it has no rate, and time is real.
     waits: bool,
     is_periodic: bool,
     stale_after: Duration,
-    /// Of the topic, if it is declared.
+    /// Declared period of the topic.
     period: Option<Duration>,
     /// The stamp of the newest message, and when it was received.
     last: Option<MonotonicTime>,
@@ -90,13 +90,13 @@ pub struct ReactionOptions {
     /// Fulfilled by values greater than this.
     #[option(default = f64::INFINITY, compared_with = "when", one_of = "bounds")]
     pub above: f64,
-    /// How long it must be fulfilled. Default: a single message suffices.
+    /// Time for which it must be fulfilled. Default: a single message suffices.
     #[option(default = Duration::ZERO)]
     pub r#for: Duration,
     /// The command to start: `command::land`.
     #[option(required)]
     pub run: CommandPath,
-    /// How long to wait after the end of the command, or after it was refused, before it is started again. Default: 1 s.
+    /// Time after the end of the command, or after it was refused, before it is started again. Default: 1 s.
     #[option(default = Duration::from_secs(1))]
     pub cooldown: Duration,
     /// The longest time without a message that does not count as silence. Default: as long as `for`, and at least 1 s and three
@@ -109,7 +109,7 @@ pub struct ReactionOptions {
 #[derive(Clone, Debug, PartialEq, Payload)]
 #[payload(no_frame)]
 pub struct ReactionState {
-    /// What has happened.
+    /// Event at the reaction.
     pub event: ReactionEvent,
     /// The value that caused it; `None` for one that is missing or NaN, and for silence.
     pub value: Option<f64>,
@@ -282,7 +282,7 @@ impl Reaction {
         Some(ReactionState { event, value })
     }
 
-    /// Whether somebody else has started the command: a second start might cancel the first.
+    /// Returns whether somebody else has started the command: a second start might cancel the first.
     fn runs(&self) -> bool {
         self.bus.commands().iter().any(|command| command.path == self.options.run.path() && command.running > 0)
     }

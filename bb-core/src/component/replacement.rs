@@ -14,7 +14,7 @@ pub(crate) struct Replacement {
     does: String,
     /// Of an estimator.
     estimator: Option<OfEstimator>,
-    /// Of an actuator: the side of the joint's transmission that it speaks of.
+    /// Side of the joint's transmission that an actuator speaks of.
     side: JointSide,
 }
 
@@ -41,7 +41,7 @@ impl Replacement {
         Self { estimator, ..self }
     }
 
-    /// The same, of an actuator.
+    /// Sets the side of an actuator.
     pub(crate) fn of_actuator(self, side: JointSide) -> Self {
         Self { side, ..self }
     }

@@ -73,7 +73,7 @@ pub trait Sensor: Sized + Send + 'static {
         None
     }
 
-    /// Whether other code publishes its messages, by path too: see [`External`](crate::component::External).
+    /// True if other code publishes its messages, by path too: see [`External`](crate::component::External).
     #[doc(hidden)]
     const IS_EXTERNAL: bool = false;
 

@@ -25,7 +25,7 @@ pub(super) struct Callback {
     pub(super) path: &'static str,
     code: DisarmHook,
     runs: Mutex<Runs>,
-    /// Its thread.
+    /// Thread that is kept for it.
     place: Option<Reserved>,
 }
 
@@ -168,7 +168,7 @@ impl Hooks {
         self.all.push(Hook { callback, owner });
     }
 
-    /// Those that have a thread come first.
+    /// All callbacks; those with a thread come first.
     pub(super) fn all(&self) -> Vec<Arc<Callback>> {
         let (with, without): (Vec<_>, Vec<_>) =
             self.all.iter().map(|hook| Arc::clone(&hook.callback)).partition(|callback| callback.place.is_some());

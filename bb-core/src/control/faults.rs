@@ -49,9 +49,9 @@ impl fmt::Display for ReportedFault {
 pub struct ReportedSafetyError {
     /// The last of them.
     pub last: SafetyError,
-    /// How many there were.
+    /// Number of them.
     pub count: u64,
-    /// When the last occurred.
+    /// Time of the last one.
     pub last_time: MonotonicTime,
 }
 

@@ -24,7 +24,7 @@ pub struct CommandEvent {
     pub execution: u64,
     /// What happened.
     pub phase: CommandPhase,
-    /// Who asked for it: the path of a component or a command, `program`, or a name from
+    /// Caller: the path of a component or a command, `program`, or a name from
     /// [`Bus::for_caller`](crate::Bus::for_caller).
     pub caller: String,
     /// The health transition that started it, if one did.

@@ -52,7 +52,7 @@ impl fmt::Display for SafetyError {
     }
 }
 
-/// What is dangerous about hardware: a kind and a quantity for programs, a text for people. A text alone converts to one.
+/// Danger from hardware: a kind and a quantity for programs, a text for people. A text alone converts to one.
 ///
 /// ```
 /// use bb_core::event::{HardwareError, HardwareErrorKind, Quantity};
@@ -70,11 +70,11 @@ impl fmt::Display for SafetyError {
 #[derive(Clone, Debug, PartialEq, Payload)]
 #[non_exhaustive]
 pub struct HardwareError {
-    /// What kind of danger it is.
+    /// Kind of danger.
     pub kind: HardwareErrorKind,
     /// The quantity that shows it.
     pub quantity: Option<Quantity>,
-    /// What happened, for people.
+    /// Description for people.
     pub message: String,
 }
 
@@ -84,7 +84,7 @@ impl HardwareError {
         Self { kind, quantity: None, message: message.into() }
     }
 
-    /// The same with the quantity that shows it; `unit` is a text, such as `degC`, or empty.
+    /// Adds the quantity that shows it; `unit` is a text, such as `degC`, or empty.
     pub fn with_quantity(self, value: f64, unit: &'static str) -> Self {
         Self { quantity: Some(Quantity { value, unit }), ..self }
     }
@@ -134,14 +134,14 @@ pub enum HardwareErrorKind {
     Communication,
     /// A disarm callback failed or did not return in time.
     NotMadeSafe,
-    /// Its code panicked too often.
+    /// Code that panicked too often.
     Panics,
     /// A kind of the component's own.
     Other(&'static str),
 }
 
 impl HardwareErrorKind {
-    /// Its name: `overheating`.
+    /// Name of the kind: `overheating`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Unspecified => "unspecified",

@@ -3,7 +3,7 @@
 use super::Fault;
 use std::fmt;
 
-/// Why a component is terminated; `terminate` gets it.
+/// Reason for which a component is terminated; `terminate` gets it.
 ///
 /// ```
 /// use bb_core::prelude::*;

@@ -213,7 +213,7 @@ pub enum Event {
     Command {
         /// The command.
         command: usize,
-        /// Who asked for it.
+        /// Caller that asked for it.
         caller: String,
     },
     /// The code of a command has ended.

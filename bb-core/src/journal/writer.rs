@@ -26,7 +26,7 @@ struct Inner {
     is_full: AtomicBool,
     /// How many lines the sink has taken, to see whether it makes progress.
     taken: AtomicU64,
-    /// How often the sink panicked.
+    /// Number of panics of the sink.
     panics: AtomicU64,
     arrived: Condvar,
     room: Condvar,
@@ -138,7 +138,7 @@ impl Journal {
         self.0.lock().queue.ended.is_some()
     }
 
-    /// How often the sink panicked.
+    /// Number of panics of the sink.
     pub(crate) fn panics(&self) -> u64 {
         self.0.panics.load(Ordering::Relaxed)
     }

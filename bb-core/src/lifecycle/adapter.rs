@@ -47,7 +47,7 @@ pub trait Periodic: Component {
     /// Its context.
     #[doc(hidden)]
     fn context(declaration: &'static SensorDeclaration, host: HostHandle) -> Self::Context;
-    /// What it counts.
+    /// Counters of the component.
     #[doc(hidden)]
     fn counters(context: &Self::Context) -> &Counts;
     /// Takes one reading.
@@ -57,7 +57,7 @@ pub trait Periodic: Component {
     fn read(&mut self, now: MonotonicTime) -> Result<Reading<Self::Output>, Fault>;
     /// When it wants to be read first.
     fn starts_at(&self) -> Option<MonotonicTime>;
-    /// Whether other code publishes its messages.
+    /// True if other code publishes its messages.
     #[doc(hidden)]
     const IS_EXTERNAL: bool = false;
 }

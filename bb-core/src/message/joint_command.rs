@@ -104,7 +104,7 @@ pub trait JointCommand: Sized {
         None
     }
 
-    /// The same command to the motor of `joint`, on the other side of its transmission: for an actuator with
+    /// Converts the command to the motor of `joint`, on the other side of its transmission: for an actuator with
     /// [`SIDE`](crate::Actuator::SIDE)` = JointSide::Motor`. `None`, the default, if that is not defined: the actuator then cannot be at a
     /// joint with a transmission.
     fn at_motor(&self, joint: &str, transmission: &Transmission) -> Option<Self> {

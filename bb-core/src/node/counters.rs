@@ -190,7 +190,7 @@ pub struct EstimatorStatistics {
     pub restarts: u64,
     /// How many times its health has changed.
     pub transitions: u64,
-    /// Its health; `None` if it was left out by [`Fault::skip`](crate::Fault::skip), for the reason in `stopped`.
+    /// Health; `None` if it was left out by [`Fault::skip`](crate::Fault::skip), for the reason in `stopped`.
     pub health: Option<HealthState>,
     /// Durations of its callbacks: all callbacks where a `latency_budget` is declared or a handler of telemetry listens, else every
     /// 64th run.

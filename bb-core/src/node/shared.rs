@@ -89,7 +89,7 @@ impl SharedNode {
         self.0.counters.statistics(self.0.declaration, self.health(), stopped, last_gap)
     }
 
-    /// Its health; `None` if it was left out.
+    /// Health; `None` if it was left out.
     pub(crate) fn health(&self) -> Option<HealthState> {
         HealthState::from_index(self.0.health.load(Ordering::Relaxed))
     }

@@ -13,7 +13,7 @@ pub(super) struct Timers {
     timers: Vec<(u32, MonotonicTime)>,
 }
 
-/// What an estimator does before anything else happens to it.
+/// Action of an estimator before anything else happens to it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Continuation {
     /// It continues with this number.

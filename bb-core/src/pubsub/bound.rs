@@ -39,7 +39,7 @@ pub(crate) fn counted_bytes<T: Payload>(message: &Stamped<T>) -> usize {
 }
 
 impl Bound {
-    /// That of a queue in front of an estimator.
+    /// Bound of a queue in front of an estimator.
     pub(crate) const fn of_estimator(capacity: usize) -> Self {
         Self { capacity, bytes: DEFAULT_BYTES }
     }

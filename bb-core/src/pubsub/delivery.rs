@@ -3,7 +3,7 @@
 use super::bound::{Bound, DEFAULT_BYTES};
 use std::time::Duration;
 
-/// What happens to a subscriber that is slower than its publisher.
+/// Treatment of a subscriber that is slower than its publisher.
 ///
 /// A subscription is bounded in messages and in bytes. The bytes of a message are those its payload holds on the heap
 /// ([`Field::heap_bytes`](crate::Field::heap_bytes)), plus the message itself if that is larger than 1 KiB; smaller
@@ -13,12 +13,12 @@ pub enum Overflow {
     /// Keeps this many messages, and at most [`Overflow::DEFAULT_BYTES`]. Beyond that, the oldest is dropped, and the
     /// loss is counted.
     DropOldest {
-        /// How many are kept: at least one, and at most [`Overflow::MAX_CAPACITY`].
+        /// Number of messages that are kept: at least one, and at most [`Overflow::MAX_CAPACITY`].
         capacity: usize,
     },
-    /// The same with its own bound in bytes.
+    /// Does the same with its own bound in bytes.
     DropOldestWithin {
-        /// How many are kept: at least one, and at most [`Overflow::MAX_CAPACITY`].
+        /// Number of messages that are kept: at least one, and at most [`Overflow::MAX_CAPACITY`].
         capacity: usize,
         /// Total bytes of the kept messages; `usize::MAX` for no bound.
         bytes: usize,
@@ -88,7 +88,7 @@ impl Overflow {
     }
 }
 
-/// What a subscription keeps, and how often it gets something: an [`Overflow`], if need be with a highest rate.
+/// Options of a subscription: an [`Overflow`], if need be with a highest rate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Delivery {
     pub(super) overflow: Overflow,

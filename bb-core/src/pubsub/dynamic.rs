@@ -39,7 +39,7 @@ impl DynamicSubscription {
         subscription
     }
 
-    /// The same without the log.
+    /// Selects as above, without the log.
     pub(super) fn among(
         topics: &[&dyn AnyTopic],
         select: Select<'_>,

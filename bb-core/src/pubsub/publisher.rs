@@ -13,7 +13,7 @@ pub struct Publisher<T> {
     gate: Arc<dyn Gate>,
 }
 
-/// Where its messages go.
+/// Target of the messages.
 enum Target<T> {
     /// To the subscribers of a path of the caller's choice.
     Topic(Arc<Topic<T>>),
@@ -100,7 +100,7 @@ impl<T: Payload> Publisher<T> {
         }
     }
 
-    /// That of a message without one.
+    /// Frame of a message without one.
     fn frame(&self) -> Frame {
         match &self.target {
             Target::Topic(_) => Frame::NONE,

@@ -55,7 +55,7 @@ pub(super) trait AnyQueue: Any + Send + Sync {
     /// See [`Queue::close`].
     fn close(&self) -> Option<Waker>;
     fn statistics(&self) -> SubscriberStatistics;
-    /// Whether its reader is gone.
+    /// Returns whether its reader is gone.
     fn is_abandoned(&self) -> bool;
 }
 
@@ -197,7 +197,7 @@ impl<M> Queue<M> {
         dropped.messages
     }
 
-    /// The same while it is read.
+    /// Reads the state after it was brought up to date.
     fn refreshed<T>(&self, read: impl FnOnce(&mut State<M>) -> T) -> T {
         let mut state = self.lock();
         let dropped = self.refresh(&mut state);
@@ -384,7 +384,7 @@ impl<M> Queue<M> {
 }
 
 impl<M> State<M> {
-    /// Whether somebody waits for a message.
+    /// Returns whether somebody waits for a message.
     fn is_awaited(&self) -> bool {
         self.waiting > 0 || self.waker.is_some()
     }

@@ -70,10 +70,10 @@ impl Kind<'_> {
 struct Made {
     number: u64,
     topic: Arc<dyn AnyTopic>,
-    /// Whether it has, or had, a publisher. Others are kept for their subscribers: topics of paths that are subscribed to before
+    /// True if it has, or had, a publisher. Others are kept for their subscribers: topics of paths that are subscribed to before
     /// anything publishes there, and in a replay those that have made room in the run.
     is_published: bool,
-    /// What had been published and lost there before.
+    /// Messages published and lost there before.
     before: (u64, u64),
 }
 
@@ -515,7 +515,7 @@ fn is_path(path: &str) -> bool {
     path.len() <= MAX_PATH_BYTES && path.split('/').all(is_name)
 }
 
-/// Why a path of the caller's choice is refused.
+/// Reason for which a path of the caller's choice is refused.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct PathError {
     act: Act,

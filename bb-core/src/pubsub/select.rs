@@ -1,6 +1,6 @@
 //! The selection of an untyped subscription: paths and payloads.
 
-/// Which paths to subscribe to. In a path, `*` stands for any one name; an empty list selects everything, as in [`Payloads`].
+/// Which paths to subscribe to. In a path, `*` matches any one name; an empty list selects everything, as in [`Payloads`].
 ///
 /// ```
 /// use bb_core::Select;
@@ -17,7 +17,7 @@ pub enum Select<'a> {
     Path(&'a str),
     /// One, and everything below it: `sensor/base_link`. Everything is below the empty path.
     Below(&'a str),
-    /// The union of these; everything if there are none.
+    /// The union of these; everything if the list is empty.
     AnyOf(&'a [Select<'a>]),
 }
 
@@ -33,7 +33,7 @@ impl Select<'_> {
     }
 }
 
-/// How many names `path` has below `pattern`, if it is there.
+/// Number of names that `path` has below `pattern`, if it is there.
 fn names_below(pattern: &str, path: &str) -> Option<usize> {
     let mut names = path.split('/');
     for wanted in pattern.split('/') {

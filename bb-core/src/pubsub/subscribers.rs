@@ -10,7 +10,7 @@ use std::task::Waker;
 
 /// The subscribers of a topic.
 struct Subscribers {
-    /// Of the topic's payload.
+    /// Queues of the topic's payload.
     queues: List<dyn AnyQueue>,
     /// Untyped subscribers.
     taps: List<Queue<DynamicMessage>>,
@@ -29,7 +29,7 @@ struct List<Q: ?Sized> {
     /// A publisher takes the list along and holds no lock while it wakes subscribers, which may subscribe and unsubscribe on that
     /// thread. So it is copied if it changes meanwhile.
     all: Taken<Q>,
-    /// How many there may be before the next cleaning: twice the number left by the last one.
+    /// Number of subscribers at the next cleaning: twice the number left by the last one.
     clean_at: usize,
 }
 

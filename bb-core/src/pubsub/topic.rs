@@ -34,7 +34,7 @@ impl<T: Payload> Topic<T> {
         self.subscribe_on(delivery.into(), &Timer::default())
     }
 
-    /// The same on the clock of a run.
+    /// Subscribes on the clock of a run.
     pub(crate) fn subscribe_on(&self, delivery: Delivery, timer: &Timer) -> Subscription<T> {
         let queue = Queue::shared(delivery, timer);
         self.hub.add(Arc::clone(&queue) as Arc<dyn AnyQueue>);

@@ -41,7 +41,7 @@ struct Inner<A: Actuator> {
     context: ActuatorContext,
     environment: Environment,
     control: Control,
-    /// Of its commands; it is one of the robot's topics.
+    /// Topic of its commands; it is one of the robot's topics.
     topic: Arc<Topic<A::Command>>,
     /// Orders from its supervisor and parameter changes.
     orders: Mutex<Vec<Order>>,

@@ -41,7 +41,7 @@ pub struct Report {
     pub panics: Panics,
 }
 
-/// How often code panicked that the robot calls beside its components, by kind.
+/// Numbers of panics of code that the robot calls beside its components, by kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Panics {

@@ -105,7 +105,7 @@ impl Sources {
         self.0.iter().filter_map(|source| source.open(options, assembly)).collect()
     }
 
-    /// Those whose messages other code publishes.
+    /// Sensors whose messages other code publishes.
     pub(super) fn external(self) -> ExternalSensors {
         ExternalSensors(self.0.into_iter().filter(|source| source.is_external()).collect())
     }
@@ -134,7 +134,7 @@ pub(super) trait AnySource: Send + Sync {
     fn open(&self, options: &OptionsList, assembly: &Assembly) -> Option<Box<dyn Source>>;
     /// Publishes a recorded message; returns `false` if it has another payload.
     fn feed(&self, message: &DynamicMessage, now: MonotonicTime) -> bool;
-    /// Whether other code publishes its messages.
+    /// Returns whether other code publishes its messages.
     fn is_external(&self) -> bool;
     /// Itself for that code.
     fn as_external(&self) -> ExternalSensor;

@@ -210,7 +210,7 @@ impl<const N: usize> Covariance<N> {
         self.dense().enforce();
     }
 
-    /// The same covariance for what is done rarely.
+    /// Covariance for operations that are rare.
     pub(in crate::navigation) fn dense(&mut self) -> Dense<'_> {
         let Self { matrix, updates, repairs } = self;
         Dense { n: N, p: matrix.data.0.as_flattened_mut(), updates, repairs }

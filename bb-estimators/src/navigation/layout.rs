@@ -96,7 +96,7 @@ impl<const N: usize> Layout<N> {
         layout
     }
 
-    /// The same for what is compiled once for all filters.
+    /// Layout for code that is compiled once for all filters.
     pub(in crate::navigation) fn quantities(&self) -> Quantities<'_> {
         let Self { blocks, motion, attitude, heading, most_jump, largest, lost } = self;
         Quantities {

@@ -23,7 +23,7 @@ pub enum Kind {
 pub enum Value {
     /// Of a [`Kind::Switch`].
     Switch(bool),
-    /// Of a [`Kind::Choice`].
+    /// Word of a [`Kind::Choice`].
     Choice(&'static str),
     /// Of a [`Kind::Count`].
     Count(u32),

@@ -7,7 +7,7 @@ use crate::filters::Axes;
 /// Trials that have something in common, whose errors are averaged.
 #[derive(Debug)]
 pub struct Family {
-    /// Its name on the command line and in the table.
+    /// Name on the command line and in the table.
     pub name: &'static str,
     /// A description.
     pub about: &'static str,
@@ -164,7 +164,7 @@ impl Family {
         FAMILIES.into_iter().find(|family| family.name == name)
     }
 
-    /// Whether it needs recordings.
+    /// Returns whether it needs recordings.
     pub fn is_recorded(&self) -> bool {
         matches!(self.source, Source::Recordings { .. })
     }

@@ -165,7 +165,7 @@ fn percent(share: Share) -> String {
 }
 
 impl Measure {
-    /// Its name in words.
+    /// Name in words.
     pub fn name(self) -> &'static str {
         match self {
             Self::Total => "total",
@@ -176,7 +176,7 @@ impl Measure {
 }
 
 impl Half {
-    /// Its letter.
+    /// Letter of the half.
     pub fn name(self) -> &'static str {
         match self {
             Self::A => "A",

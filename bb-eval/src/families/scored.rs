@@ -22,7 +22,7 @@ pub(super) struct TrialScore {
     time: Duration,
 }
 
-/// How many of the errors that came with a standard deviation were within two of them.
+/// Number of errors within two standard deviations, of those that came with one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Share {
     /// Within two.

@@ -71,7 +71,7 @@ impl Body {
     }
 }
 
-/// What an IMU with a magnetometer on the body measures.
+/// Samples an IMU with a magnetometer on the body.
 fn sampled(motion: &Motion, random: &mut Random) -> Trial {
     let noise = SimulatedImuOptions::defaults();
     let step_s = 1.0 / motion.rate;

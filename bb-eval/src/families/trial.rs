@@ -16,16 +16,16 @@ pub(super) struct Trial {
     pub(super) truth: Vec<Truth>,
 }
 
-/// What is true at the time of a sample.
+/// Truth at the time of a sample.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Truth {
     /// `None` where it is unknown.
     pub(super) world_from_body: Option<UnitQuaternion<f64>>,
-    /// Whether the body moves; only then errors count.
+    /// True if the body moves; only then errors count.
     pub(super) is_moving: bool,
 }
 
-/// What makes a trial harder.
+/// Change that makes a trial harder.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Change {
     None,
@@ -140,7 +140,7 @@ impl Trial {
 const PHASES: u32 = 4;
 
 impl Change {
-    /// How many trials are made of one.
+    /// Number of trials that are made of one.
     pub(super) fn trials(self) -> u32 {
         match self {
             Self::Gaps(_) => PHASES,

@@ -102,7 +102,7 @@ fn filled(function: &Ident, given: &Named, types: &Types<'_>, part: Part) -> Tok
     }
 }
 
-/// What an option names: a `CommandPath`, a `TopicField`, or a path as text.
+/// Value of an option that names something: a `CommandPath`, a `TopicField`, or a path as text.
 ///
 /// `TopicField::of::<BatteryState>("sensor/battery", "voltage", |message| number_of(&message.voltage))`: rustc finds the
 /// field, so that a misspelt one is reported by its name.

@@ -43,7 +43,7 @@ fn inputs(robot: &Robot) -> impl Iterator<Item = Vec<Ident>> + '_ {
     })
 }
 
-/// What options name or are bound to.
+/// Paths that options name or are bound to.
 fn options(robot: &Robot) -> impl Iterator<Item = Vec<Ident>> + '_ {
     let options = robot.components().flat_map(|component| &component.options);
     options.filter_map(|option| match &option.value {

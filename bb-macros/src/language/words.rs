@@ -153,7 +153,7 @@ words! {
     WITHIN: "within", Value::Number(Measure::Of(Dimension::TIME), Bounds::Time), Once, ": 20 ms",
         "how much older than the driver it may be; else `sync_tolerance`. Of the driver: how old it may be by the clock when it arrives";
     EXTERNAL: "external", Value::Other, Once, "",
-        "other code publishes there: the path is none that the robot declares, see [below](#inputs-from-other-code)";
+        "other code publishes there: the robot must not declare the path, see [below](#inputs-from-other-code)";
     OUTPUT: "output", Value::Other, Often, " name: [path, …];",
         "which outputs are published: elsewhere, or without a path below its own. An estimator of one output publishes it at its own path without";
     SYNC_TOLERANCE: "sync_tolerance", Value::Number(Measure::Of(Dimension::TIME), Bounds::Time), Once, ": 20 ms;",

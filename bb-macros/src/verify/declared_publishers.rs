@@ -59,7 +59,7 @@ pub(super) fn nothing_at(path: &str, known: &[String]) -> String {
     }
 }
 
-/// Whether a path is like none of the robot's: of several names, and not below what it declares.
+/// Returns whether a path is like none of the robot's: of several names, and not below what it declares.
 fn may_be_external(path: &Path, known: &[String]) -> bool {
     let Some((root, [_, ..])) = path.0.split_first() else { return false };
     let root = text(root);

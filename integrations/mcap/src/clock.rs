@@ -20,7 +20,7 @@ pub(crate) struct Clock {
 }
 
 impl Clock {
-    /// Of a recording that begins with a message of this stamp.
+    /// Clock of a recording that begins with a message of this stamp.
     // Wrapping, here and below, so that every time is read back.
     pub(crate) fn of(first: &Stamp) -> Self {
         let wall = first.wall_time.as_unix_nanos();

@@ -64,7 +64,7 @@ pub struct Recorder {
     path: PathBuf,
     /// `None` once the file is complete, or after an error.
     writer: Option<Box<FileWriter>>,
-    /// The same file, to look after it.
+    /// Handle of the same file, to look after it.
     file: Option<Watched>,
     /// The first is waited for, the others are polled.
     subscriptions: Vec<DynamicSubscription>,
@@ -83,7 +83,7 @@ pub struct Recorder {
 /// The file that is written.
 pub(crate) struct Watched {
     file: File,
-    /// How long it was at the last look.
+    /// Length at the last look.
     length: u64,
 }
 

@@ -61,7 +61,7 @@ impl RedbStore {
     ///
     /// # Errors
     /// The file cannot be opened, is not such a store, or is open in another program. An empty file is no store: what it held is
-    /// lost, and it has to be removed to begin anew.
+    /// lost, and it has to be removed to start afresh.
     pub fn open(file: impl AsRef<Path>) -> Result<Self, Fault> {
         let file = file.as_ref();
         let name = file.display().to_string();

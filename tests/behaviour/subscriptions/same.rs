@@ -61,7 +61,7 @@ fn exercise(robot: &Live<Whole>, wait: &mut dyn FnMut()) -> Result<(), Failure> 
     Ok(())
 }
 
-/// What it has received at each path, in order.
+/// Messages received at each path, in order.
 fn heard(subscription: &DynamicSubscription) -> BTreeMap<&'static str, Vec<String>> {
     let mut heard = BTreeMap::<_, Vec<String>>::new();
     for message in subscription.drain() {
@@ -86,7 +86,7 @@ const ALL: [&str; 13] = [
     "sensor/base/numbers/echo",
 ];
 
-/// What each selection gets, and how many paths that is.
+/// Selections, with the number of paths that each gets.
 const SELECTIONS: [(Select<'_>, Option<&str>, usize); 6] = [
     (Select::All, None, 15),
     (Select::Below("actuator"), None, 3),

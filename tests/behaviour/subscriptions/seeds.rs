@@ -1,4 +1,4 @@
-//! What users of Beam Bots expect of publish and subscribe.
+//! Expectations of users of Beam Bots of publish and subscribe.
 
 use crate::components::{Counter, Doing, Failure, Number, Task, at};
 use bb_core::event::{Safety, SafetyTransition};

@@ -1,4 +1,4 @@
-//! What other code publishes.
+//! Inputs that other code publishes.
 
 use bb_core::prelude::*;
 use bb_ui_tests::*;

@@ -92,7 +92,7 @@ pub(super) struct Table {
     first: Option<(u64, StringRecord)>,
     /// The number of rows returned.
     rows: u64,
-    /// Where fixes go.
+    /// Topic of the fixes.
     topic: Arc<str>,
 }
 

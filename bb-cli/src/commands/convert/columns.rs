@@ -17,7 +17,7 @@ pub(super) enum What {
     Moving,
     /// Latitude and longitude in degrees, and height.
     Fix,
-    /// Of a fix, horizontal and vertical.
+    /// Standard deviations of a fix, horizontal and vertical.
     Deviations,
 }
 
@@ -178,7 +178,7 @@ impl Columns {
     }
 }
 
-/// Whether one of these quantities is among the columns.
+/// Returns whether one of these quantities is among the columns.
 pub(super) fn has(quantities: &[Quantity], what: What) -> bool {
     quantities.iter().any(|quantity| quantity.what == what)
 }

@@ -1,4 +1,4 @@
-//! What a recording holds, in SI.
+//! Entries of a recording, in SI.
 
 use bb_core::message::Schema;
 use bb_core::payload::GnssFix;

@@ -14,11 +14,11 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug, Default)]
 pub(super) struct Input {
     pub(super) file: PathBuf,
-    /// Of a CSV.
+    /// Columns of a CSV.
     pub(super) columns: Vec<Quantity>,
     /// Hz, of a CSV without times.
     pub(super) rate: Option<f64>,
-    /// Where fixes go.
+    /// Topic of the fixes.
     pub(super) topic: Option<String>,
 }
 
@@ -124,7 +124,7 @@ pub(super) struct Source {
     /// Read from a CSV as they are needed.
     table: Option<Table>,
     waiting: VecDeque<Entry>,
-    /// What is to be said of it.
+    /// Remarks for the output.
     pub(super) notes: Vec<String>,
 }
 

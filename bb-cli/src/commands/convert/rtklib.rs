@@ -22,7 +22,7 @@ const LEAP_SECONDS: [(i64, i64); 6] = [
 /// 1980-01-06, the beginning of GPS time, s since 1970.
 const GPS_EPOCH_S: i64 = 315_964_800;
 
-/// Where the columns are, by the head of the file.
+/// Layout of the columns, by the head of the file.
 #[derive(Debug)]
 struct Head {
     is_gps_time: bool,

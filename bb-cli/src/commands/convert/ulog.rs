@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
 
-/// What a file holds, by time, and why the rest of it is not read.
+/// Reads the entries of a file, by time, and why the rest of it is not read.
 pub(super) fn read(file: &Path, topic: Option<&str>) -> Result<(Vec<Entry>, Option<String>), String> {
     let name = file.to_str().ok_or("the name of the file is not UTF-8")?;
     let log = read_file(name).map_err(|error| format!("cannot be read: {error}"))?;

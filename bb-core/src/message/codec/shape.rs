@@ -69,7 +69,7 @@ pub struct FieldUnit {
     pub exponents: [i8; 6],
     /// The dimension with its article: "a voltage".
     pub dimension: &'static str,
-    /// Its symbol: `V`.
+    /// Symbol of the unit: `V`.
     pub symbol: &'static str,
 }
 
@@ -91,7 +91,7 @@ impl FieldShape {
         Self { name, shape, units: &[] }
     }
 
-    /// The same, in one of these units.
+    /// Sets the units that a field may have.
     pub const fn in_units(mut self, units: &'static [FieldUnit]) -> Self {
         self.units = units;
         self

@@ -10,7 +10,7 @@ use std::sync::{Arc, Weak};
 use std::task::{Wake, Waker};
 use std::time::Duration;
 
-/// What a queue does path by path.
+/// Part of a queue that works path by path.
 #[derive(Debug)]
 pub(super) struct ByPath {
     is_latest: bool,
@@ -21,15 +21,15 @@ pub(super) struct ByPath {
     alarm: Waker,
 }
 
-/// What it has of each path.
+/// Messages and times of each path.
 #[derive(Debug)]
 pub(super) struct Paths<M> {
     known: Sorted<&'static str, Path>,
     /// The newest message of each path that waits for its time.
     held: Sorted<(MonotonicTime, &'static str), Entry<M>>,
-    /// How many messages have left the queue at its front.
+    /// Number of messages that have left the queue at its front.
     taken: u64,
-    /// How many paths there may be before those that matter no more are forgotten.
+    /// Number of paths at which those that no longer matter are forgotten.
     clean_at: usize,
     /// The time of the alarm that is set.
     alarm: Option<MonotonicTime>,
@@ -191,7 +191,7 @@ impl<M> Paths<M> {
         self.known.insert(name, path);
     }
 
-    /// Whether a message waits for its time, and no alarm is set for it.
+    /// Returns whether a message waits for its time, and no alarm is set for it.
     pub(super) fn needs_alarm(&self) -> bool {
         self.held.first().is_some_and(|(due, _)| self.alarm.is_none_or(|alarm| alarm > *due))
     }

@@ -3,16 +3,16 @@
 use std::fmt;
 use std::sync::Arc;
 
-/// What is wrong with the settings of a robot, a line each: the first hundred problems, and how many more there are. `Debug` prints the same as `Display`, since a `main`
+/// Problems of the settings of a robot, a line each: the first hundred problems, and how many more there are. `Debug` prints the same as `Display`, since a `main`
 /// that returns it shows `Debug`.
 #[derive(Clone, PartialEq, Eq)]
 pub struct SettingsError {
     problems: Vec<SettingProblem>,
-    /// How many there are besides.
+    /// Number of further problems.
     more: usize,
 }
 
-/// How many problems are kept.
+/// Number of problems that are kept.
 const MOST: usize = 100;
 
 /// One setting that is wrong.

@@ -54,7 +54,7 @@ pub struct SourceStatistics {
     pub restarts: u64,
     /// Why it does not run, if it does not.
     pub stopped: Option<String>,
-    /// What it counts itself, by name, see [`ServiceContext::counter`](crate::ServiceContext::counter).
+    /// Counts by name, see [`ServiceContext::counter`](crate::ServiceContext::counter).
     pub counts: Vec<(&'static str, u64)>,
 }
 

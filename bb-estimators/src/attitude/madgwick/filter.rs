@@ -106,7 +106,7 @@ impl<T: Real> MadgwickFilter<T> {
         }
     }
 
-    /// The same with a field, whose direction is given.
+    /// Makes the step with a field, whose direction is given.
     #[inline(always)]
     fn step_to_field(&mut self, before: &UnitQuaternion<T>, dt_s: T, sample: &ImuSample<T>, field: &Vector3<T>) {
         let squared_angle = sample.angular_velocity.norm_squared() * (dt_s * dt_s);

@@ -18,7 +18,7 @@ pub(super) const LAG: usize = 8;
 
 const STATES: usize = 9;
 
-/// Those that a heading does not correct: its error is not white, and gravity knows them better.
+/// States that a heading does not correct: its error is not white, and gravity knows them better.
 const UNTOUCHED_BY_FIELDS: [bool; STATES] = [true, true, false, false, false, false, true, true, false];
 
 /// A smaller variance is rounding.

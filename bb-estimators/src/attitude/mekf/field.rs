@@ -1,4 +1,4 @@
-//! What the field is where the body was, and how far it is from that now.
+//! Reference field where the body was, and its distance from the present one.
 
 use nalgebra::{Vector2, Vector3};
 
@@ -11,7 +11,7 @@ use crate::attitude::Real;
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Field<T: Real> {
     reference: Vector2<T>,
-    /// How long the body has moved in it, s.
+    /// Time for which the body has moved in it, s.
     seen_s: T,
     /// Another field, and how long the body has moved in that.
     candidate: Vector2<T>,
@@ -20,11 +20,11 @@ pub(super) struct Field<T: Real> {
     disturbance: T,
 }
 
-/// What a window tells of the heading.
+/// Evidence of a window on the heading.
 pub(super) struct Verdict<T> {
-    /// Of the measured heading over a second, rad² s.
+    /// Variance of the measured heading over a second, rad² s.
     pub(super) noise: T,
-    /// Whether the reference is another one than before.
+    /// True if the reference is another one than before.
     pub(super) is_new: bool,
 }
 
@@ -50,7 +50,7 @@ impl<T: Real> Field<T> {
         let mut squared = (plane - self.reference).norm_squared() / self.reference.norm_squared();
         let mut is_calm = squared < same;
         if (plane - self.candidate).norm_squared() < same * self.candidate.norm_squared() {
-            // A field of a body at rest may be that of the place where it lies.
+            // A field of a body at rest may be that of the place.
             self.lasted_s += moved_s.max(dt * T::of(AT_REST));
         } else {
             self.lasted_s = T::ZERO;

@@ -13,7 +13,7 @@ pub(super) const GYROSCOPE_NOISE: f64 = 1e-3;
 pub(super) const TURN_NOISE: f64 = 1e-2;
 /// Standard deviation of the bias at the start, rad/s: 1.1°/s, of a sensor that nobody has calibrated.
 pub(super) const INITIAL_BIAS: f64 = 2e-2;
-/// The same without a magnetometer, rad/s: nothing then corrects the bias about the vertical, and the heading drifts with
+/// Standard deviation of the bias without a magnetometer, rad/s: nothing then corrects the bias about the vertical, and the heading drifts with
 /// what accelerations seem to tell of it.
 pub(super) const INITIAL_BIAS_WITHOUT_FIELD: f64 = 1e-2;
 /// Growth of the bias, rad/s/√s: 0.1°/s in an hour.
@@ -23,9 +23,9 @@ pub(super) const BIAS_DRIFT: f64 = 3e-5;
 
 /// Horizontal velocity of any body, m/s, beyond what it has shown: a hand.
 pub(super) const VELOCITY_OF_ALL: f64 = 0.3;
-/// How long a velocity lasts, s: a step.
+/// Duration of a velocity, s: a step.
 pub(super) const VELOCITY_LASTS_S: f64 = 1.0;
-/// How long an acceleration lasts, s, before the opposite one follows.
+/// Duration of an acceleration, s, before the opposite one follows.
 pub(super) const ACCELERATION_LASTS_S: f64 = 0.2;
 /// Standard deviation of the velocity at the start, m/s: a pedestrian.
 pub(super) const INITIAL_VELOCITY: f64 = 1.0;
@@ -38,11 +38,11 @@ pub(super) const GRAVITY: f64 = 9.80665;
 
 // Memory.
 
-/// What is gone at once, s: a disturbance that the body has passed, an angular velocity, the shaking before rest.
+/// Shortest memory, s: a disturbance that the body has passed, an angular velocity, the shaking before rest.
 pub(super) const BRIEF_S: f64 = 0.3;
-/// What counts as some seconds, s.
+/// Memory of some seconds, s.
 pub(super) const SHORT_S: f64 = 5.0;
-/// What counts as long, s.
+/// Longest memory, s.
 pub(super) const LONG_S: f64 = 20.0;
 /// Length of a window, s: at most, a hand turns by a tenth of a radian in it.
 pub(super) const WINDOW_S: f64 = 0.03;
@@ -62,7 +62,7 @@ pub(super) const UNKNOWN: f64 = 1.0;
 
 // Rest, as VQF detects it.
 
-/// How long a sensor must be still, s.
+/// Time for which a sensor must be still, s.
 pub(super) const REST_TIME_S: f64 = 1.5;
 /// The angular velocity that is still, beyond the bias and from its own mean, rad/s.
 pub(super) const REST_RATE: f64 = 2.0 * DEGREE;
@@ -87,7 +87,7 @@ pub(super) const NEW_FIELD_S: f64 = 2.0;
 pub(super) const FAST: f64 = 20.0 * DEGREE;
 /// Part that time without it counts for.
 pub(super) const AT_REST: f64 = 0.1;
-/// What the field says of the heading for seconds contradicts it from this on, rad.
+/// Smallest error that contradicts the heading, if the field tells it for seconds, rad.
 pub(super) const CONTRADICTION: f64 = 0.75;
 /// A heading is trusted up to this standard deviation, rad: 10°.
 pub(super) const TRUSTED: f64 = 0.175;
@@ -104,7 +104,7 @@ pub(super) const CALIBRATED: f64 = 0.04;
 pub(super) const FIELD_WALK: f64 = 0.0625;
 /// The least scale: 0.5 µT.
 pub(super) const LEAST_WALK: f64 = 0.01;
-/// How many poses that first scale counts for.
+/// Number of poses that the first scale counts for.
 pub(super) const FIRST_POSES: f64 = 5.0;
 /// Turn from pose to pose, rad.
 pub(super) const POSE_TURN: f64 = 0.07;

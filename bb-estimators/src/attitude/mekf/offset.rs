@@ -15,7 +15,7 @@ use crate::attitude::Real;
 struct Hypothesis<T: Real> {
     field: Vector3<T>,
     offset: Vector3<T>,
-    /// Of field and offset.
+    /// Covariance of field and offset.
     covariance: SMatrix<T, 6, 6>,
     /// Scale of a step, squared, as learnt.
     step: T,
@@ -104,7 +104,7 @@ pub(super) struct HardIron<T: Real> {
     /// Logarithm of the odds of `some` against `none`.
     odds: T,
     is_believed: bool,
-    /// Whether the user has said it.
+    /// True if the user has said it.
     is_given: bool,
     /// Deviation of the offset when the heading was last doubted for it.
     doubted: T,
@@ -116,11 +116,11 @@ pub(super) struct HardIron<T: Real> {
     scale: Option<T>,
 }
 
-/// What a new pose tells.
+/// Result of a new pose.
 pub(super) enum Change<T> {
-    /// There is an offset.
+    /// The magnetometer has an offset.
     Found,
-    /// There is none.
+    /// The magnetometer has no offset.
     Refuted,
     /// The offset is known much better than when the heading was last doubted, with this deviation.
     Sharper(T),

@@ -1,8 +1,8 @@
-//! What a user can say about the sensors.
+//! Statements of a user about the sensors.
 
 use crate::params::{Field, Kind, Value, params};
 
-/// What is known about a magnetometer.
+/// Knowledge about a magnetometer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Magnetometer {
     /// Nothing: the filter finds out whether it has an offset, and which.
@@ -12,7 +12,7 @@ pub enum Magnetometer {
     Calibrated,
     /// It is not calibrated: it has an offset, and the heading is unknown until that is found.
     Uncalibrated,
-    /// There is none, or it is not to be used: the heading drifts with what is left of the gyroscope's bias.
+    /// No magnetometer, or one that is not to be used: the heading drifts with what is left of the gyroscope's bias.
     None,
 }
 
@@ -24,7 +24,7 @@ impl Magnetometer {
         ("none", Self::None),
     ];
 
-    /// Whether its samples are used.
+    /// Returns whether its samples are used.
     pub fn is_used(self) -> bool {
         self != Self::None
     }
@@ -52,7 +52,7 @@ params! {
         /// `auto`: whether it has an offset is found out by the motion. `calibrated`: it has none, which saves the time to
         /// find that out. `uncalibrated`: it has one, so the heading is unknown until the body has turned. `none`: six axes.
         ///
-        /// Source: whoever has mounted it.
+        /// Source: how the sensor is mounted.
         magnetometer: Magnetometer = Magnetometer::Auto;
         /// Declination of the magnetic field, positive to the east: with it north is the geographic one.
         ///

@@ -33,7 +33,7 @@ impl<T: Real> Rest<T> {
         self.still_s > T::of(REST_TIME_S)
     }
 
-    /// What was seen before a gap tells nothing about the time after it.
+    /// Forgets what was seen: before a gap it tells nothing about the time after it.
     pub(super) fn interrupt(&mut self) {
         self.still_s = T::ZERO;
     }

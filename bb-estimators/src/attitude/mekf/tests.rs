@@ -155,7 +155,7 @@ fn north_is_turned_by_the_declination() {
     assert!(world.error_of(&turned).total < 1.0, "{:?}", world.error_of(&turned));
 }
 
-/// What a plane does: the specific force stays where it is in the body, and only the velocity tells that it is not the weight.
+/// A plane in a turn: the specific force stays where it is in the body, and only the velocity tells that it is not the weight.
 #[test]
 fn a_long_turn_is_no_rest() {
     let (mut filter, rate, speed) = (filter(true), 0.4, 20.0);

@@ -9,13 +9,13 @@ use crate::attitude::Real;
 pub(super) struct Window<T: Real> {
     /// s.
     pub(super) duration: T,
-    /// Of `world_from_body`, s.
+    /// Integral of `world_from_body`, s.
     pub(super) rotation: Matrix3<T>,
-    /// Of the specific force, m/s.
+    /// Integral of the specific force, m/s.
     pub(super) force: Vector3<T>,
-    /// Of the measured angular velocity, body frame, rad.
+    /// Integral of the measured angular velocity, body frame, rad.
     pub(super) measured_turn: Vector3<T>,
-    /// Of the squared angular velocity, rad²/s.
+    /// Integral of the squared angular velocity, rad²/s.
     pub(super) squared_rate: T,
     /// Sum of the magnetic fields.
     field: Vector3<T>,

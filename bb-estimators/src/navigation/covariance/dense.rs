@@ -1,4 +1,4 @@
-//! What is rarely done to a covariance, compiled once for those of all sizes.
+//! Rare operations on a covariance, compiled once for those of all sizes.
 
 use super::Innovation;
 use crate::navigation::layout::Quantities;
@@ -133,7 +133,7 @@ impl Dense<'_> {
     }
 }
 
-/// Whether every eigenvalue of the correlations is at least this large: whether a Cholesky decomposition exists after this
+/// Returns whether every eigenvalue of the correlations is at least this large: whether a Cholesky decomposition exists after this
 /// fraction of each variance is subtracted.
 ///
 /// The pivots alone are not enough. With three positions whose sum is known and a fourth state equal to that sum, each pivot

@@ -16,7 +16,7 @@ const LEAST_NOISE: f64 = 1e-10;
 /// better relative to its terms, rounding would consume the rest.
 const LEAST_REST: f64 = 1e-13;
 
-/// If an update leaves less than this ratio of a variance, rounding may consume the rest, and the covariance is checked at once.
+/// Ratio of a variance to what an update leaves of it, below which rounding may consume the rest, and the covariance is checked at once.
 const RISKY: f64 = 1e-8;
 
 /// Rounding error of a computed covariance, relative to the variances.
@@ -88,7 +88,7 @@ pub(in crate::navigation) struct Innovation<'a> {
     whitened: &'a mut [f64],
     /// `det S` to the power of -½.
     density: f64,
-    /// Whether the update leaves next to nothing of a variance.
+    /// True if the update leaves next to nothing of a variance.
     is_risky: bool,
     /// Computes the rest of the fields from the first three and a covariance.
     decompose: fn(&mut Innovation<'_>, &[f64]) -> Option<()>,
@@ -265,7 +265,7 @@ fn decompose<const D: usize, const N: usize>(
     Some(((0..D).map(|i| lower[i][i]).product(), is_risky))
 }
 
-/// Whether all are numbers and none is infinite. Without branches, so that it is vectorised: an exponent of ones carries to the
+/// Returns whether all are numbers and none is infinite. Without branches, so that it is vectorised: an exponent of ones carries to the
 /// highest bit.
 #[inline(always)]
 fn are_finite(values: &[f64]) -> bool {
@@ -274,7 +274,7 @@ fn are_finite(values: &[f64]) -> bool {
     values.iter().fold(0, |all, x| all | ((x.to_bits() & EXPONENT) + ONE)) >> (u64::BITS - 1) == 0
 }
 
-/// Whether a matrix is a covariance: symmetric, and positive semi-definite up to rounding. The zero matrix, which describes
+/// Returns whether a matrix is a covariance: symmetric, and positive semi-definite up to rounding. The zero matrix, which describes
 /// exactly known errors, is valid.
 #[allow(clippy::neg_cmp_op_on_partial_ord, reason = "what is not a number is refused")]
 #[inline(always)]

@@ -1,4 +1,4 @@
-//! How the bodies move.
+//! Motions of the bodies.
 //!
 //! The world is east, north, up, the body forward, left, up. Orientation and acceleration are functions of time in closed
 //! form.
@@ -20,7 +20,7 @@ pub(super) struct Motion {
     /// Samples a second.
     pub(super) rate: f64,
     pub(super) length_s: f64,
-    /// How long it rests at first; errors count from then on.
+    /// Time of rest at first; errors count from then on.
     pub(super) rest_s: f64,
     /// `world_from_body`.
     pub(super) rotation: Of<UnitQuaternion<f64>>,
@@ -36,7 +36,7 @@ pub(super) struct Motion {
     pub(super) bias: Of<f64>,
 }
 
-/// How long every body but the walker rests at first, s.
+/// Time for which every body but the walker rests at first, s.
 const REST_S: f64 = 10.0;
 
 /// A course over ground.
@@ -46,7 +46,7 @@ struct Course {
     speed: Profile,
     /// rad/s, to the left.
     turn: Profile,
-    /// Where it points at first, rad from east to north.
+    /// Heading at first, rad from east to north.
     start: f64,
 }
 

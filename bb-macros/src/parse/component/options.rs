@@ -133,7 +133,7 @@ impl Reference {
         self.names().join(".")
     }
 
-    /// Where the names after the path are.
+    /// Place of the names after the path.
     pub(crate) fn field_place(&self) -> Option<Place> {
         Some(Place { start: Place::of(self.fields.first()?).start, end: Place::of(self.fields.last()?).end })
     }

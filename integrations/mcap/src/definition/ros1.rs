@@ -105,9 +105,9 @@ fn field(line: &str, owner: &str) -> String {
 
 struct Converter<'a> {
     definition: &'a MessageDefinition,
-    /// What is left of the message.
+    /// Rest of the message.
     data: &'a [u8],
-    /// Where the alignment of CDR begins.
+    /// Start of the alignment of CDR.
     start: usize,
     out: &'a mut Vec<u8>,
 }

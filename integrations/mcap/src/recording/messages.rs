@@ -19,7 +19,7 @@ use std::sync::Arc;
 pub struct RecordedMessage {
     /// The path it was published at.
     pub channel: Arc<RecordedChannel>,
-    /// When it was published, by the recording's clock: the wall time, unless the machine's date was set after the first message. A time
+    /// Time of publication, by the recording's clock: the wall time, unless the machine's date was set after the first message. A time
     /// before 1970 becomes the epoch.
     pub time: WallTime,
     /// Encoded according to the channel's definition.

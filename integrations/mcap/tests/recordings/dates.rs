@@ -122,7 +122,7 @@ fn every_message_of_a_moving_arm_has_the_date_at_which_it_was_published() -> Res
     Ok(())
 }
 
-/// What `tests/ros2/check` reads with Python's `mcap`.
+/// Recording that `tests/ros2/check` reads with Python's `mcap`.
 #[test]
 #[ignore = "tests/ros2/check runs it"]
 fn a_recording_for_others_of_a_moving_arm() -> Result<(), Box<dyn Error>> {
