@@ -215,6 +215,21 @@ fn an_optional_field_outside_of_two_bounds_at_the_rate_of_the_controller() -> Re
     Ok(())
 }
 
+/// Both reactions start `land`, which cancels all commands, itself too.
+#[test]
+fn reactions_with_one_command_do_not_cancel_each_other() -> Result<(), Failure> {
+    let mut flight = Flight::new(true)?;
+    for time in 10..210 {
+        flight.measure(time, BatteryState { voltage: 10.0, temperature: Some(340.0), ..Default::default() });
+    }
+    let events: Vec<_> = flight.commands.drain().map(|event| (event.caller.clone(), event.phase.clone())).collect();
+    let started =
+        |by: &str| events.iter().filter(|(caller, phase)| caller == by && *phase == CommandPhase::Started).count();
+    assert!(started("controller/low") >= 3 && started("controller/hot") >= 5, "{events:#?}");
+    assert!(events.iter().all(|(_, phase)| *phase != CommandPhase::Cancelled), "{events:#?}");
+    Ok(())
+}
+
 #[test]
 fn the_command_cancels_what_runs_and_a_bound_follows_its_parameter() -> Result<(), Failure> {
     let mut flight = Flight::new(true)?;
