@@ -43,7 +43,7 @@ use crate::journal::{Journal, ParameterEntry};
 use crate::lifecycle::Supervision;
 use crate::message::Origin;
 use crate::node::{BindTarget, Check, Mode, NodeEntry, Report, SharedNode};
-use crate::schedule::{Bell, Deadlines, Pool, Reserve, Reserved, Sleeper, StopSignal};
+use crate::schedule::{Bell, Deadlines, Pool, Reserve, Sleeper, StopSignal};
 use crate::telemetry::Telemetry;
 use crate::time::{Clock, MonotonicTime};
 use budgets::Budgets;
@@ -101,10 +101,10 @@ struct Inner {
     watch: Deadlines<usize>,
     limits: Deadlines<Limit>,
     pool: Pool,
-    /// The threads of disarm callbacks.
+    /// The threads of disarm callbacks of components, each of which has one.
     reserve: Reserve,
-    /// The one for callbacks of commands.
-    place: OnceLock<Reserved>,
+    /// Those of other disarm callbacks, such as the ones of commands, which may be any number.
+    spare: Reserve,
     reporter: Reporter,
     /// Numbers of panics of loggers, and of wakers that the control state has woken.
     logger_panics: AtomicU64,

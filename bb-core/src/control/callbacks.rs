@@ -46,11 +46,12 @@ pub(super) enum Reason {
 }
 
 impl Callback {
-    /// Runs it on its own thread.
+    /// Runs it on its own thread. One without takes none that another has.
     pub(super) fn start(self: &Arc<Self>, control: &Control, reason: Reason) {
         if self.begin(reason) {
             let (callback, robot) = (Arc::clone(self), control.clone());
-            control.0.reserve.run(Box::new(move || callback.work(&robot, reason)));
+            let threads = if self.place.is_some() { &control.0.reserve } else { &control.0.spare };
+            threads.run(Box::new(move || callback.work(&robot, reason)));
         }
     }
 
@@ -359,7 +360,11 @@ impl Drop for Inside {
 
 #[cfg(all(test, not(loom)))]
 mod tests {
+    use super::super::bare;
     use super::*;
+    use crate::node::Mode;
+    use std::sync::mpsc;
+    use std::time::Duration;
 
     #[test]
     fn a_thread_knows_whose_code_it_is_inside_of() {
@@ -373,5 +378,26 @@ mod tests {
         assert!(is_awaited(ROBOT) && is_in_actuator(ACTUATOR) && !is_awaited(ACTUATOR));
         drop(actuator);
         assert!(!is_awaited(ROBOT) && !is_in_actuator(ACTUATOR));
+    }
+
+    /// Where no thread can be started, one that hangs would have a component wait for its own.
+    #[test]
+    fn a_callback_without_a_thread_takes_none_that_is_kept_for_another() {
+        let control = bare::control(Mode::Real, &[], []);
+        let _place = control.0.reserve.place().expect("there are threads");
+        let ((told, started), (release, released)) = (mpsc::channel(), mpsc::channel::<()>());
+        let code = Mutex::new((told, released));
+        let code = move || {
+            let code = code.lock().unwrap_or_else(PoisonError::into_inner);
+            code.0.send(()).expect("the test waits");
+            // Until the test drops the other end.
+            let _ = code.1.recv();
+            Ok(())
+        };
+        let callback = control.lock().hooks.make("command/grip", Arc::new(code), None);
+        callback.start(&control, Reason::Disarming(1));
+        started.recv_timeout(Duration::from_secs(20)).expect("it runs");
+        assert_eq!(control.0.reserve.free(), 1, "the thread that is kept");
+        drop(release);
     }
 }

@@ -72,13 +72,13 @@ impl Control {
         }
     }
 
-    /// Keeps a thread for the callbacks of commands. The error names the component without a thread for its own.
-    pub(crate) fn start_reserve(&self) -> Result<(), (&'static str, Fault)> {
-        let place = self.0.reserve.place().map_err(|error| ("disarm", error.into()))?;
-        // It is set once.
-        let _ = self.0.place.set(place);
+    /// Keeps a thread for the callbacks of commands, until the result is dropped. The error names the component without a thread for
+    /// its own.
+    pub(crate) fn start_reserve(&self) -> Result<Reserved, (&'static str, Fault)> {
+        let place = self.0.spare.place().map_err(|error| ("disarm", error.into()))?;
         let without = self.lock().hooks.without_thread();
-        without.map_or(Ok(()), |path| Err((path, Fault::new("no thread can be started for its disarm callback"))))
+        without
+            .map_or(Ok(place), |path| Err((path, Fault::new("no thread can be started for its disarm callback"))))
     }
 
     /// Runs `make`, which creates the component at `path` or changes its options. Once it has succeeded, the callbacks it registered

@@ -84,7 +84,7 @@ impl Control {
             limits: Deadlines::new(bell.clone()),
             pool: Pool::new(move || alarm.ring()),
             reserve: Reserve::default(),
-            place: OnceLock::new(),
+            spare: Reserve::default(),
             bell,
             reporter: Reporter::default(),
             logger_panics: AtomicU64::new(0),

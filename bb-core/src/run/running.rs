@@ -5,6 +5,7 @@ use super::source::OpenSources;
 use super::threads::{self, Thread};
 use super::{Live, Report, Robot, StartError};
 use crate::control::is_in_command;
+use crate::schedule::Reserved;
 use std::fmt;
 use std::ops::Deref;
 use std::sync::Arc;
@@ -30,6 +31,8 @@ struct Threads {
     sources: Vec<Thread>,
     /// [`Running::wait`] has waited for the limit of a stop in vain: what is left has had its time.
     has_waited: bool,
+    /// Thread that is kept for disarm callbacks of commands.
+    kept: Option<Reserved>,
 }
 
 /// How long user code may take to return after the robot was told to stop.
@@ -69,9 +72,11 @@ impl<R: Robot> Running<R> {
 
 impl Threads {
     fn start(machine: Arc<Machine>, sources: OpenSources) -> Result<Self, StartError> {
-        let mut running = Self { machine: Arc::clone(&machine), sources: Vec::new(), has_waited: false };
+        let mut running =
+            Self { machine: Arc::clone(&machine), sources: Vec::new(), has_waited: false, kept: None };
         machine.control.pool().start();
-        machine.control.start_reserve().map_err(|(path, fault)| StartError::component(path, fault))?;
+        let kept = machine.control.start_reserve();
+        running.kept = Some(kept.map_err(|(path, fault)| StartError::component(path, fault))?);
         // On an error here, `running` is dropped, which stops what already runs, in order.
         threads::serve(&machine)?;
         let now = machine.environment.clock().now();

@@ -1,8 +1,9 @@
 //! Threads for disarm callbacks, which are started before they are needed.
 //!
 //! Each callback of a component has a [`Reserved`] from its registration until it is dropped, and there are at least as many threads as
-//! places. So all of these callbacks run at once, even if no thread can be started any more and some of them hang. Other jobs get
-//! further threads when they are submitted; if none can be started, they wait for the next thread that becomes free.
+//! places. So all of these callbacks run at once, even if no thread can be started any more and some of them hang. Other callbacks have
+//! a [`Reserve`] of their own with one place, since there may be any number of them: they get further threads when they are submitted,
+//! and if none can be started, they wait for the next of these threads that becomes free.
 
 use crate::fault::guarded;
 #[cfg(not(loom))]
@@ -100,6 +101,12 @@ impl Reserve {
                 state = self.0.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
             }
         }
+    }
+
+    /// The number of threads that take the next job.
+    #[cfg(test)]
+    pub(crate) fn free(&self) -> usize {
+        self.lock().free
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
