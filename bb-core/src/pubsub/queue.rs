@@ -175,13 +175,13 @@ impl<M> Queue<M> {
         self.bound.has_room(held, bytes)
     }
 
-    /// Wakes a waiting thread if there is a message, and gives the task to wake.
+    /// Wakes a waiting thread for each message, of which several may have become due at once, and gives the task to wake.
     fn woken(&self, state: &mut State<M>) -> Option<Waker> {
-        if state.messages.is_empty() {
-            return None;
-        }
-        if state.waiting > 0 {
-            self.arrived.notify_one();
+        match state.messages.len().min(state.waiting) {
+            0 if state.messages.is_empty() => return None,
+            0 => {}
+            1 => self.arrived.notify_one(),
+            _ => self.arrived.notify_all(),
         }
         state.waker.take()
     }
@@ -280,6 +280,11 @@ impl<M> Queue<M> {
     #[cfg(test)]
     pub(super) fn paths_known(&self) -> usize {
         self.lock().paths.len()
+    }
+
+    #[cfg(test)]
+    pub(super) fn threads_waiting(&self) -> usize {
+        self.lock().waiting
     }
 
     pub(super) fn is_abandoned(&self) -> bool {

@@ -185,6 +185,31 @@ fn a_thread_waits_for_the_time_of_a_message() {
     });
 }
 
+/// Threads that share a subscription each get one of the messages whose time comes at once.
+#[test]
+fn all_threads_that_wait_are_woken_for_messages_of_one_time() {
+    let (registry, hand) = registry();
+    let topics = PATHS.map(|path| registry.topic::<JointState>(path).expect("it is free"));
+    let subscription = all(&registry, every(10));
+    for position in [1.0, 2.0] {
+        topics.iter().for_each(|topic| topic.publish(&state(position)));
+    }
+    assert_eq!(subscription.drain().count(), PATHS.len());
+    std::thread::scope(|scope| {
+        let wait = || subscription.recv_timeout(Duration::from_secs(20)).map(|message| message.path());
+        let waiting = PATHS.map(|_| scope.spawn(wait));
+        while subscription.tap().0.threads_waiting() < PATHS.len() {
+            std::thread::yield_now();
+        }
+        hand.set(10);
+        let start = std::time::Instant::now();
+        let mut got = waiting.map(|thread| thread.join().ok().flatten());
+        got.sort_unstable();
+        assert_eq!(got, PATHS.map(Some));
+        assert!(start.elapsed() < Duration::from_secs(10), "one has waited for its time limit");
+    });
+}
+
 #[test]
 fn what_waits_for_its_time_arrives_when_the_robot_ends() {
     let (registry, _) = registry();
