@@ -35,6 +35,8 @@ impl Timers {
     pub(super) fn request(&mut self, request: Request, now: MonotonicTime) {
         let after = |duration: Duration| now + duration.max(SHORTEST);
         match request {
+            // A restart comes before all else, wherever it stands in the reply.
+            Request::Continue(_) if matches!(self.continue_with, Some(Continuation::Fail(_))) => {}
             Request::Continue(step) => self.continue_with = Some(Continuation::Step(step)),
             Request::Restart(reason) => self.continue_with = Some(Continuation::Fail(reason)),
             Request::Timeout(duration) => self.timeout = Some(after(duration)),
@@ -125,5 +127,16 @@ mod tests {
         timers.request(Request::Timer(1, Duration::from_millis(5)), at(0));
         timers.request(Request::Timer(1, Duration::from_millis(50)), at(0));
         assert_eq!((timers.take(at(10)), timers.next()), (None, Some(at(50))));
+    }
+
+    #[test]
+    fn a_restart_comes_before_a_continuation_in_either_order() {
+        for requests in
+            [[Request::Restart("told"), Request::Continue(3)], [Request::Continue(3), Request::Restart("told")]]
+        {
+            let mut timers = Timers::default();
+            requests.into_iter().for_each(|request| timers.request(request, at(0)));
+            assert_eq!(timers.continue_with, Some(Continuation::Fail("told")));
+        }
     }
 }
