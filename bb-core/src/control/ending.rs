@@ -27,7 +27,6 @@ impl Control {
         self.cut_short(id, Event::Cancel { execution: id }, CommandError::Cancelled);
     }
 
-    /// An execution has taken longer than its `timeout`.
     /// The execution of that number, whose caller it is, changes the operational state.
     pub(crate) fn transition_by(&self, id: u64, name: &str, caller: &Caller) -> Result<(), Fault> {
         let mut step = self.step();
@@ -50,6 +49,7 @@ impl Control {
         step.finish();
     }
 
+    /// An execution has taken longer than its `timeout`.
     pub(crate) fn timed_out(&self, id: u64) {
         self.cut_short(id, Event::Timeout { execution: id }, CommandError::TimedOut);
     }
