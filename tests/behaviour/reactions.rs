@@ -25,7 +25,7 @@ impl Command for Land {
 
 robot! {
     robot Drone;
-    parameters { battery { low: f64 = 11 V, range: 5 V..=15 V; } }
+    parameters { battery { low: f64 = 11 V, range: 5 V..=15 V; hot: f64 = 330 K; } }
     commands {
         land: Land { allowed_states: [idle, executing]; cancel: all; }
         go: Move { allowed_states: [idle, executing]; }
@@ -36,7 +36,7 @@ robot! {
             when = sensor::battery.voltage, below = param::battery::low, for = 2 s, run = command::land, cooldown = 3 s,
         );
         controller hot: Reaction(
-            when = sensor::battery.temperature, below = 250 K, above = 330 K, run = command::land, stale_after = 1500 ms,
+            when = sensor::battery.temperature, below = 250 K, above = param::battery::hot, run = command::land, stale_after = 1500 ms,
         ) { rate: 5 Hz; }
     }
     link base;
@@ -197,6 +197,50 @@ fn messages_that_come_late_or_twice_neither_start_nor_end_anything() -> Result<(
     Ok(())
 }
 
+/// A driver hands in at once what it had kept.
+#[test]
+fn a_silence_between_two_stamps_ends_the_condition_before_the_next_begins() -> Result<(), Failure> {
+    let mut flight = Flight::new(true)?;
+    for (stamp, voltage) in [(10, 10.0), (20, 10.0), (41, 10.0), (61, 10.0)] {
+        let battery = BatteryState { voltage, ..Default::default() };
+        flight.simulation.publish(drone::sensor::battery, at(100 * stamp), battery);
+    }
+    flight.simulation.run_for(Duration::from_millis(20));
+    let states: Vec<_> = flight.states().into_iter().map(|(_, state)| state).collect();
+    assert_eq!(states, ["fulfilled", "not fulfilled", "fulfilled", "started"]);
+    assert_eq!(flight.count("silent"), 1);
+    Ok(())
+}
+
+/// The newest 16,384 messages wait for a reaction with a rate.
+#[test]
+fn messages_that_a_reaction_has_no_room_for_are_counted() -> Result<(), Failure> {
+    let mut flight = Flight::new(true)?;
+    flight.simulation.run_until(at(110));
+    let battery = BatteryState { voltage: 12.0, temperature: Some(300.0), ..Default::default() };
+    for number in 0..16_384 + 5 {
+        let stamp = at(110).plus_nanos(number);
+        flight.simulation.publish(drone::sensor::battery, stamp, battery.clone());
+    }
+    flight.simulation.run_until(at(210));
+    assert_eq!(count(&flight.simulation.report(), "controller/hot", "lost"), 5);
+    Ok(())
+}
+
+#[test]
+fn options_that_make_no_sense_are_counted_and_the_old_ones_stay() -> Result<(), Failure> {
+    let mut flight = Flight::new(true)?;
+    let states = flight.simulation.subscribe(drone::controller::hot);
+    flight.simulation.set_parameter(drone::param::battery::hot, 200.0)?;
+    flight.measure(10, BatteryState { voltage: 12.0, temperature: Some(240.0), ..Default::default() });
+    flight.simulation.set_parameter(drone::param::battery::hot, 245.0)?;
+    flight.simulation.run_until(at(2000));
+    assert_eq!(count(&flight.simulation.report(), "controller/hot", "refused options"), 2);
+    let states: Vec<_> = states.drain().map(|state| (of_state(&state), state.value)).collect();
+    assert_eq!(states, [("started".to_owned(), Some(240.0))], "with `above = 330 K`, 240 K fulfils it by `below`");
+    Ok(())
+}
+
 #[test]
 fn an_optional_field_outside_of_two_bounds_at_the_rate_of_the_controller() -> Result<(), Failure> {
     let mut flight = Flight::new(true)?;
@@ -237,7 +281,8 @@ fn the_command_cancels_what_runs_and_a_bound_follows_its_parameter() -> Result<(
     each_half_second(10, 20, 10.0).into_iter().for_each(|(time, voltage)| flight.voltage(time, voltage));
     flight.simulation.set_parameter(drone::param::battery::low, 9.0)?;
     each_half_second(25, 40, 10.0).into_iter().for_each(|(time, voltage)| flight.voltage(time, voltage));
-    assert_eq!(flight.states(), [(10, "fulfilled".into())], "the new bound starts `for` anew");
+    let expected = [(10, "fulfilled".into()), (20, "not fulfilled".into())];
+    assert_eq!(flight.states(), expected, "the new bound starts `for` anew");
     flight.simulation.set_parameter(drone::param::battery::low, 10.5)?;
     each_half_second(45, 65, 10.0).into_iter().for_each(|(time, voltage)| flight.voltage(time, voltage));
     assert_eq!(flight.states(), [(45, "fulfilled".into()), (65, "started".into())]);

@@ -5,6 +5,7 @@ use crate::message::Payload;
 use crate::pubsub::{DynamicMessage, DynamicSubscription, Overflow, Select};
 use crate::time::MonotonicTime;
 use bb_macros::Options;
+use std::mem::{replace, take};
 use std::time::Duration;
 
 /// Starts a command when a field of a topic's messages has been beyond a bound for some time:
@@ -52,9 +53,9 @@ use std::time::Duration;
 ///   after `cooldown` if the condition still holds; likewise when it was refused, which is published at the command's path too.
 /// - A message that is not newer than the one before it is ignored.
 ///
-/// Without a `rate`, it acts when a message arrives, and on virtual time within 10 ms; with one, at that rate. Messages that arrive
-/// in between are not lost. It publishes a [`ReactionState`] when it starts to be fulfilled, when that ends, and when it has started a
-/// command or been refused.
+/// Without a `rate`, it acts when a message arrives, and on virtual time within 10 ms; with one, at that rate. All messages that arrived
+/// in between are judged, the newest 16,384 of them; the others are counted as `lost`. It publishes a [`ReactionState`] when it starts to
+/// be fulfilled, when that ends, also by silence or new bounds, and when it has started a command or been refused.
 #[derive(Debug)]
 pub struct Reaction {
     options: ReactionOptions,
@@ -71,11 +72,18 @@ pub struct Reaction {
     heard: MonotonicTime,
     is_silent: bool,
     fulfilled_since: Option<MonotonicTime>,
+    /// The condition has ended by new bounds, which has yet to be published.
+    has_ended: bool,
+    /// A message after a silence, which is judged once the end of the condition is published.
+    next: Option<DynamicMessage>,
     execution: Option<DynamicExecution>,
     ready: Option<MonotonicTime>,
     not_numbers: Counter,
     silences: Counter,
     refused_options: Counter,
+    lost: Counter,
+    /// How many of the lost messages are counted.
+    counted: u64,
 }
 
 /// Options of [`Reaction`].
@@ -121,7 +129,7 @@ pub struct ReactionState {
 pub enum ReactionEvent {
     /// The condition is fulfilled.
     Fulfilled,
-    /// It is no longer fulfilled.
+    /// It is no longer fulfilled, or has new bounds.
     NotFulfilled,
     /// The command was started.
     Started,
@@ -129,8 +137,12 @@ pub enum ReactionEvent {
     Refused(String),
 }
 
+/// A condition that ends without a message.
+const NOT_ANY_MORE: ReactionState = ReactionState { event: ReactionEvent::NotFulfilled, value: None };
 /// The period without a rate on virtual time.
 const PERIOD: Duration = Duration::from_millis(10);
+/// The number of messages that may wait until it acts.
+const MOST_WAITING: usize = 16_384;
 /// The longest wait for a message in real time, after which it looks at the command and at silence.
 const LONGEST_WAIT: Duration = Duration::from_millis(50);
 
@@ -183,7 +195,11 @@ impl Service for Reaction {
         }
         let stale_after = options.silence(topic.period)?;
         let is_periodic = context.period_s().is_some();
-        let messages = bus.subscribe_any(Select::Path(options.when.path()), None, Overflow::default());
+        let messages = bus.subscribe_any(
+            Select::Path(options.when.path()),
+            None,
+            Overflow::DropOldest { capacity: MOST_WAITING },
+        );
         Ok(Self {
             messages,
             waits: !is_periodic && !context.clock().is_virtual(),
@@ -194,23 +210,40 @@ impl Service for Reaction {
             heard: context.clock().now(),
             is_silent: false,
             fulfilled_since: None,
+            has_ended: false,
+            next: None,
             execution: None,
             ready: None,
             not_numbers: context.counter("not a number"),
             silences: context.counter("silent"),
             refused_options: context.counter("refused options"),
+            lost: context.counter("lost"),
+            counted: 0,
             options,
             bus,
         })
     }
 
     fn update(&mut self, now: MonotonicTime) -> Result<Reading<ReactionState>, Fault> {
-        let mut next = if self.waits { self.messages.recv_timeout(LONGEST_WAIT) } else { self.messages.try_recv() };
+        if take(&mut self.has_ended) {
+            return Ok(Reading::now(NOT_ANY_MORE).next_at(now));
+        }
+        let mut next = match self.next.take() {
+            None if self.waits => self.messages.recv_timeout(LONGEST_WAIT),
+            None => self.messages.try_recv(),
+            next => next,
+        };
+        let lost = self.messages.lagged();
+        (replace(&mut self.counted, lost)..lost).for_each(|_| self.lost.add());
         let now = if self.waits { self.bus.clock().now() } else { now };
         if self.execution.as_ref().is_some_and(|execution| execution.try_result().is_some()) {
             self.cool_down(now);
         }
         while let Some(message) = next {
+            if let Some(state) = self.end_by_gap(&message) {
+                self.next = Some(message);
+                return Ok(Reading::now(state).next_at(now));
+            }
             if let Some(state) = self.receive(&message, now) {
                 // What else waits is processed at the same time.
                 return Ok(Reading::now(state).next_at(now));
@@ -236,7 +269,7 @@ impl Service for Reaction {
             }
         };
         if (options.below, options.above) != (self.options.below, self.options.above) {
-            self.fulfilled_since = None;
+            self.has_ended |= self.fulfilled_since.take().is_some();
         }
         self.options = options;
         Ok(())
@@ -244,15 +277,17 @@ impl Service for Reaction {
 }
 
 impl Reaction {
+    /// Returns what changes with the silence before a message, if there was one.
+    fn end_by_gap(&mut self, message: &DynamicMessage) -> Option<ReactionState> {
+        let gap = message.stamp().monotonic_time.duration_since(self.last?);
+        if gap > self.stale_after { self.fall_silent() } else { None }
+    }
+
     /// Returns what changes with a message.
     fn receive(&mut self, message: &DynamicMessage, now: MonotonicTime) -> Option<ReactionState> {
         let time = message.stamp().monotonic_time;
         if self.last.is_some_and(|last| time <= last) {
             return None;
-        }
-        if self.last.is_some_and(|last| time.duration_since(last) > self.stale_after) {
-            self.note_silence();
-            self.fulfilled_since = None;
         }
         // An older stamp is nothing heard: a clock that was set back shows as silence.
         self.heard = now;
@@ -305,16 +340,11 @@ impl Reaction {
         self.ready = Some(now + self.options.cooldown);
     }
 
-    fn fall_silent(&mut self) -> Option<ReactionState> {
-        self.note_silence();
-        let ended = self.fulfilled_since.take();
-        ended.map(|_| ReactionState { event: ReactionEvent::NotFulfilled, value: None })
-    }
-
     /// Counts a silence once, whether it is noticed by the clock or by the stamp of the next message.
-    fn note_silence(&mut self) {
-        if !std::mem::replace(&mut self.is_silent, true) {
+    fn fall_silent(&mut self) -> Option<ReactionState> {
+        if !replace(&mut self.is_silent, true) {
             self.silences.add();
         }
+        self.fulfilled_since.take().map(|_| NOT_ANY_MORE)
     }
 }
