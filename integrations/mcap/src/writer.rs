@@ -27,9 +27,40 @@ pub struct BagWriter {
 
 struct Channel {
     id: u16,
-    /// ROS's name of the type.
-    name: String,
+    schema: Schema,
+    /// The shape of the message written last, unless that was encoded already.
+    shape: Option<Shape>,
     sequence: u32,
+}
+
+/// The type of a message.
+enum Type<'a> {
+    Shape { name: &'static str, shape: Shape },
+    Schema(&'a Schema),
+}
+
+impl Type<'_> {
+    fn schema(&self) -> Schema {
+        match *self {
+            Self::Shape { name, shape } => Schema::new(name, shape),
+            Self::Schema(schema) => schema.clone(),
+        }
+    }
+
+    fn shape(&self) -> Option<Shape> {
+        match *self {
+            Self::Shape { shape, .. } => Some(shape),
+            Self::Schema(_) => None,
+        }
+    }
+
+    /// Whether it is the type of the channel, by its definition.
+    fn is_of(&self, channel: &Channel) -> bool {
+        match self {
+            Self::Shape { shape, .. } => channel.shape == Some(*shape) || self.schema() == channel.schema,
+            Self::Schema(schema) => **schema == channel.schema,
+        }
+    }
 }
 
 impl BagWriter {
@@ -74,7 +105,7 @@ impl BagWriter {
         self.write_shape(topic, M::SHAPE, log_time)
     }
 
-    /// Writes a message that is encoded already, in CDR.
+    /// Writes a message that is encoded already, in CDR. Types are compared by name and definition.
     ///
     /// # Errors
     /// The topic has another type, or the file can no longer be written.
@@ -87,7 +118,7 @@ impl BagWriter {
     ) -> Result<(), RecordingError> {
         self.bytes.clear();
         self.bytes.extend(message);
-        self.write(topic, &schema.name, || schema.clone(), log_time)
+        self.write(topic, &Type::Schema(schema), log_time)
     }
 
     /// Writes the end of the file. Returns the number of messages.
@@ -108,26 +139,23 @@ impl BagWriter {
             Shape::Struct(shape) => shape.name,
             _ => "",
         };
-        self.write(topic, name, || Schema::new(name, shape), time)
+        self.write(topic, &Type::Shape { name, shape }, time)
     }
 
-    /// Writes the bytes, of the type `name`.
-    fn write(
-        &mut self,
-        topic: &str,
-        name: &str,
-        schema: impl FnOnce() -> Schema,
-        time: WallTime,
-    ) -> Result<(), RecordingError> {
+    /// Writes the bytes, which are of that type.
+    fn write(&mut self, topic: &str, of: &Type<'_>, time: WallTime) -> Result<(), RecordingError> {
         if !self.channels.contains_key(topic) {
-            let id = channel_of(&mut self.writer, topic, &schema(), "").map_err(|error| self.fail(error))?;
-            self.channels.insert(topic.to_owned(), Channel { id, name: name.to_owned(), sequence: 0 });
+            let schema = of.schema();
+            let id = channel_of(&mut self.writer, topic, &schema, "").map_err(|error| self.fail(error))?;
+            self.channels.insert(topic.to_owned(), Channel { id, schema, shape: of.shape(), sequence: 0 });
         }
         let Some(channel) = self.channels.get_mut(topic) else { return Ok(()) };
-        if channel.name != name {
-            let known = channel.name.clone();
-            return Err(self.other_type(topic, name, &known));
+        if !of.is_of(channel) {
+            let (known, name) = (channel.schema.name.clone(), of.schema().name);
+            let wanted = if known == name { format!("{known} as it was defined before") } else { known };
+            return Err(self.other_type(topic, &name, &wanted));
         }
+        channel.shape = of.shape();
         let (log_time, sequence) = (nanos(time), channel.sequence);
         channel.sequence = channel.sequence.wrapping_add(1);
         let header = MessageHeader { channel_id: channel.id, sequence, log_time, publish_time: log_time };

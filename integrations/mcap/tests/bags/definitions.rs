@@ -203,14 +203,23 @@ fn a_bag_of_payloads_is_read_back() {
     }
     let field = Stamped::new(MonotonicTime::ZERO, MagneticField::new(Vector3::z()));
     let error = writer.payload("/imu", &field).expect_err("has another type");
-    assert!(error.to_string().contains("sensor_msgs/MagneticField"), "{error}");
+    assert!(error.to_string().contains("sensor_msgs/msg/MagneticField"), "{error}");
     let own = Stamped::new(MonotonicTime::ZERO, Inner { id: 1, place: Vector3::z() });
     let error = writer.payload("/inner", &own).expect_err("ROS has none");
     assert!(error.to_string().contains("a payload that ROS has a message for"), "{error}");
-    assert_eq!(writer.finish().expect("finishes"), 500);
+    // Encoded elsewhere: what counts is the definition.
+    let imu = Schema::new("sensor_msgs/Imu", Imu::ROS.expect("ROS has one").shape());
+    let time = WallTime::from_unix_nanos(1);
+    writer.encoded("/imu", &imu, time, &[0; 8]).expect("is the same type");
+    let older = Schema { text: imu.text.replacen("float64", "float32", 1), ..imu };
+    let error = writer.encoded("/imu", &older, time, &[0; 8]).expect_err("is defined otherwise");
+    let said =
+        "the messages of /imu are sensor_msgs/msg/Imu, and sensor_msgs/msg/Imu as it was defined before is needed";
+    assert!(error.to_string().contains(said), "{error}");
+    assert_eq!(writer.finish().expect("finishes"), 501);
 
     let bag = Bag::open(&path).expect("opens");
-    assert_eq!((bag.topics().len(), bag.topics()[0].messages), (1, Some(500)));
+    assert_eq!((bag.topics().len(), bag.topics()[0].messages), (1, Some(501)));
     for (second, (message, imu)) in (1..).zip(bag.messages(&["/imu"]).expect("is there").zip(&imus)) {
         let (read, time) = message.expect("is whole").payload::<Imu>().expect("is one");
         assert_eq!((read, time.as_unix_nanos()), (*imu, second * 1_000_000_000));
