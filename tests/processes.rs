@@ -1,6 +1,9 @@
 //! What a whole process has one of: its logger, its signals, its priorities.
 
 mod blocked_logger;
+#[path = "behaviour/components.rs"]
+#[allow(dead_code, reason = "a part of the kit is needed here")]
+mod components;
 mod features;
 mod loggers;
 mod logs;

@@ -1,43 +1,22 @@
 //! Optional features: real-time priorities of workers, and signals that stop a robot. Beside them a process in which no thread
 //! can be started.
 
+use super::components::{Done, Echo, Failure, Number, Read, Servo, Source, lock};
 use bb_core::prelude::*;
 use std::process::{Command as Process, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::sync::{Mutex, PoisonError};
-
-/// A number.
-#[derive(Clone, Copy, Debug, PartialEq, Payload)]
-struct Number(f64);
-
-/// Passes on.
-#[derive(Debug)]
-struct Pass;
-
-impl Estimator for Pass {
-    type Options = NoOptions;
-    type Input = Number;
-    type Output = Number;
-
-    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-
-    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
-        Ok(Reply::emit(number.payload))
-    }
-}
+use std::sync::{Mutex, OnceLock};
 
 robot! {
     robot Urgent;
     link base {
         sensor numbers: External<Number>();
-        estimator pass: Pass() { input number: numbers; runs_on: worker, priority: 80; }
+        estimator pass: Echo() { input number: numbers; runs_on: worker, priority: 80; }
     }
 }
 
 #[test]
-fn a_worker_has_its_priority_or_the_error_says_why_not() -> Result<(), Box<dyn std::error::Error>> {
+fn a_worker_has_its_priority_or_the_error_says_why_not() -> Result<(), Failure> {
     let running = match Urgent::builder().start() {
         Ok(running) => running,
         Err(error) => {
@@ -62,65 +41,49 @@ fn a_worker_has_its_priority_or_the_error_says_why_not() -> Result<(), Box<dyn s
 robot! {
     robot Stoppable;
     commands { arm: Arm; disarm: Disarm; }
-    link base { sensor numbers: External<Number>() { estimator pass: Pass(); } }
+    link base { sensor numbers: External<Number>() { estimator pass: Echo(); } }
 }
 
-/// Does not return once it is armed.
-#[derive(Debug)]
-struct Hangs(SensorContext);
+/// Keeps the bus for `hang`.
+fn keep_bus(context: &SensorContext) -> Done {
+    BUS.get_or_init(|| context.bus());
+    Ok(())
+}
 
-impl Sensor for Hangs {
-    type Options = NoOptions;
-    type Output = Number;
+static BUS: OnceLock<bb_core::Bus> = OnceLock::new();
 
-    fn init(_: NoOptions, context: &SensorContext) -> Result<Self, Fault> {
-        Ok(Self(context.clone()))
+/// Does not return once the robot is armed.
+fn hang(_: u32, _: MonotonicTime) -> Read {
+    if BUS.get().is_some_and(|bus| bus.safety() != Safety::Disarmed) {
+        println!("it hangs");
+        park();
     }
+    Ok(Reading::nothing())
+}
 
-    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        if self.0.bus().safety() != Safety::Disarmed {
-            println!("it hangs");
-            loop {
-                std::thread::park();
-            }
-        }
-        Ok(Reading::nothing())
+fn park() -> ! {
+    loop {
+        std::thread::park();
     }
 }
 
 /// Takes its time to become safe, and says so.
-#[derive(Debug)]
-struct Motor;
-
-impl Actuator for Motor {
-    type Options = NoOptions;
-    type Command = Number;
-
-    fn init(_: NoOptions, _: &ActuatorContext) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-
-    fn handle_command(&mut self, _: &Stamped<Number>) -> Result<(), Fault> {
-        Ok(())
-    }
-
-    fn disarm(&mut self) -> Result<(), Fault> {
-        std::thread::sleep(Duration::from_millis(700));
-        println!("the motor is safe");
-        Ok(())
-    }
+fn slow(_: f64) -> Done {
+    std::thread::sleep(Duration::from_millis(700));
+    println!("the motor is safe");
+    Ok(())
 }
 
 robot! {
     robot Stuck;
     link base {
-        sensor device: Hangs() { rate: 100 Hz; }
-        joint wheel: continuous { axis: z; sensor encoder: External<JointState>(); actuator motor: Motor(); link rim { } }
+        sensor device: Source(init = keep_bus, read = hang) { rate: 100 Hz; }
+        joint wheel: continuous { axis: z; sensor encoder: External<Number>(); actuator motor: Servo(disarm = slow); link rim { } }
     }
 }
 
 /// Runs `test` of this binary in another process, whose lines are returned as they come.
-fn child(test: &str) -> Result<(std::process::Child, impl Iterator<Item = String>), Box<dyn std::error::Error>> {
+fn child(test: &str) -> Result<(std::process::Child, impl Iterator<Item = String>), Failure> {
     let mut child = Process::new(std::env::current_exe()?)
         .args([test, "--exact", "--nocapture"])
         .env("BB_TEST_SIGNAL", "1")
@@ -136,7 +99,7 @@ fn signal(child: &std::process::Child, name: &str) -> std::io::Result<()> {
     Process::new("kill").args([name, &child.id().to_string()]).status().map(drop)
 }
 
-fn run_stuck() -> Result<(), Box<dyn std::error::Error>> {
+fn run_stuck() -> Result<(), Failure> {
     let mut running = Stuck::builder().start()?;
     running.stop_on_signals()?;
     running.arm()?;
@@ -152,8 +115,7 @@ fn run_stuck() -> Result<(), Box<dyn std::error::Error>> {
 }
 
 #[test]
-fn after_a_signal_a_driver_that_hangs_keeps_neither_wait_nor_the_report() -> Result<(), Box<dyn std::error::Error>>
-{
+fn after_a_signal_a_driver_that_hangs_keeps_neither_wait_nor_the_report() -> Result<(), Failure> {
     const NAME: &str = "processes::features::after_a_signal_a_driver_that_hangs_keeps_neither_wait_nor_the_report";
     if std::env::var_os("BB_TEST_SIGNAL").is_some() {
         return run_stuck();
@@ -178,7 +140,7 @@ fn after_a_signal_a_driver_that_hangs_keeps_neither_wait_nor_the_report() -> Res
 
 #[cfg(unix)]
 #[test]
-fn a_second_signal_ends_the_process_once_the_robot_is_safe() -> Result<(), Box<dyn std::error::Error>> {
+fn a_second_signal_ends_the_process_once_the_robot_is_safe() -> Result<(), Failure> {
     use std::os::unix::process::ExitStatusExt as _;
     const NAME: &str = "processes::features::a_second_signal_ends_the_process_once_the_robot_is_safe";
     const SIGTERM: i32 = 15;
@@ -202,7 +164,7 @@ fn a_second_signal_ends_the_process_once_the_robot_is_safe() -> Result<(), Box<d
 
 /// This test runs itself as another process, which gets the signal.
 #[test]
-fn a_signal_disarms_and_stops() -> Result<(), Box<dyn std::error::Error>> {
+fn a_signal_disarms_and_stops() -> Result<(), Failure> {
     const NAME: &str = "processes::features::a_signal_disarms_and_stops";
     if std::env::var_os("BB_TEST_SIGNAL").is_some() {
         let mut running = Stoppable::builder().start()?;
@@ -210,7 +172,13 @@ fn a_signal_disarms_and_stops() -> Result<(), Box<dyn std::error::Error>> {
         running.arm().expect("it may be armed");
         println!("it is {}", running.safety());
         running.wait();
+        let live = running.live();
         println!("it is {}", running.stop().safety);
+        // A handle that is left keeps no thread.
+        while cfg!(target_os = "linux") && threads("disarm")? > 0 {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        drop(live);
         return Ok(());
     }
     let (mut child, mut lines) = child(NAME)?;
@@ -221,52 +189,110 @@ fn a_signal_disarms_and_stops() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
+/// The number of threads of this process with that name.
+fn threads(name: &str) -> Result<usize, Failure> {
+    let tasks = std::fs::read_dir("/proc/self/task")?;
+    // One that has ended meanwhile has no name.
+    let names = tasks.filter_map(|task| std::fs::read_to_string(task.ok()?.path().join("comm")).ok());
+    Ok(names.filter(|found| found.trim_end() == name).count())
+}
+
+#[test]
+fn one_signal_stops_all_robots_of_a_process_and_is_not_for_later_ones() -> Result<(), Failure> {
+    const NAME: &str = "processes::features::one_signal_stops_all_robots_of_a_process_and_is_not_for_later_ones";
+    if std::env::var_os("BB_TEST_SIGNAL").is_some() {
+        for robots in [2, 1] {
+            let running = (0..robots).map(|_| -> Result<_, Failure> {
+                let running = Stoppable::builder().start()?;
+                running.stop_on_signals()?;
+                running.arm()?;
+                Ok(running)
+            });
+            let running = running.collect::<Result<Vec<_>, _>>()?;
+            println!("{robots} armed");
+            for mut running in running {
+                running.wait();
+                println!("one is {}", running.stop().safety);
+            }
+        }
+        return Ok(());
+    }
+    let (mut child, mut lines) = child(NAME)?;
+    for robots in [2, 1] {
+        let armed = format!("{robots} armed");
+        assert!(lines.by_ref().any(|line| line.ends_with(&armed)), "{armed}");
+        // Not the same signal as the one before.
+        std::thread::sleep(Duration::from_millis(550));
+        signal(&child, "-TERM")?;
+        let said: Vec<_> = lines.by_ref().take(robots).collect();
+        assert_eq!(said, vec!["one is disarmed"; robots]);
+    }
+    assert!(child.wait()?.success());
+    Ok(())
+}
+
+/// On virtual time, a disarm callback runs on the thread that stops the robot.
+#[cfg(unix)]
+#[test]
+fn a_second_signal_ends_a_simulation_that_hangs() -> Result<(), Failure> {
+    use std::os::unix::process::ExitStatusExt as _;
+    const NAME: &str = "processes::features::a_second_signal_ends_a_simulation_that_hangs";
+    const SIGTERM: i32 = 15;
+    if std::env::var_os("BB_TEST_SIGNAL").is_some() {
+        let mut builder = Stuck::builder();
+        builder.options(stuck::sensor::base::device).read = |_, _| Ok(Reading::nothing());
+        builder.options(stuck::actuator::base::wheel::motor).disarm = |_| {
+            println!("it hangs");
+            park();
+        };
+        let simulation = builder.simulate()?;
+        simulation.stop_on_signals()?;
+        simulation.arm()?;
+        println!("it is armed");
+        park();
+    }
+    let (mut child, mut lines) = child(NAME)?;
+    assert!(lines.by_ref().any(|line| line.ends_with("it is armed")), "it is armed");
+    signal(&child, "-INT")?;
+    assert!(lines.by_ref().any(|line| line.ends_with("it hangs")), "it is being made safe");
+    std::thread::sleep(Duration::from_millis(550));
+    signal(&child, "-TERM")?;
+    assert_eq!(child.wait()?.signal(), Some(SIGTERM));
+    Ok(())
+}
+
 /// Times at which the devices were safe.
 static SAFE: Mutex<Vec<std::time::Instant>> = Mutex::new(Vec::new());
 static DEVICES: AtomicU32 = AtomicU32::new(0);
 
-/// Takes its time to become safe; the first one hangs.
-#[derive(Debug)]
-struct Device;
-
-impl Sensor for Device {
-    type Options = NoOptions;
-    type Output = Number;
-
-    fn init(_: NoOptions, context: &SensorContext) -> Result<Self, Fault> {
-        let is_first = DEVICES.fetch_add(1, Ordering::SeqCst) == 0;
-        context.on_disarm(move || {
-            if is_first {
-                loop {
-                    std::thread::park();
-                }
-            }
-            std::thread::sleep(Duration::from_millis(400));
-            SAFE.lock().unwrap_or_else(PoisonError::into_inner).push(std::time::Instant::now());
-            Ok(())
-        });
-        Ok(Self)
-    }
-
-    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        Ok(Reading::finished())
-    }
+/// Has a device take its time to become safe; the first one hangs.
+fn device(context: &SensorContext) -> Done {
+    let is_first = DEVICES.fetch_add(1, Ordering::SeqCst) == 0;
+    context.on_disarm(move || {
+        if is_first {
+            park();
+        }
+        std::thread::sleep(Duration::from_millis(400));
+        lock(&SAFE).push(std::time::Instant::now());
+        Ok(())
+    });
+    Ok(())
 }
 
 robot! {
     robot Crowded;
     link base {
-        sensor a: Device() { rate: 1 Hz; }
-        sensor b: Device() { rate: 1 Hz; }
-        sensor c: Device() { rate: 1 Hz; }
-        sensor d: Device() { rate: 1 Hz; }
-        sensor e: Device() { rate: 1 Hz; }
+        sensor a: Source(init = device) { rate: 1 Hz; }
+        sensor b: Source(init = device) { rate: 1 Hz; }
+        sensor c: Source(init = device) { rate: 1 Hz; }
+        sensor d: Source(init = device) { rate: 1 Hz; }
+        sensor e: Source(init = device) { rate: 1 Hz; }
     }
 }
 
 #[cfg(target_os = "linux")]
 #[test]
-fn where_no_thread_can_be_started_all_are_made_safe_at_once() -> Result<(), Box<dyn std::error::Error>> {
+fn where_no_thread_can_be_started_all_are_made_safe_at_once() -> Result<(), Failure> {
     use std::io::Write as _;
     const NAME: &str = "processes::features::where_no_thread_can_be_started_all_are_made_safe_at_once";
     if std::env::var_os("BB_TEST_SIGNAL").is_some() {
@@ -289,7 +315,7 @@ fn where_no_thread_can_be_started_all_are_made_safe_at_once() -> Result<(), Box<
 /// Waits until all other threads sleep: one that has only just been started still allocates its signal stack, and the limit would
 /// end it.
 #[cfg(target_os = "linux")]
-fn await_started_threads() -> Result<(), Box<dyn std::error::Error>> {
+fn await_started_threads() -> Result<(), Failure> {
     let own = std::fs::read_link("/proc/thread-self")?;
     let sleeps = |entry: std::io::Result<std::fs::DirEntry>| {
         let path = entry?.path();
@@ -309,7 +335,7 @@ fn await_started_threads() -> Result<(), Box<dyn std::error::Error>> {
 }
 
 #[cfg(target_os = "linux")]
-fn stop_without_threads() -> Result<(), Box<dyn std::error::Error>> {
+fn stop_without_threads() -> Result<(), Failure> {
     let running = Crowded::builder().start()?;
     await_started_threads()?;
     println!("it runs");
@@ -321,7 +347,7 @@ fn stop_without_threads() -> Result<(), Box<dyn std::error::Error>> {
     running.request_stop();
     let returned = start.elapsed();
     assert!(returned < Duration::from_millis(200), "the caller was kept for {returned:?}");
-    while SAFE.lock().unwrap_or_else(PoisonError::into_inner).len() < 4 {
+    while lock(&SAFE).len() < 4 {
         assert!(start.elapsed() < Duration::from_millis(1500), "one after the other takes 1.6 s");
         std::thread::sleep(Duration::from_millis(1));
     }

@@ -211,7 +211,18 @@ impl<R: Robot> Live<R> {
     #[cfg(feature = "signals")]
     pub fn stop_on_signals(&self) -> std::io::Result<()> {
         let (live, control, machine) = (self.clone(), self.machine.control.clone(), Arc::clone(&self.machine));
-        let stop = move || live.request_stop();
+        let stop = move || {
+            // On virtual time the caller runs the disarm callbacks, which may hang: the thread that waits for signals must not.
+            let stopped = live.clone();
+            let is_left = live.clock().is_virtual()
+                && std::thread::Builder::new()
+                    .name("stop".to_owned())
+                    .spawn(move || stopped.request_stop())
+                    .is_ok();
+            if !is_left {
+                live.request_stop();
+            }
+        };
         super::signals::stop_on_signals(stop, move || control.wait_until_disarmed(), move || machine.has_ended())
     }
 

@@ -25,7 +25,7 @@ static STOPPING: Mutex<Stopping> = Mutex::new(Stopping { robots: Vec::new(), fir
 static HANDLED: Mutex<bool> = Mutex::new(false);
 
 /// Has the first signal stop all robots of the process, and a later one end it once all are safe. The thread that waits for
-/// signals runs no user code of a robot in real time.
+/// signals runs these functions, which must not run user code.
 pub(super) fn stop_on_signals(
     stop: impl Fn() + Send + 'static,
     wait_until_safe: impl Fn() + Send + 'static,
