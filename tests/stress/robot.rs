@@ -186,6 +186,43 @@ impl Estimator for Join {
     }
 }
 
+/// What a [`Squall`] counts.
+#[derive(Clone, Copy, Debug, PartialEq, Payload)]
+pub(crate) struct Gust {
+    pub(crate) speed: f64,
+}
+
+/// All that has come since the last run, and what other code publishes.
+#[derive(Clone, Copy, Debug, Inputs)]
+pub(crate) struct Fronts<'a> {
+    dice: Input<'a, Dice>,
+    fronts: Every<'a, Dice>,
+    newest: Option<Input<'a, Dice>>,
+}
+
+/// Emits none, one or several at times of their own in one reply.
+#[derive(Debug)]
+pub(crate) struct Squall;
+
+impl Estimator for Squall {
+    type Options = NoOptions;
+    type Input = Fronts<'static>;
+    type Output = Vec<Timed<Gust>>;
+
+    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+
+    fn handle_input(&mut self, fronts: Fronts<'_>) -> Result<Reply<Vec<Timed<Gust>>>, Fault> {
+        let newest = fronts.newest.map_or(0.0, |newest| newest.0);
+        let of_fronts = fronts.fronts.iter().map(|front| (front.monotonic_time, front.0 + newest));
+        let of_dice =
+            (0..fronts.dice.0.abs() as u32 % 4).map(|number| (fronts.dice.monotonic_time, f64::from(number)));
+        let gusts = of_fronts.chain(of_dice);
+        Ok(Reply::emit(gusts.map(|(time, speed)| Timed::new(time, Gust { speed })).collect()))
+    }
+}
+
 /// An actuator that fails at some commands, and sometimes cannot be disarmed at first.
 #[derive(Debug)]
 pub(crate) struct Motor(f64);
@@ -275,6 +312,7 @@ robot! {
     parameters {
         gain: f64 = 1.0, range: -1.0..=2.0;
         pace: f64 = 1.0;
+        lull: f64 = 1.0;
     }
     states { careful; }
     commands {
@@ -285,7 +323,15 @@ robot! {
         react: Drive(steps = 2) { category: motion; allowed_states: [idle, executing, careful]; cancel: [motion]; }
         halt: Drive(steps = 1) { allowed_states: [idle, executing, careful]; cancel: all; }
     }
-    controllers { controller minder: Minder() { rate: 90 Hz; } }
+    controllers {
+        controller minder: Minder() { rate: 90 Hz; }
+        controller gale: Reaction(
+            when = estimator::base::squall.speed, above = 400.0, for = 4 ms, run = command::react, cooldown = 9 ms,
+        );
+        controller calm: Reaction(
+            when = estimator::base::squall.speed, below = param::lull, run = command::drive, cooldown = 30 ms,
+        ) { rate: 70 Hz; }
+    }
 
     link base {
         sensor a: Storm(gain = param::gain) {
@@ -309,6 +355,11 @@ robot! {
             lost_after: 20 ms;
         }
         estimator far: Fickle(gain = param::pace) { input dice: sensor::base::b::beside; runs_on: worker; lost_after: 9 ms; }
+        estimator squall: Squall() {
+            input dice: sensor::base::b, driver;
+            input fronts: weather::front, external;
+            input newest: weather::front, external, optional;
+        }
         estimator last: Fickle() { input dice: far; latency_budget: 300 us; }
         joint arm: continuous {
             axis: z;
