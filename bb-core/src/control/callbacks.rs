@@ -360,8 +360,8 @@ impl Drop for Inside {
 
 #[cfg(all(test, not(loom)))]
 mod tests {
-    use super::super::bare;
     use super::*;
+    use crate::control::bare;
     use crate::node::Mode;
     use std::sync::mpsc;
     use std::time::Duration;
