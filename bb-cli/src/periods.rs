@@ -13,6 +13,9 @@ pub(crate) struct Periods {
     pub(crate) median_s: f64,
     /// Whether messages come at a rate; unknown if there are few.
     pub(crate) regular: Option<bool>,
+    /// Periods that differ from another, if they do by much; known only if they come regularly.
+    #[serde(skip)]
+    pub(crate) jitter: Option<Jitter>,
     /// Gaps in the messages; known only if they come regularly.
     #[serde(skip)]
     pub(crate) gaps: Vec<Gap>,
@@ -22,6 +25,13 @@ pub(crate) struct Periods {
     /// The number of messages with the same time as the previous one.
     #[serde(skip)]
     pub(crate) repeated: usize,
+}
+
+/// The deviation of one period in ten from a multiple of the shortest usual period.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Jitter {
+    pub(crate) period_s: f64,
+    pub(crate) deviation_s: f64,
 }
 
 /// A time without messages.
@@ -34,6 +44,8 @@ pub(crate) struct Gap {
 
 /// A period longer than this many medians is a gap.
 const GAP: f64 = 3.0;
+/// Periods jitter if one in ten deviates by this part.
+const JITTER: f64 = 0.25;
 /// Messages are regular if nine of ten periods are at most this many medians,
 const REGULAR: f64 = 2.0;
 /// and nine of ten are not this many times shorter than the median, as in a burst;
@@ -57,6 +69,7 @@ impl Periods {
         let tenths = |tenths: usize| sorted[sorted.len() * tenths / 10];
         let is_regular = tenths(9) <= REGULAR * median_s && tenths(1) * BURST >= median_s && median_s > 0.0;
         let regular = (sorted.len() >= FEWEST).then_some(is_regular);
+        let jitter = (regular == Some(true)).then(|| jitter(&sorted)).flatten();
         let gaps = steps().enumerate().filter(|(_, step)| regular == Some(true) && *step > GAP * median_s);
         Some(Self {
             mean_s,
@@ -65,6 +78,7 @@ impl Periods {
             std_s: variance.sqrt(),
             median_s,
             regular,
+            jitter,
             gaps: gaps.map(|(after, length_s)| Gap { after, length_s }).collect(),
             backward: steps().enumerate().filter(|(_, step)| *step < 0.0).map(|(index, _)| index + 1).collect(),
             repeated: steps().filter(|step| *step == 0.0).count(),
@@ -73,7 +87,7 @@ impl Periods {
 
     /// The same for events: they have no rate, and so no gaps.
     pub(crate) fn of_events(self) -> Self {
-        Self { regular: Some(false), gaps: Vec::new(), ..self }
+        Self { regular: Some(false), jitter: None, gaps: Vec::new(), ..self }
     }
 
     /// Messages per second, if they come at a rate.
@@ -89,6 +103,18 @@ impl Periods {
             (None, _) => "-".to_owned(),
         }
     }
+}
+
+/// The jitter of periods in ascending order. A message that is missing leaves a multiple of the period.
+fn jitter(sorted: &[f64]) -> Option<Jitter> {
+    let short = sorted[sorted.len() / 10];
+    let usual = &sorted[..sorted.partition_point(|period| *period < 1.5 * short)];
+    let period_s = *usual.get(usual.len() / 2)?;
+    let off = |period: &f64| (period - (period / period_s).round() * period_s).abs();
+    let mut deviations: Vec<f64> = sorted.iter().map(off).collect();
+    deviations.sort_by(f64::total_cmp);
+    let deviation_s = deviations[deviations.len() * 9 / 10];
+    (deviation_s > JITTER * period_s).then_some(Jitter { period_s, deviation_s })
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Topics of a bag by the names on the command line, and their messages of any type.
 
 use crate::values::FromJson;
+use bb_core::message::codec::ros::Header;
 use bb_eval::filters::near;
 use bb_mcap::{Bag, BagMessage, MessageDefinition, Topic, Value};
 use std::path::Path;
@@ -73,12 +74,15 @@ impl TopicReader {
 
     /// The time in the header of a message, nanoseconds; `None` if it has no header, or the header has no time.
     pub(crate) fn stamp_ns(&self, message: &BagMessage) -> Option<i64> {
+        let stamp_ns = self.header(message)?.stamp.wall_time().as_unix_nanos();
+        // Zero means not set, except for a clock that begins with the recording.
+        (stamp_ns != 0 || message.log_time_ns < SECOND_NS).then_some(stamp_ns)
+    }
+
+    /// The header of a message, if its type has one.
+    pub(crate) fn header(&self, message: &BagMessage) -> Option<Header> {
         match self {
-            Self::Cdr(definition) if definition.has_header() => {
-                let stamp_ns = message.header().ok()?.stamp.wall_time().as_unix_nanos();
-                // Zero means not set, except for a clock that begins with the recording.
-                (stamp_ns != 0 || message.log_time_ns < SECOND_NS).then_some(stamp_ns)
-            }
+            Self::Cdr(definition) if definition.has_header() => message.header().ok(),
             _ => None,
         }
     }

@@ -1,17 +1,23 @@
 //! `bb info`: the contents of recordings, and anything that looks wrong in them.
 
 mod date;
+mod latency;
+mod motion;
+mod offset;
 mod quantities;
 mod remark;
 mod report;
 mod scan;
+mod scatter;
+mod signals;
 mod times;
 
 use bb_eval::files;
 use clap::Args;
 use std::path::PathBuf;
 
-/// Describes recordings: topics, types, rates, and what looks wrong (gaps, clocks, units, damage).
+/// Describes recordings: topics, types, frames, rates, and what looks wrong: gaps, clocks, units, latencies between
+/// sensors, covariances that fixes do not keep to, uncalibrated magnetometers, damage.
 #[derive(Debug, Args)]
 #[command(after_help = "Exit code: 0; 1 if a file is damaged or could not be read; 2 for a wrong use.")]
 pub(crate) struct Arguments {

@@ -1,9 +1,12 @@
 //! `bb info`, `echo`, `hz`, `plot` and `recover`, on small recordings made here.
 
-use crate::common::bags::ros::{Header, Imu, MagneticField, Stamp, Vector3};
+use crate::common::bags::ros::{
+    Header, Imu, MagneticField, NavSatFix, Pose, PoseStamped, Quaternion, Stamp, Vector3,
+};
 use crate::common::bags::{Maker, little};
 use crate::common::{bb, file};
 use bb_core::message::Schema;
+use bb_core::nalgebra;
 use bb_core::prelude::*;
 use mcap::WriteOptions;
 use serde_json::Value;
@@ -72,7 +75,11 @@ fn info(file: &Path) -> Value {
 
 /// The remarks of all topics, after their subjects.
 fn remarks(walk: &Walk, name: &str) -> Vec<String> {
-    let info = info(&walk.file(name));
+    remarks_of(&walk.file(name))
+}
+
+fn remarks_of(file: &Path) -> Vec<String> {
+    let info = info(file);
     let topics = info["topics"].as_array().expect("an array");
     let remarks = topics.iter().flat_map(|topic| topic["remarks"].as_array().expect("an array"));
     let text = |value: &Value| value.as_str().expect("text").to_owned();
@@ -105,7 +112,9 @@ fn units_that_look_wrong_are_named() {
     assert_eq!(said, "unit: the specific force has a median of 1.000: it looks to be in g; ROS has m/s²");
     let said = unit(Walk { gyroscope: 57.29578, ..Walk::default() }, "info_deg.mcap");
     assert!(
-        said.starts_with("unit: the angular velocity looks to be in deg/s: over a second gravity turns"),
+        said.starts_with(
+            "unit: the angular velocity looks to be in deg/s: where the body does not accelerate, gravity turns"
+        ),
         "{said}"
     );
     let said = unit(Walk { field: 0.48, ..Walk::default() }, "info_gauss.mcap");
@@ -125,6 +134,124 @@ fn gaps_and_clocks_are_told_with_their_places() {
     assert_eq!(back[0], "clock: 1 stamp goes back in time; the farthest by 0.005000 s, at 5.000 s");
     let boot = remarks(&Walk { stamp: |index, _| 5 + index * 10_000_000, ..Walk::default() }, "info_boot.mcap");
     assert!(boot[0].starts_with("clock: the stamps are 1700000000.000 s before the log times"), "{boot:?}");
+}
+
+/// A minute of a hand that turns an IMU about, with a magnetometer, a truth of it, and fixes of a car on a winding road.
+#[derive(Clone, Copy)]
+struct Turns {
+    /// By which magnetometer, truth and fixes are stamped late, s.
+    late_s: [f64; 3],
+    /// The deviation of fixes in the second half, of all that state 1 cm, m.
+    scatter: f64,
+    /// Of the magnetometer, T.
+    offset: f64,
+    /// Of the IMU's stamps, half milliseconds.
+    jitter: u64,
+}
+
+impl Turns {
+    fn remarks(self, name: &str) -> Vec<String> {
+        let mut maker = Maker::new(WriteOptions::new().chunk_size(Some(50_000)));
+        let topics = [
+            ("/imu", IMU),
+            ("/mag", "sensor_msgs/msg/MagneticField"),
+            ("/truth", "geometry_msgs/msg/PoseStamped"),
+            ("/fix", "sensor_msgs/msg/NavSatFix"),
+        ]
+        .map(|(topic, schema)| maker.topic(topic, schema));
+        let header = |time_ns: u64, frame: &str| {
+            let stamp = Stamp { sec: (time_ns / 1_000_000_000) as i32, nanosec: (time_ns % 1_000_000_000) as u32 };
+            Header { stamp, frame_id: frame.into() }
+        };
+        let vector = |v: nalgebra::Vector3<f64>| Vector3 { x: v.x, y: v.y, z: v.z };
+        let turned = |time: f64| {
+            let angles = [(1.3 * time).sin(), 0.7 * (2.1 * time).cos(), 1.2 * (0.9 * time).sin()];
+            nalgebra::UnitQuaternion::from_scaled_axis(nalgebra::Vector3::from(angles))
+        };
+        for index in 0..6000_u64 {
+            let time = index as f64 * 0.01;
+            let log = START_NS + index * 10_000_000;
+            let late = |late_s: f64| (log as i64 + (late_s * 1e9) as i64) as u64;
+            let rotation = turned(time);
+            let rate = (turned(time - 5e-4).inverse() * turned(time + 5e-4)).scaled_axis() / 1e-3;
+            // North and east, 20 m/s: 6 m to both sides.
+            let place = nalgebra::Vector3::new(6.0 * (0.8 * time).sin(), 20.0 * time, 0.0);
+            let force = nalgebra::Vector3::new(-6.0 * 0.64 * (0.8 * time).sin(), 0.0, 9.81);
+            let sample = Imu {
+                header: header(log + index * 7 % 11 * self.jitter * 500_000, "imu_link"),
+                angular_velocity: vector(rate),
+                linear_acceleration: vector(rotation.inverse() * force),
+                ..Imu::default()
+            };
+            maker.bytes_at(topics[0], log, &little(&sample));
+            if index % 2 == 0 {
+                let field = rotation.inverse() * nalgebra::Vector3::new(0.0, 2e-5, -4e-5);
+                let magnetic_field = vector(field.add_scalar(self.offset));
+                let stamped = header(late(self.late_s[0]), "imu_link");
+                let field = MagneticField { header: stamped, magnetic_field, ..Default::default() };
+                maker.bytes_at(topics[1], log, &little(&field));
+                let orientation = Quaternion { x: rotation.i, y: rotation.j, z: rotation.k, w: rotation.w };
+                let pose = Pose { orientation, ..Pose::default() };
+                let stamped = header(late(self.late_s[1]), "world");
+                maker.bytes_at(topics[2], log, &little(&PoseStamped { header: stamped, pose }));
+            }
+            if index % 20 == 0 {
+                let deviation = if index < 3000 { 0.01 } else { self.scatter };
+                let noise = |axis: u64| {
+                    let bits = ((index * 3 + axis + 1) as u32).wrapping_mul(2_654_435_761) >> 8;
+                    (f64::from(bits) / f64::from(1 << 23) - 1.0) * 3_f64.sqrt() * deviation
+                };
+                let metres = 6_378_137.0_f64.to_radians();
+                let fix = NavSatFix {
+                    header: header(late(self.late_s[2]), "gps"),
+                    latitude: (place.y + noise(0)) / metres,
+                    longitude: (place.x + noise(1)) / metres,
+                    altitude: noise(2),
+                    position_covariance: [1e-4, 0.0, 0.0, 0.0, 1e-4, 0.0, 0.0, 0.0, 1e-4],
+                    position_covariance_type: 2,
+                    ..Default::default()
+                };
+                maker.bytes_at(topics[3], log, &little(&fix));
+            }
+        }
+        remarks_of(&file(name, &maker.finish()))
+    }
+}
+
+/// What is odd between sensors is told, each by itself.
+#[test]
+fn latencies_scatter_offsets_and_jitter_are_told() {
+    let good = Turns { late_s: [0.0; 3], scatter: 0.01, offset: 0.0, jitter: 0 };
+    assert_eq!(good.remarks("info_turns.mcap"), [""; 0]);
+    let late = |late_s| Turns { late_s, ..good }.remarks("info_late.mcap");
+    let said = |ms: u32, order: &str, what: &str| {
+        format!("latency: its stamps are {ms} ms {order} those of /imu for the same motion, as {what} of both show")
+    };
+    assert_eq!(late([0.04, 0.0, 0.0]), [said(40, "after", "the turns")]);
+    assert_eq!(late([0.0, -0.02, 0.0]), [said(20, "before", "the turns")]);
+    assert_eq!(late([0.0, 0.0, 0.12]), [said(120, "after", "the accelerations")]);
+    let scatter = Turns { scatter: 4.0, ..good }.remarks("info_scatter.mcap");
+    assert_eq!(scatter.len(), 1, "{scatter:?}");
+    assert!(scatter[0].starts_with("covariance: 15"), "{scatter:?}");
+    assert!(scatter[0].contains(" of 300 fixes, from 29."), "{scatter:?}");
+    assert!(scatter[0].ends_with("m about the motion that /imu measures, and state 1.7 cm"), "{scatter:?}");
+    let offset = Turns { offset: 3e-5, ..good }.remarks("info_offset.mcap");
+    assert_eq!(
+        offset,
+        [
+            "calibration: the magnetometer is not calibrated: its readings lie on a sphere of 45 µT about (30, 30, 30) µT"
+        ]
+    );
+    let jitter = Turns { jitter: 1, ..good }.remarks("info_jitter.mcap");
+    assert!(jitter[0].starts_with("clock: the stamps jitter: of the periods of "), "{jitter:?}");
+}
+
+#[test]
+fn frames_are_listed() {
+    let output = bb(&["info", Walk::default().file("info_frames.mcap").to_str().expect("is text")]);
+    let head = output.out.lines().nth(2).expect("a head");
+    assert_eq!(head.split_whitespace().take(3).collect::<Vec<_>>(), ["topic", "type", "frame"], "{}", output.out);
+    assert!(output.out.contains("sensor_msgs/msg/Imu            imu        1000"), "{}", output.out);
 }
 
 #[test]

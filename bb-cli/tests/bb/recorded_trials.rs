@@ -48,7 +48,9 @@ fn units_are_told_on_real_recordings() {
     for file in broad().expect("they are there") {
         let remarks = |file: &Path| {
             let output = bb(&["info", "--json", file.to_str().expect("is text")]).out;
-            output.lines().filter(|line| line.contains("\"text\"")).map(str::to_owned).collect::<Vec<_>>()
+            // The magnetometer is late, in any unit.
+            let is_said = |line: &&str| line.contains("\"text\"") && !line.contains("its stamps are ");
+            output.lines().filter(is_said).map(str::to_owned).collect::<Vec<_>>()
         };
         let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join("cut.mcap");
         cut(&file, true, &out);
@@ -89,4 +91,55 @@ fn ten_trials() {
     let line = table.out.lines().find(|line| line.starts_with("mean of 10") && line.contains("complementary"));
     let cells: Vec<_> = line.expect("there is one").split_whitespace().collect();
     assert_eq!(cells[4], format!("{:.2}", mean("complementary", "total_deg")));
+}
+
+/// What `bb info` says of recordings of others, but for gaps and the jitter of some phones' magnetometers: latencies of
+/// magnetometers and of the car's receiver, and magnetometers that nobody calibrated. Nothing is said of units, of
+/// covariances, or of a truth.
+#[test]
+#[ignore = "needs the recordings that BB_DATA names"]
+fn remarks_are_true_of_the_recordings_of_others() {
+    let data = bb_tests::recordings::families().expect("BB_DATA");
+    let mut latencies = 0;
+    for folder in ["broad", "phones", "vehicles"] {
+        let output = bb(&["info", "--json", data.join(folder).to_str().expect("is text")]);
+        assert_eq!(output.code, Some(0), "{}", output.err);
+        let rows: Vec<Value> = serde_json::from_str(&output.out).expect("an array");
+        for row in &rows {
+            let file = Path::new(row["file"].as_str().expect("text")).file_stem().expect("has a name");
+            let file = file.to_str().expect("text");
+            let topics = row["topics"].as_array().expect("an array").iter();
+            let remarks = topics.flat_map(|topic| {
+                let name = topic["name"].as_str().expect("text");
+                topic["remarks"].as_array().expect("an array").iter().map(move |remark| (name, remark))
+            });
+            let mut is_calibrated = true;
+            for (topic, remark) in remarks {
+                let [subject, text] = ["subject", "text"].map(|field| remark[field].as_str().expect("text"));
+                let is_true = match subject {
+                    "gap" => true,
+                    "clock" => topic == "/mag" && text.starts_with("the stamps jitter") && file.contains("iphone"),
+                    "latency" => {
+                        latencies += 1;
+                        let ms = text.strip_prefix("its stamps are ").and_then(|text| text.split(' ').next());
+                        let ms: u32 = ms.expect("a latency").parse().expect("a number");
+                        match folder {
+                            "vehicles" => {
+                                file.starts_with("drive") && topic.ends_with("/fix") && (60..=110).contains(&ms)
+                            }
+                            _ => topic == "/mag" && (10..=34).contains(&ms) && text.contains("after"),
+                        }
+                    }
+                    "unit" | "calibration" if text.contains("not calibrated") => {
+                        is_calibrated = false;
+                        topic == "/mag" && file.ends_with("_raw")
+                    }
+                    _ => false,
+                };
+                assert!(is_true, "{file}: {topic}: {subject}: {text}");
+            }
+            assert_eq!(is_calibrated, !file.ends_with("_raw"), "{file}");
+        }
+    }
+    assert!(latencies >= 25, "{latencies}");
 }

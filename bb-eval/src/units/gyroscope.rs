@@ -1,5 +1,5 @@
-//! Checks whether the gyroscope is in rad/s: over a second, the direction of gravity must turn as the gyroscope
-//! reports.
+//! Checks whether the gyroscope is in rad/s: while the body does not accelerate, the direction of gravity must turn as
+//! the gyroscope reports.
 
 use bb_core::nalgebra::{UnitQuaternion, Vector3};
 
@@ -15,14 +15,23 @@ const FEWEST: usize = 3;
 const WRONG: f64 = 0.1;
 /// and the other unit by this factor less.
 const CLEARER: f64 = 3.0;
+/// The body does not accelerate where the force is gravity within this part of it, which tilts it by 11 deg at most.
+const STEADY: f64 = 0.02;
+/// Gravity as it is measured, m/s², g and mg,
+const GRAVITIES: [f64; 3] = [9.806_65, 1.0, 1000.0];
+/// is known within this part: what the accelerometer's scale and offset may be wrong by.
+const WITHIN: f64 = 0.06;
 /// The largest rate of a robot's gyroscope, rad/s: 2,000 deg/s.
 const FASTEST: f64 = 35.0;
 
 type Sample = (f64, Vector3<f64>, Vector3<f64>);
 
-/// A remark on the unit; `None` if it is right, or the recording does not show it.
-pub(super) fn verdict(samples: &[Sample]) -> Option<String> {
+/// A remark on the unit; `None` if it is right, or the recording does not show it. `calm` is the force at the calmest.
+pub(super) fn verdict(samples: &[Sample], calm: Option<f64>) -> Option<String> {
+    let gravity = calm.filter(|calm| GRAVITIES.iter().any(|known| (calm / known - 1.0).abs() < WITHIN));
+    let is_steady = |span: &&[Sample]| gravity.is_some_and(|gravity| is_steady(span, gravity));
     let mut errors: Vec<(f64, f64)> = spans(samples)
+        .filter(is_steady)
         .map(|span| (error(span, 1.0), error(span, std::f64::consts::PI / 180.0)))
         // Spans at rest are uninformative: both units give no turn.
         .filter(|(as_radians, as_degrees)| as_radians.max(*as_degrees) > WRONG)
@@ -35,8 +44,8 @@ pub(super) fn verdict(samples: &[Sample]) -> Option<String> {
         let (as_radians, as_degrees) = (median(|error| error.0), median(|error| error.1));
         if as_radians > WRONG && as_radians > CLEARER * as_degrees {
             return Some(format!(
-                "the angular velocity looks to be in deg/s: over a second gravity turns as it says within {:.1} deg, and \
-                 read as rad/s within {:.1} deg; ROS has rad/s",
+                "the angular velocity looks to be in deg/s: where the body does not accelerate, gravity turns over a \
+                 second as it says within {:.1} deg, and read as rad/s within {:.1} deg; ROS has rad/s",
                 as_degrees.to_degrees(),
                 as_radians.to_degrees()
             ));
@@ -50,6 +59,14 @@ pub(super) fn verdict(samples: &[Sample]) -> Option<String> {
     let fast = *rates.get(rates.len() * 99 / 100)?;
     (fast > FASTEST).then(|| {
         format!("the angular velocity reaches {fast:.0} rad/s, more than gyroscopes measure: it looks to be in deg/s; ROS has rad/s")
+    })
+}
+
+/// Whether the body does not accelerate: the means of a few samples each are gravity.
+fn is_steady(span: &[Sample], gravity: f64) -> bool {
+    span.chunks_exact(MEAN).all(|few| {
+        let mean = few.iter().map(|(.., force)| force).sum::<Vector3<f64>>() / MEAN as f64;
+        (mean.norm() / gravity - 1.0).abs() < STEADY
     })
 }
 
@@ -101,6 +118,30 @@ mod tests {
                 (time, Vector3::new((rate + 0.002) * unit, 0.001, 0.0), force)
             })
             .collect()
+    }
+
+    fn verdict(samples: &[Sample]) -> Option<String> {
+        super::verdict(samples, Some(9.81))
+    }
+
+    /// A hand that swings, as by a walker: gravity in the sensor hardly turns over a period, and reading the
+    /// gyroscope as deg/s fits that. A plane in a banked turn, in whose axes the force stays where it is.
+    #[test]
+    fn a_body_that_accelerates_accuses_no_gyroscope() {
+        let swing = (0..6000).map(|index| {
+            let time = f64::from(index) * 0.01;
+            let (phase, length) = (6.0 * time, 0.7);
+            let (angle, rate, turn) = (0.8 * phase.sin(), 4.8 * phase.cos(), -28.8 * phase.sin());
+            let gravity = Vector3::new(0.0, 9.81 * f64::sin(angle), 9.81 * f64::cos(angle));
+            (time, Vector3::new(rate, 0.0, 0.0), gravity + Vector3::new(0.0, length * turn, length * rate * rate))
+        });
+        let bank = 0.6_f64;
+        let turn = Vector3::new(0.0, bank.sin(), bank.cos()) * 0.35;
+        let plane = (0..6000)
+            .map(|index| (f64::from(index) * 0.01, turn, Vector3::new(0.0, 0.0, 9.81 / bank.cos())))
+            .collect::<Vec<_>>();
+        assert_eq!(verdict(&swing.collect::<Vec<_>>()), None);
+        assert_eq!((verdict(&plane), super::verdict(&plane, Some(9.81 / bank.cos()))), (None, None));
     }
 
     #[test]

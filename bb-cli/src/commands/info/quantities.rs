@@ -24,14 +24,15 @@ pub(super) fn take(units: &mut Units, message: &BagMessage) -> Result<(), Record
     Ok(())
 }
 
-/// Remarks on units that look wrong.
-pub(super) fn remarks(units: &Units) -> Vec<Remark> {
+/// Remarks on units that look wrong; not on a field whose offset is known.
+pub(super) fn remarks(units: &Units, has_offset: bool) -> Vec<Remark> {
     let mut remarks = Vec::new();
     if units.not_finite() > 0 {
         let text = format!("{} messages hold NaN or infinity", units.not_finite());
         remarks.push(Remark::new(Subject::Values, text));
     }
-    let units = units.of_imu().into_iter().chain(units.of_field()).chain(units.of_pressure());
+    let units =
+        units.of_imu().into_iter().chain(units.of_field().filter(|_| !has_offset)).chain(units.of_pressure());
     remarks.extend(units.map(|text| Remark::new(Subject::Unit, text)));
     remarks
 }

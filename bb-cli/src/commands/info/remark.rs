@@ -10,6 +10,9 @@ pub(crate) enum Subject {
     Clock,
     Unit,
     Values,
+    Latency,
+    Covariance,
+    Calibration,
     Messages,
 }
 

@@ -27,6 +27,7 @@ struct TopicRow<'a> {
     #[serde(rename = "type")]
     schema: &'a str,
     encoding: &'a str,
+    frames: &'a [String],
     messages: usize,
     rate_hz: Option<f64>,
     period: Option<&'a Periods>,
@@ -55,6 +56,7 @@ fn topic_row(topic: &TopicContent) -> TopicRow<'_> {
         name: &topic.name,
         schema: &topic.schema,
         encoding: &topic.encoding,
+        frames: &topic.frames,
         messages: topic.messages,
         rate_hz: topic.periods.as_ref().and_then(Periods::rate_hz),
         period: topic.periods.as_ref(),
@@ -80,19 +82,20 @@ fn one(content: &Content) -> String {
         ),
         None => "no messages\n\n".to_owned(),
     };
-    let mut rows = vec![["topic", "type", "messages", "rate", "longest period"].map(String::from)];
+    let mut rows = vec![["topic", "type", "frame", "messages", "rate", "longest period"].map(String::from)];
     for topic in &content.topics {
         // Two messages give no rate.
         let periods = topic.periods.as_ref().filter(|_| topic.messages > 2);
         rows.push([
             topic.name.clone(),
             topic.schema.clone(),
+            frames(&topic.frames),
             topic.messages.to_string(),
             periods.map_or_else(|| "-".to_owned(), |periods| periods.rate_in_words(1)),
             periods.map_or_else(|| "-".to_owned(), |periods| format!("{:.3} s", periods.max_s)),
         ]);
     }
-    text += &aligned(&rows, 2, usize::MAX);
+    text += &aligned(&rows, 3, usize::MAX);
     let remarks: Vec<_> = content
         .topics
         .iter()
@@ -106,6 +109,11 @@ fn one(content: &Content) -> String {
         text += &format!("to save the {} messages before it: bb recover {file} NEW.mcap\n", content.messages);
     }
     text
+}
+
+fn frames(frames: &[String]) -> String {
+    let named: Vec<&str> = frames.iter().map(|frame| &**frame).filter(|frame| !frame.is_empty()).collect();
+    if named.is_empty() { "-".to_owned() } else { named.join(", ") }
 }
 
 fn size(bytes: u64) -> String {

@@ -2,6 +2,7 @@
 
 use super::quantities;
 use super::remark::{Remark, Subject};
+use super::signals::{self, Reference, Signal};
 use super::times::Times;
 use crate::periods::Periods;
 use crate::topics::{TopicReader, is_of_events, log_ns};
@@ -28,6 +29,8 @@ pub(super) struct TopicContent {
     pub(super) name: String,
     pub(super) schema: String,
     pub(super) encoding: String,
+    /// The frames in the headers, in the order of their first messages.
+    pub(super) frames: Vec<String>,
     pub(super) messages: usize,
     pub(super) periods: Option<Periods>,
     pub(super) remarks: Vec<Remark>,
@@ -39,9 +42,14 @@ struct Open {
     reader: Option<TopicReader>,
     times: Times,
     units: Units,
+    signal: Signal,
+    frames: Vec<String>,
     /// The first message that cannot be read.
     fault: Option<String>,
 }
+
+/// Frames told of a topic; transforms have many.
+const MOST_FRAMES: usize = 4;
 
 /// Reads a whole file; the error says why not even its beginning can be read.
 pub(super) fn scan(file: &Path) -> Result<Content, String> {
@@ -75,7 +83,15 @@ pub(super) fn scan(file: &Path) -> Result<Content, String> {
         span_ns = Some(span_ns.map_or((log, log), |(start, end)| (start.min(log), end.max(log))));
         let topic = topics.entry((message.topic.clone(), message.schema.clone())).or_default();
         topic.times.push(log, topic.reader.as_ref().and_then(|reader| reader.stamp_ns(&message)));
-        let read = quantities::take(&mut topic.units, &message).map_err(|error| error.to_string());
+        let header = topic.reader.as_ref().and_then(|reader| reader.header(&message));
+        if let Some(header) = header
+            && topic.frames.len() < MOST_FRAMES
+            && !topic.frames.contains(&header.frame_id)
+        {
+            topic.frames.push(header.frame_id);
+        }
+        let read = quantities::take(&mut topic.units, &message).and_then(|()| topic.signal.take(&message));
+        let read = read.map_err(|error| error.to_string());
         let read = read.and_then(|()| match &topic.reader {
             // One message is enough for topics without units to judge.
             Some(reader) if topic.times.count() == 1 => reader.read(&message).map(drop),
@@ -88,15 +104,24 @@ pub(super) fn scan(file: &Path) -> Result<Content, String> {
     progress.finish();
 
     let start_ns = span_ns.map_or(0, |(start, _)| start);
+    let reference = Reference::new(topics.iter().map(|((name, _), open)| (&**name, &open.signal)));
     let content = bag.topics().iter().map(|topic| {
-        let open = topics.remove(&(topic.name.clone(), topic.schema.clone())).unwrap_or_default();
+        let none = Open::default();
+        let open = topics.get(&(topic.name.clone(), topic.schema.clone())).unwrap_or(&none);
         let mut remarks = open.times.remarks(start_ns);
-        remarks.extend(quantities::remarks(&open.units));
-        remarks.extend(open.fault.map(|fault| Remark::new(Subject::Messages, fault)));
+        // The poses that a robot publishes are estimates, and their delay is no fault of a sensor.
+        let is_estimate = topic.is_own && matches!(open.signal, Signal::Orientations(_));
+        let signal = if is_estimate { &Signal::None } else { &open.signal };
+        let together = signals::remarks(signal, reference.as_ref(), start_ns);
+        let has_offset = together.iter().any(|remark| remark.subject == Subject::Calibration);
+        remarks.extend(quantities::remarks(&open.units, has_offset));
+        remarks.extend(together);
+        remarks.extend(open.fault.clone().map(|fault| Remark::new(Subject::Messages, fault)));
         TopicContent {
             name: topic.name.to_string(),
             schema: topic.schema.to_string(),
             encoding: topic.encoding.to_string(),
+            frames: open.frames.clone(),
             messages: open.times.count(),
             periods: open.times.periods(),
             remarks,

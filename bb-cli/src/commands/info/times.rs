@@ -61,6 +61,17 @@ impl Times {
                 ),
             ));
         }
+        remarks.extend(periods.jitter.filter(|_| has_stamps).map(|jitter| {
+            let ms = |seconds: f64| seconds * 1e3;
+            Remark::new(
+                Subject::Clock,
+                format!(
+                    "the stamps jitter: of the periods of {:.1} ms, one in ten is off by {:.1} ms or more",
+                    ms(jitter.period_s),
+                    ms(jitter.deviation_s)
+                ),
+            )
+        }));
         let (what, one, many) = if has_stamps {
             ("stamp", "stamp goes", "stamps go")
         } else {
@@ -167,6 +178,18 @@ mod tests {
         );
         let twice = |index| EVEN(index - index % 2);
         assert_eq!(remarks(EVEN, twice), ["50 messages have the stamp of the one before"]);
+    }
+
+    #[test]
+    fn stamps_that_jitter_are_told_and_missing_messages_are_not() {
+        let jitter = |index| EVEN(index) + (index * 7 % 11 - 5) * MS / 2;
+        let said = remarks(EVEN, jitter);
+        assert_eq!(said, ["the stamps jitter: of the periods of 8.0 ms, one in ten is off by 2.5 ms or more"]);
+        let rounded = |index| EVEN(index) + (index * 7 % 11 - 5) * MS / 10;
+        assert_eq!(remarks(EVEN, rounded), [""; 0]);
+        // Every fourth message is elsewhere.
+        let held_out = |index| EVEN(index + index / 3);
+        assert_eq!(remarks(held_out, held_out), [""; 0]);
     }
 
     #[test]

@@ -1,0 +1,179 @@
+//! What several topics show together.
+
+use super::motion::{Motion, Sample};
+use super::remark::{Remark, Subject};
+use super::scatter::{Fix, Oddities, oddities};
+use super::{latency, offset};
+use bb_core::nalgebra::{UnitQuaternion, Vector3};
+use bb_core::payload::{GnssFix, Imu, MagneticField, Odometry, Pose};
+use bb_estimators::navigation::{Geodetic, LocalFrame};
+use bb_mcap::{BagMessage, IMU, MAGNETIC_FIELD, ODOMETRY, POSE, RecordingError};
+
+const FIX: &str = "sensor_msgs/msg/NavSatFix";
+
+/// Messages kept of a topic; what comes later is not looked at.
+const MOST: usize = 1_000_000;
+
+/// The measurements of a topic, by their stamps in nanoseconds.
+#[derive(Debug, Default)]
+pub(super) enum Signal {
+    #[default]
+    None,
+    Imu(Vec<Sample>),
+    Field(Vec<(i64, Vector3<f64>)>),
+    /// With the sum of their variances.
+    Fixes(Vec<(i64, Geodetic, Option<f64>)>),
+    Orientations(Vec<(i64, UnitQuaternion<f64>)>),
+}
+
+impl Signal {
+    /// Adds a message, if its type is one of these.
+    pub(super) fn take(&mut self, message: &BagMessage) -> Result<(), RecordingError> {
+        let has_room = match self {
+            Self::None => true,
+            Self::Imu(all) => all.len() < MOST,
+            Self::Field(all) => all.len() < MOST,
+            Self::Fixes(all) => all.len() < MOST,
+            Self::Orientations(all) => all.len() < MOST,
+        };
+        if !has_room {
+            return Ok(());
+        }
+        if let Self::None = self {
+            *self = match &*message.schema {
+                IMU => Self::Imu(Vec::new()),
+                MAGNETIC_FIELD => Self::Field(Vec::new()),
+                FIX => Self::Fixes(Vec::new()),
+                POSE | ODOMETRY => Self::Orientations(Vec::new()),
+                _ => return Ok(()),
+            };
+        }
+        match self {
+            Self::None => {}
+            Self::Imu(all) => {
+                let (imu, time) = message.payload::<Imu>()?;
+                all.push((time.as_unix_nanos(), imu.angular_velocity, imu.linear_acceleration));
+            }
+            Self::Field(all) => {
+                let (field, time) = message.payload::<MagneticField>()?;
+                let field = field.magnetic_field;
+                all.extend(field.iter().all(|value| value.is_finite()).then_some((time.as_unix_nanos(), field)));
+            }
+            Self::Fixes(all) => {
+                let (fix, time) = message.payload::<GnssFix>()?;
+                let position = fix.position.and_then(|at| {
+                    let at =
+                        Geodetic { latitude: at.latitude_rad, longitude: at.longitude_rad, height: at.altitude? };
+                    [at.latitude, at.longitude, at.height].iter().all(|value| value.is_finite()).then_some(at)
+                });
+                let variance = fix.position_covariance.map(|covariance| covariance.trace());
+                let variance = variance.filter(|variance| variance.is_finite() && *variance > 0.0);
+                all.extend(position.map(|position| (time.as_unix_nanos(), position, variance)));
+            }
+            Self::Orientations(all) => {
+                let (pose, time) = match &*message.schema {
+                    POSE => message.payload::<Pose>()?,
+                    _ => message.payload::<Odometry>().map(|(odometry, time)| (odometry.pose, time))?,
+                };
+                let turned = pose.world_from_body;
+                let is_rotation = (turned.norm() - 1.0).abs() < 0.1;
+                all.extend(
+                    is_rotation.then(|| (time.as_unix_nanos(), UnitQuaternion::new_normalize(turned.into_inner()))),
+                );
+            }
+        }
+        Ok(())
+    }
+
+    fn samples(&self) -> &[Sample] {
+        match self {
+            Self::Imu(samples) => samples,
+            _ => &[],
+        }
+    }
+}
+
+/// The motion that the topics are compared with.
+pub(super) struct Reference<'a> {
+    imu: &'a str,
+    motion: Motion,
+    zero_ns: i64,
+}
+
+impl<'a> Reference<'a> {
+    /// The IMU with the most messages; `None` if there is none.
+    pub(super) fn new(signals: impl Iterator<Item = (&'a str, &'a Signal)>) -> Option<Self> {
+        let (imu, signal) = signals.max_by_key(|(_, signal)| signal.samples().len())?;
+        let samples = signal.samples();
+        let zero_ns = samples.first()?.0;
+        Some(Self { imu, motion: Motion::new(samples, zero_ns), zero_ns })
+    }
+}
+
+/// Remarks on a topic beside the motion of the IMU. The places are seconds since `start_ns`.
+pub(super) fn remarks(signal: &Signal, reference: Option<&Reference<'_>>, start_ns: i64) -> Vec<Remark> {
+    let zero_ns = reference.map_or(start_ns, |reference| reference.zero_ns);
+    let seconds = |time_ns: i64| time_ns.saturating_sub(zero_ns) as f64 * 1e-9;
+    let late = |latency_s: f64, what: &str| {
+        let imu = reference.map_or("", |reference| reference.imu);
+        Remark::new(Subject::Latency, latency::remark(latency_s, imu, what))
+    };
+    let mut remarks = Vec::new();
+    match signal {
+        Signal::None | Signal::Imu(_) => {}
+        Signal::Field(fields) => {
+            let fields: Vec<_> = fields.iter().map(|(time_ns, field)| (seconds(*time_ns), *field)).collect();
+            let found = offset::offset(&fields);
+            remarks.extend(found.map(|(at, norm)| Remark::new(Subject::Calibration, offset::remark(&at, norm))));
+            let at = found.map_or(Vector3::zeros(), |(at, _)| at);
+            let latency = reference.and_then(|reference| latency::of_field(&fields, &at, &reference.motion));
+            remarks.extend(latency.map(|latency_s| late(latency_s, "the turns")));
+        }
+        Signal::Orientations(poses) => {
+            let poses: Vec<_> = poses.iter().map(|(time_ns, turned)| (seconds(*time_ns), *turned)).collect();
+            let latency = reference.and_then(|reference| latency::of_orientations(&poses, &reference.motion));
+            remarks.extend(latency.map(|latency_s| late(latency_s, "the turns")));
+        }
+        Signal::Fixes(fixes) => {
+            let Some((_, origin, _)) = fixes.first() else { return remarks };
+            let frame = LocalFrame::new(*origin);
+            let mut track: Vec<Fix> = Vec::with_capacity(fixes.len());
+            for (time_ns, position, variance) in fixes {
+                let fix =
+                    Fix { time_s: seconds(*time_ns), position: frame.position(position), variance: *variance };
+                if track.last().is_none_or(|last| last.time_s < fix.time_s) {
+                    track.push(fix);
+                }
+            }
+            let Oddities { scatter, latency_s } = oddities(&track, reference.map(|reference| &reference.motion));
+            remarks.extend(latency_s.map(|latency_s| late(latency_s, "the accelerations")));
+            remarks.extend(scatter.map(|found| {
+                let since_s = zero_ns.saturating_sub(start_ns) as f64 * 1e-9;
+                let about = match reference {
+                    Some(reference) => format!("the motion that {} measures", reference.imu),
+                    None => "any motion of a vehicle".to_owned(),
+                };
+                Remark::new(
+                    Subject::Covariance,
+                    format!(
+                        "{} of {} fixes, from {:.1} s to {:.1} s, scatter by {} about {about}, and state {}",
+                        found.count,
+                        track.len(),
+                        found.from_s + since_s,
+                        found.to_s + since_s,
+                        length(found.measured_m),
+                        length(found.stated_m)
+                    ),
+                )
+            }));
+        }
+    }
+    remarks
+}
+
+fn length(metres: f64) -> String {
+    match metres < 0.1 {
+        true => format!("{:.1} cm", metres * 100.0),
+        false => format!("{metres:.1} m"),
+    }
+}
