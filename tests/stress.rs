@@ -7,7 +7,7 @@ use bb_core::journal::{Entry, Event};
 use bb_core::prelude::*;
 use bb_core::{DynamicSubscription, Report, Stamped};
 use bb_tests::random::Random;
-use robot::{Add, Ask, Dice, Weathered, weathered};
+use robot::{Add, Ask, Dice, STOPPED, Weathered, weathered};
 use std::collections::{BTreeMap, BTreeSet};
 use std::error::Error;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -176,6 +176,7 @@ fn real_day(seed: u64) -> Result<bool, Box<dyn Error>> {
         .collect();
     std::thread::sleep(Duration::from_millis(100 + random.below(150)));
     // Callers go on while it stops, and after that, as do sensors, services, timers and commands.
+    STOPPED.lock().unwrap_or_else(PoisonError::into_inner).0 = Some(Instant::now());
     let report = running.stop();
     disturbers.into_iter().try_for_each(std::thread::JoinHandle::join).map_err(|_| "a disturber panicked")?;
     is_same_again(seed, &lines, (&hear(&all), &few), &report)
@@ -284,4 +285,14 @@ fn days_on_virtual_time() {
 #[test]
 fn days_on_many_threads() {
     days("many threads", 6, real_day);
+    let mut took = STOPPED.lock().unwrap_or_else(PoisonError::into_inner).1.clone();
+    took.sort_unstable();
+    let (Some(median), Some(most)) = (took.get(took.len() / 2), took.last()) else {
+        panic!("no motor was made safe")
+    };
+    println!(
+        "told to stop, {} motors were being made safe after {median:?} in the median, {most:?} at most",
+        took.len()
+    );
+    assert!(*median < Duration::from_millis(10), "{took:?}");
 }

@@ -3,6 +3,8 @@
 use bb_core::RequestCodec;
 use bb_core::prelude::*;
 use bb_tests::random::Random;
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
 
 /// What happens where it arrives.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
@@ -223,6 +225,9 @@ impl Estimator for Squall {
     }
 }
 
+/// When the robot of a day in real time was told to stop, and how long after that its motor was told to, day by day.
+pub(crate) static STOPPED: Mutex<(Option<Instant>, Vec<Duration>)> = Mutex::new((None, Vec::new()));
+
 /// An actuator that fails at some commands, and sometimes cannot be disarmed at first.
 #[derive(Debug)]
 pub(crate) struct Motor(f64);
@@ -241,6 +246,10 @@ impl Actuator for Motor {
     }
 
     fn disarm(&mut self) -> Result<(), Fault> {
+        let mut stopped = STOPPED.lock().unwrap_or_else(PoisonError::into_inner);
+        let took = stopped.0.take().map(|start| start.elapsed());
+        stopped.1.extend(took);
+        drop(stopped);
         if self.0.abs() > 995.0 { Err(Fault::new("the brake is stuck")) } else { Ok(()) }
     }
 }
