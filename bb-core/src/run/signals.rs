@@ -61,6 +61,7 @@ fn handle_signals() -> std::io::Result<()> {
     std::thread::Builder::new().name("signals".to_owned()).spawn(run).map(drop)
 }
 
+/// `signal-hook` cannot wait for signals here, and does not hear that a console is closed.
 #[cfg(not(unix))]
 fn handle_signals() -> std::io::Result<()> {
     /// The exit code after Ctrl-C, by convention.
