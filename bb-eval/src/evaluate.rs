@@ -9,6 +9,7 @@ use crate::score::Score;
 use crate::truths::Truths;
 use crate::units::Units;
 use crate::variants::{Variant, Variants, moving_times};
+use bb_core::nalgebra::UnitQuaternion;
 use bb_estimators::attitude::{ImuSample, OrientationError};
 use doubts::{take_units, truth_doubt, unit_doubts};
 use std::path::{Path, PathBuf};
@@ -58,6 +59,8 @@ pub struct Evaluation {
     pub broken: Option<String>,
     /// Remarks on the runs.
     pub notes: Vec<String>,
+    /// The strength of the magnetic field over time, s and T, with the errors.
+    pub fields: Vec<(f64, f64)>,
 }
 
 /// One filter on one recording.
@@ -74,6 +77,8 @@ pub struct Run {
     /// Error over time: seconds since the first sample, and degrees, `None` where the truth is unknown. The total
     /// error with nine axes, otherwise the inclination.
     pub errors: Vec<(f64, Option<f64>)>,
+    /// Orientation over time, with the errors: seconds, the estimate, and the truth where it is known.
+    pub orientations: Vec<(f64, UnitQuaternion<f64>, Option<UnitQuaternion<f64>>)>,
 }
 
 /// Evaluates recordings on all cores, with a progress bar on the terminal, and returns the results in order.
@@ -129,7 +134,15 @@ pub fn evaluate_variant(file: &Path, variant: u32, evaluator: &Evaluator, progre
 
 impl Evaluation {
     fn failed(file: &Path, fault: String, axes: Axes) -> Self {
-        Self { file: file.to_owned(), variant: None, axes, runs: Err(fault), broken: None, notes: Vec::new() }
+        Self {
+            file: file.to_owned(),
+            variant: None,
+            axes,
+            runs: Err(fault),
+            broken: None,
+            notes: Vec::new(),
+            fields: Vec::new(),
+        }
     }
 }
 
@@ -156,6 +169,7 @@ fn play(file: &Path, index: u32, evaluator: &Evaluator, show: &mut dyn FnMut(u64
     let mut samples = Vec::with_capacity(BLOCK);
     let mut start_ns = None;
     let mut played = 0_u64;
+    let mut fields = Vec::new();
     let broken = loop {
         samples.clear();
         let end = recording.read(&mut samples, BLOCK)?;
@@ -163,6 +177,11 @@ fn play(file: &Path, index: u32, evaluator: &Evaluator, show: &mut dyn FnMut(u64
         variant.apply(&mut samples, &recording.truth);
         if let Some(first) = samples.first() {
             let start_ns = *start_ns.get_or_insert(first.time_ns);
+            if evaluator.keep_errors {
+                let field =
+                    |sample: &ImuSample| Some((seconds(sample.time_ns, start_ns), sample.magnetic_field?.norm()));
+                fields.extend(samples.iter().filter_map(field));
+            }
             for player in &mut players {
                 player.play(&samples, &recording, start_ns, evaluator.keep_errors);
             }
@@ -200,7 +219,7 @@ fn play(file: &Path, index: u32, evaluator: &Evaluator, show: &mut dyn FnMut(u64
     }
     let runs = Ok(players.into_iter().map(|player| player.finish(played)).collect());
     let variant = evaluator.variants.is_changed().then_some(index);
-    Ok(Evaluation { file: file.to_owned(), variant, axes: recording.axes, runs, broken, notes })
+    Ok(Evaluation { file: file.to_owned(), variant, axes: recording.axes, runs, broken, notes, fields })
 }
 
 /// A running filter and its errors.
@@ -212,8 +231,13 @@ struct Player {
     truths: Truths,
     within_two_sigma: (u64, u64),
     time: Duration,
-    estimates: Vec<Option<bb_core::nalgebra::UnitQuaternion<f64>>>,
+    estimates: Vec<Option<UnitQuaternion<f64>>>,
     errors: Vec<(f64, Option<f64>)>,
+    orientations: Vec<(f64, UnitQuaternion<f64>, Option<UnitQuaternion<f64>>)>,
+}
+
+fn seconds(time_ns: i64, start_ns: i64) -> f64 {
+    time_ns.saturating_sub(start_ns) as f64 * 1e-9
 }
 
 impl Player {
@@ -228,6 +252,7 @@ impl Player {
             time: Duration::ZERO,
             estimates: Vec::with_capacity(BLOCK),
             errors: Vec::new(),
+            orientations: Vec::new(),
         })
     }
 
@@ -253,7 +278,9 @@ impl Player {
                     Axes::Six => error.inclination.to_degrees(),
                     Axes::Nine => error.total.to_degrees(),
                 });
-                self.errors.push((sample.time_ns.saturating_sub(start_ns) as f64 * 1e-9, angle));
+                let time_s = seconds(sample.time_ns, start_ns);
+                self.errors.push((time_s, angle));
+                self.orientations.push((time_s, *estimate, recording.truth.at(sample.time_ns).0));
             }
         }
     }
@@ -278,7 +305,7 @@ impl Player {
 
     fn finish(self, played: u64) -> Run {
         let ns_per_update = self.time.as_secs_f64() * 1e9 / played as f64;
-        let (score, within_two_sigma) = (self.score, self.within_two_sigma);
-        Run { filter: self.name, score, within_two_sigma, ns_per_update, errors: self.errors }
+        let Self { name, score, within_two_sigma, errors, orientations, .. } = self;
+        Run { filter: name, score, within_two_sigma, ns_per_update, errors, orientations }
     }
 }

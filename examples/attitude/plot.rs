@@ -26,14 +26,14 @@ pub(crate) fn picture(outcome: &Outcome) -> Result<Picture, String> {
         let estimate = line(&|point| Some(angle(&point.estimate)));
         let lines =
             vec![Line::degrees("truth", TRUTH, 4, &truth), Line::degrees("estimate", ESTIMATE, 1, &estimate)];
-        panels.push(Panel { title: String::new(), axis: format!("{name} (deg)"), lines });
+        panels.push(Panel::new(format!("{name} (deg)"), lines));
     }
     let has_heading = outcome.has_heading;
     let heading = line(&|point| point.error.filter(|_| has_heading).map(|error| error.heading.to_degrees()));
     let inclination = line(&|point| point.error.map(|error| error.inclination.to_degrees()));
     let lines =
         vec![Line::peaks("heading", HEADING, 1, &heading), Line::peaks("inclination", ESTIMATE, 1, &inclination)];
-    panels.push(Panel { title: String::new(), axis: "error (deg)".into(), lines });
+    panels.push(Panel::new("error (deg)", lines));
     let title = format!("{} ({})", series.name, outcome.filter);
     Ok(Picture { title, panels, panel_size: (1400, 240) })
 }

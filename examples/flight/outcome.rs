@@ -110,7 +110,7 @@ impl Outcome {
             line("standard deviation", 1, |point| Some(point.deviation_m)),
         ];
         let ages = vec![line("age of the anchor", 3, |point| point.age_s)];
-        let panel = |axis: &str, lines| Panel { title: String::new(), axis: axis.to_owned(), lines };
+        let panel = |axis: &str, lines| Panel::new(axis, lines);
         let panels = vec![panel("position (m)", errors), panel("age (s)", ages)];
         Picture { title: "flight".into(), panels, panel_size: (1400, 300) }
     }

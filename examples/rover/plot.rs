@@ -16,7 +16,7 @@ pub(crate) fn picture(outcome: &Outcome) -> Picture {
             Line::new("-3 sigma", PALETTE[1], 1, &below),
             Line::new("error", PALETTE[0], 2, &error),
         ];
-        Panel { title: String::new(), axis: format!("{name} (m)"), lines }
+        Panel::new(format!("{name} (m)"), lines)
     });
     Picture { title: "a minute without satellites".into(), panels: panels.collect(), panel_size: (1400, 300) }
 }

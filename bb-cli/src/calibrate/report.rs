@@ -101,7 +101,7 @@ pub(super) fn picture(file: &Path, samples: &[ImuSample], calibration: &Calibrat
     if let Ok(fit) = &calibration.accelerometer {
         lines.push(Line::new("calibrated", CALIBRATED, 3, &rests(&|force| fit.calibration.apply(force).norm())));
     }
-    panels.push(Panel { title: String::new(), axis: "specific force at rest (m/s²)".into(), lines });
+    panels.push(Panel::new("specific force at rest (m/s²)", lines));
     if let Some(magnetometer) = &calibration.magnetometer {
         let fields = |norm: &dyn Fn(&Vector3<f64>) -> f64| -> Vec<(f64, Option<f64>)> {
             let fields = samples.iter().filter_map(|sample| Some((sample.time_ns, sample.magnetic_field?)));
@@ -116,7 +116,7 @@ pub(super) fn picture(file: &Path, samples: &[ImuSample], calibration: &Calibrat
                 &fields(&|field| fit.calibration.apply(field).norm()),
             ));
         }
-        panels.push(Panel { title: String::new(), axis: "magnetic field (µT)".into(), lines });
+        panels.push(Panel::new("magnetic field (µT)", lines));
     }
     Picture { title: format!("Calibration by {}", file.display()), panels, panel_size: (1400, 320) }
 }

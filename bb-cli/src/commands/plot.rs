@@ -5,6 +5,7 @@ mod units;
 
 use crate::periods::Periods;
 use crate::topics::{TopicReader, find, is_named, log_ns, open};
+use bb_core::nalgebra::{Quaternion, UnitQuaternion};
 use bb_mcap::{Bag, Topic, Value};
 use bb_plot::{Line, PALETTE, Panel, Picture, Point};
 use clap::Args;
@@ -138,24 +139,48 @@ fn read(bag: &Bag, chosen: &mut [Chosen<'_>]) -> Result<Option<String>, String> 
 fn panels(chosen: &Chosen<'_>, start_ns: i64) -> Vec<Panel> {
     let gaps: HashSet<usize> =
         Periods::of(&chosen.times_ns).iter().flat_map(|periods| &periods.gaps).map(|gap| gap.after).collect();
-    let panels = chosen.groups.iter().zip(&chosen.values).map(|(group, values)| {
-        let lines = group.fields.iter().zip(values).enumerate().map(|(index, (field, values))| {
-            let mut points: Vec<Point> = Vec::new();
-            for (index, (time_ns, value)) in chosen.times_ns.iter().zip(values).enumerate() {
-                let time_s = time_ns.saturating_sub(start_ns) as f64 * 1e-9;
-                points.push((time_s, *value));
-                if gaps.contains(&index) {
-                    points.push((time_s, None));
-                }
+    let points = |values: &mut dyn Iterator<Item = Option<f64>>| {
+        let mut points: Vec<Point> = Vec::new();
+        for (index, (time_ns, value)) in chosen.times_ns.iter().zip(values).enumerate() {
+            let time_s = time_ns.saturating_sub(start_ns) as f64 * 1e-9;
+            points.push((time_s, value));
+            if gaps.contains(&index) {
+                points.push((time_s, None));
             }
-            Line::new(field.label.clone(), PALETTE[index % PALETTE.len()], 1, &points)
+        }
+        points
+    };
+    let panels = chosen.groups.iter().zip(&chosen.values).map(|(group, values)| {
+        let title = format!("{} {}", chosen.topic.name, group.path);
+        let colour = |index: usize| PALETTE[index % PALETTE.len()];
+        if group.is_quaternion() {
+            let angles = angles(values);
+            let lines = ["roll", "pitch", "yaw"].into_iter().enumerate().map(|(index, name)| {
+                let mut values = angles.iter().map(|angles| angles.map(|angles| angles[index].to_degrees()));
+                Line::degrees(name, colour(index), 1, &points(&mut values))
+            });
+            return Panel::new(format!("{} (deg)", group.axis()), lines.collect()).title(title);
+        }
+        let lines = group.fields.iter().zip(values).enumerate().map(|(index, (field, values))| {
+            Line::new(field.label.clone(), colour(index), 1, &points(&mut values.iter().copied()))
         });
-        let unit = units::of(&chosen.topic.schema, &group.path);
-        let axis = match (group.axis(), unit) {
+        let axis = match (group.axis(), units::of(&chosen.topic.schema, &group.path)) {
             (name, Some(unit)) => format!("{name} ({unit})"),
             (name, None) => name,
         };
-        Panel { title: format!("{} {}", chosen.topic.name, group.path), axis, lines: lines.collect() }
+        Panel::new(axis, lines.collect()).title(title)
     });
     panels.collect()
+}
+
+/// Roll, pitch and yaw, rad, of the components x, y, z, w of quaternions.
+fn angles(values: &[Vec<Option<f64>>]) -> Vec<Option<[f64; 3]>> {
+    let [x, y, z, w] = values else { return Vec::new() };
+    let of = |index: usize| {
+        let component = |values: &[Option<f64>]| values.get(index).copied().flatten();
+        let read = Quaternion::new(component(w)?, component(x)?, component(y)?, component(z)?);
+        let (roll, pitch, yaw) = UnitQuaternion::try_new(read, 0.5)?.euler_angles();
+        Some([roll, pitch, yaw])
+    };
+    (0..x.len()).map(of).collect()
 }

@@ -270,7 +270,11 @@ fn errors_are_plotted() {
         assert!(std::fs::read(&plot).expect("is there").starts_with(start));
     }
     let svg = std::fs::read_to_string(folder.join("errors.svg")).expect("is there");
-    assert!(svg.contains("madgwick") && svg.contains("total error, nine axes"));
+    for said in
+        ["madgwick", "total error, nine axes", "roll (deg)", "pitch (deg)", "yaw (deg)", "truth", "strength (µT)"]
+    {
+        assert!(svg.contains(said), "{said}");
+    }
 
     let file = Walk { truth: false, ..Walk::default() }.file("plot_no_truth.mcap");
     let plot = folder.join("nothing.svg");

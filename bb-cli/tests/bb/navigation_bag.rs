@@ -197,6 +197,11 @@ fn a_plot_has_the_track_the_errors_and_the_innovations() {
     for what in said {
         assert!(svg.contains(what), "{what}");
     }
+    // It fits a screen, and the truth is under the estimate.
+    let height = svg.split("height=\"").nth(1).and_then(|rest| rest.split('"').next()).expect("has one");
+    assert!(height.parse::<u32>().expect("a number") < 1600, "{height}");
+    let [truth, estimate] = ["stroke-width=\"7\"", "#0072B2"].map(|line| svg.find(line).expect("is drawn"));
+    assert!(truth < estimate);
     let output = bb(&["eval", "navigation", text(&bag), "--plot", "drawn.jpg"]);
     assert!(output.code == Some(2) && output.err.contains("an SVG or a PNG"), "{}", output.err);
 }

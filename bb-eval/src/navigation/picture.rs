@@ -3,19 +3,30 @@
 use super::measured::Sensor;
 use super::trace::{Row, Trace};
 use bb_estimators::navigation::chi_square::limit;
-use bb_plot::{Line, PALETTE, Panel, Part, Plane, Point, Scale, Sheet};
+use bb_plot::{Band, Colour, Line, PALETTE, Panel, Part, Plane, Point, Scale, Sheet};
 use std::path::Path;
 
 /// Most viewers cannot open a picture with more panels.
 const MOST_PANELS: usize = 120;
 
 /// Of what is expected, and of what was refused.
-const BOUND: (u8, u8, u8) = (150, 150, 150);
-const TRUTH: (u8, u8, u8) = (110, 110, 110);
-const REFUSED: (u8, u8, u8) = (213, 0, 0);
+const BOUND: Colour = (150, 150, 150);
+/// The truth is thick and light, so that it is seen under the estimate.
+const TRUTH: Colour = (190, 190, 190);
+const TRUTH_WIDTH: u32 = 7;
+const REFUSED: Colour = (213, 0, 0);
+
+/// Times without a position, times without the IMU, and states of health, but for the healthy one.
+const OUTAGE: Colour = (255, 236, 200);
+const GAP: Colour = (245, 190, 190);
+const STATES: [(&str, Colour); 3] =
+    [("starting", (225, 225, 225)), ("degraded", (225, 238, 250)), ("lost", (200, 205, 240))];
 
 /// The fraction of good innovations within their bound.
 const WITHIN: f64 = 0.95;
+
+/// A longer time without truth interrupts lines, s.
+const INTERRUPTED_S: f64 = 5.0;
 
 /// The number of bins for errors by the age of the anchor.
 const AGES: usize = 20;
@@ -42,7 +53,7 @@ pub fn plot_navigation(file: &Path, runs: &[Drawn]) -> Result<(), String> {
         let (count, runs) = (parts.len(), runs.len());
         return Err(format!("--plot draws at most {MOST_PANELS} panels, and {runs} runs have {count}; name fewer"));
     }
-    Sheet { title: "Navigation".into(), parts, panel_size: (1400, 220) }.write(file)
+    Sheet { title: "Navigation".into(), parts, panel_size: (1400, 190) }.write(file)
 }
 
 fn parts(run: &Drawn) -> Vec<Part> {
@@ -50,35 +61,72 @@ fn parts(run: &Drawn) -> Vec<Part> {
     if rows.is_empty() {
         return Vec::new();
     }
+    let bands = bands(run);
+    let panel = |title: &str, axis: String, lines| Panel::new(axis, lines).title(title).shade(&bands).cut_spikes();
     let mut parts = vec![Part::Plane(track(run), 3)];
-    let panel = |title: &str, axis: String, lines| Part::Panel(Panel { title: title.to_owned(), axis, lines });
+    let mut positions = Vec::new();
     if rows.iter().any(|row| row.errors.is_some()) {
         for (index, axis) in ["east", "north", "up"].into_iter().enumerate() {
             let title = if index == 0 { "error, and three standard deviations" } else { "" };
             let error = |row: &Row| row.errors.map(|errors| errors.position[index]);
             let deviation = |row: &Row| row.errors.map(|errors| errors.covariance[(index, index)].sqrt());
-            parts.push(panel(title, format!("{axis} (m)"), bounded(rows, &error, &deviation)));
+            positions.push(Part::Panel(panel(title, format!("{axis} (m)"), bounded(rows, &error, &deviation))));
         }
     }
+    let mut rotations = Vec::new();
     if rows.iter().any(|row| row.errors.is_some_and(|errors| errors.rotation.is_some())) {
         for (index, axis) in ["about east", "about north", "heading"].into_iter().enumerate() {
+            let title = if index == 0 { "error, and three standard deviations" } else { "" };
             let error = |row: &Row| Some(row.errors?.rotation?[index].to_degrees());
             let deviation =
                 |row: &Row| row.errors.map(|errors| errors.covariance[(3 + index, 3 + index)].sqrt().to_degrees());
-            parts.push(panel("", format!("{axis} (deg)"), bounded(rows, &error, &deviation)));
+            rotations.push(Part::Panel(panel(title, format!("{axis} (deg)"), bounded(rows, &error, &deviation))));
         }
     }
+    let mut others = Vec::new();
     for sensor in Sensor::ALL {
         if run.trace.innovations.iter().any(|innovation| innovation.sensor == sensor) {
             let title = format!("innovations of {}", sensor.name());
-            parts.push(panel(&title, "normalised".into(), innovations(&run.trace, sensor)));
+            let axis = "in standard deviations".into();
+            others.push(Part::Panel(panel(&title, axis, innovations(&run.trace, sensor))));
         }
     }
     let has_ages = rows.iter().any(|row| row.anchor_age_s.is_some() && row.errors.is_some());
     if has_ages {
-        parts.push(Part::Plane(by_age(rows), 1));
+        others.push(Part::Plane(by_age(rows), 1));
     }
+    parts.extend(in_columns(positions, rotations));
+    let second = others.split_off(others.len().div_ceil(2));
+    parts.extend(in_columns(others, second));
     parts
+}
+
+/// Two columns of parts; what has no other beside it takes the width.
+fn in_columns(left: Vec<Part>, right: Vec<Part>) -> Vec<Part> {
+    let mut right = right.into_iter();
+    left.into_iter()
+        .map(|left| match right.next() {
+            Some(right) => Part::Row(vec![left, right]),
+            None => left,
+        })
+        .collect()
+}
+
+/// Outages, gaps and states of health.
+fn bands(run: &Drawn) -> Vec<Band> {
+    let Trace { rows, health, outages, gaps, .. } = &run.trace;
+    let mut bands = Vec::new();
+    let mut shade = |label: &str, colour, times| bands.push(Band { label: label.to_owned(), colour, times });
+    let end_s = rows.last().map_or(0.0, |row| row.time_s);
+    for (index, (from_s, state)) in health.iter().enumerate() {
+        let to_s = health.get(index + 1).map_or(end_s, |(to_s, _)| *to_s);
+        if let Some((label, colour)) = STATES.into_iter().find(|(name, _)| name == state) {
+            shade(label, colour, (*from_s, to_s));
+        }
+    }
+    outages.iter().for_each(|times| shade("no position", OUTAGE, *times));
+    gaps.iter().for_each(|times| shade("no IMU", GAP, *times));
+    bands
 }
 
 fn track(run: &Drawn) -> Plane {
@@ -93,8 +141,8 @@ fn track(run: &Drawn) -> Plane {
         y_axis: "north (m)".into(),
         scale: Scale::Square,
         lines: vec![
+            Line::path("truth", TRUTH, TRUTH_WIDTH, &truth),
             Line::path("fixes", PALETTE[3], 3, &fixes),
-            Line::path("truth", TRUTH, 1, &truth),
             Line::path("estimate", PALETTE[0], 1, &estimate),
         ],
     }
@@ -106,9 +154,19 @@ fn bounded(
     error: &dyn Fn(&Row) -> Option<f64>,
     deviation: &dyn Fn(&Row) -> Option<f64>,
 ) -> Vec<Line> {
+    let known: Vec<&Row> = rows.iter().filter(|row| row.errors.is_some()).collect();
     let line = |value: &dyn Fn(&Row) -> Option<f64>| -> Vec<Point> {
-        // The line is not interrupted between samples of the truth.
-        rows.iter().filter(|row| row.errors.is_some()).map(|row| (row.time_s, value(row))).collect()
+        let mut points: Vec<Point> = Vec::with_capacity(known.len());
+        for row in &known {
+            // The line is interrupted where the truth is, and not between its samples.
+            if let Some((last_s, _)) = points.last().copied()
+                && row.time_s - last_s > INTERRUPTED_S
+            {
+                points.push((last_s, None));
+            }
+            points.push((row.time_s, value(row)));
+        }
+        points
     };
     vec![
         Line::new("+3σ", BOUND, 1, &line(&|row| deviation(row).map(|deviation| 3.0 * deviation))),
@@ -117,7 +175,7 @@ fn bounded(
     ]
 }
 
-/// Square roots of the normalised innovations squared over their dimension: 1 on average.
+/// Innovations in standard deviations: the root of their normalised square over their dimension, 1 on average.
 fn innovations(trace: &Trace, sensor: Sensor) -> Vec<Line> {
     let dimension = sensor.dimension();
     let of = |is_fused: bool| -> Vec<Point> {

@@ -1,6 +1,7 @@
 //! Lines over two axes, with labels and a legend.
 
 use super::Drawn;
+use super::band::Band;
 use super::line::Line;
 use plotters::coord::Shift;
 use plotters::prelude::*;
@@ -17,7 +18,7 @@ const ROW: i32 = 20;
 /// Around the axes, pixels.
 const MARGIN: u32 = 6;
 const X_LABELS: u32 = 42;
-const Y_LABELS: u32 = 70;
+const Y_LABELS: u32 = 86;
 
 /// What is drawn: one time axis, or a plane.
 #[derive(Clone, Copy, Debug)]
@@ -26,10 +27,31 @@ pub(super) struct Frame<'a> {
     pub(super) x_axis: &'a str,
     pub(super) y_axis: &'a str,
     pub(super) lines: &'a [Line],
+    pub(super) bands: &'a [Band],
     pub(super) scale: Scale,
-    /// Of a panel's.
+    /// Whether the horizontal axis is the time that others share.
+    pub(super) is_over_time: bool,
+    /// Whether the vertical axis ends near the range of most values.
+    pub(super) cuts_spikes: bool,
+}
+
+/// Frames beside one another.
+#[derive(Clone, Debug)]
+pub(super) struct Row<'a> {
+    pub(super) frames: Vec<Frame<'a>>,
+    /// In panels.
     pub(super) height: u32,
 }
+
+/// An axis is cut if values reach beyond those of most points by more than this many times their range.
+const SPIKE: f64 = 3.0;
+/// The part of the points at each end that may be spikes.
+const SPIKES: f64 = 0.025;
+/// What is left free beyond the values of most points, as a part of their range.
+const BEYOND: f64 = 0.3;
+
+/// From this width on, a line is drawn as one; thinner ones but the thinnest are dots.
+const THICK: u32 = 5;
 
 /// The mapping from numbers to positions on both axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,17 +80,68 @@ impl Frame<'_> {
         })
     }
 
+    /// The first band of each label.
+    fn labels(&self) -> Vec<&Band> {
+        let mut bands: Vec<&Band> = Vec::new();
+        for band in self.bands {
+            if bands.iter().all(|known| known.label != band.label) {
+                bands.push(band);
+            }
+        }
+        bands
+    }
+
+    /// Where the axis is cut, if values are far beyond those of most points.
+    fn cut(&self) -> Option<Cut> {
+        if !self.cuts_spikes {
+            return None;
+        }
+        let mut values: Vec<f64> =
+            self.shown().flat_map(|line| &line.runs).flatten().map(|(_, value)| *value).collect();
+        values.sort_by(f64::total_cmp);
+        let aside = (values.len() as f64 * SPIKES) as usize;
+        let (first, last) = (*values.first()?, *values.last()?);
+        let (low, high) = (*values.get(aside)?, *values.get(values.len() - 1 - aside)?);
+        let range = high - low;
+        let is_cut = |beyond: f64| range > 0.0 && beyond > SPIKE * range;
+        let (cuts_low, cuts_high) = (is_cut(low - first), is_cut(last - high));
+        let said = match (cuts_low, cuts_high) {
+            (false, false) => return None,
+            (true, true) => format!("{} to {}", rounded(first), rounded(last)),
+            (true, false) => format!("down to {}", rounded(first)),
+            (false, true) => format!("up to {}", rounded(last)),
+        };
+        let low = if cuts_low { low - BEYOND * range } else { first };
+        let high = if cuts_high { high + BEYOND * range } else { last };
+        Some(Cut { low, high, said: format!("cut: {said}") })
+    }
+
     /// The width of the legend, in pixels.
     pub(super) fn legend_width<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> u32 {
         let font = FONT.into_font().into_text_style(area);
         let width = |line: &Line| area.estimate_text_size(&line.label, &font).map_or(0, |(width, _)| width);
-        let widest = self.shown().map(width).max().unwrap_or(0);
+        let text = |text: &str| area.estimate_text_size(text, &font).map_or(0, |(width, _)| width);
+        let others =
+            self.labels().into_iter().map(|band| text(&band.label)).chain(self.cut().map(|cut| text(&cut.said)));
+        let widest = self.shown().map(width).chain(others).max().unwrap_or(0);
         // The estimate is rough: add a tenth.
         widest + widest / 10 + (KEY + 3 * SPACE).unsigned_abs()
     }
 
-    /// Draws it, with the legend in the `legend_width` pixels at the right, beside the data.
-    pub(super) fn draw<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>, legend_width: u32) -> Drawn<B> {
+    /// The first and the last time, if this is over time.
+    pub(super) fn times(&self) -> Option<(f64, f64)> {
+        let times = || self.shown().flat_map(|line| &line.runs).flatten().map(|(time_s, _)| *time_s);
+        let (first, last) = (times().reduce(f64::min)?, times().reduce(f64::max)?);
+        self.is_over_time.then_some((first, last))
+    }
+
+    /// Draws it, with the legend in the `legend_width` pixels at the right, beside the data. `times` is the time axis.
+    pub(super) fn draw<B: DrawingBackend>(
+        &self,
+        area: &DrawingArea<B, Shift>,
+        legend_width: u32,
+        times: Option<(f64, f64)>,
+    ) -> Drawn<B> {
         let area = match self.title.is_empty() {
             true => area.clone(),
             false => area.titled(self.title, ("sans-serif", 17))?,
@@ -82,6 +155,13 @@ impl Frame<'_> {
         for (x, y) in points {
             (start, end) = (start.min(x), end.max(x));
             (low, high) = (low.min(y), high.max(y));
+        }
+        if let Some(times) = times.filter(|_| self.is_over_time && start <= end) {
+            (start, end) = times;
+        }
+        let cut = self.cut();
+        if let Some(cut) = &cut {
+            (low, high) = (cut.low, cut.high);
         }
         if start > end {
             (start, end, low, high) = (0.0, 1.0, 0.0, 1.0);
@@ -103,12 +183,21 @@ impl Frame<'_> {
             (start, end) = widened(start, end, per_pixel * width);
             (low, high) = widened(low, high, per_pixel * height);
         }
+        let (low, high) = (low, high);
         let mut chart = ChartBuilder::on(&area)
             .margin(MARGIN)
             .x_label_area_size(X_LABELS)
             .y_label_area_size(Y_LABELS)
             .build_cartesian_2d(start..end, low..high)?;
         let (x_span, span) = (end - start, high - low);
+        for band in self.bands {
+            let (from, to) = (band.times.0.max(start), band.times.1.min(end));
+            let (red, green, blue) = band.colour;
+            let filled = RGBColor(red, green, blue).filled();
+            if from < to {
+                chart.draw_series([Rectangle::new([(from, low), (to, high)], filled)])?;
+            }
+        }
         let label = |value: f64, span: f64| match self.scale {
             Scale::Logarithmic => power(value),
             _ => tick(value, span),
@@ -124,12 +213,19 @@ impl Frame<'_> {
             .draw()?;
         for line in self.shown() {
             let style = stroke(line);
+            let placed =
+                |run| self.placed(run).map(|(x, y)| (x, if cut.is_some() { y.clamp(low, high) } else { y }));
             for run in &line.runs {
                 // Thick lines have spikes at sharp turns; dots do not. A single point is no line.
-                if line.width > 1 || run.len() == 1 {
-                    chart.draw_series(self.placed(run).map(|point| Circle::new(point, 2, style.filled())))?;
+                if (2..THICK).contains(&line.width) || run.len() == 1 {
+                    chart.draw_series(placed(run).map(|point| Circle::new(point, 2, style.filled())))?;
+                } else if line.width >= THICK {
+                    // Segment by segment, which have no spikes at sharp turns.
+                    let points: Vec<_> = placed(run).collect();
+                    let segments = points.windows(2).map(|pair| PathElement::new(pair.to_vec(), style));
+                    chart.draw_series(segments)?;
                 } else {
-                    chart.draw_series(LineSeries::new(self.placed(run), style))?;
+                    chart.draw_series(LineSeries::new(placed(run), style))?;
                 }
             }
         }
@@ -138,10 +234,22 @@ impl Frame<'_> {
 
     fn draw_legend<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> Drawn<B> {
         let font = FONT.into_font().into_text_style(area).pos(Pos::new(HPos::Left, VPos::Center));
-        for (row, line) in (0..).zip(self.shown()) {
-            let middle = ROW * row + ROW;
+        let text = |label: &str, middle: i32| Text::new(label.to_owned(), (2 * SPACE + KEY, middle), font.clone());
+        let mut middle = ROW;
+        for line in self.shown() {
             area.draw(&PathElement::new([(SPACE, middle), (SPACE + KEY, middle)], stroke(line)))?;
-            area.draw(&Text::new(line.label.clone(), (2 * SPACE + KEY, middle), font.clone()))?;
+            area.draw(&text(&line.label, middle))?;
+            middle += ROW;
+        }
+        for band in self.labels() {
+            let (red, green, blue) = band.colour;
+            let key = [(SPACE, middle - ROW / 3), (SPACE + KEY, middle + ROW / 3)];
+            area.draw(&Rectangle::new(key, RGBColor(red, green, blue).filled()))?;
+            area.draw(&text(&band.label, middle))?;
+            middle += ROW;
+        }
+        if let Some(cut) = self.cut() {
+            area.draw(&text(&cut.said, middle))?;
         }
         Ok(())
     }
@@ -152,13 +260,30 @@ fn stroke(line: &Line) -> ShapeStyle {
     RGBColor(red, green, blue).stroke_width(line.width)
 }
 
+/// The ends of an axis that is cut, and what is beyond them.
+struct Cut {
+    low: f64,
+    high: f64,
+    said: String,
+}
+
+/// Three digits of a number.
+fn rounded(value: f64) -> String {
+    match value.abs() {
+        size @ 0.01..10_000.0 => format!("{value:.*}", (2.0 - size.log10().floor()).clamp(0.0, 4.0) as usize),
+        _ => format!("{value:.1e}"),
+    }
+}
+
 /// A number at an axis of this span, with enough digits to distinguish neighbouring ticks.
 fn tick(value: f64, span: f64) -> String {
+    // Near zero, what rounding left over has no sign.
+    let value = if value.abs() < span * 1e-9 { 0.0 } else { value };
     let decimals = (1.0 - span.log10()).ceil();
     match decimals {
         ..=0.0 if span < 1e6 => format!("{value:.0}"),
         0.0..=4.0 => format!("{value:.*}", decimals as usize),
-        _ if value.abs() < span * 1e-9 => "0".to_owned(),
+        _ if value == 0.0 => "0".to_owned(),
         _ => format!("{value:.1e}"),
     }
 }
@@ -180,6 +305,7 @@ mod tests {
     fn ticks_have_the_digits_that_tell_them_apart() {
         assert_eq!(tick(-90.0, 360.0), "-90");
         assert_eq!(tick(0.5, 2.0), "0.5");
+        assert_eq!((tick(-0.0, 2.0), tick(-1e-17, 2.0)), ("0.0".to_owned(), "0.0".to_owned()));
         assert_eq!(tick(20.0, 22.0), "20");
         assert_eq!(tick(0.001, 0.01), "0.001");
         assert_eq!(tick(4.5e-5, 2e-5), "4.5e-5");

@@ -2,19 +2,21 @@
 
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+mod band;
 mod frame;
 mod line;
 mod palette;
 mod panel;
 mod plane;
 
+pub use band::Band;
 pub use frame::Scale;
 pub use line::{Line, Point};
 pub use palette::{Colour, PALETTE};
 pub use panel::Panel;
 pub use plane::{Part, Plane, Sheet};
 
-use frame::Frame;
+use frame::{Frame, Row};
 
 use plotters::coord::Shift;
 use plotters::prelude::*;
@@ -55,40 +57,57 @@ impl Picture {
     /// # Errors
     /// It cannot be written there.
     pub fn write(&self, file: &Path) -> Result<(), String> {
-        let frames: Vec<_> = self.panels.iter().map(Panel::frame).collect();
-        write(file, &self.title, &frames, self.panel_size)
+        let rows: Vec<_> = self.panels.iter().map(|panel| Row { frames: vec![panel.frame()], height: 1 }).collect();
+        write(file, &self.title, &rows, self.panel_size)
     }
 }
 
-/// Writes frames below one another, each as high as its number of `panel_size`.
-fn write(file: &Path, title: &str, frames: &[Frame<'_>], panel_size: (u32, u32)) -> Result<(), String> {
+/// Writes rows below one another, each as high as its number of `panel_size`.
+fn write(file: &Path, title: &str, rows: &[Row<'_>], panel_size: (u32, u32)) -> Result<(), String> {
     Picture::check(file, "a plot")?;
     // The font is included, so that a plot does not depend on the machine.
     register_font("sans-serif", FontStyle::Normal, epaint_default_fonts::UBUNTU_LIGHT)
         .map_err(|_| "the plot's font cannot be read")?;
     let (width, height) = panel_size;
-    let panels: u32 = frames.iter().map(|frame| frame.height).sum();
+    let panels: u32 = rows.iter().map(|row| row.height).sum();
     let size = (width, TITLE + height * panels);
-    let drawn = match format(file) {
-        Some(Format::Svg) => {
-            draw(SVGBackend::new(file, size).into_drawing_area(), title, frames).map_err(|error| error.to_string())
-        }
-        _ => draw(BitMapBackend::new(file, size).into_drawing_area(), title, frames)
-            .map_err(|error| error.to_string()),
-    };
+    let drawn =
+        match format(file) {
+            Some(Format::Svg) => draw(SVGBackend::new(file, size).into_drawing_area(), title, rows)
+                .map_err(|error| error.to_string()),
+            _ => draw(BitMapBackend::new(file, size).into_drawing_area(), title, rows)
+                .map_err(|error| error.to_string()),
+        };
     drawn.map_err(|error| format!("cannot write {}: {error}", file.display()))
 }
 
-fn draw<B: DrawingBackend>(root: DrawingArea<B, Shift>, title: &str, frames: &[Frame<'_>]) -> Drawn<B> {
+fn draw<B: DrawingBackend>(root: DrawingArea<B, Shift>, title: &str, rows: &[Row<'_>]) -> Drawn<B> {
     root.fill(&WHITE)?;
     let mut rest = root.titled(title, ("sans-serif", 24))?;
-    // The same for all, so that their time axes have equal length.
-    let legend = frames.iter().map(|frame| frame.legend_width(&rest)).max().unwrap_or(0);
+    // The same for all of a column, so that their time axes have equal length.
+    let legend = |column: usize| {
+        let frames = rows.iter().filter_map(|row| row.frames.get(column).filter(|_| row.frames.len() > 1));
+        frames.map(|frame| frame.legend_width(&rest)).max().unwrap_or(0)
+    };
+    let alone = rows.iter().filter_map(|row| row.frames.first().filter(|_| row.frames.len() == 1));
+    let alone = alone.map(|frame| frame.legend_width(&rest)).max().unwrap_or(0);
+    let columns = rows.iter().map(|row| row.frames.len()).max().unwrap_or(0);
+    let legends: Vec<u32> = (0..columns).map(legend).collect();
+    let times = rows.iter().flat_map(|row| &row.frames).filter_map(Frame::times);
+    let times = times.reduce(|all, one| (all.0.min(one.0), all.1.max(one.1))).filter(|(first, last)| first < last);
     let height = rest.dim_in_pixel().1;
-    let panels: u32 = frames.iter().map(|frame| frame.height).sum();
-    for frame in frames {
-        let (area, below) = rest.split_vertically(height * frame.height / panels.max(1));
-        frame.draw(&area, legend)?;
+    let panels: u32 = rows.iter().map(|row| row.height).sum();
+    for row in rows {
+        let (area, below) = rest.split_vertically(height * row.height / panels.max(1));
+        match &row.frames[..] {
+            [frame] => frame.draw(&area, alone, times)?,
+            frames => {
+                for ((frame, area), legend) in frames.iter().zip(area.split_evenly((1, frames.len()))).zip(&legends)
+                {
+                    frame.draw(&area, *legend, times)?;
+                }
+            }
+        }
         rest = below;
     }
     root.present()
@@ -133,7 +152,7 @@ mod tests {
             .zip(["truth", "an estimate with a long name"])
             .map(|(index, label)| Line::new(label, PALETTE[index], 1, &points))
             .collect();
-        let panel = |axis: &str| Panel { title: String::new(), axis: axis.into(), lines: lines.clone() };
+        let panel = |axis: &str| Panel::new(axis, lines.clone());
         let panels = vec![panel("roll (deg)"), panel("pitch (deg)")];
         let file = std::env::temp_dir().join(format!("bb-plot-{}.svg", std::process::id()));
         Picture { title: "walk".into(), panels, panel_size: (900, 240) }.write(&file).expect("writes");
@@ -153,5 +172,49 @@ mod tests {
             let left = numbers(&format!("<text {legend}"), "text", "x")[0][0];
             assert!(left > right, "{left} {right}");
         }
+    }
+
+    fn drawn(part: Part, name: &str) -> String {
+        let file = std::env::temp_dir().join(format!("bb-plot-{name}-{}.svg", std::process::id()));
+        Sheet { title: name.into(), parts: vec![part], panel_size: (900, 240) }.write(&file).expect("writes");
+        let svg = std::fs::read_to_string(&file).expect("reads");
+        std::fs::remove_file(&file).expect("removes");
+        svg
+    }
+
+    /// A spike of a thousand leaves the rest its height, and is told; without being asked for, nothing is cut.
+    #[test]
+    fn a_spike_does_not_flatten_the_axis() {
+        let value = |index: i32| if (50..52).contains(&index) { 1000.0 } else { f64::from(index % 7) };
+        let points: Vec<_> = (0..400).map(|index| (f64::from(index) * 0.1, Some(value(index)))).collect();
+        let panel = || Panel::new("error (m)", vec![Line::new("error", PALETTE[0], 1, &points)]);
+        let heights = |svg: &str| {
+            let data = numbers(svg, "polyline", "points").into_iter().filter(|points| points.len() > 100);
+            let mut ys: Vec<f64> = data.flat_map(|points| points.into_iter().skip(1).step_by(2)).collect();
+            ys.sort_by(f64::total_cmp);
+            // Of all but the spike.
+            ys[ys.len() - 1] - ys[ys.len() / 20]
+        };
+        let cut = drawn(Part::Panel(panel().cut_spikes()), "cut");
+        assert!(heights(&cut) > 60.0 && cut.contains("up to 1000"), "{}", heights(&cut));
+        let whole = drawn(Part::Panel(panel()), "whole");
+        assert!(heights(&whole) < 5.0 && !whole.contains("up to"), "{}", heights(&whole));
+    }
+
+    #[test]
+    fn bands_are_behind_the_lines_and_in_the_legend_once() {
+        let points: Vec<_> = (0..100).map(|index| (f64::from(index), Some(f64::from(index)))).collect();
+        let band = |times| Band { label: "outage".into(), colour: (250, 220, 180), times };
+        let panel = Panel::new("a (m)", vec![Line::new("a", PALETTE[0], 1, &points)]);
+        let panel = panel.shade(&[band((10.0, 20.0)), band((90.0, 500.0))]);
+        let two = Part::Row(vec![Part::Panel(panel.clone()), Part::Panel(panel)]);
+        let svg = drawn(two, "bands");
+        assert_eq!(svg.matches("outage").count(), 2, "once for each panel");
+        let filled: Vec<_> = svg.match_indices("#FADCB4").map(|(at, _)| at).collect();
+        assert_eq!(filled.len(), 6, "two bands and a key for each panel");
+        assert!(filled[5] < svg.rfind("<polyline").expect("has lines"));
+        // The second panel is beside the first.
+        let lefts: Vec<f64> = numbers(&svg, "rect", "x").into_iter().flatten().collect();
+        assert!(lefts.iter().any(|x| *x > 450.0) && lefts.iter().all(|x| *x < 900.0), "{lefts:?}");
     }
 }

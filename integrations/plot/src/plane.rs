@@ -1,6 +1,6 @@
 //! Lines over two quantities, and pictures with them.
 
-use super::frame::{Frame, Scale};
+use super::frame::{Frame, Row, Scale};
 use super::line::Line;
 use super::panel::Panel;
 use std::path::Path;
@@ -21,9 +21,9 @@ pub struct Plane {
 }
 
 impl Plane {
-    fn frame(&self, height: u32) -> Frame<'_> {
+    fn frame(&self) -> Frame<'_> {
         let Self { title, x_axis, y_axis, scale, lines } = self;
-        Frame { title, x_axis, y_axis, lines, scale: *scale, height }
+        Frame { title, x_axis, y_axis, lines, bands: &[], scale: *scale, is_over_time: false, cuts_spikes: false }
     }
 }
 
@@ -34,6 +34,22 @@ pub enum Part {
     Plane(Plane, u32),
     /// Over time.
     Panel(Panel),
+    /// Beside one another, as high as the highest.
+    Row(Vec<Part>),
+}
+
+impl Part {
+    fn row(&self) -> Row<'_> {
+        match self {
+            Self::Plane(plane, height) => Row { frames: vec![plane.frame()], height: *height },
+            Self::Panel(panel) => Row { frames: vec![panel.frame()], height: 1 },
+            Self::Row(parts) => {
+                let rows: Vec<Row<'_>> = parts.iter().map(Self::row).collect();
+                let height = rows.iter().map(|row| row.height).max().unwrap_or(0);
+                Row { frames: rows.into_iter().flat_map(|row| row.frames).collect(), height }
+            }
+        }
+    }
 }
 
 /// Planes and panels below one another, with a title.
@@ -53,13 +69,7 @@ impl Sheet {
     /// # Errors
     /// It cannot be written there.
     pub fn write(&self, file: &Path) -> Result<(), String> {
-        let mut frames = Vec::with_capacity(self.parts.len());
-        for part in &self.parts {
-            frames.push(match part {
-                Part::Plane(plane, height) => plane.frame(*height),
-                Part::Panel(panel) => panel.frame(),
-            });
-        }
-        super::write(file, &self.title, &frames, self.panel_size)
+        let rows: Vec<_> = self.parts.iter().map(Part::row).collect();
+        super::write(file, &self.title, &rows, self.panel_size)
     }
 }

@@ -17,7 +17,7 @@ enum Step {
     Index(usize),
 }
 
-/// Numbers that share a panel: the fields of one message, or the elements of one list.
+/// Numbers that share a panel: the components of a vector, the elements of a list, or one field.
 #[derive(Debug, PartialEq)]
 pub(super) struct Group {
     pub(super) path: Path,
@@ -84,6 +84,11 @@ impl fmt::Display for Path {
 }
 
 impl Group {
+    /// Whether these are the components of a quaternion, in the order of ROS.
+    pub(super) fn is_quaternion(&self) -> bool {
+        self.fields.iter().map(|field| &*field.label).eq(["x", "y", "z", "w"])
+    }
+
     /// The label of the axis.
     pub(super) fn axis(&self) -> String {
         let (last, _) = self.path.names();
@@ -146,13 +151,28 @@ fn collect(value: &Value, path: &Path, is_whole: bool, groups: &mut Vec<Group>) 
         Step::Index(_) => false,
     };
     let numbers = steps.iter().filter(|(step, value)| value.as_f64().is_some() && !is_left_out(step));
-    let fields: Vec<_> =
-        numbers.map(|(step, _)| Selected { path: path.join(step.clone()), label: label(step) }).collect();
-    if !fields.is_empty() {
-        groups.push(Group { path: path.clone(), fields });
+    let mut components = Vec::new();
+    for (step, _) in numbers {
+        let selected = Selected { path: path.join(step.clone()), label: label(step) };
+        match is_component(step) {
+            true => components.push(selected),
+            // A quantity of its own: latitude and altitude share no axis.
+            false => groups.push(Group { path: selected.path.clone(), fields: vec![selected] }),
+        }
+    }
+    if !components.is_empty() {
+        groups.push(Group { path: path.clone(), fields: components });
     }
     for (step, value) in steps.into_iter().filter(|(step, value)| value.as_f64().is_none() && !is_left_out(step)) {
         collect(value, &path.join(step), is_whole, groups);
+    }
+}
+
+/// Whether a number is a component of a vector, a quaternion or a list.
+fn is_component(step: &Step) -> bool {
+    match step {
+        Step::Field(name) => ["x", "y", "z", "w"].contains(&&**name),
+        Step::Index(_) => true,
     }
 }
 
@@ -230,9 +250,13 @@ mod tests {
         };
         assert_eq!(paths(""), ["payload"]);
         assert_eq!(paths("wall_time"), ["wall_time"]);
+        let fix = message(r#"{"status":{"status":0,"service":1},"latitude":48,"longitude":11,"altitude":500}"#);
+        let fix = groups(&fix, &Path::default()).expect("has some");
+        let axes: Vec<_> = fix.iter().map(Group::axis).collect();
+        assert_eq!(axes, ["latitude", "longitude", "altitude", "status", "service"]);
         // What another has of that name is a number like any other.
         let other = message(r#"{"wall_time":6,"x":1}"#);
-        assert_eq!(groups(&other, &Path::default()).expect("has some")[0].fields.len(), 2);
+        assert_eq!(groups(&other, &Path::default()).expect("has some").len(), 2);
     }
 
     #[test]
