@@ -11,9 +11,9 @@ const JSON: &str = "json";
 
 const SECOND_NS: u64 = 1_000_000_000;
 
-/// Opens a bag; the error names the file.
+/// Opens a bag, by its file, its folder or the description in that; the error names the file.
 pub(crate) fn open(file: &Path) -> Result<Bag, String> {
-    Bag::open(file).map_err(|error| error.to_string())
+    Bag::open(bb_eval::files::recording(file)?).map_err(|error| error.to_string())
 }
 
 /// The topic of this name, with or without a leading slash.

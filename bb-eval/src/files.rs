@@ -7,6 +7,9 @@ use std::path::{Path, PathBuf};
 /// The extension of recordings.
 pub const EXTENSION: &str = "mcap";
 
+/// The description that ROS 2 writes beside the files of a bag.
+const METADATA: &str = "metadata.yaml";
+
 /// Extensions of recordings that cannot be read, or only with another feature. They are also collected from folders,
 /// so that an error says for each what to do.
 const OTHERS: [&str; 6] = [".db3", ".bag", ".mcap.zstd", ".mcap.zst", ".db3.zstd", ".mcap.gz"];
@@ -16,6 +19,7 @@ const OTHERS: [&str; 6] = [".db3", ".bag", ".mcap.zstd", ".mcap.zst", ".db3.zstd
 pub fn recordings(paths: &[PathBuf]) -> Vec<(PathBuf, Result<(), String>)> {
     let mut recordings = Vec::new();
     for path in paths {
+        let path = &folder_of(path);
         if !path.is_dir() {
             recordings.push((path.clone(), Ok(())));
             continue;
@@ -31,6 +35,28 @@ pub fn recordings(paths: &[PathBuf]) -> Vec<(PathBuf, Result<(), String>)> {
         }
     }
     recordings
+}
+
+/// The folder of a bag, if its description is named, or the path itself.
+fn folder_of(path: &Path) -> PathBuf {
+    let folder = path.parent().filter(|_| path.file_name().is_some_and(|name| name == METADATA) && path.is_file());
+    match folder {
+        Some(folder) if folder.as_os_str().is_empty() => PathBuf::from("."),
+        Some(folder) => folder.to_owned(),
+        None => path.to_owned(),
+    }
+}
+
+/// The recording of a path that names one: a file, the folder of a bag, or the description in it.
+///
+/// # Errors
+/// There is none in the folder, or several; in words.
+pub fn recording(path: &Path) -> Result<PathBuf, String> {
+    let mut found = recordings(&[path.to_owned()]);
+    match found.pop() {
+        Some((file, there)) if found.is_empty() => there.map(|()| file),
+        _ => Err(format!("{}: the folder holds several recordings; name one of them", path.display())),
+    }
 }
 
 /// Searches subfolders as well, since a ROS 2 recording is a folder. Links to folders are not followed, as they may be

@@ -3,8 +3,8 @@
 //! It follows a path; an estimator across its six joints tells how the tip accelerates. The tip's IMU is unplugged in the
 //! middle of a leg: the estimator is lost, and the command that this starts stops the arm. When the IMU is back and the
 //! estimator has recovered, the arm goes on to the end of its path. On virtual time, which takes a moment and gives the
-//! same output every time; with `--real-time` live. It writes a recording that Foxglove and RViz can show, and fails if
-//! anything that belongs to the story did not happen, or not in its order.
+//! same output every time; with `--real-time` live. With `--record` it writes a recording that Foxglove and RViz can show. It
+//! fails if anything that belongs to the story did not happen, or not in its order.
 
 mod commands;
 mod expected;
@@ -31,9 +31,9 @@ struct Arguments {
     /// Takes as long as the story does, instead of running on virtual time.
     #[arg(long)]
     real_time: bool,
-    /// Where the recording goes; one that is there is replaced. Default: arm.mcap in the folder for temporary files.
-    #[arg(long, value_name = "FILE", default_value_os_t = std::env::temp_dir().join("arm.mcap"), hide_default_value = true)]
-    record: PathBuf,
+    /// Records the story to this file, MCAP, which Foxglove and RViz can show; one that is there is replaced.
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
 }
 
 fn main() -> ExitCode {
@@ -50,8 +50,10 @@ fn main() -> ExitCode {
 /// Runs the story; whether all of it happened.
 fn tell(arguments: &Arguments, out: &mut dyn Write) -> Result<bool, Box<dyn Error>> {
     let outcome = run::run(arguments, out)?;
-    // Not to the output, which is the same on every machine.
-    eprintln!("recorded to {}", arguments.record.display());
+    if let Some(file) = &arguments.record {
+        // Not to the output, which is the same on every machine.
+        eprintln!("recorded to {}", file.display());
+    }
     writeln!(out, "\n{outcome}")?;
     let missing = outcome.missing();
     match missing.as_slice() {

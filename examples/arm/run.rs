@@ -46,7 +46,7 @@ struct Story<'a> {
     robot: Run,
     events: DynamicSubscription,
     tips: Subscription<Tip>,
-    recorder: Recorder,
+    recorder: Option<Recorder>,
     truth: Truth,
     outcome: Outcome,
     out: &'a mut dyn Write,
@@ -56,11 +56,16 @@ pub(crate) fn run(arguments: &Arguments, out: &mut dyn Write) -> Result<Outcome,
     let builder = Ur5::builder();
     let events = builder.subscribe_any(TOPICS, None, Overflow::default());
     let tips = builder.subscribe(ur5::estimator::base::tip);
-    let all = builder.subscribe_any(Select::All, None, Overflow::DropOldest { capacity: 65_536 });
-    if arguments.record.exists() {
-        std::fs::remove_file(&arguments.record)?;
-    }
-    let recorder = Recorder::new(&arguments.record, all, RecorderOptions::of::<Ur5>())?;
+    let recorder = match &arguments.record {
+        Some(file) => {
+            let all = builder.subscribe_any(Select::All, None, Overflow::DropOldest { capacity: 65_536 });
+            if file.exists() {
+                std::fs::remove_file(file)?;
+            }
+            Some(Recorder::new(file, all, RecorderOptions::of::<Ur5>())?)
+        }
+        None => None,
+    };
     let robot = if arguments.real_time { Run::Real(builder.start()?) } else { Run::Virtual(builder.simulate()?) };
     let truth = Truth::new(&robot)?;
     writeln!(out, "{}", Line::header())?;
@@ -83,7 +88,9 @@ impl Story<'_> {
                 return Ok(());
             }
             self.robot.until((now + script::PERIOD).min(time));
-            self.recorder.drain()?;
+            if let Some(recorder) = &mut self.recorder {
+                recorder.drain()?;
+            }
             for line in self.events.drain().collect::<Vec<_>>().iter().filter_map(Line::of) {
                 self.write(line)?;
             }
@@ -127,9 +134,11 @@ impl Story<'_> {
         Ok(())
     }
 
-    fn end(mut self) -> Result<Outcome, Box<dyn Error>> {
-        self.recorder.drain()?;
-        self.recorder.finish()?;
+    fn end(self) -> Result<Outcome, Box<dyn Error>> {
+        if let Some(mut recorder) = self.recorder {
+            recorder.drain()?;
+            recorder.finish()?;
+        }
         Ok(self.outcome)
     }
 }

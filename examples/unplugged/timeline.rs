@@ -60,7 +60,12 @@ impl Line {
         let time = message.stamp().monotonic_time;
         if let Some(change) = message.downcast::<HealthTransition>() {
             let HealthTransition { from, to, reason, source, .. } = change.payload;
-            return Some(Self::new(time, Kind::Health, format!("{from} -> {to}"), format!("{reason}: {source}")));
+            return Some(Self::new(
+                time,
+                Kind::Health,
+                format!("{from} -> {to}"),
+                format!("{reason}: {}", short(source)),
+            ));
         }
         if let Some(event) = message.downcast::<CommandEvent>() {
             let (event, detail) = told(event);
@@ -81,10 +86,20 @@ impl Line {
     }
 }
 
+/// A path that fits into a line: of a long one, the first two parts and the last two.
+fn short(path: &str) -> String {
+    let parts: Vec<&str> = path.split('/').collect();
+    match parts.as_slice() {
+        [first, second, _, .., before, last] if parts.len() > 5 => format!("{first}/{second}/…/{before}/{last}"),
+        _ => path.to_owned(),
+    }
+}
+
 /// What became of a command, and why it was started or refused.
 fn told(event: &CommandEvent) -> (String, String) {
     let name = event.command;
-    let cause = event.health.map_or(String::new(), |health| format!("{} is {}", health.estimator, health.to));
+    let cause =
+        event.health.map_or(String::new(), |health| format!("{} is {}", short(health.estimator), health.to));
     match &event.phase {
         CommandPhase::Started => (format!("{name} started"), cause),
         CommandPhase::Refused(refusal) => {

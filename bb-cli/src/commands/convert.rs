@@ -35,7 +35,7 @@ pub(crate) struct Arguments {
     /// The bag to write, which must not exist yet.
     #[arg(value_name = "OUT.mcap")]
     out: PathBuf,
-    /// What the columns of a CSV contain, and in which unit: QUANTITY=COLUMNS[:UNIT], separated by spaces.
+    /// Contents of the columns of a CSV, with their units: QUANTITY=COLUMNS[:UNIT], separated by spaces.
     #[arg(long, value_name = "MAP", num_args = 1.., value_delimiter = ' ', long_help = MAP)]
     columns: Vec<Quantity>,
     /// The rate of the samples in Hz, for a CSV without times.
@@ -46,7 +46,7 @@ pub(crate) struct Arguments {
     with: Vec<Input>,
 }
 
-const MAP: &str = "What the columns of a CSV contain, and in which unit: QUANTITY=COLUMNS[:UNIT], separated by spaces.
+const MAP: &str = "Contents of the columns of a CSV, with their units: QUANTITY=COLUMNS[:UNIT], separated by spaces.
 
   time    s (default), ms, us, ns
   gyr     angular velocity: rad/s (default), deg/s
@@ -86,14 +86,27 @@ pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
     for input in std::iter::once(&first).chain(with) {
         match input.format().map_err(|fault| in_file(&input.file, fault))? {
             Format::Description => {
+                input.check(Format::Description).map_err(|fault| in_file(&input.file, fault))?;
                 let files = input::described(&input.file).map_err(|fault| in_file(&input.file, fault))?;
                 for file in files {
                     let format = file.format().map_err(|fault| in_file(&file.file, fault))?;
+                    if format == Format::Description {
+                        return Err(in_file(
+                            &input.file,
+                            format!(
+                                "it names {}, another description; list that one's files here, or name both with --with",
+                                file.file.display()
+                            ),
+                        ));
+                    }
                     inputs.push((file, format));
                 }
             }
             format => inputs.push((input.clone(), format)),
         }
+    }
+    for (input, format) in &inputs {
+        input.check(*format).map_err(|fault| in_file(&input.file, fault))?;
     }
     if let [(bag, Format::Ros1)] = &inputs[..] {
         return write(out, |each| ros1::each(&bag.file, each).map_err(|fault| in_file(&bag.file, fault)));
@@ -187,7 +200,8 @@ fn merge(
     }
     notes.dedup();
     if join.alone > 0 {
-        notes.push(format!("{} angular velocities without a specific force within 0.1 s left out", join.alone));
+        let velocities = if join.alone == 1 { "angular velocity" } else { "angular velocities" };
+        notes.push(format!("{} {velocities} without a specific force within 0.1 s left out", join.alone));
     }
     notes.extend(sources.iter().flat_map(|source| source.notes.iter().cloned()));
     Ok(notes)

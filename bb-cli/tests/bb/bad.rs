@@ -1,6 +1,6 @@
 //! Recordings with something wrong: a line that says what, and the others' results all the same.
 
-use crate::common::{Walk, eval, file};
+use crate::common::{Walk, bb, eval, file};
 use serde_json::Value;
 use std::path::Path;
 
@@ -82,6 +82,17 @@ fn what_a_folder_holds_is_named_with_the_way_out() {
         if cfg!(feature = "sqlite") { "check that it is a bag of ROS 2" } else { "with the feature `sqlite`" };
     assert!(lines[2].contains("walk_2.db3: ") && lines[2].contains(way_out), "{}", lines[2]);
     assert_eq!(lines[3], "error: 3 of 4 recordings could not be evaluated to the end");
+    // The description of a bag means its folder, to what reads one recording too.
+    let described = folder.join("metadata.yaml");
+    let output = eval(&[&described], &["--json", "--filter", "madgwick"]);
+    assert!(output.err.ends_with("error: 3 of 4 recordings could not be evaluated to the end\n"), "{}", output.err);
+    let echo = |path: &Path| bb(&["echo", path.to_str().expect("is text"), "/imu", "--limit", "1"]);
+    assert!(echo(&described).err.contains("the folder holds several recordings; name one of them"));
+    std::fs::remove_dir_all(folder.join("walk")).expect("removes");
+    for path in [&described, &folder] {
+        let output = echo(path);
+        assert!(output.code == Some(0) && output.out.contains("angular_velocity"), "{}", output.err);
+    }
 }
 
 /// Cut anywhere, as by a recorder that was killed: scored up to the break, which is reported.

@@ -329,7 +329,7 @@ fn sentences_of_a_receiver_are_fixes() {
     let (input, out) = (csv("drive.nmea", &text.concat()), bag("nmea.mcap"));
     let output = convert(&input, &out, &[]);
     assert_eq!((output.code, &*output.err), (Some(0), ""));
-    let said = "3 on /fix, 1 lines are no sentence with the right checksum";
+    let said = "3 on /fix, 1 line is no sentence with the right checksum";
     assert_eq!(output.out, format!("{}: {said}\n", out.display()));
     let fixes = fixes(&out, "/fix");
     // 2024-06-24T00:00:00Z
@@ -367,7 +367,10 @@ fn solutions_of_rtklib_are_fixes() {
                0.0000   0.0000   0.0000   0.50    3.0\n";
     let (solution, out) = (csv("reference.pos", &format!("{head}{row}")), bag("pos.mcap"));
     let imu = csv("pos_imu.csv", "1556695561.0,0,0,0,0,0,9.8\n1556695561.5,0,0,0,0,0,9.8\n");
-    let with = format!("{} topic=/rtk", solution.display());
+    // A name with a space.
+    let spaced = solution.with_file_name("reference of the roof.pos");
+    std::fs::copy(&solution, &spaced).expect("copies");
+    let with = format!("{} topic=/rtk", spaced.display());
     let output = convert(&imu, &out, &["--columns", "time=1 gyr=2-4 acc=5-7", "--with", &with]);
     assert_eq!((output.code, &*output.err), (Some(0), ""));
     assert_eq!(output.out, format!("{}: 2 on /imu, 1 on /rtk\n", out.display()));
@@ -378,6 +381,31 @@ fn solutions_of_rtklib_are_fixes() {
     let cut = csv("cut.pos", &format!("{head}2019/05/01 07:26:19.000   48.1\n"));
     let output = convert(&cut, &bag("cut.mcap"), &[]);
     assert!(output.err.contains("cut.pos: line 4: 3 columns are too few"), "{}", output.err);
+}
+
+/// A rate or a topic that a format does not take is not passed over, and neither is a description in another.
+#[test]
+fn what_a_format_has_not_is_refused() {
+    let solution = csv("refused.pos", "% program\n2019/05/01 07:26:19.000 48.1 11.5 520 1 9 1 1 1 0 0 0 0 0\n");
+    let outer = csv("outer.toml", "[[file]]\npath = \"inner.toml\"\n");
+    let out = bag("refused.mcap");
+    let ros1 = format!("{} topic=/rtk", data("ros1.bag").display());
+    for (input, arguments, fault) in [
+        (&solution, &["--rate", "10"][..], "--rate is for a CSV without times, and a solution of RTKLIB has times"),
+        (&data("px4.ulg"), &["--rate", "10"], "and a log of PX4 has times; leave it out"),
+        (&data("ros1.bag"), &["--rate", "10"], "and a bag of ROS 1 has times; leave it out"),
+        (&outer, &["--rate", "10"], "outer.toml: --rate is for a CSV without times"),
+        (
+            &solution,
+            &["--with", &ros1],
+            "topic=/rtk names a topic for fixes, and a bag of ROS 1 has topics of its own",
+        ),
+        (&outer, &[], "inner.toml, another description; list that one's files here"),
+    ] {
+        let output = convert(input, &out, arguments);
+        assert_eq!((output.code, out.exists()), (Some(1), false), "{}", output.err);
+        assert!(output.err.contains(fault), "{fault}: {}", output.err);
+    }
 }
 
 /// A file of `tests/data`.

@@ -35,10 +35,15 @@ pub(super) enum Format {
 }
 
 impl Input {
-    /// `FILE MAP…`, separated by spaces.
+    /// `FILE MAP…`, separated by spaces. The name of the file may have spaces: the map begins with the first word that
+    /// has a `=`.
     pub(super) fn parse(text: &str) -> Result<Self, String> {
-        let (file, map) = text.split_once(' ').unwrap_or((text, ""));
-        let mut input = Self { file: file.into(), ..Self::default() };
+        let starts = text.match_indices(' ').map(|(at, _)| at);
+        let is_word_of_map = |at: &usize| text[at + 1..].split(' ').next().is_some_and(|word| word.contains('='));
+        let is_file = Path::new(text).exists();
+        let end = starts.into_iter().find(is_word_of_map).filter(|_| !is_file).unwrap_or(text.len());
+        let (file, map) = text.split_at(end);
+        let mut input = Self { file: file.trim_end().into(), ..Self::default() };
         input.map(map)?;
         Ok(input)
     }
@@ -52,6 +57,26 @@ impl Input {
             }
         }
         Ok(())
+    }
+
+    /// Checks that the format has what is said of the file.
+    pub(super) fn check(&self, format: Format) -> Result<(), String> {
+        let name = match format {
+            Format::Csv => return Ok(()),
+            Format::Ros1 => "a bag of ROS 1 has",
+            Format::Ulog => "a log of PX4 has",
+            Format::Nmea => "the sentences of a receiver have",
+            Format::Rtklib => "a solution of RTKLIB has",
+            Format::Description => "a description has those of its files, and",
+        };
+        let has_topic = matches!(format, Format::Ulog | Format::Nmea | Format::Rtklib);
+        match (self.rate, &self.topic) {
+            (Some(_), _) => Err(format!("--rate is for a CSV without times, and {name} times; leave it out")),
+            (_, Some(topic)) if !has_topic => {
+                Err(format!("topic={topic} names a topic for fixes, and {name} topics of its own; leave it out"))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// The format, by the first bytes.
@@ -139,7 +164,8 @@ impl Source {
                 let (entries, bad) = nmea::read(&input.file, topic)?;
                 source.waiting = entries.into();
                 if bad > 0 {
-                    source.notes.push(format!("{bad} lines are no sentence with the right checksum"));
+                    let lines = if bad == 1 { "1 line is".to_owned() } else { format!("{bad} lines are") };
+                    source.notes.push(format!("{lines} no sentence with the right checksum"));
                 }
             }
             Format::Rtklib => source.waiting = rtklib::read(&input.file, topic)?.into(),
