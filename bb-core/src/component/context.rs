@@ -66,6 +66,42 @@ impl Context {
     /// # }
     /// ```
     pub fn for_test(inputs: &[(&'static str, Isometry3<f64>)]) -> Self {
+        let declaration = EstimatorDeclaration { path: "test", ..EstimatorDeclaration::NONE };
+        Self::new("test", Self::leaked(declaration, inputs), MonotonicTime::ZERO, None)
+    }
+
+    /// The same context with these inputs, the first being the driver, in the place of the declared ones: for an
+    /// estimator that wraps another whose sensors are mounted as a file says. Requests made to it are its own. (It leaks
+    /// what [`for_test`](Self::for_test) does.)
+    ///
+    /// ```
+    /// use bb_core::nalgebra::Isometry3;
+    /// use bb_core::prelude::*;
+    ///
+    /// # fn main() -> Result<(), Fault> {
+    /// let context = Context::for_test(&[("imu", Isometry3::identity()), ("gnss", Isometry3::identity())]);
+    /// let other = context.with_inputs(&[("imu", Isometry3::translation(0.0, 0.0, 1.0))]);
+    /// assert_eq!(other.frame_from_driver()?.translation.z, 1.0);
+    /// assert!(other.frame_from_input("gnss").is_err());
+    /// # Ok(())
+    /// # }
+    /// ```
+    #[must_use]
+    pub fn with_inputs(&self, inputs: &[(&'static str, Isometry3<f64>)]) -> Self {
+        Self {
+            robot: self.robot,
+            declaration: Self::leaked(*self.declaration, inputs),
+            now: self.now,
+            safety: self.safety.clone(),
+            requests: RefCell::default(),
+            replacement: None,
+        }
+    }
+
+    fn leaked(
+        declaration: EstimatorDeclaration,
+        inputs: &[(&'static str, Isometry3<f64>)],
+    ) -> &'static EstimatorDeclaration {
         let inputs = inputs.iter().enumerate().map(|(index, (name, frame_from_input))| InputDeclaration {
             index,
             name,
@@ -77,8 +113,7 @@ impl Context {
             frame_from_input: Some(Transform::of(frame_from_input)),
         });
         let inputs: &'static [InputDeclaration] = Vec::leak(inputs.collect());
-        let declaration = EstimatorDeclaration { path: "test", inputs, ..EstimatorDeclaration::NONE };
-        Self::new("test", Box::leak(Box::new(declaration)), MonotonicTime::ZERO, None)
+        Box::leak(Box::new(EstimatorDeclaration { inputs, ..declaration }))
     }
 
     /// The robot's name.
