@@ -10,7 +10,7 @@ pub(super) mod measured;
 mod options;
 mod output;
 pub(super) mod refuted;
-mod report;
+pub(super) mod report;
 mod running;
 mod states;
 pub(super) mod world;

@@ -25,6 +25,9 @@ pub struct NavigationInputs<'a> {
     pub magnetic_field: Option<Input<'a, MagneticField>>,
     /// A barometer: changes of height since its first reading.
     pub pressure: Option<Input<'a, FluidPressure>>,
+    /// The state of the link to start from, in motion or at rest: one that was kept, or one that an operator has set. With
+    /// satellite navigation, the position is that of the fixes.
+    pub start: Option<Input<'a, Odometry>>,
 }
 
 /// Poses of the sensors. `None` for inputs that the robot does not declare.
@@ -79,6 +82,13 @@ impl Mounting {
             angular_velocity: rotation * imu.angular_velocity,
             specific_force: rotation * imu.linear_acceleration,
         }
+    }
+
+    /// Pose and velocity of the body, from those of the link.
+    pub(super) fn state(&self, link: &Odometry) -> (Vector3<f64>, UnitQuaternion<f64>, Vector3<f64>) {
+        let (turn, imu) = (link.pose.world_from_body, self.link_from_imu.translation.vector);
+        let velocity = link.twist.linear + link.twist.angular.cross(&imu);
+        (link.pose.position + turn * imu, turn, turn * velocity)
     }
 
     /// The antenna in the body, m.

@@ -3,13 +3,14 @@
 use super::filter::Filter;
 use super::input::Mounting;
 use super::world::World;
+use crate::navigation::geodesy::Geodetic;
 use crate::navigation::math::skew;
 use crate::navigation::state::{
     Estimate, GYROSCOPE_BIAS, NAVIGATION, Optional, POSITION, ROTATION, States, VELOCITY,
 };
 use crate::navigation::stream::Counts;
 use bb_core::Payload;
-use bb_core::payload::{Odometry, Pose, Twist};
+use bb_core::payload::{GeodeticPosition, Odometry, Pose, Twist};
 use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, UnitQuaternion, Vector3};
 
 /// Status of the filter, published with its odometry.
@@ -47,6 +48,8 @@ pub struct NavigationStatus {
     pub hard_iron: Vector3<f64>,
     /// Barometric height minus the height, m. 0 if it is not a state.
     pub barometer_bias: f64,
+    /// Where the origin of the world is on the Earth. `None` without satellites.
+    pub world_origin: Option<GeodeticPosition>,
     /// Number of times that IMU samples were missing for longer than a sample may take.
     pub gaps: u32,
     /// Number of times the filter was wrong and restarted where fixes or poses agree.
@@ -72,6 +75,12 @@ impl From<&Counts> for Verdicts {
             invalid: counts.invalid + counts.late + counts.future,
         }
     }
+}
+
+/// A place on the Earth as a payload.
+pub(in crate::navigation) fn place_of(place: &Geodetic) -> GeodeticPosition {
+    let Geodetic { latitude, longitude, height } = *place;
+    GeodeticPosition { latitude_rad: latitude, longitude_rad: longitude, altitude: Some(height) }
 }
 
 /// Pose and motion of the link.
@@ -146,7 +155,10 @@ impl Motion {
 }
 
 /// The remaining status of the filter.
-pub(super) fn status_of<S: States, const N: usize>(filter: &Filter<S, N>) -> Option<NavigationStatus> {
+pub(super) fn status_of<S: States, const N: usize>(
+    filter: &Filter<S, N>,
+    world: &World,
+) -> Option<NavigationStatus> {
     let estimate = filter.estimate()?;
     let [gnss, odometry, _, pose, relative, magnetic_field, pressure] = filter.counts().map(Verdicts::from);
     Some(NavigationStatus {
@@ -166,6 +178,7 @@ pub(super) fn status_of<S: States, const N: usize>(filter: &Filter<S, N>) -> Opt
         gnss_delay: estimate.scalar::<S>(Optional::GnssDelay),
         hard_iron: estimate.vector::<S>(Optional::HardIron),
         barometer_bias: estimate.scalar::<S>(Optional::BarometerBias),
+        world_origin: world.first().map(|frame| place_of(frame.origin())),
         gaps: filter.eskf().gaps(),
         // The start counts as the first.
         resets: filter.eskf().resets().saturating_sub(1),

@@ -254,7 +254,7 @@ impl<S: States + Send, const N: usize> Core for Running<S, N> {
     }
 
     fn status(&self) -> Option<NavigationStatus> {
-        status_of(self.past.now())
+        status_of(self.past.now(), &self.world)
     }
 
     fn divergence(&mut self) -> Option<&'static str> {

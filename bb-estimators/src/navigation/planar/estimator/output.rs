@@ -3,8 +3,10 @@
 use super::filter::Filter;
 use super::input::Mounting;
 use crate::navigation::estimator::Verdicts;
+use crate::navigation::estimator::report::place_of;
+use crate::navigation::geodesy::LocalFrame;
 use crate::navigation::planar::estimate::{GYROSCOPE_BIAS, HEADING, POSITION, STATES, VELOCITY, WHEEL_SCALE, left};
-use bb_core::payload::{Odometry, Pose, Twist};
+use bb_core::payload::{GeodeticPosition, Odometry, Pose, Twist};
 use bb_core::{Outputs, Payload};
 use nalgebra::{Matrix6, SMatrix, UnitQuaternion, Vector2, Vector3};
 
@@ -22,7 +24,7 @@ const PLANE: f64 = 1e-6;
 pub trait PlanarOutput: Outputs + Sized {
     /// The values available for an output.
     #[doc(hidden)]
-    fn of(filter: &Filter, mounting: &Mounting) -> Option<Self>;
+    fn of(filter: &Filter, mounting: &Mounting, frame: Option<&LocalFrame>) -> Option<Self>;
 }
 
 /// Filter state beyond the odometry.
@@ -52,6 +54,8 @@ pub struct PlanarStatus {
     pub pose: Verdicts,
     /// The same for orientations.
     pub orientation: Verdicts,
+    /// Where the origin of the world is on the Earth. `None` without satellites.
+    pub world_origin: Option<GeodeticPosition>,
     /// How often IMU samples were missing for longer than a sample may take.
     pub gaps: u32,
     /// How often the filter was wrong and was reset to where fixes or poses agree.
@@ -69,7 +73,7 @@ pub struct PlanarOutputs {
 
 #[expect(private_interfaces, reason = "implemented here alone")]
 impl PlanarOutput for Odometry {
-    fn of(filter: &Filter, mounting: &Mounting) -> Option<Self> {
+    fn of(filter: &Filter, mounting: &Mounting, _: Option<&LocalFrame>) -> Option<Self> {
         let estimate = filter.ekf().estimate()?;
         // The link's pose in the body.
         let link = mounting.body_from_link;
@@ -143,7 +147,7 @@ fn on_the_plane(
 
 #[expect(private_interfaces, reason = "implemented here alone")]
 impl PlanarOutput for PlanarOutputs {
-    fn of(filter: &Filter, mounting: &Mounting) -> Option<Self> {
+    fn of(filter: &Filter, mounting: &Mounting, frame: Option<&LocalFrame>) -> Option<Self> {
         let ekf = filter.ekf();
         let estimate = ekf.estimate()?;
         let deviation = |state: usize| ekf.covariance()[(state, state)].sqrt();
@@ -161,10 +165,14 @@ impl PlanarOutput for PlanarOutputs {
             yaw_rate,
             pose,
             orientation,
+            world_origin: frame.map(|frame| place_of(frame.origin())),
             gaps: ekf.gaps(),
             // The start itself counts as the first reset.
             resets: ekf.resets().saturating_sub(1),
         };
-        Some(Self { odometry: Some(Odometry::of(filter, mounting)?), status: Some(status) })
+        Some(Self {
+            odometry: Some(<Odometry as PlanarOutput>::of(filter, mounting, frame)?),
+            status: Some(status),
+        })
     }
 }

@@ -143,7 +143,7 @@ impl Running {
 
     pub(super) fn reply<O: PlanarOutput>(&mut self, mounting: &Mounting) -> Reply<O> {
         let filter = self.past.now();
-        let reply: Reply<O> = O::of(filter, mounting).into();
+        let reply: Reply<O> = O::of(filter, mounting, self.frame.as_ref()).into();
         let counts = filter.counts();
         match filter.sight(&counts).and_then(|sight| self.watch.look(&sight)) {
             Some(reason) => reply.diverged(reason),
