@@ -7,7 +7,7 @@ use crate::navigation::{self, NavigationArguments};
 use crate::noise::{self, NoiseArguments};
 use bb_estimators::attitude::FilterParams;
 use bb_eval::Evaluator;
-use bb_eval::{Axes, Chosen, Setting};
+use bb_eval::{Align, Axes, Chosen, Mount, Setting};
 use bb_eval::{Field, Offset, Starts, Variants};
 use bb_eval::{MovingTopic, Topics};
 use bb_eval::{files, filters};
@@ -111,8 +111,18 @@ struct AttitudeArguments {
     #[arg(long, value_name = "TOPIC")]
     mag_topic: Option<String>,
     /// The topic of the true orientation, if there are several (geometry_msgs/PoseStamped), or if it is nav_msgs/Odometry.
-    #[arg(long, value_name = "TOPIC")]
-    truth_topic: Option<String>,
+    #[arg(long, alias = "truth-topic", value_name = "TOPIC")]
+    truth: Option<String>,
+    /// The place of a frame on the robot, m and degrees: FRAME=X,Y,Z,ROLL,PITCH,YAW, over those of /tf_static. FRAME may be the
+    /// topic of a sensor, that of the IMU or of the truth. TOPIC=FRAME sets the frame that a topic is about.
+    #[arg(long, value_name = "FRAME=…", allow_hyphen_values = true)]
+    mount: Vec<Mount>,
+    /// Turns the truth, whose world has axes of its own, to the estimates of each filter.
+    #[arg(long, value_enum, default_value_t = Align::None)]
+    align: Align,
+    /// The angle from true north, to which the truth refers, to magnetic north, in degrees, positive to the east.
+    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, allow_negative_numbers = true)]
+    declination: f64,
     /// The topic that says whether the body moves, if there are several (std_msgs/Bool); `none` scores the whole recording.
     #[arg(long, value_name = "TOPIC")]
     moving_topic: Option<String>,
@@ -186,6 +196,9 @@ impl AttitudeArguments {
         {
             return Err(invalid(format!("--start-before-motion is {seconds}, but must be in 0..=1000000 s")));
         }
+        if !(-180.0..=180.0).contains(&self.declination) {
+            return Err(invalid(format!("--declination is {}, but must be in -180..=180 deg", self.declination)));
+        }
         if let Some(plot) = &self.plot {
             Picture::check(plot, "--plot").map_err(invalid)?;
         }
@@ -204,13 +217,16 @@ impl AttitudeArguments {
             topics: Topics {
                 imu: self.imu_topic,
                 magnetometer: self.mag_topic,
-                truth: self.truth_topic,
+                truth: self.truth,
                 moving: match self.moving_topic {
                     None => MovingTopic::ByType,
                     Some(none) if none == "none" => MovingTopic::None,
                     Some(name) => MovingTopic::Named(name),
                 },
+                mounts: self.mount,
+                declination: self.declination.to_radians(),
             },
+            align: self.align,
             before_motion_s: self.start_before_motion,
             variants,
             keep_errors: self.plot.is_some(),

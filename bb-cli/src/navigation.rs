@@ -1,24 +1,24 @@
 //! `bb eval navigation`.
 
 use bb_eval::{
-    BagOptions, DataSet, Drawn, NAVIGATION_FILTERS, NavigationBag, NavigationFilter, NavigationSetting, Played,
-    Progress, ScoredNavigation, Trace, files, navigation_json, navigation_parameters, navigation_table,
-    play_navigation, plot_navigation,
+    Align, BagOptions, DataSet, Disturbances, Drawn, Drive, NAVIGATION_FILTERS, NavigationBag, NavigationFilter,
+    NavigationRun, NavigationSetting, Played, Progress, RobotFile, RobotSettings, ScoredNavigation, StartFrom,
+    export_navigation, files, navigation_json, navigation_table, play_navigation, plot_navigation,
 };
 use bb_plot::Picture;
 use clap::Args;
 use std::path::{Path, PathBuf};
 
 pub(crate) const EXAMPLES: &str =
-    "Exit code: 0; 1 if a data set could not be evaluated to its end, or most of it was left out or
-rejected; 2 for a wrong use.
+    "Exit code: 0; 1 if a recording could not be evaluated to its end, an option changed nothing, or most of a recording was
+left out or refused; 2 for a wrong use.
 
 Examples:
   bb eval navigation drive.mcap --truth /ground_truth --plot drive.svg
-  bb eval navigation drive.mcap --mount gps=-0.4,0,1.6 --set heading=\"90 deg\" --start align
-  bb eval navigation flight.mcap --relative-topic /vio/odometry --odometry-topic none --filter smoother
-  bb eval navigation drives/kitti_s2 drives/kitti_s5 --filter eskf --json
-  bb eval navigation flights/one --filter eskf-single --set gyroscope_noise=1e-3";
+  bb eval navigation drive.mcap --mount gps=-0.4,0,1.6 --set heading=\"90 deg\" --every 4 --outage 30s/90s
+  bb eval navigation drive.mcap --robot rover.toml --filter eskf,planar --align heading
+  bb eval navigation flight.mcap --relative-topic /vio/odometry --odometry-topic none --filter state-smoother
+  bb eval navigation drives/kitti_s2 drives/kitti_s5 --json";
 
 #[derive(Debug, Args)]
 pub(crate) struct NavigationArguments {
@@ -28,16 +28,25 @@ pub(crate) struct NavigationArguments {
     data: Vec<PathBuf>,
     /// The filters: several with commas.
     #[arg(long = "filter", value_name = "NAME", value_delimiter = ',', default_value = NAVIGATION_FILTERS[0].name,
-          value_parser = filter, long_help = filters_in_words())]
+          long_help = filters_in_words())]
     filters: Vec<NavigationFilter>,
-    /// The number of keyframes in a smoother's window.
-    #[arg(long, value_name = "KEYFRAMES", default_value_t = 20,
-          value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(2..=1000))]
-    window: usize,
-    /// Sets a parameter, in SI or with a unit, instead of the data set's value.
+    /// Takes the options of the filter from a settings file, as a robot writes it with `--list`; with `:PATH`, those of the
+    /// estimator at that path.
+    #[arg(long, value_name = "CONFIG.toml[:PATH]")]
+    robot: Option<RobotFile>,
+    /// Sets an option of the filter, as on the command line of a robot.
     #[arg(long = "set", value_name = "NAME=VALUE")]
     settings: Vec<NavigationSetting>,
-    /// Only prints the parameters, with defaults, ranges and units.
+    /// Optional states of `eskf`, several with commas: wheel_scale, gnss_delay.
+    #[arg(long, value_name = "STATE", value_delimiter = ',')]
+    states: Vec<String>,
+    /// Multiplies the noise of the IMU that the filter assumes.
+    #[arg(long, value_name = "FACTOR", value_parser = factor)]
+    noise_times: Option<f64>,
+    /// Turns and moves the truth, whose world has axes and an origin of its own, to the estimates.
+    #[arg(long, value_enum, default_value_t = Align::None)]
+    align: Align,
+    /// Only prints the options of the filters, with defaults, ranges and units, as a settings file.
     #[arg(long)]
     list: bool,
     /// Prints an array of objects instead of the table.
@@ -46,18 +55,24 @@ pub(crate) struct NavigationArguments {
     /// Plots the track, errors, innovations, and errors by the age of poses to this file, an SVG or a PNG.
     #[arg(long, value_name = "FILE", value_parser = picture)]
     plot: Option<PathBuf>,
+    /// Writes the estimates with their covariances beside the truth to this file, a CSV or an MCAP.
+    #[arg(long, value_name = "FILE")]
+    export: Option<PathBuf>,
+    #[command(flatten)]
+    disturbances: Disturbances,
     #[command(flatten)]
     bag: BagOptions,
 }
 
-fn filter(name: &str) -> Result<NavigationFilter, String> {
-    let known = NAVIGATION_FILTERS.map(|filter| filter.name);
-    let found = NAVIGATION_FILTERS.into_iter().find(|filter| filter.name == name);
-    found.ok_or_else(|| format!("no filter `{name}`; {}", bb_eval::filters::near(name, &known)))
+fn factor(text: &str) -> Result<f64, String> {
+    let factor: Option<f64> = text.parse().ok();
+    factor
+        .filter(|factor| (1e-6..=1e6).contains(factor))
+        .ok_or_else(|| "write a factor from 1e-6 to 1e6".to_owned())
 }
 
 fn filters_in_words() -> String {
-    let mut text = String::from("The filters: several with commas.\n");
+    let mut text = String::from("The filters, each as a robot declares it: several with commas.\n");
     for filter in NAVIGATION_FILTERS {
         text += &format!("\n{}: {}", filter.name, filter.about);
     }
@@ -70,12 +85,6 @@ fn picture(file: &str) -> Result<PathBuf, String> {
     Ok(file)
 }
 
-/// What a path refers to.
-enum Source {
-    Set(Box<DataSet>),
-    Bag(Box<NavigationBag>),
-}
-
 /// The results, and the faults.
 #[derive(Default)]
 struct Done {
@@ -85,29 +94,50 @@ struct Done {
     faults: Vec<String>,
 }
 
+impl Done {
+    /// What is the same for all filters is said once.
+    fn say(list: &mut Vec<String>, file: &Path, lines: Vec<String>) {
+        for line in lines {
+            let line = format!("{}: {line}", file.display());
+            if !list.contains(&line) {
+                list.push(line);
+            }
+        }
+    }
+}
+
 impl NavigationArguments {
-    /// Returns the text to print, and whether every data set could be evaluated to its end. Notes and faults go to
-    /// the error stream.
+    /// Returns the text to print, and whether all went well. Notes and faults go to the error stream.
     pub(crate) fn run(&self) -> Result<(String, bool), String> {
         if self.list {
-            return Ok((navigation_parameters(), true));
+            let options: Vec<String> = self.filters.iter().map(NavigationFilter::options).collect();
+            return Ok((options.join("\n"), true));
         }
         let mut done = Done::default();
         for path in &self.data {
             if is_prefix(path) {
-                let source = DataSet::read(path).map(|data| Source::Set(Box::new(data)));
-                self.evaluate(path, source, &mut done);
+                let drive = DataSet::read(path).map(|data| self.started(data.drive()));
+                self.evaluate(path, drive, &mut done);
                 continue;
             }
             for (file, found) in files::recordings(std::slice::from_ref(path)) {
                 let bag = found.and_then(|()| NavigationBag::read(&file, &self.bag));
-                let source = bag.map(|bag| Source::Bag(Box::new(bag)));
-                self.evaluate(&file, source.map_err(|fault| format!("{}: {fault}", file.display())), &mut done);
+                if let Some(broken) = bag.as_ref().ok().and_then(NavigationBag::broken) {
+                    done.faults.push(format!("{}: {broken}; scored up to there", file.display()));
+                }
+                let drive = bag.and_then(|bag| bag.drive());
+                self.evaluate(&file, drive.map_err(|fault| format!("{}: {fault}", file.display())), &mut done);
             }
         }
         if let Some(plot) = &self.plot {
             match plot_navigation(plot, &done.drawn) {
                 Ok(()) => eprintln!("plotted {}", plot.display()),
+                Err(fault) => done.faults.push(fault),
+            }
+        }
+        if let Some(export) = &self.export {
+            match export_navigation(export, &done.drawn) {
+                Ok(rows) => eprintln!("wrote {rows} estimates to {}", export.display()),
                 Err(fault) => done.faults.push(fault),
             }
         }
@@ -121,63 +151,48 @@ impl NavigationArguments {
         Ok((text, done.faults.is_empty()))
     }
 
-    fn evaluate(&self, file: &Path, source: Result<Source, String>, done: &mut Done) {
-        let source = match source {
-            Ok(source) => source,
-            Err(fault) => return done.faults.push(fault),
-        };
-        if let Source::Bag(bag) = &source
-            && let Some(broken) = bag.broken()
-        {
-            done.faults.push(format!("{}: {broken}; scored up to there", file.display()));
-        }
-        for filter in &self.filters {
-            if let Err(fault) = self.evaluate_one(file, &source, filter, done) {
-                let fault = format!("{}: {}: {fault}", file.display(), filter.name);
-                done.faults.push(fault);
-            }
+    /// A data set, which tells its start, without it if that is asked for.
+    fn started(&self, drive: Drive) -> Drive {
+        match self.bag.start {
+            Some(StartFrom::Own) => drive.without_start(),
+            _ => drive,
         }
     }
 
-    fn evaluate_one(
-        &self,
-        file: &Path,
-        source: &Source,
-        filter: &NavigationFilter,
-        done: &mut Done,
-    ) -> Result<(), String> {
-        let made;
-        let data = match source {
-            Source::Set(data) => data,
-            Source::Bag(bag) => {
-                made = bag.data_set(&self.settings, filter.is_smoother())?;
-                for note in &made.notes {
-                    let note = format!("{}: {note}", file.display());
-                    if !done.notes.contains(&note) {
-                        done.notes.push(note);
-                    }
-                }
-                // It is the same for all filters.
-                for doubt in &made.doubts {
-                    let doubt = format!("{}: {doubt}", file.display());
-                    if !done.faults.contains(&doubt) {
-                        done.faults.push(doubt);
-                    }
-                }
-                &made.data
-            }
+    fn evaluate(&self, file: &Path, drive: Result<Drive, String>, done: &mut Done) {
+        let drive = match drive {
+            Ok(drive) => drive,
+            Err(fault) => return done.faults.push(fault),
         };
-        let progress = Progress::new("evaluating", data.count() as u64);
-        let mut trace = self.plot.is_some().then(Trace::default);
-        let played = play_navigation(data, filter, &self.settings, self.window, trace.as_mut(), || progress.add(1));
-        progress.finish();
-        let Played { score, doubts } = played?;
-        done.scores.push((file.to_owned(), filter.name, score));
-        let named = |doubt| format!("{}: {}: {doubt}", file.display(), filter.name);
-        done.faults.extend(doubts.into_iter().map(named));
-        let name = format!("{}, {}", file.file_name().unwrap_or(file.as_os_str()).to_string_lossy(), filter.name);
-        done.drawn.extend(trace.map(|trace| Drawn { name, trace }));
-        Ok(())
+        for filter in &self.filters {
+            let progress = Progress::new("evaluating", drive.samples());
+            let played = self.settings(filter).and_then(|settings| {
+                let run = NavigationRun {
+                    settings,
+                    disturbances: self.disturbances.clone(),
+                    align: self.align,
+                    keep_trace: self.plot.is_some() || self.export.is_some(),
+                };
+                play_navigation(&drive, filter, &run, || progress.add(1))
+            });
+            progress.finish();
+            let Played { score, notes, doubts, trace } = match played {
+                Ok(played) => played,
+                Err(fault) => {
+                    done.faults.push(format!("{}: {}: {fault}", file.display(), filter.name));
+                    continue;
+                }
+            };
+            Done::say(&mut done.notes, file, notes);
+            Done::say(&mut done.faults, file, doubts);
+            done.scores.push((file.to_owned(), filter.name, score));
+            let name = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy().into_owned();
+            done.drawn.extend(trace.map(|trace| Drawn { name: format!("{name}, {}", filter.name), trace }));
+        }
+    }
+
+    fn settings(&self, filter: &NavigationFilter) -> Result<RobotSettings, String> {
+        RobotSettings::new(filter, self.robot.as_ref(), &self.settings, &self.states, self.noise_times)
     }
 }
 

@@ -1,16 +1,20 @@
 //! Runs filters on recordings.
 
+mod detail;
 mod doubts;
 
-use crate::filters::{Axes, Chosen, Refused, Running};
+pub use detail::Detail;
+
+use crate::filters::{Axes, Chosen, Deviations, Refused, Running};
 use crate::progress::Progress;
 use crate::recording::{End, Recording, Topics};
 use crate::score::Score;
 use crate::truths::Truths;
+use crate::turns::{Align, Turn, Turns, angles};
 use crate::units::Units;
 use crate::variants::{Variant, Variants, moving_times};
 use bb_core::nalgebra::UnitQuaternion;
-use bb_estimators::attitude::{ImuSample, OrientationError};
+use bb_estimators::attitude::ImuSample;
 use doubts::{take_units, truth_doubt, unit_doubts};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -40,6 +44,8 @@ pub struct Evaluator {
     pub before_motion_s: Option<f64>,
     /// How the recordings are modified.
     pub variants: Variants,
+    /// What is taken from the truth.
+    pub align: Align,
     /// Whether to keep the errors over time.
     pub keep_errors: bool,
 }
@@ -70,8 +76,8 @@ pub struct Run {
     pub filter: &'static str,
     /// Its errors.
     pub score: Score,
-    /// The number of headings with a reported standard deviation, and how many of them were within two.
-    pub within_two_sigma: (u64, u64),
+    /// What a root mean square does not tell.
+    pub detail: Detail,
     /// Mean time per sample, including reading the orientation, in ns.
     pub ns_per_update: f64,
     /// Error over time: seconds since the first sample, and degrees, `None` where the truth is unknown. The total
@@ -146,7 +152,24 @@ impl Evaluation {
     }
 }
 
-fn play(file: &Path, index: u32, evaluator: &Evaluator, show: &mut dyn FnMut(u64)) -> Result<Evaluation, String> {
+/// Filters after a recording.
+struct Passed {
+    recording: Recording,
+    units: Units,
+    players: Vec<Player>,
+    played: u64,
+    broken: Option<String>,
+    fields: Vec<(f64, f64)>,
+}
+
+/// Plays a variant of a recording. The truth of each filter is turned by its alignment.
+fn pass(
+    file: &Path,
+    index: u32,
+    evaluator: &Evaluator,
+    turns: &[Option<Turn>],
+    show: &mut dyn FnMut(u64),
+) -> Result<Passed, String> {
     let open = || Recording::open(file, &evaluator.topics, evaluator.axes, evaluator.before_motion_s);
     let mut recording = open()?;
     let magnetometer = recording.magnetometer_topic.clone().unwrap_or_default();
@@ -165,6 +188,9 @@ fn play(file: &Path, index: u32, evaluator: &Evaluator, show: &mut dyn FnMut(u64
     }
     let players = evaluator.filters.iter().map(|chosen| Player::new(&chosen.on(recording.axes)?));
     let mut players = players.collect::<Result<Vec<_>, _>>()?;
+    for (player, turn) in players.iter_mut().zip(turns) {
+        player.world_from_aligned = turn.map(|turn| turn.rotation.inverse());
+    }
     let mut units = Units::default();
     let mut samples = Vec::with_capacity(BLOCK);
     let mut start_ns = None;
@@ -197,7 +223,30 @@ fn play(file: &Path, index: u32, evaluator: &Evaluator, show: &mut dyn FnMut(u64
     if played == 0 {
         return Err("no sample of the IMU is left to play".into());
     }
-    let mut notes: Vec<_> = recording.note.iter().cloned().collect();
+    Ok(Passed { recording, units, players, played, broken, fields })
+}
+
+fn play(file: &Path, index: u32, evaluator: &Evaluator, show: &mut dyn FnMut(u64)) -> Result<Evaluation, String> {
+    let turns = match evaluator.align {
+        Align::None => Vec::new(),
+        align => {
+            let first = pass(file, index, evaluator, &[], &mut |_| {})?;
+            first.players.iter().map(|player| player.of_world.of(align)).collect()
+        }
+    };
+    let Passed { recording, units, players, played, broken, fields } = pass(file, index, evaluator, &turns, show)?;
+    let magnetometer = recording.magnetometer_topic.clone().unwrap_or_default();
+    let mut notes: Vec<_> = recording.note.iter().chain(&recording.notes).cloned().collect();
+    for (player, turn) in players.iter().zip(&turns) {
+        notes.extend(turn.map(|turn| {
+            format!(
+                "{}: the truth is turned by roll, pitch, yaw {} deg (spread {:.2} deg)",
+                player.name,
+                angles(&turn.rotation),
+                turn.spread.to_degrees()
+            )
+        }));
+    }
     if recording.axes != evaluator.axes {
         notes.push(format!("{magnetometer} holds no message, so six axes are scored"));
     }
@@ -207,7 +256,7 @@ fn play(file: &Path, index: u32, evaluator: &Evaluator, show: &mut dyn FnMut(u64
         // If filters were disturbed on purpose, their errors say nothing about the truth.
         let is_misled = !doubts.is_empty() || evaluator.variants.changes_field();
         notes.extend(doubts);
-        notes.extend(truth_doubt(&recording, &players).filter(|_| !is_misled));
+        notes.extend(truth_doubt(&recording, &players, evaluator.align).filter(|_| !is_misled));
     }
     notes.extend(players.iter().filter_map(|player| player.refusals(played)));
     if recording.note.is_none() && players.iter().all(|player| player.score.count() == 0) {
@@ -229,7 +278,12 @@ struct Player {
     score: Score,
     refused: Refused,
     truths: Truths,
-    within_two_sigma: (u64, u64),
+    detail: Detail,
+    /// Takes estimates to the world of the truth.
+    world_from_aligned: Option<UnitQuaternion<f64>>,
+    /// Estimates against the truth, in the world and in the body.
+    of_world: Turns,
+    of_body: Turns,
     time: Duration,
     estimates: Vec<Option<UnitQuaternion<f64>>>,
     errors: Vec<(f64, Option<f64>)>,
@@ -248,7 +302,10 @@ impl Player {
             score: Score::default(),
             refused: Refused::default(),
             truths: Truths::default(),
-            within_two_sigma: (0, 0),
+            detail: Detail::default(),
+            world_from_aligned: None,
+            of_world: Turns::default(),
+            of_body: Turns::default(),
             time: Duration::ZERO,
             estimates: Vec::with_capacity(BLOCK),
             errors: Vec::new(),
@@ -269,10 +326,14 @@ impl Player {
         self.time += started.elapsed();
         self.refused.count += refused.count;
         self.refused.first = self.refused.first.or(refused.first);
+        if let Some(turn) = self.world_from_aligned {
+            self.estimates.iter_mut().flatten().for_each(|estimate| *estimate = turn * *estimate);
+        }
         self.ask(samples, recording);
         for (sample, estimate) in samples.iter().zip(&self.estimates) {
             let Some(estimate) = estimate else { continue };
             let error = self.score.add_at(&recording.truth, sample.time_ns, estimate);
+            self.detail.add_error(error.as_ref());
             if keep_errors {
                 let angle = error.map(|error| match recording.axes {
                     Axes::Six => error.inclination.to_degrees(),
@@ -292,10 +353,14 @@ impl Player {
         let Some(estimate) = self.estimates.last().copied().flatten() else { return };
         let (Some(truth), true) = recording.truth.at(sample.time_ns) else { return };
         self.truths.add(&estimate, &truth);
-        let Some(deviations) = self.filter.deviations() else { return };
-        let Some(error) = OrientationError::between(&estimate, &truth) else { return };
-        self.within_two_sigma.0 += 1;
-        self.within_two_sigma.1 += u64::from(error.heading <= 2.0 * deviations.heading);
+        self.of_world.add(&(estimate * truth.inverse()));
+        self.of_body.add(&(truth.inverse() * estimate));
+        let turn = self.world_from_aligned.unwrap_or_else(UnitQuaternion::identity);
+        let deviations = self.filter.deviations().map(|deviations| {
+            let turn = turn.to_rotation_matrix().into_inner();
+            Deviations { covariance: turn * deviations.covariance * turn.transpose(), ..deviations }
+        });
+        self.detail.add(sample.time_ns, &estimate, &truth, deviations.as_ref(), self.filter.trusts_heading());
     }
 
     fn refusals(&self, played: u64) -> Option<String> {
@@ -305,7 +370,7 @@ impl Player {
 
     fn finish(self, played: u64) -> Run {
         let ns_per_update = self.time.as_secs_f64() * 1e9 / played as f64;
-        let Self { name, score, within_two_sigma, errors, orientations, .. } = self;
-        Run { filter: name, score, within_two_sigma, ns_per_update, errors, orientations }
+        let Self { name, score, detail, errors, orientations, .. } = self;
+        Run { filter: name, score, detail, ns_per_update, errors, orientations }
     }
 }

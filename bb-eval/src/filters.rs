@@ -6,7 +6,7 @@ mod settings;
 pub use list::{described, listed, parameters};
 pub use settings::{Setting, near};
 
-use bb_core::nalgebra::UnitQuaternion;
+use bb_core::nalgebra::{Matrix3, UnitQuaternion};
 use bb_estimators::attitude::{self, AttitudeFilter, FilterParams, ImuSample, SampleError};
 use bb_estimators::attitude_filters;
 use bb_estimators::params::{Params, Value};
@@ -119,11 +119,18 @@ pub trait Running {
     fn deviations(&self) -> Option<Deviations> {
         None
     }
+
+    /// Whether the heading is known well enough to be used, if the filter reports it.
+    fn trusts_heading(&self) -> Option<bool> {
+        None
+    }
 }
 
 /// Standard deviations of an orientation, rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Deviations {
+    /// The covariance of the error as a small rotation about the axes of the world, rad².
+    pub covariance: Matrix3<f64>,
     /// The deviation of the heading.
     pub heading: f64,
     /// The deviation of the inclination: the root of the sum of the variances about the two horizontal axes, which is
@@ -156,10 +163,15 @@ impl<F: AttitudeFilter> Running for F {
         refused
     }
 
+    fn trusts_heading(&self) -> Option<bool> {
+        self.is_heading_trusted()
+    }
+
     fn deviations(&self) -> Option<Deviations> {
         let world_from_body = self.world_from_body()?.to_rotation_matrix();
         let variance = world_from_body * self.orientation_uncertainty()? * world_from_body.transpose();
         Some(Deviations {
+            covariance: variance,
             heading: variance[(2, 2)].max(0.0).sqrt(),
             inclination: (variance[(0, 0)] + variance[(1, 1)]).max(0.0).sqrt(),
         })

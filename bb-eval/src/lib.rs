@@ -2,8 +2,8 @@
 //!
 //! Without features this is [`Chosen`], a filter of `bb-estimators` by its name and settings, and [`Score`] and [`Averages`],
 //! which define the errors. With the feature `recordings`, `evaluate` runs attitude filters on a
-//! `Recording`, and `evaluate_navigation` navigation filters on a `DataSet`, of CSV files or of a `NavigationBag`; with
-//! `plot`, `plot_errors` and `plot_navigation` draw the errors. `bb eval` is this library on the command line; its
+//! `Recording`, and `play_navigation` navigation filters, each declared in a robot, on a `Drive`, of CSV files or of a
+//! `NavigationBag`; with `plot`, `plot_errors` and `plot_navigation` draw the errors. `bb eval` is this library on the command line; its
 //! guide is `docs/evaluate.md`.
 
 // A robot must not stop because of an unexpected value.
@@ -20,6 +20,8 @@ mod families;
 pub mod files;
 pub mod filters;
 #[cfg(feature = "recordings")]
+mod frames;
+#[cfg(feature = "recordings")]
 mod navigation;
 mod progress;
 #[cfg(feature = "recordings")]
@@ -32,6 +34,8 @@ pub mod table;
 #[cfg(feature = "recordings")]
 mod truths;
 #[cfg(feature = "recordings")]
+mod turns;
+#[cfg(feature = "recordings")]
 pub mod units;
 #[cfg(feature = "recordings")]
 mod variants;
@@ -40,7 +44,7 @@ pub use averages::Averages;
 #[cfg(feature = "plot")]
 pub use error_plot::plot_errors;
 #[cfg(feature = "recordings")]
-pub use evaluate::{Evaluation, Evaluator, Run, evaluate, evaluate_all, evaluate_variant};
+pub use evaluate::{Detail, Evaluation, Evaluator, Run, evaluate, evaluate_all, evaluate_variant};
 #[cfg(feature = "recordings")]
 pub use families::{
     FAMILIES, Family, FamilyScore, Half, Measure, Share, families_json, families_list, families_table,
@@ -48,17 +52,21 @@ pub use families::{
 };
 pub use filters::{Axes, Chosen, Deviations, Refused, Running, Setting};
 #[cfg(feature = "recordings")]
+pub use frames::{Mount, Place};
+#[cfg(feature = "recordings")]
 pub use navigation::{
-    BagOptions, BiasDeviation, DataSet, FromBag, Inertial, Mount, NAVIGATION_FILTERS, NavigationBag,
-    NavigationFilter, NavigationScore, NavigationSetting, Origin, Place, Played, RelativeDeviation,
-    ScoredNavigation, StartFrom, Trace, evaluate_navigation, inertial, navigation_json, navigation_parameters,
-    navigation_table, play_navigation,
+    BagOptions, DataSet, Delay, Disturbances, Drive, Dropped, Fate, InState, Inertial, Keyframe,
+    NAVIGATION_FILTERS, NavigationBag, NavigationFilter, NavigationRun, NavigationScore, NavigationSetting, Noise,
+    OfAge, Origin, Played, RelativeDeviation, RobotFile, RobotSettings, Sample, ScoredNavigation, Spell, Spread,
+    StartFrom, Trace, Truth, Within, Wrong, inertial, navigation_json, navigation_table, play_navigation,
 };
 #[cfg(feature = "plot")]
-pub use navigation::{Drawn, plot_navigation};
+pub use navigation::{Drawn, export_navigation, plot_navigation};
 pub use progress::Progress;
 #[cfg(feature = "recordings")]
 pub use recording::{End, MovingTopic, Recording, Topics};
 pub use score::{Degrees, Score};
+#[cfg(feature = "recordings")]
+pub use turns::{Align, Turn, Turns};
 #[cfg(feature = "recordings")]
 pub use variants::{Field, Offset, Starts, Variants};

@@ -1,31 +1,35 @@
-//! Navigation filters, scored on recorded and simulated drives and flights.
+//! Navigation filters in their robots, scored on recorded drives and flights.
 
-mod allocations;
 mod bag;
 mod csv;
 mod data;
+mod disturb;
 mod doubt;
+mod drive;
 mod errors;
 mod evaluate;
-mod filters;
-mod flown;
-mod measured;
+#[cfg(feature = "plot")]
+mod export;
+mod feed;
 #[cfg(feature = "plot")]
 mod picture;
-mod player;
+mod record;
 mod report;
-mod step;
+mod robot;
+mod score;
 mod trace;
-mod verdicts;
 
-pub use bag::{
-    BagOptions, BiasDeviation, FromBag, Mount, NavigationBag, Origin, Place, RelativeDeviation, StartFrom,
-};
+pub use bag::{BagOptions, NavigationBag, Origin, RelativeDeviation, StartFrom};
 pub use csv::{Inertial, inertial};
-pub use data::DataSet;
-pub use evaluate::{NavigationScore, Played, evaluate_navigation, play_navigation};
-pub use filters::{NAVIGATION_FILTERS, NavigationFilter, NavigationSetting, navigation_parameters};
+pub use data::{DataSet, Keyframe, Noise, Sample, Truth};
+pub use disturb::{Delay, Disturbances, Dropped, Spell};
+pub use drive::Drive;
+pub use evaluate::{NavigationRun, Played, play_navigation};
+#[cfg(feature = "plot")]
+pub use export::export_navigation;
 #[cfg(feature = "plot")]
 pub use picture::{Drawn, plot_navigation};
 pub use report::{ScoredNavigation, navigation_json, navigation_table};
+pub use robot::{NAVIGATION_FILTERS, NavigationFilter, NavigationSetting, RobotFile, RobotSettings};
+pub use score::{Fate, InState, NavigationScore, OfAge, Spread, Within, Wrong};
 pub use trace::Trace;

@@ -1,7 +1,11 @@
 //! An opened recording: its samples, its truth, and remarks on it.
 
+use crate::frames::{Frames, Mount, TF_STATIC, frame};
+use bb_core::message::codec::ros::TransformsMessage;
+use bb_core::nalgebra::{Rotation3, UnitQuaternion, Vector3};
 use bb_estimators::attitude::ImuSample;
 use bb_mcap::{Bag, IMU, MOVING, MargSamples, ODOMETRY, POSE, RecordingError, RecordingErrorKind, Topic, Truth};
+use std::collections::HashMap;
 use std::path::Path;
 
 use crate::filters::Axes;
@@ -17,6 +21,10 @@ pub struct Topics {
     pub truth: Option<String>,
     /// The topic that says when the body moves.
     pub moving: MovingTopic,
+    /// Places of frames and sensors on the robot, over those of `/tf_static`.
+    pub mounts: Vec<Mount>,
+    /// The angle from true north to magnetic north, positive to the east, rad: the truth is turned by it.
+    pub declination: f64,
 }
 
 /// The topic that says when the body moves.
@@ -44,6 +52,13 @@ pub struct Recording {
     pub(crate) imu_topic: String,
     pub(crate) magnetometer_topic: Option<String>,
     pub(crate) truth_topic: Option<String>,
+    /// The frame of the IMU, as `--mount` takes it.
+    pub(crate) imu_name: String,
+    /// Takes what the IMU, and what the magnetometer measures to the axes of the robot; `None` if they are those.
+    base_from_imu: Option<Rotation3<f64>>,
+    base_from_magnetometer: Option<Rotation3<f64>>,
+    /// What was assumed of the mountings.
+    pub(crate) notes: Vec<String>,
     samples: MargSamples,
     /// Samples before this time are skipped.
     start_ns: i64,
@@ -66,7 +81,7 @@ impl Recording {
         };
         let poses = poses(&bag, topics.truth.as_deref())?;
         let moving = moving(&bag, &topics.moving)?;
-        let truth = truth(&bag, &[poses.as_deref().ok(), moving.as_deref()])?;
+        let mut truth = truth(&bag, &[poses.as_deref().ok(), moving.as_deref()])?;
         let note = match &poses {
             Err(fault) => Some(format!("no truth, so no errors: {fault}")),
             Ok(topic) if !truth.is_known() => {
@@ -95,7 +110,29 @@ impl Recording {
         if samples.next_time().is_none() {
             return Err(format!("{} holds no message, so there is nothing to play", imu.name));
         }
+        let named = [Some(&*imu.name), magnetic, poses.as_deref().ok()];
+        let frames = frames(&bag, &named, &imu.name, &topics.mounts)?;
+        let mut notes = Vec::new();
+        let mut base_from = |topic: &str| frames.base_from(topic, &mut notes).map(|pose| pose.rotation);
+        let base_from_imu = base_from(&imu.name)?;
+        let base_from_magnetometer = magnetic.map(&mut base_from).transpose()?.unwrap_or_default();
+        let base_from_truth = poses.as_deref().map_or_else(|_| Ok(UnitQuaternion::identity()), base_from)?;
+        // As estimators of a robot turn them, to the last bit.
+        let turned =
+            |rotation: UnitQuaternion<f64>| (rotation.angle() > 0.0).then(|| rotation.to_rotation_matrix());
+        let declination = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), topics.declination);
+        if base_from_truth.angle() > 0.0 || topics.declination != 0.0 {
+            truth.turn(&declination, &base_from_truth.inverse());
+        }
+        let imu_name = match frames.of_topic(&imu.name) {
+            "" => imu.name.to_string(),
+            frame => frame.to_owned(),
+        };
         Ok(Self {
+            imu_name,
+            base_from_imu: turned(base_from_imu),
+            base_from_magnetometer: turned(base_from_magnetometer),
+            notes,
             truth,
             note,
             axes,
@@ -117,6 +154,10 @@ impl Recording {
         let imu = bag.choose(IMU, topics.imu.as_deref()).map_err(|error| said(&error, "--imu-topic"))?;
         let samples = MargSamples::read(&bag, &imu.name, None).map_err(|error| error.kind().to_string())?;
         Ok(Self {
+            imu_name: imu.name.to_string(),
+            base_from_imu: None,
+            base_from_magnetometer: None,
+            notes: Vec::new(),
             truth: Truth::default(),
             note: None,
             axes: Axes::Six,
@@ -127,6 +168,11 @@ impl Recording {
             start_ns: i64::MIN,
             expected: imu.messages.unwrap_or(0),
         })
+    }
+
+    /// Takes the axes of the IMU to those of the robot.
+    pub(crate) fn base_from_imu(&self) -> UnitQuaternion<f64> {
+        self.base_from_imu.as_ref().map_or_else(UnitQuaternion::identity, UnitQuaternion::from_rotation_matrix)
     }
 
     /// Leaves out the samples before this time, nanoseconds.
@@ -150,14 +196,15 @@ impl Recording {
             if time.as_nanos() < self.start_ns {
                 continue;
             }
+            let turned = |rotation: &Option<Rotation3<f64>>, vector: Vector3<f64>| {
+                rotation.as_ref().map_or(vector, |rotation| rotation.matrix() * vector)
+            };
+            let field = marg.magnetic_field.filter(|_| self.axes == Axes::Nine);
             samples.push(ImuSample {
                 time_ns: time.as_nanos(),
-                angular_velocity: marg.imu.angular_velocity,
-                specific_force: marg.imu.linear_acceleration,
-                magnetic_field: marg
-                    .magnetic_field
-                    .filter(|_| self.axes == Axes::Nine)
-                    .map(|field| field.magnetic_field),
+                angular_velocity: turned(&self.base_from_imu, marg.imu.angular_velocity),
+                specific_force: turned(&self.base_from_imu, marg.imu.linear_acceleration),
+                magnetic_field: field.map(|field| turned(&self.base_from_magnetometer, field.magnetic_field)),
             });
         }
         Ok(End::NotYet)
@@ -188,7 +235,7 @@ fn poses(bag: &Bag, name: Option<&str>) -> Result<Result<String, String>, String
     let error = match bag.choose(POSE, name) {
         Ok(topic) if name.is_none() && topic.is_own => {
             return Ok(Err(format!(
-                "the poses of {} are what a robot published, an estimate say; name them with --truth-topic if they are \
+                "the poses of {} are what a robot published, an estimate say; name them with --truth if they are \
                  the truth",
                 topic.name
             )));
@@ -200,8 +247,8 @@ fn poses(bag: &Bag, name: Option<&str>) -> Result<Result<String, String>, String
         RecordingErrorKind::OtherType { .. } if bag.choose(ODOMETRY, name).is_ok() => {
             Ok(Ok(name.unwrap_or_default().to_owned()))
         }
-        RecordingErrorKind::NoTopicOfType { .. } => Ok(Err(said(&error, "--truth-topic"))),
-        _ => Err(said(&error, "--truth-topic")),
+        RecordingErrorKind::NoTopicOfType { .. } => Ok(Err(said(&error, "--truth"))),
+        _ => Err(said(&error, "--truth")),
     }
 }
 
@@ -222,6 +269,28 @@ fn moving(bag: &Bag, topic: &MovingTopic) -> Result<Option<String>, String> {
             _ => Err(said(&error, "--moving-topic")),
         },
     }
+}
+
+/// The frames of the robot, as the transforms and the first messages of some topics tell them.
+fn frames(bag: &Bag, topics: &[Option<&str>], imu: &str, mounts: &[Mount]) -> Result<Frames, String> {
+    let fault = |error: RecordingError| error.kind().to_string();
+    let mut transforms = Vec::new();
+    if bag.topics().iter().any(|topic| *topic.name == *TF_STATIC) {
+        for message in bag.messages(&[TF_STATIC]).map_err(fault)? {
+            match message {
+                Ok(message) => transforms.extend(message.decode::<TransformsMessage>().map_err(fault)?.transforms),
+                Err(_) => break,
+            }
+        }
+    }
+    let mut of_topics = HashMap::new();
+    for topic in topics.iter().flatten() {
+        // Damage is met, and reported, where the samples are read.
+        if let Some(Ok(message)) = bag.messages(&[topic]).map_err(fault)?.next() {
+            of_topics.insert((*topic).to_owned(), frame(&message).map_err(fault)?);
+        }
+    }
+    Frames::new(&transforms, &of_topics, imu, mounts)
 }
 
 /// Reads the truth, up to where the recording is cut off.

@@ -22,6 +22,18 @@ struct Row {
     inclination_deg: Option<f64>,
     /// The fraction of headings within two of the standard deviations that the filter reported.
     heading_within_two_sigma: Option<f64>,
+    /// The same of inclinations.
+    inclination_within_two_sigma: Option<f64>,
+    /// 95th percentile and largest total error.
+    p95_deg: Option<f64>,
+    max_deg: Option<f64>,
+    /// Mean normalised error squared; 3 is expected.
+    nees: Option<f64>,
+    /// The fraction of samples at which the filter trusts its heading, and the error of the heading there.
+    heading_trusted: Option<f64>,
+    heading_while_trusted_deg: Option<f64>,
+    /// How fast the heading drifts, with six axes too.
+    heading_drift_deg_per_min: Option<f64>,
     /// The number of scored samples.
     samples: u64,
     ns_per_update: f64,
@@ -44,6 +56,16 @@ pub fn json(evaluations: &[Evaluation]) -> Result<String, String> {
             heading_deg: whole.map(|rms| rms.heading),
             inclination_deg: rms.map(|rms| rms.inclination),
             heading_within_two_sigma: within(&[run], axes),
+            inclination_within_two_sigma: run.detail.tilt_within.share(),
+            p95_deg: run.detail.p95_deg().filter(|_| axes == Axes::Nine),
+            max_deg: run.detail.largest().map(|error| match axes {
+                Axes::Nine => error.total.to_degrees(),
+                Axes::Six => error.inclination.to_degrees(),
+            }),
+            nees: run.detail.nees().filter(|_| axes == Axes::Nine),
+            heading_trusted: run.detail.trusted.share(),
+            heading_while_trusted_deg: run.detail.heading_while_trusted_deg(),
+            heading_drift_deg_per_min: run.detail.drift_deg_per_min(),
             samples: run.score.count(),
             ns_per_update: run.ns_per_update,
         }
@@ -58,7 +80,7 @@ pub fn table(evaluations: &[Evaluation], axes: Axes) -> String {
     let is_asked = |evaluation: &Evaluation| evaluation.axes == axes;
     // Six, if no recording has nine.
     let axes = if runs(evaluations).any(|(evaluation, _)| is_asked(evaluation)) { axes } else { Axes::Six };
-    let mut lines: Vec<[String; 8]> = Vec::new();
+    let mut lines: Vec<[String; 13]> = Vec::new();
     for (evaluation, run) in runs(evaluations) {
         let [total, heading, inclination] = angles(run.score.rms(), evaluation.axes);
         let cost = format!("{:.0}", run.ns_per_update);
@@ -70,6 +92,17 @@ pub fn table(evaluations: &[Evaluation], axes: Axes) -> String {
             heading,
             inclination,
             percent(within(&[run], evaluation.axes)),
+            percent(run.detail.tilt_within.share()),
+            two(run.detail.largest().map(|error| match evaluation.axes {
+                Axes::Nine => error.total.to_degrees(),
+                Axes::Six => error.inclination.to_degrees(),
+            })),
+            run.detail
+                .nees()
+                .filter(|_| evaluation.axes == Axes::Nine)
+                .map_or_else(|| "-".into(), |nees| format!("{nees:.1}")),
+            percent(run.detail.trusted.share()),
+            two(run.detail.drift_deg_per_min()),
             count,
             cost,
         ]);
@@ -98,10 +131,28 @@ pub fn table(evaluations: &[Evaluation], axes: Axes) -> String {
             let [total, heading, inclination] = angles(Some(score), axes);
             let what = format!("{what} {}", averages.count);
             let share = if what.starts_with("mean") { share.clone() } else { String::new() };
-            lines.push([what, filter.into(), total, heading, inclination, share, String::new(), String::new()]);
+            let mut line = [const { String::new() }; 13];
+            for (cell, text) in line.iter_mut().zip([what, filter.into(), total, heading, inclination, share]) {
+                *cell = text;
+            }
+            lines.push(line);
         }
     }
-    let head = ["recording", "filter", "total", "heading", "inclination", "in 2σ", "samples", "ns/update"];
+    let head = [
+        "recording",
+        "filter",
+        "total",
+        "heading",
+        "inclination",
+        "in 2σ",
+        "incl. in 2σ",
+        "max",
+        "NEES",
+        "trusted",
+        "drift/min",
+        "samples",
+        "ns/update",
+    ];
     lines.insert(0, head.map(String::from));
     let mut text = format!("Error against the truth, {} axes, RMS in degrees:\n\n", axes.name());
     text += &aligned(&lines, 2, rows + 1);
@@ -133,9 +184,15 @@ pub fn complain(evaluations: &[Evaluation]) -> bool {
 
 /// The fraction of headings within two standard deviations; `None` if no filter reports them.
 fn within(runs: &[&Run], axes: Axes) -> Option<f64> {
-    let (told, within) =
-        runs.iter().fold((0, 0), |sum, run| (sum.0 + run.within_two_sigma.0, sum.1 + run.within_two_sigma.1));
+    let (told, within) = runs
+        .iter()
+        .map(|run| run.detail.heading_within)
+        .fold((0, 0), |sum, share| (sum.0 + share.all, sum.1 + share.part));
     (told > 0 && axes == Axes::Nine).then(|| within as f64 / told as f64)
+}
+
+fn two(value: Option<f64>) -> String {
+    value.map_or_else(|| "-".to_owned(), |value| format!("{value:.2}"))
 }
 
 fn percent(share: Option<f64>) -> String {

@@ -11,7 +11,7 @@ const DOUBTFUL: f64 = 20.0 * PI / 180.0;
 /// and another convention is named if its error is smaller than that, and smaller by this factor.
 const CLEARER: f64 = 3.0;
 /// Conventions whose errors differ by less than this, rad, cannot be distinguished.
-const ALIKE: f64 = 0.5 * PI / 180.0;
+pub(crate) const ALIKE: f64 = 0.5 * PI / 180.0;
 /// A verdict needs this many samples.
 const FEWEST: u64 = 3;
 

@@ -22,9 +22,16 @@ fn json_has_these_fields() {
         "file",
         "filter",
         "heading_deg",
+        "heading_drift_deg_per_min",
+        "heading_trusted",
+        "heading_while_trusted_deg",
         "heading_within_two_sigma",
         "inclination_deg",
+        "inclination_within_two_sigma",
+        "max_deg",
+        "nees",
         "ns_per_update",
+        "p95_deg",
         "samples",
         "total_deg",
         "variant",
@@ -145,12 +152,8 @@ fn without_a_topic_that_says_so_all_is_motion() {
 #[test]
 fn topics_are_named_where_several_fit() {
     let file = Walk { twice: true, ..Walk::default() }.file("twice.mcap");
-    let options = [
-        ("--imu-topic", "/imu"),
-        ("--mag-topic", "/mag"),
-        ("--truth-topic", "/truth"),
-        ("--moving-topic", "/moving"),
-    ];
+    let options =
+        [("--imu-topic", "/imu"), ("--mag-topic", "/mag"), ("--truth", "/truth"), ("--moving-topic", "/moving")];
     for left_out in 0..options.len() {
         let others = options.iter().enumerate().filter(|(index, _)| *index != left_out);
         let arguments: Vec<_> = others.flat_map(|(_, (option, topic))| [*option, *topic]).collect();

@@ -38,7 +38,7 @@ fn what_is_not_there_is_named() {
         (&no_magnetometer, &["--mag-topic", "/mag"], "no topic /mag; the bag has"),
         (
             &no_magnetometer,
-            &["--axes", "six", "--truth-topic", "/imu"],
+            &["--axes", "six", "--truth", "/imu"],
             "/imu are sensor_msgs/msg/Imu, and geometry_msgs",
         ),
         (

@@ -56,7 +56,12 @@ fn a_truth_in_another_convention_is_named() {
     let ned = notes(Walk { written: ned, ..roll() }, "doubt_ned.mcap", &[]);
     assert!(ned[0].starts_with("/truth: the truth looks to be in north, east, down: with it read so"), "{ned:?}");
     // A heading that is off, as of a room whose axes are not east and north, is nothing of that.
-    assert_eq!(notes(Walk { error: 0.8, ..roll() }, "doubt_heading.mcap", &[]), [""; 0]);
+    let turned = notes(Walk { error: 0.8, ..roll() }, "doubt_heading.mcap", &[]);
+    assert_eq!(turned.len(), 1);
+    assert!(turned[0].starts_with("the truth's world is turned about the vertical by -45.8 deg"), "{turned:?}");
+    assert!(turned[0].contains(": --align heading"), "{turned:?}");
+    let aligned = notes(Walk { error: 0.8, ..roll() }, "doubt_heading.mcap", &["--align", "heading"]);
+    assert!(aligned.iter().all(|note| note.contains("the truth is turned by")), "{aligned:?}");
 }
 
 #[test]

@@ -3,6 +3,7 @@
 mod attitude;
 mod bad;
 mod calibrate;
+mod cart;
 mod common;
 mod convert;
 mod doubts;

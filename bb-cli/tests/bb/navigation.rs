@@ -36,95 +36,112 @@ fn drive(name: &str) -> PathBuf {
 fn a_drive_is_scored() {
     let drive = drive("straight");
     let prefix = drive.to_str().expect("is text");
-    let output = bb(&["eval", "navigation", prefix, "--filter", "eskf,eskf-single", "--json"]);
+    let output = bb(&["eval", "navigation", prefix, "--filter", "eskf,planar", "--json"]);
     assert_eq!((output.code, &*output.err), (Some(0), ""));
     let rows: Vec<Value> = serde_json::from_str(&output.out).expect("an array");
-    assert_eq!((rows.len(), &rows[0]["filter"], &rows[1]["filter"]), (2, &"eskf".into(), &"eskf-single".into()));
+    assert_eq!((rows.len(), &rows[0]["filter"], &rows[1]["filter"]), (2, &"eskf".into(), &"planar".into()));
     for row in &rows {
-        let number = |name: &str| row[name].as_f64().unwrap_or_else(|| panic!("{name} is no number: {row}"));
-        assert!(number("position_rmse_m") < 0.3 && number("velocity_rmse_mps") < 0.2, "{row}");
-        assert!(number("orientation_rmse_deg") < 1.0 && number("nees") < 6.0, "{row}");
-        assert!(number("us_per_imu_sample") > 0.0 && number("ms_per_keyframe_p50") > 0.0, "{row}");
-        assert!(number("ms_per_keyframe_p99") >= number("ms_per_keyframe_p50"), "{row}");
-        assert_eq!((&row["keyframes"], &row["refused"], &row["file"]), (&90.into(), &0.into(), &prefix.into()));
+        let number = |name: &str| row[name]["rms"].as_f64().unwrap_or_else(|| panic!("{name} is no number: {row}"));
+        assert!(number("position_m") < 0.3 && number("heading_deg") < 1.0, "{row}");
+        assert!(number("horizontal_m") <= row["horizontal_m"]["max"].as_f64().expect("is known"), "{row}");
+        assert!(row["nees"].as_f64().expect("is known") < 6.0, "{row}");
+        assert!(row["us_per_imu_sample"].as_f64().expect("is known") > 0.0, "{row}");
+        // It starts at the second fix; a tenth is not scored.
+        assert!((75..92).contains(&row["scored"].as_u64().expect("is counted")), "{row}");
+        assert_eq!((&row["refused"], &row["file"]), (&0.into(), &prefix.into()));
     }
+    // What a plane tells is not scored.
+    assert_eq!(
+        (&rows[1]["vertical_m"], &rows[1]["tilt_deg"], &rows[1]["nees_expected"]),
+        (&Value::Null, &Value::Null, &3.into())
+    );
     let output = bb(&["eval", "navigation", prefix]);
-    assert!(output.out.contains("straight  eskf ") && output.out.contains("NEES"), "{}", output.out);
+    assert!(output.out.contains("straight   eskf ") && output.out.contains("healthy for"), "{}", output.out);
 }
 
+/// Options of a robot's settings file, of an unknown one, and of one that changes nothing.
 #[test]
-fn a_smoother_tells_of_its_window() {
-    let drive = drive("smoothed");
+fn a_robot_lends_its_settings() {
+    let drive = drive("lent");
     let prefix = drive.to_str().expect("is text");
-    let filters = "smoother,smoother-single,eskf";
-    let output = bb(&["eval", "navigation", prefix, "--filter", filters, "--window", "10", "--json"]);
-    assert_eq!((output.code, &*output.err), (Some(0), ""));
-    let rows: Vec<Value> = serde_json::from_str(&output.out).expect("an array");
-    assert_eq!(rows.len(), 3);
-    for row in &rows[..2] {
-        let number = |name: &str| row[name].as_f64().unwrap_or_else(|| panic!("{name} is no number: {row}"));
-        assert!(number("position_rmse_m") < 0.3 && number("nees") < 6.0, "{row}");
-        assert!(number("position_smoothed_rmse_m") < 0.3 && number("orientation_smoothed_rmse_deg") < 1.0, "{row}");
-        assert_eq!((&row["keyframes"], &row["refused"], &row["allocations"]), (&90.into(), &0.into(), &0.into()));
+    let said = |text: &str, arguments: &[&str]| {
+        let config = file("lent.toml", text.as_bytes());
+        let config = config.to_str().expect("is text");
+        bb(&[&["eval", "navigation", prefix, "--json", "--robot", config], arguments].concat())
+    };
+    let figures = |output: &crate::common::Output| {
+        let rows: Vec<Value> = serde_json::from_str(&output.out).unwrap_or_else(|_| panic!("{}", output.err));
+        rows[0]["position_m"].clone()
+    };
+    let text =
+        "[sensor.base.imu]\nrate = 3\n[estimator.base.pose]\naccelerometer_noise = 0.5\ngnss_deviation = \"5 m\"\n";
+    let lent = said(text, &[]);
+    let set = bb(&["eval", "navigation", prefix, "--json", "--set", "accelerometer_noise=0.5"]);
+    let plain = bb(&["eval", "navigation", prefix, "--json"]);
+    // The other one is the default, and said nothing about.
+    assert_eq!((lent.code, &*lent.err), (Some(0), ""));
+    assert_eq!(figures(&lent), figures(&set));
+    assert_ne!(figures(&lent), figures(&plain));
+    let unknown = said("[estimator.base.pose]\naccelerometer_noise = 0.5\ngnss_deviatoin = \"5 m\"\n", &[]);
+    assert!(
+        unknown.code == Some(1)
+            && unknown.err.contains(
+                "estimator/base/pose/gnss_deviatoin: this filter has no such option; did you mean `gnss_deviation`?"
+            ),
+        "{}",
+        unknown.err
+    );
+    let two = "[estimator.a]\naccelerometer_noise = 0.5\n[estimator.b]\naccelerometer_noise = 0.6\n";
+    let two = said(two, &[]);
+    assert!(two.code == Some(1) && two.err.contains("lent.toml:estimator/a or "), "{}", two.err);
+    // There is no barometer, and the delay of fixes is no state.
+    for option in ["pressure_deviation=2 m", "gnss_delay=0.2 s", "wheel_scale=0.1"] {
+        let output = bb(&["eval", "navigation", prefix, "--set", option]);
+        let name = option.split('=').next().expect("has one");
+        assert!(
+            output.code == Some(1)
+                && output.err.contains(&format!("--set {name}"))
+                && output.err.contains("changes nothing"),
+            "{}",
+            output.err
+        );
     }
-    assert_eq!((&rows[2]["allocations"], &rows[2]["position_smoothed_rmse_m"]), (&Value::Null, &Value::Null));
-    for window in ["1", "1001", "ten"] {
-        let output = bb(&["eval", "navigation", prefix, "--filter", "smoother", "--window", window]);
-        assert!(output.code == Some(2) && output.err.contains("--window"), "{window}: {}", output.err);
-    }
-    // Of a window that is never full nothing is smoothed.
-    let output = bb(&["eval", "navigation", prefix, "--filter", "smoother", "--window", "500", "--json"]);
-    let rows: Vec<Value> = serde_json::from_str(&output.out).expect("an array");
-    assert_eq!((output.code, &rows[0]["position_smoothed_rmse_m"]), (Some(0), &Value::Null));
+    let state = bb(&["eval", "navigation", prefix, "--set", "gnss_delay=0.2 s", "--states", "gnss_delay"]);
+    assert_eq!(state.code, Some(0), "{}", state.err);
 }
 
-/// The drive with landmarks 50 m below, each seen at the pixel that `pixel` makes of the true one.
-fn drive_above(name: &str, keyframes: std::ops::Range<u32>, pixel: fn(u32, (f64, f64)) -> (f64, f64)) -> PathBuf {
-    let (mut seen, mut known) = (String::from("k,id,u,v,sigma_px\n"), String::from("id,x,y,z,gx,gy,gz,sigma\n"));
-    let place = |id: u32| (f64::from(id % 5) * 6.0 - 6.0, f64::from(id / 5) * 6.0 - 9.0, -50.0);
-    for id in 0..20 {
-        let (x, y, z) = place(id);
-        let _ = writeln!(known, "{id},{x},{y},{z},{x},{y},{z},1");
-    }
-    for k in keyframes {
-        for id in 0..20 {
-            let (x, y, z) = place(id);
-            // From the camera, which is 10 cm ahead of the body and 5 cm below.
-            let (ahead, down) = (x - 0.2 * f64::from(k) - 0.1, -0.05 - z);
-            let (u, v) = pixel(id, (376.0 - 458.0 * y / down, 240.0 - 458.0 * ahead / down));
-            let _ = writeln!(seen, "{k},{id},{u},{v},1");
-        }
-    }
-    file(&format!("{name}_obs.csv"), seen.as_bytes());
-    file(&format!("{name}_landmarks.csv"), known.as_bytes());
-    drive(name)
-}
-
+/// Made harder by an option, where a recording had to be written again.
 #[test]
-fn landmarks_count_from_the_first_keyframe_on() {
-    let first = |id, (u, v)| if id < 3 { (-5.0, v) } else { (u, v) };
-    let drive = drive_above("first_seen", 0..1, first);
+fn outages_gaps_delays_and_noise_are_options() {
+    let drive = drive("harder");
     let prefix = drive.to_str().expect("is text");
-    let output = bb(&["eval", "navigation", prefix, "--filter", "smoother-single", "--json"]);
-    let rows: Vec<Value> = serde_json::from_str(&output.out).expect("an array");
-    assert_eq!((&*output.err, &rows[0]["refused"]), ("", &3.into()));
-    let drive = drive_above("never_off", 0..101, |_, pixel| pixel);
-    let prefix = drive.to_str().expect("is text");
-    let output = bb(&["eval", "navigation", prefix, "--filter", "smoother-single", "--json"]);
-    let rows: Vec<Value> = serde_json::from_str(&output.out).expect("an array");
-    assert_eq!((&*output.err, &rows[0]["refused"]), ("", &0.into()));
-}
-
-#[test]
-fn landmarks_that_are_refused_are_reported() {
-    let drive = drive_above("scrambled", 0..101, |id, (u, v)| if id < 11 { (-5.0, v) } else { (u, v) });
-    let prefix = drive.to_str().expect("is text");
-    let output = bb(&["eval", "navigation", prefix, "--filter", "smoother-single"]);
-    let said = "1111 of 2020 observations of landmarks were refused (the first: a value is beyond the range of any \
-        sensor): more than half, so its figures are not to be trusted";
-    assert!(output.code == Some(1) && output.err.contains(said), "{}", output.err);
-    let output = bb(&["eval", "navigation", prefix, "--filter", "smoother-single", "--set", "landmarks=false"]);
-    assert_eq!((output.code, &*output.err), (Some(0), ""));
+    let row = |arguments: &[&str]| {
+        let output = bb(&[&["eval", "navigation", prefix, "--json"], arguments].concat());
+        assert_eq!(output.code, Some(0), "{}", output.err);
+        let rows: Vec<Value> = serde_json::from_str(&output.out).expect("an array");
+        rows[0].clone()
+    };
+    let fused = |row: &Value| row["fates"][0]["fused"].as_u64().expect("is counted");
+    let plain = row(&[]);
+    let outage = row(&["--outage", "7s/10s"]);
+    assert!(fused(&outage) + 6 <= fused(&plain), "{outage}");
+    assert!(outage["ages"].as_array().expect("a list").len() == 2, "{outage}");
+    assert!(fused(&row(&["--every", "2"])) <= fused(&plain) / 2 + 1);
+    let gaps = row(&["--drop", "imu=300ms/2s"]);
+    assert!(gaps["gaps"].as_u64() >= Some(4) && plain["gaps"] == 0, "{gaps}");
+    for (arguments, least) in [(&["--delay", "gnss=500ms"][..], 0.5), (&["--noise-times", "100"], 0.0)] {
+        let row = row(arguments);
+        assert_ne!(row["position_m"], plain["position_m"]);
+        assert!(row["position_m"]["rms"].as_f64() > Some(least), "{row}");
+    }
+    let output = bb(&["eval", "navigation", prefix, "--drop", "odometry=1s/2s"]);
+    assert!(
+        output.code == Some(1) && output.err.contains("--drop changes nothing: no message of `odometry`"),
+        "{}",
+        output.err
+    );
+    let output = bb(&["eval", "navigation", prefix, "--delay", "gps=1s"]);
+    assert!(output.code == Some(2) && output.err.contains("did you mean `gnss`?"), "{}", output.err);
 }
 
 /// Each by its file, its line and its column.
@@ -141,7 +158,7 @@ fn numbers_that_nothing_can_have_are_named() {
         ("gps", 5..6, "1e-160", "_gps.csv, line 2: a column sigma is not between 1e-9 and 1e9"),
         ("gps", 6..7, "nan", "_gps.csv, line 2: a column sigma is not between 1e-9 and 1e9"),
         ("gps", 2..3, "1e300", "_gps.csv, line 2: a position is NaN, or not near the Earth"),
-        ("noise", 0..1, "1e-160", "`gyroscope_noise`"),
+        ("noise", 0..1, "1e-160", "gyroscope_noise: must be in 1e-9..=10.0"),
         ("imu", 7..8, "0", "_imu.csv, line 2: column dt must be positive"),
     ] {
         let prefix = drive("absurd");
@@ -150,7 +167,7 @@ fn numbers_that_nothing_can_have_are_named() {
         let mut lines: Vec<_> = text.lines().map(str::to_owned).collect();
         lines[1] = zeros(&lines[1], columns, with);
         std::fs::write(&file, lines.join("\n")).expect("there is room");
-        let output = bb(&["eval", "navigation", prefix.to_str().expect("is text"), "--filter", "eskf-single"]);
+        let output = bb(&["eval", "navigation", prefix.to_str().expect("is text")]);
         assert!(output.code == Some(1) && output.err.contains(said), "{said}: {}", output.err);
         assert!(!output.out.contains("NaN"), "{}", output.out);
     }
@@ -168,14 +185,18 @@ fn mistakes_are_named() {
     assert!(output.err.contains("no_such_imu.csv: there is no such file"), "{}", output.err);
     assert!(output.err.contains("broken_imu.csv, line 3: invalid float literal"), "{}", output.err);
     assert!(output.out.contains("good"), "{}", output.out);
-    for (arguments, fault) in [
-        (&["--filter", "eskff"][..], "no filter `eskff`; did you mean `eskf`?"),
-        (&["--set", "gyro_noise=1"], "no parameter `gyro_noise`; did you mean `gyroscope_noise`?"),
-        (&["--set", "gravity=down"], "`gravity` is `down`: write a number from 1 to 30 m/s^2"),
-        (&["--set", "gravity=100"], "`gravity` is 100 m/s^2: choose a value from 1 to 30 m/s^2"),
-        (&["--set", "gravity=1 g"], "`gravity` is `1 g`: its unit is m/s^2"),
+    let output = bb(&["eval", "navigation", good, "--filter", "eskff"]);
+    assert!(
+        output.code == Some(2) && output.err.contains("no filter `eskff`; did you mean `eskf`?"),
+        "{}",
+        output.err
+    );
+    for (setting, fault) in [
+        ("gyro_noise=1", "--set gyro_noise: there is no such option; did you mean `gyroscope_noise`?"),
+        ("gravity=down", "--set gravity: "),
+        ("gravity=100 m/s^2", "--set gravity: "),
     ] {
-        let output = bb(&[&["eval", "navigation", good], arguments].concat());
-        assert!(output.code == Some(2) && output.err.contains(fault), "{fault}: {}", output.err);
+        let output = bb(&["eval", "navigation", good, "--set", setting]);
+        assert!(output.code == Some(1) && output.err.contains(fault), "{fault}: {}", output.err);
     }
 }

@@ -56,6 +56,6 @@ fn of_several_imus_one_is_named_and_its_magnetometer_follows() {
     assert_eq!(output.code, Some(0), "{}", output.err);
     // A score against an estimate would look like one against the truth.
     assert!(output.err.contains("no truth, so no errors: the poses of /sensor/base/place"), "{}", output.err);
-    let output = eval(&[&file], &[imu[0], imu[1], "--truth-topic", "/sensor/base/place"]);
+    let output = eval(&[&file], &[imu[0], imu[1], "--truth", "/sensor/base/place"]);
     assert_eq!((output.code, &*output.err), (Some(0), ""));
 }

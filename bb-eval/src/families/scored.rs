@@ -226,7 +226,8 @@ mod tests {
             let truth = Truth { world_from_body: Some(true_at(index)), is_moving: index >= 3_200 };
             trial.push(sample, truth);
         }
-        let deviations = Deviations { heading: 0.26, inclination: 0.04 };
+        let covariance = bb_core::nalgebra::Matrix3::zeros();
+        let deviations = Deviations { covariance, heading: 0.26, inclination: 0.04 };
         let mut wrong = Wrong { heading: 0.5, inclination: 0.1, deviations, played: 0 };
         score(&mut wrong, &trial, axes)
     }

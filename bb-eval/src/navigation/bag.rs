@@ -1,50 +1,38 @@
-//! ROS 2 bags, and recordings of this project, as data sets.
+//! ROS 2 bags, and recordings of this project, as a robot's messages and their truth.
 
-mod align;
-mod frames;
 mod messages;
 mod notes;
 mod options;
 mod sensors;
-mod start;
-mod timeline;
 mod topics;
 mod truth;
 
-pub use options::{BagOptions, BiasDeviation, Mount, Origin, Place, RelativeDeviation, StartFrom};
+pub use options::{BagOptions, Origin, RelativeDeviation, StartFrom};
 
-use super::data::DataSet;
-use super::filters::{NavigationSetting, bag_params};
+use super::drive::Known;
+pub(crate) use truth::TrueTrack;
+
+use super::drive::Drive;
+use crate::frames::Frames;
 use crate::progress::Progress;
+use bb_core::nalgebra::Isometry3;
+
 use bb_mcap::Bag;
-use frames::Frames;
 use messages::Messages;
 use notes::Notes;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use topics::Topics;
 
 /// The messages of a bag that `bb eval navigation` plays.
 ///
-/// Measurements are ordered by the time in their headers, regardless of the order of arrival. A message of the IMU
-/// covers the time since the previous one.
+/// They reach the robot in the order and at the times in which they were recorded, with the stamps of their headers.
 #[derive(Debug)]
 pub struct NavigationBag {
-    file: PathBuf,
     topics: Topics,
     messages: Messages,
     frames: Frames,
     options: BagOptions,
-}
-
-/// A data set, with remarks on it.
-#[derive(Debug)]
-pub struct FromBag {
-    /// The inputs of the filters.
-    pub data: DataSet,
-    /// What was left out or assumed.
-    pub notes: Vec<String>,
-    /// Why figures of the rest are misleading, if too much was left out.
-    pub doubts: Vec<String>,
+    notes: Notes,
 }
 
 impl NavigationBag {
@@ -59,9 +47,15 @@ impl NavigationBag {
         let progress = Progress::new("reading", topics.expected(&bag));
         let messages = Messages::read(&bag, &topics, &progress);
         progress.finish();
-        let messages = messages?;
-        let frames = Frames::new(&messages, options)?;
-        Ok(Self { file: file.to_owned(), topics, messages, frames, options: options.clone() })
+        let mut messages = messages?;
+        let mut notes = Notes::default();
+        messages.check_imu(&topics.imu, &mut notes)?;
+        messages.settle_arrivals(&mut notes);
+        let frames = Frames::new(&messages.transforms, &messages.frames, &topics.imu, &options.mount)?;
+        let mut bag = Self { topics, messages, frames, options: options.clone(), notes: Notes::default() };
+        bag.doubt_fixes(&mut notes);
+        bag.notes = notes;
+        Ok(bag)
     }
 
     /// The damage that cut the bag off, if any.
@@ -69,23 +63,38 @@ impl NavigationBag {
         self.messages.broken.as_deref()
     }
 
-    /// The bag as a data set for filters, or for smoothers.
-    ///
-    /// The keyframes are the times of measurements and of the truth; at most ten of the truth a second are scored.
-    /// For a smoother with relative poses, they are the messages of that odometry, and other measurements move to the
-    /// nearest one.
+    /// How many samples of the IMU there are.
+    pub fn samples(&self) -> u64 {
+        self.messages.stamps(0).count() as u64
+    }
+
+    /// The messages for a filter, and the truth.
     ///
     /// # Errors
-    ///
-    /// A frame that is not connected, no start, or no samples left; in words.
-    pub fn data_set(&self, settings: &[NavigationSetting], is_smoother: bool) -> Result<FromBag, String> {
-        let (params, sensors) = bag_params(settings)?;
-        let mut notes = Notes::default();
-        let imu = self.messages.samples(&self.topics.imu, &mut notes)?;
-        let sensors = self.sensors(&imu, &sensors, &mut notes)?;
-        let start = self.start(&imu, &sensors, &params, &mut notes)?;
-        let data = timeline::data_set(self, &imu, sensors, start, params.longest_sample, is_smoother, &mut notes)?;
+    /// A frame that is not connected, or no state to start from; in words.
+    pub fn drive(&self) -> Result<Drive, String> {
+        let mut notes = self.notes.clone();
+        let feed = self.feed(&mut notes)?;
+        let told = self.truth(&mut notes)?;
         let Notes { notes, doubts } = notes;
-        Ok(FromBag { data, notes, doubts })
+        // The name of the IMU as `--mount` takes it.
+        let imu = match self.frames.of_topic(&self.topics.imu) {
+            "" => self.topics.imu.clone(),
+            frame => frame.to_owned(),
+        };
+        let origin = self.options.origin.map(|origin| origin.0);
+        Ok(Drive { feed, told, notes, doubts, origin, imu, gnss: self.topics.gnss.clone(), noise: None })
+    }
+
+    fn truth(&self, notes: &mut Notes) -> Result<Known, String> {
+        let topic = match (&self.topics.truth, &self.topics.no_truth) {
+            (Some(topic), _) => Ok(topic.clone()),
+            (None, why) => Err(why.clone().unwrap_or_else(|| "there is no topic of it".to_owned())),
+        };
+        let base_from_part = match &topic {
+            Ok(topic) => self.frames.base_from(topic, &mut notes.notes)?,
+            Err(_) => Isometry3::identity(),
+        };
+        Ok(Known { told: self.messages.truth.clone(), base_from_part, topic })
     }
 }

@@ -35,7 +35,6 @@ impl DataSet {
                 time_s: row.0[1],
                 sample,
                 scored: row.0[4] > 0.0,
-                is_referred_to: false,
                 truth: Some(Truth {
                     position: truth.vector(1),
                     world_from_body: known(truth.0[4]).then(|| truth.orientation(4)),
@@ -83,7 +82,7 @@ impl DataSet {
             Ok((row.index(0)? as u64, GnssPosition::new(row.position(2)?, horizontal, vertical)))
         })?;
         let seen = seen(prefix)?;
-        let data = Self {
+        Ok(Self {
             prefix: prefix.to_owned(),
             samples,
             keyframes,
@@ -92,13 +91,9 @@ impl DataSet {
             relative: relative.into_iter().collect(),
             anchors: anchors.into_iter().collect(),
             fixes: fixes.into_iter().collect(),
-            velocities: HashMap::new(),
             camera: (!seen.is_empty()).then(|| camera(prefix)).transpose()?,
             seen,
-            fixes_beside_relative: false,
-            antenna: Vector3::zeros(),
-        };
-        Ok(data.referred())
+        })
     }
 }
 

@@ -1,9 +1,7 @@
 //! A drive or a flight: measurements and truth.
 
-use bb_core::nalgebra::{UnitQuaternion, Vector3};
-use bb_estimators::navigation::{
-    AbsolutePose, BodyVelocity, Camera, GnssPosition, Observation, RelativePose, Start,
-};
+use bb_core::nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use bb_estimators::navigation::{AbsolutePose, Camera, Geodetic, GnssPosition, Observation, RelativePose, Start};
 use std::collections::HashMap;
 use std::path::PathBuf;
 
@@ -15,80 +13,92 @@ pub(crate) const DEVIATIONS: std::ops::RangeInclusive<f64> = 1e-9..=1e9;
 pub struct DataSet {
     /// The prefix of its files, or the bag.
     pub prefix: PathBuf,
-    pub(crate) samples: Vec<Sample>,
-    pub(crate) keyframes: Vec<Keyframe>,
+    /// The samples of the IMU.
+    pub samples: Vec<Sample>,
+    /// Times of measurement or of truth, in order.
+    pub keyframes: Vec<Keyframe>,
     /// What is known of the first keyframe.
-    pub(crate) start: Start,
+    pub start: Start,
     /// The IMU's noise according to the data set; `None` if unknown.
-    pub(crate) noise: Option<Noise>,
+    pub noise: Option<Noise>,
     /// The measurements at keyframes, by their number.
-    pub(crate) relative: HashMap<u64, RelativePose>,
-    pub(crate) anchors: HashMap<u64, AbsolutePose>,
-    pub(crate) fixes: HashMap<u64, GnssPosition>,
-    pub(crate) velocities: HashMap<u64, BodyVelocity>,
+    pub relative: HashMap<u64, RelativePose>,
+    /// Poses in the world.
+    pub anchors: HashMap<u64, AbsolutePose>,
+    /// Positions of satellite navigation.
+    pub fixes: HashMap<u64, GnssPosition>,
     /// The camera that sees landmarks, if there are any.
-    pub(crate) camera: Option<Camera>,
+    pub camera: Option<Camera>,
     /// The landmarks seen at each keyframe; used only by smoothers.
-    pub(crate) seen: HashMap<u64, Vec<Observation>>,
-    /// Whether filters also use fixes when there are relative poses; smoothers always do.
-    pub(crate) fixes_beside_relative: bool,
-    /// The point of the body whose position the truth without an orientation tells, m.
-    pub(crate) antenna: Vector3<f64>,
+    pub seen: HashMap<u64, Vec<Observation>>,
 }
 
 /// Means over `dt` seconds: rad/s, m/s².
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Sample {
-    pub(crate) angular_velocity: Vector3<f64>,
-    pub(crate) specific_force: Vector3<f64>,
-    pub(crate) dt: f64,
+pub struct Sample {
+    /// rad/s.
+    pub angular_velocity: Vector3<f64>,
+    /// m/s².
+    pub specific_force: Vector3<f64>,
+    /// How long, s.
+    pub dt: f64,
 }
 
 /// A time with a measurement other than the IMU's, or with truth.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Keyframe {
-    pub(crate) time_s: f64,
+pub struct Keyframe {
+    /// s.
+    pub time_s: f64,
     /// The first sample after it.
-    pub(crate) sample: usize,
-    pub(crate) scored: bool,
-    /// By a relative pose.
-    pub(crate) is_referred_to: bool,
-    pub(crate) truth: Option<Truth>,
+    pub sample: usize,
+    /// Whether the truth is to be scored there.
+    pub scored: bool,
+    /// What is true, if it is known.
+    pub truth: Option<Truth>,
 }
 
+/// What is true at a time.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Truth {
-    pub(crate) position: Vector3<f64>,
+pub struct Truth {
+    /// In the world, m.
+    pub position: Vector3<f64>,
     /// Unknown on some drives.
-    pub(crate) world_from_body: Option<UnitQuaternion<f64>>,
-    pub(crate) velocity: Option<Vector3<f64>>,
+    pub world_from_body: Option<UnitQuaternion<f64>>,
+    /// In the world, m/s.
+    pub velocity: Option<Vector3<f64>>,
 }
 
 /// Densities of a data sheet, and gravity.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Noise {
-    pub(crate) gyroscope: f64,
-    pub(crate) gyroscope_bias: f64,
-    pub(crate) accelerometer: f64,
-    pub(crate) accelerometer_bias: f64,
-    pub(crate) gravity: f64,
+pub struct Noise {
+    /// rad/s/√Hz.
+    pub gyroscope: f64,
+    /// Its random walk, rad/s²/√Hz.
+    pub gyroscope_bias: f64,
+    /// m/s²/√Hz.
+    pub accelerometer: f64,
+    /// Its random walk, m/s³/√Hz.
+    pub accelerometer_bias: f64,
+    /// m/s².
+    pub gravity: f64,
+}
+
+/// The contents of a message of the truth.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Told {
+    Pose(Isometry3<f64>),
+    /// A pose, and linear and angular velocity in its axes.
+    Moving(Isometry3<f64>, [Vector3<f64>; 2]),
+    /// Latitude, longitude and height, if there is a position.
+    OnEarth(Option<Geodetic>),
+    /// All that is known.
+    State(Truth),
 }
 
 impl DataSet {
     /// The number of keyframes.
     pub fn count(&self) -> usize {
         self.keyframes.len()
-    }
-
-    /// Records the keyframes that relative poses refer to.
-    pub(crate) fn referred(mut self) -> Self {
-        for relative in self.relative.values() {
-            let keyframe = usize::try_from(relative.keyframe).ok();
-            if let Some(keyframe) = keyframe.and_then(|index| self.keyframes.get_mut(index)) {
-                keyframe.is_referred_to = true;
-            }
-        }
-        self
     }
 }
 

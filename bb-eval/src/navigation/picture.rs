@@ -1,7 +1,6 @@
 //! `--plot` of `bb eval navigation`: the track, errors within their bounds, innovations, errors by the age of the anchor.
 
-use super::measured::Sensor;
-use super::trace::{Row, Trace};
+use super::trace::{Row, Sensor, Trace};
 use bb_estimators::navigation::chi_square::limit;
 use bb_plot::{Band, Colour, Line, PALETTE, Panel, Part, Plane, Point, Scale, Sheet};
 use std::path::Path;

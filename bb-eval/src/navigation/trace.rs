@@ -1,45 +1,77 @@
-//! A record of playing a data set, for a plot.
+//! A run over time, for pictures and files.
 
-use super::data::{DataSet, Keyframe, Truth};
-use super::errors::Errors;
-use super::measured::{Answers, Sensor};
-use super::step::Known;
+use super::data::Truth;
+use super::errors::{Errors, Known};
+use bb_core::event::HealthState;
 use bb_core::nalgebra::Vector3;
-use bb_estimators::navigation::Refusal;
 
-/// A record of playing a data set, keyframe by keyframe.
-#[derive(Clone, Debug, Default)]
-pub struct Trace {
-    pub(crate) rows: Vec<Row>,
-    pub(crate) innovations: Vec<Innovation>,
-    /// The positions of the fixes.
-    pub(crate) fixes: Vec<Vector3<f64>>,
-    /// States, each from its time on: `starting`, `healthy`, `degraded` or `lost`.
-    #[cfg_attr(not(feature = "plot"), expect(dead_code, reason = "for pictures"))]
-    pub(crate) health: Vec<(f64, &'static str)>,
-    /// Times without a position in the world, from and to.
-    pub(crate) outages: Vec<(f64, f64)>,
-    /// Times without samples of the IMU, from and to.
-    pub(crate) gaps: Vec<(f64, f64)>,
-    last_anchor_s: Option<f64>,
-    last_fix_s: Option<f64>,
-    last_sample: usize,
+/// A kind of measurement of positions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Sensor {
+    Fix,
 }
 
-/// A longer time without a position is an outage, s,
-const OUTAGE_S: f64 = 5.0;
-/// and a longer sample of the IMU is a gap.
-const GAP_S: f64 = 0.25;
-
-/// A keyframe.
-#[derive(Clone, Copy, Debug)]
 #[cfg_attr(not(feature = "plot"), expect(dead_code, reason = "for pictures"))]
+impl Sensor {
+    pub(crate) const ALL: [Self; 1] = [Self::Fix];
+
+    pub(crate) fn name(self) -> &'static str {
+        "fixes"
+    }
+
+    pub(crate) fn dimension(self) -> usize {
+        3
+    }
+}
+
+/// A run over time. Times are seconds since the first message.
+#[derive(Clone, Debug, Default)]
+#[cfg_attr(not(feature = "plot"), allow(dead_code, reason = "for pictures and files"))]
+pub struct Trace {
+    /// The time of the first message, ns.
+    pub(crate) first_ns: i64,
+    pub(crate) rows: Vec<Row>,
+    pub(crate) innovations: Vec<Innovation>,
+    /// The positions of the fixes that the filter got.
+    pub(crate) fixes: Vec<Vector3<f64>>,
+    /// States, each from its time on: `starting`, `healthy`, `degraded` or `lost`.
+    pub health: Vec<(f64, &'static str)>,
+    /// Times without a position in the world, from and to.
+    pub outages: Vec<(f64, f64)>,
+    /// Times without samples of the IMU, from and to.
+    pub gaps: Vec<(f64, f64)>,
+}
+
+/// A state of a filter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum State {
+    /// It has not started, or has begun again.
+    Starting,
+    /// It runs.
+    Running(HealthState),
+}
+
+impl State {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Starting => "starting",
+            Self::Running(HealthState::Healthy) => "healthy",
+            Self::Running(HealthState::Degraded) => "degraded",
+            Self::Running(HealthState::Lost) => "lost",
+        }
+    }
+}
+
+/// An estimate.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(not(feature = "plot"), expect(dead_code, reason = "for pictures and files"))]
 pub(crate) struct Row {
     pub(crate) time_s: f64,
     pub(crate) position: Vector3<f64>,
+    pub(crate) known: Known,
     pub(crate) truth: Option<Truth>,
     pub(crate) errors: Option<Errors>,
-    /// Time since the last fused absolute pose, s.
+    /// Time since the last position in the world, s.
     pub(crate) anchor_age_s: Option<f64>,
 }
 
@@ -53,47 +85,4 @@ pub(crate) struct Innovation {
     pub(crate) nis: f64,
     /// Whether it passed the gate.
     pub(crate) is_fused: bool,
-}
-
-impl Trace {
-    pub(crate) fn add(
-        &mut self,
-        keyframe: &Keyframe,
-        known: &Option<Known>,
-        answers: &Answers,
-        data: &DataSet,
-        k: u64,
-    ) {
-        let time_s = keyframe.time_s;
-        for (sensor, answer) in Sensor::ALL.into_iter().zip(answers) {
-            let (nis, is_fused) = match answer {
-                Some(Ok(fused)) => (fused.nis, true),
-                Some(Err(Refusal::Gate { nis, .. })) => (*nis, false),
-                _ => continue,
-            };
-            if sensor == Sensor::Anchor && is_fused {
-                self.last_anchor_s = Some(time_s);
-            }
-            self.innovations.push(Innovation { time_s, sensor, nis, is_fused });
-        }
-        self.fixes.extend(data.fixes.get(&k).map(|fix| fix.position));
-        if data.fixes.contains_key(&k) || data.anchors.contains_key(&k) {
-            let since_s = self.last_fix_s.replace(time_s).filter(|last_s| time_s - last_s > OUTAGE_S);
-            self.outages.extend(since_s.map(|last_s| (last_s, time_s)));
-        }
-        let mut end_s = time_s;
-        let taken = std::mem::replace(&mut self.last_sample, keyframe.sample)..keyframe.sample;
-        for sample in data.samples.get(taken).unwrap_or_default().iter().rev() {
-            self.gaps.extend((sample.dt > GAP_S).then_some((end_s - sample.dt, end_s)));
-            end_s -= sample.dt;
-        }
-        let Some(known) = known else { return };
-        self.rows.push(Row {
-            time_s,
-            position: known.position,
-            truth: keyframe.truth,
-            errors: keyframe.truth.map(|truth| Errors::between(&truth, &data.antenna, known)),
-            anchor_age_s: self.last_anchor_s.map(|last_s| time_s - last_s),
-        });
-    }
 }

@@ -1,27 +1,25 @@
 //! The messages of the chosen topics.
 
 use super::notes::Notes;
-use super::topics::{POSE_WITH_COVARIANCE, TF_STATIC, TRANSFORM, Topics};
+use super::topics::Topics;
+use crate::frames::{TF_STATIC, TRANSFORM, frame};
+use crate::navigation::data::Told;
+use crate::navigation::feed::{Message, Time, What};
 use crate::progress::Progress;
-use bb_core::message::codec::ros::{Header, TransformStamped, TransformsMessage};
-use bb_core::message::codec::{Field, Reader};
-use bb_core::nalgebra::{Isometry3, Vector3};
-use bb_core::payload::{GnssFix, Imu, Odometry, Pose, PoseWithCovariance, Twist};
+use bb_core::message::codec::ros::{TransformStamped, TransformsMessage};
+use bb_core::nalgebra::Isometry3;
+use bb_core::payload::{Imu, Odometry, Pose, PoseWithCovariance, Twist};
 use bb_estimators::navigation::Geodetic;
 use bb_mcap::{Bag, BagMessage, ODOMETRY, POSE, RecordingError};
 use std::collections::HashMap;
 
-/// Nanoseconds since the Unix epoch.
-pub(super) type Time = i64;
-
 /// The messages read, each with the time in its header.
 #[derive(Debug, Default)]
 pub(super) struct Messages {
-    pub(super) imu: Vec<Inertial>,
-    pub(super) gnss: Vec<(Time, GnssFix)>,
-    pub(super) odometry: Vec<(Time, Odometry)>,
-    pub(super) relative: Vec<(Time, Odometry)>,
-    pub(super) pose: Vec<(Time, Pose)>,
+    /// To the inputs of a filter, in the order of the file.
+    pub(super) inputs: Vec<Message>,
+    /// A drifting odometry, by stamp; each with its arrival first.
+    pub(super) relative: Vec<(Time, Time, Odometry)>,
     pub(super) truth: Vec<(Time, Told)>,
     /// The first of its topic, with the velocity if it contains one.
     pub(super) start: Option<(Time, Pose, Option<Twist>)>,
@@ -30,24 +28,6 @@ pub(super) struct Messages {
     pub(super) frames: HashMap<String, String>,
     /// The damage that cut the bag off.
     pub(super) broken: Option<String>,
-}
-
-/// A message of the IMU.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Inertial {
-    pub(super) time_ns: Time,
-    pub(super) angular_velocity: Vector3<f64>,
-    pub(super) specific_force: Vector3<f64>,
-}
-
-/// The contents of a message of the truth.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Told {
-    Pose(Isometry3<f64>),
-    /// A pose, and linear and angular velocity in its axes.
-    Moving(Isometry3<f64>, [Vector3<f64>; 2]),
-    /// Latitude, longitude and height, if there is a position.
-    OnEarth(Option<Geodetic>),
 }
 
 impl Messages {
@@ -66,12 +46,7 @@ impl Messages {
             read.take(&message, topics).map_err(fault)?;
             progress.add(1);
         }
-        // By the time of measurement; IMU messages stay in order of arrival, so that a clock that runs backwards is
-        // seen.
-        read.gnss.sort_by_key(|(time, _)| *time);
-        read.odometry.sort_by_key(|(time, _)| *time);
-        read.relative.sort_by_key(|(time, _)| *time);
-        read.pose.sort_by_key(|(time, _)| *time);
+        read.relative.sort_by_key(|(_, time, _)| *time);
         read.truth.sort_by_key(|(time, _)| *time);
         Ok(read)
     }
@@ -86,27 +61,31 @@ impl Messages {
             self.frames.insert(topic.to_owned(), frame(message)?);
         }
         let is = |name: &Option<String>| name.as_deref() == Some(topic);
+        let arrival_ns = i64::try_from(message.log_time_ns).unwrap_or(i64::MAX);
+        let mut input = |stamp_ns: Time, what: What| self.inputs.push(Message { arrival_ns, stamp_ns, what });
         if topic == topics.imu {
             let (imu, time) = message.payload::<Imu>()?;
-            self.imu.push(Inertial {
-                time_ns: time.as_unix_nanos(),
-                angular_velocity: imu.angular_velocity,
-                specific_force: imu.linear_acceleration,
-            });
+            input(time.as_unix_nanos(), What::Imu(imu));
         }
         if is(&topics.gnss) {
             let (fix, time) = message.payload()?;
-            self.gnss.push((time.as_unix_nanos(), fix));
+            input(time.as_unix_nanos(), What::Gnss(fix));
         }
         if is(&topics.odometry) {
-            self.odometry.push(odometry(message)?);
+            let (time_ns, odometry) = odometry(message)?;
+            input(time_ns, What::Odometry(odometry));
         }
-        if is(&topics.relative) {
-            self.relative.push(odometry(message)?);
+        if is(&topics.magnetic_field) {
+            let (field, time) = message.payload()?;
+            input(time.as_unix_nanos(), What::MagneticField(field));
         }
         if is(&topics.pose) {
             let (pose, time) = message.payload::<PoseWithCovariance>()?;
-            self.pose.push((time.as_unix_nanos(), pose_of(pose)));
+            input(time.as_unix_nanos(), What::Pose(pose_of(pose)));
+        }
+        if is(&topics.relative) {
+            let (time_ns, odometry) = odometry(message)?;
+            self.relative.push((arrival_ns, time_ns, odometry));
         }
         if is(&topics.truth) {
             self.truth.push(told(message)?);
@@ -126,27 +105,57 @@ impl Messages {
         Ok(())
     }
 
-    /// The messages of the IMU, each later than the previous one.
-    pub(super) fn samples(&self, topic: &str, notes: &mut Notes) -> Result<Vec<Inertial>, String> {
-        let mut samples: Vec<Inertial> = Vec::with_capacity(self.imu.len());
-        let mut back = 0;
-        for sample in &self.imu {
-            if samples.last().is_none_or(|last| last.time_ns < sample.time_ns) {
-                samples.push(*sample);
-            } else {
-                back += 1;
-            }
+    /// Stamps of the messages to an input.
+    pub(super) fn stamps(&self, input: usize) -> impl Iterator<Item = Time> + '_ {
+        self.inputs.iter().filter(move |message| message.what.input() == input).map(|message| message.stamp_ns)
+    }
+
+    /// If the recorder's clock is not that of the stamps, the messages arrive at their stamps. Says so.
+    pub(super) fn settle_arrivals(&mut self, notes: &mut Notes) {
+        let lateness = |message: &Message| message.arrival_ns.saturating_sub(message.stamp_ns);
+        let mut late: Vec<Time> = self.inputs.iter().map(lateness).collect();
+        late.sort_unstable();
+        let Some(middle) = late.get(late.len() / 2) else { return };
+        if middle.abs() > FARTHEST_NS {
+            notes.push(
+                "the recorder's clock is another than that of the stamps: messages arrive at their stamps, so delays are not \
+                 played"
+                    .to_owned(),
+            );
+            self.inputs.iter_mut().for_each(|message| message.arrival_ns = message.stamp_ns);
+            self.relative.iter_mut().for_each(|(arrival_ns, stamp_ns, _)| *arrival_ns = *stamp_ns);
         }
-        let count = self.imu.len();
-        let note = format!("{back} of {count} messages of {topic} are not stamped after the one before: left out");
+    }
+
+    /// Checks that there is an IMU to play, and says if its stamps go back.
+    pub(super) fn check_imu(&self, topic: &str, notes: &mut Notes) -> Result<(), String> {
+        let stamps: Vec<Time> = self.stamps(0).collect();
+        let mut newest = i64::MIN;
+        let mut back = 0;
+        for stamp in &stamps {
+            back += usize::from(*stamp <= newest);
+            newest = newest.max(*stamp);
+        }
+        let count = stamps.len();
+        let note = format!(
+            "{back} of {count} messages of {topic} are not stamped after the one before: a filter refuses them"
+        );
         notes.left_out(back, count, note);
-        match samples.len() {
+        let is_number = |message: &Message| match &message.what {
+            What::Imu(imu) => imu.angular_velocity.iter().chain(&imu.linear_acceleration).all(|x| x.is_finite()),
+            _ => false,
+        };
+        match count - back {
             0 => Err(format!("{topic} holds no message, so there is nothing to play")),
             1 => Err(format!("{topic} holds one message with a time of its own, and two are the least to play")),
-            _ => Ok(samples),
+            _ if !self.inputs.iter().any(is_number) => Err(format!("{topic} holds no number")),
+            _ => Ok(()),
         }
     }
 }
+
+/// A recorder that is farther than this from the stamps, ns, has another clock.
+const FARTHEST_NS: Time = 5_000_000_000;
 
 /// ROS writes zero for unknown.
 fn pose_of(pose: PoseWithCovariance) -> Pose {
@@ -181,22 +190,4 @@ fn told(message: &BagMessage) -> Result<(Time, Told), RecordingError> {
         }
     };
     Ok((time_ns, told))
-}
-
-/// The robot's frame that a message refers to; empty if it names none.
-fn frame(message: &BagMessage) -> Result<String, RecordingError> {
-    let header = message.header()?;
-    Ok(match &*message.schema {
-        // The header's frame is the world; that of the body follows.
-        ODOMETRY | TRANSFORM => {
-            let mut reader = match Reader::of_message(&message.data) {
-                Ok(reader) => reader,
-                Err(_) => return Ok(String::new()),
-            };
-            let child = Header::read(&mut reader).and_then(|_| String::read(&mut reader));
-            child.unwrap_or_default()
-        }
-        POSE | POSE_WITH_COVARIANCE => String::new(),
-        _ => header.frame_id,
-    })
 }

@@ -1,165 +1,154 @@
-//! The measurements, on the body and in the world.
+//! What the messages say about the robot: relative poses from a drifting odometry, a state to start from.
 
 use super::NavigationBag;
-use super::messages::{Inertial, Time, Told};
 use super::notes::Notes;
+use super::options::StartFrom;
 use super::truth::{TrueTrack, isometry};
-use bb_core::nalgebra::{Isometry3, Vector3};
-use bb_core::payload::{GeodeticPosition, GnssFix, GnssStatus, Odometry};
-use bb_estimators::navigation::{
-    AbsolutePose, BodyVelocity, Course, Geodetic, GnssPosition, LocalFrame, NavigationOptions,
-};
+use crate::navigation::data::Truth;
+use crate::navigation::feed::{Feed, INPUTS, Message, Time, What};
+use bb_core::nalgebra::{Isometry3, Matrix6, Vector3};
+use bb_core::payload::{GeodeticPosition, GnssFix, GnssStatus, Odometry, Pose, RelativePose, Twist};
+use bb_core::time::MonotonicTime;
+use bb_estimators::navigation::{Geodetic, LocalFrame};
 
-/// In the order of time.
-#[derive(Debug)]
-pub(super) struct Sensors {
-    pub(super) options: NavigationOptions,
-    pub(super) fixes: Vec<(Time, GnssPosition)>,
-    pub(super) velocities: Vec<(Time, BodyVelocity)>,
-    pub(super) anchors: Vec<(Time, AbsolutePose)>,
-    pub(super) relative: Vec<Pose>,
-    pub(super) truth: TrueTrack,
-    /// The point of the body whose position a truth without an orientation tells, m.
-    pub(super) antenna: Vector3<f64>,
-    /// The initial pose of the filters, by its topic; with velocity in the body and its deviation.
-    pub(super) start: Option<StartPose>,
-}
+/// The assumed deviation of a true pose for a filter that starts there: m, rad.
+const POSITION: f64 = 0.1;
+const ROTATION: f64 = 0.02;
 
-/// The first message of the topic for the initial pose.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct StartPose {
-    pub(super) time_ns: Time,
-    pub(super) pose: AbsolutePose,
-    /// In the world, with its standard deviation.
-    pub(super) velocity: Option<(Vector3<f64>, f64)>,
-}
+/// The same for a velocity from the truth, from its positions, and for an unknown one, m/s.
+const TOLD: f64 = 0.1;
+const FROM_POSITIONS: f64 = 0.5;
+const UNKNOWN: f64 = 5.0;
+
+/// The time over which true positions give a velocity, ns.
+const BASELINE_NS: i64 = 100_000_000;
 
 /// A pose, with the variances of translation and rotation if available.
-type Drifting = (Time, Isometry3<f64>, Option<(f64, f64)>);
-
-/// A pose of the body from drifting odometry.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Pose {
-    pub(super) time_ns: Time,
-    pub(super) world_from_imu: Isometry3<f64>,
-    /// Deviations of translation and rotation relative to the previous one, m and rad.
-    pub(super) deviation: (f64, f64),
-}
+type Drifting = (Time, Time, Isometry3<f64>, Option<(f64, f64)>);
 
 impl NavigationBag {
-    pub(super) fn sensors(
-        &self,
-        imu: &[Inertial],
-        options: &NavigationOptions,
-        notes: &mut Notes,
-    ) -> Result<Sensors, String> {
-        let (topics, messages) = (&self.topics, &self.messages);
-        if imu.iter().all(|sample| !is_finite(&sample.angular_velocity) || !is_finite(&sample.specific_force)) {
-            return Err(format!("{} holds no number", topics.imu));
+    /// The messages for the inputs of a filter.
+    pub(super) fn feed(&self, notes: &mut Notes) -> Result<Feed, String> {
+        let topics = &self.topics;
+        let mut mounts = [None; INPUTS.len()];
+        let of_inputs = [
+            &Some(topics.imu.clone()),
+            &topics.gnss,
+            &topics.odometry,
+            &topics.pose,
+            &topics.relative,
+            &topics.magnetic_field,
+        ];
+        for (mount, topic) in mounts.iter_mut().zip(of_inputs) {
+            *mount = topic.as_ref().map(|topic| self.frames.base_from(topic, &mut notes.notes)).transpose()?;
         }
-        let mut imu_from = |topic: &Option<String>| match topic {
-            Some(topic) => self.frames.imu_from(topic, &topics.imu, notes),
-            None => Ok(Isometry3::identity()),
-        };
-        let (antenna, wheels) = (imu_from(&topics.gnss)?, imu_from(&topics.odometry)?);
-        let (camera, map) = (imu_from(&topics.relative)?, imu_from(&topics.pose)?);
-        let (start, truth) = (imu_from(&topics.start)?, imu_from(&topics.truth)?);
-        let frame = self.world(options.gnss_deviation, notes);
-        let fix =
-            |fix| GnssPosition::of_fix(fix, frame.as_ref()?, antenna.translation.vector, options.gnss_deviation);
-        let fixes: Vec<_> = messages.gnss.iter().filter_map(|(time, of)| Some((*time, fix(of)?))).collect();
-        let count = messages.gnss.len();
-        let (nowhere, first) = nowhere(&messages.gnss);
-        if let Some(GeodeticPosition { latitude_rad, longitude_rad, altitude }) = first {
+        let mut messages = self.messages.inputs.clone();
+        messages.extend(self.relative()?);
+        let world = self.world();
+        let start = self.start(world.as_ref(), notes)?;
+        mounts[6] = start.is_some().then(Isometry3::identity);
+        messages.extend(start);
+        let mut feed = Feed { messages, mounts, world };
+        feed.sort();
+        Ok(feed)
+    }
+
+    /// Says which fixes a filter cannot use.
+    pub(super) fn doubt_fixes(&self, notes: &mut Notes) {
+        let fixes: Vec<&GnssFix> = self.fixes().map(|(_, fix)| fix).collect();
+        let is_nowhere = |fix: &&&GnssFix| fix.status != GnssStatus::NoFix && Geodetic::of_fix(fix, 0.0).is_none();
+        let nowhere: Vec<_> = fixes.iter().filter(is_nowhere).filter_map(|fix| fix.position).collect();
+        let count = fixes.len();
+        if let Some(GeodeticPosition { latitude_rad, longitude_rad, altitude }) = nowhere.first() {
             let (latitude, longitude) = (latitude_rad.to_degrees(), longitude_rad.to_degrees());
-            let height = altitude.unwrap_or(0.0);
             let note = format!(
-                "{nowhere} of {count} fixes of {} are nowhere on the Earth, the first at latitude {latitude}°, longitude \
-                 {longitude}°, {height} m: left out",
-                topics.gnss.as_deref().unwrap_or_default()
+                "{} of {count} fixes of {} are nowhere on the Earth, the first at latitude {latitude}°, longitude {longitude}°, \
+                 {} m: no filter uses them",
+                nowhere.len(),
+                self.topics.gnss.as_deref().unwrap_or_default(),
+                altitude.unwrap_or(0.0)
             );
-            notes.left_out(nowhere, count, note);
+            notes.left_out(nowhere.len(), count, note);
         }
-        let without = count - fixes.len() - nowhere;
+        let without = fixes.iter().filter(|fix| Geodetic::of_fix(fix, 0.0).is_none()).count() - nowhere.len();
         if without > 0 {
             notes.push(format!("{without} of {count} fixes have no position"));
         }
-        let velocity = |of: &Odometry| BodyVelocity::of_odometry(of, &wheels, options.odometry_deviation);
-        let pose = |of: &_| AbsolutePose::of_pose(of, &map, options.pose_deviation);
-        let start = messages.start.as_ref().map(|(time, of, twist)| {
-            let pose = AbsolutePose::of_pose(of, &start, options.pose_deviation);
-            let velocity = twist.map(|twist| {
-                let twist = Odometry { pose: *of, twist };
-                let measured = BodyVelocity::of_odometry(&twist, &start, options.odometry_deviation);
-                let swing = twist.twist.angular.cross(&start.inverse().translation.vector);
-                (of.world_from_body * (measured.velocity + swing), measured.deviation)
-            });
-            StartPose { time_ns: *time, pose, velocity }
-        });
-        let track = TrueTrack::new(&messages.truth, &truth, frame.as_ref());
-        Ok(Sensors {
-            options: *options,
-            fixes,
-            velocities: messages.odometry.iter().map(|(time, of)| (*time, velocity(of))).collect(),
-            anchors: messages.pose.iter().map(|(time, of)| (*time, pose(of))).collect(),
-            relative: self.relative(&camera)?,
-            antenna: truth.translation.vector,
-            truth: track,
-            start,
+    }
+
+    fn fixes(&self) -> impl Iterator<Item = (Time, &GnssFix)> {
+        self.messages.inputs.iter().filter_map(|message| match &message.what {
+            What::Gnss(fix) => Some((message.stamp_ns, fix)),
+            _ => None,
         })
     }
 
-    /// The origin of the world, if there are positions on the Earth.
-    fn world(&self, deviation: f64, notes: &mut Notes) -> Option<LocalFrame> {
-        let messages = &self.messages;
-        let mut of_truth = messages.truth.iter().filter_map(|(_, told)| match told {
-            Told::OnEarth(at) => *at,
-            _ => None,
-        });
-        let is_number = |at: &Geodetic| [at.latitude, at.longitude, at.height].iter().all(|x| x.is_finite());
-        // A receiver may begin with zeros, or with the place where it was switched off.
-        let mut course = Course::within(None);
-        for (time, fix) in &messages.gnss {
-            course.add(*time, fix, deviation);
-            if course.newest(*time).is_some() {
-                break;
-            }
-        }
-        let first = course.frame().map(|frame| *frame.origin()).or_else(|| of_truth.find(is_number))?;
-        if let Some(origin) = &self.options.origin {
-            return Some(LocalFrame::new(origin.0));
-        }
-        let is_local = messages.truth.iter().any(|(_, told)| !matches!(told, Told::OnEarth(_)));
-        if is_local || !messages.pose.is_empty() || messages.start.is_some() {
-            notes.push(format!(
-                "the poses are taken to be in a world whose origin is the first fix: --origin \
-                 {:.7},{:.7},{:.2} or another says where it is",
-                first.latitude.to_degrees(),
-                first.longitude.to_degrees(),
-                first.height
-            ));
-        }
-        Some(LocalFrame::new(first))
+    /// The world of poses on the Earth: as given, or at the first fix.
+    fn world(&self) -> Option<LocalFrame> {
+        let given = self.options.origin.map(|origin| origin.0);
+        let first = || self.fixes().find_map(|(_, fix)| Geodetic::of_fix(fix, 0.0));
+        given.or_else(first).map(LocalFrame::new)
     }
 
-    /// The poses of the drifting odometry, each with its deviation relative to the previous one.
-    fn relative(&self, imu_from_camera: &Isometry3<f64>) -> Result<Vec<Pose>, String> {
+    /// The state that a filter is told to start from, at the time of the first sample after it.
+    fn start(&self, world: Option<&LocalFrame>, notes: &mut Notes) -> Result<Option<Message>, String> {
+        let first_ns = self.messages.stamps(0).next().unwrap_or(0);
+        let told = match (&self.options.start, &self.topics.start) {
+            (Some(StartFrom::Own), _) | (None, None) => return Ok(None),
+            (Some(StartFrom::Truth), _) => {
+                let base_from_truth = match &self.topics.truth {
+                    Some(topic) => self.frames.base_from(topic, &mut notes.notes)?,
+                    None => Isometry3::identity(),
+                };
+                let track = TrueTrack::new(&self.messages.truth, &base_from_truth, world);
+                at_truth(&track, first_ns)
+                    .ok_or("the truth tells no orientation to start with; choose --start own, or a topic")?
+            }
+            (_, Some(topic)) => {
+                self.of_topic(topic, notes)?.ok_or_else(|| format!("{topic} holds no pose to start from"))?
+            }
+            (Some(StartFrom::Topic(name)), None) => return Err(format!("{name}: no such topic")),
+        };
+        let (time_ns, odometry) = told;
+        let stamp_ns = self.messages.stamps(0).find(|stamp| *stamp >= time_ns).unwrap_or(time_ns);
+        Ok(Some(Message { arrival_ns: stamp_ns, stamp_ns, what: What::Start(odometry) }))
+    }
+
+    fn of_topic(&self, topic: &str, notes: &mut Notes) -> Result<Option<(Time, Odometry)>, String> {
+        let Some((time_ns, pose, twist)) = self.messages.start else { return Ok(None) };
+        let base_from_part = self.frames.base_from(topic, &mut notes.notes)?;
+        let told = Isometry3::from_parts(pose.position.into(), pose.world_from_body);
+        let Some(world_from_part) = isometry(&told) else { return Ok(None) };
+        let world_from_base = world_from_part * base_from_part.inverse();
+        let turn = base_from_part.rotation;
+        let state = twist.map(|twist| {
+            let angular = turn * twist.angular;
+            (turn * twist.linear - angular.cross(&base_from_part.translation.vector), angular, twist.covariance)
+        });
+        let (linear, angular, covariance) = state.unwrap_or((Vector3::zeros(), Vector3::zeros(), None));
+        let unknown = if twist.is_some() { None } else { Some(diagonal(UNKNOWN, 1.0)) };
+        let twist = Twist { linear, angular, covariance: covariance.or(unknown) };
+        Ok(Some((time_ns, Odometry { pose: state_of(&world_from_base, pose.covariance), twist })))
+    }
+
+    /// The motions between the poses of the drifting odometry.
+    fn relative(&self) -> Result<Vec<Message>, String> {
         let mut poses: Vec<Drifting> = Vec::new();
-        for (time, odometry) in &self.messages.relative {
+        for (arrival, time, odometry) in &self.messages.relative {
             let pose = &odometry.pose;
             let told = Isometry3::from_parts(pose.position.into(), pose.world_from_body);
             let Some(world_from_camera) = isometry(&told) else { continue };
-            if poses.last().is_some_and(|(last, ..)| last == time) {
+            if poses.last().is_some_and(|(_, last, ..)| last == time) {
                 continue;
             }
             let mean = |first: usize| {
                 let covariance = pose.covariance?;
                 Some(covariance.fixed_view::<3, 3>(first, first).trace() / 3.0)
             };
-            poses.push((*time, world_from_camera * imu_from_camera.inverse(), mean(0).zip(mean(3))));
+            poses.push((*arrival, *time, world_from_camera, mean(0).zip(mean(3))));
         }
         let grown = |index: usize| -> Option<(f64, f64)> {
-            let (before, after) = (poses.get(index.checked_sub(1)?)?.2?, poses.get(index)?.2?);
+            let (before, after) = (poses.get(index.checked_sub(1)?)?.3?, poses.get(index)?.3?);
             let (translation, rotation) = (after.0 - before.0, after.1 - before.1);
             (translation > 0.0 && rotation > 0.0).then(|| (translation.sqrt(), rotation.sqrt()))
         };
@@ -180,27 +169,53 @@ impl NavigationBag {
                 }
             }
         };
-        let deviation = |index| match self.options.relative_deviation {
-            Some(_) => usual,
-            None => grown(index).unwrap_or(usual),
+        let motion = |(index, pair): (usize, &[Drifting])| {
+            let [(_, start_ns, from, _), (arrival_ns, end_ns, to, _)] = pair else { return None };
+            let way = from.inverse() * to;
+            let (translation, rotation) = match self.options.relative_deviation {
+                Some(_) => usual,
+                None => grown(index + 1).unwrap_or(usual),
+            };
+            let relative = RelativePose {
+                start: MonotonicTime::from_nanos(*start_ns),
+                end: MonotonicTime::from_nanos(*end_ns),
+                position: way.translation.vector,
+                start_from_end: way.rotation,
+                covariance: Some(diagonal(translation, rotation)),
+            };
+            Some(Message { arrival_ns: *arrival_ns, stamp_ns: *end_ns, what: What::Relative(relative) })
         };
-        let pose = |(index, (time_ns, world_from_imu, _)): (usize, &Drifting)| Pose {
-            time_ns: *time_ns,
-            world_from_imu: *world_from_imu,
-            deviation: deviation(index),
-        };
-        Ok(poses.iter().enumerate().map(pose).collect())
+        Ok(poses.windows(2).enumerate().filter_map(motion).collect())
     }
 }
 
-/// The number of fixes with an invalid position, and the first of these.
-fn nowhere(fixes: &[(Time, GnssFix)]) -> (usize, Option<GeodeticPosition>) {
-    let is_nowhere = |fix: &GnssFix| fix.status != GnssStatus::NoFix && Geodetic::of_fix(fix, 0.0).is_none();
-    let mut positions = fixes.iter().filter(|(_, fix)| is_nowhere(fix)).filter_map(|(_, fix)| fix.position);
-    let first = positions.next();
-    (positions.count() + usize::from(first.is_some()), first)
+/// The covariance with these deviations of the first and of the last three.
+fn diagonal(first: f64, last: f64) -> Matrix6<f64> {
+    let variances = [first, first, first, last, last, last].map(|deviation| deviation * deviation);
+    Matrix6::from_diagonal(&variances.into())
 }
 
-fn is_finite(vector: &Vector3<f64>) -> bool {
-    vector.iter().all(|x| x.is_finite())
+fn state_of(world_from_base: &Isometry3<f64>, covariance: Option<Matrix6<f64>>) -> Pose {
+    Pose {
+        position: world_from_base.translation.vector,
+        world_from_body: world_from_base.rotation,
+        covariance: Some(covariance.unwrap_or_else(|| diagonal(POSITION, ROTATION))),
+    }
+}
+
+fn at_truth(track: &TrueTrack, first_ns: Time) -> Option<(Time, Odometry)> {
+    let points = track.points();
+    let from = points.iter().position(|(time, truth)| *time >= first_ns && truth.world_from_body.is_some())?;
+    let (time_ns, Truth { position, world_from_body, velocity }) = points.get(from)?;
+    let later = points.iter().skip(from).find(|(time, _)| time - time_ns >= BASELINE_NS);
+    let velocity = velocity.map(|velocity| (velocity, TOLD)).or_else(|| {
+        let (later_ns, later) = later?;
+        let seconds = (later_ns - time_ns) as f64 * 1e-9;
+        Some(((later.position - position) / seconds, FROM_POSITIONS))
+    });
+    let (velocity, deviation) = velocity.unwrap_or((Vector3::zeros(), UNKNOWN));
+    let pose = state_of(&Isometry3::from_parts((*position).into(), (*world_from_body)?), None);
+    let linear = pose.world_from_body.inverse() * velocity;
+    let twist = Twist { linear, angular: Vector3::zeros(), covariance: Some(diagonal(deviation, 1.0)) };
+    Some((*time_ns, Odometry { pose, twist }))
 }

@@ -1,16 +1,12 @@
 //! The roles of a bag's topics.
 
 use super::options::{BagOptions, StartFrom};
+use crate::frames::{POSE_WITH_COVARIANCE, TF_STATIC, TRANSFORM};
 use crate::recording::said;
-use bb_mcap::{Bag, IMU, ODOMETRY, POSE, RecordingErrorKind, Topic};
+use bb_mcap::{Bag, IMU, MAGNETIC_FIELD, ODOMETRY, POSE, RecordingErrorKind, Topic};
 
 const FIX: &str = "sensor_msgs/msg/NavSatFix";
-pub(super) const POSE_WITH_COVARIANCE: &str = "geometry_msgs/msg/PoseWithCovarianceStamped";
-pub(super) const TRANSFORM: &str = "geometry_msgs/msg/TransformStamped";
 const TRANSFORMS: &str = "tf2_msgs/msg/TFMessage";
-
-/// The topic of static frames.
-pub(super) const TF_STATIC: &str = "/tf_static";
 
 /// The topic on which ROS tools publish a robot's initial pose.
 const INITIAL_POSE: &str = "/initialpose";
@@ -26,6 +22,7 @@ pub(super) struct Topics {
     pub(super) odometry: Option<String>,
     pub(super) relative: Option<String>,
     pub(super) pose: Option<String>,
+    pub(super) magnetic_field: Option<String>,
     pub(super) truth: Option<String>,
     /// Why there is no truth.
     pub(super) no_truth: Option<String>,
@@ -52,13 +49,18 @@ impl Topics {
         let gnss = choose(FIX, &options.gnss_topic, "--gnss-topic")?;
         let odometry = choose(ODOMETRY, &options.odometry_topic, "--odometry-topic")?;
         let pose = choose(POSE_WITH_COVARIANCE, &options.pose_topic, "--pose-topic")?;
+        // A magnetometer that nobody has calibrated makes a filter worse: only a named one is used.
+        let magnetic_field = match options.mag_topic.as_deref() {
+            Some(name) => only(bag, MAGNETIC_FIELD, Some(name), "--mag-topic", &[])?,
+            None => None,
+        };
         let frames = bag.choose(TRANSFORMS, Some(TF_STATIC)).ok().map(|topic| topic.name.to_string());
-        Ok(Self { imu, gnss, odometry, relative, pose, truth, no_truth, start, frames })
+        Ok(Self { imu, gnss, odometry, relative, pose, magnetic_field, truth, no_truth, start, frames })
     }
 
     pub(super) fn all(&self) -> Vec<&str> {
-        let optional =
-            [&self.gnss, &self.odometry, &self.relative, &self.pose, &self.truth, &self.start, &self.frames];
+        let Self { gnss, odometry, relative, pose, magnetic_field, truth, start, frames, .. } = self;
+        let optional = [gnss, odometry, relative, pose, magnetic_field, truth, start, frames];
         let mut all = vec![&*self.imu];
         for name in optional.into_iter().flatten() {
             if !all.contains(&&**name) {
@@ -113,7 +115,7 @@ fn only(
 fn start(bag: &Bag, options: &BagOptions) -> Result<Option<String>, String> {
     let name = match &options.start {
         Some(StartFrom::Topic(name)) => name,
-        Some(StartFrom::Truth | StartFrom::Align) => return Ok(None),
+        Some(StartFrom::Truth | StartFrom::Own) => return Ok(None),
         None => {
             let topic = bag.choose(POSE_WITH_COVARIANCE, Some(INITIAL_POSE)).ok();
             return Ok(topic.map(|topic| topic.name.to_string()));

@@ -1,7 +1,7 @@
 //! The truth over time, of the body.
 
-use super::messages::{Time, Told};
-use crate::navigation::data::Truth;
+use crate::navigation::data::{Told, Truth};
+use crate::navigation::feed::Time;
 use bb_core::nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use bb_estimators::navigation::LocalFrame;
 
@@ -10,14 +10,14 @@ const LONGEST_GAP_NS: i64 = 100_000_000;
 
 /// In the order of time.
 #[derive(Clone, Debug, Default)]
-pub(super) struct TrueTrack {
+pub(crate) struct TrueTrack {
     points: Vec<(Time, Truth)>,
 }
 
 impl TrueTrack {
-    /// From messages about a part of the body at `imu_from_part`. Values that are not finite, or not a rotation, are
+    /// From messages about a part of the body at `base_from_part`. Values that are not finite, or not a rotation, are
     /// left out. Positions on the Earth are those in the frame, of the part.
-    pub(super) fn new(told: &[(Time, Told)], imu_from_part: &Isometry3<f64>, frame: Option<&LocalFrame>) -> Self {
+    pub(crate) fn new(told: &[(Time, Told)], base_from_part: &Isometry3<f64>, frame: Option<&LocalFrame>) -> Self {
         // A program that does not know the velocity leaves it zero.
         let tells_velocity = told.iter().any(|(_, told)| match told {
             Told::Moving(_, [linear, _]) => *linear != Vector3::zeros(),
@@ -26,9 +26,10 @@ impl TrueTrack {
         let mut points: Vec<(Time, Truth)> = Vec::with_capacity(told.len());
         for (time, told) in told {
             let truth = match told {
-                Told::Pose(pose) => of_pose(pose, imu_from_part),
-                Told::Moving(pose, [linear, angular]) => of_pose(pose, imu_from_part).map(|truth| {
-                    let swing = angular.cross(&imu_from_part.inverse().translation.vector);
+                Told::State(truth) => Some(*truth),
+                Told::Pose(pose) => of_pose(pose, base_from_part),
+                Told::Moving(pose, [linear, angular]) => of_pose(pose, base_from_part).map(|truth| {
+                    let swing = angular.cross(&base_from_part.inverse().translation.vector);
                     let turned = pose.rotation * (linear + swing);
                     let velocity = (tells_velocity && is_finite(&turned)).then_some(turned);
                     Truth { velocity, ..truth }
@@ -46,12 +47,12 @@ impl TrueTrack {
         Self { points }
     }
 
-    pub(super) fn points(&self) -> &[(Time, Truth)] {
+    pub(crate) fn points(&self) -> &[(Time, Truth)] {
         &self.points
     }
 
     /// The truth at a time; `None` before the first, after the last, and in gaps.
-    pub(super) fn at(&self, time: Time) -> Option<Truth> {
+    pub(crate) fn at(&self, time: Time) -> Option<Truth> {
         let next = self.points.partition_point(|(known, _)| *known < time);
         let (after_ns, after) = self.points.get(next)?;
         if *after_ns == time {
@@ -73,10 +74,10 @@ impl TrueTrack {
     }
 }
 
-fn of_pose(world_from_part: &Isometry3<f64>, imu_from_part: &Isometry3<f64>) -> Option<Truth> {
-    let world_from_imu = isometry(world_from_part)? * imu_from_part.inverse();
-    let world_from_body = Some(world_from_imu.rotation);
-    Some(Truth { position: world_from_imu.translation.vector, world_from_body, velocity: None })
+fn of_pose(world_from_part: &Isometry3<f64>, base_from_part: &Isometry3<f64>) -> Option<Truth> {
+    let world_from_base = isometry(world_from_part)? * base_from_part.inverse();
+    let world_from_body = Some(world_from_base.rotation);
+    Some(Truth { position: world_from_base.translation.vector, world_from_body, velocity: None })
 }
 
 /// A pose, if it is valid.

@@ -1,0 +1,254 @@
+//! The places of the sensors on the robot.
+
+use bb_core::message::codec::ros::{Header, TransformStamped};
+use bb_core::message::codec::{Field, Reader};
+use bb_core::nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use bb_mcap::{BagMessage, ODOMETRY, POSE, RecordingError};
+use std::collections::HashMap;
+use std::str::FromStr;
+
+/// The topic of static frames.
+pub(crate) const TF_STATIC: &str = "/tf_static";
+
+pub(crate) const POSE_WITH_COVARIANCE: &str = "geometry_msgs/msg/PoseWithCovarianceStamped";
+pub(crate) const TRANSFORM: &str = "geometry_msgs/msg/TransformStamped";
+
+/// Where a frame is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mount {
+    /// A frame, or the topic of a sensor.
+    pub name: String,
+    /// Where it is.
+    pub at: Place,
+}
+
+/// A place on the body.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Place {
+    /// That of a frame.
+    Frame(String),
+    /// Takes its coordinates to those of the IMU.
+    Pose(Isometry3<f64>),
+}
+
+impl FromStr for Mount {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (name, place) = text.split_once('=').ok_or("no `=` in it; write FRAME=X,Y,Z, as gps=0,0,1.2")?;
+        let (name, place) = (name.trim().to_owned(), place.trim());
+        if name.is_empty() || place.is_empty() {
+            return Err("write FRAME=X,Y,Z, as gps=0,0,1.2".into());
+        }
+        let begins_as_number = place.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c));
+        let at = if begins_as_number || place.contains(',') {
+            Place::Pose(pose(place)?)
+        } else {
+            Place::Frame(place.to_owned())
+        };
+        Ok(Self { name, at })
+    }
+}
+
+/// The farthest that a sensor may be from another on the same robot, m.
+const FARTHEST: f64 = 1000.0;
+
+fn pose(text: &str) -> Result<Isometry3<f64>, String> {
+    let pose = |x, y, z, rotation| Isometry3::from_parts(Vector3::new(x, y, z).into(), rotation);
+    let numbers = numbers(text)?;
+    if let Some(far) = numbers.iter().take(3).find(|metres| metres.abs() > FARTHEST) {
+        return Err(format!("`{far}` is no place on a robot: at most {FARTHEST} m"));
+    }
+    if let Some(turn) = numbers.iter().skip(3).find(|degrees| degrees.abs() > 360.0) {
+        return Err(format!("`{turn}` is no angle: from -360 to 360 degrees"));
+    }
+    match *numbers {
+        [x, y, z] => Ok(pose(x, y, z, UnitQuaternion::identity())),
+        [x, y, z, roll, pitch, yaw] => {
+            let [roll, pitch, yaw] = [roll, pitch, yaw].map(f64::to_radians);
+            Ok(pose(x, y, z, UnitQuaternion::from_euler_angles(roll, pitch, yaw)))
+        }
+        _ => Err(format!("`{text}` must be X,Y,Z in m, or X,Y,Z,ROLL,PITCH,YAW in m and degrees")),
+    }
+}
+
+/// Numbers with commas between them.
+pub(crate) fn numbers(text: &str) -> Result<Vec<f64>, String> {
+    let number = |cell: &str| {
+        let value: Option<f64> = cell.trim().parse().ok();
+        value.filter(|value| value.is_finite()).ok_or_else(|| format!("`{}` is no number", cell.trim()))
+    };
+    text.split(',').map(number).collect()
+}
+
+/// Frames at rest relative to each other.
+#[derive(Debug)]
+pub(crate) struct Frames {
+    /// Parent, child, and what takes coordinates of the child to the parent.
+    edges: Vec<(String, String, Isometry3<f64>)>,
+    mounts: Vec<Mount>,
+    of_topics: HashMap<String, String>,
+    /// The frame of the robot.
+    base: String,
+}
+
+/// The robot's frame, as most robots name it.
+const BASES: [&str; 3] = ["base_link", "base_footprint", "base"];
+
+impl Frames {
+    /// The robot's frame is the nearest one above that of the IMU that is named like one, else the topmost, without
+    /// transforms that of the IMU.
+    pub(crate) fn new(
+        transforms: &[TransformStamped],
+        of_topics: &HashMap<String, String>,
+        imu_topic: &str,
+        mounts: &[Mount],
+    ) -> Result<Self, String> {
+        let mut edges = Vec::new();
+        for transform in transforms {
+            let (parent, child) = (plain(&transform.header.frame_id), plain(&transform.child_frame_id));
+            let pose = transform.transform;
+            let is_rotation = (pose.rotation.norm() - 1.0).abs() < 0.1;
+            let is_near = pose.translation.vector.iter().all(|x| x.abs() <= FARTHEST);
+            if !is_rotation || !is_near {
+                let what = if is_rotation { "a translation of more than a kilometre" } else { "no rotation" };
+                return Err(format!("{TF_STATIC}: the transform from {child} to {parent} is none: it has {what}"));
+            }
+            edges.push((parent, child, pose));
+        }
+        let of_topics: HashMap<String, String> =
+            of_topics.iter().map(|(topic, frame)| (topic.clone(), plain(frame))).collect();
+        let mut base = of_topics.get(imu_topic).cloned().unwrap_or_default();
+        for _ in 0..edges.len() {
+            let above = edges.iter().find(|(_, child, _)| *child == base).map(|(parent, ..)| parent.clone());
+            match above.filter(|_| !BASES.contains(&&*base)) {
+                Some(parent) => base = parent,
+                None => break,
+            }
+        }
+        Ok(Self { edges, mounts: mounts.to_vec(), of_topics, base })
+    }
+
+    /// The frame of `topic`'s data; empty if it names none.
+    pub(crate) fn of_topic(&self, topic: &str) -> &str {
+        self.of_topics.get(topic).map_or("", String::as_str)
+    }
+
+    /// Transforms coordinates from the frame of `topic`'s data to the robot's.
+    ///
+    /// # Errors
+    ///
+    /// Its frame is not connected to that of the robot.
+    pub(crate) fn base_from(&self, topic: &str, notes: &mut Vec<String>) -> Result<Isometry3<f64>, String> {
+        let of = |topic: &str| self.of_topic(topic).to_owned();
+        let frame = match self.mount(topic) {
+            Some(Place::Pose(pose)) => return Ok(*pose),
+            Some(Place::Frame(frame)) => plain(frame),
+            None => of(topic),
+        };
+        if let Some(Place::Pose(pose)) = self.mount(&frame) {
+            return Ok(*pose);
+        }
+        if frame.is_empty() || frame == self.base {
+            return Ok(Isometry3::identity());
+        }
+        if let Some(pose) = self.path(&self.base, &frame) {
+            return Ok(pose);
+        }
+        let way_out = format!("say where it is with --mount {frame}=X,Y,Z");
+        if self.edges.is_empty() {
+            notes.push(format!(
+                "nothing tells where {frame} of {topic} is ({TF_STATIC} is not there): taken to be at the robot's origin; {way_out}"
+            ));
+            return Ok(Isometry3::identity());
+        }
+        let known: Vec<_> = self.edges.iter().map(|(parent, child, _)| format!("{parent}-{child}")).collect();
+        Err(format!(
+            "frame {frame} of {topic} is not connected to {} of the robot in {TF_STATIC}, which has {}; {way_out}",
+            if self.base.is_empty() { "the frame without a name" } else { &self.base },
+            known.join(", ")
+        ))
+    }
+
+    fn mount(&self, name: &str) -> Option<&Place> {
+        let is_it = |mount: &&Mount| !name.is_empty() && plain(&mount.name) == plain(name);
+        self.mounts.iter().find(is_it).map(|mount| &mount.at)
+    }
+
+    /// Transforms coordinates from `from` to `to`, over as few frames as possible.
+    fn path(&self, to: &str, from: &str) -> Option<Isometry3<f64>> {
+        let mut reached: Vec<(&str, Isometry3<f64>)> = vec![(to, Isometry3::identity())];
+        let mut next = 0;
+        while let Some((frame, to_from_frame)) = reached.get(next).copied() {
+            if frame == from {
+                return Some(to_from_frame);
+            }
+            next += 1;
+            for (parent, child, parent_from_child) in &self.edges {
+                let neighbour = match frame {
+                    frame if frame == parent => (&**child, to_from_frame * parent_from_child),
+                    frame if frame == child => (&**parent, to_from_frame * parent_from_child.inverse()),
+                    _ => continue,
+                };
+                if reached.iter().all(|(known, _)| *known != neighbour.0) {
+                    reached.push(neighbour);
+                }
+            }
+        }
+        None
+    }
+}
+
+/// Old programs write `/base_link`.
+fn plain(frame: &str) -> String {
+    frame.trim_start_matches('/').to_owned()
+}
+
+/// The robot's frame that a message refers to; empty if it names none.
+pub(crate) fn frame(message: &BagMessage) -> Result<String, RecordingError> {
+    let header = message.header()?;
+    Ok(match &*message.schema {
+        // The header's frame is the world; that of the body follows.
+        ODOMETRY | TRANSFORM => {
+            let mut reader = match Reader::of_message(&message.data) {
+                Ok(reader) => reader,
+                Err(_) => return Ok(String::new()),
+            };
+            let child = Header::read(&mut reader).and_then(|_| String::read(&mut reader));
+            child.unwrap_or_default()
+        }
+        POSE | POSE_WITH_COVARIANCE => String::new(),
+        _ => header.frame_id,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mount_is_a_pose_or_a_frame() {
+        let mount: Mount = "gps=-0.5,0,1.5".parse().expect("is one");
+        let pose = Isometry3::translation(-0.5, 0.0, 1.5);
+        assert_eq!(mount, Mount { name: "gps".into(), at: Place::Pose(pose) });
+        let mount: Mount = "/wheels=base_link".parse().expect("is one");
+        assert_eq!(mount.at, Place::Frame("base_link".into()));
+        let Place::Pose(turned) = "imu=0,0,0,180,0,0".parse::<Mount>().expect("is one").at else {
+            panic!("it is a pose")
+        };
+        assert!((turned.rotation * Vector3::z() + Vector3::z()).norm() < 1e-12);
+        for (text, fault) in [
+            ("gps", "no `=`"),
+            ("gps=", "write FRAME=X,Y,Z"),
+            ("gps=1,2", "must be X,Y,Z in m"),
+            ("gps=1,two,3", "`two` is no number"),
+            ("gps=1,inf,3", "`inf` is no number"),
+            ("gps=1,nan,3", "`nan` is no number"),
+            ("gps=1e300,0,0", "is no place on a robot: at most 1000 m"),
+            ("gps=0,0,0,1e20,0,0", "is no angle: from -360 to 360 degrees"),
+        ] {
+            let said = text.parse::<Mount>().expect_err("is none");
+            assert!(said.contains(fault), "{text}: {said}");
+        }
+    }
+}

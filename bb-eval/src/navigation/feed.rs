@@ -1,0 +1,71 @@
+//! A recording as the messages that a robot gets, in the order of their arrival.
+
+use bb_core::nalgebra::Isometry3;
+use bb_core::payload::{GnssFix, Imu, MagneticField, Odometry, Pose, RelativePose};
+use bb_estimators::navigation::LocalFrame;
+
+/// Nanoseconds since the Unix epoch.
+pub(crate) type Time = i64;
+
+/// A message to an input of a filter.
+#[derive(Clone, Debug)]
+pub(crate) enum What {
+    Imu(Imu),
+    Gnss(GnssFix),
+    Odometry(Odometry),
+    Pose(Pose),
+    Relative(RelativePose),
+    MagneticField(MagneticField),
+    Start(Odometry),
+}
+
+/// The inputs by name, as filters declare them.
+pub(crate) const INPUTS: [&str; 7] = ["imu", "gnss", "odometry", "pose", "relative", "magnetic_field", "start"];
+
+impl What {
+    /// The number of its input among [`INPUTS`].
+    pub(crate) fn input(&self) -> usize {
+        match self {
+            Self::Imu(_) => 0,
+            Self::Gnss(_) => 1,
+            Self::Odometry(_) => 2,
+            Self::Pose(_) => 3,
+            Self::Relative(_) => 4,
+            Self::MagneticField(_) => 5,
+            Self::Start(_) => 6,
+        }
+    }
+}
+
+/// A message with its times.
+#[derive(Clone, Debug)]
+pub(crate) struct Message {
+    /// When it reaches the robot.
+    pub(crate) arrival_ns: Time,
+    /// When it was measured, as its header says.
+    pub(crate) stamp_ns: Time,
+    pub(crate) what: What,
+}
+
+/// All messages, and where the sensors are.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Feed {
+    pub(crate) messages: Vec<Message>,
+    /// Takes the coordinates of each input's sensor to the link; `None` for an input that the recording lacks.
+    pub(crate) mounts: [Option<Isometry3<f64>>; INPUTS.len()],
+    /// Where poses in the world are on the Earth, for a filter that takes them as places there.
+    pub(crate) world: Option<LocalFrame>,
+}
+
+impl Feed {
+    /// Puts the messages in the order in which they arrive: those at one time in the order of their inputs, so that the
+    /// sample of the IMU, which makes a filter run, comes last.
+    pub(crate) fn sort(&mut self) {
+        self.messages.sort_by_key(|message| (message.arrival_ns, message.what.input() == 0));
+    }
+
+    /// The first of all times, ns.
+    pub(crate) fn first_ns(&self) -> Option<Time> {
+        self.messages.iter().map(|message| message.stamp_ns.min(message.arrival_ns)).min()
+    }
+}

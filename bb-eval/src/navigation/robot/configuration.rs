@@ -1,0 +1,328 @@
+//! The filters by name, and their settings.
+
+use crate::filters::near;
+use crate::navigation::data::Noise;
+use bb_core::prelude::Options;
+use bb_core::{Builder, Robot};
+use bb_estimators::navigation::NavigationOptions;
+use bb_estimators::navigation::planar::PlanarOptions;
+use bb_estimators::navigation::state_estimator::FlightOptions;
+use std::fmt;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use super::{Flight, NAVIGATION_PATH, Planar, Spatial};
+
+/// A filter that can be chosen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NavigationFilter {
+    /// Its name for `--filter`.
+    pub name: &'static str,
+    /// A description in one line.
+    pub about: &'static str,
+    pub(super) kind: Kind,
+}
+
+/// The kind of a filter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    Spatial,
+    Planar,
+    /// With its strategy.
+    Flight(&'static str),
+}
+
+/// All filters; the first is the default.
+pub const NAVIGATION_FILTERS: [NavigationFilter; 4] = [
+    NavigationFilter { name: "eskf", about: "`Eskf`: position, velocity and attitude", kind: Kind::Spatial },
+    NavigationFilter { name: "planar", about: "`PlanarEkf`: a robot that drives on a plane", kind: Kind::Planar },
+    NavigationFilter {
+        name: "state-eskf",
+        about: "`StateEstimator(strategy = \"eskf\")`: a flight without satellite navigation",
+        kind: Kind::Flight("eskf"),
+    },
+    NavigationFilter {
+        name: "state-smoother",
+        about: "`StateEstimator(strategy = \"smoother\")`",
+        kind: Kind::Flight("smoother"),
+    },
+];
+
+impl FromStr for NavigationFilter {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        let known = NAVIGATION_FILTERS.map(|filter| filter.name);
+        let found = NAVIGATION_FILTERS.into_iter().find(|filter| filter.name == name);
+        found.ok_or_else(|| format!("no filter `{name}`; {}", near(name, &known)))
+    }
+}
+
+impl NavigationFilter {
+    /// The names of its options.
+    pub(super) fn names(&self) -> Vec<&'static str> {
+        let fields = match self.kind {
+            Kind::Spatial => NavigationOptions::FIELDS,
+            Kind::Planar => PlanarOptions::FIELDS,
+            Kind::Flight(_) => FlightOptions::FIELDS,
+        };
+        fields.iter().map(|field| field.name).collect()
+    }
+
+    /// The settings of its robot, as far as they can be applied.
+    fn listed(&self, settings: &RobotSettings) -> String {
+        fn listed<R: Robot>(mut builder: Builder<R>, settings: &RobotSettings, names: &[&str]) -> String {
+            // A setting that is refused has been reported by the run.
+            let _ = settings.apply(&mut builder, names);
+            builder.settings().to_string()
+        }
+        match self.kind {
+            Kind::Spatial => listed(Spatial::builder(), settings, &self.names()),
+            Kind::Planar => listed(Planar::builder(), settings, &self.names()),
+            Kind::Flight(_) => listed(Flight::builder(), settings, &self.names()),
+        }
+    }
+
+    /// Its options, as a robot lists them: a settings file.
+    pub fn options(&self) -> String {
+        let text = self.listed(&RobotSettings::default());
+        let of_filter = format!("[{}]", NAVIGATION_PATH.replace('/', "."));
+        let begin = text.find(&of_filter).unwrap_or(0);
+        text.get(begin..).unwrap_or_default().to_owned()
+    }
+}
+
+/// An option of a filter and its value.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NavigationSetting {
+    name: String,
+    value: String,
+    /// The file that it is from.
+    file: Option<PathBuf>,
+}
+
+impl FromStr for NavigationSetting {
+    type Err = String;
+
+    /// `gyroscope_noise=1e-3`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (name, value) =
+            text.split_once('=').ok_or("no `=` in it; write NAME=VALUE, as gyroscope_noise=1e-3")?;
+        Ok(Self { name: name.trim().to_owned(), value: value.trim().to_owned(), file: None })
+    }
+}
+
+impl fmt::Display for NavigationSetting {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.file {
+            Some(file) => write!(f, "{}: {}", file.display(), self.name),
+            None => write!(f, "--set {}={}", self.name, self.value),
+        }
+    }
+}
+
+/// The settings of a robot's filter.
+#[derive(Clone, Debug, Default)]
+pub struct RobotSettings {
+    settings: Vec<NavigationSetting>,
+    states: Vec<String>,
+    noise_times: Option<f64>,
+    /// What a recording tells of its IMU.
+    told: Vec<(&'static str, f64)>,
+}
+
+/// `CONFIG.toml`, or `CONFIG.toml:estimator/base/navigation`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RobotFile {
+    file: PathBuf,
+    path: Option<String>,
+}
+
+impl FromStr for RobotFile {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        Ok(match text.rsplit_once(':') {
+            Some((file, path)) if path.starts_with("estimator") || path.starts_with("sensor") => {
+                Self { file: file.into(), path: Some(path.replace('.', "/")) }
+            }
+            _ => Self { file: text.into(), path: None },
+        })
+    }
+}
+
+/// The options that are noise of the IMU.
+const NOISE: [&str; 4] =
+    ["gyroscope_noise", "accelerometer_noise", "gyroscope_bias_walk", "accelerometer_bias_walk"];
+
+impl RobotSettings {
+    /// Those of a file, then single ones; optional states; and what the noise of the IMU is multiplied by.
+    ///
+    /// # Errors
+    /// The file cannot be read, or has an option that the filter does not have.
+    pub fn new(
+        filter: &NavigationFilter,
+        file: Option<&RobotFile>,
+        settings: &[NavigationSetting],
+        states: &[String],
+        noise_times: Option<f64>,
+    ) -> Result<Self, String> {
+        let mut all = file.map_or_else(|| Ok(Vec::new()), |file| file.read(&filter.names()))?;
+        all.extend_from_slice(settings);
+        Ok(Self { settings: all, states: states.to_vec(), noise_times, told: Vec::new() })
+    }
+
+    /// Sets the options of the filter of a robot.
+    pub(super) fn apply<R: Robot>(&self, builder: &mut Builder<R>, known: &[&str]) -> Result<(), String> {
+        for (name, value) in &self.told {
+            // Not every filter has them all.
+            let unit = if *name == "gravity" { " m/s^2" } else { "" };
+            if known.contains(name) {
+                set(builder, name, &format!("{value:e}{unit}"))?;
+            }
+        }
+        for setting in &self.settings {
+            if !known.contains(&&*setting.name) {
+                return Err(format!(
+                    "--set {}: there is no such option; {}",
+                    setting.name,
+                    near(&setting.name, known)
+                ));
+            }
+            set(builder, &setting.name, &setting.value).map_err(|fault| match &setting.file {
+                Some(file) => format!("{}: {fault}", file.display()),
+                None => format!("--set {fault}"),
+            })?;
+        }
+        if let Some(times) = self.noise_times {
+            let settings = builder.settings().to_string();
+            for name in NOISE {
+                let value = settings.lines().rev().find_map(|line| value_of(line, name));
+                let Some(value) = value.and_then(|value| value.parse::<f64>().ok()) else { continue };
+                set(builder, name, &format!("{:e}", value * times))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// These over the noise that a recording tells of its IMU.
+    pub(crate) fn over(&self, noise: Option<&Noise>) -> Self {
+        let Some(noise) = noise else { return self.clone() };
+        let told = [
+            ("gyroscope_noise", noise.gyroscope),
+            ("accelerometer_noise", noise.accelerometer),
+            ("gyroscope_bias_walk", noise.gyroscope_bias),
+            ("accelerometer_bias_walk", noise.accelerometer_bias),
+            ("gravity", noise.gravity),
+        ];
+        Self { told: told.to_vec(), ..self.clone() }
+    }
+
+    pub(super) fn states(&self) -> Vec<&str> {
+        self.states.iter().map(String::as_str).collect()
+    }
+
+    /// # Errors
+    /// There are optional states, which this filter does not have.
+    pub(super) fn without_states(&self, filter: &str) -> Result<(), String> {
+        match self.states.is_empty() {
+            true => Ok(()),
+            false => Err(format!("--states {}: {filter} has no optional states", self.states.join(","))),
+        }
+    }
+
+    /// Each setting that is not the default, with the settings without it.
+    pub(crate) fn each(&self, filter: &NavigationFilter) -> Vec<(&NavigationSetting, Self)> {
+        let without = |(index, setting): (usize, _)| {
+            let mut others = self.clone();
+            others.settings.remove(index);
+            (filter.listed(self) != filter.listed(&others)).then_some((setting, others))
+        };
+        self.settings.iter().enumerate().filter_map(without).collect()
+    }
+}
+
+fn set<R: Robot>(builder: &mut Builder<R>, name: &str, value: &str) -> Result<(), String> {
+    let path = format!("{NAVIGATION_PATH}/{name}");
+    builder.set(&path, value).map_err(|error| error.to_string().replace(&path, name))
+}
+
+fn value_of<'a>(line: &'a str, name: &str) -> Option<&'a str> {
+    let (key, value) = line.split_once('=')?;
+    (key.trim() == name).then(|| value.split('#').next().unwrap_or(value).trim())
+}
+
+impl RobotFile {
+    /// The settings of the estimator in it: of the path that is named, or of the only estimator whose options are all of
+    /// these.
+    fn read(&self, known: &[&str]) -> Result<Vec<NavigationSetting>, String> {
+        let name = self.file.display();
+        let text = std::fs::read_to_string(&self.file).map_err(|error| format!("{name}: {error}"))?;
+        let table: toml::Table = text.parse().map_err(|error| format!("{name}: {error}"))?;
+        let mut tables = Vec::new();
+        gather(&table, String::new(), &mut tables);
+        let is_option = |option: &String| known.contains(&option.as_str());
+        let of = match &self.path {
+            Some(path) => tables.iter().find(|(other, _)| other == path).ok_or_else(|| {
+                let paths: Vec<&str> = tables.iter().map(|(path, _)| path.as_str()).collect();
+                format!("{name}: there is no [{}] in it; {}", path.replace('/', "."), near(path, &paths))
+            })?,
+            None => {
+                let of_estimators = || tables.iter().filter(|(path, _)| path.starts_with("estimator/"));
+                let whole =
+                    |(_, options): &&(String, toml::Table)| !options.is_empty() && options.keys().all(is_option);
+                let partly = |(_, options): &&(String, toml::Table)| options.keys().any(is_option);
+                let mut fitting: Vec<_> = of_estimators().filter(whole).collect();
+                if fitting.is_empty() {
+                    fitting = of_estimators().filter(partly).collect();
+                }
+                let paths = || fitting.iter().map(|(path, _)| format!("{name}:{path}")).collect::<Vec<_>>();
+                match *fitting {
+                    [one] => one,
+                    [] => return Err(format!("{name}: no estimator in it has an option of this filter")),
+                    _ => {
+                        return Err(format!(
+                            "{name}: several estimators in it may be this one; name it: --robot {}",
+                            paths().join(" or ")
+                        ));
+                    }
+                }
+            }
+        };
+        let (path, options) = of;
+        let mut settings = Vec::new();
+        for (option, value) in options {
+            if !is_option(option) {
+                return Err(format!(
+                    "{name}: {path}/{option}: this filter has no such option; {}",
+                    near(option, known)
+                ));
+            }
+            let value = match value {
+                toml::Value::String(text) => text.clone(),
+                // As JSON, which settings are.
+                other => {
+                    serde_json::to_string(other).map_err(|error| format!("{name}: {path}/{option}: {error}"))?
+                }
+            };
+            settings.push(NavigationSetting { name: option.clone(), value, file: Some(self.file.clone()) });
+        }
+        Ok(settings)
+    }
+}
+
+/// The tables of a settings file by path, each with what is no table in it.
+fn gather(table: &toml::Table, path: String, tables: &mut Vec<(String, toml::Table)>) {
+    let mut own = toml::Table::new();
+    for (key, value) in table {
+        let key = key.trim_matches('/');
+        match value {
+            toml::Value::Table(inner) => {
+                let path = if path.is_empty() { key.to_owned() } else { format!("{path}/{key}") };
+                gather(inner, path, tables);
+            }
+            value => drop(own.insert(key.to_owned(), value.clone())),
+        }
+    }
+    tables.push((path, own));
+}
