@@ -31,6 +31,7 @@ pub(crate) fn errors(file: &Path, rows: &[Row]) -> Result<Vec<Degrees>, Box<dyn 
         topics: Topics::default(),
         before_motion_s: None,
         variants: Variants::default(),
+        align: bb_eval::Align::None,
         keep_errors: false,
     };
     let evaluation = evaluate(file, &evaluator, &Progress::new("", 0));

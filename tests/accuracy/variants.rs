@@ -67,6 +67,7 @@ fn hard_recordings_are_no_worse_than_known() -> Result<(), Box<dyn Error>> {
             topics: Topics::default(),
             before_motion_s,
             variants,
+            align: bb_eval::Align::None,
             keep_errors: false,
         };
         let mut scores = Vec::new();
