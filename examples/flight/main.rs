@@ -70,8 +70,15 @@ fn run(arguments: &Arguments) -> Result<bool, Box<dyn Error>> {
             (outcome, missing)
         }
     };
+    if arguments.data.is_none() {
+        println!("{STORY}\n");
+    }
     for line in outcome.timeline() {
         println!("{line}");
+    }
+    let words = outcome.glossary();
+    if !words.is_empty() {
+        println!("\n{words}");
     }
     println!("\n{}", outcome.errors());
     if let Some(file) = &arguments.plot {
@@ -83,6 +90,13 @@ fn run(arguments: &Arguments) -> Result<bool, Box<dyn Error>> {
     }
     Ok(missing.is_none())
 }
+
+/// What is going to happen, before it does.
+const STORY: &str = "\
+A drone takes off with satellite navigation. From 20 s on its receiver is spoofed: its fixes are refused, and the drone goes on by
+its camera, with an image of the ground from a satellite to compare with every four seconds. From 40 s to 50 s it flies in fog
+and sees nothing. At 60 s the receiver is healthy again, and is let in when it has been so for ten seconds and the next image
+agrees with it. Times are in seconds.";
 
 /// From when on fixes tell where the drone is again, s.
 const LET_IN: f64 = 73.0;

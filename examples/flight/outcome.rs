@@ -11,6 +11,25 @@ use bb_estimators::navigation::state_estimator::{
 use bb_plot::{Line, PALETTE, Panel, Picture};
 use std::fmt::Write;
 
+/// Words of the timeline, with what they mean.
+const WORDS: [(&str, &str); 12] = [
+    ("satellite_anchored", "the last anchor, which tells where the drone is in the world, is fresh"),
+    ("visual_propagated", "the camera has carried the estimate on since the last anchor"),
+    ("dead_reckoned", "only the IMU carries it on"),
+    ("covariance_growing", "it becomes less certain, for nothing tells where it is"),
+    ("gate blocked", "fixes of the receiver are refused"),
+    ("gate dwelling", "the receiver is healthy again, and has to remain so for ten seconds"),
+    ("gate awaits_anchor", "it has; the next anchor has to agree with it"),
+    ("gate open", "its fixes are used"),
+    ("rejected", "a measurement was not used, for this reason"),
+    ("revised", "a late measurement has changed estimates that were given out before"),
+    (
+        "the iterations have not converged",
+        "the smoother stopped at its limit; it goes on from there with the next input",
+    ),
+    ("degraded", "an input is not used as it should be, for this reason"),
+];
+
 /// An estimate beside the truth.
 #[derive(Clone, Copy, Debug)]
 struct Point {
@@ -81,6 +100,13 @@ impl Outcome {
         lines.into_iter().map(line).collect()
     }
 
+    /// What the words of the timeline mean, of those that are in it.
+    pub(crate) fn glossary(&self) -> String {
+        let is_said = |word: &str| self.happened.iter().any(|one| one.what.contains(word));
+        let words = WORDS.iter().filter(|(word, _)| is_said(word));
+        words.map(|(word, meaning)| format!("{word:22}  {meaning}")).collect::<Vec<_>>().join("\n")
+    }
+
     /// Errors by the age of the anchor.
     pub(crate) fn errors(&self) -> String {
         let mut table = String::from("age of the anchor  estimates  error, RMS  within 2σ\n");
@@ -106,8 +132,8 @@ impl Outcome {
             Line::new(label, PALETTE[colour], 1, &points)
         };
         let errors = vec![
-            line("error", 0, |point| Some(point.error_m)),
-            line("standard deviation", 1, |point| Some(point.deviation_m)),
+            line("error, norm", 0, |point| Some(point.error_m)),
+            line("1σ of the norm", 1, |point| Some(point.deviation_m)),
         ];
         let ages = vec![line("age of the anchor", 3, |point| point.age_s)];
         let panel = |axis: &str, lines| Panel::new(axis, lines);

@@ -148,7 +148,7 @@ pub(super) fn text(found: &[Noise]) -> String {
                 density.value, axis.bias_instability, axis.bias_instability_time_s
             );
         }
-        text += "\n# of the worst axis; on a robot that moves, noise is a few times as much\n";
+        text += "\n# of the worst axis, at rest; not for a vehicle: there, vibration makes the noise 10 to 100 times as much\n";
         let options = Options::of(noise).named();
         let written = options.iter().filter_map(|(name, value)| Some(format!("{name} = {:.2e}", (*value)?)));
         let _ = writeln!(text, "Eskf({})", written.collect::<Vec<_>>().join(", "));
