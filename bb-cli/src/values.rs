@@ -103,30 +103,35 @@ impl<'de> Visitor<'de> for AnyValue {
     }
 }
 
-/// A message as lines of text, each with its line end.
-pub(crate) fn text(value: &Value) -> String {
+/// A message as lines of text, each with its line end. Payloads have an empty list for each field that is not there and
+/// for each variant that it is not: with `leaves_out_empty` those are left out.
+pub(crate) fn text(value: &Value, leaves_out_empty: bool) -> String {
     let mut text = String::new();
-    write_fields(value, 0, &mut text);
+    write_fields(value, leaves_out_empty, 0, &mut text);
     text
 }
 
-fn write_fields(value: &Value, depth: usize, text: &mut String) {
+fn is_empty(value: &Value) -> bool {
+    matches!(value, Value::List(values) if values.is_empty())
+}
+
+fn write_fields(value: &Value, leaves_out_empty: bool, depth: usize, text: &mut String) {
     let Value::Message(fields) = value else {
         *text += &format!("{}\n", inline(value));
         return;
     };
-    for (name, value) in fields {
+    for (name, value) in fields.iter().filter(|(_, value)| !(leaves_out_empty && is_empty(value))) {
         *text += &format!("{}{name}:", "  ".repeat(depth));
         match value {
             Value::Message(_) => {
                 text.push('\n');
-                write_fields(value, depth + 1, text);
+                write_fields(value, leaves_out_empty, depth + 1, text);
             }
             Value::List(values) if matches!(values.first(), Some(Value::Message(_))) => {
                 text.push('\n');
                 for value in values.iter().take(MOST_ELEMENTS) {
                     let mut element = String::new();
-                    write_fields(value, depth + 2, &mut element);
+                    write_fields(value, leaves_out_empty, depth + 2, &mut element);
                     // The dash replaces the indentation of the first field.
                     let indent = "  ".repeat(depth + 1);
                     *text += &format!("{indent}- {}", element.trim_start());
@@ -182,10 +187,14 @@ mod tests {
             serde_json::from_str(r#"{"a":{"b":1},"list":[{"x":1,"y":2},{"x":3,"y":4}],"n":[1,2],"s":"t"}"#)
                 .expect("it is JSON");
         assert_eq!(
-            super::text(&value),
+            super::text(&value, false),
             "a:\n  b: 1\nlist:\n  - x: 1\n    y: 2\n  - x: 3\n    y: 4\nn: [1, 2]\ns: \"t\"\n"
         );
+        let FromJson(variant) =
+            serde_json::from_str(r#"{"a":{"b":[],"c":[1]},"list":[],"bytes":[]}"#).expect("it is JSON");
+        assert_eq!(super::text(&variant, true), "a:\n  c: [1]\n");
+        assert!(super::text(&variant, false).contains("list: []\n"));
         let long = Value::Message(vec![("n".into(), Value::Bytes((0..20).collect()))]);
-        assert!(super::text(&long).ends_with("14, 15, …] # 20 in all\n"));
+        assert!(super::text(&long, false).ends_with("14, 15, …] # 20 in all\n"));
     }
 }

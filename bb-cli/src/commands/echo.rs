@@ -43,7 +43,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
                 let line = Line { log_time_ns: message.log_time_ns, message: Json(&value) };
                 serde_json::to_string(&line).map_err(|error| error.to_string())? + "\n"
             }
-            false => text(&value) + "---\n",
+            false => text(&value, topic.is_own) + "---\n",
         };
         // The reader of a pipe may stop early.
         if !crate::say(&printed)? {

@@ -462,6 +462,8 @@ fn own_recordings_are_read_like_others() {
     // The names are in the file; what reads it knows nothing of the type.
     let output = bb(&["echo", path.to_str().expect("is text"), "sensor/base/number"]);
     assert!(output.out.contains("    kind: MEASURED\n    measured:\n      - within: 0.5\n"), "{}", output.out);
+    assert!(!output.out.contains("[]"), "what is not there is left out: {}", output.out);
+    assert_eq!(remarks_of(&path), [""; 0]);
     let picture = path.with_extension("svg");
     let arguments = ["plot", path.to_str().expect("is text"), "sensor/base/number", "--out"];
     let output = bb(&[&arguments[..], &[picture.to_str().expect("is text")]].concat());

@@ -62,7 +62,7 @@ pub(super) fn scan(file: &Path) -> Result<Content, String> {
 
     let mut topics: HashMap<_, Open> = HashMap::new();
     for topic in bag.topics() {
-        let (reader, times) = (TopicReader::new(topic).ok(), Times::new(is_of_events(topic)));
+        let (reader, times) = (TopicReader::new(topic).ok(), Times::new(is_of_events(topic), topic.is_own));
         topics.insert((topic.name.clone(), topic.schema.clone()), Open { reader, times, ..Open::default() });
     }
     let mut span_ns: Option<(i64, i64)> = None;

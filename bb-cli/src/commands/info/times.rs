@@ -8,6 +8,8 @@ use crate::periods::Periods;
 pub(super) struct Times {
     /// Whether messages come only when something happens.
     of_events: bool,
+    /// Whether several may happen at one instant, as the commands of a robot do.
+    may_repeat: bool,
     log_ns: Vec<i64>,
     /// The times in the headers, as long as all messages have one.
     stamp_ns: Vec<i64>,
@@ -17,8 +19,8 @@ pub(super) struct Times {
 const JUMP_S: f64 = 1.0;
 
 impl Times {
-    pub(super) fn new(of_events: bool) -> Self {
-        Self { of_events, ..Self::default() }
+    pub(super) fn new(of_events: bool, may_repeat: bool) -> Self {
+        Self { of_events, may_repeat: may_repeat || of_events, ..Self::default() }
     }
 
     pub(super) fn push(&mut self, log_ns: i64, stamp_ns: Option<i64>) {
@@ -86,8 +88,7 @@ impl Times {
                 format!("{count} back in time; the farthest by {farthest_s:.6} s, at {at_s:.3} s"),
             ));
         }
-        // Several events may happen at one instant.
-        if periods.repeated > 0 && has_stamps && !self.of_events {
+        if periods.repeated > 0 && has_stamps && !self.may_repeat {
             let count = periods.repeated;
             let text = match count {
                 1 => format!("1 message has the {what} of the one before"),
@@ -195,7 +196,7 @@ mod tests {
     #[test]
     fn events_may_happen_at_one_instant() {
         let remarks = |of_events| {
-            let mut times = Times::new(of_events);
+            let mut times = Times::new(of_events, false);
             (0..20).for_each(|index| times.push(5_000 * MS + index / 2, Some(5_000 * MS + index / 2)));
             times.remarks(5_000 * MS).len()
         };
