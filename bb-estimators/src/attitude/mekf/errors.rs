@@ -16,10 +16,7 @@ pub(super) const VELOCITY: usize = 6;
 /// Lag of the magnetometer behind the gyroscope, s.
 pub(super) const LAG: usize = 8;
 
-const STATES: usize = 9;
-
-/// States that a heading does not correct: its error is not white, and gravity knows them better.
-const UNTOUCHED_BY_FIELDS: [bool; STATES] = [true, true, false, false, false, false, true, true, false];
+pub(super) const STATES: usize = 9;
 
 /// A smaller variance is rounding.
 const LEAST_VARIANCE: f64 = 1e-16;
@@ -124,12 +121,15 @@ impl<T: Real> Errors<T> {
 
     /// Corrects the state by a scalar that depends on it by `slopes`: by how much it is more than expected, with which
     /// variance.
-    pub(super) fn correct<const N: usize>(
+    ///
+    /// `kept` returns states that are left alone, as in a Schmidt–Kalman filter, with the part of their covariance with the
+    /// scalar that is: for a scalar whose error is not white, or which others know better.
+    pub(super) fn correct<const N: usize, const K: usize>(
         &mut self,
         slopes: [(usize, T); N],
         residual: T,
         variance: T,
-        is_field: bool,
+        kept: impl Fn(&[T; STATES]) -> [(usize, T); K],
     ) {
         let mut shared = [T::ZERO; STATES];
         for (one, row) in shared.iter_mut().zip(&self.covariance) {
@@ -144,19 +144,42 @@ impl<T: Real> Errors<T> {
         let inverse = T::ONE / total;
         for row in 0..STATES {
             let gain = shared[row] * inverse;
-            let is_fixed = is_field && UNTOUCHED_BY_FIELDS[row];
-            if !is_fixed {
-                self.value[row] += gain * residual;
-            }
+            self.value[row] += gain * residual;
             for column in row..STATES {
-                // Of two states that are both left alone, the covariance stays.
-                if !(is_fixed && UNTOUCHED_BY_FIELDS[column]) {
-                    let covariance = self.covariance[row][column] - gain * shared[column];
-                    self.covariance[row][column] = covariance;
-                    self.covariance[column][row] = covariance;
-                }
+                let covariance = self.covariance[row][column] - gain * shared[column];
+                self.covariance[row][column] = covariance;
+                self.covariance[column][row] = covariance;
             }
-            self.covariance[row][row] = self.covariance[row][row].max(T::of(LEAST_VARIANCE));
+        }
+        let kept = kept(&shared);
+        for (index, (row, part)) in kept.iter().enumerate() {
+            let gain = *part * inverse;
+            self.value[*row] -= gain * residual;
+            for (column, other) in &kept[index..] {
+                let covariance = self.covariance[*row][*column] + gain * *other;
+                self.covariance[*row][*column] = covariance;
+                self.covariance[*column][*row] = covariance;
+            }
+        }
+        for state in 0..STATES {
+            self.covariance[state][state] = self.covariance[state][state].max(T::of(LEAST_VARIANCE));
         }
     }
+}
+
+/// Leaves nothing alone.
+pub(super) fn nothing<T: Real>(_: &[T; STATES]) -> [(usize, T); 0] {
+    []
+}
+
+/// Leaves tilt and velocity alone, which gravity knows better than a field.
+pub(super) fn tilt_and_velocity<T: Real>(shared: &[T; STATES]) -> [(usize, T); 4] {
+    [ROTATION, ROTATION + 1, VELOCITY, VELOCITY + 1].map(|state| (state, shared[state]))
+}
+
+/// Leaves the heading and the bias about the vertical alone, given in the body frame. Accelerations tell nothing of them
+/// but by their errors, which are not white, and without a magnetometer nothing would mend that.
+pub(super) fn about_vertical<T: Real>(up: &Vector3<T>, shared: &[T; STATES]) -> [(usize, T); 4] {
+    let along = up.x * shared[BIAS] + up.y * shared[BIAS + 1] + up.z * shared[BIAS + 2];
+    [(HEADING, shared[HEADING]), (BIAS, up.x * along), (BIAS + 1, up.y * along), (BIAS + 2, up.z * along)]
 }

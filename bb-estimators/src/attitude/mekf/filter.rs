@@ -2,10 +2,12 @@
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-use super::errors::{BIAS, Errors, HEADING, LAG, ProcessNoise, ROTATION, VELOCITY};
+use super::errors::{
+    BIAS, Errors, HEADING, LAG, ProcessNoise, ROTATION, VELOCITY, about_vertical, nothing, tilt_and_velocity,
+};
 use super::field::{Field, effective_horizontal};
 use super::numbers::*;
-use super::offset::{Change, HardIron};
+use super::offset::HardIron;
 use super::params::MekfParams;
 use super::rest::Rest;
 use super::window::{MeanField, Window};
@@ -55,8 +57,7 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
     fn new(params: MekfParams) -> Result<Self, ParamsError> {
         params.check()?;
         let mut errors = Errors::new();
-        let bias = if params.magnetometer.is_used() { INITIAL_BIAS } else { INITIAL_BIAS_WITHOUT_FIELD };
-        errors.forget(BIAS..BIAS + 3, square(bias));
+        errors.forget(BIAS..BIAS + 3, square(INITIAL_BIAS));
         errors.forget(LAG..LAG + 1, square(MAGNETOMETER_LAG));
         Ok(Self {
             params,
@@ -241,23 +242,14 @@ impl<T: Real> MekfFilter<T> {
         rate: &Vector3<T>,
         field: &Vector3<T>,
     ) -> UnitQuaternion<T> {
-        match self.iron.observe(&self.rotation, field) {
-            None => {}
-            Some(Change::Found) => {
-                self.errors.doubt(HEADING, square(UNKNOWN));
-                self.forget_field();
-            }
-            Some(Change::Refuted) => {
-                self.is_north_known = false;
-                self.forget_field();
-            }
-            Some(Change::Sharper(deviation)) => {
-                let horizontal =
-                    self.field.as_ref().map_or(T::ZERO, Field::horizontal).max(T::of(0.1) * self.iron.scale());
-                let ratio = deviation / horizontal;
-                self.errors.doubt(HEADING, (ratio * ratio).min(T::ONE));
-                self.forget_field();
-            }
+        // Poses compare fields of one time, and not of the time of a magnetometer that lags.
+        let prompt = field - rate.cross(field) * self.errors.value[LAG];
+        if let Some(error) = self.iron.observe(&self.rotation, &prompt) {
+            let horizontal =
+                self.field.as_ref().map_or(T::ZERO, Field::horizontal).max(T::of(0.1) * self.iron.scale());
+            let ratio = error / horizontal;
+            self.errors.doubt(HEADING, (ratio * ratio).min(square(UNKNOWN)));
+            self.forget_field();
         }
         let field = field - self.iron.offset();
         let in_world = self.rotation * field;
@@ -302,9 +294,14 @@ impl<T: Real> MekfFilter<T> {
             + self.squared_velocity
             + square::<T>(ACCELERATION_LASTS_S) * self.squared_acceleration;
         let variance = T::TWO * T::of(VELOCITY_LASTS_S) * squared / dt;
+        let up = self.rotation.row(2).transpose();
         for state in [VELOCITY, VELOCITY + 1] {
             let value = self.errors.value[state];
-            self.errors.correct([(state, T::ONE)], -value, variance, false);
+            if self.params.magnetometer.is_used() {
+                self.errors.correct([(state, T::ONE)], -value, variance, nothing);
+            } else {
+                self.errors.correct([(state, T::ONE)], -value, variance, |shared| about_vertical(&up, shared));
+            }
         }
         if self.rest.is_detected() {
             self.fuse_rest(dt, &(window.measured_turn / dt));
@@ -346,7 +343,7 @@ impl<T: Real> MekfFilter<T> {
         let doubt = (T::of(3.0) * residual.norm_squared() / (known * square::<T>(OUTLIER))).max(T::ONE);
         for axis in 0..3 {
             let residual = mean[axis] - self.errors.value[BIAS + axis];
-            self.errors.correct([(BIAS + axis, T::ONE)], residual, square::<T>(REST_BIAS) / dt * doubt, false);
+            self.errors.correct([(BIAS + axis, T::ONE)], residual, square::<T>(REST_BIAS) / dt * doubt, nothing);
         }
     }
 
@@ -381,6 +378,6 @@ impl<T: Real> MekfFilter<T> {
             self.forget_field();
             return;
         }
-        self.errors.correct(slopes, residual, noise / dt, true);
+        self.errors.correct(slopes, residual, noise / dt, tilt_and_velocity);
     }
 }

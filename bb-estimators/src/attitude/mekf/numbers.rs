@@ -13,9 +13,6 @@ pub(super) const GYROSCOPE_NOISE: f64 = 1e-3;
 pub(super) const TURN_NOISE: f64 = 1e-2;
 /// Standard deviation of the bias at the start, rad/s: 1.1°/s, of a sensor that nobody has calibrated.
 pub(super) const INITIAL_BIAS: f64 = 2e-2;
-/// Standard deviation of the bias without a magnetometer, rad/s: nothing then corrects the bias about the vertical, and the heading drifts with
-/// what accelerations seem to tell of it.
-pub(super) const INITIAL_BIAS_WITHOUT_FIELD: f64 = 1e-2;
 /// Growth of the bias, rad/s/√s: 0.1°/s in an hour.
 pub(super) const BIAS_DRIFT: f64 = 3e-5;
 
@@ -31,8 +28,9 @@ pub(super) const ACCELERATION_LASTS_S: f64 = 0.2;
 pub(super) const INITIAL_VELOCITY: f64 = 1.0;
 /// Variance of an angle of which nothing is known, rad²: evenly around.
 pub(super) const ANY_ANGLE: f64 = 3.0;
-/// Cosine of the largest angle between the vertical and the mean specific force of some seconds: 60°, twice the weight.
-pub(super) const OVERTURNED: f64 = 0.5;
+/// Cosine of the largest angle between the vertical and the mean specific force of some seconds: 45°, a horizontal
+/// acceleration of the weight.
+pub(super) const OVERTURNED: f64 = 0.7;
 /// Standard gravity, m/s².
 pub(super) const GRAVITY: f64 = 9.80665;
 
@@ -112,5 +110,9 @@ pub(super) const POSE_TURN: f64 = 0.07;
 pub(super) const SCALE_TURN: f64 = 0.1;
 /// Logarithm of the odds against an offset at the start.
 pub(super) const ODDS: f64 = 5.0;
+/// Logarithm of the odds against another offset later: magnets that pass are many, magnets that stay are few.
+pub(super) const LATER_ODDS: f64 = 100.0;
+/// Number of poses after which a newcomer that is not about to win starts again: 35 rad.
+pub(super) const NEWCOMER_POSES: f64 = 500.0;
 /// Part to which the deviation of the offset falls until the heading by the previous one is doubted.
 pub(super) const SHARPER: f64 = 0.4;

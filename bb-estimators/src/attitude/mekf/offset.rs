@@ -1,10 +1,10 @@
-//! The offset of the magnetometer, by iron on the body, as a hypothesis against none.
+//! Offset of the magnetometer, by iron on the body: the one that is taken off, and a newcomer.
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use super::numbers::{
-    ANY_OFFSET, CALIBRATED, FIELD_WALK, FIRST_POSES, LEAST_WALK, ODDS, POSE_TURN, SCALE_TURN, SHARPER, SHORT_S,
-    TAILS,
+    ANY_OFFSET, CALIBRATED, FIELD_WALK, FIRST_POSES, LATER_ODDS, LEAST_WALK, NEWCOMER_POSES, ODDS, POSE_TURN,
+    SCALE_TURN, SHARPER, SHORT_S, TAILS,
 };
 use super::params::Magnetometer;
 use crate::attitude::Real;
@@ -78,8 +78,14 @@ impl<T: Real> Hypothesis<T> {
         let correction = gain * residual;
         self.field += correction.fixed_rows::<3>(0);
         self.offset += correction.fixed_rows::<3>(3);
-        let covariance = self.covariance - gain * with.transpose();
-        self.covariance = (covariance + covariance.transpose()) * T::HALF;
+        for row in 0..6 {
+            for column in row..6 {
+                let known: T = (0..3).map(|axis| gain[(row, axis)] * with[(column, axis)]).sum();
+                let covariance = self.covariance[(row, column)] - known;
+                self.covariance[(row, column)] = covariance;
+                self.covariance[(column, row)] = covariance;
+            }
+        }
         likelihood
     }
 
@@ -96,16 +102,23 @@ struct Pose<T: Real> {
     age_s: T,
 }
 
-/// Both hypotheses, and which of them is believed.
+/// The incumbent, whose offset is taken off, and a newcomer with any offset, which replaces it once it explains the fields
+/// so much better that it outweighs the odds against it.
+///
+/// So iron that is put on, taken off or moved is one case. A newcomer that has not won for long starts again, since what it
+/// has seen before a change speaks against it.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct HardIron<T: Real> {
-    none: Hypothesis<T>,
-    some: Hypothesis<T>,
-    /// Logarithm of the odds of `some` against `none`.
+    incumbent: Hypothesis<T>,
+    newcomer: Hypothesis<T>,
+    /// Logarithm of the odds of the newcomer.
     odds: T,
-    is_believed: bool,
-    /// True if the user has said it.
-    is_given: bool,
+    /// Poses that the newcomer has seen.
+    seen: T,
+    /// True if the incumbent has an offset: the first has at most what calibration leaves.
+    is_offset: bool,
+    /// True if the user has said that the magnetometer is calibrated, so that there is no newcomer.
+    is_calibrated: bool,
     /// Deviation of the offset when the heading was last doubted for it.
     doubted: T,
     /// The last pose, and sums of how much the field changed and the body turned from pose to pose, squared.
@@ -116,24 +129,16 @@ pub(super) struct HardIron<T: Real> {
     scale: Option<T>,
 }
 
-/// Result of a new pose.
-pub(super) enum Change<T> {
-    /// The magnetometer has an offset.
-    Found,
-    /// The magnetometer has no offset.
-    Refuted,
-    /// The offset is known much better than when the heading was last doubted, with this deviation.
-    Sharper(T),
-}
-
 impl<T: Real> HardIron<T> {
     pub(super) fn new(magnetometer: Magnetometer) -> Self {
+        let is_offset = magnetometer == Magnetometer::Uncalibrated;
         Self {
-            none: Hypothesis::new(CALIBRATED),
-            some: Hypothesis::new(ANY_OFFSET),
+            incumbent: Hypothesis::new(if is_offset { ANY_OFFSET } else { CALIBRATED }),
+            newcomer: Hypothesis::new(ANY_OFFSET),
             odds: -T::of(ODDS),
-            is_believed: magnetometer == Magnetometer::Uncalibrated,
-            is_given: magnetometer != Magnetometer::Auto,
+            seen: T::ZERO,
+            is_offset,
+            is_calibrated: magnetometer == Magnetometer::Calibrated,
             doubted: T::of(ANY_OFFSET),
             pose: None,
             changed: T::ZERO,
@@ -144,18 +149,18 @@ impl<T: Real> HardIron<T> {
 
     /// The offset to take off, body frame.
     pub(super) fn offset(&self) -> Vector3<T> {
-        match self.scale {
-            Some(scale) if self.is_believed => self.some.offset * scale,
-            _ => Vector3::zeros(),
-        }
+        self.believed() * self.scale()
+    }
+
+    /// In units of the field.
+    fn believed(&self) -> Vector3<T> {
+        if self.is_offset { self.incumbent.offset } else { Vector3::zeros() }
     }
 
     /// Variance of the offset along an axis, if there is one.
     pub(super) fn variance(&self) -> T {
-        match self.scale {
-            Some(scale) if self.is_believed => self.some.variance() * scale * scale,
-            _ => T::ZERO,
-        }
+        let scale = self.scale();
+        if self.is_offset { self.incumbent.variance() * scale * scale } else { T::ZERO }
     }
 
     /// The norm of the world's field, zero before it is known.
@@ -176,7 +181,10 @@ impl<T: Real> HardIron<T> {
     }
 
     /// Adds a field. Poses in one field show an offset by how it turns, whatever the heading.
-    pub(super) fn observe(&mut self, rotation: &Matrix3<T>, field: &Vector3<T>) -> Option<Change<T>> {
+    ///
+    /// Returns by how much the heading so far was wrong for the offset, in the unit of the field, when another offset is
+    /// found, or the same is known much better than when this was said before.
+    pub(super) fn observe(&mut self, rotation: &Matrix3<T>, field: &Vector3<T>) -> Option<T> {
         let Some(pose) = &self.pose else {
             self.begin(rotation, field);
             return None;
@@ -202,30 +210,46 @@ impl<T: Real> HardIron<T> {
         };
         self.pose = Some(Pose { rotation: *rotation, field: *field, age_s: T::ZERO });
         let measured = rotation * (field / scale);
-        let none = self.none.observe(rotation, &measured);
-        self.odds += self.some.observe(rotation, &measured) - none;
-        let deviation = self.some.variance().sqrt();
-        if !self.is_believed {
-            if self.odds > T::ZERO && !self.is_given {
-                self.is_believed = true;
-                self.doubted = deviation;
-                return Some(Change::Found);
+        let of_incumbent = self.incumbent.observe(rotation, &measured);
+        if !self.is_calibrated {
+            self.odds += self.newcomer.observe(rotation, &measured) - of_incumbent;
+            self.seen += T::ONE;
+            let moved = (self.newcomer.offset - self.believed()).norm_squared();
+            let variance = self.newcomer.variance();
+            if self.odds > T::ZERO && variance < moved {
+                let newcomer = self.another(rotation, &measured);
+                self.incumbent = core::mem::replace(&mut self.newcomer, newcomer);
+                self.is_offset = true;
+                self.doubted = variance.sqrt();
+                return Some((moved + variance).sqrt() * scale);
             }
-        } else if self.odds <= -T::of(ODDS) && !self.is_given {
-            self.is_believed = false;
-            return Some(Change::Refuted);
-        } else if deviation < T::of(SHARPER) * self.doubted {
-            return Some(Change::Sharper(scale * core::mem::replace(&mut self.doubted, deviation)));
+            if self.seen > T::of(NEWCOMER_POSES) && self.odds < -T::of(ODDS) {
+                self.newcomer = self.another(rotation, &measured);
+            }
+        }
+        let deviation = self.incumbent.variance().sqrt();
+        if self.is_offset && deviation < T::of(SHARPER) * self.doubted {
+            return Some(scale * core::mem::replace(&mut self.doubted, deviation));
         }
         None
+    }
+
+    /// A newcomer that begins with this pose.
+    fn another(&mut self, rotation: &Matrix3<T>, measured: &Vector3<T>) -> Hypothesis<T> {
+        self.odds = -T::of(LATER_ODDS);
+        self.seen = T::ZERO;
+        let mut newcomer = Hypothesis::new(ANY_OFFSET);
+        newcomer.step = self.incumbent.step;
+        newcomer.begin(rotation, measured);
+        newcomer
     }
 
     fn begin(&mut self, rotation: &Matrix3<T>, field: &Vector3<T>) {
         self.pose = Some(Pose { rotation: *rotation, field: *field, age_s: T::ZERO });
         if let Some(scale) = self.scale {
             let measured = rotation * (field / scale);
-            self.none.begin(rotation, &measured);
-            self.some.begin(rotation, &measured);
+            self.incumbent.begin(rotation, &measured);
+            self.newcomer.begin(rotation, &measured);
         }
     }
 }
