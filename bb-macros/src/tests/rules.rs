@@ -236,6 +236,13 @@ fn declared_publishers() {
         &base("estimator t: T() { input imu: sensor::base::imu; }"),
         &[("sensor::base::imu", "nothing publishes at `sensor::base::imu`, nor elsewhere; declare a sensor")],
     );
+    wrong(
+        &base("estimator t: T() { input pose: slam::pose; }"),
+        &[(
+            "slam::pose",
+            "nothing publishes at `slam::pose`, nor elsewhere; declare a sensor; if other code publishes there, add `, external`",
+        )],
+    );
 }
 
 #[test]

@@ -59,12 +59,13 @@ pub(super) fn nothing_at(path: &str, known: &[String]) -> String {
     }
 }
 
-/// Returns whether a path is like none of the robot's: of several names, and not below what it declares.
+/// Returns whether a path is like none of the robot's: of several names, and not below what it declares. Of a robot
+/// that declares no publisher, a path that begins as its own do is meant for one of those.
 fn may_be_external(path: &Path, known: &[String]) -> bool {
     let Some((root, [_, ..])) = path.0.split_first() else { return false };
     let root = text(root);
     nearest_path(&path.text(), known).is_none()
-        && !known.is_empty()
+        && !(known.is_empty() && ["sensor", "estimator", "controller", "bridge"].contains(&&*root))
         && !known.iter().any(|known| known.split("::").next() == Some(&*root))
 }
 
