@@ -52,7 +52,9 @@ impl Sensor for SimulatedImu {
 
     fn init(options: SimulatedImuOptions, context: &SensorContext) -> Result<Self, Fault> {
         let root_from_frame = context.root_from_frame().ok_or_else(|| {
-            Fault::new("it is mounted beyond a moving joint, which the simulated motion does not include")
+            Fault::new(
+                "it is mounted beyond a moving joint, which its motion does not include; use `SimulatedLinkImu`",
+            )
         })?;
         let mut random = ChaCha8Rng::seed_from_u64(options.seed ^ hash(context.path()));
         let bias = options.gyroscope_bias * normal(&mut random);
