@@ -30,7 +30,8 @@ pub struct PositionCommand {
     /// Angle in rad of a revolute or continuous joint; displacement in m of a prismatic one.
     #[payload(unit = "rad", unit = "m")]
     pub position: f64,
-    /// Velocity at the target; for an actuator that only takes a speed, the speed of the motion. rad/s or m/s.
+    /// Velocity at the target; for an actuator that only takes a speed, the speed of the motion is its magnitude: the sign is
+    /// the other one at a motor whose transmission is `reversed`. rad/s or m/s.
     #[payload(unit = "rad/s", unit = "m/s")]
     pub velocity: Option<f64>,
     /// Effort to add to the actuator's own control: N·m or N.
