@@ -145,8 +145,8 @@ impl<T: Real> Errors<T> {
         for row in 0..STATES {
             let gain = shared[row] * inverse;
             self.value[row] += gain * residual;
-            for column in row..STATES {
-                let covariance = self.covariance[row][column] - gain * shared[column];
+            for (column, other) in shared.iter().enumerate().skip(row) {
+                let covariance = self.covariance[row][column] - gain * *other;
                 self.covariance[row][column] = covariance;
                 self.covariance[column][row] = covariance;
             }
@@ -161,8 +161,8 @@ impl<T: Real> Errors<T> {
                 self.covariance[*column][*row] = covariance;
             }
         }
-        for state in 0..STATES {
-            self.covariance[state][state] = self.covariance[state][state].max(T::of(LEAST_VARIANCE));
+        for (state, row) in self.covariance.iter_mut().enumerate() {
+            row[state] = row[state].max(T::of(LEAST_VARIANCE));
         }
     }
 }
