@@ -145,8 +145,9 @@ impl<T: Real> Errors<T> {
         for row in 0..STATES {
             let gain = shared[row] * inverse;
             self.value[row] += gain * residual;
-            for (column, other) in shared.iter().enumerate().skip(row) {
-                let covariance = self.covariance[row][column] - gain * *other;
+            #[expect(clippy::needless_range_loop, reason = "an iterator costs a tenth of the filter's instructions")]
+            for column in row..STATES {
+                let covariance = self.covariance[row][column] - gain * shared[column];
                 self.covariance[row][column] = covariance;
                 self.covariance[column][row] = covariance;
             }

@@ -280,8 +280,8 @@ proptest! {
             problem.relative_pose(&mut noise, (place - 1) % (keyframes - 1) + 1);
             let (covariance, solution, within) = problem.batch();
             // The noise of the link is inverted once more.
-            let batch = (covariance, solution, 10.0 * within);
-        compare(&mut problem.smoother, 0, &batch, keyframes)?;
+            let batch = (covariance, solution, 100.0 * within);
+            compare(&mut problem.smoother, 0, &batch, keyframes)?;
         }
     }
 
