@@ -87,7 +87,7 @@ pub(crate) const STEPS: &[Step] = &[
             })
         },
     },
-    Step { name: "mekf/nine", on: None, steps: USUAL, stored: 2223.0, run: attitude::<MekfFilter> },
+    Step { name: "mekf/nine", on: None, steps: USUAL, stored: 2167.0, run: attitude::<MekfFilter> },
     Step {
         name: "smoother/30_landmarks",
         on: None,
