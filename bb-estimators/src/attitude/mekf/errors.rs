@@ -145,7 +145,10 @@ impl<T: Real> Errors<T> {
         for row in 0..STATES {
             let gain = shared[row] * inverse;
             self.value[row] += gain * residual;
-            #[expect(clippy::needless_range_loop, reason = "an iterator costs a tenth of the filter's instructions")]
+            #[expect(
+                clippy::needless_range_loop,
+                reason = "an iterator costs a tenth of the filter's instructions"
+            )]
             for column in row..STATES {
                 let covariance = self.covariance[row][column] - gain * shared[column];
                 self.covariance[row][column] = covariance;
