@@ -16,8 +16,11 @@ fn score(prefix: &Path, name: &str, settings: &[&str]) -> Result<NavigationScore
 /// The noise of the drives, tuned by hand.
 const TUNED: &[&str] = &["gyroscope_noise=5e-3", "accelerometer_noise=5e-2"];
 
+/// A row of what is known.
+type Known = (&'static str, &'static str, &'static [&'static str], f64, std::ops::Range<f64>);
+
 /// Data set, filter, options, the position that was measured, m, and the NEES that is accepted.
-const KNOWN: [(&str, &str, &[&str], f64, std::ops::Range<f64>); 7] = [
+const KNOWN: [Known; 7] = [
     ("euroc_mh01", "eskf", &[], 0.566, 5.0..9.0),
     ("euroc_mh01", "state-smoother", &[], 0.585, 5.0..9.0),
     ("simflight", "eskf", &[], 1.050, 4.0..7.0),
