@@ -122,11 +122,12 @@ impl Machine {
         if let Some(message) = self.environment.journal().and_then(|journal| hand_over(journal, deadline)) {
             report.add_fault(self.fault("journal", message));
         }
-        report.panics = self.panics(&report.topics, &self.control.between_entries(|summary| summary));
         let deadline = Instant::now() + LEAST_TO_CLOSE;
         if let Some(message) = self.control.pool().left(Lane::User, deadline) {
             report.add_fault(self.fault("pool", message));
         }
+        // Once the pool has run the wakers.
+        report.panics = self.panics(&report.topics, &self.control.between_entries(|summary| summary));
         // It is set once.
         let _ = self.last_report.set(report);
         self.wake_all(self.control.topics().journal.close());
