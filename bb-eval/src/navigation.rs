@@ -17,6 +17,7 @@ mod record;
 mod report;
 mod robot;
 mod score;
+mod scoring;
 mod trace;
 
 pub use bag::{BagOptions, NavigationBag, Origin, RelativeDeviation, StartFrom};

@@ -20,7 +20,7 @@ use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 robot! {
-    /// With the filter in three dimensions, and an attitude filter.
+    /// A cart with the filter in three dimensions, and an attitude filter.
     robot Cart;
 
     link base_link {
@@ -53,7 +53,7 @@ robot! {
 }
 
 robot! {
-    /// With the filter on a plane.
+    /// A cart with the filter on a plane.
     robot FlatCart;
 
     link base_link {
@@ -79,7 +79,7 @@ robot! {
 }
 
 robot! {
-    /// With the estimator of flights, which takes off at a place that it is told.
+    /// A cart with the estimator of flights, which takes off at a place that it is told.
     robot FlyingCart;
 
     link base_link {
@@ -291,6 +291,12 @@ fn play<R: Robot>(
     assert_eq!(simulation.stop().faults.len(), 0);
 }
 
+fn published(message: Stamped<Odometry>) -> Estimated {
+    let pose = message.pose;
+    let covariance = pose.covariance.expect("a filter knows its covariance");
+    estimated(message.monotonic_time, &pose.position, &pose.world_from_body, &covariance)
+}
+
 fn spatial(file: &Path) -> Vec<Estimated> {
     let builder = Cart::builder();
     let room = Overflow::DropOldest { capacity: 20_000 };
@@ -301,16 +307,7 @@ fn spatial(file: &Path) -> Vec<Estimated> {
         Any::Wheels(wheels) => simulation.publish(cart::sensor::base_link::wheels, time, *wheels),
         Any::Field(_) => {}
     });
-    let of = |message: Stamped<Odometry>| {
-        let pose = message.pose;
-        estimated(
-            message.monotonic_time,
-            &pose.position,
-            &pose.world_from_body,
-            &pose.covariance.expect("is known"),
-        )
-    };
-    odometry.drain().map(of).collect()
+    odometry.drain().map(published).collect()
 }
 
 fn planar(file: &Path) -> Vec<Estimated> {
@@ -323,16 +320,7 @@ fn planar(file: &Path) -> Vec<Estimated> {
         Any::Wheels(wheels) => simulation.publish(flat_cart::sensor::base_link::wheels, time, *wheels),
         Any::Field(_) => {}
     });
-    let of = |message: Stamped<Odometry>| {
-        let pose = message.pose;
-        estimated(
-            message.monotonic_time,
-            &pose.position,
-            &pose.world_from_body,
-            &pose.covariance.expect("is known"),
-        )
-    };
-    odometry.drain().map(of).collect()
+    odometry.drain().map(published).collect()
 }
 
 fn flight(file: &Path, strategy: &str) -> Vec<Estimated> {

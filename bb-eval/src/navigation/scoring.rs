@@ -1,0 +1,443 @@
+//! The comparison of a filter's record with the truth: instants, errors, states and the run over time.
+
+use super::bag::TrueTrack;
+use super::data::Truth;
+use super::drive::Known as Told;
+use super::errors::{Errors, Known};
+use super::feed::{Feed, Time, What};
+use super::record::{Estimate, Record};
+use super::score::{NavigationScore, Scored, Scores};
+use super::trace::{Innovation, Row, Sensor, State, Trace};
+use crate::turns::{Align, Turn, Turns, angles, cause};
+use bb_core::nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector3};
+use bb_estimators::navigation::{Geodetic, GnssPosition, LocalFrame};
+
+/// Less than a tenth of a second, so that a truth at 10 Hz is scored at each message even if its clock jitters.
+const SCORED_PERIOD_NS: i64 = 90_000_000;
+
+/// An estimate is compared with the truth up to this time after it, ns.
+const OLDEST_NS: i64 = 200_000_000;
+
+/// Instants at the start that are not scored: a tenth of all, but at most this many.
+const MOST_LEFT_OUT: usize = 50;
+
+/// Samples of the IMU farther apart than this many of their periods have a gap between them.
+const GAP: i64 = 5;
+
+/// An instant at which the truth is known.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Instant {
+    pub(crate) time_ns: Time,
+    pub(crate) truth: Truth,
+    /// `None` where the filter was silent.
+    pub(crate) known: Option<Known>,
+    pub(crate) errors: Option<Errors>,
+    pub(crate) is_scored: bool,
+}
+
+pub(super) struct Scoring<'a> {
+    feed: &'a Feed,
+    record: &'a Record,
+    told: &'a Told,
+    /// The world of the truth, on the Earth.
+    world: Option<LocalFrame>,
+    /// The point of the robot that a truth without orientations tells, m.
+    antenna: Vector3<f64>,
+    first_ns: Time,
+    imu_stamps: Vec<Time>,
+    /// Stamps of positions in the world, by time.
+    anchors: Vec<Time>,
+    /// States, each from its time on.
+    states: Vec<(Time, State)>,
+}
+
+impl<'a> Scoring<'a> {
+    pub(super) fn new(origin: Option<Geodetic>, feed: &'a Feed, record: &'a Record, told: &'a Told) -> Self {
+        let of_filter = record.estimates.iter().find_map(|estimate| estimate.origin);
+        let world = origin.or(of_filter).map(LocalFrame::new);
+        let stamps = |is: fn(&What) -> bool| -> Vec<Time> {
+            let mut stamps: Vec<Time> =
+                feed.messages.iter().filter(|message| is(&message.what)).map(|message| message.stamp_ns).collect();
+            stamps.sort_unstable();
+            stamps
+        };
+        let imu_stamps = stamps(|what| matches!(what, What::Imu(_)));
+        let anchors = stamps(|what| matches!(what, What::Gnss(_) | What::Pose(_)));
+        let first_ns = feed.first_ns().unwrap_or(0);
+        let states = states(record, first_ns, &imu_stamps);
+        let antenna = told.base_from_part.translation.vector;
+        Self { feed, record, told, world, antenna, first_ns, imu_stamps, anchors, states }
+    }
+
+    fn seconds(&self, time_ns: Time) -> f64 {
+        (time_ns - self.first_ns) as f64 * 1e-9
+    }
+
+    /// An estimate in the world of the truth.
+    fn known(&self, estimate: &Estimate) -> Known {
+        let own = estimate.origin.map(LocalFrame::new);
+        // Of the same world, exactly.
+        let elsewhere = own.filter(|own| self.world != Some(*own));
+        let moved = elsewhere.zip(self.world).map(|(own, world)| own.other_from_self(&world));
+        let Some(moved) = moved else {
+            let Estimate { position, velocity, world_from_body, covariance, .. } = *estimate;
+            return Known { position, velocity, world_from_body, covariance };
+        };
+        let turn = moved.rotation.to_rotation_matrix().into_inner();
+        let mut both = Matrix6::zeros();
+        both.fixed_view_mut::<3, 3>(0, 0).copy_from(&turn);
+        both.fixed_view_mut::<3, 3>(3, 3).copy_from(&turn);
+        Known {
+            position: moved.transform_point(&estimate.position.into()).coords,
+            velocity: moved.rotation * estimate.velocity,
+            world_from_body: moved.rotation * estimate.world_from_body,
+            covariance: both * estimate.covariance * both.transpose(),
+        }
+    }
+
+    /// The estimate for a time: the last one before it, moved on.
+    fn at(&self, time_ns: Time) -> Option<Estimate> {
+        let estimates = &self.record.estimates;
+        let next = estimates.partition_point(|estimate| estimate.time_ns <= time_ns);
+        let estimate = estimates.get(next.checked_sub(1)?)?;
+        (time_ns - estimate.time_ns <= OLDEST_NS).then(|| estimate.at(time_ns))
+    }
+
+    /// All instants with truth: those of the truth, or of the estimates where these are the rarer ones.
+    pub(super) fn all(&self, notes: &mut Vec<String>) -> Vec<Instant> {
+        let track = TrueTrack::new(&self.told.told, &self.told.base_from_part, self.world.as_ref());
+        let points = track.points();
+        if let Err(why) = &self.told.topic {
+            notes.push(format!("no truth, so no errors: {why}"));
+        } else if points.is_empty() {
+            let topic = self.told.topic.as_deref().unwrap_or_default();
+            notes.push(format!("no truth, so no errors: {topic} holds no position that is a number"));
+        }
+        let estimates = &self.record.estimates;
+        let (Some(begin), Some(end)) = (self.imu_stamps.first(), self.imu_stamps.last()) else { return Vec::new() };
+        let truths: Vec<(Time, Truth)> = if period(estimates.iter().map(|estimate| estimate.time_ns))
+            > 2 * period(points.iter().map(|(time, _)| *time)).min(SCORED_PERIOD_NS)
+        {
+            let at = |estimate: &Estimate| Some((estimate.time_ns, track.at(estimate.time_ns)?));
+            estimates.iter().filter_map(at).collect()
+        } else {
+            points.iter().filter(|(time, _)| (begin..=end).contains(&time)).copied().collect()
+        };
+        let is_late = self.told.is_on_earth();
+        let mut last = i64::MIN;
+        let mut instants: Vec<Instant> = Vec::new();
+        for (time_ns, truth) in truths {
+            if time_ns < last.saturating_add(SCORED_PERIOD_NS) {
+                continue;
+            }
+            last = time_ns;
+            let estimate = self.at(time_ns).map(|estimate| match is_late {
+                // In the clock of the fixes: where the robot was when they were measured.
+                true => estimate.at(time_ns - (estimate.delay_s * 1e9) as Time),
+                false => estimate,
+            });
+            let known = estimate.map(|estimate| self.known(&estimate));
+            let errors = known.map(|known| Errors::between(&truth, &self.antenna, &known));
+            instants.push(Instant { time_ns, truth, known, errors, is_scored: false });
+        }
+        if !points.is_empty() && instants.is_empty() {
+            let topic = self.told.topic.as_deref().unwrap_or_default();
+            notes.push(format!(
+                "no errors: {topic} has no message while the IMU has; are both stamped by one clock?"
+            ));
+        }
+        let delay_s = self.record.estimates.last().map_or(0.0, |estimate| estimate.delay_s);
+        if is_late && delay_s != 0.0 {
+            notes.push(format!(
+                "scored in the clock of the fixes: where the robot was {:.0} ms before the stamp of a fix, as the filter has \
+                 found in the end",
+                1e3 * delay_s
+            ));
+        }
+        // Before the first estimate there is nothing to score.
+        let with = instants.iter().filter(|instant| instant.known.is_some()).count();
+        let left_out = MOST_LEFT_OUT.min(with.saturating_sub(1) / 10);
+        let mut seen = 0;
+        for instant in &mut instants {
+            seen += usize::from(instant.known.is_some());
+            instant.is_scored = instant.known.is_some() && seen > left_out;
+        }
+        instants
+    }
+
+    /// Turns the truth to the world of the estimates, and says by how much.
+    pub(super) fn aligned(&self, instants: &mut [Instant], align: Align) -> Option<String> {
+        if align == Align::None {
+            return None;
+        }
+        let (turn, how) = turn_of(instants, align)?;
+        let scored = || instants.iter().filter(|instant| instant.is_scored);
+        let count = scored().count().max(1) as f64;
+        let moved = |instant: &Instant| {
+            let arm = if instant.truth.world_from_body.is_some() { Vector3::zeros() } else { self.antenna };
+            instant.known.map_or_else(Vector3::zeros, |known| {
+                known.position + known.world_from_body * arm - turn.rotation * instant.truth.position
+            })
+        };
+        let shift = scored().map(moved).sum::<Vector3<f64>>() / count;
+        for instant in instants.iter_mut() {
+            let Truth { position, world_from_body, velocity } = instant.truth;
+            instant.truth = Truth {
+                position: turn.rotation * position + shift,
+                world_from_body: world_from_body.map(|truth| turn.rotation * truth),
+                velocity: velocity.map(|velocity| turn.rotation * velocity),
+            };
+            let errors = instant.known.map(|known| Errors::between(&instant.truth, &self.antenna, &known));
+            instant.errors = errors;
+        }
+        Some(format!(
+            "the truth is turned by roll, pitch, yaw {} deg (spread {:.2} deg, by its {how}) and moved by {:.2}, {:.2}, {:.2} m",
+            angles(&turn.rotation),
+            turn.spread.to_degrees(),
+            shift.x,
+            shift.y,
+            shift.z
+        ))
+    }
+
+    /// A cause of a large error, if it was found to explain it.
+    pub(super) fn explained(&self, imu: &str, instants: &[Instant], align: Align) -> Option<String> {
+        let mut of_body = Turns::default();
+        let mut of_world = Turns::default();
+        let mut square = 0.0;
+        let mut count = 0.0;
+        let both = instants.iter().filter(|instant| instant.is_scored);
+        for (estimate, truth) in both.filter_map(|instant| {
+            instant.known.map(|known| known.world_from_body).zip(instant.truth.world_from_body)
+        }) {
+            of_body.add(&(truth.inverse() * estimate));
+            of_world.add(&(estimate * truth.inverse()));
+            square += truth.angle_to(&estimate).powi(2);
+            count += 1.0;
+        }
+        let rms = (square / f64::max(count, 1.0)).sqrt();
+        let base_from_imu = self.feed.mounts[0].unwrap_or_else(Isometry3::identity);
+        cause(rms, &of_body, &of_world, &base_from_imu, imu, align)
+    }
+
+    fn state(&self, time_ns: Time) -> State {
+        let next = self.states.partition_point(|(time, _)| *time <= time_ns);
+        next.checked_sub(1).and_then(|last| self.states.get(last)).map_or(State::Starting, |(_, state)| *state)
+    }
+
+    /// Time since the last position in the world, s.
+    fn age_s(&self, time_ns: Time) -> Option<f64> {
+        let next = self.anchors.partition_point(|time| *time <= time_ns);
+        let last = self.anchors.get(next.checked_sub(1)?)?;
+        Some((time_ns - last) as f64 * 1e-9)
+    }
+
+    pub(super) fn score(&self, instants: &[Instant]) -> NavigationScore {
+        let scored = instants.iter().filter(|instant| instant.is_scored).filter_map(|instant| {
+            let (known, errors) = instant.known.zip(instant.errors)?;
+            let velocity = instant.truth.velocity.map(|velocity| (velocity - known.velocity).norm());
+            Some(Scored {
+                errors,
+                velocity,
+                state: self.state(instant.time_ns),
+                age_s: self.age_s(instant.time_ns),
+            })
+        });
+        let started_s = self.record.estimates.first().map_or(f64::NAN, |estimate| self.seconds(estimate.time_ns));
+        Scores {
+            scored: scored.collect(),
+            silent: instants.iter().filter(|instant| instant.known.is_none()).count(),
+            started_s,
+            states: self.durations(),
+            fix_period_s: period(self.anchors.iter().copied()) as f64 * 1e-9,
+            sample_s: period(self.imu_stamps.iter().copied()) as f64 * 1e-9,
+            record: self.record,
+        }
+        .score()
+    }
+
+    /// Time in each state, s.
+    fn durations(&self) -> Vec<(State, f64)> {
+        let end = self.imu_stamps.last().copied().unwrap_or(self.first_ns);
+        let ends = self.states.iter().skip(1).map(|(time, _)| *time).chain([end]);
+        let mut durations: Vec<(State, f64)> = Vec::new();
+        for ((from, state), to) in self.states.iter().zip(ends) {
+            let seconds = to.saturating_sub(*from).max(0) as f64 * 1e-9;
+            match durations.iter_mut().find(|(known, _)| known == state) {
+                Some((_, sum)) => *sum += seconds,
+                None => durations.push((*state, seconds)),
+            }
+        }
+        durations.sort_by_key(|(state, _)| *state);
+        durations
+    }
+
+    pub(super) fn trace(&self, instants: &[Instant]) -> Trace {
+        let mut rows: Vec<Row> = Vec::new();
+        let mut last = i64::MIN;
+        let mut next = 0;
+        for estimate in &self.record.estimates {
+            // The instants with truth, and the estimates between them at ten a second.
+            while let Some(instant) = instants.get(next).filter(|instant| instant.time_ns <= estimate.time_ns) {
+                if let (Some(known), Some(errors)) = (instant.known, instant.errors) {
+                    rows.push(Row {
+                        time_s: self.seconds(instant.time_ns),
+                        position: known.position,
+                        known,
+                        truth: Some(instant.truth),
+                        errors: Some(errors),
+                        anchor_age_s: self.age_s(instant.time_ns),
+                    });
+                    last = instant.time_ns;
+                }
+                next += 1;
+            }
+            if estimate.time_ns >= last.saturating_add(SCORED_PERIOD_NS) {
+                last = estimate.time_ns;
+                let known = self.known(estimate);
+                rows.push(Row {
+                    time_s: self.seconds(estimate.time_ns),
+                    position: known.position,
+                    known,
+                    truth: None,
+                    errors: None,
+                    anchor_age_s: self.age_s(estimate.time_ns),
+                });
+            }
+        }
+        let spans = |times: &[Time], longest_ns: Time| -> Vec<(f64, f64)> {
+            let long = times.windows(2).filter(|pair| pair[1] - pair[0] > longest_ns);
+            long.map(|pair| (self.seconds(pair[0]), self.seconds(pair[1]))).collect()
+        };
+        Trace {
+            first_ns: self.first_ns,
+            rows,
+            innovations: self.innovations(),
+            fixes: self.fixes().map(|(_, fix)| fix.position).collect(),
+            health: self.states.iter().map(|(time, state)| (self.seconds(*time), state.name())).collect(),
+            outages: spans(&self.anchors, 3 * period(self.anchors.iter().copied())),
+            gaps: spans(&self.imu_stamps, GAP * period(self.imu_stamps.iter().copied())),
+        }
+    }
+
+    /// The fixes that the filter got, in the world of the truth, each with its stamp.
+    fn fixes(&self) -> impl Iterator<Item = (Time, GnssPosition)> + '_ {
+        let antenna = self.feed.mounts[1].unwrap_or_else(Isometry3::identity).translation.vector;
+        self.feed.messages.iter().filter_map(move |message| match &message.what {
+            What::Gnss(fix) => {
+                Some((message.stamp_ns, GnssPosition::of_fix(fix, self.world.as_ref()?, antenna, 5.0)?))
+            }
+            _ => None,
+        })
+    }
+
+    /// The fixes against the estimates before them.
+    fn innovations(&self) -> Vec<Innovation> {
+        let innovation = |(time_ns, fix): (Time, GnssPosition)| {
+            let known = self.known(&self.at(time_ns - 1)?.at(time_ns));
+            let truth = Truth { position: fix.position, world_from_body: None, velocity: None };
+            let mut errors = Errors::between(&truth, &fix.lever_arm, &known);
+            let mut position = errors.covariance.fixed_view_mut::<3, 3>(0, 0);
+            position += fix.covariance;
+            let refusals = &self.record.refusals;
+            let from = refusals.partition_point(|time| *time < time_ns);
+            let is_fused = refusals.get(from).is_none_or(|time| time - time_ns > OLDEST_NS);
+            Some(Innovation {
+                time_s: self.seconds(time_ns),
+                sensor: Sensor::Fix,
+                nis: errors.normalised(&[0, 1, 2])?,
+                is_fused,
+            })
+        };
+        self.fixes().filter_map(innovation).collect()
+    }
+}
+
+/// The median period of times in order, ns; the longest time there is for fewer than two.
+fn period(times: impl Iterator<Item = Time>) -> Time {
+    let times: Vec<Time> = times.collect();
+    let mut periods: Vec<Time> =
+        times.windows(2).map(|pair| pair[1] - pair[0]).filter(|period| *period > 0).collect();
+    periods.sort_unstable();
+    periods.get(periods.len() / 2).copied().unwrap_or(i64::MAX / 4)
+}
+
+/// The states of a filter over time. It is starting until its first estimate, and while it is silent although the IMU is not.
+fn states(record: &Record, first_ns: Time, imu: &[Time]) -> Vec<(Time, State)> {
+    let silence_ns = OLDEST_NS.max(3 * period(record.estimates.iter().map(|estimate| estimate.time_ns)));
+    let mut silent: Vec<(Time, Time)> = Vec::new();
+    let mut last = first_ns;
+    let end = imu.last().copied().unwrap_or(first_ns);
+    for time in record.estimates.iter().map(|estimate| estimate.time_ns).chain([end]) {
+        let (after, before) =
+            (imu.partition_point(|sample| *sample < time), imu.partition_point(|sample| *sample <= last));
+        let samples = after.saturating_sub(before);
+        if time - last > silence_ns && samples > 3 {
+            silent.push((last, time));
+        }
+        last = time;
+    }
+    let mut changes: Vec<Time> = record.health.iter().map(|(time, _)| *time).collect();
+    changes.extend(silent.iter().flat_map(|(from, to)| [*from, *to]));
+    changes.push(first_ns);
+    changes.retain(|time| *time >= first_ns);
+    changes.sort_unstable();
+    changes.dedup();
+    let mut states: Vec<(Time, State)> = Vec::new();
+    for time in changes {
+        let health = record.health.iter().rev().find(|(at, _)| *at <= time).map(|(_, health)| *health);
+        let is_silent = silent.iter().any(|(from, to)| (*from..*to).contains(&time));
+        let state = if is_silent { State::Starting } else { State::Running(health.unwrap_or_default()) };
+        if states.last().is_none_or(|(_, before)| *before != state) {
+            states.push((time, state));
+        }
+    }
+    states
+}
+
+/// The rotation of the truth's world to that of the estimates, by orientations or, where the truth has none, by the track.
+fn turn_of(instants: &[Instant], align: Align) -> Option<(Turn, &'static str)> {
+    let scored = || instants.iter().filter(|instant| instant.is_scored);
+    let mut turns = Turns::default();
+    for instant in scored() {
+        if let (Some(known), Some(truth)) = (instant.known, instant.truth.world_from_body) {
+            turns.add(&(known.world_from_body * truth.inverse()));
+        }
+    }
+    if let Some(turn) = turns.of(align) {
+        return Some((turn, "orientations"));
+    }
+    let pairs: Vec<(Vector3<f64>, Vector3<f64>)> =
+        scored().filter_map(|instant| Some((instant.known?.position, instant.truth.position))).collect();
+    let count = pairs.len().max(1) as f64;
+    let estimates = pairs.iter().map(|(estimate, _)| estimate).sum::<Vector3<f64>>() / count;
+    let truths = pairs.iter().map(|(_, truth)| truth).sum::<Vector3<f64>>() / count;
+    let flat = if align == Align::Heading { Vector3::new(1.0, 1.0, 0.0) } else { Vector3::new(1.0, 1.0, 1.0) };
+    let centred = |(estimate, truth): &(Vector3<f64>, Vector3<f64>)| {
+        ((estimate - estimates).component_mul(&flat), (truth - truths).component_mul(&flat))
+    };
+    let mut between = bb_core::nalgebra::Matrix3::zeros();
+    for (estimate, truth) in pairs.iter().map(centred) {
+        between += estimate * truth.transpose();
+    }
+    if align == Align::Heading {
+        // The rotation about the vertical alone.
+        let angle = (between[(1, 0)] - between[(0, 1)]).atan2(between[(0, 0)] + between[(1, 1)]);
+        between = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle).to_rotation_matrix().into_inner();
+    }
+    let svd = between.svd(true, true);
+    let (left, right) = (svd.u?, svd.v_t?);
+    let mut rotation = left * right;
+    if rotation.determinant() < 0.0 {
+        let mut mirrored = left;
+        mirrored.column_mut(2).neg_mut();
+        rotation = mirrored * right;
+    }
+    let rotation = UnitQuaternion::from_matrix(&rotation);
+    let residual: f64 =
+        pairs.iter().map(centred).map(|(estimate, truth)| (estimate - rotation * truth).norm_squared()).sum();
+    let extent: f64 = pairs.iter().map(centred).map(|(_, truth)| truth.norm_squared()).sum();
+    // As an angle over the size of the track.
+    let spread = (residual / extent.max(f64::MIN_POSITIVE)).sqrt();
+    (pairs.len() > 2).then_some((Turn { rotation, spread }, "track"))
+}
