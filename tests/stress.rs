@@ -35,7 +35,7 @@ fn texts(subscription: &DynamicSubscription) -> Heard {
     heard
 }
 
-/// What subscribers hear that do not get everything.
+/// Subscriptions that do not get everything.
 struct Few {
     /// The newest of each path, at a highest rate.
     rated: DynamicSubscription,
@@ -182,7 +182,7 @@ fn real_day(seed: u64) -> Result<bool, Box<dyn Error>> {
     is_same_again(seed, &lines, (&hear(&all), &few), &report)
 }
 
-/// What must have happened on some day.
+/// Events that must have happened on some day.
 const HAPPENS: [&str; 4] =
     ["weather/front", "estimator/base/squall", "controller/gale starts", "controller/calm starts"];
 

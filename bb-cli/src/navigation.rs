@@ -95,7 +95,7 @@ struct Done {
 }
 
 impl Done {
-    /// What is the same for all filters is said once.
+    /// Prints what is the same for all filters once.
     fn say(list: &mut Vec<String>, file: &Path, lines: Vec<String>) {
         for line in lines {
             let line = format!("{}: {line}", file.display());

@@ -103,7 +103,7 @@ struct Inner {
     pool: Pool,
     /// The threads of disarm callbacks of components, each of which has one.
     reserve: Reserve,
-    /// Those of other disarm callbacks, such as the ones of commands, which may be any number.
+    /// Threads of other disarm callbacks, such as the ones of commands, which may be any number.
     spare: Reserve,
     reporter: Reporter,
     /// Numbers of panics of loggers, and of wakers that the control state has woken.

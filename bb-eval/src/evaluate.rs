@@ -44,7 +44,7 @@ pub struct Evaluator {
     pub before_motion_s: Option<f64>,
     /// How the recordings are modified.
     pub variants: Variants,
-    /// What is taken from the truth.
+    /// Rotation that is taken from the truth.
     pub align: Align,
     /// Whether to keep the errors over time.
     pub keep_errors: bool,
@@ -76,7 +76,7 @@ pub struct Run {
     pub filter: &'static str,
     /// Its errors.
     pub score: Score,
-    /// What a root mean square does not tell.
+    /// Figures beside the root mean square.
     pub detail: Detail,
     /// Mean time per sample, including reading the orientation, in ns.
     pub ns_per_update: f64,

@@ -120,7 +120,7 @@ pub trait Running {
         None
     }
 
-    /// Whether the heading is known well enough to be used, if the filter reports it.
+    /// Returns whether the heading is known well enough to be used, if the filter reports it.
     fn trusts_heading(&self) -> Option<bool> {
         None
     }

@@ -13,19 +13,19 @@ pub(crate) const TF_STATIC: &str = "/tf_static";
 pub(crate) const POSE_WITH_COVARIANCE: &str = "geometry_msgs/msg/PoseWithCovarianceStamped";
 pub(crate) const TRANSFORM: &str = "geometry_msgs/msg/TransformStamped";
 
-/// Where a frame is.
+/// Placement of a frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mount {
     /// A frame, or the topic of a sensor.
     pub name: String,
-    /// Where it is.
+    /// The placement.
     pub at: Place,
 }
 
 /// A place on the body.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Place {
-    /// That of a frame.
+    /// The placement of a frame.
     Frame(String),
     /// Takes its coordinates to those of the IMU.
     Pose(Isometry3<f64>),
@@ -112,7 +112,9 @@ impl Frames {
             let is_near = pose.translation.vector.iter().all(|x| x.abs() <= FARTHEST);
             if !is_rotation || !is_near {
                 let what = if is_rotation { "a translation of more than a kilometre" } else { "no rotation" };
-                return Err(format!("{TF_STATIC}: the transform from {child} to {parent} is none: it has {what}"));
+                return Err(format!(
+                    "{TF_STATIC}: the transform from {child} to {parent} is not a rotation and translation: it has {what}"
+                ));
             }
             edges.push((parent, child, pose));
         }
@@ -247,7 +249,7 @@ mod tests {
             ("gps=1e300,0,0", "is no place on a robot: at most 1000 m"),
             ("gps=0,0,0,1e20,0,0", "is no angle: from -360 to 360 degrees"),
         ] {
-            let said = text.parse::<Mount>().expect_err("is none");
+            let said = text.parse::<Mount>().expect_err("not accepted");
             assert!(said.contains(fault), "{text}: {said}");
         }
     }

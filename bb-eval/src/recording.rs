@@ -57,7 +57,7 @@ pub struct Recording {
     /// Takes what the IMU, and what the magnetometer measures to the axes of the robot; `None` if they are those.
     base_from_imu: Option<Rotation3<f64>>,
     base_from_magnetometer: Option<Rotation3<f64>>,
-    /// What was assumed of the mountings.
+    /// Statements on what was assumed of the mountings.
     pub(crate) notes: Vec<String>,
     samples: MargSamples,
     /// Samples before this time are skipped.

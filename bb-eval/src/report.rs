@@ -22,7 +22,7 @@ struct Row {
     inclination_deg: Option<f64>,
     /// The fraction of headings within two of the standard deviations that the filter reported.
     heading_within_two_sigma: Option<f64>,
-    /// The same of inclinations.
+    /// Share of inclinations within two standard deviations.
     inclination_within_two_sigma: Option<f64>,
     /// 95th percentile and largest total error.
     p95_deg: Option<f64>,
@@ -32,7 +32,7 @@ struct Row {
     /// The fraction of samples at which the filter trusts its heading, and the error of the heading there.
     heading_trusted: Option<f64>,
     heading_while_trusted_deg: Option<f64>,
-    /// How fast the heading drifts, with six axes too.
+    /// Drift of the heading, with six axes too.
     heading_drift_deg_per_min: Option<f64>,
     /// The number of scored samples.
     samples: u64,

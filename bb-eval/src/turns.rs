@@ -3,11 +3,11 @@
 use bb_core::nalgebra::{Isometry3, Matrix4, Quaternion, SymmetricEigen, UnitQuaternion, Vector3};
 use std::str::FromStr;
 
-/// What is taken from the truth before it is compared: its world has axes of its own.
+/// Rotation that is taken from the truth before it is compared, whose world has axes of its own.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 pub enum Align {
-    /// Nothing: the truth is in east, north, up.
+    /// No rotation: the truth is in east, north, up.
     #[default]
     None,
     /// A turn about the vertical, and for navigation the origin.
@@ -100,7 +100,7 @@ pub(crate) fn angles(rotation: &UnitQuaternion<f64>) -> String {
     [roll, pitch, yaw].map(|angle| plain(shown(angle))).join(",")
 }
 
-/// What explains a large error of the orientation, if one of the constant rotations does: it leaves less than a third.
+/// Returns the constant rotation that explains a large error of the orientation: one that leaves less than a third of it.
 pub(crate) fn cause(
     rms: f64,
     of_body: &Turns,

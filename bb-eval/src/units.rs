@@ -27,7 +27,7 @@ const FORCES: [Guess; 3] =
 /// The range plausible as m/s².
 const FORCE: (f64, f64) = (8.8, 11.5);
 
-/// The same of a body that never rests, a runner's say: the median then has 5 to 30 m/s².
+/// Bounds for a body that never rests, a runner's say: the median then has 5 to 30 m/s².
 const MOVING_FORCES: [Guess; 2] = [(0.5, 3.0, "in g"), (500.0, 3000.0, "in mg")];
 const MOVING: (f64, f64) = (3.0, 100.0);
 

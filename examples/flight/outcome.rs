@@ -100,7 +100,7 @@ impl Outcome {
         lines.into_iter().map(line).collect()
     }
 
-    /// What the words of the timeline mean, of those that are in it.
+    /// Explains the words of the timeline, of those that are in it.
     pub(crate) fn glossary(&self) -> String {
         let is_said = |word: &str| self.happened.iter().any(|one| one.what.contains(word));
         let words = WORDS.iter().filter(|(word, _)| is_said(word));

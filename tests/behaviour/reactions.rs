@@ -282,7 +282,7 @@ fn the_command_cancels_what_runs_and_a_bound_follows_its_parameter() -> Result<(
     flight.simulation.set_parameter(drone::param::battery::low, 9.0)?;
     each_half_second(25, 40, 10.0).into_iter().for_each(|(time, voltage)| flight.voltage(time, voltage));
     let expected = [(10, "fulfilled".into()), (20, "not fulfilled".into())];
-    assert_eq!(flight.states(), expected, "the new bound starts `for` anew");
+    assert_eq!(flight.states(), expected, "the new bound starts `for` again");
     flight.simulation.set_parameter(drone::param::battery::low, 10.5)?;
     each_half_second(45, 65, 10.0).into_iter().for_each(|(time, voltage)| flight.voltage(time, voltage));
     assert_eq!(flight.states(), [(45, "fulfilled".into()), (65, "started".into())]);

@@ -188,7 +188,7 @@ impl Estimator for Join {
     }
 }
 
-/// What a [`Squall`] counts.
+/// Counts of a [`Squall`].
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 pub(crate) struct Gust {
     pub(crate) speed: f64,

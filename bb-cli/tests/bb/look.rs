@@ -143,9 +143,9 @@ struct Turns {
     late_s: [f64; 3],
     /// The deviation of fixes in the second half, of all that state 1 cm, m.
     scatter: f64,
-    /// Of the magnetometer, T.
+    /// Offset of the magnetometer, T.
     offset: f64,
-    /// Of the IMU's stamps, half milliseconds.
+    /// Jitter of the IMU's stamps, half milliseconds.
     jitter: u64,
 }
 

@@ -70,7 +70,7 @@ impl Context {
         Self::new("test", Self::leaked(declaration, inputs), MonotonicTime::ZERO, None)
     }
 
-    /// The same context with these inputs, the first being the driver, in the place of the declared ones: for an
+    /// Returns this context with other inputs than the declared ones, the first being the driver: for an
     /// estimator that wraps another whose sensors are mounted as a file says. Requests made to it are its own. (It leaks
     /// what [`for_test`](Self::for_test) does.)
     ///

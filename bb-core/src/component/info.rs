@@ -18,7 +18,8 @@ pub enum Request {
     /// [`Info::Tick`] at a fixed rate from now on; a period of zero ends it.
     Tick(Duration),
     /// A restart with fresh state, for this reason, once the outputs of the reply are published and, in reply to a call,
-    /// with the answer on its way to the caller. Comes before a [`Continue`](Self::Continue) of the same reply. Otherwise as if the callback had returned the reason as a [`Fault`](super::Fault).
+    /// with the answer on its way to the caller. It comes before a [`Continue`](Self::Continue) of the same reply. Otherwise as if the
+    /// callback had returned the reason as a [`Fault`](super::Fault).
     Restart(&'static str),
 }
 

@@ -82,7 +82,7 @@ pub struct Reaction {
     silences: Counter,
     refused_options: Counter,
     lost: Counter,
-    /// How many of the lost messages are counted.
+    /// Number of the lost messages that are counted.
     counted: u64,
 }
 

@@ -84,7 +84,7 @@ impl CommandPath {
     note = "name a number within it, as in `sensor::base::imu.angular_velocity.x`; a number may be optional"
 )]
 pub trait Number {
-    /// Its value; `None` if the field has no value.
+    /// Returns its value; `None` if the field has no value.
     fn number(&self) -> Option<f64>;
 }
 

@@ -35,7 +35,7 @@ impl Timers {
     pub(super) fn request(&mut self, request: Request, now: MonotonicTime) {
         let after = |duration: Duration| now + duration.max(SHORTEST);
         match request {
-            // A restart comes before all else, wherever it stands in the reply.
+            // A restart comes before all else, wherever it comes in the reply.
             Request::Continue(_) if matches!(self.continue_with, Some(Continuation::Fail(_))) => {}
             Request::Continue(step) => self.continue_with = Some(Continuation::Step(step)),
             Request::Restart(reason) => self.continue_with = Some(Continuation::Fail(reason)),

@@ -1,4 +1,4 @@
-//! What a root mean square does not tell of a run.
+//! Figures of a run beside the root mean square.
 
 use crate::filters::Deviations;
 use crate::turns::heading;
@@ -9,9 +9,9 @@ use std::f64::consts::{PI, TAU};
 /// A share of some samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Share {
-    /// How many there are.
+    /// Number of all samples.
     pub all: u64,
-    /// How many are meant.
+    /// Number of those that count.
     pub part: u64,
 }
 
@@ -106,7 +106,7 @@ impl Detail {
         self.largest.as_ref()
     }
 
-    /// How fast the error of the heading grows, degrees a minute: its slope over the recording, by least squares.
+    /// Growth of the error of the heading, degrees a minute: its slope over the recording, by least squares.
     pub fn drift_deg_per_min(&self) -> Option<f64> {
         let count = self.headings.len() as f64;
         let (times, errors) = self.headings.iter().fold((0.0, 0.0), |sum, (t, e)| (sum.0 + t, sum.1 + e));

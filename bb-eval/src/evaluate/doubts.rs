@@ -29,7 +29,7 @@ pub(super) fn unit_doubts(recording: &Recording, units: &Units) -> Vec<String> {
     imu.chain(units.of_field().map(|fault| format!("{magnetometer}: {fault}"))).collect()
 }
 
-/// What explains that no filter agrees with the truth: a rotation of the IMU or of the truth's world, or another convention of
+/// Explains why no filter agrees with the truth: a rotation of the IMU or of the truth's world, or another convention of
 /// the truth, judged by the filter that fits it best. Of what fits, the closest is named.
 pub(super) fn truth_doubt(recording: &Recording, players: &[Player], align: Align) -> Option<String> {
     let verdicts = players.iter().filter_map(|player| Some((player, player.truths.verdict(recording.axes)?)));

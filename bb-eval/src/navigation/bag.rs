@@ -63,7 +63,7 @@ impl NavigationBag {
         self.messages.broken.as_deref()
     }
 
-    /// How many samples of the IMU there are.
+    /// Number of samples of the IMU.
     pub fn samples(&self) -> u64 {
         self.messages.stamps(0).count() as u64
     }

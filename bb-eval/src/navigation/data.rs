@@ -40,7 +40,7 @@ pub struct Sample {
     pub angular_velocity: Vector3<f64>,
     /// m/s².
     pub specific_force: Vector3<f64>,
-    /// How long, s.
+    /// Duration, s.
     pub dt: f64,
 }
 
@@ -51,20 +51,20 @@ pub struct Keyframe {
     pub time_s: f64,
     /// The first sample after it.
     pub sample: usize,
-    /// Whether the truth is to be scored there.
+    /// True if the truth is to be scored there.
     pub scored: bool,
-    /// What is true, if it is known.
+    /// The truth, if it is known.
     pub truth: Option<Truth>,
 }
 
-/// What is true at a time.
+/// The truth at a time.
 #[derive(Clone, Copy, Debug)]
 pub struct Truth {
-    /// In the world, m.
+    /// Position in the world, m.
     pub position: Vector3<f64>,
     /// Unknown on some drives.
     pub world_from_body: Option<UnitQuaternion<f64>>,
-    /// In the world, m/s.
+    /// Velocity in the world, m/s.
     pub velocity: Option<Vector3<f64>>,
 }
 
@@ -73,11 +73,11 @@ pub struct Truth {
 pub struct Noise {
     /// rad/s/√Hz.
     pub gyroscope: f64,
-    /// Its random walk, rad/s²/√Hz.
+    /// Random walk of the gyroscope's bias, rad/s²/√Hz.
     pub gyroscope_bias: f64,
     /// m/s²/√Hz.
     pub accelerometer: f64,
-    /// Its random walk, m/s³/√Hz.
+    /// Random walk of the accelerometer's bias, m/s³/√Hz.
     pub accelerometer_bias: f64,
     /// m/s².
     pub gravity: f64,

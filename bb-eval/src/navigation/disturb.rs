@@ -5,7 +5,7 @@ use crate::filters::near;
 use bb_core::payload::GnssFix;
 use std::str::FromStr;
 
-/// What is done to the messages of a recording before a filter gets them.
+/// Changes to the messages of a recording before a filter gets them.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "clap", derive(clap::Args), command(next_help_heading = "Made harder"))]
 pub struct Disturbances {
@@ -100,13 +100,13 @@ fn time(text: &str) -> Result<Time, String> {
 }
 
 impl Spell {
-    /// Whether a time since the beginning is in the spell.
+    /// Returns whether a time since the beginning is in the spell.
     fn contains(&self, since_ns: Time) -> bool {
         since_ns.rem_euclid(self.period_ns) >= self.period_ns - self.length_ns
     }
 }
 
-/// What was withheld of a feed.
+/// Messages withheld from a feed.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Withheld {
     /// Fixes that the filter does not get, with their own stamps.
@@ -114,7 +114,7 @@ pub(crate) struct Withheld {
 }
 
 impl Disturbances {
-    /// Whether nothing is done.
+    /// Returns whether nothing is changed.
     pub fn is_none(&self) -> bool {
         *self == Self::default()
     }
@@ -196,9 +196,9 @@ mod tests {
             ("gnss=125", "`125` is no time; write it with its unit"),
             ("gnss", "no `=` in it"),
         ] {
-            let said = text.parse::<Delay>().expect_err("is none");
+            let said = text.parse::<Delay>().expect_err("not accepted");
             assert!(said.contains(fault), "{said}");
         }
-        assert!("90s/30s".parse::<Spell>().expect_err("is none").contains("less than the period"));
+        assert!("90s/30s".parse::<Spell>().expect_err("not accepted").contains("less than the period"));
     }
 }

@@ -14,7 +14,7 @@ use bb_estimators::navigation::{Geodetic, LocalFrame};
 pub struct Drive {
     pub(crate) feed: Feed,
     pub(crate) told: Known,
-    /// What was assumed or left out.
+    /// Statements on what was assumed or left out.
     pub(crate) notes: Vec<String>,
     /// Why figures would be misleading.
     pub(crate) doubts: Vec<String>,
@@ -45,14 +45,14 @@ impl Known {
         Self { told: told.collect(), base_from_part: base_from_antenna, topic: Ok("the fixes withheld".to_owned()) }
     }
 
-    /// Whether it is positions on the Earth.
+    /// Returns whether it is positions on the Earth.
     pub(crate) fn is_on_earth(&self) -> bool {
         self.told.iter().any(|(_, told)| matches!(told, Told::OnEarth(_)))
     }
 }
 
 impl Drive {
-    /// How many samples of the IMU there are.
+    /// Returns the number of samples of the IMU.
     pub fn samples(&self) -> u64 {
         self.feed.messages.iter().filter(|message| matches!(message.what, What::Imu(_))).count() as u64
     }
@@ -65,7 +65,7 @@ impl Drive {
     }
 }
 
-/// Where the world of a data set is: any place will do.
+/// Place of the world of a data set on the Earth: any will do.
 const PLACE: [f64; 3] = [48.0, 11.0, 500.0];
 
 impl DataSet {

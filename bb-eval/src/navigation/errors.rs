@@ -21,7 +21,7 @@ pub(crate) struct Errors {
     pub(crate) position: Vector3<f64>,
     /// Rotation vector in the world, rad; `None` if the truth has no orientation.
     pub(crate) rotation: Option<Vector3<f64>>,
-    /// Of heading and tilt, rad; with the rotation.
+    /// Errors of heading and tilt, rad; with the rotation.
     pub(crate) angles: Option<(f64, f64)>,
     pub(crate) covariance: Matrix6<f64>,
 }

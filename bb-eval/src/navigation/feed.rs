@@ -40,20 +40,20 @@ impl What {
 /// A message with its times.
 #[derive(Clone, Debug)]
 pub(crate) struct Message {
-    /// When it reaches the robot.
+    /// Time at which it reaches the robot.
     pub(crate) arrival_ns: Time,
-    /// When it was measured, as its header says.
+    /// Time at which it was measured, as its header says.
     pub(crate) stamp_ns: Time,
     pub(crate) what: What,
 }
 
-/// All messages, and where the sensors are.
+/// The messages and the placement of the sensors.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Feed {
     pub(crate) messages: Vec<Message>,
     /// Takes the coordinates of each input's sensor to the link; `None` for an input that the recording lacks.
     pub(crate) mounts: [Option<Isometry3<f64>>; INPUTS.len()],
-    /// Where poses in the world are on the Earth, for a filter that takes them as places there.
+    /// Place of the world on the Earth, for a filter that takes poses as places there.
     pub(crate) world: Option<LocalFrame>,
 }
 

@@ -1,4 +1,4 @@
-//! What a robot has published of its filter.
+//! Record of what a robot has published of its filter.
 
 use super::feed::{Feed, Time, What};
 use bb_core::event::HealthState;
@@ -14,9 +14,9 @@ const BEFORE_NS: i64 = 10_000_000;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Estimate {
     pub(crate) time_ns: Time,
-    /// In the filter's world, m.
+    /// Position in the filter's world, m.
     pub(crate) position: Vector3<f64>,
-    /// In the filter's world, m/s.
+    /// Velocity in the filter's world, m/s.
     pub(crate) velocity: Vector3<f64>,
     pub(crate) world_from_body: UnitQuaternion<f64>,
     /// Axes of the link, rad/s.
@@ -25,7 +25,7 @@ pub(crate) struct Estimate {
     pub(crate) covariance: Matrix6<f64>,
     /// The origin of the filter's world.
     pub(crate) origin: Option<Geodetic>,
-    /// How much later than its stamps the fixes are valid, according to the filter, s.
+    /// Delay of the fixes behind their stamps, according to the filter, s.
     pub(crate) delay_s: f64,
 }
 
@@ -55,7 +55,7 @@ impl Estimate {
         })
     }
 
-    /// The same at another time near by, at constant velocities.
+    /// Returns the estimate at another time near by, at constant velocities.
     pub(crate) fn at(&self, time_ns: Time) -> Self {
         let since_s = (time_ns - self.time_ns) as f64 * 1e-9;
         let turn = UnitQuaternion::from_scaled_axis(self.angular_velocity * since_s);
@@ -68,7 +68,7 @@ impl Estimate {
     }
 }
 
-/// What became of the measurements of one input.
+/// Fate of the measurements of one input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Verdict {
     pub(crate) input: &'static str,
@@ -86,7 +86,7 @@ pub(crate) struct Record {
     /// Why the estimate was not to be trusted, for each sample of the IMU that the filter took.
     pub(crate) reasons: Vec<Option<&'static str>>,
     pub(crate) verdicts: Vec<Verdict>,
-    /// When fixes were refused.
+    /// Times at which fixes were refused.
     pub(crate) refusals: Vec<Time>,
     last_refused: u64,
     /// Measurements refused, of a filter that does not count them by input.
@@ -96,7 +96,7 @@ pub(crate) struct Record {
     pub(crate) samples: u64,
     /// The time that the run took.
     pub(crate) seconds: f64,
-    /// Whether the filter knows no height, roll and pitch.
+    /// True if the filter knows no height, roll and pitch.
     pub(crate) is_planar: bool,
     /// The time at which virtual time is zero.
     base_ns: Time,

@@ -29,7 +29,7 @@ pub fn navigation_json(scores: &[ScoredNavigation]) -> Result<String, String> {
     Ok(serde_json::to_string_pretty(&objects).map_err(|error| error.to_string())? + "\n")
 }
 
-/// A line per bag and filter, then how each filter fared; empty if there are none.
+/// A line per bag and filter, then how each filter fared; empty without any.
 pub fn navigation_table(scores: &[ScoredNavigation]) -> String {
     if scores.is_empty() {
         return String::new();
@@ -83,7 +83,7 @@ pub fn navigation_table(scores: &[ScoredNavigation]) -> String {
     text
 }
 
-/// With three digits.
+/// A number with three digits.
 fn number(value: f64) -> String {
     match value.abs() {
         ..10.0 => format!("{value:.3}"),
@@ -93,7 +93,7 @@ fn number(value: f64) -> String {
     }
 }
 
-/// How a filter fared: its states, what was wrong, outages, and what was refused.
+/// Lines on how a filter fared: its states, what was wrong, outages, and what was refused.
 fn fared(score: &NavigationScore) -> String {
     let mut text = String::new();
     let _ = writeln!(

@@ -183,7 +183,7 @@ fn play<R: Robot>(
     record.seconds = began.elapsed().as_secs_f64();
 }
 
-/// What is common to all robots after a run.
+/// Parts that all robots have after a run.
 fn finish(record: &mut Record, health: impl Iterator<Item = Stamped<HealthTransition>>, reasons: &Reasons) {
     record.health = health.map(|change| (record.time_ns(change.time), change.to)).collect();
     let reasons = std::mem::take(&mut *reasons.lock().unwrap_or_else(PoisonError::into_inner));

@@ -12,7 +12,7 @@ const BEYOND: f64 = 0.0455;
 /// Upper ends of the ages by which the errors of an outage are shown, s.
 const AGES: [f64; 6] = [5.0, 10.0, 20.0, 30.0, 60.0, f64::INFINITY];
 
-/// How errors are distributed.
+/// Distribution of errors.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Spread {
     /// Root mean square.
@@ -38,11 +38,11 @@ impl Spread {
 /// The share of errors within two deviations, or the ellipsoid of as much probability.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Within {
-    /// Of positions.
+    /// Distribution of errors of positions.
     pub position: Option<f64>,
-    /// Of headings.
+    /// Distribution of errors of headings.
     pub heading: Option<f64>,
-    /// Of roll and pitch.
+    /// Distribution of errors of roll and pitch.
     pub tilt: Option<f64>,
 }
 
@@ -51,7 +51,7 @@ pub struct Within {
 pub struct InState {
     /// `starting`, `healthy`, `degraded` or `lost`.
     pub state: &'static str,
-    /// How long.
+    /// Duration, s.
     pub seconds: f64,
     /// Error of the position in it, m.
     pub position_m: Option<Spread>,
@@ -59,23 +59,23 @@ pub struct InState {
     pub heading_deg: Option<Spread>,
 }
 
-/// Why the estimate was not to be trusted.
+/// Reason why the estimate was not to be trusted.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Wrong {
-    /// As the filter says it.
+    /// Reason, in the words of the filter.
     pub reason: &'static str,
-    /// How long.
+    /// Duration, s.
     pub seconds: f64,
 }
 
 /// Errors by the time since the last position in the world.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct OfAge {
-    /// From this age on, s.
+    /// Age from which on it counts, s.
     pub from_s: f64,
-    /// Up to this one; null for any.
+    /// Age up to which it counts, s; null for any.
     pub to_s: Option<f64>,
-    /// How many.
+    /// Number of instants.
     pub count: usize,
     /// Horizontal error, m.
     pub horizontal_m: Spread,
@@ -86,9 +86,9 @@ pub struct OfAge {
 pub struct Fate {
     /// The input.
     pub input: &'static str,
-    /// Those that corrected the estimate.
+    /// Number of those that corrected the estimate.
     pub fused: u64,
-    /// Those that were refused.
+    /// Number of those that were refused.
     pub refused: u64,
 }
 
@@ -96,11 +96,11 @@ pub struct Fate {
 /// not estimate, is `None`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NavigationScore {
-    /// How many instants were scored.
+    /// Number of instants that were scored.
     pub scored: usize,
     /// Instants with truth at which there was no estimate.
     pub silent: usize,
-    /// When the first estimate came, s after the first message.
+    /// Time of the first estimate, s after the first message.
     pub started_s: f64,
     /// Position, m.
     pub position_m: Option<Spread>,
@@ -110,21 +110,21 @@ pub struct NavigationScore {
     pub vertical_m: Option<Spread>,
     /// Angle of the whole rotation, degrees.
     pub orientation_deg: Option<Spread>,
-    /// Its part about the vertical, degrees.
+    /// Part about the vertical, degrees.
     pub heading_deg: Option<Spread>,
     /// The rest of it, degrees.
     pub tilt_deg: Option<Spread>,
     /// Velocity, m/s.
     pub velocity_mps: Option<Spread>,
-    /// Mean normalised estimation error squared of the pose, or of the position if the truth has no orientation,
+    /// Mean normalised estimation error squared of the pose, or of the position if the truth has no orientation.
     pub nees: Option<f64>,
-    /// which is this if it is consistent.
+    /// The value of that for a consistent filter.
     pub nees_expected: usize,
-    /// Within two sigma.
+    /// Shares within two standard deviations.
     pub within: Within,
     /// Time and errors by state.
     pub states: Vec<InState>,
-    /// What was wrong, the longest first.
+    /// Reasons for it, the longest first.
     pub wrong: Vec<Wrong>,
     /// Errors in outages, by age; empty without outages.
     pub ages: Vec<OfAge>,
@@ -132,9 +132,9 @@ pub struct NavigationScore {
     pub fates: Vec<Fate>,
     /// Measurements refused, of all inputs.
     pub refused: u64,
-    /// How often the filter was wrong and began again elsewhere.
+    /// Number of times that the filter was wrong and began again elsewhere.
     pub resets: u32,
-    /// How often samples of the IMU were missing.
+    /// Number of times that samples of the IMU were missing.
     pub gaps: u32,
     /// Time of the run per sample of the IMU, with the robot around the filter, µs.
     pub us_per_imu_sample: f64,
@@ -149,7 +149,7 @@ pub(crate) struct Scored {
     pub(crate) age_s: Option<f64>,
 }
 
-/// What a score is made of.
+/// Material of a score.
 pub(crate) struct Scores<'a> {
     pub(crate) scored: Vec<Scored>,
     pub(crate) silent: usize,

@@ -62,7 +62,7 @@ pub(super) fn verdict(samples: &[Sample], calm: Option<f64>) -> Option<String> {
     })
 }
 
-/// Whether the body does not accelerate: the means of a few samples each are gravity.
+/// Returns whether the body does not accelerate: the means of a few samples each are gravity.
 fn is_steady(span: &[Sample], gravity: f64) -> bool {
     span.chunks_exact(MEAN).all(|few| {
         let mean = few.iter().map(|(.., force)| force).sum::<Vector3<f64>>() / MEAN as f64;

@@ -54,7 +54,7 @@ impl Type<'_> {
         }
     }
 
-    /// Whether it is the type of the channel, by its definition.
+    /// Returns whether it is the type of the channel, by its definition.
     fn is_of(&self, channel: &Channel) -> bool {
         match self {
             Self::Shape { shape, .. } => channel.shape == Some(*shape) || self.schema() == channel.schema,

@@ -5,10 +5,10 @@ use super::palette::Colour;
 /// A time that is shaded, with its label in the legend: an outage, say.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Band {
-    /// Its label; bands of one label have one entry in the legend.
+    /// Label; bands of one label have one entry in the legend.
     pub label: String,
     /// A light colour.
     pub colour: Colour,
-    /// From and to, s.
+    /// Begin and end, s.
     pub times: (f64, f64),
 }

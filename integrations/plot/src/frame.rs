@@ -29,9 +29,9 @@ pub(super) struct Frame<'a> {
     pub(super) lines: &'a [Line],
     pub(super) bands: &'a [Band],
     pub(super) scale: Scale,
-    /// Whether the horizontal axis is the time that others share.
+    /// True if the horizontal axis is the time that others share.
     pub(super) is_over_time: bool,
-    /// Whether the vertical axis ends near the range of most values.
+    /// True if the vertical axis ends near the range of most values.
     pub(super) cuts_spikes: bool,
 }
 
@@ -47,10 +47,10 @@ pub(super) struct Row<'a> {
 const SPIKE: f64 = 3.0;
 /// The part of the points at each end that may be spikes.
 const SPIKES: f64 = 0.025;
-/// What is left free beyond the values of most points, as a part of their range.
+/// Room beyond the values of most points, as a part of their range.
 const BEYOND: f64 = 0.3;
 
-/// From this width on, a line is drawn as one; thinner ones but the thinnest are dots.
+/// Least width of a line that is drawn as one; thinner ones but the thinnest are dots.
 const THICK: u32 = 5;
 
 /// The mapping from numbers to positions on both axes.
@@ -91,7 +91,7 @@ impl Frame<'_> {
         bands
     }
 
-    /// Where the axis is cut, if values are far beyond those of most points.
+    /// Returns the value at which the axis is cut, if values are far beyond those of most points.
     fn cut(&self) -> Option<Cut> {
         if !self.cuts_spikes {
             return None;

@@ -105,7 +105,7 @@ pub(super) fn of_orientations(poses: &[(f64, UnitQuaternion<f64>)], motion: &Mot
     of_turns(&times_s, motion, turned, |from, to, end_from_start| (turned(from, to) - end_from_start.angle()).abs())
 }
 
-/// The latency of a field that stands still in the world. Values that repeat the one before are no measurements.
+/// The latency of a field that is fixed in the world. Values that repeat the one before are no measurements.
 pub(super) fn of_field(fields: &[(f64, Vector3<f64>)], offset: &Vector3<f64>, motion: &Motion) -> Option<f64> {
     let mut measured: Vec<(f64, Vector3<f64>)> = fields.to_vec();
     measured.dedup_by(|next, last| next.1 == last.1);

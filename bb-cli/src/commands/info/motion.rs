@@ -2,7 +2,7 @@
 
 use bb_core::nalgebra::{UnitQuaternion, Vector3};
 
-/// Nothing is known of the motion between samples that are farther apart, s.
+/// Longest time between samples over which the motion is known, s.
 const LONGEST_S: f64 = 0.2;
 
 /// A sample: stamp in nanoseconds, angular velocity, specific force.
@@ -66,7 +66,7 @@ impl Motion {
         Some((before, after, (time_s - before.time_s) / (after.time_s - before.time_s)))
     }
 
-    /// Whether the motion over this time is known all along.
+    /// Returns whether the motion over this time is known all along.
     pub(super) fn is_whole(&self, from_s: f64, to_s: f64) -> bool {
         let next = self.breaks.partition_point(|time_s| *time_s < from_s);
         self.at(from_s).is_some()

@@ -21,9 +21,10 @@ const STEP_S: f64 = 0.01;
 const SHORTEST_S: f64 = 0.05;
 /// Third differences are known to this, m.
 const KNOWN: f64 = 3e-3;
-/// A group does not keep to its covariances beyond this many standard deviations,
+/// Standard deviations beyond which a group does not keep to its covariances.
 const DEVIATIONS: f64 = 5.0;
-/// this many times what the IMU measures, and this, m, which a lever arm and the IMU's errors may explain.
+/// Multiple of the motion that the IMU measures which it must exceed as well, and a margin, m, that a lever arm and the IMU's errors
+/// may explain.
 const MOTION: f64 = 3.0;
 const MARGIN: f64 = 0.3;
 /// The change of acceleration of a vehicle without an IMU, m/s³.
@@ -35,13 +36,13 @@ const FEWEST: usize = 5;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fix {
     pub(super) time_s: f64,
-    /// In a frame whose axes are straight.
+    /// Position in a frame whose axes are straight, m.
     pub(super) position: Vector3<f64>,
     /// The sum of the variances of its axes, if it states them.
     pub(super) variance: Option<f64>,
 }
 
-/// What is odd about fixes.
+/// Remarks on fixes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Oddities {
     pub(super) scatter: Option<Scatter>,

@@ -1,4 +1,4 @@
-//! What several topics show together.
+//! Remarks on several topics together.
 
 use super::motion::{Motion, Sample};
 use super::remark::{Remark, Subject};
@@ -21,7 +21,7 @@ pub(super) enum Signal {
     None,
     Imu(Vec<Sample>),
     Field(Vec<(i64, Vector3<f64>)>),
-    /// With the sum of their variances.
+    /// Positions with the sum of their variances.
     Fixes(Vec<(i64, Geodetic, Option<f64>)>),
     Orientations(Vec<(i64, UnitQuaternion<f64>)>),
 }

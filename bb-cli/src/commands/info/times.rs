@@ -8,7 +8,7 @@ use crate::periods::Periods;
 pub(super) struct Times {
     /// Whether messages come only when something happens.
     of_events: bool,
-    /// Whether several may happen at one instant, as the commands of a robot do.
+    /// True if several may happen at one instant, as the commands of a robot do.
     may_repeat: bool,
     log_ns: Vec<i64>,
     /// The times in the headers, as long as all messages have one.

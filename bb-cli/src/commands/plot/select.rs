@@ -84,7 +84,7 @@ impl fmt::Display for Path {
 }
 
 impl Group {
-    /// Whether these are the components of a quaternion, in the order of ROS.
+    /// Returns whether these are the components of a quaternion, in the order of ROS.
     pub(super) fn is_quaternion(&self) -> bool {
         self.fields.iter().map(|field| &*field.label).eq(["x", "y", "z", "w"])
     }
@@ -168,7 +168,7 @@ fn collect(value: &Value, path: &Path, is_whole: bool, groups: &mut Vec<Group>) 
     }
 }
 
-/// Whether a number is a component of a vector, a quaternion or a list.
+/// Returns whether a number is a component of a vector, a quaternion or a list.
 fn is_component(step: &Step) -> bool {
     match step {
         Step::Field(name) => ["x", "y", "z", "w"].contains(&&**name),

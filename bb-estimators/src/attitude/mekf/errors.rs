@@ -16,7 +16,7 @@ pub(super) const VELOCITY: usize = 6;
 /// Lag of the magnetometer behind the gyroscope, s.
 pub(super) const LAG: usize = 8;
 
-pub(super) const STATES: usize = 9;
+const STATES: usize = 9;
 
 /// A smaller variance is rounding.
 const LEAST_VARIANCE: f64 = 1e-16;

@@ -152,7 +152,7 @@ impl<T: Real> HardIron<T> {
         self.believed() * self.scale()
     }
 
-    /// In units of the field.
+    /// The offset that is believed, in units of the field.
     fn believed(&self) -> Vector3<T> {
         if self.is_offset { self.incumbent.offset } else { Vector3::zeros() }
     }

@@ -48,7 +48,7 @@ pub struct NavigationStatus {
     pub hard_iron: Vector3<f64>,
     /// Barometric height minus the height, m. 0 if it is not a state.
     pub barometer_bias: f64,
-    /// Where the origin of the world is on the Earth. `None` without satellites.
+    /// Place of the world's origin on the Earth. `None` without satellites.
     pub world_origin: Option<GeodeticPosition>,
     /// Number of times that IMU samples were missing for longer than a sample may take.
     pub gaps: u32,

@@ -52,7 +52,7 @@ pub struct BagOptions {
 pub enum StartFrom {
     /// At the true pose.
     Truth,
-    /// As in a robot: from rest, or from the course in motion.
+    /// The robot's own start: from rest, or from the course in motion.
     Own,
     /// At the first pose of this topic.
     Topic(String),

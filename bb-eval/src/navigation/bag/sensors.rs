@@ -1,4 +1,4 @@
-//! What the messages say about the robot: relative poses from a drifting odometry, a state to start from.
+//! Messages about the robot: relative poses from a drifting odometry, a state to start from.
 
 use super::NavigationBag;
 use super::notes::Notes;
@@ -15,7 +15,7 @@ use bb_estimators::navigation::{Geodetic, LocalFrame};
 const POSITION: f64 = 0.1;
 const ROTATION: f64 = 0.02;
 
-/// The same for a velocity from the truth, from its positions, and for an unknown one, m/s.
+/// Deviation of a velocity from the truth, from its positions, and of an unknown one, m/s.
 const TOLD: f64 = 0.1;
 const FROM_POSITIONS: f64 = 0.5;
 const UNKNOWN: f64 = 5.0;

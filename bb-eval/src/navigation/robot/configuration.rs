@@ -16,7 +16,7 @@ use super::{Flight, NAVIGATION_PATH, Planar, Spatial};
 /// A filter that can be chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NavigationFilter {
-    /// Its name for `--filter`.
+    /// Name for `--filter`.
     pub name: &'static str,
     /// A description in one line.
     pub about: &'static str,
@@ -28,7 +28,7 @@ pub struct NavigationFilter {
 pub(super) enum Kind {
     Spatial,
     Planar,
-    /// With its strategy.
+    /// The estimator of flights, with its strategy.
     Flight(&'static str),
 }
 
@@ -83,7 +83,7 @@ impl NavigationFilter {
         }
     }
 
-    /// Its options, as a robot lists them: a settings file.
+    /// Returns its options, as a robot lists them: a settings file.
     pub fn options(&self) -> String {
         let text = self.listed(&RobotSettings::default());
         let of_filter = format!("[{}]", NAVIGATION_PATH.replace('/', "."));
@@ -127,7 +127,7 @@ pub struct RobotSettings {
     settings: Vec<NavigationSetting>,
     states: Vec<String>,
     noise_times: Option<f64>,
-    /// What a recording tells of its IMU.
+    /// Noise of an IMU, as a recording tells it.
     told: Vec<(&'static str, f64)>,
 }
 
@@ -156,7 +156,7 @@ const NOISE: [&str; 4] =
     ["gyroscope_noise", "accelerometer_noise", "gyroscope_bias_walk", "accelerometer_bias_walk"];
 
 impl RobotSettings {
-    /// Those of a file, then single ones; optional states; and what the noise of the IMU is multiplied by.
+    /// Settings of a file, then single ones; optional states; and what the noise of the IMU is multiplied by.
     ///
     /// # Errors
     /// The file cannot be read, or has an option that the filter does not have.

@@ -11,7 +11,7 @@ pub(super) type Reasons = Arc<Mutex<Vec<Option<&'static str>>>>;
 /// The options of [`Mounted`].
 #[derive(Clone, Debug)]
 pub(super) struct MountedOptions<O> {
-    /// Those of the estimator.
+    /// Parameters of the estimator.
     pub(super) options: O,
     /// The inputs that the recording has, the driver first, with their places on the link.
     pub(super) inputs: Vec<(&'static str, Isometry3<f64>)>,

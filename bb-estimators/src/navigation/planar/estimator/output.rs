@@ -54,7 +54,7 @@ pub struct PlanarStatus {
     pub pose: Verdicts,
     /// The same for orientations.
     pub orientation: Verdicts,
-    /// Where the origin of the world is on the Earth. `None` without satellites.
+    /// Place of the world's origin on the Earth. `None` without satellites.
     pub world_origin: Option<GeodeticPosition>,
     /// How often IMU samples were missing for longer than a sample may take.
     pub gaps: u32,
