@@ -91,7 +91,7 @@ fn run(arguments: &Arguments) -> Result<bool, Box<dyn Error>> {
     Ok(missing.is_none())
 }
 
-/// Says what is going to happen, before it does.
+/// Story of the flight, printed before it begins.
 const STORY: &str = "\
 A drone takes off with satellite navigation. From 20 s on its receiver is spoofed: its fixes are refused, and the drone goes on by
 its camera, with an image of the ground from a satellite to compare with every four seconds. From 40 s to 50 s it flies in fog

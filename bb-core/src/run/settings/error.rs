@@ -3,8 +3,8 @@
 use std::fmt;
 use std::sync::Arc;
 
-/// Problems of the settings of a robot, a line each: the first hundred problems, and how many more there are. `Debug` prints the same as `Display`, since a `main`
-/// that returns it shows `Debug`.
+/// Problems of the settings of a robot, a line each: the first hundred, and how many more there are. `Debug` prints the same as
+/// `Display`, since a `main` that returns it shows `Debug`.
 #[derive(Clone, PartialEq, Eq)]
 pub struct SettingsError {
     problems: Vec<SettingProblem>,

@@ -86,7 +86,7 @@ impl Truth {
         self.poses.push((time.as_unix_nanos(), rotation));
     }
 
-    /// Returns the truth of another frame of the body and another world: `world_from_old ⊗ truth ⊗ old_from_body`.
+    /// Changes the truth to another frame of the body and another world: `world_from_old ⊗ truth ⊗ old_from_body`.
     pub fn turn(&mut self, world_from_old: &UnitQuaternion<f64>, old_from_body: &UnitQuaternion<f64>) {
         for rotation in self.poses.iter_mut().filter_map(|(_, rotation)| rotation.as_mut()) {
             *rotation = world_from_old * *rotation * old_from_body;
