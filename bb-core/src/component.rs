@@ -36,10 +36,10 @@ mod transforms;
 
 pub(crate) use crate::fault::{Fault, Termination};
 pub use actuator::Actuator;
-pub(crate) use actuator_link::Accepts;
+pub(crate) use actuator_link::{Accepts, AcceptsJson};
 pub use actuator_link::{ActuatorError, ActuatorLink};
 pub(crate) use binding::Binding;
-pub use bus::Bus;
+pub use bus::{Bus, Session};
 pub(crate) use caller::Caller;
 pub(crate) use command::OwnHooks;
 pub use command::{Arm, Command, CommandContext, Disarm, NoArguments, Outcome, Sleep};
@@ -48,11 +48,11 @@ pub use counter::Counter;
 pub(crate) use counter::Counts;
 pub use description::{
     ComponentDescription, ComponentKind, Description, InputDescription, JointDescription, LinkDescription,
-    ParameterDescription, TopicDescription,
+    ParameterDescription, RunKind, TopicDescription,
 };
 pub use estimator::{Estimator, HandleCall, HandleCast, Reply};
 pub(crate) use execution::AnyExecution;
-pub use execution::{CommandInfo, DynamicExecution};
+pub use execution::{CommandInfo, DynamicExecution, ExecutionInfo};
 pub use external::External;
 pub(crate) use field::FromQuantity;
 pub use field::OptionField;
@@ -74,6 +74,7 @@ pub use record::RequestCodec;
 pub use reference::{CommandPath, Number, TopicField};
 pub use sensor::{Next, Reading, Sensor};
 pub use service::Service;
+
 pub(crate) use setting::{Setting, SettingKind, quantity};
 pub(crate) use template::Template;
 pub use transforms::{InputTransform, InputTransforms};

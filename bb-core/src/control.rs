@@ -220,6 +220,7 @@ struct RunningCommand {
     health: Option<HealthTransition>,
     slot: Arc<Slot>,
     caller: Caller,
+    started: MonotonicTime,
     /// `None` in a replay.
     task: Option<Arc<Task>>,
     phase: Phase,

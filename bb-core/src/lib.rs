@@ -60,7 +60,7 @@ pub use bb_macros::{Inputs, Options, Outputs};
 pub use component::{
     Actuator, ActuatorContext, Bus, Command, CommandContext, Context, Estimator, Every, HandleCall, HandleCast,
     Info, Input, Inputs, Options, Outcome, Outputs, Reading, Reply, Request, RequestCodec, SafetyLink, Sensor,
-    SensorContext, Service, ServiceContext, Timed,
+    SensorContext, Service, ServiceContext, Session, Timed,
 };
 pub use declaration::{ParameterError, Role};
 pub use event::{

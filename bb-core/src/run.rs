@@ -47,7 +47,7 @@ pub use handle::{
 };
 pub use live::Live;
 pub use replay::{Replay, ReplayError};
-pub use report::{Panics, Report};
+pub use report::{Panics, Problem, Report, Severity};
 pub use running::Running;
 pub use settings::{SettingProblem, SettingsError, SettingsList};
 pub use simulation::Simulation;

@@ -1,6 +1,6 @@
 //! Commands to an actuator by path.
 
-use super::Caller;
+use super::{Caller, Fault};
 use crate::event::Safety;
 use crate::message::{OutOfBounds, Payload};
 use std::fmt;
@@ -67,7 +67,7 @@ impl<T: Payload> fmt::Debug for ActuatorLink<T> {
 pub enum ActuatorError {
     /// The robot is not armed.
     NotArmed(Safety),
-    /// The command that sent this has ended or was cancelled; its handles no longer work.
+    /// The command or the session that sent this has ended or was cancelled; its handles no longer work.
     Cancelled,
     /// The command holds a NaN or an infinity.
     NonFinite,
@@ -91,7 +91,7 @@ impl fmt::Display for ActuatorError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NotArmed(safety) => write!(f, "the robot is not armed ({safety})"),
-            Self::Cancelled => f.write_str("the command that sent this has ended or was cancelled"),
+            Self::Cancelled => f.write_str("the command or the session that sent this has ended or was cancelled"),
             Self::NonFinite => f.write_str("the command holds a NaN or an infinity"),
             Self::OutOfBounds(message) => f.write_str(message),
             Self::NotLimited(message) => {
@@ -123,4 +123,10 @@ pub(crate) trait Accepts<T>: Send + Sync {
     fn accept(&self, command: T, caller: &Caller) -> Result<T, ActuatorError>;
     /// Stops the joint if the last command carried out came from that caller.
     fn stop_motion_of(&self, caller: &Caller);
+}
+
+/// An actuator that takes commands in JSON.
+pub(crate) trait AcceptsJson: Send + Sync {
+    /// Returns the command with the limits applied.
+    fn accept_json(&self, command: &str, caller: &Caller) -> Result<String, Fault>;
 }

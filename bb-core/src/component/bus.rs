@@ -1,10 +1,17 @@
 //! The robot by path, for code that does not know its type: commands, controllers, bridges, dashboards.
 
+mod session;
+
+pub use session::Session;
+
 use super::host::{Controls, ExternalSensor, Host};
-use super::{Accepts, ActuatorLink, Caller, CommandInfo, Description, DynamicExecution, Fault};
+use super::{
+    Accepts, ActuatorLink, Caller, CommandInfo, Description, DynamicExecution, ExecutionInfo, Fault, RunKind,
+};
 use crate::declaration::ParameterError;
 use crate::event::{ArmError, DisarmError, Forbidden, ParameterValue, Right, Rights, Safety};
 use crate::joints::Joints;
+use crate::message::codec::from_json;
 use crate::message::nearest::nearest_path;
 use crate::message::{Payload, Stamp};
 use crate::pubsub::{
@@ -50,6 +57,12 @@ impl Bus {
     /// actuator, acts in its name.
     pub fn for_caller(&self, name: impl Into<String>, rights: impl Into<Rights>) -> Self {
         Self { host: Arc::clone(&self.host), caller: self.caller.restricted(name.into(), rights.into()) }
+    }
+
+    /// A bus for another caller, with those of `rights` that this one has, until the returned session is dropped.
+    pub fn session(&self, name: impl Into<String>, rights: impl Into<Rights>) -> Session {
+        let caller = self.caller.restricted(name.into(), rights.into()).in_session();
+        Session::new(Self { host: Arc::clone(&self.host), caller })
     }
 
     /// The name of the caller: the path of a component or a command, or `program`.
@@ -186,14 +199,18 @@ impl Bus {
     pub fn actuator<T: Payload>(&self, path: &str) -> Result<ActuatorLink<T>, Fault> {
         self.check(Right::Actuators)?;
         let Some((takes, accepts)) = self.host.actuator(path) else {
-            let near = nearest_path(path, self.actuators());
-            let hint = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
-            return Err(Fault::new(format!("no actuator is at `{path}`{hint}")));
+            return Err(self.no_actuator(path));
         };
         match accepts.downcast::<Arc<dyn Accepts<T>>>() {
             Ok(accepts) => Ok(ActuatorLink::new(*accepts, self.caller.clone())),
             Err(_) => Err(Fault::new(format!("`{path}` takes commands of type `{takes}`, not `{}`", T::NAME))),
         }
+    }
+
+    fn no_actuator(&self, path: &str) -> Fault {
+        let near = nearest_path(path, self.actuators());
+        let hint = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+        Fault::new(format!("no actuator is at `{path}`{hint}"))
     }
 
     /// The paths of all actuators.
@@ -262,6 +279,57 @@ impl Bus {
         self.settled(|robot| robot.set_parameters(changes, &self.caller))
     }
 
+    /// Sets parameters from JSON, all at once, as [`Self::set_parameters`] does. A number is in SI; `1` is accepted for a float.
+    ///
+    /// # Errors
+    /// As [`Self::set_parameters`], or the text is not a value of the parameter's type.
+    pub fn set_parameters_json<'a>(
+        &self,
+        values: impl IntoIterator<Item = (&'a str, &'a str)>,
+    ) -> Result<(), ParameterError> {
+        let parse = |(path, json): (&'a str, &'a str)| {
+            let read = match self.host.controls().parameter(path) {
+                Some(ParameterValue::Bool(_)) => from_json::<bool>(json).map(ParameterValue::Bool),
+                Some(ParameterValue::Integer(_)) => from_json::<i64>(json).map(ParameterValue::Integer),
+                Some(ParameterValue::Float(_)) => from_json::<f64>(json).map(ParameterValue::Float),
+                // Of one that does not exist, the path is refused.
+                Some(ParameterValue::Text(_)) | None => from_json::<String>(json).map(ParameterValue::Text),
+            };
+            match read {
+                Ok(value) => Ok((path.to_owned(), value)),
+                Err(error) => Err(ParameterError { path: path.to_owned(), message: error.to_string() }),
+            }
+        };
+        self.set_all(values.into_iter().map(parse).collect::<Result<_, _>>()?)
+    }
+
+    /// Sends a command in JSON to the actuator at `path`, and returns the one that was carried out: with the limits of the joint applied.
+    /// [`ComponentDescription::command`](super::ComponentDescription::command) is its shape.
+    ///
+    /// # Errors
+    /// As [`ActuatorLink::apply`], or the text does not fit the shape, no actuator is there, or the caller may not send to actuators.
+    pub fn send_json(&self, path: &str, command: &str) -> Result<String, Fault> {
+        self.check(Right::Actuators)?;
+        self.caller.check_valid()?;
+        let actuator = self.host.json_actuator(path).ok_or_else(|| self.no_actuator(path))?;
+        self.settled(|_| actuator.accept_json(command, &self.caller))
+    }
+
+    /// The report of the run so far, as [`Report::to_json`](crate::Report::to_json) writes it, with what is wrong first: what a caller that
+    /// comes late has missed.
+    ///
+    /// # Errors
+    /// The robot has not started or is gone, or the caller may not read.
+    pub fn report_json(&self) -> Result<String, Fault> {
+        self.check(Right::Read)?;
+        self.host.report_json().ok_or_else(|| Fault::new("the robot has not started, or is gone"))
+    }
+
+    /// How the robot runs.
+    pub fn run_kind(&self) -> RunKind {
+        self.host.controls().kind_of_run()
+    }
+
     /// The whole robot: links, joints, components, topics, parameters and commands, with their schemas. For a caller that may not
     /// read, without the parameters.
     pub fn description(&self) -> Description {
@@ -290,6 +358,23 @@ impl Bus {
         self.check(Right::Commands)?;
         self.caller.check_valid()?;
         self.settled(|robot| robot.start_command(path, arguments, &self.caller))
+    }
+
+    /// The executions of commands that have not ended, whoever started them; none for a caller that may not read.
+    pub fn executions(&self) -> Vec<ExecutionInfo> {
+        if self.check(Right::Read).is_err() {
+            return Vec::new();
+        }
+        self.host.controls().executions()
+    }
+
+    /// Cancels the execution of that number, whoever started it.
+    ///
+    /// # Errors
+    /// No such execution runs, or the caller may not start commands.
+    pub fn cancel(&self, execution: u64) -> Result<(), Fault> {
+        self.check(Right::Commands)?;
+        self.settled(|robot| robot.cancel(execution, &self.caller))
     }
 
     /// The operational state: `disarmed`, `idle`, `executing`, or a declared one.
@@ -327,7 +412,19 @@ impl Bus {
     /// What could not be made safe again. The safety state is `disarmed` nevertheless. Or the caller may not arm the robot.
     pub fn force_disarm(&self) -> Result<(), DisarmError> {
         self.check(Right::Arm).map_err(DisarmError::Forbidden)?;
-        self.settled(|robot| robot.disarm(true))
+        // Whoever may not force it any more may still disarm.
+        self.settled(|robot| robot.disarm(self.caller.is_valid()))
+    }
+
+    /// Disarms the robot, cancels its commands, and has its sensors and services stop as soon as it is safe. Does not wait.
+    ///
+    /// # Errors
+    /// The caller may not arm the robot.
+    pub fn request_stop(&self) -> Result<(), Fault> {
+        self.check(Right::Arm)?;
+        self.caller.check_valid()?;
+        self.settled(|robot| robot.request_stop());
+        Ok(())
     }
 
     /// The states of the joints, and all frames at any time. Every caller may see where the robot is.

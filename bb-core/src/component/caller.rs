@@ -11,25 +11,47 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub(crate) struct Caller {
     name: Cow<'static, str>,
     rights: Rights,
-    /// Flag of a command that has ended or was cancelled. Its handles then refuse to act, even if its code still runs.
-    is_over: Option<Arc<AtomicBool>>,
+    /// The execution of a command or the session that it belongs to, after whose end its handles refuse to act, even if code of it still
+    /// runs.
+    within: Option<Arc<Within>>,
     /// It calls from outside of the robot: on virtual time, what follows from its calls is settled before they return.
     is_outside: bool,
+}
+
+/// An execution of a command, or a session.
+#[derive(Debug, Default)]
+struct Within {
+    is_over: AtomicBool,
+    /// The name of a session.
+    session: Option<String>,
+    /// The execution or session in which a session was begun.
+    outer: Option<Arc<Within>>,
+}
+
+impl Within {
+    /// The innermost that is over.
+    fn over(&self) -> Option<&Self> {
+        if self.is_over.load(Ordering::SeqCst) { Some(self) } else { self.outer.as_deref().and_then(Self::over) }
+    }
+
+    fn outermost(&self) -> &Self {
+        self.outer.as_deref().map_or(self, Self::outermost)
+    }
 }
 
 impl Caller {
     /// The program that runs the robot.
     pub(crate) const PROGRAM: Self =
-        Self { name: Cow::Borrowed("program"), rights: Rights::ALL, is_over: None, is_outside: true };
+        Self { name: Cow::Borrowed("program"), rights: Rights::ALL, within: None, is_outside: true };
 
     /// The component at `path`.
     pub(crate) const fn component(path: &'static str) -> Self {
-        Self { name: Cow::Borrowed(path), rights: Rights::ALL, is_over: None, is_outside: false }
+        Self { name: Cow::Borrowed(path), rights: Rights::ALL, within: None, is_outside: false }
     }
 
     /// An execution of the command at `path`.
     pub(crate) fn execution(path: &'static str) -> Self {
-        Self { is_over: Some(Arc::default()), ..Self::component(path) }
+        Self { within: Some(Arc::default()), ..Self::component(path) }
     }
 
     /// Another caller with those of these rights that this one has.
@@ -55,28 +77,39 @@ impl Caller {
         if self.rights.contains(right) { Ok(()) } else { Err(Forbidden { caller: self.name.to_string(), right }) }
     }
 
+    /// The same caller in a session of that name, which [`Self::revoke`] ends.
+    pub(crate) fn in_session(&self) -> Self {
+        let within =
+            Within { session: Some(self.name.to_string()), outer: self.within.clone(), ..Within::default() };
+        Self { within: Some(Arc::new(within)), ..self.clone() }
+    }
+
     /// Makes its handles refuse to act from now on.
     pub(crate) fn revoke(&self) {
-        if let Some(is_over) = &self.is_over {
-            is_over.store(true, Ordering::SeqCst);
+        if let Some(within) = &self.within {
+            within.is_over.store(true, Ordering::SeqCst);
         }
     }
 
-    /// Whether both are of the same execution of a command.
+    /// Whether both are of the same execution of a command, or of the same session outside of commands.
     pub(crate) fn is_of_same(&self, other: &Self) -> bool {
-        matches!((&self.is_over, &other.is_over), (Some(one), Some(other)) if Arc::ptr_eq(one, other))
+        let (Some(one), Some(other)) = (&self.within, &other.within) else { return false };
+        std::ptr::eq(one.outermost(), other.outermost())
     }
 
     pub(crate) fn is_valid(&self) -> bool {
-        self.is_over.as_ref().is_none_or(|is_over| !is_over.load(Ordering::SeqCst))
+        self.within.as_ref().is_none_or(|within| within.over().is_none())
     }
 
     /// # Errors
-    /// It is a command that has ended or was cancelled.
+    /// It is a command that has ended or was cancelled, or a session that has ended.
     pub(crate) fn check_valid(&self) -> Result<(), Fault> {
-        if self.is_valid() {
-            return Ok(());
+        match self.within.as_ref().and_then(|within| within.over()) {
+            None => Ok(()),
+            Some(Within { session: Some(name), .. }) => {
+                Err(Fault::new(format!("the session of `{name}` has ended")))
+            }
+            Some(_) => Err(Fault::new("the command that asks for this has ended or was cancelled")),
         }
-        Err(Fault::new("the command that asks for this has ended or was cancelled"))
     }
 }

@@ -4,7 +4,9 @@ mod json;
 
 use super::CommandInfo;
 use crate::event::ParameterValue;
+use crate::message::codec::Shape;
 use crate::topology::{JointKind, Limit};
+use std::ops::RangeInclusive;
 use std::time::Duration;
 
 /// Everything that a robot consists of, see [`Bus::description`](super::Bus::description). [`Self::to_json`] writes it for
@@ -14,6 +16,8 @@ use std::time::Duration;
 pub struct Description {
     /// The name of the robot.
     pub robot: &'static str,
+    /// Whether it runs in real time, in a simulation or from a journal.
+    pub run: RunKind,
     /// Its links.
     pub links: Vec<LinkDescription>,
     /// Its joints.
@@ -28,6 +32,29 @@ pub struct Description {
     pub commands: Vec<CommandInfo>,
     /// Its operational states.
     pub states: Vec<&'static str>,
+}
+
+/// How a robot runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum RunKind {
+    /// In real time, see [`Builder::start`](crate::Builder::start).
+    Live,
+    /// On virtual time, see [`Builder::simulate`](crate::Builder::simulate).
+    Simulation,
+    /// From a journal, see [`Builder::replay`](crate::Builder::replay).
+    Replay,
+}
+
+impl RunKind {
+    /// Its name in JSON: `live`, `simulation` or `replay`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Live => "live",
+            Self::Simulation => "simulation",
+            Self::Replay => "replay",
+        }
+    }
 }
 
 /// A link.
@@ -111,6 +138,8 @@ pub struct ComponentDescription {
     pub inputs: Vec<InputDescription>,
     /// The paths at which it publishes; an actuator, the commands that it has carried out, and its motions.
     pub topics: Vec<&'static str>,
+    /// The shape of the commands that an actuator takes.
+    pub command: Option<Shape>,
     /// Whether another component took its place, see [`Builder::replace_sensor`](crate::run::Builder::replace_sensor).
     pub is_replaced: bool,
 }
@@ -155,6 +184,8 @@ pub struct ParameterDescription {
     pub default: ParameterValue,
     /// The unit it is declared with; empty for none.
     pub unit: &'static str,
+    /// The numbers that it accepts, in SI, if a range is declared.
+    pub range: Option<RangeInclusive<f64>>,
     /// The JSON Schema of its value as it is written in a file of settings.
     pub schema: String,
 }

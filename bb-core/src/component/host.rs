@@ -3,7 +3,7 @@
 use super::guardian::Guardian;
 use super::replacement::Replacement;
 use super::shared::SharedValues;
-use super::{Caller, CommandInfo, Description, DynamicExecution, Fault};
+use super::{AcceptsJson, Caller, CommandInfo, Description, DynamicExecution, ExecutionInfo, Fault, RunKind};
 use crate::declaration::ParameterError;
 use crate::event::{ArmError, DisarmError, ParameterValue, Safety};
 use crate::joints::Joints;
@@ -13,6 +13,7 @@ use crate::time::{Clock, MonotonicTime};
 use crate::topology::{GraphFormat, Topology};
 use std::any::Any;
 use std::fmt;
+use std::sync::Arc;
 
 /// The robot as a whole: its safety, states, parameters and commands. The caller has the rights that it needs.
 pub(crate) trait Controls: Guardian {
@@ -29,6 +30,12 @@ pub(crate) trait Controls: Guardian {
     fn set_parameters(&self, changes: Vec<(String, ParameterValue)>, caller: &Caller)
     -> Result<(), ParameterError>;
     fn commands(&self) -> Vec<CommandInfo>;
+    /// The executions that have not ended.
+    fn executions(&self) -> Vec<ExecutionInfo>;
+    fn cancel(&self, execution: u64, caller: &Caller) -> Result<(), Fault>;
+    /// Disarms the robot and stops its components, without waiting.
+    fn request_stop(&self);
+    fn kind_of_run(&self) -> RunKind;
     /// The execution of that number, whose caller it is, changes the operational state.
     fn transition(&self, execution: u64, state: &str, caller: &Caller) -> Result<(), Fault>;
     fn start_command(&self, path: &str, arguments: &str, caller: &Caller) -> Result<DynamicExecution, Fault>;
@@ -75,6 +82,10 @@ pub(crate) trait Host: Send + Sync {
     /// The paths of all actuators, each with its joint.
     fn actuators(&self) -> Vec<(&'static str, &'static str)>;
     fn description(&self) -> Description;
+    /// The report of the run so far as JSON; `None` before the robot has started.
+    fn report_json(&self) -> Option<String>;
+    /// The actuator at `path`, for commands in JSON.
+    fn json_actuator(&self, path: &str) -> Option<Arc<dyn AcceptsJson>>;
     fn graph(&self, format: GraphFormat) -> String;
     /// After a call from outside, on virtual time: runs disarm callbacks left by an actuator's own code, and hands lines of the
     /// journal to its sink.

@@ -4,9 +4,10 @@ use super::task::{RunningFuture, Value};
 use crate::component::{Binding, Command, CommandContext, OptionsList, Outcome, Template};
 use crate::declaration::{ParameterValues, Role};
 use crate::event::Refusal;
-use crate::fault::Fault;
+use crate::fault::{Fault, caught};
 use crate::message::Field;
 use crate::message::codec::{Shape, from_json, to_json};
+use crate::time::MonotonicTime;
 use std::any::Any;
 use std::fmt;
 
@@ -30,6 +31,8 @@ pub struct CommandStatistics {
     pub refused: u64,
     /// The reason of the last refusal.
     pub last_refusal: Option<Refusal>,
+    /// The time of the last refusal, unless the command has been started since.
+    pub refused_at: Option<MonotonicTime>,
 }
 
 /// The arguments of a command, of its own type.
@@ -51,6 +54,8 @@ pub(super) trait AnyCommand: Send + Sync {
     fn check(&self, parameters: &ParameterValues) -> Result<(), String>;
     /// The schemas of its arguments and its result.
     fn shapes(&self) -> (Shape, Shape);
+    /// The default of its arguments as JSON. User code runs here.
+    fn default_arguments(&self) -> String;
     /// Its arguments from JSON; the default ones from empty text.
     fn arguments(&self, json: &str) -> Result<Arguments, Fault>;
     /// Its result as JSON.
@@ -115,6 +120,11 @@ impl<C: Command> AnyCommand for OfType<C> {
 
     fn shapes(&self) -> (Shape, Shape) {
         (C::Arguments::SHAPE, C::Output::SHAPE)
+    }
+
+    fn default_arguments(&self) -> String {
+        // One that panics has none to show.
+        caught(|| Ok(to_json(&C::Arguments::default()))).unwrap_or_default()
     }
 
     fn arguments(&self, json: &str) -> Result<Arguments, Fault> {

@@ -6,7 +6,7 @@ use super::execution::{Execution, Slot, UntypedExecution};
 use super::step::Step;
 use super::task::{Task, Value};
 use super::{Control, Limit, Phase, RunningCommand};
-use crate::component::{Bus, Caller, CommandContext, CommandInfo, DynamicExecution, OwnHooks};
+use crate::component::{Bus, Caller, CommandContext, CommandInfo, DynamicExecution, ExecutionInfo, OwnHooks};
 use crate::declaration::{CommandDeclaration, Role};
 use crate::event::{
     CategoryDeclaration, CommandEvent, CommandPhase, HealthTransition, Refusal, RefusalReason, Right, Safety,
@@ -108,7 +108,9 @@ impl Control {
             let (arguments, output) = command.0.shapes();
             CommandInfo {
                 path: declared.path,
+                role: command.0.role(),
                 arguments,
+                default_arguments: command.0.default_arguments(),
                 output,
                 allowed_states: declared.allowed_states,
                 category: self.category(declared).name,
@@ -117,6 +119,31 @@ impl Control {
             }
         });
         infos.collect()
+    }
+
+    /// The executions that have not ended, in the order of their numbers.
+    pub(crate) fn executions(&self) -> Vec<ExecutionInfo> {
+        let state = self.lock();
+        let running = state.executions.iter().filter(|execution| !matches!(execution.phase, Phase::Lingering));
+        let infos = running.filter_map(|execution| {
+            Some(ExecutionInfo {
+                number: execution.id,
+                path: self.0.declared.commands.get(execution.command)?.path,
+                caller: execution.asked_by.clone(),
+                started: execution.started,
+            })
+        });
+        infos.collect()
+    }
+
+    /// Cancels the execution of that number on behalf of the caller.
+    pub(crate) fn cancel_by(&self, number: u64, caller: &Caller) -> Result<(), Fault> {
+        caller.check_valid()?;
+        if !self.executions().iter().any(|execution| execution.number == number) {
+            return Err(Fault::new(format!("no execution with the number {number} runs")));
+        }
+        self.cancel(number);
+        Ok(())
     }
 
     /// The first execution of each command whose code has been running for `longest` or longer.
@@ -231,6 +258,7 @@ impl Step<'_> {
         self.state.machine.running += 1;
         if let Some(statistics) = self.state.statistics.get_mut(number) {
             statistics.started += 1;
+            statistics.refused_at = None;
         }
         let control = self.control.clone();
         let slot = Arc::new(Slot::new(id, number, control.downgrade()));
@@ -268,6 +296,7 @@ impl Step<'_> {
             health,
             slot: Arc::clone(&slot),
             caller,
+            started: self.now,
             task,
             phase: Phase::Running,
         };
@@ -304,6 +333,7 @@ impl Step<'_> {
         if let Some(statistics) = self.state.statistics.get_mut(number) {
             statistics.refused += 1;
             statistics.last_refusal = Some(refusal.clone());
+            statistics.refused_at = Some(self.now);
         }
         self.effects.log(Log::Refused(refusal.clone()));
         self.publish_phase(number, 0, CommandPhase::Refused(refusal), asked_by, health);

@@ -171,6 +171,10 @@ impl<T: 'static> Future for Execution<T> {
 pub(super) struct UntypedExecution(pub(super) Arc<Slot>);
 
 impl AnyExecution for UntypedExecution {
+    fn number(&self) -> u64 {
+        self.0.id
+    }
+
     fn try_result(&self) -> Option<Result<String, Fault>> {
         let result = lock(&self.0.state).result.take();
         result.map(|result| self.0.json(result))

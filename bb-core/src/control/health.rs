@@ -201,8 +201,7 @@ impl Step<'_> {
 
     fn publish_health(&mut self, estimator: usize, transition: HealthTransition) {
         if let Some(node) = self.control.0.nodes.get(estimator) {
-            node.set_health(transition.to);
-            node.count_transition();
+            node.note_transition(transition);
         }
         self.effects.log(Log::Health(transition));
         self.publish(&self.control.0.topics.health, transition, transition.time);

@@ -93,9 +93,8 @@ impl Control {
                 })?;
             }
             let mut step = self.step();
-            if !caller.is_valid() {
-                let message = "the command that sets it has ended or was cancelled";
-                return Err(refuse(first_path, message.to_owned()));
+            if let Err(fault) = caller.check_valid() {
+                return Err(refuse(first_path, fault.to_string()));
             }
             if step.state.parameters_are_final {
                 return Err(refuse(first_path, "the robot has stopped".to_owned()));

@@ -9,7 +9,7 @@ use super::{
     ComponentOrder, Control, Health, Inner, Islands, Parts, State, StateGuard, StateMutex, Summary, Supervised,
     WeakControl,
 };
-use crate::component::{Caller, CommandInfo, Controls, DynamicExecution, Host};
+use crate::component::{Caller, CommandInfo, Controls, DynamicExecution, ExecutionInfo, Host, RunKind};
 use crate::declaration::{ActuatorDeclaration, CommandDeclaration, ParameterError, RobotDeclaration, Supervisor};
 use crate::event::{
     ArmError, CommandEvent, ComponentFault, DisarmError, HealthTransition, ParameterChange, ParameterValue, Safety,
@@ -300,6 +300,26 @@ impl Controls for Control {
 
     fn commands(&self) -> Vec<CommandInfo> {
         self.infos()
+    }
+
+    fn executions(&self) -> Vec<ExecutionInfo> {
+        Self::executions(self)
+    }
+
+    fn cancel(&self, execution: u64, caller: &Caller) -> Result<(), Fault> {
+        self.cancel_by(execution, caller)
+    }
+
+    fn request_stop(&self) {
+        self.begin_stop();
+    }
+
+    fn kind_of_run(&self) -> RunKind {
+        match self.0.mode {
+            Mode::Real => RunKind::Live,
+            Mode::Virtual => RunKind::Simulation,
+            Mode::Replay => RunKind::Replay,
+        }
     }
 
     fn transition(&self, execution: u64, state: &str, caller: &Caller) -> Result<(), Fault> {

@@ -12,6 +12,17 @@ pub enum Role {
     Disarming,
 }
 
+impl Role {
+    /// Its name in JSON: `plain`, `arming` or `disarming`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Plain => "plain",
+            Self::Arming => "arming",
+            Self::Disarming => "disarming",
+        }
+    }
+}
+
 /// A command as declared.
 #[derive(Clone, Copy, Debug)]
 pub struct CommandDeclaration {

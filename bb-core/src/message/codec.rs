@@ -41,6 +41,7 @@ mod writer;
 pub use error::DecodeError;
 pub use intern::MAX_NAME_BYTES;
 pub(crate) use intern::intern;
+pub(crate) use json::compose;
 pub(crate) use json::{Definitions, document, member};
 pub use json::{JsonError, bytes_to_json, from_json, json_schema, json_to_bytes, to_json};
 pub use reader::Reader;

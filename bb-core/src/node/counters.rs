@@ -3,7 +3,7 @@
 use super::count::Count;
 use super::latency::{Latency, LatencyStatistics};
 use crate::declaration::EstimatorDeclaration;
-use crate::event::HealthState;
+use crate::event::{HealthState, HealthTransition};
 use crate::joints::LookupError;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -143,6 +143,7 @@ impl Counters {
         &self,
         declaration: &EstimatorDeclaration,
         health: Option<HealthState>,
+        last_transition: Option<HealthTransition>,
         stopped: Option<String>,
         last_gap: Option<LookupError>,
     ) -> EstimatorStatistics {
@@ -163,6 +164,7 @@ impl Counters {
             restarts: self.restarts.get(),
             transitions: self.transitions.get(),
             health,
+            last_transition,
             latency: self.latency.statistics(),
             last_divergence: *self.last_divergence.lock().unwrap_or_else(PoisonError::into_inner),
             last_drop: self.last_drop(declaration),
@@ -192,6 +194,8 @@ pub struct EstimatorStatistics {
     pub transitions: u64,
     /// Health; `None` if it was left out by [`Fault::skip`](crate::Fault::skip), for the reason in `stopped`.
     pub health: Option<HealthState>,
+    /// The last change of its health: since when it has been in this state, and why.
+    pub last_transition: Option<HealthTransition>,
     /// Durations of its callbacks: all callbacks where a `latency_budget` is declared or a handler of telemetry listens, else every
     /// 64th run.
     pub latency: LatencyStatistics,

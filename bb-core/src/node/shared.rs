@@ -3,7 +3,7 @@
 use super::EstimatorStatistics;
 use super::counters::Counters;
 use crate::declaration::EstimatorDeclaration;
-use crate::event::HealthState;
+use crate::event::{HealthState, HealthTransition};
 use crate::joints::{LookupError, PlacedInput, Placement};
 use crate::time::MonotonicTime;
 use std::collections::VecDeque;
@@ -23,6 +23,8 @@ struct Inner {
     health: AtomicU8,
     /// When the message of the last completed run arrived, for the watchdog.
     last_run_nanos: AtomicI64,
+    /// The last change of health.
+    last_transition: Mutex<Option<HealthTransition>>,
     stopped: Mutex<Option<Stopped>>,
     /// Why a dispatch was last dropped for lack of a transform.
     last_gap: Mutex<Option<LookupError>>,
@@ -55,6 +57,7 @@ impl SharedNode {
             counters: Counters::new(declaration),
             health: AtomicU8::new(0),
             last_run_nanos: AtomicI64::new(0),
+            last_transition: Mutex::default(),
             stopped: Mutex::new(None),
             last_gap: Mutex::default(),
             casts: AtomicU32::new(0),
@@ -86,7 +89,8 @@ impl SharedNode {
     pub(crate) fn statistics(&self) -> EstimatorStatistics {
         let stopped = lock(&self.0.stopped).clone().map(|stopped| stopped.reason);
         let last_gap = lock(&self.0.last_gap).clone();
-        self.0.counters.statistics(self.0.declaration, self.health(), stopped, last_gap)
+        let last_transition = *lock(&self.0.last_transition);
+        self.0.counters.statistics(self.0.declaration, self.health(), last_transition, stopped, last_gap)
     }
 
     /// Health; `None` if it was left out.
@@ -99,11 +103,10 @@ impl SharedNode {
         self.0.health.store(LEFT_OUT, Ordering::Relaxed);
     }
 
-    pub(crate) fn set_health(&self, state: HealthState) {
-        self.0.health.store(state as u8, Ordering::Relaxed);
-    }
-
-    pub(crate) fn count_transition(&self) {
+    /// Records a change of its health.
+    pub(crate) fn note_transition(&self, transition: HealthTransition) {
+        self.0.health.store(transition.to as u8, Ordering::Relaxed);
+        *lock(&self.0.last_transition) = Some(transition);
         self.0.counters.transitions.increment();
     }
 

@@ -261,6 +261,7 @@ impl<A: Actuator> Inner<A> {
             Ok(()) => {
                 self.log(state, move || tracing::info!(component = path, "restarted"));
                 state.is_unsafe = false;
+                self.counts.note_stopped(None);
             }
             Err(failed) => self.fail(state, &failed, now),
         }
@@ -286,6 +287,7 @@ impl<A: Actuator> Inner<A> {
     fn fail(&self, state: &mut State<A>, failed: &Failed, now: MonotonicTime) {
         let message = failed.fault.to_string();
         self.context.set_failing(&message);
+        self.counts.note_stopped(Some(message.clone()));
         self.tell_control(state, Told::Failed { message: message.clone(), panicked: failed.panicked });
         self.make_safe(state);
         let restart = state.slot.fail(failed, now);

@@ -143,7 +143,7 @@ impl<R: Robot> Builder<R> {
     fn assemble(self, clock: Clock, mode: Mode) -> Result<(Live<R>, OpenSources), StartError> {
         let mut parts = Parts::<R>::new(self.topics);
         let (machine, sources) = self.draft.assemble(&mut parts, clock, mode)?;
-        Ok((Live { machine: Arc::new(machine), wiring: parts.into_wiring()? }, sources))
+        Ok((Live { machine, wiring: parts.into_wiring()? }, sources))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::component::{
     CommandInfo, ComponentDescription, ComponentKind, Description, InputDescription, JointDescription,
-    LinkDescription, ParameterDescription, TopicDescription,
+    LinkDescription, ParameterDescription, RunKind, TopicDescription,
 };
 use crate::declaration::schema::parameter_schema;
 use crate::declaration::{RobotDeclaration, SensorDeclaration};
@@ -13,6 +13,7 @@ use std::time::Duration;
 /// The description of a robot with these topics, values of its parameters and commands.
 pub(super) fn discover(
     robot: &RobotDeclaration,
+    run: RunKind,
     topics: &[&dyn AnyTopic],
     values: &[ParameterValue],
     commands: Vec<CommandInfo>,
@@ -27,6 +28,7 @@ pub(super) fn discover(
         period: period(declared),
         inputs: Vec::new(),
         topics: published(&paths, declared.path, &[]),
+        command: None,
         is_replaced: is_replaced(declared.path),
     });
     let estimators = robot.estimators.iter().map(|declared| ComponentDescription {
@@ -45,6 +47,7 @@ pub(super) fn discover(
             })
             .collect(),
         topics: published(&paths, declared.path, declared.outputs),
+        command: None,
         is_replaced: is_replaced(declared.path),
     });
     let actuators = robot.actuators.iter().map(|declared| ComponentDescription {
@@ -54,6 +57,7 @@ pub(super) fn discover(
         period: None,
         inputs: Vec::new(),
         topics: published(&paths, declared.path, &[]),
+        command: None,
         is_replaced: is_replaced(declared.path),
     });
     let components: Vec<_> = sources.chain(estimators).chain(actuators).collect();
@@ -64,6 +68,7 @@ pub(super) fn discover(
     });
     Description {
         robot: robot.name,
+        run,
         links: links(robot),
         joints: joints(robot),
         topics: topics.collect(),
@@ -132,6 +137,7 @@ fn parameters(robot: &RobotDeclaration, values: &[ParameterValue]) -> Vec<Parame
             value: values.get(number).cloned().unwrap_or_else(|| default.clone()),
             default,
             unit: declared.unit,
+            range: declared.range.map(|range| range.start..=range.end),
             schema: parameter_schema(declared),
         }
     };

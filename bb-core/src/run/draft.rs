@@ -133,7 +133,7 @@ impl Draft {
         unwired: &mut dyn Unwired,
         clock: Clock,
         mode: Mode,
-    ) -> Result<(Machine, OpenSources), StartError> {
+    ) -> Result<(Arc<Machine>, OpenSources), StartError> {
         let assembling = Assembling::new(&mut self, unwired, clock, mode)?;
         let mut facts = describe(self.robot, &unwired.topics(), &assembling.control);
         facts.push(format!("supervision: {:?}", self.supervision));
@@ -177,6 +177,8 @@ struct Assembling {
     host: Arc<dyn Host>,
     /// Weak, since components with a bus are part of the wiring.
     place: Place,
+    /// The robot once it is assembled.
+    machine: Arc<OnceLock<Weak<Machine>>>,
 }
 
 impl Assembling {
@@ -224,6 +226,7 @@ impl Assembling {
         };
         let environment = Environment::new(parts, nodes);
         let place = Place::default();
+        let machine = Arc::default();
         let host: Arc<dyn Host> = Arc::new(RobotHost {
             robot,
             control: control.clone(),
@@ -233,6 +236,7 @@ impl Assembling {
             shared: SharedValues::default(),
             replacements,
             wired: Arc::clone(&place),
+            machine: Arc::clone(&machine),
         });
         control.set_host(&host);
         control.set_islands(Box::new(WiredIslands { robot, wired: Arc::clone(&place) }));
@@ -245,7 +249,7 @@ impl Assembling {
                 tracing::error!(%fault, "an island was left");
             }
         });
-        Ok(Self { robot, mode, control, environment, host, place })
+        Ok(Self { robot, mode, control, environment, host, place, machine })
     }
 
     /// Makes the components.
@@ -294,8 +298,8 @@ impl Assembling {
         StartError::component(path, fault)
     }
 
-    fn complete(self, wired: Arc<Wired>, sources: &OpenSources, keeper: Option<Keeper>) -> Machine {
-        Machine {
+    fn complete(self, wired: Arc<Wired>, sources: &OpenSources, keeper: Option<Keeper>) -> Arc<Machine> {
+        let machine = Arc::new(Machine {
             robot: self.robot,
             wired,
             environment: self.environment,
@@ -306,6 +310,9 @@ impl Assembling {
             has_ended: AtomicBool::new(false),
             last_report: OnceLock::new(),
             keeper: Mutex::new(keeper),
-        }
+        });
+        // It is set once.
+        let _ = self.machine.set(Arc::downgrade(&machine));
+        machine
     }
 }

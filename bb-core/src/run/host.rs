@@ -2,10 +2,11 @@
 
 use super::actuator::AnyActuator;
 use super::discovery::discover;
+use super::machine::Machine;
 use super::wired::{Place, Wired as WiredRobot};
 use crate::component::replacement::{Replacement, Replacements};
 use crate::component::shared::SharedValues;
-use crate::component::{Controls, Description, ExternalSensor, Host};
+use crate::component::{AcceptsJson, Controls, Description, ExternalSensor, Host};
 use crate::control::{Control, Islands, Wired};
 use crate::declaration::{RobotDeclaration, graph};
 use crate::joints::Joints;
@@ -16,7 +17,7 @@ use crate::schedule::Door;
 use crate::time::MonotonicTime;
 use crate::topology::{GraphFormat, Topology};
 use std::any::Any;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock, Weak};
 
 /// Weak, since components with a bus are part of the wiring.
 pub(super) struct RobotHost {
@@ -28,6 +29,8 @@ pub(super) struct RobotHost {
     pub(super) shared: SharedValues,
     pub(super) replacements: Replacements,
     pub(super) wired: Place,
+    /// The robot once it is assembled, for its report.
+    pub(super) machine: Arc<OnceLock<Weak<Machine>>>,
 }
 
 impl RobotHost {
@@ -138,11 +141,32 @@ impl Host for RobotHost {
             let own = self.registry().published_topics();
             all.extend(own.iter().map(|topic| topic.as_ref()));
             let values = self.control.parameters();
-            description = Some(discover(self.robot, &all, values.all(), self.control.infos(), &|path| {
+            let run = self.control.kind_of_run();
+            description = Some(discover(self.robot, run, &all, values.all(), self.control.infos(), &|path| {
                 self.is_replaced(path)
             }));
         });
-        description.unwrap_or_else(|| discover(self.robot, &[], &[], Vec::new(), &|_| false))
+        let empty = || discover(self.robot, self.control.kind_of_run(), &[], &[], Vec::new(), &|_| false);
+        let mut description = description.unwrap_or_else(empty);
+        if let Some(wired) = self.wired() {
+            let actuators = wired.actuators();
+            for component in &mut description.components {
+                let actuator = actuators.iter().find(|actuator| actuator.path() == component.path);
+                component.command = actuator.map(|actuator| actuator.command_shape());
+            }
+        }
+        description
+    }
+
+    fn report_json(&self) -> Option<String> {
+        let machine = self.machine.get()?.upgrade()?;
+        Some(machine.report().to_json(self.control.clock().now(), &self.control.executions()))
+    }
+
+    fn json_actuator(&self, path: &str) -> Option<Arc<dyn AcceptsJson>> {
+        let wired = self.wired()?;
+        let accepts = wired.actuators().into_iter().find(|actuator| actuator.path() == path)?.accepts_json();
+        accepts.downcast::<Arc<dyn AcceptsJson>>().ok().map(|accepts| *accepts)
     }
 
     fn graph(&self, format: GraphFormat) -> String {

@@ -1,5 +1,10 @@
 //! The statistics of a run: messages published per topic, and messages dropped, with reasons.
 
+mod json;
+mod problems;
+
+pub use problems::{Problem, Severity};
+
 use super::SourceStatistics;
 use super::actuator::ActuatorStatistics;
 use crate::control::{CommandStatistics, ReportedFault, ReportedSafetyError};

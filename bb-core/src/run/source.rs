@@ -305,6 +305,7 @@ impl<S: Periodic> Running<S> {
             tracing::info!(component = path, message, "left out");
             return;
         }
+        self.shared.note_failure(self.environment.clock().now());
         self.control.component_failed(path, supervisor, message, failed.panicked);
     }
 

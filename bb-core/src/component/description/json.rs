@@ -6,7 +6,8 @@ use super::{
 };
 use crate::component::CommandInfo;
 use crate::event::ParameterValue;
-use crate::message::codec::{json_schema, to_json};
+use crate::message::codec::compose::{array, null, number, object, optional, text};
+use crate::message::codec::json_schema;
 use std::time::Duration;
 
 impl Description {
@@ -15,6 +16,7 @@ impl Description {
     pub fn to_json(&self) -> String {
         object(&[
             ("robot", text(self.robot)),
+            ("run", text(self.run.name())),
             ("states", array(&mut self.states.iter().map(|state| text(state)))),
             ("links", array(&mut self.links.iter().map(link))),
             ("joints", array(&mut self.joints.iter().map(joint))),
@@ -64,6 +66,7 @@ fn component(component: &ComponentDescription) -> String {
         ("rate_hz", rate(component.period)),
         ("inputs", array(&mut component.inputs.iter().map(input))),
         ("topics", array(&mut component.topics.iter().map(|path| text(path)))),
+        ("command", optional(component.command, json_schema)),
         ("replaced", component.is_replaced.to_string()),
     ])
 }
@@ -89,6 +92,8 @@ fn parameter(parameter: &ParameterDescription) -> String {
         ("value", value(&parameter.value)),
         ("default", value(&parameter.default)),
         ("unit", text(parameter.unit)),
+        ("minimum", optional(parameter.range.as_ref().map(|range| *range.start()), number)),
+        ("maximum", optional(parameter.range.as_ref().map(|range| *range.end()), number)),
         ("schema", parameter.schema.clone()),
     ])
 }
@@ -97,10 +102,12 @@ fn command(command: &CommandInfo) -> String {
     let states = command.allowed_states.map(|states| array(&mut states.iter().map(|state| text(state))));
     object(&[
         ("path", text(command.path)),
+        ("role", text(command.role.name())),
         ("category", text(command.category)),
         ("allowed_states", states.unwrap_or_else(null)),
         ("timeout_s", optional(command.timeout.map(|timeout| timeout.as_secs_f64()), number)),
         ("arguments", json_schema(command.arguments)),
+        ("defaults", if command.default_arguments.is_empty() { null() } else { command.default_arguments.clone() }),
         ("result", json_schema(command.output)),
     ])
 }
@@ -115,50 +122,5 @@ fn value(value: &ParameterValue) -> String {
         ParameterValue::Integer(value) => value.to_string(),
         ParameterValue::Float(value) => number(*value),
         ParameterValue::Text(value) => text(value),
-    }
-}
-
-fn text(text: &str) -> String {
-    to_json(&text.to_owned())
-}
-
-fn number(number: f64) -> String {
-    if number.is_finite() { to_json(&number) } else { null() }
-}
-
-fn null() -> String {
-    "null".to_owned()
-}
-
-fn optional<T>(value: Option<T>, write: impl FnOnce(T) -> String) -> String {
-    value.map_or_else(null, write)
-}
-
-fn array(elements: &mut dyn Iterator<Item = String>) -> String {
-    let mut json = "[".to_owned();
-    for element in elements {
-        separate(&mut json);
-        json.push_str(&element);
-    }
-    json.push(']');
-    json
-}
-
-fn object(members: &[(&str, String)]) -> String {
-    let mut json = "{".to_owned();
-    for (name, value) in members {
-        separate(&mut json);
-        json.push_str(&text(name));
-        json.push(':');
-        json.push_str(value);
-    }
-    json.push('}');
-    json
-}
-
-/// A comma, but not before the first.
-fn separate(json: &mut String) {
-    if json.len() > 1 {
-        json.push(',');
     }
 }

@@ -13,6 +13,7 @@
 //!
 //! Two things are lost: the bits of a NaN, and `Some(None)` of an `Option<Option<T>>`, which reads back as `None`.
 
+pub(crate) mod compose;
 mod error;
 mod read;
 mod schema;

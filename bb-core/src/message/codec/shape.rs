@@ -60,6 +60,8 @@ pub struct FieldShape {
     /// The unit of its numbers, if the field states one: `#[payload(unit = "V")]`. Several if that depends, as for the
     /// position of a joint: rad or m.
     pub units: &'static [FieldUnit],
+    /// Its doc comment, for forms; empty for none.
+    pub doc: &'static str,
 }
 
 /// The unit of a field's numbers.
@@ -88,12 +90,18 @@ pub(super) const NOTHING: &str = "structure_needs_at_least_one_member";
 impl FieldShape {
     /// A field.
     pub const fn new(name: &'static str, shape: Shape) -> Self {
-        Self { name, shape, units: &[] }
+        Self { name, shape, units: &[], doc: "" }
     }
 
     /// Sets the units that a field may have.
     pub const fn in_units(mut self, units: &'static [FieldUnit]) -> Self {
         self.units = units;
+        self
+    }
+
+    /// Sets the doc comment of a field.
+    pub const fn documented(mut self, doc: &'static str) -> Self {
+        self.doc = doc;
         self
     }
 

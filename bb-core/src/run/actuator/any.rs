@@ -2,9 +2,10 @@
 
 use super::held::{Guarded, Held};
 use super::{ActuatorNode, ActuatorStatistics};
-use crate::component::{Accepts, Actuator};
+use crate::component::{Accepts, AcceptsJson, Actuator};
 use crate::fault::Termination;
-use crate::message::Payload as _;
+use crate::message::codec::Shape;
+use crate::message::{Field as _, Payload as _};
 use crate::payload::MotionEnd;
 use crate::pubsub::{AnyTopic, DynamicMessage};
 use crate::time::MonotonicTime;
@@ -18,6 +19,12 @@ pub trait AnyActuator {
     fn path(&self) -> &'static str;
     /// The name of its command type.
     fn command_name(&self) -> &'static str;
+    /// The shape of its commands.
+    #[doc(hidden)]
+    fn command_shape(&self) -> Shape;
+    /// An `Arc<dyn AcceptsJson>`.
+    #[doc(hidden)]
+    fn accepts_json(&self) -> Box<dyn Any>;
     /// The topic of its commands.
     #[doc(hidden)]
     fn any_topic(&self) -> &dyn AnyTopic;
@@ -45,6 +52,15 @@ impl<A: Actuator> AnyActuator for ActuatorNode<A> {
 
     fn command_name(&self) -> &'static str {
         A::Command::NAME
+    }
+
+    fn command_shape(&self) -> Shape {
+        A::Command::SHAPE
+    }
+
+    fn accepts_json(&self) -> Box<dyn Any> {
+        let accepts: Arc<dyn AcceptsJson> = Arc::clone(&self.0) as _;
+        Box::new(accepts)
     }
 
     fn any_topic(&self) -> &dyn AnyTopic {

@@ -3,10 +3,11 @@
 use super::limits::NotLimited;
 use super::telling::Told;
 use super::{Inner, State};
-use crate::component::{Accepts, Actuator, ActuatorError, Caller};
+use crate::component::{Accepts, AcceptsJson, Actuator, ActuatorError, Caller};
 use crate::event::Safety;
-use crate::fault::{caught, guarded};
+use crate::fault::{Fault, caught, guarded};
 use crate::journal::{Event, Recorded};
+use crate::message::codec::{from_json, to_json};
 use crate::message::{Finite, Frame, Payload, Stamp, Stamped};
 use crate::pubsub::{DynamicMessage, Wakers};
 
@@ -41,6 +42,13 @@ impl<A: Actuator> Accepts<A::Command> for Inner<A> {
             }
         });
         self.control.count_waker_panics(wakers.run());
+    }
+}
+
+impl<A: Actuator> AcceptsJson for Inner<A> {
+    fn accept_json(&self, command: &str, caller: &Caller) -> Result<String, Fault> {
+        let command = from_json::<A::Command>(command)?;
+        Ok(to_json(&self.accept(command, caller)?))
     }
 }
 

@@ -6,6 +6,7 @@ use crate::joints::Joints;
 use crate::message::{Exceeded, JointBounds, LimitedQuantity, OutOfBounds, Payload};
 use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 const QUANTITIES: usize = LimitedQuantity::ALL.len();
 
@@ -15,6 +16,7 @@ pub(super) struct Counts {
     commands: AtomicU64,
     limited: [AtomicU64; QUANTITIES],
     refused: [AtomicU64; QUANTITIES],
+    stopped: Mutex<Option<String>>,
 }
 
 /// The counts of an actuator since the start.
@@ -27,6 +29,8 @@ pub struct ActuatorStatistics {
     pub commands: u64,
     limited: [u64; QUANTITIES],
     refused: [u64; QUANTITIES],
+    /// Why it does not run, if it does not.
+    pub stopped: Option<String>,
 }
 
 impl ActuatorStatistics {
@@ -85,7 +89,13 @@ impl Counts {
     pub(super) fn statistics(&self, path: &'static str) -> ActuatorStatistics {
         let load = |all: &[AtomicU64; QUANTITIES]| std::array::from_fn(|index| all[index].load(Ordering::Relaxed));
         let commands = self.commands.load(Ordering::Relaxed);
-        ActuatorStatistics { path, commands, limited: load(&self.limited), refused: load(&self.refused) }
+        let stopped = self.stopped.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        ActuatorStatistics { path, commands, limited: load(&self.limited), refused: load(&self.refused), stopped }
+    }
+
+    /// Notes why it does not run; `None` once it runs.
+    pub(super) fn note_stopped(&self, reason: Option<String>) {
+        *self.stopped.lock().unwrap_or_else(PoisonError::into_inner) = reason;
     }
 }
 

@@ -23,7 +23,16 @@ struct Shared {
     restarts: AtomicU64,
     occupied: Occupied,
     stopped: Mutex<Option<String>>,
+    failing: Mutex<Option<Failing>>,
     counters: Counts,
+}
+
+/// Failures without a reading between them.
+#[derive(Clone, Copy, Debug)]
+struct Failing {
+    since: MonotonicTime,
+    /// The readings at the last of them.
+    readings: u64,
 }
 
 #[derive(Debug, Default)]
@@ -54,6 +63,8 @@ pub struct SourceStatistics {
     pub restarts: u64,
     /// Why it does not run, if it does not.
     pub stopped: Option<String>,
+    /// Since when it has failed without a reading in between, even if it has been restarted meanwhile.
+    pub failing_since: Option<MonotonicTime>,
     /// Counts by name, see [`ServiceContext::counter`](crate::ServiceContext::counter).
     pub counts: Vec<(&'static str, u64)>,
 }
@@ -76,6 +87,7 @@ impl SharedSource {
             restarts: AtomicU64::new(0),
             occupied: Occupied::new(),
             stopped: Mutex::default(),
+            failing: Mutex::default(),
             counters,
         }))
     }
@@ -117,12 +129,16 @@ impl SharedSource {
     }
 
     pub(in crate::run) fn statistics(&self) -> SourceStatistics {
+        let readings = self.0.readings.load(Ordering::Relaxed);
+        // After a restart, the next one shows that it has recovered.
+        let failing = lock(&self.0.failing).filter(|failing| readings == failing.readings);
         SourceStatistics {
             path: self.0.path,
-            readings: self.0.readings.load(Ordering::Relaxed),
+            readings,
             skipped: self.0.skipped.load(Ordering::Relaxed),
             restarts: self.0.restarts.load(Ordering::Relaxed),
             stopped: lock(&self.0.stopped).clone(),
+            failing_since: failing.map(|failing| failing.since),
             counts: self.0.counters.all(),
         }
     }
@@ -142,5 +158,14 @@ impl SharedSource {
 
     pub(super) fn note_stop(&self, reason: String) {
         *lock(&self.0.stopped) = Some(reason);
+    }
+
+    /// Notes a failure that is not the end of a part that the robot does without.
+    pub(super) fn note_failure(&self, now: MonotonicTime) {
+        let readings = self.0.readings.load(Ordering::Relaxed);
+        let mut failing = lock(&self.0.failing);
+        // The attempt that has failed is counted too.
+        let since = failing.filter(|before| readings <= before.readings + 1).map_or(now, |before| before.since);
+        *failing = Some(Failing { since, readings });
     }
 }

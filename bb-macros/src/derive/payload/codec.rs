@@ -166,7 +166,9 @@ fn struct_shape(fields: &Fields, text: &TokenStream) -> TokenStream {
             })
             .collect();
         let in_units = (!units.is_empty()).then(|| quote!(.in_units(&[#(#units),*])));
-        quote!(FieldShape::new(#name, FieldOf::<#kind>::SHAPE) #in_units,)
+        let doc = crate::derive::fields::doc(&field.attrs);
+        let documented = (!doc.is_empty()).then(|| quote!(.documented(#doc)));
+        quote!(FieldShape::new(#name, FieldOf::<#kind>::SHAPE) #in_units #documented,)
     });
     let shapes: TokenStream = if fields.is_empty() { quote!(FieldShape::NOTHING) } else { shapes.collect() };
     quote!(StructShape { name: #text, fields: &[#shapes] })

@@ -26,7 +26,8 @@ use crate::message::codec::{EnumShape, FieldShape, Shape, StructShape};
 /// assert_eq!(
 ///     json_schema(Beep::SHAPE),
 ///     r#"{"$schema":"https://json-schema.org/draft/2020-12/schema","title":"Beep","type":"object","#.to_owned()
-///         + r#""properties":{"times":{"type":"integer","minimum":0,"maximum":255}},"required":["times"],"#
+///         + r#""properties":{"times":{"type":"integer","minimum":0,"maximum":255,"description":"How often."}},"#
+///         + r#""required":["times"],"#
 ///         + r#""additionalProperties":false}"#
 /// );
 /// ```
@@ -148,7 +149,7 @@ impl Definitions {
             }
             text(field.name, &mut json);
             json.push(':');
-            json.push_str(&self.schema(field.shape));
+            json.push_str(&annotated(self.schema(field.shape), field));
         }
         let is_required = |field: &&FieldShape| !is_optional(field.shape);
         let required: Vec<_> = fields.iter().filter(is_required).map(|field| field.name).collect();
@@ -183,6 +184,21 @@ impl Definitions {
             choices.push(choice);
         }
         format!(r#""oneOf":[{}]"#, choices.join(","))
+    }
+}
+
+/// A schema in braces with what is known of the field: its doc comment and the unit of its numbers.
+fn annotated(schema: String, field: &FieldShape) -> String {
+    let mut notes = Vec::new();
+    if !field.doc.is_empty() {
+        notes.push(member("description", field.doc));
+    }
+    if let [unit] = field.units {
+        notes.push(member("unit", unit.symbol));
+    }
+    match schema.strip_suffix('}') {
+        Some(open) if !notes.is_empty() => format!("{open},{}}}", notes.join(",")),
+        _ => schema,
     }
 }
 

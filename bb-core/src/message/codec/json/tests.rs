@@ -331,7 +331,7 @@ fn accepts(root: &Value, schema: &Value, value: &Value) -> bool {
     let all = |list: &Value| list.as_array().cloned().unwrap_or_default();
     let count = |limit: &Value| limit.as_u64().and_then(|limit| usize::try_from(limit).ok()).expect("a count");
     keywords.iter().all(|(keyword, limit)| match keyword.as_str() {
-        "$schema" | "title" | "$defs" => true,
+        "$schema" | "title" | "$defs" | "description" | "unit" => true,
         "$ref" => {
             let name = limit.as_str().and_then(|name| name.strip_prefix("#/$defs/")).expect("a definition");
             accepts(root, &root["$defs"][name], value)

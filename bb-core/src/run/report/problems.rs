@@ -1,0 +1,179 @@
+//! What is wrong with a robot at the moment, since when and why, the worst first.
+
+use super::Report;
+use crate::event::{HealthReason, HealthState, Safety};
+use crate::time::MonotonicTime;
+use std::fmt;
+
+/// How bad a [`Problem`] is. The worst compares as the least.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
+pub enum Severity {
+    /// The safety state is `error`.
+    Unsafe,
+    /// A component has stopped, or waits for its restart.
+    Stopped,
+    /// An estimator is lost.
+    Lost,
+    /// An estimator is degraded.
+    Degraded,
+    /// A command was refused, and has not been started since.
+    Refused,
+}
+
+impl Severity {
+    /// Its name in JSON: `unsafe`, `stopped`, `lost`, `degraded` or `refused`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Unsafe => "unsafe",
+            Self::Stopped => "stopped",
+            Self::Lost => "lost",
+            Self::Degraded => "degraded",
+            Self::Refused => "refused",
+        }
+    }
+}
+
+impl fmt::Display for Severity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// Something that is wrong at the moment of a [`Report`].
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Problem {
+    /// The path of the component or the command; `safety` if no component is known to have caused it.
+    pub path: String,
+    /// How bad it is.
+    pub severity: Severity,
+    /// Since when, if that is known.
+    pub since: Option<MonotonicTime>,
+    /// The reason for people.
+    pub reason: String,
+}
+
+impl Report {
+    /// What is wrong at the moment, the worst first, and of what is equally bad the newest first.
+    ///
+    /// ```
+    /// use bb_core::prelude::*;
+    /// use bb_core::run::Severity;
+    /// # #[derive(Debug)] struct Pass;
+    /// # impl Estimator for Pass {
+    /// #     type Options = NoOptions;
+    /// #     type Input = Imu;
+    /// #     type Output = Imu;
+    /// #     fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> { Ok(Self) }
+    /// #     fn handle_input(&mut self, imu: &Stamped<Imu>) -> Result<Reply<Imu>, Fault> { Ok(Reply::emit(imu.payload)) }
+    /// # }
+    /// robot! {
+    ///     robot Rig;
+    ///     link base {
+    ///         sensor imu: External<Imu>();
+    ///         estimator pass: Pass() { input imu: sensor::base::imu; lost_after: 100 ms; }
+    ///     }
+    /// }
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let mut rig = Rig::builder().simulate()?;
+    /// rig.run_until(MonotonicTime::from_nanos(10_000_000_000));
+    /// let problems = rig.report().problems();
+    /// assert_eq!((problems[0].severity, problems[0].path.as_str()), (Severity::Lost, "estimator/base/pass"));
+    /// assert_eq!(problems[0].since, Some(MonotonicTime::from_nanos(100_000_000)));
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn problems(&self) -> Vec<Problem> {
+        let mut problems = self.unsafe_components();
+        for estimator in &self.estimators {
+            let since = estimator.last_transition.map(|transition| transition.time);
+            // One that was left out is not part of the robot.
+            let Some(health) = estimator.health else { continue };
+            if let Some(stopped) = &estimator.stopped {
+                problems.push(problem(estimator.path, Severity::Stopped, since, stopped.clone()));
+                continue;
+            }
+            let severity = match health {
+                HealthState::Healthy => continue,
+                HealthState::Degraded => Severity::Degraded,
+                HealthState::Lost => Severity::Lost,
+            };
+            let mut reason = match estimator.last_transition {
+                Some(transition) => reason_of(transition.reason, transition.source),
+                None => String::new(),
+            };
+            if let Some((input, drop)) = estimator.last_drop {
+                reason += &format!("; `{input}` was dropped last: {}", drop.name());
+            }
+            if let (Some(HealthReason::NoTransform), Some(gap)) =
+                (estimator.last_transition.map(|transition| transition.reason), &estimator.last_gap)
+            {
+                reason += &format!("; {gap}");
+            }
+            if let (Some(HealthReason::Diverged), Some(divergence)) =
+                (estimator.last_transition.map(|transition| transition.reason), estimator.last_divergence)
+            {
+                reason += &format!("; {divergence}");
+            }
+            problems.push(problem(estimator.path, severity, since, reason));
+        }
+        for source in self.sources.iter().filter(|source| source.failing_since.is_some()) {
+            let reason =
+                source.stopped.clone().unwrap_or_else(|| "it was restarted, and has not been read yet".to_owned());
+            problems.push(problem(source.path, Severity::Stopped, source.failing_since, reason));
+        }
+        for actuator in &self.actuators {
+            if let Some(reason) = &actuator.stopped {
+                problems.push(problem(
+                    actuator.path,
+                    Severity::Stopped,
+                    self.failed_since(actuator.path),
+                    reason.clone(),
+                ));
+            }
+        }
+        for command in &self.commands {
+            if let (Some(since), Some(refusal)) = (command.refused_at, &command.last_refusal) {
+                let path = format!("command/{}", command.name);
+                problems.push(problem(path, Severity::Refused, Some(since), refusal.to_string()));
+            }
+        }
+        problems.sort_by_key(|problem| (problem.severity, problem.since.map(std::cmp::Reverse)));
+        problems
+    }
+
+    /// The causes of the safety state `error`, if the robot is in it.
+    fn unsafe_components(&self) -> Vec<Problem> {
+        if self.safety != Safety::Error {
+            return Vec::new();
+        }
+        if self.safety_errors.is_empty() {
+            return vec![problem("safety", Severity::Unsafe, None, "the robot could not be made safe".to_owned())];
+        }
+        let errors = self.safety_errors.iter();
+        let errors = errors.map(|error| {
+            problem(error.last.path, Severity::Unsafe, Some(error.last_time), error.last.error.to_string())
+        });
+        errors.collect()
+    }
+
+    /// The time of the last fault of a component.
+    fn failed_since(&self, path: &str) -> Option<MonotonicTime> {
+        self.faults.iter().rev().find(|fault| fault.path == path).map(|fault| fault.last_time)
+    }
+}
+
+fn problem(path: impl Into<String>, severity: Severity, since: Option<MonotonicTime>, reason: String) -> Problem {
+    Problem { path: path.into(), severity, since, reason }
+}
+
+/// A change of health in words.
+fn reason_of(reason: HealthReason, source: &str) -> String {
+    match reason {
+        HealthReason::Lost => format!("no run on a message of `{source}`"),
+        HealthReason::Recovered => "it runs again, and has not yet had enough good runs".to_owned(),
+        other => format!("{other} (`{source}`)"),
+    }
+}

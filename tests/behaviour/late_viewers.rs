@@ -1,0 +1,303 @@
+//! A caller that knows nothing of the robot and comes late: what is wrong, what runs, and what it may change until it leaves.
+
+use crate::components::Number;
+use crate::rights::Servo;
+use bb_core::component::RunKind;
+use bb_core::message::codec::from_json;
+use bb_core::prelude::*;
+use serde_json::Value;
+use std::error::Error;
+
+/// Emits its input.
+#[derive(Debug)]
+pub(crate) struct Pass;
+
+impl Estimator for Pass {
+    type Options = NoOptions;
+    type Input = Number;
+    type Output = Number;
+
+    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
+        Ok(Reply::emit(number.payload))
+    }
+}
+
+/// Fails at each command.
+#[derive(Debug)]
+pub(crate) struct Jammed;
+
+impl Actuator for Jammed {
+    type Options = NoOptions;
+    type Command = Number;
+
+    fn init(_: NoOptions, _: &ActuatorContext) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+    fn handle_command(&mut self, _: &Stamped<Number>) -> Result<(), Fault> {
+        Err(Fault::new("the gear is jammed"))
+    }
+    fn disarm(&mut self) -> Result<(), Fault> {
+        Ok(())
+    }
+}
+
+/// Arguments of [`Travel`].
+#[derive(Clone, Debug, Payload)]
+pub(crate) struct Distance {
+    /// How far.
+    #[payload(unit = "m")]
+    pub(crate) distance: f64,
+}
+
+impl Default for Distance {
+    fn default() -> Self {
+        Self { distance: 2.5 }
+    }
+}
+
+/// Takes an hour.
+#[derive(Debug)]
+pub(crate) struct Travel;
+
+impl Command for Travel {
+    type Options = NoOptions;
+    type Arguments = Distance;
+    type Output = ();
+
+    async fn run(_: NoOptions, _: Distance, context: CommandContext) -> Result<Outcome<()>, Fault> {
+        context.sleep(Duration::from_secs(3600)).await;
+        Ok(Outcome::done(()))
+    }
+}
+
+robot! {
+    robot Watched;
+    parameters {
+        /// How far the mast may turn.
+        turn: f64 = 90 deg, range: 0 deg..=180 deg;
+        count: i64 = 3;
+        name: String = "a";
+        is_on: bool = true;
+    }
+    commands {
+        travel: Travel { allowed_states: [idle]; }
+        once: Travel { allowed_states: [disarmed]; }
+        arm: Arm;
+    }
+    link base {
+        sensor number: External<Number>();
+        estimator pass: Pass() { input number: sensor::base::number; lost_after: 200 ms; recover_after: 2; }
+        joint pan: continuous { axis: z; actuator servo: Servo(); sensor encoder: External<Number>(); link head {} }
+        joint tilt: continuous { axis: z; actuator jammed: Jammed(); sensor encoder: External<Number>(); link eye {} }
+    }
+}
+
+fn at(millis: i64) -> MonotonicTime {
+    MonotonicTime::from_nanos(millis * 1_000_000)
+}
+
+fn report(bus: &bb_core::Bus) -> Result<Value, Box<dyn Error>> {
+    Ok(serde_json::from_str(&bus.report_json()?)?)
+}
+
+/// Each problem on a line.
+fn problems(report: &Value) -> Vec<String> {
+    let list = report["problems"].as_array().into_iter().flatten();
+    let text = |problem: &Value, key: &str| problem[key].as_str().unwrap_or("?").to_owned();
+    list.map(|problem| {
+        let [severity, path, reason] = ["severity", "path", "reason"].map(|key| text(problem, key));
+        format!("{severity} {path} since {}: {reason}", problem["since"])
+    })
+    .collect()
+}
+
+#[test]
+fn a_late_bus_names_all_that_is_wrong_since_when_and_why() -> Result<(), Box<dyn Error>> {
+    let mut simulation = Watched::builder().simulate()?;
+    simulation.run_until(at(1000));
+    // Refused in this state.
+    assert!(simulation.start_command("command/travel", "").is_err());
+    simulation.run_until(at(2000));
+    simulation.arm()?;
+    let jammed = simulation.send_json("actuator/base/tilt/jammed", "1").expect_err("it is jammed");
+    assert_eq!(jammed.to_string(), "the actuator failed: the gear is jammed");
+    let late = simulation.bus().for_caller("page", [Right::Read]);
+    let seen = report(&late)?;
+    assert_eq!(
+        problems(&seen),
+        [
+            "stopped actuator/base/tilt/jammed since 2.0: the gear is jammed",
+            "lost estimator/base/pass since 0.2: no run on a message of `sensor/base/number`",
+            "refused command/travel since 1.0: `travel` is refused: it is not allowed in the state `disarmed`",
+        ]
+    );
+    assert_eq!((&seen["time"], &seen["safety"], &seen["state"]), (&2.0.into(), &"armed".into(), &"idle".into()));
+    // Each of them ends: by a start, by messages, by a restart of the actuator.
+    let number = simulation.publisher::<Number>("sensor/base/number")?;
+    simulation.start_command("command/travel", "")?;
+    for step in 0..10 {
+        simulation.run_until(at(4000 + step * 10));
+        number.publish(Number(1.0));
+    }
+    assert_eq!(problems(&report(&late)?), [""; 0]);
+    Ok(())
+}
+
+/// Fails for half a second, from 0.1 s and from 5 s.
+#[derive(Debug)]
+pub(crate) struct Flaky;
+
+impl Sensor for Flaky {
+    type Options = NoOptions;
+    type Output = Number;
+
+    fn init(_: NoOptions, _: &SensorContext) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+    fn read(&mut self, now: MonotonicTime) -> Result<Reading<Number>, Fault> {
+        let is_loose = (at(100)..at(600)).contains(&now) || (at(5000)..at(5500)).contains(&now);
+        if is_loose { Err(Fault::new("the cable is loose")) } else { Ok(Reading::now(Number(1.0))) }
+    }
+}
+
+robot! {
+    robot Loose;
+    link base { sensor flaky: Flaky() { rate: 100 Hz; } }
+}
+
+/// Restarts without a reading do not begin it again, and the same fault of before has another beginning.
+#[test]
+fn a_sensor_that_is_restarted_in_vain_has_failed_since_its_last_reading() -> Result<(), Box<dyn Error>> {
+    let mut simulation = Loose::builder().simulate()?;
+    let bus = simulation.bus();
+    let mut seen = Vec::new();
+    for millis in [90, 150, 590, 4990, 5300, 9000] {
+        simulation.run_until(at(millis));
+        seen.push(problems(&report(&bus)?));
+    }
+    let loose = |since: &str| vec![format!("stopped sensor/base/flaky since {since}: the cable is loose")];
+    assert_eq!(seen, [vec![], loose("0.1"), loose("0.1"), vec![], loose("5.0"), vec![]]);
+    assert!(simulation.report().sources[0].restarts > 2, "it was restarted in vain");
+    Ok(())
+}
+
+#[test]
+fn another_caller_lists_and_cancels_what_runs() -> Result<(), Box<dyn Error>> {
+    let simulation = Watched::builder().simulate()?;
+    simulation.arm()?;
+    let first = simulation.bus().for_caller("first page", [Right::Read, Right::Commands]);
+    let second = simulation.bus().for_caller("second page", [Right::Read, Right::Commands]);
+    let visitor = simulation.bus().for_caller("visitor", [Right::Read]);
+    let started = first.start_command("command/travel", "")?;
+    let listed = second.executions();
+    let [execution] = &listed[..] else { panic!("one runs: {listed:?}") };
+    assert_eq!((execution.number, execution.path), (started.number(), "command/travel"));
+    assert_eq!((execution.caller.as_str(), execution.started), ("first page", at(0)));
+    let refused = visitor.cancel(execution.number).expect_err("it may not");
+    assert_eq!(refused.to_string(), "`visitor` does not have the right `commands`");
+    second.cancel(execution.number)?;
+    assert_eq!(started.try_result().map(|result| result.is_err()), Some(true));
+    assert_eq!(second.executions(), []);
+    let gone = second.cancel(execution.number).expect_err("it has ended");
+    assert_eq!(gone.to_string(), format!("no execution with the number {} runs", execution.number));
+    Ok(())
+}
+
+/// What was obtained through a session, by whatever thread, refuses to act once it has ended; to disarm is everybody's.
+#[test]
+fn nothing_acts_in_the_name_of_a_session_that_has_ended() -> Result<(), Box<dyn Error>> {
+    let simulation = Watched::builder().simulate()?;
+    simulation.arm()?;
+    let session = simulation.session("page 7", Rights::ALL);
+    let bus = session.bus();
+    let inner = bus.session("frame", Rights::ALL);
+    let link = bus.actuator::<Number>("actuator/base/pan/servo")?;
+    let publisher = bus.publisher::<Number>("page/number")?;
+    let heard = simulation.bus().subscribe::<Number>("page/number", Overflow::default())?;
+    link.send(Number(1.0))?;
+    publisher.publish(Number(1.0));
+    let execution = bus.start_command("command/travel", "")?.number();
+    drop(session);
+    let ended = "the session of `page 7` has ended";
+    assert_eq!(bus.start_command("command/travel", "").map(drop).unwrap_err().to_string(), ended);
+    assert_eq!(bus.cancel(execution).unwrap_err().to_string(), ended);
+    assert_eq!(bus.send_json("actuator/base/pan/servo", "1").unwrap_err().to_string(), ended);
+    assert_eq!(bus.request_stop().unwrap_err().to_string(), ended);
+    assert_eq!(
+        bus.set_parameter("param/turn", 1.0).unwrap_err().to_string(),
+        format!("param/turn is not set: {ended}")
+    );
+    assert!(inner.set_parameter("param/turn", 1.0).is_err() && bus.publisher::<Number>("page/other").is_err());
+    assert!(link.send(Number(2.0)).is_err());
+    publisher.publish(Number(2.0));
+    assert_eq!(heard.drain().map(|message| message.payload).collect::<Vec<_>>(), [Number(1.0)]);
+    assert_eq!(simulation.executions().len(), 1, "what it has started runs on");
+    bus.disarm()?;
+    assert!(bus.arm().is_err());
+    assert_eq!(simulation.safety(), Safety::Disarmed);
+    Ok(())
+}
+
+#[test]
+fn parameters_and_actuators_take_json() -> Result<(), Box<dyn Error>> {
+    let simulation = Watched::builder().simulate()?;
+    let set = |path, json| simulation.set_parameters_json([(path, json)]).map_err(|error| error.to_string());
+    assert_eq!(set("param/turn", "1"), Ok(()));
+    assert_eq!(simulation.bus().parameter("param/turn"), Some(1.0.into()));
+    assert_eq!(
+        (set("param/count", "7"), set("param/name", r#""b""#), set("param/is_on", "false")),
+        (Ok(()), Ok(()), Ok(()))
+    );
+    assert_eq!(
+        set("param/turn", "9"),
+        Err("param/turn is not set: expected a number in 0.0..=3.141592653589793 rad, found `9.0`".into())
+    );
+    for (path, json) in [("param/count", "1.5"), ("param/is_on", "1"), ("param/name", "2"), ("param/turn", "[")] {
+        let refused = set(path, json).expect_err(json);
+        assert!(refused.starts_with(&format!("{path} is not set: ")), "{refused}");
+    }
+    let unknown = set("param/trun", r#""x""#).expect_err("there is none");
+    assert_eq!(unknown, "param/trun is not set: no such parameter is declared; did you mean `param/turn`?");
+    // All or none.
+    assert!(simulation.set_parameters_json([("param/turn", "0.5"), ("param/count", "x")]).is_err());
+    assert_eq!(simulation.bus().parameter("param/turn"), Some(1.0.into()));
+
+    let refused = simulation.send_json("actuator/base/pan/servo", "1").expect_err("it is not armed");
+    assert_eq!(refused.to_string(), "the robot is not armed (disarmed)");
+    simulation.arm()?;
+    assert_eq!(from_json::<Number>(&simulation.send_json("actuator/base/pan/servo", "1.5")?)?, Number(1.5));
+    let near = simulation.send_json("actuator/base/pan/server", "1").expect_err("there is none");
+    assert_eq!(
+        near.to_string(),
+        "no actuator is at `actuator/base/pan/server`; did you mean `actuator/base/pan/servo`?"
+    );
+    Ok(())
+}
+
+/// Forms and sliders are built from this alone.
+#[test]
+fn a_description_has_what_forms_need() -> Result<(), Box<dyn Error>> {
+    let simulation = Watched::builder().simulate()?;
+    let description = simulation.description();
+    assert_eq!((description.run, simulation.run_kind()), (RunKind::Simulation, RunKind::Simulation));
+    let turn = description.parameter("param/turn").ok_or("it is declared")?;
+    assert_eq!(turn.unit, "rad");
+    assert_eq!(turn.range, Some(0.0..=std::f64::consts::PI));
+    let json: Value = serde_json::from_str(&description.to_json())?;
+    let of = |list: &str, path: &str| {
+        let list = json[list].as_array().into_iter().flatten();
+        list.clone().find(|element| element["path"] == path).cloned().unwrap_or_default()
+    };
+    let travel = of("commands", "command/travel");
+    let distance = &travel["arguments"]["properties"]["distance"];
+    assert_eq!((&distance["description"], &distance["unit"]), (&"How far.".into(), &"m".into()));
+    assert_eq!((&travel["defaults"]["distance"], &travel["role"]), (&2.5.into(), &"plain".into()));
+    assert_eq!(of("commands", "command/arm")["role"], "arming");
+    assert_eq!(of("parameters", "param/turn")["maximum"], std::f64::consts::PI);
+    assert!(of("components", "actuator/base/pan/servo")["command"].is_object());
+    assert!(of("components", "sensor/base/number")["command"].is_null());
+    Ok(())
+}
