@@ -3,6 +3,7 @@
 use crate::calibrate::Calibrate;
 use crate::commands;
 use crate::families::{self, FamiliesArguments};
+use crate::live;
 use crate::navigation::{self, NavigationArguments};
 use crate::noise::{self, NoiseArguments};
 use bb_estimators::attitude::FilterParams;
@@ -29,6 +30,8 @@ struct Bb {
 enum Command {
     #[command(flatten)]
     Other(commands::Command),
+    #[command(flatten)]
+    Live(live::LiveCommand),
     /// Scores algorithms on recordings.
     Eval {
         #[command(subcommand)]
@@ -145,6 +148,7 @@ pub(crate) enum Job {
     /// Prints this.
     Print(String),
     Other(commands::Command),
+    Live(live::LiveCommand),
 }
 
 /// `bb eval attitude`.
@@ -161,6 +165,7 @@ pub(crate) fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Job
     let what = match Bb::try_parse_from(arguments)?.command {
         Command::Eval { what } => what,
         Command::Other(command) => return Ok(Job::Other(command)),
+        Command::Live(command) => return Ok(Job::Live(command)),
         Command::Calibrate { what } => return Ok(Job::Calibrate(what)),
     };
     let arguments = match what {

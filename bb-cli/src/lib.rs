@@ -8,6 +8,7 @@ mod arguments;
 mod calibrate;
 mod commands;
 mod families;
+mod live;
 mod navigation;
 mod noise;
 mod periods;
@@ -38,6 +39,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Job::Noise(noise) => noise.run().and_then(|(text, is_whole)| Ok(say(&text)? && is_whole)),
         Job::Print(text) => say(text),
         Job::Other(command) => command.run(),
+        Job::Live(command) => command.run(),
         Job::Calibrate(calibrate) => calibrate.run().and_then(|(text, is_any)| Ok(say(&text)? && is_any)),
     };
     match done {
@@ -66,7 +68,7 @@ fn eval_attitude(attitude: &Attitude) -> Result<bool, String> {
 }
 
 /// Prints, and returns whether the output is still open: a closed pipe (`| head`) is not an error.
-fn say(text: &str) -> Result<bool, String> {
+pub(crate) fn say(text: &str) -> Result<bool, String> {
     match std::io::stdout().lock().write_all(text.as_bytes()) {
         Ok(()) => Ok(true),
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(false),

@@ -19,12 +19,13 @@ fn read(file: &str) -> String {
 }
 
 /// The folders of the crates with code that others use.
-const CRATES: [&str; 10] = [
+const CRATES: [&str; 11] = [
     "bb-macros",
     "bb-core",
     "bb-estimators",
     "bb-eval",
     "bb-cli",
+    "integrations/dashboard",
     "integrations/mavlink",
     "integrations/mcap",
     "integrations/metrics",

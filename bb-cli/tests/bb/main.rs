@@ -8,6 +8,7 @@ mod common;
 mod convert;
 mod doubts;
 mod guides;
+mod live;
 mod look;
 mod navigation;
 mod navigation_bag;

@@ -1,0 +1,61 @@
+//! Commands for a running robot, by the address of its dashboard.
+
+mod address;
+mod arming;
+mod command;
+mod connection;
+mod param;
+mod top;
+mod topic;
+mod yaml;
+
+use address::Address;
+use clap::{Args, Subcommand};
+use connection::Robot;
+
+/// The robot that a command is for.
+#[derive(Debug, Args)]
+pub(crate) struct Where {
+    /// The address that the robot's dashboard has printed; its token gives the right to steer. By default that in the variable `BB_ROBOT`,
+    /// else `http://127.0.0.1:8912`.
+    #[arg(long, value_name = "ADDRESS", global = true)]
+    robot: Option<Address>,
+    /// Of several robots at one address, the name of one.
+    #[arg(long, value_name = "NAME", global = true)]
+    name: Option<String>,
+}
+
+impl Where {
+    fn connect(&self) -> Result<Robot, String> {
+        let address = match (&self.robot, std::env::var("BB_ROBOT")) {
+            (Some(address), _) => address.clone(),
+            (None, Ok(text)) if !text.is_empty() => text.parse().map_err(|error| format!("BB_ROBOT: {error}"))?,
+            (None, _) => Address::default(),
+        };
+        Robot::connect(&address, self.name.as_deref())
+    }
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum LiveCommand {
+    Top(top::Arguments),
+    Topic(topic::Arguments),
+    Param(param::Arguments),
+    Command(command::Arguments),
+    Arm(arming::Arm),
+    Disarm(arming::Disarm),
+}
+
+impl LiveCommand {
+    /// Runs the command, and returns whether all went well.
+    pub(crate) fn run(&self) -> Result<bool, String> {
+        match self {
+            Self::Top(arguments) => top::run(arguments),
+            Self::Topic(arguments) => topic::run(arguments),
+            Self::Param(arguments) => param::run(arguments),
+            Self::Command(arguments) => command::run(arguments),
+            Self::Arm(arguments) => arguments.run(),
+            Self::Disarm(arguments) => arguments.run(),
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! `bb command`: commands of a running robot.
+
+use super::Where;
+use crate::say;
+use bb_eval::table::aligned;
+use clap::{Args, Subcommand};
+use serde_json::{Value, json};
+
+/// Lists, starts and cancels commands of a running robot.
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    at: Where,
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Debug, Subcommand)]
+enum What {
+    /// Prints all commands with their arguments, and what runs.
+    List {
+        /// Prints an object instead of the table.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Starts one, waits for its end and prints its result. If this is interrupted, the command runs on.
+    Run {
+        /// The path, such as `command/drive`, or `drive`.
+        path: String,
+        /// The arguments as a JSON object; by default those of the command.
+        arguments: Option<String>,
+        /// Prints the number of the execution, and does not wait.
+        #[arg(long)]
+        detach: bool,
+        /// Prints an object instead of the result.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Cancels what runs, whoever has started it.
+    Cancel {
+        /// The number of the execution, as `bb command list` and `bb top` print it.
+        execution: u64,
+        /// Prints an object instead of a word.
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
+    let mut robot = arguments.at.connect()?;
+    match &arguments.what {
+        What::List { json } => {
+            let executions = robot.report()?["executions"].take();
+            if *json {
+                let commands = &robot.description()["commands"];
+                return say(&format!("{}\n", json!({"commands": commands, "executions": executions})));
+            }
+            say(&(table(robot.listed("commands")) + &running(&executions)))
+        }
+        What::Run { path, arguments, detach, json } => {
+            let path = robot.element("commands", "command/", path)?["path"].clone();
+            let mut ask = json!({"path": path});
+            if let Some(arguments) = arguments {
+                ask["arguments"] = serde_json::from_str(arguments)
+                    .map_err(|error| format!("the arguments are not JSON: {error}"))?;
+            }
+            let execution = robot.ask("start", ask)?["execution"].clone();
+            if *detach {
+                let text = if *json { json!({"execution": execution}).to_string() } else { execution.to_string() };
+                return say(&format!("{text}\n"));
+            }
+            loop {
+                let message = robot.next()?;
+                if message["op"] != "result" || message["execution"] != execution {
+                    continue;
+                }
+                if let Some(error) = message["error"].as_str() {
+                    return Err(error.to_owned());
+                }
+                let value = &message["value"];
+                let text = if *json { json!({"execution": execution, "value": value}) } else { value.clone() };
+                return say(&format!("{text}\n"));
+            }
+        }
+        What::Cancel { execution, json } => {
+            robot.ask("cancel", json!({"execution": execution}))?;
+            say(&if *json { format!("{}\n", json!({"cancelled": execution})) } else { "cancelled\n".to_owned() })
+        }
+    }
+}
+
+fn table(commands: &[Value]) -> String {
+    let head = ["command", "in the states", "arguments"].map(str::to_owned);
+    let rows = commands.iter().map(|one| {
+        let states = one["allowed_states"].as_array().map(|states| {
+            let names: Vec<&str> = states.iter().filter_map(Value::as_str).collect();
+            names.join(", ")
+        });
+        let by_role = match one["role"].as_str() {
+            Some("arming") => "disarmed",
+            Some("disarming") => "all but disarmed",
+            _ => "idle",
+        };
+        let defaults = &one["defaults"];
+        let defaults = if defaults.as_object().is_none_or(|all| all.is_empty()) {
+            String::new()
+        } else {
+            defaults.to_string()
+        };
+        let path = one["path"].as_str().unwrap_or_default().to_owned();
+        [path, states.unwrap_or_else(|| by_role.to_owned()), defaults]
+    });
+    let rows: Vec<_> = std::iter::once(head).chain(rows).collect();
+    aligned(&rows, 3, usize::MAX)
+}
+
+fn running(executions: &Value) -> String {
+    let all = executions.as_array().map_or(&[][..], Vec::as_slice);
+    if all.is_empty() {
+        return "\nnothing runs\n".to_owned();
+    }
+    let lines = all.iter().map(|one| {
+        let text = |name: &str| one[name].as_str().unwrap_or_default();
+        format!("runs: {} {}, started by {}\n", one["number"], text("path"), text("caller"))
+    });
+    format!("\n{}", lines.collect::<String>())
+}

@@ -1,0 +1,152 @@
+//! A connection to a running robot.
+
+use super::address::Address;
+use serde_json::{Value, json};
+use std::collections::VecDeque;
+use std::net::TcpStream;
+use std::time::Duration;
+use tungstenite::{Message, WebSocket};
+
+/// The version of the protocol.
+const VERSION: u64 = 1;
+/// A robot that says nothing for so long is gone; it sends reports all the time.
+const SILENCE: Duration = Duration::from_secs(10);
+
+/// A running robot.
+pub(super) struct Robot {
+    socket: WebSocket<TcpStream>,
+    host: String,
+    next: u64,
+    /// Messages that came while an answer was awaited.
+    kept: VecDeque<Value>,
+    /// Who it is, what it consists of, and what this connection may do.
+    pub(super) welcome: Value,
+}
+
+impl Robot {
+    pub(super) fn connect(address: &Address, name: Option<&str>) -> Result<Self, String> {
+        let host = &address.host;
+        let failed = |why: String| format!("no robot at {host}: {why}");
+        let stream = TcpStream::connect(host).map_err(|error| failed(error.to_string()))?;
+        let _ = stream.set_nodelay(true);
+        stream.set_read_timeout(Some(SILENCE)).map_err(|error| failed(error.to_string()))?;
+        stream.set_write_timeout(Some(SILENCE)).map_err(|error| failed(error.to_string()))?;
+        let (mut socket, _) =
+            tungstenite::client(format!("ws://{host}/ws"), stream).map_err(|error| failed(error.to_string()))?;
+        let mut hello = json!({"op": "hello", "version": VERSION, "client": "bb"});
+        if let Some(token) = &address.token {
+            hello["token"] = token.as_str().into();
+        }
+        if let Some(name) = name {
+            hello["robot"] = name.into();
+        }
+        socket.send(Message::text(hello.to_string())).map_err(|error| failed(error.to_string()))?;
+        let mut robot = Self { socket, host: host.clone(), next: 1, kept: VecDeque::new(), welcome: Value::Null };
+        robot.welcome = robot.receive()?;
+        if address.token.is_some() && robot.welcome["rights"].as_array().is_some_and(|rights| rights.len() < 2) {
+            return Err(failed(
+                "the token is wrong, or of a run before; take the address that the dashboard prints".into(),
+            ));
+        }
+        Ok(robot)
+    }
+
+    /// What it consists of.
+    pub(super) fn description(&self) -> &Value {
+        &self.welcome["description"]
+    }
+
+    /// The elements of a list of the description.
+    pub(super) fn listed(&self, list: &str) -> &[Value] {
+        self.description()[list].as_array().map_or(&[], Vec::as_slice)
+    }
+
+    /// The element of a list with that path, which may lack its `prefix`; the error names the nearest one.
+    pub(super) fn element(&self, list: &str, prefix: &str, path: &str) -> Result<&Value, String> {
+        let long = format!("{prefix}{path}");
+        let elements = self.listed(list);
+        let found = elements.iter().find(|one| one["path"] == path || one["path"] == long.as_str());
+        found.ok_or_else(|| {
+            let mut paths: Vec<&str> = elements.iter().filter_map(|one| one["path"].as_str()).collect();
+            paths.sort_by_key(|known| distance(known, path).min(distance(known, &long)));
+            match paths.first() {
+                Some(near) => format!("the robot has no `{path}`; did you mean `{near}`?"),
+                None => format!("the robot has no `{path}`"),
+            }
+        })
+    }
+
+    /// The next message.
+    pub(super) fn next(&mut self) -> Result<Value, String> {
+        match self.kept.pop_front() {
+            Some(message) => Ok(message),
+            None => self.receive(),
+        }
+    }
+
+    /// The next report.
+    pub(super) fn report(&mut self) -> Result<Value, String> {
+        loop {
+            if let Some(report) = self.next()?.get_mut("report") {
+                return Ok(report.take());
+            }
+        }
+    }
+
+    /// Makes a request, and returns its answer.
+    pub(super) fn ask(&mut self, op: &str, mut more: Value) -> Result<Value, String> {
+        let id = self.next;
+        self.next += 1;
+        more["op"] = op.into();
+        more["id"] = id.into();
+        self.socket.send(Message::text(more.to_string())).map_err(|_| self.gone())?;
+        loop {
+            let message = self.receive()?;
+            if message["op"] != "answer" || message["id"] != id {
+                self.kept.push_back(message);
+                continue;
+            }
+            return match message["error"].as_str() {
+                Some(error) => Err(error.to_owned()),
+                None => Ok(message),
+            };
+        }
+    }
+
+    fn receive(&mut self) -> Result<Value, String> {
+        loop {
+            match self.socket.read() {
+                Ok(Message::Text(text)) => {
+                    let message: Value = serde_json::from_str(text.as_str())
+                        .map_err(|error| format!("{} does not speak our protocol: {error}", self.host))?;
+                    match message["error"].as_str() {
+                        Some(error) if message["op"] == "error" => return Err(format!("{}: {error}", self.host)),
+                        _ => return Ok(message),
+                    }
+                }
+                Ok(Message::Ping(_) | Message::Pong(_)) => {}
+                Ok(_) | Err(_) => return Err(self.gone()),
+            }
+        }
+    }
+
+    fn gone(&self) -> String {
+        format!("the robot at {} is gone", self.host)
+    }
+}
+
+/// The number of changes between two words.
+fn distance(one: &str, other: &str) -> usize {
+    let other: Vec<char> = other.chars().collect();
+    let mut row: Vec<usize> = (0..=other.len()).collect();
+    for (index, letter) in one.chars().enumerate() {
+        let mut before = index;
+        row[0] = index + 1;
+        for (column, wanted) in other.iter().enumerate() {
+            let change = before + usize::from(letter != *wanted);
+            before = row[column + 1];
+            row[column + 1] = change.min(before + 1).min(row[column] + 1);
+        }
+    }
+    row[other.len()]
+}

@@ -1,0 +1,19 @@
+//! What all connections use.
+
+use crate::connections::Open;
+use crate::gate::Gate;
+use crate::guests::Guests;
+use crate::hub::Hub;
+use crate::options::Settings;
+use crate::token::Token;
+
+/// What all connections use.
+#[derive(Debug)]
+pub(crate) struct Shared {
+    pub(crate) hubs: Vec<Hub>,
+    pub(crate) settings: Settings,
+    pub(crate) token: Token,
+    pub(crate) guests: Guests,
+    pub(crate) gate: Gate,
+    pub(crate) open: Open,
+}
