@@ -9,6 +9,7 @@
 //! magnetometer. Samples are integrated at once, errors propagated once per window. The offset of the magnetometer is a
 //! hypothesis beside the filter; see `offset.rs`. `numbers.rs` has all numbers, and `docs/attitude-filter.md` the equations.
 
+mod doubt;
 mod errors;
 mod field;
 mod filter;

@@ -3,7 +3,7 @@
 use nalgebra::{Vector2, Vector3};
 
 use super::numbers::{
-    AT_REST, BRIEF_S, DISTURBANCE, FAST, HEADING_NOISE, LONG_S, NEW_FIELD_S, SAME_FIELD, SHORT_S,
+    AT_REST, BRIEF_S, CALIBRATED, DISTURBANCE, HEADING_NOISE, LONG_S, NEW_FIELD_S, SAME_FIELD, SHORT_S,
 };
 use crate::attitude::Real;
 
@@ -18,6 +18,11 @@ pub(super) struct Field<T: Real> {
     lasted_s: T,
     /// Squared distance from the reference, as a fraction of its norm: the largest of late.
     disturbance: T,
+    /// Present distance from the reference, as a fraction of its norm; how far the filter has followed such distances, with the
+    /// gain of its heading; and the mean square of that.
+    off: Vector2<T>,
+    followed: Vector2<T>,
+    scatter: T,
 }
 
 /// Evidence of a window on the heading.
@@ -31,21 +36,53 @@ pub(super) struct Verdict<T> {
 impl<T: Real> Field<T> {
     pub(super) fn new(field: &Vector3<T>) -> Self {
         let plane = in_plane(field);
-        Self { reference: plane, seen_s: T::ZERO, candidate: plane, lasted_s: T::ZERO, disturbance: T::ZERO }
+        Self {
+            reference: plane,
+            seen_s: T::ZERO,
+            candidate: plane,
+            lasted_s: T::ZERO,
+            disturbance: T::ZERO,
+            off: Vector2::zeros(),
+            followed: Vector2::zeros(),
+            scatter: T::of(CALIBRATED * CALIBRATED),
+        }
     }
 
     pub(super) fn horizontal(&self) -> T {
         self.reference.x
     }
 
+    /// The vertical part over the horizontal one.
+    pub(super) fn dip(&self) -> T {
+        self.reference.y / self.effective_horizontal()
+    }
+
+    fn effective_horizontal(&self) -> T {
+        self.reference.x.max(T::of(LEAST_HORIZONTAL) * self.reference.norm())
+    }
+
+    /// Variance of the heading by what is wrong in the field for long, rad², with the expected square of an offset's part.
+    /// The part across the field, which turns the heading, is not seen, but as large as each of the two that are.
+    pub(super) fn variance(&self, offset: T) -> T {
+        (T::HALF * self.scatter + offset) * self.reference.norm_squared() / self.effective_horizontal().powi(2)
+    }
+
+    /// Adds that the heading was corrected towards the field by this part of what was missing.
+    pub(super) fn follow(&mut self, gain: T, dt: T, moved_s: T) {
+        self.followed += (self.off - self.followed) * gain;
+        let squared = self.followed.norm_squared();
+        // A body at rest sees one place, which tells that fields are wrong here, but not that they are right.
+        let seen_s = if squared > self.scatter { dt } else { moved_s };
+        self.scatter += (squared - self.scatter) * (seen_s / (self.seen_s.min(T::of(LONG_S)) + T::of(SHORT_S)));
+    }
+
     pub(super) fn is_disturbed(&self) -> bool {
         self.disturbance > T::of(SAME_FIELD * SAME_FIELD)
     }
 
-    /// Adds the mean field of a window of `dt` seconds, in which the mean square of the angular velocity was `squared_rate`.
-    pub(super) fn observe(&mut self, dt: T, field: &Vector3<T>, squared_rate: T) -> Verdict<T> {
+    /// Adds the mean field of a window of `dt` seconds, in `moved_s` of which the body was leaving its place.
+    pub(super) fn observe(&mut self, dt: T, field: &Vector3<T>, moved_s: T) -> Verdict<T> {
         let plane = in_plane(field);
-        let moved_s = if squared_rate > T::of(FAST * FAST) { dt } else { T::ZERO };
         let same = T::of(SAME_FIELD * SAME_FIELD);
         let mut squared = (plane - self.reference).norm_squared() / self.reference.norm_squared();
         let mut is_calm = squared < same;
@@ -71,6 +108,8 @@ impl<T: Real> Field<T> {
         }
         // A field that is off by its norm tells nothing more.
         squared = squared.min(T::ONE);
+        let off = (plane - self.reference) / self.reference.norm();
+        self.off = off / off.norm().max(T::ONE);
         let faded = self.disturbance + (squared - self.disturbance) * (dt / T::of(BRIEF_S)).min(T::ONE);
         self.disturbance = squared.max(faded);
         let known_s = self.seen_s + T::of(0.1);
@@ -82,9 +121,12 @@ impl<T: Real> Field<T> {
     }
 }
 
+/// The least part of a field that counts as horizontal.
+const LEAST_HORIZONTAL: f64 = 0.05;
+
 /// The horizontal part of a field, but at least a twentieth of it.
 pub(super) fn effective_horizontal<T: Real>(field: &Vector3<T>) -> T {
-    field.xy().norm().max(T::of(0.05) * field.norm())
+    field.xy().norm().max(T::of(LEAST_HORIZONTAL) * field.norm())
 }
 
 fn in_plane<T: Real>(field: &Vector3<T>) -> Vector2<T> {

@@ -1,7 +1,8 @@
 //! One step of the filter: strapdown integration with every sample, errors once per window.
 
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector2, Vector3};
 
+use super::doubt::Doubt;
 use super::errors::{
     BIAS, Errors, HEADING, LAG, ProcessNoise, ROTATION, VELOCITY, about_vertical, nothing, tilt_and_velocity,
 };
@@ -41,6 +42,7 @@ pub struct MekfFilter<T: Real = f64> {
     force_s: T,
     /// Mean of late of what the field says the heading is off by, rad.
     missed: T,
+    doubt: Doubt<T>,
     is_north_known: bool,
     last_field: Vector3<T>,
     field: Option<Field<T>>,
@@ -74,6 +76,7 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
             force: Vector3::zeros(),
             force_s: T::ZERO,
             missed: T::ZERO,
+            doubt: Doubt::new(),
             is_north_known: false,
             last_field: Vector3::zeros(),
             field: None,
@@ -148,7 +151,7 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
 
     fn orientation_uncertainty(&self) -> Option<Matrix3<T>> {
         self.state.world_from_body()?;
-        Some(self.rotation.transpose() * self.errors.block(ROTATION) * self.rotation)
+        Some(self.rotation.transpose() * self.uncertainty() * self.rotation)
     }
 
     fn is_at_rest(&self) -> Option<bool> {
@@ -160,7 +163,7 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
     }
 
     fn is_heading_trusted(&self) -> Option<bool> {
-        let is_trusted = self.is_north_known && self.errors.variance(HEADING) < square(TRUSTED);
+        let is_trusted = self.is_north_known && self.uncertainty()[(HEADING, HEADING)] < square(TRUSTED);
         self.params.magnetometer.is_used().then_some(is_trusted)
     }
 
@@ -176,6 +179,11 @@ impl<T: Real> MekfFilter<T> {
     /// field's unit. Zero until there is evidence for one.
     pub fn magnetometer_offset(&self) -> Vector3<T> {
         self.iron.offset()
+    }
+
+    /// Covariance of the rotation error in the world, rad².
+    fn uncertainty(&self) -> Matrix3<T> {
+        self.doubt.covariance(self.errors.block(ROTATION), &self.force, self.field.as_ref(), &self.iron)
     }
 
     /// After a start from a sample, the first one or the one after a gap.
@@ -212,6 +220,7 @@ impl<T: Real> MekfFilter<T> {
         self.window = Window::new();
         (self.force, self.force_s) = (Vector3::zeros(), T::ZERO);
         self.missed = T::ZERO;
+        self.doubt.begin();
         self.iron.interrupt();
     }
 
@@ -224,6 +233,7 @@ impl<T: Real> MekfFilter<T> {
         let lasting = T::of(BRIEF_S) * (T::ONE - (-dt / T::of(BRIEF_S)).exp());
         let orientation = turn(&orientation, &(mean * lasting));
         self.rotation = *orientation.to_rotation_matrix().matrix();
+        self.doubt.begin();
         let turned = (self.squared_rate * dt * dt).min(T::of(ANY_ANGLE));
         for axis in 0..3 {
             self.errors.doubt(ROTATION + axis, turned);
@@ -270,6 +280,7 @@ impl<T: Real> MekfFilter<T> {
     fn forget_field(&mut self) {
         self.field = None;
         self.window.forget_fields();
+        self.doubt.begin();
     }
 
     /// Ends a window: propagates the errors, and corrects them by what it tells.
@@ -303,6 +314,8 @@ impl<T: Real> MekfFilter<T> {
                 self.errors.correct([(state, T::ONE)], -value, variance, |shared| about_vertical(&up, shared));
             }
         }
+        let corrected = Vector2::new(self.errors.value[ROTATION], self.errors.value[ROTATION + 1]);
+        self.doubt.correct_tilt(dt, corrected);
         if self.rest.is_detected() {
             self.fuse_rest(dt, &(window.measured_turn / dt));
         }
@@ -351,9 +364,11 @@ impl<T: Real> MekfFilter<T> {
     fn fuse_field(&mut self, dt: T, mean: &MeanField<T>, squared_rate: T) {
         let MeanField { field, rate } = mean;
         let reference = self.field.get_or_insert_with(|| Field::new(field));
-        let verdict = reference.observe(dt, field, squared_rate);
+        let moved_s = if squared_rate > square(FAST) { dt } else { T::ZERO };
+        let verdict = reference.observe(dt, field, moved_s);
         if verdict.is_new {
             self.errors.doubt(HEADING, square(UNKNOWN));
+            self.doubt.begin();
         }
         let horizontal = effective_horizontal(field);
         let (east, north) = (field.x / horizontal, field.y / horizontal);
@@ -378,6 +393,9 @@ impl<T: Real> MekfFilter<T> {
             self.forget_field();
             return;
         }
+        let variance = self.errors.variance(HEADING);
+        self.doubt.miss_heading(dt, self.missed, variance, noise);
+        reference.follow(variance / (variance + noise / dt), dt, moved_s);
         self.errors.correct(slopes, residual, noise / dt, tilt_and_velocity);
     }
 }

@@ -31,6 +31,9 @@ pub(super) const ANY_ANGLE: f64 = 3.0;
 /// Cosine of the largest angle between the vertical and the mean specific force of some seconds: 45°, a horizontal
 /// acceleration of the weight.
 pub(super) const OVERTURNED: f64 = 0.7;
+/// Standard deviation of the mean specific force of some seconds, m/s²: of the accelerometer's bias, and of what does not
+/// cancel.
+pub(super) const MEAN_FORCE: f64 = 1.0;
 /// Standard gravity, m/s².
 pub(super) const GRAVITY: f64 = 9.80665;
 

@@ -163,6 +163,18 @@ impl<T: Real> HardIron<T> {
         if self.is_offset { self.incumbent.variance() * scale * scale } else { T::ZERO }
     }
 
+    /// Expected square of the error of the offset along an axis, as a fraction of the field's norm: by even odds at first, the
+    /// newcomer's is the true one.
+    pub(super) fn doubt(&self) -> T {
+        let known = if self.is_offset { self.incumbent.variance() } else { T::ZERO };
+        if self.is_calibrated {
+            return known;
+        }
+        let moved = (self.newcomer.offset - self.believed()).norm_squared() / T::of(3.0);
+        let odds = (self.odds + T::of(ODDS)).min(T::ZERO).exp();
+        known + (moved + self.newcomer.variance()) * odds / (T::ONE + odds)
+    }
+
     /// The norm of the world's field, zero before it is known.
     pub(super) fn scale(&self) -> T {
         self.scale.unwrap_or(T::ZERO)

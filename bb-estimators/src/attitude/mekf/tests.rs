@@ -71,13 +71,18 @@ fn deviations(filter: &MekfFilter) -> (f64, f64) {
     (tilt.to_degrees(), in_world[(2, 2)].sqrt().to_degrees())
 }
 
+/// A filter whose magnetometer has no offset: nobody who rests can find out.
+fn calibrated() -> MekfFilter {
+    MekfFilter::new(MekfParams { magnetometer: Magnetometer::Calibrated, ..MekfParams::default() }).unwrap()
+}
+
 /// At 10 and 5 Hz, slower than what is a gap elsewhere: it corrects as at 100 Hz.
 #[test]
 fn a_slow_sensor_is_no_sensor_with_gaps() {
     for every in [10, 20] {
         let mut world = World::new();
         world.bias = Vector3::new(0.01, -0.01, 0.01);
-        let mut filter: MekfFilter = filter(true);
+        let mut filter = calibrated();
         let mut mean = Vector3::zeros();
         for i in 1..=120 * 100 {
             let sample = world.sample(false);
@@ -127,11 +132,21 @@ fn an_offset_is_found_and_its_heading_with_it() {
 
 #[test]
 fn a_calibrated_magnetometer_is_not_doubted() {
-    let params = MekfParams { magnetometer: Magnetometer::Calibrated, ..MekfParams::default() };
-    let (mut world, mut filter) = (World::new(), MekfFilter::<f64>::new(params).unwrap());
+    let (mut world, mut filter) = (World::new(), calibrated());
     world.magnet = Vector3::new(30e-6, 0.0, 0.0);
     world.run(&mut filter, 20, true);
     assert_eq!(filter.magnetometer_offset(), Vector3::zeros());
+}
+
+#[test]
+fn a_heading_at_rest_is_trusted_of_a_calibrated_magnetometer_only() {
+    for (mut filter, at_rest) in [(calibrated(), true), (filter(true), false)] {
+        let mut world = World::new();
+        world.run(&mut filter, 30, false);
+        assert_eq!(filter.is_heading_trusted(), Some(at_rest), "{:?}", deviations(&filter));
+        world.run(&mut filter, 30, true);
+        assert_eq!(filter.is_heading_trusted(), Some(true), "{:?}", deviations(&filter));
+    }
 }
 
 #[test]
