@@ -1,7 +1,7 @@
 //! One request on one connection: its head is read within limits, and answered.
 
 use std::io::{self, Read, Write};
-use std::net::TcpStream;
+use std::net::{IpAddr, TcpStream};
 use std::time::{Duration, Instant};
 
 /// What a head may be long. Prometheus' is below 500 bytes.
@@ -16,6 +16,7 @@ enum Answer {
     Metrics { with_body: bool },
     NotFound,
     NotAllowed,
+    OtherHost,
     Bad,
     TooLong,
     TooSlow,
@@ -27,12 +28,13 @@ enum Answer {
 /// The client has gone, or does not accept the answer.
 pub(crate) fn serve(mut stream: TcpStream, render: &dyn Fn() -> String) -> io::Result<()> {
     stream.set_write_timeout(Some(PATIENCE))?;
-    let answer = read(&mut stream)?;
+    let is_local = stream.local_addr()?.ip().is_loopback();
+    let answer = read(&mut stream, is_local)?;
     write(&mut stream, answer, render)?;
     stream.shutdown(std::net::Shutdown::Write)
 }
 
-fn read(stream: &mut TcpStream) -> io::Result<Answer> {
+fn read(stream: &mut TcpStream, is_local: bool) -> io::Result<Answer> {
     let deadline = Instant::now() + PATIENCE;
     let mut head = [0; LONGEST_HEAD];
     let mut length = 0;
@@ -51,7 +53,7 @@ fn read(stream: &mut TcpStream) -> io::Result<Answer> {
             }
             Err(error) => return Err(error),
         }
-        match answer(&head[..length]) {
+        match answer(&head[..length], is_local) {
             Some(answer) => return Ok(answer),
             None if length == LONGEST_HEAD => return Ok(Answer::TooLong),
             None => {}
@@ -59,8 +61,9 @@ fn read(stream: &mut TcpStream) -> io::Result<Answer> {
     }
 }
 
-/// The answer to a head; `None` if it is incomplete.
-fn answer(head: &[u8]) -> Option<Answer> {
+/// The answer to a head; `None` if it is incomplete. At the loopback device only requests by its own names are answered: a page of another
+/// site whose name leads there (DNS rebinding) does not read the counts.
+fn answer(head: &[u8], is_local: bool) -> Option<Answer> {
     let mut headers = [httparse::EMPTY_HEADER; MOST_HEADERS];
     let mut request = httparse::Request::new(&mut headers);
     match request.parse(head) {
@@ -68,6 +71,10 @@ fn answer(head: &[u8]) -> Option<Answer> {
         Ok(httparse::Status::Complete(_)) => {}
         Err(httparse::Error::TooManyHeaders) => return Some(Answer::TooLong),
         Err(_) => return Some(Answer::Bad),
+    }
+    let mut hosts = request.headers.iter().filter(|header| header.name.eq_ignore_ascii_case("host"));
+    if is_local && !hosts.all(|host| names_this_machine(host.value)) {
+        return Some(Answer::OtherHost);
     }
     let path = request.path.unwrap_or("").split('?').next().unwrap_or("");
     Some(match (path, request.method) {
@@ -78,6 +85,16 @@ fn answer(head: &[u8]) -> Option<Answer> {
     })
 }
 
+/// Whether a host, with any port, is a name of the loopback device.
+fn names_this_machine(host: &[u8]) -> bool {
+    let Ok(host) = std::str::from_utf8(host) else { return false };
+    let host = host.trim();
+    let is_port = |port: &str| !port.is_empty() && port.chars().all(|digit| digit.is_ascii_digit());
+    let name = host.rsplit_once(':').filter(|(_, port)| is_port(port)).map_or(host, |(name, _)| name);
+    name.eq_ignore_ascii_case("localhost")
+        || name.trim_start_matches('[').trim_end_matches(']').parse::<IpAddr>().is_ok_and(|ip| ip.is_loopback())
+}
+
 fn write(stream: &mut TcpStream, answer: Answer, render: &dyn Fn() -> String) -> io::Result<()> {
     const OPEN_METRICS: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
     const PLAIN: &str = "text/plain; charset=utf-8";
@@ -85,6 +102,7 @@ fn write(stream: &mut TcpStream, answer: Answer, render: &dyn Fn() -> String) ->
         Answer::Metrics { .. } => ("200 OK", OPEN_METRICS, render()),
         Answer::NotFound => ("404 Not Found", PLAIN, "the metrics are at /metrics\n".into()),
         Answer::NotAllowed => ("405 Method Not Allowed\r\nAllow: GET, HEAD", PLAIN, "only GET and HEAD\n".into()),
+        Answer::OtherHost => ("403 Forbidden", PLAIN, "this is not a name of the loopback device\n".into()),
         Answer::Bad => ("400 Bad Request", PLAIN, "this is no HTTP request\n".into()),
         Answer::TooLong => ("431 Request Header Fields Too Large", PLAIN, "the head is too long\n".into()),
         Answer::TooSlow => ("408 Request Timeout", PLAIN, "the request took too long\n".into()),
@@ -117,9 +135,31 @@ mod tests {
             ("GET /metrics FTP/1.1\r\n\r\n", Some(Answer::Bad)),
         ];
         for (head, expected) in rows {
-            assert_eq!(answer(head.as_bytes()), expected, "{head:?}");
+            assert_eq!(answer(head.as_bytes(), false), expected, "{head:?}");
         }
         let many = format!("GET /metrics HTTP/1.1\r\n{}\r\n", "a: b\r\n".repeat(MOST_HEADERS + 1));
-        assert_eq!(answer(many.as_bytes()), Some(Answer::TooLong));
+        assert_eq!(answer(many.as_bytes(), false), Some(Answer::TooLong));
+    }
+
+    #[test]
+    fn at_the_loopback_device_only_its_names_are_answered() {
+        let answered = |host: &str| {
+            let head = format!("GET /metrics HTTP/1.1\r\nHost: {host}\r\n\r\n");
+            answer(head.as_bytes(), true) == Some(Answer::Metrics { with_body: true })
+        };
+        for host in
+            ["localhost", "LocalHost:9464", "127.0.0.1", "127.0.0.1:9464", "127.1.2.3:1", "[::1]:9464", "[::1]"]
+        {
+            assert!(answered(host), "{host}");
+        }
+        for host in
+            ["evil.example", "evil.example:9464", "localhost.evil.example", "192.168.0.1:9464", "", "localhost:x"]
+        {
+            assert!(!answered(host), "{host}");
+        }
+        let twice = b"GET /metrics HTTP/1.1\r\nHost: localhost\r\nhost: evil.example\r\n\r\n";
+        assert_eq!(answer(twice, true), Some(Answer::OtherHost));
+        assert_eq!(answer(b"GET /metrics HTTP/1.0\r\n\r\n", true), Some(Answer::Metrics { with_body: true }));
+        assert_eq!(answer(twice, false), Some(Answer::Metrics { with_body: true }));
     }
 }

@@ -96,7 +96,7 @@ fn ask(address: SocketAddr, request: &[u8]) -> (String, String) {
 
 /// Series, without the robot's label, with their values. Checks the format's requirements on the way.
 fn scrape(server: &Server) -> BTreeMap<String, f64> {
-    let (head, body) = ask(server.address(), b"GET /metrics HTTP/1.1\r\nHost: robot\r\n\r\n");
+    let (head, body) = ask(server.address(), b"GET /metrics HTTP/1.1\r\nHost: localhost\r\n\r\n");
     assert!(head.starts_with("HTTP/1.1 200 OK\r\n") && head.contains("application/openmetrics-text"), "{head}");
     assert!(head.contains(&format!("Content-Length: {}\r\n", body.len())), "{head}");
     parse(&body)
