@@ -393,15 +393,18 @@ export class Views {
       Object.assign(measured, { type: "range", min: low, max: high, step: "any", disabled: true });
       measured.setAttribute("aria-label", `${joint.name}, measured`);
       tile.append(measured);
+      let target = null, isTouched = false;
       const actuator = joint.actuators.map((path) => this.robot.description.components.find((one) => one.path === path)).find((one) => one && position(one.command, 0) !== undefined);
       if (actuator) {
-        const slider = make("input"), target = make("span", "value", "–");
+        const slider = make("input"), wanted = make("span", "value", "–");
+        target = slider;
         Object.assign(slider, { type: "range", min: low, max: high, step: (high - low) / 500, value: 0, disabled: !this.app.may("actuators") });
         slider.setAttribute("aria-label", `${joint.name}, target`);
         let next, isBusy = false;
         slider.oninput = async () => {
           next = Number(slider.value);
-          set(target, `${short(next)} ${unit}`);
+          isTouched = true;
+          set(wanted, `${short(next)} ${unit}`);
           if (isBusy) return;
           isBusy = true;
           while (next !== undefined) {
@@ -416,10 +419,12 @@ export class Views {
           }
           isBusy = false;
         };
-        tile.append(make("label", "", "Target", slider), target, error);
+        tile.append(make("label", "", "Target", slider), wanted, error);
       }
       this.tiles.set(joint.name, (state) => {
         const at = state?.position[0];
+        // Whoever moves the target first moves it from where the joint is.
+        if (target && !isTouched && at !== undefined) target.value = at;
         const degrees = unit === "rad" && at !== undefined ? ` (${short(Number((at * 180 / Math.PI).toFixed(1)))}°)` : "";
         set(value, at === undefined ? "unknown" : `${short(at)} ${unit}${degrees}${state.stale ? ", stale" : ""}`);
         value.className = `value ${state?.stale ? "error" : ""}`;

@@ -89,7 +89,9 @@ fn measure(times: &Mutex<Vec<u64>>, during: impl FnOnce()) -> Cost {
 fn watch(dashboard: &Dashboard, stop: &AtomicBool, frames: &AtomicU64) -> Result<(), Box<dyn Error>> {
     let address = dashboard.address();
     let (mut socket, _) = tungstenite::client(format!("ws://{address}/ws"), TcpStream::connect(address)?)?;
-    socket.send(Message::text(r#"{"op":"hello","version":1}"#))?;
+    // With the token: readers make room for others.
+    let token = dashboard.url().split("#token=").nth(1).unwrap_or_default().to_owned();
+    socket.send(Message::text(format!(r#"{{"op":"hello","version":1,"token":"{token}"}}"#)))?;
     let paths: Vec<String> = (0..10).map(|number| format!("\"sensor/base/s{number}\"")).collect();
     socket.send(Message::text(format!(r#"{{"op":"watch","id":1,"paths":[{}]}}"#, paths.join(","))))?;
     while !stop.load(Ordering::Relaxed) {
