@@ -19,6 +19,8 @@ pub(super) struct Robot {
     next: u64,
     /// Messages that came while an answer was awaited.
     kept: VecDeque<Value>,
+    /// Whether a report has come. The first is the last one that was made, perhaps before this connection.
+    has_report: bool,
     /// Who it is, what it consists of, and what this connection may do.
     pub(super) welcome: Value,
 }
@@ -41,7 +43,14 @@ impl Robot {
             hello["robot"] = name.into();
         }
         socket.send(Message::text(hello.to_string())).map_err(|error| failed(error.to_string()))?;
-        let mut robot = Self { socket, host: host.clone(), next: 1, kept: VecDeque::new(), welcome: Value::Null };
+        let mut robot = Self {
+            socket,
+            host: host.clone(),
+            next: 1,
+            kept: VecDeque::new(),
+            has_report: false,
+            welcome: Value::Null,
+        };
         robot.welcome = robot.receive()?;
         if address.token.is_some() && robot.welcome["rights"].as_array().is_some_and(|rights| rights.len() < 2) {
             return Err(failed(
@@ -84,10 +93,12 @@ impl Robot {
         }
     }
 
-    /// The next report.
+    /// The next report that was made since the connection.
     pub(super) fn report(&mut self) -> Result<Value, String> {
         loop {
-            if let Some(report) = self.next()?.get_mut("report") {
+            if let Some(report) = self.next()?.get_mut("report")
+                && std::mem::replace(&mut self.has_report, true)
+            {
                 return Ok(report.take());
             }
         }
