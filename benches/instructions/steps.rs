@@ -41,14 +41,14 @@ pub(crate) const STEPS: &[Step] = &[
         name: "eskf/sample",
         on: None,
         steps: USUAL,
-        stored: 4830.0,
+        stored: 4884.0,
         run: |steps| eskf(steps, |_, _, _| Ok(())),
     },
     Step {
         name: "eskf/update_3_with_gate",
         on: Some("eskf/sample"),
         steps: USUAL,
-        stored: 5742.0,
+        stored: 19_644.0,
         run: |steps| {
             eskf(steps, |filter, stream, reading| {
                 let fix = GnssPosition::new(reading.position, 1.0, 1.0);
@@ -60,7 +60,7 @@ pub(crate) const STEPS: &[Step] = &[
         name: "eskf/update_1_with_gate",
         on: Some("eskf/sample"),
         steps: USUAL,
-        stored: 3083.0,
+        stored: 11_046.0,
         run: |steps| {
             eskf(steps, |filter, stream, reading| {
                 let height = Height { height: reading.position.z, deviation: 1.0 };
