@@ -37,9 +37,6 @@ pub(crate) struct NavigationArguments {
     /// Sets an option of the filter, as on the command line of a robot.
     #[arg(long = "set", value_name = "NAME=VALUE")]
     settings: Vec<NavigationSetting>,
-    /// Optional states of `eskf`, several with commas: wheel_scale, gnss_delay.
-    #[arg(long, value_name = "STATE", value_delimiter = ',')]
-    states: Vec<String>,
     /// Multiplies the noise of the IMU that the filter assumes.
     #[arg(long, value_name = "FACTOR", value_parser = factor)]
     noise_times: Option<f64>,
@@ -192,7 +189,7 @@ impl NavigationArguments {
     }
 
     fn settings(&self, filter: &NavigationFilter) -> Result<RobotSettings, String> {
-        RobotSettings::new(filter, self.robot.as_ref(), &self.settings, &self.states, self.noise_times)
+        RobotSettings::new(filter, self.robot.as_ref(), &self.settings, self.noise_times)
     }
 }
 

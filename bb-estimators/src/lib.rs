@@ -16,7 +16,7 @@
 //!
 //! | `Eskf(…)` on a link | `input imu`, driver, and any of `input gnss`, `input odometry`, `input pose` and `input magnetic_field` | `Odometry` of the link |
 //! | `Eskf<NavigationOutputs>(…)` | as before | `output odometry`, and `output status`: biases, dead reckoning, refusals |
-//! | `WheeledEskf(…)`, `Eskf<Odometry, S, { S::DIMENSION }>(…)` | as before, and `input relative` and `input pressure` for [states](navigation::States) `S` that have them | as before |
+//! | `Eskf<Odometry, S, { S::DIMENSION }>(…)` | as before, with other [states](navigation::States) `S` than those that its inputs bring | as before |
 //! | `PlanarEkf(…)` on a link | `input imu`, driver, and any of `input gnss`, `input odometry`, `input pose` and `input orientation` | `Odometry` of the link, on a plane |
 //! | `PlanarEkf<PlanarOutputs>(…)` | as before | `output odometry`, and `output status`: bias, scale of the wheels, refusals |
 //! | `OpenLoopPosition(…)` as a sensor in a joint | the reports of the joint's actuator | `JointState` |
@@ -60,11 +60,6 @@ pub use simulation::{
 #[cfg(feature = "runtime")]
 pub type Eskf<O = Odometry, S = navigation::Navigation, const N: usize = { navigation::NAVIGATION }> =
     navigation::EskfEstimator<O, S, N>;
-
-/// The same for a vehicle whose wheels wear: the scale of their speed is a state.
-#[cfg(feature = "runtime")]
-pub type WheeledEskf<O = Odometry> =
-    Eskf<O, navigation::Wheeled, { <navigation::Wheeled as navigation::States>::DIMENSION }>;
 
 /// The filter of a robot that drives on a plane, as an estimator.
 #[cfg(feature = "runtime")]

@@ -10,18 +10,19 @@
 //!
 //! [`Eskf`] is the filter, one type parameter for its optional states; [`Alignment`] finds where it starts. Sensors are
 //! values that implement [`Measurement`], see [`measurement`] for how to add one, each with a [`Stream`] that holds its gate,
-//! counts and statistics. [`History`] fuses measurements that come late at their own time. A [`Bank`] runs several
-//! filters and finds which fits; [`Navigator`] is one that is ready for use. [`planar`] has the filter of a robot that drives on
+//! counts and statistics. [`History`] fuses measurements that come late at their own time. [`Copies`] are
+//! several filters of which the likeliest is the estimate. [`planar`] has the filter of a robot that drives on
 //! a plane. `FixedLagSmoother`, with the feature `smoother`,
 //! holds the last keyframes and corrects them in hindsight.
 
 mod alignment;
-mod bank;
 mod bounds;
 #[cfg(feature = "smoother")]
 mod camera;
 pub mod chi_square;
 mod consistency;
+#[cfg(feature = "std")]
+mod copies;
 mod covariance;
 pub mod eskf;
 #[cfg(feature = "runtime")]
@@ -34,7 +35,6 @@ mod jump;
 mod layout;
 mod math;
 pub mod measurement;
-mod navigator;
 #[cfg(test)]
 mod noise;
 pub mod planar;
@@ -52,10 +52,11 @@ mod track;
 mod upkeep;
 
 pub use alignment::{Alignment, AlignmentParams};
-pub use bank::Bank;
 #[cfg(feature = "smoother")]
 pub use camera::{Camera, Seen, Undistorted};
 pub use consistency::{Consistency, nees};
+#[cfg(feature = "std")]
+pub use copies::{Copies, Ways};
 pub use eskf::{Eskf, EskfParams, GaussMarkov, ImuDensities, ImuMean, Start};
 #[cfg(feature = "runtime")]
 pub use estimator::{
@@ -70,7 +71,6 @@ pub use measurement::{
     MagneticField, MagneticHeading, Measurement, NonHolonomic, RelativePose, WheelSpeed, ZeroRotation,
     ZeroVelocity,
 };
-pub use navigator::{Aiding, Learnt, NAVIGATED, Navigated, Navigator};
 pub use propagate::Propagate;
 pub use refusal::Refusal;
 #[cfg(feature = "autodiff")]
@@ -80,8 +80,8 @@ pub use smoother::{Factor, Kernel, NavigationFactor, Preintegration, Rows};
 #[cfg(feature = "smoother")]
 pub use smoother::{FixedLagSmoother, LandmarkParams, Observation, Sighted, SmootherParams, Updated};
 pub use state::{
-    ACCELEROMETER_BIAS, Estimate, GYROSCOPE_BIAS, Keyframe, NAVIGATION, Navigation, Optional, POSITION, ROTATION,
-    States, VELOCITY, Wheeled, offset,
+    ACCELEROMETER_BIAS, Aided, Complete, Estimate, GYROSCOPE_BIAS, Keyframe, NAVIGATED, NAVIGATION, Navigated,
+    Navigation, Optional, POSITION, ROTATION, States, VELOCITY, Vehicle, offset,
 };
 pub use stream::{Counts, Stream, StreamParams};
 pub use track::{CONFIRMED, Track, TrackPoint};

@@ -1,7 +1,7 @@
 //! The robots, each with its filter: an IMU that drives it, wheels, and satellites.
 
 use bb_core::prelude::*;
-use bb_estimators::{Eskf, WheeledEskf};
+use bb_estimators::Eskf;
 
 /// What is printed of it.
 pub(crate) const FILTER: &str = "Eskf, in three dimensions";
@@ -21,7 +21,7 @@ robot! {
             origin: { xyz: [-50 cm, 20 cm, 1.5 m] };
             link antenna { sensor gnss: External<GnssFix>(); }
         }
-        estimator navigation: WheeledEskf(heading_deviation = 3 deg) {
+        estimator navigation: Eskf(heading_deviation = 3 deg, wheel_mounting = 1 deg, gnss_delay = 1 ms) {
             input imu: sensor::base::bracket::board::imu, driver;
             input gnss: sensor::base::mast::antenna::gnss, optional;
             input odometry: sensor::base::wheels, optional;
@@ -38,7 +38,7 @@ robot! {
     link base {
         sensor imu: External<Imu>();
         sensor gnss: External<GnssFix>();
-        estimator navigation: Eskf(heading_from_course = true, gyroscope_noise = 5e-3, accelerometer_noise = 0.1) {
+        estimator navigation: Eskf() {
             input imu: sensor::base::imu, driver;
             input gnss: sensor::base::gnss, optional;
             lost_after: 200 ms;

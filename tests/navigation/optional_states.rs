@@ -29,7 +29,7 @@ robot! {
         }
         estimator navigation: Eskf<NavigationOutputs, Flaws, { Flaws::DIMENSION }>(
             heading_deviation = 3 deg, gnss_lever_arm = 0.5 m, gnss_delay = 200 ms, hard_iron = 1e-5 T,
-            magnetic_deviation = 2 deg, patience = 0
+            magnetic_deviation = 2 deg
         ) {
             input imu: sensor::base::imu, driver;
             input gnss: sensor::base::mast::antenna::gnss, optional;
@@ -132,7 +132,7 @@ fn a_lever_arm_a_delay_and_a_hard_iron_are_found() -> Result<(), StartError> {
     let iron = (status.hard_iron - HARD_IRON).xy().norm();
     println!("lever arm off by {arm} m, delay by {delay} s, hard iron by {iron} T");
     assert!(arm < 0.05, "{arm} m: {}", status.gnss_lever_arm);
-    assert!(delay < 0.01, "{delay} s: {}", status.gnss_delay);
+    assert!(delay < 0.02, "{delay} s: {}", status.gnss_delay);
     assert!(iron < 8e-7, "{iron} T: {}", status.hard_iron);
     assert_eq!((status.gnss.refused, status.magnetic_field.refused, status.resets), (0, 0, 0), "{status:?}");
     // Where it is follows, with an antenna half a metre off and at 5 m/s a delay of 0.75 m: the world begins at the first fix.

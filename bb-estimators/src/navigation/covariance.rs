@@ -133,6 +133,25 @@ impl<const N: usize> Covariance<N> {
         self.rows_mut()[state][state] += variance;
     }
 
+    /// Multiplies the matrix.
+    pub(in crate::navigation) fn multiply(&mut self, factor: f64) {
+        self.matrix *= factor;
+    }
+
+    /// Adds a block between three states and three others or the same; its transpose is added too.
+    pub(in crate::navigation) fn add(&mut self, row: usize, column: usize, block: &Matrix3<f64>) {
+        let p = self.rows_mut();
+        for i in 0..3 {
+            for j in 0..3 {
+                let sum = 0.5 * (block[(i, j)] + block[(j, i)]);
+                p[row + i][column + j] += sum;
+                if row != column {
+                    p[column + j][row + i] += sum;
+                }
+            }
+        }
+    }
+
     /// Adds a common error of three states each, of unit variance times these vectors: `P ← P + v vᵀ`.
     pub(in crate::navigation) fn inflate_along(&mut self, parts: &[(usize, Vector3<f64>)]) {
         let mut along = [0.0; N];
@@ -163,6 +182,46 @@ impl<const N: usize> Covariance<N> {
         for i in 0..3 {
             for j in 0..N {
                 p[j][first + i] = p[first + i][j];
+            }
+        }
+    }
+
+    /// Transforms three states, and adds others to them: `x ← G x + D y`.
+    pub(in crate::navigation) fn transform_with(
+        &mut self,
+        first: usize,
+        own: &Matrix3<f64>,
+        other: usize,
+        by_other: &Matrix3<f64>,
+    ) {
+        let p = self.rows_mut();
+        let (x, y) = ([p[first], p[first + 1], p[first + 2]], [p[other], p[other + 1], p[other + 2]]);
+        for i in 0..3 {
+            for j in 0..N {
+                let own = own[(i, 0)] * x[0][j] + own[(i, 1)] * x[1][j] + own[(i, 2)] * x[2][j];
+                let more = by_other[(i, 0)] * y[0][j] + by_other[(i, 1)] * y[1][j] + by_other[(i, 2)] * y[2][j];
+                p[first + i][j] = own + more;
+            }
+        }
+        // The columns of the other rows are the new rows; those of the new rows are transformed once more.
+        for j in (0..N).filter(|j| !(first..first + 3).contains(j)) {
+            for i in 0..3 {
+                p[j][first + i] = p[first + i][j];
+            }
+        }
+        for i in 0..3 {
+            let row = p[first + i];
+            for k in 0..3 {
+                let own = own[(k, 0)] * row[first] + own[(k, 1)] * row[first + 1] + own[(k, 2)] * row[first + 2];
+                let more = by_other[(k, 0)] * row[other]
+                    + by_other[(k, 1)] * row[other + 1]
+                    + by_other[(k, 2)] * row[other + 2];
+                p[first + i][first + k] = own + more;
+            }
+        }
+        for i in 0..3 {
+            for k in 0..i {
+                p[first + i][first + k] = p[first + k][first + i];
             }
         }
     }

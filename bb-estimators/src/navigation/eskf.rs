@@ -30,7 +30,10 @@ mod sample;
 mod start;
 #[cfg(test)]
 mod tests;
+mod transport;
 
+#[cfg(feature = "std")]
+pub(super) use filter::Doubt;
 pub use filter::Eskf;
 #[cfg(feature = "runtime")]
 pub(crate) use params::imu_params;

@@ -1,6 +1,5 @@
 //! The error-state Kalman filter as an estimator to declare in `robot!`.
 
-mod aligning;
 pub(super) mod course;
 mod filter;
 pub(super) mod health;
@@ -12,6 +11,7 @@ mod output;
 pub(super) mod refuted;
 pub(super) mod report;
 mod running;
+mod starting;
 mod states;
 pub(super) mod world;
 
@@ -21,10 +21,10 @@ pub use options::NavigationOptions;
 pub use output::{NavigationOutput, NavigationOutputs};
 pub use report::{NavigationStatus, Verdicts};
 
-use self::aligning::Aligning;
 use self::health::Limits;
 use self::input::Mounting;
 use self::running::Core;
+use self::starting::Starting;
 use super::refusal::Refusal;
 use super::state::{NAVIGATION, Navigation, States};
 use crate::params::Params as _;
@@ -60,9 +60,10 @@ use std::marker::PhantomData;
 /// }
 /// ```
 ///
-/// `S` lists its optional [states](States), and `N` is [`States::DIMENSION`]. Related inputs and states are declared together:
-/// relative poses require `Optional::Keyframe`, pressures require `Optional::BarometerBias`, and a state needs the input that
-/// makes it observable. With `Optional::WheelScale`, wheels are assumed not to move sideways.
+/// Its inputs bring their states: the delay of fixes, the bias of a barometer, the scale of wheels and the mounting of the IMU among
+/// them, a keyframe and the scale of relative poses. Other [states](States) are declared as `S`, with `N` = [`States::DIMENSION`]:
+/// relative poses then require `Optional::Keyframe`, pressures require `Optional::BarometerBias`, and a state needs the input that
+/// makes it observable.
 ///
 /// ```
 /// # fn main() {}
@@ -99,7 +100,7 @@ use std::marker::PhantomData;
 /// ```compile_fail
 /// use bb_core::prelude::*;
 /// use bb_estimators::Eskf;
-/// use bb_estimators::navigation::Wheeled;
+/// use bb_estimators::navigation::Vehicle;
 ///
 /// robot! {
 ///     robot Rover;
@@ -107,7 +108,7 @@ use std::marker::PhantomData;
 ///     link base {
 ///         sensor imu: External<Imu>();
 ///         sensor wheels: External<Odometry>();
-///         estimator navigation: Eskf<Odometry, Wheeled, 17>() {
+///         estimator navigation: Eskf<Odometry, Vehicle, 17>() {
 ///             input imu: sensor::base::imu, driver;
 ///             input odometry: sensor::base::wheels, optional;
 ///         }
@@ -151,12 +152,12 @@ use std::marker::PhantomData;
 /// ```
 ///
 /// The world is a local tangent frame: x east, y north, z up. Its origin is the first fix that the next fix confirmed or, without
-/// satellite navigation, the position where the filter started. The filter starts after the IMU has been at rest for a second,
-/// with the heading of the options. With `heading_from_course`, it starts once three fixes show the direction of travel. Until
-/// then it emits nothing.
+/// satellite navigation, the position where the filter started. The filter starts after the IMU has been at rest for a second, or in
+/// motion once three fixes agree. Until then it emits nothing. An unknown heading is found by itself as soon as the robot moves; until
+/// then the estimator is degraded.
 ///
-/// The filter may reject fixes or poses that agree with each other and outnumber the measurements that support its estimate. In
-/// that case the filter is wrong: its position is reset to theirs, and `resets` in its status is incremented.
+/// Positions that agree with each other for 20 s, but not with the filter, move it to them, and `resets` in its status is
+/// incremented. If they are on another part of the Earth, the estimator ends, and its supervisor starts it there.
 ///
 /// Measurements are fused at the time of their stamps, up to a second late. A gate per sensor rejects outliers, and the status
 /// reports the rejections. The health of the estimator reports a position dead-reckoned for too long, an uncertainty above the
@@ -176,7 +177,7 @@ pub(super) const MOST_REFUSED: u32 = 50;
 
 #[derive(Debug)]
 enum Phase {
-    Aligning(Box<Aligning>),
+    Starting(Box<Starting>),
     Running(Box<dyn Core>),
 }
 
@@ -195,23 +196,29 @@ impl<O: NavigationOutput, S: States + Send + 'static, const N: usize> Estimator 
         }
         let mounting = Mounting::of(context)?;
         states::check::<S>(&mounting)?;
-        let phase = Phase::Aligning(Box::new(Aligning::new(&options, None)));
+        let phase = Phase::Starting(Box::new(Starting::new(&options, None)));
         Ok(Self { options, mounting, phase, refused_in_a_row: 0, types: PhantomData })
     }
 
     fn handle_input(&mut self, inputs: NavigationInputs<'_>) -> Result<Reply<O>, Fault> {
         let sample = self.mounting.sample(inputs.imu.message());
         match &mut self.phase {
-            Phase::Aligning(aligning) => {
-                let start = aligning.take(&sample, &inputs, &self.options, &self.mounting);
-                let reply = if aligning.takes_too_long() {
+            Phase::Starting(starting) => {
+                let start = starting.take(&sample, &inputs, &self.options, &self.mounting);
+                let reply = if starting.takes_too_long() {
                     Reply::none().diverged("it has neither lain still nor seen a course, and cannot start")
                 } else {
                     Reply::none()
                 };
                 if let Some((start, world)) = start {
                     let limits = self.limits();
-                    self.phase = Phase::Running(running::started::<S, N>(&self.options, &start, world, limits)?);
+                    self.phase = Phase::Running(running::started::<S, N>(
+                        &self.options,
+                        &self.mounting,
+                        &start,
+                        world,
+                        limits,
+                    )?);
                 }
                 Ok(reply)
             }
@@ -220,6 +227,12 @@ impl<O: NavigationOutput, S: States + Send + 'static, const N: usize> Estimator 
                     self.refused_in_a_row = 0;
                     if !running.is_sound() {
                         return Err(Fault::new("its estimate is no number"));
+                    }
+                    if let Some(distance) = running.elsewhere() {
+                        let km = distance * 1e-3;
+                        return Err(Fault::new(format!(
+                            "fixes agree on a place {km:.0} km away: its world is elsewhere"
+                        )));
                     }
                     let reply: Reply<O> = O::of(running.as_ref(), &self.mounting).into();
                     Ok(match running.divergence() {
@@ -230,7 +243,7 @@ impl<O: NavigationOutput, S: States + Send + 'static, const N: usize> Estimator 
                 Err(Refusal::Gap { .. }) => {
                     tracing::info!("no sample for too long: it starts again");
                     let frame = running.frame();
-                    self.phase = Phase::Aligning(Box::new(Aligning::new(&self.options, frame)));
+                    self.phase = Phase::Starting(Box::new(Starting::new(&self.options, frame)));
                     Ok(Reply::none().diverged("no sample of the IMU for too long"))
                 }
                 Err(refusal) => {

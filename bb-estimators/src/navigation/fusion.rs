@@ -16,7 +16,7 @@ pub(super) enum Sight {
     /// The position in the world.
     Position,
     /// Only the height, with the errors of the vertical motion: a bit each.
-    Height(u32),
+    Height(u64),
     /// Only the position relative to the keyframe.
     Relative,
     /// Not the position, and of the attitude only the heading.

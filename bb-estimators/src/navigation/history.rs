@@ -5,7 +5,7 @@
 //! their stamps. T. D. Larsen et al., "Incorporation of time delayed measurements in a discrete-time Kalman filter", CDC 1998,
 //! compare this with cheaper, approximate methods.
 
-use super::eskf::{ImuMean, seconds_between};
+use super::eskf::ImuMean;
 use super::fused::Fused;
 use super::propagate::Propagate;
 use super::refusal::Refusal;
@@ -165,13 +165,12 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
     ///
     /// The same as [`Propagate::propagate`]. The history is then unchanged.
     pub fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
-        // A rejected sample must not have fused any measurement.
-        let mut alone = self.now.clone();
-        alone.filter_mut().propagate(sample)?;
         if self.has_measurements_until(sample.time_ns) {
+            // A rejected sample must not have fused any measurement.
+            self.now.filter().admits(sample)?;
             self.advance(sample, None);
         } else {
-            self.now = alone;
+            self.now.filter_mut().propagate(sample)?;
         }
         self.samples.push(*sample);
         self.keep_state();
@@ -263,16 +262,12 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
     fn advance(&mut self, sample: &ImuMean, place: Option<usize>) -> Option<Result<Fused, Refusal>> {
         let mut result = None;
         let from = time_of(&self.now).unwrap_or(i64::MAX);
-        // Decided by the whole sample: its parts can be of any length.
-        let is_gap = seconds_between(from, sample.time_ns).is_ok_and(|dt| dt > self.now.filter().longest_sample());
         for (index, (time_ns, measurement)) in self.measurements.iter().enumerate() {
             if *time_ns <= from || *time_ns > sample.time_ns {
                 continue;
             }
             if time_of(&self.now) != Some(*time_ns) {
-                // The sample is a mean, so each part of it is the same.
-                let part = ImuMean { time_ns: *time_ns, ..*sample };
-                let _ = self.now.filter_mut().propagate_part(&part, is_gap);
+                let _ = self.now.filter_mut().propagate_until(*time_ns, sample, from);
             }
             let of_it = self.now.update(measurement);
             if place == Some(index) {
@@ -281,10 +276,9 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
         }
         let reached = time_of(&self.now);
         if reached == Some(from) {
-            // A whole sample is replayed as it was propagated at first: filters of a bank may differ in what is a gap.
             let _ = self.now.filter_mut().propagate(sample);
         } else if reached != Some(sample.time_ns) {
-            let _ = self.now.filter_mut().propagate_part(sample, is_gap);
+            let _ = self.now.filter_mut().propagate_until(sample.time_ns, sample, from);
         }
         result
     }

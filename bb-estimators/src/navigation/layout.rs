@@ -13,7 +13,7 @@ const LOST: f64 = 1e-4;
 const OF_HEADING: u8 = 10;
 
 /// The number of blocks.
-pub(in crate::navigation) const BLOCKS: usize = OF_HEADING as usize + 1;
+pub(in crate::navigation) const BLOCKS: usize = OF_HEADING as usize + 2;
 
 /// The block of errors that explain no misfit.
 const NEVER_RAISED: u8 = u8::MAX;
@@ -87,6 +87,7 @@ impl<const N: usize> Layout<N> {
                     layout.set(range, 8, 1e4);
                     layout.most_jump[first] = MOST_SCALE;
                 }
+                Optional::WheelMounting => layout.set(range, 11, MOST_ROTATION),
                 Optional::HardIron => layout.set(range, 9, 1e4),
                 Optional::BarometerBias => layout.set(range, 0, 1e12),
             }

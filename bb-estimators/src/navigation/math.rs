@@ -120,6 +120,27 @@ impl Integrals {
         polynomial(vector, [1.0, self.first[0], self.first[1]])
     }
 
+    /// The derivative of `Γ1 v` with respect to the rotation vector φ.
+    ///
+    /// With `Γ1 v = v + a φ × v + b φ × (φ × v)`: the derivatives of the coefficients are `(2c - b) φᵀ` and `(3d - c) φᵀ`, where
+    /// c and d continue the series of a and b, `a = ½ - s c` and `b = 1/6 - s d` with `s = |φ|²`.
+    pub(crate) fn first_derivative(&self, vector: &Vector3<f64>, applied: &Vector3<f64>) -> Matrix3<f64> {
+        let s = vector.norm_squared();
+        let [linear, square] = self.first;
+        let next = self.second[1];
+        let after = if s < SERIES {
+            1.0 / 120.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0 * (1.0 - s / 110.0)))
+        } else {
+            (1.0 / 6.0 - square) / s
+        };
+        let once = vector.cross(applied);
+        let twice = vector.cross(&once);
+        let of_product = vector * applied.transpose() + Matrix3::identity() * vector.dot(applied)
+            - applied * vector.transpose() * 2.0;
+        (once * (2.0 * next - square) + twice * (3.0 * after - next)) * vector.transpose() - skew(applied) * linear
+            + of_product * square
+    }
+
     /// Γ2.
     pub(crate) fn second_matrix(&self, vector: &Vector3<f64>) -> Matrix3<f64> {
         polynomial(vector, [0.5, self.second[0], self.second[1]])
@@ -159,6 +180,21 @@ mod tests {
             assert!((rotation_vector(&q) - vector).norm() <= 1e-14 * (1.0 + angle), "{angle}");
             let antipode = Unit::new_unchecked(-q.into_inner());
             assert!((rotation_vector(&antipode) - vector).norm() <= 1e-14 * (1.0 + angle), "{angle}");
+        }
+    }
+
+    #[test]
+    fn derivative_of_the_first_integral_agrees_with_differences() {
+        let v = Vector3::new(1.0, 2.0, -3.0);
+        for angle in [0.0, 1e-6, 0.05, 0.1999, 0.2001, 1.5, 4.0] {
+            let vector = AXIS * angle;
+            let at = |vector: &Vector3<f64>| Integrals::new(vector).first_matrix(vector) * v;
+            let derivative = Integrals::new(&vector).first_derivative(&vector, &v);
+            for axis in 0..3 {
+                let step = Vector3::ith(axis, 1e-5);
+                let difference = (at(&(vector + step)) - at(&(vector - step))) / 2e-5;
+                assert!((derivative.column(axis) - difference).norm() < 1e-8, "{angle}");
+            }
         }
     }
 

@@ -1,6 +1,6 @@
 //! What a `History` needs of a filter to replay it.
 
-use super::eskf::{Eskf, ImuMean};
+use super::eskf::{Eskf, ImuMean, LONGEST_GAP_S, seconds_between};
 use super::refusal::Refusal;
 use super::state::States;
 
@@ -16,23 +16,28 @@ pub trait Propagate: Clone {
     /// Returns the reason why the sample is rejected. The filter is then unchanged.
     fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal>;
 
-    /// The longest interval, s, that one sample covers; a longer one is a gap. Infinite, as by default, for a filter without gaps.
-    fn longest_sample(&self) -> f64 {
-        f64::INFINITY
-    }
-
-    /// Propagates the filter over a part of a sample that measurements divide. `is_gap` tells whether the whole sample is longer than
-    /// [`longest_sample`](Self::longest_sample): every part of a gap is a gap, however short it is.
-    ///
-    /// By default, the part is propagated like a sample of its own. Provide it together with `longest_sample` if your filter treats
-    /// gaps differently, as the filters of this module do.
+    /// Checks that a sample can be propagated.
     ///
     /// # Errors
     ///
     /// The same as [`propagate`](Self::propagate).
-    fn propagate_part(&mut self, part: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
-        let _ = is_gap;
-        self.propagate(part)
+    fn admits(&self, sample: &ImuMean) -> Result<(), Refusal> {
+        self.clone().propagate(sample)
+    }
+
+    /// Propagates the filter over the part of a sample that ends at `time_ns`, where a measurement divides it. The sample began at
+    /// `since_ns`, which tells a filter that treats gaps differently whether the whole sample is one: every part of a gap is a gap,
+    /// however short it is.
+    ///
+    /// By default, the part is propagated like a sample of its own.
+    ///
+    /// # Errors
+    ///
+    /// The same as [`propagate`](Self::propagate).
+    fn propagate_until(&mut self, time_ns: i64, sample: &ImuMean, since_ns: i64) -> Result<(), Refusal> {
+        let _ = since_ns;
+        // The sample is a mean, so each part of it is the same.
+        self.propagate(&ImuMean { time_ns, ..*sample })
     }
 }
 
@@ -45,11 +50,14 @@ impl<S: States, const N: usize> Propagate for Eskf<S, N> {
         self.propagate(sample)
     }
 
-    fn longest_sample(&self) -> f64 {
-        self.params().longest_sample
+    fn admits(&self, sample: &ImuMean) -> Result<(), Refusal> {
+        sample.check()?;
+        let seconds = seconds_between(self.time_ns().ok_or(Refusal::NotStarted)?, sample.time_ns)?;
+        if seconds > LONGEST_GAP_S { Err(Refusal::Gap { seconds }) } else { Ok(()) }
     }
 
-    fn propagate_part(&mut self, part: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
-        self.propagate_part(part, is_gap)
+    fn propagate_until(&mut self, time_ns: i64, sample: &ImuMean, since_ns: i64) -> Result<(), Refusal> {
+        let is_gap = seconds_between(since_ns, sample.time_ns)? > self.params().longest_sample;
+        self.propagate_part(&ImuMean { time_ns, ..*sample }, is_gap)
     }
 }

@@ -5,7 +5,7 @@ mod states;
 
 pub use estimate::{Estimate, Keyframe};
 pub use states::{
-    ACCELEROMETER_BIAS, GYROSCOPE_BIAS, NAVIGATION, Navigation, Optional, POSITION, ROTATION, States, VELOCITY,
-    Wheeled, offset,
+    ACCELEROMETER_BIAS, Aided, Complete, GYROSCOPE_BIAS, NAVIGATED, NAVIGATION, Navigated, Navigation, Optional,
+    POSITION, ROTATION, States, VELOCITY, Vehicle, offset,
 };
-pub(super) use states::{MOST_ERRORS, distinct};
+pub(super) use states::{Led, MOST_ERRORS, distinct, led};

@@ -93,8 +93,8 @@ fn never_started(record: &Record) -> String {
     let reason = record.reasons.iter().rev().flatten().next();
     let reason = reason.map_or(String::new(), |reason| format!(": {reason}"));
     format!(
-        "it never started{reason}; a robot starts at rest, or with --set heading_from_course=true in motion, or at a state \
-         that it is told: --start truth or a topic"
+        "it never started{reason}; a robot starts at rest, or once three fixes agree, or at a state that it is given: \
+         --start truth or a topic"
     )
 }
 

@@ -21,8 +21,7 @@ use bb_estimators::navigation::state_estimator::{
     WarmStartReport,
 };
 use bb_estimators::navigation::{
-    EskfEstimator, Geodetic, LocalFrame, NAVIGATION, Navigation, NavigationOptions, NavigationOutputs,
-    NavigationStatus, Optional, States, Verdicts, Wheeled,
+    EskfEstimator, Geodetic, LocalFrame, NavigationOutputs, NavigationStatus, Verdicts,
 };
 use bb_estimators::{Eskf, PlanarEkf, StateEstimator};
 use configuration::Kind;
@@ -111,30 +110,6 @@ robot! {
 /// The path of the filter in each of them.
 pub(super) const NAVIGATION_PATH: &str = "estimator/base/navigation";
 
-/// States for relative poses.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Linked;
-
-impl States for Linked {
-    const OPTIONAL: &'static [Optional] = &[Optional::Keyframe, Optional::RelativeScale];
-}
-
-/// The latency of fixes as a state.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Late;
-
-impl States for Late {
-    const OPTIONAL: &'static [Optional] = &[Optional::GnssDelay];
-}
-
-/// The latency of fixes and the scale of wheels.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct WheeledLate;
-
-impl States for WheeledLate {
-    const OPTIONAL: &'static [Optional] = &[Optional::WheelScale, Optional::GnssDelay];
-}
-
 /// Runs a filter on a recording.
 ///
 /// # Errors
@@ -209,25 +184,9 @@ fn spatial(
         inputs: mounts(feed, &names),
         reasons: Reasons::clone(&reasons),
     };
-    let has_links = feed.mounts[4].is_some();
-    let states = settings.states();
-    let replaced = match (states.as_slice(), has_links) {
-        ([], false) => replace::<Navigation, NAVIGATION>(&mut builder, options),
-        ([], true) => replace::<Linked, { Linked::DIMENSION }>(&mut builder, options),
-        (["wheel_scale"], false) => replace::<Wheeled, { Wheeled::DIMENSION }>(&mut builder, options),
-        (["gnss_delay"], false) => replace::<Late, { Late::DIMENSION }>(&mut builder, options),
-        (["gnss_delay", "wheel_scale"] | ["wheel_scale", "gnss_delay"], false) => {
-            replace::<WheeledLate, { WheeledLate::DIMENSION }>(&mut builder, options)
-        }
-        _ => {
-            return Err(format!(
-                "--states {}: there are wheel_scale, gnss_delay, and both; with relative poses, their scale is one and there \
-                 are no others",
-                states.join(",")
-            ));
-        }
-    };
-    replaced.map_err(|fault| fault.to_string())?;
+    builder
+        .replace_estimator::<Mounted<EskfEstimator<NavigationOutputs>>>(NAVIGATION_PATH, options)
+        .map_err(|fault| fault.to_string())?;
     let odometry = builder.subscribe(spatial::estimator::base::navigation::odometry);
     let status = builder.subscribe(spatial::estimator::base::navigation::status);
     let health = builder.subscribe(system::Health);
@@ -265,13 +224,6 @@ fn spatial(
     Ok(record)
 }
 
-fn replace<S: States + Send + 'static, const N: usize>(
-    builder: &mut Builder<Spatial>,
-    options: MountedOptions<NavigationOptions>,
-) -> Result<(), Fault> {
-    builder.replace_estimator::<Mounted<EskfEstimator<NavigationOutputs, S, N>>>(NAVIGATION_PATH, options)
-}
-
 fn verdict(input: &'static str, of: &Verdicts) -> Verdict {
     Verdict { input, fused: of.fused, refused: of.refused + of.invalid }
 }
@@ -282,7 +234,6 @@ fn planar(
     settings: &RobotSettings,
     progress: &mut dyn FnMut(),
 ) -> Result<Record, String> {
-    settings.without_states("planar")?;
     let mut builder = Planar::builder();
     settings.apply(&mut builder, &filter.names())?;
     let names =
@@ -344,7 +295,6 @@ fn flight(
     settings: &RobotSettings,
     progress: &mut dyn FnMut(),
 ) -> Result<Record, String> {
-    settings.without_states("the estimator of flights")?;
     let mut builder = Flight::builder();
     builder.options(flight::estimator::base::navigation).strategy = strategy.to_owned();
     settings.apply(&mut builder, &filter.names())?;

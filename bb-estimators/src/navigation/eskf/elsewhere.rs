@@ -16,6 +16,16 @@ use crate::navigation::state::{
 /// Relative difference in variance between a keyframe and the pose that it copies: 3 µm where a pose is known to a metre.
 const COPY: f64 = 1e-11;
 
+/// Errors of a filter in the wrong place, as deviations: anywhere within 10 km, 5 m/s, 3° of tilt and 30° of heading.
+#[cfg(feature = "std")]
+const UNMOORED: f64 = 1e4;
+#[cfg(feature = "std")]
+const UNMOORED_SPEED: f64 = 5.0;
+#[cfg(feature = "std")]
+const UNMOORED_TILT: f64 = 0.05;
+#[cfg(feature = "std")]
+const UNMOORED_HEADING: f64 = 0.52;
+
 impl<S: States, const N: usize> Eskf<S, N> {
     /// Restarts from the estimate of another estimator of the same robot, with the correlations of all states that both estimate.
     /// The other may be a parallel prediction or use different noise. Optional states that the other lacks are set to zero, with
@@ -40,6 +50,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
             gyroscope_bias: other.gyroscope_bias,
             angular_velocity: other.angular_velocity,
             specific_force: other.specific_force,
+            acceleration: other.acceleration,
             keyframe: None,
             optional: SVector::zeros(),
         };
@@ -207,6 +218,44 @@ impl<S: States, const N: usize> Eskf<S, N> {
         self.covariance.set(ROTATION, &(Matrix3::identity() * (UNKNOWN * UNKNOWN)));
     }
 
+    /// Forgets the position, and doubts the motion and the attitude by as much as a filter in the wrong place may have been wrong.
+    #[cfg(feature = "std")]
+    pub(in crate::navigation) fn unmoor(&mut self) {
+        let Some(estimate) = &mut self.estimate else { return };
+        estimate.keyframe = None;
+        let square = |x: f64| x * x;
+        self.covariance.set(POSITION, &(Matrix3::identity() * square(UNMOORED)));
+        for state in [Optional::Keyframe, Optional::BarometerBias] {
+            let Some(first) = offset::<S>(state) else { continue };
+            for i in first..first + state.dimension() {
+                estimate.optional[i] = 0.0;
+                self.covariance.forget(i, self.params.variance(state));
+            }
+        }
+        for i in 0..3 {
+            self.covariance.inflate(VELOCITY + i, square(UNMOORED_SPEED));
+            let turned = if i == 2 { UNMOORED_HEADING } else { UNMOORED_TILT };
+            self.covariance.inflate(ROTATION + i, square(turned));
+        }
+        self.covariance.enforce();
+    }
+
+    /// Counts a new beginning.
+    #[cfg(feature = "std")]
+    pub(in crate::navigation) fn begin_again(&mut self) {
+        if let Some(estimate) = &self.estimate {
+            self.upkeep.started(estimate.time_ns);
+        }
+    }
+
+    /// Sets an optional state, and leaves its covariance.
+    #[cfg(feature = "std")]
+    pub(in crate::navigation) fn set_optional(&mut self, error: usize, value: f64) {
+        if let Some(estimate) = &mut self.estimate {
+            estimate.optional[error] = value;
+        }
+    }
+
     /// Makes the current pose the keyframe for relative poses. A filter without [`Optional::Keyframe`] ignores the call.
     pub fn set_keyframe(&mut self, id: u64) {
         let (Some(estimate), Some(first)) = (&mut self.estimate, offset::<S>(Optional::Keyframe)) else { return };
@@ -240,6 +289,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
         let new_from_old = Isometry3::from_parts(new_from_old.translation, rotation);
         estimate.position = new_from_old.transform_point(&estimate.position.into()).coords;
         estimate.velocity = rotation * estimate.velocity;
+        estimate.acceleration = rotation * estimate.acceleration;
         estimate.world_from_body = rotation * estimate.world_from_body;
         if let Some(keyframe) = &mut estimate.keyframe {
             keyframe.position = new_from_old.transform_point(&keyframe.position.into()).coords;

@@ -6,14 +6,15 @@ use super::params::{EskfParams, ImuDensities};
 use super::propagation::Transition;
 use super::sample::{ImuMean, LONGEST_GAP_S, seconds_between};
 use super::start::Start;
+use super::transport::Transport;
 use crate::attitude::ParamsError;
 use crate::navigation::covariance::{Covariance, Innovation, Room};
 use crate::navigation::fused::Fused;
 use crate::navigation::fusion::{Sight, Weighed, misfit};
 use crate::navigation::jump::{BiasJump, Moved, bounded};
 use crate::navigation::layout::Layout;
-use crate::navigation::math::{Integrals, exp, sqrt};
-use crate::navigation::measurement::Measurement;
+use crate::navigation::math::exp;
+use crate::navigation::measurement::{Linearised, Measurement};
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{
     Estimate, GYROSCOPE_BIAS, NAVIGATION, Navigation, Optional, POSITION, ROTATION, States, VELOCITY, distinct,
@@ -23,12 +24,12 @@ use crate::navigation::stream::{Gate, Stream};
 use crate::navigation::upkeep::{Upkeep, upkeep_methods};
 use crate::params::Params as _;
 
-/// A rotation correction below this squared angle, rad², leaves the covariance unchanged up to rounding.
-const RESET: f64 = 1e-12;
+/// Steps of an iterated correction. Three are as good as five, and two are not (`docs/navigation.md`).
+const STEPS: usize = 3;
 
-/// A larger rotation correction, rad, is clamped to this angle for the reset: the first order is invalid there, and at a whole
-/// turn Γ1 is singular.
-const LARGEST_RESET: f64 = 1.0;
+/// A linear correction is exact to two percent below this product of the normalised innovation squared and the variance of
+/// the attitude, rad².
+const LINEAR: f64 = 1e-3;
 
 /// An error-state Kalman filter with the optional states `S` and `N` errors in total; see the [module](super).
 ///
@@ -61,6 +62,33 @@ pub struct Eskf<S: States = Navigation, const N: usize = NAVIGATION> {
     /// Whether measurements correct position and velocity alone.
     pub(super) holds_attitude: bool,
     states: core::marker::PhantomData<S>,
+}
+
+/// Variances of what holding a reading over a gap may have done wrong, per axis of the body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::navigation) struct Doubt {
+    /// Rotation, rad².
+    pub(in crate::navigation) rotation: Vector3<f64>,
+    /// Change of velocity, m²/s².
+    pub(in crate::navigation) velocity: Vector3<f64>,
+}
+
+/// A measurement compared with a filter.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::navigation) struct Judged {
+    /// Normalised innovation squared.
+    pub(in crate::navigation) nis: f64,
+    pub(in crate::navigation) log_likelihood: f64,
+}
+
+/// Time over which the acceleration is averaged, s.
+const AVERAGED_S: f64 = 0.1;
+
+/// Adds a sample of `dt` seconds to the average of the acceleration.
+#[inline]
+fn average<const N: usize>(estimate: &mut Estimate<N>, dt: f64, gravity: f64) {
+    let now = estimate.world_from_body * estimate.specific_force - Vector3::new(0.0, 0.0, gravity);
+    estimate.acceleration += (now - estimate.acceleration) * (dt / (dt + AVERAGED_S));
 }
 
 impl<S: States, const N: usize> Eskf<S, N> {
@@ -150,12 +178,43 @@ impl<S: States, const N: usize> Eskf<S, N> {
         estimate.angular_velocity = sample.angular_velocity - estimate.gyroscope_bias;
         estimate.specific_force = sample.specific_force - estimate.accelerometer_bias;
         let transition = Transition::advance(estimate, dt, self.params.gravity);
+        average(estimate, dt, self.params.gravity);
         if let Some(jump) = self.jump {
             let by_bias = Matrix3::from_fn(|i, k| transition.rotation[i][k]);
             self.jump = jump.turned(sample.time_ns, &estimate.gyroscope_bias, |way| by_bias * way);
         }
         transition.apply(self.covariance.rows_mut(), &self.densities);
         self.covariance.bound(&Self::LAYOUT);
+        self.decay(dt);
+        Ok(())
+    }
+
+    /// Propagates over a part, `dt` seconds, of a gap in the samples, during which the reading is assumed to be that of `sample`, but
+    /// may have been wrong by `doubt`.
+    #[cold]
+    pub(in crate::navigation) fn hold(&mut self, sample: &ImuMean, doubt: &Doubt) -> Result<(), Refusal> {
+        let estimate = self.estimate.as_mut().ok_or(Refusal::NotStarted)?;
+        sample.check()?;
+        let dt = seconds_between(estimate.time_ns, sample.time_ns)?;
+        if dt > LONGEST_GAP_S {
+            return Err(Refusal::Gap { seconds: dt });
+        }
+        let turned = estimate.rotation();
+        estimate.time_ns = sample.time_ns;
+        estimate.angular_velocity = sample.angular_velocity - estimate.gyroscope_bias;
+        estimate.specific_force = sample.specific_force - estimate.accelerometer_bias;
+        let transition = Transition::advance(estimate, dt, self.params.gravity);
+        average(estimate, dt, self.params.gravity);
+        transition.apply(self.covariance.rows_mut(), &self.densities);
+        let in_world = |variances: &Vector3<f64>| turned * Matrix3::from_diagonal(variances) * turned.transpose();
+        let velocity = in_world(&doubt.velocity);
+        self.covariance.add(ROTATION, ROTATION, &in_world(&doubt.rotation));
+        self.covariance.add(VELOCITY, VELOCITY, &velocity);
+        self.covariance.add(POSITION, VELOCITY, &(velocity * (0.5 * dt)));
+        self.covariance.add(POSITION, POSITION, &(velocity * (dt * dt / 3.0)));
+        self.covariance.bound(&Self::LAYOUT);
+        self.covariance.enforce();
+        self.upkeep.bridged();
         self.decay(dt);
         Ok(())
     }
@@ -214,6 +273,39 @@ impl<S: States, const N: usize> Eskf<S, N> {
         self.decay(dt);
     }
 
+    /// Multiplies the white noise of the IMU, as a deviation. The walks of its biases stay: a multiple of them, found on noise, made
+    /// the biases follow every error of the model.
+    pub(in crate::navigation) fn multiply_noise(&mut self, multiple: f64) {
+        let densities = self.params.densities();
+        self.densities.gyroscope = densities.gyroscope * multiple * multiple;
+        self.densities.accelerometer = densities.accelerometer * multiple * multiple;
+    }
+
+    /// Multiplies the covariance.
+    pub(in crate::navigation) fn doubt_all(&mut self, factor: f64) {
+        self.covariance.multiply(factor);
+        self.covariance.bound(&Self::LAYOUT);
+    }
+
+    /// Compares a measurement with the filter, and leaves both as they are. `slack` is added to each variance of its noise.
+    ///
+    /// # Errors
+    ///
+    /// Returns the reason why it cannot be compared.
+    #[inline(never)]
+    pub(in crate::navigation) fn judge<M: Measurement<D>, const D: usize>(
+        &self,
+        measurement: &M,
+        slack: f64,
+    ) -> Result<Judged, Refusal> {
+        let mut room = Room::new();
+        measurement.linearise::<S, N>(self.estimate.as_ref().ok_or(Refusal::NotStarted)?, &mut room.model)?;
+        (0..D).for_each(|i| room.model.noise[(i, i)] += slack);
+        let innovation = self.covariance.innovation(&mut room, 1.0)?;
+        let nis = innovation.nis();
+        Ok(Judged { nis, log_likelihood: innovation.log_density() - 0.5 * nis })
+    }
+
     /// Corrects the filter with a measurement taken at its current time.
     ///
     /// `stream` belongs to the sensor: its gate accepts or rejects the measurement, and it keeps the sensor's counts and
@@ -239,6 +331,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
         self.update_at(stream, measurement, Gate::Open)
     }
 
+    #[inline(never)]
     fn update_at<M: Measurement<D>, const D: usize>(
         &mut self,
         stream: &mut Stream,
@@ -246,18 +339,12 @@ impl<S: States, const N: usize> Eskf<S, N> {
         gate: Gate,
     ) -> Result<Fused, Refusal> {
         let mut room = Room::new();
-        let innovation = self.innovation(stream, measurement, &mut room);
-        self.correct(stream, innovation, gate)
-    }
-
-    /// Whether a measurement fits the gate of `stream`, and would not only override it.
-    pub(crate) fn fits<M: Measurement<D>, const D: usize>(&self, stream: &Stream, measurement: &M) -> bool {
-        let mut room = Room::new();
-        self.innovation(stream, measurement, &mut room).is_ok_and(|innovation| {
-            let density = innovation.log_density();
-            let verdict = stream.weigh(innovation.nis(), innovation.dimension(), density, Gate::Closed);
-            verdict.is_ok_and(|verdict| verdict.raised <= 1.0)
-        })
+        let result = self.fuse(stream, measurement, gate, &mut room);
+        stream.count(&result);
+        if let (Ok(_), Some(estimate)) = (&result, &self.estimate) {
+            stream.fused_at(estimate.time_ns);
+        }
+        result
     }
 
     #[inline]
@@ -271,52 +358,122 @@ impl<S: States, const N: usize> Eskf<S, N> {
         self.covariance.innovation(room, stream.noise_factor())
     }
 
-    /// Fuses a measurement of any dimension, and tells its stream.
-    #[inline(never)]
-    fn correct(
-        &mut self,
-        stream: &mut Stream,
-        innovation: Result<Innovation<'_>, Refusal>,
-        gate: Gate,
-    ) -> Result<Fused, Refusal> {
-        let result = innovation.and_then(|mut innovation| self.fuse(stream, &mut innovation, gate));
-        stream.count(&result);
-        if let (Ok(_), Some(estimate)) = (&result, &self.estimate) {
-            stream.fused_at(estimate.time_ns);
-        }
-        result
-    }
-
     #[inline]
-    fn fuse(&mut self, stream: &Stream, innovation: &mut Innovation<'_>, gate: Gate) -> Result<Fused, Refusal> {
-        let weighed = Weighed::new(&mut self.covariance, stream, innovation, gate, &Self::LAYOUT, Self::sight)?;
+    fn fuse<M: Measurement<D>, const D: usize>(
+        &mut self,
+        stream: &Stream,
+        measurement: &M,
+        gate: Gate,
+        room: &mut Room<D, N>,
+    ) -> Result<Fused, Refusal> {
+        let mut innovation = self.innovation(stream, measurement, room)?;
+        let weighed =
+            Weighed::new(&mut self.covariance, stream, &mut innovation, gate, &Self::LAYOUT, Self::sight)?;
+        let fused = weighed.fused(&innovation, &Self::LAYOUT);
         let error = innovation.mean();
+        // Transported to another state, a height has derivatives with respect to all of the position.
+        let is_fix = Self::fixes_position(&innovation);
         if !Self::LAYOUT.admits(&error) {
             weighed.undo(&mut self.covariance);
             return Err(Refusal::OutOfRange);
         }
+        if weighed.is_raised() || self.holds_attitude || !M::LINEARISES || !self.is_curved(fused.nis) {
+            self.correct(stream, &innovation, &error, weighed.is_raised())?;
+            self.note(is_fix);
+            return Ok(fused);
+        }
+        let factor = stream.noise_factor() / fused.weight;
+        let mut led = error;
+        for _ in 2..STEPS {
+            led = self.step(measurement, factor, &led, room).map_or_else(|_| SVector::zeros(), |step| step.mean());
+        }
+        let innovation = match self.step(measurement, factor, &led, room) {
+            Ok(innovation) => innovation,
+            // What leads nowhere, from a state that is absurd, is corrected linearly: by a step from the state itself.
+            Err(_) => self.step(measurement, factor, &SVector::zeros(), room)?,
+        };
+        self.correct(stream, &innovation, &innovation.mean(), false)?;
+        self.note(is_fix);
+        Ok(fused)
+    }
+
+    /// Notes the time of a position in the world.
+    fn note(&mut self, is_fix: bool) {
+        if let (true, Some(estimate)) = (is_fix, &self.estimate) {
+            self.upkeep.fixed_ns = estimate.time_ns;
+        }
+    }
+
+    /// Returns whether a correction of this normalised innovation squared is so large, in an attitude so uncertain, that a linear one is
+    /// not exact.
+    #[inline]
+    fn is_curved(&self, nis: f64) -> bool {
+        let turned: f64 = (ROTATION..ROTATION + 3).map(|i| self.covariance.matrix()[(i, i)]).sum();
+        nis * turned > LINEAR
+    }
+
+    /// A step of the Gauss–Newton method, in coordinates of the exponential at the state before the correction: the innovation of a
+    /// measurement that is linearised at the state composed with `error`.
+    ///
+    /// B. M. Bell, F. W. Cathey, "The iterated Kalman filter update as a Gauss–Newton method", IEEE Transactions on Automatic Control
+    /// 38(2), 1993.
+    #[inline(never)]
+    fn step<'a, M: Measurement<D>, const D: usize>(
+        &self,
+        measurement: &M,
+        factor: f64,
+        error: &SVector<f64, N>,
+        room: &'a mut Room<D, N>,
+    ) -> Result<Innovation<'a>, Refusal> {
+        if !Self::LAYOUT.admits(error) {
+            return Err(Refusal::OutOfRange);
+        }
+        let estimate = self.estimate.as_ref().ok_or(Refusal::NotStarted)?;
+        let model = &mut room.model;
+        *model = Linearised::new();
+        measurement.linearise::<S, N>(&estimate.composed::<S>(error), model)?;
+        Transport::new::<S, N>(error).of_jacobian(&mut model.jacobian);
+        for (residual, row) in model.residual.iter_mut().zip(&model.jacobian) {
+            *residual += row.iter().zip(error.iter()).map(|(h, x)| h * x).sum::<f64>();
+        }
+        self.covariance.innovation(room, factor)
+    }
+
+    /// Corrects the state by an error, and the covariance by the innovation that led to it.
+    #[inline(never)]
+    fn correct(
+        &mut self,
+        stream: &Stream,
+        innovation: &Innovation<'_>,
+        error: &SVector<f64, N>,
+        is_raised: bool,
+    ) -> Result<(), Refusal> {
         let before = self.holds_attitude.then_some(self.covariance);
-        let error = if self.holds_attitude { Self::of_motion(&error) } else { error };
-        let corrected = self.estimate.as_ref().ok_or(Refusal::NotStarted)?.corrected::<S>(&error);
+        let error = if self.holds_attitude { Self::of_motion(error) } else { *error };
+        let estimate = self.estimate.as_ref().ok_or(Refusal::NotStarted)?;
+        let corrected = if is_raised { estimate.corrected::<S>(&error) } else { estimate.composed::<S>(&error) };
         self.estimate = Some(corrected);
         self.covariance.update(innovation);
-        if Self::fixes_position(innovation) {
-            self.upkeep.fixed_ns = corrected.time_ns;
-        }
         match before {
             Some(before) => self.covariance.restore(&before, |error| !Self::is_motion(error)),
             None => {
-                self.reset_rotation(ROTATION, &error);
-                if let Some(index) = offset::<S>(Optional::Keyframe) {
-                    self.reset_rotation(index + 3, &error);
+                let mut alone = error;
+                if is_raised {
+                    for first in [POSITION, VELOCITY] {
+                        alone.fixed_rows_mut::<3>(first).fill(0.0);
+                    }
+                    if let Some(first) = offset::<S>(Optional::Keyframe) {
+                        alone.fixed_rows_mut::<3>(first).fill(0.0);
+                    }
                 }
+                Transport::new::<S, N>(&alone).of_covariance(&mut self.covariance);
             }
         }
-        if weighed.is_raised() {
+        if is_raised {
             self.doubt(stream, innovation, &error);
         }
         self.covariance.settle(&Self::LAYOUT);
-        Ok(weighed.fused(innovation, &Self::LAYOUT))
+        Ok(())
     }
 
     /// A measurement that has overridden its gate corrected `error`, but the sensor may have been wrong. Raises what that made wrong
@@ -413,19 +570,6 @@ impl<S: States, const N: usize> Eskf<S, N> {
         Sight::Height(motion.into_iter().flatten().fold(0, |motion, error| motion | 1 << error))
     }
 
-    /// Resets the errors to the corrected rotation: `exp(θ) exp(-θ̂) ≈ exp(Γ1(θ̂) (θ - θ̂))`.
-    fn reset_rotation(&mut self, index: usize, error: &SVector<f64, N>) {
-        let mut correction = error.fixed_rows::<3>(index).into_owned();
-        let squared = correction.norm_squared();
-        if squared > RESET {
-            if squared > LARGEST_RESET * LARGEST_RESET {
-                correction *= LARGEST_RESET / sqrt(squared);
-            }
-            let jacobian = Integrals::new(&correction).first_matrix(&correction);
-            self.covariance.transform(index, &jacobian);
-        }
-    }
-
     /// The estimate at the end of the last sample; `None` before the start.
     pub fn estimate(&self) -> Option<&Estimate<N>> {
         self.estimate.as_ref()
@@ -451,6 +595,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
             estimate.specific_force = estimate.world_from_body.inverse_transform_vector(&up);
         }
         Transition::advance(&mut estimate, dt, self.params.gravity);
+        average(&mut estimate, dt, self.params.gravity);
         estimate.time_ns = time_ns;
         Ok(estimate)
     }

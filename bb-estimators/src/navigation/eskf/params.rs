@@ -87,13 +87,19 @@ imu_params! {
         /// Small: trusts the stamps. Large: needs acceleration to become observable.
         ///
         /// Source: receivers that stamp at the end of a 10 Hz period.
-        gnss_delay: GaussMarkov = GaussMarkov::constant(0.1), deviation 0.0..=10.0, shown "0.1 for ever", of "s";
+        gnss_delay: GaussMarkov = GaussMarkov::new(0.05, 5000.0), deviation 0.0..=10.0, shown "0.05 for 5000 s", of "s";
         /// Deviation of the scale of the wheel speed from 1, [`Optional::WheelScale`].
         ///
         /// Small: trusts the wheel's radius. Large: needs another source of speed to become observable.
         ///
         /// Source: wear and pressure of a tyre.
         wheel_scale: GaussMarkov = GaussMarkov::new(0.03, 1000.0), deviation 0.0..=1.0, shown "0.03 for 1000 s";
+        /// Yaw and pitch of the IMU's mounting in the vehicle beyond the declared ones, [`Optional::WheelMounting`].
+        ///
+        /// Small: trusts the mounting. Large: needs a vehicle that moves to become observable.
+        ///
+        /// Source: an IMU aligned with the vehicle by eye.
+        wheel_mounting: GaussMarkov = GaussMarkov::constant(0.09), deviation 0.0..=7.0, shown "5° for ever", of "rad";
         /// Magnetic field of the body itself, [`Optional::HardIron`].
         ///
         /// Small: trusts the calibration of the magnetometer. Large: needs rotation to become observable.
@@ -189,6 +195,7 @@ impl EskfParams {
             Optional::GnssLeverArm => Some(self.gnss_lever_arm),
             Optional::GnssDelay => Some(self.gnss_delay),
             Optional::WheelScale => Some(self.wheel_scale),
+            Optional::WheelMounting => Some(self.wheel_mounting),
             Optional::HardIron => Some(self.hard_iron),
             Optional::BarometerBias => Some(self.barometer_bias),
         }

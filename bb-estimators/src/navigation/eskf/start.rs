@@ -7,8 +7,11 @@ use crate::navigation::covariance::Covariance;
 use crate::navigation::math::unit;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{
-    ACCELEROMETER_BIAS, Estimate, GYROSCOPE_BIAS, POSITION, ROTATION, States, VELOCITY, offset,
+    ACCELEROMETER_BIAS, Estimate, GYROSCOPE_BIAS, Optional, POSITION, ROTATION, States, VELOCITY, offset,
 };
+
+/// The largest deviation of the pitch of an IMU in its vehicle, rad: 5°.
+const MOST_PITCH: f64 = 0.09;
 
 /// The state and uncertainty that a filter starts with.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,6 +83,10 @@ impl Start {
             let Some(first) = offset::<S>(*state) else { continue };
             let variance = params.variance(*state);
             (first..first + state.dimension()).for_each(|i| covariance.forget(i, variance));
+            if *state == Optional::WheelMounting {
+                // Nobody mounts an IMU with any pitch.
+                covariance.forget(first + 1, variance.min(MOST_PITCH * MOST_PITCH));
+            }
         }
         let world_from_body = unit(&self.world_from_body).ok_or(Refusal::NonFinite)?;
         let estimate = Estimate {
@@ -91,6 +98,7 @@ impl Start {
             gyroscope_bias: self.gyroscope_bias,
             angular_velocity: Vector3::zeros(),
             specific_force: Vector3::zeros(),
+            acceleration: Vector3::zeros(),
             keyframe: None,
             optional: SVector::zeros(),
         };

@@ -30,6 +30,7 @@ impl States for All {
         Optional::Keyframe,
         Optional::GnssDelay,
         Optional::WheelScale,
+        Optional::WheelMounting,
         Optional::HardIron,
         Optional::BarometerBias,
     ];
@@ -104,6 +105,7 @@ fn estimate() -> impl Strategy<Value = Estimate<ALL>> {
             gyroscope_bias,
             angular_velocity,
             specific_force,
+            acceleration: Vector3::zeros(),
             keyframe: Some(keyframe),
             optional: SVector::from_fn(
                 |i, _| if i < crate::navigation::NAVIGATION { 0.0 } else { optional[i % 32] },

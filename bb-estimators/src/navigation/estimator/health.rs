@@ -8,6 +8,9 @@ const DISTRUST_NS: i64 = 1_000_000_000;
 /// Number of consecutive refusals of one sensor that are more than outliers.
 const STORM: u64 = 3;
 
+/// A heading with a larger deviation, rad, is unknown.
+const UNKNOWN_HEADING: f64 = 0.5;
+
 /// Observations of the filter so far.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::navigation) struct Watch {
@@ -38,6 +41,8 @@ pub(in crate::navigation) struct Sight<'a> {
     pub(in crate::navigation) dead_reckoning_s: f64,
     /// Standard deviation of the horizontal position in its least certain direction, m.
     pub(in crate::navigation) deviation: f64,
+    /// Standard deviation of the heading, rad.
+    pub(in crate::navigation) heading_deviation: f64,
 }
 
 impl Watch {
@@ -66,6 +71,11 @@ impl Watch {
         }
         if self.limits.dead_reckoning_s.is_some_and(|longest_s| sight.dead_reckoning_s > longest_s) {
             return Some("the position was dead-reckoned for too long");
+        }
+        // NaN is not known either.
+        let is_heading_known = sight.heading_deviation <= UNKNOWN_HEADING;
+        if !is_heading_known {
+            return Some("the heading is not known yet");
         }
         // A NaN deviation carries no information.
         let is_certain = sight.deviation <= self.limits.deviation;

@@ -2,7 +2,7 @@
 
 use super::options::NavigationOptions;
 use crate::navigation::eskf::ImuMean;
-use crate::navigation::measurement::{BodyVelocity, MagneticHeading, NonHolonomic, RelativePose, WheelSpeed};
+use crate::navigation::measurement::{BodyVelocity, MagneticHeading, RelativePose};
 use bb_core::message::Stamped;
 use bb_core::payload::{self, FluidPressure, GnssFix, Imu, MagneticField, Odometry, Pose};
 use bb_core::{Context, Fault, Input, Inputs};
@@ -15,7 +15,7 @@ pub struct NavigationInputs<'a> {
     pub imu: Input<'a, Imu>,
     /// Satellite navigation.
     pub gnss: Option<Input<'a, GnssFix>>,
-    /// Wheels, or any other source of odometry. Only the velocity is used.
+    /// Wheels, or any other source of odometry. Only the velocity is used, along the x axis and across it.
     pub odometry: Option<Input<'a, Odometry>>,
     /// Poses in the world, from a map or a tracking system.
     pub pose: Option<Input<'a, Pose>>,
@@ -103,24 +103,15 @@ impl Mounting {
 
     /// The velocity in an odometry.
     pub(super) fn velocity(&self, odometry: &Odometry, options: &NavigationOptions) -> BodyVelocity {
-        let body_from_sensor = self.odometry.unwrap_or_else(Isometry3::identity);
-        BodyVelocity::of_odometry(odometry, &body_from_sensor, options.odometry_deviation)
-    }
-
-    /// The same for wheels: their speed along the sensor's x axis, with the constraint that they move neither sideways nor off the
-    /// ground.
-    pub(super) fn wheels(&self, odometry: &Odometry, options: &NavigationOptions) -> (WheelSpeed, NonHolonomic) {
-        let variance = odometry.twist.covariance.map(|covariance| covariance[(0, 0)]);
-        let body_from_vehicle = rotation(self.odometry.as_ref());
-        let lever_arm = place(self.odometry.as_ref());
-        let speed = WheelSpeed {
-            speed: odometry.twist.linear.x,
-            deviation: deviation(variance, options.odometry_deviation),
-            forward: body_from_vehicle * Vector3::x(),
-            lever_arm,
-        };
-        let lateral = options.sideways_deviation;
-        (speed, NonHolonomic { lateral, vertical: lateral, body_from_vehicle, lever_arm })
+        let sideways = options.sideways_deviation;
+        let least = Vector3::new(options.odometry_deviation, sideways, 2.0 * sideways);
+        let stated = |i: usize| odometry.twist.covariance.map(|covariance| covariance[(i, i)]);
+        BodyVelocity {
+            velocity: odometry.twist.linear,
+            deviations: Vector3::from_fn(|i, _| deviation(stated(i), least[i]).max(least[i])),
+            body_from_sensor: rotation(self.odometry.as_ref()),
+            lever_arm: place(self.odometry.as_ref()),
+        }
     }
 
     /// The heading from a magnetic field.

@@ -2,8 +2,8 @@
 
 use crate::navigation::geodesy::{Geodetic, LocalFrame};
 use crate::navigation::math::skew;
-use crate::navigation::measurement::{AbsolutePose, BodyVelocity, GnssPosition, isotropic};
-use bb_core::payload::{GnssFix, GnssStatus, Odometry, Pose};
+use crate::navigation::measurement::{AbsolutePose, GnssPosition, isotropic};
+use bb_core::payload::{GnssFix, GnssStatus, Pose};
 use nalgebra::{Isometry3, Matrix3, SMatrix, Vector3};
 
 /// Standard deviation of the height where a fix has none, m.
@@ -45,22 +45,6 @@ impl GnssPosition {
             covariance[(2, 2)] = UNKNOWN_HEIGHT * UNKNOWN_HEIGHT;
         }
         Some(Self { position: frame.position(&geodetic), covariance, lever_arm })
-    }
-}
-
-impl BodyVelocity {
-    /// The velocity that an odometry measured in its own frame. `deviation`, m/s, applies if it reports none.
-    pub fn of_odometry(odometry: &Odometry, body_from_sensor: &Isometry3<f64>, deviation: f64) -> Self {
-        // One deviation for all axes, from the mean of their variances.
-        let covariance = odometry.twist.covariance;
-        let variance = covariance.map(|covariance| covariance.fixed_view::<3, 3>(0, 0).trace() / 3.0);
-        let deviation = variance.filter(|variance| *variance > 0.0).map_or(deviation, f64::sqrt);
-        Self {
-            velocity: odometry.twist.linear,
-            deviation,
-            body_from_sensor: body_from_sensor.rotation,
-            lever_arm: body_from_sensor.translation.vector,
-        }
     }
 }
 

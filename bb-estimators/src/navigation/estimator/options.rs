@@ -7,13 +7,13 @@ imu_params! {
     pub struct NavigationOptions {
         /// Heading of the link's x axis at the start, from east counter-clockwise.
         heading: f64 = 0.0, in -7.0..=7.0, unit "rad";
-        /// Standard deviation of the heading at the start.
-        heading_deviation: f64 = 0.1, in 1e-6..=4.0, unit "rad";
-        /// Starts in motion, with the course over ground from fixes as the heading of the link's x axis.
-        heading_from_course: bool = false;
+        /// Standard deviation of the heading at the start. More than half a radian is an unknown heading, which the filter finds by
+        /// itself as soon as the robot moves.
+        heading_deviation: f64 = 4.0, in 1e-6..=4.0, unit "rad";
         /// Horizontal standard deviation of a fix without a covariance; the vertical one is twice as large.
         gnss_deviation: f64 = 5.0, in 1e-3..=1e4, unit "m";
-        /// Standard deviation of each component of the velocity of an odometry without a covariance.
+        /// Standard deviation of the velocity of an odometry along its x axis. A larger one in its covariance counts instead: that of
+        /// an encoder knows nothing of slip.
         odometry_deviation: f64 = 0.1, in 1e-4..=1e3, unit "m/s";
         /// Standard deviation of the position of a pose without a covariance; that of its orientation is a tenth of it,
         /// in rad.
@@ -21,8 +21,10 @@ imu_params! {
         /// Standard deviation of the translation of a relative pose without a covariance; that of its rotation is a tenth of
         /// it, in rad.
         relative_deviation: f64 = 0.05, in 1e-5..=1e3, unit "m";
-        /// Standard deviation of the sideways and vertical velocity of wheels whose scale is estimated.
-        sideways_deviation: f64 = 0.05, in 1e-4..=1e3, unit "m/s";
+        /// Standard deviation of the sideways velocity of an odometry; that of the vertical one is twice as large.
+        sideways_deviation: f64 = 0.1, in 1e-4..=1e3, unit "m/s";
+        /// Time over which the errors of an odometry's velocity are alike. 0: each reading has its own.
+        odometry_correlation: f64 = 1.0, in 0.0..=1e3, unit "s";
         /// Angle from true north to magnetic north, positive to the east.
         declination: f64 = 0.0, in -7.0..=7.0, unit "rad";
         /// Standard deviation of the heading from the magnetic field.
@@ -32,11 +34,14 @@ imu_params! {
         /// Standard deviation of the GNSS antenna's declared position, if its error is a state.
         gnss_lever_arm: f64 = 0.1, in 0.0..=100.0, unit "m";
         /// Standard deviation of the delay of fixes beyond their stamps, if the delay is a state.
-        gnss_delay: f64 = 0.1, in 0.0..=10.0, unit "s";
+        gnss_delay: f64 = 0.05, in 0.0..=10.0, unit "s";
         /// Standard deviation of the scale of the wheels from 1, if the scale is a state.
-        wheel_scale: f64 = 0.02, in 0.0..=1.0;
+        wheel_scale: f64 = 0.05, in 0.0..=1.0;
         /// Correlation time of the scale of the wheels.
         wheel_scale_time: f64 = 1000.0, in 1e-3..=f64::INFINITY, unit "s";
+        /// Standard deviation of the yaw of the IMU's mounting in the vehicle beyond the declared one, if the mounting is a state. More
+        /// than half a radian is an unknown mounting, which the filter finds by itself as soon as the vehicle moves.
+        wheel_mounting: f64 = 4.0, in 0.0..=4.0, unit "rad";
         /// Standard deviation of the scale of relative poses from 1, if the scale is a state.
         relative_scale: f64 = 0.02, in 0.0..=1.0;
         /// Correlation time of the scale of relative poses.
@@ -47,14 +52,6 @@ imu_params! {
         barometer_bias: f64 = 10.0, in 0.0..=1e4, unit "m";
         /// Correlation time of the error of the barometric height.
         barometer_bias_time: f64 = 3600.0, in 1e-3..=f64::INFINITY, unit "s";
-        /// Acceleration that a gap in the samples of the IMU may hide, as white noise.
-        gap_acceleration: f64 = 3.0, in 0.0..=1e4, plain "m/s²/√Hz";
-        /// Angular velocity that a gap in the samples of the IMU may hide, as white noise.
-        gap_rotation: f64 = 1.0, in 0.0..=1e3, plain "rad/s/√Hz";
-        /// How many consecutive measurements of a sensor the gate rejects before the filter counts as wrong, and not the
-        /// sensor. The next measurement is then fused, with the covariance raised to fit it. Fixes and poses that agree with each
-        /// other move the filter to their position instead; fewer are needed while the filter has fused only a few. 0: never.
-        patience: u32 = 50;
         /// How long the position may be dead-reckoned before the estimate counts as unreliable, if the robot has a source of
         /// fixes or poses.
         longest_dead_reckoning: f64 = 30.0, in 0.0..=f64::INFINITY, unit "s";
@@ -71,11 +68,10 @@ impl NavigationOptions {
             gyroscope_bias_walk: self.gyroscope_bias_walk,
             accelerometer_bias_walk: self.accelerometer_bias_walk,
             gravity: self.gravity,
-            gap_acceleration: self.gap_acceleration,
-            gap_rotation: self.gap_rotation,
             gnss_lever_arm: GaussMarkov::constant(self.gnss_lever_arm),
-            gnss_delay: GaussMarkov::constant(self.gnss_delay),
+            gnss_delay: GaussMarkov { deviation: self.gnss_delay, ..EskfParams::default().gnss_delay },
             wheel_scale: GaussMarkov::new(self.wheel_scale, self.wheel_scale_time),
+            wheel_mounting: GaussMarkov::constant(self.wheel_mounting),
             relative_scale: GaussMarkov::new(self.relative_scale, self.relative_scale_time),
             hard_iron: GaussMarkov { deviation: self.hard_iron, ..EskfParams::default().hard_iron },
             barometer_bias: GaussMarkov::new(self.barometer_bias, self.barometer_bias_time),

@@ -37,11 +37,6 @@ impl Refuted {
         self.track.add(point);
     }
 
-    /// From now on, coordinates are those of another world. Earlier positions are dropped.
-    pub(in crate::navigation) fn move_world(&mut self) {
-        self.track = Track::default();
-    }
-
     /// The filter has been started or moved elsewhere.
     pub(in crate::navigation) fn begin(&mut self, counts: &Counts) {
         *self = Self { track: Track::default(), fused: counts.fused };

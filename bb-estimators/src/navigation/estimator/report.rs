@@ -6,7 +6,7 @@ use super::world::World;
 use crate::navigation::geodesy::Geodetic;
 use crate::navigation::math::skew;
 use crate::navigation::state::{
-    Estimate, GYROSCOPE_BIAS, NAVIGATION, Optional, POSITION, ROTATION, States, VELOCITY,
+    Estimate, GYROSCOPE_BIAS, NAVIGATION, Optional, POSITION, ROTATION, States, VELOCITY, offset,
 };
 use crate::navigation::stream::Counts;
 use bb_core::Payload;
@@ -24,6 +24,10 @@ pub struct NavigationStatus {
     pub dead_reckoning_s: f64,
     /// Standard deviation of the horizontal position in its least certain direction, m.
     pub horizontal_deviation: f64,
+    /// Standard deviation of the heading, rad; that of a whole turn while it is unknown.
+    pub heading_deviation: f64,
+    /// The multiple of the IMU's white noise that fits best.
+    pub imu_noise: f64,
     /// Fixes by result.
     pub gnss: Verdicts,
     /// The same for velocities from odometry.
@@ -38,6 +42,10 @@ pub struct NavigationStatus {
     pub pressure: Verdicts,
     /// Scale of the wheels, less 1. 0 if it is not a state.
     pub wheel_scale: f64,
+    /// Yaw and pitch of the IMU's mounting in the vehicle beyond the declared ones, rad. 0 if they are no states.
+    pub wheel_yaw: f64,
+    /// See [`wheel_yaw`](Self::wheel_yaw).
+    pub wheel_pitch: f64,
     /// Scale of relative poses, less 1. 0 if it is not a state.
     pub relative_scale: f64,
     /// Offset of the GNSS antenna from its declared position, axes of the link, m. 0 if it is not a state.
@@ -160,12 +168,16 @@ pub(super) fn status_of<S: States, const N: usize>(
     world: &World,
 ) -> Option<NavigationStatus> {
     let estimate = filter.estimate()?;
-    let [gnss, odometry, _, pose, relative, magnetic_field, pressure] = filter.counts().map(Verdicts::from);
+    let mounting =
+        |i: usize| offset::<S>(Optional::WheelMounting).map_or(0.0, |first| estimate.optional[first + i]);
+    let [gnss, odometry, pose, relative, magnetic_field, pressure] = filter.counts().map(Verdicts::from);
     Some(NavigationStatus {
         accelerometer_bias: estimate.accelerometer_bias,
         gyroscope_bias: estimate.gyroscope_bias,
         dead_reckoning_s: filter.eskf().dead_reckoning_s(),
         horizontal_deviation: filter.horizontal_deviation(),
+        heading_deviation: filter.copies().heading_deviation(),
+        imu_noise: filter.copies().noise(),
         gnss,
         odometry,
         pose,
@@ -173,6 +185,8 @@ pub(super) fn status_of<S: States, const N: usize>(
         magnetic_field,
         pressure,
         wheel_scale: estimate.scalar::<S>(Optional::WheelScale),
+        wheel_yaw: mounting(0),
+        wheel_pitch: mounting(1),
         relative_scale: estimate.scalar::<S>(Optional::RelativeScale),
         gnss_lever_arm: estimate.vector::<S>(Optional::GnssLeverArm),
         gnss_delay: estimate.scalar::<S>(Optional::GnssDelay),

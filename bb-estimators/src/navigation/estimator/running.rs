@@ -5,19 +5,15 @@ use super::health::{Limits, Watch};
 use super::height::Heights;
 use super::input::{Mounting, NavigationInputs};
 use super::options::NavigationOptions;
-use super::refuted::{Found, Refuted};
 use super::report::{NavigationStatus, odometry_of, status_of};
 use super::world::World;
 use crate::navigation::eskf::{ImuMean, Start};
 use crate::navigation::geodesy::LocalFrame;
 use crate::navigation::history::History;
-use crate::navigation::measurement::AbsolutePose;
 use crate::navigation::refusal::Refusal;
-use crate::navigation::state::{NAVIGATION, Navigation, Optional, States, Wheeled, offset};
-use crate::navigation::track::TrackPoint;
+use crate::navigation::state::{Aided, Complete, NAVIGATION, Navigation, States, Vehicle};
 use bb_core::Fault;
 use bb_core::payload::Odometry;
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use std::any::TypeId;
 use std::fmt::Debug;
 
@@ -53,6 +49,9 @@ pub(super) trait Core: Debug + Send {
     /// The remaining status.
     fn status(&self) -> Option<NavigationStatus>;
 
+    /// The distance of positions, m, that are beyond any way of a robot from the filter.
+    fn elsewhere(&self) -> Option<f64>;
+
     /// Why the estimate is not to be trusted, if it is not.
     fn divergence(&mut self) -> Option<&'static str>;
 }
@@ -63,44 +62,55 @@ struct Running<S: States, const N: usize> {
     world: World,
     heights: Heights,
     watch: Watch,
-    /// Fixes, and poses.
-    fixes: Refuted,
-    poses: Refuted,
-    /// Orientation of the last pose.
-    orientation: Option<(UnitQuaternion<f64>, Matrix3<f64>)>,
+    resets: u32,
 }
 
 /// A filter that has started.
 ///
-/// For states that this crate provides, the function is compiled with this crate and its optimisation level. It is not compiled
-/// with the robot, which may be a debug build.
+/// Unless states are declared, they are those that the inputs bring. For states that this crate provides, the function is compiled with
+/// this crate and its optimisation level, not with the robot, which may be a debug build.
 pub(super) fn started<S: States + Send + 'static, const N: usize>(
     options: &NavigationOptions,
+    mounting: &Mounting,
     start: &Start,
     world: World,
     limits: Limits,
 ) -> Result<Box<dyn Core>, Fault> {
-    let states = TypeId::of::<S>();
-    if states == TypeId::of::<Navigation>() {
-        plain(options, start, world, limits)
-    } else if states == TypeId::of::<Wheeled>() {
-        wheeled(options, start, world, limits)
+    if TypeId::of::<S>() != TypeId::of::<Navigation>() {
+        return running::<S, N>(options, start, world, limits);
+    }
+    // Without wheels, nothing tells how the IMU is mounted on them.
+    let wheel_mounting = if mounting.odometry.is_some() { options.wheel_mounting } else { 0.0 };
+    let options = &NavigationOptions { wheel_mounting, ..*options };
+    if mounting.relative.is_some() {
+        complete(options, start, world, limits)
+    } else if mounting.odometry.is_some() {
+        vehicle(options, start, world, limits)
     } else {
-        running::<S, N>(options, start, world, limits)
+        aided(options, start, world, limits)
     }
 }
 
-fn plain(options: &NavigationOptions, start: &Start, world: World, limits: Limits) -> Result<Box<dyn Core>, Fault> {
-    running::<Navigation, NAVIGATION>(options, start, world, limits)
+fn aided(options: &NavigationOptions, start: &Start, world: World, limits: Limits) -> Result<Box<dyn Core>, Fault> {
+    running::<Aided, { Aided::DIMENSION }>(options, start, world, limits)
 }
 
-fn wheeled(
+fn vehicle(
     options: &NavigationOptions,
     start: &Start,
     world: World,
     limits: Limits,
 ) -> Result<Box<dyn Core>, Fault> {
-    running::<Wheeled, { Wheeled::DIMENSION }>(options, start, world, limits)
+    running::<Vehicle, { Vehicle::DIMENSION }>(options, start, world, limits)
+}
+
+fn complete(
+    options: &NavigationOptions,
+    start: &Start,
+    world: World,
+    limits: Limits,
+) -> Result<Box<dyn Core>, Fault> {
+    running::<Complete, { Complete::DIMENSION }>(options, start, world, limits)
 }
 
 fn running<S: States + Send + 'static, const N: usize>(
@@ -111,15 +121,7 @@ fn running<S: States + Send + 'static, const N: usize>(
 ) -> Result<Box<dyn Core>, Fault> {
     let filter = Filter::<S, N>::new(options, start)?;
     let past = Past::new(filter, LONGEST_LEAD_NS).map_err(|refusal| Fault::new(refusal.to_string()))?;
-    Ok(Box::new(Running {
-        past,
-        world,
-        heights: Heights::default(),
-        watch: Watch::new(limits),
-        fixes: Refuted::default(),
-        poses: Refuted::default(),
-        orientation: None,
-    }))
+    Ok(Box::new(Running { past, world, heights: Heights::default(), watch: Watch::new(limits), resets: 1 }))
 }
 
 impl<S: States, const N: usize> Running<S, N> {
@@ -127,40 +129,6 @@ impl<S: States, const N: usize> Running<S, N> {
         if let Err(refusal) = self.past.update(time_ns, &measured) {
             tracing::debug!(%refusal, sensor = measured.name(), "measurement refused");
         }
-    }
-
-    /// If fixes or poses agree with each other but not with the filter, moves the filter to them.
-    fn go_where_positions_agree(
-        &mut self,
-        options: &NavigationOptions,
-        mounting: &Mounting,
-    ) -> Result<(), Refusal> {
-        let now = self.past.now();
-        let [of_fixes, of_poses] = now.positions();
-        let (found, lever_arm, orientation, world) =
-            if let Some(found) = self.fixes.verdict(of_fixes, options.patience) {
-                let jump = now.position().map_or(0.0, |position| (found.point.position - position).norm());
-                let is_confirmed = self.fixes.confirms(of_fixes, options.patience);
-                let world = self.world.corrected(&found.point.position, jump, is_confirmed);
-                let position = self.world.position_in(&world, &found.point.position);
-                let turn = self.world.rotation_to(&world);
-                let velocity = found.velocity.map(|(velocity, deviation)| (turn * velocity, deviation));
-                let found = Found { point: TrackPoint { position, ..found.point }, velocity };
-                (found, mounting.antenna(), None, world)
-            } else if let Some(found) = self.poses.verdict(of_poses, options.patience) {
-                (found, Vector3::zeros(), self.orientation, self.world)
-            } else {
-                return Ok(());
-            };
-        let mut filter = now.clone();
-        filter.relocate(&found, &lever_arm, orientation)?;
-        tracing::warn!(position = ?found.point.position, "it was wrong, and begins again where positions agree");
-        // The next reading becomes the barometer's reference.
-        self.heights = Heights::default();
-        let [of_fixes, of_poses] = filter.positions();
-        self.fixes.begin(of_fixes);
-        self.poses.begin(of_poses);
-        self.begin_again(filter, world)
     }
 
     /// Continues with a filter in another place or world. The history belongs to the old one.
@@ -183,27 +151,15 @@ impl<S: States + Send, const N: usize> Core for Running<S, N> {
         if let Some(fix) = inputs.gnss.filter(|fix| fix.is_new())
             && let Some(measured) = self.world.fix(&fix.payload, options, mounting)
         {
-            let time_ns = fix.monotonic_time.as_nanos();
-            self.world.point(time_ns, &fix.payload, options).into_iter().for_each(|point| self.fixes.see(point));
-            self.fuse(time_ns, Measured::Gnss(measured));
+            self.fuse(fix.monotonic_time.as_nanos(), Measured::Gnss(measured));
         }
         if let Some(odometry) = inputs.odometry.filter(|odometry| odometry.is_new()) {
-            let time_ns = odometry.monotonic_time.as_nanos();
-            if offset::<S>(Optional::WheelScale).is_some() {
-                let (speed, sideways) = mounting.wheels(&odometry.payload, options);
-                self.fuse(time_ns, Measured::Wheels(speed));
-                self.fuse(time_ns, Measured::Sideways(sideways));
-            } else {
-                self.fuse(time_ns, Measured::Odometry(mounting.velocity(&odometry.payload, options)));
-            }
+            let measured = mounting.velocity(&odometry.payload, options);
+            self.fuse(odometry.monotonic_time.as_nanos(), Measured::Odometry(measured));
         }
         if let Some(pose) = inputs.pose.filter(|pose| pose.is_new()) {
             let measured = self.world.pose(&pose.payload, options, mounting);
-            let time_ns = pose.monotonic_time.as_nanos();
-            let AbsolutePose { position, position_covariance: covariance, .. } = measured;
-            self.poses.see(TrackPoint { time_ns, position, covariance, yaw: 0.0 });
-            self.orientation = Some((measured.world_from_body, measured.rotation_covariance));
-            self.fuse(time_ns, Measured::Pose(measured));
+            self.fuse(pose.monotonic_time.as_nanos(), Measured::Pose(measured));
         }
         if let Some(relative) = inputs.relative.filter(|relative| relative.is_new()) {
             let end_ns = relative.end.as_nanos();
@@ -222,13 +178,16 @@ impl<S: States + Send, const N: usize> Core for Running<S, N> {
                 self.fuse(pressure.monotonic_time.as_nanos(), Measured::Pressure(height));
             }
         }
-        self.go_where_positions_agree(options, mounting)?;
+        let resets = self.past.now().eskf().resets();
+        if resets != self.resets {
+            tracing::warn!("it was wrong, and goes on where positions agree");
+            // The next reading becomes the barometer's reference.
+            (self.resets, self.heights) = (resets, Heights::default());
+        }
         let mut world = self.world;
         if let Some(new_from_old) = self.past.now().position().and_then(|position| world.moves_on(&position)) {
             let mut filter = self.past.now().clone();
             filter.move_world(&new_from_old)?;
-            self.fixes.move_world();
-            self.poses.move_world();
             self.begin_again(filter, world)?;
         }
         Ok(())
@@ -255,6 +214,10 @@ impl<S: States + Send, const N: usize> Core for Running<S, N> {
 
     fn status(&self) -> Option<NavigationStatus> {
         status_of(self.past.now(), &self.world)
+    }
+
+    fn elsewhere(&self) -> Option<f64> {
+        self.past.now().copies().elsewhere()
     }
 
     fn divergence(&mut self) -> Option<&'static str> {

@@ -15,7 +15,7 @@ pub(super) fn check<S: States>(mounting: &Mounting) -> Result<(), Fault> {
         let (input, is_declared) = match state {
             Optional::Keyframe | Optional::RelativeScale => ("relative", mounting.relative.is_some()),
             Optional::GnssLeverArm | Optional::GnssDelay => ("gnss", mounting.gnss.is_some()),
-            Optional::WheelScale => ("odometry", mounting.odometry.is_some()),
+            Optional::WheelScale | Optional::WheelMounting => ("odometry", mounting.odometry.is_some()),
             Optional::HardIron => ("magnetic_field", mounting.magnetic_field.is_some()),
             Optional::BarometerBias => ("pressure", mounting.pressure.is_some()),
         };
@@ -24,6 +24,9 @@ pub(super) fn check<S: States>(mounting: &Mounting) -> Result<(), Fault> {
                 "nothing tells the state `Optional::{state:?}`: declare the input `{input}`, or leave it out of the states"
             )));
         }
+    }
+    if S::OPTIONAL.is_empty() {
+        return Ok(());
     }
     // Without its bias, a pressure would give the height the unjustified certainty of the first reading.
     let needed = [

@@ -1,20 +1,15 @@
 //! The world that the filter works in, and the one that its outputs refer to.
 
-use super::course::point;
 use super::input::Mounting;
 use super::options::NavigationOptions;
 use crate::navigation::geodesy::{Geodetic, LocalFrame};
 use crate::navigation::measurement::{AbsolutePose, GnssPosition};
-use crate::navigation::track::TrackPoint;
 use bb_core::payload::{GnssFix, Pose};
-use nalgebra::{Isometry3, Matrix3, Vector3};
+use nalgebra::{Isometry3, Vector3};
 
 /// Largest distance of a filter from the origin of its world, m. At that distance, down differs by 0.8 mrad, as much as a good
 /// accelerometer's bias.
 const FARTHEST: f64 = 5000.0;
-
-/// A filter that is found to be off by more than this, m, was never near: the origin of its world was wrong.
-pub(in crate::navigation) const FARTHEST_JUMP: f64 = 100_000.0;
 
 /// The world of the outputs has its origin where the filter started. The filter's own world is the same until it is far from that
 /// origin.
@@ -25,13 +20,11 @@ pub(super) struct World {
     /// The frame at the start.
     first: Option<LocalFrame>,
     first_from_frame: Isometry3<f64>,
-    /// Whether enough fixes agreed with it to rule out a start from wrong ones.
-    is_confirmed: bool,
 }
 
 impl World {
     pub(super) fn new(frame: Option<LocalFrame>) -> Self {
-        Self { frame, first: frame, first_from_frame: Isometry3::identity(), is_confirmed: false }
+        Self { frame, first: frame, first_from_frame: Isometry3::identity() }
     }
 
     /// The frame of the outputs.
@@ -65,43 +58,6 @@ impl World {
     /// ellipsoid.
     pub(super) fn drop(&self, position: &Vector3<f64>) -> f64 {
         self.frame.map_or(0.0, |frame| frame.geodetic(position).height - frame.origin().height - position.z)
-    }
-
-    /// The world of a filter that was wrong by `jump` (m) and is at `position`. Far from the origin of its frame, the filter
-    /// continues in one with its origin at `position`. If no robot could have moved that far, the assumed origin of the world was
-    /// wrong as well, unless many fixes have confirmed it.
-    pub(super) fn corrected(&self, position: &Vector3<f64>, jump: f64, is_confirmed: bool) -> Self {
-        let is_confirmed = self.is_confirmed || is_confirmed;
-        let kept = Self { is_confirmed, ..*self };
-        let Some(frame) = self.frame.filter(|_| position.norm() > FARTHEST) else { return kept };
-        let place = frame.geodetic(position);
-        if jump > FARTHEST_JUMP && !is_confirmed {
-            return Self::new(Some(LocalFrame::new(place)));
-        }
-        let next = LocalFrame::new(Geodetic { height: frame.origin().height, ..place });
-        let first_from_frame = self.first_from_frame * next.other_from_self(&frame);
-        Self { frame: Some(next), first_from_frame, ..kept }
-    }
-
-    /// Coordinates in the world `other`, elsewhere on the same Earth.
-    pub(super) fn position_in(&self, other: &Self, position: &Vector3<f64>) -> Vector3<f64> {
-        match (self.frame, other.frame) {
-            (Some(own), Some(others)) => own.other_from_self(&others).transform_point(&(*position).into()).coords,
-            _ => *position,
-        }
-    }
-
-    /// Rotates vectors from this world to `other`.
-    pub(super) fn rotation_to(&self, other: &Self) -> Matrix3<f64> {
-        match (self.frame, other.frame) {
-            (Some(own), Some(others)) => own.other_from_self(&others).rotation.to_rotation_matrix().into_inner(),
-            _ => Matrix3::identity(),
-        }
-    }
-
-    /// A fix as a point of a track. `None` if it has no position.
-    pub(super) fn point(&self, time_ns: i64, fix: &GnssFix, options: &NavigationOptions) -> Option<TrackPoint> {
-        point(time_ns, fix, &self.frame?, options.gnss_deviation)
     }
 
     /// If the filter, at `position`, is far from the origin, moves its world there and returns the transform of coordinates to it.

@@ -12,7 +12,8 @@ const LEAST_HORIZONTAL: f64 = 1e-3;
 
 /// Position of an antenna in the world.
 ///
-/// With the antenna at `l` in the body: `p + R l`, less the distance `(v + R (ω × l)) d` travelled during its delay d.
+/// With the antenna at `l` in the body: `p + R l`, less the distance `(v + R (ω × l)) d - ½ a d²` travelled during its delay d, with
+/// the [acceleration](Estimate::acceleration) a.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GnssPosition {
     /// Position of the antenna in the world, m.
@@ -44,7 +45,9 @@ impl Measurement<3> for GnssPosition {
         let swing = rotation * at.angular_velocity.cross(&in_body);
         let velocity = at.velocity + swing;
         let delay = at.scalar::<S>(Optional::GnssDelay);
-        model.set_residual(0, &(self.position - at.position - lever_arm + velocity * delay));
+        let bent = at.acceleration * delay;
+        let travelled = (velocity - bent * 0.5) * delay;
+        model.set_residual(0, &(self.position - at.position - lever_arm + travelled));
         model.set_noise(0, &self.covariance);
         model.set_block(0, POSITION, &Matrix3::identity());
         model.set_block(0, ROTATION, &-skew(&(lever_arm - swing * delay)));
@@ -54,7 +57,7 @@ impl Measurement<3> for GnssPosition {
         if let Some(index) = offset::<S>(Optional::GnssDelay) {
             model.set_block(0, VELOCITY, &(Matrix3::identity() * -delay));
             model.set_block(0, GYROSCOPE_BIAS, &(rotation * skew(&in_body) * -delay));
-            model.set_column(0, index, &-velocity);
+            model.set_column(0, index, &(bent - velocity));
         }
         Ok(())
     }

@@ -2,19 +2,22 @@
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-use super::{Linearised, Measurement, isotropic};
-use crate::navigation::math::skew;
+use super::{Linearised, Measurement};
+use crate::navigation::math::{rotation, skew};
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{Estimate, GYROSCOPE_BIAS, Optional, ROTATION, States, VELOCITY, offset};
 
-/// Velocity of a point of the body, in the axes of a sensor: `Mᵀ (Rᵀ v + ω × l)`.
+/// Velocity of a point of the body, in the axes of a sensor: `diag(1 + s, 1, 1) M Bᵀ (Rᵀ v + ω × l)`, with
+/// [`Optional::WheelScale`] s and the rotation M by [`Optional::WheelMounting`], first the yaw and then the pitch.
+///
+/// Of wheels, the sensor's x axis points forward, and what they measure across and up is zero: the non-holonomic constraint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BodyVelocity {
     /// Velocity in the sensor's axes, m/s.
     pub velocity: Vector3<f64>,
-    /// Standard deviation of a component, m/s.
-    pub deviation: f64,
-    /// Rotates sensor coordinates to body coordinates, M.
+    /// Standard deviations of its components, m/s.
+    pub deviations: Vector3<f64>,
+    /// Rotates sensor coordinates to body coordinates, B.
     pub body_from_sensor: UnitQuaternion<f64>,
     /// Position of the sensor in the body, m.
     pub lever_arm: Vector3<f64>,
@@ -80,15 +83,31 @@ impl Measurement<3> for BodyVelocity {
         at: &Estimate<N>,
         model: &mut Linearised<3, N>,
     ) -> Result<(), Refusal> {
-        // In the world, the isotropic noise is unchanged.
-        let rotation = at.rotation();
-        let swing = rotation * at.angular_velocity.cross(&self.lever_arm);
-        let measured = rotation * (self.body_from_sensor * self.velocity);
-        model.set_residual(0, &(measured - at.velocity - swing));
-        model.set_noise(0, &isotropic(self.deviation));
-        model.set_block(0, VELOCITY, &Matrix3::identity());
-        model.set_block(0, ROTATION, &skew(&(measured - swing)));
-        model.set_block(0, GYROSCOPE_BIAS, &(rotation * skew(&self.lever_arm)));
+        let mounting = offset::<S>(Optional::WheelMounting);
+        let angle = |component: usize| mounting.map_or(0.0, |first| at.optional[first + component]);
+        let yaw = rotation(&Vector3::new(0.0, 0.0, angle(0))).to_rotation_matrix().into_inner();
+        let pitch = rotation(&Vector3::new(0.0, angle(1), 0.0)).to_rotation_matrix().into_inner();
+        let sensor_from_body = self.body_from_sensor.to_rotation_matrix().into_inner().transpose();
+        let body_from_world = at.rotation().transpose();
+        let in_body = body_from_world * at.velocity + at.angular_velocity.cross(&self.lever_arm);
+        let turned = yaw * (sensor_from_body * in_body);
+        let in_vehicle = pitch * turned;
+        let scale = Vector3::new(1.0 + at.scalar::<S>(Optional::WheelScale), 1.0, 1.0);
+        let scaled = Matrix3::from_diagonal(&scale);
+        let from_body = scaled * pitch * yaw * sensor_from_body;
+        let from_world = from_body * body_from_world;
+        model.set_residual(0, &(self.velocity - scale.component_mul(&in_vehicle)));
+        model.set_noise(0, &Matrix3::from_diagonal(&self.deviations.component_mul(&self.deviations)));
+        model.set_block(0, VELOCITY, &from_world);
+        model.set_block(0, ROTATION, &(from_world * skew(&at.velocity)));
+        model.set_block(0, GYROSCOPE_BIAS, &(from_body * skew(&self.lever_arm)));
+        if let Some(index) = offset::<S>(Optional::WheelScale) {
+            model.jacobian[0][index] = in_vehicle.x;
+        }
+        if let Some(index) = mounting {
+            model.set_column(0, index, &(scaled * pitch * Vector3::z().cross(&turned)));
+            model.set_column(0, index + 1, &(scaled * Vector3::y().cross(&in_vehicle)));
+        }
         Ok(())
     }
 }

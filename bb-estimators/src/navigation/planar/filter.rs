@@ -404,11 +404,8 @@ impl Propagate for PlanarEkf {
         self.propagate(sample)
     }
 
-    fn longest_sample(&self) -> f64 {
-        self.params().longest_sample
-    }
-
-    fn propagate_part(&mut self, part: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
-        self.propagate_part(part, is_gap)
+    fn propagate_until(&mut self, time_ns: i64, sample: &ImuMean, since_ns: i64) -> Result<(), Refusal> {
+        let is_gap = seconds_between(since_ns, sample.time_ns)? > self.params().longest_sample;
+        self.propagate_part(&ImuMean { time_ns, ..*sample }, is_gap)
     }
 }

@@ -3,11 +3,16 @@
 use nalgebra::{Matrix3, SVector, UnitQuaternion, Vector3};
 
 use super::states::{
-    ACCELEROMETER_BIAS, GYROSCOPE_BIAS, NAVIGATION, Optional, POSITION, ROTATION, States, VELOCITY, offset,
+    ACCELEROMETER_BIAS, GYROSCOPE_BIAS, Led, NAVIGATION, Optional, POSITION, ROTATION, States, VELOCITY, led,
+    offset,
 };
 use crate::attitude::{MAX_ANGULAR_VELOCITY, MAX_SPECIFIC_FORCE};
 use crate::navigation::bounds::{is_on_earth, is_within};
-use crate::navigation::math::{renormalised, rotation, rotation_vector};
+use crate::navigation::math::{Integrals, renormalised, rotation, rotation_vector};
+
+/// The largest delay of fixes, s, in either direction: a longer one is no delay but a fault, and the position then is no longer nearly
+/// a parabola.
+const MOST_DELAY_S: f64 = 0.5;
 
 /// Pose at an earlier time, to which relative poses refer.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,6 +46,8 @@ pub struct Estimate<const N: usize> {
     pub angular_velocity: Vector3<f64>,
     /// Specific force over the last sample, bias removed, body axes, m/s².
     pub specific_force: Vector3<f64>,
+    /// Acceleration of the body in the world, averaged over the last tenth of a second, m/s².
+    pub acceleration: Vector3<f64>,
     /// The keyframe, if one was set and the filter supports keyframes.
     pub keyframe: Option<Keyframe>,
     /// Optional states, at their indices in the error vector.
@@ -90,6 +97,26 @@ impl<const N: usize> Estimate<N> {
         corrected
     }
 
+    /// The estimate composed with the exponential of an error: `R⁺ = exp(θ) R`, `v⁺ = v + Γ1(θ) δv`, `p⁺ = p + Γ1(θ) δp`, and the
+    /// other states by addition. It is the left error of SE₂(3), its axes turned to those of the world; A. Barrau, S. Bonnabel, "The
+    /// invariant extended Kalman filter as a stable observer", IEEE Transactions on Automatic Control 62(4), 2017.
+    pub(in crate::navigation) fn composed<S: States>(&self, error: &SVector<f64, N>) -> Self {
+        let mut additive = *error;
+        let part = |first: usize| error.fixed_rows::<3>(first).into_owned();
+        for Led { rotation, led } in led::<S>().into_iter().flatten() {
+            let turn = part(rotation);
+            let integral = Integrals::new(&turn).first_matrix(&turn);
+            for first in led.into_iter().flatten() {
+                additive.fixed_rows_mut::<3>(first).copy_from(&(integral * part(first)));
+            }
+        }
+        let mut composed = self.corrected::<S>(&additive);
+        if let Some(delay) = offset::<S>(Optional::GnssDelay) {
+            composed.optional[delay] = composed.optional[delay].clamp(-MOST_DELAY_S, MOST_DELAY_S);
+        }
+        composed
+    }
+
     /// The error that takes this estimate to `other`: `self.corrected(&self.error_to(&other))` is `other`, except for stamps and
     /// the last IMU sample.
     pub fn error_to<S: States>(&self, other: &Self) -> SVector<f64, N> {
@@ -123,6 +150,7 @@ impl<const N: usize> Estimate<N> {
             gyroscope_bias: zero,
             angular_velocity: zero,
             specific_force: zero,
+            acceleration: zero,
             keyframe: None,
             optional: SVector::zeros(),
         }

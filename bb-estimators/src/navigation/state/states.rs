@@ -33,6 +33,9 @@ pub enum Optional {
     GnssDelay,
     /// Scale of the wheel speed, less 1: `measured = (1 + s) true`.
     WheelScale,
+    /// Mounting of the IMU in the vehicle beyond the declared one: yaw, then pitch, of the vehicle's axes from the declared
+    /// ones, rad.
+    WheelMounting,
     /// Magnetic field of the body itself, in the body, T.
     HardIron,
     /// Bias of the barometric height: its reading minus the height in the world, m.
@@ -40,12 +43,13 @@ pub enum Optional {
 }
 
 impl Optional {
-    const ALL: [Self; 7] = [
+    const ALL: [Self; 8] = [
         Self::Keyframe,
         Self::RelativeScale,
         Self::GnssLeverArm,
         Self::GnssDelay,
         Self::WheelScale,
+        Self::WheelMounting,
         Self::HardIron,
         Self::BarometerBias,
     ];
@@ -55,6 +59,7 @@ impl Optional {
         match self {
             Self::Keyframe => 6,
             Self::GnssLeverArm | Self::HardIron => 3,
+            Self::WheelMounting => 2,
             Self::RelativeScale | Self::GnssDelay | Self::WheelScale | Self::BarometerBias => 1,
         }
     }
@@ -97,12 +102,47 @@ impl States for Navigation {
     const OPTIONAL: &'static [Optional] = &[];
 }
 
-/// Navigation states and the wheel scale, which depends on the tyre pressure.
+/// Navigation states, a keyframe for relative poses, and their scale.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Wheeled;
+pub struct Navigated;
 
-impl States for Wheeled {
-    const OPTIONAL: &'static [Optional] = &[Optional::WheelScale];
+impl States for Navigated {
+    const OPTIONAL: &'static [Optional] = &[Optional::Keyframe, Optional::RelativeScale];
+}
+
+/// The number of errors of [`Navigated`].
+pub const NAVIGATED: usize = Navigated::DIMENSION;
+
+/// Navigation states, the delay of fixes, and the bias of a barometer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Aided;
+
+impl States for Aided {
+    const OPTIONAL: &'static [Optional] = &[Optional::GnssDelay, Optional::BarometerBias];
+}
+
+/// The states of [`Aided`], and the scale and mounting of wheels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Vehicle;
+
+impl States for Vehicle {
+    const OPTIONAL: &'static [Optional] =
+        &[Optional::GnssDelay, Optional::BarometerBias, Optional::WheelScale, Optional::WheelMounting];
+}
+
+/// The states of [`Vehicle`] and of [`Navigated`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Complete;
+
+impl States for Complete {
+    const OPTIONAL: &'static [Optional] = &[
+        Optional::GnssDelay,
+        Optional::BarometerBias,
+        Optional::WheelScale,
+        Optional::WheelMounting,
+        Optional::Keyframe,
+        Optional::RelativeScale,
+    ];
 }
 
 /// The index of an optional state's first error, if the filter estimates the state.
@@ -117,6 +157,20 @@ pub const fn offset<S: States>(state: Optional) -> Option<usize> {
         i += 1;
     }
     None
+}
+
+/// A rotation error, and the errors of positions and velocities that turn with it.
+pub(in crate::navigation) struct Led {
+    pub(in crate::navigation) rotation: usize,
+    pub(in crate::navigation) led: [Option<usize>; 2],
+}
+
+/// The poses among the errors: that of the body, and that of the keyframe.
+pub(in crate::navigation) fn led<S: States>() -> [Option<Led>; 2] {
+    let body = Led { rotation: ROTATION, led: [Some(POSITION), Some(VELOCITY)] };
+    let keyframe =
+        offset::<S>(Optional::Keyframe).map(|first| Led { rotation: first + 3, led: [Some(first), None] });
+    [Some(body), keyframe]
 }
 
 const fn dimension(states: &[Optional]) -> usize {

@@ -1,8 +1,8 @@
 //! Factors that outside providers add directly to the window.
 
-#[cfg(feature = "eskf")]
-use crate::navigation::navigator::{NAVIGATED, Navigated};
 use crate::navigation::smoother::Factor;
+#[cfg(feature = "eskf")]
+use crate::navigation::state::{NAVIGATED, Navigated};
 use core::fmt::Debug;
 
 #[cfg(feature = "smoother")]

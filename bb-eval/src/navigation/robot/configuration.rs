@@ -125,7 +125,6 @@ impl fmt::Display for NavigationSetting {
 #[derive(Clone, Debug, Default)]
 pub struct RobotSettings {
     settings: Vec<NavigationSetting>,
-    states: Vec<String>,
     noise_times: Option<f64>,
     /// Noise of an IMU, as a recording tells it.
     told: Vec<(&'static str, f64)>,
@@ -156,7 +155,7 @@ const NOISE: [&str; 4] =
     ["gyroscope_noise", "accelerometer_noise", "gyroscope_bias_walk", "accelerometer_bias_walk"];
 
 impl RobotSettings {
-    /// Settings of a file, then single ones; optional states; and what the noise of the IMU is multiplied by.
+    /// Settings of a file, then single ones, and what the noise of the IMU is multiplied by.
     ///
     /// # Errors
     /// The file cannot be read, or has an option that the filter does not have.
@@ -164,12 +163,11 @@ impl RobotSettings {
         filter: &NavigationFilter,
         file: Option<&RobotFile>,
         settings: &[NavigationSetting],
-        states: &[String],
         noise_times: Option<f64>,
     ) -> Result<Self, String> {
         let mut all = file.map_or_else(|| Ok(Vec::new()), |file| file.read(&filter.names()))?;
         all.extend_from_slice(settings);
-        Ok(Self { settings: all, states: states.to_vec(), noise_times, told: Vec::new() })
+        Ok(Self { settings: all, noise_times, told: Vec::new() })
     }
 
     /// Sets the options of the filter of a robot.
@@ -216,19 +214,6 @@ impl RobotSettings {
             ("gravity", noise.gravity),
         ];
         Self { told: told.to_vec(), ..self.clone() }
-    }
-
-    pub(super) fn states(&self) -> Vec<&str> {
-        self.states.iter().map(String::as_str).collect()
-    }
-
-    /// # Errors
-    /// There are optional states, which this filter does not have.
-    pub(super) fn without_states(&self, filter: &str) -> Result<(), String> {
-        match self.states.is_empty() {
-            true => Ok(()),
-            false => Err(format!("--states {}: {filter} has no optional states", self.states.join(","))),
-        }
     }
 
     /// Each setting that is not the default, with the settings without it.

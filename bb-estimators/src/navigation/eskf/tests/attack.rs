@@ -256,7 +256,7 @@ proptest! {
                 5 => filter.update(&mut stream, &AbsolutePose::new((vector(0), deviation), (turned, deviation))),
                 6 => filter.update(&mut stream, &RelativePose::new(7, (vector(0), deviation), (turned, deviation))),
                 7 => filter.update(&mut stream, &ZeroVelocity { deviation }),
-                8 => filter.update(&mut stream, &BodyVelocity { velocity: vector(0), deviation, body_from_sensor: turned, lever_arm: vector(6) }),
+                8 => filter.update(&mut stream, &BodyVelocity { velocity: vector(0), deviations: Vector3::repeat(deviation), body_from_sensor: turned, lever_arm: vector(6) }),
                 9 => filter.update(&mut stream, &WheelSpeed { speed: x[0], deviation, forward: vector(3), lever_arm: vector(6) }),
                 10 => {
                     filter.set_keyframe(7);

@@ -63,6 +63,7 @@ fn hidden<S: States>() -> Vec<Hidden> {
         Optional::GnssLeverArm => Some(params.gnss_lever_arm),
         Optional::GnssDelay => Some(params.gnss_delay),
         Optional::WheelScale => Some(params.wheel_scale),
+        Optional::WheelMounting => Some(params.wheel_mounting),
         Optional::HardIron => Some(params.hard_iron),
         Optional::BarometerBias => Some(params.barometer_bias),
     };

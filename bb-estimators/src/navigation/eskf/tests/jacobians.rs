@@ -1,6 +1,6 @@
 //! For every measurement: the residual of an exact measurement is zero, and the Jacobian matches numeric differentiation.
 
-use nalgebra::{SVector, Vector3};
+use nalgebra::{SVector, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
 use super::{ALL, All, estimate, orientation, vector};
@@ -9,7 +9,7 @@ use crate::navigation::measurement::{
     MagneticField, MagneticHeading, Measurement, NonHolonomic, RelativePose, WheelSpeed, ZeroRotation,
     ZeroVelocity,
 };
-use crate::navigation::state::{Estimate, Optional};
+use crate::navigation::state::{Estimate, Optional, offset};
 
 /// `measurement` is exact at `truth`; nearby, its residual matches the Jacobian.
 fn check<const D: usize>(measurement: &impl Measurement<D>, truth: &Estimate<ALL>) -> Result<(), TestCaseError> {
@@ -88,8 +88,12 @@ proptest! {
     fn velocities(at in estimate(), lever_arm in vector(3.0), mounting in orientation()) {
         let in_body = at.world_from_body.inverse() * at.velocity + at.angular_velocity.cross(&lever_arm);
         let body_from_sensor = mounting;
-        let velocity = mounting.inverse() * in_body;
-        check(&BodyVelocity { velocity, deviation: 0.1, body_from_sensor, lever_arm }, &at)?;
+        let first = offset::<All>(Optional::WheelMounting).unwrap();
+        let yaw = UnitQuaternion::from_euler_angles(0.0, 0.0, at.optional[first]);
+        let pitch = UnitQuaternion::from_euler_angles(0.0, at.optional[first + 1], 0.0);
+        let mut velocity = pitch * (yaw * (mounting.inverse() * in_body));
+        velocity.x *= 1.0 + at.scalar::<All>(Optional::WheelScale);
+        check(&BodyVelocity { velocity, deviations: Vector3::new(0.1, 0.2, 0.3), body_from_sensor, lever_arm }, &at)?;
         let forward = mounting * Vector3::x();
         let speed = forward.dot(&in_body) * (1.0 + at.scalar::<All>(Optional::WheelScale));
         check(&WheelSpeed { speed, deviation: 0.1, forward, lever_arm }, &at)?;

@@ -137,7 +137,7 @@ fn a_velocity_that_does_not_fit_leaves_the_position() {
         for _ in 0..7 {
             let speed = BodyVelocity {
                 velocity: Vector3::new(slip, 0.0, 0.0),
-                deviation: 0.05,
+                deviations: Vector3::repeat(0.05),
                 body_from_sensor: UnitQuaternion::identity(),
                 lever_arm: Vector3::zeros(),
             };

@@ -39,7 +39,7 @@ fn drive(seed: u64, turn: Vector3<f64>, seconds: f64) -> (f64, f64) {
         if i % 10 == 0 {
             let speed = BodyVelocity {
                 velocity: Vector3::x() * speed + noise.vector(0.05),
-                deviation: 0.05,
+                deviations: Vector3::repeat(0.05),
                 body_from_sensor: UnitQuaternion::identity(),
                 lever_arm: Vector3::zeros(),
             };

@@ -131,6 +131,7 @@ impl Filter {
             resets: self.ekf.resets(),
             dead_reckoning_s: self.ekf.dead_reckoning_s(),
             deviation: self.deviation(),
+            heading_deviation: 0.0,
         })
     }
 }

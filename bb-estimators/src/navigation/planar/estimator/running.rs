@@ -8,7 +8,6 @@ use crate::navigation::eskf::ImuMean;
 use crate::navigation::estimator::course::point;
 use crate::navigation::estimator::health::{Limits, Watch};
 use crate::navigation::estimator::refuted::Refuted;
-use crate::navigation::estimator::world::FARTHEST_JUMP;
 use crate::navigation::geodesy::LocalFrame;
 use crate::navigation::history::History;
 use crate::navigation::planar::filter::PlanarStart;
@@ -25,6 +24,9 @@ type Past = History<Filter, SAMPLES, MEASUREMENTS, STATES>;
 
 /// How far ahead of the IMU a measurement may be stamped, ns.
 const LONGEST_LEAD_NS: i64 = 500_000_000;
+
+/// A filter that is found to be off by more than this, m, was never near: the origin of its world was wrong.
+const FARTHEST_JUMP: f64 = 100_000.0;
 
 #[derive(Debug)]
 pub(super) struct Running {

@@ -31,10 +31,10 @@ use super::{Cadence, Failure, Measured, Place, Pose, Predictor, Streams, add_tim
 use crate::attitude::ParamsError;
 use crate::navigation::eskf::{Eskf, ImuMean, Start};
 use crate::navigation::fused::Fused;
-use crate::navigation::navigator::{NAVIGATED, Navigated};
 use crate::navigation::realignment::Realignment;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::Estimate;
+use crate::navigation::state::{NAVIGATED, Navigated};
 use crate::navigation::state_estimator::factor::ProvidedFactor;
 use crate::navigation::state_estimator::params::StateEstimatorConfig;
 
@@ -71,8 +71,6 @@ pub(in crate::navigation::state_estimator) struct EskfStrategy {
     by_gaps: f64,
     /// The end of the last gap, and the variance of the rotation that it may have hidden, rad².
     gap: (i64, f64),
-    /// Whether the velocity may be wrong by more than [`SLOW`], because the attitude was lost.
-    is_fast: bool,
 }
 
 impl EskfStrategy {
@@ -90,7 +88,6 @@ impl EskfStrategy {
             attitude: Attitude::Known,
             by_gaps: 0.0,
             gap: (i64::MIN, 0.0),
-            is_fast: false,
         })
     }
 

@@ -4,11 +4,11 @@ use super::Pose;
 #[cfg(feature = "smoother")]
 use crate::navigation::eskf::EskfParams;
 use crate::navigation::eskf::{Eskf, ImuMean};
-#[cfg(feature = "eskf")]
-use crate::navigation::navigator::{NAVIGATED, Navigated};
 use crate::navigation::refusal::Refusal;
 #[cfg(feature = "smoother")]
 use crate::navigation::state::{Estimate, Navigation, States};
+#[cfg(feature = "eskf")]
+use crate::navigation::state::{NAVIGATED, Navigated};
 #[cfg(feature = "smoother")]
 use nalgebra::SMatrix;
 

@@ -5,10 +5,10 @@ use super::fused::absurd;
 use crate::navigation::eskf::Eskf;
 use crate::navigation::fused::Fused;
 use crate::navigation::measurement::{Linearised, Measurement};
-use crate::navigation::navigator::{NAVIGATED, Navigated};
 use crate::navigation::refusal::Refusal;
 use crate::navigation::smoother::{Factor, Rows};
 use crate::navigation::state::{Estimate, States};
+use crate::navigation::state::{NAVIGATED, Navigated};
 use crate::navigation::state_estimator::factor::ProvidedFactor;
 use crate::navigation::stream::Stream;
 use nalgebra::SMatrix;
@@ -54,6 +54,8 @@ impl<const D: usize> Whitened<D> {
 }
 
 impl<const D: usize> Measurement<D> for Whitened<D> {
+    const LINEARISES: bool = false;
+
     fn linearise<S: States, const N: usize>(
         &self,
         _: &Estimate<N>,

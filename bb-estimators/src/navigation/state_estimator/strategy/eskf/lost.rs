@@ -6,10 +6,10 @@ use crate::navigation::eskf::seconds_between;
 use crate::navigation::fused::Fused;
 use crate::navigation::jump::UNKNOWN;
 use crate::navigation::measurement::{GnssPosition, GnssVelocity};
-use crate::navigation::navigator::{NAVIGATED, Navigated};
 use crate::navigation::realignment::{KNOWN, Realigned, Realignment};
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{Estimate, NAVIGATION, Optional, ROTATION, offset};
+use crate::navigation::state::{NAVIGATED, Navigated};
 use alloc::boxed::Box;
 use nalgebra::{Matrix3, SMatrix, UnitQuaternion};
 
@@ -214,7 +214,6 @@ impl EskfStrategy {
         covariance: &Matrix3<f64>,
     ) {
         if self.is_lost() && is_known(covariance) && self.filter.set_attitude(world_from_body, covariance).is_ok() {
-            self.is_fast = true;
             self.doubt();
         } else if self.has_lasted() && is_known(covariance) && self.agrees(world_from_body) {
             self.confirm();

@@ -1,0 +1,476 @@
+//! Copies of one filter that differ in what nobody knows, the best by likelihood.
+//!
+//! Three questions have the same answer, a few copies of the filter side by side:
+//!
+//! * **Where it begins.** A heading that is not known begins as six, 60° apart; so does the yaw of an IMU in its vehicle, where wheels
+//!   are declared. The scale of relative poses begins as one that is exact and one that drifts. A copy that is e¹² times less likely
+//!   than the best is dropped, and so is one that has become the same as the best.
+//! * **How noisy the IMU is on this vehicle.** Once what is left of the first question is small, two more copies have four times the
+//!   white noise, and a quarter. All move on to the multiple of a copy that leads by e³, over the past two minutes. The search begins
+//!   at 16 times the data sheet, since too little confidence heals and too much locks biases in; for the same reason the covariance
+//!   grows with the noise when the search moves up.
+//! * **Whether it is in the wrong place.** A position that the gate refuses founds a newcomer: the filter as if it had been there. Each
+//!   further position goes to whom it fits better. A newcomer that has refused none for as long as the filter had been right, at
+//!   most 20 s, takes over; one that loses a position is gone. "My place was wrong" and "these fixes have an offset" explain the data
+//!   equally well, so that time decides and not likelihood.
+//!
+//! Copies are never mixed: the estimate is that of one filter. A gap in the samples is bridged as `holding.rs` says, and fixes that
+//! scatter more than they state get the noise of their scatter (`scatter.rs`).
+
+mod holding;
+mod newcomer;
+mod scatter;
+mod search;
+#[cfg(test)]
+mod tests;
+
+use std::vec::Vec;
+
+use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
+
+use self::holding::Holding;
+use self::newcomer::Newcomer;
+use self::scatter::Scatter;
+use self::search::Search;
+use super::bounds::is_within;
+use super::chi_square::limit;
+use super::eskf::{Eskf, EskfParams, GaussMarkov, ImuMean, LONGEST_GAP_S, Start, seconds_between};
+use super::fused::Fused;
+use super::math::{rotation_vector, sqrt};
+use super::measurement::{GnssPosition, Measurement};
+use super::propagate::Propagate;
+use super::refusal::Refusal;
+use super::state::{Estimate, NAVIGATION, Optional, ROTATION, States, offset};
+use super::stream::Stream;
+use crate::attitude::ParamsError;
+
+/// The number of headings, and of mountings, that cover a turn.
+const TURNS: u32 = 6;
+
+/// The deviation of each of them, rad: half of the angle between two.
+const TURN_DEVIATION: f64 = core::f64::consts::PI / 6.0;
+
+/// A larger deviation, rad, is an unknown heading: a filter cannot be corrected linearly from so far.
+pub(super) const UNKNOWN: f64 = 0.5;
+
+/// The log likelihood by which a copy leads before it becomes the best.
+const BETTER: f64 = 1.0;
+
+/// A copy this much less likely than the best is dropped.
+const IMPLAUSIBLE: f64 = 12.0;
+
+/// The log likelihood that a copy loses with a measurement that it cannot take.
+const IMPOSSIBLE: f64 = 10.0;
+
+/// A copy whose state is nearer to that of the best than this part of a deviation is the same.
+const SAME: f64 = 0.5;
+
+/// The largest normalised innovation squared of a position, to each of whose variances [`SLACK`] is added: ten deviations and metres.
+const FAR: f64 = 100.0;
+
+/// Variance that is added to those of a position before [`FAR`] is applied, m².
+const SLACK: f64 = 1.0;
+
+/// The most starts among which accelerations have a direction: with more, the heading is not known.
+const MOST_UNDECIDED: usize = 6;
+
+/// Further differences between the copies.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ways {
+    /// Searches the noise of the IMU; without it, the filter has that of its parameters.
+    pub noise: bool,
+    /// Adds copies whose scale of relative poses is exact to those in which it drifts.
+    pub scale: bool,
+}
+
+/// Copies of one [filter](Eskf) that differ in where they begin, in the noise of the IMU, and in where they believe to be. The best by
+/// likelihood is the estimate; they are never mixed.
+#[derive(Clone, Debug)]
+pub struct Copies<S: States, const N: usize> {
+    params: EskfParams,
+    ways: Ways,
+    /// At least one once it has started, the best first.
+    starts: Vec<Begun<S, N>>,
+    search: Search<S, N>,
+    newcomer: Option<Newcomer<S, N>>,
+    started_ns: i64,
+    holding: Holding,
+    scatter: Scatter,
+    /// The last whole sample.
+    last: Option<ImuMean>,
+    /// The distance of positions that would have moved the filter, m, if they are not on this part of the Earth.
+    elsewhere: Option<f64>,
+}
+
+/// A copy that began in its own way.
+#[derive(Clone, Debug)]
+struct Begun<S: States, const N: usize> {
+    id: u32,
+    filter: Eskf<S, N>,
+    /// Relative to the best.
+    log_likelihood: f64,
+}
+
+impl<S: States, const N: usize> Copies<S, N> {
+    /// Creates copies that have not started.
+    ///
+    /// # Errors
+    ///
+    /// Returns the name of the first parameter outside its accepted range.
+    pub fn new(params: EskfParams, ways: Ways) -> Result<Self, ParamsError> {
+        let starts = vec![Begun { id: 0, filter: Eskf::new(params)?, log_likelihood: 0.0 }];
+        Ok(Self {
+            params,
+            ways,
+            starts,
+            search: Search::new(ways.noise),
+            newcomer: None,
+            started_ns: 0,
+            holding: Holding::default(),
+            scatter: Scatter::default(),
+            last: None,
+            elsewhere: None,
+        })
+    }
+
+    /// Starts or restarts all copies. A heading whose deviation is more than half a radian counts as unknown, and so does such a yaw of
+    /// [`EskfParams::wheel_mounting`].
+    ///
+    /// # Errors
+    ///
+    /// The same as [`Eskf::start`].
+    pub fn start(&mut self, start: &Start) -> Result<(), Refusal> {
+        let turns = |is_unknown: bool| if is_unknown { TURNS } else { 1 };
+        let angle = |i: u32| core::f64::consts::TAU * f64::from(i) / f64::from(TURNS);
+        let mounting = offset::<S>(Optional::WheelMounting);
+        let is_mounted = mounting.is_none() || self.params.wheel_mounting.deviation <= UNKNOWN;
+        let is_pointed = start.rotation_covariance[(2, 2)] <= UNKNOWN * UNKNOWN;
+        let mut ways = Vec::new();
+        for heading in 0..turns(!is_pointed) {
+            for yaw in 0..turns(!is_mounted) {
+                for params in self.exact_and_not() {
+                    ways.push((heading, yaw, params));
+                }
+            }
+        }
+        let mut starts = Vec::new();
+        for (id, (heading, yaw, mut params)) in (0..).zip(ways) {
+            let mut begun = *start;
+            if !is_pointed {
+                let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle(heading));
+                begun.world_from_body = turn * start.world_from_body;
+                let variance = TURN_DEVIATION * TURN_DEVIATION;
+                begun.rotation_covariance =
+                    Matrix3::from_diagonal(&start.rotation_covariance.diagonal().map(|own| own.min(variance)));
+            }
+            if !is_mounted {
+                params.wheel_mounting.deviation = TURN_DEVIATION;
+            }
+            let mut filter = Eskf::new(params).map_err(|_| Refusal::OutOfRange)?;
+            filter.start(&begun)?;
+            if let Some(error) = mounting {
+                filter.set_optional(error, angle(yaw));
+            }
+            filter.multiply_noise(self.search.first_multiple());
+            starts.push(Begun { id, filter, log_likelihood: 0.0 });
+        }
+        self.starts = starts;
+        self.search = Search::new(self.ways.noise);
+        self.newcomer = None;
+        self.elsewhere = None;
+        self.started_ns = start.time_ns;
+        Ok(())
+    }
+
+    /// The parameters with and without a scale of relative poses that drifts.
+    fn exact_and_not(&self) -> Vec<EskfParams> {
+        let mut all = vec![self.params];
+        if offset::<S>(Optional::RelativeScale).is_some() && self.ways.scale {
+            all.push(EskfParams { relative_scale: GaussMarkov::constant(0.0), ..self.params });
+        }
+        all
+    }
+
+    /// The best copy.
+    pub fn best(&self) -> &Eskf<S, N> {
+        &self.starts[0].filter
+    }
+
+    /// The estimate of the best copy; `None` before the start.
+    pub fn estimate(&self) -> Option<&Estimate<N>> {
+        self.best().estimate()
+    }
+
+    /// The number of copies that began in different ways and are all plausible.
+    pub fn starts(&self) -> usize {
+        self.starts.len()
+    }
+
+    /// The multiple of the IMU's white noise that fits best.
+    pub fn noise(&self) -> f64 {
+        self.search.multiple()
+    }
+
+    /// The distance of positions, m, to which the filter would have moved if they were not beyond any way of a robot: its world has its
+    /// origin in the wrong place, and it should start again.
+    pub fn elsewhere(&self) -> Option<f64> {
+        self.elsewhere
+    }
+
+    /// The standard deviation of the heading, rad: of the best copy, or of a whole turn while the headings of others that are
+    /// plausible are far from it.
+    pub fn heading_deviation(&self) -> f64 {
+        let attitude =
+            |filter: &Eskf<S, N>| filter.estimate().map_or_else(UnitQuaternion::identity, |at| at.world_from_body);
+        let back = attitude(self.best()).inverse();
+        let is_far = |begun: &Begun<S, N>| rotation_vector(&(attitude(&begun.filter) * back)).z.abs() > UNKNOWN;
+        if self.starts.iter().any(is_far) {
+            return core::f64::consts::PI / 1.732_050_807_568_877_2;
+        }
+        sqrt(self.best().covariance()[(ROTATION + 2, ROTATION + 2)])
+    }
+
+    /// Fuses a measurement, unless the gate of `stream` refuses it for every copy.
+    ///
+    /// # Errors
+    ///
+    /// Returns a [`Refusal`] for the best copy, which the stream has counted.
+    pub fn update<M: Measurement<D>, const D: usize>(
+        &mut self,
+        stream: &mut Stream,
+        measurement: &M,
+    ) -> Result<Fused, Refusal> {
+        self.update_correlated(stream, measurement, measurement)
+    }
+
+    /// Fuses a measurement whose noise is correlated over time, and therefore larger than its own, which the gate compares it with:
+    /// `own` is the same measurement with that.
+    ///
+    /// # Errors
+    ///
+    /// The same as [`update`](Self::update).
+    pub fn update_correlated<M: Measurement<D>, const D: usize>(
+        &mut self,
+        stream: &mut Stream,
+        own: &M,
+        measurement: &M,
+    ) -> Result<Fused, Refusal> {
+        let most = limit(D, stream.params().gate);
+        let result = self.is_admitted(own, 0.0, most);
+        if let Some(newcomer) = &mut self.newcomer {
+            newcomer.aid(own, measurement, most);
+        }
+        self.fuse(stream, measurement, result)
+    }
+
+    /// Fuses a position or pose in the world. One that the filter cannot believe may show that the filter is wrong.
+    ///
+    /// # Errors
+    ///
+    /// The same as [`update`](Self::update).
+    pub fn update_position<M: Measurement<D>, const D: usize>(
+        &mut self,
+        stream: &mut Stream,
+        measurement: &M,
+    ) -> Result<Fused, Refusal> {
+        self.update_position_as(stream, measurement, measurement)
+    }
+
+    /// Judges a position by what it states, and fuses it with other noise.
+    fn update_position_as<M: Measurement<D>, const D: usize>(
+        &mut self,
+        stream: &mut Stream,
+        stated: &M,
+        measurement: &M,
+    ) -> Result<Fused, Refusal> {
+        let result = self.is_admitted(stated, SLACK, FAR);
+        let result = self.settle(stream, stated, result);
+        self.fuse(stream, measurement, result)
+    }
+
+    /// Fuses a fix like [`update_position`](Self::update_position), with the noise that the last ones have shown if they have stated
+    /// less.
+    ///
+    /// # Errors
+    ///
+    /// The same as [`update`](Self::update).
+    pub fn update_fix(&mut self, stream: &mut Stream, fix: &GnssPosition) -> Result<Fused, Refusal> {
+        let is_finite = fix.position.iter().all(|x| x.is_finite());
+        let shown = if is_finite { self.scatter.fix(fix) } else { *fix };
+        self.update_position_as(stream, fix, &shown)
+    }
+
+    /// Adds what a sample of `dt` seconds shows of the acceleration to the scatter of fixes.
+    fn scatter(&mut self, dt: f64) {
+        if self.starts.len() > MOST_UNDECIDED || self.heading_deviation() > UNKNOWN {
+            self.scatter.interrupt();
+        } else if let Some(estimate) = self.starts[0].filter.estimate() {
+            let fall = Vector3::new(0.0, 0.0, self.params.gravity);
+            self.scatter.propagate(&(estimate.world_from_body * estimate.specific_force - fall), dt);
+        }
+    }
+
+    /// Returns the log likelihood of a measurement for the best copy, if any copy admits it.
+    fn is_admitted<M: Measurement<D>, const D: usize>(
+        &self,
+        measurement: &M,
+        slack: f64,
+        most: f64,
+    ) -> Result<f64, Refusal> {
+        let judged = self.best().judge(measurement, slack)?;
+        let fits =
+            |begun: &Begun<S, N>| begun.filter.judge(measurement, slack).is_ok_and(|judged| judged.nis <= most);
+        if judged.nis <= most || self.starts.iter().skip(1).any(fits) {
+            return Ok(judged.log_likelihood);
+        }
+        // Also refuses what is no number.
+        Err(Refusal::Gate { nis: judged.nis, limit: most })
+    }
+
+    /// Fuses a measurement that is admitted, and weighs the copies by it.
+    fn fuse<M: Measurement<D>, const D: usize>(
+        &mut self,
+        stream: &mut Stream,
+        measurement: &M,
+        admitted: Result<f64, Refusal>,
+    ) -> Result<Fused, Refusal> {
+        if let Err(refusal) = admitted {
+            let result = Err(refusal);
+            stream.count(&result);
+            return result;
+        }
+        let others = *stream;
+        let mut answer = Err(Refusal::NotStarted);
+        let mut of_parent = 0.0;
+        for (i, begun) in self.starts.iter_mut().enumerate() {
+            let result = if i == 0 {
+                answer = begun.filter.update_ungated(stream, measurement);
+                answer
+            } else {
+                begun.filter.update_ungated(&mut { others }, measurement)
+            };
+            let log_likelihood = match (&result, &answer) {
+                (Ok(fused), _) => fused.log_likelihood,
+                (Err(_), Ok(best)) => best.log_likelihood - IMPOSSIBLE,
+                (Err(_), Err(_)) => 0.0,
+            };
+            begun.log_likelihood += log_likelihood;
+            if self.search.is_child_of(begun.id) {
+                of_parent = log_likelihood;
+            }
+        }
+        let fused = answer?;
+        self.search.fuse(&others, measurement, of_parent);
+        self.choose();
+        Ok(fused)
+    }
+
+    /// Puts the best first, drops what is implausible or the same, and goes on with the search.
+    fn choose(&mut self) {
+        let starts = &mut self.starts;
+        let better = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0));
+        let likelihoods = starts.iter().map(|begun| begun.log_likelihood).enumerate();
+        if let Some((best, most)) = likelihoods.max_by(better) {
+            if most > starts[0].log_likelihood + BETTER {
+                starts.swap(0, best);
+            }
+            let most = starts[0].log_likelihood;
+            starts.iter_mut().for_each(|begun| begun.log_likelihood -= most);
+        }
+        if starts.len() > 1 {
+            let best = starts[0].filter;
+            let mut is_best = true;
+            starts.retain(|begun| {
+                std::mem::take(&mut is_best)
+                    || begun.log_likelihood > -IMPLAUSIBLE && !is_same(&best, &begun.filter)
+            });
+        }
+        if let Some(now_ns) = self.starts[0].filter.estimate().map(|at| at.time_ns) {
+            self.search.go_on(&mut self.starts, now_ns);
+        }
+    }
+
+    /// Calls a function for each filter.
+    fn each(&mut self, mut with: impl FnMut(&mut Eskf<S, N>) -> Result<(), Refusal>) -> Result<(), Refusal> {
+        let starts = self.starts.iter_mut().map(|begun| &mut begun.filter);
+        let newcomer = self.newcomer.iter_mut().map(|newcomer| &mut newcomer.filter);
+        starts.chain(self.search.filters_mut()).chain(newcomer).try_for_each(&mut with)
+    }
+
+    /// See [`Eskf::set_keyframe`].
+    pub fn set_keyframe(&mut self, id: u64) {
+        let _ = self.each(|filter| {
+            filter.set_keyframe(id);
+            Ok(())
+        });
+    }
+
+    /// See [`Eskf::move_world`].
+    ///
+    /// # Errors
+    ///
+    /// The same as [`Eskf::move_world`].
+    pub fn move_world(&mut self, new_from_old: &Isometry3<f64>) -> Result<(), Refusal> {
+        self.each(|filter| filter.move_world(new_from_old))
+    }
+}
+
+/// Returns whether two copies have come to the same state, and are as sure of it.
+fn is_same<S: States, const N: usize>(a: &Eskf<S, N>, b: &Eskf<S, N>) -> bool {
+    let (Some(from), Some(to)) = (a.estimate(), b.estimate()) else { return false };
+    let error = from.error_to::<S>(to);
+    (0..N).all(|i| {
+        let (own, other) = (a.covariance()[(i, i)], b.covariance()[(i, i)]);
+        let is_known_alike = (0.25..4.0).contains(&(own / other));
+        (i >= NAVIGATION && own == other || is_known_alike) && error[i] * error[i] <= SAME * SAME * own
+    })
+}
+
+impl<S: States, const N: usize> Propagate for Copies<S, N> {
+    fn time_ns(&self) -> Option<i64> {
+        self.estimate().map(|estimate| estimate.time_ns)
+    }
+
+    fn admits(&self, sample: &ImuMean) -> Result<(), Refusal> {
+        self.best().admits(sample)
+    }
+
+    fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
+        let since_ns = self.time_ns().ok_or(Refusal::NotStarted)?;
+        self.propagate_until(sample.time_ns, sample, since_ns)
+    }
+
+    fn propagate_until(&mut self, time_ns: i64, sample: &ImuMean, since_ns: i64) -> Result<(), Refusal> {
+        let whole_s = seconds_between(since_ns, sample.time_ns)?;
+        let part_s = seconds_between(self.time_ns().ok_or(Refusal::NotStarted)?, time_ns)?;
+        let mut part = ImuMean { time_ns, ..*sample };
+        if whole_s <= self.params.longest_sample {
+            self.each(|filter| filter.propagate(&part))?;
+            self.holding.add(&part, part_s);
+            self.scatter(part_s);
+            self.last = Some(part);
+            return Ok(());
+        }
+        sample.check()?;
+        if whole_s > LONGEST_GAP_S {
+            return Err(Refusal::Gap { seconds: whole_s });
+        }
+        if let Some(last) = &self.last {
+            part.angular_velocity = (last.angular_velocity + sample.angular_velocity) * 0.5;
+            part.specific_force = (last.specific_force + sample.specific_force) * 0.5;
+        }
+        self.scatter.interrupt();
+        let doubt = self.holding.doubt(whole_s, part_s);
+        self.each(|filter| filter.hold(&part, &doubt))?;
+        if time_ns == sample.time_ns {
+            self.holding.interrupt();
+            self.last = Some(*sample);
+        }
+        Ok(())
+    }
+}
+
+/// Returns whether a distance is one on this part of the Earth.
+fn is_near(distance: &Vector3<f64>) -> bool {
+    is_within(distance, newcomer::FARTHEST)
+}

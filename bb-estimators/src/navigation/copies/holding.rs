@@ -1,0 +1,161 @@
+//! The rule for gaps in the samples of the IMU: its reading is held, and doubted by as much as holding it would lately have done
+//! wrong.
+//!
+//! For each of some lengths T, windows of T are compared with what holding the mean of the readings at their ends would have made of
+//! them: `∫ r dt - T (r(0) + r(T)) / 2`, of the angular velocity and of the specific force, per axis. The mean square over the past
+//! minute is the variance of a gap of that length, raised since gaps in curves are worse than the average minute.
+
+use nalgebra::Vector3;
+
+use crate::navigation::eskf::{Doubt, ImuMean};
+use crate::navigation::math::{exp, ln};
+
+/// The shortest length, s; each other one is twice as long as the one before.
+const SHORTEST_S: f64 = 0.1;
+
+/// The number of lengths: the longest is 12.8 s.
+const LENGTHS: usize = 8;
+
+/// The time over which squares are averaged, s.
+const PAST_S: f64 = 60.0;
+
+/// The number of windows that make a mean.
+const ENOUGH: f64 = 3.0;
+
+/// Factor on the mean square: over curves alone, the mean square is three times that of a whole minute of a car.
+const RAISED: f64 = 3.0;
+
+/// Motion that a gap may hide before anything is known of it, as white noise: 1 rad/s and 3 m/s² for about a second.
+const UNKNOWN: [f64; 2] = [1.0, 9.0];
+
+/// Statistics of the readings.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Holding {
+    /// Integrals of the angular velocity and of the specific force.
+    integral: [Vector3<f64>; 2],
+    elapsed_s: f64,
+    windows: [Window; LENGTHS],
+}
+
+/// The time, s, the reading and the integrals at the begin of a window.
+type Begin = (f64, [Vector3<f64>; 2], [Vector3<f64>; 2]);
+
+/// The window of one length that is being compared, and the squares of those before.
+#[derive(Clone, Copy, Debug, Default)]
+struct Window {
+    begun: Option<Begin>,
+    /// The mean squares, and the number of windows in them.
+    squares: [Vector3<f64>; 2],
+    count: f64,
+}
+
+fn length(index: usize) -> f64 {
+    SHORTEST_S * f64::from(1_u32 << index.min(LENGTHS))
+}
+
+impl Holding {
+    /// Adds a sample of `dt` seconds, which was no gap.
+    #[inline]
+    pub(super) fn add(&mut self, sample: &ImuMean, dt: f64) {
+        let reading = [sample.angular_velocity, sample.specific_force];
+        for (integral, reading) in self.integral.iter_mut().zip(&reading) {
+            *integral += reading * dt;
+        }
+        self.elapsed_s += dt;
+        for (index, window) in self.windows.iter_mut().enumerate() {
+            let wanted = length(index);
+            if window.begun.is_none_or(|(since_s, ..)| self.elapsed_s - since_s >= wanted) {
+                window.end(self.elapsed_s, &reading, &self.integral, wanted);
+            }
+        }
+    }
+
+    /// Ends all windows at a gap.
+    pub(super) fn interrupt(&mut self) {
+        self.windows.iter_mut().for_each(|window| window.begun = None);
+    }
+
+    /// The doubt in a part, `part_s`, of a gap that lasts `whole_s`.
+    pub(super) fn doubt(&self, whole_s: f64, part_s: f64) -> Doubt {
+        let [rotation, velocity] = [0, 1].map(|quantity| {
+            let known = |index: usize| self.windows.get(index).filter(|window| window.count >= ENOUGH);
+            let Some(first) = known(0) else { return Vector3::repeat(UNKNOWN[quantity] * part_s) };
+            let last = (0..LENGTHS).take_while(|index| known(*index).is_some()).last().unwrap_or(0);
+            let above = (0..=last).find(|index| length(*index) >= whole_s);
+            let squares = match above {
+                Some(0) => first.squares[quantity] * (whole_s / SHORTEST_S).powi(2),
+                Some(above) => {
+                    let (low, high) =
+                        (self.windows[above - 1].squares[quantity], self.windows[above].squares[quantity]);
+                    let share = ln(whole_s / length(above - 1)) / core::f64::consts::LN_2;
+                    low.zip_map(&high, |low, high| between(low, high, share))
+                }
+                None => self.windows[last].squares[quantity] * (whole_s / length(last)).powi(2),
+            };
+            squares * (RAISED * part_s / whole_s)
+        });
+        Doubt { rotation, velocity }
+    }
+}
+
+/// The geometric mean of two variances, weighted.
+fn between(low: f64, high: f64, share: f64) -> f64 {
+    let logarithm = |x: f64| ln(x.max(1e-30));
+    exp(logarithm(low) * (1.0 - share) + logarithm(high) * share)
+}
+
+impl Window {
+    fn end(&mut self, now_s: f64, reading: &[Vector3<f64>; 2], integral: &[Vector3<f64>; 2], wanted: f64) {
+        if let Some((since_s, first, from)) = &self.begun {
+            let lasted = now_s - since_s;
+            self.count = (self.count + 1.0).min(PAST_S / wanted);
+            for quantity in 0..2 {
+                let held = (first[quantity] + reading[quantity]) * (0.5 * lasted);
+                let wrong = (integral[quantity] - from[quantity] - held) * (wanted / lasted);
+                let square = wrong.component_mul(&wrong);
+                self.squares[quantity] += (square - self.squares[quantity]) / self.count.max(1.0);
+            }
+        }
+        self.begun = Some((now_s, *reading, *integral));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A body that turns to and fro: the doubt of a gap is about what it does wrong.
+    #[test]
+    fn doubt_is_as_large_as_what_holding_does_wrong() {
+        let rate = |t: f64| Vector3::new(0.0, 0.0, 0.4 * (0.9 * t).sin() + 0.2 * (2.3 * t).cos());
+        let mut holding = Holding::default();
+        for i in 1..12_000 {
+            let sample = ImuMean {
+                time_ns: i * 10_000_000,
+                angular_velocity: rate(i as f64 * 0.01),
+                specific_force: Vector3::new(0.0, 0.0, 9.8),
+            };
+            holding.add(&sample, 0.01);
+        }
+        for length in [0.25, 0.8, 2.0, 5.0] {
+            let mut sum = 0.0;
+            for begin in 0..1000 {
+                let t = f64::from(begin) * 0.07;
+                let steps = 200;
+                let step = length / f64::from(steps);
+                let integral: f64 = (0..steps).map(|i| rate(t + (f64::from(i) + 0.5) * step).z * step).sum();
+                sum += (integral - length * 0.5 * (rate(t).z + rate(t + length).z)).powi(2) / 1000.0;
+            }
+            let doubt = holding.doubt(length, length);
+            let ratio = doubt.rotation.z / RAISED / sum;
+            assert!((0.3..8.0).contains(&ratio), "{length} s: {ratio}");
+            assert!(doubt.rotation.x < 1e-20 && doubt.velocity.norm() < 1e-20);
+        }
+    }
+
+    #[test]
+    fn nothing_known_is_no_trust() {
+        let doubt = Holding::default().doubt(2.0, 1.0);
+        assert_eq!(doubt, Doubt { rotation: Vector3::repeat(1.0), velocity: Vector3::repeat(9.0) });
+    }
+}

@@ -1,0 +1,142 @@
+//! The search for the noise of the IMU on this vehicle: two copies of a filter beside it, with more noise and with less.
+
+use super::Begun;
+use crate::navigation::eskf::Eskf;
+use crate::navigation::math::exp;
+use crate::navigation::measurement::Measurement;
+use crate::navigation::state::States;
+use crate::navigation::stream::Stream;
+
+/// The ratio of two neighbouring multiples. Twice as much noise is hard to tell from the same.
+const STEP: f64 = 4.0;
+
+/// The multiples that are searched, as powers of [`STEP`]: no vehicle is quieter than the data sheet of its IMU.
+const EXPONENTS: core::ops::RangeInclusive<i32> = 0..=4;
+
+/// The power at which the search begins.
+const FIRST: i32 = 2;
+
+/// The time over which likelihoods are compared, s: two minutes of a drive.
+const PAST_S: f64 = 120.0;
+
+/// The log likelihood by which a neighbour leads when the search moves to it.
+const LEAD: f64 = 3.0;
+
+/// The shortest time between two moves, s.
+const PAUSE_S: f64 = 3.0;
+
+/// The most starts between which the search compares: with more, they say more about each other than about the noise.
+const MOST_STARTS: usize = 2;
+
+/// The state of the search.
+#[derive(Clone, Debug)]
+pub(super) struct Search<S: States, const N: usize> {
+    is_on: bool,
+    exponent: i32,
+    moved_ns: i64,
+    compared_ns: i64,
+    /// The start that the neighbours are copies of.
+    parent: Option<u32>,
+    /// The copies with more and with less noise.
+    neighbours: [Option<Neighbour<S, N>>; 2],
+}
+
+/// A copy with another noise.
+#[derive(Clone, Debug)]
+struct Neighbour<S: States, const N: usize> {
+    filter: Eskf<S, N>,
+    /// The log likelihood by which it leads its parent.
+    lead: f64,
+}
+
+impl<S: States, const N: usize> Search<S, N> {
+    pub(super) fn new(is_on: bool) -> Self {
+        let exponent = if is_on { FIRST } else { 0 };
+        Self { is_on, exponent, moved_ns: i64::MIN, compared_ns: i64::MIN, parent: None, neighbours: [None, None] }
+    }
+
+    /// The multiple at which the search begins.
+    pub(super) fn first_multiple(&self) -> f64 {
+        if self.is_on { STEP.powi(FIRST) } else { 1.0 }
+    }
+
+    /// The multiple of the noise of all starts.
+    pub(super) fn multiple(&self) -> f64 {
+        STEP.powi(self.exponent)
+    }
+
+    pub(super) fn filters_mut(&mut self) -> impl Iterator<Item = &mut Eskf<S, N>> {
+        self.neighbours.iter_mut().flatten().map(|neighbour| &mut neighbour.filter)
+    }
+
+    pub(super) fn is_child_of(&self, id: u32) -> bool {
+        self.parent == Some(id)
+    }
+
+    /// Forgets the neighbours: their parent is another filter now.
+    pub(super) fn orphan(&mut self) {
+        self.parent = None;
+        self.neighbours = [None, None];
+    }
+
+    /// Fuses a measurement in the neighbours. `of_parent` is its log likelihood for their parent.
+    pub(super) fn fuse<M: Measurement<D>, const D: usize>(
+        &mut self,
+        stream: &Stream,
+        measurement: &M,
+        of_parent: f64,
+    ) {
+        for neighbour in self.neighbours.iter_mut().flatten() {
+            if let Ok(fused) = neighbour.filter.update_ungated(&mut { *stream }, measurement) {
+                neighbour.lead += fused.log_likelihood - of_parent;
+            }
+        }
+    }
+
+    /// Moves to a neighbour that leads, and makes new neighbours where there are none.
+    pub(super) fn go_on(&mut self, starts: &mut [Begun<S, N>], now_ns: i64) {
+        if !self.is_on || starts.len() > MOST_STARTS {
+            return;
+        }
+        let since = |time_ns: i64| now_ns.saturating_sub(time_ns) as f64 * 1e-9;
+        let Some(parent) = starts.iter().position(|begun| self.is_child_of(begun.id)) else {
+            self.fork(&starts[0]);
+            (self.moved_ns, self.compared_ns) = (now_ns, now_ns);
+            return;
+        };
+        let kept = exp(-since(self.compared_ns) / PAST_S);
+        self.compared_ns = now_ns;
+        self.neighbours.iter_mut().flatten().for_each(|neighbour| neighbour.lead *= kept);
+        if since(self.moved_ns) < PAUSE_S {
+            return;
+        }
+        for (index, up) in [(0, 1), (1, -1)] {
+            let Some(neighbour) = self.neighbours[index].take_if(|neighbour| neighbour.lead > LEAD) else {
+                continue;
+            };
+            self.exponent += up;
+            self.moved_ns = now_ns;
+            starts[parent].filter = neighbour.filter;
+            for begun in starts.iter_mut() {
+                begun.filter.multiply_noise(self.multiple());
+                if up > 0 {
+                    begun.filter.doubt_all(STEP * STEP);
+                }
+            }
+            self.fork(&starts[parent]);
+            return;
+        }
+    }
+
+    fn fork(&mut self, parent: &Begun<S, N>) {
+        self.parent = Some(parent.id);
+        self.neighbours = [1, -1].map(|step| {
+            let exponent = self.exponent + step;
+            EXPONENTS.contains(&exponent).then(|| {
+                let mut filter = parent.filter;
+                filter.multiply_noise(STEP.powi(exponent));
+                Neighbour { filter, lead: 0.0 }
+            })
+        });
+    }
+}

@@ -1,0 +1,322 @@
+//! Random drives of a car: what is unknown is found, and what is wrong is not believed for long.
+
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+
+use super::{Copies, Ways};
+use crate::navigation::eskf::{EskfParams, ImuMean, Start};
+use crate::navigation::measurement::{BodyVelocity, GnssPosition};
+use crate::navigation::noise::Noise;
+use crate::navigation::propagate::Propagate;
+use crate::navigation::state::{Aided, POSITION, States, Vehicle};
+use crate::navigation::stream::{Stream, StreamParams};
+use crate::navigation::{GaussMarkov, Refusal, nees};
+
+const STEP_NS: i64 = 20_000_000;
+const STEP_S: f64 = 0.02;
+const FIX_M: f64 = 0.5;
+
+/// A car on a plane, and its IMU, which is turned in it.
+struct Car {
+    noise: Noise,
+    time_ns: i64,
+    position: Vector3<f64>,
+    heading: f64,
+    speed: f64,
+    phase: [f64; 4],
+    /// The IMU's white noise, rad/s/√Hz and m/s²/√Hz.
+    densities: [f64; 2],
+    vehicle_from_imu: UnitQuaternion<f64>,
+    biases: [Vector3<f64>; 2],
+}
+
+impl Car {
+    fn new(seed: u64, densities: [f64; 2], yaw: f64) -> Self {
+        let mut noise = Noise::new(seed);
+        let phase = core::array::from_fn(|_| noise.between(0.0, 6.0));
+        let heading = noise.between(-3.0, 3.0);
+        let biases = [noise.vector(0.005), noise.vector(0.05)];
+        Self {
+            noise,
+            time_ns: 0,
+            position: Vector3::zeros(),
+            heading,
+            speed: 8.0,
+            phase,
+            densities,
+            vehicle_from_imu: UnitQuaternion::from_euler_angles(0.0, 0.0, yaw),
+            biases,
+        }
+    }
+
+    fn world_from_imu(&self) -> UnitQuaternion<f64> {
+        UnitQuaternion::from_euler_angles(0.0, 0.0, self.heading) * self.vehicle_from_imu
+    }
+
+    fn velocity(&self) -> Vector3<f64> {
+        Vector3::new(self.heading.cos(), self.heading.sin(), 0.0) * self.speed
+    }
+
+    fn start(&self, heading_deviation: f64) -> Start {
+        let attitude = UnitQuaternion::from_euler_angles(0.0, 0.0, 0.3) * self.world_from_imu();
+        let start = Start::at(self.time_ns, (self.position, 1.0), (self.velocity(), 1.0), (attitude, 0.03));
+        let variances = Vector3::new(1e-3, 1e-3, heading_deviation * heading_deviation);
+        Start { rotation_covariance: Matrix3::from_diagonal(&variances), ..start }
+    }
+
+    /// Drives on, and returns the sample.
+    fn drive(&mut self) -> ImuMean {
+        let t = self.time_ns as f64 * 1e-9;
+        let rate = 0.25 * (0.21 * t + self.phase[0]).sin() + 0.1 * (0.53 * t + self.phase[1]).sin();
+        let along = 0.8 * (0.17 * t + self.phase[2]).cos() * 0.7;
+        let middle = self.heading + 0.5 * rate * STEP_S;
+        let direction = Vector3::new(middle.cos(), middle.sin(), 0.0);
+        let before = self.velocity();
+        self.position += direction * ((self.speed + 0.5 * along * STEP_S) * STEP_S);
+        self.heading += rate * STEP_S;
+        self.speed += along * STEP_S;
+        self.time_ns += STEP_NS;
+        let acceleration = (self.velocity() - before) / STEP_S;
+        let world_from_imu = UnitQuaternion::from_euler_angles(0.0, 0.0, middle) * self.vehicle_from_imu;
+        let force = world_from_imu.inverse() * (acceleration + Vector3::new(0.0, 0.0, 9.80665));
+        let white = |density: f64| density / STEP_S.sqrt();
+        ImuMean {
+            time_ns: self.time_ns,
+            angular_velocity: Vector3::new(0.0, 0.0, rate)
+                + self.noise.vector(white(self.densities[0]))
+                + self.biases[0],
+            specific_force: force + self.noise.vector(white(self.densities[1])) + self.biases[1],
+        }
+    }
+
+    fn fix(&mut self) -> GnssPosition {
+        GnssPosition::new(self.position + self.noise.vector(FIX_M), FIX_M, FIX_M)
+    }
+
+    fn wheels(&mut self) -> BodyVelocity {
+        BodyVelocity {
+            velocity: Vector3::new(self.speed, 0.0, 0.0) + self.noise.vector(0.05),
+            deviations: Vector3::new(0.1, 0.1, 0.2),
+            body_from_sensor: UnitQuaternion::identity(),
+            lever_arm: Vector3::zeros(),
+        }
+    }
+}
+
+fn stream() -> Stream {
+    Stream::new(StreamParams { patience: 0, ..StreamParams::default() })
+}
+
+/// Copies that know the noise of the car's own IMU, and those of fixes and wheels.
+fn copies<S: States, const N: usize>(densities: [f64; 2], mounting: f64, noise: bool) -> Copies<S, N> {
+    let params = EskfParams {
+        gyroscope_noise: densities[0],
+        accelerometer_noise: densities[1],
+        gnss_delay: GaussMarkov::constant(1e-4),
+        wheel_mounting: GaussMarkov::constant(mounting),
+        ..EskfParams::default()
+    };
+    Copies::new(params, Ways { noise, scale: false }).unwrap()
+}
+
+type Fixed = Copies<Aided, { Aided::DIMENSION }>;
+type Wheels = Copies<Vehicle, { Vehicle::DIMENSION }>;
+
+const QUIET: [f64; 2] = [1e-3, 1e-2];
+
+fn heading_error<S: States, const N: usize>(car: &Car, copies: &Copies<S, N>) -> f64 {
+    (car.world_from_imu() * copies.estimate().unwrap().world_from_body.inverse()).scaled_axis().z
+}
+
+#[test]
+fn an_unknown_heading_is_found_with_an_honest_deviation() {
+    let (mut beyond, mut known) = (0, 0);
+    for seed in 0..10 {
+        let mut car = Car::new(seed, QUIET, 0.0);
+        let mut copies: Fixed = copies(QUIET, 0.0, false);
+        copies.start(&car.start(4.0)).unwrap();
+        assert_eq!(copies.starts(), 6);
+        let mut gnss = stream();
+        for step in 1..=60 * 50 {
+            copies.propagate(&car.drive()).unwrap();
+            if step % 50 != 0 {
+                continue;
+            }
+            assert!(copies.update_position(&mut gnss, &car.fix()).is_ok(), "seed {seed}, {step}");
+            if copies.heading_deviation() < 0.5 {
+                let error = heading_error(&car, &copies).abs();
+                known += 1;
+                beyond += u32::from(error > 4.0 * copies.heading_deviation());
+            }
+        }
+        assert!(heading_error(&car, &copies).abs() < 0.1, "seed {seed}");
+        assert!(copies.starts() <= 3 && copies.heading_deviation() < 0.1, "seed {seed}: {}", copies.starts());
+    }
+    assert!(known > 300 && beyond == 0, "{beyond} of {known}");
+}
+
+#[test]
+fn an_unknown_mounting_on_wheels_is_found_with_the_heading() {
+    for (seed, yaw) in [(1, 0.0), (2, 1.6), (3, -2.4), (4, 3.1)] {
+        let mut car = Car::new(seed, QUIET, yaw);
+        let mut copies: Wheels = copies(QUIET, 4.0, false);
+        copies.start(&car.start(4.0)).unwrap();
+        assert_eq!(copies.starts(), 36);
+        let (mut gnss, mut wheels) = (stream(), stream());
+        for step in 1..=40 * 50 {
+            copies.propagate(&car.drive()).unwrap();
+            if step % 5 == 0 {
+                let _ = copies.update(&mut wheels, &car.wheels());
+            }
+            if step % 50 == 0 {
+                let _ = copies.update_position(&mut gnss, &car.fix());
+            }
+        }
+        assert!(heading_error(&car, &copies).abs() < 0.05, "yaw {yaw}: {}", heading_error(&car, &copies));
+        let first = crate::navigation::offset::<Vehicle>(crate::navigation::Optional::WheelMounting).unwrap();
+        let mounting = copies.estimate().unwrap().optional[first];
+        let off = crate::navigation::math::wrapped(mounting - yaw).abs();
+        assert!(off < 0.05, "yaw {yaw}: {mounting}");
+    }
+}
+
+/// The data sheet is off by 1/25 to 5: the multiple makes up for it, within a factor of the search's step.
+#[test]
+fn noise_is_found_whatever_the_data_sheet_says() {
+    for (seed, sheet) in [(1, 1.0), (2, 0.2), (3, 0.04)] {
+        let real = [3e-3, 5e-2];
+        let mut car = Car::new(seed, real, 0.0);
+        let mut copies: Fixed = copies(real.map(|density| density * sheet), 0.0, true);
+        copies.start(&car.start(0.4)).unwrap();
+        let (mut gnss, mut sum, mut count) = (stream(), 0.0, 0.0);
+        for step in 1..=400 * 50 {
+            copies.propagate(&car.drive()).unwrap();
+            if step % 50 == 0 {
+                copies.update_position(&mut gnss, &car.fix()).unwrap();
+                if step > 200 * 50 {
+                    let error = car.position - copies.estimate().unwrap().position;
+                    let covariance = copies.best().covariance().fixed_view::<3, 3>(POSITION, POSITION).into_owned();
+                    sum += nees(&error, &covariance).unwrap();
+                    count += 1.0;
+                }
+            }
+        }
+        let multiple = copies.noise() * sheet;
+        assert!((0.24..=17.0).contains(&multiple), "sheet {sheet}: {}", copies.noise());
+        let mean = sum / count;
+        assert!((1.0..5.0).contains(&mean), "sheet {sheet}: NEES {mean}");
+    }
+}
+
+/// A gap in a curve: the error stays within what the filter says of it.
+#[test]
+fn gaps_are_doubted_as_much_as_they_do_wrong() {
+    let (mut beyond, mut gaps) = (0, 0);
+    for seed in 0..20 {
+        let mut car = Car::new(seed, QUIET, 0.0);
+        let mut copies: Fixed = copies(QUIET, 0.0, false);
+        copies.start(&car.start(0.3)).unwrap();
+        let mut gnss = stream();
+        let missing = 15 + 20 * usize::try_from(seed % 4).unwrap();
+        for step in 1..=120 * 50_usize {
+            let sample = car.drive();
+            let is_gap = step > 50 * 50 && step % (20 * 50) < missing;
+            if !is_gap {
+                copies.propagate(&sample).unwrap();
+            }
+            if step > 50 * 50 && step % (20 * 50) == missing {
+                gaps += 1;
+                let deviation = copies.heading_deviation();
+                beyond += u32::from(heading_error(&car, &copies).abs() > 4.0 * deviation);
+                assert!(deviation < 1.0, "{deviation}");
+            }
+            if step % 50 == 0 && !is_gap {
+                let _ = copies.update_position(&mut gnss, &car.fix());
+            }
+        }
+    }
+    assert!(gaps >= 60 && beyond == 0, "{beyond} of {gaps}");
+}
+
+/// Fixes that are wrong for less than twenty seconds are refused; those that stay wrong are followed.
+#[test]
+fn a_newcomer_takes_over_after_twenty_seconds() {
+    for (seed, wrong_s, is_followed) in [(1, 10, false), (2, 19, false), (3, 60, true)] {
+        let mut car = Car::new(seed, QUIET, 0.0);
+        let mut copies: Fixed = copies(QUIET, 0.0, false);
+        copies.start(&car.start(0.3)).unwrap();
+        let mut gnss = stream();
+        let mut followed_s = None;
+        for step in 1..=180 * 50 {
+            copies.propagate(&car.drive()).unwrap();
+            if step % 50 != 0 {
+                continue;
+            }
+            let second = step / 50 - 60;
+            let is_wrong = (0..wrong_s).contains(&second);
+            let mut fix = car.fix();
+            if is_wrong {
+                fix.position += Vector3::new(3000.0, -4000.0, 0.0);
+            }
+            let result = copies.update_position(&mut gnss, &fix);
+            if second < 0 {
+                assert!(result.is_ok(), "{result:?}");
+            }
+            if is_wrong && result.is_ok() {
+                followed_s = followed_s.or(Some(second));
+            }
+        }
+        assert_eq!(followed_s.is_some(), is_followed, "{wrong_s} s");
+        assert!(followed_s.is_none_or(|followed_s| followed_s <= 22), "{followed_s:?}");
+        // After a minute of wrong ones, the right ones have been those of the newcomer for a minute.
+        let off = (copies.estimate().unwrap().position - car.position).norm();
+        assert!(off < 2.0, "{wrong_s} s: {off} m off at the end");
+        assert_eq!(copies.best().resets(), if is_followed { 3 } else { 1 });
+        assert_eq!(copies.elsewhere(), None);
+    }
+}
+
+#[test]
+fn positions_on_another_part_of_the_earth_do_not_move_the_filter() {
+    let mut car = Car::new(5, QUIET, 0.0);
+    let mut copies: Fixed = copies(QUIET, 0.0, false);
+    copies.start(&car.start(0.3)).unwrap();
+    let mut gnss = stream();
+    for step in 1..=60 * 50 {
+        copies.propagate(&car.drive()).unwrap();
+        if step % 50 == 0 {
+            let mut fix = car.fix();
+            if step > 20 * 50 {
+                fix.position.x += 3e5;
+            }
+            let _ = copies.update_position(&mut gnss, &fix);
+        }
+    }
+    assert!(copies.elsewhere().is_some_and(|distance| distance > 2e5));
+}
+
+/// A refused measurement changes nothing but the counts and a newcomer.
+#[test]
+fn what_is_refused_changes_no_copy() {
+    let mut car = Car::new(6, QUIET, 0.0);
+    let mut copies: Wheels = copies(QUIET, 0.1, true);
+    copies.start(&car.start(0.3)).unwrap();
+    let mut gnss = stream();
+    for step in 1..=30 * 50 {
+        copies.propagate(&car.drive()).unwrap();
+        if step % 50 == 0 {
+            copies.update_position(&mut gnss, &car.fix()).unwrap();
+        }
+    }
+    let states = |copies: &Wheels| format!("{:?} {:?}", copies.starts, copies.search);
+    let before = states(&copies);
+    let far = GnssPosition::new(Vector3::repeat(1e4), 1.0, 1.0);
+    assert!(matches!(copies.update_position(&mut gnss, &far), Err(Refusal::Gate { .. })));
+    let absurd = GnssPosition::new(Vector3::repeat(f64::NAN), 1.0, 1.0);
+    assert_eq!(copies.update_position(&mut gnss, &absurd), Err(Refusal::NonFinite));
+    let slip = BodyVelocity { velocity: Vector3::repeat(50.0), ..car.wheels() };
+    assert!(matches!(copies.update(&mut stream(), &slip), Err(Refusal::Gate { .. })));
+    let nan = ImuMean { specific_force: Vector3::repeat(f64::NAN), ..car.drive() };
+    assert_eq!(copies.propagate(&nan), Err(Refusal::NonFinite));
+    assert_eq!(before, states(&copies));
+    assert_eq!((gnss.counts().gate, gnss.counts().invalid), (1, 1));
+}

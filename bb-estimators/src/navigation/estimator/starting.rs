@@ -1,0 +1,236 @@
+//! Before the filter starts.
+
+use super::course::Course;
+use super::input::{Mounting, NavigationInputs};
+use super::options::NavigationOptions;
+use super::world::World;
+use crate::navigation::alignment::{Alignment, AlignmentParams};
+use crate::navigation::copies::UNKNOWN;
+use crate::navigation::eskf::{ImuMean, Start};
+use crate::navigation::geodesy::LocalFrame;
+use crate::navigation::measurement::AbsolutePose;
+use crate::navigation::refusal::Refusal;
+use crate::navigation::track::{CLEARLY, TrackPoint};
+use bb_core::message::Stamped;
+use bb_core::payload::Odometry;
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+
+/// The time of a start, ns, after which it is reported, and waits no longer for an input that may be missing.
+const LONGEST_NS: i64 = 10_000_000_000;
+
+/// The time for which the filter waits for rest once it knows where it is, ns.
+const RESTLESS_NS: i64 = 3_000_000_000;
+
+/// Standard deviation of the world's origin without satellites, m: it is known by definition.
+const ORIGIN: f64 = 0.01;
+
+/// The largest standard deviation of a heading that nothing measures, rad: the world is turned so that it is right.
+const BY_DEFINITION: f64 = 0.1;
+
+/// Standard deviation of the velocity of a robot in motion of which nothing else is known, m/s.
+const MOVING: f64 = 5.0;
+
+/// The longest time that a given state is moved on, s: after that it is too uncertain to start from.
+const LONGEST_MOVE_S: f64 = 20.0;
+
+/// Gathers the data that a start needs.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Starting {
+    alignment: Alignment,
+    course: Course,
+    /// The given state, moved on with each sample.
+    given: Option<Start>,
+    /// The last pose of the body, and its time.
+    pose: Option<(i64, AbsolutePose)>,
+    first_ns: Option<i64>,
+    /// Since when a position is known.
+    placed_ns: Option<i64>,
+    last_ns: i64,
+}
+
+impl Starting {
+    /// `frame` is that of the world, if it already has one.
+    pub(super) fn new(options: &NavigationOptions, frame: Option<LocalFrame>) -> Self {
+        let params = AlignmentParams { gravity: options.gravity, ..AlignmentParams::default() };
+        Self {
+            alignment: Alignment::new(params),
+            course: Course::within(frame),
+            given: None,
+            pose: None,
+            first_ns: None,
+            placed_ns: None,
+            last_ns: i64::MIN,
+        }
+    }
+
+    /// Returns whether the start has lasted long enough to be reported.
+    pub(super) fn takes_too_long(&self) -> bool {
+        self.has_waited(self.first_ns, LONGEST_NS)
+    }
+
+    fn has_waited(&self, since_ns: Option<i64>, longest_ns: i64) -> bool {
+        since_ns.is_some_and(|since_ns| self.last_ns.saturating_sub(since_ns) > longest_ns)
+    }
+
+    /// Adds the new inputs. Returns the start of the filter once it is known.
+    pub(super) fn take(
+        &mut self,
+        sample: &ImuMean,
+        inputs: &NavigationInputs<'_>,
+        options: &NavigationOptions,
+        mounting: &Mounting,
+    ) -> Option<(Start, World)> {
+        if let Err(refusal) = self.alignment.add(sample) {
+            tracing::debug!(%refusal, "sample refused");
+            return None;
+        }
+        self.first_ns = self.first_ns.or(Some(sample.time_ns));
+        if let Some(given) = &mut self.given {
+            move_on(given, sample);
+        }
+        if let Some(start) = inputs.start.filter(|start| start.is_new()) {
+            self.given = given(start.message(), sample, options, mounting);
+        }
+        self.last_ns = sample.time_ns;
+        self.course.turn(sample);
+        self.course.see(inputs.gnss, options.gnss_deviation);
+        let world = World::new(self.course.frame());
+        if let Some(pose) = inputs.pose.filter(|pose| pose.is_new()) {
+            let measured = world.pose(&pose.payload, options, mounting);
+            self.pose = Some((pose.monotonic_time.as_nanos(), measured));
+        }
+        let start = self.start(options, mounting).ok()?;
+        Some((start, world))
+    }
+
+    fn start(&mut self, options: &NavigationOptions, mounting: &Mounting) -> Result<Start, Refusal> {
+        let given = self.given.filter(|given| given.time_ns == self.last_ns);
+        if mounting.has_gnss() {
+            return self.at_fix(given, options, mounting);
+        }
+        if let Some(given) = given {
+            return Ok(given);
+        }
+        if mounting.pose.is_some() && !self.takes_too_long() {
+            return self.at_pose();
+        }
+        let is_measured = mounting.pose.is_some() || mounting.magnetic_field.is_some();
+        let deviation = options.heading_deviation;
+        let deviation = if is_measured || deviation <= UNKNOWN { deviation } else { BY_DEFINITION };
+        self.alignment.at_rest((-mounting.link(), ORIGIN), (options.heading, deviation))
+    }
+
+    /// At the last fix, with the velocity of the last ones.
+    fn at_fix(
+        &mut self,
+        given: Option<Start>,
+        options: &NavigationOptions,
+        mounting: &Mounting,
+    ) -> Result<Start, Refusal> {
+        let fix = *self.course.newest(self.last_ns).ok_or(Refusal::NotObservable)?;
+        self.placed_ns = self.placed_ns.or(Some(self.last_ns));
+        let start = match given {
+            Some(given) => given,
+            None => self.found(&fix, (options.heading, options.heading_deviation))?,
+        };
+        // The fix is the position of the antenna, and some time old.
+        let antenna = start.world_from_body * mounting.antenna();
+        let age_s = start.time_ns.saturating_sub(fix.time_ns) as f64 * 1e-9;
+        let position = fix.position + start.velocity * age_s - antenna;
+        let position_covariance = fix.covariance + start.velocity_covariance * (age_s * age_s);
+        Ok(Start { position, position_covariance, ..start })
+    }
+
+    /// The motion at the last fix: rest, if the IMU shows rest and fixes do not move. To an IMU, steady driving is rest.
+    fn found(&self, fix: &TrackPoint, heading: (f64, f64)) -> Result<Start, Refusal> {
+        let position = (fix.position, fix.deviation());
+        let velocity = self.course.velocity(self.last_ns);
+        let is_moving = velocity.is_some_and(|(velocity, deviation)| velocity.norm() > CLEARLY * deviation);
+        if !is_moving {
+            if velocity.is_none() && !self.takes_too_long() {
+                return Err(Refusal::NotObservable);
+            }
+            if let Ok(start) = self.alignment.at_rest(position, heading) {
+                return Ok(start);
+            }
+            if !self.has_waited(self.placed_ns, RESTLESS_NS) {
+                return Err(Refusal::NotObservable);
+            }
+        }
+        // The mean over some time is not the velocity now.
+        let velocity = velocity.map_or((Vector3::zeros(), MOVING), |(mean, deviation)| (mean, deviation + 1.0));
+        self.alignment.in_motion(position, velocity, heading)
+    }
+
+    /// At the last pose.
+    fn at_pose(&self) -> Result<Start, Refusal> {
+        let (time_ns, pose) = self.pose.ok_or(Refusal::NotObservable)?;
+        let origin = (Vector3::zeros(), ORIGIN);
+        let start = match self.alignment.at_rest(origin, (0.0, 0.0)) {
+            Ok(start) => start,
+            Err(refusal) if !self.has_waited(self.first_ns, RESTLESS_NS) => return Err(refusal),
+            Err(_) => self.alignment.in_motion(origin, (Vector3::zeros(), MOVING), (0.0, 0.0))?,
+        };
+        let age_s = start.time_ns.saturating_sub(time_ns) as f64 * 1e-9;
+        Ok(Start {
+            position: pose.position,
+            position_covariance: pose.position_covariance + start.velocity_covariance * (age_s * age_s),
+            world_from_body: pose.world_from_body,
+            rotation_covariance: pose.rotation_covariance,
+            ..start
+        })
+    }
+}
+
+/// The start from the state of the link in a message, at the time of a sample; `None` if it holds no pose.
+fn given(
+    state: &Stamped<Odometry>,
+    sample: &ImuMean,
+    options: &NavigationOptions,
+    mounting: &Mounting,
+) -> Option<Start> {
+    let (position, world_from_body, velocity) = mounting.state(state);
+    let is_state = position.iter().chain(world_from_body.coords.iter()).chain(&velocity).all(|x| x.is_finite());
+    let is_rotation = (0.99..1.01).contains(&world_from_body.norm());
+    let (deviation, turned) = (options.pose_deviation, 0.1 * options.pose_deviation);
+    let start = Start::at(
+        state.monotonic_time.as_nanos(),
+        (position, deviation),
+        (velocity, options.odometry_deviation),
+        (UnitQuaternion::new_normalize(world_from_body.into_inner()), turned),
+    );
+    let known = |covariance: Option<nalgebra::Matrix6<f64>>, first: usize| -> Option<Matrix3<f64>> {
+        let block = covariance?.fixed_view::<3, 3>(first, first).into_owned();
+        block.diagonal().iter().all(|variance| *variance > 0.0 && variance.is_finite()).then_some(block)
+    };
+    let turn = start.world_from_body.to_rotation_matrix().into_inner();
+    let in_world = |covariance: Matrix3<f64>| turn * covariance * turn.transpose();
+    let mut start = Start {
+        gyroscope_bias_deviation: AlignmentParams::default().largest_bias,
+        position_covariance: known(state.pose.covariance, 0).unwrap_or(start.position_covariance),
+        rotation_covariance: known(state.pose.covariance, 3).unwrap_or(start.rotation_covariance),
+        velocity_covariance: known(state.twist.covariance, 0).map_or(start.velocity_covariance, in_world),
+        ..start
+    };
+    move_on(&mut start, sample);
+    (is_state && is_rotation && start.time_ns == sample.time_ns).then_some(start)
+}
+
+/// Moves a state to the end of a sample, by the gyroscope and at a constant velocity, whose uncertainty grows.
+fn move_on(start: &mut Start, sample: &ImuMean) {
+    let since_s = sample.time_ns.saturating_sub(start.time_ns) as f64 * 1e-9;
+    if !(0.0..LONGEST_MOVE_S).contains(&since_s) {
+        return;
+    }
+    start.position += start.velocity * since_s;
+    let turn = UnitQuaternion::from_scaled_axis(sample.angular_velocity * since_s);
+    start.velocity = start.world_from_body * (turn * (start.world_from_body.inverse() * start.velocity));
+    start.world_from_body *= turn;
+    let changed = ACCELERATION * ACCELERATION * since_s;
+    start.velocity_covariance += Matrix3::identity() * changed;
+    start.position_covariance += start.velocity_covariance * (since_s * since_s);
+    start.time_ns = sample.time_ns;
+}
+
+/// The acceleration of a robot whose state is given, as white noise, m/s²/√Hz.
+const ACCELERATION: f64 = 1.0;
