@@ -88,6 +88,7 @@ pub(crate) enum Gate {
     /// Measurements that are too far off are rejected.
     Closed,
     /// All measurements pass.
+    #[cfg(feature = "std")]
     Open,
 }
 

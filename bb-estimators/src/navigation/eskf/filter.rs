@@ -65,6 +65,7 @@ pub struct Eskf<S: States = Navigation, const N: usize = NAVIGATION> {
 }
 
 /// Variances of what holding a reading over a gap may have done wrong, per axis of the body.
+#[cfg(feature = "std")]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::navigation) struct Doubt {
     /// Rotation, rad².
@@ -74,6 +75,7 @@ pub(in crate::navigation) struct Doubt {
 }
 
 /// A measurement compared with a filter.
+#[cfg(feature = "std")]
 #[derive(Clone, Copy, Debug)]
 pub(in crate::navigation) struct Judged {
     /// Normalised innovation squared.
@@ -191,6 +193,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
 
     /// Propagates over a part, `dt` seconds, of a gap in the samples, during which the reading is assumed to be that of `sample`, but
     /// may have been wrong by `doubt`.
+    #[cfg(feature = "std")]
     #[cold]
     pub(in crate::navigation) fn hold(&mut self, sample: &ImuMean, doubt: &Doubt) -> Result<(), Refusal> {
         let estimate = self.estimate.as_mut().ok_or(Refusal::NotStarted)?;
@@ -275,6 +278,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
 
     /// Multiplies the white noise of the IMU, as a deviation. The walks of its biases stay: a multiple of them, found on noise, made
     /// the biases follow every error of the model.
+    #[cfg(feature = "std")]
     pub(in crate::navigation) fn multiply_noise(&mut self, multiple: f64) {
         let densities = self.params.densities();
         self.densities.gyroscope = densities.gyroscope * multiple * multiple;
@@ -282,6 +286,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
     }
 
     /// Multiplies the covariance.
+    #[cfg(feature = "std")]
     pub(in crate::navigation) fn doubt_all(&mut self, factor: f64) {
         self.covariance.multiply(factor);
         self.covariance.bound(&Self::LAYOUT);
@@ -292,6 +297,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
     /// # Errors
     ///
     /// Returns the reason why it cannot be compared.
+    #[cfg(feature = "std")]
     #[inline(never)]
     pub(in crate::navigation) fn judge<M: Measurement<D>, const D: usize>(
         &self,
@@ -323,6 +329,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
     }
 
     /// Like [`update`](Self::update), but bypasses the gate.
+    #[cfg(feature = "std")]
     pub(crate) fn update_ungated<M: Measurement<D>, const D: usize>(
         &mut self,
         stream: &mut Stream,
