@@ -33,14 +33,14 @@ pub use nearest::nearest;
 pub(crate) use table::params;
 pub use value::{Field, Kind, Range, Value};
 
-/// What is stated of one parameter.
+/// Description of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameter {
     /// The name of the field.
     pub name: &'static str,
-    /// What it is, and the effect of small and large values; paragraphs are separated by blank lines.
+    /// Meaning, and the effect of small and large values; paragraphs are separated by blank lines.
     pub doc: &'static str,
-    /// What values it takes.
+    /// Kind of its values.
     pub kind: Kind,
     /// The accepted numbers; of a [`Kind::Process`], of its deviation.
     pub range: Range,

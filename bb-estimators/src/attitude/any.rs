@@ -35,7 +35,7 @@ macro_rules! any {
                 }
             }
 
-            /// What the filter is for.
+            /// Purpose of the filter.
             pub fn about(&self) -> &'static About {
                 match self {
                     $(Self::$estimator(_) => &super::$module::ABOUT,)*

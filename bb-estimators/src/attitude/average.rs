@@ -24,7 +24,7 @@ pub use estimator::{OrientationAverage, OrientationAverageOptions, OrientationPa
 pub use pair::average_pair;
 pub use slice::average;
 
-/// Why orientations have no average.
+/// Reason for which orientations have no average.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum AverageError {
     /// A weight is negative, NaN or infinite.
@@ -38,7 +38,7 @@ pub enum AverageError {
     NoWeight,
     /// An orientation is not finite.
     NonFinite {
-        /// Its position.
+        /// Position of that orientation.
         index: usize,
     },
     /// Two averages are equally good, as between two orientations of equal weight that are 180° apart.

@@ -24,7 +24,7 @@ mod tests;
 pub use filter::ComplementaryFilter;
 pub use params::ComplementaryParams;
 
-/// What the filter is for.
+/// Purpose of the filter.
 pub const ABOUT: super::About = super::About {
     when: "few numbers that are easy to choose, little work",
     idea: "the gyroscope for short times, gravity and field for long ones, each through a first-order low-pass",

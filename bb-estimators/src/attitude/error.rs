@@ -12,7 +12,7 @@ use super::Real;
 pub struct OrientationError {
     /// The whole rotation, `2 acos |w|`, rad.
     pub total: f64,
-    /// Its part about the vertical, `2 atan |z / w|`, rad.
+    /// Part of the rotation about the vertical, `2 atan |z / w|`, rad.
     pub heading: f64,
     /// The rest: its part about a horizontal axis, `2 acos √(w² + z²)`, rad.
     pub inclination: f64,

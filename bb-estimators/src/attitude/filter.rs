@@ -66,18 +66,18 @@ pub trait AttitudeFilter<T: Real = f64>: Sized {
         None
     }
 
-    /// Whether the sensor is at rest. `None` if the filter does not report it.
+    /// Returns whether the sensor is at rest. `None` if the filter does not report it.
     fn is_at_rest(&self) -> Option<bool> {
         None
     }
 
-    /// Whether the magnetic field is disturbed, so that the heading does not follow it as usual. `None` if the filter
-    /// does not report it, or uses no magnetometer.
+    /// Returns whether the magnetic field is disturbed, so that the heading does not follow it as usual. `None` if the
+    /// filter does not report it, or uses no magnetometer.
     fn is_magnetically_disturbed(&self) -> Option<bool> {
         None
     }
 
-    /// Whether the heading is known well enough to be used. `None` if the filter does not report it, or uses no
+    /// Returns whether the heading is known well enough to be used. `None` if the filter does not report it, or uses no
     /// magnetometer.
     fn is_heading_trusted(&self) -> Option<bool> {
         None
@@ -90,8 +90,8 @@ pub trait AttitudeFilter<T: Real = f64>: Sized {
 /// A filter's purpose: in its folder, for the command and the guides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct About {
-    /// When to use it.
+    /// Uses for which it is the right choice.
     pub when: &'static str,
-    /// How it works, in a sentence.
+    /// Principle of the filter, in a sentence.
     pub idea: &'static str,
 }

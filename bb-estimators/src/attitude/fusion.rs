@@ -34,7 +34,7 @@ mod tests;
 pub use filter::FusionFilter;
 pub use params::FusionParams;
 
-/// What the filter is for.
+/// Purpose of the filter.
 pub const ABOUT: super::About = super::About {
     when: "motion with strong accelerations now and then, little work",
     idea: "feedback in proportion to the error; ignores accelerometer and field where they are far off",

@@ -17,7 +17,7 @@ use super::sample::Quantity;
 /// 89.4°, which occurs only near the magnetic poles.
 pub const MIN_HORIZONTAL_FRACTION: f64 = 0.01;
 
-/// Why two vectors give no orientation.
+/// Reason for which two vectors give no orientation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum InitialError {
     /// A component is NaN or infinite.

@@ -24,7 +24,7 @@ use nalgebra::Vector3;
 
 use super::AttitudeFilter;
 
-/// At rest: one g upwards, in the world.
+/// Specific force at rest: one g upwards, in the world, m/s².
 pub(super) const UP: Vector3<f64> = Vector3::new(0.0, 0.0, 9.81);
 
 /// The magnetic field of central Europe, in the world.

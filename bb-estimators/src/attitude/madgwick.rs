@@ -26,7 +26,7 @@ mod tests;
 pub use filter::MadgwickFilter;
 pub use params::MadgwickParams;
 
-/// What the filter is for.
+/// Purpose of the filter.
 pub const ABOUT: super::About = super::About {
     when: "the least work; to compare with others",
     idea: "a step of fixed length down the gradient of how badly the orientation explains gravity and field",

@@ -27,7 +27,7 @@ mod tests;
 pub use filter::MahonyFilter;
 pub use params::MahonyParams;
 
-/// What the filter is for.
+/// Purpose of the filter.
 pub const ABOUT: super::About = super::About {
     when: "the least work, with a bias",
     idea: "proportional and integral feedback of what gravity and field miss their expected directions by",

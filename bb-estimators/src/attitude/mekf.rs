@@ -24,7 +24,7 @@ mod window;
 pub use filter::MekfFilter;
 pub use params::{Magnetometer, MekfParams};
 
-/// What the filter is for.
+/// Purpose of the filter.
 pub const ABOUT: super::About = super::About {
     when: "first choice: the most accurate from rest and in motion, without calibration, with a covariance",
     idea: "an error-state Kalman filter that also finds the gyroscope's bias, the body's velocity, and the magnetometer's offset and lag",

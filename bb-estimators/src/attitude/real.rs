@@ -26,7 +26,7 @@ pub trait Real: RealField + Copy + Default + Sum + sealed::Sealed {
     /// The nearest to `value`.
     fn of(value: f64) -> Self;
 
-    /// The same in double precision.
+    /// Converts the value to double precision.
     fn as_f64(self) -> f64;
 
     /// Nanoseconds in seconds.

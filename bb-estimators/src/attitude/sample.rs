@@ -24,7 +24,7 @@ pub const MAX_MAGNETIC_FIELD: f64 = 1e15;
 /// All vectors are in the body frame, which is the sensor's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImuSample<T = f64> {
-    /// When it was measured, nanoseconds since any fixed time.
+    /// Time of the measurement, nanoseconds since any fixed time.
     pub time_ns: i64,
     /// Angular velocity of the body relative to the world, rad/s.
     pub angular_velocity: Vector3<T>,
@@ -58,7 +58,7 @@ impl fmt::Display for Quantity {
     }
 }
 
-/// Why a filter refused a sample. The filter is unchanged.
+/// Reason for which a filter refused a sample. The filter is unchanged.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SampleError {
     /// A component is NaN or infinite.
@@ -102,14 +102,14 @@ impl Error for SampleError {}
 
 /// The directions of a sample, as unit vectors in the body frame.
 pub(super) struct Directions<T> {
-    /// Of the specific force; `None` in free fall.
+    /// Direction of the specific force; `None` in free fall.
     pub(super) up: Option<Vector3<T>>,
-    /// Of the magnetic field, if there is one to use.
+    /// Direction of the magnetic field, if there is one to use.
     pub(super) field: Option<Vector3<T>>,
 }
 
 impl<T: Real> ImuSample<T> {
-    /// The same in another scalar.
+    /// Converts the sample to another scalar.
     pub fn cast<U: Real>(&self) -> ImuSample<U> {
         let cast = |vector: &Vector3<T>| vector.map(|component| U::of(component.as_f64()));
         ImuSample {
@@ -142,8 +142,8 @@ impl<T: Real> ImuSample<T> {
         })
     }
 
-    /// Whether angular velocity and specific force are within the range of sensors, and the force shows which way is
-    /// up.
+    /// Returns whether angular velocity and specific force are within the range of sensors, and the force shows which
+    /// way is up.
     #[inline(always)]
     pub(super) fn is_usual(&self) -> bool {
         let rate = self.angular_velocity.norm_squared();

@@ -141,7 +141,7 @@ impl<T: Real> AttitudeState<T> {
         self.world_from_body
     }
 
-    /// Whether a field has set the heading, or it was given.
+    /// Returns whether a field has set the heading, or it was given.
     pub(super) fn heading_is_known(&self) -> bool {
         self.heading_known
     }

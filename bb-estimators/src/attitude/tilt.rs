@@ -20,6 +20,6 @@ mod tests;
 pub use filter::TiltFilter;
 pub use params::TiltParams;
 
-/// What the filter is for.
+/// Purpose of the filter.
 pub const ABOUT: super::About =
     super::About { when: "no gyroscope, slow motion", idea: "gravity and field, low-passed" };

@@ -48,7 +48,7 @@ mod tests;
 pub use filter::VqfFilter;
 pub use params::VqfParams;
 
-/// What the filter is for.
+/// Purpose of the filter.
 pub const ABOUT: super::About = super::About {
     when: "to agree with other programs that use VQF's published defaults",
     idea: "gravity by a strong low-pass in the gyroscope's frame, heading apart; finds bias, rest and disturbances",

@@ -56,7 +56,7 @@ pub struct SensorNoise {
     pub bias_instability: f64,
     /// The averaging time of the lowest point, s.
     pub bias_instability_time_s: f64,
-    /// Whether the curve rises again, so that the lowest point is a minimum.
+    /// `true` if the curve rises again, so that the lowest point is a minimum.
     pub is_lowest: bool,
     /// Rate random walk K, unit/s/√Hz.
     pub random_walk: Known,
@@ -71,12 +71,11 @@ pub struct Known {
     pub value: f64,
     /// One standard deviation.
     pub deviation: f64,
-    /// It is less than this with a confidence of 97.7 %: the square of the value is known within two of its
-    /// deviations.
+    /// Upper limit with a confidence of 97.7 %: the square of the value is known within two of its deviations.
     pub at_most: f64,
 }
 
-/// Why the noise cannot be computed.
+/// Reason for which the noise cannot be computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum AllanError {
     /// There are too few samples.
@@ -232,7 +231,7 @@ fn parts(time_s: f64) -> Vector3<f64> {
 }
 
 impl AllanCurve {
-    /// By increasing averaging time.
+    /// Returns the points by increasing averaging time.
     pub fn points(&self) -> &[AllanPoint] {
         self.points.get(..self.count).unwrap_or(&[])
     }
@@ -320,7 +319,8 @@ fn sqrt(x: f64) -> f64 {
     ComplexField::sqrt(x)
 }
 
-/// Of an overlapping Allan variance over m of n integrals, under white noise (0), flicker noise (1) or a random walk (2).
+/// Returns the degrees of freedom of an overlapping Allan variance over m of n integrals, under white noise (0), flicker noise (1) or a
+/// random walk (2).
 fn degrees_of_freedom(noise: usize, n: f64, m: f64) -> f64 {
     let degrees = match noise {
         0 => (3.0 * (n - 1.0) / (2.0 * m) - 2.0 * (n - 2.0) / n) * (4.0 * m * m) / (4.0 * m * m + 5.0),

@@ -113,7 +113,7 @@ struct Sums {
     count: f64,
     normal: Square,
     gradient: Vector,
-    /// Of squared residuals over their variances.
+    /// Sum of squared residuals over their variances.
     cost: f64,
     squared: f64,
 }
@@ -147,7 +147,7 @@ impl Sums {
         sums
     }
 
-    /// With the unknowns that the shape excludes removed from the equations.
+    /// Solves the equations for a step, without the unknowns that the shape excludes.
     fn step(&self, damping: f64, shape: Shape) -> Option<Vector> {
         let mut normal = self.normal;
         for index in 0..UNKNOWNS {

@@ -1,14 +1,14 @@
-//! Why there is no calibration.
+//! Errors of a calibration.
 
 use core::error::Error;
 use core::fmt;
 
-/// Why the measurements give no calibration.
+/// Reason for which the measurements give no calibration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CalibrationError {
     /// Rests, or measurements, in too few directions.
     TooFew {
-        /// What was counted, in the plural.
+        /// Name of what was counted, in the plural.
         what: &'static str,
         /// The number found.
         found: usize,
@@ -19,9 +19,9 @@ pub enum CalibrationError {
     NonFinite,
     /// The directions do not determine a parameter.
     NotObservable {
-        /// Which one: `scale` or `offset`, about the axis known least.
+        /// Name of the parameter: `scale` or `offset`, about the axis known least.
         parameter: &'static str,
-        /// Its uncertainty: standard deviation, as a fraction of the norm.
+        /// Standard deviation of the parameter, as a fraction of the norm.
         deviation: f64,
         /// The largest accepted.
         limit: f64,

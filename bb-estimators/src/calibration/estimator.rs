@@ -38,10 +38,10 @@ pub struct Calibrated<I = Imu> {
 /// Options of [`Calibrated`]: the true vector is `matrix (measured - offset)`. Without options nothing is changed.
 #[derive(Clone, Copy, Debug, PartialEq, Options)]
 pub struct CalibratedOptions {
-    /// What the gyroscope reads at rest, rad/s.
+    /// Reading of the gyroscope at rest, rad/s.
     #[option(default = [0.0; 3])]
     pub gyroscope_offset: [f64; 3],
-    /// What the accelerometer reads in free fall, m/s².
+    /// Reading of the accelerometer in free fall, m/s².
     #[option(default = [0.0; 3])]
     pub accelerometer_offset: [f64; 3],
     /// Scale and misalignment of the accelerometer, row by row.

@@ -40,7 +40,7 @@ pub struct AccelerometerFit {
     pub matrix_deviation: Matrix3<f64>,
     /// Root mean square difference between the calibrated norm and gravity over the rests, m/s².
     pub residual: f64,
-    /// The same, before the calibration.
+    /// Root mean square difference between the uncalibrated norm and gravity over the rests, m/s².
     pub residual_before: f64,
 }
 

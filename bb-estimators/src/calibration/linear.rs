@@ -12,7 +12,7 @@ pub struct Linear {
 }
 
 impl Linear {
-    /// For a sensor that needs no calibration.
+    /// Calibration of a sensor that needs none.
     pub const IDENTITY: Self = Self {
         offset: Vector3::new(0.0, 0.0, 0.0),
         matrix: Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),

@@ -18,7 +18,7 @@ pub struct MagnetometerFit {
     pub matrix_deviation: Matrix3<f64>,
     /// Root mean square difference between the calibrated norm and `norm`.
     pub residual: f64,
-    /// The same before the calibration, about the mean norm.
+    /// Root mean square difference between the uncalibrated norm and its mean.
     pub residual_before: f64,
 }
 

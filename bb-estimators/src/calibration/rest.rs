@@ -8,15 +8,15 @@ use crate::moments::Moments;
 use crate::params::{Params as _, params};
 
 params! {
-    /// What counts as rest.
+    /// Criteria of rest.
     pub struct RestParams {
-        /// How long rest is looked at before it is decided: the pieces that a rest is put together from.
+        /// Time for which samples are collected before they are judged: the pieces that a rest is put together from.
         ///
         /// Small: short rests count, and slow motion passes for rest. Large: the ends of rests are lost.
         ///
         /// Source: a quarter of a rest of two seconds.
         window: f64 = 0.5, in 0.01..=100.0, unit "s";
-        /// How long rest must last, without its first and its last window, in which a hand lets go and takes hold.
+        /// Least duration of a rest, without its first and its last window, in which a hand lets go and takes hold.
         ///
         /// Small: pauses count. Large: the mean of a rest has less noise.
         ///
@@ -40,9 +40,9 @@ params! {
 /// A rest: means over its time, body frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rest {
-    /// When it begins, nanoseconds.
+    /// Time at which it begins, nanoseconds.
     pub start_ns: i64,
-    /// When it ends, nanoseconds.
+    /// Time at which it ends, nanoseconds.
     pub end_ns: i64,
     /// The number of its samples.
     pub samples: u64,
@@ -96,7 +96,7 @@ pub struct Rests {
     window: Sums,
     /// The previous window, if it was at rest: it is part of the rest once another follows.
     last: Option<Sums>,
-    /// Whether a window at rest preceded the last one.
+    /// `true` if a window at rest preceded the last one.
     has_begun: bool,
     rest: Option<Sums>,
 }
@@ -169,7 +169,7 @@ impl Rests {
         })
     }
 
-    /// Whether a window is a rest, with the same pose as the previous window.
+    /// Returns whether a window is a rest, with the same pose as the previous window.
     fn is_rest(&self, window: &Sums) -> bool {
         let RestParams { rotation, force, .. } = self.params;
         let is_still = window.force.largest_variance(window.count) < force * force

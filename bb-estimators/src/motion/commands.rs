@@ -37,7 +37,7 @@ pub struct MoveJointsOptions {
     /// Largest derivative of the acceleration, rad/s³ or m/s³. Default: 20.
     #[option(default = 20.0, range = 1e-6..=f64::INFINITY)]
     pub jerk: f64,
-    /// How long after the planned arrival it waits for the actuators' reports. Unit: s. Default: 2 s.
+    /// Time for which it waits for the actuators' reports after the planned arrival. Unit: s. Default: 2 s.
     #[option(default = Duration::from_secs(2))]
     pub patience: Duration,
 }
@@ -87,7 +87,7 @@ impl Command for MoveJoints {
     }
 }
 
-/// How often progress is published.
+/// Period at which progress is published.
 const PROGRESS_PERIOD: Duration = Duration::from_millis(100);
 
 /// Between two points of a trajectory.

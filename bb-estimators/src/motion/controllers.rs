@@ -31,7 +31,7 @@ pub struct PidController {
     actuator: ActuatorLink<ActuatorCommand>,
     latest: Option<(MonotonicTime, f64)>,
     last_step: Option<MonotonicTime>,
-    /// Whether the actuator carries out a command of this controller.
+    /// `true` if the actuator carries out a command of this controller.
     is_driving: bool,
 }
 
@@ -44,10 +44,10 @@ pub struct PidControllerOptions {
     /// Path of the actuator, which takes `ActuatorCommand`.
     #[option(required)]
     pub actuator: &'static str,
-    /// What the output is. Default: a velocity.
+    /// Kind of the output. Default: a velocity.
     #[option(default = Drive::Velocity)]
     pub drive: Drive,
-    /// Where the joint is to be, rad or m. Default: 0.
+    /// Target position of the joint, rad or m. Default: 0.
     #[option(default = 0.0)]
     pub setpoint: f64,
     /// Proportional gain. Default: 1.
@@ -65,7 +65,7 @@ pub struct PidControllerOptions {
     /// The output is at most that, in both directions. Default: no limit but that of the joint.
     #[option(default = f64::INFINITY, range = 0.0..=f64::INFINITY)]
     pub output_limit: f64,
-    /// How fast the integral gives way while the output is at its limit. Unit: s. Default: at once.
+    /// Time constant with which the integral gives way while the output is at its limit. Unit: s. Default: at once.
     #[option(default = 0.0, range = 0.0..=1e3, unit = "s")]
     pub tracking_time: f64,
     /// A measurement that is older is not used. Unit: s. Default: 100 ms.
@@ -191,7 +191,7 @@ impl PidController {
     }
 }
 
-/// What was carried out, if anything was. A robot that is not armed, or an actuator that has failed and is restarted, is not a
+/// Returns the command that was carried out, if any. A robot that is not armed, or an actuator that has failed and is restarted, is not a
 /// fault of the controller.
 fn sent<T>(result: Result<T, ActuatorError>) -> Result<Option<T>, Fault> {
     match result {
@@ -209,7 +209,7 @@ pub struct ThresholdController {
     threshold: Threshold,
     measurement: Subscription<JointState>,
     actuator: ActuatorLink<ActuatorCommand>,
-    /// What was carried out last.
+    /// Command carried out last: on or off.
     commanded: Option<bool>,
 }
 
@@ -222,7 +222,7 @@ pub struct ThresholdControllerOptions {
     /// Path of the actuator, which takes `ActuatorCommand`.
     #[option(required)]
     pub actuator: &'static str,
-    /// On at or above this position, rad or m. Default: 1.
+    /// Position at or above which it switches on, rad or m. Default: 1.
     #[option(default = 1.0)]
     pub on_at: f64,
     /// Off at or below this position, rad or m; at most `on_at`. Default: 0.
@@ -241,7 +241,7 @@ pub struct ThresholdControllerOptions {
 pub struct ThresholdState {
     /// The position that caused it, rad or m.
     pub measurement: f64,
-    /// Whether it is on.
+    /// `true` if it switched on.
     pub is_on: bool,
 }
 

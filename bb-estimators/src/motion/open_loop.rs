@@ -25,7 +25,7 @@ pub struct OpenLoopPosition {
 /// Options of [`OpenLoopPosition`].
 #[derive(Clone, Debug, PartialEq, Options)]
 pub struct OpenLoopOptions {
-    /// How the actuator moves. Default: trapezoidal.
+    /// Shape of the motion over time. Default: trapezoidal.
     #[option(default = Easing::Trapezoidal)]
     pub easing: Easing,
     /// Acceleration of its motions, rad/s² or m/s². Default: what speeds up for a quarter of each motion.
@@ -45,9 +45,9 @@ struct Current {
 
 #[derive(Clone, Copy, Debug)]
 enum Course {
-    /// To a target.
+    /// Motion to a target.
     To(Profile),
-    /// At a velocity, until another motion begins or this one ends.
+    /// Motion at a velocity, until another motion begins or this one ends.
     At { initial: f64, velocity: f64 },
 }
 

@@ -15,8 +15,8 @@ pub struct PidParams {
     pub minimum: f64,
     /// Largest output.
     pub maximum: f64,
-    /// How fast the integral is reduced while the output is at a limit, s: a small time follows the limit closely. 0:
-    /// at once.
+    /// Time constant with which the integral is reduced while the output is at a limit, s: a small time follows the
+    /// limit closely. 0: at once.
     pub tracking_s: f64,
 }
 
@@ -126,8 +126,8 @@ impl PidParams {
         output.max(self.minimum).min(self.maximum)
     }
 
-    /// By how much a step reduces the integral for the excess over the limit. At most the integral's value is attributed to it,
-    /// so that a proportional term that saturates alone does not wind it up in the other direction.
+    /// Returns the amount by which a step reduces the integral for the excess over the limit. At most the integral's value is attributed to
+    /// it, so that a proportional term that saturates alone does not wind it up in the other direction.
     fn windup(&self, beyond: f64, integral: f64, step_s: f64) -> f64 {
         let share = if self.tracking_s > 0.0 { (step_s / self.tracking_s).min(1.0) } else { 1.0 };
         let excess =

@@ -23,7 +23,7 @@ pub struct JointMotionLimits {
     pub jerk: f64,
 }
 
-/// Why there is no trajectory.
+/// Reason for which there is no trajectory.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum PlanError {

@@ -8,14 +8,14 @@ pub enum Easing {
     /// Constant acceleration, constant velocity, constant deceleration.
     #[default]
     Trapezoidal,
-    /// The same with an acceleration that rises and falls smoothly: the velocity follows 3u² − 2u³ in each ramp.
+    /// Trapezoid with an acceleration that rises and falls smoothly: the velocity follows 3u² − 2u³ in each ramp.
     SCurve,
 }
 
 /// The pace of a motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pace {
-    /// From start to end, s.
+    /// Duration from start to end, s.
     Duration(f64),
     /// The largest speed, rad/s or m/s.
     Speed(f64),
@@ -71,7 +71,7 @@ impl Profile {
         Self { easing, initial, target, duration_s, ramp_s }
     }
 
-    /// From the start to the end, s.
+    /// Returns the duration from the start to the end, s.
     pub fn duration_s(&self) -> f64 {
         self.duration_s
     }

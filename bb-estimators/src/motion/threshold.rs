@@ -1,7 +1,7 @@
 //! A switch with hysteresis.
 
-/// On at or above one threshold, off at or below a lower one, and unchanged between them: for a fan, a heater
-/// (reversed), a pump.
+/// Switch with hysteresis: on at or above one threshold, off at or below a lower one, and unchanged between them: for a
+/// fan, a heater (reversed), a pump.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Threshold {
     on_at: f64,
@@ -15,7 +15,7 @@ impl Threshold {
         (off_at <= on_at).then_some(Self { on_at, off_at, is_on: false })
     }
 
-    /// Whether it is on after this measurement. NaN changes nothing.
+    /// Returns whether it is on after this measurement. NaN changes nothing.
     pub fn update(&mut self, measurement: f64) -> bool {
         if measurement >= self.on_at {
             self.is_on = true;
@@ -25,7 +25,7 @@ impl Threshold {
         self.is_on
     }
 
-    /// Whether it is on.
+    /// Returns whether it is on.
     pub fn is_on(&self) -> bool {
         self.is_on
     }

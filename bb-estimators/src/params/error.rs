@@ -1,4 +1,4 @@
-//! What is wrong with a parameter.
+//! Errors of parameters.
 
 use core::error::Error;
 use core::fmt;
@@ -10,7 +10,7 @@ use super::{Kind, Parameter, Range, Value, nearest};
 pub struct ParamsError {
     /// The name of the field.
     pub parameter: &'static str,
-    /// What it was set to.
+    /// Value that was refused.
     pub value: f64,
     /// The least accepted value, in the parameter's unit.
     pub min: f64,
@@ -30,14 +30,14 @@ impl fmt::Display for ParamsError {
 
 impl Error for ParamsError {}
 
-/// Why a parameter was not set. Nothing has changed.
+/// Reason for which a parameter was not set. Nothing has changed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SetError<'t> {
     /// There is no parameter of this name.
     Unknown {
-        /// What was asked for.
+        /// Name that was given.
         name: &'t str,
-        /// Those there are.
+        /// Parameters that exist.
         parameters: &'static [Parameter],
     },
     /// The text is not a value of the parameter's kind.

@@ -18,7 +18,7 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
     near.min_by_key(|(distance, _)| *distance).map(|(_, candidate)| candidate)
 }
 
-/// Whether the words of one, between underscores, begin those of the other.
+/// Returns whether the words of one, between underscores, begin those of the other.
 fn is_short_for(name: &str, candidate: &str) -> bool {
     let mut words = candidate.split('_');
     let all =

@@ -69,7 +69,7 @@ macro_rules! params {
         }
 
         impl $name {
-            /// What is stated of each parameter.
+            /// Descriptions of all parameters.
             pub const PARAMETERS: &'static [$crate::params::Parameter] = &[$(
                 $crate::params::Parameter {
                     name: stringify!($field),

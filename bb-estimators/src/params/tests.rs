@@ -1,4 +1,4 @@
-//! What holds of every parameter of every algorithm.
+//! Laws of the parameters of every algorithm.
 
 use proptest::prelude::*;
 

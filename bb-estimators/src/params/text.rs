@@ -3,7 +3,7 @@
 use super::units::{self, Quantity};
 use super::{Kind, Parameter, SetError, Value};
 
-/// What `text` says, for a parameter that has the value `now`.
+/// Parses `text` as a value of a parameter that has the value `now`.
 pub(super) fn parse<'t>(
     parameter: &'static Parameter,
     text: &'t str,

@@ -2,7 +2,7 @@
 
 use core::f64::consts::PI;
 
-/// What a text says.
+/// Quantity that a text states.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Quantity {
     /// A number, in the unit that was asked for.

@@ -6,7 +6,7 @@ use core::ops::RangeInclusive;
 /// The kinds of parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// On or off.
+    /// Switch: on or off.
     Switch,
     /// One of these names.
     Choice(&'static [&'static str]),
@@ -21,17 +21,17 @@ pub enum Kind {
 /// The value of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Value {
-    /// Of a [`Kind::Switch`].
+    /// Value of a [`Kind::Switch`].
     Switch(bool),
     /// Word of a [`Kind::Choice`].
     Choice(&'static str),
-    /// Of a [`Kind::Count`].
+    /// Value of a [`Kind::Count`].
     Count(u32),
-    /// Of a [`Kind::Number`], in the parameter's unit.
+    /// Value of a [`Kind::Number`], in the parameter's unit.
     Number(f64),
-    /// Of a [`Kind::Process`].
+    /// Value of a [`Kind::Process`].
     Process {
-        /// In the parameter's unit.
+        /// Standard deviation, in the parameter's unit.
         deviation: f64,
         /// Correlation time, s; infinite for a constant.
         time_s: f64,
@@ -39,7 +39,7 @@ pub enum Value {
 }
 
 impl fmt::Display for Value {
-    /// As [`Params::set`](super::Params::set) reads it, without the unit.
+    /// Writes the value as [`Params::set`](super::Params::set) reads it, without the unit.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Switch(switch) => write!(f, "{switch}"),
@@ -59,7 +59,7 @@ impl fmt::Display for Value {
     }
 }
 
-/// In the shorter notation; both are read back as the same number.
+/// Writes a number in the shorter notation; both are read back as the same number.
 fn fmt_number(number: f64, f: &mut fmt::Formatter<'_>) -> fmt::Result {
     let is_plain = number == 0.0 || !number.is_finite() || (1e-3..1e6).contains(&number.abs());
     if is_plain { write!(f, "{number}") } else { write!(f, "{number:e}") }
@@ -86,7 +86,7 @@ impl Range {
         }
     }
 
-    /// Whether a number is within; NaN never is.
+    /// Returns whether a number is within; NaN never is.
     pub(crate) const fn has(&self, value: f64) -> bool {
         self.min <= value && value <= self.max
     }
@@ -107,13 +107,13 @@ impl fmt::Display for Range {
 
 /// A type that a parameter can have.
 pub trait Field: Copy {
-    /// Its kind.
+    /// Kind of the parameters of this type.
     const KIND: Kind;
 
-    /// As a value.
+    /// Converts the field to a value.
     fn to_value(self) -> Value;
 
-    /// From a value of its kind.
+    /// Converts a value of this kind to the field; `None` for another kind.
     fn from_value(value: Value) -> Option<Self>;
 }
 

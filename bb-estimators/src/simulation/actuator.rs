@@ -27,7 +27,7 @@ pub struct SimulatedActuator<C = ActuatorCommand> {
     world: Arc<SimulatedWorld>,
     joint: usize,
     drivetrain: Drivetrain,
-    /// Whether a motion was reported as begun but not as ended.
+    /// `true` if a motion was reported as begun but not as ended.
     is_reported: bool,
     /// The time of its next check, while there is something to report.
     next: Option<MonotonicTime>,
@@ -50,10 +50,10 @@ pub struct SimulatedActuatorOptions {
     /// Position at the start, rad or m; clamped to the joint's limits. Default: 0.
     #[option(default = 0.0, range = -1e9..=1e9)]
     pub initial: f64,
-    /// How long the joint may be held before that is reported; with 0, at the next look. Unit: s. Default: 200 ms.
+    /// Time for which the joint may be held before that is reported; with 0, at the next check. Unit: s. Default: 200 ms.
     #[option(default = Duration::from_millis(200))]
     pub stall_after: Duration,
-    /// How often it looks whether its motion has ended. Unit: s. Default: 5 ms.
+    /// Period at which it checks whether its motion has ended. Unit: s. Default: 5 ms.
     #[option(default = Duration::from_millis(5))]
     pub period: Duration,
 }
@@ -211,7 +211,7 @@ impl<C> SimulatedActuator<C> {
         }
     }
 
-    /// How the motion has ended, if it has.
+    /// Returns the end of the motion, if it has ended.
     fn ended(&self, state: &PlantState, goal: &Goal) -> Option<MotionEnd> {
         let point = state.point;
         let is_at = |position: f64| (point.position - position).abs() <= NEAR;

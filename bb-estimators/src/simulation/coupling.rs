@@ -1,4 +1,4 @@
-//! What the links of a robot do to its joints: gravity, their inertia, and the motion of the other joints.
+//! Effects of a robot's links on its joints: gravity, their inertia, and the motion of the other joints.
 
 use super::plant::{Load, Plant, STEP_S};
 use super::root::RootMotion;
@@ -85,7 +85,7 @@ impl Coupling {
         has_mass.then_some(Self { dynamics, vectors, masses, bias, accelerations, sweeps: 0 })
     }
 
-    /// How many sweeps over the joints all steps together have taken; a step takes one at least.
+    /// Returns the number of sweeps over the joints in all steps together; a step takes one at least.
     pub(super) fn sweeps(&self) -> u64 {
         self.sweeps
     }

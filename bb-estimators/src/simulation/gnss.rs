@@ -24,9 +24,9 @@ pub struct SimulatedGnss {
     frame: LocalFrame,
     probe: Probe,
     period: Duration,
-    /// When it measures next.
+    /// Time of the next measurement.
     next: Option<MonotonicTime>,
-    /// What is measured and not published yet.
+    /// Fixes that are measured and not published yet.
     waiting: VecDeque<(MonotonicTime, GnssFix)>,
     random: ChaCha8Rng,
 }
@@ -49,7 +49,7 @@ pub struct SimulatedGnssOptions {
     /// Standard deviation of a fix in height. Unit: m. Default: 1 m.
     #[option(default = 1.0, range = 0.0..=1000.0, unit = "m")]
     pub vertical_noise: f64,
-    /// From the measurement until it is published. Unit: s. Default: 0.
+    /// Delay from the measurement until it is published. Unit: s. Default: 0.
     #[option(default = Duration::ZERO)]
     pub delay: Duration,
     /// Chooses the noise. Default: 0.

@@ -41,7 +41,7 @@ pub struct SimulatedImuOptions {
     /// Chooses the noise. Sensors at different paths have different noise with the same seed. Default: 0.
     #[option(default = 0)]
     pub seed: u64,
-    /// How long the sensor measures; it then has finished. Unit: s. Default: for ever.
+    /// Time for which the sensor measures; it then has finished. Unit: s. Default: for ever.
     #[option(default = f64::INFINITY, range = 0.0..=f64::INFINITY, unit = "s")]
     pub duration: f64,
 }

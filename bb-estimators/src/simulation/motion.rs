@@ -21,7 +21,7 @@ const NORTH: [Sine; 2] = [(0.3, 5.3), (0.05, 1.9)];
 const UP: [Sine; 2] = [(0.2, 4.1), (0.03, 1.4)];
 
 impl Motion {
-    /// How long the body rests at first, s.
+    /// Time for which the body rests at first, s.
     pub const REST_S: f64 = 2.0;
 
     /// Half the step of the central second difference, s: its error is far below any sensor's noise.

@@ -50,13 +50,13 @@ pub(super) enum Goal {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct PlantState {
     pub(super) point: JointPoint,
-    /// Of the motor.
+    /// Effort of the motor.
     pub(super) effort: f64,
-    /// How long the motor has applied its maximum while the joint did not move, s.
+    /// Time for which the motor has applied its maximum while the joint did not move, s.
     pub(super) stalled_s: f64,
 }
 
-/// What the links, as far as they declare their inertia, do to a joint during a step.
+/// Load of the links, as far as they declare their inertia, on a joint during a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Load {
     /// Their inertia about the joint, added to that of the motor.
@@ -79,7 +79,7 @@ pub(super) fn last_step(time: MonotonicTime, now: MonotonicTime) -> MonotonicTim
 /// A slower joint counts as at rest, rad/s or m/s.
 const AT_REST: f64 = 1e-12;
 
-/// How fast a deviation from a trajectory decays, 1/s.
+/// Rate at which a deviation from a trajectory decays, 1/s.
 const TRACKING: f64 = 50.0;
 
 /// See the [module](self).
@@ -186,7 +186,7 @@ impl Plant {
         self.goal = goal;
     }
 
-    /// Whether the load is that of the step before.
+    /// Returns whether the load is that of the step before.
     pub(super) fn is_loaded_as_before(&self) -> bool {
         self.load == self.planned
     }
@@ -228,7 +228,7 @@ impl Plant {
         self.drivetrain.inertia + self.load.inertia
     }
 
-    /// Whether motor and friction can hold it against its load.
+    /// Returns whether motor and friction can hold the joint against its load.
     fn can_hold(&self) -> bool {
         self.planned.effort.abs() <= self.drivetrain.effort + self.drivetrain.friction
     }
@@ -253,8 +253,8 @@ impl Plant {
         wanted.min(speed).min(self.drivetrain.velocity) * direction
     }
 
-    /// Whether the next step brings it to rest at a position, up to the error of the step length: an eighth of the
-    /// distance that the deceleration covers in a step.
+    /// Returns whether the next step brings it to rest at a position, up to the error of the step length: an eighth of
+    /// the distance that the deceleration covers in a step.
     fn is_at(&self, target: f64) -> bool {
         let d = self.deceleration();
         let JointPoint { position, velocity, .. } = self.state.point;
@@ -370,7 +370,7 @@ impl Plant {
         (1.0 - stopped_in_s / STEP_S).max(0.5)
     }
 
-    /// It comes to rest within the step, and is at `target` at its end.
+    /// Returns the state after `step_s` of a step within which the joint comes to rest, at `target`.
     fn to_rest(&self, target: f64, step_s: f64) -> PlantState {
         let JointPoint { position, velocity, .. } = self.state.point;
         let acceleration = -velocity / STEP_S;

@@ -18,7 +18,7 @@ pub(super) struct Probe {
 }
 
 impl Probe {
-    /// For a sensor declared on a link.
+    /// Creates the probe of a sensor declared on a link.
     ///
     /// # Errors
     /// It is unplugged, or is not mounted on a link.

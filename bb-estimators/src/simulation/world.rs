@@ -34,7 +34,7 @@ pub struct SimulatedWorld {
 }
 
 pub(super) struct State {
-    /// By joint; `None` if nothing moves it.
+    /// Plants by joint; `None` if nothing moves it.
     plants: Vec<Option<Plant>>,
     /// `None` if no link that moves has a mass.
     pub(super) coupling: Option<Coupling>,
@@ -42,7 +42,7 @@ pub(super) struct State {
     time: MonotonicTime,
     /// The clock of the run, once an actuator has told it.
     clock: Option<Clock>,
-    /// When the run begins, as far as is known: nothing moves before.
+    /// Time at which the run begins, as far as is known: nothing moves before.
     start: MonotonicTime,
     root: RootMotion,
     /// m/s², in the world.
@@ -116,7 +116,7 @@ impl State {
 /// A simulated joint: its true state.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SimulatedJoint {
-    /// Its position and motion.
+    /// Position and motion of the joint.
     pub point: JointPoint,
     /// Effort of its motor, N·m or N.
     pub effort: f64,
@@ -153,7 +153,7 @@ impl SimulatedWorld {
         Ok(self.joint_at(self.number(name)?, now))
     }
 
-    /// The same by number.
+    /// Returns the true state of the joint with this number.
     pub(super) fn joint_at(&self, joint: usize, now: MonotonicTime) -> SimulatedJoint {
         let (owner, multiplier, offset) = self.topology.followed(joint);
         let mut state = self.advanced(owner, now);

@@ -19,7 +19,7 @@ params! {
         ///
         /// Source: the magnetometer's time constant of VQF.
         heading_time_constant: f64 = 9.0, in 0.0..=1e6, unit "s";
-        /// Whether the magnetic field corrects the heading.
+        /// Correction of the heading by the magnetic field.
         ///
         /// Off: magnetic samples are ignored and the heading drifts with the gyroscope's bias. On: heading is the
         /// magnetic one, and follows magnetic disturbances that outlast the time constant.

@@ -37,7 +37,7 @@ pub struct Frames {
 }
 
 impl Frames {
-    /// As the robot declares them.
+    /// Returns the rotations that the robot declares.
     ///
     /// # Errors
     /// There is a moving joint between an input and the output.

@@ -21,11 +21,11 @@ pub trait AttitudeOutput: Outputs + Sized {
 pub struct AttitudeStatus {
     /// The gyroscope's bias, rad/s, in the frame of the orientation.
     pub gyroscope_bias: Option<Vector3<f64>>,
-    /// Whether the sensor is at rest.
+    /// `true` while the sensor is at rest.
     pub is_at_rest: Option<bool>,
-    /// Whether the magnetic field is disturbed.
+    /// `true` while the magnetic field is disturbed.
     pub is_magnetically_disturbed: Option<bool>,
-    /// Whether the heading is known well enough to be used.
+    /// `true` if the heading is known well enough to be used.
     pub is_heading_trusted: Option<bool>,
 }
 

@@ -183,7 +183,7 @@ impl<T: Real> FusionFilter<T> {
     }
 }
 
-/// Of a threshold, rad; 0 disables it.
+/// Returns the squared sine of a threshold, rad; infinity for 0, which disables it.
 fn squared_sine<T: Real>(threshold: T) -> T {
     let sine = threshold.sin();
     if threshold > T::ZERO { sine * sine } else { T::of(f64::INFINITY) }

@@ -1,4 +1,4 @@
-//! Whether a sensor is ignored, and for how long: rejection and recovery according to the library's documentation.
+//! Rejection of a sensor's samples, and recovery from it, according to the library's documentation.
 
 use crate::attitude::Real;
 
@@ -9,7 +9,7 @@ const TAKEN_WEIGHT: f64 = 9.0;
 /// Rejection of one sensor.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Rejection<T> {
-    /// From 0 to the recovery time, s.
+    /// Time counted towards recovery, from 0 to the recovery time, s.
     trigger_s: T,
     recovering: bool,
     ignored: bool,
@@ -20,12 +20,12 @@ impl<T: Real> Rejection<T> {
         Self { trigger_s: T::ZERO, recovering: false, ignored: false }
     }
 
-    /// Whether the last sample was ignored.
+    /// Returns whether the last sample was ignored.
     pub(super) fn is_ignored(&self) -> bool {
         self.ignored
     }
 
-    /// Whether to accept a sample that is, or is not, `near` the expected value.
+    /// Returns whether to accept a sample that is, or is not, `near` the expected value.
     #[inline]
     pub(super) fn takes(&mut self, dt_s: T, recovery_time_s: T, near: bool) -> bool {
         self.trigger_s += if near { -T::of(TAKEN_WEIGHT) * dt_s } else { dt_s };

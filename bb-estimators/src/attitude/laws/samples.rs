@@ -8,7 +8,7 @@ use super::{FIELD, UP};
 use crate::attitude::initial::initial_orientation;
 use crate::attitude::{ImuSample, Real};
 
-/// How many cases a law is checked with, and which.
+/// Number and choice of the cases that a law is checked with.
 ///
 /// In double precision they differ each time. In single precision they are always the same: a filter with a threshold
 /// may decide differently within rounding of it, which happens in about one case in 100,000. `PROPTEST_RNG_SEED`

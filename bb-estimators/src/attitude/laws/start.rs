@@ -1,4 +1,4 @@
-//! How filters start, restart after a gap, and are reset.
+//! Start of filters, restart after a gap, and reset.
 
 use nalgebra::{UnitQuaternion, Vector3};
 

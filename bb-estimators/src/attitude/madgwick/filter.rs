@@ -87,8 +87,8 @@ impl<T: Real> MadgwickFilter<T> {
         self.state.store(&turn_by_tangent(&predicted, &(descent * self.tangent(dt_s))), field);
     }
 
-    /// The same without a field. Neither the predicted quaternion nor the specific force needs unit norm, since the
-    /// gradient's norm is irrelevant.
+    /// Makes the step without a field. Neither the predicted quaternion nor the specific force needs unit norm, since
+    /// the gradient's norm is irrelevant.
     #[inline(always)]
     fn step_to_gravity(&mut self, before: &UnitQuaternion<T>, dt_s: T, sample: &ImuSample<T>) {
         let squared_angle = sample.angular_velocity.norm_squared() * (dt_s * dt_s);

@@ -14,7 +14,7 @@ params! {
         /// Source: the report's `β = √(3/4) ω̃_β` for a gyroscope that is wrong by `ω̃_β` = 6.6°/s; the report itself
         /// uses 0.041 with nine axes and 0.033 with six for a calibrated sensor.
         beta: f64 = 0.1, in 0.0..=1e3, unit "rad/s";
-        /// Whether the magnetic field corrects the heading.
+        /// Correction of the heading by the magnetic field.
         ///
         /// Off: magnetic samples are ignored and the heading drifts with the gyroscope's bias. On: heading is the
         /// magnetic one, and follows magnetic disturbances.

@@ -110,8 +110,8 @@ impl<T: Real> MahonyFilter<T> {
         }
     }
 
-    /// The same for rare cases: for a rotation that is not small, in free fall, with the first field. One after the
-    /// other, each exactly.
+    /// Corrects and then rotates, each exactly, in the rare cases: a rotation that is not small, free fall, the first
+    /// field.
     #[cold]
     fn turn_far(&mut self, sample: &ImuSample<T>, dt_s: T) {
         let (Some(before), Ok(Directions { up, field })) =

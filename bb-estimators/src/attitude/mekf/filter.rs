@@ -329,7 +329,7 @@ impl<T: Real> MekfFilter<T> {
         orientation
     }
 
-    /// On average a body does not fall: what holds it points up, or the tilt is wrong.
+    /// Returns whether the tilt is wrong by more than 45°: on average a body does not fall, so the mean force must point up.
     fn is_overturned(&mut self, dt: T, force: &Vector3<T>) -> bool {
         self.force_s = (self.force_s + dt).min(T::of(SHORT_S));
         self.force += (force - self.force) * (dt / self.force_s);
@@ -349,7 +349,7 @@ impl<T: Real> MekfFilter<T> {
         orientation
     }
 
-    /// At rest, the gyroscope reads its bias.
+    /// Corrects the bias by the mean angular velocity, which at rest is the bias.
     fn fuse_rest(&mut self, dt: T, mean: &Vector3<T>) {
         let residual = mean - self.errors.vector(BIAS);
         let known = self.errors.block(BIAS).trace() + T::of(3.0) * square::<T>(REST_BIAS);

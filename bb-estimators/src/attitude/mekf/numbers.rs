@@ -52,7 +52,7 @@ pub(super) const GAP_S: f64 = 0.08;
 
 // Doubt.
 
-/// So many standard deviations are no chance.
+/// Number of standard deviations beyond which a deviation is not due to chance.
 pub(super) const OUTLIER: f64 = 4.0;
 
 /// Part of the mean period of the samples that each sample counts for. A time of `OUTLIER` periods is a gap as well: it is the

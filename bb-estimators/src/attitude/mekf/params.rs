@@ -8,9 +8,9 @@ pub enum Magnetometer {
     /// Nothing: the filter finds out whether it has an offset, and which.
     #[default]
     Auto,
-    /// It is calibrated in its place: it has no offset.
+    /// Magnetometer that is calibrated in its place: it has no offset.
     Calibrated,
-    /// It is not calibrated: it has an offset, and the heading is unknown until that is found.
+    /// Magnetometer that is not calibrated: it has an offset, and the heading is unknown until that is found.
     Uncalibrated,
     /// No magnetometer, or one that is not to be used: the heading drifts with what is left of the gyroscope's bias.
     None,
@@ -45,9 +45,9 @@ impl Field for Magnetometer {
 }
 
 params! {
-    /// What a user can say to [`MekfFilter`](super::MekfFilter). How the body moves is not to be said: the filter sees it.
+    /// Parameters of [`MekfFilter`](super::MekfFilter). The motion of the body is not among them: the filter finds it from the samples.
     pub struct MekfParams {
-        /// What is known about the magnetometer.
+        /// Calibration of the magnetometer.
         ///
         /// `auto`: whether it has an offset is found out by the motion. `calibrated`: it has none, which saves the time to
         /// find that out. `uncalibrated`: it has one, so the heading is unknown until the body has turned. `none`: six axes.

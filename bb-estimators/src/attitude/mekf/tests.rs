@@ -18,7 +18,7 @@ struct World {
     i: i64,
     truth: UnitQuaternion<f64>,
     bias: Vector3<f64>,
-    /// In the world, T.
+    /// Magnetic field in the world, T.
     field: Vector3<f64>,
     /// A magnet on the body, T.
     magnet: Vector3<f64>,
@@ -52,7 +52,7 @@ impl World {
         }
     }
 
-    /// In degrees.
+    /// Returns the error of the estimate in degrees.
     fn error_of(&self, filter: &MekfFilter) -> OrientationError {
         let error = OrientationError::between(&filter.world_from_body().unwrap(), &self.truth).unwrap();
         OrientationError {
@@ -76,7 +76,7 @@ fn calibrated() -> MekfFilter {
     MekfFilter::new(MekfParams { magnetometer: Magnetometer::Calibrated, ..MekfParams::default() }).unwrap()
 }
 
-/// At 10 and 5 Hz, slower than what is a gap elsewhere: it corrects as at 100 Hz.
+/// A filter fed at 10 and 5 Hz, slower than what is a gap elsewhere, corrects as at 100 Hz.
 #[test]
 fn a_slow_sensor_is_no_sensor_with_gaps() {
     for every in [10, 20] {

@@ -12,7 +12,7 @@ params! {
         ///
         /// Source: the low-pass of the application note, some samples at 50 Hz.
         time_constant: f64 = 0.1, in 0.0..=1e6, unit "s";
-        /// Whether the magnetic field determines the heading.
+        /// Heading from the magnetic field.
         ///
         /// Off: magnetic samples are ignored and rotation about the vertical is not seen. On: heading is the magnetic
         /// one, and follows magnetic disturbances.

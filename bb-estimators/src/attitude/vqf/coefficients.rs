@@ -8,10 +8,10 @@ use crate::attitude::low_pass::gain;
 /// Coefficients are used for sample times that differ from theirs by up to this fraction.
 const TOLERANCE: f64 = 1.0 / 64.0;
 
-/// How far a bias wanders within the forgetting time, rad/s: 0.1°/s. Source: section 3.4 of the paper.
+/// Distance that a bias wanders within the forgetting time, rad/s: 0.1°/s. Source: section 3.4 of the paper.
 const BIAS_WANDER: f64 = 0.1 * DEGREE;
 
-/// For the processing of every sample of gyroscope and accelerometer.
+/// Coefficients for every sample of gyroscope and accelerometer.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct InertialCoefficients<T> {
     dt_s: T,
@@ -57,7 +57,7 @@ impl<T: Real> InertialCoefficients<T> {
     }
 }
 
-/// For the processing of every sample of the magnetometer.
+/// Coefficients for every sample of the magnetometer.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct FieldCoefficients<T> {
     dt_s: T,

@@ -1,4 +1,4 @@
-//! Whether the magnetic field is disturbed: section 3.6 of the paper.
+//! Detection of magnetic disturbances: section 3.6 of the paper.
 
 use nalgebra::Vector3;
 
@@ -10,9 +10,9 @@ use crate::attitude::Real;
 /// The properties of a field that a rotation about the vertical does not change.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Field<T> {
-    /// In the field's own unit.
+    /// Norm, in the unit of the samples.
     norm: T,
-    /// How far it points below the horizon, rad.
+    /// Angle of the field below the horizon, rad.
     dip: T,
 }
 

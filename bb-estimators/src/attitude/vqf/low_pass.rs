@@ -35,7 +35,7 @@ impl<T: Real> Coefficients<T> {
 pub(super) struct LowPass<T, const N: usize> {
     band: [T; N],
     low: [T; N],
-    /// How many samples the mean has so far; `None` once it is over.
+    /// Number of samples in the mean so far; `None` once it is over.
     samples: Option<T>,
     elapsed_s: T,
 }

@@ -19,13 +19,13 @@ params! {
         ///
         /// Source: the paper's `tauMag`.
         heading_time_constant: f64 = 9.0, in 1e-3..=1e6, unit "s";
-        /// Whether the gyroscope's bias is estimated at rest.
+        /// Estimation of the gyroscope's bias at rest.
         ///
         /// Off: only motion shows the bias, and slow rotation is never mistaken for one. On: rest shows it within seconds.
         ///
         /// Source: the paper's `restBiasEstEnabled`.
         rest_bias: bool = true;
-        /// Whether the gyroscope's bias is estimated in motion.
+        /// Estimation of the gyroscope's bias in motion.
         ///
         /// Off: without rest there is no bias. On: the horizontal part of the bias is found in any motion, all of it in
         /// motion that turns the sensor over.
@@ -70,7 +70,7 @@ params! {
         ///
         /// Source: the paper's `biasSigmaRest`.
         rest_bias_deviation: f64 = 0.03 * DEGREE, in 1e-06..=10.0, shown "0.03°/s", unit "rad/s";
-        /// How long the sensor must be still to count as at rest.
+        /// Time for which the sensor must be still to count as at rest.
         ///
         /// Small: a pause is mistaken for rest. Large: short rests are not used.
         ///
@@ -94,7 +94,7 @@ params! {
         ///
         /// Source: the paper's `restThAcc`.
         rest_specific_force: f64 = 0.5, in 0.0..=1e6, unit "m/s^2";
-        /// Whether a disturbed field has less weight.
+        /// Lower weight of a disturbed field.
         ///
         /// Off: the heading follows any field. On: it follows fields like the reference, others late and slowly.
         ///
@@ -112,25 +112,25 @@ params! {
         ///
         /// Source: the paper's `magRefTau`.
         reference_time_constant: f64 = 20.0, in 1e-3..=1e6, unit "s";
-        /// How far an undisturbed field's norm may be from the reference's, as a fraction of that.
+        /// Largest deviation of an undisturbed field's norm from the reference's, as a fraction of that.
         ///
         /// Small: much counts as disturbed. Large: disturbances pass.
         ///
         /// Source: the paper's `magNormTh`.
         field_norm_tolerance: f64 = 0.1, in 0.0..=1000.0;
-        /// How far an undisturbed field's dip may be from the reference's.
+        /// Largest deviation of an undisturbed field's dip from the reference's.
         ///
         /// Small: much counts as disturbed. Large: disturbances pass.
         ///
         /// Source: the paper's `magDipTh`.
         field_dip_tolerance: f64 = 10.0 * DEGREE, in 0.0..=4.0, shown "10°", unit "rad";
-        /// How long a new field must stay constant in motion to become the reference.
+        /// Time for which a new field must stay constant in motion to become the reference.
         ///
         /// Small: a disturbance becomes the reference. Large: in a new place the heading is the gyroscope's for long.
         ///
         /// Source: the paper's `magNewTime`.
         new_field_time: f64 = 20.0, in 0.0..=1e6, unit "s";
-        /// The same as `new_field_time`, for the first reference.
+        /// Time for which the first field must stay constant in motion to become the reference.
         ///
         /// Small: a disturbance becomes the reference. Large: there is no reference for a long time, and all fields count as
         /// disturbed.
@@ -143,26 +143,26 @@ params! {
         ///
         /// Source: the paper's `magNewMinGyr`.
         new_field_angular_velocity: f64 = 20.0 * DEGREE, in 0.0..=1000.0, shown "20°/s", unit "rad/s";
-        /// How long a field must match the reference to count as undisturbed.
+        /// Time for which a field must match the reference to count as undisturbed.
         ///
         /// Small: a disturbance that looks right for a moment counts. Large: good fields are not used.
         ///
         /// Source: the paper's `magMinUndisturbedTime`.
         undisturbed_time: f64 = 0.5, in 0.0..=1e6, unit "s";
-        /// How long a disturbed field is ignored.
+        /// Time for which a disturbed field is ignored.
         ///
         /// Small: long disturbances turn the heading. Large: the heading is the gyroscope's for long.
         ///
         /// Source: the paper's `magMaxRejectionTime`.
         rejection_time: f64 = 60.0, in 0.0..=1e6, unit "s";
-        /// By how much slower a field that is disturbed for longer is followed, and how many times faster the rejection
-        /// time comes back in an undisturbed field.
+        /// Factor by which a field that is disturbed for longer is followed more slowly, and by which the rejection
+        /// time comes back faster in an undisturbed field.
         ///
         /// Small: long disturbances turn the heading soon. Large: a heading that is wrong stays so.
         ///
         /// Source: the paper's `magRejectionFactor`.
         rejection_factor: f64 = 2.0, in 1.0..=1e6;
-        /// Whether the magnetic field corrects the heading.
+        /// Correction of the heading by the magnetic field.
         ///
         /// Off: magnetic samples are ignored and the heading drifts with what is left of the gyroscope's bias. On:
         /// heading is the magnetic one.

@@ -1,4 +1,4 @@
-//! Whether the sensor is at rest: section 3.5 of the paper.
+//! Detection of rest: section 3.5 of the paper.
 
 use nalgebra::Vector3;
 

@@ -206,7 +206,7 @@ fn a_root_that_is_nowhere_does_not_take_the_joints_along() {
 }
 
 proptest! {
-    /// What the sweeps find solves the equations of motion.
+    /// Accelerations that the sweeps find solve the equations of motion.
     #[test]
     fn accelerations_are_those_of_the_equations_of_motion(
         q in proptest::array::uniform3(-2.0..2.0),
@@ -267,7 +267,7 @@ proptest! {
         }
     }
 
-    /// Who asks, and how often, does not change how coupled joints move.
+    /// Queries, by any caller and at any rate, do not change how coupled joints move.
     #[test]
     fn questions_do_not_change_it(
         commands in proptest::collection::vec((0_usize..3, -5.0..5.0, 1_i64..90_000), 1..6),

@@ -75,7 +75,7 @@ proptest! {
         }
     }
 
-    /// It comes to rest at a position, without overshoot, in the time of the trapezoid.
+    /// A joint comes to rest at a position, without overshoot, in the time of the trapezoid.
     #[test]
     fn it_reaches_its_target_in_the_shortest_time(
         drivetrain in drivetrains(), from in -1.5..1.5, target in -1.5..1.5,
@@ -101,7 +101,7 @@ proptest! {
         prop_assert!((early.position - target).abs() > 0.0 || expected < 5, "sooner than it can");
     }
 
-    /// What the search for the loads of coupled joints relies on: more load never accelerates more, and no load is a threshold.
+    /// Monotony that the search for the loads of coupled joints relies on: more load never accelerates more, and no load is a threshold.
     #[test]
     fn the_acceleration_falls_with_the_load_continuously(
         drivetrain in drivetrains(), goal in goals(), velocity in prop_oneof![Just(0.0), -0.01..0.01, -4.0..4.0],
@@ -120,7 +120,7 @@ proptest! {
         prop_assert!((-1e-8..=most + 1e-8).contains(&less), "{less} of {most}");
     }
 
-    /// Who asks, and how often, does not change how it moves.
+    /// Queries, by any caller and at any rate, do not change how a joint moves.
     #[test]
     fn questions_do_not_change_it(
         goals in proptest::collection::vec((goals(), 1_i64..400_000_000), 1..6),
@@ -217,7 +217,8 @@ fn a_trajectory_within_its_means_is_followed() {
     assert_eq!(plant.at(at(3000)).point, JointPoint { position: 1.2, ..JointPoint::default() });
 }
 
-/// With an explicit step, friction would turn the velocity round each millisecond, tenfold.
+/// A light joint in thick oil comes to the velocity of its effort; with an explicit step, friction would turn the
+/// velocity round each millisecond, tenfold.
 #[test]
 fn a_light_joint_in_thick_oil_comes_to_the_velocity_of_its_effort() {
     let light = Drivetrain {

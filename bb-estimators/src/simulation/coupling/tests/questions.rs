@@ -1,4 +1,4 @@
-//! Who asks a world, how often and about when, does not change what happens in it.
+//! Queries of a world, by any caller, at any rate and about any time, do not change what happens in it.
 
 use super::{ARM, FREE, NAMES, at};
 use crate::motion::JointPath;
@@ -10,7 +10,7 @@ use nalgebra::{Isometry3, Vector3};
 use proptest::prelude::*;
 use std::sync::Arc;
 
-/// The same arm without masses: each joint moves by itself.
+/// Arm without masses: each joint moves by itself.
 static LIGHT: Topology = Topology {
     links: &[
         Link { inertial: None, ..ARM.links[0] },
@@ -21,7 +21,7 @@ static LIGHT: Topology = Topology {
     joints: ARM.joints,
 };
 
-/// What happens to a world.
+/// Event in a world.
 #[derive(Clone, Debug)]
 enum Happens {
     Goal(usize, Goal),
