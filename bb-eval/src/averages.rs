@@ -7,14 +7,14 @@ use crate::score::Degrees;
 pub struct Averages {
     /// The number of recordings.
     pub count: usize,
-    /// Of each angle separately.
+    /// Mean of each angle separately.
     pub mean: Degrees,
     /// The largest of each angle separately.
     pub worst: Degrees,
 }
 
 impl Averages {
-    /// Of the recordings' root mean squares; `None` if there are none.
+    /// Averages the recordings' root mean squares; `None` if there are none.
     pub fn of(scores: impl IntoIterator<Item = Degrees>) -> Option<Self> {
         let scores: Vec<_> = scores.into_iter().collect();
         let over = |fold: fn(&[f64]) -> f64| {

@@ -36,17 +36,17 @@ const BAR: u64 = 1000;
 pub struct Evaluator {
     /// The filters; all take the axes, see [`Chosen::all`].
     pub filters: Vec<Chosen>,
-    /// Whether the magnetometer is used.
+    /// Axes: with six, the magnetometer is not used.
     pub axes: Axes,
     /// The topics to take.
     pub topics: Topics,
     /// Starts the filters this many seconds before the first motion, instead of at the first sample.
     pub before_motion_s: Option<f64>,
-    /// How the recordings are modified.
+    /// Modifications of the recordings.
     pub variants: Variants,
     /// Rotation that is taken from the truth.
     pub align: Align,
-    /// Whether to keep the errors over time.
+    /// `true` to keep the errors over time.
     pub keep_errors: bool,
 }
 
@@ -61,7 +61,7 @@ pub struct Evaluation {
     pub axes: Axes,
     /// One run per filter, in the order of the filters; or the reason for having none.
     pub runs: Result<Vec<Run>, String>,
-    /// Why the recording is cut off, if it is; the runs cover the part before.
+    /// Damage at which the recording is cut off, if it is; the runs cover the part before.
     pub broken: Option<String>,
     /// Remarks on the runs.
     pub notes: Vec<String>,
@@ -74,7 +74,7 @@ pub struct Evaluation {
 pub struct Run {
     /// The filter's name.
     pub filter: &'static str,
-    /// Its errors.
+    /// Errors of the filter.
     pub score: Score,
     /// Figures beside the root mean square.
     pub detail: Detail,
@@ -346,8 +346,8 @@ impl Player {
         }
     }
 
-    /// Whether the heading after the last sample is within two standard deviations, and the truth's convention, if it
-    /// is relevant.
+    /// Counts whether the heading after the last sample is within two standard deviations, and the truth's convention,
+    /// if it is relevant.
     fn ask(&mut self, samples: &[ImuSample], recording: &Recording) {
         let Some(sample) = samples.last() else { return };
         let Some(estimate) = self.estimates.last().copied().flatten() else { return };

@@ -28,7 +28,7 @@ pub enum Axes {
 }
 
 impl Axes {
-    /// Its name in words.
+    /// Returns the number of axes in words.
     pub fn name(self) -> &'static str {
         match self {
             Self::Six => "six",
@@ -36,7 +36,7 @@ impl Axes {
         }
     }
 
-    /// Whether a filter can use this many axes.
+    /// Returns whether a filter can use this many axes.
     pub fn suit(self, filter: &FilterParams) -> bool {
         self == Self::Six || filter.get(MAGNETOMETER).is_some()
     }
@@ -66,12 +66,12 @@ impl Chosen {
         self.params.name()
     }
 
-    /// Its parameters.
+    /// Returns the parameters of the filter.
     pub fn params(&self) -> &FilterParams {
         &self.params
     }
 
-    /// The same without its magnetometer, if there are six axes.
+    /// Returns the filter without its magnetometer if there are six axes, else the same filter.
     /// # Errors
     /// The value is refused.
     pub fn on(&self, axes: Axes) -> Result<Self, String> {

@@ -18,7 +18,7 @@ pub struct Progress {
     /// None if it is unknown.
     length: Option<u64>,
     position: AtomicU64,
-    /// When the line was last drawn; none if the error stream is not a terminal.
+    /// Time at which the line was last drawn; none if the error stream is not a terminal.
     drawn: Option<Mutex<Instant>>,
 }
 

@@ -33,7 +33,7 @@ pub enum MovingTopic {
     /// The only topic of its type, if there is one.
     #[default]
     ByType,
-    /// This one.
+    /// Topic of this name.
     Named(String),
     /// None: the body counts as moving all the time.
     None,
@@ -222,7 +222,7 @@ pub enum End {
     Broken(String),
 }
 
-/// Whether a topic holds no message, as when a driver announces measurements that its chip does not have.
+/// Returns whether a topic holds no message, as when a driver announces measurements that its chip does not have.
 fn is_silent(bag: &Bag, topic: &Topic) -> bool {
     match topic.messages {
         Some(count) => count == 0,

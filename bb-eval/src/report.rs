@@ -13,7 +13,7 @@ use std::path::Path;
 #[derive(Serialize)]
 struct Row {
     file: String,
-    /// From 0; null if the recording is not modified.
+    /// Number of the variant, from 0; null if the recording is not modified.
     variant: Option<u32>,
     filter: &'static str,
     axes: &'static str,
@@ -215,7 +215,7 @@ pub(crate) fn name(evaluation: &Evaluation, evaluations: &[Evaluation]) -> Strin
     evaluation.variant.map_or_else(|| name.clone().into_owned(), |variant| format!("{name} #{variant}"))
 }
 
-/// With six axes the initial heading is arbitrary, so only the inclination is a result.
+/// Writes the angles; with six axes only the inclination, since the initial heading is arbitrary.
 fn angles(rms: Option<Degrees>, axes: Axes) -> [String; 3] {
     let angle = |angle: f64| format!("{angle:.2}");
     let none = || "-".to_owned();

@@ -20,9 +20,9 @@ pub struct Score {
 pub struct Degrees {
     /// The whole rotation.
     pub total: f64,
-    /// Its part about the vertical.
+    /// Part of the rotation about the vertical.
     pub heading: f64,
-    /// Its part about a horizontal axis.
+    /// Part of the rotation about a horizontal axis.
     pub inclination: f64,
 }
 

@@ -43,15 +43,15 @@ const FIELDS: [Guess; 5] = [
     (1e4, 1.5e5, "in nT"),
 ];
 const FIELD: (f64, f64) = (1e-5, 1.5e-4);
-/// In T, the field of the magnets in a phone, which a calibration takes out.
+/// Offsets of the field of the magnets in a phone, which a calibration takes out, T.
 const OFFSET: std::ops::Range<f64> = 1.5e-4..2e-3;
 
 const PRESSURES: [Guess; 2] = [(300.0, 1100.0, "in hPa"), (30.0, 110.0, "in kPa")];
-/// From the top of the highest mountain to some metres under water.
+/// Pressures from the top of the highest mountain to some metres under water, Pa.
 const PRESSURE_PA: (f64, f64) = (3e4, 2e5);
 
 impl Units {
-    /// Whether enough is collected.
+    /// Returns whether enough is collected.
     pub fn is_full(&self) -> bool {
         [self.imu.len(), self.fields.len(), self.pressures.len()].contains(&MOST)
     }

@@ -34,7 +34,7 @@ const MOST: u32 = 1000;
 /// The modifications of recordings; each combination of a start and an offset is a variant.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Variants {
-    /// This many random starts in motion.
+    /// Number of random starts in motion.
     pub starts: Option<Starts>,
     /// A constant offset of the magnetometer, in this many random directions.
     pub offset: Option<Offset>,
@@ -73,12 +73,12 @@ impl Variants {
         self.starts.map_or(1, |starts| starts.0) * self.offset.map_or(1, |offset| offset.1)
     }
 
-    /// Whether the recording is modified.
+    /// Returns whether the recording is modified.
     pub(crate) fn is_changed(&self) -> bool {
         *self != Self { seed: self.seed, ..Self::default() }
     }
 
-    /// Whether the magnetometer's readings are modified.
+    /// Returns whether the magnetometer's readings are modified.
     pub(crate) fn changes_field(&self) -> bool {
         self.offset.is_some() || self.magnet.is_some() || self.disturb.is_some() || self.drift.is_some()
     }
@@ -108,9 +108,9 @@ impl Variants {
 pub(crate) struct Variant {
     /// Samples before this time are left out.
     pub(crate) start_ns: Option<i64>,
-    /// On the body, T.
+    /// Constant offset of the field on the body, T.
     offset: Vector3<f64>,
-    /// On the body, from when to when.
+    /// Field of a magnet on the body, T, and the times from and to which it acts, ns.
     magnet: Option<(Vector3<f64>, i64, i64)>,
     pulses: Option<Pulses>,
     drift: Option<Drift>,

@@ -27,7 +27,7 @@ pub(super) struct TrialScore {
 pub struct Share {
     /// Within two.
     pub within: u64,
-    /// In all.
+    /// Number of all errors with a standard deviation.
     pub of: u64,
 }
 
@@ -111,7 +111,7 @@ impl FamilyScore {
 }
 
 impl Measure {
-    /// This angle of an error.
+    /// Returns this angle of an error.
     pub fn of(self, errors: &Degrees) -> f64 {
         match self {
             Self::Total => errors.total,

@@ -166,7 +166,7 @@ struct Rows {
     rows: Vec<Row>,
 }
 
-/// With the line of its file.
+/// Numbers of a row, with its line in the file.
 struct Row(Vec<f64>, usize);
 
 impl Rows {

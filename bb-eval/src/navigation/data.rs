@@ -17,7 +17,7 @@ pub struct DataSet {
     pub samples: Vec<Sample>,
     /// Times of measurement or of truth, in order.
     pub keyframes: Vec<Keyframe>,
-    /// What is known of the first keyframe.
+    /// Known state at the first keyframe.
     pub start: Start,
     /// The IMU's noise according to the data set; `None` if unknown.
     pub noise: Option<Noise>,

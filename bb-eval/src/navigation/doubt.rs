@@ -1,6 +1,6 @@
 //! Detects misleading figures: most of the input that a filter needs was left out.
 
-/// Whether a part is more than half of all.
+/// Returns whether a part is more than half of all.
 pub(super) fn is_most(part: u64, all: u64) -> bool {
     part > all - part.min(all)
 }

@@ -16,7 +16,7 @@ pub struct Drive {
     pub(crate) told: Known,
     /// Statements on what was assumed or left out.
     pub(crate) notes: Vec<String>,
-    /// Why figures would be misleading.
+    /// Reasons for which figures would be misleading.
     pub(crate) doubts: Vec<String>,
     /// The origin of the truth's world, if it is known.
     pub(crate) origin: Option<Geodetic>,

@@ -17,7 +17,7 @@ pub(crate) struct Known {
 /// The error of an estimate, and its reported covariance.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Errors {
-    /// In the world, m.
+    /// Error of the position, in the world, m.
     pub(crate) position: Vector3<f64>,
     /// Rotation vector in the world, rad; `None` if the truth has no orientation.
     pub(crate) rotation: Option<Vector3<f64>>,

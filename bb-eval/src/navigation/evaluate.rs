@@ -27,11 +27,11 @@ pub struct NavigationRun {
 /// The result of a run.
 #[derive(Clone, Debug)]
 pub struct Played {
-    /// Its errors.
+    /// Errors of the filter.
     pub score: NavigationScore,
     /// Assumptions, and what was left out.
     pub notes: Vec<String>,
-    /// Why its figures mislead, or an option that changed nothing.
+    /// Reasons for which its figures mislead, and options that changed nothing.
     pub doubts: Vec<String>,
     /// The run over time, if it was to be kept.
     pub trace: Option<Trace>,

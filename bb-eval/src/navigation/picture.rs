@@ -8,7 +8,7 @@ use std::path::Path;
 /// Most viewers cannot open a picture with more panels.
 const MOST_PANELS: usize = 120;
 
-/// Of what is expected, and of what was refused.
+/// Colour of expected bounds, and of what was refused.
 const BOUND: Colour = (150, 150, 150);
 /// The truth is thick and light, so that it is seen under the estimate.
 const TRUTH: Colour = (190, 190, 190);
@@ -35,7 +35,7 @@ const AGES: usize = 20;
 pub struct Drawn {
     /// Data set and filter.
     pub name: String,
-    /// Its steps.
+    /// Steps of the filter.
     pub trace: Trace,
 }
 

@@ -79,11 +79,11 @@ pub(crate) struct Verdict {
 /// A run.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Record {
-    /// By time.
+    /// Estimates by time.
     pub(crate) estimates: Vec<Estimate>,
     /// Changes of health.
     pub(crate) health: Vec<(Time, HealthState)>,
-    /// Why the estimate was not to be trusted, for each sample of the IMU that the filter took.
+    /// Reason for which the estimate was not to be trusted, for each sample of the IMU that the filter took.
     pub(crate) reasons: Vec<Option<&'static str>>,
     pub(crate) verdicts: Vec<Verdict>,
     /// Times at which fixes were refused.

@@ -244,7 +244,7 @@ impl Scores<'_> {
         wrong
     }
 
-    /// In bins, if the oldest is older than some periods of the fixes.
+    /// Collects the errors by age in bins, if the oldest is older than some periods of the fixes.
     fn ages(&self) -> Vec<OfAge> {
         let oldest = self.scored.iter().filter_map(|scored| scored.age_s).fold(0.0, f64::max);
         if oldest < (3.0 * self.fix_period_s).max(AGES[0]) {

@@ -45,9 +45,9 @@ pub struct Trace {
 /// A state of a filter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum State {
-    /// It has not started, or has begun again.
+    /// Filter that has not started, or has begun again.
     Starting,
-    /// It runs.
+    /// Running filter, with its health.
     Running(HealthState),
 }
 
@@ -83,6 +83,6 @@ pub(crate) struct Innovation {
     pub(crate) sensor: Sensor,
     /// Normalised innovation squared.
     pub(crate) nis: f64,
-    /// Whether it passed the gate.
+    /// `true` if it passed the gate.
     pub(crate) is_fused: bool,
 }

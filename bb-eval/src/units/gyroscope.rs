@@ -7,7 +7,7 @@ use bb_core::nalgebra::{UnitQuaternion, Vector3};
 const SPAN_S: f64 = 1.0;
 /// Directions of gravity are means over this many samples at both ends.
 const MEAN: usize = 5;
-/// If samples are farther apart, the turn between them is unknown.
+/// Longest time between samples, s: beyond it, the turn between them is unknown.
 const LONGEST_S: f64 = 0.1;
 /// A verdict needs this many spans in motion,
 const FEWEST: usize = 3;

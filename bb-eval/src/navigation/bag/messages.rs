@@ -16,7 +16,7 @@ use std::collections::HashMap;
 /// The messages read, each with the time in its header.
 #[derive(Debug, Default)]
 pub(super) struct Messages {
-    /// To the inputs of a filter, in the order of the file.
+    /// Messages to the inputs of a filter, in the order of the file.
     pub(super) inputs: Vec<Message>,
     /// A drifting odometry, by stamp; each with its arrival first.
     pub(super) relative: Vec<(Time, Time, Odometry)>,
@@ -110,7 +110,7 @@ impl Messages {
         self.inputs.iter().filter(move |message| message.what.input() == input).map(|message| message.stamp_ns)
     }
 
-    /// If the recorder's clock is not that of the stamps, the messages arrive at their stamps. Says so.
+    /// Makes the messages arrive at their stamps if the recorder's clock is not that of the stamps, and adds a note of it.
     pub(super) fn settle_arrivals(&mut self, notes: &mut Notes) {
         let lateness = |message: &Message| message.arrival_ns.saturating_sub(message.stamp_ns);
         let mut late: Vec<Time> = self.inputs.iter().map(lateness).collect();

@@ -1,11 +1,11 @@
-//! Which topics of a bag are what, and what the bag does not say.
+//! Options of a bag: the roles of its topics, and the facts that it does not hold.
 
 use crate::frames::{Mount, numbers};
 use crate::navigation::data::DEVIATIONS;
 use bb_estimators::navigation::Geodetic;
 use std::str::FromStr;
 
-/// Which topics of a bag are what, and what the bag does not say. The default takes topics by their type.
+/// Roles of a bag's topics, and the facts that the bag does not hold. The default takes topics by their type.
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "clap", derive(clap::Args), command(next_help_heading = "Options for bags"))]
 pub struct BagOptions {
@@ -31,7 +31,7 @@ pub struct BagOptions {
     /// The topic of a magnetometer whose heading `eskf` uses (sensor_msgs/MagneticField). Default: none.
     #[cfg_attr(feature = "clap", arg(long, value_name = "TOPIC"))]
     pub mag_topic: Option<String>,
-    /// Where the filters start: `own` (as in a robot: from rest, or from the course), `truth`, or the topic of a pose
+    /// Start of the filters: `own` (as in a robot: from rest, or from the course), `truth`, or the topic of a pose
     /// (geometry_msgs/PoseWithCovarianceStamped, nav_msgs/Odometry). Default: /initialpose if there is one, or `own`.
     #[cfg_attr(feature = "clap", arg(long, value_name = "FROM"))]
     pub start: Option<StartFrom>,
@@ -47,14 +47,14 @@ pub struct BagOptions {
     pub relative_deviation: Option<RelativeDeviation>,
 }
 
-/// Where filters start.
+/// Source of the state in which filters start.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum StartFrom {
-    /// At the true pose.
+    /// True pose.
     Truth,
     /// The robot's own start: from rest, or from the course in motion.
     Own,
-    /// At the first pose of this topic.
+    /// First pose of this topic.
     Topic(String),
 }
 
@@ -73,7 +73,7 @@ impl FromStr for StartFrom {
 /// Heights of something on or above the Earth, m.
 const HEIGHTS: std::ops::RangeInclusive<f64> = -1e4..=1e6;
 
-/// Where the origin of the world is.
+/// Position of the world's origin on the Earth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Origin(pub Geodetic);
 

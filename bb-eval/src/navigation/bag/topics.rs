@@ -24,7 +24,7 @@ pub(super) struct Topics {
     pub(super) pose: Option<String>,
     pub(super) magnetic_field: Option<String>,
     pub(super) truth: Option<String>,
-    /// Why there is no truth.
+    /// Reason for which there is no truth.
     pub(super) no_truth: Option<String>,
     pub(super) start: Option<String>,
     pub(super) frames: Option<String>,

@@ -8,15 +8,15 @@ use bb_estimators::navigation::LocalFrame;
 /// The truth is not interpolated over longer gaps.
 const LONGEST_GAP_NS: i64 = 100_000_000;
 
-/// In the order of time.
+/// True states in the order of time.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TrueTrack {
     points: Vec<(Time, Truth)>,
 }
 
 impl TrueTrack {
-    /// From messages about a part of the body at `base_from_part`. Values that are not finite, or not a rotation, are
-    /// left out. Positions on the Earth are those in the frame, of the part.
+    /// Collects the truth from messages about a part of the body at `base_from_part`. Values that are not finite, or
+    /// not a rotation, are left out. Positions on the Earth are those in the frame, of the part.
     pub(crate) fn new(told: &[(Time, Told)], base_from_part: &Isometry3<f64>, frame: Option<&LocalFrame>) -> Self {
         // A program that does not know the velocity leaves it zero.
         let tells_velocity = told.iter().any(|(_, told)| match told {

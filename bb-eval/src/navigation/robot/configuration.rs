@@ -203,7 +203,7 @@ impl RobotSettings {
         Ok(())
     }
 
-    /// These over the noise that a recording tells of its IMU.
+    /// Returns these options, with the noise of a recording's IMU where they give none.
     pub(crate) fn over(&self, noise: Option<&Noise>) -> Self {
         let Some(noise) = noise else { return self.clone() };
         let told = [
