@@ -52,7 +52,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     }
 }
 
-/// Whether every recording could be evaluated to its end.
+/// Evaluates attitude filters; returns whether every recording could be evaluated to its end.
 fn eval_attitude(attitude: &Attitude) -> Result<bool, String> {
     let Attitude { paths, evaluator, json, plot } = attitude;
     let files = files::recordings(paths);

@@ -193,7 +193,7 @@ impl NavigationArguments {
     }
 }
 
-/// Whether a path is the prefix of CSV files, not a recording.
+/// Returns whether a path is the prefix of CSV files, not a recording.
 fn is_prefix(path: &Path) -> bool {
     let mut samples = path.as_os_str().to_owned();
     samples.push("_imu.csv");

@@ -11,7 +11,7 @@ pub(crate) struct Periods {
     /// The standard deviation.
     pub(crate) std_s: f64,
     pub(crate) median_s: f64,
-    /// Whether messages come at a rate; unknown if there are few.
+    /// `true` if messages come at a rate; unknown if there are few.
     pub(crate) regular: Option<bool>,
     /// Periods that differ from another, if they do by much; known only if they come regularly.
     #[serde(skip)]
@@ -54,8 +54,8 @@ const BURST: f64 = 10.0;
 const FEWEST: usize = 8;
 
 impl Periods {
-    /// From the times of messages in order, nanoseconds; `None` if there are fewer than two. Times that go back do
-    /// not count as periods.
+    /// Computes the periods from the times of messages in order, nanoseconds; `None` if there are fewer than two. Times
+    /// that go back do not count as periods.
     pub(crate) fn of(times_ns: &[i64]) -> Option<Self> {
         let seconds = |ns: i64| ns as f64 * 1e-9;
         let steps = || times_ns.windows(2).map(|pair| seconds(pair[1].saturating_sub(pair[0])));
@@ -85,7 +85,7 @@ impl Periods {
         })
     }
 
-    /// The same for events: they have no rate, and so no gaps.
+    /// Returns the periods as those of events: they have no rate, and so no gaps.
     pub(crate) fn of_events(self) -> Self {
         Self { regular: Some(false), jitter: None, gaps: Vec::new(), ..self }
     }

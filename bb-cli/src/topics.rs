@@ -6,7 +6,7 @@ use bb_eval::filters::near;
 use bb_mcap::{Bag, BagMessage, MessageDefinition, Topic, Value};
 use std::path::Path;
 
-/// How messages in JSON are encoded.
+/// Encoding of messages in JSON.
 const JSON: &str = "json";
 
 const SECOND_NS: u64 = 1_000_000_000;
@@ -30,12 +30,12 @@ pub(crate) fn find<'a>(bag: &'a Bag, name: &str) -> Result<&'a Topic, String> {
     })
 }
 
-/// Whether a topic has this name, with or without a leading slash.
+/// Returns whether a topic has this name, with or without a leading slash.
 pub(crate) fn is_named(topic: &Topic, name: &str) -> bool {
     *topic.name == *name || topic.name.strip_prefix('/') == Some(name.trim_start_matches('/'))
 }
 
-/// Whether a topic reports events of a robot: no rate is expected of it.
+/// Returns whether a topic reports events of a robot: no rate is expected of it.
 pub(crate) fn is_of_events(topic: &Topic) -> bool {
     const EVENTS: [&str; 7] = ["health", "fault", "state_machine", "safety", "command", "param", "journal"];
     let first = topic.name.trim_start_matches('/').split('/').next();
@@ -50,7 +50,7 @@ pub(crate) enum TopicReader {
 }
 
 impl TopicReader {
-    /// For a topic; the error says why its messages cannot be read.
+    /// Creates the reader of a topic; the error says why its messages cannot be read.
     pub(crate) fn new(topic: &Topic) -> Result<Self, String> {
         match &*topic.encoding {
             "cdr" => topic.message_definition().map(Self::Cdr).map_err(|fault| format!("{}: {fault}", topic.name)),
@@ -88,7 +88,7 @@ impl TopicReader {
     }
 }
 
-/// When a message was logged, nanoseconds.
+/// Returns the time at which a message was logged, nanoseconds.
 pub(crate) fn log_ns(message: &BagMessage) -> i64 {
     i64::try_from(message.log_time_ns).unwrap_or(i64::MAX)
 }

@@ -30,7 +30,7 @@ const FILES: [(&str, &str); 6] = [
 const CRATES: [(&str, &str, &[&str]); 2] =
     [("bb-core", "bb-core", &["signals"]), ("bb-mcap", "integrations/mcap", &[])];
 
-/// Where this command was built.
+/// Folder of the sources from which this command was built.
 const CHECKOUT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
 
 pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {

@@ -21,7 +21,7 @@ pub(crate) struct Arguments {
     /// A recording or a ROS 2 bag.
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// What to plot: a field of a topic with all numbers in it, or a whole topic except header and covariances.
+    /// Values to plot: a field of a topic with all numbers in it, or a whole topic except header and covariances.
     #[arg(value_name = "TOPIC[.FIELD]", required = true)]
     fields: Vec<String>,
     /// The SVG or PNG file to write; an existing one is replaced.

@@ -7,7 +7,7 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 
-/// Of what was fitted.
+/// Colour of fitted lines.
 const FITTED: (u8, u8, u8) = (150, 150, 150);
 
 /// The numbers of an axis, in SI.
@@ -17,7 +17,7 @@ struct Axis {
     noise_density_deviation: f64,
     bias_instability: f64,
     bias_instability_time_s: f64,
-    /// Whether the curve rises again after its minimum; otherwise the bias instability is an upper limit.
+    /// `true` if the curve rises again after its minimum; otherwise the bias instability is an upper limit.
     bias_instability_is_lowest: bool,
     random_walk: f64,
     random_walk_deviation: f64,
@@ -51,7 +51,7 @@ impl Axis {
 struct Options {
     gyroscope_noise: Option<f64>,
     accelerometer_noise: Option<f64>,
-    /// If a random walk is seen; otherwise its upper limit.
+    /// Random walk of the gyroscope if one is seen; otherwise its upper limit.
     gyroscope_walk: Option<f64>,
     accelerometer_walk: Option<f64>,
 }
@@ -76,7 +76,7 @@ impl Options {
         }
     }
 
-    /// By the names of the options of `Eskf`; in rad/s, m/s² and roots of Hz.
+    /// Returns the values by the names of the options of `Eskf`; in rad/s, m/s² and roots of Hz.
     fn named(&self) -> [(&'static str, Option<f64>); 4] {
         [
             ("gyroscope_noise", self.gyroscope_noise),
@@ -87,7 +87,7 @@ impl Options {
     }
 }
 
-/// Whether it is told from nothing.
+/// Returns whether the random walk differs from zero by more than two standard deviations.
 fn is_seen(walk: &Known) -> bool {
     walk.value > 0.0 && walk.value > 2.0 * walk.deviation
 }

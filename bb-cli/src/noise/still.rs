@@ -19,7 +19,7 @@ const TURNING: f64 = 0.2;
 /// The shortest usable part, s.
 const LEAST_S: f64 = 10.0;
 
-/// With fewer levels, a sensor cannot be distinguished from a saturated one.
+/// Least number of levels: with fewer, a sensor cannot be distinguished from a saturated one.
 const LEVELS: usize = 20;
 
 /// A larger fraction of samples at one end of the range means saturation.

@@ -244,8 +244,8 @@ enum Any {
     Field(MagneticField),
 }
 
-/// Its messages in the order of arrival, a sample of the IMU after what arrives with it; times on virtual time, which begins
-/// 10 ms before.
+/// Returns the recording's messages in the order of arrival, a sample of the IMU after what arrives with it; times on virtual time, which
+/// begins 10 ms before.
 fn messages(file: &Path) -> Vec<(MonotonicTime, Any)> {
     let bag = Bag::open(file).expect("is a bag");
     let mut messages = Vec::new();

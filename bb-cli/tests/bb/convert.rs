@@ -12,7 +12,7 @@ fn csv(name: &str, text: &str) -> PathBuf {
     file(name, text.as_bytes())
 }
 
-/// Where the bag of this name goes.
+/// Returns the path of the bag of this name.
 fn bag(name: &str) -> PathBuf {
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     let _ = std::fs::remove_file(&path);
@@ -200,7 +200,7 @@ fn what_is_wrong_is_told_by_line_and_column() {
     assert_eq!(std::fs::read(&out).expect("reads"), b"mine", "what was there stays");
 }
 
-/// Of the head only its names are used, whatever is in it.
+/// A head serves for the names of the columns only, whatever is in it.
 #[test]
 fn a_comment_does_not_choose_the_delimiter() {
     let text = "# logged at noon; by me; with a chip; in a hurry\r\nt,gx,gy,gz,ax,ay,az\r\n\r\n1,1,2,3,0,0,9.8";
@@ -236,7 +236,7 @@ fn a_pipe_is_read_once() {
     }
 }
 
-/// As phones log them: each sensor with a file, a rate and times of its own.
+/// Columns as phones log them: each sensor with a file, a rate and times of its own.
 #[test]
 fn sensors_with_files_of_their_own_are_joined() {
     let rows = |step: f64, offset: f64, count: u32, value: fn(f64) -> [f64; 3]| {
@@ -308,7 +308,7 @@ fn a_description_is_checked() {
     );
 }
 
-/// With the checksum of a sentence.
+/// Returns a sentence with its checksum.
 fn sentence(text: &str) -> String {
     let sum = text.bytes().fold(0, |sum, byte| sum ^ byte);
     format!("${text}*{sum:02X}\r\n")

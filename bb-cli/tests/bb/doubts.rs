@@ -9,7 +9,7 @@ fn roll() -> Walk {
     Walk { samples: 1000, axis: V::x(), ..Walk::default() }
 }
 
-/// What is said beside the table.
+/// Returns the notes that are printed beside the table.
 fn notes(walk: Walk, name: &str, arguments: &[&str]) -> Vec<String> {
     let file = walk.file(name);
     let output = eval(&[&file], &[&["--filter", "mekf,madgwick"], arguments].concat());

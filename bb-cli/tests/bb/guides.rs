@@ -1,4 +1,4 @@
-//! What the guides say that commands print, they print. `UPDATE_GUIDES=1` rewrites it.
+//! Commands in the guides print what the guides say. `UPDATE_GUIDES=1` rewrites it.
 
 use crate::common::poses;
 use std::fmt::Write;
@@ -53,7 +53,7 @@ fn rest(line: impl Fn(u64) -> String) -> String {
     (0..200).map(|index| line(index) + "\n").collect()
 }
 
-/// As `numpy.savetxt` writes it.
+/// Returns a rest as `numpy.savetxt` writes it.
 fn broad() -> String {
     rest(|_| {
         let imu = "0e+00,0e+00,0e+00,0e+00,0e+00,9.81e+00,0e+00,2.0e+01,-4.3e+01";
@@ -91,7 +91,8 @@ fn chip() -> String {
     text
 }
 
-/// What a line of a shell prints, of `bb` and of the few others that the guides need. With `is_right` it must end well.
+/// Runs a line of a shell, of `bb` and of the few others that the guides need, and returns what it prints. With
+/// `is_right` it must end well.
 fn run(line: &str, folder: &Path, is_right: bool) -> String {
     // Words in single quotes are one.
     let parts = line.split('\'').enumerate();
@@ -121,7 +122,7 @@ fn run(line: &str, folder: &Path, is_right: bool) -> String {
     }
 }
 
-/// What is the same in each run: the time that a filter took is not.
+/// Returns the part of a text that is the same in each run: the time that a filter took is not.
 fn lasting(text: &str) -> String {
     let has_times = text.contains("ns/update");
     let line = |line: &str| match line.rsplit_once(' ') {

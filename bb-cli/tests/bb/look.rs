@@ -139,7 +139,7 @@ fn gaps_and_clocks_are_told_with_their_places() {
 /// A minute of a hand that turns an IMU about, with a magnetometer, a truth of it, and fixes of a car on a winding road.
 #[derive(Clone, Copy)]
 struct Turns {
-    /// By which magnetometer, truth and fixes are stamped late, s.
+    /// Delays of the stamps of magnetometer, truth and fixes, s.
     late_s: [f64; 3],
     /// The deviation of fixes in the second half, of all that state 1 cm, m.
     scatter: f64,
@@ -218,7 +218,7 @@ impl Turns {
     }
 }
 
-/// What is odd between sensors is told, each by itself.
+/// Faults between sensors are reported, each by itself.
 #[test]
 fn latencies_scatter_offsets_and_jitter_are_told() {
     let good = Turns { late_s: [0.0; 3], scatter: 0.01, offset: 0.0, jitter: 0 };
@@ -410,22 +410,22 @@ robot! {
 /// A payload that ROS has no message for.
 #[derive(Clone, Debug, Payload)]
 struct Number {
-    /// Its value.
+    /// Value of the number.
     value: f64,
-    /// It may have one.
+    /// Name, if it has one.
     name: Option<String>,
-    /// Where it is from.
+    /// Origin of the number.
     kind: Kind,
 }
 
-/// Where a number is from.
+/// Origin of a number.
 #[derive(Clone, Debug, Payload)]
 enum Kind {
-    /// From nowhere.
+    /// Unknown origin.
     NotYetKnown,
-    /// From an instrument.
+    /// Reading of an instrument.
     Measured {
-        /// What it is known to.
+        /// Uncertainty.
         within: f64,
     },
 }

@@ -25,7 +25,7 @@ fn number(row: &Value, name: &str) -> f64 {
 
 const FIGURES: [&str; 4] = ["position_m", "orientation_deg", "velocity_mps", "nees"];
 
-/// Whether figures agree, within a relative bound.
+/// Compares figures, within a relative bound.
 fn agree(ours: &Value, theirs: &Value, bound: f64) {
     assert_eq!(ours["filter"], theirs["filter"]);
     for name in FIGURES {
@@ -34,7 +34,7 @@ fn agree(ours: &Value, theirs: &Value, bound: f64) {
     }
 }
 
-/// The same robot takes both; the files tell more of the start.
+/// Files and bag with the same drive give the same figures of one robot; the files hold more of the start.
 #[test]
 fn a_bag_gives_the_figures_of_the_files() {
     let drive = Drive::new(1, 300);
@@ -134,7 +134,7 @@ fn a_start_is_at_rest_or_at_a_pose_or_at_the_truth() {
     assert!(output.code == Some(1) && output.err.contains("it never started"), "{}", output.err);
 }
 
-/// On a steady circle without wheels, a tilt and a centripetal acceleration look alike: a heading is right, or said to be unknown.
+/// An unknown heading is found or said to be unknown: on a steady circle without wheels, a tilt and a centripetal acceleration look alike.
 #[test]
 fn an_unknown_heading_is_found_or_said_to_be_unknown() {
     for seed in [5, 6, 18] {
@@ -327,7 +327,7 @@ fn figures_of_less_than_half_of_a_bag_are_an_error() {
     distrusted(&stuck, "stuck.mcap", &["700 of 1001 messages of /imu are not stamped after the one before"]);
 }
 
-/// Of which none begins the world, nor the filter.
+/// Wrong fixes at the beginning set neither the origin of the world nor the start of the filter.
 #[test]
 fn a_bag_begins_where_fixes_agree() {
     let drive = Drive::new(13, 300);

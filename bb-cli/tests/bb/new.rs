@@ -96,7 +96,7 @@ fn the_project_compiles_passes_its_tests_and_records() {
     }
 }
 
-/// How the workspace compiles in the profile `dev`, as configuration: with anything else, cargo would compile every dependency again.
+/// Returns the profile `dev` of the workspace as configuration: with anything else, cargo would compile every dependency again.
 fn profiles() -> Vec<String> {
     let manifest = std::fs::read_to_string(Path::new(WORKSPACE).join("Cargo.toml")).expect("reads");
     let tables = manifest.split("\n[").filter_map(|table| table.split_once("]\n"));

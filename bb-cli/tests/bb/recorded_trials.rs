@@ -1,4 +1,4 @@
-//! On the trials of BROAD, in the folder that `BB_DATA` names.
+//! Commands on the trials of BROAD, in the folder that `BB_DATA` names.
 
 use crate::common::bb;
 use bb_core::Stamped;
@@ -93,8 +93,8 @@ fn ten_trials() {
     assert_eq!(cells[4], format!("{:.2}", mean("complementary", "total_deg")));
 }
 
-/// What `bb info` says of recordings of others, but for gaps and the jitter of some phones' magnetometers: latencies of
-/// magnetometers and of the car's receiver, and magnetometers that nobody calibrated. Nothing is said of units, of
+/// Remarks of `bb info` on recordings of others, but for gaps and the jitter of some phones' magnetometers: latencies
+/// of magnetometers and of the car's receiver, and magnetometers that nobody calibrated. Nothing is said of units, of
 /// covariances, or of a truth.
 #[test]
 #[ignore = "needs the recordings that BB_DATA names"]

@@ -67,7 +67,7 @@ impl fmt::Display for What {
 /// A column as named on the command line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Column {
-    /// From 0.
+    /// Index of the column, from 0.
     Number(usize),
     Name(String),
 }
@@ -85,9 +85,9 @@ impl fmt::Display for Column {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Quantity {
     pub(super) what: What,
-    /// In the order of the quantity: x, y, z, or w, x, y, z.
+    /// Columns in the order of the quantity: x, y, z, or w, x, y, z.
     pub(super) columns: Vec<Column>,
-    /// To SI.
+    /// Factor of the conversion to SI.
     pub(super) factor: f64,
 }
 

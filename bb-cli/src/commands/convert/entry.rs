@@ -35,7 +35,7 @@ pub(super) enum What {
         topic: Arc<str>,
         fix: GnssFix,
     },
-    /// In CDR, of ROS 2.
+    /// Message of ROS 2 in CDR.
     Encoded {
         topic: Arc<str>,
         schema: Arc<Schema>,

@@ -144,7 +144,7 @@ pub(super) fn described(description: &Path) -> Result<Vec<Input>, String> {
 
 /// The entries of a file, in its order.
 pub(super) struct Source {
-    /// For errors.
+    /// Path of the file, for errors.
     pub(super) file: PathBuf,
     /// Read from a CSV as they are needed.
     table: Option<Table>,

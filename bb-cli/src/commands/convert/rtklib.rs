@@ -9,7 +9,7 @@ use chrono::{NaiveDate, NaiveDateTime};
 use std::path::Path;
 use std::sync::Arc;
 
-/// By how much GPS time is ahead of UTC, since 2017, s; and before, by the time of each leap second.
+/// Offsets of GPS time from UTC since 2017, s; and before, by the time of each leap second.
 const LEAP_SECONDS: [(i64, i64); 6] = [
     (1_483_228_800, 18),
     (1_435_708_800, 17),

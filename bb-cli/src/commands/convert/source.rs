@@ -74,7 +74,7 @@ fn said(error: csv::Error) -> String {
     }
 }
 
-/// Whether a cell is a number, possibly with a decimal comma.
+/// Returns whether a cell is a number, possibly with a decimal comma.
 pub(super) fn is_number(cell: &str) -> bool {
     cell.replace(',', ".").parse::<f64>().is_ok()
 }
@@ -102,7 +102,7 @@ fn start(input: &mut dyn BufRead) -> std::io::Result<(Vec<u8>, u8)> {
     Ok((start, delimiters.first().map_or(b',', |delimiter| *delimiter as u8)))
 }
 
-/// In a line with tabs or semicolons, commas belong to its numbers.
+/// Returns the delimiter of a line. With tabs or semicolons, commas belong to its numbers.
 fn delimiter(line: &str) -> char {
     ['\t', ';'].into_iter().find(|delimiter| line.contains(*delimiter)).unwrap_or(',')
 }

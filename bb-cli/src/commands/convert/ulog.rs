@@ -54,7 +54,7 @@ pub(super) fn read(file: &Path, topic: Option<&str>) -> Result<(Vec<Entry>, Opti
     Ok((entries, broken))
 }
 
-/// By how much the receiver's clock is ahead of the time since boot, µs; 0 if it never tells the time.
+/// Returns the lead of UTC over the time since boot, µs; 0 if the receiver never reports the time.
 fn utc(log: &ParsedData) -> f64 {
     let Some(gnss) = Columns::of(log, &["vehicle_gps_position", "sensor_gps"]) else { return 0.0 };
     let (Ok(us), Ok(utc)) = (gnss.all(&["timestamp"]), gnss.all(&["time_utc_usec"])) else { return 0.0 };

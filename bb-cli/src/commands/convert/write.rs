@@ -20,7 +20,7 @@ const NAMED: [&str; 5] = ["/imu", "/mag", FIX, "/truth", "/moving"];
 pub(super) struct Bag {
     writer: BagWriter,
     counts: Counts,
-    /// What was written last.
+    /// State of motion written last.
     moving: Option<bool>,
 }
 

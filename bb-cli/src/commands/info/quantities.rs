@@ -1,4 +1,4 @@
-//! What the values of a topic suggest about their units.
+//! Units that the values of a topic suggest.
 
 use super::remark::{Remark, Subject};
 use bb_core::payload::{FluidPressure, Imu, MagneticField};

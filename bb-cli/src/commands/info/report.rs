@@ -16,7 +16,7 @@ struct Row<'a> {
     start_ns: Option<i64>,
     duration_s: Option<f64>,
     messages: usize,
-    /// Where and why the file is cut off; `messages` is the number before that, which `bb recover` saves.
+    /// Place and cause of the damage at which the file is cut off; `messages` is the number before that, which `bb recover` saves.
     damage: Option<&'a str>,
     topics: Vec<TopicRow<'a>>,
 }

@@ -18,9 +18,9 @@ pub(super) struct Content {
     /// The first and the last log time, nanoseconds.
     pub(super) span_ns: Option<(i64, i64)>,
     pub(super) messages: usize,
-    /// In the order of the file.
+    /// Topics in the order of the file.
     pub(super) topics: Vec<TopicContent>,
-    /// Where and why the file cannot be read further.
+    /// Place and cause of the damage behind which the file cannot be read.
     pub(super) damage: Option<String>,
 }
 

@@ -191,7 +191,7 @@ mod tests {
         (position, acceleration)
     }
 
-    /// Its IMU, mounted askew, for two minutes.
+    /// Returns two minutes of the vehicle's IMU, mounted askew.
     fn motion() -> Motion {
         let mount = UnitQuaternion::from_euler_angles(0.3, 0.2, 1.0);
         let samples = (0..12_000).map(|index| {

@@ -6,7 +6,7 @@ use crate::periods::Periods;
 /// The times of the messages of a topic.
 #[derive(Debug, Default)]
 pub(super) struct Times {
-    /// Whether messages come only when something happens.
+    /// `true` if messages come only when something happens.
     of_events: bool,
     /// True if several may happen at one instant, as the commands of a robot do.
     may_repeat: bool,
@@ -102,7 +102,7 @@ impl Times {
         remarks
     }
 
-    /// Whether the log and the stamps use the same clock.
+    /// Remarks on whether the log and the stamps use the same clock.
     fn clocks(&self, at: &dyn Fn(usize) -> f64) -> Vec<Remark> {
         let mut remarks = Vec::new();
         let offset = |index: usize| seconds(self.log_ns[index].saturating_sub(self.stamp_ns[index]));

@@ -176,7 +176,7 @@ fn is_component(step: &Step) -> bool {
     }
 }
 
-/// Whether a field is marked as unknown, in ROS by −1 as the first element of its covariance.
+/// Returns whether a field is marked as unknown, in ROS by −1 as the first element of its covariance.
 fn is_unknown(name: &str, message: &Value) -> bool {
     match message.field(&format!("{name}_covariance")) {
         Some(Value::List(values)) => values.first().and_then(Value::as_f64) == Some(-1.0),
@@ -184,7 +184,7 @@ fn is_unknown(name: &str, message: &Value) -> bool {
     }
 }
 
-/// Whether a field is a time in a message without a ROS definition: such times are the horizontal axis.
+/// Returns whether a field is a time in a message without a ROS definition: such times are the horizontal axis.
 fn is_time_of_payload(name: &str, message: &Value) -> bool {
     ["monotonic_time", "wall_time"].contains(&name) && message.field("payload").is_some()
 }

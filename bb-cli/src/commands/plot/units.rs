@@ -2,7 +2,7 @@
 
 use super::select::Path;
 
-/// By the name of the field that holds the numbers.
+/// Units by the name of the field that holds the numbers.
 const UNITS: [(&str, &str); 21] = [
     ("angular_velocity", "rad/s"),
     ("linear_acceleration", "m/s²"),

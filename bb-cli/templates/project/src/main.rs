@@ -78,7 +78,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 mod tests {
     use super::*;
 
-    /// On virtual time: ten seconds take milliseconds, and every run gives the same result.
+    /// Simulation on virtual time: ten seconds take milliseconds, and every run gives the same result.
     #[test]
     fn the_temperature_is_smoothed() -> Result<(), Box<dyn Error>> {
         let builder = Oven::builder();

@@ -2,7 +2,7 @@
 
 use bb_core::prelude::*;
 
-/// What the thermometer publishes: plain data in SI units.
+/// Payload of the thermometer: plain data in SI units.
 #[derive(Clone, Debug, Payload)]
 pub struct Temperature {
     /// K

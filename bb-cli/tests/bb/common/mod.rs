@@ -13,7 +13,7 @@ use bb_core::nalgebra::{UnitQuaternion, Vector3 as V};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// What the command gave.
+/// Result of the command.
 pub struct Output {
     pub code: Option<i32>,
     pub out: String,
@@ -47,11 +47,11 @@ pub struct Walk {
     pub error: f64,
     /// The gyroscope's, rad/s.
     pub bias: f64,
-    /// What it turns about.
+    /// Axis of the turn.
     pub axis: V<f64>,
-    /// Of the gyroscope, the accelerometer and the magnetometer, as parts of the SI unit.
+    /// Units of the gyroscope, the accelerometer and the magnetometer, as parts of the SI unit.
     pub units: [f64; 3],
-    /// How the truth is written, of `world_from_body`.
+    /// Convention in which the truth is written, applied to `world_from_body`.
     pub written: fn(UnitQuaternion<f64>) -> UnitQuaternion<f64>,
     /// The magnetometer's topic is there, and nothing on it.
     pub silent: bool,

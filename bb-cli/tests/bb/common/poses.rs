@@ -9,7 +9,7 @@ use std::path::PathBuf;
 pub const GRAVITY: f64 = 9.81;
 const PERIOD_NS: u64 = 10_000_000;
 
-/// What the simulated sensors are wrong by.
+/// Errors of the simulated sensors.
 pub struct Errors {
     pub gyroscope: V<f64>,
     pub accelerometer: (V<f64>, Matrix3<f64>),

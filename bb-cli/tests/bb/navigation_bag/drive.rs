@@ -11,7 +11,7 @@ use std::path::PathBuf;
 
 pub(crate) const ORIGIN: &str = "48.1,11.5,520";
 
-/// Where the mounted sensors are, in the frame of the IMU, which lies on its back, turned by 90°.
+/// Mounting of the sensors in the frame of the IMU, which lies on its back, turned by 90°.
 pub(crate) const GPS_IN_IMU: &str = "gps=0.3,-0.5,-1.5,180,0,90";
 pub(crate) const BASE_IN_IMU: &str = "base=0.1,-0.2,0.4,180,0,90";
 
@@ -31,7 +31,7 @@ pub(crate) struct Drive {
     seed: u32,
 }
 
-/// What is in a bag, and what is wrong with it.
+/// Contents of a bag, and its faults.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Bagged {
     pub(crate) fixes: bool,
@@ -48,19 +48,19 @@ pub(crate) struct Bagged {
     pub(crate) transforms: bool,
     /// A second receiver, better, at /precise.
     pub(crate) precise: bool,
-    /// How much later than measured all but the IMU arrives.
+    /// Delay with which all messages but the samples of the IMU arrive, ns.
     pub(crate) late_ns: i64,
     pub(crate) no_imu: bool,
     pub(crate) two_imus: bool,
-    /// From and to.
+    /// Range of the samples whose values are NaN.
     pub(crate) nan: (i64, i64),
     /// Three samples have the stamp of an earlier one.
     pub(crate) back: bool,
-    /// So have all after the third second.
+    /// `true` if all samples after the third second have the stamp of an earlier one.
     pub(crate) stuck: bool,
     /// Fixes of a receiver that mistakes the pole.
     pub(crate) beyond_the_pole: bool,
-    /// So many fixes at the beginning are ten kilometres off.
+    /// Number of fixes at the beginning that are ten kilometres off.
     pub(crate) wrong_fixes: usize,
     pub(crate) no_truth: bool,
     /// The frame of the receiver is not connected.
@@ -95,10 +95,10 @@ struct Sample {
     accelerometer: V<f64>,
 }
 
-/// What is measured at a keyframe.
+/// Measurements at a keyframe.
 struct Measured {
     fix: V<f64>,
-    /// Of the pose since the keyframe before.
+    /// Change of the pose since the keyframe before.
     relative: Isometry3<f64>,
     anchor: Isometry3<f64>,
     speed: f64,
@@ -147,7 +147,7 @@ impl Drive {
         (Isometry3::new(position, V::z() * angle), speed / RADIUS, speed)
     }
 
-    /// As the IMU would measure on the vehicle's axes.
+    /// Returns the samples that the IMU would measure on the vehicle's axes.
     fn samples(&self, rest: bool) -> Vec<Sample> {
         let mut noise = Noise(self.seed.wrapping_mul(2_654_435_761) | 1);
         let sample = |i: i64| {
@@ -388,7 +388,7 @@ impl Drive {
         file(name, &maker.finish())
     }
 
-    /// What the accelerometer measures where it is, not at the base.
+    /// Returns the specific force at the accelerometer, not at the base.
     fn force(&self, at_base: &V<f64>, base_from_imu: &Isometry3<f64>, i: i64, rest: bool) -> V<f64> {
         let rate = V::new(0.0, 0.0, self.truth(i.max(1) as f64 - 0.5, rest).1);
         at_base + rate.cross(&rate.cross(&base_from_imu.translation.vector))
