@@ -36,7 +36,7 @@ pub enum Address {
     },
 }
 
-/// Why a string is not an [`Address`].
+/// Reason for which a string is not an [`Address`].
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the link `{text}` {reason}; write `udpin:HOST:PORT`, `udpout:HOST:PORT` or `serial:DEVICE:BAUD`")]
 pub struct AddressError {

@@ -8,7 +8,7 @@ use mavlink::consts::{self, v1, v2};
 use mavlink::dialects::common::MavMessage;
 use mavlink::{MAV_STX, MAV_STX_V2, MavHeader, MavlinkVersion, Message, calculate_crc};
 
-/// What was found.
+/// Frame that was found.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Item {
     /// A message of the dialect.
@@ -23,7 +23,7 @@ pub(crate) enum Item {
 #[derive(Debug, Default)]
 pub(crate) struct Framer {
     buffer: Vec<u8>,
-    /// How much of the buffer has been processed.
+    /// Number of bytes at the front of the buffer that have been processed.
     start: usize,
     /// No message begins before this, except at `start`. It keeps the work linear in the bytes, for any noise.
     clean: usize,
@@ -53,7 +53,7 @@ impl Framer {
         self.buffer.extend_from_slice(bytes);
     }
 
-    /// Whether bytes are waiting that may become a frame.
+    /// Returns whether bytes are waiting that may become a frame.
     pub(crate) fn is_waiting(&self) -> bool {
         self.start < self.buffer.len()
     }
@@ -97,7 +97,7 @@ impl Framer {
     }
 }
 
-/// Whether the bytes begin with a whole message of the dialect.
+/// Returns whether the bytes begin with a whole message of the dialect.
 pub(crate) fn begins_with_message(bytes: &[u8]) -> bool {
     bytes.first().is_some_and(|byte| is_marker(*byte))
         && matches!(examine_known(bytes), Some(Candidate::Frame(_, Item::Message(..))))

@@ -22,13 +22,13 @@ use std::io;
 use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 
-/// Why a link cannot be opened, or can no longer be used.
+/// Reason for which a link cannot be opened, or can no longer be used.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum LinkError {
     /// The address is malformed.
     #[error(transparent)]
     Address(#[from] AddressError),
-    /// It cannot be opened: the port is taken, or the device does not exist.
+    /// Failure to open the link: the port is taken, or the device does not exist.
     #[error("the link `{address}` cannot be opened: {source}")]
     Open {
         /// The address of the link.
@@ -36,7 +36,7 @@ pub enum LinkError {
         /// Why.
         source: Arc<io::Error>,
     },
-    /// It worked, but no longer does: the device was unplugged.
+    /// Failure of an open link: the device was unplugged.
     #[error("the link `{address}` has failed: {source}")]
     Failed {
         /// The address of the link.
@@ -150,7 +150,7 @@ impl Link {
         self.shared.check()
     }
 
-    /// When the last heartbeat of a peer came, on the machine's clock.
+    /// Returns the time of a peer's last heartbeat, on the machine's clock.
     pub(crate) fn last_heartbeat(&self, peer: Peer) -> Option<MonotonicTime> {
         self.shared.last_heartbeat(peer)
     }

@@ -19,7 +19,7 @@ use source::{Estimate, Source};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// How long an update without a rate waits.
+/// Time for which an update without a rate waits.
 const WAIT: Duration = Duration::from_millis(50);
 
 /// Counts of a [`MavlinkSender`] since its start; published with each change.
@@ -54,7 +54,7 @@ pub struct MavlinkSender {
     kind: Kind,
     max_age_s: f64,
     clock: Clock,
-    /// Whether it has a rate, and so must not wait.
+    /// `true` if it has a rate, and so must not wait.
     is_paced: bool,
     sent: MavlinkSent,
     /// Number of the last text that was sent in several messages.

@@ -4,9 +4,9 @@ use bb_core::MonotonicTime;
 use bb_core::time::DeviceClock;
 use std::time::Duration;
 
-/// How much stamps and arrivals may disagree from one message to the next.
+/// Largest disagreement of stamps and arrivals from one message to the next.
 const TOLERANCE: Duration = Duration::from_secs(1);
-/// How long stamps may be behind by more than that.
+/// Time for which stamps may be behind by more than that.
 const PATIENCE: Duration = Duration::from_secs(2);
 
 /// The unit of a stream's stamps.
@@ -40,7 +40,7 @@ pub(crate) enum ClockFault {
 pub(crate) struct Stamps {
     clock: DeviceClock,
     unit: Unit,
-    /// How long the same stamp may repeat.
+    /// Time for which the same stamp may repeat.
     still: Duration,
     last: Option<Last>,
     late_since: Option<MonotonicTime>,
@@ -49,7 +49,7 @@ pub(crate) struct Stamps {
 #[derive(Clone, Copy, Debug)]
 struct Last {
     ticks: u64,
-    /// Of the newest message, and of the first with these ticks.
+    /// Arrivals of the newest message, and of the first with these ticks.
     arrival: MonotonicTime,
     since: MonotonicTime,
 }
@@ -113,7 +113,7 @@ impl Stamps {
         if for_s > PATIENCE.as_secs_f64() { Err(ClockFault::Late { for_s, by_s }) } else { Ok(()) }
     }
 
-    /// From one stamp to another, s.
+    /// Returns the time from one stamp to another, s.
     fn seconds(&self, from: u64, to: u64) -> f64 {
         match self.unit {
             Unit::Micros => to.wrapping_sub(from).cast_signed() as f64 * 1e-6,

@@ -9,7 +9,7 @@ use std::time::Duration;
 /// The longest wait of a read: a dropped link stops within this time.
 pub(crate) const READ_TIMEOUT: Duration = Duration::from_millis(50);
 
-/// How long a write to a serial port may take.
+/// Time that a write to a serial port may take.
 #[cfg(feature = "serial")]
 const WRITE_TIMEOUT: Duration = Duration::from_millis(250);
 
@@ -20,9 +20,9 @@ pub(crate) const LONGEST_READ: usize = 65_536;
 pub(crate) enum Reader {
     Udp {
         socket: UdpSocket,
-        /// Where the last datagram came from.
+        /// Sender of the last datagram.
         from: Option<SocketAddr>,
-        /// Where to answer, if that is the sender.
+        /// Destination of answers, if that is the sender.
         peer: Option<Arc<Mutex<Option<SocketAddr>>>>,
     },
     #[cfg(feature = "serial")]

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Received {
     pub(crate) message: MavMessage,
-    /// On the machine's clock.
+    /// Time of arrival, on the machine's clock.
     pub(crate) arrival: MonotonicTime,
 }
 
@@ -88,7 +88,7 @@ impl Inbox {
         }
     }
 
-    /// How many messages were lost because this user was slow.
+    /// Returns the number of messages that were lost because this user was slow.
     pub(crate) fn dropped(&self) -> u64 {
         self.lock().dropped
     }

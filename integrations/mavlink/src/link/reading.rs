@@ -76,7 +76,7 @@ mod tests {
     use crate::transport;
     use mavlink::{MavHeader, MavlinkVersion, MessageData, write_versioned_msg};
 
-    /// It does not wait for the bytes that the frame announces.
+    /// Frame that breaks off: the reader does not wait for the bytes that its header announces.
     #[test]
     fn a_datagram_that_is_cut_off_does_not_delay_the_next_one() {
         let address = Address::UdpOut { remote: "127.0.0.1:9".into() };

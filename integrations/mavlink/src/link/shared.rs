@@ -41,7 +41,7 @@ pub(crate) struct Shared {
 struct State {
     inboxes: Vec<Weak<Inbox>>,
     statistics: LinkStatistics,
-    /// By system and component.
+    /// Peers by system and component.
     heard: BTreeMap<(u8, u8), Heard>,
     failure: Option<LinkError>,
 }
@@ -166,7 +166,7 @@ impl Shared {
         self.state().statistics.bytes_skipped = bytes;
     }
 
-    /// When the last heartbeat of a peer came.
+    /// Returns the time of a peer's last heartbeat.
     pub(super) fn last_heartbeat(&self, peer: Peer) -> Option<MonotonicTime> {
         let state = self.state();
         let of_peer = state.heard.iter().filter(|((system_id, component_id), _)| {

@@ -68,7 +68,7 @@ impl GpsInput {
 
     /// Week, and milliseconds in it; both 0 before the first week.
     fn gps_time(&self, wall: WallTime) -> (u16, u32) {
-        /// From 1970 to 6 January 1980.
+        /// Time from 1970 to 6 January 1980, ms.
         const EPOCH_MS: i64 = 315_964_800_000;
         const WEEK_MS: i64 = 7 * 24 * 3_600 * 1_000;
         let since = wall.as_unix_nanos() / 1_000_000 - EPOCH_MS + i64::from(self.leap_seconds) * 1_000;
@@ -78,7 +78,7 @@ impl GpsInput {
     }
 }
 
-/// In tenths of microdegrees.
+/// Converts an angle to tenths of microdegrees; `None` beyond the limit, degrees.
 fn degrees(radians: f64, limit: f64) -> Option<i32> {
     let degrees = radians.to_degrees();
     // NaN is out of range as well.
@@ -110,7 +110,7 @@ pub(super) mod tests {
     use bb_estimators::navigation::state_estimator::SourceLabel;
     use proptest::prelude::*;
 
-    /// In Munich, to the north-west, 5 m and 2 m to east and north, 3 m up.
+    /// Returns an estimate in Munich, to the north-west, 5 m and 2 m to east and north, 3 m up.
     pub(in crate::sender) fn estimate() -> FlightEstimate {
         FlightEstimate {
             frame_id: [7; 16],

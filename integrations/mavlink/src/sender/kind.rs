@@ -14,7 +14,7 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    /// Whether it can be built from the odometry of any estimator, which does not know its place on the Earth.
+    /// Returns whether it can be built from the odometry of any estimator, which does not know its place on the Earth.
     pub(super) fn takes_odometry(&self) -> bool {
         matches!(self, Self::Odometry(_))
     }

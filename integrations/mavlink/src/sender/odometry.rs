@@ -15,7 +15,7 @@ const JUMP: f64 = 1000.0;
 #[derive(Clone, Debug)]
 pub(super) struct OdometryFrame {
     origin: Origin,
-    /// How often the origin has changed.
+    /// Number of changes of the origin.
     moves: u32,
     /// The last estimate: its position, and its count of jumps.
     last: Option<(Geodetic, u32)>,
@@ -25,11 +25,11 @@ pub(super) struct OdometryFrame {
 /// The origin of the local frame.
 #[derive(Clone, Debug)]
 enum Origin {
-    /// From the options: it stays.
+    /// Origin from the options: it stays.
     Given(LocalFrame),
-    /// At an estimate that was not degraded: it stays, unless it proves to be wrong.
+    /// Position of an estimate that was not degraded: it stays, unless it proves to be wrong.
     Trusted(LocalFrame),
-    /// At an estimate, until one is not degraded.
+    /// Position of an estimate, until one is not degraded.
     Provisional(LocalFrame),
     /// There is no estimate yet.
     Unknown,
@@ -116,7 +116,7 @@ impl OdometryFrame {
     }
 }
 
-/// In the axes of the framework: the world's for position, the body's for the rest.
+/// State in the axes of the framework: the world's for position, the body's for the rest.
 struct Motion {
     position: Vector3<f64>,
     world_from_body: UnitQuaternion<f64>,

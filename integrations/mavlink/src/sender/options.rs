@@ -1,4 +1,4 @@
-//! What can be set of the bridge.
+//! Options of the bridge.
 
 use super::gps_input::GpsInput;
 use super::kind::Kind;
@@ -11,7 +11,7 @@ use std::time::Duration;
 /// Options of [`MavlinkSender`](super::MavlinkSender).
 #[derive(Clone, Debug, Options)]
 pub struct MavlinkSenderOptions {
-    /// Where the flight controller is reached: see [`Address`](crate::Address).
+    /// Address of the flight controller: see [`Address`](crate::Address).
     #[option(required)]
     pub link: String,
     /// Path of the estimate, such as `estimator/base/navigation/estimate`.
@@ -63,10 +63,10 @@ pub struct MavlinkSenderOptions {
     /// is not degraded.
     #[option(default = f64::NAN, unit = "rad")]
     pub origin_latitude: f64,
-    /// Of the origin.
+    /// Longitude of the origin.
     #[option(default = 0.0, unit = "rad")]
     pub origin_longitude: f64,
-    /// Of the origin, above the ellipsoid.
+    /// Height of the origin above the ellipsoid.
     #[option(default = 0.0, unit = "m")]
     pub origin_height: f64,
 }

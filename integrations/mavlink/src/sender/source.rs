@@ -43,7 +43,7 @@ impl Source {
         }
     }
 
-    /// The same, but waits for one until `timeout`.
+    /// Returns the newest estimate; without one, waits until `timeout`.
     pub(super) fn wait(&self, timeout: Duration) -> Option<Estimate> {
         match self {
             Self::Flight(estimates) => {

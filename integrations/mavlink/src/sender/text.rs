@@ -47,7 +47,7 @@ mod tests {
     use bb_core::MonotonicTime;
     use proptest::prelude::*;
 
-    /// As assembled by a ground station.
+    /// Assembles the text as a ground station does.
     fn joined(messages: &[STATUSTEXT_DATA]) -> String {
         messages.iter().map(|message| message.text.to_str().expect("it is ASCII")).collect()
     }

@@ -14,7 +14,7 @@ use std::time::Duration;
 /// Options of [`MavlinkAttitude`].
 #[derive(Clone, Debug, Options)]
 pub struct MavlinkAttitudeOptions {
-    /// Where the flight controller is reached: see [`Address`](crate::Address).
+    /// Address of the flight controller: see [`Address`](crate::Address).
     #[option(required)]
     pub link: String,
     /// System that sends; 0 for any.
@@ -23,7 +23,7 @@ pub struct MavlinkAttitudeOptions {
     /// Component that sends; 0 for any.
     #[option(default = 1)]
     pub component_id: u8,
-    /// How long it may send nothing that can be used.
+    /// Time for which it may send nothing that can be used.
     #[option(default = Duration::from_secs(1))]
     pub timeout: Duration,
 }

@@ -13,7 +13,7 @@ use std::time::Duration;
 /// Options of [`MavlinkGnss`].
 #[derive(Clone, Debug, Options)]
 pub struct MavlinkGnssOptions {
-    /// Where the flight controller is reached: see [`Address`](crate::Address).
+    /// Address of the flight controller: see [`Address`](crate::Address).
     #[option(required)]
     pub link: String,
     /// Height of the geoid above the ellipsoid, where the robot is: the height of a fix that gives only the one above
@@ -26,7 +26,7 @@ pub struct MavlinkGnssOptions {
     /// Component that sends; 0 for any.
     #[option(default = 1)]
     pub component_id: u8,
-    /// How long it may send nothing that can be used.
+    /// Time for which it may send nothing that can be used.
     #[option(default = Duration::from_secs(2))]
     pub timeout: Duration,
 }

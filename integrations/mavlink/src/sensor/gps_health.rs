@@ -11,19 +11,19 @@ use std::time::Duration;
 /// Options of [`MavlinkGpsHealth`].
 #[derive(Clone, Debug, Options)]
 pub struct MavlinkGpsHealthOptions {
-    /// Where the flight controller is reached: see [`Address`](crate::Address).
+    /// Address of the flight controller: see [`Address`](crate::Address).
     #[option(required)]
     pub link: String,
-    /// With fewer satellites it is unstable. A receiver that does not say how many it sees is not judged by it.
+    /// Number of satellites below which it is unstable. A receiver that does not report the number is not judged by it.
     #[option(default = 6)]
     pub least_satellites: u8,
-    /// With a larger dilution of precision it is unstable.
+    /// Dilution of precision above which it is unstable.
     #[option(default = 2.5, range = 0.1..=100.0)]
     pub largest_hdop: f64,
-    /// With a larger horizontal accuracy, where the receiver says one, it is unstable.
+    /// Horizontal accuracy above which it is unstable, where the receiver reports one.
     #[option(default = 10.0, range = 0.01..=10000.0, unit = "m")]
     pub largest_accuracy: f64,
-    /// For how long it is spoofed after a text that says so.
+    /// Time for which it counts as spoofed after a text that reports spoofing.
     #[option(default = Duration::from_secs(10))]
     pub spoofed_for: Duration,
     /// System that sends; 0 for any.
@@ -32,7 +32,7 @@ pub struct MavlinkGpsHealthOptions {
     /// Component that sends; 0 for any.
     #[option(default = 1)]
     pub component_id: u8,
-    /// How long it may send nothing that can be used.
+    /// Time for which it may send nothing that can be used.
     #[option(default = Duration::from_secs(2))]
     pub timeout: Duration,
 }
@@ -94,15 +94,15 @@ const NOT: [&str; 4] = ["no", "not", "none", "without"];
 /// Words that may be between these and the word.
 const BETWEEN: [&str; 6] = ["gps", "gnss", "gps1", "gps2", "longer", "more"];
 
-/// What says after the word that it has ended, or is not so.
+/// Words after "spoofing" that say that it has ended, or is not present.
 const ENDED: [&str; 10] =
     ["cleared", "clear", "ended", "gone", "stopped", "resolved", "recovered", "none", "ok", "inactive"];
 
-/// What says beside the word that it is so, unless it is denied.
+/// Words beside "spoofing" that say that it is present, unless they are denied.
 const FOUND: [&str; 4] = ["detect", "detects", "detected", "indicated"];
 
-/// Whether a text reports spoofing, or its absence; `None` if it is about something else. In doubt, it counts as
-/// spoofing.
+/// Returns whether a text reports spoofing, or its absence; `None` if it is about something else. In doubt, it counts
+/// as spoofing.
 fn spoofing(text: &STATUSTEXT_DATA) -> Option<bool> {
     // A colon is a word: a negation before it, as in "not trusted: spoofed", does not apply after it.
     let text = text.text.to_str().ok()?.to_ascii_lowercase().replace(':', " : ");

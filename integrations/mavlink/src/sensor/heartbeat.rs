@@ -10,7 +10,7 @@ use std::time::Duration;
 /// Options of [`MavlinkHeartbeat`].
 #[derive(Clone, Debug, Options)]
 pub struct MavlinkHeartbeatOptions {
-    /// Where the flight controller is reached: see [`Address`](crate::Address).
+    /// Address of the flight controller: see [`Address`](crate::Address).
     #[option(required)]
     pub link: String,
     /// System that sends; 0 for any.
@@ -19,7 +19,7 @@ pub struct MavlinkHeartbeatOptions {
     /// Component that sends; 0 for any.
     #[option(default = 1)]
     pub component_id: u8,
-    /// How long it may send nothing. Heartbeats come once a second.
+    /// Time for which it may send nothing. Heartbeats come once a second.
     #[option(default = Duration::from_secs(5))]
     pub timeout: Duration,
 }
@@ -37,7 +37,7 @@ pub struct FlightController {
     pub custom_mode: u32,
     /// `MAV_STATE`: 3 is standby, 4 is active.
     pub system_status: u8,
-    /// Whether motors may turn.
+    /// `true` if motors may turn.
     pub is_armed: bool,
     /// The link since it was opened.
     pub link: LinkStatistics,

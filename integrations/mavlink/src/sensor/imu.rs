@@ -14,13 +14,13 @@ use std::time::Duration;
 /// Options of [`MavlinkImu`].
 #[derive(Clone, Debug, Options)]
 pub struct MavlinkImuOptions {
-    /// Where the flight controller is reached: see [`Address`](crate::Address).
+    /// Address of the flight controller: see [`Address`](crate::Address).
     #[option(required)]
     pub link: String,
     /// `highres_imu` or `scaled_imu2`.
     #[option(default = "highres_imu")]
     pub message: String,
-    /// Which IMU, of a flight controller that sends `HIGHRES_IMU` of several.
+    /// Number of the IMU, of a flight controller that sends `HIGHRES_IMU` of several.
     #[option(default = 0)]
     pub id: u8,
     /// System that sends; 0 for any.
@@ -29,7 +29,7 @@ pub struct MavlinkImuOptions {
     /// Component that sends; 0 for any.
     #[option(default = 1)]
     pub component_id: u8,
-    /// How long it may send nothing that can be used.
+    /// Time for which it may send nothing that can be used.
     #[option(default = Duration::from_secs(1))]
     pub timeout: Duration,
 }
@@ -110,7 +110,7 @@ fn high_res(data: &HIGHRES_IMU_DATA) -> Result<Imu, &'static str> {
     Ok(Imu::new(swap_body(&rate), swap_body(&force)))
 }
 
-/// From mrad/s and thousandths of standard gravity.
+/// Converts mrad/s and thousandths of standard gravity to SI.
 fn scaled(data: &SCALED_IMU2_DATA) -> Imu {
     const G: f64 = 9.80665;
     let force = Vector3::new(data.xacc, data.yacc, data.zacc).cast::<f64>() * (1e-3 * G);

@@ -6,11 +6,11 @@ use bb_core::{Fault, MonotonicTime, SensorContext};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// How long one read waits.
+/// Time for which one read waits.
 const WAIT: Duration = Duration::from_millis(50);
 /// The number of messages that may be queued for a driver; more is a flood.
 const CAPACITY: usize = 64;
-/// How often a flood is logged.
+/// Shortest period at which a flood is logged.
 const COMPLAINT: Duration = Duration::from_secs(10);
 
 /// Messages of one peer.
@@ -20,15 +20,15 @@ pub(super) struct Stream {
     inbox: Arc<Inbox>,
     peer: Peer,
     name: &'static str,
-    /// How long it may be silent.
+    /// Time for which it may be silent.
     timeout: Duration,
     robot: Clock,
     path: &'static str,
     opened: MonotonicTime,
-    /// When the last message came, and the last one with a value, on the machine's clock.
+    /// Times of the last message, and of the last one with a value, on the machine's clock.
     message: Option<MonotonicTime>,
     value: Option<MonotonicTime>,
-    /// Why the last message had no value.
+    /// Reason for which the last message had no value.
     without: &'static str,
     dropped: u64,
     complained: Option<MonotonicTime>,

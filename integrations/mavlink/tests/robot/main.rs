@@ -69,7 +69,7 @@ fn fault_of_imu(faults: &Subscription<ComponentFault>, text: &str) -> String {
         .message
 }
 
-/// At 48° north.
+/// Returns an estimate at 48° north.
 fn estimate(time: MonotonicTime, longitude_deg: f64) -> FlightEstimate {
     FlightEstimate {
         frame_id: [0; 16],
@@ -94,7 +94,7 @@ fn estimate(time: MonotonicTime, longitude_deg: f64) -> FlightEstimate {
     }
 }
 
-/// What is sent to the ground.
+/// Returns an event whose text is sent to the ground.
 fn text(level: Level, text: &str) -> FlightEvent {
     FlightEvent {
         time: MonotonicTime::ZERO,

@@ -13,7 +13,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-/// Its behaviour, which tests switch.
+/// Behaviour of the flight controller, which tests switch.
 #[derive(Debug, Default)]
 pub(crate) struct Does {
     /// Sends no `HIGHRES_IMU`.
@@ -26,9 +26,9 @@ pub(crate) struct Does {
     pub(crate) is_spoofed: AtomicBool,
     /// Sends without a pause.
     pub(crate) floods: AtomicBool,
-    /// How far its clock is ahead, ms.
+    /// Lead of its clock, ms.
     pub(crate) ahead_ms: AtomicI64,
-    /// Its clock stands still.
+    /// `true` if its clock stands still.
     pub(crate) is_still: AtomicBool,
     pub(crate) ends: AtomicBool,
 }

@@ -19,7 +19,7 @@ fn flying(peer: &Peer) -> bb_core::Builder<Drone> {
     builder
 }
 
-/// It ends when its input is closed.
+/// Process of the flight controller; it ends when its input is closed.
 struct Peer {
     process: Child,
     address: String,
@@ -67,7 +67,7 @@ impl Drop for Peer {
     }
 }
 
-/// To the north, in Sydney.
+/// Returns an estimate of a vehicle that points north, in Sydney.
 fn estimate(time: MonotonicTime) -> FlightEstimate {
     let (latitude_rad, longitude_rad) = ((-33.8_f64).to_radians(), 151.2_f64.to_radians());
     FlightEstimate {

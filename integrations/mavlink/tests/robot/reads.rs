@@ -1,4 +1,4 @@
-//! What the drivers publish.
+//! Messages that the drivers publish.
 
 use super::{Drone, LONG, drone};
 use crate::other::Other;

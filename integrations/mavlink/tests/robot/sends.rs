@@ -1,4 +1,4 @@
-//! What the bridge sends.
+//! Messages that the bridge sends.
 
 use super::{LONG, drone, estimate, text};
 use crate::other::Other;
