@@ -1,4 +1,4 @@
-//! How fast messages of an IMU are recorded and read, and how large they become.
+//! Speed at which messages of an IMU are recorded and read, and the size that they take.
 
 use bb_core::nalgebra::{Matrix3, Vector3};
 use bb_core::payload::Imu;

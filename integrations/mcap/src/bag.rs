@@ -41,8 +41,8 @@ pub struct Topic {
     pub definition: Arc<str>,
     /// The format of the definition, for example `ros2msg`.
     pub definition_encoding: Arc<str>,
-    /// Whether it is from a recording of a robot of this project. Its poses may be estimates, so they are not
-    /// used as truth by default.
+    /// `true` if it is from a recording of a robot of this project. Its poses may be estimates, so they are not used as
+    /// truth by default.
     pub is_own: bool,
     /// The number of messages, in a damaged bag before the damage; `None` if a summary leaves it out.
     pub messages: Option<u64>,
@@ -159,7 +159,7 @@ impl Bag {
         self.messages_of(topics, true)
     }
 
-    /// The same for topics in any encoding; for messages that are not CDR only the bytes are available.
+    /// Reads topics in any encoding; for messages that are not CDR only the bytes are available.
     ///
     /// # Errors
     ///

@@ -57,7 +57,7 @@ enum Kind {
     Text,
     /// The number of an enum's variant; the message of this index has the variants' names.
     Variant(usize),
-    /// By index.
+    /// Message of this index.
     Message(usize),
 }
 
@@ -73,7 +73,7 @@ enum Count {
 const DEEPEST: usize = 32;
 
 impl MessageDefinition {
-    /// For a type in the full spelling, from its definition in the file: a text, and its format. Both may be empty.
+    /// Returns the definition of a type in the full spelling, from that in the file: a text, and its format. Both may be empty.
     ///
     /// # Errors
     /// The text cannot be read, and the type is not a known one; in words.
@@ -100,7 +100,7 @@ impl MessageDefinition {
         parse::definition(name, text).map_err(|fault| format!("the definition of {name} is malformed: {fault}"))
     }
 
-    /// Whether a message begins with a `std_msgs/Header`, which contains the time of its values.
+    /// Returns whether a message begins with a `std_msgs/Header`, which contains the time of its values.
     pub fn has_header(&self) -> bool {
         let first = self.messages.first().and_then(|message| message.fields.first());
         first.is_some_and(|field| match (field.kind, field.count) {

@@ -32,7 +32,7 @@ impl RecordingError {
         &self.kind
     }
 
-    /// Whether the file is read up to here and breaks off or is damaged, as after a crash or a loss of power.
+    /// Returns whether the file is read up to here and breaks off or is damaged, as after a crash or a loss of power.
     pub fn is_break(&self) -> bool {
         use RecordingErrorKind::{Compression, Corrupt, TooLarge, Truncated};
         matches!(*self.kind, Truncated { .. } | Corrupt { .. } | TooLarge { .. } | Compression { .. })
@@ -55,15 +55,15 @@ pub enum RecordingErrorKind {
     /// The operating system refused.
     #[error("cannot be read at byte {byte}: {cause}; check the file's permissions and the disk")]
     Read {
-        /// Where reading stopped.
+        /// Byte at which reading stopped.
         byte: u64,
-        /// What the operating system said.
+        /// Error of the operating system.
         cause: io::Error,
     },
     /// The file is something else than MCAP.
     #[error("not an MCAP file: {found}")]
     NotMcap {
-        /// What it seems to be, and what to do with it.
+        /// Kind of the file, as far as it can be guessed, and what to do with it.
         found: &'static str,
     },
     /// The file stops in the middle, as after a recorder that was killed; see [`recover`](crate::recover()).
@@ -75,7 +75,7 @@ pub enum RecordingErrorKind {
     Truncated {
         /// Messages of all topics before the break.
         messages: u64,
-        /// Where the first incomplete record starts.
+        /// Byte at which the first incomplete record starts.
         byte: u64,
         /// The size of the file in bytes.
         size: u64,
@@ -88,9 +88,9 @@ pub enum RecordingErrorKind {
     Corrupt {
         /// Messages of all topics before the place.
         messages: u64,
-        /// Where the record or chunk starts.
+        /// Byte at which the record or chunk starts.
         byte: u64,
-        /// What is wrong with it.
+        /// Fault of the record or chunk.
         fault: String,
     },
     /// A record or chunk that this reader refuses to hold in memory.
@@ -101,9 +101,9 @@ pub enum RecordingErrorKind {
     TooLarge {
         /// Messages of all topics before the place.
         messages: u64,
-        /// Where the record or chunk starts.
+        /// Byte at which the record or chunk starts.
         byte: u64,
-        /// Its length in bytes, unpacked.
+        /// Length in bytes, unpacked.
         length: u64,
         /// The longest accepted, in bytes.
         limit: u64,
@@ -114,7 +114,7 @@ pub enum RecordingErrorKind {
          or convert with one of these"
     )]
     Compression {
-        /// Where the chunk starts.
+        /// Byte at which the chunk starts.
         byte: u64,
         /// The method the file names.
         compression: String,
@@ -126,7 +126,7 @@ pub enum RecordingErrorKind {
     Database {
         /// Messages of all topics before the fault.
         messages: u64,
-        /// What SQLite said.
+        /// Error of SQLite.
         cause: String,
     },
     /// The bag has no topic of that name.
@@ -158,7 +158,7 @@ pub enum RecordingErrorKind {
     OtherType {
         /// The topic.
         topic: String,
-        /// Its type.
+        /// Type of its messages.
         schema: String,
         /// The type that is needed.
         wanted: String,
@@ -187,11 +187,11 @@ pub enum RecordingErrorKind {
         schema: String,
         /// The number of the message on its topic, from 1.
         message: u64,
-        /// When it was logged, in nanoseconds of the recorder's clock.
+        /// Time at which it was logged, in nanoseconds of the recorder's clock.
         log_time_ns: u64,
-        /// Where its record starts, or the chunk that holds it.
+        /// Byte at which its record starts, or the chunk that holds it.
         byte: u64,
-        /// What is wrong with it.
+        /// Fault of the payload.
         fault: String,
     },
     /// The file to write exists already.
@@ -203,7 +203,7 @@ pub enum RecordingErrorKind {
     /// The file cannot be written to, for example because the disk is full.
     #[error("cannot be written to, {} certain to be in it: {cause}", first(*.messages))]
     Write {
-        /// How many messages are in the file for certain, from the first on: those that had been flushed.
+        /// Number of messages that are in the file for certain, from the first on: those that had been flushed.
         messages: u64,
         /// Why.
         cause: io::Error,
@@ -244,7 +244,7 @@ pub enum RecordingErrorKind {
          `bb_mcap::Bag`"
     )]
     Foreign {
-        /// As the file says.
+        /// Name of the program, according to the file.
         library: String,
     },
     /// Nothing was recorded at this path.
@@ -260,11 +260,11 @@ pub enum RecordingErrorKind {
     OtherPayload {
         /// The path.
         path: String,
-        /// What was recorded.
+        /// Fields of the payload that was recorded.
         recorded: String,
-        /// What was asked for.
+        /// Name of the payload that was asked for.
         asked: &'static str,
-        /// What that is.
+        /// Current fields of that payload.
         now: String,
     },
     /// A message does not match its channel.
@@ -272,12 +272,12 @@ pub enum RecordingErrorKind {
     Message {
         /// The path.
         path: String,
-        /// What is wrong with it.
+        /// Fault of the message.
         cause: DecodeError,
     },
 }
 
-/// Of an error while creating a file.
+/// Converts an error while creating a file.
 pub(crate) fn create_error(cause: io::Error) -> RecordingErrorKind {
     match cause.kind() {
         io::ErrorKind::AlreadyExists => RecordingErrorKind::Exists,
@@ -285,7 +285,7 @@ pub(crate) fn create_error(cause: io::Error) -> RecordingErrorKind {
     }
 }
 
-/// What is certain to be in a file.
+/// Describes the messages that are certain to be in a file.
 fn first(messages: u64) -> String {
     match messages {
         0 => "no message is".to_owned(),
@@ -294,7 +294,7 @@ fn first(messages: u64) -> String {
     }
 }
 
-/// Of an error while writing, after so many messages had been flushed.
+/// Converts an error while writing, after so many messages had been flushed.
 pub(crate) fn write_error(messages: u64, error: McapError) -> RecordingErrorKind {
     match error {
         McapError::Io(cause) => RecordingErrorKind::Write { messages, cause },

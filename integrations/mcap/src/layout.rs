@@ -15,9 +15,9 @@ const FRAME: &str = "bb.frame";
 /// The layout of a channel's messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Layout {
-    /// As written by ROS; other data is the same for the whole channel, or is in the channel beside it.
+    /// Layout of ROS; other data is the same for the whole channel, or is in the channel beside it.
     Ros,
-    /// With all data.
+    /// Layout with all data.
     Exact,
     /// Likewise: the messages of a `Ros` channel that differ from the rest, each just before the message it belongs
     /// to.
@@ -53,7 +53,7 @@ impl Shared {
         Self { robot: origin.robot.to_owned(), node: origin.node.to_owned(), frame: frame.name().to_owned() }
     }
 
-    /// Whether a stamp can be derived from its wall time.
+    /// Returns whether a stamp can be derived from its wall time.
     pub(crate) fn gives(&self, clock: &Clock, stamp: &Stamp) -> bool {
         clock.monotonic(stamp.wall_time) == stamp.monotonic_time
             && self.frame == stamp.frame.name()

@@ -19,7 +19,7 @@ pub struct PlayedOptions {
     /// Added to the recorded stamps: the difference between this run's clock and that of the recorded run. Default: 0.
     #[option(default = 0.0, range = -1e9..=1e9, unit = "s")]
     pub offset: f64,
-    /// How long after its stamp a sensor's message is published: the time that it took from the measurement to the robot, which is
+    /// Time from its stamp after which a sensor's message is published: the time that it took from the measurement to the robot, which is
     /// not recorded. The stamp remains that of the measurement. An estimator ignores it. Unit: s. Default: 0.
     #[option(default = Duration::ZERO)]
     pub delay: Duration,
@@ -54,7 +54,7 @@ impl<T: Payload> Played<T> {
         Some(MonotonicTime::from_nanos(message.monotonic_time.as_nanos().saturating_add(offset_nanos)))
     }
 
-    /// Whether a message, or the error in its place, is due at `now`.
+    /// Returns whether a message, or the error in its place, is due at `now`.
     fn is_due(&mut self, now: MonotonicTime) -> bool {
         self.messages.peek().is_some() && self.next_time().is_none_or(|time| time <= now)
     }

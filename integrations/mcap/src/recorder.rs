@@ -221,7 +221,7 @@ impl Recorder {
         Ok(())
     }
 
-    /// What has been recorded so far.
+    /// Returns a report of what has been recorded so far.
     pub fn report(&self) -> RecorderReport {
         let lost = self.subscriptions.iter().map(DynamicSubscription::lagged).sum();
         RecorderReport { lost, ..self.report }
@@ -457,7 +457,7 @@ impl std::fmt::Debug for Recorder {
 
 pub(crate) type FileWriter = Writer<BufWriter<Box<dyn Output>>>;
 
-/// Why nothing more is written.
+/// Reason for which nothing more is written.
 enum WriteFault {
     File(McapError),
     Message(RecordingErrorKind),

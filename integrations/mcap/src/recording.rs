@@ -25,7 +25,7 @@ pub struct RecordedChannel {
     pub payload: String,
     /// The name of its definition: `sensor_msgs/msg/Imu`.
     pub schema: String,
-    /// Its definition.
+    /// Definition of the type.
     pub definition: String,
     /// The number of messages, in a damaged file before the damage.
     pub messages: u64,
@@ -118,7 +118,7 @@ impl Recording {
         self.lost
     }
 
-    /// Where and why the file is cut off, if it is.
+    /// Returns the place and the cause of the break at which the file is cut off, if it is.
     pub fn broken(&self) -> Option<&RecordingError> {
         self.broken.as_deref()
     }

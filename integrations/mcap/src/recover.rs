@@ -16,7 +16,7 @@ use std::path::Path;
 pub struct Recovered {
     /// The number of messages.
     pub messages: u64,
-    /// Where and why the file was damaged; `None` if it was complete.
+    /// Place and cause of the damage; `None` if the file was complete.
     pub broken: Option<RecordingError>,
 }
 

@@ -17,7 +17,7 @@ pub struct BagImuOptions {
     /// The topic of the magnetometer. Default: the one that was recorded with the IMU, or the only one of its type.
     #[option(default = "")]
     pub magnetometer_topic: String,
-    /// Whether to play back the magnetometer, which the bag must then contain. Default: yes.
+    /// Playback of the magnetometer, which the bag must then contain. Default: yes.
     #[option(default = true)]
     pub magnetometer: bool,
 }

@@ -16,19 +16,19 @@ use std::sync::Arc;
 pub struct BagMessage {
     /// The topic it was published on; the same allocation for every message of the topic.
     pub topic: Arc<str>,
-    /// Its type in the full spelling, as `sensor_msgs/msg/Imu`.
+    /// Type in the full spelling, as `sensor_msgs/msg/Imu`.
     pub schema: Arc<str>,
-    /// When the recorder received it, in nanoseconds of the recorder's clock, usually since 1970. The measurement
-    /// time is in the header.
+    /// Time at which the recorder received it, in nanoseconds of the recorder's clock, usually since 1970. The
+    /// measurement time is in the header.
     pub log_time_ns: u64,
     /// The encoded message; decompressed, if the message was compressed individually.
     pub data: Vec<u8>,
     /// The encoding of `data`; only `cdr` can be decoded here.
     pub encoding: Arc<str>,
     path: Arc<Path>,
-    /// Its number on its topic, from 1.
+    /// Number of the message on its topic, from 1.
     number: u64,
-    /// Where its record starts, or the chunk that holds it.
+    /// Byte at which its record starts, or the chunk that holds it.
     byte: u64,
 }
 
@@ -120,7 +120,7 @@ impl BagMessage {
     }
 }
 
-/// Whether `schema`, in the full spelling, is the type `name`: `sensor_msgs/msg/Imu` is `sensor_msgs/Imu`.
+/// Returns whether `schema`, in the full spelling, is the type `name`: `sensor_msgs/msg/Imu` is `sensor_msgs/Imu`.
 fn is_named(schema: &str, name: &str) -> bool {
     schema == name
         || name.split_once('/').is_some_and(|(package, name)| {
@@ -146,7 +146,7 @@ pub(super) struct MessageKind {
     pub(super) encoding: Arc<str>,
 }
 
-/// Whether messages of this topic can be read.
+/// Checks that messages of this topic can be read.
 pub(crate) fn check(topic: &str, encoding: &str) -> Result<(), RecordingErrorKind> {
     match encoding {
         "cdr" => Ok(()),

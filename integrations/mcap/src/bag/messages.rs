@@ -23,7 +23,7 @@ pub struct BagMessages {
     /// The source of messages instead of records, in a bag that is a database.
     #[cfg(feature = "sqlite")]
     rows: Option<super::sqlite::Rows>,
-    /// What to do with the messages of each channel met so far; `None` for unwanted ones.
+    /// Routes of the messages of each channel met so far; `None` for unwanted ones.
     routes: HashMap<u16, Option<Route>>,
 }
 

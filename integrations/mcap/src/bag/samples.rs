@@ -42,7 +42,7 @@ impl MargSamples {
         Ok(samples)
     }
 
-    /// When the next sample was measured; `None` at the end.
+    /// Returns the time of the next sample's measurement; `None` at the end.
     pub fn next_time(&self) -> Option<MonotonicTime> {
         self.pending.as_ref().map(|(time, _)| *time)
     }
@@ -77,7 +77,7 @@ impl MargSamples {
         Ok(self.pending.take())
     }
 
-    /// At the end, there is no further sample that the last reading may belong to.
+    /// Gives the last reading to the held sample: at the end, there is no further sample that it may belong to.
     fn settle(&mut self) {
         if let Some((_, field)) = self.early.take() {
             self.give(field);

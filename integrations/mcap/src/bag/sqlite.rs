@@ -13,10 +13,10 @@ use std::sync::Arc;
 /// The first bytes of an SQLite database.
 const MAGIC: &[u8] = b"SQLite format 3\0";
 
-/// How many messages are looked up at once. Their data is read one by one.
+/// Number of messages that are listed at once. Their data is read one by one.
 const PAGE: i64 = 1000;
 
-/// Whether a file is a database. Returns false for an unreadable one, so that the MCAP reader reports why.
+/// Returns whether a file is a database; false for an unreadable one, so that the MCAP reader reports why.
 pub(super) fn is_database(path: &Path) -> bool {
     let mut start = [0; MAGIC.len()];
     // Checked before opening: opening a pipe would wait for a writer.

@@ -28,7 +28,7 @@ const LONGEST_GAP_NS: i64 = 100_000_000;
 /// and when the body moves (`std_msgs/Bool`, on change).
 #[derive(Clone, Debug, Default)]
 pub struct Truth {
-    /// By time; `None` where the markers were lost.
+    /// Poses by time; `None` where the markers were lost.
     poses: Vec<(i64, Option<UnitQuaternion<f64>>)>,
     /// Changes, by time; in a recording without them, the body counts as moving all the time.
     moving: Vec<(i64, bool)>,
@@ -93,12 +93,12 @@ impl Truth {
         }
     }
 
-    /// When the body first moves, in nanoseconds; `None` if the recording does not say, or it never moves.
+    /// Returns the time at which the body first moves, in nanoseconds; `None` if the recording does not say, or it never moves.
     pub fn first_motion(&self) -> Option<i64> {
         self.moving.iter().find(|(_, moving)| *moving).map(|(time, _)| *time)
     }
 
-    /// Whether any orientation is known.
+    /// Returns whether any orientation is known.
     pub fn is_known(&self) -> bool {
         self.poses.iter().any(|(_, pose)| pose.is_some())
     }

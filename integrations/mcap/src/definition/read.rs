@@ -6,7 +6,7 @@ use bb_core::message::DecodeError;
 use bb_core::message::codec::Reader;
 use std::sync::Arc;
 
-/// What follows the message is ignored: ROS counts padding for empty lists that it does not write.
+/// Reads a message. Bytes that follow it are ignored: ROS counts padding for empty lists that it does not write.
 pub(super) fn message(definition: &MessageDefinition, data: &[u8]) -> Result<Value, DecodeError> {
     fields(definition, 0, &mut Reader::of_message(data)?)
 }

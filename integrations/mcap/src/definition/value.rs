@@ -15,7 +15,7 @@ pub enum Value {
     Variant {
         /// Counted from zero.
         number: u32,
-        /// In the spelling of message constants: `OUT_OF_RANGE`.
+        /// Name in the spelling of message constants: `OUT_OF_RANGE`.
         name: Arc<str>,
     },
     /// `float32`

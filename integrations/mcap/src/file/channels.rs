@@ -75,7 +75,7 @@ impl Channels {
         self.channels.get(&id)
     }
 
-    /// By number.
+    /// Returns the channels by number.
     pub(crate) fn iter(&self) -> impl Iterator<Item = (u16, &Channel)> {
         self.channels.iter().map(|(id, channel)| (*id, channel))
     }

@@ -14,9 +14,9 @@ pub(super) enum Chunk {
     Beginning { data: Vec<u8>, at: usize },
 }
 
-/// Why a chunk cannot be read, or not further.
+/// Reason for which a chunk cannot be read, or not further.
 pub(super) enum ChunkFault {
-    /// It is cut off, as was known.
+    /// End of a chunk that is cut off, as was known.
     Ends,
     Corrupt(String),
     TooLarge(u64),
@@ -118,10 +118,10 @@ impl Chunk {
 
 /// The header of a chunk.
 struct Head<'a> {
-    /// Its decompressed length.
+    /// Decompressed length.
     unpacked: u64,
     compression: &'a str,
-    /// Its stored length.
+    /// Stored length.
     packed: u64,
     /// The available part of it.
     data: &'a [u8],
@@ -148,7 +148,7 @@ fn split(bytes: &[u8]) -> Option<(u8, &[u8])> {
     Some((opcode, fields.take(length)?))
 }
 
-/// Whether the bytes are a sequence of complete records.
+/// Returns whether the bytes are a sequence of complete records.
 fn is_framed(mut records: &[u8]) -> bool {
     while !records.is_empty() {
         let Some((_, record)) = split(records) else { return false };

@@ -19,13 +19,13 @@ pub(crate) struct Records {
     file: BufReader<File>,
     /// The size of the file when it was opened. A recorder may still be writing to it.
     size: u64,
-    /// Whether the file ends like a complete one, so that running over its end is damage and not truncation.
+    /// `true` if the file ends like a complete one, so that running over its end is damage and not truncation.
     is_finished: bool,
-    /// Whether headers, metadata and attachments are wanted as well.
+    /// `true` if headers, metadata and attachments are wanted as well.
     all: bool,
-    /// Where the next record of the file starts.
+    /// Byte at which the next record of the file starts.
     next: u64,
-    /// Where the current record starts, or the chunk it is in.
+    /// Byte at which the current record starts, or the chunk it is in.
     byte: u64,
     /// The chunk being read.
     chunk: Option<Chunk>,
@@ -104,7 +104,7 @@ impl Records {
         self.file
     }
 
-    /// Where the current record starts, or the chunk it is in.
+    /// Returns the byte at which the current record starts, or the chunk it is in.
     pub(crate) fn byte(&self) -> u64 {
         self.byte
     }

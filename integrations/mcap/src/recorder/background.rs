@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// How long the thread waits for a message before it checks whether to stop.
+/// Time for which the thread waits for a message before it checks whether to stop.
 const WAIT: Duration = Duration::from_millis(20);
 
 /// A recorder that writes on its own thread until it is stopped or dropped.
@@ -49,12 +49,12 @@ impl BackgroundRecorder {
         }
     }
 
-    /// What has been recorded so far.
+    /// Returns a report of what has been recorded so far.
     pub fn report(&self) -> RecorderReport {
         self.shared.report()
     }
 
-    /// Whether it is still writing. If it ends before it is stopped, there was an error, which [`stop`](Self::stop) returns.
+    /// Returns whether it is still writing. If it ends before it is stopped, there was an error, which [`stop`](Self::stop) returns.
     pub fn is_running(&self) -> bool {
         self.thread.as_ref().is_some_and(|thread| !thread.is_finished())
     }

@@ -14,7 +14,7 @@ pub(super) struct Frames {
     body: Option<(String, Told)>,
 }
 
-/// How much a path says about a body, in increasing order.
+/// Amount of what a path says about a body, in increasing order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Told {
     Orientation,
@@ -24,7 +24,7 @@ enum Told {
 }
 
 impl Frames {
-    /// For a robot placed by `body`, or otherwise by the path that says the most, the first of several.
+    /// Creates the frames of a robot placed by `body`, or otherwise by the path that says the most, the first of several.
     pub(super) fn new(topology: &'static Topology, body: Option<String>) -> Self {
         Self { topology, body: body.map(|path| (path, Told::Chosen)) }
     }
@@ -93,7 +93,7 @@ impl Frames {
         told
     }
 
-    /// These joints, and those that follow them.
+    /// Returns these joints, and those that follow them.
     fn moved(&self, told: &[(usize, Vec<f64>)]) -> Vec<(usize, Vec<f64>)> {
         let position = |number: usize| told.iter().find(|(joint, _)| *joint == number).map(|(_, at)| at);
         let moved = (0..self.topology.joints.len()).filter_map(|number| {

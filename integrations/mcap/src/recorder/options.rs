@@ -1,11 +1,11 @@
-//! How a recording is written.
+//! Options of a recorder.
 
 use bb_core::Robot;
 use bb_core::topology::Topology;
 use mcap::WriteOptions;
 use std::time::Duration;
 
-/// How chunks are packed.
+/// Compression of chunks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Compression {
@@ -18,7 +18,7 @@ pub enum Compression {
     Zstd,
 }
 
-/// How a recording is written.
+/// Options of a recorder.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct RecorderOptions {
@@ -27,19 +27,19 @@ pub struct RecorderOptions {
     pub flush_messages: u64,
     /// After so much time likewise, if anything has come. Default: 200 ms.
     pub flush_interval: Duration,
-    /// Whether each flush also waits until the disk has it, so that a loss of power does not lose it. Default: no.
+    /// `true` to wait at each flush until the disk has it, so that a loss of power does not lose it. Default: no.
     pub sync: bool,
-    /// How chunks are packed. Default: lz4.
+    /// Compression of chunks. Default: lz4.
     pub compression: Compression,
     /// The largest chunk, in bytes; a flush ends one as well. Default: 1 MiB.
     pub chunk_bytes: u64,
-    /// Whether joints that move, poses and orientations are written as transforms to `/tf` as well, of a robot that the
+    /// `true` to write joints that move, poses and orientations as transforms to `/tf` as well, of a robot that the
     /// recorder was told. Default: yes.
     pub transforms: bool,
     /// The path whose poses or orientations place the robot's root link in `world`, on `/tf`. Default: the first that
     /// publishes poses of the root link, or orientations as long as none does.
     pub body: Option<String>,
-    /// Whose frames, URDF and name are written. Default: none.
+    /// Robot whose frames, URDF and name are written. Default: none.
     pub(crate) robot: Option<Described>,
 }
 
@@ -89,7 +89,7 @@ impl RecorderOptions {
     }
 }
 
-/// What tells recordings of this crate from others.
+/// Name of the program by which recordings of this crate are recognised.
 pub(crate) const LIBRARY: &str = "bb-mcap";
 
 fn library() -> String {

@@ -64,7 +64,7 @@ impl RecordedMessage {
 }
 
 impl RecordedChannel {
-    /// Whether its messages have the current fields of `T`.
+    /// Checks that its messages have the current fields of `T`.
     pub(crate) fn check<T: Payload>(&self) -> Result<(), RecordingErrorKind> {
         let exact = Stamped::<T>::schema();
         let now = match self.layout {
@@ -99,7 +99,7 @@ pub(crate) struct Wanted {
 #[derive(Debug)]
 enum Role {
     Main(Arc<RecordedChannel>),
-    /// Of the channel with this number.
+    /// Messages that complete those of the channel with this number.
     Beside(u16),
     /// Likewise.
     Companion(u16),

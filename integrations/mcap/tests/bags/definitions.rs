@@ -100,7 +100,7 @@ prop_compose! {
 }
 
 proptest! {
-    /// What the project writes of any type, its definition reads.
+    /// A definition reads what the project writes of any type.
     #[test]
     fn a_definition_reads_what_was_written(value in everything()) {
         let mut bytes = Vec::new();

@@ -21,7 +21,7 @@ impl Stamp {
 /// `std_msgs/msg/Header`
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
 pub struct Header {
-    /// When the values held, by the sender's clock; not when they were recorded.
+    /// Time of the values, by the sender's clock; not that of recording.
     pub stamp: Stamp,
     /// The frame of the values.
     pub frame_id: String,
@@ -73,9 +73,9 @@ impl Default for Quaternion {
 /// `geometry_msgs/msg/Pose`: from the body to the frame of the header.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Pose {
-    /// Where the body is, metres.
+    /// Position of the body, metres.
     pub position: Point,
-    /// How it is turned.
+    /// Orientation of the body.
     pub orientation: Quaternion,
 }
 
@@ -93,8 +93,8 @@ pub struct PoseStamped {
 pub struct PoseWithCovariance {
     /// The pose.
     pub pose: Pose,
-    /// Of x, y, z (metres) and the rotation about the fixed X, Y, Z axes (radians), row by row. The definition's
-    /// flat array of 36 has the same bytes.
+    /// Covariance of x, y, z (metres) and the rotation about the fixed X, Y, Z axes (radians), row by row. The
+    /// definition's flat array of 36 has the same bytes.
     pub covariance: [[f64; 6]; 6],
 }
 
@@ -112,7 +112,7 @@ pub struct Twist {
 pub struct TwistWithCovariance {
     /// The velocities.
     pub twist: Twist,
-    /// Of the linear (m/s), then the angular velocity (rad/s), row by row.
+    /// Covariance of the linear (m/s), then the angular velocity (rad/s), row by row.
     pub covariance: [[f64; 6]; 6],
 }
 
@@ -173,7 +173,7 @@ pub struct NavSatStatus {
 pub struct NavSatFix {
     /// Time and the frame of the antenna.
     pub header: Header,
-    /// Whether there is a fix.
+    /// State of the fix.
     pub status: NavSatStatus,
     /// Degrees, north positive.
     pub latitude: f64,

@@ -7,7 +7,7 @@ use std::fs::{File, OpenOptions};
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::Path;
 
-/// How many messages can be read; that nothing panics is the point.
+/// Returns the number of messages that can be read; that nothing panics is the point.
 fn readable(path: &Path) -> usize {
     let Ok(recording) = Recording::open(path) else { return 0 };
     let imu = recording.messages::<Imu>("sensor/base/imu");

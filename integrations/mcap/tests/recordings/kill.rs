@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 
 const FILE: &str = "BB_RECORDER_TEST_FILE";
 
-/// What is killed: it records until it is, and says how much is safe.
+/// Process that is killed: it records until then, and prints how much is safe.
 #[test]
 fn child() {
     let Ok(file) = std::env::var(FILE) else { return };

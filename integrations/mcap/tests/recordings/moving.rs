@@ -10,7 +10,7 @@ use bb_estimators::{SimulatedActuator, SimulatedEncoder};
 use bb_mcap::{Bag, Recorder, RecorderOptions, Recording};
 use std::collections::HashMap;
 
-/// Where a platform has driven: x, y, m; heading, rad.
+/// Position that a platform has driven to: x, y, m; heading, rad.
 #[derive(Clone, Debug, PartialEq, Payload)]
 #[payload(joint_position)]
 struct Driven([f64; 3]);

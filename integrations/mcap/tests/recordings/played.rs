@@ -1,4 +1,4 @@
-//! What was recorded, in the place of the components that published it.
+//! Recordings in the place of the components that published them.
 
 use super::robot::Temporary;
 use bb_core::prelude::*;

@@ -5,7 +5,7 @@ use bb_core::prelude::*;
 use bb_mcap::{Recorder, RecorderOptions};
 use std::path::{Path, PathBuf};
 
-/// What a robot of ours alone knows.
+/// Payload that only this robot has, not ROS.
 #[derive(Clone, Debug, PartialEq, Payload)]
 pub(crate) enum Gripper {
     /// Holds nothing.
@@ -75,7 +75,7 @@ counted! {
 }
 
 counted! {
-    /// Where it is.
+    /// Locator of the robot.
     Locator, Odometry, |n| Odometry {
         pose: Pose {
             position: Vector3::new(f64::from(n), 0.0, 0.0),

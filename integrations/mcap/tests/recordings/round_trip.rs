@@ -1,4 +1,4 @@
-//! What was published is what is read.
+//! Round trip: messages are read as they were published.
 
 use super::robot::{Gripper, Rover, Temporary, record, rover};
 use bb_core::message::codec::encode;
@@ -124,7 +124,7 @@ fn asking_for_what_is_not_there_says_what_is() {
     let other = recording.messages::<Pose>("sensor/base/imu").expect_err("it is an IMU").to_string();
     assert!(other.contains("`sensor/base/imu` was recorded as `Imu`, and `Pose` is now"), "{other}");
     {
-        /// The same name, other fields.
+        /// Payload of the same name with other fields.
         #[derive(Clone, Debug, Payload)]
         enum Gripper {
             Open,

@@ -44,7 +44,7 @@ fn recorded(name: &str) -> (Temporary, Vec<Stamped<Marg>>) {
     (file, published.drain().collect())
 }
 
-/// What `tests/ros2/check` reads with programs of others.
+/// Recording that `tests/ros2/check` reads with programs of others.
 #[test]
 #[ignore = "tests/ros2/check runs it"]
 fn a_recording_for_others() {
