@@ -1,4 +1,4 @@
-//! What a running robot counts, as Prometheus reads it.
+//! Metrics of a running robot, for Prometheus.
 //!
 //! An [`Exporter`] takes a new report of the robot for each scrape: the robot itself does nothing more than without it.
 //! [`Exporter::render`] gives the text, [`Exporter::serve`] answers `GET /metrics`.

@@ -4,13 +4,13 @@ use std::io::{self, Read, Write};
 use std::net::{IpAddr, TcpStream};
 use std::time::{Duration, Instant};
 
-/// What a head may be long. Prometheus' is below 500 bytes.
+/// Largest length of a head, bytes. Prometheus' is below 500.
 const LONGEST_HEAD: usize = 8 * 1024;
 const MOST_HEADERS: usize = 64;
-/// How long a client may take to send its head, and to receive the answer.
+/// Time that a client may take to send its head, and to receive the answer.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// What becomes of a request.
+/// Answer to a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Answer {
     Metrics { with_body: bool },
@@ -85,7 +85,7 @@ fn answer(head: &[u8], is_local: bool) -> Option<Answer> {
     })
 }
 
-/// Whether a host, with any port, is a name of the loopback device.
+/// Returns whether a host, with any port, is a name of the loopback device.
 fn names_this_machine(host: &[u8]) -> bool {
     let Ok(host) = std::str::from_utf8(host) else { return false };
     let host = host.trim();

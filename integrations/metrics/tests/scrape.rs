@@ -257,7 +257,7 @@ fn it_stops_when_dropped_and_names_an_address_that_is_taken() {
     simulation.stop();
 }
 
-/// Its holder keeps `Stuck` in its callback.
+/// Lock whose holder keeps `Stuck` in its callback.
 static HELD: Mutex<()> = Mutex::new(());
 
 struct Stuck;
