@@ -7,7 +7,7 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-/// Of labels, in pixels.
+/// Font of labels, and its size in pixels.
 const FONT: (&str, u32) = ("sans-serif", 14);
 
 /// The key of a line in the legend, its distance to what is beside it, and the height of a row; pixels.
@@ -20,7 +20,7 @@ const MARGIN: u32 = 6;
 const X_LABELS: u32 = 42;
 const Y_LABELS: u32 = 86;
 
-/// What is drawn: one time axis, or a plane.
+/// Contents of a picture: one time axis, or a plane.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Frame<'a> {
     pub(super) title: &'a str,
@@ -39,7 +39,7 @@ pub(super) struct Frame<'a> {
 #[derive(Clone, Debug)]
 pub(super) struct Row<'a> {
     pub(super) frames: Vec<Frame<'a>>,
-    /// In panels.
+    /// Height in panels.
     pub(super) height: u32,
 }
 

@@ -3,7 +3,7 @@
 /// Red, green, blue.
 pub type Colour = (u8, u8, u8);
 
-/// In the order in which lines take them. Yellow, which is faint on white, comes last.
+/// Colours in the order in which lines take them. Yellow, which is faint on white, comes last.
 pub const PALETTE: [Colour; 8] = [
     (0, 114, 178),
     (213, 94, 0),

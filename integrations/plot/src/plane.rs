@@ -30,7 +30,7 @@ impl Plane {
 /// A part of a [`Sheet`].
 #[derive(Clone, Debug)]
 pub enum Part {
-    /// As high as this many panels.
+    /// Plane as high as this many panels.
     Plane(Plane, u32),
     /// Over time.
     Panel(Panel),
@@ -57,7 +57,7 @@ impl Part {
 pub struct Sheet {
     /// The title above them.
     pub title: String,
-    /// From the top.
+    /// Parts from top to bottom.
     pub parts: Vec<Part>,
     /// Width, and height of a panel, in pixels.
     pub panel_size: (u32, u32),
