@@ -46,12 +46,12 @@ use std::io::ErrorKind;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// By path, the value as JSON, which other programs can read.
+/// Values by path, as JSON, which other programs can read.
 const PARAMETERS: TableDefinition<'_, &str, &str> = TableDefinition::new("parameters");
 
 /// A [`ParameterStore`] in a file. One program at a time may have it open.
 pub struct RedbStore {
-    /// What errors call it.
+    /// Name of the store in errors.
     name: String,
     database: Database,
 }
