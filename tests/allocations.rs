@@ -1,4 +1,4 @@
-//! From a sensor's publish to the outputs of all estimators downstream nothing is allocated.
+//! Allocations on the way from a sensor's publish to the outputs of all estimators downstream: there are none.
 
 use bb_core::component::InputTransforms;
 use bb_core::nalgebra::{UnitQuaternion, Vector2, Vector3};
@@ -89,7 +89,7 @@ fn nothing_is_allocated_for_subscribers_that_are_full_or_awaited() {
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 struct Flash;
 
-/// Where a camera was, m.
+/// Position of a camera, m.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 struct Spot(Vector3<f64>);
 

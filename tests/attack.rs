@@ -114,7 +114,7 @@ impl Body {
         }
     }
 
-    /// How fast the time in motion passes: smoothly between 0 at rest and 1, with its slope.
+    /// Returns the pace of the time in motion: smoothly between 0 at rest and 1, with its slope.
     fn pace(&self, time_s: f64) -> (f64, f64) {
         if self.rests_s == 0.0 {
             return (1.0, 0.0);
@@ -133,7 +133,7 @@ impl Body {
 /// The field of a place of the Earth, of what stands about there, and of magnets that pass.
 struct Field {
     earth: Vector3<f64>,
-    /// In terms of the time in motion: a body that rests stays in its field.
+    /// Field of the surroundings over the time in motion: a body that rests stays in its field.
     places: Vectors,
     passing: Vector3<f64>,
     passes_every_s: f64,

@@ -1,4 +1,4 @@
-//! Where moving robots are, how fast, and how their joints reach a target.
+//! Kinematics of moving robots: positions, velocities, and how their joints reach a target.
 
 mod inverse;
 mod laws;

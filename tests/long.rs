@@ -1,4 +1,5 @@
-//! What takes minutes, or needs recordings. Built by its name alone, with optimisation: `cargo test --release -p bb-long-tests --test long`.
+//! Tests that take minutes, or need recordings. Built by name alone, with optimisation: `cargo test --release -p bb-long-tests --test
+//! long`.
 
 mod accuracy;
 mod attack;

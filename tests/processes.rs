@@ -1,4 +1,4 @@
-//! What a whole process has one of: its logger, its signals, its priorities.
+//! Objects of which a whole process has one: its logger, its signals, its priorities.
 
 mod blocked_logger;
 #[path = "behaviour/components.rs"]

@@ -15,7 +15,7 @@ use std::time::Instant;
 
 type Lines = Arc<Mutex<Vec<Entry>>>;
 
-/// What was published, path by path, to the last bit of payload and stamp.
+/// Messages published, path by path, to the last bit of payload and stamp.
 type Heard = BTreeMap<&'static str, Vec<String>>;
 
 fn hear(subscription: &DynamicSubscription) -> Heard {
@@ -99,7 +99,7 @@ fn builder(random: &mut Random) -> bb_core::Builder<Weathered> {
     builder
 }
 
-/// What comes from outside: the same calls on a simulated robot and on a running one.
+/// Disturbs a robot from outside: the same calls on a simulated robot and on a running one.
 fn disturb(live: &bb_core::Live<Weathered>, random: &mut Random) {
     let dice = Dice(random.below(1000) as f64);
     match random.below(18) {
@@ -247,7 +247,7 @@ fn from_environment(name: &str) -> Option<u64> {
     std::env::var(name).ok()?.parse().ok()
 }
 
-/// So many days, or as many as fit into `BB_STRESS_SECONDS`.
+/// Runs so many days, or as many as fit into `BB_STRESS_SECONDS`.
 fn days(kind: &str, few: u64, day: fn(u64) -> Result<bool, Box<dyn Error>>) {
     std::panic::set_hook(Box::new(|info| {
         let of_test = std::thread::current().name().is_some_and(|name| name.contains("days"));

@@ -24,7 +24,7 @@ fn filters() -> impl Iterator<Item = FilterParams> {
     FilterParams::ALL.iter().map(|default| default())
 }
 
-/// What is between `<!-- NAME -->` and `<!-- end -->` is `table`, or becomes it.
+/// Checks that the text between `<!-- NAME -->` and `<!-- end -->` is `table`, or replaces it.
 fn hold(file: &str, name: &str, table: &str) {
     // Several tables of one file are renewed at the same time.
     static ONE: Mutex<()> = Mutex::new(());

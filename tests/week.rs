@@ -115,7 +115,7 @@ fn every_run_of_everything_is_the_same() -> Result<(), Box<dyn std::error::Error
     Ok(())
 }
 
-/// This process's memory in bytes, if the system says so.
+/// Returns this process's memory in bytes, if the system reports it.
 fn memory() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|line| line.starts_with("VmRSS:"))?;

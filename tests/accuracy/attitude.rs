@@ -72,7 +72,7 @@ fn mean_errors_on_broad() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Those that count.
+/// Returns the errors that count with these axes.
 fn angles(errors: &Degrees, row: &Row) -> Vec<f64> {
     match row.axes {
         Axes::Nine => vec![errors.total, errors.heading, errors.inclination],

@@ -1,5 +1,5 @@
-//! What each filter reaches on BROAD: `accuracy.csv` in its folder, which the tests are held against and the guide's tables
-//! are made from. `UPDATE_ACCURACY=1` renews it.
+//! Accuracy of each filter on BROAD: `accuracy.csv` in its folder, which the tests are held against and the guide's tables are made from.
+//! `UPDATE_ACCURACY=1` renews it.
 
 use bb_estimators::attitude::FilterParams;
 use bb_eval::{Averages, Axes, Chosen, Degrees, Setting};
@@ -117,7 +117,7 @@ pub(crate) fn rows() -> Result<Vec<Row>, Box<dyn Error>> {
     Ok(rows)
 }
 
-/// Whether the files are to be renewed instead of held against.
+/// Returns whether the files are to be renewed instead of held against.
 pub(crate) fn is_update() -> bool {
     std::env::var_os("UPDATE_ACCURACY").is_some()
 }

@@ -6,7 +6,7 @@ use bb_eval::{
 use bb_tests::recordings::broad;
 use std::error::Error;
 
-/// What is changed, and the total error as measured on ten trials of BROAD: mean and worst, degrees.
+/// Change of the recordings, and the total error as measured on ten trials of BROAD: mean and worst, degrees.
 struct Known {
     name: &'static str,
     before_motion_s: Option<f64>,

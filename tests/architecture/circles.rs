@@ -12,7 +12,7 @@ fn no_modules_import_each_other_in_a_circle() {
     assert!(all.is_empty(), "{all:#?}");
 }
 
-/// Of each folder, which of its modules import which others.
+/// Imports of each folder: which of its modules import which others.
 type Imports = BTreeMap<Module, BTreeMap<String, BTreeSet<String>>>;
 
 fn circles_of(krate: &str) -> Vec<String> {

@@ -61,7 +61,7 @@ fn arrows_between_crates_point_one_way() {
     }
 }
 
-/// What a user may leave out is in `integrations/`, so that the top level is what the project is.
+/// Optional crates are in `integrations/`, so that the top level is what the project is.
 #[test]
 fn the_top_level_is_the_project() {
     let entries = std::fs::read_dir(root()).expect("it is the checkout");

@@ -1,4 +1,4 @@
-//! What the documents name is there.
+//! Paths and names in the documents: all of them exist.
 
 use super::{CRATES, read, root};
 

@@ -1,5 +1,5 @@
-//! What ARCHITECTURE.md claims: every path in it exists, arrows between crates, folders and files point one way, and of the
-//! runtime only that is public which its users name.
+//! Claims of ARCHITECTURE.md: every path in it exists, arrows between crates, folders and files point one way, and of the runtime only that
+//! is public which its users name.
 
 mod circles;
 mod crates;
@@ -51,7 +51,7 @@ fn code_below(folder: &Path, files: &mut Vec<PathBuf>) {
     }
 }
 
-/// Whether a folder's file declares the module for tests alone.
+/// Returns whether a folder's file declares the module for tests alone.
 fn is_for_tests(folder: &str, module: &str) -> bool {
     let declaration = format!(" mod {module};");
     let lines: Vec<&str> = folder.lines().collect();

@@ -11,7 +11,7 @@ pub(super) struct Modules(BTreeMap<Module, Code>);
 
 struct Code {
     text: String,
-    /// What each name is that the module takes in by a `use` of its own.
+    /// Names that the module takes in by a `use` of its own, with their paths.
     names: BTreeMap<String, Vec<String>>,
 }
 
@@ -110,7 +110,7 @@ impl Modules {
     }
 }
 
-/// What each name of a module is that it takes in by `use`.
+/// Collects the names that a module takes in by `use`, with their paths.
 fn names_in(code: &str) -> BTreeMap<String, Vec<String>> {
     let mut names = BTreeMap::new();
     for line in code.match_indices("use ").filter(|(at, _)| begins_statement(&code[..*at])) {
@@ -155,7 +155,7 @@ pub(super) fn public_names_in(code: &str) -> Vec<String> {
     names
 }
 
-/// Whether a `use` after this text is a statement at the margin.
+/// Returns whether a `use` after this text is a statement at the margin.
 fn begins_statement(before: &str) -> bool {
     let line = before.rsplit('\n').next().unwrap_or("");
     line.is_empty() || line == "pub " || line.starts_with("pub(") && line.ends_with(") ")
@@ -164,7 +164,7 @@ fn begins_statement(before: &str) -> bool {
 /// A path as names, with the name it is given by `as`.
 type Path = (Vec<String>, Option<String>);
 
-/// What follows `start` in the paths that begin with it: those in a group one by one.
+/// Returns what follows `start` in the paths that begin with it: those in a group one by one.
 pub(super) fn paths_from(code: &str, start: &str) -> Vec<Path> {
     let mut paths = Vec::new();
     for (at, _) in code.match_indices(start) {

@@ -1,4 +1,4 @@
-//! What is public in the runtime is what a program names that uses it. Plumbing is exported by `__private` alone.
+//! Public items of the runtime: those that a program names which uses it. Plumbing is exported by `__private` alone.
 
 use super::modules::public_names_in;
 use super::{code_of, root};

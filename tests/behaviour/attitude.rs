@@ -1,4 +1,4 @@
-//! What attitude estimators emit: the orientation alone, or beside what else they know.
+//! Outputs of attitude estimators: the orientation alone, or beside what else they know.
 
 use bb_core::prelude::*;
 use bb_estimators::attitude::AttitudeOutputs;

@@ -112,7 +112,7 @@ fn child() {
     drop(recorder);
 }
 
-/// What a file holds up to where it breaks off.
+/// Reads the entries of a file up to where it breaks off.
 fn lines_of(file: &std::path::Path) -> Result<Vec<Entry>, Failure> {
     let reader = JournalReader::<Again>::default();
     let recording = Recording::open(file)?;

@@ -1,12 +1,12 @@
-//! What a latency budget charges an estimator with in real time, and what is measured without one.
+//! Latency budgets in real time: what they charge an estimator with, and what is measured without one.
 
 use crate::components::{Failure, Number, Scale, at};
 use bb_core::prelude::*;
 
-/// How long a copy for a subscriber takes.
+/// Time that a copy for a subscriber takes.
 const COPYING: Duration = Duration::from_millis(60);
 
-/// How long dropping a message takes.
+/// Time that dropping a message takes.
 const DROPPING: Duration = Duration::from_millis(40);
 
 /// A payload whose copies take long, and whose messages are dropped slowly.

@@ -6,7 +6,7 @@ use bb_core::prelude::*;
 use bb_core::telemetry::TelemetryEvent;
 use std::sync::{Arc, Mutex};
 
-/// Where to go, and how.
+/// Destination of a trip, and its pace.
 #[derive(Clone, Debug, Default, PartialEq, Payload)]
 pub(crate) struct Goal {
     pub(crate) name: String,
@@ -14,7 +14,7 @@ pub(crate) struct Goal {
     pub(crate) stops: Vec<u8>,
 }
 
-/// Where it got to.
+/// Destination that was reached.
 #[derive(Clone, Debug, PartialEq, Payload)]
 pub(crate) struct Arrival {
     pub(crate) name: String,

@@ -7,7 +7,7 @@ use bb_core::event::ParameterValue;
 use bb_core::prelude::*;
 use bb_core::run::DropReason;
 
-/// What it can be told and asked.
+/// Cast that adds a number.
 pub(crate) struct Add(f64);
 pub(crate) struct HowMuch;
 /// Asks, and wants a timeout or more work after the answer.
@@ -21,7 +21,7 @@ pub(crate) struct Leave {}
 pub(crate) struct SumOptions {
     #[option(default = 1.0, range = 0.0..=10.0)]
     pub(crate) gain: f64,
-    /// What it asks for in `init`.
+    /// Name of the request that it makes in `init`.
     #[option(default = "nothing")]
     pub(crate) asks: &'static str,
 }
@@ -307,7 +307,7 @@ robot! {
     }
 }
 
-/// It is as if it were not there; those that take its outputs have an input that never comes.
+/// Estimators that are left out do not exist; those that take their outputs have an input that never comes.
 #[test]
 fn an_estimator_may_be_left_out() -> Result<(), StartError> {
     let builder = Partial::builder();

@@ -8,7 +8,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::task::Poll;
 
-/// What a [`Misbehave`] does.
+/// Behaviour of a [`Misbehave`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Payload)]
 pub(crate) enum Kind {
     #[default]

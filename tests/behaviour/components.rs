@@ -20,19 +20,19 @@ impl JointPositions for Number {
 
 pub(crate) type Failure = Box<dyn std::error::Error>;
 
-/// What code without a result gives.
+/// Result of code that returns nothing.
 pub(crate) type Done = Result<(), Fault>;
 
-/// What code of an [`Echo`] gives.
+/// Result of code of an [`Echo`].
 pub(crate) type Replied = Result<Reply<Number>, Fault>;
 
-/// What an [`Echo`] does with a number, and with another one that it keeps.
+/// Code of an [`Echo`] for a number, with another one that it keeps.
 pub(crate) type OnNumber = fn(&mut f64, f64) -> Replied;
 
-/// What code of a [`Source`] or a [`Pulse`] gives.
+/// Result of code of a [`Source`] or a [`Pulse`].
 pub(crate) type Read = Result<Reading<Number>, Fault>;
 
-/// What code of a [`Task`] gives.
+/// Result of code of a [`Task`].
 pub(crate) type Doing = Pin<Box<dyn Future<Output = Result<Outcome<()>, Fault>> + Send>>;
 
 /// Options of [`Source`].
@@ -40,7 +40,7 @@ pub(crate) type Doing = Pin<Box<dyn Future<Output = Result<Outcome<()>, Fault>> 
 pub(crate) struct SourceOptions {
     #[option(default = |_| Ok(()))]
     pub(crate) init: fn(&SensorContext) -> Done,
-    /// What the reading of this number gives, counted from 1.
+    /// Code of the reading of this number, counted from 1.
     #[option(default = |_, _| Ok(Reading::nothing()))]
     pub(crate) read: fn(u32, MonotonicTime) -> Read,
     #[option(default = || None)]
@@ -92,7 +92,7 @@ impl Drop for Source {
 pub(crate) struct EchoOptions {
     #[option(default = |_| Ok(()))]
     pub(crate) init: fn(&Context) -> Done,
-    /// What becomes of a number, with another one that it keeps.
+    /// Code for a number, with another one that it keeps.
     #[option(default = |_, number| Ok(Reply::emit(Number(number))))]
     pub(crate) input: OnNumber,
     #[option(default = |_, _| Ok(Reply::none()))]
@@ -180,7 +180,7 @@ pub(crate) struct ServoOptions {
     pub(crate) init: fn(&ActuatorContext) -> Done,
     #[option(default = |_| Ok(()))]
     pub(crate) command: fn(f64) -> Done,
-    /// What it does with the last number when it is disarmed.
+    /// Code that runs with the last number when it is disarmed.
     #[option(default = |_| Ok(()))]
     pub(crate) disarm: fn(f64) -> Done,
     #[option(default = |_| ())]
@@ -233,7 +233,7 @@ pub(crate) struct PulseOptions {
     pub(crate) init: MakeUpdate,
 }
 
-/// What gives a [`Pulse`] its code.
+/// Function that gives a [`Pulse`] its code.
 pub(crate) type MakeUpdate = fn(&ServiceContext) -> Result<Update, Fault>;
 
 /// The code of an update of a [`Pulse`].
@@ -286,7 +286,7 @@ pub(crate) struct CounterOptions {
     /// The first number.
     #[option(default = 0.0)]
     pub(crate) start: f64,
-    /// How many numbers it gives.
+    /// Number of numbers that it gives.
     #[option(default = 5)]
     pub(crate) count: u32,
 }
@@ -316,7 +316,7 @@ impl Sensor for Counter {
 /// Options of [`Scale`].
 #[derive(Clone, Debug, Options)]
 pub(crate) struct ScaleOptions {
-    /// What each number is multiplied by.
+    /// Factor that each number is multiplied by.
     #[option(default = 2.0, range = -1e3..=1e3)]
     pub(crate) factor: f64,
 }
@@ -339,18 +339,18 @@ impl Estimator for Scale {
     }
 }
 
-/// What [`Snapshot`] saw: the numbers, and which were new. NaN would be dropped, so what is missing is -1.
+/// Inputs that [`Snapshot`] received: the numbers, and which were new. NaN would be dropped, so what is missing is -1.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 pub(crate) struct Seen {
     /// The driver's number.
     pub(crate) driver: f64,
     /// The second number.
     pub(crate) second: f64,
-    /// Whether it was new.
+    /// `true` if the second number was new.
     pub(crate) second_is_new: bool,
     /// The number that need not be there.
     pub(crate) third: f64,
-    /// Whether it was new.
+    /// `true` if the third number was new.
     pub(crate) third_is_new: bool,
 }
 
@@ -406,7 +406,7 @@ impl Sensor for CanEncoder {
     }
 }
 
-/// What a [`Move`] is told.
+/// Arguments of a [`Move`].
 #[derive(Clone, Copy, Debug, Default, Payload)]
 pub(crate) struct Target {
     pub(crate) millis: u64,
@@ -434,7 +434,7 @@ impl Command for Move {
     }
 }
 
-/// What threads and tests share, though one that had it panicked.
+/// Locks what threads and tests share, though one that had it panicked.
 pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -36,7 +36,8 @@ fn at_rest() -> Imu {
     Imu::new(Vector3::zeros(), Vector3::new(0.0, 0.0, 9.80665))
 }
 
-/// What both emit last, of poses that are turned by `off` (world axes, rad) from a robot that rests, its x axis to the north.
+/// Returns the last outputs of both, fed with poses that are turned by `off` (world axes, rad) from a robot that rests, its x axis to the
+/// north.
 fn rests(off: Vector3<f64>, deviations: Vector3<f64>) -> Result<[Pose; 2], StartError> {
     let builder = Turned::builder();
     let emitted =
@@ -77,7 +78,7 @@ fn a_rotation_is_known_about_the_axes_of_the_world() -> Result<(), StartError> {
     Ok(())
 }
 
-/// Of a sensor whose own axis points up, so that no axis of its body is the one that counts.
+/// A heading is known about up, for a sensor whose own axis points up, so that no axis of its body is the one that counts.
 #[test]
 fn a_heading_is_known_about_up() -> Result<(), StartError> {
     let off = Vector3::new(0.0, 0.0, 0.1);

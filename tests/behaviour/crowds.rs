@@ -10,7 +10,7 @@ static HERE: Gate = Gate::new();
 
 static CANCELLED: Gate = Gate::new();
 
-/// Where commands that health starts hang.
+/// Place at which commands that health starts hang.
 pub(crate) struct OfHealth;
 
 impl Place for OfHealth {
@@ -18,7 +18,7 @@ impl Place for OfHealth {
     const NAME: &'static str = "here";
 }
 
-/// Where those hang that are cancelled.
+/// Place at which commands hang that are cancelled.
 pub(crate) struct InVain;
 
 impl Place for InVain {
@@ -28,7 +28,7 @@ impl Place for InVain {
 
 static WAITING: Gate = Gate::new();
 
-/// Where more hang than there are threads.
+/// Place at which more commands hang than there are threads.
 pub(crate) struct InLine;
 
 impl Place for InLine {

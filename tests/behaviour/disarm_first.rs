@@ -18,7 +18,7 @@ const AT_ONCE: Duration = Duration::from_secs(2);
 
 static HERE: Gate = Gate::new();
 
-/// Whether the motor was told to stop.
+/// State of the motor: `true` once it was asked to stop.
 static STOPPED: (Mutex<bool>, Condvar) = (Mutex::new(false), Condvar::new());
 
 fn set_stopped(stopped: bool) {
@@ -75,7 +75,7 @@ impl Estimator for Thinker {
     }
 }
 
-/// Where commands hang.
+/// Place at which commands hang.
 #[derive(Debug)]
 pub(crate) struct InCommands;
 
@@ -117,7 +117,7 @@ impl Service for Steer {
     }
 }
 
-/// What must be stopped.
+/// Motor that must be stopped.
 #[derive(Debug)]
 pub(crate) struct Motor;
 
@@ -184,7 +184,7 @@ robot! {
     }
 }
 
-/// What hangs is one place.
+/// Lock of the place at which code hangs: one test at a time uses it.
 static ALONE: Mutex<()> = Mutex::new(());
 
 fn alone() -> MutexGuard<'static, ()> {
@@ -413,7 +413,7 @@ impl Sensor for Thermometer {
     }
 }
 
-/// What a command has been given.
+/// Context that a command was given.
 static LENT: Mutex<Option<CommandContext>> = Mutex::new(None);
 
 /// Gives away what it was given, and waits.
@@ -432,7 +432,7 @@ impl Command for Lend {
     }
 }
 
-/// What became of the last attempt of a command to move.
+/// Result of a command's last attempt to move.
 static TRIED: Mutex<Option<Result<(), ActuatorError>>> = Mutex::new(None);
 
 /// Hangs, and moves once it is let go.

@@ -1,4 +1,4 @@
-//! What tools learn of a running robot: its description as JSON, by path, and its picture.
+//! Descriptions for tools of a running robot: its declaration as JSON, by path, and its picture.
 
 use crate::components::{CanEncoder, Counter, Failure, Scale, Task};
 use bb_core::component::{ComponentKind, JointPublisher};

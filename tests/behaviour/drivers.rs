@@ -19,7 +19,7 @@ pub struct AccelerometerOptions {
 
 pub struct Accelerometer {
     port: Box<dyn SerialPort>,
-    /// What has arrived of the next line.
+    /// Bytes of the next line that have arrived.
     line: Vec<u8>,
 }
 

@@ -14,7 +14,7 @@ struct Events<'a> {
     second: Every<'a, Number>,
 }
 
-/// What a run saw.
+/// Numbers that reached a run.
 #[derive(Clone, Debug, Default, PartialEq, Payload)]
 struct SeenEvents {
     first: Vec<f64>,
@@ -30,7 +30,7 @@ const HOLDS: f64 = -3.0;
 /// Options of [`Witness`].
 #[derive(Clone, Debug, Options)]
 struct WitnessOptions {
-    /// Whether it waits where it is told to.
+    /// `true` to wait at the message that asks for it.
     #[option(default = false)]
     holds: bool,
 }
@@ -203,7 +203,7 @@ fn a_worker_that_is_held_up_sees_each_message_in_the_run_that_it_came_before() {
 /// The step from which on nothing fails.
 const HALF: u32 = 1000;
 
-/// In a random order, with failures and restarts, and again from the journal.
+/// Every message, in a random order, with failures and restarts, is in one run or was lost with a failure; and again from the journal.
 #[test]
 fn each_message_is_in_one_run_or_was_lost_with_a_failure() -> Result<(), Failure> {
     for seed in 0..8 {

@@ -1,4 +1,4 @@
-//! What an `init` has started that fails then: how it is made safe, and what becomes of callbacks that fail or hang.
+//! Starts that fail: how what an `init` has started is made safe, and what becomes of callbacks that fail or hang.
 
 use crate::components::{Number, side_by_side, within};
 use crate::gate::Gate;
@@ -9,11 +9,11 @@ use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
 /// The devices of one test.
 struct Rig {
     gate: Gate,
-    /// Whether callbacks pass the gate, or fail.
+    /// `true` if callbacks pass the gate; `false` if they fail.
     hangs: bool,
-    /// How often the device was made.
+    /// Number of times that the device was made.
     made: AtomicU32,
-    /// How many threads are in its callbacks, and how many have left them.
+    /// Numbers of threads that are in its callbacks, and that have left them.
     inside: AtomicI32,
     left: AtomicI32,
     /// The largest number of threads that were inside at a time.
@@ -34,7 +34,7 @@ impl Rig {
         Self { gate: Gate::new(), hangs, made, inside, left, most }
     }
 
-    /// How many threads have entered its callbacks.
+    /// Returns the number of threads that have entered its callbacks.
     fn entered(&self) -> i32 {
         self.inside.load(Ordering::SeqCst) + self.left.load(Ordering::SeqCst)
     }
@@ -54,7 +54,7 @@ impl Rig {
 /// Options of [`Device`] and [`Servo`].
 #[derive(Clone, Debug, Options)]
 pub(crate) struct DeviceOptions {
-    /// Its rig.
+    /// Index of its rig.
     #[option(default = 0)]
     pub(crate) rig: usize,
 }
@@ -88,7 +88,7 @@ impl Sensor for Device {
     }
 }
 
-/// The same as an actuator.
+/// Device as an actuator.
 #[derive(Debug)]
 pub(crate) struct Servo;
 

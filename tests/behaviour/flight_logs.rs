@@ -1,4 +1,4 @@
-//! What the state estimator tells a subscriber that writes JSON: one object a line, by level, each with its fields.
+//! Logs of the state estimator in a subscriber that writes JSON: one object a line, by level, each with its fields.
 
 use bb_core::nalgebra::{UnitQuaternion, Vector3};
 use bb_estimators::navigation::state_estimator::{

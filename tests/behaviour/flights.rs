@@ -215,7 +215,7 @@ fn an_imu_that_stops_engages_the_fallback_and_its_return_recovers_it() -> Result
     Ok(())
 }
 
-/// What went to the recorder is in the file, though nothing is logged: no subscriber of `tracing` is set.
+/// Events for the recorder are in the file, though nothing is logged: no subscriber of `tracing` is set.
 #[test]
 fn the_recorder_holds_labels_the_gate_rejections_and_faults() -> Result<(), Failure> {
     for strategy in STRATEGIES {

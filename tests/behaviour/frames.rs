@@ -6,12 +6,12 @@ use bb_core::prelude::*;
 use bb_core::topology::JointKind;
 use std::sync::Mutex;
 
-/// Where the inputs' origins are in the frame of the output, m.
+/// Origins of the inputs in the frame of the output, m.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 pub(crate) struct Origins {
-    /// Of `near`.
+    /// Origin of `near`.
     pub(crate) near: Vector3<f64>,
-    /// Of `far`.
+    /// Origin of `far`.
     pub(crate) far: Vector3<f64>,
     /// The x axis of `far`.
     pub(crate) far_x: Vector3<f64>,
@@ -20,9 +20,9 @@ pub(crate) struct Origins {
 /// Two numbers from two places.
 #[derive(Clone, Copy, Debug, Inputs)]
 pub(crate) struct Places<'a> {
-    /// From here.
+    /// Number from the link of the estimator.
     pub(crate) near: Input<'a, Number>,
-    /// From there.
+    /// Number from another link.
     pub(crate) far: Input<'a, Number>,
 }
 

@@ -86,7 +86,7 @@ impl<P: Place + Send + Sync> Command for Stuck<P> {
     }
 }
 
-/// What a [`Brake`] does.
+/// Code of a [`Brake`].
 pub(crate) trait Brakes: Send + 'static {
     fn brake() -> Result<(), Fault>;
 }

@@ -7,7 +7,7 @@ use bb_core::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard};
 
-/// How often brakes were applied: by the estimator, and by the command.
+/// Number of times that brakes were applied: by the estimator, and by the command.
 static BRAKED: [AtomicU32; 2] = [AtomicU32::new(0), AtomicU32::new(0)];
 
 fn braked() -> [u32; 2] {

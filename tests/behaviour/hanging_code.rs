@@ -158,7 +158,7 @@ mod pools {
 
     static HANG: Hangs = Hangs::new();
 
-    /// Where commands hang until all are let go.
+    /// Place at which commands hang until all are let go.
     pub(crate) struct InPool;
 
     impl Place for InPool {
@@ -324,7 +324,7 @@ mod reentrance {
     /// One test at a time has the robot.
     static TURN: Mutex<()> = Mutex::new(());
 
-    /// What hangs, hangs on that thread alone.
+    /// Runs a test on a thread of its own: code that hangs, hangs on that thread alone.
     fn in_time(test: impl FnOnce() -> Result<(), Box<dyn std::error::Error>> + Send + 'static) {
         let _turn = TURN.lock();
         let (done, ended) = mpsc::channel();

@@ -178,7 +178,7 @@ fn latencies_and_ages_of_messages_are_counted() -> Result<(), StartError> {
     Ok(())
 }
 
-/// What publishes all along, and is refused: the statistics say why the estimator is lost.
+/// Messages that are refused all along: the statistics say why the estimator is lost.
 #[test]
 fn a_loss_after_refused_messages_has_their_reason() -> Result<(), StartError> {
     let mut run = Run::start()?;

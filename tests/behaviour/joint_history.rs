@@ -5,7 +5,7 @@ use crate::joints::{Pixel, joint};
 use bb_core::component::InputTransforms;
 use bb_core::prelude::*;
 
-/// From the base, and from beyond the joint: the newest of both, however old.
+/// Inputs from the base, and from beyond the joint: the newest of both, however old.
 #[derive(Clone, Copy, Debug, Inputs)]
 pub(crate) struct Kept<'a> {
     #[allow(dead_code, reason = "it only drives")]

@@ -150,7 +150,7 @@ fn on_virtual_time(builder: bb_core::Builder<Swing>, millis: i64) -> Result<(Hea
     })
 }
 
-/// Whether some were answered, and some were not, for each of the reasons.
+/// Returns whether some inputs were answered, and some were not, for each of the reasons.
 fn is_a_bad_day(report: &Report) -> bool {
     ["estimator/base/spot", "estimator/base/busy"].iter().all(|path| {
         let estimator = report.estimator(path).expect("it is declared");

@@ -10,11 +10,11 @@ use bb_core::prelude::*;
 use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
-/// What a camera sees.
+/// Measurement of a camera.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 pub(crate) struct Pixel(pub(crate) f64);
 
-/// Where an input was, m, and its x axis.
+/// Position of an input, m, and its x axis.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 pub(crate) struct Spot {
     pub(crate) at: Vector3<f64>,
@@ -48,7 +48,7 @@ impl Estimator for Spotter {
     }
 }
 
-/// From the base, from the tip, and from a joint.
+/// Inputs from the base, from the tip, and from a joint.
 #[derive(Clone, Copy, Debug, Inputs)]
 pub(crate) struct Views<'a> {
     pub(crate) imu: Input<'a, Pixel>,
@@ -57,10 +57,10 @@ pub(crate) struct Views<'a> {
     pub(crate) lift: Option<Input<'a, JointState>>,
 }
 
-/// What [`Fusion`] was told.
+/// Inputs that [`Fusion`] received.
 #[derive(Clone, Debug, PartialEq, Payload)]
 pub(crate) struct Told {
-    /// Where the camera was, or why that is not known.
+    /// Position of the camera, or the reason for which it is not known.
     pub(crate) camera: String,
     pub(crate) lift: Option<f64>,
 }
@@ -319,7 +319,7 @@ fn a_motor_is_seen_through_its_transmission() -> Result<(), Failure> {
     Ok(())
 }
 
-/// As those of declared sensors, also in a replay.
+/// States at a path of one's own below `sensor` are kept as those of declared sensors, also in a replay.
 #[test]
 fn states_at_a_path_of_ones_own_below_sensor_are_kept() -> Result<(), Failure> {
     let states = |names: &[&str], positions: &[f64]| JointStates {

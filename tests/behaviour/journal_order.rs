@@ -1,4 +1,4 @@
-//! What happens at one instant, or in the middle of something else, happens in the same order again from the journal.
+//! Order of what happens at one instant, or in the middle of something else: it is the same again from the journal.
 
 use crate::components::{Doing, Echo, Failure, Number, Replied, Task, at};
 use crate::gate::wait_until;

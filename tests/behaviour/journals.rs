@@ -1,4 +1,4 @@
-//! What may happen to a robot once, and happens again from its journal.
+//! Replays of whatever may happen to a robot, from its journal.
 
 use crate::components::{Done, Failure, Number, Replied, Servo, at, within};
 use crate::gate::Gate;
@@ -115,7 +115,7 @@ fn brakes(last: f64) -> Done {
     if last == REFUSES { Err(Fault::new("no brake")) } else { Ok(()) }
 }
 
-/// How often a [`Drive`] moves, and what it does then.
+/// Number of steps of a [`Drive`], and what it does at each.
 #[derive(Clone, Copy, Debug, Default, Payload)]
 pub(crate) struct Way {
     pub(crate) steps: u32,
@@ -179,7 +179,7 @@ robot! {
     }
 }
 
-/// What hangs is one for all.
+/// Lock of the place at which code hangs: one test at a time uses it.
 static ALONE: Mutex<()> = Mutex::new(());
 
 pub(crate) fn alone() -> MutexGuard<'static, ()> {
@@ -197,7 +197,7 @@ fn again(script: impl FnOnce(&mut Simulation<Again>) -> Result<(), Failure>) -> 
     })
 }
 
-/// The same in real time.
+/// Runs it in real time as `script` has it, and again.
 fn again_in_real_time(script: impl FnOnce(&Running<Again>)) -> Result<(Heard, Report), Failure> {
     same_again(Again::builder, |builder| {
         let running = builder.start()?;

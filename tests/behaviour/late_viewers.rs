@@ -47,7 +47,7 @@ impl Actuator for Jammed {
 /// Arguments of [`Travel`].
 #[derive(Clone, Debug, Payload)]
 pub(crate) struct Distance {
-    /// How far.
+    /// Distance to travel.
     #[payload(unit = "m")]
     pub(crate) distance: f64,
 }
@@ -76,7 +76,7 @@ impl Command for Travel {
 robot! {
     robot Watched;
     parameters {
-        /// How far the mast may turn.
+        /// Largest angle of the mast.
         turn: f64 = 90 deg, range: 0 deg..=180 deg;
         count: i64 = 3;
         name: String = "a";
@@ -206,7 +206,7 @@ fn another_caller_lists_and_cancels_what_runs() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// What was obtained through a session, by whatever thread, refuses to act once it has ended; to disarm is everybody's.
+/// Objects obtained through a session, by whatever thread, refuse to act once it has ended; to disarm is everybody's.
 #[test]
 fn nothing_acts_in_the_name_of_a_session_that_has_ended() -> Result<(), Box<dyn Error>> {
     let simulation = Watched::builder().simulate()?;
@@ -293,7 +293,7 @@ fn a_description_has_what_forms_need() -> Result<(), Box<dyn Error>> {
     };
     let travel = of("commands", "command/travel");
     let distance = &travel["arguments"]["properties"]["distance"];
-    assert_eq!((&distance["description"], &distance["unit"]), (&"How far.".into(), &"m".into()));
+    assert_eq!((&distance["description"], &distance["unit"]), (&"Distance to travel.".into(), &"m".into()));
     assert_eq!((&travel["defaults"]["distance"], &travel["role"]), (&2.5.into(), &"plain".into()));
     assert_eq!(of("commands", "command/arm")["role"], "arming");
     assert_eq!(of("parameters", "param/turn")["maximum"], std::f64::consts::PI);

@@ -1,4 +1,4 @@
-//! What hangs when the robot stops is left behind and reported; nobody waits for it for longer than the robot says.
+//! Code that hangs when the robot stops is left behind and reported; nobody waits for it for longer than the robot says.
 
 use crate::components::{Number, within};
 use crate::gate::Gate;
@@ -9,10 +9,10 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, mpsc};
 use std::task::{Context as Polled, Wake, Waker};
 
-/// Where all of it hangs.
+/// Gate at which all of it hangs.
 static HERE: Gate = Gate::new();
 
-/// How often something was made safe.
+/// Number of times that something was made safe.
 static DISARMED: AtomicU32 = AtomicU32::new(0);
 
 /// Hangs when it is closed.
@@ -45,7 +45,7 @@ impl Actuator for Clinging {
 #[derive(Debug)]
 pub(crate) struct Heavy(Dropping);
 
-/// What hangs when it is dropped.
+/// Value that hangs when it is dropped.
 #[derive(Debug)]
 struct Dropping;
 

@@ -35,9 +35,9 @@ robot! {
     }
 }
 
-/// What it reads is what follows from where the link is: second differences of its position, and the turning of its axes. This
-/// uses the kinematics of positions alone, not those of velocities and accelerations that the sensor uses. Joints accelerate
-/// evenly within a millisecond of the world, so the three poses are taken within one.
+/// An IMU on a moving link reads what follows from the link's motion: second differences of its position, and the turning of its axes. This
+/// uses the kinematics of positions alone, not those of velocities and accelerations that the sensor uses. Joints accelerate evenly within
+/// a millisecond of the world, so the three poses are taken within one.
 #[test]
 fn an_imu_on_a_moving_link_measures_how_that_moves() -> Result<(), Failure> {
     let mut simulation = Swing::builder().simulate()?;

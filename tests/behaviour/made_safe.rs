@@ -11,41 +11,41 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// The devices of these tests are there once.
 static ALONE: Mutex<()> = Mutex::new(());
 
-/// How many motors turn.
+/// Number of motors that turn.
 static TURNING: AtomicI32 = AtomicI32::new(0);
-/// How often a motor was made.
+/// Number of times that a motor was made.
 static MADE: AtomicU32 = AtomicU32::new(0);
-/// What the motor made first, and the later ones, do in `init`.
+/// Behaviour in `init` of the motor made first, and of the later ones.
 static FIRST: AtomicU32 = AtomicU32::new(WORKS);
 static LATER: AtomicU32 = AtomicU32::new(WORKS);
 /// Armed by the lidar's callback, with what that was told.
 static ARMS: Mutex<Option<Live<Scanner>>> = Mutex::new(None);
 static ARMED: Mutex<Option<Result<(), ArmError>>> = Mutex::new(None);
-/// Whether a brake holds.
+/// `true` while a brake holds.
 static HOLDS: AtomicBool = AtomicBool::new(true);
 
-/// Whether a motor registers what stops it before it is started, or after.
+/// `true` if a motor registers what stops it before it is started; `false` if after.
 static REGISTERS_FIRST: AtomicBool = AtomicBool::new(false);
 
 const WORKS: u32 = 0;
 const FAILS: u32 = 1;
 const PANICS: u32 = 2;
 const FAILS_FOR_GOOD: u32 = 3;
-/// It works until it is read.
+/// Motor that works until it is read.
 const FAILS_WHEN_READ: u32 = 4;
-/// It works, and goes on when it is made safe.
+/// Motor that works, and goes on when it is made safe.
 const STAYS: u32 = 5;
 
-/// What a brake waits for.
+/// Condition that a brake waits for.
 static BRAKES: AtomicU32 = AtomicU32::new(SLOWLY);
-/// For 300 ms.
+/// Wait for 300 ms.
 const SLOWLY: u32 = 0;
-/// For a lidar that was started meanwhile to be made safe.
+/// Wait for a lidar that was started meanwhile to be made safe.
 const UNTIL_SAFE: u32 = 1;
-/// For a lidar to be at the gate of its `init`.
+/// Wait for a lidar to be at the gate of its `init`.
 const UNTIL_AT_GATE: u32 = 2;
 
-/// Where the second lidar's `init` and then its callback may wait.
+/// Gate at which the second lidar's `init` and then its callback may wait.
 static GATE: Gate = Gate::new();
 
 fn alone() -> MutexGuard<'static, ()> {
@@ -137,7 +137,7 @@ impl Brakes for Slowly {
     }
 }
 
-/// Where a command blocks its thread.
+/// Gate at which a command blocks its thread.
 static BLOCK: Gate = Gate::new();
 
 #[derive(Debug)]
@@ -181,7 +181,7 @@ fn what_is_started_while_the_robot_is_disarmed_is_made_safe_as_well() {
     });
 }
 
-/// Who arms the robot.
+/// Caller that arms the robot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Arms {
     Call,
@@ -243,7 +243,7 @@ fn what_is_started_after_a_disarming_by_an_init_from_before_is_made_safe_before_
     });
 }
 
-/// Its own code that would wait for itself is told at once.
+/// Code that makes hardware safe gets an error at once if it arms the robot: it would wait for itself.
 #[test]
 fn what_makes_hardware_safe_cannot_arm_the_robot_meanwhile() {
     let _alone = alone();
@@ -313,7 +313,7 @@ impl Command for Check {
     }
 }
 
-/// Where to go. It takes long to find out.
+/// Distance to go. Its default takes long to find out.
 #[derive(Clone, Debug, Payload)]
 pub(crate) struct Far {
     metres: f64,
@@ -326,7 +326,7 @@ impl Default for Far {
     }
 }
 
-/// How often `go` ran.
+/// Number of times that `go` ran.
 static WENT: AtomicU32 = AtomicU32::new(0);
 
 /// Goes there.
@@ -464,7 +464,7 @@ fn each_disarm_reports_its_own_callbacks() {
     });
 }
 
-/// What `disarm` and `arm` return to a callback.
+/// Results of `disarm` and `arm` in a callback.
 type Said = (Result<(), DisarmError>, Result<(), ArmError>);
 
 static SAID: Mutex<Vec<Said>> = Mutex::new(Vec::new());

@@ -8,7 +8,7 @@ use bb_core::run::{ActuatorError, ActuatorHandle};
 use bb_core::{DynamicSubscription, Exceeded, JointBounds, JointCommand, OutOfBounds};
 use std::sync::{Arc, Mutex};
 
-/// What the driver does wrong, and whether it reports the end of its motion when it is disarmed.
+/// Fault of the driver, and whether it reports the end of its motion when it is disarmed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Fails {
     #[default]
@@ -40,7 +40,7 @@ impl Script {
 struct DriveOptions {
     #[option(default = Script::default())]
     script: Script,
-    /// It is restarted when this changes.
+    /// Current of the motor; the drive is restarted when it changes.
     #[option(default = 1.0)]
     current: f64,
 }

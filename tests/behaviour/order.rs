@@ -1,4 +1,4 @@
-//! What comes before what, on many threads; and code that the robot calls, which may call it back.
+//! Order of callbacks on many threads; and code that the robot calls, which may call it back.
 
 use crate::components::{Ask, Done, Echo, Number, Replied, Servo, Source, lock, when_woken, within};
 use crate::gate::PATIENCE;

@@ -83,7 +83,7 @@ fn outputs_go_to_their_paths_and_only_when_emitted() -> Result<(), StartError> {
     Ok(())
 }
 
-/// As many numbers, counted from 0, as it is told.
+/// Estimator that emits as many numbers, counted from 0, as its input says.
 #[derive(Debug)]
 pub(crate) struct Unroll;
 
@@ -112,7 +112,7 @@ impl HandleCast<Number> for Unroll {
 pub(crate) struct Samples {
     /// Each at its own time.
     pub(crate) samples: Vec<Timed<Number>>,
-    /// At the time of the driver's message.
+    /// Number at the time of the driver's message.
     pub(crate) count: Option<Number>,
 }
 

@@ -1,4 +1,4 @@
-//! What commands, controllers and outside code publish at paths of their own.
+//! Paths of their own at which commands, controllers and outside code publish.
 
 use crate::components::{Counter, Doing, Failure, Number, Pulse, Task, Update};
 use crate::replay::{entries, journal, same_again};
@@ -6,10 +6,10 @@ use bb_core::DynamicSubscription;
 use bb_core::journal::Event;
 use bb_core::prelude::*;
 
-/// How far a mission has come.
+/// Progress of a mission.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 pub(crate) struct Progress {
-    /// From 0 to 1.
+    /// Part that is done, from 0 to 1.
     pub(crate) done: f64,
 }
 
@@ -174,8 +174,8 @@ fn rows(report: &bb_core::Report) -> Vec<(&'static str, &'static str, u64)> {
     report.topics.iter().map(|topic| (topic.path, topic.payload, topic.published)).collect()
 }
 
-/// What was published at nowhere is reported too. More paths than a robot may have at once, those that nobody uses make room. A replay reports the same ones, with the same counts,
-/// whether somebody uses them there or not.
+/// Paths that made room are reported no more: there are more than a robot may have at once, and those that nobody uses make room. What was
+/// published at nowhere is reported too. A replay reports the same ones, with the same counts, whether somebody uses them there or not.
 #[test]
 fn a_replay_reports_the_paths_that_made_room_no_more() -> Result<(), Failure> {
     let mut builder = Missionary::builder();

@@ -223,7 +223,7 @@ impl Clone for SlowOptions {
     }
 }
 
-/// What it was told: its gains in order, and whether 50 was refused.
+/// Gains that it received, in order, and whether 50 was refused.
 static TUNED: Mutex<(Vec<f64>, Option<bool>)> = Mutex::new((Vec::new(), None));
 
 /// Tunes itself as it starts.

@@ -17,11 +17,11 @@ struct Memory(Arc<Mutex<State>>);
 #[derive(Debug, Default)]
 struct State {
     sets: Vec<Values>,
-    /// How many attempts fail.
+    /// Number of attempts that fail.
     fails: u32,
     panics: bool,
     attempts: u32,
-    /// What it does before it stores something.
+    /// Code that runs before it stores something.
     before: Option<fn()>,
 }
 

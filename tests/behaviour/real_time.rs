@@ -60,7 +60,7 @@ fn sensors_run_on_threads_of_their_own_and_stop_when_told() -> Result<(), StartE
 pub(crate) struct Checking {
     context: ActuatorContext,
     next: MonotonicTime,
-    /// When the first command came of which it is said below that the next one must not.
+    /// Time of the first command that arrived while a call was overdue.
     overdue_since: Option<MonotonicTime>,
 }
 

@@ -12,7 +12,7 @@ use bb_core::prelude::*;
 /// Options of [`Ramp`].
 #[derive(Clone, Debug, Options)]
 struct RampOptions {
-    /// What it adds at each message.
+    /// Increment at each message.
     #[option(default = 1.0, range = 0.0..=10.0)]
     step: f64,
     /// The message at which it fails; 0 for none.
@@ -81,7 +81,7 @@ impl Estimator for Above {
     }
 }
 
-/// The same of an estimator that knows of fixed transforms only.
+/// Estimator that knows of fixed transforms only.
 #[derive(Debug)]
 struct Fixed;
 

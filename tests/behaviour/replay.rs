@@ -10,7 +10,7 @@ use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 
-/// What a sensor of a bad day gives: numbers that come late, twice, with a NaN, or not at all, and now and then it fails.
+/// Sensor on a bad day: numbers that come late, twice, with a NaN, or not at all, and now and then it fails.
 #[derive(Debug)]
 pub(crate) struct BadDay {
     random: Random,
@@ -158,7 +158,7 @@ robot! {
     }
 }
 
-/// What is published, as text that differs if a bit of payload or stamp does.
+/// Writes a message as text that differs if a bit of payload or stamp does.
 pub(crate) fn text(message: &DynamicMessage) -> String {
     let stamp = message.stamp();
     let payload = message
@@ -207,14 +207,14 @@ pub(crate) fn journal<R: Robot>(builder: &mut Builder<R>) -> Lines {
     lines
 }
 
-/// What was written, in its order.
+/// Returns the entries that were written, in their order.
 pub(crate) fn entries(lines: &Lines) -> Vec<Entry> {
     let mut entries = std::mem::take(&mut *lock(lines));
     entries.sort_by_key(|entry| entry.number);
     entries
 }
 
-/// What a file would hold of a journal, read back: payloads are known by their paths alone.
+/// Returns what a file would hold of a journal, read back: payloads are known by their paths alone.
 pub(crate) fn read_back<R: Robot>(entries: &[Entry]) -> Result<Vec<Entry>, Failure> {
     let reader = JournalReader::<R>::default();
     let read = entries.iter().map(|line| {
@@ -233,7 +233,7 @@ thread_local! {
     static IS_AGAIN: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Whether this thread plays a journal: components of a first run that behave differently ask for it.
+/// Returns whether this thread plays a journal: components of a first run that behave differently ask for it.
 pub(crate) fn is_again() -> bool {
     IS_AGAIN.get()
 }
@@ -299,7 +299,7 @@ fn builder(reads: u32) -> Builder<Day> {
     builder
 }
 
-/// So many readings of each sensor, and a number, a parameter and now and then a command for every hundred.
+/// Runs as many readings of each sensor, and a number, a parameter and now and then a command for every hundred.
 fn virtual_days(reads: u32) -> Result<(), Failure> {
     let mut builder = self::builder(reads);
     let lines = journal(&mut builder);

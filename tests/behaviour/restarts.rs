@@ -1,4 +1,4 @@
-//! What a restart leaves alone, what it resets, and what becomes of those who fail in an unusual way.
+//! Restarts: what they leave alone, what they reset, and what becomes of those who fail in an unusual way.
 
 use crate::components::{
     Break, Counter, Done, Echo, Number, Read, Replied, Servo, Source, Task, at, lock, numbers, within,
@@ -133,7 +133,7 @@ fn a_sensor_that_panics_in_starts_at_is_restarted() -> Result<(), StartError> {
     Ok(())
 }
 
-/// What has become of the instances of which component.
+/// Events of the instances, with the component's name.
 static LOG: Mutex<Vec<(&str, String)>> = Mutex::new(Vec::new());
 
 fn log(who: &'static str, what: impl Into<String>) {
@@ -145,7 +145,7 @@ fn made(who: &'static str) -> Done {
     Ok(())
 }
 
-/// What has become of it since the last time.
+/// Takes the events of a component since the last time.
 fn logged(who: &str) -> Vec<String> {
     lock(&LOG).extract_if(.., |(of, _)| *of == who).map(|(_, what)| what).collect()
 }

@@ -1,4 +1,4 @@
-//! What a caller may do: each verb of the bus needs its right, and everybody may disarm.
+//! Rights of a caller: each verb of the bus needs its right, and everybody may disarm.
 
 use crate::components::Number;
 use bb_core::prelude::*;
@@ -38,7 +38,7 @@ robot! {
     }
 }
 
-/// What a bus is asked for, and why it refuses.
+/// Request to a bus that needs a right; its error says why the bus refuses.
 type Verb = fn(&Bus) -> Result<(), Box<dyn std::error::Error>>;
 
 const VERBS: [(Right, &str, Verb); 8] = [

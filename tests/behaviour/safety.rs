@@ -1,4 +1,4 @@
-//! What makes hardware safe, and when that itself goes wrong.
+//! Code that makes hardware safe, and what happens when it goes wrong itself.
 
 use crate::components::{Done, Number, Servo, Source, at, lock, within};
 use crate::gate::Gate;

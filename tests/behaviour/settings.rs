@@ -6,7 +6,7 @@ use bb_core::{Builder, HandleCall};
 use proptest::prelude::*;
 use std::path::PathBuf;
 
-/// How a device is read.
+/// Filter of a device's readings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Payload)]
 pub(crate) enum Filtering {
     #[default]
@@ -87,7 +87,7 @@ robot! {
     robot Set;
     parameters {
         tuning {
-            /// How much is believed.
+            /// Weight of a new reading.
             gain: f64 = 0.5, range: 0.0..=1.0;
             limit: f64 = 2 m/s;
             count: i64 = 3;
@@ -416,7 +416,7 @@ tries = 2
 nick = "a"
 
 [param.tuning]
-# How much is believed.
+# Weight of a new reading.
 # In 0.0..=1.0.
 gain = 0.5
 limit = "2 m/s"
@@ -436,7 +436,7 @@ fn the_schema_says_what_can_be_set() {
         r#""examples":["1 m"],"description":"Readings beyond it are dropped. In 0.1..=30.0 m.","default":"4 m"}"#,
         r#""retries":{"type":"integer","minimum":1.0,"maximum":8.0,"description":"In 1..=8.","default":3}"#,
         r##""filtering":{"$ref":"#/$defs/Filtering","default":"None"}"##,
-        r#""gain":{"type":"number","minimum":0.0,"maximum":1.0,"description":"How much is believed. In 0.0..=1.0.","default":0.5}"#,
+        r#""gain":{"type":"number","minimum":0.0,"maximum":1.0,"description":"Weight of a new reading. In 0.0..=1.0.","default":0.5}"#,
         r#""$defs":{"Filtering":"#,
         // Neither a number without a unit nor a text without a number.
         r#""pattern":"^\\s*[-+]?([0-9][0-9_]*\\.?[0-9_]*|\\.[0-9][0-9_]*)([eE][-+]?[0-9]+)?\\s*[^\\s0-9._+\\-eE].*$""#,

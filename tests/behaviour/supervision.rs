@@ -1,4 +1,4 @@
-//! Who is restarted when something fails too often, and who is not.
+//! Supervision: who is restarted when something fails too often, and who is not.
 
 use crate::components::{Done, Echo, Number, Read, Replied, Source, at, lock, within};
 use bb_core::prelude::*;

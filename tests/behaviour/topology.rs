@@ -1,4 +1,4 @@
-//! What links weigh and look like, how joints resist; URDF in and out.
+//! Masses, shapes and resistance of links and joints; URDF in and out.
 
 use crate::components::{Counter, Scale, Snapshot};
 use bb_core::prelude::*;

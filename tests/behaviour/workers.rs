@@ -51,7 +51,7 @@ robot! {
 
 const HEAVY: &str = "estimator/base/heavy";
 
-/// What hangs is one thing.
+/// Lock of the code that hangs: one test at a time uses it.
 static ALONE: Mutex<()> = Mutex::new(());
 
 fn publish(running: &Running<Laden>, number: f64) {
@@ -221,7 +221,7 @@ robot! {
     }
 }
 
-/// In an inbox, for a restart and for a driver: as many bytes as a subscription keeps.
+/// Large messages that wait in an inbox, for a restart or for a driver are bounded in bytes as those of a subscription.
 #[test]
 fn large_messages_that_wait_are_bounded_in_bytes() {
     const SIZE: usize = 1920 * 1080 * 3;

@@ -28,7 +28,7 @@ fn solver(arm: &Arm, params: InverseParams) -> InverseKinematics {
     InverseKinematics::new(&arm.kinematics, arm.base, arm.tip, params).expect("both are its links")
 }
 
-/// How far apart two poses are: m, rad.
+/// Returns the distance between two poses: m, rad.
 fn apart(left: &Isometry3<f64>, right: &Isometry3<f64>) -> (f64, f64) {
     let between = left.inv_mul(right);
     (between.translation.vector.norm(), between.rotation.angle())

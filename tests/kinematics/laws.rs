@@ -1,4 +1,4 @@
-//! What holds of any robot.
+//! Laws of the kinematics of any robot.
 
 use super::robots::{Anymal, panda, ur5};
 use bb_core::kinematics::{Frames, InverseKinematics, InverseParams, Kinematics, KinematicsError, Target};

@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 type Failure = Box<dyn Error>;
 
-/// Where the platform is by its wheels: x, y, m; heading, rad.
+/// Position of the platform by its wheels: x, y, m; heading, rad.
 #[derive(Clone, Debug, PartialEq, Payload)]
 #[payload(joint_position)]
 struct Driven([f64; 3]);
@@ -22,11 +22,11 @@ impl JointPositions for Driven {
     }
 }
 
-/// That something was seen.
+/// Detection of a camera or a lidar.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 struct Flash;
 
-/// Where both were, in the frame of the map.
+/// Poses of both, in the frame of the map.
 #[derive(Clone, Debug, PartialEq, Payload)]
 struct View {
     camera: Isometry3<f64>,
@@ -147,7 +147,7 @@ fn transform(value: &Value) -> Result<Matrix4<f64>, Failure> {
     Ok(transform)
 }
 
-/// What a sensor gives, and when it arrives.
+/// Message of a sensor, in the order of arrival.
 enum Message {
     Odometry(Driven),
     Arm(JointStates),

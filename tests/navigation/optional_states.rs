@@ -8,7 +8,7 @@ use bb_core::prelude::*;
 use bb_estimators::Eskf;
 use bb_estimators::navigation::{Geodetic, LocalFrame, NavigationOutputs, Optional, States};
 
-/// What is wrong with it.
+/// States of the errors that the robot has.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Flaws;
 
@@ -49,7 +49,7 @@ const HARD_IRON: Vector3<f64> = Vector3::new(6e-6, -4e-6, 0.0);
 const FIELD: Vector3<f64> = Vector3::new(0.0, 2.1e-5, -4.3e-5);
 const FIX: f64 = 0.1;
 
-/// At rest for three seconds, then curves to both sides at changing speed.
+/// Motion of the robot: at rest for three seconds, then curves to both sides at changing speed.
 #[derive(Clone, Copy, Debug)]
 struct State {
     position: Vector3<f64>,

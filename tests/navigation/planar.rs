@@ -49,7 +49,7 @@ const AXLE: Vector3<f64> = Vector3::new(-0.3, 0.0, 0.0);
 const BIAS: f64 = 0.006;
 const SCALE: f64 = 0.02;
 
-/// What goes wrong, and when.
+/// Failures of the sensors, and their times, s.
 #[derive(Clone, Debug, Default)]
 struct Failures {
     no_fixes: Range<f64>,
@@ -58,7 +58,7 @@ struct Failures {
     no_imu: Range<f64>,
     wrong_imu: Range<f64>,
     late_fixes: bool,
-    /// Of the noise, added to that of all other tests.
+    /// Seed of the noise, added to that of all other tests.
     seed: u64,
     /// A compass, instead of a heading that is known.
     compass: bool,
@@ -66,13 +66,13 @@ struct Failures {
 
 #[derive(Debug)]
 struct Seen {
-    /// Of the position after ten seconds, m.
+    /// Largest error of the position after ten seconds, m.
     worst: f64,
     at_the_end: f64,
     worst_heading: f64,
     /// Normalised error of position and heading, in the mean: 3 if the filter is right.
     nees: f64,
-    /// How often the error was beyond three standard deviations in the direction where the position is least known.
+    /// Number of times that the error was beyond three standard deviations in the direction where the position is least known.
     beyond: usize,
     status: PlanarStatus,
     health: Vec<(f64, HealthState, HealthReason)>,

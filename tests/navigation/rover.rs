@@ -40,8 +40,8 @@ const ANTENNA: Vector3<f64> = Vector3::new(-0.5, 0.2, 1.5);
 pub(super) const ORIGIN: (f64, f64, f64) = (48.1, 11.6, 520.0);
 const STEP_MILLIS: i64 = 10;
 
-/// Where the rover is at a time: it is at rest for three seconds, speeds up to 2 m/s along its x axis, east, and then drives on a
-/// circle of 20 m.
+/// Motion of the rover at a time: it is at rest for three seconds, speeds up to 2 m/s along its x axis, east, and then drives on a circle
+/// of 20 m.
 pub(super) struct Truth {
     pub(super) position: Vector3<f64>,
     pub(super) heading: f64,
@@ -93,7 +93,7 @@ impl Noise {
     }
 }
 
-/// What goes wrong, and when.
+/// Failure of a sensor, and its time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Failure {
     Nothing,
@@ -128,7 +128,7 @@ impl Failure {
     }
 }
 
-/// What was seen of a drive.
+/// Errors and reports of a drive.
 #[derive(Debug)]
 struct Seen {
     /// The largest horizontal error of the position after the start, m; after a failure; and at the end.
@@ -238,8 +238,8 @@ fn drive(failure: Failure, seconds: f64) -> Result<Seen, StartError> {
     Ok(seen)
 }
 
-/// Where the true origin is in the world whose origin is the first fix: at the first fix the rover stood at the true origin, and
-/// the fix was the antenna's, with its noise.
+/// Returns the true origin in the world whose origin is the first fix: at the first fix the rover stood at the true origin, and the fix was
+/// the antenna's, with its noise.
 fn first_fix() -> Vector3<f64> {
     let mut noise = Noise::new(7);
     // The wheels take the first three.
@@ -402,7 +402,7 @@ fn a_vehicle_in_motion_takes_its_heading_from_its_course_and_leaves_its_origin_b
     Ok(())
 }
 
-/// At rest, a start takes a second, the first time and after more than a minute without samples.
+/// A start at rest takes a second, the first time and after more than a minute without samples.
 #[test]
 fn a_rover_at_rest_that_was_blind_for_a_minute_starts_again() -> Result<(), StartError> {
     let builder = Surveyor::builder();

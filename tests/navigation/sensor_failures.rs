@@ -64,7 +64,7 @@ const RELATIVE_SCALE: f64 = -0.015;
 const STEP_MILLIS: u64 = 20;
 const END_MILLIS: u64 = 100_000;
 
-/// What goes wrong.
+/// Failure of a sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Failure {
     NoFixes,
@@ -104,9 +104,9 @@ struct Sensors {
     frame: LocalFrame,
     noise: Noise,
     base_from_camera: Isometry3<f64>,
-    /// Where the first fix was, in the frame: the origin of the world.
+    /// Position of the first fix, in the frame: the origin of the world.
     origin: Option<Vector3<f64>>,
-    /// Where the camera was at its last picture.
+    /// Pose of the camera at its last picture.
     picture: Option<(MonotonicTime, Isometry3<f64>)>,
 }
 
@@ -200,11 +200,11 @@ impl Sensors {
     }
 }
 
-/// What was seen at one instant.
+/// Errors and reports at one instant.
 struct Seen {
     error: f64,
     deviation: f64,
-    /// Of the attitude filter and of the navigation filter, deg.
+    /// Errors of the attitude filter and of the navigation filter, deg.
     attitude: [f64; 2],
     status: NavigationStatus,
 }
@@ -348,7 +348,7 @@ fn each_sensor_fails_in_turn_and_the_robot_says_so() -> Result<(), Box<dyn std::
     Ok(())
 }
 
-/// Of two robots: what each is refused for at the start.
+/// Refusals at the start, of two robots.
 mod refused {
     use super::{FluidPressure, RelativePose};
     use bb_core::prelude::*;

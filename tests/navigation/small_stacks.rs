@@ -56,8 +56,8 @@ fn on_a_small_stack<T: Send + 'static>(run: impl FnOnce() -> T + Send + 'static)
     thread.join().expect("it has run to its end")
 }
 
-/// At rest with every sensor, a kilometre away from the fifth second on: it starts, fuses what comes late, is moved, and its world
-/// moves on.
+/// A filter with all states runs on a small stack: at rest with every sensor, a kilometre away from the fifth second on, it starts, fuses
+/// what comes late, is moved, and its world moves on.
 #[test]
 fn a_filter_with_all_states_runs_on_a_small_stack() {
     let last = on_a_small_stack(|| {

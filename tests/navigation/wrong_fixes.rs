@@ -37,7 +37,7 @@ robot! {
     }
 }
 
-/// What one filter did; its world is turned as that of the drive, but for the Earth between.
+/// Outputs of one filter; its world is turned as that of the drive, but for the Earth between.
 #[derive(Debug, Default)]
 struct Seen {
     /// Seconds and poses.
@@ -202,7 +202,7 @@ fn a_filter_that_began_at_wrong_fixes_is_moved_to_the_right_ones() {
     }
 }
 
-/// For 40 s, in which the filter goes there after all, having refused them for twenty; they are right again afterwards.
+/// A filter follows wrong fixes that last 40 s, having refused them for twenty, and comes back undamaged when they are right again.
 #[test]
 fn a_filter_that_followed_wrong_fixes_comes_back_undamaged() {
     for off in wrong(&munich()) {

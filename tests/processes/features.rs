@@ -162,7 +162,7 @@ fn a_second_signal_ends_the_process_once_the_robot_is_safe() -> Result<(), Failu
     Ok(())
 }
 
-/// This test runs itself as another process, which gets the signal.
+/// A signal disarms and stops. The test runs itself as another process, which gets the signal.
 #[test]
 fn a_signal_disarms_and_stops() -> Result<(), Failure> {
     const NAME: &str = "processes::features::a_signal_disarms_and_stops";
@@ -231,7 +231,7 @@ fn one_signal_stops_all_robots_of_a_process_and_is_not_for_later_ones() -> Resul
     Ok(())
 }
 
-/// On virtual time, a disarm callback runs on the thread that stops the robot.
+/// A second signal ends a simulation that hangs: on virtual time, a disarm callback runs on the thread that stops the robot.
 #[cfg(unix)]
 #[test]
 fn a_second_signal_ends_a_simulation_that_hangs() -> Result<(), Failure> {

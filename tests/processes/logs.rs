@@ -1,4 +1,4 @@
-//! What a running robot tells a `tracing` subscriber.
+//! Messages of a running robot to a `tracing` subscriber.
 
 use bb_core::prelude::*;
 use std::fmt::Write;

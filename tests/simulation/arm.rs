@@ -84,7 +84,7 @@ const JOINTS: [&str; 4] = ["pan", "lift", "elbow", "reach"];
 const DAMPING: [f64; 4] = [2.0, 1.0, 0.5, 3.0];
 const MOTORS: [f64; 4] = [0.3, 0.2, 0.1, 0.5];
 
-/// What is measured at one time.
+/// Measurements at one time.
 #[derive(Debug)]
 struct Sample {
     position: [f64; 4],

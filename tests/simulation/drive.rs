@@ -68,28 +68,28 @@ fn eight(time_s: f64) -> Isometry3<f64> {
     Isometry3::from_parts(position, UnitQuaternion::from_euler_angles(0.0, 0.0, heading))
 }
 
-/// What an estimator says in a span of time: its largest error, m, and its deviation at the end, m.
+/// Estimates of a filter in a span of time: their largest error, m, and the deviation at the end, m.
 #[derive(Debug, Default)]
 struct Span {
-    /// In how many tenths of a second it has said anything.
+    /// Number of tenths of a second with an estimate.
     spoken: usize,
     worst: f64,
     last: f64,
     deviation: f64,
 }
 
-/// What goes wrong, if anything.
+/// Faults of the drive, if any.
 #[derive(Clone, Copy, Debug)]
 struct Faults {
-    /// By how much faster the wheels turn when they spin, m/s.
+    /// Excess speed of the wheels when they spin, m/s.
     slip: f64,
-    /// Of the noise.
+    /// Seed of the noise.
     seed: u64,
-    /// How fast the filter on a plane takes the rover to change its speed, m/s²/√Hz.
+    /// Noise with which the filter on a plane lets the rover change its speed, m/s²/√Hz.
     forward_acceleration: f64,
 }
 
-/// With the default settings of the filter.
+/// Faults with the default settings of the filter.
 const FAULTS: Faults = Faults { slip: 6.0, seed: 0, forward_acceleration: 1.0 };
 
 /// The errors of both filters between the given times.
@@ -193,8 +193,8 @@ fn they_survive_lost_and_wrong_satellites_and_spinning_wheels() -> Result<(), Fa
     Ok(())
 }
 
-/// What `docs/planar.md` says of wheels that spin. With an accelerometer no spin is believed. On a plane, wheels are refused for as
-/// long as the rover cannot have sped up like that by its settings.
+/// Wheels that spin, as `docs/planar.md` says. With an accelerometer no spin is believed. On a plane, wheels are refused for as long as the
+/// rover cannot have sped up like that by its settings.
 #[test]
 fn a_spin_is_believed_if_the_rover_can_speed_up_like_that() -> Result<(), Failure> {
     for seed in 0..4 {
@@ -213,7 +213,7 @@ fn a_spin_is_believed_if_the_rover_can_speed_up_like_that() -> Result<(), Failur
     Ok(())
 }
 
-/// How a fix comes: late by the delay, with the time at which it was measured, and none from an outage.
+/// Fixes come late by the delay, with the time at which they were measured, and none comes from an outage.
 #[test]
 fn a_simulated_receiver_is_as_late_and_as_wrong_as_it_is_told() -> Result<(), Failure> {
     let mut builder = Rover::builder();

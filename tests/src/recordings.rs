@@ -3,13 +3,13 @@
 
 use std::path::{Path, PathBuf};
 
-/// How many trials of BROAD the bounds are for.
+/// Number of trials of BROAD that the bounds are for.
 pub const TRIALS: usize = 10;
 
 /// Number of recordings of phones.
 pub const PHONES: usize = 66;
 
-/// How many data sets of navigation there are; one is left out, as it has the samples of another.
+/// Number of data sets of navigation; one is left out, as it has the samples of another.
 pub const SETS: usize = 7;
 
 /// The trials of BROAD, by name.

@@ -6,7 +6,7 @@ use bb_tests::random::Random;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
-/// What happens where it arrives.
+/// Number that chooses what happens where it arrives.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 #[payload(joint_position)]
 pub(crate) struct Dice(pub(crate) f64);
@@ -225,7 +225,7 @@ impl Estimator for Squall {
     }
 }
 
-/// When the robot of a day in real time was told to stop, and how long after that its motor was told to, day by day.
+/// Time at which the robot of a day in real time was asked to stop, and the delay until its motor was, day by day.
 pub(crate) static STOPPED: Mutex<(Option<Instant>, Vec<Duration>)> = Mutex::new((None, Vec::new()));
 
 /// An actuator that fails at some commands, and sometimes cannot be disarmed at first.

@@ -28,7 +28,7 @@ fn joints_move_through_points_and_arrive_together() -> Result<(), Failure> {
     Ok(())
 }
 
-/// Where the joints are 2 s after what happened to the command 1 s after its start; they rest since.
+/// Checks that the joints stop soon after something happens to the command 1 s after its start, and rest since.
 fn after(what: fn(&Simulation<Crane>, &Execution<()>)) -> Result<(), Failure> {
     let mut simulation = ready()?;
     let ends = ends(&simulation.bus());
@@ -127,7 +127,7 @@ fn a_command_that_preempts_another_takes_over_its_joints() -> Result<(), Failure
     Ok(())
 }
 
-/// It fails at the first joint that it loses; by then the other one is somebody else's too.
+/// A command fails at the first joint that it loses; by then the other one is somebody else's too.
 #[test]
 fn a_command_that_loses_its_joints_leaves_them_to_whoever_moves_them() -> Result<(), Failure> {
     let mut simulation = ready()?;

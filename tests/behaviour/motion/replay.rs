@@ -4,7 +4,7 @@ use super::*;
 use crate::replay::{entries, journal, read_back};
 use std::collections::BTreeMap;
 
-/// What was published at each path below `actuator` and `command`.
+/// Collects the messages published at each path below `actuator` and `command`.
 fn heard(all: &DynamicSubscription) -> BTreeMap<&'static str, Vec<String>> {
     let mut heard: BTreeMap<&'static str, Vec<String>> = BTreeMap::new();
     for message in all.drain() {

@@ -5,7 +5,7 @@ use crate::replay::{entries, journal};
 use bb_core::prelude::*;
 use bb_core::{Builder, Delivery, DynamicMessage};
 
-/// At most ten a second of each path.
+/// Delivers at most ten messages a second of each path.
 fn slowly(overflow: Overflow) -> Delivery {
     overflow.at_most_every(Duration::from_millis(100))
 }

@@ -23,7 +23,7 @@ pub fn double(sample: &ImuSample) -> Option<f64> {
     all(sample)
 }
 
-/// The same in `f32`.
+/// Computes the heading error of all filters together after one sample, rad, in `f32`.
 pub fn single(sample: &ImuSample<f32>) -> Option<f64> {
     all(sample)
 }
@@ -47,7 +47,7 @@ impl States for Rover {
     const OPTIONAL: &'static [Optional] = &[Optional::GnssLeverArm];
 }
 
-/// Where it is, east of the origin, after one sample and one fix, m.
+/// Returns the position after one sample and one fix, east of the origin, m.
 pub fn navigate(sample: &ImuMean) -> Option<f64> {
     let mut filter = Eskf::<Rover, { Rover::DIMENSION }>::new(EskfParams::default()).ok()?;
     let rest = Vector3::zeros();
@@ -57,7 +57,7 @@ pub fn navigate(sample: &ImuMean) -> Option<f64> {
     Some(filter.estimate()?.position.x)
 }
 
-/// The same on a plane.
+/// Returns the position of the filter on a plane after one sample and one fix, east of the origin, m.
 pub fn drive(sample: &ImuMean) -> Option<f64> {
     let mut filter = PlanarEkf::new(PlanarParams::default()).ok()?;
     let rest = Vector2::zeros();
@@ -67,7 +67,7 @@ pub fn drive(sample: &ImuMean) -> Option<f64> {
     Some(filter.estimate()?.position.x)
 }
 
-/// With the first of its parameters set by name.
+/// Returns the orientation after a sample, with the first of the filter's parameters set by name.
 fn updated<T: Real>(mut params: FilterParams, sample: &ImuSample<T>) -> Option<UnitQuaternion<T>> {
     let first = params.parameters().first()?.name;
     params.set(first, "0.5").ok()?;

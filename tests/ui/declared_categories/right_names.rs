@@ -6,7 +6,7 @@ use bb_ui_tests::*;
 robot! {
     robot Rover;
     commands {
-        /// What moves.
+        /// Commands that move the robot.
         category motion { concurrency: 2; }
         category default { concurrency: 3; }
         category speech;

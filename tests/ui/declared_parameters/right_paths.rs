@@ -6,9 +6,9 @@ use bb_ui_tests::*;
 robot! {
     robot Rover;
     parameters {
-        /// Of the filter.
+        /// Parameters of the filter.
         imu {
-            /// How far each sample moves the estimate.
+            /// Weight of a sample in the estimate.
             gain: f64 = 0.2, range: 0.0..=1.0;
             memory { time: f64 = 500 ms; }
         }

@@ -6,7 +6,7 @@ use bb_ui_tests::*;
 robot! {
     robot Rover;
     states {
-        /// It feels its way.
+        /// Slow operation with less certainty.
         degraded;
         moving;
     }

@@ -9,7 +9,7 @@ pub struct Pair<T> {
     pub second: T,
 }
 
-/// This one can.
+/// Payload whose parameter can be recorded.
 #[derive(Clone, Debug, Payload)]
 pub struct Timed<T: Payload> {
     pub value: T,

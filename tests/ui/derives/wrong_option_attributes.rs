@@ -1,4 +1,4 @@
-//! What is said of options in other words, and numbers of another kind.
+//! Attributes of options in other words, and numbers of another kind.
 
 use bb_core::prelude::*;
 

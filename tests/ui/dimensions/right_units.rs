@@ -1,4 +1,4 @@
-//! The same quantity in other units, spaced and glued.
+//! Quantities in several units, spaced and glued.
 
 use bb_core::prelude::*;
 use bb_ui_tests::*;

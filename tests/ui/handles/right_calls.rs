@@ -1,4 +1,4 @@
-//! How a robot is assembled and subscribed to; a function `new` of the user's is his.
+//! Calls that assemble a robot and subscribe to it; a function `new` of the user's is his.
 
 use bb_core::prelude::*;
 use bb_ui_tests::*;

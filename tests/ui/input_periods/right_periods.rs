@@ -1,4 +1,4 @@
-//! As often as it must, optional, of unknown rate, or in step with the driver.
+//! Inputs that come as often as they must, are optional, of unknown rate, or in step with the driver.
 
 use bb_core::prelude::*;
 use bb_ui_tests::*;

@@ -1,4 +1,4 @@
-//! What is published is what is taken.
+//! Payloads that are published and taken: they are the same.
 
 use bb_core::prelude::*;
 use bb_ui_tests::*;

@@ -1,4 +1,4 @@
-//! Its one input is its sensor.
+//! Nested estimator whose one input is its sensor.
 
 use bb_core::prelude::*;
 use bb_ui_tests::*;

@@ -1,4 +1,4 @@
-//! What could not be read does not hide what it holds from `main`: two messages.
+//! Parts that could not be read do not hide what they hold from `main`: two messages.
 
 use bb_core::prelude::*;
 use bb_ui_tests::*;

@@ -1,4 +1,4 @@
-//! That the single input is marked as driver makes no difference.
+//! Mark of the single input as driver: it makes no difference.
 
 use bb_core::prelude::*;
 use bb_ui_tests::*;

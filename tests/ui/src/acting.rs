@@ -39,14 +39,14 @@ commands! {
     MoveTo(MoveToOptions)
 }
 
-/// Where a joint is to go.
+/// Target position of a joint.
 #[derive(Clone, Copy, Debug, Payload)]
 pub struct Position(pub f64);
 
 /// Options of [`Servo`].
 #[derive(Clone, Debug, Options)]
 pub struct ServoOptions {
-    /// On the bus.
+    /// Number of the servo on the bus.
     #[option(default = 1)]
     pub id: u8,
 }

@@ -9,10 +9,10 @@ pub struct Tilt;
 /// Options of [`Tilt`].
 #[derive(Clone, Debug, Options)]
 pub struct TiltOptions {
-    /// How far each sample moves the estimate.
+    /// Weight of a sample in the estimate.
     #[option(default = 0.1, range = 0.0..=1.0)]
     pub gain: f64,
-    /// How long the estimate remembers. Unit: s.
+    /// Time constant of the estimate. Unit: s.
     #[option(default = 2.0, unit = "s")]
     pub time_constant: f64,
 }
@@ -67,9 +67,9 @@ pub struct Motion;
 /// Outputs of [`Motion`].
 #[derive(Debug, Default, Outputs)]
 pub struct MotionOutputs {
-    /// How it is turned.
+    /// Orientation of the body.
     pub orientation: Option<Orientation>,
-    /// How it moves.
+    /// Velocity of the body.
     pub velocity: Option<Twist>,
 }
 

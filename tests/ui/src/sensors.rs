@@ -15,7 +15,7 @@ pub struct Bmi270Options {
     /// The highest angular velocity it measures. Unit: rad/s.
     #[option(default = 35.0, range = 2.0..=35.0, unit = "rad/s")]
     pub full_scale: f64,
-    /// How many samples are averaged to one.
+    /// Number of samples that are averaged to one.
     #[option(default = 1, range = 1..=16)]
     pub averages: u8,
 }

@@ -9,7 +9,7 @@ robot! {
     /// The body.
     link base {
         ;
-        /// It measures.
+        /// Inertial sensor.
         sensor imu: Bmi270(bus = "i2c-1",) { rate: 200Hz; };
         joint mount: fixed { link mast; };
     };

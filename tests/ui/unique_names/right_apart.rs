@@ -1,4 +1,4 @@
-//! The same name in different places.
+//! Equal names in different places.
 
 use bb_core::prelude::*;
 use bb_ui_tests::*;

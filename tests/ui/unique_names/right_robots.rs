@@ -9,7 +9,7 @@ mod inner {
     use bb_ui_tests::*;
 
     robot! {
-        /// With a [`Tilt`].
+        /// Robot with a [`Tilt`].
         pub(super) robot Arm;
         link base { sensor imu: Bmi270(bus = "i2c-1") { estimator tilt: Tilt(); } }
     }

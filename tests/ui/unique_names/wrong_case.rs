@@ -1,4 +1,4 @@
-//! In snake case the type and the module of the handles are one name.
+//! Names in snake case: the type and the module of the handles are one name.
 
 use bb_core::prelude::*;
 

@@ -11,7 +11,7 @@ robot! {
 }
 
 robot! {
-    /// With a magnetometer.
+    /// Robot with a magnetometer.
     pub robot Rover;
     link base {
         sensor imu: Bmi270(bus = "i2c-1") { estimator tilt: Tilt(); }
