@@ -76,3 +76,29 @@ fn the_top_level_is_the_project() {
         ["bb-cli", "bb-core", "bb-estimators", "bb-eval", "bb-macros", "benches", "examples", "tests"]
     );
 }
+
+/// A published crate says what it is for, and the toolchain that builds everything is the oldest that the crates promise.
+#[test]
+fn published_crates_are_described() {
+    for krate in super::CRATES {
+        let manifest = read(&format!("{krate}/Cargo.toml"));
+        for key in ["description = \"", "keywords = [", "categories = [", "readme", "license", "rust-version"] {
+            assert!(manifest.lines().any(|line| line.starts_with(key)), "{krate}/Cargo.toml has no `{key}`");
+        }
+    }
+    let value = |file: &str, key: &str| {
+        let text = read(file);
+        let line = text
+            .lines()
+            .find(|line| line.starts_with(key))
+            .unwrap_or_else(|| panic!("{file}: no {key}"))
+            .to_owned();
+        line.split('"').nth(1).map(str::to_owned)
+    };
+    let promised = value("Cargo.toml", "rust-version").expect("a version");
+    let used = value("rust-toolchain.toml", "channel").expect("a version");
+    assert!(
+        used == promised || used == format!("{promised}.0"),
+        "rust-version {promised} is not checked by {used}"
+    );
+}
