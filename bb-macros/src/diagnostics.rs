@@ -38,7 +38,7 @@ impl Place {
         self.start.start().line
     }
 
-    /// Whether `next` follows without whitespace.
+    /// Returns whether `next` follows without whitespace.
     pub(crate) fn touches(self, next: Span) -> bool {
         let (end, start) = (self.end.end(), next.start());
         end.line == start.line && end.column == start.column

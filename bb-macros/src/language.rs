@@ -28,7 +28,7 @@ pub(crate) struct Word {
     pub(crate) occurs: Occurs,
     /// The syntax after the word, up to the end of its item.
     pub(crate) example: &'static str,
-    /// For the reference, which a test compares.
+    /// Text of the reference, which a test compares.
     #[cfg_attr(not(test), allow(dead_code, reason = "read by the test of the reference"))]
     pub(crate) doc: &'static str,
 }
@@ -52,7 +52,7 @@ pub(crate) enum Value {
     Other,
 }
 
-/// How often a word may be written in one block.
+/// Number of times that a word may be written in one block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Occurs {
     Once,
@@ -153,7 +153,7 @@ language! {
             Actuator = ACTUATOR,
             Link = LINK,
         }
-        /// What is declared at a joint of a URDF.
+        /// An item that is declared at a joint of a URDF.
         UrdfJointItem in "a joint of a URDF" {
             Sensor = SENSOR,
             Actuator = ACTUATOR,
@@ -291,7 +291,7 @@ language! {
     }
 }
 
-/// Whether a word starts an item in any place.
+/// Returns whether a word starts an item in any place.
 pub(crate) fn starts_item(text: &str) -> bool {
     item_words().any(|word| word == text)
 }

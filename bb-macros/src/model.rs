@@ -48,7 +48,7 @@ pub(crate) struct Robot {
     pub(crate) parameter_groups: Table<ParameterGroupId, ParameterGroup>,
     /// The number of the parameter at each path, with `::` between the names.
     parameter_paths: HashMap<String, ParameterId>,
-    /// In addition to the built-in ones.
+    /// Declared states, without the built-in ones.
     pub(crate) states: Vec<State>,
     /// The default one, then the declared ones.
     pub(crate) categories: Table<CategoryId, Category>,
@@ -59,7 +59,7 @@ pub(crate) struct Robot {
     pub(crate) given: Vec<Given>,
     /// All words that are written too often.
     pub(crate) repeated: Vec<Ident>,
-    /// Whether everything could be read; if not, a missing item may have been declared.
+    /// `true` if everything could be read; if not, a missing item may have been declared.
     pub(crate) complete: bool,
 }
 
@@ -67,7 +67,7 @@ pub(crate) struct Robot {
 pub(crate) struct Link {
     pub(crate) attributes: Vec<Attribute>,
     pub(crate) name: Ident,
-    /// Its name at run time; differs from the identifier only where a URDF's name is not an identifier.
+    /// Name at run time; differs from the identifier only where a URDF's name is not an identifier.
     pub(crate) label: String,
     /// The joint that carries it; `None` for a root.
     pub(crate) joint: Option<JointId>,
@@ -78,9 +78,9 @@ pub(crate) struct Link {
 pub(crate) struct Joint {
     pub(crate) attributes: Vec<Attribute>,
     pub(crate) name: Ident,
-    /// Its name at run time, as a link's.
+    /// Name at run time, as a link's.
     pub(crate) label: String,
-    /// Whether it comes from a URDF, which its reader has checked, and where a limit may be a single position.
+    /// `true` if the joint comes from a URDF, which its reader has checked, and where a limit may be a single position.
     pub(crate) from_urdf: bool,
     pub(crate) kind: JointKind,
     pub(crate) kind_word: Ident,
@@ -89,13 +89,13 @@ pub(crate) struct Joint {
     pub(crate) properties: JointProperties,
 }
 
-/// Where a sensor is mounted.
+/// Place at which a sensor is mounted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Mount {
-    /// Of the robot as a whole: in no frame.
+    /// The robot as a whole: no frame.
     Robot,
     Link(LinkId),
-    /// At a joint: fixed to the parent link, at the joint's origin.
+    /// A joint: fixed to the parent link, at the joint's origin.
     Joint(JointId),
 }
 
@@ -113,7 +113,7 @@ pub(crate) struct Sensor {
     pub(crate) publisher: PublisherId,
 }
 
-/// What moves a joint.
+/// A declared actuator, which moves a joint.
 #[derive(Clone, Debug)]
 pub(crate) struct Actuator {
     pub(crate) attributes: Vec<Attribute>,
@@ -123,7 +123,7 @@ pub(crate) struct Actuator {
     pub(crate) path: Vec<String>,
 }
 
-/// What runs beside the topology, in no frame: a controller or a bridge.
+/// A controller or a bridge, which runs beside the topology, in no frame.
 #[derive(Clone, Debug)]
 pub(crate) struct Service {
     pub(crate) kind: ServiceKind,
@@ -136,7 +136,7 @@ pub(crate) struct Service {
     pub(crate) path: Vec<String>,
 }
 
-/// Where an estimator is declared.
+/// Place at which an estimator is declared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Home {
     Sensor(SensorId),
@@ -151,14 +151,14 @@ pub(crate) struct Estimator {
     pub(crate) component: Component,
     pub(crate) inputs: Vec<Input>,
     pub(crate) outputs: Vec<Output>,
-    /// As written.
+    /// Settings as written.
     pub(crate) settings: Settings<EstimatorSetting>,
     pub(crate) timing: Timing,
     pub(crate) reactions: Reactions,
     pub(crate) health: Health,
     /// `None` if it runs on its input's thread.
     pub(crate) worker: Option<Worker>,
-    /// Its own path.
+    /// Path of the estimator itself.
     pub(crate) path: Vec<String>,
     /// One per output; its own path if none is declared.
     pub(crate) publishers: Vec<PublisherId>,
@@ -182,12 +182,12 @@ pub(crate) struct Input {
 
 #[derive(Clone, Debug)]
 pub(crate) struct Publisher {
-    /// Its path, name by name.
+    /// Path, name by name.
     pub(crate) path: Vec<String>,
     pub(crate) from: From,
 }
 
-/// Who publishes.
+/// Part that publishes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum From {
     Sensor(SensorId),
@@ -252,7 +252,7 @@ impl Robot {
 }
 
 impl Estimator {
-    /// Whether it is nested in a sensor.
+    /// Returns whether the estimator is nested in a sensor.
     pub(crate) fn is_nested(&self) -> bool {
         matches!(self.home, Home::Sensor(_))
     }

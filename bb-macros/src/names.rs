@@ -38,7 +38,7 @@ pub(crate) fn nearest_path<'a>(path: &str, known: &'a [String]) -> Option<&'a st
     near.or_else(|| same_end.rev().max_by_key(|candidate| in_order(&names, candidate)))
 }
 
-/// How many of the last names of a path occur in `candidate`, in the same order.
+/// Counts the last names of a path that occur in `candidate`, in the same order.
 fn in_order(names: &[&str], candidate: &str) -> usize {
     let mut candidate = candidate.rsplit("::");
     names.iter().rev().take_while(|name| candidate.any(|other| other == **name)).count()

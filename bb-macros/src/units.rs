@@ -37,7 +37,7 @@ impl Dimension {
     /// N·m·s/rad
     pub(crate) const ANGULAR_DAMPING: Self = Self([2, 1, -1, 0, 0, -1]);
 
-    /// With its article, for messages.
+    /// Returns the name of the dimension with its article, for messages.
     pub(crate) fn name(self) -> String {
         let named = NAMED.iter().find(|(dimension, _)| *dimension == self.0);
         named.map_or_else(|| format!("a quantity in {}", self.symbol()), |(_, name)| (*name).to_owned())

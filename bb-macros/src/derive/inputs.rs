@@ -24,7 +24,7 @@ enum Kind {
 }
 
 impl Field<'_> {
-    /// Whether the estimator can run without it.
+    /// Returns whether the estimator can run without the input.
     fn is_optional(&self) -> bool {
         self.kind != Kind::Required
     }
@@ -49,7 +49,7 @@ impl Field<'_> {
         }
     }
 
-    /// What the slot keeps, as the field.
+    /// Returns code that takes the cached messages from the slot, in the form of the field.
     fn kept(&self) -> TokenStream {
         let slot = &self.slot;
         match self.kind {
@@ -60,7 +60,7 @@ impl Field<'_> {
     }
 }
 
-/// How a field takes its messages, and their payload.
+/// Returns the way in which a field takes its messages, and their payload.
 fn taken(field: &Type) -> Option<(Kind, &Type)> {
     let optional = || fields::wrapped(field, "Option").and_then(|inner| fields::wrapped(inner, "Input"));
     let required = fields::wrapped(field, "Input").map(|payload| (Kind::Required, payload));

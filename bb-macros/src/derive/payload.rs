@@ -14,11 +14,11 @@ use syn::{Data, DeriveInput, Field, Fields, Generics, LitStr};
 struct Attributes {
     /// ROS has a message for it.
     is_ros: bool,
-    /// It reports the position of a joint.
+    /// `true` if the payload reports the position of a joint.
     tells_position: bool,
-    /// It commands a joint.
+    /// `true` if the payload commands a joint.
     commands_joint: bool,
-    /// It is the same in every frame.
+    /// `true` if the payload is the same in every frame.
     has_no_frame: bool,
     /// The name of its definition, if different from its own.
     name: Option<LitStr>,
@@ -175,7 +175,7 @@ fn arm(head: &TokenStream, fields: &Fields, diagnostics: &mut Diagnostics) -> To
 /// The contents of `#[payload(…)]` on a field.
 #[derive(Default)]
 struct FieldAttributes {
-    /// It may hold NaN and infinities.
+    /// `true` if the field may hold NaN and infinities.
     is_any: bool,
     /// The units of its numbers, each as it was written too.
     units: Vec<(Unit, String)>,

@@ -213,7 +213,7 @@ fn positions(robot: &Robot, types: &Types<'_>) -> TokenStream {
     checks.collect()
 }
 
-/// At most one command arms and one disarms, each allowed in a suitable state.
+/// Checks that at most one command arms and one disarms, each allowed in a suitable state.
 fn roles(robot: &Robot, types: &Types<'_>) -> TokenStream {
     let mut checks = TokenStream::new();
     let mut before: Vec<TokenStream> = Vec::new();

@@ -28,7 +28,7 @@ struct Module {
     known: HashSet<String>,
     places: HashMap<String, usize>,
     docs: Vec<Attribute>,
-    /// Where its name was declared, if it was: editors jump there.
+    /// Place at which the name was declared, if it was: editors jump there.
     span: Option<Span>,
 }
 

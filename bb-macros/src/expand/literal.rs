@@ -56,7 +56,7 @@ pub(super) fn spanned_call(
     quote_spanned!(place.start=> const _: () = ::bb_core::__private::#check #generics #arguments;)
 }
 
-/// The same tokens, all at `span`. Names are resolved as in the expansion, wherever `span` comes from: a robot may be
+/// Returns the same tokens, all at `span`. Names are resolved as in the expansion, wherever `span` comes from: a robot may be
 /// declared through a user's `macro_rules!`.
 pub(super) fn respan(tokens: TokenStream, span: Span) -> TokenStream {
     at(tokens, span.resolved_at(Span::call_site()))

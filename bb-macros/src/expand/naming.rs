@@ -15,7 +15,7 @@ use std::collections::{HashMap, HashSet};
 /// The names of a robot's parts and publishers.
 #[derive(Debug)]
 pub(super) struct Naming {
-    /// By position, see [`Part::position`].
+    /// Names of the parts, by position; see [`Part::position`].
     parts: Vec<PartNames>,
     publishers: Table<PublisherId, PublisherNames>,
 }
@@ -39,7 +39,7 @@ pub(super) struct PartNames {
     pub(super) given_options: Ident,
     /// `__member__sensor_base_imu_tilt`: an estimator in its island.
     pub(super) member: Ident,
-    /// Where the user wrote its type. Names are looked up as in the expansion.
+    /// Place at which the user wrote the type. Names are looked up as in the expansion.
     pub(super) span: Span,
 }
 
@@ -50,7 +50,7 @@ pub(super) struct PublisherNames {
     pub(super) name: Ident,
     /// `__Rover_2_11__payload__sensor_base_imu_tilt`, named after the first publisher of this output of this type.
     pub(super) payload: Ident,
-    /// Whether it is the first.
+    /// `true` for the first publisher of this output of this type.
     pub(super) is_first: bool,
 }
 

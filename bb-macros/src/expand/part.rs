@@ -27,7 +27,7 @@ impl Part {
         sensors.chain(estimators).chain(actuators).chain(services).chain(commands)
     }
 
-    /// Its place among all.
+    /// Returns the part's place among all.
     pub(super) fn position(self, robot: &Robot) -> usize {
         let sensors = robot.sensors.len();
         let estimators = sensors + robot.estimators.len();

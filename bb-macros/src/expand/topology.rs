@@ -74,7 +74,7 @@ fn joint(robot: &Robot, joint: &Joint, child: LinkId) -> TokenStream {
     })
 }
 
-/// As declared, so that an exported URDF has the same numbers.
+/// Returns an origin with the numbers as declared, so that an exported URDF has the same ones.
 fn origin(origin: Option<&Origin>) -> TokenStream {
     let Some(origin) = origin else { return quote!(__private::Origin::IDENTITY) };
     let (xyz, rpy) = (values(origin.xyz.as_ref(), 0.0), values(origin.rpy.as_ref(), 0.0));

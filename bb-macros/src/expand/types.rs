@@ -62,10 +62,10 @@ pub(super) fn aliases(types: &Types<'_>) -> TokenStream {
     aliases.collect()
 }
 
-/// How handles reach the parts they name.
+/// Way in which handles reach the parts they name.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Accessors {
-    /// Into the wiring.
+    /// Access to the wiring.
     Wired,
     /// No access: the robot is invalid, and its handles have only names and types.
     Stub,
@@ -119,7 +119,7 @@ pub(super) struct Types<'a> {
     robot: &'a Robot,
     naming: &'a Naming,
     name: &'a Ident,
-    /// How many modules below: the robot's own, which imports these names, is the first.
+    /// Number of modules below: the robot's own, which imports these names, is the first.
     depth: usize,
 }
 
@@ -133,7 +133,7 @@ pub(super) struct Named {
 }
 
 impl Named {
-    /// The same at `span`.
+    /// Returns the same name at `span`.
     pub(super) fn at(&self, span: Span) -> Self {
         let Self { above, mut name } = self.clone();
         name.set_span(span.resolved_at(Span::call_site()));
@@ -156,7 +156,7 @@ impl<'a> Types<'a> {
         Self { robot, naming, name, depth }
     }
 
-    /// The same, named from `depth` modules below.
+    /// Returns the same types, named from `depth` modules below.
     pub(super) fn below(&self, depth: usize) -> Self {
         Self::new(self.robot, self.naming, self.name, depth)
     }
@@ -213,7 +213,7 @@ impl<'a> Types<'a> {
         self.robot
     }
 
-    /// Who publishes.
+    /// Returns the part that publishes.
     pub(super) fn from(&self, publisher: PublisherId) -> From {
         self.robot.publishers[publisher].from
     }
@@ -246,7 +246,7 @@ impl<'a> Types<'a> {
         self.named(&self.names(part).options)
     }
 
-    /// The same for the type as the user wrote it.
+    /// The type of a part's options, by the part's type as the user wrote it.
     pub(super) fn given_options(&self, part: Part) -> Named {
         self.named(&self.names(part).given_options)
     }
@@ -311,7 +311,7 @@ impl<'a> Types<'a> {
         quote_spanned!(self.span(part)=> <#kind as #contract>::Output)
     }
 
-    /// Where the user wrote the type.
+    /// Returns the place at which the user wrote the type.
     pub(super) fn span(&self, part: Part) -> Span {
         self.names(part).span
     }

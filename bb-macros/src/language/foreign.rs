@@ -133,7 +133,7 @@ const ROWS: [Row; 40] = [
     ),
 ];
 
-/// What to write instead of `word` in `place`.
+/// Returns what to write instead of `word` in `place`.
 pub(crate) fn way_out(place: &str, word: &str) -> Option<&'static str> {
     let is_here =
         |(places, words, _): &&Row| (places.is_empty() || places.contains(&place)) && words.contains(&word);

@@ -29,7 +29,7 @@ impl JointKind {
         Self::ALL.into_iter().find(|(known, _)| *known == name).map(|(_, kind)| kind)
     }
 
-    /// Whether it turns about an axis, so its position is an angle.
+    /// Returns whether the joint turns about an axis, so that its position is an angle.
     pub(crate) fn turns(self) -> bool {
         matches!(self, Self::Revolute | Self::Continuous)
     }

@@ -20,7 +20,7 @@ pub(crate) const DEFAULT_CATEGORY: &str = "default";
 pub(crate) struct Category {
     pub(crate) attributes: Vec<Attribute>,
     pub(crate) name: Ident,
-    /// How many of its commands may run at once.
+    /// Number of commands of the category that may run at once.
     pub(crate) concurrency: u32,
 }
 
@@ -30,7 +30,7 @@ pub(crate) struct Command {
     pub(crate) name: Ident,
     pub(crate) path: Vec<String>,
     pub(crate) component: Component,
-    /// As written.
+    /// Settings as written.
     pub(crate) settings: CommandSettings,
     /// Built-in or declared states; `None` for the default.
     pub(crate) allowed_states: Option<Vec<Ident>>,
@@ -39,7 +39,7 @@ pub(crate) struct Command {
     pub(crate) cancel: Cancel,
 }
 
-/// Which commands it cancels when it starts.
+/// Commands that a command cancels when it starts.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Cancel {
     Nothing,

@@ -1,4 +1,4 @@
-//! When an estimator is degraded or lost, and the commands this starts.
+//! Conditions under which an estimator is degraded or lost, and the commands this starts.
 
 use super::{CommandId, Robot};
 use crate::language::EstimatorSetting;
@@ -10,7 +10,7 @@ pub(crate) struct Timing {
     pub(crate) sync_tolerance_s: Option<f64>,
     pub(crate) latency_budget_s: Option<f64>,
     pub(crate) lost_after_s: Option<f64>,
-    /// How many good completions in a row end a degradation.
+    /// Number of good completions in a row that end a degradation.
     pub(crate) recover_after: u32,
 }
 

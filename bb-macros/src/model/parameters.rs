@@ -15,10 +15,10 @@ pub(crate) struct Parameter {
     pub(crate) name: Ident,
     /// `param`, the groups, the name.
     pub(crate) path: Vec<String>,
-    /// Its group; empty in `parameters` itself.
+    /// Group of the parameter; `None` in `parameters` itself.
     pub(crate) group: Option<ParameterGroupId>,
     pub(crate) kind: ParameterKind,
-    /// In a verified robot it is of this kind, and so are the ends of the range.
+    /// Default value. In a verified robot it is of this kind, and so are the ends of the range.
     pub(crate) default: Literal,
     pub(crate) range: Option<ParameterRange>,
 }

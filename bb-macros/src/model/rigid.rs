@@ -12,8 +12,8 @@ pub(crate) struct Rigid {
 impl Rigid {
     pub(crate) const IDENTITY: Self = Self { translation: [0.0; 3], rotation: [1.0, 0.0, 0.0, 0.0] };
 
-    /// From a translation in m and the angles roll, pitch, yaw in rad about the fixed axes x, y, z in this order, as in
-    /// URDF: R = Rz(yaw) Ry(pitch) Rx(roll).
+    /// Converts a translation in m and the angles roll, pitch, yaw in rad about the fixed axes x, y, z in this order, as in URDF:
+    /// R = Rz(yaw) Ry(pitch) Rx(roll).
     pub(crate) fn from_xyz_rpy(translation: [f64; 3], [roll, pitch, yaw]: [f64; 3]) -> Self {
         let about = |axis: usize, angle: f64| {
             let mut rotation = [(angle / 2.0).cos(), 0.0, 0.0, 0.0];

@@ -31,7 +31,7 @@ pub(crate) struct LinkBody {
 pub(crate) struct Link {
     pub(crate) attributes: Vec<Attribute>,
     pub(crate) name: Ident,
-    /// Its name in the URDF, which need not be an identifier.
+    /// Name in the URDF, which need not be an identifier.
     pub(crate) label: Option<String>,
     pub(crate) sensors: Vec<Sensor>,
     pub(crate) estimators: Vec<Estimator>,

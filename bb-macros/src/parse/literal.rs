@@ -15,7 +15,7 @@ pub(crate) struct Literal {
     pub(crate) value: Value,
     /// Dimension, if the literal is a number.
     pub(crate) dimension: Dimension,
-    /// Whether a unit was written.
+    /// `true` if a unit was written.
     pub(crate) has_unit: bool,
     pub(crate) place: Place,
 }
@@ -26,7 +26,7 @@ pub(crate) enum Value {
     Bool(bool),
     /// A number without a fraction and without a unit.
     Integer(i64),
-    /// In SI.
+    /// A number, in SI.
     Number(f64),
     Text(String),
 }

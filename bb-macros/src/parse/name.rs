@@ -62,7 +62,7 @@ fn expected(word: &Ident) -> String {
     format!("expected the name of this `{word}`")
 }
 
-/// What to write instead of a literal: `2tyre`, `"base"`.
+/// Returns what to write instead of a literal: `2tyre`, `"base"`.
 fn no_name(literal: &Lit) -> Option<String> {
     match literal {
         Lit::Int(number) if !number.suffix().is_empty() => {

@@ -116,7 +116,7 @@ impl ParameterKind {
         (&["str", "string"], Self::Text),
     ];
 
-    /// Its spelling.
+    /// Returns the spelling of the type.
     pub(crate) fn name(self) -> &'static str {
         Self::ALL.into_iter().find(|(_, kind)| *kind == self).map_or("", |(name, _)| name)
     }

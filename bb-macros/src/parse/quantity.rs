@@ -11,10 +11,10 @@ use syn::{Lit, LitInt, Token};
 /// A literal number with its unit, if it has one.
 #[derive(Clone, Debug)]
 pub(crate) struct Quantity {
-    /// In SI.
+    /// Value, in SI.
     pub(crate) value: f64,
     pub(crate) dimension: Dimension,
-    /// Whether a unit was written.
+    /// `true` if a unit was written.
     pub(crate) has_unit: bool,
     pub(crate) place: Place,
 }
@@ -27,7 +27,7 @@ const ANGLES: &str = "expected a number with its unit; nothing is computed here,
 const NAMES: &str = "expected a number with its unit; write it out, the value of a name is not known here";
 
 impl Quantity {
-    /// Whether a number starts here.
+    /// Returns whether a number starts here.
     pub(crate) fn peek(input: ParseStream<'_>) -> bool {
         let is_number =
             |input: ParseStream<'_>| matches!(input.fork().parse::<Lit>(), Ok(Lit::Int(_) | Lit::Float(_)));
@@ -44,7 +44,7 @@ impl Quantity {
         Self::parse_element(input)
     }
 
-    /// The same in a list, where a number may follow a comma.
+    /// Parses a quantity in a list, where a number may follow a comma.
     pub(crate) fn parse_element(input: ParseStream<'_>) -> syn::Result<Self> {
         let start = input.cursor();
         let sign = if input.peek(Token![-]) {

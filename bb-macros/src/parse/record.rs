@@ -124,7 +124,7 @@ fn glued_comma(input: ParseStream<'_>) -> Option<syn::Error> {
     None
 }
 
-/// Whether a comma and a number directly follow a number, without spaces.
+/// Returns whether a comma and a number directly follow a number, without spaces.
 fn is_glued(input: ParseStream<'_>) -> bool {
     let _: syn::Result<Option<Token![-]>> = input.parse();
     let tokens: Vec<Place> =

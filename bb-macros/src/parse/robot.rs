@@ -33,7 +33,7 @@ pub(crate) struct Robot {
     pub(crate) given: Vec<Given>,
     /// All words repeated where they may not be.
     pub(crate) repeated: Vec<Ident>,
-    /// Whether everything could be read. If not, missing parts may have been declared.
+    /// `true` if everything could be read. If not, missing parts may have been declared.
     pub(crate) complete: bool,
 }
 
@@ -130,7 +130,7 @@ impl Robot {
     }
 }
 
-/// Whether `robot Name` starts here, after comments and `pub`.
+/// Returns whether `robot Name` starts here, after comments and `pub`.
 fn starts_header(input: ParseStream<'_>) -> bool {
     let _: syn::Result<Vec<Attribute>> = input.call(Attribute::parse_outer);
     let _: syn::Result<Visibility> = input.parse();

@@ -48,7 +48,7 @@ impl<S: Copy + PartialEq> Settings<S> {
         self.0.iter().map(|(word, setting)| (*word, &setting.quantity))
     }
 
-    /// Those of one word.
+    /// Returns the settings of one word.
     pub(crate) fn of(&self, word: S) -> impl Iterator<Item = &Setting> {
         self.0.iter().filter(move |(other, _)| *other == word).map(|(_, setting)| setting)
     }

@@ -21,7 +21,7 @@ pub(super) fn place_since(start: Cursor<'_>, input: ParseStream<'_>) -> Place {
     place
 }
 
-/// Whether an item starts here: with a word of the language, or a name followed by `:` or braces.
+/// Returns whether an item starts here: with a word of the language, or a name followed by `:` or braces.
 pub(super) fn starts_item(input: ParseStream<'_>) -> bool {
     let is_word = input.fork().call(Ident::parse_any).map(|word| language::starts_item(&word.to_string()));
     let is_name = input.peek2(Token![:]) && !input.peek2(Token![::]) || input.peek2(syn::token::Brace);

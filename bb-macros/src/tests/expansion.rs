@@ -10,7 +10,7 @@ pub(super) const WHOLE: &str = r#"
     sensors { sensor battery: Battery(); }
     /// The body.
     link base {
-        /// It measures.
+        /// Inertial sensor.
         sensor imu: drivers::Bmi270<2>(bus = "i2c-1", rate = 2 * K, scale = 2000 deg/s, gain = -0.5) {
             rate: 200 Hz;
             estimator tilt: Madgwick<Imu>(beta = 0.1);
@@ -37,13 +37,13 @@ pub(super) const WHOLE: &str = r#"
     }
 "#;
 
-/// What a robot does beside sensing and estimating.
+/// A robot's actions beside sensing and estimating.
 pub(super) const ACTING: &str = r#"
     robot Rover;
     parameters {
-        /// Of the filter.
+        /// Parameters of the filter.
         imu {
-            /// How far it moves.
+            /// Step of the filter.
             beta: f64 = 0.1, range: 0.0..=1.0;
             mount { height: f64 = 90 cm, range: 0 m..=2 m; }
         }
@@ -52,15 +52,15 @@ pub(super) const ACTING: &str = r#"
         verbose: bool = false;
     }
     states {
-        /// It feels its way.
+        /// Slow driving.
         degraded;
         moving;
     }
     commands {
-        /// What moves.
+        /// Commands that move.
         category motion { concurrency: 2; }
         category default { concurrency: 3; }
-        /// It may move now.
+        /// Permission to move.
         arm: Arm;
         move_to: MoveTo(speed = 1 m/s) { allowed_states: [idle, executing]; timeout: 2 s; category: motion; }
         slow_down: SlowDown { cancel: [motion, default]; category: default; }
@@ -68,7 +68,7 @@ pub(super) const ACTING: &str = r#"
         resume: Resume { allowed_states: [degraded,]; }
     }
     controllers {
-        /// It balances.
+        /// Balance.
         controller stability: Stability(gain = param::imu::beta) { rate: 100 Hz; }
     }
     bridges { bridge ros: RosBridge(port = 1, name = param::name); bridge log: Log { rate: 10 Hz; } }
@@ -96,7 +96,7 @@ pub(super) const ACTING: &str = r#"
         }
         joint pan: continuous {
             axis: z;
-            /// It turns.
+            /// Turning motor.
             actuator servo: Dynamixel(id = 3);
             sensor encoder: Encoder(id = 3);
             link head;
@@ -107,7 +107,7 @@ pub(super) const ACTING: &str = r#"
 /// One of everything that a robot may have.
 const EVERYTHING: &str = include_str!("expansion/everything.txt");
 
-/// Where its expansion is stored, so that a change of the macro can be reviewed as a change of its output.
+/// File in which the expansion is stored, so that a change of the macro can be reviewed as a change of its output.
 const EXPANDED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/src/tests/expansion/everything.rs");
 
 /// Lines of that file: every robot pays for them in its build. A change that raises the number says in its commit by how much and why.

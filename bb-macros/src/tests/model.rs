@@ -1,4 +1,4 @@
-//! What a robot is after its names are resolved.
+//! Tests of the model: a robot after its names are resolved.
 
 use super::expansion::ACTING;
 use super::tokens;

@@ -1,4 +1,4 @@
-//! For any tokens, the macro does not panic, returns tokens that parse, and points at what was written.
+//! Tests with mutated robots: for any tokens, the macro does not panic, returns tokens that parse, and points at what was written.
 
 use super::expansion::{ACTING, WHOLE};
 use super::{diagnostics, tokens};

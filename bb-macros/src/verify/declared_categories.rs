@@ -31,7 +31,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     }
 }
 
-/// Whether there is such a category; if not, reports it.
+/// Returns whether there is such a category; if not, reports it.
 fn declared(robot: &Robot, name: &Ident, diagnostics: &mut Diagnostics) -> bool {
     // Unread items may have declared the missing ones.
     if robot.category(name).is_some() || !robot.complete {

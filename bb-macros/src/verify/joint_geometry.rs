@@ -79,7 +79,7 @@ fn limit(joint: &Joint, complete: bool, diagnostics: &mut Diagnostics) {
     }
 }
 
-/// For every kind of joint: even if no limit is needed, one that excludes every position is a mistake.
+/// Checks the range of every kind of joint: even if no limit is needed, one that excludes every position is a mistake.
 fn range(limit: &Limit, diagnostics: &mut Diagnostics) {
     if let (Some(lower), Some(upper)) = (&limit.lower, &limit.upper)
         && lower.dimension == upper.dimension

@@ -50,7 +50,7 @@ fn find<'a>(robot: &'a Robot, name: &Ident) -> Option<(JointId, &'a Joint)> {
     robot.joints.enumerate().find(|(_, joint)| joint.name == *name)
 }
 
-/// Whether following leads back to the start; each cycle is reported only at its first joint.
+/// Returns whether following leads back to the start; each cycle is reported only at its first joint.
 fn is_circle(robot: &Robot, start: JointId) -> bool {
     let mut id = start;
     for _ in robot.joints.ids() {

@@ -15,7 +15,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum State {
     New,
-    /// On the current path.
+    /// Visited and on the current path.
     Open,
     Done,
 }

@@ -24,7 +24,7 @@ pub(super) fn check(robot: &Robot, diagnostics: &mut Diagnostics) {
     }
 }
 
-/// Whether a value has the parameter's type; if not, reports it.
+/// Returns whether a value has the parameter's type; if not, reports it.
 fn of_type(parameter: &Parameter, literal: &Literal, diagnostics: &mut Diagnostics) -> bool {
     let (name, kind) = (&parameter.name, parameter.kind);
     let found = match (&literal.value, kind) {

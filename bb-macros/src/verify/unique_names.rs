@@ -88,7 +88,7 @@ enum Siblings {
     Joint(JointId),
     Sensor(SensorId),
     Services(ServiceKind),
-    /// In a group, or in `parameters` itself.
+    /// Parameters of a group, or those in `parameters` itself.
     Parameters(Option<ParameterGroupId>),
     States,
     Categories,

@@ -25,7 +25,7 @@ pub(super) struct Attribute {
     pub(super) compared_with: String,
     /// The group of options of which at least one is to be given.
     pub(super) one_of: String,
-    /// Whether it has an error, so that missing parts are not reported as well.
+    /// `true` if the attribute has an error, so that missing parts are not reported as well.
     pub(super) is_mistaken: bool,
 }
 

@@ -1,4 +1,4 @@
-//! What a publisher calls: its consumers, in its own island and in others.
+//! Calls that a publisher makes: its consumers, in its own island and in others.
 
 use super::Wiring;
 use super::consumers::{Consumer, Visit, entry, visits};

@@ -1,4 +1,4 @@
-//! Who takes the messages of each publisher, and in which order.
+//! Consumers of each publisher's messages, in the order in which they take them.
 
 use crate::expand::islands::{IslandId, Islands};
 use crate::expand::order;
@@ -10,9 +10,9 @@ use proc_macro2::{Ident, Span};
 pub(super) struct Consumer {
     pub(super) estimator: EstimatorId,
     pub(super) input: Option<usize>,
-    /// Whether its message makes the estimator run; otherwise it is kept until another one does.
+    /// `true` if a message makes the estimator run; otherwise it is kept until another one does.
     pub(super) runs: bool,
-    /// Where rustc reports a payload mismatch: the path of the input, or the type of a nested estimator.
+    /// Place at which rustc reports a payload mismatch: the path of the input, or the type of a nested estimator.
     pub(super) span: Span,
 }
 

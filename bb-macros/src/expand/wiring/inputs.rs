@@ -13,11 +13,11 @@ use std::collections::HashMap;
 /// The aliases for an input: each is named after the first input that it fits, and declared there.
 pub(super) struct Input {
     pub(super) source: PublisherId,
-    /// Its field, and the payload it takes.
+    /// Field of the input.
     pub(super) field: Ident,
     pub(super) taken: Ident,
     pub(super) declares_field: bool,
-    /// Whether that payload and its publisher's are known.
+    /// Constant that says whether that payload and its publisher's are known.
     pub(super) known: Ident,
     pub(super) declares_known: bool,
 }

@@ -1,4 +1,4 @@
-//! When a command may run, for how long, together with which others, and which ones it ends.
+//! Settings of a command: states it is allowed in, time limit, category, and the commands it cancels.
 
 use crate::language::CommandItem;
 use crate::parse::Notes;

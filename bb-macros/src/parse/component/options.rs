@@ -184,8 +184,7 @@ fn elsewhere(input: ParseStream<'_>) -> Option<syn::Error> {
     (is_all && names.len() > 1).then(|| place_since(start, input).syntax(message))
 }
 
-/// Whether a function starts here in the syntax of Python, JavaScript or C++: `lambda x: …`, `(x) => …`, `[](double
-/// x) { … }`.
+/// Returns whether a function starts here in the syntax of Python, JavaScript or C++: `lambda x: …`, `(x) => …`, `[](double x) { … }`.
 fn is_function(input: ParseStream<'_>) -> bool {
     if input.fork().parse::<Ident>().is_ok_and(|word| word == "lambda") {
         return input.peek2(syn::Ident) || input.peek2(Token![:]) && !input.peek2(Token![::]);

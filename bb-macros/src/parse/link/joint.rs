@@ -17,7 +17,7 @@ use syn::ext::IdentExt;
 use syn::parse::ParseStream;
 use syn::{Attribute, Token};
 
-/// How a joint moves. Every occurrence of each property is kept: a rule refuses the second.
+/// Properties of a joint's motion. Every occurrence of each property is kept: a rule refuses the second.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct JointProperties {
     pub(crate) origins: Vec<Origin>,
@@ -32,7 +32,7 @@ pub(crate) struct JointProperties {
 pub(crate) struct Joint {
     pub(crate) attributes: Vec<Attribute>,
     pub(crate) name: Ident,
-    /// Its name in the URDF, which need not be an identifier.
+    /// Name in the URDF, which need not be an identifier.
     pub(crate) label: Option<String>,
     pub(crate) kind: JointKind,
     pub(crate) kind_word: Ident,

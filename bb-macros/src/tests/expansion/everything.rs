@@ -543,7 +543,7 @@ const _: () = {
     static __PARAMETERS: [__private::ParameterDeclaration; 1usize] = [
         __private::ParameterDeclaration {
             path: "param/imu/beta",
-            doc: "How far each sample moves the estimate.",
+            doc: "Weight of each sample in the estimate.",
             default: __private::ParameterDefault::Float(0.1f64),
             range: __private::Some(__private::Range {
                 start: 0f64,
@@ -1514,7 +1514,7 @@ pub mod rover {
                 4usize,
             );
             pub mod pose {
-                /// Where it is.
+                /// Pose of the body.
                 ///
                 ///`estimator/base/pose/pose`
                 pub const pose: ::bb_core::__private::OutputHandle<
@@ -1575,7 +1575,7 @@ pub mod rover {
             super::__Robot,
             super::__Rover_2_11__command_arm,
         > = ::bb_core::__private::CommandHandle::new("command/arm", 0usize, 8usize);
-        /// It moves.
+        /// Motion to a target.
         ///
         ///`command/move_to`
         pub const move_to: ::bb_core::__private::CommandHandle<
@@ -1590,7 +1590,7 @@ pub mod rover {
     }
     pub mod param {
         pub mod imu {
-            /// How far each sample moves the estimate.
+            /// Weight of each sample in the estimate.
             ///
             ///`param/imu/beta`
             pub const beta: ::bb_core::__private::ParameterHandle<

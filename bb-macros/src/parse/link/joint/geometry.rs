@@ -22,7 +22,7 @@ pub(crate) struct Origin {
 #[derive(Clone, Debug)]
 pub(crate) struct Axis {
     pub(crate) word: Ident,
-    /// As written, not yet of unit length.
+    /// Direction as written, not yet of unit length.
     pub(crate) direction: [f64; 3],
     /// The components, if they were written as numbers; they have no unit.
     pub(crate) components: Vec<Quantity>,
