@@ -97,7 +97,7 @@ struct Inner {
     safety: AtomicU8,
     bell: Bell,
     sleeper: Sleeper,
-    /// When each estimator is lost unless a run has been completed.
+    /// Time at which each estimator is lost unless a run has been completed.
     watch: Deadlines<usize>,
     limits: Deadlines<Limit>,
     pool: Pool,
@@ -157,11 +157,11 @@ pub(crate) type Wired = Arc<dyn std::any::Any + Send + Sync>;
 enum Limit {
     /// The `timeout` of an execution.
     Execution(u64),
-    /// How long an arming command waits for cancelled ones.
+    /// Time for which an arming command waits for cancelled ones.
     Arming,
-    /// How long disarm callbacks may take.
+    /// Time that disarm callbacks may take.
     Disarming(u64),
-    /// The same for those that run outside of a disarming.
+    /// Time that disarm callbacks outside of a disarming may take.
     Apart(Key),
 }
 
@@ -174,7 +174,7 @@ type StateGuard<'a> = MutexGuard<'a, State>;
 
 struct State {
     machine: Machine,
-    /// In the order of their numbers.
+    /// Executions in the order of their numbers.
     executions: Vec<RunningCommand>,
     statistics: Vec<CommandStatistics>,
     next_id: u64,
@@ -194,10 +194,9 @@ struct State {
     held_lingering: Vec<u64>,
     /// The outcome of the last disarming.
     last_disarm: Result<(), DisarmError>,
-    /// How often a disarming was requested. A caller that has been waiting to arm the robot since before then gives
-    /// up.
+    /// Number of times that a disarming was requested. A caller that has been waiting to arm the robot since before then gives up.
     disarms: u64,
-    /// How often the robot was disarmed.
+    /// Number of disarmings that have begun.
     generation: u64,
     /// The robot has started: a thread keeps time.
     has_begun: bool,
@@ -229,11 +228,11 @@ struct RunningCommand {
 /// The phase of an execution.
 enum Phase {
     Running,
-    /// Its code has succeeded; it is disarming the robot.
+    /// The code has succeeded; the execution is disarming the robot.
     Disarming(Option<Value>, Option<&'static str>),
-    /// Its code has succeeded; it arms the robot once cancelled commands are gone.
+    /// The code has succeeded; the execution arms the robot once cancelled commands are gone.
     Arming(Option<Value>, Option<&'static str>),
-    /// It was cancelled or has timed out, and its code has not returned yet.
+    /// The execution was cancelled or has timed out, and its code has not returned yet.
     Lingering,
 }
 
@@ -272,13 +271,13 @@ pub(crate) enum ComponentOrder {
 struct Disarming {
     generation: u64,
     force: bool,
-    /// It ends in `error`, whatever the callbacks return.
+    /// `true` if the disarming ends in `error`, whatever the callbacks return.
     to_error: bool,
     /// The execution that disarms it.
     by: Option<u64>,
     /// The numbers and paths of callbacks that have not returned, each as often as it is to run.
     left: Vec<(u64, &'static str)>,
-    /// Its outcome, for callers that wait for it.
+    /// Outcome, for callers that wait for it.
     outcome: Arc<OnceLock<Result<(), DisarmError>>>,
     errors: Vec<SafetyError>,
 }

@@ -1,4 +1,4 @@
-//! What `robot!` declares, as constant data.
+//! Declarations of `robot!`, as constant data.
 
 mod command;
 pub(crate) mod estimator;

@@ -64,17 +64,16 @@ pub trait Payload: Clone + std::fmt::Debug + Send + Sync + Field + 'static {
     /// The type's name, for messages: `Imu`.
     const NAME: &'static str;
 
-    /// Its layout in ROS, if ROS has a message for it.
+    /// Layout in ROS, if ROS has a message for the payload.
     #[doc(hidden)]
     const ROS: Option<RosLayout<Self>> = None;
 
-    /// Whether it reports the position of the joint at which it is measured; set by `#[payload(joint_position)]`.
-    /// Each joint with an actuator needs a sensor, or an estimator in one, that publishes such a payload. It
-    /// implements [`JointPositions`].
+    /// `true` if the payload reports the position of the joint at which it is measured; set by `#[payload(joint_position)]`. Each joint
+    /// with an actuator needs a sensor, or an estimator in one, that publishes such a payload. It implements [`JointPositions`].
     const TELLS_JOINT_POSITION: bool = false;
 
-    /// Whether its values are relative to a frame, unlike the state of a joint or of a battery.
-    /// `#[payload(no_frame)]` says that they are not. An input of such a payload may span moving joints.
+    /// `true` if the values are relative to a frame, unlike the state of a joint or of a battery. `#[payload(no_frame)]` says that they
+    /// are not. An input of such a payload may span moving joints.
     const DEPENDS_ON_FRAME: bool = true;
 
     /// Calls `listener` with what it reports about joints, see [`JointPositions`].
@@ -83,7 +82,7 @@ pub trait Payload: Clone + std::fmt::Debug + Send + Sync + Field + 'static {
         let _ = listener;
     }
 
-    /// Whether it commands a joint, whose limits are then applied; set by `#[payload(joint_command)]`. It implements
+    /// `true` if the payload commands a joint, whose limits are then applied; set by `#[payload(joint_command)]`. It implements
     /// [`JointCommand`].
     const COMMANDS_JOINT: bool = false;
 

@@ -71,27 +71,27 @@ use wired::declaration;
 
 /// A declared robot. `robot!` implements it for the type that it defines; users call [`Robot::builder`].
 pub trait Robot: Sized + Send + Sync + 'static {
-    /// Its name.
+    /// Name.
     const NAME: &'static str;
-    /// Its links and joints.
+    /// Links and joints.
     const TOPOLOGY: &'static Topology;
-    /// Its sensors, in the order of their declaration.
+    /// Sensors, in the order of their declaration.
     const SENSORS: &'static [SensorDeclaration];
-    /// Its estimators, in the order of their declaration.
+    /// Estimators, in the order of their declaration.
     const ESTIMATORS: &'static [EstimatorDeclaration];
-    /// Its actuators, in the order of their declaration.
+    /// Actuators, in the order of their declaration.
     const ACTUATORS: &'static [ActuatorDeclaration];
-    /// Its controllers and bridges, in the order of their declaration.
+    /// Controllers and bridges, in the order of their declaration.
     const SERVICES: &'static [SensorDeclaration];
-    /// Its declared states, without the built-in ones.
+    /// Declared states, without the built-in ones.
     const STATES: &'static [&'static str];
     /// The categories of its commands.
     const CATEGORIES: &'static [CategoryDeclaration];
-    /// Its commands, in the order of their declaration.
+    /// Commands, in the order of their declaration.
     const COMMANDS: &'static [CommandDeclaration];
-    /// Its parameters, in the order of their declaration.
+    /// Parameters, in the order of their declaration.
     const PARAMETERS: &'static [ParameterDeclaration];
-    /// Where its islands are in the wiring.
+    /// Places of the islands in the wiring.
     #[doc(hidden)]
     const ISLANDS: &'static [IslandOf<Self::Wiring>];
     /// The options bound to a parameter: the number of the component in [`Robot::options`], the option's name, and
@@ -114,7 +114,7 @@ pub trait Robot: Sized + Send + Sync + 'static {
     /// Starts all estimators; errors are stored in `assembly`.
     #[doc(hidden)]
     fn wire(topics: Self::Topics, options: &OptionsList, assembly: &Assembly) -> Self::Wiring;
-    /// Its sensors and services.
+    /// Returns the sensors and services.
     #[doc(hidden)]
     fn sources(wiring: &Arc<Self::Wiring>) -> Sources;
     #[doc(hidden)]
@@ -129,7 +129,7 @@ pub trait Robot: Sized + Send + Sync + 'static {
     #[doc(hidden)]
     fn commands(options: &OptionsList) -> Vec<Prepared>;
 
-    /// Its links and joints as a URDF file.
+    /// Returns the links and joints as a URDF file.
     fn to_urdf() -> String {
         Self::TOPOLOGY.to_urdf(Self::NAME)
     }

@@ -1,4 +1,4 @@
-//! When things are due, and the threads that do them.
+//! Due times, and the threads that do what is due.
 
 mod agenda;
 mod bell;

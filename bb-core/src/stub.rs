@@ -120,14 +120,14 @@ impl<T> NotProbed for Probe<T> {}
 #[derive(Debug)]
 pub struct Probed<T, const IMPLEMENTED: u8>(PhantomData<fn() -> T>);
 
-/// It does not.
+/// Not implemented.
 const NO: u8 = 0;
-/// It does.
+/// Implemented.
 const YES: u8 = 1;
-/// It does in a way that rustc reports at the implementation.
+/// Implemented in a way that rustc reports at the implementation.
 const WRONGLY: u8 = 2;
 
-/// How a type implements its trait, by the constants of [`Probe`].
+/// Returns how a type implements its trait, by the constants of [`Probe`].
 pub const fn implemented(is: bool, implements: bool) -> u8 {
     match (is, implements) {
         (true, _) => YES,
@@ -159,7 +159,7 @@ impl<T> Known for Probed<T, WRONGLY> {
     type Given = Wrong<T>;
 }
 
-/// Whether both payloads are known, and must therefore be equal.
+/// Returns whether both payloads are known, and must therefore be equal.
 pub const fn both_known<P: Payload, T: Payload>() -> bool {
     P::KNOWN && T::KNOWN
 }

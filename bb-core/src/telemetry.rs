@@ -36,14 +36,14 @@ pub enum TelemetryEvent {
         path: &'static str,
         /// The message's stamp.
         stamp: Stamp,
-        /// From the stamp, which is that of the driver's message unless it is [`Timed`](crate::Timed), to the emission.
+        /// Time from the stamp, which is that of the driver's message unless it is [`Timed`](crate::Timed), to the emission.
         age: Duration,
     },
     /// A callback returned.
     Latency {
         /// The path of the estimator.
         estimator: &'static str,
-        /// How long it took.
+        /// Duration of the callback.
         duration: Duration,
     },
     /// A message or a dispatch was dropped.

@@ -31,13 +31,13 @@ pub struct Topology {
 /// A rigid body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Link {
-    /// Its name, and that of its frame.
+    /// Name of the link, and of its frame.
     pub name: &'static str,
     /// The number of the joint that carries it; `None` for the root.
     pub parent_joint: Option<usize>,
     /// Takes points from this link to the root, if all joints between are fixed.
     pub root_from_link: Option<Transform>,
-    /// Its mass and moments of inertia.
+    /// Mass and moments of inertia.
     pub inertial: Option<Inertial>,
     /// Shapes that viewers draw.
     pub visuals: &'static [Visual],
@@ -48,9 +48,9 @@ pub struct Link {
 /// A connection between two links.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Joint {
-    /// Its name.
+    /// Name.
     pub name: &'static str,
-    /// Its type.
+    /// Kind of motion.
     pub kind: JointKind,
     /// The number of the link it is mounted on.
     pub parent: usize,
@@ -60,9 +60,9 @@ pub struct Joint {
     pub parent_from_joint: Origin,
     /// The axis of motion in the joint's frame, of unit length; for a planar joint the plane's normal.
     pub axis: Option<[f64; 3]>,
-    /// Its limits of position, velocity and effort.
+    /// Limits of position, velocity and effort.
     pub limit: Option<Limit>,
-    /// Its damping and friction.
+    /// Damping and friction.
     pub dynamics: Option<Dynamics>,
     /// The joint that it follows.
     pub mimic: Option<Mimic>,
@@ -84,13 +84,13 @@ pub struct Dynamics {
 pub struct Mimic {
     /// The number of the joint it follows.
     pub joint: usize,
-    /// How far it moves for each unit of the other.
+    /// Motion for each unit of the other's.
     pub multiplier: f64,
-    /// Its position where the other's is 0; rad or m.
+    /// Position where the other's is 0; rad or m.
     pub offset: f64,
 }
 
-/// How a joint moves (URDF's types).
+/// Kind of a joint's motion (URDF's types).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JointKind {
     /// Not at all.
@@ -108,7 +108,7 @@ pub enum JointKind {
 }
 
 impl JointKind {
-    /// Its name in URDF.
+    /// Returns the name in URDF.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Fixed => "fixed",
@@ -147,7 +147,7 @@ impl Origin {
     /// No motion at all.
     pub const IDENTITY: Self = Self { xyz: [0.0; 3], rpy: [0.0; 3] };
 
-    /// The same as an isometry.
+    /// Returns the origin as an isometry.
     pub fn isometry(&self) -> Isometry3<f64> {
         let [roll, pitch, yaw] = self.rpy;
         let rotation = UnitQuaternion::from_euler_angles(roll, pitch, yaw);
@@ -168,13 +168,13 @@ impl Transform {
     /// No motion at all.
     pub const IDENTITY: Self = Self { translation: [0.0; 3], rotation: [1.0, 0.0, 0.0, 0.0] };
 
-    /// Of an isometry.
+    /// Creates the transform of an isometry.
     pub fn of(isometry: &Isometry3<f64>) -> Self {
         let Quaternion { coords } = *isometry.rotation;
         Self { translation: isometry.translation.vector.into(), rotation: [coords.w, coords.x, coords.y, coords.z] }
     }
 
-    /// The same as an isometry.
+    /// Returns the transform as an isometry.
     pub fn isometry(&self) -> Isometry3<f64> {
         let [w, x, y, z] = self.rotation;
         let rotation = UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));

@@ -1,4 +1,4 @@
-//! Whether an estimator's declaration is complete.
+//! Checks that an estimator's declaration is complete.
 
 use super::find::find_input;
 use super::names::list;
@@ -14,9 +14,9 @@ enum InputFault {
     Single,
     /// A required one is not declared.
     Missing(&'static str),
-    /// It is nested, but the algorithm needs several inputs.
+    /// A nested estimator whose algorithm needs several inputs.
     NeedsSeveral,
-    /// It is nested, but the algorithm requires none of its several inputs.
+    /// A nested estimator whose algorithm requires none of its several inputs.
     NeedsNone,
 }
 
@@ -36,7 +36,7 @@ pub const fn check_estimator<E: Estimator, const G: usize, const D: usize>(
     report::<E>(estimator, option, missing_input::<E::Input>(&declared), has_outputs);
 }
 
-/// The same for a nested estimator, whose only input is its sensor's.
+/// Checks a nested estimator, whose only input is its sensor's, as [`check_estimator`] does.
 #[track_caller]
 pub const fn check_nested<E: Estimator, const G: usize>(estimator: &str, given: [&str; G], has_outputs: bool) {
     let option = missing_option(<E::Options as Options>::FIELDS, &given);
@@ -93,7 +93,8 @@ const fn missing_input<I: Inputs>(declared: &[&str]) -> Option<InputFault> {
     None
 }
 
-/// Why the sensor of a nested estimator is not its input: the algorithm must have exactly one required input, or only one.
+/// Returns the reason for which the sensor of a nested estimator is not its input: the algorithm must have exactly one required
+/// input, or only one.
 const fn no_nested_input<I: Inputs>() -> Option<InputFault> {
     if !I::KNOWN || <I::Nested as TakenAt<I>>::INDEX != UNKNOWN_INDEX {
         return None;

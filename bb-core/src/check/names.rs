@@ -1,4 +1,4 @@
-//! Whether declared inputs and outputs are the algorithm's, by name.
+//! Checks of the names of declared inputs and outputs against those of the algorithm.
 
 use super::find::{find_input, find_output};
 use super::text::{Text, equal, nearest};

@@ -1,4 +1,4 @@
-//! Whether the options given to a component are complete, of the right dimension and in range.
+//! Checks that the options given to a component are complete, of the right dimension and in range.
 
 use super::text::{Text, contains, equal};
 use crate::component::{OptionField, Options};

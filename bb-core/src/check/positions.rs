@@ -1,4 +1,4 @@
-//! Whether the position of an actuated joint is known.
+//! Checks that the position of an actuated joint is known.
 
 use super::text::Text;
 

@@ -60,7 +60,7 @@ pub(super) const fn equal(a: &str, b: &str) -> bool {
     true
 }
 
-/// Whether `name` is among `names`.
+/// Returns whether `name` is among `names`.
 pub(super) const fn contains(names: &[&str], name: &str) -> bool {
     let mut index = 0;
     while index < names.len() {

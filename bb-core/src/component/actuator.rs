@@ -54,7 +54,7 @@ use crate::time::MonotonicTime;
     note = "implement `bb_core::Actuator` for it"
 )]
 pub trait Actuator: Sized + Send + 'static {
-    /// Its options: the struct that `Name(…)` in `robot!` fills.
+    /// Options of the actuator: the struct that `Name(…)` in `robot!` fills.
     type Options: Options;
     /// The commands it takes.
     type Command: Payload;
@@ -76,7 +76,8 @@ pub trait Actuator: Sized + Send + 'static {
     /// Any error is reported, and the actuator is made safe and restarted.
     fn handle_command(&mut self, command: &Stamped<Self::Command>) -> Result<(), Fault>;
 
-    /// When to call [`update`](Self::update); asked after each call of its code. The default is `None`: never.
+    /// Returns the time at which to call [`update`](Self::update); asked after each call of the actuator's code. The default is `None`:
+    /// never.
     fn next_update(&self) -> Option<MonotonicTime> {
         None
     }

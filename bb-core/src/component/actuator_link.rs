@@ -30,8 +30,8 @@ impl<T: Payload> ActuatorLink<T> {
         self.apply(command).map(drop)
     }
 
-    /// As [`send`](Self::send), and returns the command that was carried out: with the limits of the joint applied. A controller
-    /// uses it to see that its output was clamped.
+    /// Sends a command as [`send`](Self::send) does, and returns the command that was carried out: with the limits of the joint
+    /// applied. A controller uses it to see that its output was clamped.
     ///
     /// # Errors
     /// As [`send`](Self::send).
@@ -61,7 +61,7 @@ impl<T: Payload> fmt::Debug for ActuatorLink<T> {
     }
 }
 
-/// Why an actuator has not carried out a command.
+/// Reason for which an actuator has not carried out a command.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ActuatorError {

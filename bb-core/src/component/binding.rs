@@ -4,7 +4,7 @@ use super::{FromQuantity, Options};
 use crate::declaration::ParameterValues;
 use std::time::Duration;
 
-/// Which parameters the options of a component are bound to.
+/// Parameters that the options of a component are bound to.
 #[derive(Debug)]
 pub struct Binding<O> {
     /// Puts their values into the options.
@@ -22,7 +22,7 @@ impl<O> Clone for Binding<O> {
 impl<O> Copy for Binding<O> {}
 
 impl<O: Options> Binding<O> {
-    /// To none.
+    /// A binding to no parameter.
     pub const NONE: Self = Self { apply: |_, _| {}, parameters: &[] };
 
     /// The options with the values put in, validated.

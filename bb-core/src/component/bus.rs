@@ -325,7 +325,7 @@ impl Bus {
         self.host.report_json().ok_or_else(|| Fault::new("the robot has not started, or is gone"))
     }
 
-    /// How the robot runs.
+    /// Returns the kind of the run: in real time, in a simulation or from a journal.
     pub fn run_kind(&self) -> RunKind {
         self.host.controls().kind_of_run()
     }

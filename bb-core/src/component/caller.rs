@@ -1,4 +1,4 @@
-//! Who asks a robot for something, and what it may ask for.
+//! Callers of a robot, and their rights.
 
 use super::Fault;
 use crate::event::{Forbidden, Right, Rights};
@@ -6,7 +6,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Who asks a robot for something. Handles that were obtained for a caller act in its name.
+/// A caller of a robot. Handles that were obtained for a caller act in its name.
 #[derive(Clone, Debug)]
 pub(crate) struct Caller {
     name: Cow<'static, str>,
@@ -14,7 +14,7 @@ pub(crate) struct Caller {
     /// The execution of a command or the session that it belongs to, after whose end its handles refuse to act, even if code of it still
     /// runs.
     within: Option<Arc<Within>>,
-    /// It calls from outside of the robot: on virtual time, what follows from its calls is settled before they return.
+    /// `true` for a caller outside of the robot: on virtual time, what follows from its calls is settled before they return.
     is_outside: bool,
 }
 
@@ -77,7 +77,7 @@ impl Caller {
         if self.rights.contains(right) { Ok(()) } else { Err(Forbidden { caller: self.name.to_string(), right }) }
     }
 
-    /// The same caller in a session of that name, which [`Self::revoke`] ends.
+    /// Returns the same caller in a session of that name, which [`Self::revoke`] ends.
     pub(crate) fn in_session(&self) -> Self {
         let within =
             Within { session: Some(self.name.to_string()), outer: self.within.clone(), ..Within::default() };
@@ -91,7 +91,7 @@ impl Caller {
         }
     }
 
-    /// Whether both are of the same execution of a command, or of the same session outside of commands.
+    /// Returns whether both are of the same execution of a command, or of the same session outside of commands.
     pub(crate) fn is_of_same(&self, other: &Self) -> bool {
         let (Some(one), Some(other)) = (&self.within, &other.within) else { return false };
         std::ptr::eq(one.outermost(), other.outermost())

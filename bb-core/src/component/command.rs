@@ -51,15 +51,15 @@ use std::time::Duration;
     note = "implement `bb_core::Command` for it"
 )]
 pub trait Command: Sized + Send + 'static {
-    /// Its options: the struct that `Name(…)` in `robot!` fills.
+    /// Options of the command: the struct that `Name(…)` in `robot!` fills.
     type Options: Options;
     /// The arguments its caller gives. Derive [`Payload`] for the type, so that tools can start the command with
     /// arguments from JSON. A command started by a health transition gets the default.
     type Arguments: Field + Default + Send + 'static;
-    /// Its result.
+    /// Result of the command.
     type Output: Field + Send + 'static;
 
-    /// Whether it arms or disarms the robot.
+    /// Effect of the command on the robot's safety: whether it arms or disarms the robot.
     const ROLE: Role = Role::Plain;
 
     /// Runs it.
@@ -73,11 +73,11 @@ pub trait Command: Sized + Send + 'static {
     ) -> impl Future<Output = Result<Outcome<Self::Output>, Fault>> + Send;
 }
 
-/// For commands without arguments.
+/// The arguments of a command without arguments.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Payload)]
 pub struct NoArguments;
 
-/// How a command has ended.
+/// The value of a command that succeeded, and the state that it names next, if any.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[must_use]
 pub struct Outcome<T> {
@@ -186,8 +186,8 @@ impl CommandContext {
         Ok(())
     }
 
-    /// Whether it was cancelled or has timed out. Anything it sends from then on is refused. A command that blocks
-    /// its thread should check this from time to time.
+    /// Returns whether the command was cancelled or has timed out. Anything it sends from then on is refused. A command that blocks its
+    /// thread should check this from time to time.
     pub fn is_cancelled(&self) -> bool {
         !self.bus.caller.is_valid()
     }
@@ -242,7 +242,7 @@ impl OwnHooks {
         Self { path, host, execution }
     }
 
-    /// Once the execution's code has returned, a callback is dropped.
+    /// Adds a callback, which is dropped once the execution's code has returned.
     pub(crate) fn add(&self, hook: DisarmHook) {
         self.host.controls().on_disarm(self.path, Some(self.execution), hook);
     }

@@ -1,4 +1,4 @@
-//! What a component is given when it starts.
+//! Contexts that components are given when they start.
 
 use super::guardian::Guardian;
 use super::host::Host;
@@ -38,7 +38,7 @@ impl Context {
         Self { robot, declaration, now, safety, requests: RefCell::default(), replacement: None }
     }
 
-    /// The same, of an estimator that takes the place of the declared one.
+    /// Returns the same context, of an estimator that takes the place of the declared one.
     pub(crate) fn with_replacement(self, replacement: Option<Replacement>) -> Self {
         Self { replacement, ..self }
     }
@@ -179,7 +179,7 @@ impl Context {
         self.requests.borrow().clone()
     }
 
-    /// The same for the driver, or for the only input.
+    /// Returns the transform from the frame of the driver, or of the only input, to that of the output.
     ///
     /// # Errors
     /// There is a moving joint between them.
@@ -226,7 +226,7 @@ impl ComponentContext {
         self.host.controls().clock()
     }
 
-    /// Whether the robot is stopping: a component that waits for its device should then stop waiting.
+    /// Returns whether the robot is stopping: a component that waits for its device should then stop waiting.
     pub fn is_stopping(&self) -> bool {
         self.host.controls().is_stopping()
     }
@@ -402,7 +402,7 @@ impl ActuatorContext {
         lock(&self.reports).begin(motion);
     }
 
-    /// The same at `end_motion`, for the end of a motion.
+    /// Publishes the end of a motion at `end_motion`, as [`begin_motion`](Self::begin_motion) does the beginning.
     pub fn end_motion(&self, mut motion: EndMotion) {
         motion.position = self.gear.map_or(motion.position, |gear| gear.joint_position(motion.position));
         lock(&self.reports).end(motion);

@@ -16,38 +16,38 @@ use std::time::Duration;
 pub struct Description {
     /// The name of the robot.
     pub robot: &'static str,
-    /// Whether it runs in real time, in a simulation or from a journal.
+    /// Kind of the run: in real time, in a simulation or from a journal.
     pub run: RunKind,
-    /// Its links.
+    /// Links.
     pub links: Vec<LinkDescription>,
-    /// Its joints.
+    /// Joints.
     pub joints: Vec<JointDescription>,
-    /// Its sensors, estimators, actuators, controllers and bridges.
+    /// Sensors, estimators, actuators, controllers and bridges.
     pub components: Vec<ComponentDescription>,
-    /// Its topics, those created at run time included.
+    /// Topics, those created at run time included.
     pub topics: Vec<TopicDescription>,
-    /// Its parameters.
+    /// Parameters.
     pub parameters: Vec<ParameterDescription>,
-    /// Its commands.
+    /// Commands.
     pub commands: Vec<CommandInfo>,
-    /// Its operational states.
+    /// Operational states.
     pub states: Vec<&'static str>,
 }
 
-/// How a robot runs.
+/// Kind of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum RunKind {
-    /// In real time, see [`Builder::start`](crate::Builder::start).
+    /// A run in real time, see [`Builder::start`](crate::Builder::start).
     Live,
-    /// On virtual time, see [`Builder::simulate`](crate::Builder::simulate).
+    /// A run on virtual time, see [`Builder::simulate`](crate::Builder::simulate).
     Simulation,
-    /// From a journal, see [`Builder::replay`](crate::Builder::replay).
+    /// A replay of a journal, see [`Builder::replay`](crate::Builder::replay).
     Replay,
 }
 
 impl RunKind {
-    /// Its name in JSON: `live`, `simulation` or `replay`.
+    /// Returns the name in JSON: `live`, `simulation` or `replay`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Live => "live",
@@ -63,11 +63,11 @@ impl RunKind {
 pub struct LinkDescription {
     /// The joints and links from the root to it: `base/pan/head`.
     pub path: String,
-    /// Its name.
+    /// Name.
     pub name: &'static str,
     /// The joint that carries it; `None` for the root.
     pub parent_joint: Option<&'static str>,
-    /// Its mass, kg, if declared.
+    /// Mass, kg, if declared.
     pub mass: Option<f64>,
 }
 
@@ -77,15 +77,15 @@ pub struct LinkDescription {
 pub struct JointDescription {
     /// The links and joints from the root to it: `base/pan`.
     pub path: String,
-    /// Its name.
+    /// Name.
     pub name: &'static str,
-    /// How it moves.
+    /// Kind of motion.
     pub kind: JointKind,
     /// The link that carries it.
     pub parent: &'static str,
     /// The link that it carries.
     pub child: &'static str,
-    /// Its limits.
+    /// Limits.
     pub limit: Option<Limit>,
     /// The joint that it mimics.
     pub mimics: Option<&'static str>,
@@ -93,7 +93,7 @@ pub struct JointDescription {
     pub actuators: Vec<&'static str>,
 }
 
-/// What a component is.
+/// Kind of a component.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ComponentKind {
@@ -126,21 +126,21 @@ impl ComponentKind {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct ComponentDescription {
-    /// Its path: `sensor/base/imu`.
+    /// Path: `sensor/base/imu`.
     pub path: &'static str,
-    /// What it is.
+    /// Kind.
     pub kind: ComponentKind,
     /// The frame of what it publishes: a link or a joint; empty for none.
     pub frame: &'static str,
-    /// How often it is read or called, if it has a rate.
+    /// Period of readings or calls, if the component has a rate.
     pub period: Option<Duration>,
-    /// What an estimator takes.
+    /// Inputs of an estimator.
     pub inputs: Vec<InputDescription>,
     /// The paths at which it publishes; an actuator, the commands that it has carried out, and its motions.
     pub topics: Vec<&'static str>,
     /// The shape of the commands that an actuator takes.
     pub command: Option<Shape>,
-    /// Whether another component took its place, see [`Builder::replace_sensor`](crate::run::Builder::replace_sensor).
+    /// `true` if another component took its place, see [`Builder::replace_sensor`](crate::run::Builder::replace_sensor).
     pub is_replaced: bool,
 }
 
@@ -148,13 +148,13 @@ pub struct ComponentDescription {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct InputDescription {
-    /// Its name.
+    /// Name.
     pub name: &'static str,
     /// The path of its publisher.
     pub source: &'static str,
-    /// Whether its arrival triggers a dispatch.
+    /// `true` if the arrival of a message triggers a dispatch.
     pub is_driver: bool,
-    /// Whether the estimator is called without it.
+    /// `true` if the estimator is called without the input.
     pub is_optional: bool,
 }
 
@@ -162,11 +162,11 @@ pub struct InputDescription {
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct TopicDescription {
-    /// Its path.
+    /// Path.
     pub path: &'static str,
     /// The name of its payload.
     pub payload: &'static str,
-    /// How often it is published, if that is declared: the rate of a sensor or a service.
+    /// Period at which messages are published, if that is declared: the rate of a sensor or a service.
     pub period: Option<Duration>,
 }
 
@@ -174,13 +174,13 @@ pub struct TopicDescription {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct ParameterDescription {
-    /// Its path: `param/gains/kp`.
+    /// Path: `param/gains/kp`.
     pub path: &'static str,
-    /// Its documentation.
+    /// Documentation.
     pub doc: &'static str,
-    /// Its present value, in SI.
+    /// Present value, in SI.
     pub value: ParameterValue,
-    /// Its value as declared, in SI.
+    /// Value as declared, in SI.
     pub default: ParameterValue,
     /// The unit it is declared with; empty for none.
     pub unit: &'static str,

@@ -41,14 +41,14 @@ use super::{Context, Fault, Info, InputTransforms, Inputs, Options, Outputs, Req
     note = "implement `bb_core::Estimator` for it"
 )]
 pub trait Estimator: Sized + Send + 'static {
-    /// Its options: the struct that `Name(…)` in `robot!` fills.
+    /// Options of the estimator: the struct that `Name(…)` in `robot!` fills.
     type Options: Options;
     /// A payload, or a struct of several inputs.
     type Input: Inputs; // of a struct: `type Input = Pair<'static>;`
     /// A payload, or a struct of several outputs; [`Outputs`] lists the forms, among them several messages at once.
     type Output: Outputs;
 
-    /// Whether it handles changing transforms, with [`handle_transforms`](Self::handle_transforms), so its inputs may
+    /// `true` if the estimator handles changing transforms, with [`handle_transforms`](Self::handle_transforms), so that its inputs may
     /// span moving joints.
     const HANDLES_MOVING_JOINTS: bool = false;
 
@@ -121,11 +121,11 @@ pub trait Estimator: Sized + Send + 'static {
     label = "no `HandleCall<{Q}>`"
 )]
 pub trait HandleCall<Q>: Estimator {
-    /// Its answer.
+    /// Answer to the request.
     type Response;
 
-    /// How a journal holds these requests, so that a replay repeats them: `Some(RequestCodec::bytes())` for a request
-    /// that derives [`Payload`](crate::message::Payload). By default, the journal holds only the outputs that they caused.
+    /// Form of these requests in a journal, so that a replay repeats them: `Some(RequestCodec::bytes())` for a request that derives
+    /// [`Payload`](crate::message::Payload). By default, the journal holds only the outputs that they caused.
     const RECORD: Option<RequestCodec<Q>> = None;
 
     /// Answers, and may emit outputs as well. With [`Request::Restart`] in the reply, the estimator answers and then
@@ -201,7 +201,7 @@ impl<O> Reply<O> {
         self.output
     }
 
-    /// Why the estimate has diverged, if it has.
+    /// Returns the reason for which the estimate has diverged, if it has.
     pub fn divergence(&self) -> Option<&'static str> {
         self.diverged
     }

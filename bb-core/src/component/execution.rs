@@ -11,9 +11,9 @@ use std::time::Duration;
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct CommandInfo {
-    /// Its path: `command/go`.
+    /// Path: `command/go`.
     pub path: &'static str,
-    /// Its effect on the robot's safety.
+    /// Effect on the robot's safety.
     pub role: Role,
     /// The shape of its arguments.
     pub arguments: Shape,
@@ -23,9 +23,9 @@ pub struct CommandInfo {
     pub output: Shape,
     /// The states in which it may start; `None` means those of its role.
     pub allowed_states: Option<&'static [&'static str]>,
-    /// Its category.
+    /// Category.
     pub category: &'static str,
-    /// How long it may take.
+    /// Longest time that an execution may take.
     pub timeout: Option<Duration>,
     /// Number of its executions that have not ended.
     pub running: usize,
@@ -35,7 +35,7 @@ pub struct CommandInfo {
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct ExecutionInfo {
-    /// Its number, as in [`CommandEvent`](crate::event::CommandEvent): [`Bus::cancel`](crate::Bus::cancel) takes it.
+    /// Number, as in [`CommandEvent`](crate::event::CommandEvent): [`Bus::cancel`](crate::Bus::cancel) takes it.
     pub number: u64,
     /// The path of its command.
     pub path: &'static str,

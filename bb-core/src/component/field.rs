@@ -6,13 +6,13 @@ use std::time::Duration;
 /// The description of one option.
 #[derive(Clone, Copy, Debug)]
 pub struct OptionField {
-    /// Its name.
+    /// Name.
     pub name: &'static str,
-    /// Its doc comment.
+    /// Doc comment.
     pub doc: &'static str,
-    /// Whether it must be given.
+    /// `true` if the option must be given.
     pub required: bool,
-    /// Its dimension, where a unit is stated.
+    /// Dimension, where a unit is stated.
     pub dimension: Option<Dimension>,
     /// The unit it was stated in.
     pub unit: &'static str,
@@ -63,9 +63,9 @@ impl<T: From<&'static str>> FromText for T {
     note = "an option with a unit is an `f64`, an `f32`, a `Duration`, or an `Option` of one of these"
 )]
 pub trait FromQuantity {
-    /// From its value in SI.
+    /// Converts the value in SI.
     fn from_quantity(value: f64) -> Self;
-    /// Its value in SI, if it has one.
+    /// Returns the value in SI, if there is one.
     fn to_quantity(&self) -> Option<f64>;
     /// The value for `null`, if the type has one.
     fn none() -> Option<Self>
@@ -74,14 +74,14 @@ pub trait FromQuantity {
     {
         None
     }
-    /// From a string in the SI unit, for types more exact than an `f64`.
+    /// Converts a string in the SI unit, for types more exact than an `f64`.
     fn from_exact(_text: &str) -> Option<Self>
     where
         Self: Sized,
     {
         None
     }
-    /// Its value in SI as decimal digits, for types more exact than an `f64`.
+    /// Returns the value in SI as decimal digits, for types more exact than an `f64`.
     fn to_exact(&self) -> Option<String> {
         None
     }
@@ -118,7 +118,7 @@ impl FromQuantity for Duration {
         Some(self.as_secs_f64())
     }
 
-    /// Of seconds with up to nine decimal places.
+    /// Converts seconds with up to nine decimal places.
     fn from_exact(text: &str) -> Option<Self> {
         let (seconds, fraction) = text.split_once('.').unwrap_or((text, ""));
         let are_digits = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit());

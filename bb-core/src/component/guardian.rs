@@ -24,7 +24,7 @@ pub struct SafetyLink {
 }
 
 impl SafetyLink {
-    /// For tests: without a guardian, nothing happens.
+    /// Creates a link. Without a guardian, as in tests, nothing happens.
     pub(crate) fn new(path: &'static str, guardian: Option<Arc<dyn Guardian>>) -> Self {
         Self { path, guardian }
     }

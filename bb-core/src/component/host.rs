@@ -19,7 +19,7 @@ use std::sync::Arc;
 pub(crate) trait Controls: Guardian {
     fn origin(&self) -> Origin;
     fn clock(&self) -> &Clock;
-    /// Whether components are to stop.
+    /// Returns whether components are to stop.
     fn is_stopping(&self) -> bool;
     fn state(&self) -> &'static str;
     fn safety(&self) -> Safety;
@@ -64,7 +64,7 @@ pub(crate) trait Host: Send + Sync {
     fn with_topics(&self, call: &mut dyn FnMut(&[&dyn AnyTopic]));
     /// The topics created at run time.
     fn registry(&self) -> &Registry;
-    /// Whether there is a journal.
+    /// Returns whether there is a journal.
     fn is_journaled(&self) -> bool;
     /// Calls `publish` unless the robot has stopped; first waits while too many entries are queued for the journal's
     /// sink.

@@ -23,7 +23,7 @@ pub enum Request {
     Restart(&'static str),
 }
 
-/// Why [`handle_info`](super::Estimator::handle_info) is called.
+/// Reason for a call of [`handle_info`](super::Estimator::handle_info).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Info {

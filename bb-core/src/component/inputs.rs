@@ -67,9 +67,9 @@ pub trait Inputs: 'static {
 /// The description of one field of an input struct.
 #[derive(Clone, Copy, Debug)]
 pub struct InputField {
-    /// Its name.
+    /// Name.
     pub name: &'static str,
-    /// Whether the estimator can run without it.
+    /// `true` if the estimator can run without the input.
     pub optional: bool,
 }
 
@@ -87,10 +87,10 @@ pub trait InputAt<const I: FieldIndex>: Inputs {
     /// The payload it takes.
     type Payload: Payload;
 
-    /// What keeps its messages until the driver arrives.
+    /// Store of the input's messages until the driver arrives.
     type Slot: Slot<Self::Payload>;
 
-    /// Its slot; `None` if the estimator takes only a single payload, which needs no cache.
+    /// Returns the input's slot; `None` if the estimator takes only a single payload, which needs no cache.
     fn slot(cache: &mut Self::Cache) -> Option<&mut Self::Slot>;
 
     /// The estimator's input when this input is the driver and `message` has arrived.
@@ -103,7 +103,7 @@ pub trait InputAt<const I: FieldIndex>: Inputs {
 /// [`InputAt`] implemented by the field: a type is named once, while a number would be computed at each use.
 #[doc(hidden)]
 pub trait TakenAt<T: Inputs + ?Sized>: 'static {
-    /// Its number.
+    /// Number of the field.
     const INDEX: FieldIndex;
 
     /// The payload it takes.

@@ -14,7 +14,7 @@ pub(crate) enum MotionReport {
 pub(super) struct MotionReports {
     pending: Vec<MotionReport>,
     current: Option<BeginMotion>,
-    /// Why the actuator is failing: its motion ends with this reason, whatever it reports meanwhile.
+    /// Reason for which the actuator is failing: its motion ends with this reason, whatever it reports meanwhile.
     failing: Option<String>,
     /// The runtime has reported the end of the last motion. A later report of that end is dropped.
     has_ended: bool,

@@ -53,7 +53,7 @@ pub trait Options: Clone + std::fmt::Debug + Send + 'static {
     }
 }
 
-/// For components without options.
+/// The options of a component without options.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct NoOptions;
 
@@ -78,25 +78,25 @@ impl OptionsList {
         self.0.push(Box::new(options));
     }
 
-    /// Those of a component.
+    /// Returns the options of a component.
     pub(crate) fn any(&mut self, component: usize) -> Option<&mut dyn AnyOptions> {
         self.0.get_mut(component).map(Box::as_mut)
     }
 
-    /// The same, of the type that the expansion knows them to be of.
+    /// Returns the options of a component, in the type that the expansion knows them to be of.
     pub(crate) fn of<O: 'static>(&self, component: usize) -> &O {
         let options: Option<&dyn Any> = self.0.get(component).map(|options| &**options as &dyn Any);
         options.and_then(<dyn Any>::downcast_ref).unwrap_or_else(unverified)
     }
 
-    /// The same, to change them.
+    /// Returns the options of a component to be changed, in the type that the expansion knows them to be of.
     pub(crate) fn of_mut<O: 'static>(&mut self, component: usize) -> &mut O {
         let options = self.any(component).map(|options| options as &mut dyn Any);
         options.and_then(<dyn Any>::downcast_mut).unwrap_or_else(unverified)
     }
 }
 
-/// For what only a robot that failed to verify does not have.
+/// Panics for a value that only a robot that failed to verify does not have.
 #[allow(clippy::panic, reason = "such a robot does not compile")]
 pub(crate) fn unverified<T>() -> T {
     panic!("this robot did not verify")

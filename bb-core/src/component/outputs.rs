@@ -197,7 +197,7 @@ impl<E: Emitted> OutputField for Vec<E> {
 /// Output number `I` of `Self` exists, and can be taken out of an emitted value.
 #[doc(hidden)]
 pub trait OutputAt<const I: FieldIndex>: Outputs {
-    /// Its payload.
+    /// Payload of the output.
     type Payload: Payload;
 
     /// Takes its messages, if any were emitted, and hands each to `publish`.
@@ -210,7 +210,7 @@ pub trait OutputAt<const I: FieldIndex>: Outputs {
 /// [`OutputAt`] implemented by the field; see [`TakenAt`](super::TakenAt).
 #[doc(hidden)]
 pub trait EmittedAt<T>: 'static {
-    /// Its payload.
+    /// Payload of the output.
     type Payload: Payload;
 
     /// See [`OutputAt::each`].

@@ -129,7 +129,7 @@ pub struct ReactionState {
 pub enum ReactionEvent {
     /// The condition is fulfilled.
     Fulfilled,
-    /// It is no longer fulfilled, or has new bounds.
+    /// The condition is no longer fulfilled, or has new bounds.
     NotFulfilled,
     /// The command was started.
     Started,

@@ -1,10 +1,10 @@
-//! How a journal holds requests to estimators.
+//! Requests to estimators as a journal holds them.
 
 use crate::journal::{Request, RequestKind};
 use crate::message::Field;
 use crate::message::codec::{Reader, Writer};
 
-/// How a journal holds requests of type `Q`, see [`HandleCall::RECORD`](super::HandleCall::RECORD).
+/// The form of requests of type `Q` in a journal, see [`HandleCall::RECORD`](super::HandleCall::RECORD).
 #[derive(Debug)]
 pub struct RequestCodec<Q> {
     encode: fn(&Q) -> Vec<u8>,
@@ -20,7 +20,7 @@ impl<Q> Clone for RequestCodec<Q> {
 impl<Q> Copy for RequestCodec<Q> {}
 
 impl<Q: Field> RequestCodec<Q> {
-    /// As bytes, in the layout of payloads.
+    /// Creates a codec of bytes in the layout of payloads.
     pub const fn bytes() -> Self {
         Self {
             encode: |request| {

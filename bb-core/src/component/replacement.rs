@@ -10,19 +10,19 @@ use std::sync::Arc;
 #[derive(Clone)]
 pub(crate) struct Replacement {
     make: Arc<dyn Any + Send + Sync>,
-    /// What it publishes or takes: "publishes `Imu`".
+    /// Payload that the component publishes or takes, in words: "publishes `Imu`".
     does: String,
-    /// Of an estimator.
+    /// Facts about a replacement that is an estimator.
     estimator: Option<OfEstimator>,
     /// Side of the joint's transmission that an actuator speaks of.
     side: JointSide,
 }
 
-/// What the runtime has to know of an estimator before it is created.
+/// Facts about an estimator that the runtime has to know before it is created.
 #[derive(Clone)]
 struct OfEstimator {
     handles_moving_joints: bool,
-    /// Its type and its options. The options' `Debug` is code of the user.
+    /// Type and options of the estimator as text. The options' `Debug` is code of the user.
     shown: Arc<dyn Fn() -> String + Send + Sync>,
 }
 
@@ -31,7 +31,7 @@ impl Replacement {
         Self { make: Arc::new(make), does, estimator: None, side: JointSide::Joint }
     }
 
-    /// The same, of an estimator; `shown` writes its type and its options.
+    /// Returns the same replacement, of an estimator; `shown` writes its type and its options.
     pub(crate) fn of_estimator(
         self,
         handles_moving_joints: bool,
@@ -56,12 +56,12 @@ impl Replacement {
         self.make.downcast_ref()
     }
 
-    /// What it publishes or takes.
+    /// Returns the payload that the component publishes or takes, in words.
     pub(crate) fn does(&self) -> &str {
         &self.does
     }
 
-    /// Whether the inputs of the estimator may span moving joints.
+    /// Returns whether the inputs of the estimator may span moving joints.
     pub(crate) fn handles_moving_joints(&self) -> bool {
         self.estimator.as_ref().is_some_and(|estimator| estimator.handles_moving_joints)
     }

@@ -45,9 +45,9 @@ use crate::time::MonotonicTime;
     note = "implement `bb_core::Sensor` for it; a payload that other code publishes is declared as `External<Payload>()`"
 )]
 pub trait Sensor: Sized + Send + 'static {
-    /// Its options: the struct that `Name(…)` in `robot!` fills.
+    /// Options of the sensor: the struct that `Name(…)` in `robot!` fills.
     type Options: Options;
-    /// What it publishes.
+    /// Payload that the sensor publishes.
     type Output: Payload;
 
     /// Opens the device.
@@ -103,12 +103,12 @@ pub struct Reading<T> {
     pub(crate) next: Next,
 }
 
-/// When a sensor is read next.
+/// Time at which a sensor is read next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Next {
-    /// At its declared rate.
+    /// The next period of the declared rate.
     AtRate,
-    /// At that time.
+    /// The time given.
     At(MonotonicTime),
     /// Never: there is no more to read.
     Never,
@@ -151,7 +151,7 @@ impl<T> Reading<T> {
         self.time
     }
 
-    /// When to read next.
+    /// Returns the time at which to read next.
     pub fn next(&self) -> Next {
         self.next
     }

@@ -14,7 +14,7 @@ use crate::time::MonotonicTime;
     note = "implement `bb_core::Service` for it"
 )]
 pub trait Service: Sized + Send + 'static {
-    /// Its options: the struct that `Name(…)` in `robot!` fills.
+    /// Options of the service: the struct that `Name(…)` in `robot!` fills.
     type Options: Options;
     /// The payload it publishes at its path: its state, or a diagnosis.
     type Output: Payload;

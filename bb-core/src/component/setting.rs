@@ -14,17 +14,17 @@ use std::marker::PhantomData;
 pub trait Setting {
     /// Sets it from JSON.
     fn set(&mut self, json: &str) -> Result<(), String>;
-    /// Its value as it would be written; `None` if it cannot be.
+    /// Returns the value as it would be written; `None` if it cannot be.
     fn value(&self) -> Option<String>;
-    /// What can be written.
+    /// Returns the form in which the option can be written.
     fn kind(&self) -> SettingKind;
-    /// Its value in SI, if it is a number.
+    /// Returns the value in SI, if it is a number.
     fn number(&self) -> Option<f64> {
         None
     }
 }
 
-/// What can be written for an option.
+/// Form in which an option can be written.
 #[derive(Clone, Copy, Debug)]
 pub enum SettingKind {
     /// A number with a unit, in a text.
@@ -43,7 +43,7 @@ pub enum SettingKind {
 pub struct SettingOf<T>(PhantomData<fn() -> T>);
 
 impl<T> SettingOf<T> {
-    /// Of this type.
+    /// Creates a marker of this type.
     #[expect(clippy::new_without_default, reason = "the expansion alone makes it")]
     pub const fn new() -> Self {
         Self(PhantomData)
@@ -66,7 +66,7 @@ impl<T: FromQuantity> WithUnit<T> for &&&SettingOf<T> {
 pub trait ByValue<T> {
     /// The option in `slot`.
     fn plain<'a>(&self, slot: &'a mut T) -> Box<dyn Setting + 'a>;
-    /// The same for an option that states a unit and is not a single number: its numbers are in SI.
+    /// Returns the option in `slot`, which states a unit and is not a single number: its numbers are in SI.
     fn with_unit<'a>(&self, _: OptionField, slot: &'a mut T) -> Box<dyn Setting + 'a> {
         self.plain(slot)
     }
@@ -82,7 +82,7 @@ impl<T: Field> ByValue<T> for &&SettingOf<T> {
 pub trait ByText<T> {
     /// The option in `slot`.
     fn plain<'a>(&self, slot: &'a mut T) -> Box<dyn Setting + 'a>;
-    /// The same.
+    /// Returns the option in `slot`, whatever unit it states.
     fn with_unit<'a>(&self, _: OptionField, slot: &'a mut T) -> Box<dyn Setting + 'a> {
         self.plain(slot)
     }
@@ -100,7 +100,7 @@ pub trait ByCode<T> {
     fn plain<'a>(&self, _: &'a mut T) -> Box<dyn Setting + 'a> {
         Box::new(CodeSlot)
     }
-    /// The same.
+    /// Returns the option in `slot`, whatever unit it states.
     fn with_unit<'a>(&self, _: OptionField, slot: &'a mut T) -> Box<dyn Setting + 'a> {
         self.plain(slot)
     }

@@ -24,7 +24,7 @@ pub struct InputTransform {
 #[derive(Clone, Debug)]
 enum Placed {
     At(Isometry3<f64>),
-    /// Its payload is the same in every frame.
+    /// No transform: the payload is the same in every frame.
     Nowhere,
     /// No message of it takes part in this dispatch.
     Absent,
@@ -32,7 +32,7 @@ enum Placed {
 }
 
 impl InputTransform {
-    /// Of an input that takes part: transforms points from its frame to the output's. For tests of an estimator.
+    /// Creates the transform of an input that takes part: it transforms points from its frame to the output's. For tests of an estimator.
     ///
     /// ```
     /// use bb_core::component::{InputTransform, InputTransforms};
@@ -76,12 +76,12 @@ impl InputTransform {
 }
 
 impl<'a> InputTransforms<'a> {
-    /// Of these inputs; the first one is the driver. For tests of an estimator.
+    /// Creates the transforms of these inputs; the first one is the driver. For tests of an estimator.
     pub fn new(inputs: &'a [InputTransform]) -> Self {
         Self { inputs, driver_time: MonotonicTime::ZERO }
     }
 
-    /// The same, for a message of the driver with this stamp.
+    /// Returns the same transforms, for a message of the driver with this stamp.
     pub fn at(self, driver_time: MonotonicTime) -> Self {
         Self { driver_time, ..self }
     }
@@ -102,7 +102,7 @@ impl<'a> InputTransforms<'a> {
         declared.ok_or_else(|| Fault::new(format!("no input `{input}` is declared")))?.get()
     }
 
-    /// The same for the driver, or for the only input.
+    /// Transforms points from the frame of the driver, or of the only input, to that of the output.
     ///
     /// # Errors
     /// Its payload depends on no frame.

@@ -6,7 +6,7 @@ use crate::schedule::{Lane, Sleeper};
 use crate::time::{Clock, MonotonicTime};
 use std::task::Waker;
 
-/// It does not keep the control state alive, whose topics have it.
+/// The clock and the alarms. They do not keep the control state alive, whose topics have them.
 struct RunAlarms {
     clock: Clock,
     sleeper: Sleeper,

@@ -20,30 +20,30 @@ use crate::time::MonotonicTime;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// How long disarm callbacks may take.
+/// Time that disarm callbacks may take.
 pub(crate) const DISARM_WITHIN: Duration = Duration::from_secs(5);
 
-/// How long arming waits for the code of cancelled commands to return.
+/// Time for which arming waits for the code of cancelled commands to return.
 pub(super) const ARM_WITHIN: Duration = Duration::from_secs(5);
 
 /// The longest wait in one piece.
 const LONGEST_WAIT: Duration = Duration::from_secs(3600);
 
-/// How long [`Control::disarm`] waits beyond the callbacks' limit.
+/// Time for which [`Control::disarm`] waits beyond the callbacks' limit.
 const MARGIN: Duration = Duration::from_secs(1);
 
 impl State {
-    /// Whether the code of a cancelled command has not returned yet.
+    /// Returns whether the code of a cancelled command has not returned yet.
     pub(super) fn has_lingering(&self) -> bool {
         self.executions.iter().any(|execution| matches!(execution.phase, Phase::Lingering))
     }
 
-    /// Whether the code of a command, or a disarm callback outside of a disarming, has not returned.
+    /// Returns whether the code of a command, or a disarm callback outside of a disarming, has not returned.
     fn is_anything_inside(&self) -> bool {
         !self.apart.is_empty() || self.executions.iter().any(RunningCommand::is_inside)
     }
 
-    /// How many disarmings have ended.
+    /// Returns the number of disarmings that have ended.
     pub(super) fn ended_disarmings(&self) -> u64 {
         self.generation - u64::from(self.disarming.is_some())
     }
@@ -52,7 +52,7 @@ impl State {
         self.disarming.as_ref().is_some_and(|disarming| disarming.generation == generation)
     }
 
-    /// Whether the last disarming is over.
+    /// Returns whether the last disarming is over.
     pub(super) fn is_stopped(&self) -> bool {
         self.is_stopping && self.disarming.is_none()
     }
@@ -97,7 +97,7 @@ impl Control {
         step.arm()
     }
 
-    /// In a replay: arming was requested.
+    /// Replays a request to arm the robot.
     pub(crate) fn replay_arm(&self) {
         // Whether it succeeds follows from the state.
         let _ = self.step().arm();
@@ -139,7 +139,7 @@ impl Control {
         outcome.get().cloned().unwrap_or(Err(DisarmError::Unfinished))
     }
 
-    /// In a replay: disarming was requested.
+    /// Replays a request to disarm the robot.
     pub(crate) fn replay_disarm(&self, force: bool) {
         let mut step = self.step();
         if !step.state.is_stopped() {
@@ -181,7 +181,7 @@ impl Control {
         }
     }
 
-    /// Whether the disarm callbacks run.
+    /// Returns whether the disarm callbacks run.
     pub(crate) fn is_disarming(&self) -> bool {
         self.lock().disarming.is_some()
     }
@@ -364,7 +364,7 @@ impl Step<'_> {
         self.publish_machine(None);
     }
 
-    /// Whether the robot is armed or may be.
+    /// Checks that the robot is armed or may be.
     fn may_arm(&self) -> Result<(), ArmError> {
         match self.state.machine.safety {
             Safety::Armed => Ok(()),

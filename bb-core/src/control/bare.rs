@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 static NOTHING: Topology = Topology { links: &[], joints: &[] };
 
-/// With these estimators, whose nodes are `nodes`, and nothing else.
+/// Creates a control state with these estimators, whose nodes are `nodes`, and nothing else.
 pub(super) fn control(
     mode: Mode,
     estimators: &'static [EstimatorDeclaration],

@@ -60,7 +60,7 @@ impl Budgets {
         }
     }
 
-    /// Whether `component`'s supervisor is `above` or below it.
+    /// Returns whether `component`'s supervisor is `above` or below it.
     pub(super) fn is_below(&self, component: Supervisor, above: Supervisor) -> bool {
         std::iter::successors(Some(component), |current| self.parents.get(*current).copied().flatten())
             .any(|current| current == above)

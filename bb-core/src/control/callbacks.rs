@@ -220,7 +220,7 @@ impl Hooks {
         self.all.iter_mut().filter(is_new).map(|hook| hook.owner = owner).count() > 0
     }
 
-    /// Whether callbacks of a failed `init` of the component at `path` have not returned.
+    /// Returns whether callbacks of a failed `init` of the component at `path` have not returned.
     pub(super) fn hang(&self, path: &str) -> bool {
         let mut failed =
             self.all.iter().filter(|hook| hook.callback.path == path && hook.owner == Owner::FailedInit);
@@ -253,16 +253,16 @@ impl Hooks {
 pub(super) struct Apart {
     pub(super) key: Key,
     pub(super) path: &'static str,
-    /// Its `init` has failed: an unplugged device is not dangerous. Each callback that succeeds is forgotten; one that fails is a
-    /// fault, and stays for the next disarming. Otherwise hardware was started on a disarmed robot, and one that fails is a hardware
-    /// error.
+    /// `true` if the component's `init` has failed: an unplugged device is not dangerous. Each callback that succeeds is forgotten; one
+    /// that fails is a fault, and stays for the next disarming. Otherwise hardware was started on a disarmed robot, and one that fails
+    /// is a hardware error.
     pub(super) is_failed_init: bool,
     /// The numbers of those that have not returned.
     pub(super) left: Vec<u64>,
 }
 
 impl State {
-    /// Whether somebody waits for a callback to run for that reason.
+    /// Returns whether somebody waits for a callback to run for that reason.
     fn is_wanted(&self, reason: Reason, number: u64) -> bool {
         match reason {
             Reason::Disarming(generation) => {
@@ -299,13 +299,13 @@ enum Code {
     Command,
 }
 
-/// Whether the calling thread runs code of `robot` that its disarming waits for: a disarm callback, or an actuator's code, which the
-/// actuator's callback waits for.
+/// Returns whether the calling thread runs code of `robot` that its disarming waits for: a disarm callback, or an actuator's code,
+/// which the actuator's callback waits for.
 pub(crate) fn is_awaited(robot: usize) -> bool {
     is_inside(|place| place.robot == robot && place.code != Code::Command)
 }
 
-/// Whether the calling thread runs a disarm callback of `robot`.
+/// Returns whether the calling thread runs a disarm callback of `robot`.
 pub(super) fn is_callback(robot: usize) -> bool {
     is_inside(|place| place.robot == robot && place.code == Code::Callback)
 }
@@ -315,7 +315,7 @@ pub(crate) fn is_in_command(robot: usize) -> bool {
     is_inside(|place| place.robot == robot && place.code == Code::Command)
 }
 
-/// Whether the calling thread is inside the actuator.
+/// Returns whether the calling thread is inside the actuator.
 pub(crate) fn is_in_actuator(actuator: usize) -> bool {
     is_inside(|place| place.code == Code::Actuator(actuator))
 }
@@ -380,7 +380,7 @@ mod tests {
         assert!(!is_awaited(ROBOT) && !is_in_actuator(ACTUATOR));
     }
 
-    /// Where no thread can be started, one that hangs would have a component wait for its own.
+    /// A callback that may hang does not use the thread that is kept for another component's callback.
     #[test]
     fn a_callback_without_a_thread_takes_none_that_is_kept_for_another() {
         let control = bare::control(Mode::Real, &[], []);

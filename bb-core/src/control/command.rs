@@ -15,19 +15,19 @@ use std::fmt;
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct CommandStatistics {
-    /// Its name.
+    /// Name.
     pub name: &'static str,
-    /// How often it was started.
+    /// Executions started.
     pub started: u64,
-    /// How often it has succeeded.
+    /// Executions that succeeded.
     pub succeeded: u64,
-    /// How often it has failed.
+    /// Executions that failed.
     pub failed: u64,
-    /// How often it took too long.
+    /// Executions that took longer than the `timeout`.
     pub timed_out: u64,
-    /// How often it was cancelled.
+    /// Executions cancelled.
     pub cancelled: u64,
-    /// How often it was refused.
+    /// Requests refused.
     pub refused: u64,
     /// The reason of the last refusal.
     pub last_refusal: Option<Refusal>,
@@ -50,15 +50,15 @@ pub(super) trait AnyCommand: Send + Sync {
         parameters: &ParameterValues,
         context: CommandContext,
     ) -> Result<RunningFuture, Fault>;
-    /// Whether its options would be valid with these parameters. User code runs here.
+    /// Checks that the command's options would be valid with these parameters. User code runs here.
     fn check(&self, parameters: &ParameterValues) -> Result<(), String>;
     /// The schemas of its arguments and its result.
     fn shapes(&self) -> (Shape, Shape);
     /// The default of its arguments as JSON. User code runs here.
     fn default_arguments(&self) -> String;
-    /// Its arguments from JSON; the default ones from empty text.
+    /// Reads the command's arguments from JSON; the default ones from empty text.
     fn arguments(&self, json: &str) -> Result<Arguments, Fault>;
-    /// Its result as JSON.
+    /// Returns the command's result as JSON.
     fn result_json(&self, result: Value) -> Result<String, Fault>;
 }
 

@@ -79,7 +79,7 @@ impl Control {
         Ok(DynamicExecution::new(UntypedExecution(slot)))
     }
 
-    /// In a replay: a command was requested.
+    /// Replays a request of a command.
     pub(crate) fn replay_command(&self, number: usize, caller: String) {
         // A command that was refused is refused again.
         let _ = self.request(self.step(), number, None, caller);
@@ -173,7 +173,7 @@ impl Control {
         category.unwrap_or(CategoryDeclaration { name: "default", concurrency: 1 })
     }
 
-    /// On virtual time: drops the futures of cancelled commands now.
+    /// Drops the futures of cancelled commands at once, on virtual time.
     pub(super) fn drop_cancelled(&self) {
         let lingering: Vec<_> = {
             let state = self.lock();
@@ -183,7 +183,7 @@ impl Control {
         lingering.into_iter().for_each(|task| task.run());
     }
 
-    /// On virtual time: polls each command that can make progress once.
+    /// Polls each command that can make progress once, on virtual time.
     pub(crate) fn poll_ready(&self) {
         let ready = std::mem::take(&mut *self.0.ready.lock().unwrap_or_else(PoisonError::into_inner));
         ready.into_iter().for_each(|task| task.run());
@@ -354,7 +354,7 @@ impl Step<'_> {
         }
     }
 
-    /// Whether another command may start. A command that hangs leaves an execution running each time it is started and cancelled.
+    /// Returns whether another command may start. A command that hangs leaves an execution running each time it is started and cancelled.
     fn has_room(&self, role: Role, of_health: bool) -> Result<(), RefusalReason> {
         let executions = self.state.executions.iter();
         let lingering = executions.filter(|execution| matches!(execution.phase, Phase::Lingering)).count();

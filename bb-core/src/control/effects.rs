@@ -169,8 +169,8 @@ impl Control {
         Vec::new()
     }
 
-    /// On virtual time: runs the waiting disarm callbacks in order on the calling thread, and returns true if there
-    /// were any. None of them runs inside code that it would wait for.
+    /// Runs the waiting disarm callbacks in order on the calling thread, on virtual time, and returns true if there were any. None of
+    /// them runs inside code that it would wait for.
     pub(crate) fn run_pending_hooks(&self) -> bool {
         if is_awaited(self.id()) {
             return false;

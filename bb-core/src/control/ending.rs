@@ -1,4 +1,4 @@
-//! How a command ends: by itself, cancelled, or timed out.
+//! Ends of commands: by themselves, cancelled, or timed out.
 //!
 //! - Its code returns ([`Control::code_returned`]): the outcome is written to the journal and applied. A command that disarms waits for
 //!   the disarming, one that arms waits for cancelled commands; any other is settled at once.
@@ -39,7 +39,7 @@ impl Control {
         state.map(drop)
     }
 
-    /// In a replay: an execution changed the operational state.
+    /// Replays a change of the operational state by an execution.
     pub(crate) fn replay_transition(&self, id: u64, name: &str) {
         let mut step = self.step();
         if let Ok(state) = step.may_become(name) {
@@ -76,7 +76,7 @@ impl Control {
         self.apply_outcome(id, end, value);
     }
 
-    /// In a replay: the code of a command had ended.
+    /// Replays the end of a command's code.
     pub(crate) fn replay_end(&self, id: u64, end: End) {
         self.apply_outcome(id, end, None);
     }
@@ -126,7 +126,7 @@ impl Control {
 }
 
 impl RunningCommand {
-    /// Whether its code has not returned, or its future is to be dropped.
+    /// Returns whether the command's code has not returned, or its future is to be dropped.
     pub(super) fn is_inside(&self) -> bool {
         self.task.as_ref().is_some_and(|task| task.may_act())
     }
@@ -194,7 +194,7 @@ impl Step<'_> {
         self.forget(hooks);
     }
 
-    /// Whether that execution is of a command that arms the robot.
+    /// Returns whether that execution is of a command that arms the robot.
     fn is_arming(&self, id: u64) -> bool {
         let execution = self.position(id).and_then(|index| self.state.executions.get(index));
         execution.is_some_and(|execution| self.role(execution.command) == Role::Arming)

@@ -18,15 +18,15 @@ pub struct Execution<T> {
     result: PhantomData<fn() -> T>,
 }
 
-/// Why a command has no result.
+/// Reason for which a command has no result.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum CommandError {
-    /// It has failed, and why.
+    /// The command has failed, for this reason.
     Failed(String),
-    /// It took longer than its `timeout`.
+    /// The command took longer than its `timeout`.
     TimedOut,
-    /// It was cancelled: by its caller, by another command, or because the robot was disarmed or stopped.
+    /// The command was cancelled: by its caller, by another command, or because the robot was disarmed or stopped.
     Cancelled,
 }
 

@@ -15,13 +15,13 @@ const KEPT: usize = 256;
 pub struct ReportedFault {
     /// The path of the component.
     pub path: &'static str,
-    /// What happened.
+    /// Message of the fault.
     pub message: String,
-    /// How often it occurred.
+    /// Number of times that the fault occurred.
     pub count: u64,
-    /// When it occurred first.
+    /// Time of the first occurrence.
     pub first_time: MonotonicTime,
-    /// When it occurred last.
+    /// Time of the last occurrence.
     pub last_time: MonotonicTime,
 }
 

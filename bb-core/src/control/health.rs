@@ -49,7 +49,7 @@ impl Control {
         self.0.reports.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// In a replay: processes the first waiting report of an estimator; returns false if there is none.
+    /// Processes the first waiting report of an estimator in a replay; returns false if there is none.
     pub(crate) fn replay_report(&self, estimator: usize) -> bool {
         let report = self.reports().get_mut(&estimator).and_then(std::collections::VecDeque::pop_front);
         match report {
@@ -99,7 +99,7 @@ impl Control {
         self.note_fault_now(path, message);
     }
 
-    /// As above; returns the time at which it is reported.
+    /// Records a fault as [`Self::note_fault`] does; returns the time at which it is reported.
     pub(crate) fn note_fault_now(&self, path: &'static str, message: String) -> MonotonicTime {
         let mut step = self.step();
         let now = step.now;
@@ -141,7 +141,7 @@ impl Control {
         true
     }
 
-    /// In a replay: an estimator was lost.
+    /// Replays the loss of an estimator.
     pub(crate) fn replay_lost(&self, estimator: usize, last_run: MonotonicTime) {
         let mut step = self.step();
         step.lost(estimator, last_run);

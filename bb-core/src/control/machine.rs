@@ -26,7 +26,7 @@ impl Default for Machine {
 }
 
 impl Machine {
-    /// Its name.
+    /// Returns the name of the state.
     pub(super) fn state(&self) -> &'static str {
         match self.safety {
             Safety::Armed if self.running > 0 && self.resting == IDLE => EXECUTING,

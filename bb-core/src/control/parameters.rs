@@ -126,12 +126,12 @@ impl Control {
         }
     }
 
-    /// From here on, no parameter is accepted.
+    /// Accepts no parameter from here on.
     pub(crate) fn close_parameters(&self) {
         self.lock().parameters_are_final = true;
     }
 
-    /// In a replay: parameters were set. Components whose options are bound to them are notified by their own lines.
+    /// Replays a set of parameters. Components whose options are bound to them are notified by their own lines.
     pub(crate) fn replay_parameters(&self, changes: Vec<ParameterEntry>) {
         let mut step = self.step();
         let values = step.state.parameters.with(changed(&changes));

@@ -144,7 +144,7 @@ impl Control {
         }
     }
 
-    /// Whether callbacks run outside of a disarming.
+    /// Returns whether callbacks run outside of a disarming.
     #[cfg(loom)]
     pub(super) fn makes_safe(&self) -> bool {
         !self.lock().apart.is_empty()
@@ -240,7 +240,7 @@ impl Step<'_> {
     }
 }
 
-/// In a replay, the journal contains the components' reports, and there is no hardware.
+/// The guardian of components. In a replay, the journal contains their reports, and there is no hardware.
 impl Guardian for Control {
     fn on_disarm(&self, path: &'static str, execution: Option<u64>, hook: DisarmHook) {
         match self.0.mode {

@@ -173,7 +173,7 @@ impl Control {
         self.0.has_orders.store(true, Ordering::Release);
     }
 
-    /// Whether any got an order since the last call.
+    /// Returns whether any component got an order since the last call.
     pub(crate) fn take_orders(&self) -> bool {
         self.0.has_orders.swap(false, Ordering::AcqRel)
     }
@@ -194,7 +194,7 @@ impl Control {
         call(self.summary(&state))
     }
 
-    /// The same after the last entry.
+    /// Calls `call` with a summary after the last entry.
     pub(crate) fn end<T>(&self, call: impl FnOnce(Summary) -> T) -> T {
         let mut state = self.lock();
         state.has_ended = true;

@@ -41,9 +41,9 @@ struct State {
     is_scheduled: bool,
     is_woken: bool,
     is_cancelled: bool,
-    /// When it was polled last, and how often at that instant.
+    /// Time of the last poll, and the number of polls at that instant.
     polled: (MonotonicTime, u32),
-    /// When the thread that is inside its code entered it.
+    /// Time at which the thread that is inside the code entered it.
     entered: Option<MonotonicTime>,
 }
 
@@ -89,17 +89,17 @@ impl Task {
         }
     }
 
-    /// Its code is not entered any more. Call this before [`Self::cancel`], which cannot be called under a lock.
+    /// Ensures that the code is not entered any more. Call this before [`Self::cancel`], which cannot be called under a lock.
     pub(super) fn mark_cancelled(&self) {
         self.lock().is_cancelled = true;
     }
 
-    /// Whether its code may still act: a thread is inside, or its future is to be dropped.
+    /// Returns whether the code may still act: a thread is inside, or the future is to be dropped.
     pub(super) fn may_act(&self) -> bool {
         matches!(self.lock().code, Code::Polled | Code::Future(_))
     }
 
-    /// Its future is dropped as soon as its code yields.
+    /// Drops the future as soon as its code yields.
     pub(super) fn cancel(self: &Arc<Self>) {
         let Some(control) = self.control.upgrade() else { return };
         let mut state = self.lock();
@@ -172,7 +172,7 @@ impl Task {
         }
     }
 
-    /// How it has ended, if it has; otherwise its future is kept.
+    /// Polls the future; returns how it has ended, if it has, otherwise the future is kept.
     fn poll(self: &Arc<Self>, mut future: RunningFuture) -> Option<Ended> {
         let waker = Waker::from(Arc::clone(self));
         let polled = caught(|| Ok(future.as_mut().poll(&mut Context::from_waker(&waker))));
@@ -188,7 +188,7 @@ impl Task {
         Some(ended)
     }
 
-    /// Why it is stuck, if it is.
+    /// Returns the fault of a command that is stuck, if it is.
     fn is_stuck(&self, now: MonotonicTime, is_virtual: bool) -> Option<Fault> {
         if !is_virtual {
             return None;
@@ -203,7 +203,7 @@ impl Task {
         })
     }
 
-    /// When the thread that is inside its code entered it.
+    /// Returns the time at which the thread that is inside the code entered it.
     pub(super) fn entered_at(&self) -> Option<MonotonicTime> {
         let state = self.lock();
         state.entered.filter(|_| matches!(state.code, Code::Polled))

@@ -1,6 +1,6 @@
 //! Commands as declared.
 
-/// What a command does to the robot's safety when it succeeds.
+/// Effect of a command on the robot's safety when it succeeds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Role {
     /// Nothing.
@@ -13,7 +13,7 @@ pub enum Role {
 }
 
 impl Role {
-    /// Its name in JSON: `plain`, `arming` or `disarming`.
+    /// Returns the name in JSON: `plain`, `arming` or `disarming`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Plain => "plain",
@@ -26,21 +26,21 @@ impl Role {
 /// A command as declared.
 #[derive(Clone, Copy, Debug)]
 pub struct CommandDeclaration {
-    /// Its name.
+    /// Name.
     pub name: &'static str,
-    /// Its path: `command/stop`.
+    /// Path: `command/stop`.
     pub path: &'static str,
     /// The states in which it may start; `None` for the default of its role.
     pub allowed_states: Option<&'static [&'static str]>,
-    /// How long it may take.
+    /// Longest time that an execution may take, in nanoseconds.
     pub timeout_nanos: Option<i64>,
     /// The number of its category.
     pub category: usize,
-    /// What it cancels when it starts.
+    /// Commands that it cancels when it starts.
     pub cancel: Cancel,
 }
 
-/// What a command cancels when it starts.
+/// Commands that a command cancels when it starts.
 #[derive(Clone, Copy, Debug)]
 pub enum Cancel {
     /// Nothing.
@@ -62,8 +62,8 @@ impl Cancel {
 }
 
 impl CommandDeclaration {
-    /// Whether it may start in a state. By default, arming commands start in `disarmed`, disarming ones in every
-    /// other state, and the rest when the robot is `idle`.
+    /// Returns whether the command may start in a state. By default, arming commands start in `disarmed`, disarming ones in every other
+    /// state, and the rest when the robot is `idle`.
     pub(crate) fn allowed(&self, role: Role, state: &str) -> bool {
         match (self.allowed_states, role) {
             (Some(states), _) => states.contains(&state),

@@ -7,11 +7,11 @@ use crate::topology::Transform;
 /// An estimator as declared.
 #[derive(Clone, Copy, Debug)]
 pub struct EstimatorDeclaration {
-    /// Its path: `estimator/base_link/pose`.
+    /// Path: `estimator/base_link/pose`.
     pub path: &'static str,
     /// The frame of what it publishes.
     pub frame: Frame,
-    /// Its inputs, in the order of their declaration. A nested estimator's only input is its sensor.
+    /// Inputs, in the order of their declaration. A nested estimator's only input is its sensor.
     pub inputs: &'static [InputDeclaration],
     /// The paths it publishes at: one per declared output, or its own.
     pub outputs: &'static [&'static str],
@@ -23,7 +23,7 @@ pub struct EstimatorDeclaration {
     pub supervisor: usize,
     /// The settings of its health.
     pub health: HealthDeclaration,
-    /// Whether it has a thread of its own.
+    /// Thread of its own, if it has one.
     pub worker: Option<WorkerDeclaration>,
 }
 
@@ -50,11 +50,11 @@ impl EstimatorDeclaration {
 /// The settings of an estimator's health.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HealthDeclaration {
-    /// How long a callback may take.
+    /// Longest time that a callback may take, in nanoseconds.
     pub latency_budget_nanos: Option<i64>,
-    /// How long without a completed run on a driver message until it is lost.
+    /// Time without a completed run on a driver message until the estimator is lost, in nanoseconds.
     pub lost_after_nanos: Option<i64>,
-    /// How many good completions in a row until it is healthy again: at least 1.
+    /// Number of good completions in a row until the estimator is healthy again: at least 1.
     pub recover_after: u32,
     /// The number of the command that is started when it degrades.
     pub on_degraded: Option<usize>,
@@ -85,13 +85,13 @@ impl Default for HealthDeclaration {
 /// An island of estimators.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct IslandDeclaration {
-    /// Its number.
+    /// Number of the island.
     pub number: usize,
     /// The path of its first estimator.
     pub name: &'static str,
-    /// How its own thread runs, if it has one.
+    /// Settings of the island's own thread, if it has one.
     pub worker: Option<WorkerDeclaration>,
-    /// Whether one of its estimators has a latency budget, so that callbacks are measured.
+    /// `true` if one of the estimators has a latency budget, so that callbacks are measured.
     pub is_measured: bool,
     /// The numbers of its estimators, in the order in which a message reaches them.
     pub estimators: &'static [usize],
@@ -104,7 +104,7 @@ pub struct IslandDeclaration {
 pub struct InletDeclaration {
     /// The publisher, as the island numbers them.
     pub entry: usize,
-    /// Its estimators that take it, each with the number of the input.
+    /// Estimators of the island that take it, each with the number of the input.
     pub inputs: &'static [(usize, usize)],
 }
 
@@ -120,19 +120,19 @@ pub struct WorkerDeclaration {
 /// One input as declared.
 #[derive(Clone, Copy, Debug)]
 pub struct InputDeclaration {
-    /// Its number among the declared inputs.
+    /// Number among the declared inputs.
     pub index: usize,
-    /// Its name.
+    /// Name.
     pub name: &'static str,
     /// The path of its publisher.
     pub source: &'static str,
-    /// Whether its arrival triggers a dispatch.
+    /// `true` if the arrival of a message triggers a dispatch.
     pub driver: bool,
-    /// Whether the estimator is called without it when it is missing or too old.
+    /// `true` if the estimator is called without the input when it is missing or too old.
     pub optional: bool,
-    /// How much older than the driver it may be; `None` for any age.
+    /// Greatest age of a message relative to the driver's, in nanoseconds; `None` for any age.
     pub tolerance_nanos: Option<i64>,
-    /// How old it may be when it arrives, by the clock; for the driver.
+    /// Greatest age of a message by the clock when it arrives, in nanoseconds; for the driver.
     pub stale_after_nanos: Option<i64>,
     /// Takes points from its frame to the output's; `None` if there is a moving joint between.
     pub frame_from_input: Option<Transform>,
@@ -153,7 +153,7 @@ impl InputDeclaration {
         }
     }
 
-    /// Whether a message that is `age_nanos` older than the driver is too old. A newer one never is.
+    /// Returns whether a message that is `age_nanos` older than the driver is too old. A newer one never is.
     pub(crate) fn is_too_old(&self, age_nanos: i64) -> bool {
         self.tolerance_nanos.is_some_and(|tolerance| age_nanos > tolerance)
     }

@@ -8,11 +8,11 @@ use std::sync::Arc;
 /// A parameter as declared.
 #[derive(Clone, Copy, Debug)]
 pub struct ParameterDeclaration {
-    /// Its path: `param/imu/beta`.
+    /// Path: `param/imu/beta`.
     pub path: &'static str,
-    /// Its doc comment.
+    /// Doc comment.
     pub doc: &'static str,
-    /// Its value at the start, in SI.
+    /// Value at the start, in SI.
     pub default: ParameterDefault,
     /// The numbers accepted, in SI.
     pub range: Option<Range>,
@@ -144,12 +144,12 @@ impl ParameterValues {
     }
 }
 
-/// Why a parameter was not set.
+/// Reason for which a parameter was not set.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ParameterError {
-    /// Its path.
+    /// Path of the parameter.
     pub path: String,
-    /// What was expected.
+    /// Fault, with what was expected.
     pub message: String,
 }
 

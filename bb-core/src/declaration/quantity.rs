@@ -5,12 +5,12 @@
 pub struct Dimension {
     /// Exponents of metre, kilogram, second, ampere, kelvin and radian.
     pub exponents: [i8; 6],
-    /// With its article, for messages: "a length".
+    /// Name with its article, for messages: "a length".
     pub name: &'static str,
 }
 
 impl Dimension {
-    /// Whether both are the same dimension, whatever their names.
+    /// Returns whether both are the same dimension, whatever their names.
     pub(crate) const fn equals(&self, other: &Self) -> bool {
         let [metre, kilogram, second, ampere, kelvin, radian] = self.exponents;
         let theirs = other.exponents;
@@ -30,6 +30,6 @@ pub struct Range {
     pub start: f64,
     /// The largest accepted.
     pub end: f64,
-    /// As the user wrote it, for messages.
+    /// Text as the user wrote it, for messages.
     pub text: &'static str,
 }

@@ -11,7 +11,7 @@ pub type Supervisor = usize;
 /// A sensor, a controller or a bridge as declared.
 #[derive(Clone, Copy, Debug)]
 pub struct SensorDeclaration {
-    /// Its path: `sensor/base_link/imu`.
+    /// Path: `sensor/base_link/imu`.
     pub path: &'static str,
     /// The frame of what it publishes.
     pub frame: Frame,
@@ -26,7 +26,7 @@ pub struct SensorDeclaration {
 /// An actuator as declared.
 #[derive(Clone, Copy, Debug)]
 pub struct ActuatorDeclaration {
-    /// Its path: `actuator/base_link/pan/servo`.
+    /// Path: `actuator/base_link/pan/servo`.
     pub path: &'static str,
     /// The joint that it moves, which is the frame of its commands.
     pub joint: &'static str,

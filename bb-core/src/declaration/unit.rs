@@ -7,7 +7,7 @@ bb_macros::unit_tables!();
 /// A quantity as written.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Quantity {
-    /// In SI.
+    /// Value, in SI.
     pub(crate) value: f64,
     /// `None` for a number without a unit.
     pub(crate) exponents: Option<[i8; 6]>,

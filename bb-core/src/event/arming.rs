@@ -1,9 +1,9 @@
-//! Why a robot could not be armed or disarmed.
+//! Errors of arming and disarming.
 
 use super::{Forbidden, SafetyError};
 use std::fmt;
 
-/// Why a robot is not armed.
+/// Reason for which a robot is not armed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ArmError {
@@ -15,8 +15,7 @@ pub enum ArmError {
     Stopping,
     /// The code of these commands, which were cancelled, has not returned.
     Lingering(Vec<&'static str>),
-    /// These components were started on the disarmed robot, or could not be started, and their disarm callbacks have not
-    /// returned.
+    /// Components that were started on the disarmed robot, or could not be started, and whose disarm callbacks have not returned.
     MakingSafe(Vec<&'static str>),
     /// The robot was disarmed while this waited, or the command that arms it was cancelled.
     Cancelled,
@@ -26,11 +25,11 @@ pub enum ArmError {
     Forbidden(Forbidden),
 }
 
-/// Why a robot may not be safe.
+/// Reason for which a robot may not be safe.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum DisarmError {
-    /// These disarm callbacks failed or did not return in time.
+    /// Disarm callbacks that failed or did not return in time.
     Failed(Vec<SafetyError>),
     /// The safety state is `error`, and this disarm was not forced, or hardware reported an error meanwhile.
     Error,

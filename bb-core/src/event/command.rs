@@ -18,11 +18,11 @@ pub struct StateTransition {
 /// An event of a command, published at its path: `command/stop`.
 #[derive(Clone, Debug, PartialEq, Eq, Payload)]
 pub struct CommandEvent {
-    /// Its name.
+    /// Name of the command.
     pub command: &'static str,
     /// The number of this execution; 0 if it was refused.
     pub execution: u64,
-    /// What happened.
+    /// Event in the life of the execution.
     pub phase: CommandPhase,
     /// Caller: the path of a component or a command, `program`, or a name from
     /// [`Bus::for_caller`](crate::Bus::for_caller).
@@ -35,36 +35,36 @@ pub struct CommandEvent {
 #[derive(Clone, Debug, PartialEq, Eq, Payload)]
 #[non_exhaustive]
 pub enum CommandPhase {
-    /// It runs.
+    /// The command runs.
     Started,
-    /// It has succeeded.
+    /// The command has succeeded.
     Succeeded,
-    /// It has failed, and why.
+    /// The command has failed, for this reason.
     Failed(String),
-    /// It took longer than its `timeout`.
+    /// The command took longer than its `timeout`.
     TimedOut,
-    /// It was cancelled: by its caller, by another command, or because the robot was disarmed or stopped.
+    /// The command was cancelled: by its caller, by another command, or because the robot was disarmed or stopped.
     Cancelled,
-    /// It was not started, and why.
+    /// The command was not started, for this reason.
     Refused(Refusal),
 }
 
 /// A category of commands: how many of them may run at once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Payload)]
 pub struct CategoryDeclaration {
-    /// Its name.
+    /// Name.
     pub name: &'static str,
-    /// How many.
+    /// Number of commands of the category that may run at once.
     pub concurrency: usize,
 }
 
-/// Why a command was not started.
+/// Reason for which a command was not started.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Payload)]
 #[non_exhaustive]
 pub enum RefusalReason {
-    /// Its `allowed_states` do not include the current state.
+    /// The command's `allowed_states` do not include the current state.
     State,
-    /// Its category is full, and it cancels none of the running commands.
+    /// The command's category is full, and it cancels none of the running commands.
     Busy,
     /// The safety state is `error`, or the robot is being disarmed.
     Safety,
@@ -77,13 +77,13 @@ pub enum RefusalReason {
 /// A command that was not started.
 #[derive(Clone, Debug, PartialEq, Eq, Payload)]
 pub struct Refusal {
-    /// Its name.
+    /// Name of the command.
     pub command: &'static str,
     /// Why.
     pub reason: RefusalReason,
     /// The operational state it was refused in.
     pub state: &'static str,
-    /// Its category.
+    /// Category of the command.
     pub category: CategoryDeclaration,
 }
 

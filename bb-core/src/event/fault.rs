@@ -8,7 +8,7 @@ use std::fmt;
 pub struct ComponentFault {
     /// The path of the component.
     pub path: &'static str,
-    /// What happened.
+    /// Message of the fault.
     pub message: String,
 }
 

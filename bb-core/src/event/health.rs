@@ -4,10 +4,10 @@ use crate::message::Payload;
 use crate::time::MonotonicTime;
 use std::fmt;
 
-/// How far an estimator's output can be trusted.
+/// Health of an estimator: how far its output can be trusted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Payload)]
 pub enum HealthState {
-    /// Its last completions were good.
+    /// The last completions were good.
     #[default]
     Healthy,
     /// Something was bad, and not enough good completions have followed.
@@ -16,7 +16,7 @@ pub enum HealthState {
     Lost,
 }
 
-/// Why the health of an estimator has changed.
+/// Reason for a change of an estimator's health.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Payload)]
 #[non_exhaustive]
 pub enum HealthReason {
@@ -28,9 +28,9 @@ pub enum HealthReason {
     StaleInput,
     /// The algorithm reported that its estimate should not be trusted.
     Diverged,
-    /// It failed and is restarted, or was restarted by a supervisor or with new options.
+    /// The estimator failed and is restarted, or was restarted by a supervisor or with new options.
     Restarted,
-    /// It failed and remains stopped.
+    /// The estimator failed and remains stopped.
     Stopped,
     /// No run on a driver message was completed for `lost_after`.
     Lost,

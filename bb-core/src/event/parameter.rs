@@ -17,7 +17,7 @@ pub enum ParameterValue {
 }
 
 impl ParameterValue {
-    /// Its type as written in `parameters`.
+    /// Returns the type as written in `parameters`.
     pub fn type_name(&self) -> &'static str {
         match self {
             Self::Bool(_) => "bool",
@@ -42,7 +42,7 @@ impl fmt::Display for ParameterValue {
 /// A parameter that has changed, published at its path: `param/imu/beta`.
 #[derive(Clone, Debug, PartialEq, Payload)]
 pub struct ParameterChange {
-    /// Its path.
+    /// Path.
     pub path: &'static str,
     /// The previous value.
     pub from: ParameterValue,

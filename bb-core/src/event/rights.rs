@@ -1,4 +1,4 @@
-//! What a caller may do with a robot.
+//! Rights of a caller at a robot.
 
 use std::fmt;
 
@@ -60,7 +60,7 @@ impl Rights {
     /// All.
     pub const ALL: Self = Self((1 << Right::ALL.len()) - 1);
 
-    /// Whether this one is among them.
+    /// Returns whether this right is among them.
     pub const fn contains(self, right: Right) -> bool {
         self.0 & 1 << right as u8 != 0
     }
@@ -87,7 +87,7 @@ impl FromIterator<Right> for Rights {
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Forbidden {
-    /// Who has called.
+    /// Name of the caller.
     pub caller: String,
     /// The right that it lacks.
     pub right: Right,

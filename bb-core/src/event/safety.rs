@@ -1,9 +1,9 @@
-//! Whether the robot may move.
+//! Safety of the robot: its permission to move.
 
 use crate::message::Payload;
 use std::fmt;
 
-/// Whether the robot may move.
+/// Safety state: whether the robot may move.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Payload)]
 pub enum Safety {
     /// Motion is inhibited.
@@ -37,12 +37,12 @@ pub struct SafetyTransition {
     pub to: Safety,
 }
 
-/// Why the safety state is `error`, published at `safety/error`.
+/// Reason for the safety state `error`, published at `safety/error`.
 #[derive(Clone, Debug, PartialEq, Payload)]
 pub struct SafetyError {
     /// The component.
     pub path: &'static str,
-    /// What happened.
+    /// Error of the hardware.
     pub error: HardwareError,
 }
 
@@ -116,7 +116,7 @@ pub enum HardwareErrorKind {
     /// Only a text says what it is.
     #[default]
     Unspecified,
-    /// It is too hot.
+    /// Too hot.
     Overheating,
     /// Too much current flows.
     Overcurrent,
@@ -126,11 +126,11 @@ pub enum HardwareErrorKind {
     Undervoltage,
     /// The load, force or torque is too great.
     Overload,
-    /// It does not move, or not as it was told.
+    /// Blocked: it does not move, or not as commanded.
     Blocked,
-    /// It has left its range, or a limit switch was hit.
+    /// Outside of its range, or a limit switch was hit.
     OutOfRange,
-    /// It does not answer, or what it says makes no sense.
+    /// No answer, or an answer that makes no sense.
     Communication,
     /// A disarm callback failed or did not return in time.
     NotMadeSafe,

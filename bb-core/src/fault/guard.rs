@@ -11,7 +11,7 @@ pub(crate) type Panic = Box<dyn Any + Send>;
 /// A failed call of user code.
 pub(crate) struct Failed {
     pub(crate) fault: Fault,
-    /// It panicked, and may have left its data inconsistent.
+    /// `true` if the code panicked, and may have left its data inconsistent.
     pub(crate) panicked: bool,
 }
 
@@ -30,7 +30,7 @@ pub(crate) fn caught<T>(call: impl FnOnce() -> Result<T, Fault>) -> Result<T, Fa
     }
 }
 
-/// The same for code that returns no fault.
+/// Calls code that returns no fault, and turns a panic into a fault.
 pub(crate) fn guarded(call: impl FnOnce()) -> Result<(), Fault> {
     let called = caught(|| {
         call();

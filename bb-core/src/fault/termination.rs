@@ -26,9 +26,9 @@ use std::fmt;
 pub enum Termination<'a> {
     /// The robot stops.
     Stop,
-    /// It is made again with new options, since its `handle_options` takes none.
+    /// The component is made again with new options, since its `handle_options` takes none.
     NewOptions,
-    /// It is restarted with the others of its supervisor, one of which has panicked too often.
+    /// The component is restarted with the others of its supervisor, one of which has panicked too often.
     Supervisor,
     /// One of its callbacks has returned this fault.
     Fault(&'a Fault),

@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::fmt;
 
-/// Why a sensor or an estimator cannot start, or stops. Any error converts to one with `?`.
+/// A reason for which a sensor or an estimator cannot start, or stops. Any error converts to one with `?`.
 ///
 /// ```
 /// use bb_core::Fault;
@@ -25,13 +25,13 @@ pub struct Fault {
 /// The consequence for the component.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Then {
-    /// It is restarted.
+    /// The component is restarted.
     Restart,
-    /// It remains stopped: a restart would not help.
+    /// The component remains stopped: a restart would not help.
     Stay,
-    /// It is not needed in this robot.
+    /// The component is not needed in this robot.
     Skip,
-    /// It takes new options only by a restart.
+    /// The component takes new options only by a restart.
     Remake,
 }
 
@@ -46,14 +46,14 @@ impl Fault {
         Self { error: error.into(), then: Then::Stay }
     }
 
-    /// From `init`: the component is not needed in this robot, which runs without it. An estimator that is left out at the
-    /// start has no health and is never lost; those that take its outputs have an input that never comes. After the start
+    /// Creates the fault of an `init` of a component that is not needed in this robot, which runs without it. An estimator that is left
+    /// out at the start has no health and is never lost; those that take its outputs have an input that never comes. After the start
     /// others rely on the component: left out by a later `init`, it stays stopped, and an estimator is lost in time.
     pub fn skip(reason: impl Into<String>) -> Self {
         Self { error: reason.into().into(), then: Then::Skip }
     }
 
-    /// From the default `handle_options`: restart the component with its new options.
+    /// Creates the fault of the default `handle_options`: restart the component with its new options.
     pub(crate) fn remake() -> Self {
         Self { error: "it is restarted with its new options".into(), then: Then::Remake }
     }

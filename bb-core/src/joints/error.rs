@@ -5,7 +5,7 @@ use crate::time::MonotonicTime;
 use std::fmt;
 use std::time::Duration;
 
-/// Why there is no transform between two frames at a time.
+/// Reason for which there is no transform between two frames at a time.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum LookupError {
@@ -18,14 +18,14 @@ pub enum LookupError {
     TooOld {
         /// The joint.
         joint: &'static str,
-        /// How much later.
+        /// Time by which it begins later.
         by: Duration,
     },
     /// The newest state of a joint is older than the requested time.
     InFuture {
         /// The joint.
         joint: &'static str,
-        /// How much older.
+        /// Time by which it is older.
         by: Duration,
     },
     /// The robot has no frame of that name, and all frames that it has are connected. tf2 calls this a `LookupException`.
@@ -37,7 +37,7 @@ pub enum LookupError {
     },
 }
 
-/// The same error, with the joint given by its number in the topology, as written to a journal.
+/// A [`LookupError`] with the joint given by its number in the topology, as written to a journal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Payload)]
 pub enum Gap {
     /// No state has arrived yet.
@@ -45,18 +45,18 @@ pub enum Gap {
         /// The joint.
         joint: usize,
     },
-    /// Its history begins later.
+    /// The joint's history begins later.
     TooOld {
         /// The joint.
         joint: usize,
-        /// How much later.
+        /// Time by which it begins later, in nanoseconds.
         nanos: i64,
     },
-    /// Its newest state is older.
+    /// The joint's newest state is older.
     InFuture {
         /// The joint.
         joint: usize,
-        /// How much older.
+        /// Time by which it is older, in nanoseconds.
         nanos: i64,
     },
 }
@@ -73,7 +73,7 @@ impl Gap {
     }
 }
 
-/// The same error for one joint, which the caller knows.
+/// A [`Gap`] of one joint, which the caller knows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Missing {
     Unknown,

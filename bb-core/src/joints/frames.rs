@@ -65,7 +65,7 @@ impl TransformHandle {
         self.within(time, 0)
     }
 
-    /// As [`Self::at`], but predicted where the newest state of a joint is older by no more than `tolerance`.
+    /// Returns the transform as [`Self::at`] does, but predicted where the newest state of a joint is older by no more than `tolerance`.
     ///
     /// # Errors
     /// As for [`Self::at`].
@@ -87,9 +87,9 @@ impl TransformHandle {
         found.map_err(|gap| self.joints.error(gap))
     }
 
-    /// As [`Self::at`], after waiting at most `timeout` for joints whose state at that time has not arrived yet. This blocks the
-    /// thread, so commands, which share theirs, should use [`Self::at`] and sleep between attempts. On virtual time no state
-    /// arrives in the meantime, so this does not wait.
+    /// Returns the transform as [`Self::at`] does, after waiting at most `timeout` for joints whose state at that time has not arrived
+    /// yet. This blocks the thread, so commands, which share theirs, should use [`Self::at`] and sleep between attempts. On virtual
+    /// time no state arrives in the meantime, so this does not wait.
     ///
     /// # Errors
     /// As for [`Self::at`].

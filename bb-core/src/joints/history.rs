@@ -16,7 +16,7 @@ pub(super) struct History {
     capacity: usize,
     span_nanos: i64,
     times: Box<[i64]>,
-    /// For each state, its positions, then velocities, then efforts; NaN where a quantity is not measured.
+    /// Positions of each state, then its velocities, then its efforts; NaN where a quantity is not measured.
     rows: Box<[f64]>,
     /// The slot for the next state.
     next: usize,
@@ -26,9 +26,9 @@ pub(super) struct History {
     behind: Option<(i64, i64, u32)>,
 }
 
-/// For how long a joint's states may be out of order before the history restarts with them.
+/// Time for which a joint's states may be out of order before the history restarts with them.
 const SET_BACK_NANOS: i64 = 100_000_000;
-/// How many of them there must be.
+/// Number of such states that there must be.
 const SET_BACK_STATES: u32 = 5;
 
 /// The time over which an acceleration is taken.
@@ -43,8 +43,8 @@ pub(super) struct State<'a> {
     pub(super) effort: &'a [f64],
 }
 
-/// How many turns the expected angle of a continuous joint may be from the reported one. Beyond that, turns are counted from the
-/// reported angle.
+/// Number of turns by which the expected angle of a continuous joint may differ from the reported one. Beyond that, turns are
+/// counted from the reported angle.
 const MOST_TURNS: f64 = 1e5;
 
 impl History {
@@ -125,8 +125,8 @@ impl History {
         Ok(())
     }
 
-    /// Whether states older than the newest one have arrived in order, and without a newer one between, for
-    /// [`SET_BACK_NANOS`] and as [`SET_BACK_STATES`]. Then the clock of the joint's sensor was set back, or the newest stamp was wrong.
+    /// Returns whether states older than the newest one have arrived in order, and without a newer one between, for [`SET_BACK_NANOS`]
+    /// and as [`SET_BACK_STATES`]. Then the clock of the joint's sensor was set back, or the newest stamp was wrong.
     fn is_set_back(&mut self, time: i64) -> bool {
         let (first, count) = match self.behind {
             Some((first, last, count)) if time > last => (first, count.saturating_add(1)),

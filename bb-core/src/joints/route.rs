@@ -100,7 +100,7 @@ impl Route {
         self.with_positions(|positions| self.read(&states.lock(), time, tolerance_nanos, positions))
     }
 
-    /// As above, after waiting for states that have not arrived yet.
+    /// Returns the transform as [`Self::at`] does, after waiting for states that have not arrived yet.
     pub(super) fn waited_for(
         &self,
         states: &SharedStates,
@@ -161,7 +161,7 @@ pub(crate) struct RouteOf {
     pub(crate) source: Frame,
     /// The frame of the estimator.
     pub(crate) target: Frame,
-    /// How much older than a message the newest state of a joint may be; `None` means the value declared for the robot.
+    /// Age by which the newest state of a joint may be older than a message; `None` means the value declared for the robot.
     pub(crate) tolerance_nanos: Option<i64>,
 }
 
@@ -205,7 +205,7 @@ impl Routes {
         self.0.get(estimator).cloned().unwrap_or_else(|| Arc::new([]))
     }
 
-    /// Whether any of these estimators has a route.
+    /// Returns whether any of these estimators has a route.
     pub(crate) fn has_any(&self, estimators: &[usize]) -> bool {
         let has = |estimator: &usize| self.0.get(*estimator).is_some_and(|routes| !routes.is_empty());
         estimators.iter().any(has)

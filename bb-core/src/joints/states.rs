@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// How far ahead of the clock a stamp may be.
+/// Time by which a stamp may be ahead of the clock.
 const MAX_SKEW_NANOS: i64 = 1_000_000_000;
 
 /// The most unknown joint names that are counted individually.

@@ -3,7 +3,7 @@
 use crate::time::MonotonicTime;
 use std::fmt;
 
-/// Why a joint's state was refused.
+/// Reason for which a joint's state was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
 pub enum JointRefusal {
@@ -42,9 +42,9 @@ pub(super) const REFUSALS: usize = JointRefusal::ALL.len();
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct JointStatistics {
-    /// Its name, or the name given in a message if there is no such joint.
+    /// Name of the joint, or the name given in a message if there is no such joint.
     pub joint: String,
-    /// Whether the robot declares it.
+    /// `true` if the robot declares the joint.
     pub is_declared: bool,
     /// States accepted.
     pub states: u64,
@@ -54,7 +54,7 @@ pub struct JointStatistics {
 }
 
 impl JointStatistics {
-    /// How many states were refused for `reason`.
+    /// Returns the number of states that were refused for `reason`.
     pub fn refused(&self, reason: JointRefusal) -> u64 {
         self.refused[reason as usize]
     }
@@ -78,19 +78,19 @@ impl fmt::Display for JointStatistics {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct JointStatus {
-    /// Its name.
+    /// Name of the joint.
     pub joint: &'static str,
     /// The stamp of its newest state; `None` if its state is unknown.
     pub time: Option<MonotonicTime>,
-    /// Whether that state is older than [`JointSettings::stale_after`](super::JointSettings).
+    /// `true` if that state is older than [`JointSettings::stale_after`](super::JointSettings).
     pub is_stale: bool,
-    /// Its position at that time, with one number for each coordinate; empty if its state is unknown.
+    /// Position at that time, with one number for each coordinate; empty if the state is unknown.
     pub position: Vec<f64>,
-    /// Its velocity at that time; empty if it was not measured.
+    /// Velocity at that time; empty if it was not measured.
     pub velocity: Vec<f64>,
-    /// Its mean acceleration over the last 50 ms, or between the last two states if they are further apart; empty unless the velocity
-    /// was measured at both ends.
+    /// Mean acceleration over the last 50 ms, or between the last two states if they are further apart; empty unless the velocity was
+    /// measured at both ends.
     pub acceleration: Vec<f64>,
-    /// Its effort at that time; empty if it was not measured.
+    /// Effort at that time; empty if it was not measured.
     pub effort: Vec<f64>,
 }

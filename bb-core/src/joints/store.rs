@@ -17,7 +17,7 @@ use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// How much joint history is kept, and for how long a state is valid.
+/// Settings of the joint history: its length, and the time for which a state is valid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct JointSettings {
     /// States older than this are dropped: 10 s.

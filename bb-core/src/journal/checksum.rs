@@ -9,7 +9,7 @@ thread_local! {
     static BYTES: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Of the payload's bytes, the times and the frame. Not cryptographic: it detects an algorithm that is not
+/// Returns a checksum of the payload's bytes, the times and the frame. Not cryptographic: it detects an algorithm that is not
 /// deterministic.
 pub(crate) fn checksum<T: Payload>(message: &Stamped<T>) -> u64 {
     BYTES.with(|bytes| {

@@ -13,11 +13,11 @@ use std::sync::Arc;
 /// lines at `journal`.
 #[derive(Clone, Debug, Payload)]
 pub struct JournalLine {
-    /// Its number, from 1, without gaps.
+    /// Number of the line, from 1, without gaps.
     pub number: u64,
     /// The time of the robot's clock.
     pub time: MonotonicTime,
-    /// What was processed.
+    /// Event that was processed.
     pub event: Event,
 }
 
@@ -33,7 +33,7 @@ impl JournalLine {
     }
 }
 
-/// The same type, under a name for code that handles many of them.
+/// Another name of [`JournalLine`], for code that handles many of them.
 pub type Entry = JournalLine;
 
 /// See [`Entry`]. Islands, estimators, publishers, actuators, commands and parameters are named by their numbers.
@@ -46,7 +46,7 @@ pub enum Event {
         declaration: Vec<String>,
         /// Wall time minus monotonic time, in nanoseconds. With the line's time, it gives the date at which the run began.
         wall_offset_nanos: i64,
-        /// Whether the run was on virtual time.
+        /// `true` if the run was on virtual time.
         is_virtual: bool,
     },
     /// The wall clock was set; the next line is the first to see it.
@@ -88,9 +88,9 @@ pub enum Event {
     Drop {
         /// The island.
         island: usize,
-        /// As in [`Event::Deliver`].
+        /// The publisher, as in [`Event::Deliver`].
         entry: usize,
-        /// As in [`Event::Deliver`].
+        /// The message, as in [`Event::Deliver`].
         message: u64,
     },
     /// The estimators of an island started.
@@ -124,9 +124,9 @@ pub enum Event {
     Silence {
         /// The estimator.
         estimator: usize,
-        /// How often it has been lost, this time included.
+        /// Number of times that the estimator has been lost, this time included.
         epoch: u32,
-        /// When a run on a message of its driver had last been completed.
+        /// Time at which a run on a message of its driver had last been completed.
         last_run: MonotonicTime,
     },
     /// An estimator handled a request.
@@ -141,7 +141,7 @@ pub enum Event {
         /// The island.
         island: usize,
     },
-    /// How long the measured callbacks of a line took.
+    /// The durations of a line's measured callbacks.
     Measured {
         /// The number of that line.
         cause: u64,
@@ -150,18 +150,18 @@ pub enum Event {
     },
     /// An estimator emitted a message.
     Output {
-        /// Its island.
+        /// Island of the estimator.
         island: usize,
         /// The publisher.
         publisher: usize,
-        /// Its checksum.
+        /// Checksum of the message.
         checksum: u64,
     },
     /// An estimator emitted a message in reply to a request that the journal does not hold.
     Emission {
         /// The publisher.
         publisher: usize,
-        /// Whether it is the first one of the callback: the outputs of one callback count once.
+        /// `true` for the first message of the callback: the outputs of one callback count once.
         is_first: bool,
         /// The message.
         message: Recorded,
@@ -175,33 +175,33 @@ pub enum Event {
     Lost {
         /// The estimator.
         estimator: usize,
-        /// When one had last been completed.
+        /// Time at which one had last been completed.
         last_run: MonotonicTime,
     },
     /// A sensor, a service or an actuator failed.
     Failed {
-        /// Its path.
+        /// Path of the component.
         path: &'static str,
-        /// Its supervisor.
+        /// Supervisor of the component.
         supervisor: usize,
-        /// What happened.
+        /// Message of the fault.
         message: String,
-        /// Whether it panicked.
+        /// `true` if the component panicked.
         panicked: bool,
     },
     /// A component hangs or did not stop properly, or something other than a component failed. It had no other
     /// consequence.
     Noted {
-        /// Its path.
+        /// Path of the component.
         path: &'static str,
-        /// What happened.
+        /// Message of the fault.
         message: String,
     },
     /// Hardware was reported to be in a dangerous state.
     HardwareError {
-        /// By which component.
+        /// Path of the component that reported it.
         path: &'static str,
-        /// What happened.
+        /// Error of the hardware.
         error: HardwareError,
     },
     /// Parameters were set, all at once.
@@ -242,12 +242,12 @@ pub enum Event {
     Arm,
     /// The robot was disarmed.
     Disarm {
-        /// Whether it was forced.
+        /// `true` if the disarming was forced.
         force: bool,
     },
     /// The disarm callbacks have returned, or their time limit has passed.
     Disarmed {
-        /// What could not be made safe.
+        /// Errors of what could not be made safe.
         errors: Vec<SafetyError>,
     },
     /// Arming gave up waiting for cancelled commands.
@@ -282,11 +282,11 @@ pub enum Event {
 pub struct ParameterEntry {
     /// The parameter, by its number.
     pub parameter: usize,
-    /// Its new value.
+    /// New value.
     pub value: ParameterValue,
 }
 
-/// How long a callback took.
+/// The duration of a callback.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Payload)]
 pub struct Callback {
     /// The estimator.
@@ -295,15 +295,15 @@ pub struct Callback {
     pub nanos: i64,
 }
 
-/// How the code of a command has ended.
+/// The end of a command's code.
 #[derive(Clone, Debug, PartialEq, Eq, Payload)]
 pub enum End {
-    /// It succeeded, and may have named the next state.
+    /// The code succeeded, and may have named the next state.
     Succeeded {
-        /// That state.
+        /// Next state, if one was named.
         next_state: Option<String>,
     },
-    /// It failed, and why.
+    /// The code failed.
     Failed {
         /// Why.
         message: String,
@@ -313,7 +313,7 @@ pub enum End {
 /// A request to an estimator.
 #[derive(Clone, Debug, PartialEq, Eq, Payload)]
 pub struct Request {
-    /// Whether a caller waits for the answer.
+    /// Kind of the request: whether a caller waits for the answer.
     pub kind: RequestKind,
     /// The name of its type.
     pub name: String,
@@ -324,7 +324,7 @@ pub struct Request {
 /// The kind of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Payload)]
 pub enum RequestKind {
-    /// With an answer: `HandleCall`.
+    /// A request with an answer: `HandleCall`.
     Call,
     /// One-way: `HandleCast`.
     Cast,
@@ -333,9 +333,9 @@ pub enum RequestKind {
 /// A message in a journal: the value itself, or bytes read from a file.
 #[derive(Clone, Debug)]
 pub enum Recorded {
-    /// As it was published.
+    /// The message as it was published.
     Message(DynamicMessage),
-    /// Its bytes.
+    /// Bytes of the message.
     Bytes(Arc<[u8]>),
 }
 

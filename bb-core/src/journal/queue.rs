@@ -16,8 +16,8 @@ pub(super) const MOST: Load = Load { lines: 4 * CAPACITY.lines, bytes: 4 * CAPAC
 /// The load of one batch for the sink.
 pub(super) const BATCH: Load = Load { lines: 1 << 10, bytes: 1 << 20 };
 
-/// How long outside producers wait for a sink that is too slow. A sink that takes no line for this long while
-/// [`CAPACITY`] is queued hangs. The journal then ends there: it never has a gap.
+/// Time for which outside producers wait for a sink that is too slow. A sink that takes no line for this long while [`CAPACITY`] is
+/// queued hangs. The journal then ends there: it never has a gap.
 pub(super) const LONGEST_WAIT: Duration = Duration::from_secs(2);
 
 /// The amount of queued data.
@@ -67,11 +67,11 @@ pub(super) struct Queue {
     pub(super) wall_offset_nanos: i64,
     /// While too much is queued: how many lines the sink had taken when that number last changed, and when it did.
     stalled: Option<(u64, Instant)>,
-    /// Why no more lines are accepted.
+    /// Reason for which no more lines are accepted.
     pub(super) ended: Option<Ended>,
 }
 
-/// Why a journal ended before the run.
+/// Reason for which a journal ended before the run.
 #[derive(Debug)]
 pub(super) struct Ended {
     pub(super) message: String,

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 /// dropped there after the last one.
 pub type Sink = Arc<dyn Fn(Entry) + Send + Sync>;
 
-/// How often the thread checks, unless a full batch wakes it before.
+/// Time between two checks by the thread, unless a full batch wakes it before.
 const PERIOD: Duration = Duration::from_millis(2);
 
 /// The writing end. Clones share the journal.
@@ -22,9 +22,9 @@ pub(crate) struct Journal(Arc<Inner>);
 
 struct Inner {
     state: Mutex<State>,
-    /// Whether outside producers have to wait: read without the lock.
+    /// `true` if outside producers have to wait: read without the lock.
     is_full: AtomicBool,
-    /// How many lines the sink has taken, to see whether it makes progress.
+    /// Number of lines that the sink has accepted, to see whether it makes progress.
     taken: AtomicU64,
     /// Number of panics of the sink.
     panics: AtomicU64,
@@ -133,7 +133,7 @@ impl Journal {
         self.0.room.notify_all();
     }
 
-    /// Whether it ended before the run, because of its sink.
+    /// Returns whether the journal ended before the run, because of its sink.
     pub(crate) fn has_ended(&self) -> bool {
         self.0.lock().queue.ended.is_some()
     }

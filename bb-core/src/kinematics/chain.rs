@@ -9,9 +9,9 @@ use nalgebra::{Dim, Isometry3, Matrix, RawStorageMut, U6, Vector3, Vector6};
 /// constant.
 #[derive(Clone, Debug)]
 pub struct Chain {
-    /// From the last common ancestor towards the tip.
+    /// Steps from the last common ancestor towards the tip.
     to_tip: Box<[Step]>,
-    /// From the last common ancestor towards the base.
+    /// Steps from the last common ancestor towards the base.
     to_base: Box<[Step]>,
     body_from_tip: Isometry3<f64>,
     base_from_body: Isometry3<f64>,
@@ -89,7 +89,7 @@ impl Chain {
         Ok(self.at(positions))
     }
 
-    /// The same, with the number of positions unchecked.
+    /// Returns the same as [`Self::transform`], with the number of positions unchecked.
     #[inline]
     pub(crate) fn at(&self, positions: &[f64]) -> Isometry3<f64> {
         let mut from_tip = self.body_from_tip;
@@ -148,8 +148,7 @@ impl Chain {
         self.to_tip.len() + self.to_base.len()
     }
 
-    /// The same between frames fixed to the two links: transforms points from the one on the tip to the one on the
-    /// base.
+    /// Returns the chain between frames fixed to the two links: it transforms points from the one on the tip to the one on the base.
     pub(crate) fn between(mut self, base_from_frame: &Isometry3<f64>, tip_from_frame: &Isometry3<f64>) -> Self {
         let frame_from_base = base_from_frame.inverse();
         self.body_from_tip *= tip_from_frame;
@@ -173,7 +172,7 @@ impl Chain {
         self
     }
 
-    /// Whether a velocity of the robot moves it.
+    /// Returns whether a velocity of the robot moves the chain.
     pub(crate) fn has(&self, velocity: usize) -> bool {
         let mut has = false;
         for step in self.to_tip.iter().chain(&self.to_base) {

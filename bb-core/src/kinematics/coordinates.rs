@@ -1,9 +1,9 @@
-//! How one joint moves its child, in the frame in which its axis is z.
+//! Motion of one joint's child, in the frame in which the joint's axis is z.
 
 use crate::topology::JointKind;
 use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
-/// How a joint moves, and where its coordinates are.
+/// Motion of a joint, and the place of its coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Motion {
     /// Rotates about z.

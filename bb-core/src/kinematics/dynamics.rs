@@ -38,7 +38,7 @@ impl Wrench {
         }
     }
 
-    /// The same wrench at the origin of the parent, in the axes of the parent.
+    /// Returns the same wrench at the origin of the parent, in the axes of the parent.
     fn carried(&self, parent_from_body: &Isometry3<f64>) -> Self {
         let force = parent_from_body.rotation * self.force;
         let lever = &parent_from_body.translation.vector;
@@ -61,7 +61,7 @@ pub struct Dynamics {
 }
 
 impl Dynamics {
-    /// Of a robot.
+    /// Creates the dynamics of a robot.
     pub fn new(kinematics: Kinematics) -> Self {
         let own = super::mass::rigid_bodies(&kinematics);
         let wrenches = vec![Wrench::NONE; own.len()];
@@ -73,7 +73,7 @@ impl Dynamics {
         &self.frames
     }
 
-    /// The same, to be updated.
+    /// Returns the poses and motions of the robot's links, to be updated.
     pub fn frames_mut(&mut self) -> &mut Frames {
         &mut self.frames
     }

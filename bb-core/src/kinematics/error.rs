@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// Why a robot has no kinematics, or a state does not fit it.
+/// Reason for which a robot has no kinematics, or a state does not fit it.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum KinematicsError {
@@ -26,8 +26,8 @@ pub enum KinematicsError {
         /// The joint.
         joint: &'static str,
     },
-    /// That joint mimics a joint that it cannot follow: itself, directly or through others, or one that has not
-    /// exactly one degree of freedom.
+    /// The joint mimics a joint that it cannot follow: itself, directly or through others, or one that has not exactly one degree of
+    /// freedom.
     Mimic {
         /// The joint.
         joint: &'static str,
@@ -43,7 +43,7 @@ pub enum KinematicsError {
     NotConverged {
         /// Position error of the best attempt, m.
         position_error: f64,
-        /// Its rotation error, rad; 0 if only a position was asked for.
+        /// Rotation error of the best attempt, rad; 0 if only a position was asked for.
         rotation_error: f64,
         /// The number of iterations, restarts included.
         iterations: u32,
@@ -52,9 +52,9 @@ pub enum KinematicsError {
     Coordinates {
         /// Positions, velocities or accelerations.
         what: &'static str,
-        /// How many there are.
+        /// Number of the robot.
         expected: usize,
-        /// How many were given.
+        /// Number that was given.
         given: usize,
     },
 }

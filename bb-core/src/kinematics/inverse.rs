@@ -61,7 +61,7 @@ pub struct Solution<'a> {
     pub rotation_error: f64,
     /// The total number of iterations.
     pub iterations: u32,
-    /// How often it restarted from a random position.
+    /// Number of restarts from a random position.
     pub restarts: u32,
 }
 
@@ -76,7 +76,7 @@ pub struct InverseKinematics {
     /// The reciprocal weight of each velocity, 0 for those that do not move the chain.
     mobility: Vec<f64>,
     jacobian: Matrix6xX<f64>,
-    /// The same for the joints that are not held at a limit, times their mobility.
+    /// Jacobian of the joints that are not held at a limit, times their mobility.
     free: Matrix6xX<f64>,
     held: Vec<bool>,
     step: Vec<f64>,
@@ -90,7 +90,7 @@ const PATIENCE: u32 = 8;
 /// The longest step of a joint in one iteration, rad or m.
 const LONGEST_STEP: f64 = 0.7;
 
-/// Once the target is reached, this many iterations move the redundant joints towards the posture.
+/// Number of iterations that move the redundant joints towards the posture once the target is reached.
 const POLISH: u32 = 60;
 
 /// Position and rotation error, and both as one vector.
@@ -101,7 +101,7 @@ struct Error {
 }
 
 impl InverseKinematics {
-    /// For the chain from `base` to `tip`.
+    /// Creates a solver for the chain from `base` to `tip`.
     ///
     /// # Errors
     /// A link does not belong to this robot; weights or a posture of another length or not finite; or a weight that
@@ -375,7 +375,7 @@ fn finite(what: &'static str, numbers: &[f64]) -> Result<(), KinematicsError> {
 struct Random(u64);
 
 impl Random {
-    /// From 0 to 1.
+    /// Returns a number from 0 to 1.
     fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut mixed = self.0;

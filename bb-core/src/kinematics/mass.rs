@@ -44,7 +44,7 @@ impl RigidBody {
         self.inertia += other.inertia;
     }
 
-    /// The same body in the frame of another one. With `x' = R x + r`, the inertia `−∫ [x]² dm` becomes
+    /// Returns the same body in the frame of another one. With `x' = R x + r`, the inertia `−∫ [x]² dm` becomes
     /// `R I Rᵀ − [r][R h] − [R h][r] − m [r]²`, where `h` is the first moment.
     pub(super) fn carried(&self, other_from_body: &Isometry3<f64>) -> Self {
         let rotation = other_from_body.rotation.to_rotation_matrix();

@@ -47,8 +47,7 @@ pub(super) struct Placement {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct LinkId(pub(super) usize);
 
-/// Which coordinates belong to a joint. Both ranges are empty for a fixed joint; a joint that mimics another has that
-/// joint's.
+/// Coordinates of a joint. Both ranges are empty for a fixed joint; a joint that mimics another has that joint's.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct JointCoordinates {
     /// Indices into the positions.
@@ -58,7 +57,7 @@ pub struct JointCoordinates {
 }
 
 impl Kinematics {
-    /// Of a robot, `Rover::TOPOLOGY`, or of links and joints from elsewhere.
+    /// Creates the kinematics of a robot, `Rover::TOPOLOGY`, or of links and joints from elsewhere.
     ///
     /// # Errors
     /// The links do not form a tree, a moving joint has no axis, its limits exclude each other, or it mimics a joint
@@ -276,7 +275,7 @@ fn follow(topology: &Topology, joint: usize) -> Result<Followed, KinematicsError
     Err(KinematicsError::Mimic { joint })
 }
 
-/// How a joint moves, and the rotation from the frame in which its axis is z to its own; `None` for a fixed one.
+/// Returns the motion of a joint, and the rotation from the frame in which its axis is z to its own; `None` for a fixed one.
 fn motion(
     joint: &Joint,
     coordinates: &JointCoordinates,

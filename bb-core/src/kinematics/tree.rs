@@ -78,7 +78,7 @@ impl LinkMotion {
 }
 
 impl Frames {
-    /// At [`Kinematics::neutral`].
+    /// Creates the frames at [`Kinematics::neutral`].
     pub fn new(kinematics: Kinematics) -> Self {
         let at_rest = State { root_from_body: Isometry3::identity(), motion: LinkMotion::REST };
         let own_masses = own_masses(&kinematics);

@@ -15,7 +15,7 @@ use std::fmt;
 
 /// A component as seen by its `Slot`.
 pub trait Component: Sized + Send + 'static {
-    /// Its options.
+    /// Options of the component.
     type Options: Options;
     /// The context for its start.
     type Context: Send;
@@ -41,10 +41,10 @@ pub trait Component: Sized + Send + 'static {
 
 /// A component that is called at a rate and publishes its readings: a sensor or a service.
 pub trait Periodic: Component {
-    /// What it publishes.
+    /// Payload that the component publishes.
     type Output: Payload;
 
-    /// Its context.
+    /// Returns the context of the component.
     #[doc(hidden)]
     fn context(declaration: &'static SensorDeclaration, host: HostHandle) -> Self::Context;
     /// Counters of the component.
@@ -55,7 +55,7 @@ pub trait Periodic: Component {
     /// # Errors
     /// Why it cannot be taken.
     fn read(&mut self, now: MonotonicTime) -> Result<Reading<Self::Output>, Fault>;
-    /// When it wants to be read first.
+    /// Returns the time at which the component wants to be read first.
     fn starts_at(&self) -> Option<MonotonicTime>;
     /// True if other code publishes its messages.
     #[doc(hidden)]
@@ -146,7 +146,7 @@ impl<E: Estimator> Component for AsEstimator<E> {
 /// A sensor, or its replacement.
 #[doc(hidden)]
 pub enum AsSensor<S: Sensor> {
-    /// As declared.
+    /// The declared sensor.
     Declared(S),
     /// A replacement.
     Replaced(StandInSensor<S::Output>),
@@ -202,7 +202,7 @@ impl<S: Sensor> Component for AsSensor<S> {
 /// A controller or a bridge, or its replacement.
 #[doc(hidden)]
 pub enum AsService<S: Service> {
-    /// As declared.
+    /// The declared service.
     Declared(S),
     /// A replacement.
     Replaced(StandInService<S::Output>),

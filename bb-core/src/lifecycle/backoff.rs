@@ -3,14 +3,14 @@
 use crate::time::MonotonicTime;
 use std::time::Duration;
 
-/// How failed components are restarted.
+/// Settings of the restarts of failed components.
 ///
 /// A fault (`Err`) restarts its component alone, for as long as the robot runs. So does a panic, which also counts
 /// against the budget of the component's supervisor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Supervision {
-    /// How many panics a supervisor allows within [`Self::within`] before it escalates to its parent, which restarts
-    /// everything below. Default: 3.
+    /// Number of panics that a supervisor allows within [`Self::within`] before it escalates to its parent, which restarts everything
+    /// below. Default: 3.
     pub max_restarts: usize,
     /// See [`Self::max_restarts`]. Default: 5 s.
     pub within: Duration,
@@ -43,7 +43,7 @@ impl Supervision {
     }
 }
 
-/// How often in a row a component has failed, and when it last failed.
+/// Number of a component's failures in a row, and the time of the last one.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Failures {
     count: u32,

@@ -39,9 +39,9 @@ enum State<C> {
     /// Not created yet, or retired.
     Vacant,
     Running(C),
-    /// It has failed, and will be restarted at that time.
+    /// The component has failed, and will be restarted at that time.
     Waiting(MonotonicTime),
-    /// It remains stopped.
+    /// The component remains stopped.
     Stopped,
 }
 
@@ -72,7 +72,7 @@ impl<C: Component> Slot<C> {
         matches!(self.state, State::Running(_))
     }
 
-    /// When it is to be restarted, if a restart is pending.
+    /// Returns the time of a pending restart, if there is one.
     pub(crate) fn restart_at(&self) -> Option<MonotonicTime> {
         match self.state {
             State::Waiting(at) => Some(at),
@@ -101,7 +101,7 @@ impl<C: Component> Slot<C> {
         }
     }
 
-    /// It has failed at `now`: it is retired, and restarted after its backoff unless the fault is permanent.
+    /// Retires a component that has failed at `now`; it is restarted after its backoff unless the fault is permanent.
     pub(crate) fn fail(&mut self, failed: &Failed, now: MonotonicTime) -> AfterFault {
         let previous = std::mem::replace(&mut self.state, State::Stopped);
         if let State::Running(component) = previous {
@@ -130,7 +130,7 @@ impl<C: Component> Slot<C> {
         true
     }
 
-    /// Its supervisor gives up: it is no longer restarted.
+    /// Ends restarts, since the supervisor gives up.
     pub(crate) fn give_up(&mut self) {
         if matches!(self.state, State::Waiting(_)) {
             self.state = State::Stopped;
@@ -152,7 +152,7 @@ impl<C: Component> Slot<C> {
 }
 
 impl<C: Component> Drop for Slot<C> {
-    /// For a robot that did not start. The `Drop` of the options is code of the user, too.
+    /// Retires the component of a robot that did not start. The `Drop` of the options is code of the user, too.
     fn drop(&mut self) {
         let _ = self.retire(Termination::Stop);
         discard(std::mem::replace(&mut self.recipe.options, Err(String::new())));

@@ -66,10 +66,10 @@ use super::Finite;
             nalgebra's types"
 )]
 pub trait Field: Finite + Sized {
-    /// What its bytes mean.
+    /// Shape of the value: the meaning of its bytes.
     const SHAPE: Shape;
 
-    /// Whether no value uses the heap, so that [`heap_bytes`](Self::heap_bytes) need not be called.
+    /// `true` if no value uses the heap, so that [`heap_bytes`](Self::heap_bytes) need not be called.
     const IS_INLINE: bool = false;
 
     /// Bytes that it holds on the heap, in addition to its `size_of`. Data shared by an `Arc` counts in full.

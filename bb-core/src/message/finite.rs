@@ -1,4 +1,4 @@
-//! Whether data holds no NaN and no infinity.
+//! Checks that data holds no NaN and no infinity.
 
 use crate::time::{MonotonicTime, WallTime};
 use nalgebra::{Dim, Isometry3, Matrix, Quaternion, RawStorage, Unit};
@@ -13,7 +13,7 @@ use std::time::Duration;
     note = "implement `bb_core::Finite` for it, or derive `Payload`"
 )]
 pub trait Finite {
-    /// Whether every number in it is finite.
+    /// Returns whether every number in it is finite.
     fn is_finite(&self) -> bool;
 }
 

@@ -1,6 +1,6 @@
-//! What a message reports about joints.
+//! Reports of joints in messages.
 
-/// What a payload reports about one joint: as many numbers as the joint has coordinates, in the order of
+/// A payload's report of one joint: as many numbers as the joint has coordinates, in the order of
 /// [`kinematics`](crate::kinematics#coordinates); one for a revolute or prismatic joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointReading<'a> {
@@ -13,17 +13,17 @@ pub struct JointReading<'a> {
     pub velocity: &'a [f64],
     /// Torques in N·m, forces in N; empty if it is not measured.
     pub effort: &'a [f64],
-    /// On which side of the joint's transmission.
+    /// Side of the joint's transmission.
     pub side: JointSide,
 }
 
-/// Where something is measured at a joint with a transmission.
+/// Side of a joint's transmission at which something is measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum JointSide {
-    /// At the joint itself.
+    /// The joint itself.
     #[default]
     Joint,
-    /// At its motor, on the other side of the declared transmission.
+    /// The motor, on the other side of the declared transmission.
     Motor,
 }
 
@@ -81,7 +81,7 @@ impl<'a> JointReading<'a> {
         Self { joint: None, position, velocity: &[], effort: &[], side: JointSide::Joint }
     }
 
-    /// Of the joint of that name.
+    /// Returns the same reading, of the joint of that name.
     pub fn of(self, joint: &'a str) -> Self {
         Self { joint: Some(joint), ..self }
     }

@@ -169,7 +169,7 @@ impl JointBounds {
 }
 
 impl Exceeded {
-    /// Whether it exceeded anything.
+    /// Returns whether the command exceeded anything.
     pub fn any(self) -> bool {
         self.position || self.velocity || self.effort
     }
@@ -189,7 +189,7 @@ impl LimitedQuantity {
     /// All of them.
     pub const ALL: &'static [Self] = &[Self::Position, Self::Velocity, Self::Effort];
 
-    /// Its name for people.
+    /// Returns the name for people.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Position => "position",
@@ -214,7 +214,7 @@ impl fmt::Display for OutOfBounds {
 
 impl std::error::Error for OutOfBounds {}
 
-/// Whether it was outside.
+/// Clamps a value to its bounds; returns whether it was outside.
 fn hold(value: &mut f64, lower: f64, upper: f64) -> bool {
     let held = value.max(lower).min(upper);
     let is_outside = held != *value;

@@ -18,7 +18,7 @@ impl Frame {
         Self(name)
     }
 
-    /// Its name.
+    /// Returns the name of the link or joint.
     pub const fn name(self) -> &'static str {
         self.0
     }
@@ -30,7 +30,7 @@ impl fmt::Display for Frame {
     }
 }
 
-/// Where a message was first published.
+/// Place at which a message was first published.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Origin {
     /// The robot's name.
@@ -42,13 +42,13 @@ pub struct Origin {
 /// All of a message but its payload.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Stamp {
-    /// When it was measured, on the monotonic clock: for order and age.
+    /// Time of the measurement, on the monotonic clock: for order and age.
     pub monotonic_time: MonotonicTime,
-    /// When it was measured, by the calendar: for logs.
+    /// Time of the measurement, by the calendar: for logs.
     pub wall_time: WallTime,
     /// The frame the payload is in.
     pub frame: Frame,
-    /// Where it was published.
+    /// Place at which the message was published.
     pub origin: Origin,
 }
 
@@ -65,13 +65,13 @@ impl Stamp {
 pub struct Stamped<T> {
     /// The data, in SI units.
     pub payload: T,
-    /// When it was measured, on this machine's monotonic clock: for order and age.
+    /// Time of the measurement, on this machine's monotonic clock: for order and age.
     pub monotonic_time: MonotonicTime,
-    /// When it was measured, by the calendar: for logs.
+    /// Time of the measurement, by the calendar: for logs.
     pub wall_time: WallTime,
     /// The frame the payload is in.
     pub frame: Frame,
-    /// Where it was published.
+    /// Place at which the message was published.
     pub origin: Origin,
 }
 
@@ -99,12 +99,12 @@ impl<T> Deref for Stamped<T> {
     }
 }
 
-/// Whether two payloads are known, as a type: it is computed once for all publishers and inputs of the same types.
+/// Marker that says whether two payloads are known: it is computed once for all publishers and inputs of the same types.
 #[derive(Debug)]
 pub struct BothKnown<const KNOWN: bool>;
 
-/// Whether a publisher of `Self` may feed an input of type `T`. It may if the types are equal, or if one of them is
-/// unknown because of another error.
+/// A payload whose publisher may feed an input of type `T`. It may if the types are equal, or if one of them is unknown because of
+/// another error.
 ///
 /// The wiring names it at every `input`, where a mismatch is reported. `K` is a [`BothKnown`].
 #[diagnostic::on_unimplemented(
@@ -114,7 +114,7 @@ pub struct BothKnown<const KNOWN: bool>;
             come from another sensor, or from an estimator that converts them"
 )]
 pub trait Feeds<T: Payload, K>: Payload {
-    /// The same message.
+    /// Returns the same message.
     fn feed(message: &Stamped<Self>) -> &Stamped<T>;
 }
 

@@ -1,4 +1,4 @@
-//! What an island does to one of its estimators, other than delivering messages.
+//! Operations of an island on one of its estimators, other than delivering messages.
 
 use crate::message::Stamp;
 use crate::node::{NodeEntry, Turn};
@@ -18,8 +18,8 @@ pub enum Act<'a, 'b> {
     Handle(NodeEntry, &'a Turn<'b>),
     /// Let a caller visit it.
     Visit(&'a mut Visit<'a>, &'a Turn<'b>),
-    /// In a replay: create the estimator.
+    /// Create the estimator, in a replay.
     BeginReplay,
-    /// In a replay: publish the output emitted in reply to a request missing from the journal.
+    /// Publish the output emitted in reply to a request missing from the journal, in a replay.
     Emit(&'a DynamicMessage, &'a Turn<'b>),
 }

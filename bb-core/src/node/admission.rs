@@ -5,7 +5,7 @@ use crate::message::Payload;
 use crate::message::Stamped;
 use crate::time::MonotonicTime;
 
-/// How far ahead of the clock a stamp may be, in nanoseconds: 1 s.
+/// Time by which a stamp may be ahead of the clock, in nanoseconds: 1 s.
 pub(super) const MAX_SKEW_NANOS: i64 = 1_000_000_000;
 
 /// Remembers the time of the last message of each input.

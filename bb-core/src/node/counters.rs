@@ -8,7 +8,7 @@ use crate::joints::LookupError;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// Why a message or a dispatch was dropped.
+/// Reason for which a message or a dispatch was dropped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
 pub enum DropReason {
@@ -49,7 +49,7 @@ impl DropReason {
         Self::Displaced,
     ];
 
-    /// Its name in reports.
+    /// Returns the name in reports.
     pub const fn name(self) -> &'static str {
         match self {
             Self::SyncMiss => "sync miss",
@@ -178,19 +178,19 @@ impl Counters {
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct EstimatorStatistics {
-    /// Its path.
+    /// Path of the estimator.
     pub path: &'static str,
-    /// By input, in the order of declaration.
+    /// Counts by input, in the order of declaration.
     pub inputs: Vec<InputStatistics>,
-    /// How many times it was called.
+    /// Number of calls.
     pub dispatched: u64,
-    /// How many times it emitted.
+    /// Number of emissions.
     pub emitted: u64,
-    /// How many times it reported that it has diverged.
+    /// Number of times that the estimator reported that it has diverged.
     pub diverged: u64,
-    /// How many times it was restarted.
+    /// Number of restarts.
     pub restarts: u64,
-    /// How many times its health has changed.
+    /// Number of changes of health.
     pub transitions: u64,
     /// Health; `None` if it was left out by [`Fault::skip`](crate::Fault::skip), for the reason in `stopped`.
     pub health: Option<HealthState>,
@@ -204,9 +204,9 @@ pub struct EstimatorStatistics {
     /// The input and the reason of the last dropped message or run, if the estimator has not run since. It explains why an
     /// estimator is lost although its driver publishes.
     pub last_drop: Option<(&'static str, DropReason)>,
-    /// Why it is not running, if so.
+    /// Reason for which the estimator is not running, if so.
     pub stopped: Option<String>,
-    /// Why the last dispatch that lacked a transform was dropped: the joint concerned, and how old its state was.
+    /// Reason for which the last dispatch that lacked a transform was dropped: the joint concerned, and the age of its state.
     pub last_gap: Option<LookupError>,
 }
 
@@ -214,7 +214,7 @@ pub struct EstimatorStatistics {
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct InputStatistics {
-    /// Its name.
+    /// Name of the input.
     pub name: &'static str,
     /// The path of its publisher.
     pub source: &'static str,
@@ -227,7 +227,7 @@ pub struct InputStatistics {
 }
 
 impl InputStatistics {
-    /// How many messages were dropped for `reason`.
+    /// Returns the number of messages that were dropped for `reason`.
     pub fn dropped(&self, reason: DropReason) -> u64 {
         self.dropped[reason as usize]
     }

@@ -19,9 +19,9 @@ pub enum NodeEntry {
     GiveUp,
     /// The estimator is lost.
     Silence {
-        /// How often the estimator has been lost, this time included.
+        /// Number of times that the estimator has been lost, this time included.
         epoch: u32,
-        /// When the watchdog saw the last run completed.
+        /// Time at which the last run was completed, as the watchdog saw it.
         last_run: MonotonicTime,
     },
     /// A one-way request: a `Cast<E>`.
@@ -71,9 +71,9 @@ pub(crate) enum Report {
     Health(HealthReport),
     /// The estimator has failed.
     Failed {
-        /// What happened.
+        /// Message of the fault.
         message: String,
-        /// Whether it panicked, which counts against its supervisor's budget.
+        /// `true` if the estimator panicked, which counts against its supervisor's budget.
         panicked: bool,
     },
 }
@@ -82,6 +82,6 @@ pub(crate) enum Report {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct HealthReport {
     pub(crate) transition: HealthTransition,
-    /// How many losses the estimator knew of. A report from before the last loss is out of date.
+    /// Number of losses that the estimator knew of. A report from before the last loss is out of date.
     pub(crate) epoch: u32,
 }

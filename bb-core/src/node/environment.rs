@@ -58,14 +58,14 @@ pub(crate) enum BindTarget {
 /// Drains the island with that number.
 type Drain = Box<dyn Fn(usize) + Send + Sync>;
 
-/// How a robot runs.
+/// Mode of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Mode {
-    /// In real time, on many threads.
+    /// Real time, on many threads.
     Real,
-    /// On virtual time, on the caller's thread.
+    /// Virtual time, on the caller's thread.
     Virtual,
-    /// From a journal.
+    /// A replay of a journal.
     Replay,
 }
 
@@ -84,7 +84,7 @@ pub(crate) struct Refusal {
 #[derive(Clone)]
 pub struct Environment(Arc<Inner>);
 
-/// What each message reads. All else is behind a trait object: rustc proves for each robot that its wiring may be sent to
+/// State that each message reads. All else is behind a trait object: rustc proves for each robot that its wiring may be sent to
 /// other threads, and would walk every type in here.
 struct Inner {
     mode: Mode,
@@ -408,7 +408,7 @@ impl Environment {
         if self.0.has_telemetry { self.shared().telemetry.as_ref() } else { None }
     }
 
-    /// Whether individual messages are observed by a journal, a telemetry handler or the comparison of a replay.
+    /// Returns whether individual messages are observed by a journal, a telemetry handler or the comparison of a replay.
     #[inline]
     pub(crate) fn is_observed(&self) -> bool {
         self.0.has_journal || self.0.has_telemetry || self.0.mode == Mode::Replay

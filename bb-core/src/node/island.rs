@@ -94,15 +94,15 @@ pub trait IslandState: Sized {
         self.act(wiring, estimator, Act::Handle(entry, turn));
     }
 
-    /// In a replay: creates its estimators.
+    /// Creates the estimators of the island, in a replay.
     fn begin_replay(&mut self, wiring: &Self::Wiring) {
         for estimator in Self::DECLARATION.estimators {
             self.act(wiring, *estimator, Act::BeginReplay);
         }
     }
 
-    /// In a replay: publishes the output that an estimator emitted in reply to a request missing from the journal. Returns `false`
-    /// if no estimator of this island has such a publisher.
+    /// Publishes the output that an estimator emitted in reply to a request missing from the journal, in a replay. Returns `false` if
+    /// no estimator of this island has such a publisher.
     fn emit(&mut self, wiring: &Self::Wiring, message: &DynamicMessage, turn: &Turn<'_>) -> bool {
         Self::DECLARATION.estimators.iter().any(|estimator| self.act(wiring, *estimator, Act::Emit(message, turn)))
     }
@@ -116,7 +116,7 @@ pub trait IslandState: Sized {
     }
 }
 
-/// How long a caller waits for an island.
+/// Time for which a caller waits for an island.
 const LONGEST_CALL: Duration = Duration::from_secs(5);
 
 /// The ordering for values that are not part of the model.
@@ -130,15 +130,15 @@ pub struct Island<S: IslandState> {
     pending: AtomicUsize,
     /// Callers that wait for the island, and publishers that wait for room in its inbox.
     waiting: AtomicUsize,
-    /// Whether a publisher has waited for room in vain. The holder is considered hung until it takes the next entry.
+    /// `true` if a publisher has waited for room in vain. The holder is considered hung until it takes the next entry.
     hangs: AtomicBool,
     /// Signals to the worker that an entry has been added.
     arrived: Condvar,
     /// Signals to waiting threads that an entry was taken or that the island is free.
     moved: Condvar,
-    /// Whether a worker serves the island.
+    /// `true` if a worker serves the island.
     served: AtomicBool,
-    /// Whether a journal determines when entries are processed.
+    /// `true` if a journal determines when entries are processed.
     replayed: AtomicBool,
     /// Number of entries processed, used to report an island that hangs.
     turns: AtomicU64,
@@ -146,7 +146,7 @@ pub struct Island<S: IslandState> {
     running: AtomicU32,
     /// The time of the last entry.
     entered_nanos: AtomicI64,
-    /// Whether its estimators have stopped.
+    /// `true` once the estimators of the island have stopped.
     has_retired: AtomicBool,
 }
 
@@ -165,7 +165,7 @@ struct Keyed<M> {
     message: M,
 }
 
-/// Why a call was not made.
+/// Reason for which a call was not made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CallError {
     /// The calling thread is inside an island of the same robot and would wait for itself.
@@ -174,10 +174,10 @@ pub enum CallError {
     Busy,
 }
 
-/// What a thread found when it checked whether an island is held.
+/// Result of a check whether an island is held.
 struct Looked {
     is_held: bool,
-    /// Whether an entry is waiting that another thread may have left because of this check.
+    /// `true` if an entry is waiting that another thread may have left because of this check.
     has_kept: bool,
 }
 
@@ -364,7 +364,7 @@ impl<S: IslandState> Island<S> {
         Some(Within::new(state, wiring.environment().robot()))
     }
 
-    /// Whether a thread holds the island. The caller does not want to enter.
+    /// Returns whether a thread holds the island. The caller does not want to enter.
     fn is_held(&self, wiring: &S::Wiring) -> bool {
         let Looked { is_held, has_kept } = self.look();
         if has_kept {
@@ -389,7 +389,7 @@ impl<S: IslandState> Island<S> {
         Looked { is_held, has_kept }
     }
 
-    /// Whether no thread holds the island. The caller checks the inbox afterwards: see [`Self::look`].
+    /// Returns whether no thread holds the island. The caller checks the inbox afterwards: see [`Self::look`].
     fn is_free(&self) -> bool {
         !matches!(self.state.try_lock(), Err(TryLockError::WouldBlock))
     }

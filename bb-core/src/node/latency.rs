@@ -84,7 +84,7 @@ fn upper_end(bucket: usize) -> u64 {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct LatencyStatistics {
-    /// How many callbacks were measured.
+    /// Number of measured callbacks.
     pub count: u64,
     /// The median.
     pub median: Duration,

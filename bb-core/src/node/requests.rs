@@ -12,7 +12,7 @@ pub(crate) type Cast<E> = Box<dyn FnOnce(&mut E) -> Result<Reply<<E as Estimator
 /// Handles a request from its bytes in a journal.
 pub(super) type Handle<E> = fn(&mut E, &[u8]) -> Result<Reply<<E as Estimator>::Output>, Fault>;
 
-/// How requests of one type are handled by one estimator; `handle` is a [`Handle`].
+/// Handler of the requests of one type at one estimator; `handle` is a [`Handle`].
 struct Known {
     estimator: TypeId,
     kind: RequestKind,

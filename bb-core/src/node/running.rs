@@ -36,7 +36,7 @@ pub struct Node<E: Estimator> {
 type Deliver<E> =
     Box<dyn FnOnce(&mut Node<E>, &Turn<'_>, &mut Option<<E as Estimator>::Output>) -> Option<Stamp> + Send>;
 
-/// How many times in a row an estimator may continue its work before it is considered stuck.
+/// Number of times in a row that an estimator may continue its work before it is considered stuck.
 const STUCK_AFTER: u32 = 1_000_000;
 
 /// Arrival of a message: now, or before a restart that it has waited for.
@@ -196,7 +196,7 @@ impl<E: Estimator> Node<E> {
         Stamp { monotonic_time, wall_time, ..self.common.template }
     }
 
-    /// Whether the estimator has asked to continue at once.
+    /// Returns whether the estimator has asked to continue at once.
     #[inline]
     pub fn is_unfinished(&self) -> bool {
         self.common.timers.continue_with.is_some()

@@ -21,12 +21,12 @@ struct Inner {
     counters: Counters,
     /// The health last published by the control state, or [`LEFT_OUT`].
     health: AtomicU8,
-    /// When the message of the last completed run arrived, for the watchdog.
+    /// Arrival of the last completed run's message, for the watchdog.
     last_run_nanos: AtomicI64,
     /// The last change of health.
     last_transition: Mutex<Option<HealthTransition>>,
     stopped: Mutex<Option<Stopped>>,
-    /// Why a dispatch was last dropped for lack of a transform.
+    /// Reason for which a dispatch was last dropped for lack of a transform.
     last_gap: Mutex<Option<LookupError>>,
     /// The number of waiting one-way requests.
     casts: AtomicU32,
@@ -41,11 +41,11 @@ struct Inner {
 /// Stands for the health of an estimator that was left out.
 const LEFT_OUT: u8 = u8::MAX;
 
-/// Why an estimator is not running.
+/// Reason for which an estimator is not running.
 #[derive(Clone, Debug)]
 pub(crate) struct Stopped {
     pub(crate) reason: String,
-    /// Whether it is never restarted.
+    /// `true` if the estimator is never restarted.
     pub(crate) for_good: bool,
 }
 
@@ -72,7 +72,7 @@ impl SharedNode {
         &self.0.counters
     }
 
-    /// Its number among the robot's estimators.
+    /// Returns the number among the robot's estimators.
     pub(crate) fn number(&self) -> usize {
         self.0.number
     }
@@ -98,7 +98,7 @@ impl SharedNode {
         HealthState::from_index(self.0.health.load(Ordering::Relaxed))
     }
 
-    /// It is not part of this robot: it has no health, and is not watched.
+    /// Leaves out an estimator that is not part of this robot: it has no health, and is not watched.
     pub(super) fn leave_out(&self) {
         self.0.health.store(LEFT_OUT, Ordering::Relaxed);
     }

@@ -16,9 +16,9 @@ pub(super) struct Timers {
 /// Action of an estimator before anything else happens to it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Continuation {
-    /// It continues with this number.
+    /// Continue with this number.
     Step(u32),
-    /// It fails for this reason, after its reply.
+    /// Fail for this reason, after the reply.
     Fail(&'static str),
 }
 

@@ -9,7 +9,7 @@ use std::cell::Cell;
 #[derive(Debug, Default)]
 pub(super) struct Timing {
     first: Cell<Option<First>>,
-    /// When the last measured callback ended, as long as nothing has happened since.
+    /// End of the last measured callback, as long as nothing has happened since.
     ended: Cell<Option<Begun>>,
 }
 
@@ -21,11 +21,11 @@ struct First {
     reading: Reading,
 }
 
-/// When a callback to be measured began.
+/// Beginning of a callback to be measured.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Begun(Reading);
 
-/// When a measured callback ended, and how long it took.
+/// End and duration of a measured callback.
 pub(super) struct Measured {
     pub(super) end: MonotonicTime,
     pub(super) nanos: i64,

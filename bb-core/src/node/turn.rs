@@ -25,7 +25,7 @@ pub struct Turn<'a> {
     /// The estimator whose callback runs or ran last, used to report one that hangs.
     running: &'a AtomicU32,
     timing: Timing,
-    /// How long measured callbacks took, if there is a journal.
+    /// Durations of measured callbacks, if there is a journal.
     measured: RefCell<Vec<Callback>>,
     /// Transforms of inputs across moving joints, if there is a journal.
     placed: RefCell<Vec<PlacedInput>>,
@@ -33,7 +33,7 @@ pub struct Turn<'a> {
     answering: Cell<Option<&'static EstimatorDeclaration>>,
     /// The estimator whose outputs answer such a request.
     unrecorded: Cell<Option<&'static EstimatorDeclaration>>,
-    /// Whether the most recent callback has already emitted at one of its outputs.
+    /// `true` if the most recent callback has already emitted at one of its outputs.
     has_emitted: Cell<bool>,
 }
 

@@ -76,7 +76,7 @@ pub struct BeginMotion {
     /// Speed of the motion, if known, rad/s or m/s; never negative.
     #[payload(unit = "rad/s", unit = "m/s")]
     pub speed: Option<f64>,
-    /// When the joint is expected to arrive.
+    /// Time at which the joint is expected to arrive.
     pub expected_arrival: Option<MonotonicTime>,
 }
 
@@ -86,7 +86,7 @@ pub struct EndMotion {
     /// Position at the end, measured or assumed, rad or m.
     #[payload(unit = "rad", unit = "m")]
     pub position: f64,
-    /// Why the motion ended.
+    /// Reason for the end of the motion.
     pub end: MotionEnd,
 }
 
@@ -103,7 +103,7 @@ impl BeginMotion {
     }
 }
 
-/// Why a motion ended.
+/// Reason for the end of a motion.
 #[derive(Clone, Debug, PartialEq, Eq, Payload)]
 pub enum MotionEnd {
     /// The joint has reached the target.

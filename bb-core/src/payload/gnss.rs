@@ -9,9 +9,9 @@ use nalgebra::Matrix3;
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 #[payload(ros)]
 pub struct GnssFix {
-    /// What the position is based on.
+    /// Basis of the position.
     pub status: GnssStatus,
-    /// Which satellite systems were used.
+    /// Satellite systems that were used.
     pub services: GnssServices,
     /// The position, if the receiver has one.
     pub position: Option<GeodeticPosition>,
@@ -43,9 +43,9 @@ pub enum GnssStatus {
     NoFix,
     /// Satellites alone.
     Fix,
-    /// With corrections from satellites (WAAS, EGNOS).
+    /// Corrections from satellites (WAAS, EGNOS).
     SatelliteAugmented,
-    /// With corrections from the ground (differential, RTK).
+    /// Corrections from the ground (differential, RTK).
     GroundAugmented,
 }
 

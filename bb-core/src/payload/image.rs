@@ -15,7 +15,7 @@ pub struct Image {
     /// Channels and their size, by ROS's names: `rgb8`, `bgr8`, `mono8`, `mono16`, `16UC1` for a depth in mm, `32FC1` for
     /// one in m, `bayer_rggb8`.
     pub encoding: &'static str,
-    /// Whether multi-byte numbers are big-endian.
+    /// `true` if multi-byte numbers are big-endian.
     pub is_bigendian: bool,
     /// Bytes of a row, including padding.
     pub step: u32,

@@ -9,14 +9,14 @@ use std::sync::Arc;
 #[derive(Clone, Debug, Default, PartialEq, Payload)]
 #[payload(ros)]
 pub struct Path {
-    /// From the start.
+    /// Poses from the start to the end.
     pub poses: Arc<[PathPose]>,
 }
 
 /// A pose on a path.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 pub struct PathPose {
-    /// When the body is there; the Unix epoch if a path has no times.
+    /// Time at which the body is there; the Unix epoch if a path has no times.
     pub time: WallTime,
     /// The body's origin in the world, m.
     #[payload(unit = "m")]

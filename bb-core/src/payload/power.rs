@@ -20,45 +20,45 @@ pub struct BatteryState {
     /// Remaining charge, coulomb.
     #[payload(unit = "A*s")]
     pub charge: Option<f64>,
-    /// Its charge when it was last full, coulomb.
+    /// Charge of the battery when it was last full, coulomb.
     #[payload(unit = "A*s")]
     pub capacity: Option<f64>,
-    /// Its charge when full, as designed, coulomb.
+    /// Charge of the battery when full, as designed, coulomb.
     #[payload(unit = "A*s")]
     pub design_capacity: Option<f64>,
     /// Remaining charge as a fraction of the capacity, from 0 to 1.
     pub percentage: Option<f64>,
-    /// Whether it is being charged.
+    /// State of charging.
     pub status: BatteryStatus,
-    /// Its condition.
+    /// Condition of the battery.
     pub health: BatteryHealth,
-    /// Its chemistry.
+    /// Chemistry of the battery.
     pub technology: BatteryTechnology,
-    /// Whether it is present.
+    /// `true` if the battery is present.
     pub is_present: bool,
     /// V, by cell; empty if the number of cells is unknown.
     pub cell_voltages: Vec<Option<f64>>,
     /// K, by cell; empty if the number of cells is unknown.
     pub cell_temperatures: Vec<Option<f64>>,
-    /// Its location in the robot.
+    /// Location in the robot.
     pub location: String,
-    /// Its serial number.
+    /// Serial number.
     pub serial_number: String,
 }
 
-/// Whether a battery is being charged.
+/// State of charging of a battery.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Payload)]
 pub enum BatteryStatus {
     /// Unknown.
     #[default]
     Unknown,
-    /// It is being charged.
+    /// Charging.
     Charging,
-    /// It supplies the robot.
+    /// Discharging: it supplies the robot.
     Discharging,
     /// Neither.
     NotCharging,
-    /// It is full.
+    /// Full.
     Full,
 }
 
@@ -80,9 +80,9 @@ pub enum BatteryHealth {
     UnspecifiedFailure,
     /// Too cold.
     Cold,
-    /// Its watchdog expired.
+    /// The watchdog expired.
     WatchdogTimerExpired,
-    /// It was charged for too long.
+    /// The battery was charged for too long.
     SafetyTimerExpired,
 }
 
@@ -114,7 +114,7 @@ pub enum BatteryTechnology {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Payload)]
 #[payload(no_frame)]
 pub struct PowerState {
-    /// Whether it is switched on.
+    /// `true` if the supply is switched on.
     pub is_on: bool,
     /// V
     #[payload(unit = "V")]

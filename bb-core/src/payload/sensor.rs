@@ -44,7 +44,7 @@ pub struct MagneticField {
     /// The field, tesla.
     #[payload(unit = "T")]
     pub magnetic_field: Vector3<f64>,
-    /// Its covariance, T².
+    /// Covariance of the field, T².
     pub covariance: Option<Matrix3<f64>>,
 }
 
@@ -73,7 +73,7 @@ pub struct FluidPressure {
     /// Absolute pressure, Pa.
     #[payload(unit = "Pa")]
     pub fluid_pressure: f64,
-    /// Its variance, Pa².
+    /// Variance of the pressure, Pa².
     #[payload(unit = "Pa^2")]
     pub variance: Option<f64>,
 }

@@ -11,7 +11,7 @@ use std::time::Duration;
 pub struct JointTrajectory {
     /// The joints.
     pub joint_names: Arc<[String]>,
-    /// In the order of their times.
+    /// Points in the order of their times.
     pub points: Arc<[TrajectoryPoint]>,
 }
 
@@ -27,11 +27,11 @@ pub struct TrajectoryPoint {
     pub accelerations: Vec<f64>,
     /// N·m or N
     pub efforts: Vec<f64>,
-    /// From the start of the trajectory.
+    /// Time from the start of the trajectory.
     pub time_from_start: Duration,
 }
 
-/// What a position of a trajectory is rounded to, rad or m: points that are close in time are not too fast for it.
+/// Precision to which a position of a trajectory is rounded, rad or m: points that are close in time are not too fast for it.
 const ROUNDING: f64 = 1e-9;
 
 /// A trajectory that leads one joint beyond its limits is refused as a whole: clamped to them, it would be another one,

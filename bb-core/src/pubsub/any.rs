@@ -35,7 +35,7 @@ pub(super) trait AnyMessage: Send + Sync {
     fn to_json(&self) -> String;
     /// A topic for its payload.
     fn new_topic(&self, path: &'static str) -> Arc<dyn AnyTopic>;
-    /// Whether the topic is one for its payload.
+    /// Returns whether the topic is one for the message's payload.
     fn fits(&self, topic: &dyn AnyTopic) -> bool;
 }
 
@@ -68,7 +68,7 @@ impl DynamicMessage {
         self.message.payload_name()
     }
 
-    /// When it was measured, in which frame, and where.
+    /// Returns the stamp: time of the measurement, frame and place.
     pub fn stamp(&self) -> Stamp {
         self.message.stamp()
     }
@@ -116,7 +116,7 @@ impl DynamicMessage {
         self.message.ros_companion()
     }
 
-    /// Whether payload and wall time can be read back from ROS's layout bit for bit.
+    /// Returns whether payload and wall time can be read back from ROS's layout bit for bit.
     pub fn is_exact_as_ros(&self) -> bool {
         self.message.is_exact_as_ros()
     }
@@ -136,11 +136,11 @@ impl fmt::Debug for DynamicMessage {
 
 /// The common interface of all topics.
 pub trait AnyTopic: Any + Send + Sync {
-    /// Its path.
+    /// Returns the path.
     fn path(&self) -> &'static str;
     /// The name of its payload's type.
     fn payload_name(&self) -> &'static str;
-    /// Whether the values of its messages are relative to a frame.
+    /// Returns whether the values of the messages are relative to a frame.
     #[doc(hidden)]
     fn depends_on_frame(&self) -> bool;
     /// Returns the definitions of its messages: the exact one, and those of ROS if it has any.
@@ -159,7 +159,7 @@ pub trait AnyTopic: Any + Send + Sync {
     /// Itself, to downcast to its type.
     #[doc(hidden)]
     fn as_any(&self) -> &dyn Any;
-    /// Its counts.
+    /// Returns the counts.
     fn statistics(&self) -> TopicStatistics;
     /// Tells all subscribers that no more will come. Returns the tasks to wake, which is the subscribers' code.
     #[must_use = "a task that waits for a message waits for ever unless it is woken"]

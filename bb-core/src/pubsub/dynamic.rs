@@ -109,12 +109,12 @@ impl DynamicSubscription {
         (0..self.queue.len()).map_while(|_| self.try_recv())
     }
 
-    /// How many messages wait now.
+    /// Returns the number of messages that wait now.
     pub fn waiting(&self) -> usize {
         self.queue.len()
     }
 
-    /// How many messages were lost because this subscriber was slow.
+    /// Returns the number of messages that were lost because this subscriber was slow.
     pub fn lagged(&self) -> u64 {
         self.queue.lagged()
     }

@@ -15,9 +15,9 @@ pub struct Publisher<T> {
 
 /// Target of the messages.
 enum Target<T> {
-    /// To the subscribers of a path of the caller's choice.
+    /// The subscribers of a path of the caller's choice.
     Topic(Arc<Topic<T>>),
-    /// To a sensor of the robot whose messages other code publishes, at `path`, in `frame` unless they have one.
+    /// A sensor of the robot whose messages other code publishes, at `path`, in `frame` unless they have one.
     Sensor { path: &'static str, frame: Frame, enter: Weak<Enter<T>> },
 }
 
@@ -31,7 +31,7 @@ pub(crate) type Tell<'a> = dyn Fn(&mut dyn FnMut(JointReading<'_>)) + 'a;
 pub(crate) trait Gate: Send + Sync {
     /// Has `publish` called with the stamp of a payload that is published now; not once the publisher may not act any more.
     fn pass(&self, publish: &mut dyn FnMut(Stamp));
-    /// Whether messages are to be shown to [`Self::note`].
+    /// Returns whether messages are to be shown to [`Self::note`].
     fn is_noted(&self) -> bool;
     /// A message is about to be published, at this time.
     fn note(&self, message: DynamicMessage, now: MonotonicTime);
@@ -108,7 +108,7 @@ impl<T: Payload> Publisher<T> {
         }
     }
 
-    /// Its path.
+    /// Returns the path.
     pub fn path(&self) -> &'static str {
         match &self.target {
             Target::Topic(topic) => topic.path(),

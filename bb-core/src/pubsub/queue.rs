@@ -27,7 +27,7 @@ pub(super) struct Queue<M> {
     arrived: Condvar,
     bound: Bound,
     by_path: Option<Box<ByPath>>,
-    /// Its reader is gone.
+    /// `true` once the reader is gone.
     abandoned: AtomicBool,
 }
 

@@ -32,7 +32,7 @@ pub(crate) struct Registry {
 #[derive(Default)]
 struct State {
     topics: Sorted<&'static str, Made>,
-    /// In a replay: paths that had a publisher, whose payload's type is not known before the first message.
+    /// Paths that had a publisher, in a replay, whose payload's type is not known before the first message.
     expected: Sorted<&'static str, Expected>,
     /// Topics that were made or expected so far.
     made: u64,
@@ -83,12 +83,12 @@ struct Expected {
     payload: &'static str,
 }
 
-/// What happens to the paths of a registry.
+/// Change of a path of a registry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum PathChange {
-    /// It has a topic now.
+    /// The path has a topic now.
     Made { path: &'static str, payload: &'static str },
-    /// Its topic, which nobody used, has made room for another.
+    /// The path's topic, which nobody used, has made room for another.
     Evicted { path: &'static str },
 }
 
@@ -97,7 +97,7 @@ impl Registry {
     /// removed.
     pub(crate) const MAX_TOPICS: usize = 1024;
 
-    /// For a robot that declares these paths.
+    /// Creates the registry of a robot that declares these paths.
     pub(crate) fn new(declared: impl IntoIterator<Item = &'static str>) -> Self {
         Self { declared: declared.into_iter().collect(), ..Self::default() }
     }
@@ -132,7 +132,7 @@ impl Registry {
         subscription
     }
 
-    /// The same for tests, which no journal is told of.
+    /// Returns the topic at `path` to publish at, for tests, which have no journal.
     #[cfg(test)]
     pub(crate) fn topic<T: Payload>(&self, path: &str) -> Result<Arc<Topic<T>>, PathError> {
         self.topic_noted(path, &mut |_| ())
@@ -229,7 +229,7 @@ impl Registry {
         }
     }
 
-    /// In a replay: somebody could publish at `path` from now on; no more if the name of the payload is empty.
+    /// Replays that somebody could publish at `path` from now on; no more if the name of the payload is empty.
     pub(crate) fn expect(&self, path: &'static str, payload: &'static str) {
         let mut state = self.lock();
         let dropped = if payload.is_empty() { state.forget(path) } else { state.expect(path, payload) };
@@ -384,7 +384,7 @@ impl State {
         None
     }
 
-    /// The same.
+    /// Forgets that somebody could publish at `path`; returns a topic that is removed for it.
     fn forget(&mut self, path: &'static str) -> Option<Made> {
         self.expected.remove(path);
         let made = self.topics.get_mut(path)?;
@@ -415,11 +415,11 @@ impl fmt::Debug for Registry {
     }
 }
 
-/// What live subscriptions select.
+/// Selections of live subscriptions.
 #[derive(Default)]
 struct Selections {
     all: Vec<Selection>,
-    /// How many there may be before dropped ones are removed: twice the number left the last time.
+    /// Number of selections at which dropped ones are removed: twice the number left the last time.
     clean_at: usize,
 }
 
@@ -533,7 +533,7 @@ enum Act {
 enum Reason {
     Malformed,
     Declared,
-    /// It has another payload, and whether that is published there or only subscribed to.
+    /// The path has another payload, which is published there or only subscribed to.
     OtherPayload {
         payload: &'static str,
         is_published: bool,

@@ -1,6 +1,6 @@
 //! The selection of an untyped subscription: paths and payloads.
 
-/// Which paths to subscribe to. In a path, `*` matches any one name; an empty list selects everything, as in [`Payloads`].
+/// Selection of paths to subscribe to. In a path, `*` matches any one name; an empty list selects everything, as in [`Payloads`].
 ///
 /// ```
 /// use bb_core::Select;
@@ -22,7 +22,7 @@ pub enum Select<'a> {
 }
 
 impl Select<'_> {
-    /// Whether it includes `path`.
+    /// Returns whether the selection includes `path`.
     pub fn includes(self, path: &str) -> bool {
         match self {
             Self::All => true,
@@ -42,11 +42,11 @@ fn names_below(pattern: &str, path: &str) -> Option<usize> {
     Some(names.count())
 }
 
-/// In a pattern: any one name.
+/// Pattern of any one name in a path.
 pub(super) const ANY_NAME: &str = "*";
 
-/// Which payloads to subscribe to, by the names of their types. `None` and an empty list convert to all of them; a name, `Some` of a
-/// name, an array or a slice of names to only these.
+/// Selection of payloads to subscribe to, by the names of their types. `None` and an empty list convert to all of them; a name,
+/// `Some` of a name, an array or a slice of names to only these.
 ///
 /// ```
 /// use bb_core::Payloads;
@@ -62,7 +62,7 @@ impl<'a> Payloads<'a> {
     /// Payloads of any type.
     pub const ALL: Self = Self(None);
 
-    /// Whether it includes the payload type `name`.
+    /// Returns whether the selection includes the payload type `name`.
     pub fn includes(&self, name: &str) -> bool {
         self.0.as_ref().is_none_or(|names| names.contains(&name))
     }

@@ -4,11 +4,11 @@
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct SubscriberStatistics {
-    /// Whether it knows the payload's type.
+    /// `true` if the subscriber knows the payload's type.
     pub is_typed: bool,
     /// Messages waiting for it.
     pub waiting: usize,
-    /// How many may wait.
+    /// Number of messages that may wait.
     pub capacity: usize,
     /// Bytes of the waiting messages that count towards the bound: see [`Overflow`](super::Overflow).
     pub bytes: usize,
@@ -20,7 +20,7 @@ pub struct SubscriberStatistics {
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct TopicStatistics {
-    /// Its path.
+    /// Path of the topic.
     pub path: &'static str,
     /// The name of its payload's type.
     pub payload: &'static str,

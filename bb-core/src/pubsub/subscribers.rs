@@ -139,7 +139,7 @@ impl Hub {
         Listeners { queues: Arc::clone(&subscribers.queues.all), taps: Arc::clone(&subscribers.taps.all) }
     }
 
-    /// Whether these are still all of them.
+    /// Returns whether these are still all of the listeners.
     pub(super) fn has_still(&self, listeners: &Listeners) -> bool {
         let subscribers = self.lock();
         Arc::ptr_eq(&listeners.queues, &subscribers.queues.all)

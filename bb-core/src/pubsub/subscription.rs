@@ -35,7 +35,7 @@ impl<T> Subscription<T> {
         self.unmatched.as_deref()
     }
 
-    /// For a path whose publisher must exist.
+    /// Returns the subscription to a path whose publisher must exist.
     ///
     /// # Errors
     /// Nothing published there when it was created.
@@ -77,7 +77,7 @@ impl<T> Subscription<T> {
         (0..self.queue.len()).map_while(|_| self.try_recv())
     }
 
-    /// How many messages were lost because this subscriber was slow.
+    /// Returns the number of messages that were lost because this subscriber was slow.
     pub fn lagged(&self) -> u64 {
         self.queue.lagged()
     }

@@ -57,7 +57,7 @@ impl<T: Payload> Topic<T> {
         self.hub.published.store(self.hub.published.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
     }
 
-    /// Whether there are subscribers.
+    /// Returns whether there are subscribers.
     #[inline]
     pub(crate) fn is_listened_to(&self) -> bool {
         self.hub.listening.load(Ordering::Acquire) > 0

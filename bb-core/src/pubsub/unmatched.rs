@@ -21,7 +21,7 @@ enum Part {
     /// Nothing publishes there, but something does below it.
     PathAbove,
     Subtree,
-    /// It has a `*` that is no whole name.
+    /// A `*` that is no whole name.
     Pattern,
     Payload,
 }
@@ -65,7 +65,7 @@ impl fmt::Display for Unmatched {
 
 impl std::error::Error for Unmatched {}
 
-/// Why nothing can be subscribed to at `path`.
+/// Returns the reason for which nothing can be subscribed to at `path`.
 pub(crate) fn unmatched_at(path: &str, topics: &[&dyn AnyTopic]) -> Unmatched {
     if has_odd_star(path) {
         return Unmatched::new(Part::Pattern, path, None);

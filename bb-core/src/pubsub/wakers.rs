@@ -17,8 +17,7 @@ pub(crate) struct Wakers {
 }
 
 impl Wakers {
-    /// For a publisher that holds no lock of its own: evicted messages are dropped immediately, without an
-    /// allocation.
+    /// Creates the wakers of a publisher that holds no lock of its own: evicted messages are dropped immediately, without an allocation.
     pub(super) fn dropping_at_once() -> Self {
         let mut wakers = Self::default();
         wakers.drops_at_once = true;
@@ -44,7 +43,7 @@ impl Wakers {
         }
     }
 
-    /// Whether there is nothing to do.
+    /// Returns whether there is nothing to do.
     #[inline]
     pub(crate) fn is_empty(&self) -> bool {
         // The slots are filled in order.

@@ -54,16 +54,16 @@ struct Inner<A: Actuator> {
 
 struct State<A: Actuator> {
     slot: Slot<AsActuator<A>>,
-    /// Whether it has failed and could not be made safe.
+    /// `true` if the actuator has failed and could not be made safe.
     is_unsafe: bool,
-    /// Whether it was asked to carry out a command after it was last made safe.
+    /// `true` if the actuator was asked to carry out a command after it was last made safe.
     may_move: bool,
     /// The command execution that sent the last command to be carried out.
     moved_by: Caller,
     /// The update time that is currently set as an alarm.
     alarm: Option<MonotonicTime>,
-    /// On virtual time: changes to report to the control state once the lock is released. Loggers, telemetry handlers and
-    /// subscribers receive them on this thread and may disarm the robot, which takes the lock.
+    /// Changes to report to the control state once the lock is released, on virtual time. Loggers, telemetry handlers and subscribers
+    /// receive them on this thread and may disarm the robot, which takes the lock.
     told: Vec<Told>,
 }
 

@@ -16,7 +16,8 @@ pub(super) fn bound_to(robot: &RobotDeclaration, component: usize, path: &str) -
     Some(robot.parameters.get(*parameter)?.path)
 }
 
-/// Why an option bound to this parameter would refuse its new value. Options of a component that is replaced refuse nothing.
+/// Returns the reason for which an option bound to this parameter would refuse its new value. Options of a component that is
+/// replaced refuse nothing.
 pub(super) fn refused_by_bound(
     robot: &RobotDeclaration,
     options: &mut OptionsList,

@@ -47,12 +47,12 @@ impl<R: Robot> Builder<R> {
         self.draft.set_parameter(parameter.number(), value.into_value())
     }
 
-    /// How components that fail are restarted.
+    /// Returns the settings of the restarts of components that fail, to be changed.
     pub fn supervision(&mut self) -> &mut Supervision {
         &mut self.draft.supervision
     }
 
-    /// How much history of joint states is kept, and for how long a state is valid.
+    /// Returns the settings of the history of joint states, to be changed: its length, and the time for which a state is valid.
     pub fn joints(&mut self) -> &mut JointSettings {
         &mut self.draft.joints
     }

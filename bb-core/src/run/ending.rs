@@ -12,13 +12,16 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::task::Waker;
 use std::time::{Duration, Instant};
 
-/// How long the journal's sink may take for the last lines.
+/// Time that the journal's sink may take for the last lines.
 const HAND_OVER_WITHIN: Duration = Duration::from_secs(1);
 
-/// How long actuators have to stop and parameters to be stored, and how long the sink has for the last lines and components
-/// to drop their values, no matter how much time has been used up before.
+/// Least time that actuators have to stop and parameters to be stored, no matter how much has been used up before.
 const LEAST_TO_STOP: Duration = Duration::from_millis(100);
+
+/// Least time that the sink has for the last lines and components to drop their values.
 const LEAST_TO_CLOSE: Duration = Duration::from_millis(200);
+
+/// Least time that idle workers have to stop.
 const LEAST_TO_RETIRE: Duration = Duration::from_millis(20);
 
 impl Machine {
@@ -42,7 +45,7 @@ impl Machine {
         }
     }
 
-    /// On virtual time: stops all estimators in order. The journal's line of the stop implies it.
+    /// Stops all estimators in order, on virtual time. The journal's line of the stop implies it.
     pub(super) fn retire_quietly(&self) {
         let now = self.environment.clock().now();
         for island in self.islands() {

@@ -20,7 +20,7 @@ impl StartError {
         self.path
     }
 
-    /// Why it does not start.
+    /// Returns the reason for which the robot does not start.
     pub fn fault(&self) -> &Fault {
         &self.fault
     }

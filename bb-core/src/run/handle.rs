@@ -26,11 +26,11 @@ use std::marker::PhantomData;
     note = "an estimator of several outputs is subscribed to output by output"
 )]
 pub trait Publisher<R: Robot>: Copy {
-    /// What it publishes.
+    /// Payload of the messages.
     type Payload: Payload;
-    /// Its path.
+    /// Returns the path of the publisher.
     fn path(self) -> &'static str;
-    /// Its topic.
+    /// Returns the topic of the publisher.
     #[doc(hidden)]
     fn topic<'a>(self, topics: &'a R::Topics, system: &'a SystemTopics) -> &'a Topic<Self::Payload>;
 }
@@ -60,7 +60,7 @@ macro_rules! handle {
                 Self { path, $($field,)* of: PhantomData }
             }
 
-            /// Its path.
+            /// Returns the path.
             pub const fn path(self) -> &'static str {
                 self.path
             }
@@ -312,7 +312,7 @@ visitable!(EstimatorHandle<E: Estimator, T: Payload>, EstimatorOfSeveralHandle<E
 
 /// A component with options: the handle of a sensor or of an estimator.
 pub trait Configurable<R: Robot>: Copy {
-    /// Its options.
+    /// Options of the component.
     type Options;
     /// Returns them from the options of the robot.
     #[doc(hidden)]

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 /// The path at which faults of a store are reported.
 pub(super) const PATH: &str = "param";
 
-/// How long the last set may take to be stored when the robot stops.
+/// Time that the last set may take to be stored when the robot stops.
 const STORED_WITHIN: Duration = Duration::from_secs(2);
 
 /// A store, with the values that it has.
@@ -56,9 +56,9 @@ impl Desk {
 
 /// A store at work.
 pub(super) enum Keeper {
-    /// On a thread of its own.
+    /// A store on a thread of its own.
     Apart(Arc<Desk>),
-    /// On virtual time all user code runs on the caller's thread: everything is stored at the end.
+    /// A store on virtual time: all user code runs on the caller's thread, and everything is stored at the end.
     Here(Box<Work>),
 }
 

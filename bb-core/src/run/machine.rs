@@ -1,4 +1,4 @@
-//! What all kinds of run share: the wiring and the operations on it.
+//! The part that all kinds of run share: the wiring and the operations on it.
 
 use super::actuator::AnyActuator;
 use super::keeper::Keeper;
@@ -28,13 +28,13 @@ pub(super) struct Machine {
     pub(super) sources: Mutex<Vec<SharedSource>>,
     /// The threads of the robot have no work left.
     pub(super) has_ended: AtomicBool,
-    /// Its report at the end.
+    /// Report at the end.
     pub(super) last_report: OnceLock<Report>,
     /// Taken at the end.
     pub(super) keeper: Mutex<Option<Keeper>>,
 }
 
-/// How many one-way requests may wait for an estimator; further ones are refused.
+/// Number of one-way requests that may wait for an estimator; further ones are refused.
 const MOST_CASTS: u32 = 1024;
 
 impl Machine {

@@ -1,9 +1,9 @@
-//! When a thread entered a component's code.
+//! Time at which a thread entered a component's code.
 
 use crate::time::{Clock, MonotonicTime};
 use std::sync::atomic::{AtomicI64, Ordering};
 
-/// When a component's code was entered: to report code that hangs.
+/// Time at which a component's code was entered: to report code that hangs.
 #[derive(Debug)]
 pub(super) struct Occupied(AtomicI64);
 
@@ -15,7 +15,7 @@ impl Occupied {
         Self(AtomicI64::new(OUTSIDE))
     }
 
-    /// When its code was entered, if a thread is inside.
+    /// Returns the time at which the code was entered, if a thread is inside.
     pub(super) fn entered_at(&self) -> Option<MonotonicTime> {
         let nanos = self.0.load(Ordering::Acquire);
         (nanos != OUTSIDE).then(|| MonotonicTime::from_nanos(nanos))

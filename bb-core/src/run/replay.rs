@@ -46,16 +46,16 @@ struct Replayer {
     unrecorded: HashMap<usize, (u64, String)>,
     /// Turns that had not ended when the journal ended.
     cut: Vec<ReplayError>,
-    /// Why nothing more is played.
+    /// Reason for which nothing more is played.
     refused: Option<ReplayError>,
 }
 
-/// Why a journal cannot be replayed.
+/// Reason for which a journal cannot be replayed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ReplayError {
     /// The number of the line.
     pub line: u64,
-    /// What is wrong with it.
+    /// Fault of the line.
     pub message: String,
 }
 
@@ -83,7 +83,7 @@ impl<R: Robot> Replay<R> {
         know_calls::<V::Estimator, Q>();
     }
 
-    /// The same for one-way requests.
+    /// Lets one-way requests of type `Q` to an estimator be repeated, as [`Self::know_calls`] does calls.
     pub fn know_casts<V: Visitable<R>, Q>(&self, _: V)
     where
         V::Estimator: HandleCast<Q>,
@@ -362,7 +362,7 @@ impl Replayer {
         self.go_on(number, time, entry)
     }
 
-    /// The same for an entry that belongs to the previous turn.
+    /// Hands over an entry that belongs to the previous turn.
     fn go_on(&self, number: usize, time: MonotonicTime, entry: Replayed<'_>) -> Result<(), String> {
         let machine = &self.machine;
         let island = machine.island(number).ok_or("the robot has no such island")?;

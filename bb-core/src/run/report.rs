@@ -38,7 +38,7 @@ pub struct Report {
     /// Components that have failed: the newest 256 faults, in the order in which they occurred last. A fault that a component
     /// repeats is listed once, with its count.
     pub faults: Vec<ReportedFault>,
-    /// How many faults there were, with those that were repeated.
+    /// Number of faults, with those that were repeated.
     pub all_faults: u64,
     /// Errors that have made the safety state `error`, by component and kind: at most 256.
     pub safety_errors: Vec<ReportedSafetyError>,
@@ -86,7 +86,7 @@ impl Report {
         self.all_faults += 1;
     }
 
-    /// This report, if no component has failed.
+    /// Returns this report, if no component has failed.
     ///
     /// # Errors
     /// Of the faults that are kept, the one that occurred first.

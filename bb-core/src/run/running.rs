@@ -27,7 +27,7 @@ pub struct Running<R: Robot> {
 /// The threads of a run.
 struct Threads {
     machine: Arc<Machine>,
-    /// Of sensors and services.
+    /// Threads of sensors and services.
     sources: Vec<Thread>,
     /// [`Running::wait`] has waited for the limit of a stop in vain: what is left has had its time.
     has_waited: bool,
@@ -35,18 +35,18 @@ struct Threads {
     kept: Option<Reserved>,
 }
 
-/// How long user code may take to return after the robot was told to stop.
+/// Time that user code may take to return after the robot was asked to stop.
 pub(super) const STOP_WITHIN: Duration = Duration::from_secs(5);
 
-/// How long it may take at least, once disarm callbacks have used up their time.
+/// Least time that it may take, once disarm callbacks have used up their time.
 const GRACE: Duration = Duration::from_millis(400);
 
 /// The robot has stopped within this time after the call, even if code hangs. Includes all of the above and the last
 /// lines of the journal.
 const BACK_WITHIN: Duration = Duration::from_millis(5800);
 
-/// How long loggers may take for the last lines. Without this wait, a program that ends after `stop` would not log
-/// what could not be made safe.
+/// Time that loggers may take for the last lines. Without this wait, a program that ends after `stop` would not log what could not
+/// be made safe.
 const LINES_WITHIN: Duration = Duration::from_millis(150);
 
 impl<R: Robot> Running<R> {

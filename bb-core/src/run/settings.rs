@@ -52,7 +52,7 @@ impl<R: Robot> Builder<R> {
         self.draft.load_settings(file.as_ref())
     }
 
-    /// The same for TOML text; errors name it `name`.
+    /// Sets options and parameters from TOML text, as [`Builder::load_settings`] does from a file; errors name it `name`.
     ///
     /// # Errors
     /// As [`Builder::load_settings`].

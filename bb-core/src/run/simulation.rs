@@ -30,7 +30,7 @@ struct VirtualRun {
     due: BinaryHeap<Reverse<(MonotonicTime, usize)>>,
 }
 
-/// What is due next.
+/// Kind of the next event that is due.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Kind {
     Source,
@@ -45,7 +45,7 @@ impl<R: Robot> Simulation<R> {
         Self { run: VirtualRun::new(Arc::clone(&live.machine), sources), live }
     }
 
-    /// When the next sensor is due; `None` once all have finished.
+    /// Returns the time at which the next sensor is due; `None` once all have finished.
     pub fn next_due(&self) -> Option<MonotonicTime> {
         self.run.next_due()
     }
@@ -145,7 +145,7 @@ impl VirtualRun {
         self.machine.settle();
     }
 
-    /// What is due next, and when; anything overdue is due now.
+    /// Returns the next event that is due, and its time; anything overdue is due now.
     fn next(&self) -> Option<(MonotonicTime, Kind)> {
         let now = self.clock().now();
         let machine = &self.machine;

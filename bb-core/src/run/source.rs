@@ -28,7 +28,7 @@ pub struct Assembly {
 }
 
 impl Assembly {
-    /// What all islands share.
+    /// Returns the state that all islands share.
     pub fn environment(&self) -> &Environment {
         &self.environment
     }
@@ -36,13 +36,13 @@ impl Assembly {
 
 /// A running sensor or service, whatever its type.
 pub(crate) trait Source: Send {
-    /// Its path.
+    /// Returns the path of the component.
     fn path(&self) -> &'static str;
     /// The time of its first reading, if it asks for one.
     fn starts_at(&mut self) -> Option<MonotonicTime>;
     /// Starts it: its first reading is due at once, or at the time it asks for.
     fn begin(&mut self);
-    /// When it is read or restarted next; `None` before it has begun and after it has finished.
+    /// Returns the time of the next reading or restart; `None` before it has begun and after it has finished.
     fn due(&self) -> Option<MonotonicTime>;
     /// Carries out orders of its supervisor and changes of parameters.
     fn obey(&mut self);
@@ -50,7 +50,7 @@ pub(crate) trait Source: Send {
     fn fire(&mut self);
     /// Closes the device.
     fn terminate(&mut self);
-    /// Its state shared with other threads.
+    /// Returns the state shared with other threads.
     #[doc(hidden)]
     fn shared(&self) -> SharedSource;
 }
@@ -110,7 +110,7 @@ impl Sources {
         ExternalSensors(self.0.into_iter().filter(|source| source.is_external()).collect())
     }
 
-    /// By the number of the publisher.
+    /// Returns the sources by the number of the publisher.
     pub(super) fn by_publisher(self) -> HashMap<usize, Box<dyn AnySource>> {
         self.0.into_iter().map(|source| (source.publisher(), source)).collect()
     }
@@ -256,7 +256,7 @@ impl<S: Periodic> Running<S> {
         self.next_due(reading.next, due, now)
     }
 
-    /// When to read next after a reading that was due at `due`.
+    /// Returns the time of the next reading after one that was due at `due`.
     fn next_due(
         &mut self,
         next: Next,

@@ -96,7 +96,7 @@ pub(super) fn join(thread: JoinHandle<()>, deadline: Instant) -> Result<(), &'st
     thread.join().map_err(|_| "its thread panicked")
 }
 
-/// When a source that did not return was entered, in words.
+/// Returns the time since a source that did not return was entered, in words.
 pub(super) fn since(entered_at: Option<MonotonicTime>, now: MonotonicTime) -> String {
     let entered = entered_at.map(|at| format!("; its code was entered {:.1?} ago", now.duration_since(at)));
     entered.unwrap_or_default()

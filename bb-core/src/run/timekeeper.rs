@@ -10,17 +10,17 @@ use std::time::{Duration, Instant};
 /// The longest sleep.
 const LONGEST_WAIT: Duration = Duration::from_millis(200);
 
-/// How often the wall clock is read again.
+/// Period at which the wall clock is read again.
 const WALL_PERIOD: Duration = Duration::from_secs(1);
 
-/// How often islands are checked.
+/// Period at which islands are checked.
 const LOOK_PERIOD: Duration = Duration::from_millis(100);
 
 /// A callback that has not returned for this long hangs.
 const HANGS_AFTER: Duration = Duration::from_secs(1);
 
-/// The same for a command, which may block its thread, and for a sensor or a service without a rate, which may wait
-/// for its device. Equal to the time that a stopping robot waits for it.
+/// Time after which a command hangs, which may block its thread, and a sensor or a service without a rate, which may wait for its
+/// device. Equal to the time that a stopping robot waits for it.
 const WAITS_TOO_LONG: Duration = Duration::from_secs(5);
 
 /// An island's state at the last check.
@@ -31,7 +31,7 @@ struct Seen {
     is_reported: bool,
 }
 
-/// Until the robot has ended.
+/// Keeps time until the robot has ended.
 pub(super) fn keep_time(machine: &Machine) {
     let clock = machine.environment.clock();
     let mut seen = vec![Seen::default(); machine.wired.islands.len()];
@@ -93,8 +93,8 @@ fn look(machine: &Machine, seen: &mut [Seen], now: MonotonicTime) {
     }
 }
 
-/// The same for sensors and services. `reported`: for each source already reported as hanging, when its code was
-/// entered.
+/// Reports sensors and services that hang, each time once. `reported`: for each source already reported, the time at which its code
+/// was entered.
 fn look_at_sources(machine: &Machine, reported: &mut [Option<MonotonicTime>], now: MonotonicTime) {
     for (source, reported) in machine.shared_sources().iter().zip(reported) {
         let longest = if source.has_rate() { HANGS_AFTER } else { WAITS_TOO_LONG };
@@ -102,14 +102,14 @@ fn look_at_sources(machine: &Machine, reported: &mut [Option<MonotonicTime>], no
     }
 }
 
-/// The same for actuators.
+/// Reports actuators that hang, each time once.
 fn look_at_actuators(machine: &Machine, reported: &mut [Option<MonotonicTime>], now: MonotonicTime) {
     for (actuator, reported) in machine.actuators().into_iter().zip(reported) {
         report_hanging(machine, actuator.path(), actuator.entered_at(), HANGS_AFTER, reported, now);
     }
 }
 
-/// The same for commands: the first hanging execution of each. `reported`: those already reported.
+/// Reports commands that hang: the first hanging execution of each. `reported`: those already reported.
 fn look_at_commands(machine: &Machine, reported: &mut Vec<u64>, now: MonotonicTime) {
     let hanging = machine.control.hanging(now, WAITS_TOO_LONG);
     for Hanging { path, first, duration } in &hanging {

@@ -7,7 +7,7 @@ use crate::component::Estimator;
 pub trait Visitable<R: Robot>: Copy {
     /// The estimator.
     type Estimator: Estimator;
-    /// Its number.
+    /// Returns the number of the estimator.
     #[doc(hidden)]
     fn number(self) -> usize;
 }

@@ -1,4 +1,4 @@
-//! When to wake each island: for timers, ticks and restarts.
+//! Times at which to wake each island: for timers, ticks and restarts.
 
 use super::Bell;
 use crate::sorted::Sorted;
@@ -12,7 +12,7 @@ pub(crate) struct Agenda {
     bell: Bell,
 }
 
-/// At most one entry per island, its earliest: an island that is woken says when to wake it next.
+/// Entries of the agenda. At most one per island, its earliest: an island that is woken says when to wake it next.
 #[derive(Debug, Default)]
 struct Entries {
     by_time: Sorted<(MonotonicTime, usize), ()>,

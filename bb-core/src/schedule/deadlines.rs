@@ -5,7 +5,7 @@ use crate::sorted::Sorted;
 use crate::time::MonotonicTime;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// At most one deadline for each key; equal times are in the order of the keys.
+/// Deadlines by key, at most one for each; equal times are in the order of the keys.
 #[derive(Debug)]
 pub(crate) struct Deadlines<K> {
     entries: Mutex<Entries<K>>,

@@ -25,7 +25,7 @@ struct Shared {
 const CLOSED: usize = 1;
 const ONE_INSIDE: usize = 2;
 
-/// Its holder is inside until this is dropped.
+/// Permit to be inside, until it is dropped.
 #[derive(Debug)]
 pub(crate) struct Inside<'a>(Option<&'a Shared>);
 

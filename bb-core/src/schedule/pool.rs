@@ -35,7 +35,7 @@ pub(crate) enum Lane {
 impl Lane {
     const ALL: [Self; 4] = [Self::Safety, Self::Robot, Self::Commands, Self::User];
 
-    /// How many of its jobs may run at once; others wait until one returns.
+    /// Returns the number of the lane's jobs that may run at once; others wait until one returns.
     const fn most(self) -> usize {
         match self {
             // The model checker has room for few threads.
@@ -45,7 +45,7 @@ impl Lane {
         }
     }
 
-    /// Its jobs, for a report.
+    /// Returns the name of the lane's jobs, for a report.
     const fn jobs(self) -> &'static str {
         match self {
             Self::Safety => "commands that disarm or that health has started",
@@ -59,7 +59,7 @@ impl Lane {
 /// Threads that are always there.
 const READY: usize = if cfg!(loom) { 1 } else { 2 };
 
-/// How long a lane must be full, with jobs waiting, before that is reported.
+/// Time for which a lane must be full, with jobs waiting, before that is reported.
 const FULL_AFTER: Duration = Duration::from_secs(1);
 
 /// The threads of one robot. Clones are the same pool; it ends with [`Pool::close`].
@@ -68,7 +68,7 @@ pub(crate) struct Pool(Arc<Shared>);
 
 struct Shared {
     state: Mutex<Crew>,
-    /// How long a thread beyond [`READY`] stays without work.
+    /// Time for which a thread beyond [`READY`] stays without work.
     idle_for: Duration,
     /// Tells the thread that keeps time that a job waits.
     alarm: Box<dyn Fn() + Send + Sync>,

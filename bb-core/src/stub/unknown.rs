@@ -26,7 +26,7 @@ pub struct UnknownOutput;
 /// The number of an input or output that does not exist.
 pub(crate) const UNKNOWN_INDEX: usize = usize::MAX;
 
-/// The same as a field.
+/// The field of an input or output that does not exist.
 pub type NoField = At<UNKNOWN_INDEX>;
 
 impl Finite for Unknown {

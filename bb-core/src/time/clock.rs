@@ -104,7 +104,7 @@ impl Clock {
         self.wall_offset_nanos.load(Ordering::Relaxed)
     }
 
-    /// Whether time is virtual.
+    /// Returns whether time is virtual.
     pub fn is_virtual(&self) -> bool {
         matches!(self.kind, Kind::Virtual(_))
     }

@@ -64,21 +64,21 @@ struct State {
 const WINDOW_NANOS: i64 = 10_000_000_000;
 const WINDOW_READINGS: u32 = 16;
 
-/// How far a reading may be ahead of its arrival, if the previous one was late, or behind it, if it was overtaken.
+/// Time in nanoseconds by which a reading may be ahead of its arrival, if the previous one was late, or behind it, if it was overtaken.
 const TOLERANCE_NANOS: f64 = 1e9;
 
 /// The relation of a reading to the previous one.
 enum Step {
-    /// This many ticks later.
+    /// Later by this many ticks.
     Later(u64),
-    /// This many ticks earlier.
+    /// Earlier by this many ticks.
     Overtaken(u64),
     /// The counter was restarted.
     Restarted,
 }
 
 impl DeviceClock {
-    /// For a counter of `bits` bits, at most 64, that counts `ticks_per_second`.
+    /// Creates the clock of a counter of `bits` bits, at most 64, that counts `ticks_per_second`.
     pub fn new(ticks_per_second: f64, bits: u32) -> Self {
         let modulus = 1_u64.checked_shl(bits).filter(|_| bits < 64);
         let nanos_per_tick = Some(1e9 / ticks_per_second).filter(|nanos| nanos.is_finite() && *nanos > 0.0);

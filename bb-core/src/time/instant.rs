@@ -20,7 +20,7 @@ impl MonotonicTime {
     /// The largest instant: a time that never comes.
     pub const MAX: Self = Self(i64::MAX);
 
-    /// From nanoseconds.
+    /// Creates an instant from nanoseconds.
     pub const fn from_nanos(nanos: i64) -> Self {
         Self(nanos)
     }
@@ -46,14 +46,14 @@ impl MonotonicTime {
         Duration::from_nanos(if nanos < 0 { 0 } else { nanos as u64 })
     }
 
-    /// This instant, `nanos` later; saturates.
+    /// Returns the instant `nanos` later; saturates.
     pub const fn plus_nanos(self, nanos: i64) -> Self {
         Self(self.0.saturating_add(nanos))
     }
 }
 
 impl WallTime {
-    /// From nanoseconds since the Unix epoch.
+    /// Creates a time from nanoseconds since the Unix epoch.
     pub const fn from_unix_nanos(nanos: i64) -> Self {
         Self(nanos)
     }

@@ -67,8 +67,8 @@ impl Stopwatch {
     }
 }
 
-/// Whether the counter and the system's clock agree within a percent over a pause. The scale would be wrong for good if the machine was
-/// suspended, or the thread had no core, at the wrong moment of the calibration.
+/// Returns whether the counter and the system's clock agree within a percent over a pause. The scale would be wrong for good if the
+/// machine was suspended, or the thread had no core, at the wrong moment of the calibration.
 fn is_right(counter: &quanta::Clock) -> bool {
     let start = together(counter);
     std::thread::sleep(Duration::from_millis(50));

@@ -20,7 +20,7 @@ pub struct Visual {
     pub link_from_shape: Origin,
     /// The shape.
     pub geometry: Geometry,
-    /// Its colour.
+    /// Colour.
     pub material: Option<Material>,
 }
 
@@ -52,7 +52,7 @@ pub enum Geometry {
     },
     /// A mesh in a file.
     Mesh {
-        /// Its name, as URDF has it: `package://…` or a path.
+        /// Name of the file, as URDF has it: `package://…` or a path.
         file: &'static str,
         /// Factors along x, y and z.
         scale: [f64; 3],
@@ -62,7 +62,7 @@ pub enum Geometry {
 /// A colour by name.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material {
-    /// Its name, empty if it has none.
+    /// Name, empty if it has none.
     pub name: &'static str,
     /// Red, green, blue, opacity, each from 0 to 1.
     pub color: Option<[f64; 4]>,

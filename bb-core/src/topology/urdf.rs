@@ -176,7 +176,7 @@ fn joined(values: &[impl Display]) -> String {
     values.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ")
 }
 
-/// In quotes, as an attribute's value.
+/// Returns a text in quotes, as an attribute's value.
 fn quoted(text: &str) -> String {
     let escaped = text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;");
     format!("\"{escaped}\"")

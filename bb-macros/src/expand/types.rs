@@ -246,7 +246,7 @@ impl<'a> Types<'a> {
         self.named(&self.names(part).options)
     }
 
-    /// The type of a part's options, by the part's type as the user wrote it.
+    /// Returns the type of a part's options, by the part's type as the user wrote it.
     pub(super) fn given_options(&self, part: Part) -> Named {
         self.named(&self.names(part).given_options)
     }

@@ -74,12 +74,12 @@ impl<'a, T> Every<'a, T> {
         self.first.len() + self.second.len()
     }
 
-    /// Whether none has arrived since the last run.
+    /// Returns whether no message has arrived since the last run.
     pub fn is_empty(&self) -> bool {
         self.first.is_empty() && self.second.is_empty()
     }
 
-    /// The same, after others were lost.
+    /// Returns the same messages, after others were lost.
     pub fn after_losing(self, lost: u64) -> Self {
         Self { lost, ..self }
     }
@@ -103,7 +103,7 @@ impl<'a, T> IntoIterator for Every<'a, T> {
 #[doc(hidden)]
 #[derive(Debug)]
 pub struct EverySlot<T> {
-    /// Those that have been seen come first, until another arrives.
+    /// Messages since the last dispatch; those that have been seen come first, until another arrives.
     messages: VecDeque<Stamped<T>>,
     /// The counted bytes of each, for a payload of which they count.
     sizes: VecDeque<usize>,

@@ -33,7 +33,7 @@ impl<'a, T> Input<'a, T> {
         Self { message, is_new: false }
     }
 
-    /// Whether it has arrived since the last dispatch, so that each reading of a slow sensor is fused once.
+    /// Returns whether the message has arrived since the last dispatch, so that each reading of a slow sensor is fused once.
     pub fn is_new(&self) -> bool {
         self.is_new
     }

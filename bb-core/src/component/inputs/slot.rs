@@ -1,4 +1,4 @@
-//! What an input keeps between two dispatches.
+//! Stores of an input's messages between two dispatches.
 
 use crate::declaration::InputDeclaration;
 use crate::message::Payload;
@@ -36,8 +36,8 @@ pub trait Slot<T: Payload> {
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SyncMiss {
-    /// Its number among the declared inputs.
+    /// Number among the declared inputs.
     pub input: usize,
-    /// How much older than the driver it was; `None` if it has not arrived yet.
+    /// Age of the message relative to the driver's, in nanoseconds; `None` if it has not arrived yet.
     pub age_nanos: Option<i64>,
 }

@@ -43,7 +43,7 @@ pub(super) struct Primitive {
     pub(super) id: u32,
 }
 
-/// How many elements a field has.
+/// Number of elements of a field.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Count {
     One,
@@ -175,7 +175,7 @@ impl Primitive {
     const UINT32: Self = Self { name: "uint32", id: 7 };
 }
 
-/// With a package.
+/// Returns a type's name with its package.
 fn full_name(name: &str) -> String {
     match name.split_once('/') {
         Some(_) => name.to_owned(),

@@ -3,7 +3,7 @@
 use super::{DecodeError, Field, Reader, Shape, Writer};
 use std::marker::PhantomData;
 
-/// Whether a field is finite. Of the functions that the derive calls, only this and [`is_any`] require a [`Field`].
+/// Returns whether a field is finite. Of the functions that the derive calls, only this and [`is_any`] require a [`Field`].
 #[inline]
 pub fn is_finite<T: Field>(value: &T) -> bool {
     value.is_finite()
@@ -22,7 +22,7 @@ impl<T: Field> FieldOf<T> {
     /// The meaning of its bytes.
     pub const SHAPE: Shape = T::SHAPE;
 
-    /// Whether no value uses the heap.
+    /// `true` if no value uses the heap.
     pub const IS_INLINE: bool = T::IS_INLINE;
 
     /// Bytes that it holds on the heap.

@@ -1,4 +1,4 @@
-//! Why bytes cannot be read.
+//! Errors of bytes that cannot be read.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -21,7 +21,7 @@ impl DecodeError {
         Self(Box::new(Fault { path: Path::default(), at, expected: expected.into(), found: found.into() }))
     }
 
-    /// The same error, in the field `name` of a larger value; `[2]` is the third of a list.
+    /// Returns the same error, in the field `name` of a larger value; `[2]` is the third of a list.
     pub fn within(mut self, name: impl Into<Cow<'static, str>>) -> Self {
         self.0.path.enter(name);
         self

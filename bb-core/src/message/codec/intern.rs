@@ -14,7 +14,7 @@ struct Names {
 
 static NAMES: Mutex<Option<Names>> = Mutex::new(None);
 
-/// The same text, kept forever; `None` if the limit is reached.
+/// Returns the same text, kept forever; `None` if the limit is reached.
 pub(crate) fn intern(text: &str) -> Option<&'static str> {
     if text.is_empty() {
         return Some("");

@@ -37,7 +37,7 @@ const NAN: &str = "NaN";
 const INFINITY: &str = "Infinity";
 const NEGATIVE_INFINITY: &str = "-Infinity";
 
-/// How the fields of a struct or a variant are written.
+/// Form in which the fields of a struct or a variant are written.
 enum Form {
     /// No fields: `{}`.
     Empty,

@@ -14,7 +14,7 @@ const PADDING: usize = 3;
 pub struct Reader<'a> {
     bytes: &'a [u8],
     at: usize,
-    /// Whether numbers begin with the most significant byte.
+    /// `true` if numbers begin with the most significant byte.
     is_big_endian: bool,
 }
 
@@ -159,7 +159,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// What comes after the fields of that variant: the empty lists of those after it.
+    /// Reads the rest after the fields of that variant: the empty lists of those after it.
     #[doc(hidden)]
     pub fn end_variant(&mut self, shape: &Shape, number: u32) -> Result<(), DecodeError> {
         let (_, _, after) = split(shape, number);

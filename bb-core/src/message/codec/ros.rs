@@ -190,7 +190,7 @@ pub struct RosLayout<T> {
 }
 
 impl<T: Payload + RosMessage> RosLayout<T> {
-    /// As its [`RosMessage`] implementation does.
+    /// Layout given by the payload's [`RosMessage`] implementation.
     pub const OF: Self = Self {
         shape: <T::Message as Field>::SHAPE,
         write: |message, writer| T::to_ros(message).write(writer),
@@ -199,15 +199,14 @@ impl<T: Payload + RosMessage> RosLayout<T> {
         companion: T::COMPANION,
     };
 
-    /// As its [`RosMessage`] implementation does.
+    /// Returns the layout given by the payload's [`RosMessage`] implementation.
     #[doc(hidden)]
     pub const fn of() -> Self {
         Self::OF
     }
 }
 
-/// Whether payload and wall time of a message are the same bit for bit after ROS's layout, with its second message if there is
-/// one.
+/// Returns whether payload and wall time of a message are the same bit for bit after ROS's layout, with its second message if there is one.
 fn reads_back<T: Payload + RosMessage>(message: &Stamped<T>) -> bool {
     let mut bytes = Vec::new();
     T::to_ros(message).write(&mut Writer::new(&mut bytes));

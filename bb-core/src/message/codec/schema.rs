@@ -20,7 +20,7 @@ impl Schema {
     /// The encoding of messages, as named by MCAP.
     pub const MESSAGE_ENCODING: &'static str = "cdr";
 
-    /// Of the type `name` with the given shape.
+    /// Creates the schema of the type `name` with the given shape.
     pub fn new(name: &str, shape: Shape) -> Self {
         let definitions = definitions(name, shape);
         let mut text = String::new();

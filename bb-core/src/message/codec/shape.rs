@@ -46,21 +46,21 @@ pub enum Shape {
 pub struct StructShape {
     /// `Imu`; for a ROS message, with its package: `sensor_msgs/Imu`.
     pub name: &'static str,
-    /// In the order of the bytes.
+    /// Fields in the order of the bytes.
     pub fields: &'static [FieldShape],
 }
 
 /// A field of a struct.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FieldShape {
-    /// Its name; for an unnamed field, its number.
+    /// Name; the number of an unnamed field.
     pub name: &'static str,
-    /// What its bytes mean.
+    /// Shape of the value: the meaning of its bytes.
     pub shape: Shape,
     /// The unit of its numbers, if the field states one: `#[payload(unit = "V")]`. Several if that depends, as for the
     /// position of a joint: rad or m.
     pub units: &'static [FieldUnit],
-    /// Its doc comment, for forms; empty for none.
+    /// Doc comment, for forms; empty for none.
     pub doc: &'static str,
 }
 
@@ -80,7 +80,7 @@ pub struct FieldUnit {
 pub struct EnumShape {
     /// `Safety`
     pub name: &'static str,
-    /// By number.
+    /// Variants by number.
     pub variants: &'static [StructShape],
 }
 

@@ -178,8 +178,8 @@ pub fn decode_as_ros<T: Payload>(bytes: &[u8]) -> Result<(T, WallTime), DecodeEr
     }
 }
 
-/// Whether payload and wall time of a message read back from ROS's layout bit for bit, including the second message
-/// if there is one.
+/// Returns whether payload and wall time of a message read back from ROS's layout bit for bit, including the second message if
+/// there is one.
 pub fn is_exact_as_ros<T: Payload>(message: &Stamped<T>) -> bool {
     // Through a pointer in the constant, so that it is compiled only for payloads that ROS has a message for.
     match &T::ROS {

@@ -1,4 +1,4 @@
-//! What a replay compares with its journal.
+//! Comparison of a replay with its journal.
 
 use super::lock;
 use std::collections::{HashMap, VecDeque};
@@ -15,7 +15,7 @@ pub(crate) struct Comparison {
 /// A value that an estimator asked for in a replay but the journal does not have.
 #[derive(Clone, Debug)]
 pub(crate) struct Missing {
-    /// Its path.
+    /// Path of the estimator.
     pub(crate) estimator: &'static str,
     /// The missing value, such as `how long its callback took`.
     pub(crate) what: String,

@@ -19,13 +19,13 @@ pub trait Alone: Sized + 'static {
     type Wiring: IslandWiring;
     /// The estimator's type.
     type Estimator: Estimator;
-    /// What the publisher of its input publishes.
+    /// Payload of the input's publisher.
     type Source: Payload;
-    /// Its input.
+    /// Input of the estimator.
     type Input: TakenAt<<Self::Estimator as Estimator>::Input>;
-    /// Its output, or the first of several.
+    /// Output of the estimator, or the first of several.
     type Output: EmittedAt<<Self::Estimator as Estimator>::Output>;
-    /// Its number, where its messages come from, and where they go.
+    /// Number of the estimator, and the source and target of its messages.
     const INLET: Inlet<Self::Source, TakenBy<Self>>;
 
     /// Finds the island and the output's topic in the wiring.
@@ -52,7 +52,7 @@ pub trait Alone: Sized + 'static {
 type TakenBy<A> = <<A as Alone>::Input as TakenAt<<<A as Alone>::Estimator as Estimator>::Input>>::Payload;
 type PayloadOf<A> = <<A as Alone>::Output as EmittedAt<<<A as Alone>::Estimator as Estimator>::Output>>::Payload;
 
-/// Where the messages of an estimator that is an island of its own come from, and where they go.
+/// Source and target of the messages of an estimator that is an island of its own.
 #[allow(missing_debug_implementations)]
 pub struct Inlet<P, T> {
     /// The estimator's number.

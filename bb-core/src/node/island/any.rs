@@ -54,11 +54,11 @@ pub trait IslandIn<W> {
     fn busy(&self, wiring: &W) -> Option<(u64, usize)>;
     /// The time of the last entry.
     fn entered_at(&self) -> MonotonicTime;
-    /// Whether the calling thread is inside an island of this robot, and thus must not wait for one.
+    /// Returns whether the calling thread is inside an island of this robot, and thus must not wait for one.
     fn is_inside(&self, wiring: &W) -> bool;
-    /// Whether its estimators have stopped.
+    /// Returns whether the estimators of the island have stopped.
     fn has_retired(&self) -> bool;
-    /// Whether its inbox is empty and no thread holds it.
+    /// Returns whether the inbox is empty and no thread holds the island.
     fn is_idle(&self, wiring: &W) -> bool;
     /// Restricts processing of entries to [`Self::replay`].
     fn begin_replay(&self, wiring: &W);

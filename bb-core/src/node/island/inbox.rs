@@ -17,7 +17,7 @@ pub(super) enum Entry<M> {
     Wake,
     /// All estimators start.
     Start,
-    /// For the estimator with that number.
+    /// An entry for the estimator with that number.
     Node(usize, NodeEntry),
 }
 
@@ -31,7 +31,7 @@ pub(super) struct Inbox<M> {
     bound: Bound,
     held: Held,
     wakes: u8,
-    /// If set, the estimators stop before any other waiting entry is processed.
+    /// Time of the stop, if one is requested: the estimators stop before any other waiting entry is processed.
     retires: Option<MonotonicTime>,
 }
 
@@ -115,7 +115,7 @@ impl<M> Inbox<M> {
         self.retires = Some(now);
     }
 
-    /// Whether the estimators are to stop.
+    /// Returns whether the estimators are to stop.
     pub(super) fn retires(&self) -> bool {
         self.retires.is_some()
     }

@@ -14,7 +14,7 @@ loom::thread_local! {
     static INSIDE: RefCell<Vec<RobotId>> = RefCell::new(Vec::new());
 }
 
-/// Whether the calling thread is inside an island of that robot.
+/// Returns whether the calling thread is inside an island of that robot.
 pub(super) fn is_inside(robot: RobotId) -> bool {
     with(|inside| inside.contains(&robot)).unwrap_or(false)
 }

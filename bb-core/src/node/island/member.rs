@@ -18,14 +18,14 @@ pub(super) type OptionsOf<M> = <<M as Member>::Estimator as Estimator>::Options;
 
 /// Implemented by `robot!` for each estimator.
 pub trait Member {
-    /// Its island.
+    /// Island of the estimator.
     type State: IslandState;
     /// The estimator's type.
     type Estimator: Estimator;
-    /// Its number.
+    /// Number of the estimator.
     const NUMBER: usize;
 
-    /// Its node in the island.
+    /// Returns the estimator's node in the island.
     fn node(island: &mut Self::State) -> &mut Node<Self::Estimator>;
 
     /// Publishes the emitted outputs, one by one.

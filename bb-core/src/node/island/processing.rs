@@ -25,7 +25,7 @@ impl<S: IslandState> Island<S> {
         self.process_line(wiring, now, Some((line, wall_offset_nanos)), run)
     }
 
-    /// As above, for an entry whose line has already been written with that offset of the wall clock.
+    /// Processes an entry whose line has already been written with that offset of the wall clock.
     #[inline]
     pub(super) fn process_line<T>(
         &self,

@@ -5,7 +5,7 @@ use super::{Held, Island, IslandState, IslandWiring as _};
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-/// How long a publisher waits for room in a full inbox before it concludes that the holder hangs.
+/// Time for which a publisher waits for room in a full inbox before it concludes that the holder hangs.
 const LONGEST_WAIT: Duration = Duration::from_millis(500);
 
 impl<S: IslandState> Island<S> {

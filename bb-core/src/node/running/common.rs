@@ -26,7 +26,7 @@ pub(super) struct Common {
     pub(super) stale_after_nanos: Option<i64>,
     /// A run is not measured if its number has one of these bits.
     pub(super) unmeasured: u64,
-    /// Whether it takes transforms across moving joints: see `placing`.
+    /// `true` if the estimator takes transforms across moving joints: see `placing`.
     pub(super) handles_moving_joints: bool,
     pub(super) shared: SharedNode,
     pub(super) environment: Environment,
@@ -36,7 +36,7 @@ pub(super) struct Common {
     pub(super) health: Health,
     /// Number of losses that the estimator knows of.
     pub(super) epoch: u32,
-    /// Whether its last run was good.
+    /// `true` if the last run was good.
     pub(super) was_good: bool,
     pub(super) timers: Timers,
     /// The latest time at which its island is woken for it.

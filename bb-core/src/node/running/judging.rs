@@ -1,4 +1,4 @@
-//! What follows from a run and from a message that was not used: counts, durations, telemetry and health.
+//! Consequences of a run, and of a message that was not used: counts, durations, telemetry and health.
 
 use super::common::Common;
 use super::placing::Unplaced;
@@ -150,7 +150,7 @@ impl Common {
         (nanos > budget).then_some(HealthReason::LatencyOverrun)
     }
 
-    /// In a replay: the journal does not have the value that the estimator asks for.
+    /// Reports, in a replay, that the journal does not have the value that the estimator asks for.
     #[cold]
     pub(super) fn miss_in_journal<D: Default>(&self, what: String) -> D {
         self.environment.replayed().miss(Missing { estimator: self.declaration.path, what });

@@ -12,7 +12,7 @@ use crate::time::MonotonicTime;
 use nalgebra::Isometry3;
 use std::sync::Arc;
 
-/// When an input was measured, and its transform at that time.
+/// Time at which an input was measured, and its transform at that time.
 type PlacedAt = (MonotonicTime, Isometry3<f64>);
 
 /// The transforms of an estimator's inputs.
@@ -26,7 +26,7 @@ pub(super) struct Placing {
     inputs: Box<[InputTransform]>,
 }
 
-/// Why a dispatch is dropped.
+/// Reason for which a dispatch is dropped.
 #[derive(Debug)]
 pub(super) enum Unplaced {
     /// The transform of a required input is unknown.
@@ -55,7 +55,7 @@ impl Placing {
         Self { declaration, shared: environment.node(number), routes, placed, inputs: inputs.collect() }
     }
 
-    /// Why `replacement` cannot take the place of the estimator: `robot!` has checked only the declared one.
+    /// Returns the reason for which `replacement` cannot take the place of the estimator: `robot!` has checked only the declared one.
     pub(super) fn fault_of(&self, replacement: &Replacement) -> Option<Fault> {
         let spans = self.routes.first().filter(|_| !replacement.handles_moving_joints())?;
         let input = self.declaration.inputs.get(spans.input).map_or("", |input| input.name);

@@ -95,7 +95,7 @@ impl<E: Estimator> Node<E> {
         Some(Box::new(move |estimator| handle(estimator, &bytes)))
     }
 
-    /// In a replay: creates the estimator when the journal begins.
+    /// Creates the estimator in a replay, when the journal begins.
     pub fn begin_replay(&mut self) {
         self.make_first(self.common.environment.clock().now());
     }

@@ -181,7 +181,7 @@ struct NavSatStatus {
 }
 
 impl NavSatStatus {
-    /// From −2.
+    /// Statuses by number, from −2.
     const STATUSES: [GnssStatus; 5] = [
         GnssStatus::Unknown,
         GnssStatus::NoFix,

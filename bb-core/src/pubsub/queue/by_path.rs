@@ -39,7 +39,7 @@ pub(super) struct Paths<M> {
 
 #[derive(Clone, Copy, Debug)]
 struct Path {
-    /// From when on its next message is delivered.
+    /// Time from which on the next message is delivered.
     next: MonotonicTime,
     /// The number of its last message in the queue, if that is not among those taken.
     last: u64,
@@ -64,7 +64,7 @@ impl<M: Send + 'static> Wake for Alarm<M> {
 }
 
 impl ByPath {
-    /// For a delivery that depends on paths.
+    /// Creates the queue by path of a delivery that depends on paths.
     pub(super) fn of<M: Send + 'static>(delivery: Delivery, timer: &Timer, queue: &Weak<Queue<M>>) -> Option<Self> {
         let is_latest = delivery.overflow == Overflow::LatestPerPath;
         let alarm = || Arc::new(Alarm(Weak::clone(queue))).into();

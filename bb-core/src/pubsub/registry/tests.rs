@@ -120,7 +120,7 @@ fn topics_nobody_uses_make_room_and_used_ones_do_not() {
     assert_eq!(refusal(&registry, "one/more"), "accepted");
 }
 
-/// What has a row, and how much was published there.
+/// Returns the paths that have a row, and the number of messages published there.
 fn rows(registry: &Registry) -> Vec<(&'static str, &'static str, u64)> {
     registry.statistics().iter().map(|row| (row.path, row.payload, row.published)).collect()
 }
@@ -274,7 +274,7 @@ fn a_replay_has_the_payload_of_its_run_at_a_path_whatever_is_subscribed_to() {
     assert_eq!((same.drain().count(), rows(&registry).len()), (1, 2));
 }
 
-/// So it costs the same however many paths there are, and there is no broker in the middle.
+/// A publish costs the same however many paths there are: there is no broker in the middle.
 #[test]
 fn a_publish_takes_nothing_that_topics_share() {
     let registry = registry();

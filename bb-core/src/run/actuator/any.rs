@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 
 /// The common interface of all running actuators.
 pub trait AnyActuator {
-    /// Its path.
+    /// Returns the path of the actuator.
     fn path(&self) -> &'static str;
     /// The name of its command type.
     fn command_name(&self) -> &'static str;
@@ -31,7 +31,7 @@ pub trait AnyActuator {
     /// An `Arc<dyn Accepts<T>>`, where `T` is the type of its commands.
     #[doc(hidden)]
     fn accepts(&self) -> Box<dyn Any>;
-    /// In a replay: publishes a command that it carried out; returns `false` if the command has another type.
+    /// Publishes a command that the actuator carried out, in a replay; returns `false` if the command has another type.
     #[doc(hidden)]
     fn replay(&self, message: &DynamicMessage) -> bool;
     /// Stops the actuator once it is free; returns `false` if it is still busy after `timeout`.

@@ -31,7 +31,7 @@ impl<S> Guarded<S> {
         Some(self.held(self.state.lock().unwrap_or_else(PoisonError::into_inner)))
     }
 
-    /// As [`Self::enter`], without waiting.
+    /// Enters as [`Self::enter`] does, without waiting.
     pub(super) fn try_enter(&self) -> Option<Held<'_, S>> {
         match self.state.try_lock() {
             Ok(state) => Some(self.held(state)),

@@ -23,31 +23,31 @@ pub(super) struct Counts {
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct ActuatorStatistics {
-    /// Its path.
+    /// Path of the actuator.
     pub path: &'static str,
     /// Commands carried out.
     pub commands: u64,
     limited: [u64; QUANTITIES],
     refused: [u64; QUANTITIES],
-    /// Why it does not run, if it does not.
+    /// Reason for which the actuator does not run, if it does not.
     pub stopped: Option<String>,
 }
 
 impl ActuatorStatistics {
-    /// How many commands exceeded the joint's limit of that quantity and were clamped to it.
+    /// Returns the number of commands that exceeded the joint's limit of that quantity and were clamped to it.
     pub fn limited(&self, quantity: LimitedQuantity) -> u64 {
         self.limited[quantity as usize]
     }
 
-    /// How many commands were refused because they would exceed the joint's limit of that quantity.
+    /// Returns the number of commands that were refused because they would exceed the joint's limit of that quantity.
     pub fn refused(&self, quantity: LimitedQuantity) -> u64 {
         self.refused[quantity as usize]
     }
 }
 
-/// Why a command is not carried out.
+/// Reason for which a command is not carried out.
 pub(super) enum NotLimited {
-    /// It is the first one if `is_first`.
+    /// The first such command if `is_first`.
     OutOfBounds { out: OutOfBounds, is_first: bool },
     /// The payload's code has panicked.
     Failed(Fault),

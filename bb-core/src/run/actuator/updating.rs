@@ -23,7 +23,7 @@ impl<A: Actuator> Inner<A> {
         }
     }
 
-    /// When its code asks to be updated.
+    /// Returns the time at which the actuator's code asks to be updated.
     pub(super) fn next_update(&self, state: &mut State<A>) -> Option<MonotonicTime> {
         let actuator = state.slot.running()?;
         let asked = {

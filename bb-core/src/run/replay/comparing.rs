@@ -38,7 +38,7 @@ impl Replayer {
         Err(format!("`{}` emits a message more than it did{}", self.path_of(publisher), self.hint(island)))
     }
 
-    /// What may explain a difference.
+    /// Returns a possible explanation of a difference.
     pub(super) fn hint(&self, island: usize) -> String {
         let Some((line, name)) = self.unrecorded.get(&island) else { return String::new() };
         format!(

@@ -1,11 +1,11 @@
-//! Whether the journal holds the whole turn of a line.
+//! Checks that the journal holds the whole turn of a line.
 
 use super::Replayer;
 use crate::journal::{Callback, Entry, Event, Request};
 
 impl Replayer {
-    /// Whether a line still lacks the durations of its callbacks, the places of its inputs, or the outputs emitted in
-    /// reply to a request.
+    /// Returns whether a line still lacks the durations of its callbacks, the places of its inputs, or the outputs emitted in reply to
+    /// a request.
     pub(super) fn is_open(&self, entry: &Entry) -> bool {
         let Some(number) = self.island_of(&entry.event) else { return false };
         if let Event::Request { request: Request { bytes: None, .. }, .. } = &entry.event
@@ -16,7 +16,7 @@ impl Replayer {
         self.has_not_ended(number, entry.number)
     }
 
-    /// Whether the lines are missing that an island writes when that line's turn has ended.
+    /// Returns whether the lines are missing that an island writes when that line's turn has ended.
     pub(super) fn has_not_ended(&self, island: usize, line: u64) -> bool {
         let island = self.machine.island(island);
         let is_measured = island.is_some_and(|island| island.declaration().is_measured);

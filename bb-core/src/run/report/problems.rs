@@ -1,11 +1,11 @@
-//! What is wrong with a robot at the moment, since when and why, the worst first.
+//! Problems of a robot at the moment, with their beginning and their reason, the worst first.
 
 use super::Report;
 use crate::event::{HealthReason, HealthState, Safety};
 use crate::time::MonotonicTime;
 use std::fmt;
 
-/// How bad a [`Problem`] is. The worst compares as the least.
+/// Severity of a [`Problem`]. The worst compares as the least.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
 pub enum Severity {
@@ -22,7 +22,7 @@ pub enum Severity {
 }
 
 impl Severity {
-    /// Its name in JSON: `unsafe`, `stopped`, `lost`, `degraded` or `refused`.
+    /// Returns the name in JSON: `unsafe`, `stopped`, `lost`, `degraded` or `refused`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Unsafe => "unsafe",
@@ -46,7 +46,7 @@ impl fmt::Display for Severity {
 pub struct Problem {
     /// The path of the component or the command; `safety` if no component is known to have caused it.
     pub path: String,
-    /// How bad it is.
+    /// Severity.
     pub severity: Severity,
     /// Since when, if that is known.
     pub since: Option<MonotonicTime>,
@@ -55,7 +55,7 @@ pub struct Problem {
 }
 
 impl Report {
-    /// What is wrong at the moment, the worst first, and of what is equally bad the newest first.
+    /// Returns the problems of the moment, the worst first, and of equally bad ones the newest first.
     ///
     /// ```
     /// use bb_core::prelude::*;

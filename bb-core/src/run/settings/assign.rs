@@ -10,24 +10,24 @@ use crate::run::bound::{bound_to, fields, refused_by_bound};
 use crate::run::draft::Draft;
 use crate::sorted::Sorted;
 
-/// How a file writes `None` for an option that may be `None`.
+/// Text by which a file writes `None` for an option that may be `None`.
 pub(super) const NULL_TEXT: &str = "\"null\"";
 
-/// How many unknown names are compared with all known ones.
+/// Number of unknown names that are compared with all known ones.
 const HINTS: usize = 32;
 
 /// A setting as written.
 pub(super) struct Assignment {
     pub(super) place: Place,
     pub(super) path: String,
-    /// Its value.
+    /// Value.
     pub(super) json: String,
     /// Another possible meaning: a string without quotation marks.
     pub(super) text: Option<String>,
 }
 
 impl Assignment {
-    /// Of JSON, or else of a plain text.
+    /// Creates an assignment of JSON, or else of a plain text.
     pub(super) fn from_text(place: Place, path: &str, value: &str) -> Self {
         let text = to_json(&value.to_owned());
         let path = path.to_owned();
@@ -58,7 +58,7 @@ pub(super) fn names(draft: &mut Draft) -> Sorted<String, ()> {
     names
 }
 
-/// Whether a setting is below this path.
+/// Returns whether a setting is below this path.
 #[cfg(feature = "toml")]
 pub(super) fn is_beginning(names: &Sorted<String, ()>, path: &str) -> bool {
     let start = format!("{path}/");
@@ -151,7 +151,7 @@ fn target(robot: &RobotDeclaration, paths: &[&str], options: &mut OptionsList, p
     Some(Target::Option { component, field })
 }
 
-/// Whether a numeric option is within its range.
+/// Checks that a numeric option is within its range.
 fn in_range(options: &mut dyn AnyOptions, field: usize) -> Result<(), String> {
     let Some(declared) = options.fields().get(field).copied() else { return Ok(()) };
     let number = options.setting(field).and_then(|setting| setting.number());
@@ -202,7 +202,7 @@ fn parameter(declared: &ParameterDeclaration, assignment: &Assignment) -> Result
     Ok(value)
 }
 
-/// What is wrong with a path that names no setting.
+/// Returns the fault of a path that names no setting.
 fn unknown(names: &Sorted<String, ()>, paths: &[&str], path: &str) -> String {
     let below = |component: &str| {
         let start = format!("{component}/");

@@ -1,4 +1,4 @@
-//! What is wrong with settings.
+//! Errors of settings.
 
 use std::fmt;
 use std::sync::Arc;
@@ -23,21 +23,21 @@ pub struct SettingProblem {
     message: String,
 }
 
-/// Where a setting was written.
+/// Place at which a setting was written.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Place {
-    /// In a file.
+    /// A file.
     #[cfg_attr(not(feature = "toml"), expect(dead_code, reason = "no file is read without the feature"))]
     File {
         name: Arc<str>,
         /// Line and column, from 1; `None` for the file itself.
         position: Option<(usize, usize)>,
     },
-    /// On the command line.
+    /// The command line.
     Argument,
-    /// In an environment variable of that name.
+    /// An environment variable of that name.
     Variable(Arc<str>),
-    /// In code.
+    /// Code.
     Code,
 }
 

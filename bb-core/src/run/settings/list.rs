@@ -26,7 +26,7 @@ struct Table {
 struct Line {
     name: &'static str,
     doc: &'static str,
-    /// In TOML, or why it cannot be written.
+    /// Value in TOML, or the reason for which it cannot be written.
     value: Result<String, String>,
     /// Range and unit.
     limits: String,

@@ -49,7 +49,7 @@ fn insert(root: &mut Sorted<String, Node>, path: &str, schema: String) {
     table.insert(last.to_owned(), Node::Setting(schema));
 }
 
-/// Whether a table at this path would collide with a setting.
+/// Returns whether a table at this path would collide with a setting.
 fn is_through_setting(root: &Sorted<String, Node>, path: &str) -> bool {
     let mut table = root;
     for name in path.split('/') {

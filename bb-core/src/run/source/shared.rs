@@ -15,7 +15,7 @@ pub(crate) struct SharedSource(Arc<Shared>);
 #[derive(Debug)]
 struct Shared {
     path: &'static str,
-    /// Whether it is read at a rate; otherwise it may wait for its device.
+    /// `true` if the component is read at a rate; otherwise it may wait for its device.
     has_rate: bool,
     inbox: Mutex<Inbox>,
     readings: AtomicU64,
@@ -49,19 +49,19 @@ pub(super) enum Order {
     GiveUp,
 }
 
-/// What a sensor or a service has done since the start.
+/// Counts of a sensor or a service since the start.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct SourceStatistics {
-    /// Its path.
+    /// Path of the component.
     pub path: &'static str,
-    /// How often it was read.
+    /// Number of readings.
     pub readings: u64,
     /// Readings at its rate that it missed because it, or a component downstream, took too long.
     pub skipped: u64,
-    /// How often it was restarted.
+    /// Number of restarts.
     pub restarts: u64,
-    /// Why it does not run, if it does not.
+    /// Reason for which the component does not run, if it does not.
     pub stopped: Option<String>,
     /// Since when it has failed without a reading in between, even if it has been restarted meanwhile.
     pub failing_since: Option<MonotonicTime>,
@@ -119,7 +119,7 @@ impl SharedSource {
         self.0.has_rate
     }
 
-    /// When its code was entered, if it is inside.
+    /// Returns the time at which the component's code was entered, if a thread is inside.
     pub(in crate::run) fn entered_at(&self) -> Option<MonotonicTime> {
         self.0.occupied.entered_at()
     }

@@ -5,10 +5,10 @@ use super::{FULL_AFTER, Job, Lane, READY};
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-/// How long jobs wait without any being taken before another thread is started.
+/// Time for which jobs wait without any being started before another thread is started.
 pub(super) const PATIENCE: Duration = Duration::from_millis(2);
 
-/// How long jobs of a later lane wait before they overtake those of an earlier one.
+/// Time for which jobs of a later lane wait before they overtake those of an earlier one.
 const OVERDUE: Duration = Duration::from_millis(50);
 
 /// Delay before another attempt to start a thread after one failed.
@@ -30,7 +30,7 @@ pub(super) struct Crew {
     starting: usize,
     /// Idle threads, the most recently active last. That one takes the next job, so those at the front can end.
     idle: Vec<Thread>,
-    /// When a thread last took a job. While jobs are being taken, the others wait because the machine is busy.
+    /// Time at which a thread last took a job. While jobs are being taken, the others wait because the machine is busy.
     taken: Option<Instant>,
     /// The last attempt to start a thread failed.
     without_thread: Option<WithoutThread>,
@@ -54,7 +54,7 @@ struct WithoutThread {
     is_reported: bool,
 }
 
-/// What a thread does next.
+/// Next action of a thread.
 pub(super) enum Next {
     Job(Lane, Job),
     Idle,
@@ -125,7 +125,7 @@ impl Crew {
         self.is_closed
     }
 
-    /// Whether there is a job that a thread may take.
+    /// Returns whether there is a job that a thread may take.
     pub(super) fn may_take(&self) -> bool {
         Lane::ALL.into_iter().any(|lane| self.front(lane).is_some())
     }
@@ -148,7 +148,7 @@ impl Crew {
         overdue.or_else(|| waiting().next()).map(|(_, lane)| lane)
     }
 
-    /// How long the waiting jobs may go on waiting: zero to start a thread now, `None` if that would not help.
+    /// Returns the time for which the waiting jobs may go on waiting: zero to start a thread now, `None` if that would not help.
     pub(super) fn wait(&self, now: Instant) -> Option<Duration> {
         let since = Lane::ALL.into_iter().filter_map(|lane| self.front(lane)).min()?;
         if self.starting > 0 {
@@ -176,7 +176,7 @@ impl Crew {
         })
     }
 
-    /// Why no thread could be started; each failure once.
+    /// Returns the reason for which no thread could be started; each failure once.
     pub(super) fn newly_without_thread(&mut self) -> Option<String> {
         let without = self.without_thread.as_mut().filter(|without| !without.is_reported)?;
         without.is_reported = true;

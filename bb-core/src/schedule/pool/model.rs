@@ -10,7 +10,7 @@ use loom::sync::{Arc, Condvar, Mutex};
 use loom::thread;
 use std::time::{Duration, Instant};
 
-/// What threads tell each other.
+/// State that the threads share.
 #[derive(Default)]
 struct Told {
     /// A job waits.

@@ -1,4 +1,4 @@
-//! What the pool needs of threads; a model has its own.
+//! Threads as the pool needs them; a model has its own.
 
 #[cfg(not(loom))]
 mod real {
@@ -45,7 +45,7 @@ mod real {
 
 pub(super) use real::{Mutex, MutexGuard, Thread, current, park, spawn};
 
-/// What a thread runs.
+/// The code of a thread.
 pub(super) type Run = Box<dyn FnOnce() + Send>;
 
 /// Starts a thread of that name.

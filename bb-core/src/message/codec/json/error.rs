@@ -1,4 +1,4 @@
-//! Why JSON cannot be read.
+//! Errors of JSON that cannot be read.
 
 use crate::message::DecodeError;
 use crate::message::codec::error::Path;
@@ -21,7 +21,7 @@ impl JsonError {
         Self::new(format!("expected {expected}, found {found}"))
     }
 
-    /// The same error, in the field `name` of a larger value.
+    /// Returns the same error, in the field `name` of a larger value.
     pub fn within(mut self, name: impl Into<Cow<'static, str>>) -> Self {
         self.path.enter(name);
         self
@@ -37,7 +37,7 @@ impl JsonError {
         self.path.to_string()
     }
 
-    /// What is wrong there: `missing`, `expected an integer from 0 to 255, found 300`.
+    /// Returns the fault at that place: `missing`, `expected an integer from 0 to 255, found 300`.
     pub fn reason(&self) -> &str {
         &self.reason
     }

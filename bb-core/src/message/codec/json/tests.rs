@@ -55,7 +55,7 @@ enum Mode {
 #[derive(Clone, Debug, Default, PartialEq, Payload)]
 struct Wrapped(Option<u16>);
 
-/// As a user writes it for a command without arguments.
+/// The arguments of a command without arguments, as a user writes them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Payload)]
 struct NoArguments;
 
@@ -410,7 +410,7 @@ fn anything() -> impl Strategy<Value = Value> {
     ]
 }
 
-/// What was read from JSON is a value like any other.
+/// Checks that a value that was read from JSON is a value like any other.
 fn read_or_refuse<T: Field>(text: &str) {
     if let Ok(value) = from_json::<T>(text) {
         round_trip(&value);

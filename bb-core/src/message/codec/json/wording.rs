@@ -27,7 +27,7 @@ pub(super) fn mismatch(shape: Shape, value: &RawValue) -> JsonError {
     JsonError::mismatch(expected(shape), found(value))
 }
 
-/// As named in JSON.
+/// Names the values of a shape in the words of JSON.
 pub(super) fn expected(shape: Shape) -> String {
     if let Some(range) = range(shape) {
         return format!("an integer from {} to {}", range.start(), range.end());
@@ -81,7 +81,7 @@ pub(super) struct Shortened<'a>(pub(super) &'a str);
 
 impl fmt::Display for Shortened<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        /// In characters.
+        /// Longest text shown, in characters.
         const MOST: usize = 40;
         match self.0.char_indices().nth(MOST) {
             Some((end, _)) => write!(f, "{}…", &self.0[..end]),

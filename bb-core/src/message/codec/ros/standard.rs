@@ -32,7 +32,7 @@ impl Time {
         }
     }
 
-    /// The same as nanoseconds.
+    /// Returns the same time as nanoseconds.
     pub fn wall_time(self) -> WallTime {
         WallTime::from_unix_nanos(i64::from(self.sec) * NANOS_PER_SECOND + i64::from(self.nanosec))
     }
@@ -71,7 +71,7 @@ impl DurationMessage {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Payload)]
 #[payload(name = "std_msgs/Header")]
 pub struct Header {
-    /// When it was measured.
+    /// Time of the measurement.
     pub stamp: Time,
     /// The frame of the values.
     pub frame_id: String,

@@ -63,7 +63,7 @@ proptest! {
     }
 }
 
-/// From the packages' `msg/*.json` in ROS 2 Kilted; `tests/ros2/check` compares with the installed ones.
+/// Type hashes from the packages' `msg/*.json` in ROS 2 Kilted; `tests/ros2/check` compares with the installed ones.
 #[test]
 fn type_hashes_are_those_of_ros() {
     fn named<T: Payload>(hashes: &mut Vec<(String, String)>) {
@@ -314,7 +314,7 @@ fn messages_that_a_payload_cannot_be_are_refused_by_field() {
     );
 }
 
-/// As rclpy writes a `JointState` whose lists are empty.
+/// Bytes that rclpy writes for a `JointState` whose lists are empty.
 #[test]
 fn what_ros_appends_is_ignored() {
     let mut bytes = vec![0; 36];

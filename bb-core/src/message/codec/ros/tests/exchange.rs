@@ -68,7 +68,7 @@ fn messages_for_ros() {
     std::fs::write(file("exact.jsonl"), exact.join("\n")).expect("the folder is there");
 }
 
-/// Whether a message written by ROS, in hexadecimal digits, is the one it was given.
+/// Returns whether a message written by ROS, in hexadecimal digits, is the one it was given.
 fn is_read<T: Payload + RosMessage>(name: &str, cdr: &str, expected: &str) -> bool {
     if Stamped::<T>::ros_schema().is_none_or(|schema| schema.name != name) {
         return false;
