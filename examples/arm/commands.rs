@@ -1,4 +1,4 @@
-//! What the arm can be told.
+//! Commands of the arm.
 
 use crate::path;
 use crate::robot::ur5;

@@ -1,9 +1,9 @@
-//! What must happen, and in which order.
+//! Events that must happen, in their order.
 
 use crate::timeline::{Kind, Line};
 use std::fmt;
 
-/// What belongs to the story, without its times.
+/// Events of the story, without their times.
 const EXPECTED: &[(Kind, &str)] = &[
     (Kind::State, "disarmed -> idle"),
     (Kind::Command, "follow started"),
@@ -35,26 +35,26 @@ const NEAR: f64 = 1e-6;
 /// An estimate is right, rad/s: three axes of two gyroscopes with biases of 3 mrad/s each.
 const RIGHT: f64 = 0.03;
 
-/// What has happened.
+/// Events and figures of a run.
 #[derive(Debug, Default)]
 pub(crate) struct Outcome {
     pub(crate) lines: Vec<Line>,
     /// The largest speed of a joint when the IMU was unplugged, rad/s.
     pub(crate) speed_when_unplugged: f64,
-    /// The same while the arm was held.
+    /// Largest speed of a joint while the arm was held, rad/s.
     pub(crate) speed_while_held: f64,
     /// The largest distance of a joint from the end of the path, rad.
     pub(crate) distance_from_end: f64,
     /// The largest error of the tip's angular velocity, rad/s.
     pub(crate) worst_error: f64,
-    /// How many estimates were compared.
+    /// Number of estimates that were compared.
     pub(crate) compared: u32,
-    /// In real time, where no estimate is of just now, so that none need be compared.
+    /// `true` in real time, where no estimate is of just now, so that none need be compared.
     pub(crate) is_real_time: bool,
 }
 
 impl Outcome {
-    /// What of the story has not happened, or not after what comes before it.
+    /// Returns the events of the story that have not happened, or not after what comes before them.
     pub(crate) fn missing(&self) -> Vec<String> {
         let mut rest = self.lines.as_slice();
         let mut is_missing = |(kind, event): &&(Kind, &str)| {

@@ -1,6 +1,6 @@
-//! Where the arm goes.
+//! Path of the arm.
 
-/// Its joints, from the base to the tip.
+/// Joints of the arm, from the base to the tip.
 const JOINTS: [&str; 6] = ["shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3"];
 
 /// Legs of the path: it passes through all points of a leg, and comes to rest at the last. Angles in rad.
@@ -15,7 +15,7 @@ pub(crate) fn joints() -> Vec<String> {
     JOINTS.map(str::to_owned).to_vec()
 }
 
-/// Where it comes to rest at the end.
+/// Returns the positions at which the joints come to rest at the end, rad.
 pub(crate) fn end() -> impl Iterator<Item = (&'static str, f64)> {
     let last = LEGS.last().and_then(|leg| leg.last()).copied().unwrap_or_default();
     JOINTS.into_iter().zip(last)

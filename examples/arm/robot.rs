@@ -11,7 +11,7 @@ robot! {
     pub(crate) robot Ur5;
 
     parameters {
-        /// How many legs of its path it has done.
+        /// Number of legs of its path that it has done.
         leg: i64 = 0, range: 0..=100;
     }
 

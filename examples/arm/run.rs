@@ -41,7 +41,7 @@ impl Run {
     }
 }
 
-/// What is written down.
+/// Run of the robot, with the record of its events.
 struct Story<'a> {
     robot: Run,
     events: DynamicSubscription,
@@ -143,7 +143,7 @@ impl Story<'_> {
     }
 }
 
-/// What really happens.
+/// True motion of the arm.
 struct Truth {
     world: Arc<SimulatedWorld>,
     frames: Frames,
@@ -155,7 +155,7 @@ impl Truth {
         Ok(Self { world, frames: Frames::new(Kinematics::new(Ur5::TOPOLOGY)?) })
     }
 
-    /// How far an estimate of just now of the tip's angular velocity is off, rad/s.
+    /// Returns the error of the estimated angular velocity of the tip at its own time, rad/s.
     fn error(&mut self, tip: &Stamped<Tip>) -> Result<f64, Box<dyn Error>> {
         let (mut positions, mut velocities, mut accelerations) = (Vec::new(), Vec::new(), Vec::new());
         for joint in path::joints() {

@@ -1,4 +1,4 @@
-//! What happens to the arm.
+//! Events from outside: the arm's operator, and a cable that is unplugged.
 
 use crate::timeline::{Kind, Line};
 use bb_core::prelude::*;
@@ -13,7 +13,7 @@ pub(crate) enum Deed {
     Disarm,
 }
 
-/// When it is done.
+/// Deeds and their times.
 pub(crate) const STEPS: [(MonotonicTime, Deed); 5] = [
     (at(500), Deed::Arm),
     (at(1000), Deed::Follow),
@@ -22,10 +22,10 @@ pub(crate) const STEPS: [(MonotonicTime, Deed); 5] = [
     (at(15_000), Deed::Disarm),
 ];
 
-/// When the story ends.
+/// Time at which the story ends.
 pub(crate) const END: MonotonicTime = at(15_500);
 
-/// How often what has happened is written down.
+/// Period at which events are written down.
 pub(crate) const PERIOD: Duration = Duration::from_millis(100);
 
 impl Deed {

@@ -27,7 +27,7 @@ fn the_story_on_virtual_time_is_the_stored_one_and_is_recorded() -> Result<(), B
     Ok(())
 }
 
-/// What viewers need, and what happened.
+/// Checks that a recording holds what viewers need, and the events.
 fn recorded(file: &PathBuf) -> Result<(), Box<dyn Error>> {
     let recording = Recording::open(file)?;
     let count = |path: &str| {

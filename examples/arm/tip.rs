@@ -4,14 +4,14 @@ use bb_core::component::InputTransforms;
 use bb_core::nalgebra::{UnitQuaternion, Vector3};
 use bb_core::prelude::*;
 
-/// What it takes.
+/// Inputs of the estimator.
 #[derive(Clone, Copy, Debug, Inputs)]
 pub(crate) struct TipInputs<'a> {
     tip: Input<'a, Imu>,
     base: Input<'a, Imu>,
 }
 
-/// How the tip moves relative to the base, in the axes of the base.
+/// Motion of the tip relative to the base, in the axes of the base.
 #[derive(Clone, Debug, Payload)]
 pub(crate) struct Tip {
     /// m/s²

@@ -1,4 +1,4 @@
-//! What a run gave: estimates beside the truth, and their errors.
+//! Results of a run: estimates beside the truth, and their errors.
 
 use bb_core::Report;
 use bb_core::nalgebra::UnitQuaternion;
@@ -13,7 +13,7 @@ pub(crate) struct Outcome {
     pub(crate) report: Report,
     pub(crate) seconds: f64,
     pub(crate) has_truth: bool,
-    /// Whether there is a magnetometer; without one heading starts anywhere and is no result.
+    /// `true` if there is a magnetometer; without one heading starts anywhere and is no result.
     pub(crate) has_heading: bool,
 }
 

@@ -43,7 +43,7 @@ robot! {
     }
 }
 
-/// How long the matcher takes to find where an image is, ms.
+/// Time that the matcher takes to find where an image is, ms.
 const MATCHING: i64 = 300;
 
 /// A drone in flight, on virtual time.

@@ -1,24 +1,24 @@
-//! What the labels of a recorded flight must be: they follow from when something was measured.
+//! Labels that a recorded flight must have: they follow from the times of the measurements.
 
 use crate::recorded::{Recorded, Sent};
 use bb_core::prelude::*;
 use bb_estimators::navigation::state_estimator::SourceLabel;
 
-/// How old an anchor may be, and for how long nothing may be seen, s: the defaults of the estimator.
+/// Largest age of an anchor, and longest time in which nothing may be seen, s: the defaults of the estimator.
 const ANCHOR_AGE: f64 = 3.0;
 const VISUAL_LOSS: f64 = 1.0;
 
 /// Labels may change as much earlier or later: estimates come five times a second, s.
 const TOLERANCE: f64 = 0.21;
 
-/// When something was measured that tells where the drone is, or how it has moved, s.
+/// Times of measurements that show the drone's position, or its motion, s.
 pub(crate) struct Expected {
     anchored_s: Vec<f64>,
     seen_s: Vec<f64>,
 }
 
 impl Expected {
-    /// Of a recording. What it says is an outlier must be refused.
+    /// Collects the times of a recording. What it says is an outlier must be refused.
     pub(crate) fn of(recorded: &Recorded) -> Self {
         let seconds = |time: &MonotonicTime| time.as_nanos() as f64 * 1e-9;
         let mut this = Self { anchored_s: Vec::new(), seen_s: Vec::new() };
@@ -34,7 +34,7 @@ impl Expected {
         this
     }
 
-    /// As if something had been seen all the time.
+    /// Returns the times as if something had been seen all the time.
     #[cfg(test)]
     pub(crate) fn without_breaks(mut self) -> Self {
         let last_s = self.seen_s.last().copied().unwrap_or(0.0);

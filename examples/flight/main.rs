@@ -29,7 +29,7 @@ use std::sync::Arc;
 #[derive(Debug, Parser)]
 #[command(name = "flight")]
 struct Arguments {
-    /// What does the work.
+    /// Strategy of the estimator: a smoother, or a filter.
     #[arg(long, default_value = "smoother", value_parser = ["smoother", "eskf"])]
     strategy: String,
     /// Flies a recorded flight again in place of the simulated one: the prefix of its CSV files, `folder/name` for
@@ -98,10 +98,10 @@ its camera, with an image of the ground from a satellite to compare with every f
 and sees nothing. At 60 s the receiver is healthy again, and is let in when it has been so for ten seconds and the next image
 agrees with it. Times are in seconds.";
 
-/// From when on fixes tell where the drone is again, s.
+/// Time from which on fixes tell where the drone is again, s.
 const LET_IN: f64 = 73.0;
 
-/// What has not happened on the simulated flight.
+/// Returns what has not happened on the simulated flight.
 fn simulated(outcome: &Outcome) -> Option<String> {
     let fault = |is_fault: bool, text: &str| is_fault.then(|| text.to_owned());
     timeline::missing(&outcome.happened)
@@ -114,7 +114,7 @@ fn simulated(outcome: &Outcome) -> Option<String> {
         .or_else(|| fault(!outcome.is_fixed_after(LET_IN), "fixes that are used again"))
 }
 
-/// What has not happened on a recorded flight: its labels follow from when something was measured.
+/// Returns what has not happened on a recorded flight: its labels follow from the times of the measurements.
 fn again(outcome: &Outcome, recorded: &Recorded) -> Option<String> {
     let start = "started from flight_controller";
     if outcome.happened.iter().filter(|one| one.what.starts_with("started")).any(|one| one.what != start) {

@@ -1,4 +1,4 @@
-//! What came of the flight: events, and errors against the truth.
+//! Results of a flight: events, and errors against the truth.
 
 use crate::sensors::frame;
 use crate::timeline::Happened;
@@ -41,7 +41,7 @@ struct Point {
     covariance_norm: f64,
 }
 
-/// Where the drone was at a time, s, in the tangent frame at its origin, as far as that is known.
+/// Position of the drone at a time, s, in the tangent frame at its origin, as far as that is known.
 type Truth = Box<dyn Fn(f64) -> Option<Vector3<f64>>>;
 
 /// See the module.
@@ -147,7 +147,7 @@ impl Outcome {
         self.points.iter().map(|point| point.error_m).fold(0.0, f64::max)
     }
 
-    /// Whether the covariance grew all the time while it was dead reckoning.
+    /// Returns whether the covariance grew all the time while it was dead reckoning.
     pub(crate) fn grows_while_dead_reckoning(&self) -> bool {
         let is_lost = |point: &Point| point.label == SourceLabel::DeadReckoned;
         let pairs = self.points.windows(2).filter(|two| is_lost(&two[0]) && is_lost(&two[1]));
@@ -156,13 +156,14 @@ impl Outcome {
         grows && count > 40
     }
 
-    /// Whether from a time on, s, each estimate is younger than a second after what tells where it is: anchors are four seconds apart.
+    /// Returns whether each estimate after `from_s`, s, is younger than a second since the last absolute position: anchors are four seconds
+    /// apart.
     pub(crate) fn is_fixed_after(&self, from_s: f64) -> bool {
         let mut points = self.points.iter().filter(|point| point.time_s > from_s).peekable();
         points.peek().is_some() && points.all(|point| point.age_s.is_some_and(|age_s| age_s < 1.0))
     }
 
-    /// Whether the receiver is let in at the end.
+    /// Returns whether the receiver is let in at the end.
     pub(crate) fn is_gate_open(&self) -> bool {
         self.health.is_some_and(|health| health.is_gate_open)
     }

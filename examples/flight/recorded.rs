@@ -11,12 +11,12 @@ use bb_estimators::navigation::state_estimator::{
 use std::error::Error;
 use std::path::Path;
 
-/// What reached the estimator, at its stamp.
+/// Input of the estimator, at its stamp.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Sent {
     Imu(Imu),
     Vio(RelativePoseReading),
-    /// Whether the recording says that it is none of this place.
+    /// Anchor, and whether the recording says that it is an outlier.
     Anchor(AnchorReading, bool),
     Fix(GnssFix),
 }
@@ -24,7 +24,7 @@ pub(crate) enum Sent {
 /// See the module. Its world is the tangent frame at the origin of the simulated flight.
 pub(crate) struct Recorded {
     pub(crate) start: (MonotonicTime, WarmStartReport),
-    /// In the order of stamps.
+    /// Inputs in the order of stamps.
     pub(crate) sent: Vec<(MonotonicTime, Sent)>,
     /// Times, s, and positions of the truth.
     pub(crate) truth: Vec<(f64, Vector3<f64>)>,
@@ -48,7 +48,7 @@ impl Rows {
         }
     }
 
-    /// Those that a recording may have or not.
+    /// Reads the rows of a file that a recording may have or not.
     fn read_if_there(prefix: &Path, what: &str, columns: usize) -> Result<Self, Box<dyn Error>> {
         let file = format!("{}_{what}.csv", prefix.display());
         if Path::new(&file).exists() { Self::read(prefix, what, columns) } else { Ok(Self(Vec::new())) }

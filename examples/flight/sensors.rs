@@ -1,4 +1,4 @@
-//! What the sensors of the drone measure, and what goes wrong with them.
+//! Measurements of the drone's sensors, and their faults.
 
 use crate::trajectory::{GRAVITY, motion};
 use bb_core::nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3};
@@ -13,9 +13,9 @@ pub(crate) const FRAME: i64 = 100;
 pub(crate) const FIX: i64 = 200;
 pub(crate) const END: i64 = 90_000;
 
-/// When the receiver is spoofed, and when it is healthy again.
+/// Time for which the receiver is spoofed; after it, it is healthy again.
 pub(crate) const SPOOFED: std::ops::Range<i64> = 20_000..60_000;
-/// When the drone is in fog.
+/// Time for which the drone is in fog.
 pub(crate) const FOG: std::ops::Range<i64> = 40_000..50_000;
 
 pub(crate) fn frame() -> LocalFrame {
@@ -126,7 +126,7 @@ impl Sensors {
         }
     }
 
-    /// What the flight controller says of its receiver.
+    /// Returns the flight controller's report on its receiver.
     pub(crate) fn report(millis: i64) -> GpsReport {
         GpsReport { health: if SPOOFED.contains(&millis) { GpsHealth::Spoofed } else { GpsHealth::Stable } }
     }

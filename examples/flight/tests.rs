@@ -61,7 +61,8 @@ fn recorded(name: &str) -> Result<Arc<Recorded>, Box<dyn Error>> {
     Ok(Arc::new(Recorded::read(&bb_tests::recordings::navigation()?.join(name))?))
 }
 
-/// Its camera is blind for five seconds, anchors are up to nine seconds apart, and some are of another place.
+/// A recorded flight has the labels that follow from it: its camera is blind for five seconds, anchors are up to nine
+/// seconds apart, and some are of another place.
 #[test]
 #[ignore = "needs recordings: .ci/run runs it"]
 fn a_recorded_flight_has_the_labels_that_follow_from_it() -> Result<(), Box<dyn Error>> {
@@ -97,7 +98,7 @@ fn every_recorded_flight_has_the_labels_that_follow_from_it() -> Result<(), Box<
 const FILE: &str = "FLIGHT_TEST_FILE";
 const STRATEGY: &str = "FLIGHT_TEST_STRATEGY";
 
-/// What is killed: it flies and records.
+/// Process that is killed: it flies and records.
 #[test]
 fn child() {
     let (Ok(file), Ok(strategy)) = (std::env::var(FILE), std::env::var(STRATEGY)) else { return };

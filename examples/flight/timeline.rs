@@ -1,4 +1,4 @@
-//! What must have happened, in this order; other things may happen between, but not all.
+//! Events that must have happened, in this order; others may happen between, but not all.
 
 /// Something that happened: when, s, and what.
 #[derive(Clone, Debug, PartialEq)]
@@ -7,7 +7,7 @@ pub(crate) struct Happened {
     pub(crate) what: String,
 }
 
-/// What happens, and from when to when, s.
+/// Events, and the times from and to which each must happen, s.
 const EXPECTED: [(&str, f64, f64); 13] = [
     ("started from origin", 1.0, 2.0),
     ("label satellite_anchored", 1.0, 3.0),
@@ -33,8 +33,8 @@ pub(crate) fn missing(happened: &[Happened]) -> Option<String> {
     })
 }
 
-/// What may happen only as it is expected: a receiver that is let in earlier, in between, is not what is to be shown. What ends a
-/// flight may not happen at all.
+/// Events that may happen only as expected: a receiver that is let in earlier, in between, is not what is to be shown. What ends a flight
+/// may not happen at all.
 const ONLY_EXPECTED: [&str; 5] = ["gate", "started", "fatal", "fallback", "clock_set_back"];
 
 /// The first that should not have happened.

@@ -5,11 +5,11 @@ use std::f64::consts::TAU;
 
 pub(crate) const GRAVITY: f64 = 9.80665;
 
-/// When it takes off, s, and how long it takes to reach its speed.
+/// Time of take-off, s, and time until it has reached its speed, s.
 const TAKE_OFF: f64 = 3.0;
 const SPEEDING_UP: f64 = 8.0;
 
-/// Where it is and how it moves, in the tangent frame at its origin.
+/// Motion of the drone, in the tangent frame at its origin.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Motion {
     pub(crate) position: Vector3<f64>,
@@ -17,7 +17,7 @@ pub(crate) struct Motion {
     pub(crate) world_from_body: UnitQuaternion<f64>,
 }
 
-/// How far along the way it is, s at full speed, with both derivatives.
+/// Returns the progress along the way, s at full speed, with both derivatives.
 fn progress(t: f64) -> [f64; 3] {
     let s = (t - TAKE_OFF) / SPEEDING_UP;
     if s <= 0.0 {

@@ -1,4 +1,4 @@
-//! What the sensors of a drive say, and what is true.
+//! Measurements of a drive, and its truth.
 
 use bb_core::nalgebra::Vector3;
 use bb_core::payload::{GeodeticPosition, GnssFix, GnssServices, GnssStatus, Twist};
@@ -9,13 +9,13 @@ use std::ops::Range;
 /// A drive, from the sensors' side.
 #[derive(Clone, Debug)]
 pub(crate) struct Drive {
-    /// In their order.
+    /// Messages of the sensors, in their order.
     pub(crate) events: Vec<(MonotonicTime, Event)>,
-    /// Where the link is when, in the frame of the drive.
+    /// Positions of the link by time, in the frame of the drive.
     pub(crate) truth: Vec<(MonotonicTime, Vector3<f64>)>,
-    /// On the Earth.
+    /// Frame of the drive on the Earth.
     pub(crate) frame: LocalFrame,
-    /// When there are no fixes, s.
+    /// Time without fixes, s.
     pub(crate) outage: Range<f64>,
 }
 

@@ -7,12 +7,12 @@ use bb_core::prelude::*;
 use std::fmt;
 use std::ops::Range;
 
-/// How a drive ended.
+/// Results of a drive.
 #[derive(Debug)]
 pub(crate) struct Outcome {
     filter: &'static str,
     pub(crate) points: Vec<Point>,
-    /// When the health changed, and to what.
+    /// Changes of health: time, s, and the new state.
     health: Vec<(f64, HealthState)>,
     outage: Range<f64>,
 }
@@ -69,7 +69,7 @@ impl Outcome {
         self.points.iter().rev().find(|point| point.time_s < time_s)
     }
 
-    /// What of the claims did not happen.
+    /// Returns the claims that did not come true.
     pub(crate) fn missing(&self) -> Vec<String> {
         let mut missing = Vec::new();
         let mut claim = |holds: bool, what: &str| {

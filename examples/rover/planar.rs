@@ -29,7 +29,7 @@ mod tests {
         Ok(())
     }
 
-    /// On a plane and without wheels, as `--data` plays it.
+    /// Recorded drive on a plane and without wheels, as `--data` plays it.
     #[test]
     #[ignore = "needs recordings: .ci/run runs it"]
     fn the_recorded_drive_keeps_within_its_bounds() -> Result<(), Box<dyn Error>> {

@@ -7,7 +7,7 @@ use bb_estimators::navigation::{Geodetic, LocalFrame};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-/// When the recorded receiver is switched off, s.
+/// Time for which the recorded receiver is switched off, s.
 const OUTAGE: std::ops::Range<f64> = 120.0..180.0;
 
 pub(crate) fn drive(prefix: &Path) -> Result<Drive, Box<dyn Error>> {

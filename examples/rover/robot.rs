@@ -3,7 +3,7 @@
 use bb_core::prelude::*;
 use bb_estimators::Eskf;
 
-/// What is printed of it.
+/// Name of the filter in the output.
 pub(crate) const FILTER: &str = "Eskf, in three dimensions";
 
 robot! {

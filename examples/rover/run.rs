@@ -28,7 +28,7 @@ pub(crate) fn main() -> ExitCode {
     }
 }
 
-/// Whether all that is claimed happened.
+/// Runs the example; returns whether all that is claimed happened.
 fn run(arguments: &Arguments) -> Result<bool, Box<dyn Error>> {
     if let Some(file) = &arguments.plot {
         Picture::check(file, "--plot")?;

@@ -22,7 +22,7 @@ const WHEEL_SCALE: f64 = 0.005;
 const WHEELS: f64 = 0.05;
 const FIX: f64 = 0.5;
 
-/// Where the rover is, m, rad, m/s.
+/// State of the rover, m, rad, m/s.
 #[derive(Clone, Copy, Debug)]
 struct State {
     position: Vector3<f64>,
@@ -30,7 +30,7 @@ struct State {
     speed: f64,
 }
 
-/// At rest for three seconds, then between 1 and 2 m/s.
+/// Returns the speed, m/s: at rest for three seconds, then between 1 and 2 m/s.
 fn speed(time_s: f64) -> f64 {
     let start = ((time_s - 3.0) / 2.0).clamp(0.0, 1.0);
     start * (1.5 + 0.5 * (0.2 * (time_s - 3.0)).sin())

@@ -28,7 +28,7 @@ fn another_filter_is_four_other_lines() {
     }
 }
 
-/// With errors a hundred times as large, with fixes in what is said to be the outage, and without any output.
+/// Drives with errors a hundred times as large, with fixes in what is said to be the outage, and without any output.
 #[test]
 fn what_does_not_happen_is_missing() -> Result<(), Box<dyn Error>> {
     let missing = |change: &dyn Fn(&mut Outcome)| -> Result<Vec<String>, Box<dyn Error>> {

@@ -1,4 +1,4 @@
-//! What the rover can be told.
+//! Commands of the rover.
 
 use crate::rover::rover;
 use bb_core::prelude::*;
@@ -6,10 +6,10 @@ use bb_core::prelude::*;
 /// Options of [`Pace`].
 #[derive(Clone, Debug, Options)]
 pub(crate) struct PaceOptions {
-    /// How fast the rover is to drive. Unit: m/s.
+    /// Target speed of the rover. Unit: m/s.
     #[option(required, range = 0.0..=1.5, unit = "m/s")]
     pub(crate) speed: f64,
-    /// How long it takes to get there. Unit: s.
+    /// Time that the change of speed takes. Unit: s.
     #[option(default = Duration::from_millis(200))]
     pub(crate) over: Duration,
     /// The state that the rover is in then.

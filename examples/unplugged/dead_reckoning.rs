@@ -3,7 +3,7 @@
 use bb_core::nalgebra::{UnitQuaternion, Vector3};
 use bb_core::prelude::*;
 
-/// What it takes.
+/// Inputs of the estimator.
 #[derive(Clone, Copy, Debug, Inputs)]
 pub(crate) struct DeadReckoningInputs<'a> {
     imu: Input<'a, Imu>,

@@ -1,8 +1,8 @@
-//! What must happen, and in which order.
+//! Events that must happen, in their order.
 
 use crate::timeline::{Kind, Line};
 
-/// What belongs to the story, without its times.
+/// Events of the story, without their times.
 const EXPECTED: &[(Kind, &str)] = &[
     (Kind::State, "disarmed -> idle"),
     (Kind::Command, "drive started"),
@@ -30,7 +30,7 @@ const EXPECTED: &[(Kind, &str)] = &[
     (Kind::Command, "disarm finished"),
 ];
 
-/// What of it has not happened, or not after what comes before it.
+/// Returns the events of the story that have not happened, or not after what comes before them.
 pub(crate) fn missing(lines: &[Line]) -> Vec<(Kind, &'static str)> {
     let mut rest = lines;
     let mut is_missing = |(kind, event): &&(Kind, &str)| {

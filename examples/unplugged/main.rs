@@ -1,4 +1,4 @@
-//! What a robot does when its sensors fail, as a story on a terminal.
+//! Failing sensors and what a robot does then, as a story on a terminal.
 //!
 //! A rover drives in a circle and estimates its pose from an IMU and its wheels. The wheels stall, the IMU is unplugged,
 //! both come back; the health of the estimator starts the commands that slow the rover down, stop it and let it drive on.

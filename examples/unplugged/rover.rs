@@ -7,11 +7,11 @@ use crate::sensors::{Gyroscope, Wheels};
 use bb_core::prelude::*;
 
 robot! {
-    /// It drives in a circle, at the speed that its commands set.
+    /// Rover that drives in a circle, at the speed that its commands set.
     pub(crate) robot Rover;
 
     parameters {
-        /// How fast it drives.
+        /// Speed of the rover.
         speed: f64 = 0 m/s, range: 0 m/s..=1.5 m/s;
     }
 

@@ -8,7 +8,7 @@ use bb_core::{Builder, DynamicSubscription};
 use std::error::Error;
 use std::io::Write;
 
-/// What has happened so far.
+/// Run of the robot, with the events so far.
 struct Story<'a> {
     events: DynamicSubscription,
     poses: Subscription<Pose>,

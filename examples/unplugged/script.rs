@@ -1,4 +1,4 @@
-//! What happens to the rover: cables that are pulled, and commands of its operator.
+//! Events from outside: cables that are pulled, and commands of the rover's operator.
 
 use bb_core::prelude::*;
 
@@ -12,7 +12,7 @@ pub(crate) struct Silence {
 }
 
 impl Silence {
-    /// Whether it lasts at `time`.
+    /// Returns whether it lasts at `time`.
     pub(crate) fn includes(self, time: MonotonicTime) -> bool {
         (at(self.from_millis)..at(self.until_millis)).contains(&time)
     }
@@ -35,13 +35,13 @@ pub(crate) const IMU_UNPLUGGED: Silence = Silence {
 /// Something that is done.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Deed {
-    /// To the hardware, by itself: the sensors know of it.
+    /// Event of the hardware, by itself: the sensors know of it.
     Hardware(&'static str, &'static str),
-    /// By the operator.
+    /// Arming by the operator.
     Arm,
-    /// By the operator.
+    /// Drive command by the operator.
     Drive,
-    /// By the operator.
+    /// Disarming by the operator.
     Disarm,
 }
 
@@ -57,7 +57,7 @@ pub(crate) fn steps() -> Vec<(MonotonicTime, Deed)> {
     steps.into_iter().map(|(millis, deed)| (at(millis), deed)).collect()
 }
 
-/// When the story ends.
+/// Time at which the story ends.
 pub(crate) const END: MonotonicTime = at(7000);
 
 const fn at(millis: u64) -> MonotonicTime {

@@ -4,22 +4,22 @@ use crate::script::{Silence, WHEELS_STALLED};
 use bb_core::nalgebra::Vector3;
 use bb_core::prelude::*;
 
-/// Of the circle, m.
+/// Radius of the circle, m.
 const RADIUS_M: f64 = 2.0;
 
 /// Options of both sensors.
 #[derive(Clone, Debug, Options)]
 pub(crate) struct SimulatedOptions {
-    /// How fast the rover drives. Unit: m/s.
+    /// Speed of the rover. Unit: m/s.
     #[option(required, range = 0.0..=1.5, unit = "m/s")]
     pub(crate) speed: f64,
-    /// When the sensor says nothing.
+    /// Time for which the sensor says nothing.
     #[option(required)]
     pub(crate) silence: Silence,
 }
 
 impl SimulatedOptions {
-    /// What was measured, if anything is heard of it.
+    /// Returns the measurement, or nothing while the sensor is silent.
     fn reading<T>(&self, now: MonotonicTime, measured: T) -> Reading<T> {
         if self.silence.includes(now) { Reading::nothing() } else { Reading::now(measured) }
     }

@@ -14,7 +14,7 @@ fn the_story_on_virtual_time_is_the_stored_one() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Its speed is a parameter, so another one is another story.
+/// A setting from outside takes effect: the speed is a parameter, so another one is another story.
 #[test]
 fn a_setting_from_outside_takes_effect() -> Result<(), Box<dyn Error>> {
     let mut builder = Rover::builder();

@@ -1,4 +1,4 @@
-//! What happened, as lines of a table.
+//! Events as lines of a table.
 
 use bb_core::event::{CommandEvent, CommandPhase, ParameterChange, StateTransition};
 use bb_core::prelude::*;
@@ -55,7 +55,7 @@ impl Line {
         Self { time, kind, event: event.into(), detail: detail.into() }
     }
 
-    /// Of a message from one of [`TOPICS`].
+    /// Creates the line of a message from one of [`TOPICS`].
     pub(crate) fn of(message: &DynamicMessage) -> Option<Self> {
         let time = message.stamp().monotonic_time;
         if let Some(change) = message.downcast::<HealthTransition>() {
@@ -95,7 +95,7 @@ fn short(path: &str) -> String {
     }
 }
 
-/// What became of a command, and why it was started or refused.
+/// Describes the progress of a command, and why it was started or refused.
 fn told(event: &CommandEvent) -> (String, String) {
     let name = event.command;
     let cause =
