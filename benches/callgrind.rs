@@ -8,7 +8,7 @@ use std::process::Command;
 pub const ANY_PROCESSOR: &[(&str, &str)] =
     &[("GLIBC_TUNABLES", "glibc.cpu.hwcaps=-AVX,-AVX2,-FMA,-FMA4,-ERMS,-FSRM,-AVX_Fast_Unaligned_Load")];
 
-/// Whether it can be run at all.
+/// Returns whether valgrind can be run.
 pub fn is_there() -> bool {
     Command::new("valgrind").arg("--version").output().is_ok_and(|output| output.status.success())
 }

@@ -1,6 +1,6 @@
-//! What a robot costs to compile: seconds of `cargo check` for 10, 100 and 1,000 sensors with an estimator each, and of
-//! `cargo build` for 10 and 100, per declaration, after everything it depends on is built; and beside it a crate without a
-//! robot. A build without optimization writes the code of every estimator, which a check does not.
+//! Cost of compiling a robot: seconds of `cargo check` for 10, 100 and 1,000 sensors with an estimator each, and of `cargo build` for 10
+//! and 100, per declaration, after everything it depends on is built; and beside it a crate without a robot. A build without optimization
+//! writes the code of every estimator, which a check does not.
 //!
 //! `cargo bench -p bb-benches --bench compile` prints one JSON object a line. It makes a crate in the target folder.
 

@@ -1,5 +1,5 @@
-//! What the states of joints cost: a look-up of a transform through seven moving joints, beside the multiplication alone, and a
-//! message with the states of joints.
+//! Cost of the states of joints: a look-up of a transform through seven moving joints, beside the multiplication alone, and a message with
+//! the states of joints.
 //!
 //! `cargo bench -p bb-benches --bench joints` prints one JSON object.
 

@@ -1,5 +1,5 @@
-//! What kinematics cost: a transform through seven moving joints, its Jacobian, all links, and inverse kinematics of random
-//! poses within the limits of two arms, the fastest of three times each.
+//! Cost of kinematics: a transform through seven moving joints, its Jacobian, all links, and inverse kinematics of random poses within the
+//! limits of two arms, the fastest of three times each.
 //!
 //! `cargo bench -p bb-benches --bench kinematics` prints one JSON object a line.
 

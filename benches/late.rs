@@ -1,4 +1,4 @@
-//! What a fix costs that comes late: at 400 Hz, with 320 samples and 16 states of history, in time and by up to 500 ms.
+//! Cost of a fix that comes late: at 400 Hz, with 320 samples and 16 states of history, in time and by up to 500 ms.
 //!
 //! `cargo bench -p bb-benches --bench late` prints the time of one, the smallest and the median of 2,000.
 

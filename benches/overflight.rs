@@ -41,7 +41,7 @@ pub struct Overflight {
     next: u64,
 }
 
-/// What the sensors measure from one keyframe to the next.
+/// Measurements from one keyframe to the next.
 #[derive(Clone, Debug)]
 pub struct Keyframe {
     id: u64,

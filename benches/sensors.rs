@@ -12,7 +12,7 @@ use std::time::Instant;
 #[derive(Debug)]
 struct Counter(u64);
 
-/// How often it was read.
+/// Number of times that it was read.
 #[derive(Clone, Copy, Debug, Payload)]
 struct Count {
     value: u64,
@@ -102,7 +102,7 @@ fn main() -> Result<(), StartError> {
 /// Readings taken, as a fraction of those due.
 struct Fraction {
     all: f64,
-    /// Of the sensor that was read least.
+    /// Fraction of the sensor that was read least.
     least: f64,
 }
 

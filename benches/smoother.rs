@@ -1,6 +1,6 @@
-//! What a keyframe of the fixed-lag smoother costs: with the usual thresholds, and with all of the window linearised and
-//! eliminated again each time, and with landmarks; and what a sample of the IMU does. The time of a keyframe is the least of
-//! several runs, so that other work of the machine is not counted.
+//! Cost of a keyframe of the fixed-lag smoother: with the usual thresholds, and with all of the window linearised and eliminated again each
+//! time, and with landmarks; and the cost of a sample of the IMU. The time of a keyframe is the least of several runs, so that other work of
+//! the machine is not counted.
 //!
 //! `cargo bench -p bb-benches --bench smoother` prints one JSON object a line. A number of keyframes as argument makes one long
 //! run of a window of 20 in place of these, and prints each tenth of it, and the memory in use; a second number is that of the

@@ -1,5 +1,5 @@
-//! From the end of one estimator's callback to the start of the next one's on another island, beside a message that one
-//! thread sends another over a channel.
+//! Time from the end of one estimator's callback to the start of the next one's on another island, beside a message
+//! that one thread sends another over a channel.
 
 use super::Line;
 use super::chain::Inertial;
@@ -26,7 +26,7 @@ impl Estimator for Depart {
     }
 }
 
-/// How long messages took, in nanoseconds.
+/// Delays of messages, in nanoseconds.
 #[derive(Debug)]
 pub(super) struct Arrivals {
     clock: Clock,
@@ -62,7 +62,7 @@ impl Estimator for Arrive {
     }
 }
 
-/// What two islands send to a third.
+/// Messages of two islands to a third.
 #[derive(Clone, Copy, Debug, Inputs)]
 pub(super) struct Two<'a> {
     pub(super) driver: Input<'a, Inertial>,
@@ -129,7 +129,7 @@ robot! {
 const ROUNDS: usize = 5;
 const MESSAGES: usize = 22_000;
 const WARM_UP: usize = 2_000;
-/// From one message to the next: time enough for a thread to fall asleep.
+/// Time from one message to the next: enough for a thread to fall asleep.
 const PERIOD: Duration = Duration::from_micros(20);
 
 pub(super) fn measure() -> Result<Vec<Line>, Box<dyn std::error::Error>> {

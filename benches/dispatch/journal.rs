@@ -1,5 +1,4 @@
-//! What a journal adds to a message for one estimator, with a sink that only counts, beside a push into a vector behind a
-//! mutex.
+//! Cost that a journal adds to a message for one estimator, with a sink that only counts, beside a push into a vector behind a mutex.
 
 use super::chain::{Inertial, Pass};
 use super::{Line, in_turn};

@@ -1,5 +1,5 @@
-//! What the runtime costs: a hop from estimator to estimator, within an island, between two, and to a worker; a publish, an
-//! allocation, a journal; what an estimator that hangs on a worker does to a chain beside it; and how long `stop` takes.
+//! Costs of the runtime: a hop from estimator to estimator, within an island, between two, and to a worker; a publish, an allocation, a
+//! journal; what an estimator that hangs on a worker does to a chain beside it; and how long `stop` takes.
 //!
 //! `cargo bench -p bb-benches --bench dispatch -- --json` prints one JSON object a line; without `--json`, a table. Names of
 //! files here (`chain`, `stop`) run those alone. Nanoseconds are the smallest of many batches, beside the same work without

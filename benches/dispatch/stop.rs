@@ -1,5 +1,5 @@
-//! How long `stop` takes, and how long it takes until the motor has been made safe: of a robot that is idle, and of one in
-//! which a sensor, an estimator, an estimator on a worker, a command and a disarm callback hang.
+//! Time that `stop` takes, and time until the motor has been made safe: of a robot that is idle, and of one in which a sensor, an
+//! estimator, an estimator on a worker, a command and a disarm callback hang.
 
 use super::Line;
 use super::chain::{Inertial, Pass};
@@ -8,11 +8,11 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError, mpsc};
 use std::time::Instant;
 
-/// Whether everything that can hang does.
+/// `true` if everything that can hang does.
 static HANGS: AtomicBool = AtomicBool::new(false);
-/// How many threads do.
+/// Number of threads that hang.
 static HANGING: AtomicUsize = AtomicUsize::new(0);
-/// When the motor was first made safe.
+/// Time at which the motor was first made safe.
 static SAFE: Mutex<Option<Instant>> = Mutex::new(None);
 
 fn hang() {

@@ -59,7 +59,7 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Of one step, less those of what it is made on top of.
+/// Counts the instructions of one step, less those of what it is made on top of.
 fn instructions(step: &Step) -> Result<f64, Box<dyn Error>> {
     let (short, long) = step.steps;
     let of = |name: &str| {

@@ -1,4 +1,4 @@
-//! What the steps are given: a body that turns about all axes on the spot, measured with noise that is the same in every run.
+//! Inputs of the steps: a body that turns about all axes on the spot, measured with noise that is the same in every run.
 
 use bb_core::nalgebra::{UnitQuaternion, Vector3};
 use rand_chacha::ChaCha8Rng;
@@ -18,11 +18,11 @@ pub(crate) struct Reading {
     pub(crate) specific_force: Vector3<f64>,
     /// T.
     pub(crate) magnetic_field: Vector3<f64>,
-    /// In the world, m.
+    /// Position in the world, m.
     pub(crate) position: Vector3<f64>,
 }
 
-/// As many readings, whatever the number of steps that are counted.
+/// Makes the readings, equal in every run, whatever the number of steps that are counted.
 pub(crate) fn readings(number: usize) -> Vec<Reading> {
     let mut generator = ChaCha8Rng::seed_from_u64(12_345);
     let mut noise = |deviation: f64| {

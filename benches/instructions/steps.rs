@@ -13,7 +13,7 @@ use bb_estimators::navigation::{
 use std::error::Error;
 use std::hint::black_box;
 
-/// What is counted.
+/// Step whose instructions are counted.
 pub(crate) struct Step {
     pub(crate) name: &'static str,
     /// Each step does this one as well; its instructions are taken off.
@@ -26,12 +26,12 @@ pub(crate) struct Step {
     pub(crate) run: fn(usize) -> Result<(), Box<dyn Error>>,
 }
 
-/// Of a step that takes microseconds.
+/// Numbers of steps that take microseconds.
 const USUAL: (usize, usize) = (SHORT, LONG);
-/// Of a keyframe, after its window of 20 is full of tracks.
+/// Numbers of keyframes, after the window of 20 is full of tracks.
 const KEYFRAMES: (usize, usize) = (60, 160);
 
-/// In `f64`. Those of `Eskf` have 15 states, those of the attitude filters read the orientation too.
+/// Steps, in `f64`. Those of `Eskf` have 15 states, those of the attitude filters read the orientation too.
 pub(crate) const STEPS: &[Step] = &[
     Step { name: "hop/none", on: None, steps: USUAL, stored: 246.0, run: hop::direct },
     // Sixteen hops each.

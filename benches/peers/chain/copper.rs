@@ -1,11 +1,11 @@
-//! The same chain in Copper, without its log.
+//! Chain in Copper, without its log.
 
 use crate::Inertial;
 use cu29::prelude::*;
 use std::hint::black_box;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// How many messages the sink has taken.
+/// Number of messages that the sink has taken.
 static TAKEN: AtomicU64 = AtomicU64::new(0);
 
 #[derive(Reflect)]

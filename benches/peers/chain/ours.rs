@@ -108,12 +108,12 @@ impl Ours<Timed> {
 }
 
 impl<R: Robot> Ours<R> {
-    /// What a sensor's driver does: reads the clock, and publishes.
+    /// Does what a sensor's driver does: reads the clock, and publishes.
     pub(crate) fn iterate(&mut self, reading: &Inertial) {
         self.running.publish(self.imu, self.running.clock().now(), black_box(*reading));
     }
 
-    /// How many messages the sink has taken.
+    /// Stops the robot and returns the number of messages that the sink has taken.
     pub(crate) fn stop(self) -> u64 {
         self.running.stop().estimator("estimator/base/sink").map_or(0, |sink| sink.dispatched)
     }

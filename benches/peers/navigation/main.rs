@@ -24,14 +24,14 @@ const LONG: usize = READINGS;
 /// The argument that makes this program a run to be counted.
 const COUNT: &str = "count";
 
-/// What a filter does with a reading.
+/// Work of a filter for a reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum What {
     /// Takes the sample of the IMU.
     Predict,
-    /// And then the position.
+    /// Prediction and update with the position.
     Position,
-    /// And then the height alone.
+    /// Prediction and update with the height alone.
     Height,
 }
 
@@ -80,7 +80,7 @@ fn sides() -> impl Iterator<Item = Side> {
     std::iter::once(OURS).chain(PEERS)
 }
 
-/// What the filter `F` does with the readings; that it stays where it is, if it is told.
+/// Runs the filter `F` on the readings, and checks that it stays where it is, if it is told.
 fn run<F: Navigating>(what: What, readings: &[Reading]) -> Result<(), Box<dyn Error>> {
     let mut filter = F::start()?;
     // One loop for each, so that none asks which it is.
@@ -139,7 +139,7 @@ fn instructions(side: &str) -> Result<[f64; 3], Box<dyn Error>> {
     Ok(counted)
 }
 
-/// Of a sample, and of the updates without the samples before them.
+/// Returns the costs of a sample, and of the updates without the samples before them.
 fn costs(sides: &[[f64; 3]]) -> Vec<[(&'static str, f64); 3]> {
     let cost = |&[position, height, predict]: &[f64; 3]| {
         [("predict", predict), ("position", position - predict), ("height", height - predict)]

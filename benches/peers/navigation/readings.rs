@@ -1,4 +1,4 @@
-//! What the filters are given: a body at rest and level, measured with noise that is the same in every run.
+//! Inputs of the filters: a body at rest and level, measured with noise that is the same in every run.
 
 use nalgebra::Vector3;
 use rand_chacha::ChaCha8Rng;

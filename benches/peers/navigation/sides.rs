@@ -19,7 +19,7 @@ const GYROSCOPE_BIAS_WALK: f64 = 2e-5;
 const ACCELEROMETER_BIAS_WALK: f64 = 3e-3;
 const POSITION_VARIANCE: f64 = POSITION_NOISE * POSITION_NOISE;
 
-/// At the start.
+/// Standard deviation of the position at the start, m; the others likewise.
 const POSITION_DEVIATION: f64 = 1.0;
 const VELOCITY_DEVIATION: f64 = 0.1;
 const ROTATION_DEVIATION: f64 = 0.05;
@@ -39,7 +39,7 @@ pub trait Navigating: Sized {
     /// Takes the height alone.
     fn height(&mut self, reading: &Reading) -> Result<(), Box<dyn Error>>;
 
-    /// Where it says that it is, z up, m.
+    /// Returns the estimated position, z up, m.
     fn at(&self) -> Vector3<f64>;
 }
 

@@ -61,7 +61,7 @@ fn compare(pair: &Pair, files: &[PathBuf], json: bool) -> Result<(), Box<dyn Err
     Ok(())
 }
 
-/// Which of a pair.
+/// Side of a pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Side {
     Ours,

@@ -1,4 +1,4 @@
-//! What is compared with what.
+//! Pairs of our filters and peers that are compared.
 
 use crate::peers::{self, Beside};
 use bb_eval::Axes;
@@ -6,9 +6,9 @@ use bb_eval::Axes;
 /// One of our filters and a peer, each with its parameters.
 pub struct Pair {
     pub name: &'static str,
-    /// By the name that `bb eval attitude --filter` takes; a pair without it is left out.
+    /// Name that `bb eval attitude --filter` takes; a pair without it is left out.
     pub ours: &'static str,
-    /// As `--set` takes them.
+    /// Settings as `--set` takes them.
     pub settings: &'static [&'static str],
     pub axes: Axes,
     pub peer: fn() -> Beside,
@@ -20,8 +20,8 @@ impl Pair {
     }
 }
 
-/// Where both sides are one algorithm, they have the same settings. Else ours run with their defaults and the peers with
-/// what is best for them on BROAD; VQF has its defaults.
+/// Pairs that are compared. Where both sides are one algorithm, they have the same settings. Else ours run with their defaults and the
+/// peers with what is best for them on BROAD; VQF has its defaults.
 pub const PAIRS: &[Pair] = &[
     Pair {
         name: "madgwick/ahrs_madgwick/nine",

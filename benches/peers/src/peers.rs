@@ -82,8 +82,8 @@ pub fn fusion_best() -> Beside {
     fusion([0.1, 40.0, 20.0])
 }
 
-/// With the correction of the gyroscope's bias that comes with it; gain, and rejection of acceleration and field in
-/// degrees.
+/// Makes the peer with the correction of the gyroscope's bias that comes with it; gain, and rejection of acceleration
+/// and field in degrees.
 fn fusion(parameters: [f64; 3]) -> Beside {
     in_enu(Peer {
         make: |_, [gain, acceleration, magnetic]| {
