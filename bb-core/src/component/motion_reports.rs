@@ -79,7 +79,7 @@ mod tests {
     }
 
     #[test]
-    fn a_motion_ends_once_whoever_reports_its_end_first() {
+    fn a_motion_ends_once_whichever_side_reports_its_end_first() {
         let failed = || MotionEnd::Failed("no current".to_owned());
         let mut reports = MotionReports::default();
         // The actuator reports nothing while it fails, and the end too late.

@@ -69,7 +69,7 @@ pub struct Reaction {
     period: Option<Duration>,
     /// The stamp of the newest message, and when it was received.
     last: Option<MonotonicTime>,
-    heard: MonotonicTime,
+    received: MonotonicTime,
     is_silent: bool,
     fulfilled_since: Option<MonotonicTime>,
     /// The condition has ended by new bounds, which has yet to be published.
@@ -207,7 +207,7 @@ impl Service for Reaction {
             stale_after,
             period: topic.period,
             last: None,
-            heard: context.clock().now(),
+            received: context.clock().now(),
             is_silent: false,
             fulfilled_since: None,
             has_ended: false,
@@ -250,7 +250,7 @@ impl Service for Reaction {
             }
             next = self.messages.try_recv();
         }
-        let state = if now.duration_since(self.heard) > self.stale_after { self.fall_silent() } else { None };
+        let state = if now.duration_since(self.received) > self.stale_after { self.fall_silent() } else { None };
         let reading = state.map_or(Reading::nothing(), Reading::now);
         Ok(if self.is_periodic || self.waits { reading } else { reading.next_at(now + PERIOD) })
     }
@@ -290,7 +290,7 @@ impl Reaction {
             return None;
         }
         // An older stamp is nothing heard: a clock that was set back shows as silence.
-        self.heard = now;
+        self.received = now;
         self.is_silent = false;
         self.last = Some(time);
         let value = self.options.when.number_in(message).filter(|value| !value.is_nan());

@@ -116,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn a_supervisor_looks_after_all_below_it() {
+    fn a_supervisor_restarts_all_below_it() {
         let supervisors = budgets();
         assert!(supervisors.is_below(2, 3) && supervisors.is_below(2, 1) && supervisors.is_below(2, 0));
         assert!(!supervisors.is_below(1, 2));

@@ -385,8 +385,8 @@ mod tests {
     fn a_callback_without_a_thread_takes_none_that_is_kept_for_another() {
         let control = bare::control(Mode::Real, &[], []);
         let _place = control.0.reserve.place().expect("there are threads");
-        let ((told, started), (release, released)) = (mpsc::channel(), mpsc::channel::<()>());
-        let code = Mutex::new((told, released));
+        let ((begin, started), (release, released)) = (mpsc::channel(), mpsc::channel::<()>());
+        let code = Mutex::new((begin, released));
         let code = move || {
             let code = code.lock().unwrap_or_else(PoisonError::into_inner);
             code.0.send(()).expect("the test waits");

@@ -52,8 +52,8 @@ struct State {
 impl State {
     /// The result; an error if it was already taken.
     fn take(&mut self) -> Option<Result<Value, CommandError>> {
-        let taken = || Err(CommandError::Failed("its result was taken already".into()));
-        self.has_ended.then(|| self.result.take().unwrap_or_else(taken))
+        let missing = || Err(CommandError::Failed("its result was taken already".into()));
+        self.has_ended.then(|| self.result.take().unwrap_or_else(missing))
     }
 }
 

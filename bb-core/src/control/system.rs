@@ -159,7 +159,7 @@ impl Control {
     }
 
     /// Adds a sensor, a service or an actuator to its supervisor.
-    pub(crate) fn look_after(
+    pub(crate) fn supervise(
         &self,
         path: &'static str,
         supervisor: Supervisor,

@@ -146,7 +146,7 @@ impl History {
 
     /// The angle of a continuous joint, in the turn nearest to the prediction from the last state.
     fn unwound(&self, state: &State<'_>) -> Option<f64> {
-        let told = *state.position.first()?;
+        let reported = *state.position.first()?;
         let last = self.length.checked_sub(1)?;
         if self.kind != JointKind::Continuous {
             return None;
@@ -159,12 +159,12 @@ impl History {
             None => 0.0,
         };
         let expected = before + velocity * state.time.seconds_since(MonotonicTime::from_nanos(self.time(last)));
-        if (expected - told).abs() > MOST_TURNS * TAU || expected.is_nan() {
+        if (expected - reported).abs() > MOST_TURNS * TAU || expected.is_nan() {
             // An absurd velocity or stamp: restart counting turns here, since the angle would otherwise lose its digits
             // permanently.
-            return Some(told);
+            return Some(reported);
         }
-        Some(told + TAU * ((expected - told) / TAU).round())
+        Some(reported + TAU * ((expected - reported) / TAU).round())
     }
 
     const fn stride(&self) -> usize {

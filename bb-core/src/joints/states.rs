@@ -96,17 +96,17 @@ impl SharedStates {
         has_room
     }
 
-    /// Calls `look` until it succeeds, until no new state can change its answer, or until `timeout` expires.
+    /// Calls `lookup` until it succeeds, until no new state can change its answer, or until `timeout` expires.
     pub(super) fn wait<T>(
         &self,
         timeout: Duration,
-        mut look: impl FnMut(&States) -> Result<T, Gap>,
+        mut lookup: impl FnMut(&States) -> Result<T, Gap>,
     ) -> Result<T, Gap> {
         let start = Instant::now();
         let mut states = self.lock();
         self.waiting.fetch_add(1, Ordering::Relaxed);
         let answer = loop {
-            let answer = look(&states);
+            let answer = lookup(&states);
             let may_come = matches!(answer, Err(Gap::Unknown { .. } | Gap::InFuture { .. }));
             let left = timeout.saturating_sub(start.elapsed());
             if !may_come || left.is_zero() {

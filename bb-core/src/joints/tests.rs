@@ -111,18 +111,18 @@ proptest! {
         let error = (found.to_homogeneous() - expected.to_homogeneous()).abs().max();
         prop_assert!(error < 1e-12, "{target} {source}: {found} {expected}");
         // Messages for viewers give the same result.
-        let told = topology.joints.iter().enumerate().map(|(number, _)| {
+        let by_joint = topology.joints.iter().enumerate().map(|(number, _)| {
             let (owner, multiplier, offset) = topology.followed(number);
             let range = kinematics.joint(topology.joints[owner].name).expect("it has one").positions.clone();
             let of_owner = positions[range].to_vec();
             let is_own = owner == number;
             (number, if is_own { of_owner } else { vec![multiplier * of_owner[0] + offset] })
         });
-        let told: Vec<(usize, Vec<f64>)> = told.collect();
+        let by_joint: Vec<(usize, Vec<f64>)> = by_joint.collect();
         let mut root_from_link = Isometry3::identity();
         let mut at = find_number(topology, source);
         while let Some(joint) = topology.links[at].parent_joint.map(|number| &topology.joints[number]) {
-            let motion = joint.motion(&told[at - 1].1);
+            let motion = joint.motion(&by_joint[at - 1].1);
             root_from_link = joint.parent_from_joint.isometry() * motion * root_from_link;
             at = joint.parent;
         }

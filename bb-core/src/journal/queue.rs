@@ -149,7 +149,7 @@ impl Queue {
     /// Ends the journal if its sink, which has taken `taken` lines, hangs or is so slow that too much is queued.
     /// Returns whether it has ended now. It is reported later: a logger may block for as long as the sink does.
     #[cold]
-    pub(super) fn judge(&mut self, taken: u64) -> bool {
+    pub(super) fn judge(&mut self, accepted: u64) -> bool {
         if self.ended.is_some() {
             return false;
         }
@@ -158,11 +158,11 @@ impl Queue {
             return false;
         }
         let now = Instant::now();
-        let (seen, since) = *self.stalled.get_or_insert((taken, now));
-        if seen != taken {
-            self.stalled = Some((taken, now));
+        let (seen, since) = *self.stalled.get_or_insert((accepted, now));
+        if seen != accepted {
+            self.stalled = Some((accepted, now));
         }
-        let why = match (seen == taken && now.duration_since(since) >= LONGEST_WAIT, self.load.fills(MOST)) {
+        let why = match (seen == accepted && now.duration_since(since) >= LONGEST_WAIT, self.load.fills(MOST)) {
             (true, _) => "hangs",
             (false, true) => "is too slow",
             (false, false) => return false,

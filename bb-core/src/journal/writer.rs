@@ -25,7 +25,7 @@ struct Inner {
     /// `true` if outside producers have to wait: read without the lock.
     is_full: AtomicBool,
     /// Number of lines that the sink has accepted, to see whether it makes progress.
-    taken: AtomicU64,
+    accepted: AtomicU64,
     /// Number of panics of the sink.
     panics: AtomicU64,
     arrived: Condvar,
@@ -60,7 +60,7 @@ impl Journal {
         Self(Arc::new(Inner {
             state: Mutex::new(state),
             is_full: AtomicBool::new(false),
-            taken: AtomicU64::new(0),
+            accepted: AtomicU64::new(0),
             panics: AtomicU64::new(0),
             arrived: Condvar::new(),
             room: Condvar::new(),
@@ -144,7 +144,7 @@ impl Journal {
     }
 
     /// Checks whether the sink hangs while no lines are written. Returns the error once; the journal has then ended.
-    pub(crate) fn look(&self) -> Option<String> {
+    pub(crate) fn check(&self) -> Option<String> {
         let mut state = self.0.lock();
         self.0.judge(&mut state);
         let Ended { message, is_reported } = state.queue.ended.as_mut().filter(|ended| !ended.is_reported)?;
@@ -207,7 +207,7 @@ impl Inner {
                     log_panic("the journal's sink failed", &fault);
                 }
                 // Only one thread at a time gets here: a plain store instead of an atomic addition.
-                self.taken.store(self.taken.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
+                self.accepted.store(self.accepted.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
             }
             state = self.lock();
             state.queue.handed_over(batch);
@@ -240,7 +240,7 @@ impl Inner {
     }
 
     fn judge(&self, state: &mut State) {
-        if state.queue.judge(self.taken.load(Ordering::Relaxed)) {
+        if state.queue.judge(self.accepted.load(Ordering::Relaxed)) {
             self.is_full.store(false, Ordering::Relaxed);
             self.room.notify_all();
         }
@@ -327,18 +327,18 @@ mod tests {
             journal.wait_for_room();
             journal.write(MonotonicTime::ZERO, 0, Event::Arm);
         }
-        assert!(journal.look().is_some_and(|message| message.starts_with("its sink hangs")));
-        assert_eq!(journal.look(), None, "it is said once");
+        assert!(journal.check().is_some_and(|message| message.starts_with("its sink hangs")));
+        assert_eq!(journal.check(), None, "it is said once");
         assert_eq!(journal.write(MonotonicTime::ZERO, 0, Event::Stop), 0);
     }
 
     #[test]
-    fn whoever_writes_the_journal_of_a_sink_that_hangs_ends_and_its_memory_is_bounded() {
+    fn the_journal_of_a_sink_that_hangs_ends_and_its_memory_is_bounded() {
         let (journal, _release) = hanging();
         // Nobody here waits for room.
         let written = fill(&journal, 2 * MOST.lines);
         assert!(written <= MOST.lines, "{written}");
-        assert!(journal.look().is_some_and(|message| message.contains("it ends before line")));
+        assert!(journal.check().is_some_and(|message| message.contains("it ends before line")));
     }
 
     #[test]
@@ -346,7 +346,7 @@ mod tests {
         let (journal, _release) = hanging();
         fill(&journal, CAPACITY.lines + 2);
         let start = Instant::now();
-        while journal.look().is_none() {
+        while journal.check().is_none() {
             assert!(start.elapsed() < Duration::from_secs(20));
             std::thread::sleep(Duration::from_millis(10));
         }
@@ -362,7 +362,7 @@ mod tests {
         while start.elapsed() < LONGEST_WAIT + Duration::from_secs(1) {
             release.send(()).expect("the sink is there");
             std::thread::sleep(Duration::from_millis(100));
-            assert_eq!(journal.look(), None);
+            assert_eq!(journal.check(), None);
         }
     }
 
@@ -378,12 +378,12 @@ mod tests {
         // None of these writes waits for room. The text is not copied.
         let written = (0..1000).filter(|_| journal.write(MonotonicTime::ZERO, 0, large(LARGE)) > 0).count();
         assert_eq!(written, MOST.bytes / LARGE, "the line beyond is refused");
-        assert!(journal.look().is_some_and(|message| message.starts_with("its sink is too slow")));
+        assert!(journal.check().is_some_and(|message| message.starts_with("its sink is too slow")));
         drop(release);
     }
 
     #[test]
-    fn an_outside_producer_waits_while_large_lines_wait_and_one_that_is_larger_than_all_is_taken() {
+    fn an_outside_producer_waits_while_large_lines_wait_and_one_that_is_larger_than_all_is_accepted() {
         let (journal, release) = hanging();
         journal.write(MonotonicTime::ZERO, 0, large(CAPACITY.bytes));
         let start = Instant::now();

@@ -64,7 +64,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_oldest_make_room_and_all_are_told() {
+    fn the_oldest_make_room_and_all_are_reported() {
         let mut backlog = Backlog::new();
         for input in 0..BOUND.capacity + 3 {
             let oldest = backlog.make_room(0).map(|(input, ())| input);

@@ -175,7 +175,7 @@ pub enum CallError {
 }
 
 /// Result of a check whether an island is held.
-struct Looked {
+struct Check {
     is_held: bool,
     /// `true` if an entry is waiting that another thread may have left because of this check.
     has_kept: bool,
@@ -366,7 +366,7 @@ impl<S: IslandState> Island<S> {
 
     /// Returns whether a thread holds the island. The caller does not want to enter.
     fn is_held(&self, wiring: &S::Wiring) -> bool {
-        let Looked { is_held, has_kept } = self.look();
+        let Check { is_held, has_kept } = self.check();
         if has_kept {
             wiring.environment().schedule_drain(S::DECLARATION.number);
         }
@@ -375,7 +375,7 @@ impl<S: IslandState> Island<S> {
 
     /// Tries the lock and releases it at once. A thread that found it taken meanwhile has left its entry in the inbox for the
     /// holder, so another thread has to process that entry.
-    fn look(&self) -> Looked {
+    fn check(&self) -> Check {
         let tried = self.state.try_lock();
         let is_held = matches!(tried, Err(TryLockError::WouldBlock));
         // Releasing a lock is not a step of the model. This call is a step, at which other threads find the lock taken.
@@ -386,10 +386,10 @@ impl<S: IslandState> Island<S> {
         fence(Ordering::SeqCst);
         let has_kept =
             !is_held && self.pending.load(Ordering::Relaxed) != 0 && !self.served.load(Ordering::Relaxed);
-        Looked { is_held, has_kept }
+        Check { is_held, has_kept }
     }
 
-    /// Returns whether no thread holds the island. The caller checks the inbox afterwards: see [`Self::look`].
+    /// Returns whether no thread holds the island. The caller checks the inbox afterwards: see [`Self::check`].
     fn is_free(&self) -> bool {
         !matches!(self.state.try_lock(), Err(TryLockError::WouldBlock))
     }

@@ -132,11 +132,11 @@ mod tests {
     #[test]
     fn a_restart_comes_before_a_continuation_in_either_order() {
         for requests in
-            [[Request::Restart("told"), Request::Continue(3)], [Request::Continue(3), Request::Restart("told")]]
+            [[Request::Restart("asked"), Request::Continue(3)], [Request::Continue(3), Request::Restart("asked")]]
         {
             let mut timers = Timers::default();
             requests.into_iter().for_each(|request| timers.request(request, at(0)));
-            assert_eq!(timers.continue_with, Some(Continuation::Fail("told")));
+            assert_eq!(timers.continue_with, Some(Continuation::Fail("asked")));
         }
     }
 }

@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn a_star_stands_for_one_whole_name() {
+    fn a_star_matches_one_whole_name() {
         let includes = |select: Select<'_>| {
             ["sensor/arm/encoder", "sensor/arm/hand/encoder", "sensor/arm", "sensor/arm/encoder/raw"]
                 .map(|path| select.includes(path))

@@ -28,12 +28,12 @@ impl Subscribers {
 struct List<Q: ?Sized> {
     /// A publisher takes the list along and holds no lock while it wakes subscribers, which may subscribe and unsubscribe on that
     /// thread. So it is copied if it changes meanwhile.
-    all: Taken<Q>,
+    all: Snapshot<Q>,
     /// Number of subscribers at the next cleaning: twice the number left by the last one.
     clean_at: usize,
 }
 
-type Taken<Q> = Arc<Vec<Arc<Q>>>;
+type Snapshot<Q> = Arc<Vec<Arc<Q>>>;
 
 impl<Q: AnyQueue + ?Sized> List<Q> {
     const FEW: usize = 16;
@@ -65,8 +65,8 @@ impl<Q: ?Sized> Default for List<Q> {
 
 /// The subscribers at one time.
 pub(super) struct Listeners {
-    pub(super) queues: Taken<dyn AnyQueue>,
-    pub(super) taps: Taken<Queue<DynamicMessage>>,
+    pub(super) queues: Snapshot<dyn AnyQueue>,
+    pub(super) taps: Snapshot<Queue<DynamicMessage>>,
 }
 
 /// A topic without its payload.
@@ -194,11 +194,11 @@ mod tests {
         let place = Arc::as_ptr(&list.all);
         queues.iter().skip(1).for_each(|queue| list.add(Arc::clone(queue)));
         assert_eq!(Arc::as_ptr(&list.all), place);
-        let taken = Arc::clone(&list.all);
+        let snapshot = Arc::clone(&list.all);
         list.add(Arc::clone(&queues[0]));
-        assert_eq!((taken.len(), list.all.len()), (1000, 1001));
+        assert_eq!((snapshot.len(), list.all.len()), (1000, 1001));
         queues.iter().skip(1).for_each(|queue| queue.abandon());
         list.clean();
-        assert_eq!((taken.len(), list.all.len()), (1000, 2));
+        assert_eq!((snapshot.len(), list.all.len()), (1000, 2));
     }
 }

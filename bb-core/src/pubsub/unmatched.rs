@@ -148,7 +148,7 @@ mod tests {
     use tracing::span::{Attributes, Id, Record};
     use tracing::{Event, Level, Metadata, Subscriber};
 
-    fn told(select: Select<'_>, payloads: Payloads<'_>) -> Vec<String> {
+    fn warnings(select: Select<'_>, payloads: Payloads<'_>) -> Vec<String> {
         let imu = Topic::<Imu>::new("sensor/base/imu");
         let encoder = Topic::<JointState>::new("sensor/arm/encoder");
         let tilt = Topic::<Orientation>::new("estimator/base/tilt");
@@ -160,18 +160,18 @@ mod tests {
     #[test]
     fn what_matches_is_not_mentioned() {
         for select in [Select::All, Select::Path("sensor/base/imu"), Select::Below("sensor/base")] {
-            assert_eq!(told(select, Payloads::from(["Imu"])), [""; 0]);
+            assert_eq!(warnings(select, Payloads::from(["Imu"])), [""; 0]);
         }
         for select in
             [Select::AnyOf(&[]), Select::Path("sensor/*/encoder"), Select::Below("*/base"), Select::Below("")]
         {
-            assert_eq!(told(select, Payloads::ALL), [""; 0]);
+            assert_eq!(warnings(select, Payloads::ALL), [""; 0]);
         }
     }
 
     #[test]
     fn a_pattern_names_the_nearest_pattern() {
-        let path = |path| told(Select::Path(path), Payloads::ALL);
+        let path = |path| warnings(Select::Path(path), Payloads::ALL);
         assert_eq!(
             path("sensor/*/encodr"),
             ["nothing publishes at `sensor/*/encodr`; did you mean `sensor/*/encoder`?"]
@@ -179,7 +179,7 @@ mod tests {
         assert_eq!(path("sensor/*"), ["nothing publishes at `sensor/*` itself, only below it"]);
         assert_eq!(path("*"), ["nothing publishes at `*` itself, only below it"]);
         assert_eq!(
-            told(Select::Below("senser/*"), Payloads::ALL),
+            warnings(Select::Below("senser/*"), Payloads::ALL),
             ["nothing publishes at or below `senser/*`; did you mean `sensor/*`?"]
         );
         for odd in ["sensor/**", "sensor/*/enc*"] {
@@ -187,13 +187,13 @@ mod tests {
                 "nothing publishes at `{odd}`: a `*` stands for one whole name between `/`; `Select::Below` selects all below a \
                  path"
             );
-            assert_eq!([told(Select::Below(odd), Payloads::ALL), path(odd)].concat(), [&*expected; 2]);
+            assert_eq!([warnings(Select::Below(odd), Payloads::ALL), path(odd)].concat(), [&*expected; 2]);
         }
     }
 
     #[test]
     fn a_path_or_a_subtree_names_the_nearest() {
-        let path = |path| told(Select::Path(path), Payloads::ALL);
+        let path = |path| warnings(Select::Path(path), Payloads::ALL);
         assert_eq!(
             path("sensor/base/imuu"),
             ["nothing publishes at `sensor/base/imuu`; did you mean `sensor/base/imu`?"]
@@ -202,7 +202,7 @@ mod tests {
         assert_eq!(path(""), ["nothing publishes at ``"]);
         assert_eq!(path("sensor/base"), ["nothing publishes at `sensor/base` itself, only below it"]);
 
-        let below = |path| told(Select::Below(path), Payloads::ALL);
+        let below = |path| warnings(Select::Below(path), Payloads::ALL);
         assert_eq!(below("sensro"), ["nothing publishes at or below `sensro`; did you mean `sensor`?"]);
         assert_eq!(
             below("sensor/bsae"),
@@ -211,11 +211,11 @@ mod tests {
     }
 
     #[test]
-    fn each_of_several_is_told_for_itself() {
+    fn each_of_several_has_its_own_warning() {
         let several =
             [Select::Path("sensor/base/imu"), Select::Path("sensor/base/imy"), Select::Below("estimater")];
         assert_eq!(
-            told(Select::AnyOf(&several), Payloads::from(["Imu", "Orientatoin"])),
+            warnings(Select::AnyOf(&several), Payloads::from(["Imu", "Orientatoin"])),
             [
                 "nothing publishes at `sensor/base/imy`; did you mean `sensor/base/imu`?",
                 "nothing publishes at or below `estimater`; did you mean `estimator`?",
@@ -227,15 +227,15 @@ mod tests {
     #[test]
     fn a_payload_names_the_nearest_of_those_that_are_selected() {
         assert_eq!(
-            told(Select::Below("sensor"), Payloads::from("imu")),
+            warnings(Select::Below("sensor"), Payloads::from("imu")),
             ["nothing that is selected publishes `imu`; did you mean `Imu`?"]
         );
         assert_eq!(
-            told(Select::Below("sensor"), Payloads::from("Orientation")),
+            warnings(Select::Below("sensor"), Payloads::from("Orientation")),
             ["nothing that is selected publishes `Orientation`"]
         );
         let typo = "nothing publishes at `imu`; did you mean `sensor/base/imu`?";
-        assert_eq!(told(Select::Path("imu"), Payloads::from("Imu")), [typo]);
+        assert_eq!(warnings(Select::Path("imu"), Payloads::from("Imu")), [typo]);
     }
 
     /// Counts warnings.

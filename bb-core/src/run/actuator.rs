@@ -13,7 +13,7 @@ use self::held::{Guarded, Held};
 pub use self::limits::ActuatorStatistics;
 use self::limits::Counts;
 use self::reports::publish_reports;
-use self::telling::Told;
+use self::telling::Change;
 use self::updating::Due;
 use super::occupied::Occupied;
 use super::source::Assembly;
@@ -64,7 +64,7 @@ struct State<A: Actuator> {
     alarm: Option<MonotonicTime>,
     /// Changes to report to the control state once the lock is released, on virtual time. Loggers, telemetry handlers and subscribers
     /// receive them on this thread and may disarm the robot, which takes the lock.
-    told: Vec<Told>,
+    pending: Vec<Change>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -121,7 +121,7 @@ impl<A: Actuator> ActuatorNode<A> {
                     may_move: false,
                     moved_by: Caller::PROGRAM,
                     alarm: None,
-                    told: Vec::new(),
+                    pending: Vec::new(),
                 },
             ),
         });
@@ -130,13 +130,13 @@ impl<A: Actuator> ActuatorNode<A> {
             inner.alone(|_| ());
         }
         // Weak, since the actuator owns the control state, which stores these callbacks.
-        let told = Arc::downgrade(&inner);
-        let target = BindTarget::Other(Box::new(move || Inner::tell(&told, Order::Options)));
+        let weak = Arc::downgrade(&inner);
+        let target = BindTarget::Other(Box::new(move || Inner::tell(&weak, Order::Options)));
         assembly.environment.bind(declaration.path, options, binding, target);
-        let told = Arc::downgrade(&inner);
-        assembly.control.look_after(declaration.path, declaration.supervisor, move |order| {
+        let weak = Arc::downgrade(&inner);
+        assembly.control.supervise(declaration.path, declaration.supervisor, move |order| {
             Inner::tell(
-                &told,
+                &weak,
                 match order {
                     ComponentOrder::Restart => Order::Restart,
                     ComponentOrder::GiveUp => Order::GiveUp,
@@ -180,10 +180,10 @@ impl<A: Actuator> Inner<A> {
         if let Some(topics) = self.control.topics().actuators.get(self.number) {
             publish_reports(topics, &self.context, &self.environment, &mut wakers);
         }
-        let told = std::mem::take(&mut state.told);
+        let pending = std::mem::take(&mut state.pending);
         drop(state);
         self.control.count_waker_panics(wakers.run());
-        told.into_iter().for_each(|told| self.tell_now(told));
+        pending.into_iter().for_each(|change| self.tell_now(change));
     }
 
     /// Called by the control state, which must not wait for the actuator's code.
@@ -280,7 +280,7 @@ impl<A: Actuator> Inner<A> {
         if let Err(failed) = caught(|| actuator.disarm()) {
             state.is_unsafe = true;
             let message = format!("it has failed and could not be made safe: {}", failed.fault);
-            self.tell_control(state, Told::Unsafe(message));
+            self.tell_control(state, Change::Unsafe(message));
         }
     }
 
@@ -288,7 +288,7 @@ impl<A: Actuator> Inner<A> {
         let message = failed.fault.to_string();
         self.context.set_failing(&message);
         self.counts.note_stopped(Some(message.clone()));
-        self.tell_control(state, Told::Failed { message: message.clone(), panicked: failed.panicked });
+        self.tell_control(state, Change::Failed { message: message.clone(), panicked: failed.panicked });
         self.make_safe(state);
         let restart = state.slot.fail(failed, now);
         self.end_motion(MotionEnd::Failed(message));

@@ -154,5 +154,5 @@ fn hand_over(journal: &Journal, deadline: Instant) -> Option<String> {
     let longest = HAND_OVER_WITHIN.min(deadline.saturating_duration_since(Instant::now()));
     let in_time = journal.hand_over(longest);
     let late = || "its sink did not take the last lines in time: it ends before the run".to_owned();
-    journal.look().or_else(|| (!in_time && !journal.has_ended()).then(late))
+    journal.check().or_else(|| (!in_time && !journal.has_ended()).then(late))
 }

@@ -291,14 +291,14 @@ impl Replayer {
             Event::Output { island, publisher, checksum } => self.compare(island, publisher, checksum)?,
             Event::Emission { publisher, is_first, message } => self.emit(publisher, is_first, time, message)?,
             Event::Report { estimator } => {
-                let is_told = control.replay_report(estimator)
+                let is_reported = control.replay_report(estimator)
                     || (self.is_virtual && control.is_stopping() && {
                         // On virtual time, the stop implies that estimators are retired, in order; this one failed in
                         // doing so.
                         self.retire();
                         control.replay_report(estimator)
                     });
-                if !is_told {
+                if !is_reported {
                     let declared = self.machine.robot.estimators.get(estimator);
                     let path = declared.map_or("?", |declared| declared.path);
                     let hint = declared.map_or_else(String::new, |declared| self.hint(declared.island));

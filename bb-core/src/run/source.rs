@@ -184,16 +184,16 @@ impl Assembly {
         let shared =
             SharedSource::new(declaration.path, declaration.period_nanos.is_some(), S::counters(&context).clone());
         let tell = {
-            let (told, control) = (shared.clone(), self.control.downgrade());
+            let (source, control) = (shared.clone(), self.control.downgrade());
             move |order| {
-                told.tell(order);
+                source.tell(order);
                 if let Some(control) = control.upgrade() {
                     control.note_order();
                 }
             }
         };
-        let told = tell.clone();
-        let target = BindTarget::Other(Box::new(move || told(Order::Options)));
+        let tell_of_options = tell.clone();
+        let target = BindTarget::Other(Box::new(move || tell_of_options(Order::Options)));
         self.environment.bind(declaration.path, options, binding, target);
         let mut slot = Slot::<S>::new(Recipe::new(options, binding), self.environment.supervision());
         let parameters = self.control.parameters();
@@ -204,7 +204,7 @@ impl Assembly {
         if made.is_err() {
             return None;
         }
-        self.control.look_after(declaration.path, declaration.supervisor, move |order| {
+        self.control.supervise(declaration.path, declaration.supervisor, move |order| {
             tell(match order {
                 ComponentOrder::Restart => Order::Restart,
                 ComponentOrder::GiveUp => Order::GiveUp,

@@ -14,7 +14,7 @@ const LONGEST_WAIT: Duration = Duration::from_millis(200);
 const WALL_PERIOD: Duration = Duration::from_secs(1);
 
 /// Period at which islands are checked.
-const LOOK_PERIOD: Duration = Duration::from_millis(100);
+const CHECK_PERIOD: Duration = Duration::from_millis(100);
 
 /// A callback that has not returned for this long hangs.
 const HANGS_AFTER: Duration = Duration::from_secs(1);
@@ -39,7 +39,7 @@ pub(super) fn keep_time(machine: &Machine) {
     let mut reported_actuators = vec![None; machine.robot.actuators.len()];
     let mut reported_commands = Vec::new();
     let mut wall_read = Instant::now();
-    let mut looked = Instant::now();
+    let mut checked = Instant::now();
     while !machine.has_ended.load(Ordering::Acquire) {
         let control = &machine.control;
         let now = clock.now();
@@ -55,13 +55,13 @@ pub(super) fn keep_time(machine: &Machine) {
             wall_read = Instant::now();
             clock.refresh_wall();
         }
-        if looked.elapsed() >= LOOK_PERIOD {
-            looked = Instant::now();
-            look(machine, &mut seen, now);
-            look_at_sources(machine, &mut reported, now);
-            look_at_actuators(machine, &mut reported_actuators, now);
-            look_at_commands(machine, &mut reported_commands, now);
-            look_at_queues(machine);
+        if checked.elapsed() >= CHECK_PERIOD {
+            checked = Instant::now();
+            check_islands(machine, &mut seen, now);
+            check_sources(machine, &mut reported, now);
+            check_actuators(machine, &mut reported_actuators, now);
+            check_commands(machine, &mut reported_commands, now);
+            check_queues(machine);
         }
         let relief = control.pool().relieve();
         let due = [
@@ -71,12 +71,12 @@ pub(super) fn keep_time(machine: &Machine) {
             control.next_limit(),
             relief.map(|relief| clock.now() + relief),
         ];
-        control.bell().wait_until(clock, due.into_iter().flatten().min(), LONGEST_WAIT.min(LOOK_PERIOD));
+        control.bell().wait_until(clock, due.into_iter().flatten().min(), LONGEST_WAIT.min(CHECK_PERIOD));
     }
 }
 
 /// Reports estimators that hang, each time once.
-fn look(machine: &Machine, seen: &mut [Seen], now: MonotonicTime) {
+fn check_islands(machine: &Machine, seen: &mut [Seen], now: MonotonicTime) {
     for (island, seen) in machine.islands().zip(seen) {
         let turn = island.busy().map(|(turn, _)| turn);
         if turn.is_none() || turn != seen.turn {
@@ -95,7 +95,7 @@ fn look(machine: &Machine, seen: &mut [Seen], now: MonotonicTime) {
 
 /// Reports sensors and services that hang, each time once. `reported`: for each source already reported, the time at which its code
 /// was entered.
-fn look_at_sources(machine: &Machine, reported: &mut [Option<MonotonicTime>], now: MonotonicTime) {
+fn check_sources(machine: &Machine, reported: &mut [Option<MonotonicTime>], now: MonotonicTime) {
     for (source, reported) in machine.shared_sources().iter().zip(reported) {
         let longest = if source.has_rate() { HANGS_AFTER } else { WAITS_TOO_LONG };
         report_hanging(machine, source.path(), source.entered_at(), longest, reported, now);
@@ -103,14 +103,14 @@ fn look_at_sources(machine: &Machine, reported: &mut [Option<MonotonicTime>], no
 }
 
 /// Reports actuators that hang, each time once.
-fn look_at_actuators(machine: &Machine, reported: &mut [Option<MonotonicTime>], now: MonotonicTime) {
+fn check_actuators(machine: &Machine, reported: &mut [Option<MonotonicTime>], now: MonotonicTime) {
     for (actuator, reported) in machine.actuators().into_iter().zip(reported) {
         report_hanging(machine, actuator.path(), actuator.entered_at(), HANGS_AFTER, reported, now);
     }
 }
 
 /// Reports commands that hang: the first hanging execution of each. `reported`: those already reported.
-fn look_at_commands(machine: &Machine, reported: &mut Vec<u64>, now: MonotonicTime) {
+fn check_commands(machine: &Machine, reported: &mut Vec<u64>, now: MonotonicTime) {
     let hanging = machine.control.hanging(now, WAITS_TOO_LONG);
     for Hanging { path, first, duration } in &hanging {
         if !reported.contains(first) {
@@ -121,11 +121,11 @@ fn look_at_commands(machine: &Machine, reported: &mut Vec<u64>, now: MonotonicTi
 }
 
 /// Reports that the pool has no threads left for some jobs, and that the journal has ended.
-fn look_at_queues(machine: &Machine) {
+fn check_queues(machine: &Machine) {
     while let Some(message) = machine.control.pool().report() {
         machine.fault("pool", message);
     }
-    if let Some(message) = machine.environment.journal().and_then(Journal::look) {
+    if let Some(message) = machine.environment.journal().and_then(Journal::check) {
         machine.fault("journal", message);
     }
 }

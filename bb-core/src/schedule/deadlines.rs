@@ -73,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_key_has_one_deadline_and_they_are_taken_in_order() {
+    fn a_key_has_one_deadline_and_they_pass_in_order() {
         let at = MonotonicTime::from_nanos;
         let deadlines = Deadlines::new(Bell::default());
         for nanos in (10..1000).rev() {

@@ -111,7 +111,7 @@ mod tests {
     use std::time::Duration;
 
     #[test]
-    fn whoever_was_let_in_is_waited_for_and_nobody_comes_in_later() {
+    fn threads_inside_are_waited_for_and_none_enters_later() {
         for _ in 0..200 {
             let (door, written) = (Door::new(true), AtomicUsize::new(0));
             let at_the_end = std::thread::scope(|scope| {

@@ -209,8 +209,8 @@ impl Pool {
                     drop(crew);
                     let was_long = threads::park(longest);
                     crew = self.0.lock();
-                    let was_told = crew.rise();
-                    if was_long && !was_told && crew.threads() > READY && !crew.may_take() {
+                    let was_notified = crew.rise();
+                    if was_long && !was_notified && crew.threads() > READY && !crew.may_take() {
                         return crew.leave();
                     }
                 }
@@ -325,8 +325,8 @@ mod tests {
 
     #[test]
     fn jobs_run_once_there_are_threads_again() {
-        let (can_start, told) = (Arc::new(AtomicBool::new(false)), mpsc::channel());
-        let (can, tell) = (Arc::clone(&can_start), std::sync::Mutex::new(told.0));
+        let (can_start, alarms) = (Arc::new(AtomicBool::new(false)), mpsc::channel());
+        let (can, tell) = (Arc::clone(&can_start), std::sync::Mutex::new(alarms.0));
         let spawn = move |name, run| match can.load(Ordering::SeqCst) {
             true => threads::spawn(name, run),
             false => Err(std::io::Error::other("too many")),
@@ -336,7 +336,7 @@ mod tests {
         pool.start();
         let (done, finished) = mpsc::channel();
         pool.submit(Lane::Robot, move || done.send(()).expect("the test waits"));
-        assert!(told.1.try_recv().is_ok(), "the thread that keeps time tries again");
+        assert!(alarms.1.try_recv().is_ok(), "the thread that keeps time tries again");
         let report = pool.report().expect("there is no thread");
         assert_eq!(report, "no thread can be started, and jobs wait: too many");
         assert_eq!(pool.report(), None, "it is said once");

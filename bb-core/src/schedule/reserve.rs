@@ -165,11 +165,11 @@ mod tests {
         assert_eq!(reserve.lock().threads, 3, "before any job");
         let (release, blocked) = mpsc::channel::<()>();
         let blocked = Arc::new(Mutex::new(blocked));
-        let (told, running) = mpsc::channel();
+        let (started, running) = mpsc::channel();
         for number in 0..5 {
-            let (told, blocked) = (told.clone(), Arc::clone(&blocked));
+            let (started, blocked) = (started.clone(), Arc::clone(&blocked));
             reserve.run(Box::new(move || {
-                told.send(number).expect("the test waits");
+                started.send(number).expect("the test waits");
                 drop(blocked.lock().map(|blocked| blocked.recv()));
                 assert!(number != 1, "a job that panics");
             }));

@@ -223,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn a_device_that_starts_again_or_stands_still_is_learnt_anew() {
+    fn a_device_that_restarts_or_pauses_is_learnt_again() {
         let mut clock = DeviceClock::new(1e6, 32);
         let mut read = |ticks: u64, ms: i64| clock.time_of(ticks, at(ms * 1_000_000)).as_nanos() / 1_000;
         assert_eq!(read(3_000_000, 100), 100_000);

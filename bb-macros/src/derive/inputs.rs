@@ -61,7 +61,7 @@ impl Field<'_> {
 }
 
 /// Returns the way in which a field takes its messages, and their payload.
-fn taken(field: &Type) -> Option<(Kind, &Type)> {
+fn kind_and_payload(field: &Type) -> Option<(Kind, &Type)> {
     let optional = || fields::wrapped(field, "Option").and_then(|inner| fields::wrapped(inner, "Input"));
     let required = fields::wrapped(field, "Input").map(|payload| (Kind::Required, payload));
     required
@@ -82,7 +82,7 @@ pub(crate) fn inputs(item: &DeriveInput, diagnostics: &mut Diagnostics) -> Token
     }
     let mut inputs = Vec::new();
     for (index, field) in named.iter().enumerate() {
-        let (Some(name), Some((kind, payload))) = (&field.ident, taken(&field.ty)) else {
+        let (Some(name), Some((kind, payload))) = (&field.ident, kind_and_payload(&field.ty)) else {
             let message = "expected `Input<'a, Payload>`, `Option<Input<'a, Payload>>` or `Every<'a, Payload>`";
             diagnostics.error(&field.ty, message.into());
             continue;

@@ -123,7 +123,7 @@ fn names_are_unique_among_their_kind() {
 }
 
 #[test]
-fn each_setting_stands_once() {
+fn each_setting_occurs_once() {
     let robot = with(
         "category other { concurrency: 1; concurrency: 2; }
          a: A(x = 1, x = 2) {
@@ -167,7 +167,7 @@ fn quantities() {
 }
 
 #[test]
-fn paths_that_commands_and_parameters_have_are_taken() {
+fn paths_of_commands_and_parameters_are_not_free() {
     let robot = |path| {
         format!(
             "robot R; parameters {{ imu {{ beta: f64 = 1; }} }} commands {{ go: Go; }}

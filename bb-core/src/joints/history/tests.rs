@@ -156,14 +156,14 @@ proptest! {
     /// A joint that keeps turning, reported within one turn: between two states it is at its true angle, whichever turn was
     /// reported.
     #[test]
-    fn turns_are_unwound(rate in -30.0..30.0_f64, start in -10.0..10.0_f64, told in 1..4_u32, is_measured: bool) {
+    fn turns_are_unwound(rate in -30.0..30.0_f64, start in -10.0..10.0_f64, wrapping in 1..4_u32, is_measured: bool) {
         // Without a velocity, only steps of less than half a turn can be resolved.
         let rate = if is_measured { rate * 10.0 } else { rate };
         let truth = |millis: f64| start + rate * millis * 1e-3;
         let mut history = History::new(JointKind::Continuous, 64, i64::MAX);
         for step in 0..20 {
             let angle = truth(f64::from(step) * 100.0);
-            let wrapped = match told {
+            let wrapped = match wrapping {
                 1 => angle.rem_euclid(TAU),
                 2 => angle - TAU * (angle / TAU).round(),
                 _ => angle,

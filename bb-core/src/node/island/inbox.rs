@@ -148,9 +148,9 @@ impl<M> Inbox<M> {
         (waiting.count() + 1 >= MOST_OPTIONS).then_some(last)
     }
 
-    pub(super) fn take(&mut self) -> Option<Taken<M>> {
+    pub(super) fn take(&mut self) -> Option<Dequeued<M>> {
         if let Some(now) = self.retires.take() {
-            return Some(Taken::Retire(now));
+            return Some(Dequeued::Retire(now));
         }
         let (now, entry) = self.entries.pop_front()?;
         match entry {
@@ -158,12 +158,12 @@ impl<M> Inbox<M> {
             Entry::Wake => self.wakes -= 1,
             Entry::Start | Entry::Node(..) => {}
         }
-        Some(Taken::Entry(now, entry))
+        Some(Dequeued::Entry(now, entry))
     }
 }
 
 /// An entry taken from an inbox.
-pub(super) enum Taken<M> {
+pub(super) enum Dequeued<M> {
     Entry(MonotonicTime, Entry<M>),
     Retire(MonotonicTime),
 }
@@ -176,13 +176,13 @@ mod tests {
         MonotonicTime::from_nanos(nanos)
     }
 
-    fn taken(inbox: &mut Inbox<char>) -> String {
-        let text = |taken: Taken<char>| match taken {
-            Taken::Entry(_, Entry::Message(message, _)) => message.to_string(),
-            Taken::Entry(time, Entry::Wake) => time.as_nanos().to_string(),
-            Taken::Entry(_, Entry::Start) => "S".to_owned(),
-            Taken::Entry(_, Entry::Node(number, entry)) => format!("[{number} {entry:?}]"),
-            Taken::Retire(_) => "R".to_owned(),
+    fn dequeued(inbox: &mut Inbox<char>) -> String {
+        let text = |entry: Dequeued<char>| match entry {
+            Dequeued::Entry(_, Entry::Message(message, _)) => message.to_string(),
+            Dequeued::Entry(time, Entry::Wake) => time.as_nanos().to_string(),
+            Dequeued::Entry(_, Entry::Start) => "S".to_owned(),
+            Dequeued::Entry(_, Entry::Node(number, entry)) => format!("[{number} {entry:?}]"),
+            Dequeued::Retire(_) => "R".to_owned(),
         };
         std::iter::from_fn(|| inbox.take()).map(text).collect()
     }
@@ -202,7 +202,7 @@ mod tests {
         assert_eq!(inbox.pop_message(), Some('a'), "one is dropped to make room");
         assert!(!inbox.has_room(0));
         inbox.retire(at(6));
-        assert_eq!(taken(&mut inbox), "RS1b[7 Restart]3c");
+        assert_eq!(dequeued(&mut inbox), "RS1b[7 Restart]3c");
         assert!(inbox.pending() == Pending::NOTHING && inbox.has_room(0));
     }
 

@@ -255,15 +255,15 @@ fn a_publisher_and_the_end() {
 
 /// A thread that checks whether the island is held, to report one that hangs, must not keep an entry in the inbox.
 #[test]
-fn a_publisher_what_is_due_and_a_look() {
-    let looks: Thread<4> = |island, wiring| {
-        if island.look().has_kept {
+fn a_publisher_what_is_due_and_a_check() {
+    let checks: Thread<4> = |island, wiring| {
+        if island.check().has_kept {
             island.drain(wiring);
         }
     };
     let due: Thread<4> = |island, wiring| post(island, wiring, |inbox| inbox.wake(NOW));
-    check::<4, 2>(3, [looks, due], |seen, _| assert_eq!(seen.wakes, 1));
-    check::<4, 3>(2, [publish_twice::<0, 4>, due, looks], |seen, dropped| {
+    check::<4, 2>(3, [checks, due], |seen, _| assert_eq!(seen.wakes, 1));
+    check::<4, 3>(2, [publish_twice::<0, 4>, due, checks], |seen, dropped| {
         all::<2, 4>(seen, dropped);
         assert_eq!(seen.wakes, 1);
     });

@@ -1,6 +1,6 @@
 //! Processing one entry of an island: its line in the journal, its turn, and what the turn has found.
 
-use super::inbox::{Entry, Taken};
+use super::inbox::{Dequeued, Entry};
 use super::{Island, IslandState, IslandWiring as _, Key, Keyed, RELAXED};
 use crate::fault::discard;
 use crate::journal::Event;
@@ -55,13 +55,13 @@ impl<S: IslandState> Island<S> {
     pub(super) fn process_next(&self, state: &mut S, wiring: &S::Wiring) -> bool {
         let environment = wiring.environment();
         let mut inbox = self.inbox();
-        let Some(taken) = inbox.take() else { return false };
+        let Some(dequeued) = inbox.take() else { return false };
         self.pending.store(inbox.pending().0, Ordering::Relaxed);
         self.hangs.store(false, Ordering::Relaxed);
         // The inbox's lock is held here, so the line of a message dropped at the same time comes after this one.
-        let (now, line) = match &taken {
-            Taken::Retire(now) => (*now, Event::Retire { island: S::DECLARATION.number }),
-            Taken::Entry(now, entry) => (*now, line_of::<S>(entry)),
+        let (now, line) = match &dequeued {
+            Dequeued::Retire(now) => (*now, Event::Retire { island: S::DECLARATION.number }),
+            Dequeued::Entry(now, entry) => (*now, line_of::<S>(entry)),
         };
         let line = environment.journal().map(|journal| {
             let offset = environment.clock().wall_offset_nanos();
@@ -69,17 +69,17 @@ impl<S: IslandState> Island<S> {
         });
         drop(inbox);
         self.tell_waiting();
-        let retires = matches!(taken, Taken::Retire(_));
-        self.process_line(wiring, now, line, |turn| match taken {
-            Taken::Retire(_) => for_all(state, wiring, turn, || NodeEntry::Retire),
-            Taken::Entry(_, Entry::Message(Keyed { message, .. }, _)) => {
+        let retires = matches!(dequeued, Dequeued::Retire(_));
+        self.process_line(wiring, now, line, |turn| match dequeued {
+            Dequeued::Retire(_) => for_all(state, wiring, turn, || NodeEntry::Retire),
+            Dequeued::Entry(_, Entry::Message(Keyed { message, .. }, _)) => {
                 state.deliver(wiring, &message, turn);
                 // Its publisher is done with it, and those who got it are too: a panic in its `Drop` is nobody's.
                 discard(message);
             }
-            Taken::Entry(_, Entry::Wake) => state.wake(wiring, turn),
-            Taken::Entry(_, Entry::Start) => for_all(state, wiring, turn, || NodeEntry::Start),
-            Taken::Entry(_, Entry::Node(estimator, entry)) => state.handle(wiring, estimator, entry, turn),
+            Dequeued::Entry(_, Entry::Wake) => state.wake(wiring, turn),
+            Dequeued::Entry(_, Entry::Start) => for_all(state, wiring, turn, || NodeEntry::Start),
+            Dequeued::Entry(_, Entry::Node(estimator, entry)) => state.handle(wiring, estimator, entry, turn),
         });
         if retires {
             // Count and journal the remaining entries before the last report.

@@ -28,7 +28,7 @@ pub(super) struct Paths<M> {
     /// The newest message of each path that waits for its time.
     held: Sorted<(MonotonicTime, &'static str), Entry<M>>,
     /// Number of messages that have left the queue at its front.
-    taken: u64,
+    popped: u64,
     /// Number of paths at which those that no longer matter are forgotten.
     clean_at: usize,
     /// The time of the alarm that is set.
@@ -41,14 +41,14 @@ pub(super) struct Paths<M> {
 struct Path {
     /// Time from which on the next message is delivered.
     next: MonotonicTime,
-    /// The number of its last message in the queue, if that is not among those taken.
+    /// The number of its last message in the queue, if that is not among those popped.
     last: u64,
 }
 
 impl<M> Default for Paths<M> {
     fn default() -> Self {
         let (known, held) = (Sorted::default(), Sorted::default());
-        Self { known, held, taken: 0, clean_at: 64, alarm: None, is_over: false }
+        Self { known, held, popped: 0, clean_at: 64, alarm: None, is_over: false }
     }
 }
 
@@ -147,7 +147,7 @@ impl<M> Queue<M> {
     ) {
         let next = time + by.period;
         let last = state.paths.known.get(path).map(|path| path.last);
-        let waiting = last.filter(|_| by.is_latest).and_then(|last| last.checked_sub(state.paths.taken));
+        let waiting = last.filter(|_| by.is_latest).and_then(|last| last.checked_sub(state.paths.popped));
         let index = waiting.and_then(|index| usize::try_from(index).ok());
         if let Some(before) = index.and_then(|index| state.messages.get_mut(index)) {
             state.bytes = state.bytes - before.bytes + entry.bytes;
@@ -162,7 +162,7 @@ impl<M> Queue<M> {
             dropped.messages.extend(state.pop());
             (dropped.lost, state.lagged) = (dropped.lost + 1, state.lagged + 1);
         }
-        let last = state.paths.taken + state.messages.len() as u64;
+        let last = state.paths.popped + state.messages.len() as u64;
         state.bytes += entry.bytes;
         state.messages.push_back(entry);
         state.paths.remember(path, Path { next, last }, time);
@@ -175,15 +175,15 @@ const START: MonotonicTime = MonotonicTime::from_nanos(i64::MIN);
 impl<M> Paths<M> {
     /// Counts a message that has left at the front.
     pub(super) fn take(&mut self) {
-        self.taken += 1;
+        self.popped += 1;
     }
 
     /// Stores what is known of a path at that time.
     fn remember(&mut self, name: &'static str, path: Path, now: MonotonicTime) {
         if self.known.len() >= self.clean_at {
-            let taken = self.taken;
+            let popped = self.popped;
             let known = take(&mut self.known).into_entries();
-            for (name, path) in known.filter(|(_, path)| path.last >= taken || path.next > now) {
+            for (name, path) in known.filter(|(_, path)| path.last >= popped || path.next > now) {
                 self.known.insert(name, path);
             }
             self.clean_at = (2 * self.known.len()).max(64);

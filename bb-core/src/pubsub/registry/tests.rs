@@ -70,7 +70,7 @@ fn paths_of_others_and_odd_ones_are_refused() {
 }
 
 #[test]
-fn two_types_of_one_name_are_told_apart() {
+fn two_types_of_one_name_are_distinguished() {
     mod elsewhere {
         #[derive(Clone, Debug, crate::message::Payload)]
         pub(super) struct JointState;
@@ -99,7 +99,7 @@ fn topics_nobody_uses_make_room_and_used_ones_do_not() {
     let all = listen(&registry, Select::All);
     let kept = registry.topic::<JointState>("kept").expect("it is free");
     let path = |number: usize| format!("scratch/{number}");
-    let heard = registry.topic::<JointState>("heard").expect("it is free").subscribe(Overflow::default());
+    let subscription = registry.topic::<JointState>("heard").expect("it is free").subscribe(Overflow::default());
     for number in 0..2 * Registry::MAX_TOPICS {
         let topic = registry.topic(&path(number)).expect("an older one makes room");
         topic.publish(&state(0.0));
@@ -109,7 +109,7 @@ fn topics_nobody_uses_make_room_and_used_ones_do_not() {
     // The same topics as before, for their publishers and typed subscribers.
     registry.topic("kept").expect("it is there").publish(&state(1.0));
     registry.topic("heard").expect("it is there").publish(&state(1.0));
-    assert_eq!((kept.statistics().published, heard.drain().count()), (1, 1));
+    assert_eq!((kept.statistics().published, subscription.drain().count()), (1, 1));
     // A topic that was removed is received again when it is created again.
     registry.topic(&path(0)).expect("an older one makes room").publish(&state(1.0));
     assert_eq!(all.drain().count(), 3);
@@ -126,7 +126,7 @@ fn rows(registry: &Registry) -> Vec<(&'static str, &'static str, u64)> {
 }
 
 #[test]
-fn changes_are_told_in_order_and_a_replay_that_is_told_of_them_counts_the_same() {
+fn changes_are_reported_in_order_and_a_replay_of_them_counts_the_same() {
     let (registry, replayed) = (registry(), registry());
     let mut changes = Vec::new();
     let mut make = |path: &str| {

@@ -53,7 +53,7 @@ fn check(subscription: &DynamicSubscription, from_the_start: bool) -> usize {
 }
 
 #[test]
-fn whoever_subscribes_at_any_time_receives_every_later_message_once() {
+fn a_subscriber_receives_every_later_message_once_from_any_time_on() {
     let registry = Registry::new(["sensor/base/imu"]);
     let early = subscribe(&registry);
     let is_over = AtomicBool::new(false);

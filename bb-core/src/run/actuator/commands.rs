@@ -1,7 +1,7 @@
 //! Carries out commands, within the limits of the joint.
 
 use super::limits::NotLimited;
-use super::telling::Told;
+use super::telling::Change;
 use super::{Inner, State};
 use crate::component::{Accepts, AcceptsJson, Actuator, ActuatorError, Caller};
 use crate::event::Safety;
@@ -111,7 +111,7 @@ impl<A: Actuator> Inner<A> {
         });
         if let Err(fault) = published {
             // The actuator has moved: neither it nor the sender fails.
-            self.tell_control(state, Told::MessageFailed(format!("its message {fault}")));
+            self.tell_control(state, Change::MessageFailed(format!("its message {fault}")));
         }
         Ok(message.payload)
     }
@@ -135,7 +135,7 @@ impl<A: Actuator> Inner<A> {
             ))),
             Err(failed) => {
                 let message = failed.fault.to_string();
-                self.tell_control(state, Told::MessageFailed(format!("the conversion of its command {message}")));
+                self.tell_control(state, Change::MessageFailed(format!("the conversion of its command {message}")));
                 Err(ActuatorError::NotConverted(message))
             }
         }
@@ -173,7 +173,7 @@ impl<A: Actuator> Inner<A> {
             }
             Err(NotLimited::Failed(fault)) => {
                 let message = fault.to_string();
-                self.tell_control(state, Told::MessageFailed(format!("the limit of its command {message}")));
+                self.tell_control(state, Change::MessageFailed(format!("the limit of its command {message}")));
                 Err(ActuatorError::NotLimited(message))
             }
         }

@@ -8,7 +8,7 @@ use crate::node::Mode;
 use crate::schedule::Lane;
 
 /// Changes to report to the control state.
-pub(super) enum Told {
+pub(super) enum Change {
     Failed {
         message: String,
         panicked: bool,
@@ -23,29 +23,29 @@ impl<A: Actuator> Inner<A> {
     pub(super) fn log(&self, state: &mut State<A>, write: impl FnOnce() + Send + 'static) {
         match self.environment.mode() {
             Mode::Real => self.environment.pool().submit(Lane::User, write),
-            Mode::Virtual | Mode::Replay => state.told.push(Told::Log(Box::new(write))),
+            Mode::Virtual | Mode::Replay => state.pending.push(Change::Log(Box::new(write))),
         }
     }
 
-    pub(super) fn tell_control(&self, state: &mut State<A>, told: Told) {
+    pub(super) fn tell_control(&self, state: &mut State<A>, change: Change) {
         match self.environment.mode() {
-            Mode::Real => self.tell_now(told),
-            Mode::Virtual | Mode::Replay => state.told.push(told),
+            Mode::Real => self.tell_now(change),
+            Mode::Virtual | Mode::Replay => state.pending.push(change),
         }
     }
 
-    pub(super) fn tell_now(&self, told: Told) {
+    pub(super) fn tell_now(&self, change: Change) {
         let ActuatorDeclaration { path, supervisor, .. } = *self.declaration;
-        match told {
-            Told::Failed { message, panicked } => {
+        match change {
+            Change::Failed { message, panicked } => {
                 self.control.component_failed(path, supervisor, message, panicked)
             }
-            Told::Unsafe(message) => {
+            Change::Unsafe(message) => {
                 let error = HardwareError::new(HardwareErrorKind::NotMadeSafe, message);
                 self.control.note_hardware_error(path, error);
             }
-            Told::MessageFailed(message) => self.control.note_fault(path, message),
-            Told::Log(write) => write(),
+            Change::MessageFailed(message) => self.control.note_fault(path, message),
+            Change::Log(write) => write(),
         }
     }
 }

@@ -30,8 +30,8 @@ pub(super) struct Crew {
     starting: usize,
     /// Idle threads, the most recently active last. That one takes the next job, so those at the front can end.
     idle: Vec<Thread>,
-    /// Time at which a thread last took a job. While jobs are being taken, the others wait because the machine is busy.
-    taken: Option<Instant>,
+    /// Time at which a thread last started a job. While jobs are being started, the others wait because the machine is busy.
+    last_job: Option<Instant>,
     /// The last attempt to start a thread failed.
     without_thread: Option<WithoutThread>,
     is_closed: bool,
@@ -157,7 +157,7 @@ impl Crew {
         if let Some(WithoutThread { tried, .. }) = &self.without_thread {
             return Some(RETRY.saturating_sub(now.saturating_duration_since(*tried)));
         }
-        let since = self.taken.map_or(since, |taken| taken.max(since));
+        let since = self.last_job.map_or(since, |at| at.max(since));
         Some(PATIENCE.saturating_sub(now.saturating_duration_since(since)))
     }
 
@@ -213,7 +213,7 @@ impl Crew {
         match queue.waiting.pop_front() {
             Some((_, job)) => {
                 queue.running += 1;
-                self.taken = Some(now);
+                self.last_job = Some(now);
                 Next::Job(lane, job)
             }
             None => Next::Idle,
@@ -269,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn a_thread_is_started_when_none_has_taken_a_job_and_not_because_jobs_wait() {
+    fn a_thread_is_started_when_none_has_begun_a_job_and_not_because_jobs_wait() {
         let start = Instant::now();
         let at = |millis| start + Duration::from_millis(millis);
         let mut crew = busy(start);
@@ -294,17 +294,17 @@ mod tests {
         let start = Instant::now();
         let mut crew = Crew::default();
         crew.add(Lane::User, Box::new(|| {}), start);
-        let mut taken = Vec::new();
+        let mut begun = Vec::new();
         for millis in 0..100 {
             let now = start + Duration::from_millis(millis);
             (0..2).for_each(|_| crew.add(Lane::Robot, Box::new(|| {}), now));
             match crew.next(now) {
                 Next::Job(Lane::Robot, _) => {}
-                Next::Job(lane, _) => taken.push((millis, lane)),
+                Next::Job(lane, _) => begun.push((millis, lane)),
                 Next::Idle | Next::End => panic!("jobs wait"),
             }
         }
-        assert_eq!(taken, [(50, Lane::User)]);
+        assert_eq!(begun, [(50, Lane::User)]);
         // Even an overdue job does not overtake those that make the robot safe.
         let now = start + Duration::from_secs(1);
         crew.add(Lane::Safety, Box::new(|| {}), now);
@@ -312,7 +312,7 @@ mod tests {
     }
 
     #[test]
-    fn when_there_is_no_thread_to_be_had_that_is_told_once_and_tried_again() {
+    fn a_thread_that_cannot_be_started_is_reported_once_and_tried_again() {
         let start = Instant::now();
         let at = |millis| start + Duration::from_millis(millis);
         let mut crew = busy(start);
@@ -340,10 +340,10 @@ mod tests {
         for lane in Lane::ALL.into_iter().rev() {
             crew.add(lane, Box::new(|| {}), now);
         }
-        let taken = std::iter::from_fn(|| match crew.next(now) {
+        let begun = std::iter::from_fn(|| match crew.next(now) {
             Next::Job(lane, _) => Some(lane),
             Next::Idle | Next::End => None,
         });
-        assert_eq!(taken.collect::<Vec<_>>(), Lane::ALL);
+        assert_eq!(begun.collect::<Vec<_>>(), Lane::ALL);
     }
 }

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 /// State that the threads share.
 #[derive(Default)]
-struct Told {
+struct Shared {
     /// A job waits.
     is_rung: bool,
     /// Jobs that have run.
@@ -24,36 +24,36 @@ struct Told {
 #[derive(Clone)]
 struct Model {
     pool: Pool,
-    told: Arc<(Mutex<Told>, Condvar)>,
+    shared: Arc<(Mutex<Shared>, Condvar)>,
 }
 
 impl Model {
     /// The first `failing` attempts to start a thread fail.
     fn new(failing: usize) -> Self {
-        let told: Arc<(Mutex<Told>, Condvar)> = Arc::new((Mutex::new(Told::default()), Condvar::new()));
-        let rung = Arc::clone(&told);
-        let alarm = move || tell(&rung, |told| told.is_rung = true);
+        let shared: Arc<(Mutex<Shared>, Condvar)> = Arc::new((Mutex::new(Shared::default()), Condvar::new()));
+        let rung = Arc::clone(&shared);
+        let alarm = move || tell(&rung, |shared| shared.is_rung = true);
         let left = std::sync::atomic::AtomicUsize::new(failing);
         let spawn = move |name: String, run: Run| {
             use std::sync::atomic::Ordering::Relaxed;
             let fails = left.fetch_update(Relaxed, Relaxed, |left| left.checked_sub(1)).is_ok();
             if fails { Err(std::io::Error::other("too many")) } else { spawn(name, run) }
         };
-        Self { pool: Pool::with(Duration::ZERO, alarm, spawn), told }
+        Self { pool: Pool::with(Duration::ZERO, alarm, spawn), shared }
     }
 
     fn quick(&self, lane: Lane) {
-        let told = Arc::clone(&self.told);
-        self.pool.submit(lane, move || tell(&told, |told| told.done += 1));
+        let shared = Arc::clone(&self.shared);
+        self.pool.submit(lane, move || tell(&shared, |shared| shared.done += 1));
     }
 
     /// A job that hangs until the end.
     fn hanging(&self, lane: Lane) {
-        let told = Arc::clone(&self.told);
+        let shared = Arc::clone(&self.shared);
         self.pool.submit(lane, move || {
-            let mut state = told.0.lock().expect("nobody panicked");
+            let mut state = shared.0.lock().expect("nobody panicked");
             while !state.is_released {
-                state = told.1.wait(state).expect("nobody panicked");
+                state = shared.1.wait(state).expect("nobody panicked");
             }
         });
     }
@@ -65,32 +65,32 @@ impl Model {
         let late = Instant::now() + Duration::from_secs(3600);
         loop {
             let waits = self.pool.relieve_at(late).is_some();
-            let mut told = self.told.0.lock().expect("nobody panicked");
-            if told.done >= done {
+            let mut shared = self.shared.0.lock().expect("nobody panicked");
+            if shared.done >= done {
                 return;
             }
             if waits {
-                drop(told);
+                drop(shared);
                 thread::yield_now();
                 continue;
             }
-            while !told.is_rung && told.done < done {
-                told = self.told.1.wait(told).expect("nobody panicked");
+            while !shared.is_rung && shared.done < done {
+                shared = self.shared.1.wait(shared).expect("nobody panicked");
             }
-            told.is_rung = false;
+            shared.is_rung = false;
         }
     }
 
     /// All threads end.
     fn end(&self) {
-        tell(&self.told, |told| told.is_released = true);
+        tell(&self.shared, |shared| shared.is_released = true);
         self.pool.close();
     }
 }
 
-fn tell(told: &(Mutex<Told>, Condvar), tell: impl FnOnce(&mut Told)) {
-    tell(&mut told.0.lock().expect("nobody panicked"));
-    told.1.notify_all();
+fn tell(shared: &(Mutex<Shared>, Condvar), tell: impl FnOnce(&mut Shared)) {
+    tell(&mut shared.0.lock().expect("nobody panicked"));
+    shared.1.notify_all();
 }
 
 /// Runs `run` in all orders with at most this many preemptions, where the first `failing` attempts to start a thread
@@ -174,12 +174,12 @@ fn jobs_around_the_end_while_a_thread_hangs() {
         let submits = thread::spawn(move || other.quick(Lane::User));
         model.pool.close();
         submits.join().expect("it does not panic");
-        let mut told = model.told.0.lock().expect("nobody panicked");
-        while told.done < 1 {
-            told = model.told.1.wait(told).expect("nobody panicked");
+        let mut shared = model.shared.0.lock().expect("nobody panicked");
+        while shared.done < 1 {
+            shared = model.shared.1.wait(shared).expect("nobody panicked");
         }
-        told.is_released = true;
-        drop(told);
-        model.told.1.notify_all();
+        shared.is_released = true;
+        drop(shared);
+        model.shared.1.notify_all();
     });
 }

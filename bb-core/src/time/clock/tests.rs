@@ -79,7 +79,7 @@ fn a_thread_that_waits_until_a_deadline_finds_that_it_has_come() {
 }
 
 #[test]
-fn virtual_time_moves_only_forward_and_only_when_told() {
+fn virtual_time_moves_only_forward_and_only_on_request() {
     let clock = Clock::virtual_at(MonotonicTime::from_nanos(5));
     let reader = clock.clone();
     clock.advance_to(MonotonicTime::from_nanos(9));
