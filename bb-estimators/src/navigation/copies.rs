@@ -177,6 +177,7 @@ impl<S: States, const N: usize> Copies<S, N> {
         self.starts = starts;
         self.search = Search::new(self.ways.noise);
         self.newcomer = None;
+        self.scatter = Scatter::default();
         self.elsewhere = None;
         self.started_ns = start.time_ns;
         Ok(())
@@ -411,7 +412,9 @@ impl<S: States, const N: usize> Copies<S, N> {
     ///
     /// The same as [`Eskf::move_world`].
     pub fn move_world(&mut self, new_from_old: &Isometry3<f64>) -> Result<(), Refusal> {
-        self.each(|filter| filter.move_world(new_from_old))
+        self.each(|filter| filter.move_world(new_from_old))?;
+        self.scatter.interrupt();
+        Ok(())
     }
 }
 

@@ -177,7 +177,7 @@ impl Stream {
     }
 
     /// Resets the count of successive rejections, because the filter was relocated.
-    #[cfg(any(feature = "runtime", feature = "smoother", feature = "eskf"))]
+    #[cfg(any(feature = "std", feature = "smoother", feature = "eskf"))]
     pub(crate) fn forgive(&mut self) {
         self.counts.gate_in_a_row = 0;
         self.recovered = [0.0; 3];

@@ -294,6 +294,39 @@ fn positions_on_another_part_of_the_earth_do_not_move_the_filter() {
     assert!(copies.elsewhere().is_some_and(|distance| distance > 2e5));
 }
 
+/// Fixes in two worlds are not compared with each other: their distance is no noise.
+#[test]
+fn another_world_is_no_scatter_of_fixes() {
+    let noise_after = |change: fn(&mut Fixed, &Car, &Vector3<f64>)| {
+        let mut car = Car::new(7, QUIET, 0.0);
+        let mut copies: Fixed = copies(QUIET, 0.0, false);
+        copies.start(&car.start(0.3)).unwrap();
+        let (mut gnss, mut world, mut noise) = (stream(), Vector3::zeros(), 0.0_f64);
+        for step in 1..=40 * 50 {
+            copies.propagate(&car.drive()).unwrap();
+            if step == 35 * 50 {
+                world = Vector3::new(5000.0, 0.0, 0.0);
+                change(&mut copies, &car, &world);
+            }
+            if step % 50 == 0 {
+                let fix = car.fix();
+                let fix = GnssPosition { position: fix.position + world, ..fix };
+                if step >= 35 * 50 {
+                    noise = noise.max({ copies.scatter }.fix(&fix).covariance[(0, 0)].sqrt());
+                }
+                copies.update_fix(&mut gnss, &fix).unwrap();
+            }
+        }
+        noise
+    };
+    let moved = noise_after(|copies, _, world| copies.move_world(&(*world).into()).unwrap());
+    let restarted = noise_after(|copies, car, world| {
+        let start = car.start(0.3);
+        copies.start(&Start { position: start.position + world, ..start }).unwrap();
+    });
+    assert!(moved < 2.0 * FIX_M && restarted < 2.0 * FIX_M, "{moved} m, {restarted} m");
+}
+
 /// A refused measurement changes nothing but the counts and a newcomer.
 #[test]
 fn what_is_refused_changes_no_copy() {
