@@ -47,7 +47,7 @@ fn the_filters_and_when_to_take_them() {
     for filter in filters() {
         let _ = writeln!(table, "| `{}` | {} | {} |", filter.estimator(), filter.about().when, filter.about().idea);
     }
-    hold("docs/attitude.md", "filters", &table);
+    hold("book/src/how-to/attitude.md", "filters", &table);
 }
 
 #[test]
@@ -86,7 +86,7 @@ fn what_filters_know() {
             table += if tells(filter) { " yes |" } else { " |" };
         }
     }
-    hold("docs/attitude.md", "knowledge", &(table + "\n"));
+    hold("book/src/how-to/attitude.md", "knowledge", &(table + "\n"));
 }
 
 #[test]
@@ -110,7 +110,7 @@ fn what_filters_reach() -> Result<(), Box<dyn Error>> {
             };
         }
     }
-    hold("docs/attitude.md", "accuracy", &table);
+    hold("book/src/how-to/attitude.md", "accuracy", &table);
     Ok(())
 }
 
@@ -156,7 +156,7 @@ fn what_filters_reach_on_families() -> Result<(), Box<dyn Error>> {
         }
         table += " |\n";
     }
-    hold("docs/attitude.md", "families", &table);
+    hold("book/src/how-to/attitude.md", "families", &table);
     Ok(())
 }
 
@@ -180,7 +180,7 @@ fn the_parameters() {
     for (title, params) in other {
         section(&mut text, title, params);
     }
-    hold("docs/parameters.md", "parameters", &text);
+    hold("book/src/reference/parameters.md", "parameters", &text);
 }
 
 fn section(text: &mut String, title: &str, params: &dyn Params) {

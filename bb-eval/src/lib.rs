@@ -4,7 +4,7 @@
 //! which define the errors. With the feature `recordings`, `evaluate` runs attitude filters on a
 //! `Recording`, and `play_navigation` navigation filters, each declared in a robot, on a `Drive`, of CSV files or of a
 //! `NavigationBag`; with `plot`, `plot_errors` and `plot_navigation` draw the errors. `bb eval` is this library on the command line; its
-//! guide is `docs/evaluate.md`.
+//! guide is `book/src/how-to/evaluate.md`.
 
 // A robot must not stop because of an unexpected value.
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]

@@ -1,9 +1,11 @@
 //! Paths and names in the documents: all of them exist.
 
 use super::{CRATES, read, root};
+use std::collections::BTreeSet;
+use std::path::{Component, Path, PathBuf};
 
 #[test]
-fn every_path_in_the_documents_exists() {
+fn paths_in_the_documents_exist() {
     for document in ["ARCHITECTURE.md", "CONTRIBUTING.md", "README.md"] {
         let text = read(document);
         let quoted = text.split('`').skip(1).step_by(2);
@@ -19,6 +21,111 @@ fn every_path_in_the_documents_exists() {
         for path in paths {
             assert!(root().join(path).exists(), "{document} names {path}, which is not there");
         }
+    }
+}
+
+/// The pages of the book by path, without the table of contents.
+fn pages() -> Vec<PathBuf> {
+    let (mut folders, mut pages) = (vec![root().join("book/src")], Vec::new());
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(&folder).expect("it is a folder").flatten() {
+            let path = entry.path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|end| end == "md") && !path.ends_with("SUMMARY.md") {
+                pages.push(path);
+            }
+        }
+    }
+    pages.sort();
+    pages
+}
+
+/// The lines outside of blocks of code.
+fn prose(text: &str) -> impl Iterator<Item = &str> {
+    let mut is_code = false;
+    text.lines().filter(move |line| {
+        let is_fence = line.starts_with("```");
+        is_code ^= is_fence;
+        !is_code && !is_fence
+    })
+}
+
+/// The targets of a document's links to other files and places, `path#anchor`, either part of which may be empty.
+fn links(text: &str) -> Vec<&str> {
+    prose(text)
+        .flat_map(|line| line.split("](").skip(1))
+        .filter_map(|rest| rest.split(')').next())
+        .filter(|target| !target.contains(':'))
+        .collect()
+}
+
+/// The anchors that mdBook and GitHub give to a document's headings.
+fn anchors(text: &str) -> BTreeSet<String> {
+    let mut anchors = BTreeSet::new();
+    for title in prose(text).filter(|line| line.starts_with('#')).map(|line| line.trim_start_matches('#').trim()) {
+        let kept = title.chars().filter(|letter| letter.is_alphanumeric() || " -_".contains(*letter));
+        let anchor: String = kept.collect::<String>().to_lowercase().replace(' ', "-");
+        let again = (1..).map(|count| format!("{anchor}-{count}"));
+        let free = std::iter::once(anchor.clone()).chain(again).find(|anchor| !anchors.contains(anchor));
+        anchors.extend(free);
+    }
+    anchors
+}
+
+/// A path without `..`, so that two of one file are equal.
+fn plain(path: &Path) -> PathBuf {
+    path.components().fold(PathBuf::new(), |mut plain, part| {
+        if part == Component::ParentDir && plain.file_name().is_some() {
+            plain.pop();
+        } else {
+            plain.push(part);
+        }
+        plain
+    })
+}
+
+#[test]
+fn summary_names_each_page_of_the_book_once() {
+    let summary = read("book/src/SUMMARY.md");
+    let mut named: Vec<PathBuf> = links(&summary).iter().map(|link| root().join("book/src").join(link)).collect();
+    named.sort();
+    assert_eq!(named, pages());
+}
+
+#[test]
+fn every_link_leads_to_a_place() {
+    let documents = ["ARCHITECTURE.md", "CONTRIBUTING.md", "README.md"].map(|document| root().join(document));
+    let mut checked = 0;
+    for document in pages().into_iter().chain(documents) {
+        let text = std::fs::read_to_string(&document).expect("it is there");
+        for link in links(&text) {
+            let (path, anchor) = link.split_once('#').unwrap_or((link, ""));
+            let folder = document.parent().expect("it is in a folder");
+            let target = if path.is_empty() { document.clone() } else { plain(&folder.join(path)) };
+            let name = document.display();
+            let there = std::fs::read(&target).unwrap_or_else(|error| panic!("{name} links to {link}: {error}"));
+            assert!(
+                anchor.is_empty() || anchors(&String::from_utf8_lossy(&there)).contains(anchor),
+                "{name} links to {link}, where no heading is called so"
+            );
+            checked += 1;
+        }
+    }
+    assert!(checked > 100, "{checked}");
+}
+
+#[test]
+fn code_of_the_book_is_compiled() {
+    let compiled = read("tests/src/lib.rs");
+    for page in pages() {
+        let text = std::fs::read_to_string(&page).expect("it is there");
+        let is_code = |line: &str| line.starts_with("```rust") && !line.contains("ignore");
+        let name = plain(&page).strip_prefix(plain(&root())).expect("it is in the project").display().to_string();
+        assert!(
+            !text.lines().any(is_code) || compiled.contains(&format!("\"{name}\"")),
+            "tests/src/lib.rs does not name {name}"
+        );
     }
 }
 

@@ -1,4 +1,4 @@
-//! The serial driver of `docs/drivers.md`, on a pseudo-terminal.
+//! The serial driver of `book/src/how-to/drivers.md`, on a pseudo-terminal.
 #![cfg(unix)]
 #![allow(unreachable_pub, reason = "as the guide has it")]
 
@@ -111,10 +111,10 @@ fn a_serial_device_is_unplugged_and_comes_back() {
 
 #[test]
 fn the_guide_shows_this_driver() {
-    let guide = include_str!("../../docs/drivers.md");
+    let guide = include_str!("../../book/src/how-to/drivers.md");
     let file = include_str!("drivers.rs");
     let start =
         guide.find("#[derive(Clone, Debug, Options)]\npub struct AccelerometerOptions").expect("the driver");
     let end = guide[start..].find("fn main()").expect("it ends") + start;
-    assert!(file.contains(&guide[start..end]), "tests/behaviour/drivers.rs and docs/drivers.md differ");
+    assert!(file.contains(&guide[start..end]), "tests/behaviour/drivers.rs and book/src/how-to/drivers.md differ");
 }

@@ -3,70 +3,32 @@
 pub mod random;
 pub mod recordings;
 
-#[cfg(doctest)]
-#[doc = include_str!("../../README.md")]
-struct Readme;
+/// Documents whose code is compiled, and run unless it says `no_run`.
+macro_rules! compiled {
+    ($($name:ident: $path:literal,)*) => {$(
+        #[cfg(doctest)]
+        #[doc = include_str!(concat!("../../", $path))]
+        struct $name;
+    )*};
+}
 
-#[cfg(doctest)]
-#[doc = include_str!("../../docs/components.md")]
-struct Components;
-
-#[cfg(doctest)]
-#[doc = include_str!("../../docs/attitude.md")]
-struct Attitude;
-
-#[cfg(doctest)]
-#[doc = include_str!("../../docs/calibrate.md")]
-struct Calibrate;
-
-#[cfg(doctest)]
-#[doc = include_str!("../../docs/navigation.md")]
-struct Navigation;
-
-#[cfg(doctest)]
-#[doc = include_str!("../../docs/kinematics.md")]
-struct Kinematics;
-
-#[cfg(doctest)]
-#[doc = include_str!("../../docs/motion.md")]
-struct Motion;
-
-#[cfg(doctest)]
-#[doc = include_str!("../../docs/joints.md")]
-struct Joints;
-
-#[cfg(doctest)]
-#[doc = include_str!("../../docs/planar.md")]
-struct Planar;
-
-#[cfg(doctest)]
-#[doc = include_str!("../../docs/runtime.md")]
-struct Runtime;
-
-#[cfg(doctest)]
-#[doc = include_str!("../../docs/beam-bots.md")]
-struct BeamBots;
-
-#[cfg(doctest)]
-#[doc = include_str!("../../docs/recording.md")]
-struct Recording;
-
-#[cfg(doctest)]
-#[doc = include_str!("../../docs/settings.md")]
-struct Settings;
-
-#[cfg(doctest)]
-#[doc = include_str!("../../docs/mavlink.md")]
-struct Mavlink;
-
-#[cfg(doctest)]
-#[doc = include_str!("../../docs/drivers.md")]
-struct Drivers;
-
-#[cfg(doctest)]
-#[doc = include_str!("../../docs/programs.md")]
-struct Programs;
-
-#[cfg(doctest)]
-#[doc = include_str!("../../docs/coming-from.md")]
-struct ComingFrom;
+// A test of the architecture checks that each page of the book with code is here.
+compiled! {
+    Readme: "README.md",
+    Components: "book/src/how-to/components.md",
+    Attitude: "book/src/how-to/attitude.md",
+    Calibrate: "book/src/how-to/calibrate.md",
+    Navigation: "docs/navigation.md",
+    Kinematics: "book/src/how-to/kinematics.md",
+    Motion: "book/src/how-to/motion.md",
+    Joints: "book/src/how-to/joints.md",
+    Planar: "docs/planar.md",
+    Runtime: "book/src/how-to/runtime.md",
+    BeamBots: "book/src/coming-from/beam-bots.md",
+    Recording: "book/src/how-to/recording.md",
+    Settings: "book/src/how-to/settings.md",
+    Mavlink: "book/src/how-to/mavlink.md",
+    Drivers: "book/src/how-to/drivers.md",
+    Programs: "book/src/how-to/programs.md",
+    ComingFrom: "book/src/coming-from/ros2.md",
+}

@@ -13,7 +13,7 @@ fn robots() {
 #[test]
 fn errors_in_the_guide_are_pinned_here() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let guide = fs::read_to_string(folder.join("../../docs/components.md")).expect("it is there");
+    let guide = fs::read_to_string(folder.join("../../book/src/how-to/components.md")).expect("it is there");
     let rows: Vec<&str> = guide.lines().filter(|line| line.starts_with("| E0")).collect();
     assert!(rows.len() > 4, "{rows:#?}");
     let pinned = pinned(folder);

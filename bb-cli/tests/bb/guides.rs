@@ -202,14 +202,14 @@ fn check(guide: &str) {
 
 #[test]
 fn the_guide_to_the_command() {
-    check("docs/command.md");
+    check("book/src/how-to/command.md");
 }
 
 #[test]
 fn the_guide_to_calibration() {
-    check("docs/calibrate.md");
+    check("book/src/how-to/calibrate.md");
     // What the robot in it is given is what the command printed.
-    let text = std::fs::read_to_string(root().join("docs/calibrate.md")).expect("is there");
+    let text = std::fs::read_to_string(root().join("book/src/how-to/calibrate.md")).expect("is there");
     let options: Vec<&str> = text.lines().filter(|line| line.starts_with("                ")).collect();
     assert!(options.len() >= 2, "{options:?}");
     for option in options {
