@@ -184,11 +184,11 @@ pub fn complain(evaluations: &[Evaluation]) -> bool {
 
 /// The fraction of headings within two standard deviations; `None` if no filter reports them.
 fn within(runs: &[&Run], axes: Axes) -> Option<f64> {
-    let (told, within) = runs
+    let (known, within) = runs
         .iter()
         .map(|run| run.detail.heading_within)
         .fold((0, 0), |sum, share| (sum.0 + share.all, sum.1 + share.part));
-    (told > 0 && axes == Axes::Nine).then(|| within as f64 / told as f64)
+    (known > 0 && axes == Axes::Nine).then(|| within as f64 / known as f64)
 }
 
 fn two(value: Option<f64>) -> String {

@@ -9,7 +9,7 @@ mod truth;
 
 pub use options::{BagOptions, Origin, RelativeDeviation, StartFrom};
 
-use super::drive::Known;
+use super::drive::RecordedTruth;
 pub(crate) use truth::TrueTrack;
 
 use super::drive::Drive;
@@ -75,7 +75,7 @@ impl NavigationBag {
     pub fn drive(&self) -> Result<Drive, String> {
         let mut notes = self.notes.clone();
         let feed = self.feed(&mut notes)?;
-        let told = self.truth(&mut notes)?;
+        let truth = self.truth(&mut notes)?;
         let Notes { notes, doubts } = notes;
         // The name of the IMU as `--mount` takes it.
         let imu = match self.frames.of_topic(&self.topics.imu) {
@@ -83,10 +83,10 @@ impl NavigationBag {
             frame => frame.to_owned(),
         };
         let origin = self.options.origin.map(|origin| origin.0);
-        Ok(Drive { feed, told, notes, doubts, origin, imu, gnss: self.topics.gnss.clone(), noise: None })
+        Ok(Drive { feed, truth, notes, doubts, origin, imu, gnss: self.topics.gnss.clone(), noise: None })
     }
 
-    fn truth(&self, notes: &mut Notes) -> Result<Known, String> {
+    fn truth(&self, notes: &mut Notes) -> Result<RecordedTruth, String> {
         let topic = match (&self.topics.truth, &self.topics.no_truth) {
             (Some(topic), _) => Ok(topic.clone()),
             (None, why) => Err(why.clone().unwrap_or_else(|| "there is no topic of it".to_owned())),
@@ -95,6 +95,6 @@ impl NavigationBag {
             Ok(topic) => self.frames.base_from(topic, &mut notes.notes)?,
             Err(_) => Isometry3::identity(),
         };
-        Ok(Known { told: self.messages.truth.clone(), base_from_part, topic })
+        Ok(RecordedTruth { messages: self.messages.truth.clone(), base_from_part, topic })
     }
 }

@@ -85,7 +85,7 @@ pub struct Noise {
 
 /// The contents of a message of the truth.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Told {
+pub(crate) enum TruthMessage {
     Pose(Isometry3<f64>),
     /// A pose, and linear and angular velocity in its axes.
     Moving(Isometry3<f64>, [Vector3<f64>; 2]),

@@ -1,6 +1,6 @@
 //! A recording as a filter and its score take it: of a bag, or of CSV files.
 
-use super::data::{DataSet, Keyframe, Noise, Told, nanoseconds};
+use super::data::{DataSet, Keyframe, Noise, TruthMessage, nanoseconds};
 use super::feed::{Feed, Message, Time, What};
 use bb_core::nalgebra::{Isometry3, Matrix3, Matrix6};
 use bb_core::payload::{
@@ -13,7 +13,7 @@ use bb_estimators::navigation::{Geodetic, LocalFrame};
 #[derive(Clone, Debug)]
 pub struct Drive {
     pub(crate) feed: Feed,
-    pub(crate) told: Known,
+    pub(crate) truth: RecordedTruth,
     /// Statements on what was assumed or left out.
     pub(crate) notes: Vec<String>,
     /// Reasons for which figures would be misleading.
@@ -24,30 +24,34 @@ pub struct Drive {
     pub(crate) imu: String,
     /// The topic of the fixes.
     pub(crate) gnss: Option<String>,
-    /// Noise that the recording tells of its IMU.
+    /// The IMU's noise according to the recording; `None` if unknown.
     pub(crate) noise: Option<Noise>,
 }
 
-/// The truth of a recording, as it tells it.
+/// The truth of a recording.
 #[derive(Clone, Debug)]
-pub(crate) struct Known {
-    pub(crate) told: Vec<(Time, Told)>,
+pub(crate) struct RecordedTruth {
+    pub(crate) messages: Vec<(Time, TruthMessage)>,
     /// The part of the robot that it is about.
     pub(crate) base_from_part: Isometry3<f64>,
     /// The topic, or why there is none.
     pub(crate) topic: Result<String, String>,
 }
 
-impl Known {
+impl RecordedTruth {
     /// The fixes of an antenna as the truth.
     pub(crate) fn of_fixes(fixes: &[(Time, GnssFix)], base_from_antenna: Isometry3<f64>) -> Self {
-        let told = fixes.iter().map(|(time, fix)| (*time, Told::OnEarth(Geodetic::of_fix(fix, 0.0))));
-        Self { told: told.collect(), base_from_part: base_from_antenna, topic: Ok("the fixes withheld".to_owned()) }
+        let messages = fixes.iter().map(|(time, fix)| (*time, TruthMessage::OnEarth(Geodetic::of_fix(fix, 0.0))));
+        Self {
+            messages: messages.collect(),
+            base_from_part: base_from_antenna,
+            topic: Ok("the fixes withheld".to_owned()),
+        }
     }
 
     /// Returns whether it is positions on the Earth.
     pub(crate) fn is_on_earth(&self) -> bool {
-        self.told.iter().any(|(_, told)| matches!(told, Told::OnEarth(_)))
+        self.messages.iter().any(|(_, message)| matches!(message, TruthMessage::OnEarth(_)))
     }
 }
 
@@ -57,7 +61,7 @@ impl Drive {
         self.feed.messages.iter().filter(|message| matches!(message.what, What::Imu(_))).count() as u64
     }
 
-    /// Without the state that a filter would be told to start from.
+    /// Removes the state that a filter would be given to start from.
     pub fn without_start(mut self) -> Self {
         self.feed.messages.retain(|message| !matches!(message.what, What::Start(_)));
         self.feed.mounts[6] = None;
@@ -91,7 +95,7 @@ impl DataSet {
         }
         if let (Some(first), Some(sample)) = (self.keyframes.first(), self.samples.first()) {
             let time_ns = nanoseconds(first.time_s);
-            put(time_ns, What::Start(self.told_start()));
+            put(time_ns, What::Start(self.given_start()));
             // A filter starts at a sample.
             put(time_ns, imu(sample));
         }
@@ -138,16 +142,17 @@ impl DataSet {
         let mut feed = Feed { messages, mounts, world: Some(world) };
         feed.sort();
         let scored = self.keyframes.iter().filter(|keyframe| keyframe.scored);
-        let told = scored.filter_map(|keyframe| Some((nanoseconds(keyframe.time_s), Told::State(keyframe.truth?))));
-        let told = Known {
-            told: told.collect(),
+        let true_states = scored
+            .filter_map(|keyframe| Some((nanoseconds(keyframe.time_s), TruthMessage::State(keyframe.truth?))));
+        let truth = RecordedTruth {
+            messages: true_states.collect(),
             base_from_part: Isometry3::identity(),
             topic: Ok(format!("{}_truth.csv", self.prefix.display())),
         };
         let (notes, doubts) = (Vec::new(), Vec::new());
         Drive {
             feed,
-            told,
+            truth,
             notes,
             doubts,
             origin: Some(place),
@@ -157,7 +162,7 @@ impl DataSet {
         }
     }
 
-    fn told_start(&self) -> Odometry {
+    fn given_start(&self) -> Odometry {
         let start = &self.start;
         let turn = start.world_from_body.inverse();
         let to_body = turn.to_rotation_matrix().into_inner();

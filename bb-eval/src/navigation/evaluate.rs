@@ -2,7 +2,7 @@
 
 use super::disturb::Disturbances;
 use super::doubt::{distrusted, is_most};
-use super::drive::{Drive, Known as Told};
+use super::drive::{Drive, RecordedTruth};
 use super::record::{Estimate, Record};
 use super::robot::{self, NavigationFilter, RobotSettings};
 use super::score::NavigationScore;
@@ -48,11 +48,11 @@ pub fn play_navigation(
     run: &NavigationRun,
     mut progress: impl FnMut(),
 ) -> Result<Played, String> {
-    let Drive { mut feed, mut told, mut notes, mut doubts, origin, imu, gnss, noise } = drive.clone();
+    let Drive { mut feed, mut truth, mut notes, mut doubts, origin, imu, gnss, noise } = drive.clone();
     let settings = run.settings.over(noise.as_ref());
     let withheld = run.disturbances.apply(&mut feed)?;
-    if !withheld.fixes.is_empty() && (told.topic.is_err() || told.topic.as_ref().ok() == gnss.as_ref()) {
-        told = Told::of_fixes(&withheld.fixes, feed.mounts[1].unwrap_or_else(Isometry3::identity));
+    if !withheld.fixes.is_empty() && (truth.topic.is_err() || truth.topic.as_ref().ok() == gnss.as_ref()) {
+        truth = RecordedTruth::of_fixes(&withheld.fixes, feed.mounts[1].unwrap_or_else(Isometry3::identity));
         notes.push("the fixes that the filter does not get are the truth".to_owned());
     }
     let record = robot::run(filter, &feed, &settings, &mut progress)?;
@@ -66,7 +66,7 @@ pub fn play_navigation(
         }
     }
     doubts.extend(refused(&record));
-    let scoring = Scoring::new(origin, &feed, &record, &told);
+    let scoring = Scoring::new(origin, &feed, &record, &truth);
     let mut scored = scoring.all(&mut notes);
     notes.extend(scoring.aligned(&mut scored, run.align));
     notes.extend(scoring.explained(&imu, &scored, run.align));

@@ -2,7 +2,7 @@
 
 use super::bag::TrueTrack;
 use super::data::Truth;
-use super::drive::Known as Told;
+use super::drive::RecordedTruth;
 use super::errors::{Errors, Known};
 use super::feed::{Feed, Time, What};
 use super::record::{Estimate, Record};
@@ -38,10 +38,10 @@ pub(crate) struct Instant {
 pub(super) struct Scoring<'a> {
     feed: &'a Feed,
     record: &'a Record,
-    told: &'a Told,
+    truth: &'a RecordedTruth,
     /// The world of the truth, on the Earth.
     world: Option<LocalFrame>,
-    /// The point of the robot that a truth without orientations tells, m.
+    /// The point of the robot that a truth without orientations is about, m.
     antenna: Vector3<f64>,
     first_ns: Time,
     imu_stamps: Vec<Time>,
@@ -52,7 +52,12 @@ pub(super) struct Scoring<'a> {
 }
 
 impl<'a> Scoring<'a> {
-    pub(super) fn new(origin: Option<Geodetic>, feed: &'a Feed, record: &'a Record, told: &'a Told) -> Self {
+    pub(super) fn new(
+        origin: Option<Geodetic>,
+        feed: &'a Feed,
+        record: &'a Record,
+        truth: &'a RecordedTruth,
+    ) -> Self {
         let of_filter = record.estimates.iter().find_map(|estimate| estimate.origin);
         let world = origin.or(of_filter).map(LocalFrame::new);
         let stamps = |is: fn(&What) -> bool| -> Vec<Time> {
@@ -65,8 +70,8 @@ impl<'a> Scoring<'a> {
         let anchors = stamps(|what| matches!(what, What::Gnss(_) | What::Pose(_)));
         let first_ns = feed.first_ns().unwrap_or(0);
         let states = states(record, first_ns, &imu_stamps);
-        let antenna = told.base_from_part.translation.vector;
-        Self { feed, record, told, world, antenna, first_ns, imu_stamps, anchors, states }
+        let antenna = truth.base_from_part.translation.vector;
+        Self { feed, record, truth, world, antenna, first_ns, imu_stamps, anchors, states }
     }
 
     fn seconds(&self, time_ns: Time) -> f64 {
@@ -105,12 +110,12 @@ impl<'a> Scoring<'a> {
 
     /// All instants with truth: those of the truth, or of the estimates where these are the rarer ones.
     pub(super) fn all(&self, notes: &mut Vec<String>) -> Vec<Instant> {
-        let track = TrueTrack::new(&self.told.told, &self.told.base_from_part, self.world.as_ref());
+        let track = TrueTrack::new(&self.truth.messages, &self.truth.base_from_part, self.world.as_ref());
         let points = track.points();
-        if let Err(why) = &self.told.topic {
+        if let Err(why) = &self.truth.topic {
             notes.push(format!("no truth, so no errors: {why}"));
         } else if points.is_empty() {
-            let topic = self.told.topic.as_deref().unwrap_or_default();
+            let topic = self.truth.topic.as_deref().unwrap_or_default();
             notes.push(format!("no truth, so no errors: {topic} holds no position that is a number"));
         }
         let estimates = &self.record.estimates;
@@ -123,7 +128,7 @@ impl<'a> Scoring<'a> {
         } else {
             points.iter().filter(|(time, _)| (begin..=end).contains(&time)).copied().collect()
         };
-        let is_late = self.told.is_on_earth();
+        let is_late = self.truth.is_on_earth();
         let mut last = i64::MIN;
         let mut instants: Vec<Instant> = Vec::new();
         for (time_ns, truth) in truths {
@@ -141,7 +146,7 @@ impl<'a> Scoring<'a> {
             instants.push(Instant { time_ns, truth, known, errors, is_scored: false });
         }
         if !points.is_empty() && instants.is_empty() {
-            let topic = self.told.topic.as_deref().unwrap_or_default();
+            let topic = self.truth.topic.as_deref().unwrap_or_default();
             notes.push(format!(
                 "no errors: {topic} has no message while the IMU has; are both stamped by one clock?"
             ));

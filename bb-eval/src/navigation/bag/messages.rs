@@ -3,7 +3,7 @@
 use super::notes::Notes;
 use super::topics::Topics;
 use crate::frames::{TF_STATIC, TRANSFORM, frame};
-use crate::navigation::data::Told;
+use crate::navigation::data::TruthMessage;
 use crate::navigation::feed::{Message, Time, What};
 use crate::progress::Progress;
 use bb_core::message::codec::ros::{TransformStamped, TransformsMessage};
@@ -20,7 +20,7 @@ pub(super) struct Messages {
     pub(super) inputs: Vec<Message>,
     /// A drifting odometry, by stamp; each with its arrival first.
     pub(super) relative: Vec<(Time, Time, Odometry)>,
-    pub(super) truth: Vec<(Time, Told)>,
+    pub(super) truth: Vec<(Time, TruthMessage)>,
     /// The first of its topic, with the velocity if it contains one.
     pub(super) start: Option<(Time, Pose, Option<Twist>)>,
     pub(super) transforms: Vec<TransformStamped>,
@@ -88,7 +88,7 @@ impl Messages {
             self.relative.push((arrival_ns, time_ns, odometry));
         }
         if is(&topics.truth) {
-            self.truth.push(told(message)?);
+            self.truth.push(truth_message(message)?);
         }
         if is(&topics.start) && self.start.is_none() {
             self.start = Some(match &*message.schema {
@@ -169,25 +169,25 @@ fn odometry(message: &BagMessage) -> Result<(Time, Odometry), RecordingError> {
     Ok((time.as_unix_nanos(), odometry))
 }
 
-fn told(message: &BagMessage) -> Result<(Time, Told), RecordingError> {
+fn truth_message(message: &BagMessage) -> Result<(Time, TruthMessage), RecordingError> {
     let isometry = |pose: &Pose| Isometry3::from_parts(pose.position.into(), pose.world_from_body);
-    let (time_ns, told) = match &*message.schema {
+    let (time_ns, content) = match &*message.schema {
         ODOMETRY => {
             let (time_ns, Odometry { pose, twist }) = odometry(message)?;
-            (time_ns, Told::Moving(isometry(&pose), [twist.linear, twist.angular]))
+            (time_ns, TruthMessage::Moving(isometry(&pose), [twist.linear, twist.angular]))
         }
         POSE => {
             let (pose, time) = message.payload()?;
-            (time.as_unix_nanos(), Told::Pose(isometry(&pose)))
+            (time.as_unix_nanos(), TruthMessage::Pose(isometry(&pose)))
         }
         TRANSFORM => {
             let TransformStamped { header, transform, .. } = message.decode()?;
-            (header.stamp.wall_time().as_unix_nanos(), Told::Pose(transform))
+            (header.stamp.wall_time().as_unix_nanos(), TruthMessage::Pose(transform))
         }
         _ => {
             let (fix, time) = message.payload()?;
-            (time.as_unix_nanos(), Told::OnEarth(Geodetic::of_fix(&fix, 0.0)))
+            (time.as_unix_nanos(), TruthMessage::OnEarth(Geodetic::of_fix(&fix, 0.0)))
         }
     };
-    Ok((time_ns, told))
+    Ok((time_ns, content))
 }

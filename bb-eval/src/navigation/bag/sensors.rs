@@ -16,7 +16,7 @@ const POSITION: f64 = 0.1;
 const ROTATION: f64 = 0.02;
 
 /// Deviation of a velocity from the truth, from its positions, and of an unknown one, m/s.
-const TOLD: f64 = 0.1;
+const GIVEN: f64 = 0.1;
 const FROM_POSITIONS: f64 = 0.5;
 const UNKNOWN: f64 = 5.0;
 
@@ -90,10 +90,10 @@ impl NavigationBag {
         given.or_else(first).map(LocalFrame::new)
     }
 
-    /// The state that a filter is told to start from, at the time of the first sample after it.
+    /// The state that a filter is given to start from, at the time of the first sample after it.
     fn start(&self, world: Option<&LocalFrame>, notes: &mut Notes) -> Result<Option<Message>, String> {
         let first_ns = self.messages.stamps(0).next().unwrap_or(0);
-        let told = match (&self.options.start, &self.topics.start) {
+        let state = match (&self.options.start, &self.topics.start) {
             (Some(StartFrom::Own), _) | (None, None) => return Ok(None),
             (Some(StartFrom::Truth), _) => {
                 let base_from_truth = match &self.topics.truth {
@@ -109,7 +109,7 @@ impl NavigationBag {
             }
             (Some(StartFrom::Topic(name)), None) => return Err(format!("{name}: no such topic")),
         };
-        let (time_ns, odometry) = told;
+        let (time_ns, odometry) = state;
         let stamp_ns = self.messages.stamps(0).find(|stamp| *stamp >= time_ns).unwrap_or(time_ns);
         Ok(Some(Message { arrival_ns: stamp_ns, stamp_ns, what: What::Start(odometry) }))
     }
@@ -117,8 +117,8 @@ impl NavigationBag {
     fn of_topic(&self, topic: &str, notes: &mut Notes) -> Result<Option<(Time, Odometry)>, String> {
         let Some((time_ns, pose, twist)) = self.messages.start else { return Ok(None) };
         let base_from_part = self.frames.base_from(topic, &mut notes.notes)?;
-        let told = Isometry3::from_parts(pose.position.into(), pose.world_from_body);
-        let Some(world_from_part) = isometry(&told) else { return Ok(None) };
+        let part = Isometry3::from_parts(pose.position.into(), pose.world_from_body);
+        let Some(world_from_part) = isometry(&part) else { return Ok(None) };
         let world_from_base = world_from_part * base_from_part.inverse();
         let turn = base_from_part.rotation;
         let state = twist.map(|twist| {
@@ -136,8 +136,8 @@ impl NavigationBag {
         let mut poses: Vec<Drifting> = Vec::new();
         for (arrival, time, odometry) in &self.messages.relative {
             let pose = &odometry.pose;
-            let told = Isometry3::from_parts(pose.position.into(), pose.world_from_body);
-            let Some(world_from_camera) = isometry(&told) else { continue };
+            let part = Isometry3::from_parts(pose.position.into(), pose.world_from_body);
+            let Some(world_from_camera) = isometry(&part) else { continue };
             if poses.last().is_some_and(|(_, last, ..)| last == time) {
                 continue;
             }
@@ -208,7 +208,7 @@ fn at_truth(track: &TrueTrack, first_ns: Time) -> Option<(Time, Odometry)> {
     let from = points.iter().position(|(time, truth)| *time >= first_ns && truth.world_from_body.is_some())?;
     let (time_ns, Truth { position, world_from_body, velocity }) = points.get(from)?;
     let later = points.iter().skip(from).find(|(time, _)| time - time_ns >= BASELINE_NS);
-    let velocity = velocity.map(|velocity| (velocity, TOLD)).or_else(|| {
+    let velocity = velocity.map(|velocity| (velocity, GIVEN)).or_else(|| {
         let (later_ns, later) = later?;
         let seconds = (later_ns - time_ns) as f64 * 1e-9;
         Some(((later.position - position) / seconds, FROM_POSITIONS))

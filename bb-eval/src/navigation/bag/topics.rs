@@ -34,18 +34,18 @@ impl Topics {
     pub(super) fn choose(bag: &Bag, options: &BagOptions) -> Result<Self, String> {
         let imu = bag.choose(IMU, options.imu_topic.as_deref()).map_err(|error| said(&error, "--imu-topic"))?;
         let imu = imu.name.to_string();
-        let mut taken: Vec<String> = Vec::new();
+        let mut used: Vec<String> = Vec::new();
         let start = start(bag, options)?;
-        taken.extend(start.clone());
+        used.extend(start.clone());
         let relative = match options.relative_topic.as_deref() {
             Some(name) => only(bag, ODOMETRY, Some(name), "--relative-topic", &[])?,
             None => None,
         };
-        taken.extend(relative.clone());
-        let (truth, no_truth) = truth(bag, options.truth.as_deref(), &taken)?;
-        taken.extend(truth.clone());
+        used.extend(relative.clone());
+        let (truth, no_truth) = truth(bag, options.truth.as_deref(), &used)?;
+        used.extend(truth.clone());
         let choose =
-            |schema: &str, name: &Option<String>, option: &str| only(bag, schema, name.as_deref(), option, &taken);
+            |schema: &str, name: &Option<String>, option: &str| only(bag, schema, name.as_deref(), option, &used);
         let gnss = choose(FIX, &options.gnss_topic, "--gnss-topic")?;
         let odometry = choose(ODOMETRY, &options.odometry_topic, "--odometry-topic")?;
         let pose = choose(POSE_WITH_COVARIANCE, &options.pose_topic, "--pose-topic")?;
@@ -73,8 +73,8 @@ impl Topics {
     /// The approximate number of messages.
     pub(super) fn expected(&self, bag: &Bag) -> u64 {
         let names = self.all();
-        let taken = bag.topics().iter().filter(|topic| names.contains(&&*topic.name));
-        taken.filter_map(|topic| topic.messages).sum()
+        let used = bag.topics().iter().filter(|topic| names.contains(&&*topic.name));
+        used.filter_map(|topic| topic.messages).sum()
     }
 }
 
@@ -88,7 +88,7 @@ fn only(
     schema: &str,
     name: Option<&str>,
     option: &str,
-    taken: &[String],
+    used: &[String],
 ) -> Result<Option<String>, String> {
     match name {
         Some(NONE) => return Ok(None),
@@ -99,7 +99,7 @@ fn only(
         None => {}
     }
     let free =
-        bag.topics().iter().filter(|topic| is_of(topic, schema) && taken.iter().all(|name| **name != *topic.name));
+        bag.topics().iter().filter(|topic| is_of(topic, schema) && used.iter().all(|name| **name != *topic.name));
     let candidates: Vec<_> = free.map(|topic| topic.name.to_string()).collect();
     match <[String; 1]>::try_from(candidates) {
         Ok([name]) => Ok(Some(name)),
@@ -126,7 +126,7 @@ fn start(bag: &Bag, options: &BagOptions) -> Result<Option<String>, String> {
 }
 
 /// The topic of the truth, or why there is none.
-fn truth(bag: &Bag, name: Option<&str>, taken: &[String]) -> Result<(Option<String>, Option<String>), String> {
+fn truth(bag: &Bag, name: Option<&str>, used: &[String]) -> Result<(Option<String>, Option<String>), String> {
     match name {
         Some(NONE) => return Ok((None, Some("--truth none".to_owned()))),
         Some(name) => {
@@ -144,7 +144,7 @@ fn truth(bag: &Bag, name: Option<&str>, taken: &[String]) -> Result<(Option<Stri
         }
         None => {}
     }
-    let is_free = |topic: &&Topic| taken.iter().all(|name| **name != *topic.name);
+    let is_free = |topic: &&Topic| used.iter().all(|name| **name != *topic.name);
     let kinds = |topic: &&Topic| is_of(topic, POSE) || is_of(topic, TRANSFORM);
     let candidates: Vec<_> = bag.topics().iter().filter(kinds).filter(is_free).collect();
     let names = || candidates.iter().map(|topic| &*topic.name).collect::<Vec<_>>().join(", ");

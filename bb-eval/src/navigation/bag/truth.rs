@@ -1,6 +1,6 @@
 //! The truth over time, of the body.
 
-use crate::navigation::data::{Told, Truth};
+use crate::navigation::data::{Truth, TruthMessage};
 use crate::navigation::feed::Time;
 use bb_core::nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use bb_estimators::navigation::LocalFrame;
@@ -17,24 +17,28 @@ pub(crate) struct TrueTrack {
 impl TrueTrack {
     /// Collects the truth from messages about a part of the body at `base_from_part`. Values that are not finite, or
     /// not a rotation, are left out. Positions on the Earth are those in the frame, of the part.
-    pub(crate) fn new(told: &[(Time, Told)], base_from_part: &Isometry3<f64>, frame: Option<&LocalFrame>) -> Self {
+    pub(crate) fn new(
+        messages: &[(Time, TruthMessage)],
+        base_from_part: &Isometry3<f64>,
+        frame: Option<&LocalFrame>,
+    ) -> Self {
         // A program that does not know the velocity leaves it zero.
-        let tells_velocity = told.iter().any(|(_, told)| match told {
-            Told::Moving(_, [linear, _]) => *linear != Vector3::zeros(),
+        let tells_velocity = messages.iter().any(|(_, message)| match message {
+            TruthMessage::Moving(_, [linear, _]) => *linear != Vector3::zeros(),
             _ => false,
         });
-        let mut points: Vec<(Time, Truth)> = Vec::with_capacity(told.len());
-        for (time, told) in told {
-            let truth = match told {
-                Told::State(truth) => Some(*truth),
-                Told::Pose(pose) => of_pose(pose, base_from_part),
-                Told::Moving(pose, [linear, angular]) => of_pose(pose, base_from_part).map(|truth| {
+        let mut points: Vec<(Time, Truth)> = Vec::with_capacity(messages.len());
+        for (time, message) in messages {
+            let truth = match message {
+                TruthMessage::State(truth) => Some(*truth),
+                TruthMessage::Pose(pose) => of_pose(pose, base_from_part),
+                TruthMessage::Moving(pose, [linear, angular]) => of_pose(pose, base_from_part).map(|truth| {
                     let swing = angular.cross(&base_from_part.inverse().translation.vector);
                     let turned = pose.rotation * (linear + swing);
                     let velocity = (tells_velocity && is_finite(&turned)).then_some(turned);
                     Truth { velocity, ..truth }
                 }),
-                Told::OnEarth(at) => frame.zip(at.as_ref()).map(|(frame, at)| {
+                TruthMessage::OnEarth(at) => frame.zip(at.as_ref()).map(|(frame, at)| {
                     let position = frame.position(at);
                     Truth { position, world_from_body: None, velocity: None }
                 }),

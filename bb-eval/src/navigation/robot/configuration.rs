@@ -126,8 +126,8 @@ impl fmt::Display for NavigationSetting {
 pub struct RobotSettings {
     settings: Vec<NavigationSetting>,
     noise_times: Option<f64>,
-    /// Noise of an IMU, as a recording tells it.
-    told: Vec<(&'static str, f64)>,
+    /// Noise of a recording's IMU, by the names of the options.
+    imu_noise: Vec<(&'static str, f64)>,
 }
 
 /// `CONFIG.toml`, or `CONFIG.toml:estimator/base/navigation`.
@@ -167,12 +167,12 @@ impl RobotSettings {
     ) -> Result<Self, String> {
         let mut all = file.map_or_else(|| Ok(Vec::new()), |file| file.read(&filter.names()))?;
         all.extend_from_slice(settings);
-        Ok(Self { settings: all, noise_times, told: Vec::new() })
+        Ok(Self { settings: all, noise_times, imu_noise: Vec::new() })
     }
 
     /// Sets the options of the filter of a robot.
     pub(super) fn apply<R: Robot>(&self, builder: &mut Builder<R>, known: &[&str]) -> Result<(), String> {
-        for (name, value) in &self.told {
+        for (name, value) in &self.imu_noise {
             // Not every filter has them all.
             let unit = if *name == "gravity" { " m/s^2" } else { "" };
             if known.contains(name) {
@@ -206,14 +206,14 @@ impl RobotSettings {
     /// Returns these options, with the noise of a recording's IMU where they give none.
     pub(crate) fn over(&self, noise: Option<&Noise>) -> Self {
         let Some(noise) = noise else { return self.clone() };
-        let told = [
+        let imu_noise = [
             ("gyroscope_noise", noise.gyroscope),
             ("accelerometer_noise", noise.accelerometer),
             ("gyroscope_bias_walk", noise.gyroscope_bias),
             ("accelerometer_bias_walk", noise.accelerometer_bias),
             ("gravity", noise.gravity),
         ];
-        Self { told: told.to_vec(), ..self.clone() }
+        Self { imu_noise: imu_noise.to_vec(), ..self.clone() }
     }
 
     /// Each setting that is not the default, with the settings without it.
