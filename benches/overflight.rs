@@ -134,7 +134,7 @@ pub struct Pilot {
     smoother: FixedLagSmoother<Scaled, { Scaled::DIMENSION }>,
     anchors: Stream,
     odometry: Stream,
-    sights: Stream,
+    observations: Stream,
 }
 
 impl Pilot {
@@ -150,7 +150,7 @@ impl Pilot {
         let level = UnitQuaternion::identity();
         smoother.start(0, &Start::at(0, (flight.begin, 1.0), (flight.speed, 0.1), (level, 0.03)))?;
         let stream = Stream::default();
-        Ok(Self { smoother, anchors: stream, odometry: stream, sights: stream })
+        Ok(Self { smoother, anchors: stream, odometry: stream, observations: stream })
     }
 
     /// Takes the samples of the IMU.
@@ -168,14 +168,14 @@ impl Pilot {
     ///
     /// If something is refused, but not by its gate.
     pub fn fly(&mut self, keyframe: &Keyframe) -> Result<(), Refusal> {
-        let Self { smoother, anchors, odometry, sights } = self;
+        let Self { smoother, anchors, odometry, observations } = self;
         smoother.add_keyframe(keyframe.id)?;
         passed(smoother.add(odometry, keyframe.id, keyframe.way))?;
         if let Some(pose) = keyframe.pose {
             passed(smoother.add(anchors, keyframe.id, pose))?;
         }
         for observation in &keyframe.seen {
-            passed(smoother.observe(sights, keyframe.id, black_box(observation)))?;
+            passed(smoother.observe(observations, keyframe.id, black_box(observation)))?;
         }
         smoother.update()?;
         black_box((smoother.estimate(), smoother.pose_covariance()));

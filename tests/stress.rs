@@ -16,15 +16,15 @@ use std::time::Instant;
 type Lines = Arc<Mutex<Vec<Entry>>>;
 
 /// Messages published, path by path, to the last bit of payload and stamp.
-type Heard = BTreeMap<&'static str, Vec<String>>;
+type Messages = BTreeMap<&'static str, Vec<String>>;
 
-fn hear(subscription: &DynamicSubscription) -> Heard {
+fn messages(subscription: &DynamicSubscription) -> Messages {
     assert_eq!(subscription.lagged(), 0);
     texts(subscription)
 }
 
-fn texts(subscription: &DynamicSubscription) -> Heard {
-    let mut heard = Heard::new();
+fn texts(subscription: &DynamicSubscription) -> Messages {
+    let mut heard = Messages::new();
     for message in subscription.drain() {
         let payload = match message.downcast::<Dice>() {
             Some(dice) => format!("{:016x}", dice.0.to_bits()),
@@ -51,7 +51,7 @@ impl Few {
     }
 
     /// Checks it against what was published; returns what came at the highest rate.
-    fn heard(&self, all: &Heard) -> Result<Heard, String> {
+    fn check(&self, all: &Messages) -> Result<Messages, String> {
         let newest: BTreeMap<_, _> =
             all.iter().map(|(path, all)| (*path, all.last().into_iter().cloned().collect())).collect();
         let latest = texts(&self.latest);
@@ -150,7 +150,7 @@ fn virtual_day(seed: u64) -> Result<bool, Box<dyn Error>> {
         }
     }
     let report = simulation.stop();
-    is_same_again(seed, &lines, (&hear(&all), &few), &report)
+    is_same_again(seed, &lines, (&messages(&all), &few), &report)
 }
 
 fn real_day(seed: u64) -> Result<bool, Box<dyn Error>> {
@@ -179,7 +179,7 @@ fn real_day(seed: u64) -> Result<bool, Box<dyn Error>> {
     STOPPED.lock().unwrap_or_else(PoisonError::into_inner).0 = Some(Instant::now());
     let report = running.stop();
     disturbers.into_iter().try_for_each(std::thread::JoinHandle::join).map_err(|_| "a disturber panicked")?;
-    is_same_again(seed, &lines, (&hear(&all), &few), &report)
+    is_same_again(seed, &lines, (&messages(&all), &few), &report)
 }
 
 /// Events that must have happened on some day.
@@ -187,7 +187,7 @@ const HAPPENS: [&str; 4] =
     ["weather/front", "estimator/base/squall", "controller/gale starts", "controller/calm starts"];
 
 /// Notes what has happened.
-fn note(heard: &Heard) {
+fn note(heard: &Messages) {
     let starts = |caller: &str| {
         let texts = heard.iter().filter(|(path, _)| path.starts_with("command/")).flat_map(|(_, texts)| texts);
         let caller = format!("caller: \"{caller}\"");
@@ -204,7 +204,7 @@ static HAPPENED: Mutex<BTreeSet<&'static str>> = Mutex::new(BTreeSet::new());
 fn is_same_again(
     seed: u64,
     lines: &Lines,
-    (first, few): (&Heard, &Few),
+    (first, few): (&Messages, &Few),
     report: &Report,
 ) -> Result<bool, Box<dyn Error>> {
     let builder = builder(&mut Random::new(seed));
@@ -218,7 +218,7 @@ fn is_same_again(
     );
     replay.play(lines)?;
     let report_again = replay.stop();
-    let again = hear(&all);
+    let again = messages(&all);
     for path in first.keys().chain(again.keys()) {
         let none = Vec::new();
         let (then, now) = (first.get(path).unwrap_or(&none), again.get(path).unwrap_or(&none));
@@ -229,7 +229,7 @@ fn is_same_again(
         }
     }
     note(first);
-    let (then, now) = (few.heard(first)?, few_again.heard(&again)?);
+    let (then, now) = (few.check(first)?, few_again.check(&again)?);
     // In real time, a period of a replay ends at another line.
     if is_virtual && then != now {
         println!("seed {seed}, at a highest rate:\n  then {then:?}\n  now  {now:?}");

@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn each_convention_is_told() {
+    fn each_convention_is_recognised() {
         let (ned, flu) = (enu_from_ned().inverse(), frd_from_flu().inverse());
         let writes: [&dyn Fn(UnitQuaternion<f64>) -> UnitQuaternion<f64>; CONVENTIONS.len()] = [
             &|truth| truth.inverse(),

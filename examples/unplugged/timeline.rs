@@ -68,7 +68,7 @@ impl Line {
             ));
         }
         if let Some(event) = message.downcast::<CommandEvent>() {
-            let (event, detail) = told(event);
+            let (event, detail) = description(event);
             return Some(Self::new(time, Kind::Command, event, detail));
         }
         if let Some(change) = message.downcast::<ParameterChange>() {
@@ -96,7 +96,7 @@ fn short(path: &str) -> String {
 }
 
 /// Describes the progress of a command, and why it was started or refused.
-fn told(event: &CommandEvent) -> (String, String) {
+fn description(event: &CommandEvent) -> (String, String) {
     let name = event.command;
     let cause =
         event.health.map_or(String::new(), |health| format!("{} is {}", short(health.estimator), health.to));

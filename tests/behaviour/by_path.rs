@@ -216,7 +216,7 @@ fn messages_say_which_process_they_come_from() -> Result<(), StartError> {
 }
 
 #[test]
-fn handlers_of_telemetry_are_told_of_everything_and_may_panic() -> Result<(), StartError> {
+fn handlers_of_telemetry_get_every_event_and_may_panic() -> Result<(), StartError> {
     let mut builder = Open::builder();
     builder.supervision().first_backoff = Duration::from_millis(1);
     let told: Arc<Mutex<Vec<TelemetryEvent>>> = Arc::default();

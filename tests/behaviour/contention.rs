@@ -66,11 +66,11 @@ impl HandleCall<Ask> for Ordered {
     }
 }
 
-static TOLD: AtomicU64 = AtomicU64::new(0);
+static CASTS: AtomicU64 = AtomicU64::new(0);
 
 impl HandleCast<Tell> for Ordered {
     fn handle_cast(&mut self, Tell: Tell) -> Result<Reply<Number>, Fault> {
-        TOLD.fetch_add(1, Ordering::SeqCst);
+        CASTS.fetch_add(1, Ordering::SeqCst);
         Ok(Reply::none())
     }
 }
@@ -115,7 +115,7 @@ fn every_lost_message_is_counted_whatever_publishes_or_fails() {
         builder.supervision().first_backoff = Duration::from_micros(100);
         builder.supervision().longest_backoff = Duration::from_millis(1);
         let running = builder.start().expect("it starts");
-        let told = TOLD.load(Ordering::SeqCst);
+        let before = CASTS.load(Ordering::SeqCst);
         let mut casts = 0;
         std::thread::scope(|scope| {
             for sensor in [crowded::sensor::base::a, crowded::sensor::base::b] {
@@ -150,7 +150,7 @@ fn every_lost_message_is_counted_whatever_publishes_or_fails() {
         }
         assert!(report.faults.iter().all(|fault| fault.message == "asked to fail"), "{:?}", report.faults);
         // Those that waited when it stopped are not taken any more.
-        assert!(TOLD.load(Ordering::SeqCst) - told <= casts);
+        assert!(CASTS.load(Ordering::SeqCst) - before <= casts);
     });
 }
 

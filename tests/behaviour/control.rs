@@ -87,7 +87,7 @@ robot! {
         eager: Task(run = eager);
         go: Move { category: motion; timeout: 1 s; }
         turn: Move { category: motion; allowed_states: [idle, executing]; }
-        look: Move { allowed_states: [idle, executing, parked]; }
+        watch: Move { allowed_states: [idle, executing, parked]; }
         stop: Move { allowed_states: [idle, executing]; cancel: [motion]; }
         halt: Move { allowed_states: [idle, executing]; cancel: all; }
     }
@@ -158,7 +158,7 @@ fn a_command_may_name_the_next_state_if_it_is_declared() -> Result<(), Failure> 
     simulation.run_until(at(10));
     assert_eq!(simulation.state(), "parked");
     assert!(simulation.command(commanded::command::go, millis(1)).is_err(), "by default only when idle");
-    let lost = simulation.command(commanded::command::look, Target { millis: 1, does: Some("lost") })?;
+    let lost = simulation.command(commanded::command::watch, Target { millis: 1, does: Some("lost") })?;
     simulation.run_until(at(20));
     let error = lost.try_result().expect("it has ended").expect_err("there is no such state").to_string();
     assert_eq!(error, "the command failed: it names the next state `lost`, which is not declared");
@@ -167,7 +167,7 @@ fn a_command_may_name_the_next_state_if_it_is_declared() -> Result<(), Failure> 
 }
 
 #[test]
-fn a_command_fails_times_out_or_is_cancelled_and_each_is_told() -> Result<(), Failure> {
+fn a_command_that_fails_times_out_or_is_cancelled_is_reported() -> Result<(), Failure> {
     let _alone = alone();
     let builder = Commanded::builder();
     let events = builder.subscribe(commanded::command::go);
@@ -207,15 +207,15 @@ fn a_category_has_its_limit_and_its_pre_emption() -> Result<(), Failure> {
     let second = simulation.command(commanded::command::turn, millis(500))?;
     let refusal = simulation.command(commanded::command::turn, millis(500)).expect_err("two are the limit");
     assert_eq!(refusal.to_string(), "`turn` is refused: 2 of the category `motion` run already, and no more may");
-    let looking = simulation.command(commanded::command::look, millis(500))?;
+    let watching = simulation.command(commanded::command::watch, millis(500))?;
     simulation.run_until(at(100));
     assert!(
         simulation.command(commanded::command::stop, millis(10)).is_err(),
-        "looking is of its own category, the default one, which it does not cancel"
+        "watching is of its own category, the default one, which it does not cancel"
     );
     let halting = simulation.command(commanded::command::halt, millis(10))?;
     simulation.run_until(at(200));
-    for cancelled in [first, second, looking] {
+    for cancelled in [first, second, watching] {
         assert_eq!(cancelled.try_result(), Some(Err(CommandError::Cancelled)));
     }
     assert_eq!(halting.try_result(), Some(Ok(at(110))));

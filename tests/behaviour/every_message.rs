@@ -148,7 +148,7 @@ fn what_a_run_sees() -> Result<(), StartError> {
 }
 
 #[test]
-fn what_the_driver_lets_wait_for_too_long_is_counted_and_told() -> Result<(), StartError> {
+fn messages_that_wait_too_long_for_the_driver_are_counted_and_reported() -> Result<(), StartError> {
     let builder = Witnessed::builder();
     let here = builder.subscribe(witnessed::estimator::base::here);
     let mut run = builder.simulate()?;

@@ -93,7 +93,7 @@ fn what_a_dispatch_sees() -> Result<(), StartError> {
 const SNAPSHOT: &str = "estimator/base/snapshot";
 
 #[test]
-fn a_dropped_dispatch_is_told_to_handlers_of_telemetry() -> Result<(), StartError> {
+fn a_dropped_dispatch_reaches_handlers_of_telemetry() -> Result<(), StartError> {
     let told: Arc<Mutex<Vec<TelemetryEvent>>> = Arc::default();
     let mut builder = FanIn::builder();
     let tell = Arc::clone(&told);

@@ -154,10 +154,10 @@ fn the_topology_is_data() {
 }
 
 /// Contexts of estimators, in the order in which they are made.
-static TOLD: Mutex<Vec<[&str; 3]>> = Mutex::new(Vec::new());
+static CONTEXTS: Mutex<Vec<[&str; 3]>> = Mutex::new(Vec::new());
 
 fn note(context: &Context) -> Done {
-    lock(&TOLD).push([context.robot(), context.path(), context.frame().name()]);
+    lock(&CONTEXTS).push([context.robot(), context.path(), context.frame().name()]);
     Ok(())
 }
 
@@ -174,16 +174,16 @@ robot! {
 }
 
 #[test]
-fn an_estimator_is_told_its_robot_its_path_and_its_frame() -> Result<(), StartError> {
+fn an_estimator_gets_its_robot_its_path_and_its_frame() -> Result<(), StartError> {
     Placed::builder().simulate()?;
-    let mut told = std::mem::take(&mut *lock(&TOLD));
-    told.sort_unstable();
+    let mut contexts = std::mem::take(&mut *lock(&CONTEXTS));
+    contexts.sort_unstable();
     let expected = [
         ["Placed", "estimator/base/pan/head/of_a_link", "head"],
         ["Placed", "sensor/base/imu/at_a_link", "base"],
         ["Placed", "sensor/base/pan/encoder/at_a_joint", "pan"],
         ["Placed", "sensor/clock/of_the_robot", ""],
     ];
-    assert_eq!(told, expected);
+    assert_eq!(contexts, expected);
     Ok(())
 }

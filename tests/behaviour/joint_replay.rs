@@ -3,7 +3,7 @@
 use crate::components::{Failure, at};
 use crate::gate::wait_until;
 use crate::joints::{Fusion, Pixel, Spotter};
-use crate::replay::{Heard, Random, counts, entries, hear, journal, overflow, play, same};
+use crate::replay::{Published, Random, collect, counts, entries, journal, overflow, play, same};
 use bb_core::Report;
 use bb_core::journal::{Entry, Event};
 use bb_core::prelude::*;
@@ -126,23 +126,26 @@ fn builder(seed: u64, reads: u32) -> bb_core::Builder<Swing> {
 fn day(
     mut builder: bb_core::Builder<Swing>,
     run: impl FnOnce(bb_core::Builder<Swing>) -> Result<Report, Failure>,
-) -> Result<(Heard, Report, Vec<Entry>), Failure> {
+) -> Result<(Published, Report, Vec<Entry>), Failure> {
     let lines = journal(&mut builder);
     let all = builder.subscribe_any(Select::All, None, overflow());
     let report = run(builder)?;
-    let mut heard = Heard::new();
-    hear(&all, &mut heard);
+    let mut heard = Published::new();
+    collect(&all, &mut heard);
     Ok((heard, report, entries(&lines)))
 }
 
-fn replayed(lines: &[Entry]) -> Result<(Heard, Report), Failure> {
+fn replayed(lines: &[Entry]) -> Result<(Published, Report), Failure> {
     let mut builder = Swing::builder();
     // What the store would answer is another matter: the journal has what it did answer.
     builder.joints().states = 2;
     play(builder, lines)
 }
 
-fn on_virtual_time(builder: bb_core::Builder<Swing>, millis: i64) -> Result<(Heard, Report, Vec<Entry>), Failure> {
+fn on_virtual_time(
+    builder: bb_core::Builder<Swing>,
+    millis: i64,
+) -> Result<(Published, Report, Vec<Entry>), Failure> {
     day(builder, |builder| {
         let mut simulation = builder.simulate()?;
         simulation.run_until(at(millis));
@@ -158,7 +161,7 @@ fn is_a_bad_day(report: &Report) -> bool {
     })
 }
 
-fn same_again((first, report, lines): &(Heard, Report, Vec<Entry>)) -> Result<(), Failure> {
+fn same_again((first, report, lines): &(Published, Report, Vec<Entry>)) -> Result<(), Failure> {
     assert!(is_a_bad_day(report), "{report}");
     let (again, report_again) = replayed(lines)?;
     same(first, &again);

@@ -59,7 +59,7 @@ pub(crate) struct Views<'a> {
 
 /// Inputs that [`Fusion`] received.
 #[derive(Clone, Debug, PartialEq, Payload)]
-pub(crate) struct Told {
+pub(crate) struct Received {
     /// Position of the camera, or the reason for which it is not known.
     pub(crate) camera: String,
     pub(crate) lift: Option<f64>,
@@ -73,7 +73,7 @@ pub(crate) struct Fusion {
 impl Estimator for Fusion {
     type Options = NoOptions;
     type Input = Views<'static>;
-    type Output = Told;
+    type Output = Received;
     const HANDLES_MOVING_JOINTS: bool = true;
 
     fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
@@ -91,9 +91,9 @@ impl Estimator for Fusion {
         Ok(())
     }
 
-    fn handle_input(&mut self, views: Views<'_>) -> Result<Reply<Told>, Fault> {
+    fn handle_input(&mut self, views: Views<'_>) -> Result<Reply<Received>, Fault> {
         assert!(views.imu.0 >= 0.0);
-        Ok(Reply::emit(Told { camera: self.camera.clone(), lift: views.lift.map(|lift| lift.position) }))
+        Ok(Reply::emit(Received { camera: self.camera.clone(), lift: views.lift.map(|lift| lift.position) }))
     }
 }
 
@@ -237,16 +237,16 @@ fn what_is_unknown_or_too_old_drops_the_dispatch_and_is_never_zero() -> Result<(
 }
 
 #[test]
-fn an_optional_input_is_told_why_it_has_no_transform() -> Result<(), StartError> {
+fn an_optional_input_gets_the_reason_for_a_missing_transform() -> Result<(), StartError> {
     let builder = Reach::builder();
-    let told = builder.subscribe(reach::estimator::base::fusion);
+    let received = builder.subscribe(reach::estimator::base::fusion);
     let mut simulation = builder.simulate()?;
     let imu = reach::sensor::base::imu;
     let next = |simulation: &mut Simulation<Reach>, ms| {
         simulation.publish(imu, at(ms), Pixel(0.0));
-        told.drain().last().map(|told| told.payload)
+        received.drain().last().map(|message| message.payload)
     };
-    let some = |camera: &str, lift| Some(Told { camera: camera.into(), lift });
+    let some = |camera: &str, lift| Some(Received { camera: camera.into(), lift });
     assert_eq!(next(&mut simulation, 1), some("the input `camera` takes no part in this dispatch", None));
     simulation.publish(CAMERA, at(2), Pixel(0.0));
     let unknown = "the input `camera` has no transform: nothing is known yet of the joint `shoulder`";

@@ -2,7 +2,7 @@
 
 use crate::components::{Done, Failure, Number, Replied, Servo, at, within};
 use crate::gate::Gate;
-use crate::replay::{Heard, is_again, same_again};
+use crate::replay::{Published, is_again, same_again};
 use bb_core::prelude::*;
 use bb_core::run::CommandError;
 use bb_core::run::DropReason;
@@ -188,7 +188,9 @@ pub(crate) fn alone() -> MutexGuard<'static, ()> {
 }
 
 /// Runs it on virtual time as `script` has it, and again.
-fn again(script: impl FnOnce(&mut Simulation<Again>) -> Result<(), Failure>) -> Result<(Heard, Report), Failure> {
+fn again(
+    script: impl FnOnce(&mut Simulation<Again>) -> Result<(), Failure>,
+) -> Result<(Published, Report), Failure> {
     same_again(Again::builder, |builder| {
         let mut simulation = builder.simulate()?;
         assert_eq!(simulation.arm(), Ok(()));
@@ -198,7 +200,7 @@ fn again(script: impl FnOnce(&mut Simulation<Again>) -> Result<(), Failure>) -> 
 }
 
 /// Runs it in real time as `script` has it, and again.
-fn again_in_real_time(script: impl FnOnce(&Running<Again>)) -> Result<(Heard, Report), Failure> {
+fn again_in_real_time(script: impl FnOnce(&Running<Again>)) -> Result<(Published, Report), Failure> {
     same_again(Again::builder, |builder| {
         let running = builder.start()?;
         assert_eq!(running.arm(), Ok(()));
@@ -207,7 +209,7 @@ fn again_in_real_time(script: impl FnOnce(&Running<Again>)) -> Result<(Heard, Re
     })
 }
 
-fn count(heard: &Heard, path: &str) -> usize {
+fn count(heard: &Published, path: &str) -> usize {
     heard.get(path).map_or(0, Vec::len)
 }
 

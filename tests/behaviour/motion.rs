@@ -49,7 +49,7 @@ struct Hobby(Arc<Mutex<Vec<f64>>>);
 #[derive(Clone, Debug, Default, Options)]
 struct HobbyOptions {
     #[option(required)]
-    told: Arc<Mutex<Vec<f64>>>,
+    commanded: Arc<Mutex<Vec<f64>>>,
 }
 
 impl Actuator for Hobby {
@@ -57,7 +57,7 @@ impl Actuator for Hobby {
     type Command = PositionCommand;
 
     fn init(options: HobbyOptions, _: &ActuatorContext) -> Result<Self, Fault> {
-        Ok(Self(options.told))
+        Ok(Self(options.commanded))
     }
 
     fn handle_command(&mut self, command: &Stamped<PositionCommand>) -> Result<(), Fault> {
@@ -133,7 +133,7 @@ robot! {
         joint flap: revolute {
             axis: z;
             limit: { lower: -10 deg, upper: 10 deg, velocity: 1 rad/s, effort: 1 N*m };
-            actuator servo: Hobby(told = Arc::default());
+            actuator servo: Hobby(commanded = Arc::default());
             sensor encoder: External<JointState>();
             link plate;
         }

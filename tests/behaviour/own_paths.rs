@@ -56,16 +56,16 @@ robot! {
     link base { sensor counter: Counter(count = 3) { rate: 100 Hz; } }
 }
 
-fn told(subscription: &DynamicSubscription) -> Vec<(&'static str, i64, f64)> {
-    let told = |message: bb_core::DynamicMessage| {
+fn received(subscription: &DynamicSubscription) -> Vec<(&'static str, i64, f64)> {
+    let row = |message: bb_core::DynamicMessage| {
         let done = message.downcast::<Progress>().map_or(f64::NAN, |progress| progress.done);
         (message.path(), message.stamp().monotonic_time.as_nanos() / 1_000_000, done)
     };
-    subscription.drain().map(told).collect()
+    subscription.drain().map(row).collect()
 }
 
 #[test]
-fn a_subtree_is_heard_without_being_told_of_its_publishers() -> Result<(), Failure> {
+fn a_subtree_is_received_without_naming_its_publishers() -> Result<(), Failure> {
     let builder = Missionary::builder();
     let early = builder.subscribe_any(Select::Below("mission"), None, Overflow::default());
     let by_payload = builder.subscribe_any(Select::All, ["Progress", "Number"], Overflow::default());
@@ -79,7 +79,7 @@ fn a_subtree_is_heard_without_being_told_of_its_publishers() -> Result<(), Failu
     let progress = [(drive, 50, 0.0), (drive, 60, 0.5), (drive, 70, 1.0)];
     let mut expected = vec![("mission/plan/progress", 0, 0.5)];
     expected.extend(progress);
-    assert_eq!(told(&early), expected);
+    assert_eq!(received(&early), expected);
     assert_eq!(by_payload.drain().count(), 3 + expected.len());
     Ok(())
 }
@@ -93,7 +93,7 @@ fn a_command_publishes_its_progress_below_its_path_which_a_replay_publishes_agai
         simulation.command(missionary::command::climb, NoArguments)?;
         simulation.run_for(Duration::from_millis(50));
         let path = "command/climb/progress";
-        assert_eq!(told(&commands), [(path, 0, 0.25), (path, 10, 0.75)]);
+        assert_eq!(received(&commands), [(path, 0, 0.25), (path, 10, 0.75)]);
         Ok(simulation.stop())
     })?;
     assert_eq!(heard.get("command/climb/progress").map(Vec::len), Some(2));
@@ -122,7 +122,7 @@ fn outside_code_publishes_and_is_listed() -> Result<(), Failure> {
     radio.publish(Progress { done: 0.25 });
     let message = Stamped::new(MonotonicTime::from_nanos(3_000_000), Progress { done: 0.5 });
     radio.clone().forward(&message);
-    assert_eq!(told(&all), [("radio/link", 7, 0.25), ("radio/link", 3, 0.5)]);
+    assert_eq!(received(&all), [("radio/link", 7, 0.25), ("radio/link", 3, 0.5)]);
     for typed in [&early, &typed] {
         assert_eq!(typed.drain().map(|message| message.origin.robot).collect::<Vec<_>>(), ["Missionary", ""]);
     }

@@ -323,7 +323,7 @@ fn a_replay_gives_the_same_events_with_the_same_caller() -> Result<(), Failure> 
 }
 
 #[test]
-fn callers_are_named_by_whoever_asked() -> Result<(), Failure> {
+fn events_of_a_command_name_its_caller() -> Result<(), Failure> {
     let mut simulation = Drone::builder().simulate()?;
     simulation.arm()?;
     let events = simulation.subscribe(drone::command::land);

@@ -38,7 +38,7 @@ robot! {
 }
 
 #[test]
-fn sensors_run_on_threads_of_their_own_and_stop_when_told() -> Result<(), StartError> {
+fn sensors_run_on_threads_of_their_own_and_stop_on_request() -> Result<(), StartError> {
     let builder = Live::builder();
     let scaled = builder.subscribe(live::sensor::base::numbers::scaled);
     let running = builder.start()?;

@@ -252,7 +252,7 @@ robot! {
 }
 
 #[test]
-fn options_of_what_is_replaced_are_not_looked_at() -> Result<(), Failure> {
+fn options_of_replaced_components_are_ignored() -> Result<(), Failure> {
     let error = Desk::builder().simulate().expect_err("its options are refused").to_string();
     assert_eq!(error, "sensor/base/device cannot start: there is no such device");
 

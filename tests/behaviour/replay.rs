@@ -171,9 +171,9 @@ pub(crate) fn text(message: &DynamicMessage) -> String {
 }
 
 /// Whatever is published while the robot runs, path by path.
-pub(crate) type Heard = BTreeMap<&'static str, Vec<String>>;
+pub(crate) type Published = BTreeMap<&'static str, Vec<String>>;
 
-pub(crate) fn hear(subscription: &DynamicSubscription, heard: &mut Heard) {
+pub(crate) fn collect(subscription: &DynamicSubscription, heard: &mut Published) {
     assert_eq!(subscription.lagged(), 0);
     for message in subscription.drain() {
         heard.entry(message.path()).or_default().push(text(&message));
@@ -247,19 +247,19 @@ pub(crate) fn once_more<T>(run: impl FnOnce() -> T) -> T {
 }
 
 /// Runs a robot from its journal; what it gives.
-pub(crate) fn play<R: Robot>(builder: Builder<R>, entries: &[Entry]) -> Result<(Heard, Report), Failure> {
+pub(crate) fn play<R: Robot>(builder: Builder<R>, entries: &[Entry]) -> Result<(Published, Report), Failure> {
     let all = builder.subscribe_any(Select::All, None, overflow());
-    let mut heard = Heard::new();
+    let mut heard = Published::new();
     let report = once_more(|| {
         let mut replay = builder.replay()?;
         // In parts, as from a file.
         for part in entries.chunks((entries.len() / 1000).max(7)) {
             replay.play(part.to_vec())?;
-            hear(&all, &mut heard);
+            collect(&all, &mut heard);
         }
         Ok::<_, Failure>(replay.stop())
     })?;
-    hear(&all, &mut heard);
+    collect(&all, &mut heard);
     Ok((heard, report))
 }
 
@@ -267,13 +267,13 @@ pub(crate) fn play<R: Robot>(builder: Builder<R>, entries: &[Entry]) -> Result<(
 pub(crate) fn same_again<R: Robot>(
     builder: impl Fn() -> Builder<R>,
     run: impl FnOnce(Builder<R>) -> Result<Report, Failure>,
-) -> Result<(Heard, Report), Failure> {
+) -> Result<(Published, Report), Failure> {
     let mut first_builder = builder();
     let lines = journal(&mut first_builder);
     let all = first_builder.subscribe_any(Select::All, None, overflow());
     let report = run(first_builder)?;
-    let mut first = Heard::new();
-    hear(&all, &mut first);
+    let mut first = Published::new();
+    collect(&all, &mut first);
     let (again, report_again) = play(builder(), &entries(&lines))?;
     same(&first, &again);
     assert_eq!(counts(&report), counts(&report_again));
@@ -281,8 +281,8 @@ pub(crate) fn same_again<R: Robot>(
     Ok((first, report))
 }
 
-pub(crate) fn same(first: &Heard, again: &Heard) {
-    let paths = |heard: &Heard| heard.iter().map(|(path, texts)| (*path, texts.len())).collect::<Vec<_>>();
+pub(crate) fn same(first: &Published, again: &Published) {
+    let paths = |heard: &Published| heard.iter().map(|(path, texts)| (*path, texts.len())).collect::<Vec<_>>();
     assert_eq!(paths(first), paths(again));
     for ((path, first), (_, again)) in first.iter().zip(again) {
         if let Some(line) = (0..first.len()).find(|line| first[*line] != again[*line]) {
@@ -306,19 +306,19 @@ fn virtual_days(reads: u32) -> Result<(), Failure> {
     let all = builder.subscribe_any(Select::All, None, overflow());
     let mut simulation = builder.simulate()?;
     simulation.command(day::command::arm, NoArguments)?;
-    let mut first = Heard::new();
+    let mut first = Published::new();
     for step in 1..=i64::from(reads / 100) {
         simulation.publish(day::sensor::base::fed, at(step * 100), Number(step as f64));
         simulation.set_parameter(day::param::gain, (step % 20) as f64 / 10.0)?;
         if step % 50 == 0 {
             // Refused, or not, as its state has it.
             let _ = simulation.command(day::command::settle, NoArguments);
-            hear(&all, &mut first);
+            collect(&all, &mut first);
         }
     }
     let report = simulation.stop();
     let (again, report_again) = play(self::builder(reads), &entries(&lines))?;
-    hear(&all, &mut first);
+    collect(&all, &mut first);
     let of = |path: &str| first.get(path).map_or(0, Vec::len);
     assert!(of("health") > 100 && of("command/settle") > 100 && of("estimator/base/pair") > 1000, "much happens");
     assert!(report.estimators.iter().any(|estimator| estimator.restarts > 3));

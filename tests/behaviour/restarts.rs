@@ -232,7 +232,7 @@ fn new_options_close_and_drop_the_old_instance_before_the_new_one_is_made() -> R
 }
 
 #[test]
-fn each_component_is_told_why_it_ends() -> Result<(), StartError> {
+fn each_component_gets_the_reason_for_its_end() -> Result<(), StartError> {
     let _alone = alone();
     let mut simulation = Single::builder().simulate()?;
     lock(&LOG).clear();

@@ -85,7 +85,7 @@ fn each_verb_needs_its_right_and_names_it_and_the_caller() -> Result<(), Box<dyn
 }
 
 #[test]
-fn whoever_may_not_read_sees_no_values_and_no_messages() -> Result<(), Box<dyn std::error::Error>> {
+fn callers_that_may_not_read_see_no_values_and_no_messages() -> Result<(), Box<dyn std::error::Error>> {
     let robot = Guarded::builder().simulate()?;
     for (rights, may_read) in [(Rights::NONE, false), ([Right::Read].into(), true)] {
         let page = robot.bus().for_caller("page", rights);

@@ -344,7 +344,7 @@ fn a_byte_order_mark_is_no_column_and_depth_is_no_panic() {
 
 /// Tables of which every key is a comment, as `--list` writes them, say nothing.
 #[test]
-fn empty_tables_of_known_paths_are_taken() {
+fn empty_tables_of_known_paths_are_accepted() {
     let mut builder = Set::builder();
     let before = builder.settings().to_string();
     let empty = "[sensor]\n[sensor.base.source.every]\n# port = 1\n[param]\n[param.tuning]\n";

@@ -8,10 +8,10 @@ use bb_core::run::CommandError;
 use std::sync::Mutex;
 
 /// Answers to those who asked for a transition.
-static TOLD: Mutex<Vec<String>> = Mutex::new(Vec::new());
+static ANSWERS: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
-fn told<T>(result: Result<T, Fault>) {
-    lock(&TOLD).push(result.map_or_else(|fault| fault.to_string(), |_| "done".to_owned()));
+fn note<T>(result: Result<T, Fault>) {
+    lock(&ANSWERS).push(result.map_or_else(|fault| fault.to_string(), |_| "done".to_owned()));
 }
 
 /// Asks once more when the command is over.
@@ -19,7 +19,7 @@ struct Last(CommandContext);
 
 impl Drop for Last {
     fn drop(&mut self) {
-        told(self.0.transition("idle"));
+        note(self.0.transition("idle"));
     }
 }
 
@@ -47,7 +47,7 @@ fn fail(context: CommandContext) -> Doing {
 fn wrong(context: CommandContext) -> Doing {
     Box::pin(async move {
         for name in ["dokking", "executing", "disarmed", ""] {
-            told(context.transition(name));
+            note(context.transition(name));
         }
         Ok(Outcome::done(()))
     })
@@ -55,7 +55,7 @@ fn wrong(context: CommandContext) -> Doing {
 
 fn early(context: CommandContext) -> Doing {
     Box::pin(async move {
-        told(context.transition("docking"));
+        note(context.transition("docking"));
         Ok(Outcome::done(()))
     })
 }
@@ -84,12 +84,12 @@ robot! {
 fn alone() -> std::sync::MutexGuard<'static, ()> {
     static ALONE: Mutex<()> = Mutex::new(());
     let guard = lock(&ALONE);
-    lock(&TOLD).clear();
+    lock(&ANSWERS).clear();
     guard
 }
 
-fn take_told() -> Vec<String> {
-    std::mem::take(&mut *lock(&TOLD))
+fn take_answers() -> Vec<String> {
+    std::mem::take(&mut *lock(&ANSWERS))
 }
 
 fn changes(states: &Subscription<StateTransition>) -> Vec<(i64, &'static str, &'static str, Option<&'static str>)> {
@@ -125,7 +125,7 @@ fn other_commands_follow_a_transition_at_once() -> Result<(), Failure> {
         (300, "docking", "charging", dock),
     ];
     assert_eq!(changes(&states), expected);
-    assert_eq!(take_told(), ["done"]);
+    assert_eq!(take_answers(), ["done"]);
     Ok(())
 }
 
@@ -140,7 +140,7 @@ fn the_state_stays_when_the_command_is_cancelled_or_fails_and_goes_when_it_is_di
     simulation.run_until(at(400));
     assert_eq!(docking.try_result(), Some(Err(CommandError::Cancelled)));
     assert_eq!(simulation.state(), "docking");
-    assert_eq!(take_told(), ["the command that asks for this has ended or was cancelled"]);
+    assert_eq!(take_answers(), ["the command that asks for this has ended or was cancelled"]);
     simulation.disarm()?;
     simulation.arm()?;
     assert_eq!(simulation.state(), "idle");
@@ -157,14 +157,14 @@ fn a_state_that_is_not_declared_is_refused_and_so_is_any_of_a_robot_that_is_not_
     let mut simulation = Harbour::builder().simulate()?;
     simulation.command(harbour::command::early, NoArguments)?;
     simulation.run_until(at(10));
-    assert_eq!(take_told(), ["the robot is not armed: its safety state is `disarmed`"]);
+    assert_eq!(take_answers(), ["the robot is not armed: its safety state is `disarmed`"]);
     simulation.arm()?;
     let wrong = simulation.command(harbour::command::wrong, NoArguments)?;
     simulation.run_until(at(20));
     assert_eq!(wrong.try_result(), Some(Ok(())));
-    let [misspelt, others @ ..] = &take_told()[..] else { return Err("it asked".into()) };
+    let [misspelt, others @ ..] = &take_answers()[..] else { return Err("it asked".into()) };
     assert_eq!(misspelt, "no state `dokking` is declared; did you mean `docking`?");
-    assert!(others.iter().all(|told| told.starts_with("no state `")), "{others:?}");
+    assert!(others.iter().all(|answer| answer.starts_with("no state `")), "{others:?}");
     assert_eq!(simulation.state(), "idle");
     Ok(())
 }

@@ -147,7 +147,7 @@ impl Sensors {
             simulation.publish(ranger::sensor::base::barometer, time, FluidPressure { fluid_pressure, variance });
         }
         if millis.is_multiple_of(200) {
-            self.look(simulation, time, now);
+            self.publish_motion(simulation, time, now);
         }
         if millis.is_multiple_of(200) && !fails(NoFixes, now) {
             let off = if fails(WrongFixes, now) { 80.0 } else { 0.0 };
@@ -177,7 +177,7 @@ impl Sensors {
     }
 
     /// A picture: how the camera moved since the last one.
-    fn look(&mut self, simulation: &mut Simulation<Ranger>, time: MonotonicTime, now: f64) {
+    fn publish_motion(&mut self, simulation: &mut Simulation<Ranger>, time: MonotonicTime, now: f64) {
         let Truth { position, heading, .. } = truth(now);
         let world_from_base = UnitQuaternion::from_euler_angles(0.0, 0.0, heading);
         let world_from_camera = Isometry3::from_parts(position.into(), world_from_base) * self.base_from_camera;

@@ -47,7 +47,7 @@ impl Estimator for Same {
 }
 
 robot! {
-    robot Told;
+    robot Logged;
     link base {
         sensor brake: Brake() { rate: 100 Hz; }
         sensor number: External<Number>() { estimator same: Same() { lost_after: 10 ms; } }
@@ -96,7 +96,7 @@ fn what_is_not_safe_is_logged_before_the_robot_is_gone() -> Result<(), Box<dyn s
 
 fn what_is_not_safe_is_logged() -> Result<(), Box<dyn std::error::Error>> {
     tracing::subscriber::set_global_default(Slow)?;
-    let running = Told::builder().start()?;
+    let running = Logged::builder().start()?;
     running.arm()?;
     drop(running);
     assert_eq!(ERRORS.load(Ordering::SeqCst), 1, "a program may end here");
@@ -116,7 +116,7 @@ fn the_rest_goes_on() -> Result<(), Box<dyn std::error::Error>> {
     PANICS.store(true, Ordering::SeqCst);
     let heard = Arc::new(AtomicU32::new(0));
     let hears = Arc::clone(&heard);
-    let mut builder = Told::builder();
+    let mut builder = Logged::builder();
     builder.telemetry(|_, event| assert!(!matches!(event, TelemetryEvent::Transition(_)), "a handler that panics"));
     builder.journal(|line| assert!(!format!("{line:?}").contains("Silence"), "a sink that panics"));
     builder.telemetry(move |_, event| {

@@ -215,7 +215,7 @@ fn a_spin_is_believed_if_the_rover_can_speed_up_like_that() -> Result<(), Failur
 
 /// Fixes come late by the delay, with the time at which they were measured, and none comes from an outage.
 #[test]
-fn a_simulated_receiver_is_as_late_and_as_wrong_as_it_is_told() -> Result<(), Failure> {
+fn a_simulated_receiver_has_the_delay_and_the_faults_that_are_set() -> Result<(), Failure> {
     let mut builder = Rover::builder();
     let options = SimulatedGnssOptions {
         delay: Duration::from_millis(330),

@@ -287,10 +287,10 @@ impl Command for Drive {
     }
 }
 
-/// Publishes what it heard last, and sets a parameter from it.
+/// Publishes what it received last, and sets a parameter from it.
 #[derive(Debug)]
 pub(crate) struct Minder {
-    heard: Subscription<Dice>,
+    joined: Subscription<Dice>,
     bus: bb_core::Bus,
 }
 
@@ -300,11 +300,11 @@ impl Service for Minder {
 
     fn init(_: NoOptions, context: &ServiceContext) -> Result<Self, Fault> {
         let bus = context.bus();
-        Ok(Self { heard: bus.subscribe("estimator/base/joined", Overflow::default())?, bus })
+        Ok(Self { joined: bus.subscribe("estimator/base/joined", Overflow::default())?, bus })
     }
 
     fn update(&mut self, _: MonotonicTime) -> Result<Reading<Dice>, Fault> {
-        let Some(dice) = self.heard.drain().last() else { return Ok(Reading::nothing()) };
+        let Some(dice) = self.joined.drain().last() else { return Ok(Reading::nothing()) };
         if dice.0 < -900.0 {
             return Err(Fault::new("too little"));
         }

@@ -53,7 +53,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
 
 /// Checks that cargo accepts the name for a package, and that it does not shadow a crate.
 fn package(name: &str) -> Result<String, String> {
-    const TAKEN: [&str; 14] = [
+    const OTHER_CRATES: [&str; 14] = [
         "test",
         "core",
         "std",
@@ -86,7 +86,7 @@ fn package(name: &str) -> Result<String, String> {
     if KEYWORDS.contains(&name) {
         return Err(format!("`{name}` is a word of Rust"));
     }
-    if TAKEN.contains(&name) {
+    if OTHER_CRATES.contains(&name) {
         return Err(format!("`{name}` is the name of another crate"));
     }
     Ok(name.to_owned())

@@ -189,7 +189,7 @@ fn a_start_before_the_motion_leaves_out_the_rest() {
 }
 
 #[test]
-fn variants_are_seeded_and_told_apart() {
+fn variants_are_seeded_and_distinguished() {
     let file = Walk::default().file("variants.mcap");
     let variants = |more: &[&str]| {
         let options = ["--json", "--filter", "mekf", "--start", "random:3", "--offset", "30uT:2"];

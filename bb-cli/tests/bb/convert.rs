@@ -142,7 +142,7 @@ fn a_rate_takes_the_place_of_times() {
 }
 
 #[test]
-fn what_is_wrong_is_told_by_line_and_column() {
+fn errors_are_reported_by_line_and_column() {
     let map = ["--columns", "time=t gyr=gx,gy,gz acc=4-6"];
     let head = "t,gx,gy,gz,ax,ay,az\n";
     for (name, text, fault) in [

@@ -44,7 +44,7 @@ fn cut(recording: &Path, in_si: bool, out: &Path) {
 /// Slow and fast motion, with breaks, tapping and magnets: in SI nothing looks wrong, in a chip's units all does.
 #[test]
 #[ignore = "needs recordings: .ci/run runs it"]
-fn units_are_told_on_real_recordings() {
+fn units_are_recognised_on_real_recordings() {
     for file in broad().expect("they are there") {
         let remarks = |file: &Path| {
             let output = bb(&["info", "--json", file.to_str().expect("is text")]).out;

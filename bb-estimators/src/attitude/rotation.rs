@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn rounding_is_taken_away() {
+    fn rounding_is_removed() {
         let q = Quaternion::new(0.5, 0.5, -0.5, 0.5) * (1.0 + 1e-9_f64);
         assert!((renormalised(&Unit::new_unchecked(q)).norm() - 1.0).abs() < 1e-15);
     }

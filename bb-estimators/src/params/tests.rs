@@ -68,7 +68,7 @@ fn a_value_just_outside_its_range_is_refused_and_changes_nothing() {
 }
 
 #[test]
-fn a_value_of_another_kind_is_not_taken() {
+fn a_value_of_another_kind_is_refused() {
     each(|params| {
         for (index, row) in params.parameters().iter().enumerate() {
             let other = if row.kind == Kind::Switch { Value::Number(1.0) } else { Value::Switch(true) };
@@ -95,7 +95,7 @@ proptest! {
     }
 
     #[test]
-    fn any_text_is_taken_or_refused_and_what_is_taken_is_in_range(text in "\\PC{0,12}|[-+.e0-9]{0,8}( ?[a-zµ/^*2]{0,5})?") {
+    fn any_text_is_refused_or_parsed_within_the_range(text in "\\PC{0,12}|[-+.e0-9]{0,8}( ?[a-zµ/^*2]{0,5})?") {
         each(|params| {
             for row in params.parameters() {
                 let _ = params.set(row.name, &text);

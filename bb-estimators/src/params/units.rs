@@ -125,7 +125,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_taken_with_a_unit_and_without() {
+    fn numbers_are_parsed_with_a_unit_and_without() {
         for (text, unit, expected) in [
             ("0.1", "rad/s", 0.1),
             (" 0.1 rad/s ", "rad/s", 0.1),
@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn other_units_and_no_numbers_are_told_apart() {
+    fn other_units_and_no_numbers_are_distinguished() {
         for (text, unit) in
             [("5 m", "s"), ("5 furlong", "m"), ("5 m/", "m"), ("5 m^0", "m"), ("5 m", ""), ("5e m", "")]
         {

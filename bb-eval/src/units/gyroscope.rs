@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn degrees_are_told_from_radians() {
+    fn degrees_are_distinguished_from_radians() {
         assert_eq!(verdict(&walk(1.0, 1.0)), None);
         let said = verdict(&walk(57.3, 1.0)).expect("it is wrong");
         assert!(said.contains("in deg/s"), "{said}");

@@ -6,7 +6,7 @@ use std::hint::black_box;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Number of messages that the sink has taken.
-static TAKEN: AtomicU64 = AtomicU64::new(0);
+static RECEIVED: AtomicU64 = AtomicU64::new(0);
 
 #[derive(Reflect)]
 struct Source;
@@ -69,7 +69,7 @@ impl CuSinkTask for Sink {
     fn process(&mut self, _: &CuContext, input: &Self::Input<'_>) -> CuResult<()> {
         if let Some(payload) = input.payload() {
             black_box(payload);
-            TAKEN.store(TAKEN.load(Ordering::Relaxed) + 1, Ordering::Relaxed);
+            RECEIVED.store(RECEIVED.load(Ordering::Relaxed) + 1, Ordering::Relaxed);
         }
         Ok(())
     }
@@ -92,5 +92,5 @@ pub(crate) fn run<T>(measure: impl FnOnce(&mut dyn FnMut()) -> T) -> CuResult<(T
     });
     result?;
     running.stop()?;
-    Ok((measured, TAKEN.load(Ordering::Relaxed)))
+    Ok((measured, RECEIVED.load(Ordering::Relaxed)))
 }

@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_of_other_dialects_are_told_from_noise() {
+    fn frames_of_other_dialects_are_distinguished_from_noise() {
         let mut framer = Framer::default();
         framer.push(&[&unknown(3)[..], &frame(MavlinkVersion::V2, 4).0, &unknown(5)].concat());
         let items = all(&mut framer);

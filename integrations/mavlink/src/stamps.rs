@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn a_clock_that_lies_is_told() {
+    fn a_wrong_clock_is_reported() {
         let feed = |readings: &[(u64, i64)]| {
             let mut stamps = stamps(Unit::Micros);
             readings
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn a_clock_at_half_speed_is_told() {
+    fn a_clock_at_half_speed_is_reported() {
         let mut stamps = stamps(Unit::Micros);
         let fault = (0..10_000_i64).step_by(100).find_map(|millis| {
             stamps.time_of(1_000_000 + millis as u64 * 500, at(millis)).err().map(|fault| (millis, fault))

@@ -83,7 +83,7 @@ pub struct Recorder {
 /// The file that is written.
 pub(crate) struct Watched {
     file: File,
-    /// Length at the last look.
+    /// Length at the last check.
     length: u64,
 }
 
@@ -207,14 +207,14 @@ impl Recorder {
     /// Writing failed, or another program has removed or truncated the file.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         self.guarded(|recorder, writer| {
-            recorder.look()?;
+            recorder.check_file()?;
             writer.flush()?;
             if recorder.options.sync
                 && let Some(watched) = &recorder.file
             {
                 watched.file.sync_data()?;
             }
-            recorder.look()
+            recorder.check_file()
         })?;
         self.report.flushed = self.report.messages;
         self.last_flush = Instant::now();
@@ -351,8 +351,8 @@ impl Recorder {
         }
         writer.write_to_known_channel(&header(channel.id), main)?;
         if let Some(frames) = &mut self.frames {
-            let told = frames.told(message);
-            self.transform(&told, log_time, writer)?;
+            let transforms = frames.transforms(message);
+            self.transform(&transforms, log_time, writer)?;
         }
         Ok(true)
     }
@@ -397,8 +397,8 @@ impl Recorder {
         Ok(writer.write_to_known_channel(&header, &self.bytes.main)?)
     }
 
-    /// Checks that the file is still there, with all that was in it at the last look.
-    fn look(&mut self) -> Result<(), WriteFault> {
+    /// Checks that the file is still there, with all that was in it at the last check.
+    fn check_file(&mut self) -> Result<(), WriteFault> {
         let Some(watched) = &mut self.file else { return Ok(()) };
         let found = watched.file.metadata()?;
         #[cfg(unix)]
@@ -420,7 +420,7 @@ impl Recorder {
         self.drain()?;
         let report = self.report();
         self.guarded(|recorder, writer| {
-            recorder.look()?;
+            recorder.check_file()?;
             let counts = [("messages", report.messages), ("lost", report.lost), ("too_large", report.too_large)];
             let metadata = counts.map(|(key, count)| (key.to_owned(), count.to_string())).into();
             writer.write_metadata(&Metadata { name: END.to_owned(), metadata })?;
@@ -434,7 +434,7 @@ impl Recorder {
         ended.map_err(|cause| {
             RecordingError::new(&self.path, RecordingErrorKind::Write { messages: report.flushed, cause })
         })?;
-        self.look().map_err(|fault| self.failed(fault))?;
+        self.check_file().map_err(|fault| self.failed(fault))?;
         self.report.flushed = report.messages;
         Ok(())
     }

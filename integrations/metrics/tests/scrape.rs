@@ -243,7 +243,7 @@ fn bad_requests_do_no_harm() {
 }
 
 #[test]
-fn it_stops_when_dropped_and_names_an_address_that_is_taken() {
+fn it_stops_when_dropped_and_names_an_address_that_is_in_use() {
     let simulation = Watched::builder().simulate().expect("it starts");
     let server = Exporter::new(simulation.live()).serve("0.0.0.0:0").expect("a port is free");
     let address = SocketAddr::new([127, 0, 0, 1].into(), server.address().port());

@@ -129,7 +129,7 @@ fn a_command_that_preempts_another_takes_over_its_joints() -> Result<(), Failure
 
 /// A command fails at the first joint that it loses; by then the other one is somebody else's too.
 #[test]
-fn a_command_that_loses_its_joints_leaves_them_to_whoever_moves_them() -> Result<(), Failure> {
+fn a_command_that_loses_its_joints_fails_and_leaves_them_alone() -> Result<(), Failure> {
     let mut simulation = ready()?;
     let execution = simulation.command(crane::command::go, targets(&[[1.2, 1.9]]))?;
     simulation.run_for(Duration::from_secs(1));

@@ -4,9 +4,9 @@ use super::*;
 
 #[test]
 fn commands_beyond_a_limit_are_brought_back_and_counted() -> Result<(), Failure> {
-    let told = Arc::new(Mutex::new(Vec::new()));
+    let commanded = Arc::new(Mutex::new(Vec::new()));
     let mut builder = simulated()?;
-    builder.options(crane::actuator::base::flap::servo).told = Arc::clone(&told);
+    builder.options(crane::actuator::base::flap::servo).commanded = Arc::clone(&commanded);
     let simulation = builder.simulate()?;
     assert_eq!(simulation.arm(), Ok(()));
     let servo = crane::actuator::base::flap::servo;
@@ -15,7 +15,7 @@ fn commands_beyond_a_limit_are_brought_back_and_counted() -> Result<(), Failure>
     for (position, velocity) in [(0.1, None), (0.2, Some(0.5)), (-9.0, Some(-7.0)), (limit, None)] {
         simulation.actuate(servo, PositionCommand { position, velocity, effort: None })?;
     }
-    assert_eq!(*told.lock().map_err(|_| "poisoned")?, [0.1, limit, -limit, limit]);
+    assert_eq!(*commanded.lock().map_err(|_| "poisoned")?, [0.1, limit, -limit, limit]);
     let velocities: Vec<_> = carried_out
         .drain()
         .filter_map(|message| message.downcast::<PositionCommand>().map(|command| command.velocity))
@@ -35,9 +35,9 @@ fn commands_beyond_a_limit_are_brought_back_and_counted() -> Result<(), Failure>
 /// A value at a bound is carried out as it is; the next number beyond it is clamped, and counted.
 #[test]
 fn each_bound_belongs_to_what_is_allowed() -> Result<(), Failure> {
-    let told = Arc::new(Mutex::new(Vec::new()));
+    let commanded = Arc::new(Mutex::new(Vec::new()));
     let mut builder = simulated()?;
-    builder.options(crane::actuator::base::flap::servo).told = told;
+    builder.options(crane::actuator::base::flap::servo).commanded = commanded;
     let simulation = builder.simulate()?;
     assert_eq!(simulation.arm(), Ok(()));
     let servo = crane::actuator::base::flap::servo;

@@ -5,7 +5,7 @@ use crate::replay::{entries, journal, read_back};
 use std::collections::BTreeMap;
 
 /// Collects the messages published at each path below `actuator` and `command`.
-fn heard(all: &DynamicSubscription) -> BTreeMap<&'static str, Vec<String>> {
+fn published(all: &DynamicSubscription) -> BTreeMap<&'static str, Vec<String>> {
     let mut heard: BTreeMap<&'static str, Vec<String>> = BTreeMap::new();
     for message in all.drain() {
         heard.entry(message.path()).or_default().push(format!("{} {message:?}", message.stamp().monotonic_time));
@@ -30,7 +30,7 @@ fn motions_and_their_reports_are_the_same_in_a_replay() -> Result<(), Failure> {
     simulation.actuate(servo, PositionCommand { position: 9.0, ..Default::default() }.into())?;
     simulation.run_until(at(2000));
     simulation.stop();
-    let first = heard(&all);
+    let first = published(&all);
     for path in ["actuator/base/slew/motor", "actuator/base/slew/motor/end_motion", "command/go/progress"] {
         assert!(first.contains_key(path), "nothing at {path}");
     }
@@ -43,7 +43,7 @@ fn motions_and_their_reports_are_the_same_in_a_replay() -> Result<(), Failure> {
         replay.play(lines)?;
         replay.stop();
         drop(progress);
-        let again = heard(&all);
+        let again = published(&all);
         for (path, messages) in &first {
             assert_eq!(Some(messages), again.get(path), "{path}");
         }

@@ -16,7 +16,7 @@ struct Shafts(Mutex<HashMap<&'static str, Shaft>>);
 struct Shaft {
     position: f64,
     limit: Option<Limit>,
-    told: Vec<ActuatorCommand>,
+    commanded: Vec<ActuatorCommand>,
 }
 
 /// A motor that is at once where it is told to be.
@@ -41,7 +41,7 @@ impl Actuator for GearMotor {
     fn handle_command(&mut self, command: &Stamped<ActuatorCommand>) -> Result<(), Fault> {
         let mut shafts = lock(&self.shafts.0);
         let shaft = shafts.entry(self.context.joint()).or_default();
-        shaft.told.push(command.payload.clone());
+        shaft.commanded.push(command.payload.clone());
         if let ActuatorCommand::Position(command) = &command.payload {
             self.context.begin_motion(BeginMotion {
                 initial_position: shaft.position,
@@ -215,7 +215,7 @@ fn the_motor_gets_the_motors_numbers_and_everybody_else_the_joints() -> Result<(
         ActuatorCommand::Hold,
         ActuatorCommand::Stop,
     ];
-    assert_eq!(shaft(&shafts, "arm").told, expected);
+    assert_eq!(shaft(&shafts, "arm").commanded, expected);
     let published: Vec<_> = published
         .drain()
         .filter_map(|message| Some(message.downcast::<ActuatorCommand>()?.payload.clone()))
@@ -242,8 +242,8 @@ fn limits_are_those_of_the_joint_and_the_motor_sees_its_own() -> Result<(), Fail
         geared::actuator::base::arm::motor,
         PositionCommand { position: 9.0, ..Default::default() }.into(),
     )?;
-    let told = shaft(&shafts, "arm").told;
-    assert_eq!(told, [PositionCommand { position: GEAR.motor_position(2.0), ..Default::default() }.into()]);
+    let commanded = shaft(&shafts, "arm").commanded;
+    assert_eq!(commanded, [PositionCommand { position: GEAR.motor_position(2.0), ..Default::default() }.into()]);
     let report = simulation.report();
     assert_eq!(report.actuator(ARM).ok_or("it is declared")?.limited(LimitedQuantity::Position), 1);
     Ok(())
@@ -257,8 +257,8 @@ fn without_a_transmission_the_motor_is_the_joint_to_the_bit() -> Result<(), Fail
         simulation.actuate(wrist, command)?;
     }
     simulation.run_for(Duration::from_millis(20));
-    let Shaft { told, limit, .. } = shaft(&shafts, "wrist");
-    assert_eq!(told, commands());
+    let Shaft { commanded, limit, .. } = shaft(&shafts, "wrist");
+    assert_eq!(commanded, commands());
     let limit = limit.ok_or("it is declared")?;
     assert_eq!(
         (limit.lower, limit.upper, limit.velocity, limit.effort),

@@ -62,7 +62,7 @@ fn exercise(robot: &Live<Whole>, wait: &mut dyn FnMut()) -> Result<(), Failure> 
 }
 
 /// Messages received at each path, in order.
-fn heard(subscription: &DynamicSubscription) -> BTreeMap<&'static str, Vec<String>> {
+fn published(subscription: &DynamicSubscription) -> BTreeMap<&'static str, Vec<String>> {
     let mut heard = BTreeMap::<_, Vec<String>>::new();
     for message in subscription.drain() {
         heard.entry(message.path()).or_default().push(format!("{message:?}"));
@@ -110,7 +110,7 @@ fn listen(
 fn check(early: &[DynamicSubscription], late: &[DynamicSubscription]) {
     for (((early, late), (select, payload, count)), number) in early.iter().zip(late).zip(SELECTIONS).zip(0..) {
         assert_eq!(early.paths(), late.paths());
-        let (early, late) = (heard(early), heard(late));
+        let (early, late) = (published(early), published(late));
         assert_eq!(early, late, "{select:?} {payload:?}");
         assert_eq!(early.len(), count, "{select:?}: {:?}", early.keys());
         if number == 0 {

@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn gaps_and_stamps_that_go_back_are_told_with_their_places() {
+    fn gaps_and_stamps_that_go_back_are_reported_with_their_places() {
         let gap = |index| EVEN(index) + if index > 40 { 500 * MS } else { 0 };
         assert_eq!(remarks(gap, gap), ["1 gap of more than 3 periods; the longest is 0.510 s, after 0.400 s"]);
         let back = |index| EVEN(index) - if index == 30 { 25 * MS } else { 0 };
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn stamps_that_jitter_are_told_and_missing_messages_are_not() {
+    fn stamps_that_jitter_are_reported_and_missing_messages_are_not() {
         let jitter = |index| EVEN(index) + (index * 7 % 11 - 5) * MS / 2;
         let said = remarks(EVEN, jitter);
         assert_eq!(said, ["the stamps jitter: of the periods of 8.0 ms, one in ten is off by 2.5 ms or more"]);
@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn clocks_that_differ_are_told() {
+    fn clocks_that_differ_are_reported() {
         let later = |index| EVEN(index) - 3_600_000 * MS;
         assert_eq!(
             remarks(EVEN, later),

@@ -4,7 +4,7 @@ use crate::attitude::Real;
 
 /// An accepted sample counts this many times as much against recovery as a rejected one counts for it: recovery
 /// starts above 90 % of rejected samples.
-const TAKEN_WEIGHT: f64 = 9.0;
+const ACCEPTED_WEIGHT: f64 = 9.0;
 
 /// Rejection of one sensor.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,7 +28,7 @@ impl<T: Real> Rejection<T> {
     /// Returns whether to accept a sample that is, or is not, `near` the expected value.
     #[inline]
     pub(super) fn takes(&mut self, dt_s: T, recovery_time_s: T, near: bool) -> bool {
-        self.trigger_s += if near { -T::of(TAKEN_WEIGHT) * dt_s } else { dt_s };
+        self.trigger_s += if near { -T::of(ACCEPTED_WEIGHT) * dt_s } else { dt_s };
         if self.trigger_s > recovery_time_s {
             self.recovering = true;
         } else if self.trigger_s <= T::ZERO {

@@ -58,7 +58,7 @@ fn accelerations_are_rejected_and_recovered_from() {
 }
 
 #[test]
-fn a_disturbed_field_is_told_and_ignored() {
+fn a_disturbed_field_is_reported_and_ignored() {
     let mut filter = filter(true);
     filter.start_at(0, UnitQuaternion::identity()).unwrap();
     filter.update(&LEVEL(1)).unwrap();
@@ -80,7 +80,7 @@ fn rest_shows_the_offset() {
 }
 
 #[test]
-fn a_gyroscope_at_its_range_starts_up_anew() {
+fn a_gyroscope_at_its_range_starts_up_again() {
     let mut filter = FusionFilter::new(FusionParams { gyroscope_range: 10.0, ..Default::default() }).unwrap();
     filter.start_at(0, UnitQuaternion::identity()).unwrap();
     filter.update(&ImuSample { angular_velocity: Vector3::new(0.0, 0.0, 9.9), ..LEVEL(1) }).unwrap();

@@ -42,12 +42,12 @@ struct State {
     inboxes: Vec<Weak<Inbox>>,
     statistics: LinkStatistics,
     /// Peers by system and component.
-    heard: BTreeMap<(u8, u8), Heard>,
+    peers: BTreeMap<(u8, u8), PeerState>,
     failure: Option<LinkError>,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Heard {
+struct PeerState {
     sequence: u8,
     heartbeat: Option<MonotonicTime>,
 }
@@ -140,9 +140,9 @@ impl Shared {
             Item::Message(header, message) => {
                 state.statistics.messages += 1;
                 let id = message.message_id();
-                let heard = state.hear(header);
+                let peer = state.received(header);
                 if id == HEARTBEAT_DATA::ID {
-                    heard.heartbeat = Some(arrival);
+                    peer.heartbeat = Some(arrival);
                 }
                 let inboxes: Vec<_> = state.inboxes.iter().filter_map(Weak::upgrade).collect();
                 let dropped = inboxes.iter().filter(|inbox| inbox.offer(header, id, &message, arrival)).count();
@@ -151,12 +151,12 @@ impl Shared {
             }
             Item::Unknown(header) => {
                 state.statistics.unknown += 1;
-                state.hear(header);
+                state.received(header);
                 false
             }
             Item::Invalid(header) => {
                 state.statistics.invalid += 1;
-                state.hear(header);
+                state.received(header);
                 false
             }
         }
@@ -169,10 +169,10 @@ impl Shared {
     /// Returns the time of a peer's last heartbeat.
     pub(super) fn last_heartbeat(&self, peer: Peer) -> Option<MonotonicTime> {
         let state = self.state();
-        let of_peer = state.heard.iter().filter(|((system_id, component_id), _)| {
+        let of_peer = state.peers.iter().filter(|((system_id, component_id), _)| {
             peer.is(MavHeader { system_id: *system_id, component_id: *component_id, sequence: 0 })
         });
-        of_peer.filter_map(|(_, heard)| heard.heartbeat).max()
+        of_peer.filter_map(|(_, peer)| peer.heartbeat).max()
     }
 
     pub(super) fn statistics(&self) -> LinkStatistics {
@@ -212,20 +212,20 @@ impl Shared {
 
 impl State {
     /// Counts frames lost before this one.
-    fn hear(&mut self, header: MavHeader) -> &mut Heard {
+    fn received(&mut self, header: MavHeader) -> &mut PeerState {
         let MavHeader { system_id, component_id, sequence } = header;
-        let heard = self
-            .heard
+        let peer = self
+            .peers
             .entry((system_id, component_id))
-            .or_insert(Heard { sequence: sequence.wrapping_sub(1), heartbeat: None });
-        let lost = sequence.wrapping_sub(heard.sequence).wrapping_sub(1);
+            .or_insert(PeerState { sequence: sequence.wrapping_sub(1), heartbeat: None });
+        let lost = sequence.wrapping_sub(peer.sequence).wrapping_sub(1);
         // A difference of more than half the range is more likely a frame that was overtaken or sent twice, or a
         // sender that restarted.
         if lost < 128 {
             self.statistics.lost += u64::from(lost);
         }
-        heard.sequence = sequence;
-        heard
+        peer.sequence = sequence;
+        peer
     }
 }
 

@@ -42,7 +42,7 @@ fn a_stream_that_stops_is_reported_and_comes_back() {
 }
 
 #[test]
-fn a_flight_controller_that_is_gone_is_told_from_a_stream_that_stops() {
+fn a_flight_controller_that_is_gone_is_distinguished_from_a_stream_that_stops() {
     let other = Other::new();
     other.does.is_dead.store(true, Ordering::Release);
     other.does.is_mute.store(true, Ordering::Release);

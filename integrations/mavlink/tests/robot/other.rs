@@ -37,7 +37,7 @@ pub(crate) struct Does {
 pub(crate) struct Other {
     pub(crate) address: String,
     pub(crate) does: Arc<Does>,
-    pub(crate) heard: Receiver<(MavHeader, MavMessage)>,
+    pub(crate) received: Receiver<(MavHeader, MavMessage)>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -46,7 +46,7 @@ impl Other {
         let socket = UdpSocket::bind("127.0.0.1:0").expect("a port is free");
         let address = format!("udpout:{}", socket.local_addr().expect("it is bound"));
         socket.set_read_timeout(Some(Duration::from_millis(10))).expect("it can be set");
-        let (hears, heard) = channel();
+        let (hears, received) = channel();
         let does = Arc::new(Does::default());
         let told = Arc::clone(&does);
         let thread = thread::spawn(move || {
@@ -72,12 +72,12 @@ impl Other {
                 }
             }
         });
-        Self { address, does, heard, thread: Some(thread) }
+        Self { address, does, received, thread: Some(thread) }
     }
 
     /// The next message that fits.
     pub(crate) fn hears<T>(&self, mut fits: impl FnMut(MavHeader, MavMessage) -> Option<T>) -> Option<T> {
-        std::iter::from_fn(|| self.heard.recv_timeout(super::LONG).ok())
+        std::iter::from_fn(|| self.received.recv_timeout(super::LONG).ok())
             .find_map(|(header, message)| fits(header, message))
     }
 }

@@ -23,7 +23,7 @@ fn flying(peer: &Peer) -> bb_core::Builder<Drone> {
 struct Peer {
     process: Child,
     address: String,
-    heard: Receiver<Value>,
+    received: Receiver<Value>,
 }
 
 impl Peer {
@@ -38,13 +38,13 @@ impl Peer {
             .expect("Python starts");
         let mut lines = BufReader::new(process.stdout.take().expect("it is piped")).lines().map_while(Result::ok);
         let address = format!("udpout:127.0.0.1:{}", lines.next().expect("it says its port"));
-        let (hears, heard) = channel();
+        let (hears, received) = channel();
         std::thread::spawn(move || {
             for line in lines {
                 let _ = hears.send(serde_json::from_str(&line).expect("a line of JSON"));
             }
         });
-        Self { process, address, heard }
+        Self { process, address, received }
     }
 
     /// Tells it which fault to simulate.
@@ -54,7 +54,7 @@ impl Peer {
     }
 
     fn hears(&self, kind: &str, fits: impl Fn(&Value) -> bool) -> Value {
-        std::iter::from_fn(|| self.heard.recv_timeout(LONG).ok())
+        std::iter::from_fn(|| self.received.recv_timeout(LONG).ok())
             .find(|message| message["mavpackettype"] == kind && fits(message))
             .unwrap_or_else(|| panic!("no {kind} arrived"))
     }
@@ -114,40 +114,40 @@ fn a_robot_and_pymavlink_understand_each_other() {
     let live = running.live();
     let now = Clock::real().now();
     live.publish(drone::sensor::base::estimate, now, estimate(now));
-    let heard = peer.hears("GPS_INPUT", |_| true);
+    let received = peer.hears("GPS_INPUT", |_| true);
     for (name, value) in [("lat", -338_000_000), ("lon", 1_512_000_000), ("yaw", 36_000), ("fix_type", 3)] {
-        assert_eq!(heard[name], json!(value), "{name}");
+        assert_eq!(received[name], json!(value), "{name}");
     }
     for (name, value) in [("alt", 32.5), ("vn", 2.0), ("ve", 1.0), ("vd", -3.0), ("horiz_accuracy", 2.0)] {
-        assert_eq!(heard[name], json!(value), "{name}");
+        assert_eq!(received[name], json!(value), "{name}");
     }
     // Accuracy of the speed, and vertical dilution of precision.
-    assert_eq!((&heard["ignore_flags"], &heard["from"]), (&json!(32 + 4), &json!([1, 220])));
-    assert_eq!(heard["hdop"], json!(1.0));
+    assert_eq!((&received["ignore_flags"], &received["from"]), (&json!(32 + 4), &json!([1, 220])));
+    assert_eq!(received["hdop"], json!(1.0));
 
     live.publish(drone::sensor::base::estimate, now, estimate(now));
-    let heard = peer.hears("ODOMETRY", |_| true);
+    let received = peer.hears("ODOMETRY", |_| true);
     assert_eq!(
-        (&heard["frame_id"], &heard["child_frame_id"], &heard["from"]),
+        (&received["frame_id"], &received["child_frame_id"], &received["from"]),
         (&json!(1), &json!(12), &json!([1, 197]))
     );
-    assert_eq!(heard["reset_counter"], json!(5));
+    assert_eq!(received["reset_counter"], json!(5));
     let number = |value: &Value| value.as_f64().expect("it is a number");
     // To the north, where the velocity is 2 m/s forward, 1 m/s to the right and 3 m/s up.
     for (name, value) in [("x", 0.0), ("y", 0.0), ("z", 0.0), ("vx", 2.0), ("vy", 1.0), ("vz", -3.0)] {
-        assert!((number(&heard[name]) - value).abs() < 1e-6, "{name}: {}", heard[name]);
+        assert!((number(&received[name]) - value).abs() < 1e-6, "{name}: {}", received[name]);
     }
-    assert!((number(&heard["q"][0]).abs() - 1.0).abs() < 1e-6, "{}", heard["q"]);
-    assert!((number(&heard["pose_covariance"][0]) - 4.0).abs() < 1e-6);
-    assert_eq!((&heard["rollspeed"], &heard["velocity_covariance"][0]), (&Value::Null, &Value::Null));
+    assert!((number(&received["q"][0]).abs() - 1.0).abs() < 1e-6, "{}", received["q"]);
+    assert!((number(&received["pose_covariance"][0]) - 4.0).abs() < 1e-6);
+    assert_eq!((&received["rollspeed"], &received["velocity_covariance"][0]), (&Value::Null, &Value::Null));
 
     let long = "0123456789".repeat(5);
     let event = |said: &str| FlightEvent { kind: "fallback_engaged".into(), ..text(Level::Error, said) };
     let events = vec![event("no estimate"), event(&format!("{long}{long}"))];
     live.publish(drone::sensor::base::events, now, FlightEvents { events, lost: 0 });
-    let heard: Vec<Value> = (0..4).map(|_| peer.hears("STATUSTEXT", |_| true)).collect();
+    let received: Vec<Value> = (0..4).map(|_| peer.hears("STATUSTEXT", |_| true)).collect();
     let texts: Vec<_> =
-        heard.iter().map(|text| (&text["text"], &text["id"], &text["chunk_seq"], &text["severity"])).collect();
+        received.iter().map(|text| (&text["text"], &text["id"], &text["chunk_seq"], &text["severity"])).collect();
     let [text, first, empty] = ["no estimate", &long, ""].map(|text| json!(text));
     let [zero, one, two] = [0, 1, 2].map(|number| json!(number));
     assert_eq!(

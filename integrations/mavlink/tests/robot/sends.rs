@@ -45,13 +45,13 @@ fn texts_arrive_with_their_severities() {
     let long = "x".repeat(60);
     let events = vec![text(Level::Warn, "visual blackout"), text(Level::Info, &long)];
     running.live().publish(drone::sensor::base::events, now, FlightEvents { events, lost: 0 });
-    let heard = |_| {
+    let received = |_| {
         other.hears(|_, message| match message {
             MavMessage::STATUSTEXT(data) => Some(data),
             _ => None,
         })
     };
-    let texts: Vec<_> = (0..3).map_while(heard).collect();
+    let texts: Vec<_> = (0..3).map_while(received).collect();
     let read: Vec<_> = texts
         .iter()
         .map(|data| (data.severity, data.text.to_str().map(str::len), data.id, data.chunk_seq))

@@ -11,12 +11,12 @@ use bb_core::{DynamicMessage, JointSide};
 pub(super) struct Frames {
     topology: &'static Topology,
     /// The path that places the robot, and whether it includes a position.
-    body: Option<(String, Told)>,
+    body: Option<(String, BodyContent)>,
 }
 
-/// Amount of what a path says about a body, in increasing order.
+/// State of a body that a path holds, in increasing order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Told {
+enum BodyContent {
     Orientation,
     Pose,
     /// Chosen explicitly, whatever it contains.
@@ -26,7 +26,7 @@ enum Told {
 impl Frames {
     /// Creates the frames of a robot placed by `body`, or otherwise by the path that says the most, the first of several.
     pub(super) fn new(topology: &'static Topology, body: Option<String>) -> Self {
-        Self { topology, body: body.map(|path| (path, Told::Chosen)) }
+        Self { topology, body: body.map(|path| (path, BodyContent::Chosen)) }
     }
 
     /// All moving joints, at rest: their positions until a message reports others.
@@ -39,13 +39,13 @@ impl Frames {
     }
 
     /// The transforms reported by a message.
-    pub(super) fn told(&mut self, message: &DynamicMessage) -> TransformsMessage {
+    pub(super) fn transforms(&mut self, message: &DynamicMessage) -> TransformsMessage {
         let stamp = message.stamp();
         let joints = self.joints(message);
         if !joints.is_empty() {
             return TransformsMessage::moving(self.topology, self.moved(&joints), stamp.wall_time);
         }
-        let Some((told, world_from_body)) = place(message) else { return NONE };
+        let Some((content, world_from_body)) = place(message) else { return NONE };
         let at = |child: &str| TransformStamped {
             header: Header { stamp: Time::of(stamp.wall_time), frame_id: WORLD.to_owned() },
             child_frame_id: child.to_owned(),
@@ -55,19 +55,19 @@ impl Frames {
         let mut transforms = vec![at(message.path())];
         if let Some(root) = self.topology.links.first()
             && root.name == stamp.frame.name()
-            && self.tells_of_the_body(message.path(), told)
+            && self.places_the_body(message.path(), content)
         {
             transforms.push(at(root.name));
         }
         TransformsMessage { transforms }
     }
 
-    fn tells_of_the_body(&mut self, path: &str, told: Told) -> bool {
+    fn places_the_body(&mut self, path: &str, content: BodyContent) -> bool {
         match &self.body {
             Some((known, _)) if known == path => true,
-            Some((_, known)) if *known >= told => false,
+            Some((_, known)) if *known >= content => false,
             _ => {
-                self.body = Some((path.to_owned(), told));
+                self.body = Some((path.to_owned(), content));
                 true
             }
         }
@@ -75,7 +75,7 @@ impl Frames {
 
     /// The joints whose positions a message reports, and these positions.
     fn joints(&self, message: &DynamicMessage) -> Vec<(usize, Vec<f64>)> {
-        let mut told = Vec::new();
+        let mut positions = Vec::new();
         let stamp = message.stamp();
         message.tell_joints(&mut |reading| {
             let name = reading.joint.unwrap_or_else(|| stamp.frame.name());
@@ -87,15 +87,15 @@ impl Frames {
                 (_, position) => position.to_vec(),
             };
             if position.iter().all(|value| value.is_finite()) {
-                told.push((number, position));
+                positions.push((number, position));
             }
         });
-        told
+        positions
     }
 
     /// Returns these joints, and those that follow them.
-    fn moved(&self, told: &[(usize, Vec<f64>)]) -> Vec<(usize, Vec<f64>)> {
-        let position = |number: usize| told.iter().find(|(joint, _)| *joint == number).map(|(_, at)| at);
+    fn moved(&self, positions: &[(usize, Vec<f64>)]) -> Vec<(usize, Vec<f64>)> {
+        let position = |number: usize| positions.iter().find(|(joint, _)| *joint == number).map(|(_, at)| at);
         let moved = (0..self.topology.joints.len()).filter_map(|number| {
             let (owner, multiplier, offset) = self.topology.followed(number);
             let follows = || match position(owner)?.as_slice() {
@@ -111,14 +111,14 @@ impl Frames {
 const NONE: TransformsMessage = TransformsMessage { transforms: Vec::new() };
 
 /// The pose of a body from an estimate; `None` if the message is not an estimate of a pose, or is not finite.
-fn place(message: &DynamicMessage) -> Option<(Told, Isometry3<f64>)> {
+fn place(message: &DynamicMessage) -> Option<(BodyContent, Isometry3<f64>)> {
     let at = |position: Vector3<f64>, rotation: UnitQuaternion<f64>| {
         let is_place = position.iter().all(|value| value.is_finite()) && (rotation.norm() - 1.0).abs() < 0.1;
         is_place
             .then(|| Isometry3::from_parts(position.into(), UnitQuaternion::new_normalize(rotation.into_inner())))
     };
     if let Some(orientation) = message.downcast::<Orientation>() {
-        return Some((Told::Orientation, at(Vector3::zeros(), orientation.world_from_body)?));
+        return Some((BodyContent::Orientation, at(Vector3::zeros(), orientation.world_from_body)?));
     }
     let (position, rotation) = if let Some(pose) = message.downcast::<Pose>() {
         (pose.position, pose.world_from_body)
@@ -128,5 +128,5 @@ fn place(message: &DynamicMessage) -> Option<(Told, Isometry3<f64>)> {
         let Odometry { pose, .. } = message.downcast::<Odometry>()?.payload;
         (pose.position, pose.world_from_body)
     };
-    Some((Told::Pose, at(position, rotation)?))
+    Some((BodyContent::Pose, at(position, rotation)?))
 }

@@ -34,7 +34,7 @@ pub struct RecorderOptions {
     /// The largest chunk, in bytes; a flush ends one as well. Default: 1 MiB.
     pub chunk_bytes: u64,
     /// `true` to write joints that move, poses and orientations as transforms to `/tf` as well, of a robot that the
-    /// recorder was told. Default: yes.
+    /// recorder was given. Default: yes.
     pub transforms: bool,
     /// The path whose poses or orientations place the robot's root link in `world`, on `/tf`. Default: the first that
     /// publishes poses of the root link, or orientations as long as none does.

@@ -9,16 +9,16 @@ use std::sync::{Arc, Mutex};
 
 /// Takes so many bytes.
 struct Disk {
-    taken: Arc<Mutex<Cursor<Vec<u8>>>>,
+    written: Arc<Mutex<Cursor<Vec<u8>>>>,
     room: usize,
 }
 
 impl Write for Disk {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let mut taken = self.taken.lock().map_err(|_| io::ErrorKind::Other)?;
-        match self.room.saturating_sub(taken.get_ref().len()) {
+        let mut written = self.written.lock().map_err(|_| io::ErrorKind::Other)?;
+        match self.room.saturating_sub(written.get_ref().len()) {
             0 => Err(io::ErrorKind::StorageFull.into()),
-            room => taken.write(&bytes[..bytes.len().min(room)]),
+            room => written.write(&bytes[..bytes.len().min(room)]),
         }
     }
 
@@ -29,7 +29,7 @@ impl Write for Disk {
 
 impl Seek for Disk {
     fn seek(&mut self, position: SeekFrom) -> io::Result<u64> {
-        self.taken.lock().map_err(|_| io::ErrorKind::Other)?.seek(position)
+        self.written.lock().map_err(|_| io::ErrorKind::Other)?.seek(position)
     }
 }
 
@@ -44,8 +44,8 @@ fn publish(topic: &Topic<JointState>, count: u32) {
 fn a_full_disk_is_an_error_that_names_the_file_and_what_was_written_before_is_readable() {
     let topic = Topic::<JointState>::new("sensor/arm/encoder");
     let all = DynamicSubscription::new([&topic as &dyn AnyTopic], Select::All, None, Overflow::default());
-    let taken = Arc::new(Mutex::new(Cursor::new(Vec::new())));
-    let disk = Disk { taken: Arc::clone(&taken), room: 4000 };
+    let written = Arc::new(Mutex::new(Cursor::new(Vec::new())));
+    let disk = Disk { written: Arc::clone(&written), room: 4000 };
     let options = RecorderOptions { flush_messages: 10, ..RecorderOptions::default() };
     let mut recorder = Recorder::on(Path::new("full.mcap"), Box::new(disk), None, all, options).expect("it fits");
     publish(&topic, 1000);
@@ -61,7 +61,7 @@ fn a_full_disk_is_an_error_that_names_the_file_and_what_was_written_before_is_re
     assert!(matches!(recorder.finish().expect_err("it was given up").kind(), RecordingErrorKind::GivenUp));
 
     let file = std::env::temp_dir().join(format!("bb-mcap-full-{}.mcap", std::process::id()));
-    std::fs::write(&file, taken.lock().expect("nobody panicked").get_ref()).expect("there is room here");
+    std::fs::write(&file, written.lock().expect("nobody panicked").get_ref()).expect("there is room here");
     let recording = crate::Recording::open(&file).expect("it breaks off");
     let read = recording.messages::<JointState>("sensor/arm/encoder").expect("it was recorded");
     assert!(read.filter(Result::is_ok).count() as u64 >= flushed);
@@ -69,14 +69,14 @@ fn a_full_disk_is_an_error_that_names_the_file_and_what_was_written_before_is_re
 }
 
 #[test]
-fn a_disk_that_is_full_at_the_end_of_the_file_is_told() {
+fn a_disk_that_is_full_at_the_end_of_the_file_is_reported() {
     let topic = Topic::<JointState>::new("sensor/arm/encoder");
     let mut failed_at_the_end = 0;
     // However much fits: the header, a part of the chunk, all but the last byte.
     for room in 0.. {
         let all = DynamicSubscription::new([&topic as &dyn AnyTopic], Select::All, None, Overflow::default());
-        let taken = Arc::new(Mutex::new(Cursor::new(Vec::new())));
-        let disk = Disk { taken: Arc::clone(&taken), room };
+        let written = Arc::new(Mutex::new(Cursor::new(Vec::new())));
+        let disk = Disk { written: Arc::clone(&written), room };
         let options = RecorderOptions { flush_messages: 2, ..RecorderOptions::default() };
         let Ok(mut recorder) = Recorder::on(Path::new("full.mcap"), Box::new(disk), None, all, options) else {
             continue;
@@ -103,7 +103,7 @@ fn a_disk_that_is_full_at_the_end_of_the_file_is_told() {
 
 #[cfg(unix)]
 #[test]
-fn a_file_that_another_program_removes_or_truncates_is_told() {
+fn a_file_that_another_program_removes_or_truncates_is_reported() {
     type Change = fn(&Path) -> io::Result<()>;
     let remove: Change = |path| std::fs::remove_file(path);
     let truncate: Change = |path| File::create(path).map(drop);
@@ -137,7 +137,7 @@ fn a_file_that_another_program_removes_or_truncates_is_told() {
 fn a_recorder_on_a_thread_says_when_it_has_failed() {
     let topic = Topic::<JointState>::new("sensor/arm/encoder");
     let all = DynamicSubscription::new([&topic as &dyn AnyTopic], Select::All, None, Overflow::default());
-    let disk = Disk { taken: Arc::default(), room: 1000 };
+    let disk = Disk { written: Arc::default(), room: 1000 };
     let recorder = Recorder::on(Path::new("full.mcap"), Box::new(disk), None, all, RecorderOptions::default());
     let recorder = recorder.and_then(Recorder::spawn).expect("it starts");
     publish(&topic, 1000);

@@ -133,7 +133,7 @@ robot! {
 }
 
 #[test]
-fn a_recorder_of_the_builder_has_what_an_arm_is_told_and_reports() -> Result<(), Box<dyn std::error::Error>> {
+fn a_recorder_of_the_builder_has_the_commands_and_reports_of_an_arm() -> Result<(), Box<dyn std::error::Error>> {
     let file = Temporary::new("arm");
     let builder = Lifter::builder();
     let all = builder.subscribe_any(Select::All, None, Overflow::DropOldest { capacity: 10_000 });

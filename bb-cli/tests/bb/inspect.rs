@@ -126,7 +126,7 @@ fn units_that_look_wrong_are_named() {
 }
 
 #[test]
-fn gaps_and_clocks_are_told_with_their_places() {
+fn gaps_and_clocks_are_reported_with_their_places() {
     let gap = remarks(&Walk { missing: 400..450, ..Walk::default() }, "info_gap.mcap");
     assert_eq!(gap, ["gap: 1 gap of more than 3 periods; the longest is 0.510 s, after 3.990 s"; 2]);
     let stamp = |index: u64, log: u64| if index == 500 { log - 15_000_000 } else { log };
@@ -220,7 +220,7 @@ impl Turns {
 
 /// Faults between sensors are reported, each by itself.
 #[test]
-fn latencies_scatter_offsets_and_jitter_are_told() {
+fn latencies_scatter_offsets_and_jitter_are_reported() {
     let good = Turns { late_s: [0.0; 3], scatter: 0.01, offset: 0.0, jitter: 0 };
     assert_eq!(good.remarks("info_turns.mcap"), [""; 0]);
     let late = |late_s| Turns { late_s, ..good }.remarks("info_late.mcap");
@@ -255,7 +255,7 @@ fn frames_are_listed() {
 }
 
 #[test]
-fn what_a_damaged_file_holds_is_told_and_saved() {
+fn contents_of_a_damaged_file_are_reported_and_saved() {
     let bytes = Walk::default().bytes();
     let path = file("info_cut.mcap", &bytes[..bytes.len() / 2]);
     let name = path.to_str().expect("is text");
