@@ -34,7 +34,7 @@ impl Replayed for Rover {
 
 const PERIOD_NS: i64 = 2_500_000;
 const FIXES: i64 = 2_000;
-/// Between two fixes.
+/// Number of samples between two fixes.
 const SAMPLES: i64 = 80;
 
 fn main() -> Result<(), Box<dyn Error>> {

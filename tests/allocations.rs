@@ -84,8 +84,7 @@ fn nothing_is_allocated_for_subscribers_that_are_full_or_awaited() {
     assert_eq!((by_number.lagged(), by_bytes.lagged(), latest.lagged()), (997, 991, 1000));
 }
 
-/// Nor at a keyframe of the smoother, whatever happens there.
-/// What a camera saw.
+/// Detection of a camera.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 struct Flash;
 

@@ -142,7 +142,7 @@ mod tests {
         assert_eq!(Periods::of(&[]), None);
     }
 
-    /// Like health changes: twice within a millisecond, then nothing for a while.
+    /// Bursts, like health changes: twice within a millisecond, then nothing for a while.
     #[test]
     fn bursts_have_no_rate_and_no_gaps() {
         let bursts: Vec<i64> =

@@ -49,7 +49,7 @@ pub struct Parameter {
 }
 
 impl Parameter {
-    /// The first paragraph of the documentation, with its line breaks.
+    /// Returns the first paragraph of the documentation, with its line breaks.
     pub fn summary(&self) -> &'static str {
         self.doc.split("\n\n").next().unwrap_or("").trim()
     }

@@ -214,7 +214,7 @@ impl Recording {
 /// The state of reading.
 #[derive(Debug)]
 pub enum End {
-    /// There may be more.
+    /// Reading that goes on: there may be more.
     NotYet,
     /// Everything is read.
     Whole,

@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// Between two readings.
+/// Time between two readings, ns.
 pub(crate) const PERIOD_NS: i64 = 10_000_000;
 
 /// All sensors at one moment, body axes.

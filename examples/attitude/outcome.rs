@@ -8,7 +8,7 @@ use std::fmt;
 
 pub(crate) struct Outcome {
     pub(crate) filter: &'static str,
-    /// The one that counts comes first.
+    /// Series of estimates; the one that counts comes first.
     pub(crate) series: Vec<Series>,
     pub(crate) report: Report,
     pub(crate) seconds: f64,

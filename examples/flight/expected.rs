@@ -58,7 +58,7 @@ impl Expected {
         }
     }
 
-    /// The first label that is another than it must be.
+    /// Returns the first label that is another than it must be.
     pub(crate) fn fault(&self, labels: impl IntoIterator<Item = (f64, SourceLabel)>) -> Option<String> {
         labels.into_iter().find_map(|(time_s, label)| {
             let expected = self.at(time_s);

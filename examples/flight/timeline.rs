@@ -24,7 +24,7 @@ const EXPECTED: [(&str, f64, f64); 13] = [
     ("gate open", 72.0, 73.0),
 ];
 
-/// The first that did not happen in its order.
+/// Returns the first event that did not happen in its order.
 pub(crate) fn missing(happened: &[Happened]) -> Option<String> {
     let mut left = happened.iter();
     EXPECTED.iter().find_map(|(what, from_s, to_s)| {
@@ -37,7 +37,7 @@ pub(crate) fn missing(happened: &[Happened]) -> Option<String> {
 /// may not happen at all.
 const ONLY_EXPECTED: [&str; 5] = ["gate", "started", "fatal", "fallback", "clock_set_back"];
 
-/// The first that should not have happened.
+/// Returns the first event that should not have happened.
 pub(crate) fn unexpected(happened: &[Happened]) -> Option<String> {
     let is_expected = |one: &Happened| {
         let mut rows = EXPECTED.iter();

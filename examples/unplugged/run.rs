@@ -12,7 +12,7 @@ use std::io::Write;
 struct Story<'a> {
     events: DynamicSubscription,
     poses: Subscription<Pose>,
-    /// Has happened after what is written so far.
+    /// Line that has happened after what is written so far.
     next: Option<Line>,
     lines: Vec<Line>,
     out: &'a mut dyn Write,
@@ -49,7 +49,7 @@ impl<'a> Story<'a> {
         Ok(Self { events, poses, next: None, lines: Vec::new(), out })
     }
 
-    /// Does one step of the script. What becomes of a command is seen on its topic.
+    /// Carries out one step of the script. The result of a command is seen on its topic.
     fn take_place(&mut self, robot: &Live<Rover>, time: MonotonicTime, deed: Deed) -> std::io::Result<()> {
         let (kind, event, detail) = match deed {
             Deed::Hardware(event, detail) => (Kind::Hardware, event, detail),

@@ -27,7 +27,7 @@ const LAYERS: [&str; 19] = [
     "run",
 ];
 
-/// The first names of all paths that begin with `crate::`, also of those in a group.
+/// Collects the first names of all paths that begin with `crate::`, also of those in a group.
 fn named_in_crate(code: &str) -> Vec<&str> {
     let name = |text: &str| text.chars().take_while(|c| c.is_alphanumeric() || *c == '_').count();
     let mut names = Vec::new();

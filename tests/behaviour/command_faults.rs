@@ -15,7 +15,7 @@ pub(crate) enum Kind {
     Sleep,
     /// Wakes itself and never gives way.
     Spin,
-    /// Does not come back until it may.
+    /// Blocks its thread until it may go on.
     Block,
     /// Sleeps so long that it never ends.
     Endless,
@@ -24,7 +24,7 @@ pub(crate) enum Kind {
 static MAY_GO_ON: AtomicBool = AtomicBool::new(false);
 static BLOCKS: AtomicBool = AtomicBool::new(false);
 
-/// Does what it is told.
+/// Command that behaves as its arguments say.
 #[derive(Debug)]
 pub(crate) struct Misbehave;
 
@@ -58,7 +58,7 @@ impl Command for Misbehave {
 type Starts = Box<dyn FnOnce() + Send>;
 static STARTS: Mutex<Option<Starts>> = Mutex::new(None);
 
-/// Does something before it gives its future.
+/// Command that does something before it gives its future.
 #[derive(Debug)]
 pub(crate) struct Nested;
 

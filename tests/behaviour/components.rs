@@ -155,7 +155,7 @@ impl HandleCall<Ask> for Echo {
     }
 }
 
-/// Has an [`Echo`] fail.
+/// Call at which an [`Echo`] fails.
 pub(crate) struct Break;
 
 impl HandleCall<Break> for Echo {
@@ -283,7 +283,7 @@ impl Command for Task {
 /// Options of [`Counter`].
 #[derive(Clone, Debug, Options)]
 pub(crate) struct CounterOptions {
-    /// The first number.
+    /// First number.
     #[option(default = 0.0)]
     pub(crate) start: f64,
     /// Number of numbers that it gives.
@@ -357,7 +357,7 @@ pub(crate) struct Seen {
 /// Three numbers.
 #[derive(Clone, Copy, Debug, Inputs)]
 pub(crate) struct Numbers<'a> {
-    /// The one that dispatches in these tests.
+    /// Input that dispatches in these tests.
     pub(crate) driver: Input<'a, Number>,
     /// One that must be there.
     pub(crate) second: Input<'a, Number>,
@@ -444,7 +444,7 @@ pub(crate) fn numbers(subscription: &Subscription<Number>) -> Vec<f64> {
     subscription.drain().map(|number| number.0).collect()
 }
 
-/// Has `run` called on the publisher's thread at the next message.
+/// Calls `run` on the publisher's thread at the next message.
 pub(crate) fn when_woken<T: Payload>(subscription: &mut Subscription<T>, run: impl FnMut() + Send + 'static) {
     struct Wakes(Mutex<Box<dyn FnMut() + Send>>);
     impl Wake for Wakes {

@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, mpsc};
 use std::task::{Context as Polled, Wake, Waker};
 
-/// Within it a motor is told to stop, whatever hangs: shorter than any time that the robot gives code that hangs.
+/// Time within which a motor is stopped, whatever hangs: shorter than any time that the robot gives code that hangs.
 const AT_ONCE: Duration = Duration::from_secs(2);
 
 static HERE: Gate = Gate::new();
@@ -84,7 +84,7 @@ impl Place for InCommands {
     const NAME: &'static str = "a command";
 }
 
-/// Is done at once.
+/// Command that is done at once.
 #[derive(Debug)]
 pub(crate) struct Alarm;
 
@@ -202,7 +202,7 @@ impl Wake for Hangs {
     }
 }
 
-/// Has the waker of a subscriber called at the next message.
+/// Polls a subscriber with a waker that hangs at the next message.
 fn wait<T: Payload>(subscription: &mut Subscription<T>, place: &'static str) {
     let waker = Waker::from(Arc::new(Hangs(place)));
     let awaited = pin!(subscription.recv_async());
@@ -598,7 +598,7 @@ fn a_component_that_reports_a_hardware_error_has_the_robot_disarmed() -> Result<
     Ok(())
 }
 
-/// While the robot runs, and once each time.
+/// A sensor that hangs is reported while the robot runs, and once each time.
 #[test]
 fn a_sensor_that_hangs_is_reported_with_the_time_since() {
     let _alone = alone();

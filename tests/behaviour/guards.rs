@@ -58,7 +58,7 @@ fn lift(context: CommandContext) -> Doing {
     })
 }
 
-/// Has a fault from the beginning.
+/// Reports a fault from the beginning.
 fn burn(context: &SensorContext) -> Done {
     context.hardware_error("it is burnt");
     Ok(())

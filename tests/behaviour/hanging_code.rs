@@ -166,7 +166,7 @@ mod pools {
         const NAME: &'static str = "here";
     }
 
-    /// Does what is to be done when an estimator is degraded.
+    /// Command that runs when an estimator is degraded.
     pub(crate) struct Halt;
 
     impl Command for Halt {

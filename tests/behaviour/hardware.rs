@@ -53,7 +53,7 @@ fn lidar(context: &ServiceContext) -> Result<Update, Fault> {
     Ok(Box::new(|_| Ok(Reading::nothing())))
 }
 
-/// Is left out, or not.
+/// Initialises a spare device, which may be left out.
 fn spare(context: &SensorContext) -> Done {
     if !IS_SKIPPED.load(Ordering::SeqCst) {
         return Ok(());
@@ -62,7 +62,7 @@ fn spare(context: &SensorContext) -> Done {
     Err(Fault::skip("it is not plugged in"))
 }
 
-/// Has a callback that holds the command's own context.
+/// Registers a callback that holds the command's own context.
 fn lift(context: CommandContext) -> Doing {
     Box::pin(async move {
         let kept = context.clone();
@@ -85,7 +85,7 @@ fn block(_: CommandContext) -> Doing {
     })
 }
 
-/// Has the robot armed on another thread.
+/// Arms the robot on another thread.
 fn arm_later(context: CommandContext) -> Doing {
     Box::pin(async move {
         let bus = context.bus();

@@ -104,7 +104,7 @@ impl HandleCast<Doubt> for Adder {
     }
 }
 
-/// Is the last number before it cannot be made safe.
+/// Last number before it cannot be made safe.
 const REFUSES: f64 = 99.0;
 
 fn moves(to: f64) -> Done {

@@ -344,7 +344,7 @@ impl Command for Go {
     }
 }
 
-/// Has another command go.
+/// Command that starts another one.
 #[derive(Debug)]
 pub(crate) struct Mission;
 

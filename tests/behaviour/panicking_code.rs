@@ -169,7 +169,7 @@ mod outputs {
 mod instants {
     use super::*;
 
-    /// Is unplugged.
+    /// Sensor that is unplugged.
     #[derive(Debug)]
     pub(crate) struct Unplugged;
 

@@ -199,7 +199,7 @@ pub(crate) fn counts(report: &Report) -> String {
 
 pub(crate) type Lines = Arc<Mutex<Vec<Entry>>>;
 
-/// Has a robot write its journal.
+/// Makes a robot write its journal.
 pub(crate) fn journal<R: Robot>(builder: &mut Builder<R>) -> Lines {
     let lines = Lines::default();
     let sink = Arc::clone(&lines);

@@ -28,7 +28,7 @@ pub(crate) struct FanOptions {
     pub(crate) speed: f64,
 }
 
-/// Is set to its speed whenever that changes, and registers what stops it once.
+/// Motor that is set to its speed whenever that changes, and registers what stops it once.
 #[derive(Debug)]
 pub(crate) struct Fan;
 
@@ -66,7 +66,7 @@ fn brake(context: &SensorContext) -> Done {
     Ok(())
 }
 
-/// Has its torque on from here on.
+/// Turns the torque on from here on.
 fn torque_on(_: &ActuatorContext) -> Done {
     TURNS.store(true, Ordering::SeqCst);
     MADE.fetch_add(1, Ordering::SeqCst);

@@ -16,7 +16,7 @@ fn alone() -> MutexGuard<'static, ()> {
     lock(&ALONE)
 }
 
-/// Is unplugged from 0.5 s to 2 s.
+/// Fails from 0.5 s to 2 s, as a sensor that is unplugged.
 fn unplugged(_: u32, now: MonotonicTime) -> Read {
     if (at(500)..at(2000)).contains(&now) { Err(Fault::new("unplugged")) } else { Ok(Reading::now(Number(1.0))) }
 }

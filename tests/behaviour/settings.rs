@@ -16,7 +16,7 @@ pub(crate) enum Filtering {
     },
 }
 
-/// Has no JSON form.
+/// Option that has no JSON form.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Opaque;
 

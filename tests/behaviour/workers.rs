@@ -161,7 +161,7 @@ struct Frame {
     pixels: Vec<u8>,
 }
 
-/// Does not return from its first frame, or fails at it.
+/// Estimator that does not return from its first frame, or fails at it.
 #[derive(Debug)]
 struct Eye<const HANGS: bool>;
 

@@ -81,7 +81,7 @@ enum Failure {
 
 use Failure::*;
 
-/// When, s, and how it is told.
+/// Begin and end of each failure, s, and its description.
 const FAILURES: [(f64, f64, Failure, &str); 10] = [
     (20.0, 28.0, NoFixes, "no satellites"),
     (32.0, 35.0, WrongFixes, "fixes 80 m off"),

@@ -259,7 +259,7 @@ fn where_latitude_and_longitude_are_zero_is_a_place_too() {
     }
 }
 
-/// After ten seconds in which no other came.
+/// A fix that stays the only one begins the world after ten seconds in which no other came.
 #[test]
 fn a_fix_that_stays_the_only_one_begins_the_world_late() {
     for seen in drive_as(|_| truth(0.0), &munich(), 20, |number, right| (number == 0).then_some(right)) {

@@ -15,7 +15,7 @@ robot! {
     link base { sensor number: External<Number>(); }
 }
 
-/// Does not come back.
+/// Subscriber that does not return.
 struct Blocks;
 
 fn block() -> ! {

@@ -52,7 +52,7 @@ fn keep_bus(context: &SensorContext) -> Done {
 
 static BUS: OnceLock<bb_core::Bus> = OnceLock::new();
 
-/// Does not return once the robot is armed.
+/// Blocks once the robot is armed.
 fn hang(_: u32, _: MonotonicTime) -> Read {
     if BUS.get().is_some_and(|bus| bus.safety() != Safety::Disarmed) {
         println!("it hangs");
@@ -265,7 +265,7 @@ fn a_second_signal_ends_a_simulation_that_hangs() -> Result<(), Failure> {
 static SAFE: Mutex<Vec<std::time::Instant>> = Mutex::new(Vec::new());
 static DEVICES: AtomicU32 = AtomicU32::new(0);
 
-/// Has a device take its time to become safe; the first one hangs.
+/// Registers a device that takes its time to become safe; the first one hangs.
 fn device(context: &SensorContext) -> Done {
     let is_first = DEVICES.fetch_add(1, Ordering::SeqCst) == 0;
     context.on_disarm(move || {

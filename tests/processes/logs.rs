@@ -61,7 +61,7 @@ mod harmless {
     use bb_core::prelude::*;
 
     robot! {
-        /// Has nothing that must be made safe.
+        /// Robot with nothing that must be made safe.
         pub(super) robot Harmless;
         link base { sensor number: External<Number>(); }
     }

@@ -67,7 +67,7 @@ impl Sensor for Storm {
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 pub(crate) struct Ask(pub(crate) f64);
 
-/// Has a number emitted; not recorded, so that a replay plays what was emitted.
+/// Request to emit a number; not recorded, so that a replay plays what was emitted.
 #[derive(Debug)]
 pub(crate) struct Add(pub(crate) f64);
 

@@ -30,7 +30,7 @@ const AT_THE_END: f64 = 0.1;
 pub(super) struct Still {
     pub(super) samples: Range<usize>,
     pub(super) period_s: f64,
-    /// After the first sample of the recording, s.
+    /// Begin of the part, after the first sample of the recording, s.
     pub(super) from_s: f64,
     pub(super) seconds: f64,
     /// Remarks on the recording.

@@ -424,7 +424,7 @@ fn a_recording_with_faults_is_scored_by_one_command() {
     assert!(!row["wrong"].as_array().expect("a list").is_empty(), "{row}");
 }
 
-/// Without transforms, the rotation of the IMU is found, said, and taken away by what is said.
+/// Rotation of the IMU without transforms: it is found, reported, and undone by what is reported.
 #[test]
 fn an_imu_at_90_degrees_is_found_and_mounted() {
     let file = cart("cart_bare.mcap", false);

@@ -34,7 +34,7 @@ pub enum AverageError {
         /// The weight.
         weight: f64,
     },
-    /// There is no orientation, or all weights are 0.
+    /// Absence of orientations, or weights that are all 0.
     NoWeight,
     /// An orientation is not finite.
     NonFinite {

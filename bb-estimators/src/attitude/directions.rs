@@ -57,7 +57,7 @@ pub(super) fn expected<T: Real>(world_from_body: &UnitQuaternion<T>) -> [Vector3
     [Vector3::new(T::ONE - yy - zz, xy - wz, xz + wy), Vector3::new(xz - wy, yz + wx, T::ONE - xx - yy)]
 }
 
-/// Up as expected in the body frame, times the squared norm of `world_from_body`, which may be any.
+/// Returns the direction of up expected in the body frame, times the squared norm of `world_from_body`, which may be any.
 #[inline]
 pub(super) fn expected_up<T: Real>(world_from_body: &Quaternion<T>) -> Vector3<T> {
     let (w, x, y, z) = (world_from_body.w, world_from_body.i, world_from_body.j, world_from_body.k);

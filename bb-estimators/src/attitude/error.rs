@@ -14,7 +14,7 @@ pub struct OrientationError {
     pub total: f64,
     /// Part of the rotation about the vertical, `2 atan |z / w|`, rad.
     pub heading: f64,
-    /// The rest: its part about a horizontal axis, `2 acos √(w² + z²)`, rad.
+    /// Part of the rotation about a horizontal axis, `2 acos √(w² + z²)`, rad.
     pub inclination: f64,
 }
 

@@ -7,7 +7,7 @@ use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3};
 
 use super::Real;
 
-/// Below this squared angle, rad², sine and cosine of the half angle are computed by series.
+/// Squared angle, rad², below which sine and cosine of the half angle are computed by series.
 pub(super) const SERIES_SQUARED_ANGLE: f64 = 0.01;
 
 /// Cosine of half an angle, and the factor that makes the sine of half of it of the angle, for its square, rad².

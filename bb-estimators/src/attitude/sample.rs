@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 
 use super::Real;
 
-/// Below this specific force, m/s², a sensor is in free fall and does not show which way is up.
+/// Specific force, m/s², below which a sensor is in free fall and does not show which way is up.
 pub const FREE_FALL: f64 = 0.5;
 
 /// The largest component of the angular velocity that a filter accepts, rad/s. Gyroscopes end below 100 rad/s.

@@ -21,7 +21,7 @@ pub struct GyroscopeFit {
 pub enum Model {
     /// Offset and scale: with six to eight directions.
     Scale,
-    /// Also misalignment: with at least nine directions.
+    /// Scale and misalignment: with at least nine directions.
     ScaleAndMisalignment,
 }
 

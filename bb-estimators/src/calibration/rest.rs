@@ -147,7 +147,7 @@ impl Rests {
         None
     }
 
-    /// The rest at the end of the samples, if any.
+    /// Returns the rest at the end of the samples, if any.
     pub fn finish(&mut self) -> Option<Rest> {
         self.end()
     }

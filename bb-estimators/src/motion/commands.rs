@@ -90,7 +90,7 @@ impl Command for MoveJoints {
 /// Period at which progress is published.
 const PROGRESS_PERIOD: Duration = Duration::from_millis(100);
 
-/// Between two points of a trajectory.
+/// Time between two points of a trajectory.
 const POINT_PERIOD: Duration = Duration::from_millis(10);
 
 impl MoveJoints {

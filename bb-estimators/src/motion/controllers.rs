@@ -225,7 +225,7 @@ pub struct ThresholdControllerOptions {
     /// Position at or above which it switches on, rad or m. Default: 1.
     #[option(default = 1.0)]
     pub on_at: f64,
-    /// Off at or below this position, rad or m; at most `on_at`. Default: 0.
+    /// Position at or below which it switches off, rad or m; at most `on_at`. Default: 0.
     #[option(default = 0.0)]
     pub off_at: f64,
     /// Velocity while it is on, rad/s or m/s. Default: 1.

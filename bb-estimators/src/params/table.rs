@@ -1,4 +1,4 @@
-//! The one statement of a parameter.
+//! Macro that declares the parameters of an algorithm.
 
 /// Writes a struct of parameters: one field a parameter, with its documentation, default, range and unit.
 ///

@@ -8,7 +8,7 @@ use core::ops::RangeInclusive;
 pub enum Kind {
     /// Switch: on or off.
     Switch,
-    /// One of these names.
+    /// Choice of one of these names.
     Choice(&'static [&'static str]),
     /// A natural number.
     Count,

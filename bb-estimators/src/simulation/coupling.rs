@@ -65,7 +65,7 @@ pub(super) struct Coupling {
 /// motors have little inertia: six with 0.01 kg m² each are still off by 4e-4 of the largest.
 const SWEEPS: u32 = 1_000;
 
-/// After so many sweeps, a joint that comes to an end of its range in one of them does so in all that follow.
+/// Number of sweeps after which a joint that comes to an end of its range in one of them does so in all that follow.
 const UNDECIDED: u32 = 50;
 
 /// The change of the accelerations in a sweep that ends the search, relative to the largest, or rad/s² or m/s².

@@ -59,7 +59,7 @@ pub(super) struct PlantState {
 /// Load of the links, as far as they declare their inertia, on a joint during a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Load {
-    /// Their inertia about the joint, added to that of the motor.
+    /// Inertia of the links about the joint, added to that of the motor.
     pub(super) inertia: f64,
     /// The effort that balances gravity, velocities and the accelerations of other joints.
     pub(super) effort: f64,
@@ -87,10 +87,10 @@ const TRACKING: f64 = 50.0;
 pub(super) struct Plant {
     pub(super) drivetrain: Drivetrain,
     pub(super) goal: Goal,
-    /// During the present step.
+    /// Load during the present step.
     pub(super) load: Load,
-    /// During the step before. The servo plans with it: with the present one, which depends on what the servo does, the search
-    /// for it might not converge.
+    /// Load during the step before. The servo plans with it: with the present one, which depends on what the servo does, the search for it
+    /// might not converge.
     planned: Load,
     /// The range that obstacles leave free.
     free: (f64, f64),

@@ -53,7 +53,7 @@ pub(super) struct State {
 }
 
 impl State {
-    /// Has all joints begin with the run. Those of actuators that are created earlier, on virtual time before the first stamp of a
+    /// Makes all joints begin with the run. Those of actuators that are created earlier, on virtual time before the first stamp of a
     /// recording, rest until then.
     fn begin(&mut self) {
         let Some(start) = self.clock.as_ref().map(Clock::start).filter(|start| *start > self.start) else { return };

@@ -25,7 +25,7 @@ pub(super) struct TrialScore {
 /// Number of errors within two standard deviations, of those that came with one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Share {
-    /// Within two.
+    /// Number of errors within two standard deviations.
     pub within: u64,
     /// Number of all errors with a standard deviation.
     pub of: u64,

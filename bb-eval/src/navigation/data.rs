@@ -49,7 +49,7 @@ pub struct Sample {
 pub struct Keyframe {
     /// s.
     pub time_s: f64,
-    /// The first sample after it.
+    /// Index of the first sample after it.
     pub sample: usize,
     /// True if the truth is to be scored there.
     pub scored: bool,

@@ -27,7 +27,7 @@ pub(crate) struct Errors {
 }
 
 impl Errors {
-    /// Without a true orientation, the true position is that of the antenna, a point of the body.
+    /// Returns the errors of an estimate. Without a true orientation, the true position is that of the antenna, a point of the body.
     pub(crate) fn between(truth: &Truth, antenna: &Vector3<f64>, estimate: &Known) -> Self {
         let Known { position, world_from_body, covariance, .. } = estimate;
         if let Some(orientation) = truth.world_from_body {

@@ -64,7 +64,7 @@ impl Feed {
         self.messages.sort_by_key(|message| (message.arrival_ns, message.what.input() == 0));
     }
 
-    /// The first of all times, ns.
+    /// Returns the first of all times, ns.
     pub(crate) fn first_ns(&self) -> Option<Time> {
         self.messages.iter().map(|message| message.stamp_ns.min(message.arrival_ns)).min()
     }

@@ -103,7 +103,7 @@ pub(crate) struct Record {
 }
 
 impl Record {
-    /// Before the first message of a feed.
+    /// Creates the record before the first message of a feed.
     pub(crate) fn of(feed: &Feed) -> Self {
         let base_ns = feed.first_ns().unwrap_or(0).saturating_sub(BEFORE_NS);
         Self { base_ns, ..Self::default() }

@@ -112,7 +112,7 @@ pub struct NavigationScore {
     pub orientation_deg: Option<Spread>,
     /// Part about the vertical, degrees.
     pub heading_deg: Option<Spread>,
-    /// The rest of it, degrees.
+    /// Part about a horizontal axis, degrees.
     pub tilt_deg: Option<Spread>,
     /// Velocity, m/s.
     pub velocity_mps: Option<Spread>,

@@ -89,7 +89,7 @@ robot! {
     }
 }
 
-/// Either chain, started.
+/// Chain of this runtime, of either kind, started.
 pub(crate) struct Ours<R: Robot> {
     running: Running<R>,
     imu: SensorHandle<R, External<Inertial>>,

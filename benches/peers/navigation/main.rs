@@ -112,7 +112,7 @@ fn run<F: Navigating>(what: What, readings: &[Reading]) -> Result<(), Box<dyn Er
     if told < 1.0 { Ok(()) } else { Err(format!("{what:?}: a filter at rest is at {}", filter.at()).into()) }
 }
 
-/// Per step, of each side: nanoseconds of each of [`WHAT`].
+/// Measures nanoseconds per step, of each side, of each of [`WHAT`].
 fn times() -> Result<Vec<[f64; 3]>, Box<dyn Error>> {
     let readings = readings();
     let mut least = vec![[f64::INFINITY; 3]; sides().count()];
@@ -128,7 +128,7 @@ fn times() -> Result<Vec<[f64; 3]>, Box<dyn Error>> {
     Ok(least)
 }
 
-/// Per step: instructions of each of [`WHAT`].
+/// Counts instructions per step of each of [`WHAT`].
 fn instructions(side: &str) -> Result<[f64; 3], Box<dyn Error>> {
     let mut counted = [0.0; 3];
     for ((what, _), counted) in WHAT.into_iter().zip(&mut counted) {

@@ -9,7 +9,7 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use nalgebra_of_ahrs as na;
 use std::f64::consts::FRAC_1_SQRT_2;
 
-/// They take a fixed one. That of BROAD, s.
+/// Fixed period of the peers: that of BROAD, s.
 const PERIOD_S: f64 = 3.5e-3;
 
 const STANDARD_GRAVITY: f64 = 9.80665;

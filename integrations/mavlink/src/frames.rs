@@ -32,9 +32,9 @@ pub(crate) struct Framer {
 
 /// The meaning of the bytes after a marker.
 enum Candidate {
-    /// They may become a frame.
+    /// Bytes that may become a frame.
     Partial,
-    /// They are not a frame.
+    /// Bytes that are not a frame.
     Noise,
     Frame(usize, Item),
 }

@@ -33,7 +33,7 @@ pub enum LinkError {
     Open {
         /// The address of the link.
         address: Address,
-        /// Why.
+        /// Cause of the failure.
         source: Arc<io::Error>,
     },
     /// Failure of an open link: the device was unplugged.
@@ -41,7 +41,7 @@ pub enum LinkError {
     Failed {
         /// The address of the link.
         address: Address,
-        /// Why.
+        /// Cause of the failure.
         source: Arc<io::Error>,
     },
 }

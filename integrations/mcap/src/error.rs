@@ -46,7 +46,7 @@ impl RecordingError {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordingErrorKind {
-    /// There is no such file.
+    /// File that does not exist.
     #[error("no such file; check the path")]
     Missing,
     /// The path is a directory or a device.
@@ -205,7 +205,7 @@ pub enum RecordingErrorKind {
     Write {
         /// Number of messages that are in the file for certain, from the first on: those that had been flushed.
         messages: u64,
-        /// Why.
+        /// Error of the operating system.
         cause: io::Error,
     },
     /// Another program has removed or truncated the file while it was written.

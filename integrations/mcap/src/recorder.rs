@@ -66,7 +66,7 @@ pub struct Recorder {
     writer: Option<Box<FileWriter>>,
     /// Handle of the same file, to look after it.
     file: Option<Watched>,
-    /// The first is waited for, the others are polled.
+    /// Subscriptions that are recorded: the first is waited for, the others are polled.
     subscriptions: Vec<DynamicSubscription>,
     options: RecorderOptions,
     channels: HashMap<&'static str, Channel>,
@@ -167,8 +167,8 @@ impl Recorder {
         })
     }
 
-    /// Also records the messages of this subscription. Each subscription has its own queue, so frequent messages do
-    /// not displace rare ones when the disk is slow. A message that several subscriptions receive is recorded several
+    /// Records the messages of this subscription, too. Each subscription has its own queue, so frequent messages do not
+    /// displace rare ones when the disk is slow. A message that several subscriptions receive is recorded several
     /// times.
     ///
     /// # Errors

@@ -10,7 +10,7 @@ use std::sync::{Mutex, PoisonError};
 /// Forwards its input; fails, or reports divergence, when told to.
 struct Judge(SafetyLink);
 
-/// Is left out.
+/// Estimator that is left out.
 struct Absent;
 
 impl Estimator for Absent {

@@ -15,7 +15,7 @@ const KEY: i32 = 18;
 const SPACE: i32 = 8;
 const ROW: i32 = 20;
 
-/// Around the axes, pixels.
+/// Margin around the axes, pixels.
 const MARGIN: u32 = 6;
 const X_LABELS: u32 = 42;
 const Y_LABELS: u32 = 86;
@@ -80,7 +80,7 @@ impl Frame<'_> {
         })
     }
 
-    /// The first band of each label.
+    /// Returns the first band of each label.
     fn labels(&self) -> Vec<&Band> {
         let mut bands: Vec<&Band> = Vec::new();
         for band in self.bands {
@@ -128,7 +128,7 @@ impl Frame<'_> {
         widest + widest / 10 + (KEY + 3 * SPACE).unsigned_abs()
     }
 
-    /// The first and the last time, if this is over time.
+    /// Returns the first and the last time, if this is over time.
     pub(super) fn times(&self) -> Option<(f64, f64)> {
         let times = || self.shown().flat_map(|line| &line.runs).flatten().map(|(time_s, _)| *time_s);
         let (first, last) = (times().reduce(f64::min)?, times().reduce(f64::max)?);

@@ -32,9 +32,9 @@ impl Plane {
 pub enum Part {
     /// Plane as high as this many panels.
     Plane(Plane, u32),
-    /// Over time.
+    /// Panel over time.
     Panel(Panel),
-    /// Beside one another, as high as the highest.
+    /// Parts beside one another, as high as the highest.
     Row(Vec<Part>),
 }
 

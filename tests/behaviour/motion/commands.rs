@@ -55,8 +55,8 @@ fn a_command_that_is_cancelled_or_whose_robot_is_disarmed_stops_its_joints() -> 
     after(|simulation, _| assert_eq!(simulation.disarm(), Ok(())))
 }
 
-/// Before it has begun, on its first step, while its joints speed up, go on, slow down, and once it has ended; and once more
-/// after that.
+/// A command may be cancelled before it has begun, on its first step, while its joints speed up, go on, slow down, and once it has ended;
+/// and once more after that.
 #[test]
 fn a_command_may_be_cancelled_in_each_phase_of_its_motion() -> Result<(), Failure> {
     let mut phases = Vec::new();
@@ -113,7 +113,7 @@ fn a_command_that_times_out_stops_its_joints() -> Result<(), Failure> {
     Ok(())
 }
 
-/// The one that is pre-empted is dropped after the other has begun: what it leaves does not stop that one's motion.
+/// A command that preempts another takes over its joints: what the other leaves when it is dropped later does not stop the motion.
 #[test]
 fn a_command_that_preempts_another_takes_over_its_joints() -> Result<(), Failure> {
     let mut simulation = ready()?;

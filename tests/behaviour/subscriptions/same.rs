@@ -36,7 +36,7 @@ robot! {
     }
 }
 
-/// Has something published at each path.
+/// Publishes something at each path.
 fn exercise(robot: &Live<Whole>, wait: &mut dyn FnMut()) -> Result<(), Failure> {
     let report = |path: &str| robot.report().topic(path).map_or(0, |topic| topic.published);
     let mut published = |path: &str, count: u64| {

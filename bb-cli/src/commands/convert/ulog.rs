@@ -110,7 +110,7 @@ struct Columns<'a> {
 }
 
 impl<'a> Columns<'a> {
-    /// The first of these topics that the log has.
+    /// Returns the first of these topics that the log has.
     fn of(log: &'a ParsedData, topics: &[&'a str]) -> Option<Self> {
         topics.iter().find_map(|topic| {
             let fields = log.messages.get(*topic)?.get(&MultiId::new(0))?;

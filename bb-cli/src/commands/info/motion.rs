@@ -18,7 +18,7 @@ pub(super) struct Motion {
 
 #[derive(Clone, Copy, Debug)]
 struct Point {
-    /// Since the zero of the recording.
+    /// Time since the zero of the recording, s.
     time_s: f64,
     inertial_from_body: UnitQuaternion<f64>,
     way: Vector3<f64>,

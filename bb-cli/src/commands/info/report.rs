@@ -12,7 +12,7 @@ use serde::Serialize;
 struct Row<'a> {
     file: String,
     bytes: u64,
-    /// The first log time, and the time from the first to the last.
+    /// First log time, and the time from the first to the last.
     start_ns: Option<i64>,
     duration_s: Option<f64>,
     messages: usize,

@@ -27,7 +27,7 @@ pub(super) struct Group {
 #[derive(Debug, PartialEq)]
 pub(super) struct Selected {
     pub(super) path: Path,
-    /// Within the group.
+    /// Name of the field within the group.
     pub(super) label: String,
 }
 

@@ -133,8 +133,8 @@ impl Drive {
         Self { poses, seed }
     }
 
-    /// After so many samples: pose of the vehicle, angular velocity and speed. It is at speed from the start, or at rest for a
-    /// while and then accelerates for `RAMP` seconds.
+    /// Returns pose of the vehicle, angular velocity and speed after so many samples. It is at speed from the start, or at rest for a while
+    /// and then accelerates for `RAMP` seconds.
     fn truth(&self, samples: f64, rest: bool) -> (Isometry3<f64>, f64, f64) {
         let t = if rest { ((samples - REST) * DT).max(0.0) } else { samples * DT };
         let (distance, speed) = match rest {

@@ -27,9 +27,9 @@ pub struct OrientationAverageOptions {
 /// Two orientations of one body.
 #[derive(Clone, Copy, Debug, Inputs)]
 pub struct OrientationPair<'a> {
-    /// The one with the given weight.
+    /// Orientation with the given weight.
     pub first: Input<'a, Orientation>,
-    /// The other.
+    /// Orientation with the rest of the weight.
     pub second: Input<'a, Orientation>,
 }
 

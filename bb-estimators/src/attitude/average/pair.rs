@@ -5,7 +5,7 @@ use nalgebra::{Unit, UnitQuaternion};
 use super::{AverageError, check};
 use crate::attitude::Real;
 
-/// Below this relative difference of M's two eigenvalues, the average is undefined.
+/// Relative difference of M's two eigenvalues below which the average is undefined.
 const AMBIGUOUS: f64 = 1e-12;
 
 /// The average of two orientations with weights, which need not add up to 1.

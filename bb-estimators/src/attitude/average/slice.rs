@@ -7,7 +7,7 @@ use nalgebra::{Matrix4, Quaternion, SymmetricEigen, Unit, UnitQuaternion};
 use super::{AverageError, check};
 use crate::attitude::Real;
 
-/// Below this relative difference of M's two largest eigenvalues, the average is undefined.
+/// Relative difference of M's two largest eigenvalues below which the average is undefined.
 const AMBIGUOUS: f64 = 1e-12;
 
 /// The average of orientations with weights, which need not add up to 1.

@@ -13,7 +13,7 @@ use crate::params::Params as _;
 /// Standard gravity, m/s².
 const GRAVITY: f64 = 9.80665;
 
-/// Below this squared tangent, upside down is an equilibrium, which a lean to one side ends.
+/// Squared tangent below which upside down is an equilibrium, which a lean to one side ends.
 const UPSIDE_DOWN: f64 = 1e-6;
 
 /// The complementary filter on quaternions.

@@ -16,7 +16,7 @@ pub trait AttitudeOutput: Outputs + Sized {
     fn of<F: AttitudeFilter>(filter: &F) -> Option<Self>;
 }
 
-/// The other estimates of a filter; `None` if its algorithm has none.
+/// Further estimates of a filter; `None` if its algorithm has none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Payload)]
 pub struct AttitudeStatus {
     /// The gyroscope's bias, rad/s, in the frame of the orientation.

@@ -22,7 +22,7 @@ const FULL_RANGE: f64 = 0.98;
 /// Beyond a right angle the correction is that of twice the greatest sine. Source: the library's.
 const FAR: f64 = 2.0;
 
-/// Below this norm, an error has no direction.
+/// Norm below which an error has no direction.
 const NO_ERROR: f64 = 1e-12;
 
 /// The revised AHRS algorithm of Madgwick's thesis.

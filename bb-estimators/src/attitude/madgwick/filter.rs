@@ -10,7 +10,7 @@ use crate::attitude::state::{AttitudeState, Usual};
 use crate::attitude::{AttitudeFilter, ImuSample, ParamsError, Real, SampleError};
 use crate::params::Params as _;
 
-/// Below this norm, the gradient is rounding noise without a direction of descent.
+/// Norm below which the gradient is rounding noise without a direction of descent.
 const NO_GRADIENT: f64 = 1e-12;
 
 /// Madgwick's gradient-descent filter.

@@ -10,7 +10,7 @@ use crate::attitude::state::{AttitudeState, Usual};
 use crate::attitude::{AttitudeFilter, ImuSample, ParamsError, Real, SampleError};
 use crate::params::Params as _;
 
-/// Below this norm, an error upside down has no direction of its own: the filter then turns about a horizontal axis.
+/// Norm below which an error upside down has no direction of its own: the filter then turns about a horizontal axis.
 const NO_ERROR: f64 = 1e-6;
 
 /// The explicit complementary filter with bias correction.

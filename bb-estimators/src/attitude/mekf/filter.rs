@@ -186,7 +186,7 @@ impl<T: Real> MekfFilter<T> {
         self.doubt.covariance(self.errors.block(ROTATION), &self.force, self.field.as_ref(), &self.iron)
     }
 
-    /// After a start from a sample, the first one or the one after a gap.
+    /// Starts the estimation of errors after a start from a sample, the first one or the one after a gap.
     #[cold]
     fn restart(&mut self, sample: &ImuSample<T>) {
         let Some(orientation) = self.state.world_from_body() else { return };

@@ -53,7 +53,7 @@ impl<T: Real> Disturbance<T> {
         }
     }
 
-    /// After a gap: the reference stays, a pending change of it does not.
+    /// Forgets a pending change of the reference after a gap; the reference stays.
     pub(super) fn forget_motion(&mut self) {
         self.fields = LowPass::new();
         self.candidate = None;

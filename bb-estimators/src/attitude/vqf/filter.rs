@@ -17,7 +17,7 @@ use crate::params::Params as _;
 /// Standard gravity, m/s².
 const GRAVITY: f64 = 9.80665;
 
-/// Below this squared norm, (m/s²)², a mean specific force does not show which way is up.
+/// Squared norm, (m/s²)², below which a mean specific force does not show which way is up.
 const NO_FORCE: f64 = 1e-12;
 
 /// The initial sample time of the coefficients, s; the first samples change it.
@@ -107,7 +107,7 @@ impl<T: Real> AttitudeFilter<T> for VqfFilter<T> {
         Some(self.rest.is_detected())
     }
 
-    /// Also before the first reference has been seen in motion for long enough.
+    /// Returns whether the field is disturbed; it counts as such before the first reference has been seen in motion for long enough.
     fn is_magnetically_disturbed(&self) -> Option<bool> {
         let watched = self.params.magnetometer && self.params.disturbance_rejection;
         watched.then_some(self.disturbance.is_detected())

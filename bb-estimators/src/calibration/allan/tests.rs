@@ -1,4 +1,4 @@
-//! Against Python's `allantools`, and against noise of known densities.
+//! Comparisons with Python's `allantools`, and with noise of known densities.
 
 use super::*;
 use rand_chacha::ChaCha8Rng;

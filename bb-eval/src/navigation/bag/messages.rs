@@ -21,7 +21,7 @@ pub(super) struct Messages {
     /// A drifting odometry, by stamp; each with its arrival first.
     pub(super) relative: Vec<(Time, Time, Odometry)>,
     pub(super) truth: Vec<(Time, TruthMessage)>,
-    /// The first of its topic, with the velocity if it contains one.
+    /// First message of the topic to start from, with the velocity if it contains one.
     pub(super) start: Option<(Time, Pose, Option<Twist>)>,
     pub(super) transforms: Vec<TransformStamped>,
     /// The frames of the sensors by topic; for odometry, that of the body.

@@ -11,7 +11,7 @@ const LONG: Duration = Duration::from_secs(20);
 
 use std::time::Duration;
 
-/// The other side: a socket at a port that the system chose.
+/// Other side of the link: a socket at a port that the system chose.
 struct Other {
     socket: UdpSocket,
     sequence: u8,
@@ -241,8 +241,8 @@ fn what_cannot_be_opened_says_why() {
     );
 }
 
-/// Beside another voice, nobody hears that of the onboard computer once it is dropped; without one, it is there again, and its
-/// numbers go on.
+/// A voice that is dropped says nothing more: beside another one, nobody hears that of the onboard computer; without one, it is there
+/// again, and its numbers go on.
 #[test]
 fn a_voice_that_is_dropped_says_nothing_more() {
     let (_other, address) = Other::new();

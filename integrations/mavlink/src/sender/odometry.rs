@@ -31,7 +31,7 @@ enum Origin {
     Trusted(LocalFrame),
     /// Position of an estimate, until one is not degraded.
     Provisional(LocalFrame),
-    /// There is no estimate yet.
+    /// Origin that is not known yet: there is no estimate.
     Unknown,
 }
 

@@ -157,7 +157,7 @@ impl Stream {
 /// The time after which the specification considers a component gone: four or five heartbeats, s.
 const HEARTBEAT_LOST: f64 = 5.0;
 
-/// The one of `names` that an option selects.
+/// Returns the one of `names` that an option selects.
 ///
 /// # Errors
 /// There is none.

@@ -25,7 +25,7 @@ pub struct MargSamples {
     early: Option<(MonotonicTime, MagneticField)>,
     /// The error to be returned after that sample.
     broken: Option<RecordingError>,
-    /// After an error.
+    /// `true` after an error.
     is_over: bool,
 }
 

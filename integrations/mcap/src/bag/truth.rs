@@ -8,7 +8,7 @@ use bb_core::{Payload, WallTime};
 
 /// The type of a topic of poses.
 pub const POSE: &str = "geometry_msgs/msg/PoseStamped";
-/// The other type of a topic of poses, with velocities.
+/// Other type of a topic of poses, with velocities.
 pub const ODOMETRY: &str = "nav_msgs/msg/Odometry";
 /// The type of a topic that says whether the body moves.
 pub const MOVING: &str = "std_msgs/msg/Bool";

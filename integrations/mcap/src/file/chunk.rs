@@ -140,7 +140,7 @@ impl<'a> Head<'a> {
     }
 }
 
-/// The first of several records: its kind and its bytes.
+/// Returns the first of several records: its kind and its bytes.
 fn split(bytes: &[u8]) -> Option<(u8, &[u8])> {
     let mut fields = Fields(bytes);
     let [opcode] = fields.number::<1>()?;

@@ -35,7 +35,7 @@ pub(crate) struct Records {
     body: Vec<u8>,
     /// Messages before the current record.
     messages: u64,
-    /// After the end, and after the damage.
+    /// `true` after the end, and after the damage.
     is_over: bool,
 }
 

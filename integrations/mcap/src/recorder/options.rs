@@ -9,7 +9,7 @@ use std::time::Duration;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Compression {
-    /// Not at all.
+    /// No compression.
     None,
     /// Fast.
     #[default]
@@ -22,10 +22,10 @@ pub enum Compression {
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct RecorderOptions {
-    /// After so many messages they are handed to the operating system, so that the death of the process does not lose
-    /// them. Small: larger files and more calls; large: more is lost. Default: 100.
+    /// Number of messages after which they are handed to the operating system, so that the death of the process does
+    /// not lose them. Small: larger files and more calls; large: more is lost. Default: 100.
     pub flush_messages: u64,
-    /// After so much time likewise, if anything has come. Default: 200 ms.
+    /// Time after which they are handed over likewise, if anything has come. Default: 200 ms.
     pub flush_interval: Duration,
     /// `true` to wait at each flush until the disk has it, so that a loss of power does not lose it. Default: no.
     pub sync: bool,

@@ -137,7 +137,7 @@ fn only_the_chosen_topics_come() {
     }
 }
 
-/// Without a summary the topics come from the messages; a summary may also leave out channels or counts.
+/// Summaries may lack anything: without one the topics come from the messages; one may also leave out channels or counts.
 #[test]
 fn summaries_may_lack_anything() {
     for (layout, options) in layouts() {

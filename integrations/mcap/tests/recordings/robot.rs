@@ -12,7 +12,7 @@ pub(crate) enum Gripper {
     Open,
     /// Holds something.
     Holding { force_n: f32, what: String },
-    /// Does not know.
+    /// State that it does not know.
     Unknown(Option<Vec<u16>>),
 }
 

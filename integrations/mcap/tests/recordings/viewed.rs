@@ -172,13 +172,13 @@ fn a_simulated_run_has_the_date_of_virtual_time() {
 mod other {
     use super::*;
 
-    /// Has the name of another.
+    /// Payload with the name of another one.
     #[derive(Clone, Debug, PartialEq, Payload)]
     pub(super) struct Scan {
         pub(super) label: String,
     }
 
-    /// Has the name of another, but not where it is recorded.
+    /// Payload with the name of another one, but not where it is recorded.
     #[derive(Clone, Debug, PartialEq, Payload)]
     #[payload(name = "my_robot/LabelledScan")]
     pub(super) struct Gripper {
@@ -186,7 +186,7 @@ mod other {
     }
 }
 
-/// Has the name of another.
+/// Payload with the name of another one.
 #[derive(Clone, Debug, PartialEq, Payload)]
 pub(crate) struct Scan {
     x: f64,
