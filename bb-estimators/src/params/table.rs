@@ -6,13 +6,13 @@
 /// params! {
 ///     /// The tuning of some filter.
 ///     pub struct SomeParams {
-///         /// How soon the tilt follows the accelerometer.
+///         /// Time constant with which the tilt follows the accelerometer.
 ///         ///
 ///         /// Small: …. Large: …. Source: ….
 ///         tilt_time_constant: f64 = 3.0, in 0.0..=1e6, unit "s";
 ///         /// White noise of the gyroscope.
 ///         gyroscope_noise: f64 = 0.5 * DEGREE, in 0.0..=1.0, shown "0.5°/s/√Hz", plain "rad/s/√Hz";
-///         /// Whether the magnetic field corrects the heading.
+///         /// Correction of the heading by the magnetic field.
 ///         magnetometer: bool = true;
 ///         /// How far the scale of the wheel speed is from 1.
 ///         wheel_scale: GaussMarkov = GaussMarkov::new(0.03, 1000.0), deviation 0.0..=1.0, shown "0.03 for 1000 s";
