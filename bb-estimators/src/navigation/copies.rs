@@ -17,6 +17,7 @@
 //! Copies are never mixed: the estimate is that of one filter. A gap in the samples is bridged as `holding.rs` says, and fixes that
 //! scatter more than they state get the noise of their scatter (`scatter.rs`).
 
+mod filter;
 mod holding;
 mod newcomer;
 mod scatter;
@@ -26,29 +27,28 @@ mod tests;
 
 use std::vec::Vec;
 
-use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Vector3};
 
+pub(super) use self::filter::{CopiedFilter, Fix, Update};
 use self::holding::Holding;
 use self::newcomer::Newcomer;
 use self::scatter::Scatter;
 use self::search::Search;
 use super::bounds::is_within;
 use super::chi_square::limit;
-use super::eskf::{Eskf, EskfParams, GaussMarkov, ImuMean, LONGEST_GAP_S, Start, seconds_between};
+use super::eskf::{Eskf, ImuMean, LONGEST_GAP_S, seconds_between};
 use super::fused::Fused;
-use super::math::{rotation_vector, sqrt};
-use super::measurement::{GnssPosition, Measurement};
 use super::propagate::Propagate;
 use super::refusal::Refusal;
-use super::state::{Estimate, NAVIGATION, Optional, ROTATION, States, offset};
+use super::state::States;
 use super::stream::Stream;
 use crate::attitude::ParamsError;
 
 /// The number of headings, and of mountings, that cover a turn.
-const TURNS: u32 = 6;
+pub(super) const TURNS: u32 = 6;
 
 /// The deviation of each of them, rad: half of the angle between two.
-const TURN_DEVIATION: f64 = core::f64::consts::PI / 6.0;
+pub(super) const TURN_DEVIATION: f64 = core::f64::consts::PI / 6.0;
 
 /// A larger deviation, rad, is an unknown heading: a filter cannot be corrected linearly from so far.
 pub(super) const UNKNOWN: f64 = 0.5;
@@ -61,9 +61,6 @@ const IMPLAUSIBLE: f64 = 12.0;
 
 /// The log likelihood that a copy loses with a measurement that it cannot take.
 const IMPOSSIBLE: f64 = 10.0;
-
-/// A copy whose state is nearer to that of the best than this part of a deviation is the same.
-const SAME: f64 = 0.5;
 
 /// The largest normalised innovation squared of a position, to each of whose variances [`SLACK`] is added: ten deviations and metres.
 const FAR: f64 = 100.0;
@@ -83,16 +80,16 @@ pub struct Ways {
     pub scale: bool,
 }
 
-/// Copies of one [filter](Eskf) that differ in where they begin, in the noise of the IMU, and in where they believe to be. The best by
+/// Copies of one filter, such as [`Eskf`], that differ in where they begin, in the noise of the IMU, and in where they believe to be. The best by
 /// likelihood is the estimate; they are never mixed.
 #[derive(Clone, Debug)]
-pub struct Copies<S: States, const N: usize> {
-    params: EskfParams,
+pub struct Copies<F: CopiedFilter> {
+    params: F::Params,
     ways: Ways,
     /// At least one once it has started, the best first.
-    starts: Vec<Begun<S, N>>,
-    search: Search<S, N>,
-    newcomer: Option<Newcomer<S, N>>,
+    starts: Vec<Begun<F>>,
+    search: Search<F>,
+    newcomer: Option<Newcomer<F>>,
     started_ns: i64,
     holding: Holding,
     scatter: Scatter,
@@ -104,21 +101,21 @@ pub struct Copies<S: States, const N: usize> {
 
 /// A copy that began in its own way.
 #[derive(Clone, Debug)]
-struct Begun<S: States, const N: usize> {
+struct Begun<F: CopiedFilter> {
     id: u32,
-    filter: Eskf<S, N>,
+    filter: F,
     /// Relative to the best.
     log_likelihood: f64,
 }
 
-impl<S: States, const N: usize> Copies<S, N> {
+impl<F: CopiedFilter> Copies<F> {
     /// Creates copies that have not started.
     ///
     /// # Errors
     ///
     /// Returns the name of the first parameter outside its accepted range.
-    pub fn new(params: EskfParams, ways: Ways) -> Result<Self, ParamsError> {
-        let starts = vec![Begun { id: 0, filter: Eskf::new(params)?, log_likelihood: 0.0 }];
+    pub fn new(params: F::Params, ways: Ways) -> Result<Self, ParamsError> {
+        let starts = vec![Begun { id: 0, filter: F::new(params)?, log_likelihood: 0.0 }];
         Ok(Self {
             params,
             ways,
@@ -133,72 +130,33 @@ impl<S: States, const N: usize> Copies<S, N> {
         })
     }
 
-    /// Starts or restarts all copies. A heading whose deviation is more than half a radian counts as unknown, and so does such a yaw of
-    /// [`EskfParams::wheel_mounting`].
+    /// Starts or restarts all copies, in each way of what is unknown of the start.
     ///
     /// # Errors
     ///
-    /// The same as [`Eskf::start`].
-    pub fn start(&mut self, start: &Start) -> Result<(), Refusal> {
-        let turns = |is_unknown: bool| if is_unknown { TURNS } else { 1 };
-        let angle = |i: u32| core::f64::consts::TAU * f64::from(i) / f64::from(TURNS);
-        let mounting = offset::<S>(Optional::WheelMounting);
-        let is_mounted = mounting.is_none() || self.params.wheel_mounting.deviation <= UNKNOWN;
-        let is_pointed = start.rotation_covariance[(2, 2)] <= UNKNOWN * UNKNOWN;
-        let mut ways = Vec::new();
-        for heading in 0..turns(!is_pointed) {
-            for yaw in 0..turns(!is_mounted) {
-                for params in self.exact_and_not() {
-                    ways.push((heading, yaw, params));
-                }
-            }
-        }
-        let mut starts = Vec::new();
-        for (id, (heading, yaw, mut params)) in (0..).zip(ways) {
-            let mut begun = *start;
-            if !is_pointed {
-                let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle(heading));
-                begun.world_from_body = turn * start.world_from_body;
-                let variance = TURN_DEVIATION * TURN_DEVIATION;
-                begun.rotation_covariance =
-                    Matrix3::from_diagonal(&start.rotation_covariance.diagonal().map(|own| own.min(variance)));
-            }
-            if !is_mounted {
-                params.wheel_mounting.deviation = TURN_DEVIATION;
-            }
-            let mut filter = Eskf::new(params).map_err(|_| Refusal::OutOfRange)?;
-            filter.start(&begun)?;
-            if let Some(error) = mounting {
-                filter.set_optional(error, angle(yaw));
-            }
-            filter.multiply_noise(self.search.first_multiple());
-            starts.push(Begun { id, filter, log_likelihood: 0.0 });
-        }
-        self.starts = starts;
+    /// The same as those of the filter.
+    pub fn start(&mut self, start: &F::Start) -> Result<(), Refusal> {
+        let filters = F::starts(&self.params, self.ways, start)?;
         self.search = Search::new(self.ways.noise);
+        let begun = |(id, mut filter): (u32, F)| {
+            filter.multiply_noise(self.search.first_multiple());
+            Begun { id, filter, log_likelihood: 0.0 }
+        };
+        self.starts = (0..).zip(filters).map(begun).collect();
         self.newcomer = None;
         self.scatter = Scatter::default();
         self.elsewhere = None;
-        self.started_ns = start.time_ns;
+        self.started_ns = self.time_ns().unwrap_or(0);
         Ok(())
     }
 
-    /// The parameters with and without a scale of relative poses that drifts.
-    fn exact_and_not(&self) -> Vec<EskfParams> {
-        let mut all = vec![self.params];
-        if offset::<S>(Optional::RelativeScale).is_some() && self.ways.scale {
-            all.push(EskfParams { relative_scale: GaussMarkov::constant(0.0), ..self.params });
-        }
-        all
-    }
-
     /// The best copy.
-    pub fn best(&self) -> &Eskf<S, N> {
+    pub fn best(&self) -> &F {
         &self.starts[0].filter
     }
 
     /// The estimate of the best copy; `None` before the start.
-    pub fn estimate(&self) -> Option<&Estimate<N>> {
+    pub fn estimate(&self) -> Option<&F::Estimate> {
         self.best().estimate()
     }
 
@@ -221,14 +179,11 @@ impl<S: States, const N: usize> Copies<S, N> {
     /// The standard deviation of the heading, rad: of the best copy, or of a whole turn while the headings of others that are
     /// plausible are far from it.
     pub fn heading_deviation(&self) -> f64 {
-        let attitude =
-            |filter: &Eskf<S, N>| filter.estimate().map_or_else(UnitQuaternion::identity, |at| at.world_from_body);
-        let back = attitude(self.best()).inverse();
-        let is_far = |begun: &Begun<S, N>| rotation_vector(&(attitude(&begun.filter) * back)).z.abs() > UNKNOWN;
+        let is_far = |begun: &Begun<F>| self.best().turn_to(&begun.filter).abs() > UNKNOWN;
         if self.starts.iter().any(is_far) {
             return core::f64::consts::PI / 1.732_050_807_568_877_2;
         }
-        sqrt(self.best().covariance()[(ROTATION + 2, ROTATION + 2)])
+        self.best().heading_deviation()
     }
 
     /// Fuses a measurement, unless the gate of `stream` refuses it for every copy.
@@ -236,11 +191,10 @@ impl<S: States, const N: usize> Copies<S, N> {
     /// # Errors
     ///
     /// Returns a [`Refusal`] for the best copy, which the stream has counted.
-    pub fn update<M: Measurement<D>, const D: usize>(
-        &mut self,
-        stream: &mut Stream,
-        measurement: &M,
-    ) -> Result<Fused, Refusal> {
+    pub fn update<M, const D: usize>(&mut self, stream: &mut Stream, measurement: &M) -> Result<Fused, Refusal>
+    where
+        F: Update<M, D>,
+    {
         self.update_correlated(stream, measurement, measurement)
     }
 
@@ -250,12 +204,15 @@ impl<S: States, const N: usize> Copies<S, N> {
     /// # Errors
     ///
     /// The same as [`update`](Self::update).
-    pub fn update_correlated<M: Measurement<D>, const D: usize>(
+    pub fn update_correlated<M, const D: usize>(
         &mut self,
         stream: &mut Stream,
         own: &M,
         measurement: &M,
-    ) -> Result<Fused, Refusal> {
+    ) -> Result<Fused, Refusal>
+    where
+        F: Update<M, D>,
+    {
         let most = limit(D, stream.params().gate);
         let result = self.is_admitted(own, 0.0, most);
         if let Some(newcomer) = &mut self.newcomer {
@@ -269,21 +226,27 @@ impl<S: States, const N: usize> Copies<S, N> {
     /// # Errors
     ///
     /// The same as [`update`](Self::update).
-    pub fn update_position<M: Measurement<D>, const D: usize>(
+    pub fn update_position<M, const D: usize>(
         &mut self,
         stream: &mut Stream,
         measurement: &M,
-    ) -> Result<Fused, Refusal> {
+    ) -> Result<Fused, Refusal>
+    where
+        F: Update<M, D>,
+    {
         self.update_position_as(stream, measurement, measurement)
     }
 
     /// Judges a position by what it states, and fuses it with other noise.
-    fn update_position_as<M: Measurement<D>, const D: usize>(
+    fn update_position_as<M, const D: usize>(
         &mut self,
         stream: &mut Stream,
         stated: &M,
         measurement: &M,
-    ) -> Result<Fused, Refusal> {
+    ) -> Result<Fused, Refusal>
+    where
+        F: Update<M, D>,
+    {
         let result = self.is_admitted(stated, SLACK, FAR);
         let result = self.settle(stream, stated, result);
         self.fuse(stream, measurement, result)
@@ -295,8 +258,11 @@ impl<S: States, const N: usize> Copies<S, N> {
     /// # Errors
     ///
     /// The same as [`update`](Self::update).
-    pub fn update_fix(&mut self, stream: &mut Stream, fix: &GnssPosition) -> Result<Fused, Refusal> {
-        let is_finite = fix.position.iter().all(|x| x.is_finite());
+    pub fn update_fix<M: Fix, const D: usize>(&mut self, stream: &mut Stream, fix: &M) -> Result<Fused, Refusal>
+    where
+        F: Update<M, D>,
+    {
+        let is_finite = fix.position().iter().all(|x| x.is_finite());
         let shown = if is_finite { self.scatter.fix(fix) } else { *fix };
         self.update_position_as(stream, fix, &shown)
     }
@@ -305,22 +271,18 @@ impl<S: States, const N: usize> Copies<S, N> {
     fn scatter(&mut self, dt: f64) {
         if self.starts.len() > MOST_UNDECIDED || self.heading_deviation() > UNKNOWN {
             self.scatter.interrupt();
-        } else if let Some(estimate) = self.starts[0].filter.estimate() {
-            let fall = Vector3::new(0.0, 0.0, self.params.gravity);
-            self.scatter.propagate(&(estimate.world_from_body * estimate.specific_force - fall), dt);
+        } else if let Some(acceleration) = self.best().acceleration() {
+            self.scatter.propagate(&acceleration, dt);
         }
     }
 
     /// Returns the log likelihood of a measurement for the best copy, if any copy admits it.
-    fn is_admitted<M: Measurement<D>, const D: usize>(
-        &self,
-        measurement: &M,
-        slack: f64,
-        most: f64,
-    ) -> Result<f64, Refusal> {
+    fn is_admitted<M, const D: usize>(&self, measurement: &M, slack: f64, most: f64) -> Result<f64, Refusal>
+    where
+        F: Update<M, D>,
+    {
         let judged = self.best().judge(measurement, slack)?;
-        let fits =
-            |begun: &Begun<S, N>| begun.filter.judge(measurement, slack).is_ok_and(|judged| judged.nis <= most);
+        let fits = |begun: &Begun<F>| begun.filter.judge(measurement, slack).is_ok_and(|judged| judged.nis <= most);
         if judged.nis <= most || self.starts.iter().skip(1).any(fits) {
             return Ok(judged.log_likelihood);
         }
@@ -329,12 +291,15 @@ impl<S: States, const N: usize> Copies<S, N> {
     }
 
     /// Fuses a measurement that is admitted, and weighs the copies by it.
-    fn fuse<M: Measurement<D>, const D: usize>(
+    fn fuse<M, const D: usize>(
         &mut self,
         stream: &mut Stream,
         measurement: &M,
         admitted: Result<f64, Refusal>,
-    ) -> Result<Fused, Refusal> {
+    ) -> Result<Fused, Refusal>
+    where
+        F: Update<M, D>,
+    {
         if let Err(refusal) = admitted {
             let result = Err(refusal);
             stream.count(&result);
@@ -382,22 +347,23 @@ impl<S: States, const N: usize> Copies<S, N> {
             let best = starts[0].filter;
             let mut is_best = true;
             starts.retain(|begun| {
-                std::mem::take(&mut is_best)
-                    || begun.log_likelihood > -IMPLAUSIBLE && !is_same(&best, &begun.filter)
+                std::mem::take(&mut is_best) || begun.log_likelihood > -IMPLAUSIBLE && !best.is_same(&begun.filter)
             });
         }
-        if let Some(now_ns) = self.starts[0].filter.estimate().map(|at| at.time_ns) {
+        if let Some(now_ns) = self.time_ns() {
             self.search.go_on(&mut self.starts, now_ns);
         }
     }
 
     /// Calls a function for each filter.
-    fn each(&mut self, mut with: impl FnMut(&mut Eskf<S, N>) -> Result<(), Refusal>) -> Result<(), Refusal> {
+    fn each(&mut self, mut with: impl FnMut(&mut F) -> Result<(), Refusal>) -> Result<(), Refusal> {
         let starts = self.starts.iter_mut().map(|begun| &mut begun.filter);
         let newcomer = self.newcomer.iter_mut().map(|newcomer| &mut newcomer.filter);
         starts.chain(self.search.filters_mut()).chain(newcomer).try_for_each(&mut with)
     }
+}
 
+impl<S: States, const N: usize> Copies<Eskf<S, N>> {
     /// See [`Eskf::set_keyframe`].
     pub fn set_keyframe(&mut self, id: u64) {
         let _ = self.each(|filter| {
@@ -418,20 +384,9 @@ impl<S: States, const N: usize> Copies<S, N> {
     }
 }
 
-/// Returns whether two copies have come to the same state, and are as sure of it.
-fn is_same<S: States, const N: usize>(a: &Eskf<S, N>, b: &Eskf<S, N>) -> bool {
-    let (Some(from), Some(to)) = (a.estimate(), b.estimate()) else { return false };
-    let error = from.error_to::<S>(to);
-    (0..N).all(|i| {
-        let (own, other) = (a.covariance()[(i, i)], b.covariance()[(i, i)]);
-        let is_known_alike = (0.25..4.0).contains(&(own / other));
-        (i >= NAVIGATION && own == other || is_known_alike) && error[i] * error[i] <= SAME * SAME * own
-    })
-}
-
-impl<S: States, const N: usize> Propagate for Copies<S, N> {
+impl<F: CopiedFilter> Propagate for Copies<F> {
     fn time_ns(&self) -> Option<i64> {
-        self.estimate().map(|estimate| estimate.time_ns)
+        self.best().time_ns()
     }
 
     fn admits(&self, sample: &ImuMean) -> Result<(), Refusal> {
@@ -447,7 +402,7 @@ impl<S: States, const N: usize> Propagate for Copies<S, N> {
         let whole_s = seconds_between(since_ns, sample.time_ns)?;
         let part_s = seconds_between(self.time_ns().ok_or(Refusal::NotStarted)?, time_ns)?;
         let mut part = ImuMean { time_ns, ..*sample };
-        if whole_s <= self.params.longest_sample {
+        if whole_s <= self.best().longest_sample() {
             self.each(|filter| filter.propagate(&part))?;
             self.holding.add(&part, part_s);
             self.scatter(part_s);

@@ -32,9 +32,9 @@ mod start;
 mod tests;
 mod transport;
 
-#[cfg(feature = "std")]
-pub(super) use filter::Doubt;
 pub use filter::Eskf;
+#[cfg(feature = "std")]
+pub(super) use filter::{Doubt, Judged};
 #[cfg(feature = "runtime")]
 pub(crate) use params::imu_params;
 pub use params::{EskfParams, GaussMarkov, ImuDensities};

@@ -4,9 +4,9 @@
 //! is the noise of the fixes, `σ² (1/t₁² + (1/t₁ + 1/t₂)² + 1/t₂²)` per axis. A receiver whose fixes scatter more than they state gets
 //! the noise of its scatter; otherwise the filter would blame the IMU, and follow every fix.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
-use crate::navigation::measurement::GnssPosition;
+use super::Fix;
 
 /// Error of the acceleration by a wrong attitude, a lever arm and a bias, m/s². Scatter counts beyond that.
 const ALLOWED: f64 = 1.0;
@@ -62,13 +62,13 @@ impl Scatter {
     }
 
     /// Adds a fix. Returns it with the noise that fixes have shown, if they have stated less.
-    pub(super) fn fix(&mut self, fix: &GnssPosition) -> GnssPosition {
+    pub(super) fn fix<M: Fix>(&mut self, fix: &M) -> M {
         let leg = core::mem::take(&mut self.leg);
-        let last = self.last.replace(fix.position);
+        let last = self.last.replace(fix.position());
         let is_near = (1e-3..LONGEST_S).contains(&leg.seconds);
-        let mean = last.filter(|_| is_near).map(|last| (fix.position - last) / leg.seconds);
+        let mean = last.filter(|_| is_near).map(|last| (fix.position() - last) / leg.seconds);
         let before = core::mem::replace(&mut self.before, mean.map(|mean| (leg, mean)));
-        let stated = fix.covariance.trace() / 3.0;
+        let stated = fix.variance();
         let mut alone = 0.0;
         if let (Some(mean), Some((earlier, mean_before))) = (mean, before) {
             let expected = earlier.velocity + leg.position / leg.seconds - earlier.position / earlier.seconds;
@@ -77,17 +77,15 @@ impl Scatter {
             let allowed = ALLOWED * 0.5 * (earlier.seconds + leg.seconds);
             let excess = ((mean - mean_before - expected).norm() - allowed).max(0.0);
             self.variances.rotate_right(1);
-            self.variances[0] = excess * excess / (3.0 * by_noise);
+            self.variances[0] = excess * excess / (M::AXES * by_noise);
             self.count = (self.count + 1).min(DIFFERENCES);
             if self.variances[0] > CLEAR * stated.max(self.shown()) {
                 // As if this fix alone made the difference.
-                alone = excess * excess * leg.seconds * leg.seconds / 3.0;
+                alone = excess * excess * leg.seconds * leg.seconds / M::AXES;
             }
         }
         let shown = self.shown().max(alone);
-        let missing = shown - stated;
-        let covariance = fix.covariance + Matrix3::identity() * missing.max(0.0);
-        GnssPosition { covariance, ..*fix }
+        fix.with_noise((shown - stated).max(0.0))
     }
 
     /// The variance of an axis that the last fixes show, m²; 0 as long as there are few.
@@ -105,6 +103,7 @@ impl Scatter {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::navigation::measurement::GnssPosition;
     use crate::navigation::noise::Noise;
 
     /// Fixes at 5 Hz of a body on a circle, with this noise: the median of the deviations that they get instead of the stated one.

@@ -1,10 +1,7 @@
 //! The search for the noise of the IMU on this vehicle: two copies of a filter beside it, with more noise and with less.
 
-use super::Begun;
-use crate::navigation::eskf::Eskf;
+use super::{Begun, CopiedFilter, Update};
 use crate::navigation::math::exp;
-use crate::navigation::measurement::Measurement;
-use crate::navigation::state::States;
 use crate::navigation::stream::Stream;
 
 /// The ratio of two neighbouring multiples. Twice as much noise is hard to tell from the same.
@@ -30,7 +27,7 @@ const MOST_STARTS: usize = 2;
 
 /// The state of the search.
 #[derive(Clone, Debug)]
-pub(super) struct Search<S: States, const N: usize> {
+pub(super) struct Search<F: CopiedFilter> {
     is_on: bool,
     exponent: i32,
     moved_ns: i64,
@@ -38,18 +35,18 @@ pub(super) struct Search<S: States, const N: usize> {
     /// The start that the neighbours are copies of.
     parent: Option<u32>,
     /// The copies with more and with less noise.
-    neighbours: [Option<Neighbour<S, N>>; 2],
+    neighbours: [Option<Neighbour<F>>; 2],
 }
 
 /// A copy with another noise.
 #[derive(Clone, Debug)]
-struct Neighbour<S: States, const N: usize> {
-    filter: Eskf<S, N>,
+struct Neighbour<F: CopiedFilter> {
+    filter: F,
     /// The log likelihood by which it leads its parent.
     lead: f64,
 }
 
-impl<S: States, const N: usize> Search<S, N> {
+impl<F: CopiedFilter> Search<F> {
     pub(super) fn new(is_on: bool) -> Self {
         let exponent = if is_on { FIRST } else { 0 };
         Self { is_on, exponent, moved_ns: i64::MIN, compared_ns: i64::MIN, parent: None, neighbours: [None, None] }
@@ -65,7 +62,7 @@ impl<S: States, const N: usize> Search<S, N> {
         STEP.powi(self.exponent)
     }
 
-    pub(super) fn filters_mut(&mut self) -> impl Iterator<Item = &mut Eskf<S, N>> {
+    pub(super) fn filters_mut(&mut self) -> impl Iterator<Item = &mut F> {
         self.neighbours.iter_mut().flatten().map(|neighbour| &mut neighbour.filter)
     }
 
@@ -80,12 +77,10 @@ impl<S: States, const N: usize> Search<S, N> {
     }
 
     /// Fuses a measurement in the neighbours. `of_parent` is its log likelihood for their parent.
-    pub(super) fn fuse<M: Measurement<D>, const D: usize>(
-        &mut self,
-        stream: &Stream,
-        measurement: &M,
-        of_parent: f64,
-    ) {
+    pub(super) fn fuse<M, const D: usize>(&mut self, stream: &Stream, measurement: &M, of_parent: f64)
+    where
+        F: Update<M, D>,
+    {
         for neighbour in self.neighbours.iter_mut().flatten() {
             if let Ok(fused) = neighbour.filter.update_ungated(&mut { *stream }, measurement) {
                 neighbour.lead += fused.log_likelihood - of_parent;
@@ -94,7 +89,7 @@ impl<S: States, const N: usize> Search<S, N> {
     }
 
     /// Moves to a neighbour that leads, and makes new neighbours where there are none.
-    pub(super) fn go_on(&mut self, starts: &mut [Begun<S, N>], now_ns: i64) {
+    pub(super) fn go_on(&mut self, starts: &mut [Begun<F>], now_ns: i64) {
         if !self.is_on || starts.len() > MOST_STARTS {
             return;
         }
@@ -128,7 +123,7 @@ impl<S: States, const N: usize> Search<S, N> {
         }
     }
 
-    fn fork(&mut self, parent: &Begun<S, N>) {
+    fn fork(&mut self, parent: &Begun<F>) {
         self.parent = Some(parent.id);
         self.neighbours = [1, -1].map(|step| {
             let exponent = self.exponent + step;

@@ -19,7 +19,7 @@ use nalgebra::{Isometry3, Vector3};
 /// See the [module](self).
 #[derive(Clone, Debug)]
 pub(super) struct Filter<S: States, const N: usize> {
-    copies: Copies<S, N>,
+    copies: Copies<Eskf<S, N>>,
     /// Indexed by [`Measured::sensor`].
     streams: [Stream; SENSORS],
     /// When an odometry was last fused, and the time over which its errors are alike, s.
@@ -69,7 +69,7 @@ impl<S: States, const N: usize> Filter<S, N> {
         Ok(Self { copies, streams: [stream; SENSORS], odometry_ns: None, correlation_s })
     }
 
-    pub(super) fn copies(&self) -> &Copies<S, N> {
+    pub(super) fn copies(&self) -> &Copies<Eskf<S, N>> {
         &self.copies
     }
 
@@ -125,14 +125,14 @@ impl<S: States, const N: usize> Filter<S, N> {
 }
 
 impl<S: States, const N: usize> Replayed for Filter<S, N> {
-    type Filter = Copies<S, N>;
+    type Filter = Copies<Eskf<S, N>>;
     type Measurement = Measured;
 
-    fn filter(&self) -> &Copies<S, N> {
+    fn filter(&self) -> &Copies<Eskf<S, N>> {
         &self.copies
     }
 
-    fn filter_mut(&mut self) -> &mut Copies<S, N> {
+    fn filter_mut(&mut self) -> &mut Copies<Eskf<S, N>> {
         &mut self.copies
     }
 

@@ -1,0 +1,242 @@
+//! What copies need of a filter.
+
+use core::fmt::Debug;
+use std::vec;
+use std::vec::Vec;
+
+use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
+
+use super::{TURN_DEVIATION, TURNS, UNKNOWN, Ways};
+use crate::attitude::ParamsError;
+use crate::navigation::eskf::{Doubt, Eskf, EskfParams, GaussMarkov, ImuMean, Judged, Start};
+use crate::navigation::fused::Fused;
+use crate::navigation::math::{rotation_vector, sqrt};
+use crate::navigation::measurement::{GnssPosition, Measurement};
+use crate::navigation::propagate::Propagate;
+use crate::navigation::refusal::Refusal;
+use crate::navigation::state::{Estimate, Optional, ROTATION, States, offset};
+use crate::navigation::stream::Stream;
+
+/// A copy whose state is nearer to that of the best than this part of a deviation is the same.
+const SAME: f64 = 0.5;
+
+/// A filter of which there can be [`Copies`](super::Copies).
+#[expect(private_interfaces, reason = "implemented here alone")]
+pub trait CopiedFilter: Propagate + Copy + Debug {
+    /// Its parameters.
+    type Params: Copy + Debug;
+    /// The state that it starts with.
+    type Start;
+    /// The state that it estimates.
+    type Estimate;
+
+    /// A filter that has not started.
+    fn new(params: Self::Params) -> Result<Self, ParamsError>;
+
+    /// A filter that has started for each way of what is unknown of the start.
+    fn starts(params: &Self::Params, ways: Ways, start: &Self::Start) -> Result<Vec<Self>, Refusal>;
+
+    /// The estimate; `None` before the start.
+    fn estimate(&self) -> Option<&Self::Estimate>;
+
+    /// The position in the world, m.
+    fn position(&self) -> Option<Vector3<f64>>;
+
+    /// The acceleration in the world that the last sample shows, m/s².
+    fn acceleration(&self) -> Option<Vector3<f64>>;
+
+    /// The angle about the vertical to the attitude of another, rad.
+    fn turn_to(&self, other: &Self) -> f64;
+
+    /// The standard deviation of the heading, rad.
+    fn heading_deviation(&self) -> f64;
+
+    /// Whether another has come to the same state, and is as sure of it.
+    fn is_same(&self, other: &Self) -> bool;
+
+    /// The longest interval that a sample covers, s; a longer one is a gap.
+    fn longest_sample(&self) -> f64;
+
+    /// Propagates over a part of a gap, during which the reading is assumed to be that of `sample`, but may have been wrong by `doubt`.
+    fn hold(&mut self, sample: &ImuMean, doubt: &Doubt) -> Result<(), Refusal>;
+
+    /// Multiplies the white noise of the IMU, as a deviation.
+    fn multiply_noise(&mut self, multiple: f64);
+
+    /// Multiplies the covariance.
+    fn doubt_all(&mut self, factor: f64);
+
+    /// Forgets the position, and doubts the motion by as much as a filter in the wrong place may have been wrong.
+    fn unmoor(&mut self);
+
+    /// Counts a new beginning.
+    fn begin_again(&mut self);
+}
+
+/// A filter that a measurement `M` with `D` components corrects.
+#[expect(private_interfaces, reason = "implemented here alone")]
+pub trait Update<M, const D: usize>: CopiedFilter {
+    /// Compares a measurement with the filter. `slack` is added to each variance of its noise.
+    fn judge(&self, measurement: &M, slack: f64) -> Result<Judged, Refusal>;
+
+    /// Corrects the filter with a measurement, whatever its gate.
+    fn update_ungated(&mut self, stream: &mut Stream, measurement: &M) -> Result<Fused, Refusal>;
+}
+
+/// A position from satellites, whose noise may be larger than stated.
+pub trait Fix: Copy {
+    /// The number of axes that it measures.
+    const AXES: f64;
+
+    /// The position, m; zero along an axis that it does not measure.
+    fn position(&self) -> Vector3<f64>;
+
+    /// The mean variance of an axis, m².
+    fn variance(&self) -> f64;
+
+    /// The fix with this variance added to each axis, m².
+    #[must_use]
+    fn with_noise(&self, variance: f64) -> Self;
+}
+
+/// Returns whether two filters, an `error` apart, have come to the same state, and are as sure of it.
+pub(in crate::navigation) fn is_same<const N: usize>(
+    error: &SVector<f64, N>,
+    own: &SMatrix<f64, N, N>,
+    other: &SMatrix<f64, N, N>,
+) -> bool {
+    (0..N).all(|i| {
+        let (own, other) = (own[(i, i)], other[(i, i)]);
+        let is_known_alike = own == other || (0.25..4.0).contains(&(own / other));
+        is_known_alike && error[i] * error[i] <= SAME * SAME * own
+    })
+}
+
+impl Fix for GnssPosition {
+    const AXES: f64 = 3.0;
+
+    fn position(&self) -> Vector3<f64> {
+        self.position
+    }
+
+    fn variance(&self) -> f64 {
+        self.covariance.trace() / 3.0
+    }
+
+    fn with_noise(&self, variance: f64) -> Self {
+        Self { covariance: self.covariance + Matrix3::identity() * variance, ..*self }
+    }
+}
+
+#[expect(private_interfaces, reason = "implemented here alone")]
+impl<S: States, M: Measurement<D>, const N: usize, const D: usize> Update<M, D> for Eskf<S, N> {
+    fn judge(&self, measurement: &M, slack: f64) -> Result<Judged, Refusal> {
+        self.judge(measurement, slack)
+    }
+
+    fn update_ungated(&mut self, stream: &mut Stream, measurement: &M) -> Result<Fused, Refusal> {
+        self.update_ungated(stream, measurement)
+    }
+}
+
+#[expect(private_interfaces, reason = "implemented here alone")]
+impl<S: States, const N: usize> CopiedFilter for Eskf<S, N> {
+    type Params = EskfParams;
+    type Start = Start;
+    type Estimate = Estimate<N>;
+
+    fn new(params: EskfParams) -> Result<Self, ParamsError> {
+        Self::new(params)
+    }
+
+    /// A heading whose deviation is more than half a radian counts as unknown, and so does such a yaw of
+    /// [`EskfParams::wheel_mounting`].
+    fn starts(params: &EskfParams, ways: Ways, start: &Start) -> Result<Vec<Self>, Refusal> {
+        let turns = |is_unknown: bool| if is_unknown { TURNS } else { 1 };
+        let angle = |i: u32| core::f64::consts::TAU * f64::from(i) / f64::from(TURNS);
+        let mounting = offset::<S>(Optional::WheelMounting);
+        let is_mounted = mounting.is_none() || params.wheel_mounting.deviation <= UNKNOWN;
+        let is_pointed = start.rotation_covariance[(2, 2)] <= UNKNOWN * UNKNOWN;
+        let mut scales = vec![*params];
+        if offset::<S>(Optional::RelativeScale).is_some() && ways.scale {
+            scales.push(EskfParams { relative_scale: GaussMarkov::constant(0.0), ..*params });
+        }
+        let mut filters = Vec::new();
+        for heading in 0..turns(!is_pointed) {
+            let mut begun = *start;
+            if !is_pointed {
+                let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle(heading));
+                begun.world_from_body = turn * start.world_from_body;
+                let variance = TURN_DEVIATION * TURN_DEVIATION;
+                begun.rotation_covariance =
+                    Matrix3::from_diagonal(&start.rotation_covariance.diagonal().map(|own| own.min(variance)));
+            }
+            for yaw in 0..turns(!is_mounted) {
+                for mut params in scales.iter().copied() {
+                    if !is_mounted {
+                        params.wheel_mounting.deviation = TURN_DEVIATION;
+                    }
+                    let mut filter = Self::new(params).map_err(|_| Refusal::OutOfRange)?;
+                    filter.start(&begun)?;
+                    if let Some(error) = mounting {
+                        filter.set_optional(error, angle(yaw));
+                    }
+                    filters.push(filter);
+                }
+            }
+        }
+        Ok(filters)
+    }
+
+    fn estimate(&self) -> Option<&Estimate<N>> {
+        self.estimate()
+    }
+
+    fn position(&self) -> Option<Vector3<f64>> {
+        self.estimate().map(|estimate| estimate.position)
+    }
+
+    fn acceleration(&self) -> Option<Vector3<f64>> {
+        let fall = Vector3::new(0.0, 0.0, self.params().gravity);
+        self.estimate().map(|estimate| estimate.world_from_body * estimate.specific_force - fall)
+    }
+
+    fn turn_to(&self, other: &Self) -> f64 {
+        let attitude =
+            |filter: &Self| filter.estimate().map_or_else(UnitQuaternion::identity, |at| at.world_from_body);
+        rotation_vector(&(attitude(other) * attitude(self).inverse())).z
+    }
+
+    fn heading_deviation(&self) -> f64 {
+        sqrt(self.covariance()[(ROTATION + 2, ROTATION + 2)])
+    }
+
+    fn is_same(&self, other: &Self) -> bool {
+        let (Some(from), Some(to)) = (self.estimate(), other.estimate()) else { return false };
+        is_same(&from.error_to::<S>(to), self.covariance(), other.covariance())
+    }
+
+    fn longest_sample(&self) -> f64 {
+        self.params().longest_sample
+    }
+
+    fn hold(&mut self, sample: &ImuMean, doubt: &Doubt) -> Result<(), Refusal> {
+        self.hold(sample, doubt)
+    }
+
+    fn multiply_noise(&mut self, multiple: f64) {
+        self.multiply_noise(multiple);
+    }
+
+    fn doubt_all(&mut self, factor: f64) {
+        self.doubt_all(factor);
+    }
+
+    fn unmoor(&mut self) {
+        self.unmoor();
+    }
+
+    fn begin_again(&mut self) {
+        self.begin_again();
+    }
+}
