@@ -282,6 +282,6 @@ struct Disarming {
     errors: Vec<SafetyError>,
 }
 
-/// Does not keep the robot alive.
+/// Control state of a robot that it does not keep alive.
 #[derive(Clone)]
 pub(crate) struct WeakControl(Weak<Inner>);

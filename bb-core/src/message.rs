@@ -106,7 +106,7 @@ pub trait Payload: Clone + std::fmt::Debug + Send + Sync + Field + 'static {
         None
     }
 
-    /// False for the placeholder of an unknown payload, in a robot that does not compile.
+    /// `false` for the placeholder of an unknown payload, in a robot that does not compile.
     #[doc(hidden)]
     const KNOWN: bool = true;
 }

@@ -52,7 +52,7 @@ pub enum TelemetryEvent {
         estimator: &'static str,
         /// The name of the input.
         input: &'static str,
-        /// Why.
+        /// Reason for the drop.
         reason: &'static str,
     },
     /// The health of an estimator has changed.

@@ -93,7 +93,7 @@ pub struct Mimic {
 /// Kind of a joint's motion (URDF's types).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JointKind {
-    /// Not at all.
+    /// No motion.
     Fixed,
     /// Turns about its axis between limits.
     Revolute,

@@ -23,7 +23,7 @@ pub(crate) fn graft(tree: Robot, diagnostics: &mut Diagnostics) -> (Robot, Token
     graft::graft(tree, diagnostics)
 }
 
-/// Without the feature: an error if a robot names a URDF.
+/// Reports an error if a robot names a URDF, without the feature.
 #[cfg(not(feature = "urdf"))]
 pub(crate) fn graft(mut tree: Robot, diagnostics: &mut Diagnostics) -> (Robot, TokenStream) {
     for topology in &tree.topologies {

@@ -7,9 +7,9 @@ use std::time::Duration;
 /// Parameters that the options of a component are bound to.
 #[derive(Debug)]
 pub struct Binding<O> {
-    /// Puts their values into the options.
+    /// Puts the values of the parameters into the options.
     pub apply: fn(&mut O, &ParameterValues),
-    /// Their numbers.
+    /// Numbers of the parameters.
     pub parameters: &'static [usize],
 }
 

@@ -144,7 +144,7 @@ pub trait HandleCall<Q>: Estimator {
     label = "no `HandleCast<{Q}>`"
 )]
 pub trait HandleCast<Q>: Estimator {
-    /// See [`HandleCall::RECORD`].
+    /// Form of these requests in a journal, see [`HandleCall::RECORD`].
     const RECORD: Option<RequestCodec<Q>> = None;
 
     /// Handles the request.
@@ -180,7 +180,7 @@ impl<O> Reply<O> {
         self
     }
 
-    /// Also asks for a timer, a tick, a timeout or a continue. A reply has one request: the last one wins.
+    /// Adds a request for a timer, a tick, a timeout or a continue. A reply has one request: the last one wins.
     pub fn and(mut self, request: Request) -> Self {
         self.request = Some(request);
         self

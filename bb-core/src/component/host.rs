@@ -87,8 +87,8 @@ pub(crate) trait Host: Send + Sync {
     /// The actuator at `path`, for commands in JSON.
     fn json_actuator(&self, path: &str) -> Option<Arc<dyn AcceptsJson>>;
     fn graph(&self, format: GraphFormat) -> String;
-    /// After a call from outside, on virtual time: runs disarm callbacks left by an actuator's own code, and hands lines of the
-    /// journal to its sink.
+    /// Runs disarm callbacks left by an actuator's own code, and hands lines of the journal to its sink: after a call from outside, on
+    /// virtual time.
     fn settle(&self);
 }
 

@@ -59,7 +59,7 @@ pub trait Inputs: 'static {
     /// The inputs by name; empty if the input is a single payload.
     const FIELDS: &'static [InputField];
 
-    /// False for the placeholder of an unknown estimator, in a robot that does not compile.
+    /// `false` for the placeholder of an unknown estimator, in a robot that does not compile.
     #[doc(hidden)]
     const KNOWN: bool = true;
 }

@@ -104,11 +104,11 @@ pub(crate) fn unverified<T>() -> T {
 
 /// The options of one component, whatever its type.
 pub(crate) trait AnyOptions: Any + Send {
-    /// See [`Options::FIELDS`].
+    /// Returns the fields, see [`Options::FIELDS`].
     fn fields(&self) -> &'static [OptionField];
     /// The option number `index` of [`AnyOptions::fields`].
     fn setting(&mut self, index: usize) -> Option<Box<dyn Setting + '_>>;
-    /// See [`Options::validate`].
+    /// Validates the options, see [`Options::validate`].
     fn validate(&self) -> Result<(), String>;
     /// A copy, to be changed and put back by [`AnyOptions::replace`].
     fn copy(&self) -> Box<dyn AnyOptions>;

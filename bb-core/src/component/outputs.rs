@@ -43,7 +43,7 @@ pub trait Outputs: Sized + Send + 'static {
     /// The outputs by name; empty if the output is a single payload, whose name is `out`.
     const FIELDS: &'static [&'static str];
 
-    /// False for the placeholder of an unknown estimator, in a robot that does not compile.
+    /// `false` for the placeholder of an unknown estimator, in a robot that does not compile.
     #[doc(hidden)]
     const KNOWN: bool = true;
 
@@ -154,7 +154,7 @@ impl<T: Payload> Emitted for Timed<T> {
 /// The messages of one output in one reply: none or one, or any number.
 #[doc(hidden)]
 pub trait OutputField: Default {
-    /// Their payload.
+    /// Payload of the messages.
     type Payload: Payload;
 
     /// Takes them, and hands each to `publish`.

@@ -61,7 +61,7 @@ pub struct Reaction {
     options: ReactionOptions,
     bus: Bus,
     messages: DynamicSubscription,
-    /// True if it waits for messages itself: it has no rate, and time is real.
+    /// `true` if the reaction waits for messages itself: it has no rate, and time is real.
     waits: bool,
     is_periodic: bool,
     stale_after: Duration,
@@ -123,7 +123,7 @@ pub struct ReactionState {
     pub value: Option<f64>,
 }
 
-/// See [`ReactionState`].
+/// Event at a reaction, see [`ReactionState`].
 #[derive(Clone, Debug, PartialEq, Eq, Payload)]
 #[non_exhaustive]
 pub enum ReactionEvent {

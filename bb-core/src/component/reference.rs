@@ -104,7 +104,7 @@ impl<T: Number> Number for Option<T> {
     }
 }
 
-/// See [`Number::number`].
+/// Returns the number of a field, see [`Number::number`].
 pub fn number_of<T: Number>(field: &T) -> Option<f64> {
     field.number()
 }

@@ -73,7 +73,7 @@ pub trait Sensor: Sized + Send + 'static {
         None
     }
 
-    /// True if other code publishes its messages, by path too: see [`External`](crate::component::External).
+    /// `true` if other code publishes the sensor's messages, by path too: see [`External`](crate::component::External).
     #[doc(hidden)]
     const IS_EXTERNAL: bool = false;
 
@@ -110,7 +110,7 @@ pub enum Next {
     AtRate,
     /// The time given.
     At(MonotonicTime),
-    /// Never: there is no more to read.
+    /// No time: there is no more to read.
     Never,
 }
 

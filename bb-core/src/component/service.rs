@@ -25,8 +25,8 @@ pub trait Service: Sized + Send + 'static {
     /// Why it cannot start. At the start of the robot, the robot then does not start.
     fn init(options: Self::Options, context: &ServiceContext) -> Result<Self, Fault>;
 
-    /// Does its work once: at the declared `rate`, or repeatedly without one, so it may wait for its device or peer.
-    /// It must then return from time to time, so that the robot can stop.
+    /// Performs its work once: at the declared `rate`, or repeatedly without one, so it may wait for its device or peer. It must then
+    /// return from time to time, so that the robot can stop.
     ///
     /// # Errors
     /// Why it cannot go on; the fault is reported, and the service is restarted with fresh state.

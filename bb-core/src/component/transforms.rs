@@ -48,7 +48,7 @@ impl InputTransform {
         Self { name, is_driver: true, placed: Placed::At(frame_from_input) }
     }
 
-    /// Initially: its transform if no joint moves between.
+    /// Creates the initial transform: that of an input without a moving joint between.
     pub(crate) fn declared(name: &'static str, is_driver: bool, fixed: Option<Isometry3<f64>>) -> Self {
         Self { name, is_driver, placed: fixed.map_or(Placed::Nowhere, Placed::At) }
     }

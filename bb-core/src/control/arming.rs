@@ -442,7 +442,7 @@ impl Step<'_> {
         self.finish();
     }
 
-    /// See [`Control::hardware_error`].
+    /// Handles a hardware error, see [`Control::hardware_error`].
     pub(super) fn hardware_error(&mut self, error: SafetyError) {
         self.publish_safety_error(error);
         match self.state.machine.safety {

@@ -142,7 +142,7 @@ struct Hook {
 /// The lifetime of a callback.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Owner {
-    /// Never forgotten: it is the actuator's own.
+    /// Kept until the robot's end: the callback is the actuator's own.
     Actuator,
     /// Forgotten when the component is created again.
     Component,

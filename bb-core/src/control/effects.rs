@@ -17,7 +17,7 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// See the [module](self).
+/// Effects of an entry, see the [module](self).
 #[derive(Default)]
 pub(super) struct Effects {
     pub(super) wakers: Wakers,

@@ -44,7 +44,7 @@ pub(super) struct Slot {
 #[derive(Default)]
 struct State {
     result: Option<Result<Value, CommandError>>,
-    /// Set once there is or was a result; the first one counts.
+    /// `true` once there is or was a result; the first one counts.
     has_ended: bool,
     waker: Option<Waker>,
 }

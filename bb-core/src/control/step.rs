@@ -88,7 +88,7 @@ impl Step<'_> {
         self.publish(&self.control.0.topics.safety_error, error, self.now);
     }
 
-    /// See [`Control::note_fault`].
+    /// Records a fault, see [`Control::note_fault`].
     pub(super) fn note_fault(&mut self, path: &'static str, message: String) {
         self.line(Event::Noted { path, message: message.clone() });
         self.publish_fault(path, message);

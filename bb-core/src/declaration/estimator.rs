@@ -33,7 +33,7 @@ impl EstimatorDeclaration {
         self.inputs.iter().find(|input| input.driver)
     }
 
-    /// Without settings.
+    /// Declaration without settings.
     pub(crate) const NONE: Self = Self {
         path: "",
         frame: Frame::NONE,

@@ -31,7 +31,7 @@ pub struct CommandEvent {
     pub health: Option<HealthTransition>,
 }
 
-/// See [`CommandEvent`].
+/// Phase of an execution, see [`CommandEvent`].
 #[derive(Clone, Debug, PartialEq, Eq, Payload)]
 #[non_exhaustive]
 pub enum CommandPhase {
@@ -79,7 +79,7 @@ pub enum RefusalReason {
 pub struct Refusal {
     /// Name of the command.
     pub command: &'static str,
-    /// Why.
+    /// Reason for the refusal.
     pub reason: RefusalReason,
     /// The operational state it was refused in.
     pub state: &'static str,

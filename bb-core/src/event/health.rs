@@ -51,9 +51,9 @@ pub struct HealthTransition {
     pub from: HealthState,
     /// The new state.
     pub to: HealthState,
-    /// Why.
+    /// Reason for the change.
     pub reason: HealthReason,
-    /// When.
+    /// Time of the change.
     pub time: MonotonicTime,
 }
 

@@ -21,7 +21,7 @@ pub enum Right {
 }
 
 impl Right {
-    /// All of them.
+    /// All rights, one by one.
     pub const ALL: [Self; 6] =
         [Self::Read, Self::Parameters, Self::Commands, Self::Arm, Self::Actuators, Self::Publish];
 
@@ -57,7 +57,7 @@ impl fmt::Debug for Rights {
 impl Rights {
     /// None but to disarm.
     pub const NONE: Self = Self(0);
-    /// All.
+    /// All rights.
     pub const ALL: Self = Self((1 << Right::ALL.len()) - 1);
 
     /// Returns whether this right is among them.

@@ -113,7 +113,7 @@ impl fmt::Display for HardwareError {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Payload)]
 #[non_exhaustive]
 pub enum HardwareErrorKind {
-    /// Only a text says what it is.
+    /// A danger that only the text describes.
     #[default]
     Unspecified,
     /// Too hot.

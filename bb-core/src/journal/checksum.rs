@@ -5,7 +5,7 @@ use crate::message::{Payload, Stamped};
 use std::cell::RefCell;
 
 thread_local! {
-    /// Kept to reuse its allocation.
+    /// Buffer kept to reuse its allocation.
     static BYTES: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
 }
 

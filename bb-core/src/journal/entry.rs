@@ -36,7 +36,7 @@ impl JournalLine {
 /// Another name of [`JournalLine`], for code that handles many of them.
 pub type Entry = JournalLine;
 
-/// See [`Entry`]. Islands, estimators, publishers, actuators, commands and parameters are named by their numbers.
+/// Event of a line, see [`Entry`]. Islands, estimators, publishers, actuators, commands and parameters are named by their numbers.
 #[derive(Clone, Debug, Payload)]
 #[non_exhaustive]
 pub enum Event {
@@ -145,7 +145,7 @@ pub enum Event {
     Measured {
         /// The number of that line.
         cause: u64,
-        /// Each, in order.
+        /// Durations, in order.
         callbacks: Vec<Callback>,
     },
     /// An estimator emitted a message.
@@ -206,7 +206,7 @@ pub enum Event {
     },
     /// Parameters were set, all at once.
     Parameters {
-        /// Each with its new value.
+        /// Changed parameters with their new values.
         changes: Vec<ParameterEntry>,
     },
     /// A command was requested.
@@ -220,7 +220,7 @@ pub enum Event {
     Ended {
         /// The number of the execution.
         execution: u64,
-        /// How.
+        /// End of the code.
         end: End,
     },
     /// A command was cancelled by its caller.
@@ -258,7 +258,7 @@ pub enum Event {
     Placed {
         /// The number of that line.
         cause: u64,
-        /// Each, in order.
+        /// Transforms, in order.
         inputs: Vec<PlacedInput>,
     },
     /// A command changed the operational state while it ran.
@@ -305,7 +305,7 @@ pub enum End {
     },
     /// The code failed.
     Failed {
-        /// Why.
+        /// Reason for the failure.
         message: String,
     },
 }
@@ -326,7 +326,7 @@ pub struct Request {
 pub enum RequestKind {
     /// A request with an answer: `HandleCall`.
     Call,
-    /// One-way: `HandleCast`.
+    /// A one-way request: `HandleCast`.
     Cast,
 }
 

@@ -56,16 +56,16 @@ pub(super) struct Batch {
     load: Load,
 }
 
-/// See the [module](self).
+/// Queue of lines, see the [module](self).
 pub(super) struct Queue {
     batches: VecDeque<Batch>,
     /// The queued load, including the batch being handed to the sink.
     load: Load,
-    /// Kept to reuse its allocation.
+    /// Empty batch, kept to reuse its allocation.
     spare: Vec<Entry>,
     next: u64,
     pub(super) wall_offset_nanos: i64,
-    /// While too much is queued: how many lines the sink had taken when that number last changed, and when it did.
+    /// Number of lines that the sink had accepted when that number last changed, and the time of the change, while too much is queued.
     stalled: Option<(u64, Instant)>,
     /// Reason for which no more lines are accepted.
     pub(super) ended: Option<Ended>,

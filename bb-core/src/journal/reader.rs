@@ -7,7 +7,7 @@ use std::fmt;
 
 /// The publishers of a robot, whose payloads a journal refers to by number. Every [`Robot`](crate::Robot) has them.
 pub trait Publishers {
-    /// Their topics.
+    /// Topics of the publishers.
     #[doc(hidden)]
     type Topics;
 

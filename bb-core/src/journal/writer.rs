@@ -217,7 +217,7 @@ impl Inner {
         state.is_draining = false;
     }
 
-    /// After the last line: resources owned by the sink, such as a file, are closed here.
+    /// Drops the sink after the last line: resources that it owns, such as a file, are closed here.
     fn finish(&self) {
         let sink = self.lock().sink.take();
         discard(sink);

@@ -57,7 +57,7 @@ pub trait Periodic: Component {
     fn read(&mut self, now: MonotonicTime) -> Result<Reading<Self::Output>, Fault>;
     /// Returns the time at which the component wants to be read first.
     fn starts_at(&self) -> Option<MonotonicTime>;
-    /// True if other code publishes its messages.
+    /// `true` if other code publishes the component's messages.
     #[doc(hidden)]
     const IS_EXTERNAL: bool = false;
 }

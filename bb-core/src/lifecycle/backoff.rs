@@ -12,7 +12,7 @@ pub struct Supervision {
     /// Number of panics that a supervisor allows within [`Self::within`] before it escalates to its parent, which restarts everything
     /// below. Default: 3.
     pub max_restarts: usize,
-    /// See [`Self::max_restarts`]. Default: 5 s.
+    /// Time within which panics count, see [`Self::max_restarts`]. Default: 5 s.
     pub within: Duration,
     /// The delay before the first restart of a component, at least 100 µs; it doubles with each further one in a row.
     /// Default: 10 ms.

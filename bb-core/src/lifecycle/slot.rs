@@ -27,7 +27,7 @@ impl<O: Options> Recipe<O> {
     }
 }
 
-/// See the [module](super).
+/// Slot of a component, see the [module](super).
 pub(crate) struct Slot<C: Component> {
     recipe: Recipe<C::Options>,
     state: State<C>,

@@ -34,7 +34,7 @@ pub struct Transmission {
     pub reduction: f64,
     /// The joint's position when the motor is at 0; rad or m.
     pub offset: f64,
-    /// True if the joint turns the other way than the motor.
+    /// `true` if the joint turns the other way than the motor.
     pub is_reversed: bool,
 }
 

@@ -31,7 +31,7 @@ pub enum DropReason {
     Displaced,
 }
 
-/// Without a declared budget or a handler of telemetry, one of this many callbacks is measured: a power of two.
+/// Number of callbacks of which one is measured without a declared budget or a handler of telemetry: a power of two.
 pub(super) const SAMPLED: u64 = 64;
 
 const REASONS: usize = DropReason::ALL.len();
@@ -87,7 +87,7 @@ pub(crate) struct Counters {
     /// every 64th run.
     pub(super) latency: Latency,
     pub(super) last_divergence: Mutex<Option<&'static str>>,
-    /// See [`Self::set_last_drop`]; 0 if nothing was dropped.
+    /// Last drop, see [`Self::set_last_drop`]; 0 if nothing was dropped.
     last_drop: AtomicU64,
 }
 

@@ -69,7 +69,7 @@ pub(crate) enum Mode {
     Replay,
 }
 
-/// See [`Environment::robot`].
+/// Identifier of a run, see [`Environment::robot`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct RobotId(pub(super) usize);
 

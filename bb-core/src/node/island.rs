@@ -283,8 +283,8 @@ impl<S: IslandState> Island<S> {
         }
     }
 
-    /// After an entry was added: signals the worker, or drains the island on this thread unless another thread holds it. That
-    /// thread checks the inbox after it has released the island. The fences ensure that one of the two threads sees the other.
+    /// Signals the worker after an entry was added, or drains the island on this thread unless another thread holds it. That thread
+    /// checks the inbox after it has released the island. The fences ensure that one of the two threads sees the other.
     fn attend(&self, wiring: &S::Wiring) {
         fence(Ordering::SeqCst);
         if self.served.load(Ordering::Relaxed) {
@@ -306,8 +306,8 @@ impl<S: IslandState> Island<S> {
         }
     }
 
-    /// After this thread has processed as many entries as an inbox holds, it leaves the rest to the waiting threads. They check the
-    /// inbox after their wait, and the fences ensure that one of the two threads sees the other.
+    /// Processes as many entries as an inbox holds, then leaves the rest to the waiting threads. They check the inbox after their wait,
+    /// and the fences ensure that one of the two threads sees the other.
     #[cold]
     fn drain(&self, wiring: &S::Wiring) {
         if self.replayed.load(Ordering::Relaxed) {

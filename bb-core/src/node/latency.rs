@@ -9,7 +9,7 @@ use std::time::Duration;
 
 /// Buckets per power of two.
 const PARTS: usize = 8;
-/// Up to 2^40 ns: 18 minutes.
+/// Number of buckets: up to 2^40 ns, 18 minutes.
 const BUCKETS: usize = 40 * PARTS;
 
 pub(super) struct Latency {

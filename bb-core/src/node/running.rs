@@ -42,9 +42,9 @@ const STUCK_AFTER: u32 = 1_000_000;
 /// Arrival of a message: now, or before a restart that it has waited for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Arrival {
-    /// Just now.
+    /// Now.
     New,
-    /// Before a restart; it has been counted.
+    /// Earlier, before a restart; it has been counted.
     Late,
 }
 

@@ -148,7 +148,7 @@ pub trait AnyTopic: Any + Send + Sync {
     fn schemas(&self) -> fn() -> Vec<Schema>;
     /// All subscribers.
     fn subscribers(&self) -> Vec<SubscriberStatistics>;
-    /// Also hands every message to `tap`.
+    /// Hands every message to `tap` as well.
     #[doc(hidden)]
     fn tap(&self, tap: &Tap);
     /// Decodes a message from bytes written by [`DynamicMessage::encode`].
@@ -156,7 +156,7 @@ pub trait AnyTopic: Any + Send + Sync {
     fn decode(&self, bytes: &[u8]) -> Result<DynamicMessage, DecodeError>;
     /// Publishes a message if its payload is this topic's; otherwise does nothing and returns `false`.
     fn publish_dynamic(&self, message: &DynamicMessage) -> bool;
-    /// Itself, to downcast to its type.
+    /// Returns the topic itself, to downcast to its type.
     #[doc(hidden)]
     fn as_any(&self) -> &dyn Any;
     /// Returns the counts.

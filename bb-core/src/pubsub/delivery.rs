@@ -16,7 +16,7 @@ pub enum Overflow {
         /// Number of messages that are kept: at least one, and at most [`Overflow::MAX_CAPACITY`].
         capacity: usize,
     },
-    /// Does the same with its own bound in bytes.
+    /// Keeps this many messages, and at most this many bytes. Beyond that, the oldest is dropped, and the loss is counted.
     DropOldestWithin {
         /// Number of messages that are kept: at least one, and at most [`Overflow::MAX_CAPACITY`].
         capacity: usize,

@@ -29,7 +29,7 @@ pub(crate) type Tell<'a> = dyn Fn(&mut dyn FnMut(JointReading<'_>)) + 'a;
 
 /// The checks that a publisher passes on its way to its topic.
 pub(crate) trait Gate: Send + Sync {
-    /// Has `publish` called with the stamp of a payload that is published now; not once the publisher may not act any more.
+    /// Calls `publish` with the stamp of a payload that is published now; not once the publisher may not act any more.
     fn pass(&self, publish: &mut dyn FnMut(Stamp));
     /// Returns whether messages are to be shown to [`Self::note`].
     fn is_noted(&self) -> bool;

@@ -52,7 +52,7 @@ struct Entry<M> {
 
 /// A queue of a topic, without its payload: all that is done with it but adding messages.
 pub(super) trait AnyQueue: Any + Send + Sync {
-    /// See [`Queue::close`].
+    /// Closes the queue, see [`Queue::close`].
     fn close(&self) -> Option<Waker>;
     fn statistics(&self) -> SubscriberStatistics;
     /// Returns whether its reader is gone.
@@ -373,7 +373,7 @@ impl<M> Queue<M> {
         pending
     }
 
-    /// Has the reader woken when the time of a message comes.
+    /// Returns that no message is due yet, and has the reader woken when the time of one comes.
     fn pending(&self, mut state: MutexGuard<'_, State<M>>) -> Poll<Option<M>> {
         let alarm = state.paths.arm();
         drop(state);

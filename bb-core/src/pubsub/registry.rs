@@ -70,8 +70,8 @@ impl Kind<'_> {
 struct Made {
     number: u64,
     topic: Arc<dyn AnyTopic>,
-    /// True if it has, or had, a publisher. Others are kept for their subscribers: topics of paths that are subscribed to before
-    /// anything publishes there, and in a replay those that have made room in the run.
+    /// `true` if the topic has, or had, a publisher. Others are kept for their subscribers: topics of paths that are subscribed to
+    /// before anything publishes there, and in a replay those that have made room in the run.
     is_published: bool,
     /// Messages published and lost there before.
     before: (u64, u64),
@@ -473,7 +473,7 @@ impl Selection {
     }
 }
 
-/// See [`Select`].
+/// Selection that owns its paths, see [`Select`].
 enum OwnedSelect {
     All,
     Path(Box<str>),

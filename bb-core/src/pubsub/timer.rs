@@ -10,7 +10,7 @@ use std::task::Waker;
 #[derive(Clone, Default)]
 pub(crate) struct Timer(Arc<OnceLock<Box<dyn Alarms>>>);
 
-/// See [`Timer`].
+/// Clock and alarms behind a [`Timer`].
 pub(crate) trait Alarms: Send + Sync {
     fn now(&self) -> MonotonicTime;
     /// Wakes `waker` at that time, on another thread than the caller's or later on the same one.

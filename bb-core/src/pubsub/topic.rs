@@ -92,8 +92,8 @@ impl<T: Payload> Topic<T> {
         }
     }
 
-    /// Only enqueues `message`: what is to be woken and dropped goes to `wakers`. For a publisher that holds a lock. No user's
-    /// code runs here but the payload's `clone`, and that only if somebody listens.
+    /// Enqueues `message` only: what is to be woken and dropped goes to `wakers`. For a publisher that holds a lock. No user's code
+    /// runs here but the payload's `clone`, and that only if somebody listens.
     #[inline]
     pub(crate) fn publish_deferred(&self, message: &Stamped<T>, wakers: &mut Wakers) {
         self.hub.published.fetch_add(1, Ordering::Relaxed);

@@ -136,7 +136,7 @@ impl Drop for Keeper {
     }
 }
 
-/// See [`Keeper`].
+/// A store, its values and the sets that wait for it, see [`Keeper`].
 pub(super) struct Work {
     store: Box<dyn ParameterStore>,
     values: BTreeMap<String, ParameterValue>,

@@ -30,7 +30,7 @@ pub(super) struct Machine {
     pub(super) has_ended: AtomicBool,
     /// Report at the end.
     pub(super) last_report: OnceLock<Report>,
-    /// Taken at the end.
+    /// Store of parameters, which is removed at the end.
     pub(super) keeper: Mutex<Option<Keeper>>,
 }
 
@@ -105,7 +105,7 @@ impl Machine {
         self.wired.island(number)
     }
 
-    /// Has all estimators start.
+    /// Starts all estimators.
     pub(super) fn start_islands(&self, now: MonotonicTime) {
         for island in self.islands() {
             island.start(now);
@@ -118,7 +118,7 @@ impl Machine {
         running.map_or(island.declaration().name, |estimator| estimator.path)
     }
 
-    /// See [`Host::settle`].
+    /// Settles a call from outside, see [`Host::settle`].
     pub(super) fn settle(&self) {
         self.host.settle();
     }

@@ -21,7 +21,7 @@ struct Stopping {
 
 static STOPPING: Mutex<Stopping> = Mutex::new(Stopping { robots: Vec::new(), first: None });
 
-/// True if the process has its handler.
+/// `true` if the process has its handler.
 static HANDLED: Mutex<bool> = Mutex::new(false);
 
 /// Has the first signal stop all robots of the process, and a later one end it once all are safe. The thread that waits for

@@ -136,7 +136,7 @@ pub(super) trait AnySource: Send + Sync {
     fn feed(&self, message: &DynamicMessage, now: MonotonicTime) -> bool;
     /// Returns whether other code publishes its messages.
     fn is_external(&self) -> bool;
-    /// Itself for that code.
+    /// Returns the source as that code sees it.
     fn as_external(&self) -> ExternalSensor;
 }
 

@@ -18,7 +18,7 @@ struct Shared {
     /// Twice the number of threads inside, plus 1 once closed. One word, so an entering thread either is seen by the
     /// closing thread or finds the door closed.
     state: AtomicUsize,
-    /// Without a journal there is nothing to agree with, so entries are not counted.
+    /// `true` if entries are counted: without a journal there is nothing to agree with.
     is_counted: bool,
 }
 

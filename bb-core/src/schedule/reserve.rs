@@ -13,7 +13,7 @@ use std::sync::Arc;
 #[cfg(not(loom))]
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
-/// See the [module](self).
+/// Code to run on a thread, see the [module](self).
 type Job = Box<dyn FnOnce() + Send>;
 
 /// The threads of one robot. They end when there are more of them than places.

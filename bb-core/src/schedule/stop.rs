@@ -5,8 +5,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::Thread;
 use std::time::Duration;
 
-/// Set when the robot's sensors and services are to stop. Each sleeping thread is parked separately, so thousands of
-/// them do not contend for one lock.
+/// Signal that the robot's sensors and services are to stop. Each sleeping thread is parked separately, so thousands of them do not
+/// contend for one lock.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct StopSignal(Arc<Shared>);
 

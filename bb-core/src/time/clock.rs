@@ -27,7 +27,7 @@ pub struct Clock {
     kind: Kind,
     /// Wall time minus monotonic time, in nanoseconds; shared by the clones.
     wall_offset_nanos: Arc<AtomicI64>,
-    /// See [`Clock::start`]; shared by the clones.
+    /// Start of the run, see [`Clock::start`]; shared by the clones.
     start_nanos: Arc<AtomicI64>,
 }
 
@@ -40,7 +40,7 @@ enum Kind {
 /// The smallest change of the measured offset that is adopted: more than preemption between two reads causes, less
 /// than shows in a recording.
 const WALL_STEP_NANOS: u64 = 1_000_000;
-/// No clock that counts from its start is at a later time.
+/// Latest time, in nanoseconds, of a clock that counts from its start.
 const YEAR_NANOS: i64 = 365 * 86_400_000_000_000;
 
 impl Clock {

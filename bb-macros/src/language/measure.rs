@@ -43,7 +43,7 @@ pub(crate) enum Bounds {
     Any,
     /// A number used as a divisor.
     NotZero,
-    /// More than 0.
+    /// Greater than 0.
     Positive,
     /// A time that fits in nanoseconds.
     Time,

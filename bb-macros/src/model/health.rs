@@ -32,7 +32,7 @@ pub(crate) struct Worker {
 }
 
 impl Timing {
-    /// Without any setting.
+    /// Timing without any setting.
     pub(crate) const DEFAULT: Self =
         Self { sync_tolerance_s: None, latency_budget_s: None, lost_after_s: None, recover_after: 1 };
 

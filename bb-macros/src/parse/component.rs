@@ -63,7 +63,7 @@ impl<'a> Declared<'a> {
 }
 
 impl Component {
-    /// Also returns whether its braces have ended it, so that no `;` is missing.
+    /// Parses a component; returns also whether its braces have ended it, so that no `;` is missing.
     fn parse(word: &str, name: &Ident, input: ParseStream<'_>, notes: &mut Notes<'_>) -> syn::Result<(Self, bool)> {
         let mut kind = path_of_type(name, input)?;
         let is_made_here = mistaken::constructor(&mut kind, notes);

@@ -108,7 +108,7 @@ impl ParameterKind {
     const ALL: [(&'static str, Self); 4] =
         [("bool", Self::Bool), ("i64", Self::Integer), ("f64", Self::Number), ("String", Self::Text)];
 
-    /// Their names in other languages.
+    /// Names of the types in other languages.
     const ELSEWHERE: [(&'static [&'static str], Self); 4] = [
         (&["boolean", "Bool"], Self::Bool),
         (&["int", "integer", "long", "i32", "u32", "u64", "usize"], Self::Integer),

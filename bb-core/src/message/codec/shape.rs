@@ -41,7 +41,7 @@ pub enum Shape {
     Enum(&'static EnumShape),
 }
 
-/// See [`Shape::Struct`].
+/// Shape of a struct, see [`Shape::Struct`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StructShape {
     /// `Imu`; for a ROS message, with its package: `sensor_msgs/Imu`.
@@ -75,7 +75,7 @@ pub struct FieldUnit {
     pub symbol: &'static str,
 }
 
-/// See [`Shape::Enum`].
+/// Shape of an enum, see [`Shape::Enum`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EnumShape {
     /// `Safety`

@@ -31,7 +31,7 @@ pub trait Alone: Sized + 'static {
     /// Finds the island and the output's topic in the wiring.
     fn find(wiring: &Self::Wiring) -> (&Island<Solo<Self>>, &Topic<PayloadOf<Self>>);
 
-    /// See [`Member::publish`]. By default it has one output, which no estimator takes.
+    /// Publishes the emitted outputs, see [`Member::publish`]. By default the estimator has one output, which no estimator takes.
     #[inline]
     fn publish(
         wiring: &Self::Wiring,
@@ -43,7 +43,7 @@ pub trait Alone: Sized + 'static {
         emit::<Self::Output, _>(emitted, stamp, turn, Self::INLET.publisher, topic);
     }
 
-    /// See [`Member::emitted`].
+    /// Returns the emission of that message, see [`Member::emitted`].
     fn emitted(output: usize, message: &DynamicMessage) -> Option<<Self::Estimator as Estimator>::Output> {
         if output == 0 { alone::<Self::Output, _>(message) } else { None }
     }

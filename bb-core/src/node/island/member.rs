@@ -141,9 +141,9 @@ pub fn act<M: Member>(island: &mut M::State, wiring: &WiringOf<M>, act: Act<'_, 
 trait Steps {
     /// Performs an act, or does one thing that is due, and publishes what the estimator emits.
     fn step(&mut self, act: Option<Act<'_, '_>>, turn: &Turn<'_>) -> Next;
-    /// See [`Node::begin_replay`].
+    /// Begins a replay, see [`Node::begin_replay`].
     fn begin_replay(&mut self);
-    /// See [`Node::panicked`].
+    /// Handles a panic, see [`Node::panicked`].
     fn panicked(&mut self, panic: Panic, turn: &Turn<'_>);
 }
 

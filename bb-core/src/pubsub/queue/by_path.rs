@@ -215,7 +215,7 @@ impl<M> Paths<M> {
         self.known.len()
     }
 
-    /// Has no message wait for its time from now on.
+    /// Delivers every message at once from now on.
     pub(super) fn end(&mut self) {
         self.is_over = true;
     }

@@ -88,7 +88,7 @@ fn a_subscriber_receives_every_later_message_once_from_any_time_on() {
     assert!(registry.topics().len() <= (PUBLISHERS + 1) * PATHS);
 }
 
-/// Also a subscriber that joins while others publish: the messages it gets are in the order of the lines.
+/// A subscriber that joins while others publish gets its messages in the order of the lines, too.
 #[test]
 fn subscribers_receive_messages_in_the_order_of_their_lines() {
     const EACH: u32 = 20_000;

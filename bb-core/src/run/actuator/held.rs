@@ -4,7 +4,7 @@
 use crate::control::{Inside, is_in_actuator};
 use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
 
-/// See the [module](self). Its address identifies the actuator, so it must not be moved while it is used.
+/// Lock around an actuator's state, see the [module](self). Its address identifies the actuator, so it must not be moved while it is used.
 pub(super) struct Guarded<S> {
     /// The robot, whose disarming waits for the actuator's code.
     robot: usize,

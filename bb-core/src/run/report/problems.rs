@@ -48,7 +48,7 @@ pub struct Problem {
     pub path: String,
     /// Severity.
     pub severity: Severity,
-    /// Since when, if that is known.
+    /// Beginning, if it is known.
     pub since: Option<MonotonicTime>,
     /// The reason for people.
     pub reason: String,

@@ -37,7 +37,7 @@ struct Failing {
 
 #[derive(Debug, Default)]
 struct Inbox {
-    /// Each kind at most once.
+    /// Orders, each kind at most once.
     orders: Vec<Order>,
     thread: Option<Thread>,
 }
@@ -63,7 +63,7 @@ pub struct SourceStatistics {
     pub restarts: u64,
     /// Reason for which the component does not run, if it does not.
     pub stopped: Option<String>,
-    /// Since when it has failed without a reading in between, even if it has been restarted meanwhile.
+    /// Time since which the component has failed without a reading in between, even if it has been restarted meanwhile.
     pub failing_since: Option<MonotonicTime>,
     /// Counts by name, see [`ServiceContext::counter`](crate::ServiceContext::counter).
     pub counts: Vec<(&'static str, u64)>,

@@ -42,7 +42,7 @@ pub(super) struct Crew {
 struct Queue {
     waiting: VecDeque<(Instant, Job)>,
     running: usize,
-    /// Since when all of its threads are busy while a job waits.
+    /// Time since which all of the lane's threads are busy while a job waits.
     full_since: Option<Instant>,
     is_reported: bool,
 }
@@ -130,7 +130,7 @@ impl Crew {
         Lane::ALL.into_iter().any(|lane| self.front(lane).is_some())
     }
 
-    /// Since when the first job of a lane waits, if a thread may take it.
+    /// Returns the time since which the first job of a lane waits, if a thread may take it.
     fn front(&self, lane: Lane) -> Option<Instant> {
         let queue = &self.lanes[lane as usize];
         queue.waiting.front().filter(|_| queue.running < lane.most()).map(|(since, _)| *since)

@@ -165,7 +165,7 @@ fn a_job_of_a_full_lane_that_has_room_again() {
     });
 }
 
-/// After the end nobody keeps time.
+/// Jobs at the end of a pool, after which nobody keeps time.
 #[test]
 fn jobs_around_the_end_while_a_thread_hangs() {
     check(2, 0, |model| {

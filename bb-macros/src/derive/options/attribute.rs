@@ -121,7 +121,7 @@ fn value(meta: &ParseNestedMeta<'_>, example: &str) -> syn::Result<()> {
     equals.map(drop).map_err(|_| syn::Error::new(place, format!("expected `=`, as in `{word} = {example}`")))
 }
 
-/// Only a comma may follow a value. Other tokens are usually a unit.
+/// Checks that only a comma follows a value. Other tokens are usually a unit.
 fn end(input: ParseStream<'_>, field: &Field) -> syn::Result<()> {
     if input.is_empty() || input.peek(Token![,]) {
         return Ok(());

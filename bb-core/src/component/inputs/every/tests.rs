@@ -20,7 +20,7 @@ fn message(number: u64, millis: i64) -> Stamped<Number> {
 }
 
 proptest! {
-    /// Beside a plain list of what waits. A step is a number of messages before a run.
+    /// Comparison with a plain list of what waits. A step is a number of messages before a run.
     #[test]
     fn each_message_is_seen_once_or_counted_as_lost(steps in prop::collection::vec(0..1500_u64, 0..12)) {
         let mut slot = EverySlot::default();
