@@ -1,6 +1,6 @@
 //! Paths and names in the documents: all of them exist.
 
-use super::{CRATES, read, root};
+use super::{CRATES, project_files, read, root};
 use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf};
 
@@ -26,17 +26,8 @@ fn paths_in_the_documents_exist() {
 
 /// The pages of the book by path, without the table of contents.
 fn pages() -> Vec<PathBuf> {
-    let (mut folders, mut pages) = (vec![root().join("book/src")], Vec::new());
-    while let Some(folder) = folders.pop() {
-        for entry in std::fs::read_dir(&folder).expect("it is a folder").flatten() {
-            let path = entry.path();
-            if path.is_dir() {
-                folders.push(path);
-            } else if path.extension().is_some_and(|end| end == "md") && !path.ends_with("SUMMARY.md") {
-                pages.push(path);
-            }
-        }
-    }
+    let is_page = |path: &PathBuf| path.extension().is_some_and(|end| end == "md") && !path.ends_with("SUMMARY.md");
+    let mut pages: Vec<PathBuf> = project_files("book/src").filter(is_page).collect();
     pages.sort();
     pages
 }
@@ -132,24 +123,14 @@ fn code_of_the_book_is_compiled() {
 /// Recordings come through `BB_DATA`, and nothing else is looked for outside the checkout.
 #[test]
 fn nothing_beside_the_project_is_named() {
-    let mut folders = vec![root().to_owned()];
     let (mut read, mut found) = (0, Vec::new());
-    while let Some(folder) = folders.pop() {
-        for entry in std::fs::read_dir(&folder).expect("it is a folder").flatten() {
-            let (path, name) = (entry.path(), entry.file_name());
-            if path.is_dir() {
-                let is_source = name != "target" && !name.to_string_lossy().starts_with('.');
-                folders.extend(is_source.then_some(path));
-                continue;
-            }
-            let is_text = path
-                .extension()
-                .is_none_or(|end| ["md", "rs", "py", "toml", "txt"].iter().any(|text| end == *text));
-            let Ok(text) = std::fs::read_to_string(&path) else { continue };
-            read += usize::from(is_text);
-            if is_text && text.contains(concat!("../", "shared")) {
-                found.push(path);
-            }
+    for path in project_files("") {
+        let is_text =
+            path.extension().is_none_or(|end| ["md", "rs", "py", "toml", "txt"].iter().any(|text| end == *text));
+        let Ok(text) = std::fs::read_to_string(&path) else { continue };
+        read += usize::from(is_text);
+        if is_text && text.contains(concat!("../", "shared")) {
+            found.push(path);
         }
     }
     assert!(read > 500 && found.is_empty(), "{read} files read; beside the project: {found:#?}");

@@ -1,7 +1,8 @@
 //! Claims of ARCHITECTURE.md: every path in it exists, arrows between crates, folders and files point one way, and of the runtime only that
-//! is public which its users name.
+//! is public which its users name, and doc comments open with a phrase.
 
 mod circles;
+mod comments;
 mod crates;
 mod documents;
 mod layers;
@@ -32,6 +33,28 @@ const CRATES: [&str; 11] = [
     "integrations/plot",
     "integrations/redb",
 ];
+
+/// Returns all files of the project below a folder, without those that are built or hidden.
+fn project_files(below: &str) -> impl Iterator<Item = PathBuf> {
+    let mut folders = vec![root().join(below)];
+    let mut files: Vec<PathBuf> = Vec::new();
+    std::iter::from_fn(move || {
+        while files.is_empty() {
+            let folder = folders.pop()?;
+            let entries =
+                std::fs::read_dir(&folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
+            for entry in entries.flatten() {
+                let (path, name) = (entry.path(), entry.file_name());
+                if !path.is_dir() {
+                    files.push(path);
+                } else if name != "target" && !name.to_string_lossy().starts_with('.') {
+                    folders.push(path);
+                }
+            }
+        }
+        files.pop()
+    })
+}
 
 /// All files of code below a folder, without those of tests.
 fn code_below(folder: &Path, files: &mut Vec<PathBuf>) {
