@@ -49,6 +49,7 @@ mod state;
 pub mod state_estimator;
 mod stream;
 mod track;
+mod update;
 mod upkeep;
 
 pub use alignment::{Alignment, AlignmentParams};

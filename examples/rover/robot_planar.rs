@@ -38,7 +38,7 @@ robot! {
     link base {
         sensor imu: External<Imu>();
         sensor gnss: External<GnssFix>();
-        estimator navigation: PlanarEkf(heading_from_course = true, gyroscope_noise = 5e-3) {
+        estimator navigation: PlanarEkf() {
             input imu: sensor::base::imu, driver;
             input gnss: sensor::base::gnss, optional;
             lost_after: 200 ms;

@@ -103,7 +103,7 @@ robot! {
     link base {
         sensor imu: External<Imu>();
         sensor gnss: External<GnssFix>();
-        estimator planar: PlanarEkf() {
+        estimator planar: PlanarEkf(heading_deviation = 10 deg) {
             input imu: sensor::base::imu, driver;
             input gnss: sensor::base::gnss, optional;
         }

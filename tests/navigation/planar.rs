@@ -62,6 +62,8 @@ struct Failures {
     seed: u64,
     /// A compass, instead of a heading that is known.
     compass: bool,
+    /// Nothing says where it heads.
+    unknown_heading: bool,
 }
 
 #[derive(Debug)]
@@ -84,6 +86,9 @@ fn drive(failures: &Failures, seconds: f64) -> Result<Seen, StartError> {
     if failures.compass {
         // It says nothing about the heading itself.
         builder.options(cart::estimator::base::navigation).heading = 2.0;
+    }
+    if failures.unknown_heading {
+        builder.options(cart::estimator::base::navigation).heading_deviation = 4.0;
     }
     let room = Overflow::DropOldest { capacity: 1 << 16 };
     let odometry = builder.subscribe_with(cart::estimator::base::navigation::odometry, room);
@@ -212,7 +217,7 @@ fn a_cart_knows_where_it_is_and_finds_bias_and_scale() -> Result<(), StartError>
     assert!((1.0..5.0).contains(&seen.nees), "{seen:?}");
     let status = &seen.status;
     assert!((status.gyroscope_bias - BIAS).abs() < 5e-4 && status.gyroscope_bias_deviation < 5e-4, "{seen:?}");
-    assert!((status.wheel_scale - SCALE).abs() < 0.005 && status.wheel_scale_deviation < 0.005, "{seen:?}");
+    assert!((status.wheel_scale - SCALE).abs() < 0.005 && status.wheel_scale_deviation < 0.01, "{seen:?}");
     assert_eq!((status.gnss.refused, status.odometry.refused, status.yaw_rate.refused), (0, 0, 0), "{seen:?}");
     expect_health(&seen, &[]);
     // With every sample after the second fix, which it starts at.
@@ -275,6 +280,21 @@ fn a_cart_that_was_blind_for_a_minute_starts_again_in_motion() -> Result<(), Sta
 }
 
 #[test]
+fn a_heading_that_nobody_knows_is_found_by_driving() -> Result<(), StartError> {
+    for seed in 0..5 {
+        let seen = drive(&Failures { unknown_heading: true, seed, ..Failures::default() }, 60.0)?;
+        assert!(seen.worst < 1.0 && seen.at_the_end < 0.4 && seen.worst_heading < 0.1, "{seen:?}");
+        assert_eq!(
+            (seen.status.gnss.refused, seen.status.odometry.refused, seen.status.resets),
+            (0, 0, 0),
+            "{seen:?}"
+        );
+        expect_health(&seen, &[(0.2..=0.4, Degraded, Diverged), (1.0..=8.0, Healthy, Recovered)]);
+    }
+    Ok(())
+}
+
+#[test]
 fn a_compass_takes_the_place_of_a_heading_that_is_known() -> Result<(), StartError> {
     let seen = drive(&Failures { compass: true, ..Failures::default() }, 60.0)?;
     assert!(seen.worst < 1.0 && seen.worst_heading < 0.05 && seen.status.orientation.fused > 500, "{seen:?}");
@@ -310,14 +330,6 @@ robot! {
 fn wheels_that_do_not_stand_upright_are_refused_at_the_start() {
     let refused = Tilted::builder().simulate().map(drop).expect_err("its x axis points down");
     assert!(refused.to_string().contains("the frame of the input `odometry` is not level"), "{refused}");
-}
-
-#[test]
-fn a_course_without_satellites_is_refused_at_the_start() {
-    let mut builder = Level::builder();
-    builder.options(level::estimator::base::navigation).heading_from_course = true;
-    let refused = builder.simulate().map(drop).expect_err("nothing shows a course");
-    assert!(refused.to_string().contains("`heading_from_course` needs the input `gnss`"), "{refused}");
 }
 
 robot! {

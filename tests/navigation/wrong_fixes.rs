@@ -179,7 +179,7 @@ fn a_filter_that_began_at_wrong_fixes_is_moved_to_the_right_ones() {
             }
             // Ten kilometres away it is the same world; where no robot could have come from, it is not.
             let here = LocalFrame::new(munich()).position(&off).norm() < 100_000.0;
-            if here || is_planar {
+            if here {
                 assert_eq!(seen.resets, 1, "{off:?}");
                 assert!((4..=12).contains(&seen.refused), "{off:?}: {}", seen.refused);
             } else {
@@ -221,16 +221,14 @@ fn a_filter_that_followed_wrong_fixes_comes_back_undamaged() {
             assert!(before < 1.0, "{off:?}: {before} m");
             assert_eq!((seen.state_at(45.0), seen.state_at(150.0)), (HealthState::Degraded, HealthState::Healthy));
             assert!((seen.gyroscope_bias - 0.003).abs() < 1e-3, "{off:?}: {}", seen.gyroscope_bias);
-            if !is_near && !is_planar {
+            if !is_near {
                 // Each time it was another filter, and the last has its own world.
                 assert_eq!(seen.resets, 0, "{off:?}");
                 continue;
             }
             let (after, turned) = seen.worst(&munich(), &munich(), 125.0..160.0);
             assert!(after < 1.0 && turned < 0.05, "{off:?}: {after} m, {turned} rad");
-            // Far round the Earth, velocities are not those of the wheels either.
-            let resets = if is_near { 2..=2 } else { 2..=6 };
-            assert!(resets.contains(&seen.resets), "{off:?}: {}", seen.resets);
+            assert_eq!(seen.resets, 2, "{off:?}");
         }
     }
 }
@@ -255,7 +253,7 @@ fn where_latitude_and_longitude_are_zero_is_a_place_too() {
     let zero = Geodetic::from_degrees(0.0, 0.0, 0.0);
     for seen in drive(&zero, 30, |_, right| Some(right)) {
         let (position, turned) = seen.worst(&zero, &zero, 0.0..30.0);
-        assert!(position < 1.5 && turned < 0.06 && seen.resets == 0, "{position} m, {turned} rad");
+        assert!(position < 1.5 && turned < 0.07 && seen.resets == 0, "{position} m, {turned} rad");
     }
 }
 

@@ -205,10 +205,10 @@ fn a_spin_is_believed_if_the_rover_can_speed_up_like_that() -> Result<(), Failur
         };
         for slip in [2.0, 3.0, 4.0, 6.0] {
             let [space, plane] = spin(slip, 0.3)?;
-            assert!(space < 0.5 && plane < 0.6, "seed {seed}, {slip} m/s: {space} m and {plane} m");
+            assert!(space < 0.5 && plane < 0.8, "seed {seed}, {slip} m/s: {space} m and {plane} m");
         }
         let [space, plane] = spin(3.0, FAULTS.forward_acceleration)?;
-        assert!(space < 0.5 && (3.0..6.0).contains(&plane), "seed {seed}, by default: {space} m and {plane} m");
+        assert!(space < 0.5 && (2.0..4.0).contains(&plane), "seed {seed}, by default: {space} m and {plane} m");
     }
     Ok(())
 }

@@ -29,7 +29,7 @@ use std::vec::Vec;
 
 use nalgebra::{Isometry3, Vector3};
 
-pub(super) use self::filter::{CopiedFilter, Fix, Update};
+pub(super) use self::filter::{CopiedFilter, Fix, Update, is_same};
 use self::holding::Holding;
 use self::newcomer::Newcomer;
 use self::scatter::Scatter;

@@ -32,6 +32,8 @@ mod start;
 mod tests;
 mod transport;
 
+#[cfg(feature = "std")]
+pub(super) use elsewhere::{UNMOORED, UNMOORED_HEADING, UNMOORED_SPEED};
 pub use filter::Eskf;
 #[cfg(feature = "std")]
 pub(super) use filter::{Doubt, Judged};

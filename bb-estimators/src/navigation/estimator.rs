@@ -1,5 +1,6 @@
 //! The error-state Kalman filter as an estimator to declare in `robot!`.
 
+pub(super) mod correlation;
 pub(super) mod course;
 mod filter;
 pub(super) mod health;
@@ -8,7 +9,6 @@ mod input;
 pub(super) mod measured;
 mod options;
 mod output;
-pub(super) mod refuted;
 pub(super) mod report;
 mod running;
 mod starting;

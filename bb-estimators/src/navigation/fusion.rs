@@ -10,6 +10,37 @@ use super::stream::{Gate, Stream, Verdict};
 
 use raising::raised_to_fit;
 
+/// Applies the gate of a stream to an innovation, and weakens what is far off.
+///
+/// # Errors
+///
+/// Returns [`Refusal::Gate`], [`Refusal::NonFinite`] or [`Refusal::Noise`].
+#[inline]
+pub(super) fn weighed<const N: usize>(
+    covariance: &Covariance<N>,
+    stream: &Stream,
+    innovation: &mut Innovation<'_>,
+    gate: Gate,
+) -> Result<Fused, Refusal> {
+    let (nis, dimension) = (innovation.nis(), innovation.dimension());
+    if nis.is_nan() {
+        return Err(Refusal::NonFinite);
+    }
+    let Verdict { weight, raised, limit, log_likelihood } =
+        stream.weigh(nis, dimension, innovation.log_density(), gate)?;
+    if raised > 1.0 {
+        return Err(Refusal::Gate { nis, limit });
+    }
+    if weight < 1.0 {
+        innovation.soften(weight);
+        if !innovation.decompose(covariance.matrix().as_slice()) {
+            return Err(Refusal::Noise);
+        }
+    }
+    let whitened = innovation.first_whitened();
+    Ok(Fused { nis, dimension, weight, raised, limit, log_likelihood, whitened, misfit: [0.0; 3] })
+}
+
 /// What a measurement observes of the position.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Sight {

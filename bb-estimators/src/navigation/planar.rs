@@ -40,6 +40,9 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod arc;
+#[cfg(feature = "std")]
+mod copies;
 mod estimate;
 #[cfg(feature = "runtime")]
 mod estimator;

@@ -18,13 +18,13 @@ const COPY: f64 = 1e-11;
 
 /// Errors of a filter in the wrong place, as deviations: anywhere within 10 km, 5 m/s, 3° of tilt and 30° of heading.
 #[cfg(feature = "std")]
-const UNMOORED: f64 = 1e4;
+pub(in crate::navigation) const UNMOORED: f64 = 1e4;
 #[cfg(feature = "std")]
-const UNMOORED_SPEED: f64 = 5.0;
+pub(in crate::navigation) const UNMOORED_SPEED: f64 = 5.0;
 #[cfg(feature = "std")]
 const UNMOORED_TILT: f64 = 0.05;
 #[cfg(feature = "std")]
-const UNMOORED_HEADING: f64 = 0.52;
+pub(in crate::navigation) const UNMOORED_HEADING: f64 = 0.52;
 
 impl<S: States, const N: usize> Eskf<S, N> {
     /// Restarts from the estimate of another estimator of the same robot, with the correlations of all states that both estimate.

@@ -8,9 +8,6 @@ use bb_core::Input;
 use bb_core::payload::GnssFix;
 use nalgebra::Vector3;
 
-/// How far the robot's motion may differ from its x axis, rad.
-pub(in crate::navigation) const SLIP: f64 = 0.1;
-
 /// Number of agreeing fixes that may define a world. With a receiver at 1 Hz, a robot often cannot wait for more.
 const AGREED: u32 = 2;
 
@@ -115,12 +112,7 @@ impl Course {
 }
 
 /// A fix in a frame. `None` if it has no position.
-pub(in crate::navigation) fn point(
-    time_ns: i64,
-    fix: &GnssFix,
-    frame: &LocalFrame,
-    deviation: f64,
-) -> Option<TrackPoint> {
+fn point(time_ns: i64, fix: &GnssFix, frame: &LocalFrame, deviation: f64) -> Option<TrackPoint> {
     let GnssPosition { position, covariance, .. } = GnssPosition::of_fix(fix, frame, Vector3::zeros(), deviation)?;
     Some(TrackPoint { time_ns, position, covariance, yaw: 0.0 })
 }

@@ -1,5 +1,6 @@
 //! The filter with a stream per sensor.
 
+use super::correlation::Correlation;
 use super::health::{Sight, largest_deviation};
 use super::input::keyframe_at;
 use super::options::NavigationOptions;
@@ -22,9 +23,7 @@ pub(super) struct Filter<S: States, const N: usize> {
     copies: Copies<Eskf<S, N>>,
     /// Indexed by [`Measured::sensor`].
     streams: [Stream; SENSORS],
-    /// When an odometry was last fused, and the time over which its errors are alike, s.
-    odometry_ns: Option<i64>,
-    correlation_s: f64,
+    correlation: Correlation,
 }
 
 /// A measurement from one of the sensors.
@@ -65,8 +64,8 @@ impl<S: States, const N: usize> Filter<S, N> {
         let mut copies = Copies::new(options.params(), Ways { noise: true, scale: true })?;
         copies.start(start).map_err(|refusal| Fault::new(refusal.to_string()))?;
         let stream = Stream::new(StreamParams { patience: 0, ..StreamParams::default() });
-        let correlation_s = options.odometry_correlation;
-        Ok(Self { copies, streams: [stream; SENSORS], odometry_ns: None, correlation_s })
+        let correlation = Correlation::new(options.odometry_correlation);
+        Ok(Self { copies, streams: [stream; SENSORS], correlation })
     }
 
     pub(super) fn copies(&self) -> &Copies<Eskf<S, N>> {
@@ -113,13 +112,9 @@ impl<S: States, const N: usize> Filter<S, N> {
         self.copies.move_world(new_from_old)
     }
 
-    /// Fuses an odometry. Slip lasts: the noise of one reading is that of all within the correlation time, `1 + 2 τ / dt` times its own.
     fn odometry(&mut self, own: &BodyVelocity) -> Result<Fused, Refusal> {
         let now_ns = self.estimate().ok_or(Refusal::NotStarted)?.time_ns;
-        let since_s = self.odometry_ns.map_or(f64::INFINITY, |before| now_ns.saturating_sub(before) as f64 * 1e-9);
-        let alike = (1.0 + 2.0 * self.correlation_s / since_s.max(1e-3)).sqrt();
-        self.odometry_ns = Some(now_ns);
-        let correlated = BodyVelocity { deviations: own.deviations * alike, ..*own };
+        let correlated = BodyVelocity { deviations: own.deviations * self.correlation.factor(now_ns), ..*own };
         self.copies.update_correlated(&mut self.streams[1], own, &correlated)
     }
 }

@@ -2,7 +2,13 @@
 
 use nalgebra::{Matrix2, SVector, Vector2};
 
+use super::arc::arc;
+use crate::attitude::MAX_ANGULAR_VELOCITY;
+use crate::navigation::bounds::{MOST_ROTATION, MOST_VARIANCE};
+use crate::navigation::covariance::{Covariance, Innovation};
+use crate::navigation::layout::{Layout, MOST_SCALE};
 use crate::navigation::math::{cos, sin, wrapped};
+use crate::navigation::update::Composed;
 
 /// Error of the position in the world, m.
 pub const POSITION: usize = 0;
@@ -84,4 +90,78 @@ impl PlanarEstimate {
 /// A vector rotated by 90° counter-clockwise: its derivative with respect to its angle.
 pub(super) fn left(vector: &Vector2<f64>) -> Vector2<f64> {
     Vector2::new(-vector.y, vector.x)
+}
+
+/// The errors live on SE(2), with axes turned to those of the world: the heading turns the position error. Velocity, bias and scale are
+/// those of the body, and their errors add.
+impl Composed<STATES> for PlanarEstimate {
+    const LAYOUT: Layout<STATES> = {
+        let mut layout = Layout::EMPTY;
+        layout.motion = [0, 2];
+        (layout.attitude, layout.heading) = (1, HEADING);
+        layout.set((POSITION, 2), 0, MOST_VARIANCE);
+        layout.set((HEADING, 1), 1, MOST_ROTATION);
+        layout.set((VELOCITY, 2), 2, MOST_VARIANCE);
+        layout.set((GYROSCOPE_BIAS, 1), 3, MAX_ANGULAR_VELOCITY * MAX_ANGULAR_VELOCITY);
+        // A hundred times the largest deviation that its parameter accepts.
+        layout.set((WHEEL_SCALE, 1), 4, 1e4);
+        layout.most_jump[WHEEL_SCALE] = MOST_SCALE;
+        layout
+    };
+
+    fn composed(&self, error: &SVector<f64, STATES>) -> Self {
+        let mut additive = *error;
+        let moved = arc(error[HEADING]).0 * error.fixed_rows::<2>(POSITION);
+        additive.fixed_rows_mut::<2>(POSITION).copy_from(&moved);
+        self.corrected(&additive)
+    }
+
+    #[inline]
+    fn transport_jacobian(error: &SVector<f64, STATES>, jacobian: &mut [[f64; STATES]]) {
+        let (integral, turned) = transport(error);
+        for row in jacobian {
+            let position = [row[POSITION], row[POSITION + 1]];
+            row[HEADING] += position[0] * turned[0] + position[1] * turned[1];
+            for j in 0..2 {
+                row[POSITION + j] = position[0] * integral[(0, j)] + position[1] * integral[(1, j)];
+            }
+        }
+    }
+
+    #[inline]
+    fn transport_covariance(error: &SVector<f64, STATES>, covariance: &mut Covariance<STATES>) {
+        let (integral, turned) = transport(error);
+        let moved = |x: f64, y: f64, heading: f64| integral * Vector2::new(x, y) + turned * heading;
+        let rows = covariance.rows_mut();
+        let [xs, ys, headings, ..] = rows;
+        for ((x, y), heading) in xs.iter_mut().zip(ys.iter_mut()).zip(headings) {
+            [*x, *y] = moved(*x, *y, *heading).into();
+        }
+        for row in rows.iter_mut() {
+            let [x, y] = moved(row[POSITION], row[POSITION + 1], row[HEADING]).into();
+            (row[POSITION], row[POSITION + 1]) = (x, y);
+        }
+        // Exactly symmetric.
+        let [xs, ys, others @ ..] = rows;
+        ys[POSITION] = xs[POSITION + 1];
+        for (row, (x, y)) in others.iter_mut().zip(xs.iter().zip(ys.iter()).skip(HEADING)) {
+            (row[POSITION], row[POSITION + 1]) = (*x, *y);
+        }
+    }
+
+    /// Only the position is turned by the heading. To iterate what depends on the scale of the wheels would make too much of it: that is
+    /// linearised at the velocity that the same reading shows.
+    fn curvature(innovation: &Innovation<'_>, covariance: &Covariance<STATES>) -> f64 {
+        if Self::fixes_position(innovation) { covariance.matrix()[(HEADING, HEADING)] } else { 0.0 }
+    }
+
+    fn fixes_position(innovation: &Innovation<'_>) -> bool {
+        innovation.rows(STATES).any(|row| row[POSITION] != 0.0 || row[POSITION + 1] != 0.0)
+    }
+}
+
+/// The derivatives of the position error of a composed state: with respect to that of the error, and to the heading.
+fn transport(error: &SVector<f64, STATES>) -> (Matrix2<f64>, Vector2<f64>) {
+    let (integral, by_turn) = arc(error[HEADING]);
+    (integral, by_turn * error.fixed_rows::<2>(POSITION))
 }

@@ -1,19 +1,19 @@
 //! The planar filter as an estimator to declare in `robot!`.
 
-mod aligning;
 mod filter;
 mod input;
 mod options;
 mod output;
 mod running;
+mod starting;
 
 pub use input::PlanarInputs;
 pub use options::PlanarOptions;
 pub use output::{PlanarOutput, PlanarOutputs, PlanarStatus};
 
-use self::aligning::Aligning;
 use self::input::Mounting;
 use self::running::Running;
+use self::starting::Starting;
 use crate::navigation::estimator::MOST_REFUSED;
 use crate::navigation::estimator::health::Limits;
 use crate::navigation::refusal::Refusal;
@@ -51,9 +51,12 @@ use std::marker::PhantomData;
 /// ```
 ///
 /// The world is a local tangent frame: x east, y north. Its origin is the first fix or, without satellite navigation, the link's
-/// position at the start. The filter starts with the first sample or, with satellite navigation, with the second fix that agrees
-/// with the first. The robot may be in motion or at rest. The initial heading comes from the options, from an orientation or,
-/// with `heading_from_course`, from the course of the fixes.
+/// position at the start. The filter starts with the first sample or pose or, with satellite navigation, with the second fix that
+/// agrees with the first, in motion or at rest. An unknown heading is found by itself as soon as the robot moves; until then the
+/// estimator is degraded. Without wheels, it starts once the robot moves, forwards.
+///
+/// Positions that agree with each other for 20 s, but not with the filter, move it to them, and `resets` in its status is
+/// incremented. If they are on another part of the Earth, the estimator ends, and its supervisor starts it there.
 ///
 /// Measurements are fused at the time of their stamps, up to a second late. A gate per sensor rejects outliers. The health is
 /// that of [`EskfEstimator`](crate::navigation::EskfEstimator).
@@ -69,7 +72,7 @@ pub struct PlanarEstimator<O = Odometry> {
 
 #[derive(Debug)]
 enum Phase {
-    Aligning(Box<Aligning>),
+    Starting(Box<Starting>),
     Running(Box<Running>),
 }
 
@@ -81,13 +84,10 @@ impl<O: PlanarOutput> Estimator for PlanarEstimator<O> {
     fn init(options: PlanarOptions, context: &Context) -> Result<Self, Fault> {
         options.params().check()?;
         let mounting = Mounting::of(context)?;
-        if options.heading_from_course && !mounting.has_gnss() {
-            return Err(Fault::new("`heading_from_course` needs the input `gnss`"));
-        }
         Ok(Self {
             options,
             mounting,
-            phase: Phase::Aligning(Box::new(Aligning::new(None))),
+            phase: Phase::Starting(Box::new(Starting::new(None))),
             refused_in_a_row: 0,
             output: PhantomData,
         })
@@ -96,11 +96,11 @@ impl<O: PlanarOutput> Estimator for PlanarEstimator<O> {
     fn handle_input(&mut self, inputs: PlanarInputs<'_>) -> Result<Reply<O>, Fault> {
         let sample = self.mounting.sample(inputs.imu.message());
         match &mut self.phase {
-            Phase::Aligning(aligning) => {
-                let start = aligning.take(&sample, &inputs, &self.options, &self.mounting);
+            Phase::Starting(starting) => {
+                let start = starting.take(&sample, &inputs, &self.options, &self.mounting);
                 let Some((start, frame)) = start else {
                     let reply = Reply::none();
-                    let is_late = aligning.takes_too_long();
+                    let is_late = starting.takes_too_long();
                     return Ok(if is_late { reply.diverged("it cannot start without fixes") } else { reply });
                 };
                 let longest_s = self.options.longest_dead_reckoning;
@@ -117,11 +117,17 @@ impl<O: PlanarOutput> Estimator for PlanarEstimator<O> {
                     if !running.is_sound() {
                         return Err(Fault::new("its estimate is no number"));
                     }
+                    if let Some(distance) = running.elsewhere() {
+                        let km = distance * 1e-3;
+                        return Err(Fault::new(format!(
+                            "fixes agree on a place {km:.0} km away: its world is elsewhere"
+                        )));
+                    }
                     Ok(running.reply(&self.mounting))
                 }
                 Err(Refusal::Gap { .. }) => {
                     tracing::info!("no sample for too long: it starts again");
-                    self.phase = Phase::Aligning(Box::new(Aligning::new(running.frame())));
+                    self.phase = Phase::Starting(Box::new(Starting::new(running.frame())));
                     Ok(Reply::none().diverged("no sample of the IMU for too long"))
                 }
                 Err(refusal) => {

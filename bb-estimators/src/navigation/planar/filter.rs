@@ -1,52 +1,29 @@
 //! The filter: gyroscope samples propagate it, and measurements correct it.
 
-use nalgebra::{Matrix2, Matrix3, SMatrix, Vector1, Vector2};
+use nalgebra::{Matrix2, Matrix3, SMatrix, Vector2};
 
 use super::estimate::{GYROSCOPE_BIAS, HEADING, POSITION, PlanarEstimate, STATES, VELOCITY, WHEEL_SCALE};
 use super::measurement::PlanarMeasurement;
-use super::params::PlanarParams;
+use super::params::{Densities, PlanarParams};
 use super::propagation::Transition;
 use crate::attitude::{MAX_ANGULAR_VELOCITY, ParamsError};
-use crate::navigation::bounds::{MOST_ROTATION, MOST_VARIANCE, is_on_earth, is_within};
-use crate::navigation::covariance::{Covariance, Innovation, Room};
+use crate::navigation::bounds::{is_on_earth, is_within};
+use crate::navigation::covariance::Covariance;
 use crate::navigation::eskf::{ImuMean, LONGEST_GAP_S, seconds_between};
 use crate::navigation::fused::Fused;
-use crate::navigation::fusion::{Sight, Weighed};
-use crate::navigation::jump::{BiasJump, Moved, bounded};
-use crate::navigation::layout::{Layout, MOST_SCALE};
+use crate::navigation::layout::Layout;
 use crate::navigation::math::{exp, wrapped};
 use crate::navigation::propagate::Propagate;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::stream::{Gate, Stream};
+use crate::navigation::update::{Composed as _, updated};
 use crate::navigation::upkeep::{Upkeep, upkeep_methods};
 use crate::params::Params as _;
 
-const LAYOUT: Layout<STATES> = {
-    let mut layout = Layout::EMPTY;
-    layout.motion = [0, 2];
-    (layout.attitude, layout.heading) = (1, HEADING);
-    layout.set((POSITION, 2), 0, MOST_VARIANCE);
-    layout.set((HEADING, 1), 1, MOST_ROTATION);
-    layout.set((VELOCITY, 2), 2, MOST_VARIANCE);
-    layout.set((GYROSCOPE_BIAS, 1), 3, MAX_ANGULAR_VELOCITY * MAX_ANGULAR_VELOCITY);
-    // A hundred times the largest deviation that its parameter accepts.
-    layout.set((WHEEL_SCALE, 1), 4, 1e4);
-    layout.most_jump[WHEEL_SCALE] = MOST_SCALE;
-    layout
-};
+pub(super) const LAYOUT: Layout<STATES> = PlanarEstimate::LAYOUT;
 
 /// A variance that amounts to a known state, where 0 would make the matrix singular.
 const KNOWN: f64 = 1e-24;
-
-/// Whether a measurement observes the position.
-fn sees_position(innovation: &Innovation<'_>) -> bool {
-    innovation.rows(STATES).any(|row| row[POSITION] != 0.0 || row[POSITION + 1] != 0.0)
-}
-
-#[cold]
-fn sight(innovation: &Innovation<'_>) -> Sight {
-    if sees_position(innovation) { Sight::Position } else { Sight::Nothing }
-}
 
 /// The state and uncertainty that a filter starts with.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -131,11 +108,10 @@ impl PlanarStart {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlanarEkf {
     params: PlanarParams,
-    estimate: Option<PlanarEstimate>,
-    covariance: Covariance<STATES>,
-    upkeep: Upkeep,
-    /// A jump of the bias that may be the fault of a sensor.
-    jump: Option<BiasJump<1>>,
+    pub(super) densities: Densities,
+    pub(super) estimate: Option<PlanarEstimate>,
+    pub(super) covariance: Covariance<STATES>,
+    pub(super) upkeep: Upkeep,
 }
 
 impl PlanarEkf {
@@ -146,7 +122,8 @@ impl PlanarEkf {
     /// Returns the name of the first parameter outside its accepted range.
     pub fn new(params: PlanarParams) -> Result<Self, ParamsError> {
         params.check()?;
-        Ok(Self { params, estimate: None, covariance: Covariance::new(), upkeep: Upkeep::default(), jump: None })
+        let (densities, covariance, upkeep) = (params.densities(), Covariance::new(), Upkeep::default());
+        Ok(Self { params, densities, estimate: None, covariance, upkeep })
     }
 
     /// The parameters that the filter was created with.
@@ -166,7 +143,6 @@ impl PlanarEkf {
         self.upkeep.started(start.time_ns);
         self.estimate = Some(estimate);
         self.covariance = covariance;
-        self.jump = None;
         Ok(())
     }
 
@@ -191,20 +167,38 @@ impl PlanarEkf {
     /// The same as [`propagate`](Self::propagate).
     #[inline]
     pub fn propagate_part(&mut self, sample: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
-        let estimate = self.estimate.as_mut().ok_or(Refusal::NotStarted)?;
+        let dt = self.seconds_to(sample)?;
+        if is_gap || dt > self.params.longest_sample {
+            self.bridge(sample.time_ns, 0.0, dt, &self.params.gap_densities());
+        } else {
+            let bias = self.estimate.map_or(0.0, |estimate| estimate.gyroscope_bias);
+            self.advance(sample.time_ns, sample.angular_velocity.z - bias, dt, &{ self.densities });
+        }
+        Ok(())
+    }
+
+    /// The time from the filter to the end of a sample, s.
+    #[inline]
+    pub(super) fn seconds_to(&self, sample: &ImuMean) -> Result<f64, Refusal> {
+        let estimate = self.estimate.as_ref().ok_or(Refusal::NotStarted)?;
         sample.check()?;
         let dt = seconds_between(estimate.time_ns, sample.time_ns)?;
-        let is_gap = is_gap || dt > self.params.longest_sample;
-        if dt > LONGEST_GAP_S {
-            return Err(Refusal::Gap { seconds: dt });
-        }
-        estimate.time_ns = sample.time_ns;
-        estimate.yaw_rate = if is_gap { 0.0 } else { sample.angular_velocity.z - estimate.gyroscope_bias };
-        let densities = if is_gap { self.params.gap_densities() } else { self.params.densities() };
-        Transition::advance(estimate, dt).apply(self.covariance.rows_mut(), &densities);
-        if is_gap {
-            self.upkeep.bridged();
-        }
+        if dt > LONGEST_GAP_S { Err(Refusal::Gap { seconds: dt }) } else { Ok(dt) }
+    }
+
+    /// Propagates over a part, `dt` seconds, of a gap in the samples.
+    #[cold]
+    pub(super) fn bridge(&mut self, time_ns: i64, yaw_rate: f64, dt: f64, densities: &Densities) {
+        self.advance(time_ns, yaw_rate, dt, densities);
+        self.covariance.enforce();
+        self.upkeep.bridged();
+    }
+
+    #[inline]
+    fn advance(&mut self, time_ns: i64, yaw_rate: f64, dt: f64, densities: &Densities) {
+        let Some(estimate) = &mut self.estimate else { return };
+        (estimate.time_ns, estimate.yaw_rate) = (time_ns, yaw_rate);
+        Transition::advance(estimate, dt).apply(self.covariance.rows_mut(), densities);
         let scale = self.params.wheel_scale;
         if scale.time_s != f64::INFINITY {
             let factor = exp(-dt / scale.time_s);
@@ -213,21 +207,6 @@ impl PlanarEkf {
             self.covariance.decay(WHEEL_SCALE, factor, variance.max(KNOWN));
         }
         self.covariance.bound(&LAYOUT);
-        if is_gap {
-            self.covariance.enforce();
-        } else if self.jump.is_some() {
-            self.turn_jump(dt);
-        }
-        Ok(())
-    }
-
-    /// Adds a sample of `dt` seconds to what a jump of the bias makes of the heading.
-    #[cold]
-    #[inline(never)]
-    fn turn_jump(&mut self, dt: f64) {
-        let (Some(estimate), Some(jump)) = (&self.estimate, self.jump) else { return };
-        let bias = Vector1::new(estimate.gyroscope_bias);
-        self.jump = jump.turned(estimate.time_ns, &bias, |way| -way * dt);
     }
 
     /// Corrects the filter with a measurement taken at its current time.
@@ -243,119 +222,30 @@ impl PlanarEkf {
         stream: &mut Stream,
         measurement: &M,
     ) -> Result<Fused, Refusal> {
-        let mut room = Room::new();
-        let innovation = self.innovation(stream, measurement, &mut room);
-        self.correct(stream, innovation)
+        self.update_at(stream, measurement, Gate::Closed)
     }
 
     #[inline]
-    fn innovation<'a, M: PlanarMeasurement<D>, const D: usize>(
-        &self,
-        stream: &Stream,
-        measurement: &M,
-        room: &'a mut Room<D, STATES>,
-    ) -> Result<Innovation<'a>, Refusal> {
-        measurement.linearise(self.estimate.as_ref().ok_or(Refusal::NotStarted)?, &mut room.model)?;
-        self.covariance.innovation(room, stream.noise_factor())
-    }
-
-    /// Fuses a measurement, and tells its stream.
-    ///
-    /// Compiled for each measurement: with seven states, loops over a dimension that is not a constant cost 4 % of the step.
-    #[inline(always)]
-    fn correct(
+    pub(super) fn update_at<M: PlanarMeasurement<D>, const D: usize>(
         &mut self,
         stream: &mut Stream,
-        innovation: Result<Innovation<'_>, Refusal>,
+        measurement: &M,
+        gate: Gate,
     ) -> Result<Fused, Refusal> {
-        let result = innovation.and_then(|mut innovation| self.fuse(stream, &mut innovation));
+        let result = self.estimate.as_mut().ok_or(Refusal::NotStarted).and_then(|estimate| {
+            let linearise = |at: &PlanarEstimate, model: &mut _| measurement.linearise(at, model);
+            let updated = updated(estimate, &mut self.covariance, stream, gate, linearise)?;
+            *estimate = updated.estimate;
+            if updated.is_fix {
+                self.upkeep.fixed_ns = estimate.time_ns;
+            }
+            Ok(updated.fused)
+        });
         stream.count(&result);
         if let (Ok(_), Some(estimate)) = (&result, &self.estimate) {
             stream.fused_at(estimate.time_ns);
         }
         result
-    }
-
-    #[inline(always)]
-    fn fuse(&mut self, stream: &Stream, innovation: &mut Innovation<'_>) -> Result<Fused, Refusal> {
-        let estimate = self.estimate.as_mut().ok_or(Refusal::NotStarted)?;
-        let weighed = Weighed::new(&mut self.covariance, stream, innovation, Gate::Closed, &LAYOUT, sight)?;
-        let error = innovation.mean();
-        if !LAYOUT.admits(&error) {
-            weighed.undo(&mut self.covariance);
-            return Err(Refusal::OutOfRange);
-        }
-        *estimate = estimate.corrected(&error);
-        self.covariance.update(innovation);
-        self.covariance.settle(&LAYOUT);
-        if sees_position(innovation) {
-            self.upkeep.fixed_ns = estimate.time_ns;
-        }
-        let fused = weighed.fused(innovation, &LAYOUT);
-        if weighed.is_raised() && error[GYROSCOPE_BIAS] != 0.0 {
-            self.follow_jump(stream.fused_ns(), error[GYROSCOPE_BIAS]);
-        }
-        Ok(fused)
-    }
-
-    /// Raises the variance of the heading after a measurement has overridden its gate and added `change` to the bias.
-    #[cold]
-    fn follow_jump(&mut self, fused_ns: Option<i64>, change: f64) {
-        let Some(estimate) = &self.estimate else { return };
-        let (bias, change) = (Vector1::new(estimate.gyroscope_bias), Vector1::new(change));
-        let moved = Moved { now_ns: estimate.time_ns, fused_ns, bias, change, in_world: change };
-        let (jump, turned) = BiasJump::follow(self.jump, &moved);
-        self.jump = jump;
-        let turned = bounded(&turned, self.covariance.matrix()[(HEADING, HEADING)]);
-        self.covariance.inflate(HEADING, turned.norm_squared());
-    }
-
-    /// Relocates a filter that was wrong, m: sets the position and, if given, the velocity (in the world, m/s) and the heading
-    /// (rad), each with its covariance. The other states keep their covariance but are uncorrelated with the new ones. The call
-    /// counts as a reset.
-    ///
-    /// # Errors
-    ///
-    /// Returns [`Refusal::NonFinite`] if a value is not finite, [`Refusal::OutOfRange`] if it is absurdly large, and
-    /// [`Refusal::Noise`] if a covariance is not positive definite. The filter is then unchanged.
-    pub fn relocate(
-        &mut self,
-        position: (Vector2<f64>, Matrix2<f64>),
-        velocity: Option<(Vector2<f64>, Matrix2<f64>)>,
-        heading: Option<(f64, f64)>,
-    ) -> Result<(), Refusal> {
-        let mut estimate = self.estimate.ok_or(Refusal::NotStarted)?;
-        let mut covariance = self.covariance;
-        estimate.position = position.0;
-        covariance.set_pair(POSITION, &position.1);
-        if let Some((heading, variance)) = heading {
-            estimate.heading = wrapped(heading);
-            covariance.forget(HEADING, variance.max(KNOWN));
-        }
-        if let Some((velocity, of_velocity)) = velocity {
-            let body_from_world = estimate.world_from_body().transpose();
-            estimate.velocity = body_from_world * velocity;
-            covariance.set_pair(VELOCITY, &(body_from_world * of_velocity * body_from_world.transpose()));
-        }
-        if !estimate.is_finite() {
-            return Err(Refusal::NonFinite);
-        }
-        if !is_on_earth(estimate.position.iter().chain(&estimate.velocity))
-            || !is_within([&estimate.gyroscope_bias], MAX_ANGULAR_VELOCITY)
-        {
-            return Err(Refusal::OutOfRange);
-        }
-        if !covariance.is_positive_definite() {
-            return Err(Refusal::Noise);
-        }
-        covariance.bound(&LAYOUT);
-        self.estimate = Some(estimate);
-        self.covariance = covariance;
-        self.upkeep.started(estimate.time_ns);
-        if let (Some(jump), true) = (&mut self.jump, heading.is_some()) {
-            jump.relocated();
-        }
-        Ok(())
     }
 
     /// The estimate at the end of the last sample; `None` before the start.

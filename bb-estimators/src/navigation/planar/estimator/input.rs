@@ -3,6 +3,8 @@
 use super::options::PlanarOptions;
 use crate::navigation::eskf::ImuMean;
 use crate::navigation::estimator::measured::told;
+use crate::navigation::geodesy::LocalFrame;
+use crate::navigation::measurement::GnssPosition;
 use crate::navigation::planar::measurement::{PlanarHeading, PlanarPose, PlanarPosition, WheelVelocity, YawRate};
 use bb_core::message::Stamped;
 use bb_core::payload::{GnssFix, Imu, Odometry, Orientation, Pose};
@@ -36,7 +38,8 @@ pub(super) struct Mounting {
     body_from_imu: UnitQuaternion<f64>,
     antenna: Option<Vector2<f64>>,
     body_from_pose: Option<Isometry3<f64>>,
-    body_from_orientation: UnitQuaternion<f64>,
+    body_from_orientation: Option<UnitQuaternion<f64>>,
+    has_wheels: bool,
 }
 
 impl Mounting {
@@ -57,8 +60,8 @@ impl Mounting {
             body_from_imu: body_from_link.rotation * context.frame_from_driver()?.rotation,
             antenna: optional("gnss").map(|gnss| (body_from_link * gnss).translation.vector.xy()),
             body_from_pose: optional("pose").map(|pose| body_from_link * pose),
-            body_from_orientation: optional("orientation")
-                .map_or(UnitQuaternion::identity(), |sensor| body_from_link.rotation * sensor.rotation),
+            body_from_orientation: optional("orientation").map(|sensor| body_from_link.rotation * sensor.rotation),
+            has_wheels: optional("odometry").is_some(),
         })
     }
 
@@ -85,29 +88,45 @@ impl Mounting {
         self.antenna.unwrap_or_else(Vector2::zeros)
     }
 
-    /// Converts a fix at `position` in the world.
-    pub(super) fn position(&self, position: &Vector3<f64>, covariance: &Matrix3<f64>) -> PlanarPosition {
-        let covariance = covariance.fixed_view::<2, 2>(0, 0).into_owned();
-        PlanarPosition { position: position.xy(), covariance, lever_arm: self.antenna() }
+    /// A fix in a frame; `None` if it has no position.
+    pub(super) fn fix(&self, fix: &GnssFix, frame: &LocalFrame, options: &PlanarOptions) -> Option<PlanarPosition> {
+        let fix = GnssPosition::of_fix(fix, frame, Vector3::zeros(), options.gnss_deviation)?;
+        let covariance = fix.covariance.fixed_view::<2, 2>(0, 0).into_owned();
+        Some(PlanarPosition { position: fix.position.xy(), covariance, lever_arm: self.antenna() })
+    }
+
+    /// Whether the robot has wheels.
+    pub(super) fn has_wheels(&self) -> bool {
+        self.has_wheels
+    }
+
+    /// Whether something measures the heading in the world alone.
+    pub(super) fn has_orientation(&self) -> bool {
+        self.body_from_orientation.is_some()
+    }
+
+    /// Whether something measures poses in the world.
+    pub(super) fn has_poses(&self) -> bool {
+        self.body_from_pose.is_some()
     }
 
     /// The velocity and yaw rate from wheel odometry.
     pub(super) fn wheels(&self, odometry: &Odometry, options: &PlanarOptions) -> (WheelVelocity, YawRate) {
         let square = |x: f64| x * x;
-        let known = |variance: f64| Some(variance).filter(|variance| *variance > 0.0);
         let covariance = odometry.twist.covariance;
-        let variance = |i: usize| covariance.and_then(|covariance| known(covariance[(i, i)]));
-        let of_velocity = |i: usize| variance(i).unwrap_or(square(options.odometry_deviation));
+        let stated = |i: usize| covariance.map_or(0.0, |covariance| covariance[(i, i)]);
+        let variance = |i: usize, least: f64| stated(i).max(square(least));
         let mut velocity = odometry.twist.linear.xy();
-        let mut noise = Matrix2::new(of_velocity(0), 0.0, 0.0, of_velocity(1));
+        let mut noise = Matrix2::new(variance(0, options.odometry_deviation), 0.0, 0.0, 0.0);
         if options.omnidirectional {
+            noise[(1, 1)] = variance(1, options.odometry_deviation);
             let between = covariance.map_or(0.0, |covariance| 0.5 * (covariance[(0, 1)] + covariance[(1, 0)]));
             (noise[(0, 1)], noise[(1, 0)]) = (between, between);
         } else {
             velocity.y = 0.0;
             noise[(1, 1)] = square(options.sideways_deviation);
         }
-        let deviation = variance(5).map_or(options.yaw_rate_deviation, f64::sqrt);
+        let deviation = variance(5, options.yaw_rate_deviation).sqrt();
         let velocity = WheelVelocity { velocity, covariance: noise, lever_arm: Vector2::zeros() };
         (velocity, YawRate { rate: odometry.twist.angular.z, deviation })
     }
@@ -136,7 +155,8 @@ impl Mounting {
 
     /// The heading of the body, from an orientation of its sensor.
     pub(super) fn heading(&self, orientation: &Orientation, options: &PlanarOptions) -> PlanarHeading {
-        let world_from_body = orientation.world_from_body * self.body_from_orientation.inverse();
+        let body_from_sensor = self.body_from_orientation.unwrap_or_else(UnitQuaternion::identity);
+        let world_from_body = orientation.world_from_body * body_from_sensor.inverse();
         let variance = orientation.covariance.map(|covariance| about_up(&orientation.world_from_body, &covariance));
         let deviation =
             variance.filter(|variance| *variance > 0.0).map_or(options.orientation_deviation, f64::sqrt);

@@ -26,24 +26,22 @@ params! {
         sideways_deviation: f64 = 0.05, in 1e-4..=1e3, unit "m/s";
         /// Heading of the link's x axis at the start, from east counter-clockwise.
         heading: f64 = 0.0, in -7.0..=7.0, unit "rad";
-        /// Standard deviation of the heading at the start.
-        heading_deviation: f64 = 0.1, in 1e-6..=4.0, unit "rad";
-        /// Starts in motion, with the course over ground from fixes as the heading of the body's x axis.
-        heading_from_course: bool = false;
+        /// Standard deviation of the heading at the start. More than half a radian is an unknown heading, which the filter finds by
+        /// itself as soon as the robot moves.
+        heading_deviation: f64 = 4.0, in 1e-6..=4.0, unit "rad";
         /// Horizontal standard deviation of a fix without a covariance.
         gnss_deviation: f64 = 5.0, in 1e-3..=1e4, unit "m";
-        /// Standard deviation of each component of the velocity of an odometry without a covariance.
+        /// Standard deviation of each component of the velocity of an odometry. A larger one in its covariance counts instead: that of
+        /// an encoder knows nothing of slip.
         odometry_deviation: f64 = 0.1, in 1e-4..=1e3, unit "m/s";
-        /// Standard deviation of the yaw rate of an odometry without a covariance.
+        /// Standard deviation of the yaw rate of an odometry. A larger one in its covariance counts instead.
         yaw_rate_deviation: f64 = 0.05, in 1e-5..=1e3, unit "rad/s";
+        /// Time over which the errors of an odometry are alike. 0: each reading has its own.
+        odometry_correlation: f64 = 1.0, in 0.0..=1e3, unit "s";
         /// Standard deviation of the position of a pose without a covariance; that of its heading is a tenth of it, in rad.
         pose_deviation: f64 = 0.5, in 1e-4..=1e3, unit "m";
         /// Standard deviation of the heading of an orientation without a covariance.
         orientation_deviation: f64 = 0.1, in 1e-5..=4.0, unit "rad";
-        /// How many consecutive measurements of a sensor the gate rejects before the filter counts as wrong, and not the
-        /// sensor. The next measurement is then fused, with the covariance raised to fit it. Fixes and poses that agree with each
-        /// other move the filter to their position instead; fewer are needed while the filter has fused only a few. 0: never.
-        patience: u32 = 50;
         /// How long the position may be dead-reckoned before the estimate counts as unreliable, if the robot has a source of
         /// fixes or poses.
         longest_dead_reckoning: f64 = 30.0, in 0.0..=f64::INFINITY, unit "s";

@@ -34,8 +34,10 @@ pub struct PlanarStatus {
     pub gyroscope_bias: f64,
     /// Scale of the wheels' velocity, less 1: `measured = (1 + s) true`.
     pub wheel_scale: f64,
-    /// Standard deviation of the heading, rad.
+    /// Standard deviation of the heading, rad; that of a whole turn while it is unknown.
     pub heading_deviation: f64,
+    /// The multiple of the gyroscope's white noise that fits best.
+    pub imu_noise: f64,
     /// Standard deviation of the gyroscope's bias, rad/s.
     pub gyroscope_bias_deviation: f64,
     /// Standard deviation of the wheels' scale.
@@ -155,7 +157,8 @@ impl PlanarOutput for PlanarOutputs {
         let status = PlanarStatus {
             gyroscope_bias: estimate.gyroscope_bias,
             wheel_scale: estimate.wheel_scale,
-            heading_deviation: deviation(HEADING),
+            heading_deviation: filter.copies().heading_deviation(),
+            imu_noise: filter.copies().noise(),
             gyroscope_bias_deviation: deviation(GYROSCOPE_BIAS),
             wheel_scale_deviation: deviation(WHEEL_SCALE),
             dead_reckoning_s: ekf.dead_reckoning_s(),

@@ -5,16 +5,12 @@ use super::filter::{Filter, Measured};
 use super::input::{Mounting, PlanarInputs};
 use super::options::PlanarOptions;
 use crate::navigation::eskf::ImuMean;
-use crate::navigation::estimator::course::point;
 use crate::navigation::estimator::health::{Limits, Watch};
-use crate::navigation::estimator::refuted::Refuted;
 use crate::navigation::geodesy::LocalFrame;
 use crate::navigation::history::History;
 use crate::navigation::planar::filter::PlanarStart;
 use crate::navigation::refusal::Refusal;
-use crate::navigation::track::TrackPoint;
 use bb_core::{Fault, Reply};
-use nalgebra::{Vector2, Vector3};
 
 /// Number of stored IMU samples, which limits how late a measurement may be: 1.3 s at 400 Hz.
 const SAMPLES: usize = 512;
@@ -25,22 +21,13 @@ type Past = History<Filter, SAMPLES, MEASUREMENTS, STATES>;
 /// How far ahead of the IMU a measurement may be stamped, ns.
 const LONGEST_LEAD_NS: i64 = 500_000_000;
 
-/// A filter that is found to be off by more than this, m, was never near: the origin of its world was wrong.
-const FARTHEST_JUMP: f64 = 100_000.0;
-
 #[derive(Debug)]
 pub(super) struct Running {
     past: Past,
     /// The world's frame on the Earth; `None` without satellite navigation.
     frame: Option<LocalFrame>,
-    /// Whether enough fixes agreed with the frame to rule out wrong fixes at its origin.
-    is_confirmed: bool,
     watch: Watch,
-    /// State of the fixes, and of the poses, that contradict the filter.
-    fixes: Refuted,
-    poses: Refuted,
-    /// Heading of the last pose, with its variance, rad.
-    heading: Option<(f64, f64)>,
+    resets: u32,
 }
 
 impl Running {
@@ -53,9 +40,12 @@ impl Running {
     ) -> Result<Box<Self>, Fault> {
         let filter = Filter::new(options, start)?;
         let past = Past::new(filter, LONGEST_LEAD_NS).map_err(|refusal| Fault::new(refusal.to_string()))?;
-        let (fixes, poses) = (Refuted::default(), Refuted::default());
-        let watch = Watch::new(limits);
-        Ok(Box::new(Self { past, frame, is_confirmed: false, watch, fixes, poses, heading: None }))
+        Ok(Box::new(Self { past, frame, watch: Watch::new(limits), resets: 1 }))
+    }
+
+    /// The distance of positions, m, that are beyond any way of a robot from the filter.
+    pub(super) fn elsewhere(&self) -> Option<f64> {
+        self.past.now().copies().elsewhere()
     }
 
     /// The world's frame on the Earth; `None` without satellite navigation.
@@ -78,69 +68,34 @@ impl Running {
         self.past.propagate(sample)?;
         if let Some(fix) = inputs.gnss.filter(|fix| fix.is_new())
             && let Some(frame) = &self.frame
-            && let Some(point) = point(fix.monotonic_time.as_nanos(), &fix.payload, frame, options.gnss_deviation)
+            && let Some(measured) = mounting.fix(&fix.payload, frame, options)
         {
-            let measured = mounting.position(&point.position, &point.covariance);
-            self.fixes.see(point);
-            self.fuse(point.time_ns, Measured::Gnss(measured));
+            self.fuse(fix.monotonic_time.as_nanos(), Measured::Gnss(measured));
         }
         if let Some(odometry) = inputs.odometry.filter(|odometry| odometry.is_new()) {
-            let time_ns = odometry.monotonic_time.as_nanos();
             let (velocity, rate) = mounting.wheels(&odometry.payload, options);
-            self.fuse(time_ns, Measured::Odometry(velocity));
-            self.fuse(time_ns, Measured::YawRate(rate));
+            self.fuse(odometry.monotonic_time.as_nanos(), Measured::Odometry(velocity, rate));
         }
         if let Some(pose) = inputs.pose.filter(|pose| pose.is_new()) {
             let measured = mounting.pose(&pose.payload, options);
-            let time_ns = pose.monotonic_time.as_nanos();
-            let mut covariance = measured.covariance;
-            self.heading = Some((measured.heading, covariance[(2, 2)]));
-            // Its third component belongs to the heading; the height does not matter here.
-            covariance[(2, 2)] = 1.0;
-            self.poses.see(TrackPoint { time_ns, position: measured.position.push(0.0), covariance, yaw: 0.0 });
-            self.fuse(time_ns, Measured::Pose(measured));
+            self.fuse(pose.monotonic_time.as_nanos(), Measured::Pose(measured));
         }
         if let Some(orientation) = inputs.orientation.filter(|orientation| orientation.is_new()) {
             let measured = mounting.heading(&orientation.payload, options);
             self.fuse(orientation.monotonic_time.as_nanos(), Measured::Orientation(measured));
         }
-        self.go_where_positions_agree(options, mounting)
+        let resets = self.past.now().ekf().resets();
+        if resets != self.resets {
+            tracing::warn!("it was wrong, and goes on where positions agree");
+            self.resets = resets;
+        }
+        Ok(())
     }
 
     fn fuse(&mut self, time_ns: i64, measured: Measured) {
         if let Err(refusal) = self.past.update(time_ns, &measured) {
             tracing::debug!(%refusal, sensor = measured.name(), "measurement refused");
         }
-    }
-
-    /// Relocates the filter if fixes or poses agree with each other but not with it.
-    fn go_where_positions_agree(&mut self, options: &PlanarOptions, mounting: &Mounting) -> Result<(), Refusal> {
-        let now = self.past.now();
-        let [of_fixes, of_poses] = now.positions();
-        let mut frame = self.frame;
-        let (found, lever_arm, heading) = if let Some(mut found) = self.fixes.verdict(of_fixes, options.patience) {
-            let here = now.ekf().estimate().map_or_else(Vector2::zeros, |estimate| estimate.position);
-            self.is_confirmed |= self.fixes.confirms(of_fixes, options.patience);
-            if (found.point.position.xy() - here).norm() > FARTHEST_JUMP && !self.is_confirmed {
-                // No robot can have travelled this far, so the assumed origin of the world was wrong.
-                frame = frame.map(|frame| LocalFrame::new(frame.geodetic(&found.point.position)));
-                found.point.position = Vector3::zeros();
-            }
-            (found, mounting.antenna(), None)
-        } else if let Some(found) = self.poses.verdict(of_poses, options.patience) {
-            (found, Vector2::zeros(), self.heading)
-        } else {
-            return Ok(());
-        };
-        let mut filter = now.clone();
-        filter.relocate(&found, &lever_arm, heading)?;
-        tracing::warn!(position = ?found.point.position, "it was wrong, and begins again where positions agree");
-        let [of_fixes, of_poses] = filter.positions();
-        self.fixes.begin(of_fixes);
-        self.poses.begin(of_poses);
-        self.past.restart(filter)?;
-        self.frame = frame;
-        Ok(())
     }
 
     pub(super) fn reply<O: PlanarOutput>(&mut self, mounting: &Mounting) -> Reply<O> {

@@ -13,6 +13,7 @@ use super::super::{
 use super::{estimate, vector};
 use crate::navigation::Linearised;
 use crate::navigation::covariance::Covariance;
+use crate::navigation::update::Composed;
 
 const STEP: f64 = 1e-5;
 
@@ -62,6 +63,36 @@ proptest! {
             moved.error_to(&other)
         });
         prop_assert!((numeric - transition.matrix()).amax() < 1e-6, "{} is not {}", transition.matrix(), numeric);
+    }
+
+    /// T, which takes a change of an error to errors of the state that is composed with it.
+    #[test]
+    fn of_the_composition(
+        at in estimate(), error in proptest::collection::vec(-2.0..2.0, STATES),
+        numbers in proptest::collection::vec(-1.0..1.0, STATES * STATES),
+    ) {
+        let error = SVector::<f64, STATES>::from_vec(error);
+        let composed = at.composed(&error);
+        let numeric = SMatrix::<f64, STATES, STATES>::from_columns(&core::array::from_fn::<_, STATES, _>(|state| {
+            let moved = |step: f64| {
+                let mut error = error;
+                error[state] += step;
+                composed.error_to(&at.composed(&error))
+            };
+            (moved(STEP) - moved(-STEP)) / (2.0 * STEP)
+        }));
+        let mut rows: [[f64; STATES]; STATES] = core::array::from_fn(|i| core::array::from_fn(|j| f64::from(u8::from(i == j))));
+        PlanarEstimate::transport_jacobian(&error, &mut rows);
+        let transport = SMatrix::<f64, STATES, STATES>::from_fn(|i, j| rows[i][j]);
+        prop_assert!((numeric - transport).amax() < 1e-7, "{} is not {}", transport, numeric);
+        let root = SMatrix::<f64, STATES, STATES>::from_iterator(numbers);
+        let dense = root * root.transpose();
+        let mut covariance = Covariance::<STATES>::new();
+        *covariance.rows_mut() = core::array::from_fn(|i| core::array::from_fn(|j| dense[(i, j)]));
+        PlanarEstimate::transport_covariance(&error, &mut covariance);
+        let expected = transport * dense * transport.transpose();
+        prop_assert!((covariance.matrix() - expected).amax() < 1e-12 * (1.0 + expected.amax()));
+        prop_assert_eq!(covariance.matrix(), &covariance.matrix().transpose());
     }
 
     #[test]

@@ -1,0 +1,149 @@
+//! The start of the filter.
+
+use super::input::{Mounting, PlanarInputs, heading};
+use super::options::PlanarOptions;
+use crate::navigation::copies::UNKNOWN;
+use crate::navigation::eskf::ImuMean;
+use crate::navigation::estimator::course::Course;
+use crate::navigation::geodesy::LocalFrame;
+use crate::navigation::planar::filter::PlanarStart;
+use crate::navigation::planar::measurement::{PlanarHeading, PlanarPose};
+use crate::navigation::track::CLEARLY;
+use nalgebra::{Matrix2, Rotation2, Vector2, Vector3};
+
+/// The time of a start, ns, after which it is reported, and waits no longer for an input that may be missing.
+const LONGEST_NS: i64 = 10_000_000_000;
+
+/// Standard deviation of the start position without satellite navigation, where the origin is known by definition, m.
+const ORIGIN: f64 = 0.01;
+
+/// The largest standard deviation of a heading that nothing measures, rad: the world is turned so that it is right.
+const BY_DEFINITION: f64 = 0.1;
+
+/// Standard deviation of the initial velocity if no sensor reports it, m/s.
+const SPEED: f64 = 1.0;
+
+/// Gathers the data that a start needs.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Starting {
+    course: Course,
+    /// The last orientation and pose of the body, and the velocity of the wheels.
+    orientation: Option<PlanarHeading>,
+    pose: Option<PlanarPose>,
+    wheels: Option<Vector2<f64>>,
+    first_ns: Option<i64>,
+    last_ns: i64,
+}
+
+impl Starting {
+    /// `frame` is the frame of the world, if it exists already.
+    pub(super) fn new(frame: Option<LocalFrame>) -> Self {
+        let course = Course::within(frame);
+        Self { course, orientation: None, pose: None, wheels: None, first_ns: None, last_ns: i64::MIN }
+    }
+
+    /// Returns whether the start has lasted long enough to be reported.
+    pub(super) fn takes_too_long(&self) -> bool {
+        self.first_ns.is_some_and(|first_ns| self.last_ns.saturating_sub(first_ns) > LONGEST_NS)
+    }
+
+    /// Adds the new inputs. Returns the start of the filter once it is known, and the frame of its world.
+    pub(super) fn take(
+        &mut self,
+        sample: &ImuMean,
+        inputs: &PlanarInputs<'_>,
+        options: &PlanarOptions,
+        mounting: &Mounting,
+    ) -> Option<(PlanarStart, Option<LocalFrame>)> {
+        self.first_ns = self.first_ns.or(Some(sample.time_ns));
+        self.last_ns = self.last_ns.max(sample.time_ns);
+        // On a plane, up is z, regardless of the accelerometer.
+        self.course.turn(&ImuMean { specific_force: Vector3::z(), ..*sample });
+        self.course.see(inputs.gnss, options.gnss_deviation);
+        if let Some(orientation) = inputs.orientation {
+            let measured = mounting.heading(&orientation.payload, options);
+            self.orientation = measured.heading.is_finite().then_some(measured);
+        }
+        if let Some(pose) = inputs.pose {
+            let measured = mounting.pose(&pose.payload, options);
+            let is_finite = measured.position.iter().all(|x| x.is_finite()) && measured.heading.is_finite();
+            self.pose = is_finite.then_some(measured);
+        }
+        if let Some(odometry) = inputs.odometry {
+            let velocity = mounting.wheels(&odometry.payload, options).0.velocity;
+            self.wheels = velocity.iter().all(|x| x.is_finite()).then_some(velocity);
+        }
+        sample.check().ok()?;
+        let heading = self.heading(options, mounting);
+        let start = |position, velocity| PlanarStart::at(sample.time_ns, position, heading, velocity);
+        if !mounting.has_gnss() {
+            let velocity = self.speed_of_wheels().unwrap_or((Vector2::zeros(), SPEED));
+            if let Some(pose) = self.pose {
+                let position_covariance = pose.covariance.fixed_view::<2, 2>(0, 0).into_owned();
+                let at_pose = start((pose.position, ORIGIN), velocity);
+                return Some((PlanarStart { position_covariance, ..at_pose }, None));
+            }
+            if mounting.has_poses() && !self.takes_too_long() {
+                return None;
+            }
+            // The link starts at the origin.
+            let position = -(Rotation2::new(heading.0) * mounting.body_from_link.translation.vector.xy());
+            return Some((start((position, ORIGIN), velocity), None));
+        }
+        let fix = *self.course.newest(self.last_ns)?;
+        let (ahead, deviation) = self.in_motion(heading, mounting)?;
+        // The fix is the position of the antenna, and some time old.
+        let age_s = sample.time_ns.saturating_sub(fix.time_ns) as f64 * 1e-9;
+        let turn = Rotation2::new(heading.0);
+        let arm = turn * mounting.antenna();
+        let (moved, off) = if heading.1 > UNKNOWN {
+            (-arm, ahead.norm() * age_s + arm.norm())
+        } else {
+            (turn * ahead * age_s - arm, arm.norm() * heading.1)
+        };
+        let more = off * off + deviation * deviation * age_s * age_s;
+        let own: Matrix2<f64> = fix.covariance.fixed_view::<2, 2>(0, 0).into_owned();
+        let position_covariance = own + Matrix2::identity() * more;
+        let at_fix = start((fix.position.xy() + moved, ORIGIN), (ahead, deviation));
+        Some((PlanarStart { position_covariance, ..at_fix }, self.course.frame()))
+    }
+
+    /// The velocity in the body that wheels report, m/s, with its standard deviation.
+    fn speed_of_wheels(&self) -> Option<(Vector2<f64>, f64)> {
+        self.wheels.map(|velocity| (velocity, SPEED.min(0.1 + 0.1 * velocity.norm())))
+    }
+
+    /// The velocity in the body at the last fix, m/s, with its standard deviation: that of the wheels or, without wheels, of the last
+    /// fixes. Nothing but their course tells forwards from backwards then, so that an unknown heading waits for one.
+    fn in_motion(&self, heading: (f64, f64), mounting: &Mounting) -> Option<(Vector2<f64>, f64)> {
+        if mounting.has_wheels()
+            && let Some(of_wheels) = self.speed_of_wheels()
+        {
+            return Some(of_wheels);
+        }
+        let course = self.course.velocity(self.last_ns);
+        if heading.1 <= UNKNOWN {
+            let turned = |(velocity, deviation): (Vector3<f64>, f64)| {
+                (Rotation2::new(-heading.0) * velocity.xy(), deviation + SPEED)
+            };
+            return course.map(turned).or(self.takes_too_long().then_some((Vector2::zeros(), SPEED)));
+        }
+        let (velocity, deviation) = course?;
+        let speed = velocity.xy().norm();
+        (speed > CLEARLY * deviation).then(|| (Vector2::new(speed, 0.0), deviation))
+    }
+
+    /// The heading of the body with its standard deviation, rad: as it is measured, or from the options.
+    fn heading(&self, options: &PlanarOptions, mounting: &Mounting) -> (f64, f64) {
+        let of_pose = self.pose.map(|pose| (pose.heading, pose.covariance[(2, 2)].sqrt()));
+        let of_orientation = self.orientation.map(|measured| (measured.heading, measured.deviation));
+        if let Some(measured) = of_pose.or(of_orientation).filter(|(_, deviation)| *deviation <= UNKNOWN) {
+            return measured;
+        }
+        let is_measured = mounting.has_positions() || mounting.has_orientation();
+        let deviation = options.heading_deviation;
+        let deviation = if is_measured || deviation <= UNKNOWN { deviation } else { BY_DEFINITION };
+        // The heading of the options is that of the link.
+        (options.heading - heading(&mounting.body_from_link.rotation), deviation)
+    }
+}
