@@ -21,6 +21,7 @@ use crate::outcome::Outcome;
 use crate::recorded::Recorded;
 use clap::Parser;
 use std::error::Error;
+use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -70,23 +71,25 @@ fn run(arguments: &Arguments) -> Result<bool, Box<dyn Error>> {
             (outcome, missing)
         }
     };
+    // Errors are values, also where the reader of a pipe is gone.
+    let mut out = std::io::stdout().lock();
     if arguments.data.is_none() {
-        println!("{STORY}\n");
+        writeln!(out, "{STORY}\n")?;
     }
     for line in outcome.timeline() {
-        println!("{line}");
+        writeln!(out, "{line}")?;
     }
     let words = outcome.glossary();
     if !words.is_empty() {
-        println!("\n{words}");
+        writeln!(out, "\n{words}")?;
     }
-    println!("\n{}", outcome.errors());
+    writeln!(out, "\n{}", outcome.errors())?;
     if let Some(file) = &arguments.plot {
         outcome.picture().write(file)?;
     }
     match &missing {
-        None => println!("\nAll that was expected happened, in its order."),
-        Some(missing) => println!("\nmissing: {missing}"),
+        None => writeln!(out, "\nAll that was expected happened, in its order.")?,
+        Some(missing) => writeln!(out, "\nmissing: {missing}")?,
     }
     Ok(missing.is_none())
 }

@@ -23,9 +23,9 @@ pub enum Overflow {
         /// Total bytes of the kept messages; `usize::MAX` for no bound.
         bytes: usize,
     },
-    /// Keeps only the newest message; the loss of the others is counted.
+    /// Keeps only the newest message. The others are counted by `lagged`, not as lost: nobody wanted them.
     KeepLatest,
-    /// Keeps the newest message of each path; the loss of the others is counted. A newer message takes the place of the one that waits, so
+    /// Keeps the newest message of each path; the others count as with [`Overflow::KeepLatest`]. A newer message takes the place of the one that waits, so
     /// that each path has its turn. It is bounded by the number of paths.
     LatestPerPath,
 }

@@ -114,7 +114,7 @@ impl DynamicSubscription {
         self.queue.len()
     }
 
-    /// Returns the number of messages that were lost because this subscriber was slow.
+    /// Returns the number of messages that this subscriber did not get, since newer ones have taken their room.
     pub fn lagged(&self) -> u64 {
         self.queue.lagged()
     }

@@ -26,6 +26,8 @@ pub(super) struct Queue<M> {
     state: Mutex<State<M>>,
     arrived: Condvar,
     bound: Bound,
+    /// The reader wants the newest alone: what makes room for it is no loss.
+    keeps_newest: bool,
     by_path: Option<Box<ByPath>>,
     /// `true` once the reader is gone.
     abandoned: AtomicBool,
@@ -80,7 +82,7 @@ impl<M: Send + 'static> Queue<M> {
         })
     }
 
-    /// Adds a message of `bytes` counted bytes. Returns how many of the oldest were dropped to make room for it.
+    /// Adds a message of `bytes` counted bytes. Returns the number of messages that were lost to make room for it.
     /// Wakers and dropped messages go to `wakers`.
     pub(super) fn push(&self, path: &'static str, message: M, bytes: usize, wakers: &mut Wakers) -> u64 {
         if let Some(by_path) = &self.by_path {
@@ -115,7 +117,7 @@ impl<M: Send + 'static> Queue<M> {
                 if let Some(evicted) = evicted {
                     wakers.discard(evicted);
                 }
-                return lost;
+                return self.loss(lost);
             }
             // A message that needs the room of several evicts them one at a time: each is dropped without the lock.
             drop(state);
@@ -142,11 +144,16 @@ impl<M: Send + 'static> Queue<M> {
         }
         drop(state);
         dropped.messages.into_iter().for_each(|message| wakers.discard(message));
-        dropped.lost
+        self.loss(dropped.lost)
     }
 }
 
 impl<M> Queue<M> {
+    /// Returns how many of the messages that were dropped for newer ones the reader has lost.
+    fn loss(&self, dropped: u64) -> u64 {
+        if self.keeps_newest { 0 } else { dropped }
+    }
+
     #[cfg(test)]
     pub(super) fn new(overflow: Overflow) -> Self {
         Self::with(overflow, None)
@@ -166,8 +173,9 @@ impl<M> Queue<M> {
             waiting: 0,
             paths: Paths::default(),
         };
+        let keeps_newest = matches!(overflow, Overflow::KeepLatest | Overflow::LatestPerPath);
         let abandoned = AtomicBool::new(false);
-        Self { state: Mutex::new(state), arrived: Condvar::new(), bound, by_path, abandoned }
+        Self { state: Mutex::new(state), arrived: Condvar::new(), bound, keeps_newest, by_path, abandoned }
     }
 
     fn has_room(&self, state: &State<M>, bytes: usize) -> bool {
@@ -298,7 +306,7 @@ impl<M> Queue<M> {
             waiting: state.messages.len(),
             capacity: self.bound.capacity,
             bytes: state.bytes,
-            lost: state.lagged,
+            lost: self.loss(state.lagged),
         }
     }
 

@@ -12,7 +12,7 @@ pub struct SubscriberStatistics {
     pub capacity: usize,
     /// Bytes of the waiting messages that count towards the bound: see [`Overflow`](super::Overflow).
     pub bytes: usize,
-    /// Messages it lost because it was slow.
+    /// Messages it lost because it was slow; none if it keeps the newest alone.
     pub lost: u64,
 }
 
@@ -26,7 +26,8 @@ pub struct TopicStatistics {
     pub payload: &'static str,
     /// Messages published.
     pub published: u64,
-    /// Messages that subscribers lost because they were slow, or read only after more had arrived than they keep.
+    /// Messages that subscribers lost because they were slow, or read only after more had arrived than they keep. Those that keep the
+    /// newest alone lose none.
     pub lost: u64,
     /// Wakers of subscriptions that panicked when they were woken by a publisher.
     pub panics: u64,

@@ -77,7 +77,7 @@ impl<T> Subscription<T> {
         (0..self.queue.len()).map_while(|_| self.try_recv())
     }
 
-    /// Returns the number of messages that were lost because this subscriber was slow.
+    /// Returns the number of messages that this subscriber did not get, since newer ones have taken their room.
     pub fn lagged(&self) -> u64 {
         self.queue.lagged()
     }
@@ -130,6 +130,7 @@ mod tests {
         }
         assert_eq!(slow.drain().map(|message| message.position).collect::<Vec<_>>(), [3.0, 4.0]);
         assert_eq!((slow.lagged(), latest.lagged()), (2, 3));
+        assert_eq!(topic.statistics().lost, 2, "who keeps the newest alone loses nothing");
         assert_eq!(latest.try_recv().map(|message| message.position), Some(4.0));
     }
 

@@ -68,7 +68,7 @@ fn an_evicted_message_is_dropped_with_the_wakers() {
         }
     }
     let dropped = Arc::new(AtomicUsize::new(0));
-    let queue = super::super::queue::Queue::new(Overflow::KeepLatest);
+    let queue = super::super::queue::Queue::new(Overflow::DropOldest { capacity: 1 });
     let mut wakers = Wakers::default();
     let mut lost = 0;
     for _ in 0..3 {
