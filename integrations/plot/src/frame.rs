@@ -50,6 +50,9 @@ const SPIKES: f64 = 0.025;
 /// Room beyond the values of most points, as a part of their range.
 const BEYOND: f64 = 0.3;
 
+/// Labels of the vertical axis at most.
+const LABELS: usize = 11;
+
 /// Least width of a line that is drawn as one; thinner ones but the thinnest are dots.
 const THICK: u32 = 5;
 
@@ -114,6 +117,15 @@ impl Frame<'_> {
         let low = if cuts_low { low - BEYOND * range } else { first };
         let high = if cuts_high { high + BEYOND * range } else { last };
         Some(Cut { low, high, said: format!("cut: {said}") })
+    }
+
+    /// The number of labels of a vertical axis whose values are a few whole numbers, as those of a state are.
+    fn whole(&self, low: f64, high: f64) -> Option<usize> {
+        let mut values = self.shown().flat_map(|line| &line.runs).flatten().map(|(_, value)| *value);
+        let count = high.floor() - low.ceil() + 1.0;
+        let is_whole =
+            self.scale == Scale::Linear && count < LABELS as f64 && values.all(|value| value.fract() == 0.0);
+        is_whole.then_some(count as usize)
     }
 
     /// The width of the legend, in pixels.
@@ -198,6 +210,7 @@ impl Frame<'_> {
                 chart.draw_series([Rectangle::new([(from, low), (to, high)], filled)])?;
             }
         }
+        let labels = self.whole(low, high).unwrap_or(LABELS);
         let label = |value: f64, span: f64| match self.scale {
             Scale::Logarithmic => power(value),
             _ => tick(value, span),
@@ -208,7 +221,8 @@ impl Frame<'_> {
             .x_desc(self.x_axis)
             .y_desc(self.y_axis)
             .x_label_formatter(&|value| label(*value, x_span))
-            .y_label_formatter(&|value| label(*value, span))
+            .y_label_formatter(&|value| label(*value, if labels < LABELS { f64::INFINITY } else { span }))
+            .y_labels(labels)
             .label_style(FONT)
             .draw()?;
         for line in self.shown() {
@@ -281,7 +295,7 @@ fn tick(value: f64, span: f64) -> String {
     let value = if value.abs() < span * 1e-9 { 0.0 } else { value };
     let decimals = (1.0 - span.log10()).ceil();
     match decimals {
-        ..=0.0 if span < 1e6 => format!("{value:.0}"),
+        ..=0.0 if span < 1e6 || span.is_infinite() => format!("{value:.0}"),
         0.0..=4.0 => format!("{value:.*}", decimals as usize),
         _ if value == 0.0 => "0".to_owned(),
         _ => format!("{value:.1e}"),
@@ -307,6 +321,7 @@ mod tests {
         assert_eq!(tick(0.5, 2.0), "0.5");
         assert_eq!((tick(-0.0, 2.0), tick(-1e-17, 2.0)), ("0.0".to_owned(), "0.0".to_owned()));
         assert_eq!(tick(20.0, 22.0), "20");
+        assert_eq!(tick(1.0, f64::INFINITY), "1", "of a whole number");
         assert_eq!(tick(0.001, 0.01), "0.001");
         assert_eq!(tick(4.5e-5, 2e-5), "4.5e-5");
         assert_eq!(tick(0.0, 2e-5), "0");
