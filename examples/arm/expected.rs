@@ -39,6 +39,8 @@ const RIGHT: f64 = 0.03;
 #[derive(Debug, Default)]
 pub(crate) struct Outcome {
     pub(crate) lines: Vec<Line>,
+    /// Positions of the joints over time, s and rad.
+    pub(crate) joints: Vec<(f64, Vec<f64>)>,
     /// The largest speed of a joint when the IMU was unplugged, rad/s.
     pub(crate) speed_when_unplugged: f64,
     /// Largest speed of a joint while the arm was held, rad/s.

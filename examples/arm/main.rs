@@ -9,6 +9,7 @@
 mod commands;
 mod expected;
 mod path;
+mod plot;
 mod robot;
 mod run;
 mod script;
@@ -18,6 +19,7 @@ mod tests;
 mod timeline;
 mod tip;
 
+use bb_plot::Picture;
 use clap::Parser;
 use std::error::Error;
 use std::io::Write;
@@ -34,6 +36,9 @@ struct Arguments {
     /// Records the story to this file, MCAP, which Foxglove and RViz can show; one that is there is replaced.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
+    /// Plots the positions of the joints into this file, an SVG or a PNG.
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
 }
 
 fn main() -> ExitCode {
@@ -49,7 +54,14 @@ fn main() -> ExitCode {
 
 /// Runs the story; whether all of it happened.
 fn tell(arguments: &Arguments, out: &mut dyn Write) -> Result<bool, Box<dyn Error>> {
+    if let Some(file) = &arguments.plot {
+        Picture::check(file, "--plot")?;
+    }
     let outcome = run::run(arguments, out)?;
+    if let Some(file) = &arguments.plot {
+        plot::picture(&outcome).write(file)?;
+        eprintln!("plotted {}", file.display());
+    }
     if let Some(file) = &arguments.record {
         // Not to the output, which is the same on every machine.
         eprintln!("recorded to {}", file.display());

@@ -94,6 +94,7 @@ impl Story<'_> {
             for line in self.events.drain().collect::<Vec<_>>().iter().filter_map(Line::of) {
                 self.write(line)?;
             }
+            self.outcome.joints.push(self.truth.positions(&self.robot)?);
             // The world knows where joints are, not where they were: on virtual time the last estimate is of just now.
             let now = self.robot.clock().now();
             if let Some(tip) = self.tips.drain().last().filter(|tip| tip.monotonic_time == now) {
@@ -168,6 +169,14 @@ impl Truth {
         let tool = self.frames.kinematics().link("tool").ok_or("it is declared")?;
         let true_rate = self.frames.root_from_link(tool)?.rotation * self.frames.motion(tool)?.angular_velocity;
         Ok((tip.angular_velocity - true_rate).norm())
+    }
+
+    /// The time, s, and the positions of the joints, rad.
+    fn positions(&self, robot: &Live<Ur5>) -> Result<(f64, Vec<f64>), Box<dyn Error>> {
+        let now = robot.clock().now();
+        let joints = path::joints();
+        let positions = joints.iter().map(|joint| Ok(self.world.joint(joint, now)?.point.position));
+        Ok((now.seconds_since(MonotonicTime::ZERO), positions.collect::<Result<_, Box<dyn Error>>>()?))
     }
 
     /// The largest speed of a joint, rad/s.

@@ -11,7 +11,8 @@ use std::path::PathBuf;
 
 fn arguments(name: &str) -> Arguments {
     let file = format!("arm-{name}-{}.mcap", std::process::id());
-    Arguments { real_time: false, record: Some(std::env::temp_dir().join(file)) }
+    let record = std::env::temp_dir().join(file);
+    Arguments { real_time: false, plot: Some(record.with_extension("svg")), record: Some(record) }
 }
 
 #[test]
@@ -24,6 +25,14 @@ fn the_story_on_virtual_time_is_the_stored_one_and_is_recorded() -> Result<(), B
     let file = arguments.record.ok_or("it is recorded")?;
     recorded(&file)?;
     std::fs::remove_file(&file)?;
+    let plot = arguments.plot.ok_or("it is plotted")?;
+    let drawn = std::fs::read_to_string(&plot)?;
+    std::fs::remove_file(&plot)?;
+    assert!(
+        ["position (deg)", "shoulder_pan", "wrist_3", "no IMU at the tip"]
+            .iter()
+            .all(|label| drawn.contains(label))
+    );
     Ok(())
 }
 
@@ -51,7 +60,7 @@ fn recorded(file: &PathBuf) -> Result<(), Box<dyn Error>> {
 
 #[test]
 fn what_has_not_happened_is_missing() -> Result<(), Box<dyn Error>> {
-    let arguments = Arguments { real_time: false, record: None };
+    let arguments = Arguments { real_time: false, record: None, plot: None };
     let outcome = run::run(&arguments, &mut std::io::sink())?;
     assert_eq!(outcome.missing(), [] as [String; 0]);
     let lines = outcome.lines.iter().filter(|line| line.event != "stop started").cloned().collect();

@@ -14,13 +14,15 @@ pub(crate) struct Outcome {
     pub(crate) points: Vec<Point>,
     /// Changes of health: time, s, and the new state.
     health: Vec<(f64, HealthState)>,
-    outage: Range<f64>,
+    pub(crate) outage: Range<f64>,
 }
 
 /// One instant at which the truth is known.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Point {
     pub(crate) time_s: f64,
+    /// True position, east and north, m.
+    pub(crate) truth: Vector2<f64>,
     /// East and north, m.
     pub(crate) error: Vector2<f64>,
     /// Standard deviations of both, m.
@@ -51,6 +53,7 @@ impl Outcome {
             let covariance: Matrix2<f64> = covariance.fixed_view::<2, 2>(0, 0).into_owned();
             points.push(Point {
                 time_s: seconds(time),
+                truth: truth.xy(),
                 error: (position - truth).xy(),
                 deviation: Vector2::new(covariance[(0, 0)], covariance[(1, 1)]).map(f64::sqrt),
                 worst: covariance.symmetric_eigenvalues().max().sqrt(),

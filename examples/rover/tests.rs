@@ -71,6 +71,7 @@ fn errors_and_bounds_are_drawn() -> Result<(), Box<dyn Error>> {
     plot::picture(&run::simulated(&simulated::drive())?).write(&file)?;
     let drawn = std::fs::read_to_string(&file)?;
     std::fs::remove_file(&file)?;
-    assert!(["east (m)", "north (m)", "3 sigma", "error"].iter().all(|label| drawn.contains(label)));
+    let labels = ["track", "error east (m)", "error north (m)", "3 sigma", "no satellites", "without satellites"];
+    assert!(labels.iter().all(|label| drawn.contains(label)));
     Ok(())
 }
