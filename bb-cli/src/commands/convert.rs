@@ -48,7 +48,7 @@ pub(crate) struct Arguments {
 
 const MAP: &str = "Contents of the columns of a CSV, with their units: QUANTITY=COLUMNS[:UNIT], separated by spaces.
 
-  time    s (default), ms, us, ns
+  time    s (default), ms, us, ns; time=1:ms@1700000000.5 if the clock began then, s since 1970
   gyr     angular velocity: rad/s (default), deg/s
   acc     specific force: m/s2 (default), g, mg
   mag     magnetic field: T (default), mT, uT, nT, G, mG

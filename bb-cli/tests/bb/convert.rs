@@ -159,7 +159,7 @@ fn errors_are_reported_by_line_and_column() {
         (
             "before",
             "-0.25,1,2,3,4,5,6\n",
-            "line 2, column 1 (t): `-0.25` is before 1970, where no time of a bag is; add a constant to all times",
+            "line 2, column 1 (t): `-0.25` is before 1970, where no time of a bag is; say when the clock was zero, as time=1@1700000000",
         ),
         (
             "after",
@@ -250,10 +250,14 @@ fn sensors_with_files_of_their_own_are_joined() {
     // The specific force grows linearly, so that interpolation is exact.
     let gyroscope = csv("gyroscope.txt", &rows(0.01, 0.0, 100, |t| [0.0, 0.0, t]));
     let accelerometer = csv("accelerometer.txt", &rows(0.008, 0.003, 100, |t| [t, 2.0 * t, 9.8]));
-    let field = csv("magnetometer.txt", &rows(0.02, 0.0, 50, |_| [0.0, 20.0, -40.0]));
+    // Spaces, on a clock that began 50 s before.
+    let field = rows(0.02, 50.0, 50, |_| [0.0, 20.0, -40.0]).replace('\t', "  ");
+    let field = csv("magnetometer.txt", &field);
     let out = bag("joined.mcap");
-    let with =
-        [format!("{} time=1 acc=2-4", accelerometer.display()), format!("{} time=1 mag=2-4:uT", field.display())];
+    let with = [
+        format!("{} time=1 acc=2-4", accelerometer.display()),
+        format!("{} time=1@-50 mag=2-4:uT", field.display()),
+    ];
     let arguments = ["--columns", "time=1 gyr=2-4", "--with", &with[0], "--with", &with[1]];
     let output = convert(&gyroscope, &out, &arguments);
     assert_eq!((output.code, &*output.err), (Some(0), ""));
@@ -275,7 +279,7 @@ fn sensors_with_files_of_their_own_are_joined() {
         "phone.toml",
         "[[file]]\npath = \"gyroscope.txt\"\ncolumns = \"time=1 gyr=2-4\"\n\
          [[file]]\npath = \"accelerometer.txt\"\ncolumns = \"time=1 acc=2-4\"\n\
-         [[file]]\npath = \"magnetometer.txt\"\ncolumns = \"time=1 mag=2-4:uT\"\n",
+         [[file]]\npath = \"magnetometer.txt\"\ncolumns = \"time=1@-50 mag=2-4:uT\"\n",
     );
     let described = bag("described.mcap");
     let output = convert(&description, &described, &[]);

@@ -284,8 +284,9 @@ impl Cells<'_> {
                 time => (time * self.quantity.factor * 1e9).round() as i64,
             },
         };
+        let time_ns = time_ns.saturating_add(self.quantity.zero_ns);
         let fault = match time_ns {
-            ..0 => "is before 1970, where no time of a bag is; add a constant to all times",
+            ..0 => "is before 1970, where no time of a bag is; say when the clock was zero, as time=1@1700000000",
             0..=LAST_NS => return Ok(time_ns),
             _ => "is after 2038, which no stamp of ROS holds; is the unit another (s, ms, us, ns)?",
         };
@@ -295,7 +296,7 @@ impl Cells<'_> {
 
 /// A decimal number with a unit as nanoseconds, rounded down, without conversion to a float; `None` if the number or
 /// the unit is not decimal.
-fn exact_ns(cell: &str, factor: f64) -> Option<i64> {
+pub(super) fn exact_ns(cell: &str, factor: f64) -> Option<i64> {
     let units = [(1.0, 9), (1e-3, 6), (1e-6, 3), (1e-9, 0)];
     let (_, digits) = units.into_iter().find(|(unit, _)| *unit == factor)?;
     let (whole, part) = cell.split_once('.').unwrap_or((cell, ""));

@@ -1,5 +1,6 @@
 //! The contents of the columns.
 
+use super::cells::exact_ns;
 use super::units::{self, Units};
 use bb_eval::filters::near;
 use std::fmt;
@@ -89,6 +90,8 @@ pub(crate) struct Quantity {
     pub(super) columns: Vec<Column>,
     /// Factor of the conversion to SI.
     pub(super) factor: f64,
+    /// Time at which the clock was zero, ns since 1970; 0 but for a time.
+    pub(super) zero_ns: i64,
 }
 
 impl FromStr for Quantity {
@@ -100,6 +103,13 @@ impl FromStr for Quantity {
         let what = WHATS.iter().find(|(known, _)| *known == name).map(|(_, what)| *what);
         let names = WHATS.map(|(name, _)| name);
         let what = what.ok_or_else(|| format!("no quantity `{name}`; {}", near(name, &names)))?;
+        let (rest, zero_ns) = match rest.rsplit_once('@') {
+            Some((rest, zero)) if what == What::Time => {
+                let wrong = || format!("`{zero}` is no number of seconds since 1970, at which the clock was zero");
+                (rest, exact_ns(zero, 1.0).ok_or_else(wrong)?)
+            }
+            _ => (rest, 0),
+        };
         let (columns, unit) = match rest.rsplit_once(':') {
             Some((columns, unit)) => (columns, Some(unit)),
             None => (rest, None),
@@ -126,7 +136,7 @@ impl FromStr for Quantity {
             (What::Moving | What::Fix, Some(_)) => return Err(format!("`{name}` has no unit to choose")),
             (_, Some(unit)) => units::factor(unit, what.units())?,
         };
-        Ok(Self { what, columns, factor })
+        Ok(Self { what, columns, factor, zero_ns })
     }
 }
 
@@ -201,6 +211,9 @@ mod tests {
         assert_eq!(columns("quat=5-8:xyzw"), Ok(vec!["8".into(), "5".into(), "6".into(), "7".into()]));
         assert_eq!(columns("quat=q_*:xyzw").expect("are some")[0], "q_w");
         assert_eq!(columns("time=t:us"), Ok(vec!["t".into()]));
+        let time: Quantity = "time=7:ms@1752003257.25".parse().expect("is one");
+        assert_eq!((time.factor, time.zero_ns), (1e-3, 1_752_003_257_250_000_000));
+        assert_eq!("time=1@-2.76".parse().map(|time: Quantity| time.zero_ns), Ok(-2_760_000_000));
     }
 
     #[test]
@@ -211,6 +224,7 @@ mod tests {
         assert_eq!(fault("gyr=1-2"), "`gyr` has 3 columns, and 2 are named");
         assert_eq!(fault("time=1,2"), "`time` has 1 column, and 2 are named");
         assert_eq!(fault("gyr=1-3:dgs/s"), "no unit `dgs/s`; there are rad/s, deg/s, dps");
+        assert_eq!(fault("time=1@noon"), "`noon` is no number of seconds since 1970, at which the clock was zero");
         assert_eq!(fault("gyr=0-2"), "`gyr` has 3 columns, and 1 are named");
         assert_eq!(fault("quat=1-4:zyx"), "no order `zyx`; there are wxyz, xyzw");
         assert_eq!(fault("acc=4-2"), "`4-2` is not a column; name it, or count from 1, as 2-4");

@@ -13,6 +13,8 @@ const LONGEST_START: u64 = 1 << 20;
 /// The lines of a CSV as cells.
 pub(super) struct Source {
     reader: csv::Reader<Box<dyn Read>>,
+    /// `true` if any number of spaces separates cells, so that none is empty.
+    has_spaces: bool,
     bytes: Option<u64>,
 }
 
@@ -39,7 +41,7 @@ impl Source {
             // A carriage return before it is trimmed.
             .terminator(Terminator::Any(b'\n'))
             .from_reader(Box::new(whole) as Box<dyn Read>);
-        Ok(Self { reader, bytes })
+        Ok(Self { reader, has_spaces: delimiter == b' ', bytes })
     }
 
     /// The length, if it is a regular file.
@@ -59,6 +61,9 @@ impl Source {
             if record.iter().any(|cell| !cell.is_empty()) || record.len() > 1 {
                 let within: usize = record.iter().map(|cell| cell.matches('\n').count()).sum();
                 let line = self.reader.position().line().saturating_sub(1 + within as u64);
+                if self.has_spaces {
+                    record = record.iter().filter(|cell| !cell.is_empty()).collect();
+                }
                 return Ok(Some((line, record)));
             }
         }
@@ -92,7 +97,7 @@ fn start(input: &mut dyn BufRead) -> std::io::Result<(Vec<u8>, u8)> {
         }
         let line = String::from_utf8_lossy(&start[before..]);
         let delimiter = delimiter(&line);
-        let first = line.trim_start_matches('\u{feff}').split(delimiter).next().unwrap_or("");
+        let first = line.trim_start_matches('\u{feff}').trim_start().split(delimiter).next().unwrap_or("");
         if is_number(first.trim().trim_matches('"').trim()) {
             return Ok((start, delimiter as u8));
         }
@@ -102,9 +107,10 @@ fn start(input: &mut dyn BufRead) -> std::io::Result<(Vec<u8>, u8)> {
     Ok((start, delimiters.first().map_or(b',', |delimiter| *delimiter as u8)))
 }
 
-/// Returns the delimiter of a line. With tabs or semicolons, commas belong to its numbers.
+/// Returns the delimiter of a line. With tabs or semicolons, commas belong to its numbers; spaces may follow a comma.
 fn delimiter(line: &str) -> char {
-    ['\t', ';'].into_iter().find(|delimiter| line.contains(*delimiter)).unwrap_or(',')
+    let has = |delimiter: &char| line.trim().contains(*delimiter);
+    ['\t', ';', ',', ' '].into_iter().find(has).unwrap_or(',')
 }
 
 #[cfg(test)]
@@ -122,6 +128,8 @@ mod tests {
         assert_eq!(of("# x, y, z, and so on, and on\n0;1\n"), b';');
         assert_eq!(of("t;x\n0,5;1,5\n"), b';');
         assert_eq!(of("\u{feff}\"0\"\t1\r\n"), b'\t');
+        assert_eq!(of("t x\n  0.5  -1e-3\n"), b' ');
+        assert_eq!(of("0, 1\n"), b',');
         assert_eq!(of("a;b;c"), b';');
         assert_eq!(of(""), b',');
     }
