@@ -8,7 +8,7 @@ use crate::navigation::{self, NavigationArguments};
 use crate::noise::{self, NoiseArguments};
 use bb_estimators::attitude::FilterParams;
 use bb_eval::Evaluator;
-use bb_eval::{Align, Axes, Chosen, Mount, Setting};
+use bb_eval::{Align, Axes, Chosen, Declination, Disturbances, Mount, Origin, RobotFile, Setting};
 use bb_eval::{Field, Offset, Starts, Variants};
 use bb_eval::{MovingTopic, Topics};
 use bb_eval::{files, filters};
@@ -66,7 +66,8 @@ Examples:
   bb eval attitude walk.mcap
   bb eval attitude recordings/ --filter mekf,madgwick --axes 6 --plot errors.svg
   bb eval attitude walk.mcap --filter madgwick --set beta=0.05 --json
-  bb eval attitude walk.mcap --filter mekf,vqf --start random:8 --offset 30uT:4";
+  bb eval attitude walk.mcap --filter mekf,vqf --start random:8 --offset 30uT:4
+  bb eval attitude walk.mcap --filter mekf --robot rover.toml --outage 20s/60s --export walk.csv";
 
 #[derive(Debug, Args)]
 struct AttitudeArguments {
@@ -83,6 +84,10 @@ struct AttitudeArguments {
     /// Sets a parameter, in SI or with a unit, for all chosen filters that have it; FILTER.NAME=VALUE for one filter.
     #[arg(long = "set", value_name = "NAME=VALUE")]
     settings: Vec<Setting>,
+    /// Takes the options of the filter from a settings file, as a robot writes it with `--list`; with `:PATH`, those of the
+    /// estimator at that path. Needs --filter.
+    #[arg(long, value_name = "CONFIG.toml[:PATH]")]
+    robot: Option<RobotFile>,
     /// Only prints the parameters of the chosen filters, with defaults, ranges and units.
     #[arg(long)]
     list: bool,
@@ -123,9 +128,13 @@ struct AttitudeArguments {
     /// Turns the truth, whose world has axes of its own, to the estimates of each filter.
     #[arg(long, value_enum, default_value_t = Align::None)]
     align: Align,
-    /// The angle from true north, to which the truth refers, to magnetic north, in degrees, positive to the east.
-    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, allow_negative_numbers = true)]
-    declination: f64,
+    /// The angle from true north, to which the truth refers, to magnetic north, in degrees, positive to the east; `auto` takes
+    /// that of the World Magnetic Model at the first fix, or at --origin. Default: 0.
+    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
+    declination: Option<Declination>,
+    /// The place for `--declination auto`, in degrees and m above the ellipsoid. Default: that of the first fix.
+    #[arg(long, value_name = "LATITUDE,LONGITUDE,HEIGHT", allow_hyphen_values = true, requires = "declination")]
+    origin: Option<Origin>,
     /// The topic that says whether the body moves, if there are several (std_msgs/Bool); `none` scores the whole recording.
     #[arg(long, value_name = "TOPIC")]
     moving_topic: Option<String>,
@@ -135,6 +144,11 @@ struct AttitudeArguments {
     /// Plots the errors over time to this file, an SVG or a PNG.
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
+    /// Writes the estimates with their covariances beside the truth to this file, a CSV or an MCAP.
+    #[arg(long, value_name = "FILE", value_parser = bb_eval::exportable)]
+    export: Option<PathBuf>,
+    #[command(flatten)]
+    disturbances: Disturbances,
 }
 
 /// The requested work.
@@ -158,6 +172,7 @@ pub(crate) struct Attitude {
     pub(crate) evaluator: Evaluator,
     pub(crate) json: bool,
     pub(crate) plot: Option<PathBuf>,
+    pub(crate) export: Option<PathBuf>,
 }
 
 /// Parses the command line. The error contains the text to print and the exit code, which is 0 for `--help`.
@@ -201,11 +216,21 @@ impl AttitudeArguments {
         {
             return Err(invalid(format!("--start-before-motion is {seconds}, but must be in 0..=1000000 s")));
         }
-        if !(-180.0..=180.0).contains(&self.declination) {
-            return Err(invalid(format!("--declination is {}, but must be in -180..=180 deg", self.declination)));
+        if self.origin.is_some() && self.declination != Some(Declination::Auto) {
+            return Err(invalid("--origin changes nothing without --declination auto".to_owned()));
         }
         if let Some(plot) = &self.plot {
             Picture::check(plot, "--plot").map_err(invalid)?;
+        }
+        if let Some(robot) = &self.robot {
+            if filters.len() > 1 {
+                return Err(invalid("--robot gives the options of one filter; name it with --filter".to_owned()));
+            }
+            for filter in &filters {
+                let mut settings = Setting::of_robot(filter, robot).map_err(invalid)?;
+                settings.append(&mut self.settings);
+                self.settings = settings;
+            }
         }
         let variants = Variants {
             starts: self.start,
@@ -229,14 +254,18 @@ impl AttitudeArguments {
                     Some(name) => MovingTopic::Named(name),
                 },
                 mounts: self.mount,
-                declination: self.declination.to_radians(),
+                declination: self.declination.unwrap_or_default(),
+                origin: self.origin,
             },
             align: self.align,
             before_motion_s: self.start_before_motion,
             variants,
-            keep_errors: self.plot.is_some(),
+            disturbances: self.disturbances,
+            without: Chosen::without_each(&filters, self.axes, &self.settings).map_err(invalid)?,
+            keep_trace: self.plot.is_some() || self.export.is_some(),
         };
-        let attitude = Attitude { paths: self.files, evaluator, json: self.json, plot: self.plot };
+        let (json, plot, export) = (self.json, self.plot, self.export);
+        let attitude = Attitude { paths: self.files, evaluator, json, plot, export };
         Ok(Job::Attitude(Box::new(attitude)))
     }
 

@@ -16,7 +16,7 @@ mod topics;
 mod values;
 
 use arguments::{Attitude, Job};
-use bb_eval::{evaluate_all, files, plot_errors, report};
+use bb_eval::{evaluate_all, export_attitude, files, plot_errors, report};
 use std::ffi::OsString;
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
@@ -54,15 +54,19 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
 
 /// Evaluates attitude filters; returns whether every recording could be evaluated to its end.
 fn eval_attitude(attitude: &Attitude) -> Result<bool, String> {
-    let Attitude { paths, evaluator, json, plot } = attitude;
+    let Attitude { paths, evaluator, json, plot, export } = attitude;
     let files = files::recordings(paths);
     let evaluations = evaluate_all(&files, evaluator);
     let text = if *json { report::json(&evaluations)? } else { report::table(&evaluations, evaluator.axes) };
     say(&text)?;
-    let is_whole = report::complain(&evaluations);
+    let is_whole = report::complain(&evaluations, &evaluator.without);
     if let Some(plot) = plot {
         plot_errors(plot, &evaluations, evaluator.axes)?;
         eprintln!("plotted {}", plot.display());
+    }
+    if let Some(export) = export {
+        let rows = export_attitude(export, &evaluations)?;
+        eprintln!("wrote {rows} estimates to {}", export.display());
     }
     Ok(is_whole)
 }

@@ -3,7 +3,7 @@
 use bb_eval::{
     Align, BagOptions, DataSet, Disturbances, Drawn, Drive, NAVIGATION_FILTERS, NavigationBag, NavigationFilter,
     NavigationRun, NavigationSetting, Played, Progress, RobotFile, RobotSettings, ScoredNavigation, StartFrom,
-    export_navigation, files, navigation_json, navigation_table, play_navigation, plot_navigation,
+    export_navigation, exportable, files, navigation_json, navigation_table, play_navigation, plot_navigation,
 };
 use bb_plot::Picture;
 use clap::Args;
@@ -53,7 +53,7 @@ pub(crate) struct NavigationArguments {
     #[arg(long, value_name = "FILE", value_parser = picture)]
     plot: Option<PathBuf>,
     /// Writes the estimates with their covariances beside the truth to this file, a CSV or an MCAP.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = exportable)]
     export: Option<PathBuf>,
     #[command(flatten)]
     disturbances: Disturbances,

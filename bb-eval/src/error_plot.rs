@@ -16,9 +16,11 @@ const TRUTH_WIDTH: u32 = 7;
 /// Times without samples, and with a field that differs from its median.
 const GAP: Colour = (245, 190, 190);
 const DISTURBED: Colour = (255, 236, 200);
+/// Times without a reading of the field.
+const NO_FIELD: Colour = (225, 225, 240);
 /// A longer time without samples is a gap, s,
 const GAP_S: f64 = 0.2;
-/// and a field is disturbed if its strength is off by this part, for this long, s.
+/// and a field is disturbed if its strength is off by this part, or missing, for this long, s.
 const OFF: f64 = 0.15;
 const OFF_S: f64 = 0.5;
 
@@ -69,12 +71,12 @@ fn panels(evaluation: &Evaluation, all: &[Evaluation]) -> Vec<Panel> {
         };
         let truth = runs.first().map(|run| {
             let points: Vec<Point> =
-                run.orientations.iter().map(|(time_s, _, truth)| (*time_s, truth.as_ref().map(degrees))).collect();
+                run.estimates.iter().map(|of| (of.time_s, of.truth.as_ref().map(degrees))).collect();
             Line::degrees("truth", TRUTH, TRUTH_WIDTH, &points)
         });
         let estimates = runs.iter().enumerate().map(|(index, run)| {
             let points: Vec<Point> =
-                run.orientations.iter().map(|(time_s, turned, _)| (*time_s, Some(degrees(turned)))).collect();
+                run.estimates.iter().map(|of| (of.time_s, Some(degrees(&of.world_from_body)))).collect();
             Line::degrees(run.filter, colour(index), 1, &points)
         });
         panels
@@ -107,7 +109,10 @@ fn bands(evaluation: &Evaluation, runs: &[crate::Run]) -> Vec<Band> {
     }
     disturbed.retain(|(from_s, to_s)| to_s - from_s > OFF_S);
     let times = runs.first().map_or(&[][..], |run| &run.errors);
+    let silences = evaluation.fields.windows(2).map(|pair| (pair[0].0, pair[1].0));
+    let silences = silences.filter(|(from_s, to_s)| to_s - from_s > OFF_S);
     let gaps = times.windows(2).filter(|pair| pair[1].0 - pair[0].0 > GAP_S).map(|pair| (pair[0].0, pair[1].0));
     let disturbed = disturbed.into_iter().map(|times| band("disturbed field", DISTURBED, times));
-    disturbed.chain(gaps.map(|times| band("no IMU", GAP, times))).collect()
+    let silences = silences.map(|times| band("no field", NO_FIELD, times));
+    disturbed.chain(silences).chain(gaps.map(|times| band("no IMU", GAP, times))).collect()
 }

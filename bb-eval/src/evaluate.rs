@@ -2,10 +2,12 @@
 
 mod detail;
 mod doubts;
+mod rejoined;
 
 pub use detail::Detail;
 
-use crate::filters::{Axes, Chosen, Deviations, Refused, Running};
+use crate::disturb::Disturbances;
+use crate::filters::{Axes, Chosen, Deviations, Refused, Running, Without};
 use crate::progress::Progress;
 use crate::recording::{End, Recording, Topics};
 use crate::score::Score;
@@ -13,9 +15,10 @@ use crate::truths::Truths;
 use crate::turns::{Align, Turn, Turns, angles};
 use crate::units::Units;
 use crate::variants::{Variant, Variants, moving_times};
-use bb_core::nalgebra::UnitQuaternion;
+use bb_core::nalgebra::{Matrix3, UnitQuaternion};
 use bb_estimators::attitude::ImuSample;
 use doubts::{take_units, truth_doubt, unit_doubts};
+use rejoined::Rejoined;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -44,10 +47,31 @@ pub struct Evaluator {
     pub before_motion_s: Option<f64>,
     /// Modifications of the recordings.
     pub variants: Variants,
+    /// Messages that the filters do not get, or later.
+    pub disturbances: Disturbances,
+    /// Settings whose effect is to be proven, see [`Evaluation::idle`].
+    pub without: Vec<Without>,
     /// Rotation that is taken from the truth.
     pub align: Align,
-    /// `true` to keep the errors over time.
-    pub keep_errors: bool,
+    /// `true` to keep errors and estimates over time.
+    pub keep_trace: bool,
+}
+
+impl Evaluator {
+    /// Scores these filters on recordings as they are, with topics by their types.
+    pub fn new(filters: Vec<Chosen>, axes: Axes) -> Self {
+        Self {
+            filters,
+            axes,
+            topics: Topics::default(),
+            before_motion_s: None,
+            variants: Variants::default(),
+            disturbances: Disturbances::default(),
+            without: Vec::new(),
+            align: Align::None,
+            keep_trace: false,
+        }
+    }
 }
 
 /// The results of one recording.
@@ -65,6 +89,8 @@ pub struct Evaluation {
     pub broken: Option<String>,
     /// Remarks on the runs.
     pub notes: Vec<String>,
+    /// Settings of [`Evaluator::without`], by their place, without which the filter gives the same.
+    pub idle: Vec<usize>,
     /// The strength of the magnetic field over time, s and T, with the errors.
     pub fields: Vec<(f64, f64)>,
 }
@@ -83,8 +109,25 @@ pub struct Run {
     /// Error over time: seconds since the first sample, and degrees, `None` where the truth is unknown. The total
     /// error with nine axes, otherwise the inclination.
     pub errors: Vec<(f64, Option<f64>)>,
-    /// Orientation over time, with the errors: seconds, the estimate, and the truth where it is known.
-    pub orientations: Vec<(f64, UnitQuaternion<f64>, Option<UnitQuaternion<f64>>)>,
+    /// Estimates over time, with the errors.
+    pub estimates: Vec<Estimate>,
+    /// Errors while `--outage` withheld the field.
+    pub outage: Score,
+}
+
+/// An estimate beside the truth.
+#[derive(Clone, Copy, Debug)]
+pub struct Estimate {
+    /// Stamp of the sample, ns since the Unix epoch.
+    pub time_ns: i64,
+    /// Seconds since the first sample.
+    pub time_s: f64,
+    /// Rotates vectors of the body to the world.
+    pub world_from_body: UnitQuaternion<f64>,
+    /// The covariance of the error as a small rotation about the axes of the world, rad², if the filter reports it.
+    pub covariance: Option<Matrix3<f64>>,
+    /// The truth, where it is known.
+    pub truth: Option<UnitQuaternion<f64>>,
 }
 
 /// Evaluates recordings on all cores, with a progress bar on the terminal, and returns the results in order.
@@ -147,6 +190,7 @@ impl Evaluation {
             runs: Err(fault),
             broken: None,
             notes: Vec::new(),
+            idle: Vec::new(),
             fields: Vec::new(),
         }
     }
@@ -157,6 +201,8 @@ struct Passed {
     recording: Recording,
     units: Units,
     players: Vec<Player>,
+    /// `true` for each of [`Evaluator::without`] that changes something.
+    proven: Vec<bool>,
     played: u64,
     broken: Option<String>,
     fields: Vec<(f64, f64)>,
@@ -191,6 +237,12 @@ fn pass(
     for (player, turn) in players.iter_mut().zip(turns) {
         player.world_from_aligned = turn.map(|turn| turn.rotation.inverse());
     }
+    let mut others = Vec::new();
+    for without in &evaluator.without {
+        others.push(Player::new(&without.filter.on(recording.axes)?)?);
+    }
+    let mut proven = vec![false; others.len()];
+    let mut rejoined = None;
     let mut units = Units::default();
     let mut samples = Vec::with_capacity(BLOCK);
     let mut start_ns = None;
@@ -203,16 +255,30 @@ fn pass(
         variant.apply(&mut samples, &recording.truth);
         if let Some(first) = samples.first() {
             let start_ns = *start_ns.get_or_insert(first.time_ns);
-            if evaluator.keep_errors {
+            rejoined = rejoined.or_else(|| Rejoined::new(&evaluator.disturbances, start_ns));
+        }
+        played += samples.len() as u64;
+        if let Some(rejoined) = &mut rejoined {
+            rejoined.replace(&mut samples, !matches!(end, End::NotYet));
+        }
+        if let Some(start_ns) = start_ns {
+            if evaluator.keep_trace {
                 let field =
                     |sample: &ImuSample| Some((seconds(sample.time_ns, start_ns), sample.magnetic_field?.norm()));
                 fields.extend(samples.iter().filter_map(field));
             }
-            for player in &mut players {
-                player.play(&samples, &recording, start_ns, evaluator.keep_errors);
+            for samples in samples.chunks(ASKED) {
+                for player in &mut players {
+                    player.play(samples, &recording, start_ns, evaluator.keep_trace);
+                    if let Some(rejoined) = &rejoined {
+                        player.play_outage(samples, &recording, |time_ns| rejoined.is_out(time_ns));
+                    }
+                }
+                for ((without, other), is_proven) in evaluator.without.iter().zip(&mut others).zip(&mut proven) {
+                    *is_proven = *is_proven || players[without.index].differs(other, samples);
+                }
             }
         }
-        played += samples.len() as u64;
         show(played * BAR / recording.expected.max(played).max(1));
         match end {
             End::NotYet => {}
@@ -223,7 +289,10 @@ fn pass(
     if played == 0 {
         return Err("no sample of the IMU is left to play".into());
     }
-    Ok(Passed { recording, units, players, played, broken, fields })
+    if let Some(rejoined) = &rejoined {
+        rejoined.check()?;
+    }
+    Ok(Passed { recording, units, players, proven, played, broken, fields })
 }
 
 fn play(file: &Path, index: u32, evaluator: &Evaluator, show: &mut dyn FnMut(u64)) -> Result<Evaluation, String> {
@@ -234,7 +303,8 @@ fn play(file: &Path, index: u32, evaluator: &Evaluator, show: &mut dyn FnMut(u64
             first.players.iter().map(|player| player.of_world.of(align)).collect()
         }
     };
-    let Passed { recording, units, players, played, broken, fields } = pass(file, index, evaluator, &turns, show)?;
+    let Passed { recording, units, players, proven, played, broken, fields } =
+        pass(file, index, evaluator, &turns, show)?;
     let magnetometer = recording.magnetometer_topic.clone().unwrap_or_default();
     let mut notes: Vec<_> = recording.note.iter().chain(&recording.notes).cloned().collect();
     for (player, turn) in players.iter().zip(&turns) {
@@ -254,11 +324,21 @@ fn play(file: &Path, index: u32, evaluator: &Evaluator, show: &mut dyn FnMut(u64
     if index == 0 {
         let doubts = unit_doubts(&recording, &units);
         // If filters were disturbed on purpose, their errors say nothing about the truth.
-        let is_misled = !doubts.is_empty() || evaluator.variants.changes_field();
+        let is_disturbed = evaluator.variants.changes_field() || !evaluator.disturbances.is_none();
+        let is_misled = !doubts.is_empty() || is_disturbed;
         notes.extend(doubts);
         notes.extend(truth_doubt(&recording, &players, evaluator.align).filter(|_| !is_misled));
     }
     notes.extend(players.iter().filter_map(|player| player.refusals(played)));
+    notes.extend(players.iter().filter_map(|player| {
+        let (rms, count) = (player.outage.rms()?, player.outage.count());
+        let error = match recording.axes {
+            Axes::Six => format!("inclination {:.2}", rms.inclination),
+            Axes::Nine => format!("total {:.2}, heading {:.2}", rms.total, rms.heading),
+        };
+        Some(format!("{}: in {count} samples without a field: {error} deg", player.name))
+    }));
+    let idle = (0..proven.len()).filter(|index| !proven[*index]).collect();
     if recording.note.is_none() && players.iter().all(|player| player.score.count() == 0) {
         notes.push(
             "no errors: no sample of the IMU has truth within 0.05 s while the body moves; are both stamped by \
@@ -268,7 +348,7 @@ fn play(file: &Path, index: u32, evaluator: &Evaluator, show: &mut dyn FnMut(u64
     }
     let runs = Ok(players.into_iter().map(|player| player.finish(played)).collect());
     let variant = evaluator.variants.is_changed().then_some(index);
-    Ok(Evaluation { file: file.to_owned(), variant, axes: recording.axes, runs, broken, notes, fields })
+    Ok(Evaluation { file: file.to_owned(), variant, axes: recording.axes, runs, broken, notes, idle, fields })
 }
 
 /// A running filter and its errors.
@@ -287,7 +367,8 @@ struct Player {
     time: Duration,
     estimates: Vec<Option<UnitQuaternion<f64>>>,
     errors: Vec<(f64, Option<f64>)>,
-    orientations: Vec<(f64, UnitQuaternion<f64>, Option<UnitQuaternion<f64>>)>,
+    kept: Vec<Estimate>,
+    outage: Score,
 }
 
 fn seconds(time_ns: i64, start_ns: i64) -> f64 {
@@ -309,41 +390,81 @@ impl Player {
             time: Duration::ZERO,
             estimates: Vec::with_capacity(BLOCK),
             errors: Vec::new(),
-            orientations: Vec::new(),
+            kept: Vec::new(),
+            outage: Score::default(),
         })
     }
 
-    fn play(&mut self, samples: &[ImuSample], recording: &Recording, start_ns: i64, keep_errors: bool) {
-        for samples in samples.chunks(ASKED) {
-            self.play_some(samples, recording, start_ns, keep_errors);
-        }
-    }
-
-    fn play_some(&mut self, samples: &[ImuSample], recording: &Recording, start_ns: i64, keep_errors: bool) {
+    /// Runs the filter on up to [`ASKED`] samples.
+    fn play(&mut self, samples: &[ImuSample], recording: &Recording, start_ns: i64, keep_trace: bool) {
         self.estimates.clear();
-        let started = Instant::now();
-        let refused = self.filter.run(samples, &mut self.estimates);
-        self.time += started.elapsed();
-        self.refused.count += refused.count;
-        self.refused.first = self.refused.first.or(refused.first);
-        if let Some(turn) = self.world_from_aligned {
-            self.estimates.iter_mut().flatten().for_each(|estimate| *estimate = turn * *estimate);
+        // A covariance can be read after a sample only.
+        for samples in samples.chunks(if keep_trace { 1 } else { ASKED }) {
+            self.run(samples);
+            if keep_trace && let Some((sample, Some(estimate))) = samples.last().zip(self.estimates.last().copied())
+            {
+                self.kept.push(Estimate {
+                    time_ns: sample.time_ns,
+                    time_s: seconds(sample.time_ns, start_ns),
+                    world_from_body: estimate,
+                    covariance: self.deviations().map(|deviations| deviations.covariance),
+                    truth: recording.truth.at(sample.time_ns).0,
+                });
+            }
         }
         self.ask(samples, recording);
         for (sample, estimate) in samples.iter().zip(&self.estimates) {
             let Some(estimate) = estimate else { continue };
             let error = self.score.add_at(&recording.truth, sample.time_ns, estimate);
             self.detail.add_error(error.as_ref());
-            if keep_errors {
+            if keep_trace {
                 let angle = error.map(|error| match recording.axes {
                     Axes::Six => error.inclination.to_degrees(),
                     Axes::Nine => error.total.to_degrees(),
                 });
-                let time_s = seconds(sample.time_ns, start_ns);
-                self.errors.push((time_s, angle));
-                self.orientations.push((time_s, *estimate, recording.truth.at(sample.time_ns).0));
+                self.errors.push((seconds(sample.time_ns, start_ns), angle));
             }
         }
+    }
+
+    /// Appends the estimates after samples.
+    fn run(&mut self, samples: &[ImuSample]) {
+        let from = self.estimates.len();
+        let started = Instant::now();
+        let refused = self.filter.run(samples, &mut self.estimates);
+        self.time += started.elapsed();
+        self.refused.count += refused.count;
+        self.refused.first = self.refused.first.or(refused.first);
+        if let Some(turn) = self.world_from_aligned {
+            self.estimates.iter_mut().skip(from).flatten().for_each(|estimate| *estimate = turn * *estimate);
+        }
+    }
+
+    /// Returns what the filter says of its estimate, in the axes of the truth's world.
+    fn deviations(&self) -> Option<Deviations> {
+        let deviations = self.filter.deviations()?;
+        let turn =
+            self.world_from_aligned.unwrap_or_else(UnitQuaternion::identity).to_rotation_matrix().into_inner();
+        Some(Deviations { covariance: turn * deviations.covariance * turn.transpose(), ..deviations })
+    }
+
+    /// Scores the samples that were played last, where the field was withheld.
+    fn play_outage(&mut self, samples: &[ImuSample], recording: &Recording, is_out: impl Fn(i64) -> bool) {
+        for (sample, estimate) in samples.iter().zip(&self.estimates) {
+            if let Some(estimate) = estimate.as_ref().filter(|_| is_out(sample.time_ns)) {
+                let _error = self.outage.add_at(&recording.truth, sample.time_ns, estimate);
+            }
+        }
+    }
+
+    /// Runs another filter on the samples that were played last, and returns whether its estimates are others.
+    fn differs(&self, other: &mut Self, samples: &[ImuSample]) -> bool {
+        other.world_from_aligned = self.world_from_aligned;
+        other.estimates.clear();
+        other.run(samples);
+        other.estimates != self.estimates
+            || other.filter.deviations() != self.filter.deviations()
+            || other.filter.trusts_heading() != self.filter.trusts_heading()
     }
 
     /// Counts whether the heading after the last sample is within two standard deviations, and the truth's convention,
@@ -355,11 +476,7 @@ impl Player {
         self.truths.add(&estimate, &truth);
         self.of_world.add(&(estimate * truth.inverse()));
         self.of_body.add(&(truth.inverse() * estimate));
-        let turn = self.world_from_aligned.unwrap_or_else(UnitQuaternion::identity);
-        let deviations = self.filter.deviations().map(|deviations| {
-            let turn = turn.to_rotation_matrix().into_inner();
-            Deviations { covariance: turn * deviations.covariance * turn.transpose(), ..deviations }
-        });
+        let deviations = self.deviations();
         self.detail.add(sample.time_ns, &estimate, &truth, deviations.as_ref(), self.filter.trusts_heading());
     }
 
@@ -370,7 +487,7 @@ impl Player {
 
     fn finish(self, played: u64) -> Run {
         let ns_per_update = self.time.as_secs_f64() * 1e9 / played as f64;
-        let Self { name, score, detail, errors, orientations, .. } = self;
-        Run { filter: name, score, detail, ns_per_update, errors, orientations }
+        let Self { name, score, detail, errors, kept, outage, .. } = self;
+        Run { filter: name, score, detail, ns_per_update, errors, estimates: kept, outage }
     }
 }

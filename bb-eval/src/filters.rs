@@ -4,7 +4,7 @@ mod list;
 mod settings;
 
 pub use list::{described, listed, parameters};
-pub use settings::{Setting, near};
+pub use settings::{Setting, Without, near};
 
 use bb_core::nalgebra::{Matrix3, UnitQuaternion};
 use bb_estimators::attitude::{self, AttitudeFilter, FilterParams, ImuSample, SampleError};

@@ -10,10 +10,16 @@
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod averages;
+#[cfg(feature = "recordings")]
+mod declination;
+#[cfg(feature = "recordings")]
+mod disturb;
 #[cfg(feature = "plot")]
 mod error_plot;
 #[cfg(feature = "recordings")]
 mod evaluate;
+#[cfg(feature = "plot")]
+mod export;
 #[cfg(feature = "recordings")]
 mod families;
 #[cfg(feature = "recordings")]
@@ -28,6 +34,8 @@ mod progress;
 mod recording;
 #[cfg(feature = "recordings")]
 pub mod report;
+#[cfg(feature = "recordings")]
+mod robot_file;
 mod score;
 #[cfg(feature = "recordings")]
 pub mod table;
@@ -41,30 +49,38 @@ pub mod units;
 mod variants;
 
 pub use averages::Averages;
+#[cfg(feature = "recordings")]
+pub use declination::Declination;
+#[cfg(feature = "recordings")]
+pub use disturb::{Delay, Disturbances, Dropped, Spell};
 #[cfg(feature = "plot")]
 pub use error_plot::plot_errors;
 #[cfg(feature = "recordings")]
-pub use evaluate::{Detail, Evaluation, Evaluator, Run, evaluate, evaluate_all, evaluate_variant};
+pub use evaluate::{Detail, Estimate, Evaluation, Evaluator, Run, evaluate, evaluate_all, evaluate_variant};
+#[cfg(feature = "plot")]
+pub use export::{export_attitude, export_navigation, exportable};
 #[cfg(feature = "recordings")]
 pub use families::{
     FAMILIES, Family, FamilyScore, Half, Measure, Share, families_json, families_list, families_table,
     score_families,
 };
-pub use filters::{Axes, Chosen, Deviations, Refused, Running, Setting};
+pub use filters::{Axes, Chosen, Deviations, Refused, Running, Setting, Without};
 #[cfg(feature = "recordings")]
 pub use frames::{Mount, Place};
 #[cfg(feature = "recordings")]
 pub use navigation::{
-    BagOptions, DataSet, Delay, Disturbances, Drive, Dropped, Fate, InState, Inertial, Keyframe,
-    NAVIGATION_FILTERS, NavigationBag, NavigationFilter, NavigationRun, NavigationScore, NavigationSetting, Noise,
-    OfAge, Origin, Played, RelativeDeviation, RobotFile, RobotSettings, Sample, ScoredNavigation, Spell, Spread,
-    StartFrom, Trace, Truth, Within, Wrong, inertial, navigation_json, navigation_table, play_navigation,
+    BagOptions, DataSet, Drive, Fate, InState, Inertial, Keyframe, NAVIGATION_FILTERS, NavigationBag,
+    NavigationFilter, NavigationRun, NavigationScore, NavigationSetting, Noise, OfAge, Origin, Played,
+    RelativeDeviation, RobotSettings, Sample, ScoredNavigation, Spread, StartFrom, Trace, Truth, Within, Wrong,
+    inertial, navigation_json, navigation_table, play_navigation,
 };
 #[cfg(feature = "plot")]
-pub use navigation::{Drawn, export_navigation, plot_navigation};
+pub use navigation::{Drawn, plot_navigation};
 pub use progress::Progress;
 #[cfg(feature = "recordings")]
 pub use recording::{End, MovingTopic, Recording, Topics};
+#[cfg(feature = "recordings")]
+pub use robot_file::RobotFile;
 pub use score::{Degrees, Score};
 #[cfg(feature = "recordings")]
 pub use turns::{Align, Turn, Turns};

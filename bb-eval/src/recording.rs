@@ -1,14 +1,19 @@
 //! An opened recording: its samples, its truth, and remarks on it.
 
+use crate::declination::Declination;
 use crate::frames::{Frames, Mount, TF_STATIC, frame};
 use bb_core::message::codec::ros::TransformsMessage;
 use bb_core::nalgebra::{Rotation3, UnitQuaternion, Vector3};
+use bb_core::payload::GnssFix;
+use bb_core::time::MonotonicTime;
 use bb_estimators::attitude::ImuSample;
+use bb_estimators::navigation::Geodetic;
 use bb_mcap::{Bag, IMU, MOVING, MargSamples, ODOMETRY, POSE, RecordingError, RecordingErrorKind, Topic, Truth};
 use std::collections::HashMap;
 use std::path::Path;
 
 use crate::filters::Axes;
+use crate::navigation::{FIX, Origin};
 
 /// The topics to use if several in a recording match.
 #[derive(Clone, Debug, Default)]
@@ -23,8 +28,10 @@ pub struct Topics {
     pub moving: MovingTopic,
     /// Places of frames and sensors on the robot, over those of `/tf_static`.
     pub mounts: Vec<Mount>,
-    /// The angle from true north to magnetic north, positive to the east, rad: the truth is turned by it.
-    pub declination: f64,
+    /// The angle from true north, to which the truth refers, to magnetic north: the truth is turned by it.
+    pub declination: Declination,
+    /// The place for the declination. Default: that of the first fix.
+    pub origin: Option<Origin>,
 }
 
 /// The topic that says when the body moves.
@@ -120,8 +127,17 @@ impl Recording {
         // As estimators of a robot turn them, to the last bit.
         let turned =
             |rotation: UnitQuaternion<f64>| (rotation.angle() > 0.0).then(|| rotation.to_rotation_matrix());
-        let declination = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), topics.declination);
-        if base_from_truth.angle() > 0.0 || topics.declination != 0.0 {
+        let declination = match topics.declination {
+            Declination::Known(angle) => angle,
+            Declination::Auto => {
+                let place = topics.origin.map_or_else(|| first_place(&bag), |Origin(place)| Ok(Some(place)))?;
+                let time_ns = samples.next_time().map_or(0, MonotonicTime::as_nanos);
+                topics.declination.at(place, time_ns, &mut notes)?
+            }
+        };
+        let is_declined = declination != 0.0;
+        let declination = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), declination);
+        if base_from_truth.angle() > 0.0 || is_declined {
             truth.turn(&declination, &base_from_truth.inverse());
         }
         let imu_name = match frames.of_topic(&imu.name) {
@@ -228,6 +244,21 @@ fn is_silent(bag: &Bag, topic: &Topic) -> bool {
         Some(count) => count == 0,
         None => bag.messages(&[&topic.name]).is_ok_and(|mut messages| messages.next().is_none()),
     }
+}
+
+/// The place of the first fix, if the recording has one.
+fn first_place(bag: &Bag) -> Result<Option<Geodetic>, String> {
+    let fault = |error: RecordingError| error.kind().to_string();
+    let topics: Vec<_> = bag.topics().iter().filter(|topic| *topic.schema == *FIX).collect();
+    let names: Vec<_> = topics.iter().map(|topic| &topic.name).collect();
+    // Damage is met, and reported, where the samples are read.
+    for message in bag.messages(&names).map_err(fault)?.map_while(Result::ok) {
+        let (fix, _) = message.payload::<GnssFix>().map_err(fault)?;
+        if let Some(place) = Geodetic::of_fix(&fix, 0.0) {
+            return Ok(Some(place));
+        }
+    }
+    Ok(None)
 }
 
 /// The topic of poses, or why there is none. An explicitly named one must exist.

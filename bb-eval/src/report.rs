@@ -2,7 +2,7 @@
 
 use crate::averages::Averages;
 use crate::evaluate::{Evaluation, Run};
-use crate::filters::Axes;
+use crate::filters::{Axes, Without};
 use crate::score::Degrees;
 use crate::table::aligned;
 use serde::Serialize;
@@ -34,6 +34,8 @@ struct Row {
     heading_while_trusted_deg: Option<f64>,
     /// Drift of the heading, with six axes too.
     heading_drift_deg_per_min: Option<f64>,
+    /// The error while the field was withheld by `--outage`: the total one.
+    outage_deg: Option<f64>,
     /// The number of scored samples.
     samples: u64,
     ns_per_update: f64,
@@ -66,6 +68,7 @@ pub fn json(evaluations: &[Evaluation]) -> Result<String, String> {
             heading_trusted: run.detail.trusted.share(),
             heading_while_trusted_deg: run.detail.heading_while_trusted_deg(),
             heading_drift_deg_per_min: run.detail.drift_deg_per_min(),
+            outage_deg: run.outage.rms().map(|rms| rms.total),
             samples: run.score.count(),
             ns_per_update: run.ns_per_update,
         }
@@ -159,8 +162,9 @@ pub fn table(evaluations: &[Evaluation], axes: Axes) -> String {
     text
 }
 
-/// Prints remarks on the runs, then errors, to the error stream; returns whether there were no errors.
-pub fn complain(evaluations: &[Evaluation]) -> bool {
+/// Prints remarks on the runs, then errors, to the error stream; returns whether there were no errors. A setting without which
+/// all recordings give the same is an error.
+pub fn complain(evaluations: &[Evaluation], without: &[Without]) -> bool {
     for evaluation in evaluations {
         for note in &evaluation.notes {
             eprintln!("note: {}: {note}", evaluation.file.display());
@@ -179,7 +183,22 @@ pub fn complain(evaluations: &[Evaluation]) -> bool {
     if bad > 0 && evaluations.len() > 1 {
         eprintln!("error: {bad} of {} recordings could not be evaluated to the end", evaluations.len());
     }
-    bad == 0
+    let scored: Vec<_> = evaluations.iter().filter(|evaluation| evaluation.runs.is_ok()).collect();
+    let is_idle = |place: usize| scored.iter().all(|evaluation| evaluation.idle.contains(&place));
+    let idle: Vec<_> = without.iter().enumerate().filter(|(place, _)| is_idle(*place)).collect();
+    // A setting of several filters is one.
+    let is_all_idle = |setting: &str| {
+        let all = without.iter().filter(|other| other.setting == setting).count();
+        idle.iter().filter(|(_, other)| other.setting == setting).count() == all
+    };
+    let mut named: Vec<&str> = Vec::new();
+    for (_, Without { setting, .. }) in idle.iter().filter(|_| !scored.is_empty()) {
+        if is_all_idle(setting) && !named.contains(&&**setting) {
+            eprintln!("error: {setting} changes nothing on these recordings");
+            named.push(setting);
+        }
+    }
+    bad == 0 && named.is_empty()
 }
 
 /// The fraction of headings within two standard deviations; `None` if no filter reports them.

@@ -100,6 +100,9 @@ pub(crate) fn angles(rotation: &UnitQuaternion<f64>) -> String {
     [roll, pitch, yaw].map(|angle| plain(shown(angle))).join(",")
 }
 
+/// Factor by which an error must shrink without a constant for that constant to explain it.
+pub(crate) const LEFT: f64 = 3.0;
+
 /// Returns the constant rotation that explains a large error of the orientation: one that leaves less than a third of it.
 pub(crate) fn cause(
     rms: f64,
@@ -110,7 +113,6 @@ pub(crate) fn cause(
     align: Align,
 ) -> Option<String> {
     const LARGE: f64 = 15.0;
-    const LEFT: f64 = 3.0;
     if rms.to_degrees() < LARGE {
         return None;
     }

@@ -1,8 +1,6 @@
 //! The Kalman filter on recordings made harder: started in motion, with iron on the body and in the world.
 
-use bb_eval::{
-    Averages, Axes, Chosen, Evaluator, Field, Offset, Progress, Starts, Topics, Variants, evaluate_variant,
-};
+use bb_eval::{Averages, Axes, Chosen, Evaluator, Field, Offset, Progress, Starts, Variants, evaluate_variant};
 use bb_tests::recordings::broad;
 use std::error::Error;
 
@@ -62,13 +60,9 @@ fn hard_recordings_are_no_worse_than_known() -> Result<(), Box<dyn Error>> {
     for Known { name, before_motion_s, variants, total } in known()? {
         let count = variants.count();
         let evaluator = Evaluator {
-            filters: vec![Chosen::named("mekf", Axes::Nine, &[])?],
-            axes: Axes::Nine,
-            topics: Topics::default(),
             before_motion_s,
             variants,
-            align: bb_eval::Align::None,
-            keep_errors: false,
+            ..Evaluator::new(vec![Chosen::named("mekf", Axes::Nine, &[])?], Axes::Nine)
         };
         let mut scores = Vec::new();
         for file in &files {

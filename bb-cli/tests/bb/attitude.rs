@@ -1,6 +1,6 @@
 //! `bb eval attitude` on whole recordings.
 
-use crate::common::{Walk, bb, eval};
+use crate::common::{Walk, bb, eval, file};
 use serde_json::Value;
 
 fn rows(out: &str) -> Vec<Value> {
@@ -31,6 +31,7 @@ fn json_has_these_fields() {
         "max_deg",
         "nees",
         "ns_per_update",
+        "outage_deg",
         "p95_deg",
         "samples",
         "total_deg",
@@ -230,6 +231,136 @@ fn settings_change_the_filter() {
 }
 
 #[test]
+fn a_setting_that_changes_nothing_is_an_error() {
+    let file = Walk { bias: 0.1, ..Walk::default() }.file("idle.mcap");
+    // VQF forgets biases over hours on this recording of three seconds, at rest or not.
+    let idle = ["--filter", "vqf", "--set", "rejection_time=59"];
+    let output = eval(&[&file], &idle);
+    assert_eq!(output.code, Some(1), "{}", output.err);
+    assert!(
+        output.err.contains("error: --set rejection_time=59 changes nothing on these recordings"),
+        "{}",
+        output.err
+    );
+    // The figures are there nonetheless.
+    assert!(output.out.contains("vqf"), "{}", output.out);
+    let of_two = ["--filter", "vqf,complementary", "--set", "heading_time_constant=20"];
+    assert_eq!(eval(&[&file], &of_two).code, Some(0));
+}
+
+/// The options of a robot's settings file are those of `--set`.
+#[test]
+fn a_robot_lends_its_settings() {
+    let walk = Walk { bias: 0.1, ..Walk::default() }.file("lent_walk.mcap");
+    let lent = |text: &str, arguments: &[&str]| {
+        let config = file("lent_attitude.toml", text.as_bytes());
+        eval(&[&walk], &[&["--json", "--robot", config.to_str().expect("is text")], arguments].concat())
+    };
+    let heading = |output: &crate::common::Output| {
+        assert_eq!(output.code, Some(0), "{}", output.err);
+        rows(&output.out)[0]["heading_deg"].clone()
+    };
+    let text = "[sensor.base.imu]\nrate = 3\n[estimator.base.orientation]\nbeta = \"2 rad/s\"\n";
+    let set = eval(&[&walk], &["--json", "--filter", "madgwick", "--set", "beta=2"]);
+    assert_eq!(heading(&lent(text, &["--filter", "madgwick"])), heading(&set));
+    for (text, arguments, fault) in [
+        (text, &[][..], "--robot gives the options of one filter; name it with --filter"),
+        (text, &["--filter", "mahony"], "no estimator in it has an option of this filter"),
+        (
+            "[estimator.o]\nbeta = 2\ngamma = 1\n",
+            &["--filter", "madgwick"],
+            "estimator/o/gamma: this filter has no such option",
+        ),
+    ] {
+        let output = lent(text, arguments);
+        assert!(output.code == Some(2) && output.err.contains(fault), "{}", output.err);
+    }
+    let idle = lent("[estimator.o]\nrejection_time = \"59 s\"\n", &["--filter", "vqf"]);
+    let fault = "lent_attitude.toml: rejection_time changes nothing on these recordings";
+    assert!(idle.code == Some(1) && idle.err.contains(fault), "{}", idle.err);
+}
+
+/// Made harder by an option, where a recording had to be written again.
+#[test]
+fn outages_gaps_and_delays_are_options() {
+    let file = Walk { bias: 0.05, ..Walk::default() }.file("disturbed.mcap");
+    let row = |arguments: &[&str]| {
+        let output = eval(&[&file], &[&["--json", "--filter", "madgwick"], arguments].concat());
+        assert_eq!(output.code, Some(0), "{}", output.err);
+        (rows(&output.out)[0].clone(), output.err)
+    };
+    let number = |row: &Value, name: &str| row[name].as_f64().unwrap_or_else(|| panic!("{name}: {row}"));
+    let (plain, said) = row(&[]);
+    assert!(plain["outage_deg"].is_null() && said.is_empty(), "{said}");
+    // In the last second the gyroscope alone turns the estimate, and its bias is 2.9 deg/s.
+    let (outage, said) = row(&["--outage", "1s/2990ms"]);
+    assert!(number(&outage, "heading_deg") > number(&plain, "heading_deg") + 0.5, "{outage}");
+    assert!(number(&outage, "outage_deg") > number(&outage, "total_deg"), "{outage}");
+    assert!(said.contains("madgwick: in 100 samples without a field: total "), "{said}");
+    let (every, _) = row(&["--every", "4"]);
+    assert!(number(&every, "heading_deg") > number(&plain, "heading_deg"), "{every}");
+    let (gaps, _) = row(&["--drop", "imu=200ms/1s"]);
+    assert_eq!((plain["samples"].as_u64(), gaps["samples"].as_u64()), (Some(199), Some(159)));
+    // It turns by 0.5 rad/s: stamps 100 ms later are off by 2.9 deg.
+    let (late, _) = row(&["--delay", "imu=100ms", "--delay", "magnetic_field=100ms"]);
+    let heading = number(&late, "heading_deg") - number(&plain, "heading_deg");
+    assert!((heading - 2.86).abs() < 0.3, "{heading}");
+    let (late, _) = row(&["--delay", "magnetic_field=200ms"]);
+    assert!(number(&late, "heading_deg") > number(&plain, "heading_deg"), "{late}");
+    for (arguments, fault) in [
+        (["--outage", "30s/90s"], "--outage changes nothing: no message of `magnetic_field` falls in it"),
+        (["--drop", "gnss=1s/2s"], "--drop changes nothing: no message of `gnss` falls in it"),
+        (["--delay", "gnss=1s"], "--delay changes nothing: there is no message of `gnss` to delay"),
+    ] {
+        let output = eval(&[&file], &arguments);
+        assert!(output.code == Some(1) && output.err.contains(fault), "{}", output.err);
+    }
+    let six = eval(&[&file], &["--axes", "6", "--outage", "1s/2s"]);
+    assert!(six.code == Some(1) && six.err.contains("--outage changes nothing"), "{}", six.err);
+}
+
+/// Each estimate with its covariance beside the truth, as a CSV and as a bag.
+#[test]
+fn estimates_are_exported() {
+    let walk = Walk { error: 0.1, lost: 150..200, ..Walk::default() }.file("exported.mcap");
+    let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR"));
+    let export = |name: &str, filter: &str| {
+        let to = folder.join(name);
+        let arguments = ["--json", "--filter", filter, "--export", to.to_str().expect("is text")];
+        let output = eval(&[&walk], &arguments);
+        assert_eq!(output.code, Some(0), "{}", output.err);
+        (to, rows(&output.out))
+    };
+    let (csv, scored) = export("attitude.csv", "mekf,madgwick");
+    let text = std::fs::read_to_string(csv).expect("was written");
+    let mut lines = text.lines();
+    let head = "run,t_s,qw,qx,qy,qz,true_qw,true_qx,true_qy,true_qz,p00,p01,p02,p11,p12,p22";
+    assert_eq!(lines.next(), Some(head));
+    let lines: Vec<_> = lines.filter(|line| line.starts_with("\"exported, mekf\"")).collect();
+    assert_eq!((lines.len(), text.lines().count()), (300, 601));
+    let cells: Vec<Vec<f64>> = lines
+        .iter()
+        .map(|line| line.rsplit("\",").next().expect("has cells").split(','))
+        .map(|cells| cells.map(|cell| cell.parse().expect("is a number")).collect())
+        .collect();
+    assert_eq!(cells.iter().filter(|cells| cells[5].is_nan()).count(), 50, "the truth was lost");
+    // The rows give the figure of the table.
+    let turned =
+        |cells: &[f64]| 2.0 * cells[..4].iter().zip(&cells[4..8]).map(|(a, b)| a * b).sum::<f64>().abs().acos();
+    let errors: Vec<f64> =
+        cells[101..].iter().map(|cells| turned(&cells[1..])).filter(|error| !error.is_nan()).collect();
+    let rms = (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt().to_degrees();
+    assert!((rms - scored[0]["total_deg"].as_f64().expect("is scored")).abs() < 1e-6, "{rms}");
+    assert!(cells.iter().all(|cells| cells[9] > 0.0 && cells[12] > 0.0 && cells[14] > 0.0), "variances");
+
+    let (bag, _) = export("attitude_export.mcap", "mekf");
+    let info = bb(&["info", bag.to_str().expect("is text")]);
+    for line in ["/estimate  geometry_msgs/msg/QuaternionStamped", "/truth     geometry_msgs/msg/PoseStamped"] {
+        assert!(info.out.contains(line), "{}", info.out);
+    }
+}
+
+#[test]
 fn a_wrong_use_has_exit_code_2_and_a_way_out() {
     let file = Walk::default().file("use.mcap");
     let missing = std::path::Path::new("no/such/folder/plot.svg").display().to_string();
@@ -242,6 +373,9 @@ fn a_wrong_use_has_exit_code_2_and_a_way_out() {
         (&["--set", "madgwick.beta=-1"], "choose a value from 0 to 1000 rad/s"),
         (&["--plot", "errors.pdf"], "call the file errors.svg or .png"),
         (&["--plot", &missing], "there is no folder no/such/folder"),
+        (&["--export", "walk.txt"], "write to a file that ends in .csv or .mcap"),
+        (&["--declination", "east"], "write degrees in -180..=180, or auto"),
+        (&["--declination", "4", "--origin", "48,11,500"], "--origin changes nothing without --declination auto"),
         (&["--jsom"], "--json"),
     ] {
         let output = eval(&[&file], arguments);

@@ -455,6 +455,13 @@ fn an_imu_at_90_degrees_is_found_and_mounted() {
     assert!((heading(&undeclined) - DECLINATION_DEG).abs() < 1.0);
     let aligned = heading(&[&undeclined[..], &["--align", "heading"]].concat());
     assert!(aligned < 2.0, "{aligned}");
+    // The model knows it from the place and the date.
+    let auto = [&undeclined[..], &["--declination", "auto"]].concat();
+    assert!((heading(&auto) - right).abs() < 0.5, "{}", heading(&auto));
+    let said = bb(&auto).err;
+    assert!(said.contains("of the World Magnetic Model at 48.100,11.500 on 2023-11-14"), "{said}");
+    let elsewhere = [&auto[..], &["--origin", "64,-22,0"]].concat();
+    assert!(heading(&elsewhere) > 10.0, "Iceland has 11 degrees to the west");
     let told = cart("cart_told.mcap", true);
     let told: Vec<&str> =
         attitude.iter().map(|word| if *word == file { told.to_str().expect("is text") } else { word }).collect();

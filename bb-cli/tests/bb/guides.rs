@@ -24,6 +24,15 @@ fn scratch(name: &str) -> PathBuf {
         folder.join("poses.mcap"),
     )
     .expect("copies");
+    std::fs::copy(crate::cart::cart(&format!("guide_cart_{name}.mcap"), true), folder.join("own.mcap"))
+        .expect("copies");
+    std::fs::write(folder.join("oxts.txt"), oxts()).expect("writes");
+    std::fs::create_dir_all(folder.join("Nexus5_AR")).expect("makes");
+    for (name, text) in smartphone() {
+        std::fs::write(folder.join(name), text).expect("writes");
+    }
+    let log = rest(|index| format!("0.119,0.027,1.013,-0.671,3.082,0.198,{}", 261_906 + 10 * index));
+    std::fs::write(folder.join("imu_1934.csv"), log).expect("writes");
     let (imu, truth) = euroc();
     for (name, text) in [("imu0/data.csv", imu), ("state_groundtruth_estimate0/data.csv", truth)] {
         let file = folder.join("mav0").join(name);
@@ -74,6 +83,30 @@ fn euroc() -> (String, String) {
     let imu = head.to_owned() + &rest(|index| format!("{},0,0,0,0,0,9.81", time(index)));
     let head = "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z []\n";
     (imu, head.to_owned() + &rest(|index| format!("{},4.6,-1.8,0.8,1,0,0,0", time(index))))
+}
+
+/// Two seconds of KITTI's inertial system, a line from each of its files: latitude, longitude, height, three angles, five velocities, three
+/// accelerations twice, three angular velocities twice, and six of accuracy and state.
+fn oxts() -> String {
+    rest(|_| {
+        let (place, angles) =
+            ("49.015003823272 8.4342971002335 116.43032836914", "0.035447 0.00966 -0.7202638980385");
+        let (velocities, force) = ("0 0 9 0 0", "0.1 0.2 9.81 0.1 0.2 9.8");
+        format!("{place} {angles} {velocities} {force} 0 0 0.01 0 0 0.01 0.05 0.01 4 11 4 4 0")
+    })
+}
+
+/// The files of a smartphone, with spaces: time and axes.
+fn smartphone() -> [(&'static str, String); 3] {
+    let of = |columns: &'static str| rest(|index| format!("{:.9} {columns}", 0.417_457_403 + index as f64 * 0.005));
+    [
+        (
+            "Nexus5_AR/gyroscope.txt",
+            of("0.04737854 -0.07136536 6.2561035E-4 0.013793947 -0.0052337646 0.070999146"),
+        ),
+        ("Nexus5_AR/accelerometer.txt", of("0.1 0.2 9.81")),
+        ("Nexus5_AR/magnetometer.txt", of("0.1 20.0 -43.0")),
+    ]
 }
 
 /// Twelve seconds at 100 Hz, with a pause: turns about x, in deg/s, g and µT.

@@ -3,6 +3,8 @@
 use super::{Axes, Chosen, MAGNETOMETER};
 use bb_estimators::attitude::FilterParams;
 use bb_estimators::params::{Params, SetError, nearest};
+use std::fmt;
+use std::path::PathBuf;
 use std::str::FromStr;
 
 /// A parameter and its value: of one filter, or of all that have it.
@@ -11,6 +13,30 @@ pub struct Setting {
     filter: Option<String>,
     name: String,
     value: String,
+    /// The file that it is from.
+    file: Option<PathBuf>,
+}
+
+impl fmt::Display for Setting {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { filter, name, value, file } = self;
+        match (file, filter) {
+            (Some(file), _) => write!(f, "{}: {name}", file.display()),
+            (None, Some(filter)) => write!(f, "--set {filter}.{name}={value}"),
+            (None, None) => write!(f, "--set {name}={value}"),
+        }
+    }
+}
+
+/// A filter without one of its settings, to prove that the setting has an effect.
+#[derive(Clone, Debug)]
+pub struct Without {
+    /// The place of the filter among those chosen.
+    pub index: usize,
+    /// The setting in words.
+    pub setting: String,
+    /// The filter without it.
+    pub filter: Chosen,
 }
 
 impl FromStr for Setting {
@@ -23,7 +49,24 @@ impl FromStr for Setting {
             Some((filter, name)) => (Some(filter.trim().to_owned()), name),
             None => (None, path),
         };
-        Ok(Self { filter, name: name.trim().to_owned(), value: value.trim().to_owned() })
+        Ok(Self { filter, name: name.trim().to_owned(), value: value.trim().to_owned(), file: None })
+    }
+}
+
+#[cfg(feature = "recordings")]
+impl Setting {
+    /// Reads the options of a filter from the settings file of a robot.
+    ///
+    /// # Errors
+    /// The file cannot be read, or has no estimator, several, or an option that the filter does not have.
+    pub fn of_robot(filter: &FilterParams, robot: &crate::RobotFile) -> Result<Vec<Self>, String> {
+        let known: Vec<_> = filter.parameters().iter().map(|row| row.name).collect();
+        let read = robot.read(&known)?.into_iter();
+        let of = |(name, value)| {
+            let file = Some(robot.file().to_owned());
+            Self { filter: Some(filter.name().to_owned()), name, value, file }
+        };
+        Ok(read.map(of).collect())
     }
 }
 
@@ -50,6 +93,29 @@ impl Chosen {
         chosen.collect()
     }
 
+    /// The filters of [`all`](Self::all) without each of their settings in turn, but for settings that are the default.
+    ///
+    /// # Errors
+    /// As [`all`](Self::all).
+    pub fn without_each(
+        filters: &[FilterParams],
+        axes: Axes,
+        settings: &[Setting],
+    ) -> Result<Vec<Without>, String> {
+        let whole = Self::all(filters, axes, settings)?;
+        let mut all = Vec::new();
+        for (place, setting) in settings.iter().enumerate() {
+            let others: Vec<_> = settings.iter().enumerate().filter(|(other, _)| *other != place).collect();
+            let others: Vec<_> = others.into_iter().map(|(_, setting)| setting.clone()).collect();
+            for (index, filter) in Self::all(filters, axes, &others)?.into_iter().enumerate() {
+                if whole.get(index) != Some(&filter) {
+                    all.push(Without { index, setting: setting.to_string(), filter });
+                }
+            }
+        }
+        Ok(all)
+    }
+
     /// The filter of this name with these settings.
     ///
     /// # Errors
@@ -68,8 +134,8 @@ impl Setting {
     }
 
     fn check(&self, filters: &[FilterParams]) -> Result<(), String> {
-        let Self { filter, name, value } = self;
-        if name == MAGNETOMETER && matches!(value.as_str(), "true" | "false" | "none") {
+        let Self { filter, name, value, file } = self;
+        if file.is_none() && name == MAGNETOMETER && matches!(value.as_str(), "true" | "false" | "none") {
             return Err("--set magnetometer does not choose the axes; choose --axes six or nine".into());
         }
         if filters.iter().any(|filter| self.is_of(filter)) {

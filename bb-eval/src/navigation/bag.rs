@@ -10,12 +10,16 @@ mod truth;
 pub use options::{BagOptions, Origin, RelativeDeviation, StartFrom};
 
 use super::drive::RecordedTruth;
+pub(crate) use topics::FIX;
 pub(crate) use truth::TrueTrack;
 
 use super::drive::Drive;
+use super::feed::{Message, What};
+use crate::disturb::IMU;
 use crate::frames::Frames;
 use crate::progress::Progress;
 use bb_core::nalgebra::Isometry3;
+use bb_estimators::navigation::Geodetic;
 
 use bb_mcap::Bag;
 use messages::Messages;
@@ -76,6 +80,7 @@ impl NavigationBag {
         let mut notes = self.notes.clone();
         let feed = self.feed(&mut notes)?;
         let truth = self.truth(&mut notes)?;
+        let declination = self.declination(&mut notes.notes)?;
         let Notes { notes, doubts } = notes;
         // The name of the IMU as `--mount` takes it.
         let imu = match self.frames.of_topic(&self.topics.imu) {
@@ -83,7 +88,30 @@ impl NavigationBag {
             frame => frame.to_owned(),
         };
         let origin = self.options.origin.map(|origin| origin.0);
-        Ok(Drive { feed, truth, notes, doubts, origin, imu, gnss: self.topics.gnss.clone(), noise: None })
+        Ok(Drive {
+            feed,
+            truth,
+            notes,
+            doubts,
+            origin,
+            imu,
+            gnss: self.topics.gnss.clone(),
+            noise: None,
+            declination,
+        })
+    }
+
+    /// The declination that is given, or that of the first fix, rad.
+    fn declination(&self, notes: &mut Vec<String>) -> Result<Option<f64>, String> {
+        let Some(declination) = self.options.declination else { return Ok(None) };
+        let place = |message: &Message| match &message.what {
+            What::Gnss(fix) => Geodetic::of_fix(fix, 0.0),
+            _ => None,
+        };
+        let origin = self.options.origin.map(|origin| origin.0);
+        let place = origin.or_else(|| self.messages.inputs.iter().find_map(place));
+        let time_ns = self.messages.stamps(IMU).next().unwrap_or(0);
+        declination.at(place, time_ns, notes).map(Some)
     }
 
     fn truth(&self, notes: &mut Notes) -> Result<RecordedTruth, String> {

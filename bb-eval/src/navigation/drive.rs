@@ -26,6 +26,8 @@ pub struct Drive {
     pub(crate) gnss: Option<String>,
     /// The IMU's noise according to the recording; `None` if unknown.
     pub(crate) noise: Option<Noise>,
+    /// Magnetic declination that is given for the recording, rad.
+    pub(crate) declination: Option<f64>,
 }
 
 /// The truth of a recording.
@@ -159,6 +161,7 @@ impl DataSet {
             imu: "imu".to_owned(),
             gnss: None,
             noise: self.noise,
+            declination: None,
         }
     }
 

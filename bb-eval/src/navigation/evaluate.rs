@@ -1,6 +1,5 @@
 //! Runs a filter in its robot on a bag, and scores what it publishes.
 
-use super::disturb::Disturbances;
 use super::doubt::{distrusted, is_most};
 use super::drive::{Drive, RecordedTruth};
 use super::record::{Estimate, Record};
@@ -8,6 +7,7 @@ use super::robot::{self, NavigationFilter, RobotSettings};
 use super::score::NavigationScore;
 use super::scoring::Scoring;
 use super::trace::Trace;
+use crate::disturb::Disturbances;
 use crate::turns::Align;
 use bb_core::nalgebra::Isometry3;
 
@@ -48,11 +48,14 @@ pub fn play_navigation(
     run: &NavigationRun,
     mut progress: impl FnMut(),
 ) -> Result<Played, String> {
-    let Drive { mut feed, mut truth, mut notes, mut doubts, origin, imu, gnss, noise } = drive.clone();
-    let settings = run.settings.over(noise.as_ref());
-    let withheld = run.disturbances.apply(&mut feed)?;
-    if !withheld.fixes.is_empty() && (truth.topic.is_err() || truth.topic.as_ref().ok() == gnss.as_ref()) {
-        truth = RecordedTruth::of_fixes(&withheld.fixes, feed.mounts[1].unwrap_or_else(Isometry3::identity));
+    let Drive { mut feed, mut truth, mut notes, mut doubts, origin, imu, gnss, noise, declination } = drive.clone();
+    let settings = run.settings.over(noise.as_ref(), declination);
+    if declination.is_some() && !filter.has("declination") {
+        doubts.push(format!("--declination changes nothing: {} uses no magnetometer", filter.name));
+    }
+    let withheld = feed.disturb(&run.disturbances)?;
+    if !withheld.is_empty() && (truth.topic.is_err() || truth.topic.as_ref().ok() == gnss.as_ref()) {
+        truth = RecordedTruth::of_fixes(&withheld, feed.mounts[1].unwrap_or_else(Isometry3::identity));
         notes.push("the fixes that the filter does not get are the truth".to_owned());
     }
     let record = robot::run(filter, &feed, &settings, &mut progress)?;
@@ -70,6 +73,7 @@ pub fn play_navigation(
     let mut scored = scoring.all(&mut notes);
     notes.extend(scoring.aligned(&mut scored, run.align));
     notes.extend(scoring.explained(&imu, &scored, run.align));
+    notes.extend(scoring.displaced(&scored, run.align, origin.is_some()));
     let score = scoring.score(&scored);
     let trace = run.keep_trace.then(|| scoring.trace(&scored));
     Ok(Played { score, notes, doubts, trace })

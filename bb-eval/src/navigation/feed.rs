@@ -4,8 +4,8 @@ use bb_core::nalgebra::Isometry3;
 use bb_core::payload::{GnssFix, Imu, MagneticField, Odometry, Pose, RelativePose};
 use bb_estimators::navigation::LocalFrame;
 
-/// Nanoseconds since the Unix epoch.
-pub(crate) type Time = i64;
+use crate::disturb::{Disturbances, GNSS, IMU, MAGNETIC_FIELD};
+pub(crate) use crate::disturb::{INPUTS, Time};
 
 /// A message to an input of a filter.
 #[derive(Clone, Debug)]
@@ -19,19 +19,16 @@ pub(crate) enum What {
     Start(Odometry),
 }
 
-/// The inputs by name, as filters declare them.
-pub(crate) const INPUTS: [&str; 7] = ["imu", "gnss", "odometry", "pose", "relative", "magnetic_field", "start"];
-
 impl What {
     /// The number of its input among [`INPUTS`].
     pub(crate) fn input(&self) -> usize {
         match self {
-            Self::Imu(_) => 0,
-            Self::Gnss(_) => 1,
+            Self::Imu(_) => IMU,
+            Self::Gnss(_) => GNSS,
             Self::Odometry(_) => 2,
             Self::Pose(_) => 3,
             Self::Relative(_) => 4,
-            Self::MagneticField(_) => 5,
+            Self::MagneticField(_) => MAGNETIC_FIELD,
             Self::Start(_) => 6,
         }
     }
@@ -67,5 +64,30 @@ impl Feed {
     /// Returns the first of all times, ns.
     pub(crate) fn first_ns(&self) -> Option<Time> {
         self.messages.iter().map(|message| message.stamp_ns.min(message.arrival_ns)).min()
+    }
+
+    /// Makes it harder. Returns the fixes that the filter does not get, with their own stamps.
+    ///
+    /// # Errors
+    /// An option changes nothing; names it.
+    pub(crate) fn disturb(&mut self, disturbances: &Disturbances) -> Result<Vec<(Time, GnssFix)>, String> {
+        let first_ns = self.messages.iter().map(|message| message.stamp_ns).min().unwrap_or(0);
+        let mut disturber = disturbances.of(GNSS, first_ns);
+        let mut withheld = Vec::new();
+        self.messages.retain_mut(|message| {
+            let input = message.what.input();
+            let is_kept = disturber.keeps(input, message.stamp_ns);
+            match &message.what {
+                What::Gnss(fix) if !is_kept => withheld.push((message.stamp_ns, *fix)),
+                _ => {}
+            }
+            let delay_ns = if is_kept { disturber.delay_ns(input) } else { 0 };
+            message.stamp_ns += delay_ns;
+            message.arrival_ns += delay_ns;
+            is_kept
+        });
+        disturber.check()?;
+        self.sort();
+        Ok(withheld)
     }
 }

@@ -4,7 +4,7 @@
 mod configuration;
 mod mounted;
 
-pub use configuration::{NAVIGATION_FILTERS, NavigationFilter, NavigationSetting, RobotFile, RobotSettings};
+pub use configuration::{NAVIGATION_FILTERS, NavigationFilter, NavigationSetting, RobotSettings};
 
 use super::feed::{Feed, INPUTS, Time, What};
 use super::record::{Estimate, Record, Verdict};

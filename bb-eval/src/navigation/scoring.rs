@@ -8,7 +8,7 @@ use super::feed::{Feed, Time, What};
 use super::record::{Estimate, Record};
 use super::score::{NavigationScore, Scored, Scores};
 use super::trace::{Innovation, Row, Sensor, State, Trace};
-use crate::turns::{Align, Turn, Turns, angles, cause};
+use crate::turns::{Align, LEFT, Turn, Turns, angles, cause};
 use bb_core::nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector3};
 use bb_estimators::navigation::{Geodetic, GnssPosition, LocalFrame};
 
@@ -34,6 +34,9 @@ pub(crate) struct Instant {
     pub(crate) errors: Option<Errors>,
     pub(crate) is_scored: bool,
 }
+
+/// Deviations that the filter claims, of which an offset of the truth's world is more.
+const CLAIMS: f64 = 2.0;
 
 pub(super) struct Scoring<'a> {
     feed: &'a Feed,
@@ -178,13 +181,8 @@ impl<'a> Scoring<'a> {
         let (turn, how) = turn_of(instants, align)?;
         let scored = || instants.iter().filter(|instant| instant.is_scored);
         let count = scored().count().max(1) as f64;
-        let moved = |instant: &Instant| {
-            let arm = if instant.truth.world_from_body.is_some() { Vector3::zeros() } else { self.antenna };
-            instant.known.map_or_else(Vector3::zeros, |known| {
-                known.position + known.world_from_body * arm - turn.rotation * instant.truth.position
-            })
-        };
-        let shift = scored().map(moved).sum::<Vector3<f64>>() / count;
+        let shift =
+            scored().filter_map(|instant| self.moved(instant, &turn.rotation)).sum::<Vector3<f64>>() / count;
         for instant in instants.iter_mut() {
             let Truth { position, world_from_body, velocity } = instant.truth;
             instant.truth = Truth {
@@ -203,6 +201,40 @@ impl<'a> Scoring<'a> {
             shift.y,
             shift.z
         ))
+    }
+
+    /// Way from the true position, turned, to the estimate, m.
+    fn moved(&self, instant: &Instant, turn: &UnitQuaternion<f64>) -> Option<Vector3<f64>> {
+        let arm = if instant.truth.world_from_body.is_some() { Vector3::zeros() } else { self.antenna };
+        let known = instant.known?;
+        Some(known.position + known.world_from_body * arm - turn * instant.truth.position)
+    }
+
+    /// A place of the truth's world that is not that of the filter's, if it was found to explain the error.
+    pub(super) fn displaced(&self, instants: &[Instant], align: Align, has_origin: bool) -> Option<String> {
+        // A world that does not begin at a fix is given.
+        if align != Align::None || has_origin || self.world.is_none() || self.truth.is_on_earth() {
+            return None;
+        }
+        let scored = || instants.iter().filter(|instant| instant.is_scored);
+        let moved: Vec<Vector3<f64>> =
+            scored().filter_map(|instant| self.moved(instant, &UnitQuaternion::identity())).collect();
+        let mean = moved.iter().sum::<Vector3<f64>>() / moved.len().max(1) as f64;
+        let rms = |of: &Vector3<f64>| {
+            let squares = moved.iter().map(|moved| (moved - of).norm_squared()).sum::<f64>();
+            (squares / moved.len().max(1) as f64).sqrt()
+        };
+        let (all, left) = (rms(&Vector3::zeros()), rms(&mean));
+        let claimed =
+            scored().filter_map(|instant| Some(instant.known?.covariance.fixed_view::<3, 3>(0, 0).trace()));
+        // What the filter says of its own error is no other world.
+        let claimed = claimed.sum::<f64>() / moved.len().max(1) as f64;
+        (LEFT * left < all && mean.norm_squared() > CLAIMS * CLAIMS * claimed).then(|| {
+            format!(
+                "the world of the truth begins elsewhere than that of the filter, at its first fix: {left:.2} m of {all:.2} m are \
+                 left without a constant offset; say where it begins with --origin, or use --align heading"
+            )
+        })
     }
 
     /// A cause of a large error, if it was found to explain it.

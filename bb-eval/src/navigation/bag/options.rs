@@ -1,5 +1,6 @@
 //! Options of a bag: the roles of its topics, and the facts that it does not hold.
 
+use crate::declination::Declination;
 use crate::frames::{Mount, numbers};
 use crate::navigation::data::DEVIATIONS;
 use bb_estimators::navigation::Geodetic;
@@ -31,6 +32,13 @@ pub struct BagOptions {
     /// The topic of a magnetometer whose heading `eskf` uses (sensor_msgs/MagneticField). Default: none.
     #[cfg_attr(feature = "clap", arg(long, value_name = "TOPIC"))]
     pub mag_topic: Option<String>,
+    /// The angle from true north to magnetic north, in degrees, positive to the east, in place of the option `declination` of
+    /// `eskf`; `auto` takes that of the World Magnetic Model at the first fix, or at --origin.
+    #[cfg_attr(
+        feature = "clap",
+        arg(long, value_name = "DEGREES", allow_negative_numbers = true, requires = "mag_topic")
+    )]
+    pub declination: Option<Declination>,
     /// Start of the filters: `own` (as in a robot: from rest, or from the course), `truth`, or the topic of a pose
     /// (geometry_msgs/PoseWithCovarianceStamped, nav_msgs/Odometry). Default: /initialpose if there is one, or `own`.
     #[cfg_attr(feature = "clap", arg(long, value_name = "FROM"))]

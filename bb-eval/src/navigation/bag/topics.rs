@@ -5,7 +5,7 @@ use crate::frames::{POSE_WITH_COVARIANCE, TF_STATIC, TRANSFORM};
 use crate::recording::said;
 use bb_mcap::{Bag, IMU, MAGNETIC_FIELD, ODOMETRY, POSE, RecordingErrorKind, Topic};
 
-const FIX: &str = "sensor_msgs/msg/NavSatFix";
+pub(crate) const FIX: &str = "sensor_msgs/msg/NavSatFix";
 const TRANSFORMS: &str = "tf2_msgs/msg/TFMessage";
 
 /// The topic on which ROS tools publish a robot's initial pose.

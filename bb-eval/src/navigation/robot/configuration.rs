@@ -2,6 +2,7 @@
 
 use crate::filters::near;
 use crate::navigation::data::Noise;
+use crate::robot_file::RobotFile;
 use bb_core::prelude::Options;
 use bb_core::{Builder, Robot};
 use bb_estimators::navigation::NavigationOptions;
@@ -69,6 +70,11 @@ impl NavigationFilter {
         fields.iter().map(|field| field.name).collect()
     }
 
+    /// Returns whether it has an option.
+    pub(crate) fn has(&self, option: &str) -> bool {
+        self.names().contains(&option)
+    }
+
     /// The settings of its robot, as far as they can be applied.
     fn listed(&self, settings: &RobotSettings) -> String {
         fn listed<R: Robot>(mut builder: Builder<R>, settings: &RobotSettings, names: &[&str]) -> String {
@@ -126,28 +132,8 @@ impl fmt::Display for NavigationSetting {
 pub struct RobotSettings {
     settings: Vec<NavigationSetting>,
     noise_times: Option<f64>,
-    /// Noise of a recording's IMU, by the names of the options.
-    imu_noise: Vec<(&'static str, f64)>,
-}
-
-/// `CONFIG.toml`, or `CONFIG.toml:estimator/base/navigation`.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct RobotFile {
-    file: PathBuf,
-    path: Option<String>,
-}
-
-impl FromStr for RobotFile {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        Ok(match text.rsplit_once(':') {
-            Some((file, path)) if path.starts_with("estimator") || path.starts_with("sensor") => {
-                Self { file: file.into(), path: Some(path.replace('.', "/")) }
-            }
-            _ => Self { file: text.into(), path: None },
-        })
-    }
+    /// Options that a recording gives by its IMU and its place, by name.
+    recorded: Vec<(&'static str, f64)>,
 }
 
 /// The options that are noise of the IMU.
@@ -165,16 +151,28 @@ impl RobotSettings {
         settings: &[NavigationSetting],
         noise_times: Option<f64>,
     ) -> Result<Self, String> {
-        let mut all = file.map_or_else(|| Ok(Vec::new()), |file| file.read(&filter.names()))?;
+        let mut all = Vec::new();
+        if let Some(file) = file {
+            let read = file.read(&filter.names())?.into_iter();
+            all.extend(read.map(|(name, value)| NavigationSetting {
+                name,
+                value,
+                file: Some(file.file().to_owned()),
+            }));
+        }
         all.extend_from_slice(settings);
-        Ok(Self { settings: all, noise_times, imu_noise: Vec::new() })
+        Ok(Self { settings: all, noise_times, recorded: Vec::new() })
     }
 
     /// Sets the options of the filter of a robot.
     pub(super) fn apply<R: Robot>(&self, builder: &mut Builder<R>, known: &[&str]) -> Result<(), String> {
-        for (name, value) in &self.imu_noise {
+        for (name, value) in &self.recorded {
             // Not every filter has them all.
-            let unit = if *name == "gravity" { " m/s^2" } else { "" };
+            let unit = match *name {
+                "gravity" => " m/s^2",
+                "declination" => " rad",
+                _ => "",
+            };
             if known.contains(name) {
                 set(builder, name, &format!("{value:e}{unit}"))?;
             }
@@ -203,17 +201,20 @@ impl RobotSettings {
         Ok(())
     }
 
-    /// Returns these options, with the noise of a recording's IMU where they give none.
-    pub(crate) fn over(&self, noise: Option<&Noise>) -> Self {
-        let Some(noise) = noise else { return self.clone() };
-        let imu_noise = [
-            ("gyroscope_noise", noise.gyroscope),
-            ("accelerometer_noise", noise.accelerometer),
-            ("gyroscope_bias_walk", noise.gyroscope_bias),
-            ("accelerometer_bias_walk", noise.accelerometer_bias),
-            ("gravity", noise.gravity),
-        ];
-        Self { imu_noise: imu_noise.to_vec(), ..self.clone() }
+    /// Returns these options, with the noise of a recording's IMU and its declination (rad) where they give none.
+    pub(crate) fn over(&self, noise: Option<&Noise>, declination: Option<f64>) -> Self {
+        let of_imu = |noise: &Noise| {
+            [
+                ("gyroscope_noise", noise.gyroscope),
+                ("accelerometer_noise", noise.accelerometer),
+                ("gyroscope_bias_walk", noise.gyroscope_bias),
+                ("accelerometer_bias_walk", noise.accelerometer_bias),
+                ("gravity", noise.gravity),
+            ]
+        };
+        let recorded = noise.map(of_imu).into_iter().flatten();
+        let recorded = recorded.chain(declination.map(|declination| ("declination", declination))).collect();
+        Self { recorded, ..self.clone() }
     }
 
     /// Each setting that is not the default, with the settings without it.
@@ -235,79 +236,4 @@ fn set<R: Robot>(builder: &mut Builder<R>, name: &str, value: &str) -> Result<()
 fn value_of<'a>(line: &'a str, name: &str) -> Option<&'a str> {
     let (key, value) = line.split_once('=')?;
     (key.trim() == name).then(|| value.split('#').next().unwrap_or(value).trim())
-}
-
-impl RobotFile {
-    /// The settings of the estimator in it: of the path that is named, or of the only estimator whose options are all of
-    /// these.
-    fn read(&self, known: &[&str]) -> Result<Vec<NavigationSetting>, String> {
-        let name = self.file.display();
-        let text = std::fs::read_to_string(&self.file).map_err(|error| format!("{name}: {error}"))?;
-        let table: toml::Table = text.parse().map_err(|error| format!("{name}: {error}"))?;
-        let mut tables = Vec::new();
-        gather(&table, String::new(), &mut tables);
-        let is_option = |option: &String| known.contains(&option.as_str());
-        let of = match &self.path {
-            Some(path) => tables.iter().find(|(other, _)| other == path).ok_or_else(|| {
-                let paths: Vec<&str> = tables.iter().map(|(path, _)| path.as_str()).collect();
-                format!("{name}: there is no [{}] in it; {}", path.replace('/', "."), near(path, &paths))
-            })?,
-            None => {
-                let of_estimators = || tables.iter().filter(|(path, _)| path.starts_with("estimator/"));
-                let whole =
-                    |(_, options): &&(String, toml::Table)| !options.is_empty() && options.keys().all(is_option);
-                let partly = |(_, options): &&(String, toml::Table)| options.keys().any(is_option);
-                let mut fitting: Vec<_> = of_estimators().filter(whole).collect();
-                if fitting.is_empty() {
-                    fitting = of_estimators().filter(partly).collect();
-                }
-                let paths = || fitting.iter().map(|(path, _)| format!("{name}:{path}")).collect::<Vec<_>>();
-                match *fitting {
-                    [one] => one,
-                    [] => return Err(format!("{name}: no estimator in it has an option of this filter")),
-                    _ => {
-                        return Err(format!(
-                            "{name}: several estimators in it may be this one; name it: --robot {}",
-                            paths().join(" or ")
-                        ));
-                    }
-                }
-            }
-        };
-        let (path, options) = of;
-        let mut settings = Vec::new();
-        for (option, value) in options {
-            if !is_option(option) {
-                return Err(format!(
-                    "{name}: {path}/{option}: this filter has no such option; {}",
-                    near(option, known)
-                ));
-            }
-            let value = match value {
-                toml::Value::String(text) => text.clone(),
-                // As JSON, which settings are.
-                other => {
-                    serde_json::to_string(other).map_err(|error| format!("{name}: {path}/{option}: {error}"))?
-                }
-            };
-            settings.push(NavigationSetting { name: option.clone(), value, file: Some(self.file.clone()) });
-        }
-        Ok(settings)
-    }
-}
-
-/// The tables of a settings file by path, each with what is no table in it.
-fn gather(table: &toml::Table, path: String, tables: &mut Vec<(String, toml::Table)>) {
-    let mut own = toml::Table::new();
-    for (key, value) in table {
-        let key = key.trim_matches('/');
-        match value {
-            toml::Value::Table(inner) => {
-                let path = if path.is_empty() { key.to_owned() } else { format!("{path}/{key}") };
-                gather(inner, path, tables);
-            }
-            value => drop(own.insert(key.to_owned(), value.clone())),
-        }
-    }
-    tables.push((path, own));
 }

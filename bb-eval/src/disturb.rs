@@ -1,21 +1,30 @@
-//! A recording made harder: fixes withheld, messages dropped or late.
+//! A recording made harder: fixes or the field withheld, messages dropped or late.
 
-use super::feed::{Feed, INPUTS, Time, What};
 use crate::filters::near;
-use bb_core::payload::GnssFix;
 use std::str::FromStr;
+
+/// Nanoseconds since the Unix epoch.
+pub(crate) type Time = i64;
+
+/// The inputs of filters by name, as filters declare them.
+pub(crate) const INPUTS: [&str; 7] = ["imu", "gnss", "odometry", "pose", "relative", "magnetic_field", "start"];
+/// Places among [`INPUTS`].
+pub(crate) const IMU: usize = 0;
+pub(crate) const GNSS: usize = 1;
+pub(crate) const MAGNETIC_FIELD: usize = 5;
 
 /// Changes to the messages of a recording before a filter gets them.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "clap", derive(clap::Args), command(next_help_heading = "Made harder"))]
 pub struct Disturbances {
-    /// Withholds the fixes for LENGTH at the end of each PERIOD, as 30s/90s. The errors in these are shown by their age.
+    /// Withholds the fixes, or of an attitude filter the magnetic field, for LENGTH at the end of each PERIOD, as 30s/90s. The
+    /// errors without them are shown.
     #[cfg_attr(feature = "clap", arg(long, value_name = "LENGTH/PERIOD"))]
     pub outage: Option<Spell>,
-    /// Gives every N-th fix to the filter, and withholds the others.
+    /// Gives every N-th fix, or reading of the magnetic field, to the filter, and withholds the others.
     #[cfg_attr(feature = "clap", arg(long, value_name = "N"))]
     pub every: Option<u32>,
-    /// Stamps and delivers the messages of an input later, as gnss=125ms. Several.
+    /// Stamps and delivers the messages of an input later, as gnss=125ms, or earlier, as magnetic_field=-12ms. Several.
     #[cfg_attr(feature = "clap", arg(long, value_name = "INPUT=TIME"))]
     pub delay: Vec<Delay>,
     /// Drops the messages of an input for LENGTH at the end of each PERIOD, as imu=300ms/10s. Several.
@@ -33,6 +42,7 @@ pub struct Spell {
 /// A delay of an input.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Delay {
+    /// Place among [`INPUTS`].
     input: usize,
     time_ns: Time,
 }
@@ -106,11 +116,20 @@ impl Spell {
     }
 }
 
-/// Messages withheld from a feed.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Withheld {
-    /// Fixes that the filter does not get, with their own stamps.
-    pub(crate) fixes: Vec<(Time, GnssFix)>,
+/// Changes made to the messages of one recording, in the order of their times.
+#[derive(Debug)]
+pub(crate) struct Disturber<'a> {
+    disturbances: &'a Disturbances,
+    /// The input that `--outage` and `--every` withhold.
+    aiding: usize,
+    first_ns: Time,
+    /// Messages that the outage and each of the drops withheld.
+    dropped: Vec<u64>,
+    /// Messages of the aiding input, and those that were not in their turn.
+    aids: u64,
+    thinned: u64,
+    /// Messages that each of the delays moved.
+    delayed: Vec<u64>,
 }
 
 impl Disturbances {
@@ -119,64 +138,83 @@ impl Disturbances {
         *self == Self::default()
     }
 
-    /// Changes a feed.
+    /// Changes to a recording that begins at `first_ns`.
+    pub(crate) fn of(&self, aiding: usize, first_ns: Time) -> Disturber<'_> {
+        let (dropped, delayed) = (vec![0; self.drop.len() + 1], vec![0; self.delay.len()]);
+        Disturber { disturbances: self, aiding, first_ns, dropped, aids: 0, thinned: 0, delayed }
+    }
+}
+
+impl Disturber<'_> {
+    /// The spells, each with its input and its option.
+    fn spells(&self) -> impl Iterator<Item = (usize, Spell, &'static str)> {
+        let drops = self.disturbances.drop.iter().map(|drop| (drop.input, drop.spell, "--drop"));
+        drops.chain(self.disturbances.outage.map(|spell| (self.aiding, spell, "--outage")))
+    }
+
+    /// Returns whether the aiding input is withheld at a time by the outage.
+    pub(crate) fn is_out(&self, stamp_ns: Time) -> bool {
+        self.disturbances.outage.is_some_and(|spell| spell.contains(stamp_ns - self.first_ns))
+    }
+
+    /// Returns whether a filter gets this message.
+    pub(crate) fn keeps(&mut self, input: usize, stamp_ns: Time) -> bool {
+        let since_ns = stamp_ns - self.first_ns;
+        let mut dropped = std::mem::take(&mut self.dropped);
+        let mut is_kept = true;
+        for ((of, spell, _), count) in self.spells().zip(&mut dropped) {
+            if of == input && spell.contains(since_ns) {
+                is_kept = false;
+                *count += 1;
+            }
+        }
+        self.dropped = dropped;
+        if let Some(every) = self.disturbances.every.filter(|_| input == self.aiding) {
+            let is_its_turn = self.aids.is_multiple_of(u64::from(every.max(1)));
+            self.aids += 1;
+            self.thinned += u64::from(!is_its_turn);
+            is_kept &= is_its_turn;
+        }
+        is_kept
+    }
+
+    /// Returns the time by which a message comes later, ns.
+    pub(crate) fn delay_ns(&mut self, input: usize) -> Time {
+        let mut delay_ns = 0;
+        for (delay, count) in self.disturbances.delay.iter().zip(&mut self.delayed) {
+            if delay.input == input && delay.time_ns != 0 {
+                delay_ns += delay.time_ns;
+                *count += 1;
+            }
+        }
+        delay_ns
+    }
+
+    /// Checks that each option has changed something.
     ///
     /// # Errors
-    /// An option changes nothing; names it.
-    pub(crate) fn apply(&self, feed: &mut Feed) -> Result<Withheld, String> {
-        let first_ns = feed.messages.iter().map(|message| message.stamp_ns).min().unwrap_or(0);
-        let mut drops: Vec<_> =
-            self.drop.iter().map(|Dropped { input, spell }| (*input, *spell, "--drop")).collect();
-        drops.extend(self.outage.map(|spell| (1, spell, "--outage")));
-        let mut withheld = Withheld::default();
-        let mut dropped = vec![0_u64; drops.len()];
-        let (mut fixes, mut thinned) = (0_u32, 0_u64);
-        feed.messages.retain(|message| {
-            let input = message.what.input();
-            let since_ns = message.stamp_ns - first_ns;
-            let mut is_kept = true;
-            for ((of, spell, _), count) in drops.iter().zip(&mut dropped) {
-                if *of == input && spell.contains(since_ns) {
-                    is_kept = false;
-                    *count += 1;
-                }
-            }
-            let What::Gnss(fix) = &message.what else { return is_kept };
-            if let Some(every) = self.every {
-                let is_its_turn = fixes.is_multiple_of(every.max(1));
-                fixes += 1;
-                thinned += u64::from(!is_its_turn);
-                is_kept &= is_its_turn;
-            }
-            if !is_kept {
-                withheld.fixes.push((message.stamp_ns, *fix));
-            }
-            is_kept
-        });
-        for ((input, _, option), count) in drops.iter().zip(&dropped) {
+    /// The option that has not, in words.
+    pub(crate) fn check(&self) -> Result<(), String> {
+        for ((input, _, option), count) in self.spells().zip(&self.dropped) {
             if *count == 0 {
-                return Err(format!("{option} changes nothing: no message of `{}` falls in it", INPUTS[*input]));
+                return Err(format!("{option} changes nothing: no message of `{}` falls in it", INPUTS[input]));
             }
         }
-        if self.every.is_some() && thinned == 0 {
-            return Err("--every changes nothing: there are too few fixes".to_owned());
+        if self.disturbances.every.is_some() && self.thinned == 0 {
+            return Err(format!(
+                "--every changes nothing: there are too few messages of `{}`",
+                INPUTS[self.aiding]
+            ));
         }
-        for Delay { input, time_ns } in &self.delay {
-            let mut count = 0_u64;
-            for message in feed.messages.iter_mut().filter(|message| message.what.input() == *input) {
-                message.stamp_ns += time_ns;
-                message.arrival_ns += time_ns;
-                count += 1;
-            }
-            if count == 0 || *time_ns == 0 {
+        for (delay, count) in self.disturbances.delay.iter().zip(&self.delayed) {
+            if *count == 0 {
                 return Err(format!(
                     "--delay changes nothing: there is no message of `{}` to delay",
-                    INPUTS[*input]
+                    INPUTS[delay.input]
                 ));
             }
         }
-        feed.sort();
-        Ok(withheld)
+        Ok(())
     }
 }
 
