@@ -72,14 +72,14 @@ pub(crate) const STEPS: &[Step] = &[
         name: "planar/sample",
         on: None,
         steps: USUAL,
-        stored: 1074.0,
+        stored: 1087.0,
         run: |steps| planar(steps, |_, _, _| Ok(())),
     },
     Step {
         name: "planar/position_with_gate",
         on: Some("planar/sample"),
         steps: USUAL,
-        stored: 2144.0,
+        stored: 5885.0,
         run: |steps| {
             planar(steps, |filter, stream, reading| {
                 let fix = PlanarPosition::new(reading.position.xy(), 1.0);
