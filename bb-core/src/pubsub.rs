@@ -19,7 +19,7 @@ mod typed;
 mod unmatched;
 mod wakers;
 
-pub use any::{AnyTopic, DynamicMessage};
+pub use any::{AnyTopic, DynamicMessage, Encoded};
 pub(crate) use bound::{Bound, Held, counted_bytes, is_counted};
 pub use delivery::{Delivery, Overflow};
 pub use dynamic::{DynamicSubscription, RecvDynamic};

@@ -2,11 +2,14 @@
 
 use crate::components::{Echo, Failure, Number, Pulse, Seen, Snapshot, Source, SourceOptions, Update, at, numbers};
 use crate::gate::wait_until;
-use crate::replay::{entries, journal, overflow, play, read_back, same_again};
+use crate::replay::{Random, entries, journal, overflow, play, read_back, same_again};
 use bb_core::event::{HealthState, Right};
 use bb_core::journal::Event;
+use bb_core::message::codec::{Layouts, Shape, encode, encode_as_ros, from_json, to_json};
+use bb_core::payload::*;
 use bb_core::prelude::*;
-use bb_core::run::DropReason;
+use bb_core::run::{Bus, DropReason};
+use serde_json::{Value, json};
 
 /// All numbers since the last run.
 #[derive(Clone, Copy, Debug, Inputs)]
@@ -227,5 +230,284 @@ fn a_replay_takes_what_was_published_bit_for_bit() -> Result<(), Failure> {
     let count = |path| heard.get(path).map_or(0, |texts: &Vec<_>| texts.len());
     assert_eq!(count("estimator/base/echo"), echoes.drain().count());
     assert_eq!(count("estimator/base/sum"), sums.drain().count());
+    Ok(())
+}
+
+/// A field of every form.
+#[derive(Clone, Debug, Payload)]
+struct Everything {
+    yes: bool,
+    letter: char,
+    tiny: i8,
+    wide: u64,
+    single: f32,
+    text: String,
+    maybe: Option<Option<u16>>,
+    nested: Vec<Form>,
+    table: [[f64; 2]; 3],
+    after: Duration,
+    matrix: bb_core::nalgebra::Matrix2x3<f64>,
+    unit: (),
+}
+
+#[derive(Clone, Debug, Payload)]
+enum Form {
+    Unit,
+    Pair(f64, String),
+    Fields { x: f32, list: Vec<u16> },
+    One(Option<bool>),
+}
+
+robot! {
+    robot Injected;
+    link base {
+        sensor imu: External<Imu>();
+        sensor marg: External<Marg>();
+        sensor scan: External<LaserScan>();
+        sensor odometry: External<Odometry>();
+        sensor everything: External<Everything>();
+    }
+}
+
+/// JSON of the shape, of which the type may still refuse some.
+fn random_json(random: &mut Random, shape: Shape) -> Value {
+    let fields = |random: &mut Random, of: &[bb_core::message::codec::FieldShape]| -> Value {
+        match of {
+            [only] if only.name == "0" => random_json(random, only.shape),
+            // What a struct without fields has.
+            of if of.iter().any(|field| field.name.starts_with("structure_needs")) => json!({}),
+            of => Value::Object(
+                of.iter().map(|field| (field.name.into(), random_json(random, field.shape))).collect(),
+            ),
+        }
+    };
+    match shape {
+        Shape::Bool => json!(random.below(2) == 1),
+        Shape::Char => json!(["x", "é", "\"", "\n"][random.below(4) as usize]),
+        Shape::Text => json!(["", "base_link", "é \\ \"quoted\"", "left wheel"][random.below(4) as usize]),
+        Shape::F32 | Shape::F64 => match random.below(8) {
+            0 => json!(["NaN", "Infinity", "-Infinity"][random.below(3) as usize]),
+            1 => json!([0.0, -0.0, -1.0, 1e-300][random.below(4) as usize]),
+            _ => json!(random.noise()),
+        },
+        Shape::I8 | Shape::U8 | Shape::I16 | Shape::U16 => json!(random.below(128)),
+        Shape::I32 | Shape::U32 | Shape::I64 | Shape::U64 => json!(random.below(1_000_000_000)),
+        Shape::Option(of) => {
+            if random.below(2) == 0 {
+                Value::Null
+            } else {
+                random_json(random, *of)
+            }
+        }
+        Shape::List(of) => (0..random.below(4)).map(|_| random_json(random, *of)).collect(),
+        Shape::Array(of, length) => (0..length).map(|_| random_json(random, *of)).collect(),
+        Shape::Struct(of) => fields(random, of.fields),
+        Shape::Enum(of) => {
+            let variant = &of.variants[random.below(of.variants.len() as u64) as usize];
+            match variant.fields.is_empty() {
+                true => json!(variant.name),
+                false => json!({ variant.name: fields(random, variant.fields) }),
+            }
+        }
+    }
+}
+
+/// A value in a tree of JSON, and its path as errors write it.
+fn random_leaf<'a>(random: &mut Random, value: &'a mut Value, path: &mut String) -> &'a mut Value {
+    match value {
+        Value::Object(members) if !members.is_empty() => {
+            let index = random.below(members.len() as u64) as usize;
+            let Some((name, member)) = members.iter_mut().nth(index) else {
+                unreachable!("it is below the length")
+            };
+            *path += if path.is_empty() { "" } else { "." };
+            *path += name;
+            random_leaf(random, member, path)
+        }
+        Value::Array(items) if !items.is_empty() => {
+            let index = random.below(items.len() as u64) as usize;
+            *path += &format!("[{index}]");
+            random_leaf(random, &mut items[index], path)
+        }
+        leaf => leaf,
+    }
+}
+
+/// Random payloads of each type, and damaged copies of each.
+const CASES: usize = 10;
+
+/// Publishes random payloads at `path`, typed and as data: the same bits arrive. What is damaged is refused with its place, or is another
+/// payload.
+fn typed_and_by_path<T: Payload>(bus: &Bus, path: &str, random: &mut Random) -> Result<(), Failure> {
+    let publisher = bus.publisher::<T>(path)?;
+    let arrived = bus.subscribe_any(Select::Path(path), None, overflow());
+    let bytes = |arrived: &bb_core::DynamicSubscription| -> Result<Vec<u8>, Failure> {
+        let mut bytes = Vec::new();
+        arrived.try_recv().ok_or("nothing has arrived")?.encode(&mut bytes);
+        Ok(bytes)
+    };
+    let (mut published, mut last_refusal) = (0, String::new());
+    for _ in 0..10 * CASES {
+        if published == CASES {
+            break;
+        }
+        let mut value = random_json(random, Layouts::of::<T>().payload());
+        // Some values are refused by the type, typed or not.
+        let payload = from_json::<T>(&value.to_string());
+        let Ok(payload) = payload else {
+            let refused = bus.publish_json(path, &value.to_string()).expect_err("the type refuses it").to_string();
+            assert_eq!(refused, format!("nothing is published at `{path}`: {}", payload.expect_err("it is one")));
+            last_refusal = refused;
+            continue;
+        };
+        published += 1;
+        publisher.publish(payload.clone());
+        let typed = bytes(&arrived)?;
+        bus.publish_json(path, &to_json(&payload))?;
+        assert_eq!(bytes(&arrived)?, typed, "{path} {value}");
+        bus.publish_cdr(path, &typed)?;
+        assert_eq!(bytes(&arrived)?, typed, "{path} {value}");
+
+        // In ROS's layout: what that keeps.
+        let mut ros = Vec::new();
+        let message = bb_core::message::codec::decode::<Stamped<T>>(&typed)?;
+        if encode_as_ros(&message, &mut ros) && bus.publish_ros(path, &ros).is_ok() {
+            let back = arrived.try_recv().ok_or("nothing has arrived")?;
+            let (mut kept, mut again) = (Vec::new(), Vec::new());
+            let (read, wall_time) = bb_core::message::codec::decode_as_ros::<T>(&ros)?;
+            encode(&Stamped { payload: read, wall_time, ..message.clone() }, &mut kept);
+            back.encode(&mut again);
+            if wall_time.as_unix_nanos() != 0 {
+                assert_eq!(again, kept, "{path} {value}");
+            }
+        }
+
+        let mut place = String::new();
+        *random_leaf(random, &mut value, &mut place) = json!({ "wrong": [{}] });
+        let refused = bus.publish_json(path, &value.to_string()).expect_err("no field is that").to_string();
+        let expected = format!("nothing is published at `{path}`: {place}");
+        assert!(refused.starts_with(&expected), "{refused}\n{expected}\n{value}");
+        for _ in 0..CASES {
+            let mut text = to_json(&payload).into_bytes();
+            let (mut exact, mut ros) = (typed.clone(), ros.clone());
+            for bytes in [&mut text, &mut exact, &mut ros] {
+                for _ in 0..=random.below(3) {
+                    let at = random.below(bytes.len().max(1) as u64) as usize;
+                    match random.below(3) {
+                        0 => bytes.truncate(at),
+                        1 if at < bytes.len() => bytes[at] = random.below(256) as u8,
+                        _ if at < bytes.len() => drop(bytes.remove(at)),
+                        _ => {}
+                    }
+                }
+            }
+            let results = [
+                bus.publish_json(path, &String::from_utf8_lossy(&text)),
+                bus.publish_cdr(path, &exact),
+                bus.publish_ros(path, &ros),
+            ];
+            for error in results.iter().filter_map(|result| result.as_ref().err()) {
+                assert!(error.to_string().starts_with(&format!("nothing is published at `{path}`: ")), "{error}");
+            }
+            assert_eq!(arrived.drain().count(), results.iter().filter(|result| result.is_ok()).count());
+        }
+    }
+    assert_eq!(published, CASES, "{last_refusal}");
+    Ok(())
+}
+
+#[test]
+fn data_by_path_is_the_typed_message_or_an_error_that_names_the_field() -> Result<(), Failure> {
+    let simulation = Injected::builder().simulate()?;
+    let (bus, random) = (simulation.bus(), &mut Random::new(1));
+    typed_and_by_path::<Imu>(&bus, "sensor/base/imu", random)?;
+    typed_and_by_path::<Marg>(&bus, "sensor/base/marg", random)?;
+    typed_and_by_path::<LaserScan>(&bus, "sensor/base/scan", random)?;
+    typed_and_by_path::<Odometry>(&bus, "sensor/base/odometry", random)?;
+    typed_and_by_path::<Everything>(&bus, "sensor/base/everything", random)?;
+    macro_rules! own {
+        ($($payload:ident)*) => { $( typed_and_by_path::<$payload>(&bus, concat!("own/", stringify!($payload)), random)?; )* };
+    }
+    own! {
+        MagneticField FluidPressure Range Image GnssFix BatteryState JointState JointStates PositionCommand VelocityCommand
+        EffortCommand JointTrajectory Orientation Pose PoseWithCovariance Twist TwistWithCovariance Accel Wrench Path
+    }
+    Ok(())
+}
+
+#[test]
+fn what_cannot_be_published_by_path_says_why() -> Result<(), Failure> {
+    let simulation = Mapped::builder().simulate()?;
+    let refused = |path: &str| simulation.publish_json(path, "1.5").map_err(|error| error.to_string());
+    assert_eq!(refused("slam/scale"), Ok(()), "an external input");
+    assert_eq!(refused("sensor/radio"), Ok(()), "an external sensor");
+    let own = "cannot publish at `sensor/base/ticks`: only its own publisher does; choose another path";
+    assert_eq!(refused("sensor/base/ticks"), Err(own.into()));
+    let unknown = |path: &str, hint: &str| {
+        let why = "its payload is not known, since nobody has published or subscribed there";
+        Err(format!("cannot publish at `{path}`: {why}{hint}"))
+    };
+    assert_eq!(refused("sensor/radios"), unknown("sensor/radios", "; did you mean `sensor/radio`?"));
+    assert_eq!(refused("own/number"), unknown("own/number", ""));
+    // From when somebody waits for it.
+    let awaited = simulation.subscribe::<Number>("own/number", Overflow::default())?;
+    assert_eq!((refused("own/number"), numbers(&awaited)), (Ok(()), vec![1.5]));
+    let session = simulation.session("page 1", Rights::ALL);
+    let page = session.bus();
+    drop(session);
+    let ended = page.publish_json("sensor/radio", "1").expect_err("it has ended").to_string();
+    assert_eq!(ended, "the session of `page 1` has ended");
+    let bus = simulation.bus();
+    simulation.stop().ok()?;
+    let stopped = bus.publish_json("sensor/radio", "1").expect_err("it has stopped").to_string();
+    assert!(stopped.ends_with("the robot has stopped") || stopped.starts_with("cannot publish"), "{stopped}");
+    Ok(())
+}
+
+/// The journal names whoever publishes, once for as long as it is the same.
+#[test]
+fn the_journal_names_who_publishes_for_a_sensor() -> Result<(), Failure> {
+    let mut builder = Mapped::builder();
+    let lines = journal(&mut builder);
+    let simulation = builder.simulate()?;
+    let page = simulation.for_caller("page 1", [Right::Publish]);
+    let bridge = simulation.for_caller("bridge", [Right::Publish]);
+    let radio = bridge.publisher::<Number>("sensor/radio")?;
+    for number in 0..3 {
+        page.publish_json("sensor/radio", &number.to_string())?;
+    }
+    assert!(page.publish_json("sensor/radio", "true").is_err());
+    radio.publish(Number(3.0));
+    page.publish_json("slam/scale", "4")?;
+    page.publish_json("sensor/radio", "5")?;
+    simulation.stop().ok()?;
+    let lines = entries(&lines);
+    let callers: Vec<_> = lines
+        .iter()
+        .cloned()
+        .filter_map(|line| match line.event {
+            Event::Publisher { path, caller } => Some(format!("{path}: {caller}")),
+            Event::Message { message: bb_core::journal::Recorded::Message(message), .. } => {
+                message.downcast::<Number>().map(|number| number.0.to_string())
+            }
+            _ => None,
+        })
+        .collect();
+    let expected = [
+        "sensor/radio: page 1",
+        "0",
+        "1",
+        "2",
+        "sensor/radio: bridge",
+        "3",
+        "slam/scale: page 1",
+        "4",
+        "sensor/radio: page 1",
+        "5",
+    ];
+    assert_eq!(callers, expected);
+    let (heard, report) = play(Mapped::builder(), &read_back::<Mapped>(&lines)?)?;
+    report.ok()?;
+    assert_eq!(heard.get("sensor/radio").map(Vec::len), Some(5));
     Ok(())
 }

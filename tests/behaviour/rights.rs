@@ -41,7 +41,7 @@ robot! {
 /// Request to a bus that needs a right; its error says why the bus refuses.
 type Verb = fn(&Bus) -> Result<(), Box<dyn std::error::Error>>;
 
-const VERBS: [(Right, &str, Verb); 8] = [
+const VERBS: [(Right, &str, Verb); 11] = [
     (Right::Read, "subscribe", |bus| {
         Ok(bus.subscribe::<Number>("sensor/base/pan/encoder", Overflow::default()).map(drop)?)
     }),
@@ -54,7 +54,21 @@ const VERBS: [(Right, &str, Verb); 8] = [
     }),
     (Right::Arm, "force_disarm", |bus| Ok(bus.force_disarm()?)),
     (Right::Publish, "publisher", |bus| Ok(bus.publisher::<Number>("page/number").map(drop)?)),
+    (Right::Publish, "publish_json", |bus| Ok(bus.publish_json("sensor/base/pan/encoder", "1")?)),
+    (Right::Publish, "publish_cdr", |bus| Ok(bus.publish_cdr("sensor/base/pan/encoder", &encoded())?)),
+    (Right::Publish, "publish_ros", |bus| {
+        // There is no such message, which only those learn who may publish.
+        let error = bus.publish_ros("sensor/base/pan/encoder", &[0; 4]).expect_err("it is none").to_string();
+        if error.contains("a payload that ROS has a message for") { Ok(()) } else { Err(error.into()) }
+    }),
 ];
+
+/// A message of the encoder.
+fn encoded() -> Vec<u8> {
+    let mut bytes = Vec::new();
+    bb_core::message::codec::encode(&Stamped::new(MonotonicTime::ZERO, Number(1.0)), &mut bytes);
+    bytes
+}
 
 #[test]
 fn each_verb_needs_its_right_and_names_it_and_the_caller() -> Result<(), Box<dyn std::error::Error>> {

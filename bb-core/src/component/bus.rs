@@ -1,27 +1,28 @@
 //! The robot by path, for code that does not know its type: commands, controllers, bridges, dashboards.
 
+mod publishing;
 mod session;
 
 pub use session::Session;
 
-use super::host::{Controls, ExternalSensor, Host};
+use super::host::{Controls, Host};
 use super::{
     Accepts, ActuatorLink, Caller, CommandInfo, Description, DynamicExecution, ExecutionInfo, Fault, RunKind,
 };
 use crate::declaration::ParameterError;
 use crate::event::{ArmError, DisarmError, Forbidden, ParameterValue, Right, Rights, Safety};
 use crate::joints::Joints;
+use crate::message::Payload;
 use crate::message::codec::from_json;
 use crate::message::nearest::nearest_path;
-use crate::message::{Payload, Stamp};
 use crate::pubsub::{
-    AnyTopic, Delivery, DynamicMessage, DynamicSubscription, Enter, Gate, Payloads, Publisher, Select,
-    SubscriberStatistics, Subscription, Tell, Topic, unmatched_at,
+    AnyTopic, Delivery, DynamicSubscription, Payloads, Select, SubscriberStatistics, Subscription, Topic,
+    unmatched_at,
 };
-use crate::time::{Clock, MonotonicTime};
+use crate::time::Clock;
 use crate::topology::{GraphFormat, Topology};
 use std::fmt;
-use std::sync::{Arc, Weak};
+use std::sync::Arc;
 
 /// Topics, actuators, parameters, commands and states, by path, in the name of a caller and with its rights. Clones are the same.
 ///
@@ -135,46 +136,6 @@ impl Bus {
             subscribed = Some(self.host.registry().subscribe(topics, select, &payloads, delivery));
         });
         subscribed.unwrap_or_else(|| DynamicSubscription::new([], select, payloads, delivery))
-    }
-
-    /// Returns a publisher at a path of the caller's choice, such as `mission/progress`: names of letters, digits,
-    /// `_`, `-` and `.`, separated by `/`. Existing subscriptions to everything, or to a subtree with this path,
-    /// receive its messages. A second publisher at the same path shares it.
-    ///
-    /// A robot has at most 1024 such paths; a new one replaces the oldest that is no longer used. Names of paths are kept for as long as
-    /// the process lives, at most 1 MiB of them: what changes without end, such as the number of a request, belongs in the payload.
-    /// The path may also be that of an
-    /// `external` input of an estimator, or of a sensor declared as [`External`](crate::component::External): everything downstream then runs before
-    /// `publish` returns, as for messages of a sensor.
-    ///
-    /// Payloads that name joints, such as [`JointStates`](crate::payload::JointStates), update the [joints](Self::joints) if the path is
-    /// below `sensor/`.
-    ///
-    /// # Errors
-    /// The path is that of another declared publisher or of a topic that every robot has, it has another payload already, it is
-    /// malformed, too many are in use, the robot has stopped, the command that this bus belongs to has ended, or the caller may
-    /// not publish.
-    pub fn publisher<T: Payload>(&self, path: &str) -> Result<Publisher<T>, Fault> {
-        self.check(Right::Publish)?;
-        self.caller.check_valid()?;
-        let gate = || Arc::new(OwnPath { host: Arc::clone(&self.host), caller: self.caller.clone() });
-        if let Some(ExternalSensor { path, frame, payload, enter }) = self.host.external(path) {
-            return match enter.downcast::<Weak<Enter<T>>>() {
-                Ok(enter) => Ok(Publisher::of_sensor(path, frame, *enter, gate())),
-                Err(_) => Err(self.other_payload(path, payload, T::NAME)),
-            };
-        }
-        let topic = self.host.registry().topic_noted::<T>(path, &mut |change| self.host.note_path(change))?;
-        Ok(Publisher::new(topic, gate()))
-    }
-
-    /// The error for a payload that is not that of an external input or sensor.
-    fn other_payload(&self, path: &str, taken: &str, offered: &str) -> Fault {
-        let takers = self.host.takers(path);
-        let takers = takers.iter().map(|(estimator, input)| format!("the input `{input}` of `{estimator}`"));
-        let takers = takers.collect::<Vec<_>>().join(" and ");
-        let takers = if takers.is_empty() { "the robot".to_owned() } else { takers };
-        Fault::new(format!("cannot publish `{offered}` at `{path}`: {takers} takes `{taken}`"))
     }
 
     /// All paths with a publisher.
@@ -456,44 +417,6 @@ impl Bus {
             result = call.take().map(|call| call(&all));
         });
         result.unwrap_or_default()
-    }
-}
-
-/// Publishes at a path of the caller's choice.
-struct OwnPath {
-    host: Arc<dyn Host>,
-    caller: Caller,
-}
-
-impl Gate for OwnPath {
-    fn pass(&self, publish: &mut dyn FnMut(Stamp)) {
-        self.host.while_open(&mut || {
-            // After what had to be waited for.
-            if !self.caller.is_valid() {
-                return;
-            }
-            let robot = self.host.controls();
-            let clock = robot.clock();
-            let monotonic_time = clock.now();
-            let wall_time = clock.wall_at(monotonic_time);
-            let stamp = Stamp { monotonic_time, wall_time, origin: robot.origin(), ..Stamp::default() };
-            publish(stamp);
-        });
-        if self.caller.is_outside() {
-            self.host.settle();
-        }
-    }
-
-    fn is_noted(&self) -> bool {
-        self.host.is_journaled()
-    }
-
-    fn note(&self, message: DynamicMessage, now: MonotonicTime) {
-        self.host.note_own(message, now);
-    }
-
-    fn hear(&self, path: &str, stamp: Stamp, now: MonotonicTime, tell: &Tell<'_>) {
-        self.host.joints().hear_at(path, stamp, now, tell);
     }
 }
 

@@ -4,7 +4,7 @@ mod json;
 
 use super::CommandInfo;
 use crate::event::ParameterValue;
-use crate::message::codec::Shape;
+use crate::message::codec::{Layouts, Shape};
 use crate::topology::{JointKind, Limit};
 use std::ops::RangeInclusive;
 use std::time::Duration;
@@ -166,6 +166,11 @@ pub struct TopicDescription {
     pub path: &'static str,
     /// The name of its payload.
     pub payload: &'static str,
+    /// The layouts of its messages: names, hashes and definitions, known before the first message.
+    pub layouts: Layouts,
+    /// True if callers publish there, see [`Bus::publish_json`](super::Bus::publish_json): an external sensor or input, or a path of a
+    /// caller's choice.
+    pub is_external: bool,
     /// Period at which messages are published, if that is declared: the rate of a sensor or a service.
     pub period: Option<Duration>,
 }

@@ -71,10 +71,16 @@ pub(crate) trait Host: Send + Sync {
     fn while_open(&self, publish: &mut dyn FnMut());
     /// Something may be published at a path of one's own, or no more.
     fn note_path(&self, change: PathChange);
+    /// A caller publishes at `path`: a line of the journal, if the one before it was another.
+    fn note_caller(&self, path: &'static str, caller: &str);
     /// A message is published at a path of one's own.
     fn note_own(&self, message: DynamicMessage, now: MonotonicTime);
     /// The sensor at `path`, if other code publishes its messages.
     fn external(&self, path: &str) -> Option<ExternalSensor>;
+    /// The paths of those sensors.
+    fn externals(&self) -> Vec<&'static str>;
+    /// Publishes a message at the path of such a sensor, if it has its payload, and runs everything downstream.
+    fn enter(&self, message: &DynamicMessage, now: MonotonicTime);
     /// The inputs at `path`, each as its estimator and its name.
     fn takers(&self, path: &str) -> Vec<(&'static str, &'static str)>;
     /// The actuator at `path`: the name of the type of its commands, and an `Arc<dyn Accepts<T>>`.

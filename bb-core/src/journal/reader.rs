@@ -2,7 +2,7 @@
 
 use super::{Entry, Event, JournalLine, Recorded};
 use crate::message::DecodeError;
-use crate::pubsub::{AnyTopic, DynamicMessage};
+use crate::pubsub::{AnyTopic, DynamicMessage, Encoded};
 use std::fmt;
 
 /// The publishers of a robot, whose payloads a journal refers to by number. Every [`Robot`](crate::Robot) has them.
@@ -52,7 +52,7 @@ impl<R: Publishers> JournalReader<R> {
 pub(crate) fn decoded(topic: &dyn AnyTopic, message: Recorded) -> Result<DynamicMessage, DecodeError> {
     match message {
         Recorded::Message(message) => Ok(message),
-        Recorded::Bytes(bytes) => topic.decode(&bytes),
+        Recorded::Bytes(bytes) => topic.decode(Encoded::Exact(&bytes), &|stamp| stamp),
     }
 }
 

@@ -7,6 +7,7 @@
 //! | the layout of the bytes | [`Shape`], and as text for other programs [`Schema`] (`ros2msg`) |
 //! | the hash by which ROS 2 tells types apart | [`type_hash`] |
 //! | a message in the layout that ROS has for it | [`RosMessage`] |
+//! | all of these for one payload, without its type | [`Layouts`] |
 //! | a value to JSON and back, and the JSON Schema of a type | [`to_json`], [`from_json`], [`json_schema`] |
 //!
 //! A message has an *exact* layout, that of [`Stamped`](crate::Stamped) with all its fields. It may also have the
@@ -48,7 +49,7 @@ pub use reader::Reader;
 pub use ros::{RosCompanion, RosLayout, RosMessage};
 pub use schema::Schema;
 pub use shape::{EnumShape, FieldShape, FieldUnit, Shape, StructShape};
-pub use stamped::{decode_as_ros, decode_companion, encode_as_ros, encode_companion, is_exact_as_ros};
+pub use stamped::{Layouts, decode_as_ros, decode_companion, encode_as_ros, encode_companion, is_exact_as_ros};
 pub use type_description::{type_description, type_hash};
 pub use writer::Writer;
 

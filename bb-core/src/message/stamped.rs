@@ -58,6 +58,19 @@ impl Stamp {
         let Self { monotonic_time, wall_time, frame, origin } = self;
         Stamped { payload, monotonic_time, wall_time, frame, origin }
     }
+
+    /// The stamp of a message from elsewhere: without a wall time it gets that of its monotonic time, given both `now`; without a frame,
+    /// `frame`.
+    pub(crate) fn completed(mut self, now: Self, frame: Frame) -> Self {
+        if self.wall_time == WallTime::default() {
+            let age = now.monotonic_time.nanos_since(self.monotonic_time);
+            self.wall_time = WallTime::from_unix_nanos(now.wall_time.as_unix_nanos().saturating_sub(age));
+        }
+        if self.frame == Frame::NONE {
+            self.frame = frame;
+        }
+        self
+    }
 }
 
 /// A message: a payload, when it was measured, in which frame, and where. Dereferences to its payload.

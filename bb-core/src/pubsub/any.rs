@@ -2,6 +2,7 @@
 
 use super::queue::Queue;
 use super::statistics::{SubscriberStatistics, TopicStatistics};
+use crate::message::codec::Layouts;
 use crate::message::{DecodeError, JointReading, Payload, Schema, Stamp, Stamped};
 use std::any::Any;
 use std::fmt;
@@ -26,11 +27,9 @@ pub(super) trait AnyMessage: Send + Sync {
     fn tell_joints(&self, listener: &mut dyn FnMut(JointReading<'_>));
     fn fmt_payload(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result;
     fn encode(&self, bytes: &mut Vec<u8>);
-    fn schema(&self) -> Schema;
+    fn layouts(&self) -> Layouts;
     fn encode_as_ros(&self, bytes: &mut Vec<u8>) -> bool;
-    fn ros_schema(&self) -> Option<Schema>;
     fn encode_companion(&self, bytes: &mut Vec<u8>) -> bool;
-    fn ros_companion(&self) -> Option<(&'static str, Schema)>;
     fn is_exact_as_ros(&self) -> bool;
     fn to_json(&self) -> String;
     /// A topic for its payload.
@@ -56,6 +55,11 @@ impl DynamicMessage {
 
     pub(super) fn message(&self) -> &dyn AnyMessage {
         &*self.message
+    }
+
+    /// The layouts in which it is written.
+    pub fn layouts(&self) -> Layouts {
+        self.message.layouts()
     }
 
     /// The path it was published at.
@@ -92,7 +96,7 @@ impl DynamicMessage {
 
     /// The information a program needs to read it without knowing the payload.
     pub fn schema(&self) -> Schema {
-        self.message.schema()
+        self.layouts().schema()
     }
 
     /// Appends the message in ROS's layout; returns `false` and appends nothing if ROS has no message for its
@@ -103,7 +107,7 @@ impl DynamicMessage {
 
     /// ROS's definition, if ROS has a message for its payload.
     pub fn ros_schema(&self) -> Option<Schema> {
-        self.message.ros_schema()
+        self.layouts().ros_schema()
     }
 
     /// Appends the second ROS message; returns `false` and appends nothing if there is none.
@@ -113,7 +117,7 @@ impl DynamicMessage {
 
     /// The last part of the topic and the definition of a second message, if ROS has two for its payload.
     pub fn ros_companion(&self) -> Option<(&'static str, Schema)> {
-        self.message.ros_companion()
+        self.layouts().ros_companion()
     }
 
     /// Returns whether payload and wall time can be read back from ROS's layout bit for bit.
@@ -134,6 +138,18 @@ impl fmt::Debug for DynamicMessage {
     }
 }
 
+/// The bytes of a message.
+#[doc(hidden)]
+#[derive(Clone, Copy, Debug)]
+pub enum Encoded<'a> {
+    /// With its stamp, as [`DynamicMessage::encode`] writes it.
+    Exact(&'a [u8]),
+    /// In ROS's layout, which has only a wall time.
+    Ros(&'a [u8]),
+    /// The payload alone, as [`encode`](crate::message::codec::encode) writes it.
+    Payload(&'a [u8]),
+}
+
 /// The common interface of all topics.
 pub trait AnyTopic: Any + Send + Sync {
     /// Returns the path.
@@ -143,19 +159,21 @@ pub trait AnyTopic: Any + Send + Sync {
     /// Returns whether the values of the messages are relative to a frame.
     #[doc(hidden)]
     fn depends_on_frame(&self) -> bool;
-    /// Returns the definitions of its messages: the exact one, and those of ROS if it has any.
-    #[doc(hidden)]
-    fn schemas(&self) -> fn() -> Vec<Schema>;
+    /// The layouts in which its messages are written.
+    fn layouts(&self) -> Layouts;
     /// All subscribers.
     fn subscribers(&self) -> Vec<SubscriberStatistics>;
     /// Hands every message to `tap` as well.
     #[doc(hidden)]
     fn tap(&self, tap: &Tap);
-    /// Decodes a message from bytes written by [`DynamicMessage::encode`].
+    /// Decodes a message; `stamp` completes what its bytes say of its stamp.
     #[doc(hidden)]
-    fn decode(&self, bytes: &[u8]) -> Result<DynamicMessage, DecodeError>;
+    fn decode(&self, message: Encoded<'_>, stamp: &dyn Fn(Stamp) -> Stamp) -> Result<DynamicMessage, DecodeError>;
     /// Publishes a message if its payload is this topic's; otherwise does nothing and returns `false`.
     fn publish_dynamic(&self, message: &DynamicMessage) -> bool;
+    /// Publishes a message that `write` writes into a journal, if its payload is this topic's.
+    #[doc(hidden)]
+    fn publish_dynamic_as_written(&self, message: &DynamicMessage, write: &mut dyn FnMut()) -> bool;
     /// Returns the topic itself, to downcast to its type.
     #[doc(hidden)]
     fn as_any(&self) -> &dyn Any;

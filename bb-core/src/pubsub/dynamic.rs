@@ -7,6 +7,7 @@ use super::select::{Payloads, Select};
 use super::timer::Timer;
 use super::unmatched::{Unmatched, unmatched};
 use crate::message::Schema;
+use crate::message::codec::Layouts;
 use std::future::Future;
 use std::pin::Pin;
 use std::sync::Arc;
@@ -19,7 +20,7 @@ use std::time::Duration;
 pub struct DynamicSubscription {
     queue: Arc<Queue<DynamicMessage>>,
     paths: Vec<&'static str>,
-    schemas: Vec<fn() -> Vec<Schema>>,
+    layouts: Vec<Layouts>,
     unmatched: Vec<Unmatched>,
 }
 
@@ -49,16 +50,16 @@ impl DynamicSubscription {
     ) -> Self {
         let queue = Queue::shared(delivery, timer);
         let mut paths = Vec::new();
-        let mut schemas = Vec::new();
+        let mut layouts = Vec::new();
         for topic in topics {
             if select.includes(topic.path()) && payloads.includes(topic.payload_name()) {
                 topic.tap(&Tap(Arc::clone(&queue)));
                 paths.push(topic.path());
-                schemas.push(topic.schemas());
+                layouts.push(topic.layouts());
             }
         }
         let unmatched = unmatched(topics, select, payloads);
-        Self { queue, paths, schemas, unmatched }
+        Self { queue, paths, layouts, unmatched }
     }
 
     /// Logs unmatched parts. No lock may be held: it runs the user's `tracing` subscriber.
@@ -79,7 +80,7 @@ impl DynamicSubscription {
 
     /// The definitions of the topics it listened to when it was created, by path: what a recorder would write.
     pub fn schemas(&self) -> impl Iterator<Item = (&'static str, Vec<Schema>)> + '_ {
-        self.paths.iter().zip(&self.schemas).map(|(path, schemas)| (*path, schemas()))
+        self.paths.iter().zip(&self.layouts).map(|(path, layouts)| (*path, layouts.schemas()))
     }
 
     /// The parts of its selection that matched nothing when it was created, each with the nearest name.

@@ -2,7 +2,7 @@
 
 use super::{AnyTopic as _, DynamicMessage, Topic};
 use crate::message::{Frame, JointReading, Payload, Stamp, Stamped};
-use crate::time::{MonotonicTime, WallTime};
+use crate::time::MonotonicTime;
 use std::fmt;
 use std::sync::{Arc, Weak};
 
@@ -33,6 +33,8 @@ pub(crate) trait Gate: Send + Sync {
     fn pass(&self, publish: &mut dyn FnMut(Stamp));
     /// Returns whether messages are to be shown to [`Self::note`].
     fn is_noted(&self) -> bool;
+    /// The publisher's caller is about to publish a message.
+    fn note_caller(&self);
     /// A message is about to be published, at this time.
     fn note(&self, message: DynamicMessage, now: MonotonicTime);
     /// A message that tells of joints is about to be published at `path`.
@@ -63,14 +65,7 @@ impl<T: Payload> Publisher<T> {
     /// [`Stamped::new`] makes, gets that of the robot's clock at its monotonic time.
     pub fn forward(&self, message: &Stamped<T>) {
         self.gate.pass(&mut |now| {
-            let mut stamp = message.stamp();
-            if stamp.wall_time == WallTime::default() {
-                let age = now.monotonic_time.nanos_since(stamp.monotonic_time);
-                stamp.wall_time = WallTime::from_unix_nanos(now.wall_time.as_unix_nanos().saturating_sub(age));
-            }
-            if stamp.frame == Frame::NONE {
-                stamp.frame = self.frame();
-            }
+            let stamp = message.stamp().completed(now, self.frame());
             match stamp == message.stamp() {
                 true => self.hand_out(message, now.monotonic_time),
                 false => self.hand_out(&stamp.message(message.payload.clone()), now.monotonic_time),
@@ -79,6 +74,7 @@ impl<T: Payload> Publisher<T> {
     }
 
     fn hand_out(&self, message: &Stamped<T>, now: MonotonicTime) {
+        self.gate.note_caller();
         if let Target::Topic(topic) = &self.target
             && T::TELLS_JOINT_POSITION
         {

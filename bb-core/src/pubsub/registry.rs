@@ -172,8 +172,12 @@ impl Registry {
         Ok((typed(topic), false))
     }
 
-    /// The topic at the path of a message, created for its payload if it does not exist.
-    pub(crate) fn topic_of(&self, message: &DynamicMessage) -> Result<Arc<dyn AnyTopic>, PathError> {
+    /// The topic at the path of a message, created for its payload if it does not exist; `note` as for [`Self::topic_noted`].
+    pub(crate) fn topic_of(
+        &self,
+        message: &DynamicMessage,
+        note: &mut dyn FnMut(PathChange),
+    ) -> Result<Arc<dyn AnyTopic>, PathError> {
         let erased = message.message();
         let kind = Kind {
             name: message.payload_name(),
@@ -181,7 +185,7 @@ impl Registry {
             make: &|path| erased.new_topic(path),
             fits: &|topic| erased.fits(topic),
         };
-        self.published(message.path(), &kind, &mut |_| ())
+        self.published(message.path(), &kind, note)
     }
 
     fn published(

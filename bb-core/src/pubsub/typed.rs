@@ -1,10 +1,12 @@
 //! Implements the type-erased interfaces for messages and topics of a known payload.
 
-use super::any::{AnyMessage, AnyTopic, DynamicMessage, Tap};
+use super::any::{AnyMessage, AnyTopic, DynamicMessage, Encoded, Tap};
 use super::statistics::{SubscriberStatistics, TopicStatistics};
 use super::topic::Topic;
-use crate::message::codec::{encode, encode_as_ros, encode_companion, is_exact_as_ros, to_json};
-use crate::message::{DecodeError, JointReading, Payload, Schema, Stamp, Stamped};
+use crate::message::codec::{
+    Layouts, decode, decode_as_ros, encode, encode_as_ros, encode_companion, is_exact_as_ros, to_json,
+};
+use crate::message::{DecodeError, JointReading, Payload, Stamp, Stamped};
 use std::any::Any;
 use std::fmt;
 use std::sync::Arc;
@@ -33,20 +35,14 @@ impl<T: Payload> AnyMessage for Stamped<T> {
     fn encode(&self, bytes: &mut Vec<u8>) {
         encode(self, bytes);
     }
-    fn schema(&self) -> Schema {
-        Self::schema()
+    fn layouts(&self) -> Layouts {
+        Self::LAYOUTS
     }
     fn encode_as_ros(&self, bytes: &mut Vec<u8>) -> bool {
         encode_as_ros(self, bytes)
     }
-    fn ros_schema(&self) -> Option<Schema> {
-        Self::ros_schema()
-    }
     fn encode_companion(&self, bytes: &mut Vec<u8>) -> bool {
         encode_companion(self, bytes)
-    }
-    fn ros_companion(&self) -> Option<(&'static str, Schema)> {
-        Self::ros_companion()
     }
     fn is_exact_as_ros(&self) -> bool {
         is_exact_as_ros(self)
@@ -71,8 +67,8 @@ impl<T: Payload> AnyTopic for Topic<T> {
         T::NAME
     }
 
-    fn schemas(&self) -> fn() -> Vec<Schema> {
-        Stamped::<T>::schemas
+    fn layouts(&self) -> Layouts {
+        Stamped::<T>::LAYOUTS
     }
 
     fn subscribers(&self) -> Vec<SubscriberStatistics> {
@@ -83,14 +79,27 @@ impl<T: Payload> AnyTopic for Topic<T> {
         self.hub.tap(tap);
     }
 
-    fn decode(&self, bytes: &[u8]) -> Result<DynamicMessage, DecodeError> {
-        let message: Stamped<T> = crate::message::codec::decode(bytes)?;
-        Ok(DynamicMessage::of(self.hub.path, message))
+    fn decode(&self, message: Encoded<'_>, stamp: &dyn Fn(Stamp) -> Stamp) -> Result<DynamicMessage, DecodeError> {
+        let message: Stamped<T> = match message {
+            Encoded::Exact(bytes) => decode(bytes)?,
+            Encoded::Payload(bytes) => Stamp::default().message(decode(bytes)?),
+            Encoded::Ros(bytes) => {
+                let (payload, wall_time) = decode_as_ros(bytes)?;
+                Stamp { wall_time, ..Stamp::default() }.message(payload)
+            }
+        };
+        let stamp = stamp(message.stamp());
+        Ok(DynamicMessage::of(self.hub.path, stamp.message(message.payload)))
     }
 
     fn publish_dynamic(&self, message: &DynamicMessage) -> bool {
         let message = message.downcast();
         message.inspect(|message| self.publish(message)).is_some()
+    }
+
+    fn publish_dynamic_as_written(&self, message: &DynamicMessage, write: &mut dyn FnMut()) -> bool {
+        let message = message.downcast();
+        message.inspect(|message| self.publish_as_written(message, write)).is_some()
     }
 
     fn as_any(&self) -> &dyn Any {

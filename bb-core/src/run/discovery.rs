@@ -18,6 +18,7 @@ pub(super) fn discover(
     values: &[ParameterValue],
     commands: Vec<CommandInfo>,
     is_replaced: &dyn Fn(&str) -> bool,
+    is_external: &dyn Fn(&str) -> bool,
 ) -> Description {
     let paths: Vec<_> = topics.iter().map(|topic| topic.path()).collect();
     let sources = robot.sensors.iter().chain(robot.services);
@@ -64,6 +65,8 @@ pub(super) fn discover(
     let topics = topics.iter().map(|topic| TopicDescription {
         path: topic.path(),
         payload: topic.payload_name(),
+        layouts: topic.layouts(),
+        is_external: is_external(topic.path()),
         period: components.iter().find(|component| component.path == topic.path()).and_then(|found| found.period),
     });
     Description {

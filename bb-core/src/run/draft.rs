@@ -236,6 +236,7 @@ impl Assembling {
             shared: SharedValues::default(),
             replacements,
             wired: Arc::clone(&place),
+            callers: Mutex::default(),
             machine: Arc::clone(&machine),
         });
         control.set_host(&host);

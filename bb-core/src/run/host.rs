@@ -14,10 +14,11 @@ use crate::journal::{Event, Journal, Recorded};
 use crate::node::NodeEntry;
 use crate::pubsub::{AnyTopic, DynamicMessage, PathChange, Registry};
 use crate::schedule::Door;
+use crate::sorted::Sorted;
 use crate::time::MonotonicTime;
 use crate::topology::{GraphFormat, Topology};
 use std::any::Any;
-use std::sync::{Arc, OnceLock, Weak};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError, Weak};
 
 /// Weak, since components with a bus are part of the wiring.
 pub(super) struct RobotHost {
@@ -29,6 +30,8 @@ pub(super) struct RobotHost {
     pub(super) shared: SharedValues,
     pub(super) replacements: Replacements,
     pub(super) wired: Place,
+    /// The last caller of each path that callers publish at, for the journal.
+    pub(super) callers: Mutex<Sorted<&'static str, String>>,
     /// The robot once it is assembled, for its report.
     pub(super) machine: Arc<OnceLock<Weak<Machine>>>,
 }
@@ -98,7 +101,22 @@ impl Host for RobotHost {
         }
     }
 
+    fn note_caller(&self, path: &'static str, caller: &str) {
+        if self.journal.is_none() {
+            return;
+        }
+        // The line is written under the lock, so that lines of one path are in the order of the callers.
+        let mut callers = self.callers.lock().unwrap_or_else(PoisonError::into_inner);
+        if callers.get(path).is_none_or(|last| last != caller) {
+            callers.insert(path, caller.to_owned());
+            self.note(|| Event::Publisher { path, caller: caller.to_owned() });
+        }
+    }
+
     fn note_path(&self, change: PathChange) {
+        if let PathChange::Evicted { path } = change {
+            self.callers.lock().unwrap_or_else(PoisonError::into_inner).remove(path);
+        }
         self.note(|| match change {
             PathChange::Made { path, payload } => Event::OwnPublisher { path, payload },
             PathChange::Evicted { path } => Event::OwnPublisher { path, payload: "" },
@@ -114,6 +132,16 @@ impl Host for RobotHost {
 
     fn external(&self, path: &str) -> Option<ExternalSensor> {
         self.wired()?.external(path)
+    }
+
+    fn externals(&self) -> Vec<&'static str> {
+        self.wired().map_or_else(Vec::new, |wired| wired.externals())
+    }
+
+    fn enter(&self, message: &DynamicMessage, now: MonotonicTime) {
+        if let Some(wired) = self.wired() {
+            wired.enter(message, now);
+        }
     }
 
     fn takers(&self, path: &str) -> Vec<(&'static str, &'static str)> {
@@ -136,19 +164,24 @@ impl Host for RobotHost {
 
     fn description(&self) -> Description {
         let mut description = None;
+        let wired = self.wired();
+        let externals = wired.as_ref().map_or_else(Vec::new, |wired| wired.externals());
         self.with_topics(&mut |topics| {
             let mut all = topics.to_vec();
             let own = self.registry().published_topics();
             all.extend(own.iter().map(|topic| topic.as_ref()));
             let values = self.control.parameters();
             let run = self.control.kind_of_run();
-            description = Some(discover(self.robot, run, &all, values.all(), self.control.infos(), &|path| {
-                self.is_replaced(path)
-            }));
+            let is_external =
+                |path: &str| externals.contains(&path) || own.iter().any(|topic| topic.path() == path);
+            let is_replaced = |path: &str| self.is_replaced(path);
+            let commands = self.control.infos();
+            description = Some(discover(self.robot, run, &all, values.all(), commands, &is_replaced, &is_external));
         });
-        let empty = || discover(self.robot, self.control.kind_of_run(), &[], &[], Vec::new(), &|_| false);
+        let empty =
+            || discover(self.robot, self.control.kind_of_run(), &[], &[], Vec::new(), &|_| false, &|_| false);
         let mut description = description.unwrap_or_else(empty);
-        if let Some(wired) = self.wired() {
+        if let Some(wired) = wired {
             let actuators = wired.actuators();
             for component in &mut description.components {
                 let actuator = actuators.iter().find(|actuator| actuator.path() == component.path);

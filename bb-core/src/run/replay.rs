@@ -267,6 +267,8 @@ impl Replayer {
                 }
             }
             Event::Own { path, message } => self.publish_own(path, time, message)?,
+            // Who has published changes nothing.
+            Event::Publisher { .. } => {}
             Event::OwnPublisher { path, payload } => control.topics().registry.expect(path, payload),
             Event::Actuated { actuator, message } => self.actuated(actuator, message)?,
             Event::Deliver { island, entry, message } => {

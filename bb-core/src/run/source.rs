@@ -124,6 +124,17 @@ impl ExternalSensors {
     pub(super) fn at(&self, path: &str) -> Option<ExternalSensor> {
         self.0.iter().map(|source| source.as_external()).find(|sensor| sensor.path == path)
     }
+
+    pub(super) fn paths(&self) -> Vec<&'static str> {
+        self.0.iter().map(|source| source.as_external().path).collect()
+    }
+
+    /// Publishes a message at its path.
+    pub(super) fn enter(&self, message: &DynamicMessage, now: MonotonicTime) {
+        if let Some(source) = self.0.iter().find(|source| source.as_external().path == message.path()) {
+            source.feed(message, now);
+        }
+    }
 }
 
 /// A sensor or a service before it is made, whatever its type.

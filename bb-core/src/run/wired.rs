@@ -11,7 +11,8 @@ use crate::component::{ExternalSensor, Fault, OptionsList};
 use crate::control::Prepared;
 use crate::declaration::RobotDeclaration;
 use crate::node::{AnyIsland, islands_in};
-use crate::pubsub::AnyTopic;
+use crate::pubsub::{AnyTopic, DynamicMessage};
+use crate::time::MonotonicTime;
 use std::any::Any;
 use std::sync::{Arc, OnceLock, Weak};
 
@@ -124,7 +125,21 @@ impl Wired {
 
     /// The sensor at `path`, if other code publishes its messages.
     pub(super) fn external(&self, path: &str) -> Option<ExternalSensor> {
-        self.external.get_or_init(|| self.sources().external()).at(path)
+        self.external_sensors().at(path)
+    }
+
+    /// The paths of those sensors.
+    pub(super) fn externals(&self) -> Vec<&'static str> {
+        self.external_sensors().paths()
+    }
+
+    /// Publishes a message at the path of such a sensor, if it has its payload.
+    pub(super) fn enter(&self, message: &DynamicMessage, now: MonotonicTime) {
+        self.external_sensors().enter(message, now);
+    }
+
+    fn external_sensors(&self) -> &ExternalSensors {
+        self.external.get_or_init(|| self.sources().external())
     }
 
     /// The sensors and services, not made yet.

@@ -7,13 +7,15 @@ use super::{
 use crate::component::CommandInfo;
 use crate::event::ParameterValue;
 use crate::message::codec::compose::{array, null, number, object, optional, text};
-use crate::message::codec::json_schema;
+use crate::message::codec::{Layouts, Schema, json_schema};
 use std::time::Duration;
 
 impl Description {
     /// One JSON object with the lists `links`, `joints`, `components`, `topics`, `parameters`, `commands` and `states`, whose
-    /// elements have a `path`.
+    /// elements have a `path`. The `layout` of a topic is an index of the list `layouts`.
     pub fn to_json(&self) -> String {
+        let mut layouts: Vec<Layouts> = Vec::new();
+        let topics: Vec<String> = self.topics.iter().map(|of| topic(of, &mut layouts)).collect();
         object(&[
             ("robot", text(self.robot)),
             ("run", text(self.run.name())),
@@ -21,7 +23,8 @@ impl Description {
             ("links", array(&mut self.links.iter().map(link))),
             ("joints", array(&mut self.joints.iter().map(joint))),
             ("components", array(&mut self.components.iter().map(component))),
-            ("topics", array(&mut self.topics.iter().map(topic))),
+            ("topics", array(&mut topics.into_iter())),
+            ("layouts", array(&mut layouts.iter().map(layout))),
             ("parameters", array(&mut self.parameters.iter().map(parameter))),
             ("commands", array(&mut self.commands.iter().map(command))),
         ])
@@ -80,8 +83,37 @@ fn input(input: &InputDescription) -> String {
     ])
 }
 
-fn topic(topic: &TopicDescription) -> String {
-    object(&[("path", text(topic.path)), ("payload", text(topic.payload)), ("rate_hz", rate(topic.period))])
+fn topic(topic: &TopicDescription, layouts: &mut Vec<Layouts>) -> String {
+    let known = layouts.iter().position(|layouts| *layouts == topic.layouts);
+    let layout = known.unwrap_or_else(|| {
+        layouts.push(topic.layouts);
+        layouts.len() - 1
+    });
+    object(&[
+        ("path", text(topic.path)),
+        ("payload", text(topic.payload)),
+        ("rate_hz", rate(topic.period)),
+        ("external", topic.is_external.to_string()),
+        ("layout", layout.to_string()),
+    ])
+}
+
+fn layout(layouts: &Layouts) -> String {
+    let definition = |schema: &Schema| [("name", text(&schema.name)), ("definition", text(&schema.text))];
+    let ros = layouts.ros_schema().map(|schema| {
+        let [name, definition] = definition(&schema);
+        object(&[name, ("hash", optional(layouts.ros_type_hash(), |hash| text(&hash))), definition])
+    });
+    let companion = layouts.ros_companion().map(|(topic, schema)| {
+        let [name, definition] = definition(&schema);
+        object(&[("topic", text(topic)), name, definition])
+    });
+    object(&[
+        ("schema", layouts.json_schema()),
+        ("exact", object(&definition(&layouts.schema()))),
+        ("ros", ros.unwrap_or_else(null)),
+        ("companion", companion.unwrap_or_else(null)),
+    ])
 }
 
 fn parameter(parameter: &ParameterDescription) -> String {

@@ -2,78 +2,114 @@
 
 use super::ros::Header;
 use super::{
-    DecodeError, Field, FieldShape, Reader, RosCompanion, RosLayout, Schema, Shape, StructShape, Writer, type_hash,
+    DecodeError, Field, FieldShape, Reader, RosCompanion, RosLayout, Schema, Shape, StructShape, Writer,
+    json_schema, type_hash,
 };
 use crate::message::{Finite, Frame, Origin, Payload, Stamp, Stamped};
 use crate::time::WallTime;
 
+/// The layouts in which messages of one payload are written, for programs that do not know its type.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Layouts {
+    name: &'static str,
+    payload: Shape,
+    exact: Shape,
+    ros: Option<&'static StructShape>,
+    companion: Option<(&'static str, &'static StructShape)>,
+}
+
+impl Layouts {
+    /// Those of a payload.
+    pub const fn of<T: Payload>() -> Self {
+        let (name, payload, exact) = (T::NAME, T::SHAPE, <Stamped<T> as Field>::SHAPE);
+        let ros = match &T::ROS {
+            Some(RosLayout { shape: Shape::Struct(shape), .. }) => Some(*shape),
+            _ => None,
+        };
+        let companion = match &T::ROS {
+            Some(RosLayout {
+                companion: Some(RosCompanion { topic, shape: Shape::Struct(shape), .. }), ..
+            }) => Some((*topic, *shape)),
+            _ => None,
+        };
+        Self { name, payload, exact, ros, companion }
+    }
+
+    /// The shape of the payload.
+    pub const fn payload(&self) -> Shape {
+        self.payload
+    }
+
+    /// The JSON Schema of the payload.
+    pub fn json_schema(&self) -> String {
+        json_schema(self.payload)
+    }
+
+    /// The definition of a message in the exact layout.
+    pub fn schema(&self) -> Schema {
+        // The name of the definition is that given to the derive, if any: two types with the same name need two.
+        let name = match self.payload {
+            Shape::Struct(shape) => shape.name,
+            Shape::Enum(shape) => shape.name,
+            _ => self.name,
+        };
+        Schema::new(&format!("{name}Stamped"), self.exact)
+    }
+
+    /// The name of ROS's message, `sensor_msgs/Imu`, if ROS has one for the payload.
+    pub fn ros_name(&self) -> Option<&'static str> {
+        self.ros.map(|shape| shape.name)
+    }
+
+    /// ROS's definition of a message, if ROS has one for the payload.
+    pub fn ros_schema(&self) -> Option<Schema> {
+        self.ros.map(Schema::of)
+    }
+
+    /// The [`type_hash`] of ROS's message, if ROS has one for the payload.
+    pub fn ros_type_hash(&self) -> Option<String> {
+        self.ros.map(|shape| type_hash(shape.name, Shape::Struct(shape)))
+    }
+
+    /// The last part of the topic and the definition of a second message, if ROS has two for the payload.
+    pub fn ros_companion(&self) -> Option<(&'static str, Schema)> {
+        self.companion.map(|(topic, shape)| (topic, Schema::of(shape)))
+    }
+
+    /// The exact definition, and those of ROS.
+    pub(crate) fn schemas(&self) -> Vec<Schema> {
+        let companion = self.ros_companion().map(|(_, schema)| schema);
+        [Some(self.schema()), self.ros_schema(), companion].into_iter().flatten().collect()
+    }
+}
+
 impl<T: Payload> Stamped<T> {
+    /// The layouts in which messages of this payload are written.
+    pub const LAYOUTS: Layouts = Layouts::of::<T>();
+
     /// The information a program needs to read a message in the exact layout without knowing the payload.
     pub fn schema() -> Schema {
-        exact_schema(T::NAME, T::SHAPE, Self::SHAPE)
+        Self::LAYOUTS.schema()
     }
 
     /// ROS's definition of a message, if ROS has one for the payload.
     pub fn ros_schema() -> Option<Schema> {
-        ros_shape::<T>().map(Schema::of)
+        Self::LAYOUTS.ros_schema()
     }
 
     /// The name of ROS's message, `sensor_msgs/Imu`, if ROS has one for the payload.
     pub fn ros_name() -> Option<&'static str> {
-        ros_shape::<T>().map(|shape| shape.name)
+        Self::LAYOUTS.ros_name()
     }
 
     /// The last part of the topic and the definition of a second message, if ROS has two for the payload.
     pub fn ros_companion() -> Option<(&'static str, Schema)> {
-        const { ros_companion::<T>() }.map(|(topic, shape)| (topic, Schema::of(shape)))
-    }
-
-    /// The exact definition, and those of ROS.
-    pub(crate) fn schemas() -> Vec<Schema> {
-        let companion = const { ros_companion::<T>() }.map(|(_, shape)| shape);
-        all_schemas(exact_schema(T::NAME, T::SHAPE, Self::SHAPE), ros_shape::<T>(), companion)
+        Self::LAYOUTS.ros_companion()
     }
 
     /// The [`type_hash`] of ROS's message, if ROS has one for the payload.
     pub fn ros_type_hash() -> Option<String> {
-        ros_shape::<T>().map(|shape| type_hash(shape.name, Shape::Struct(shape)))
-    }
-}
-
-/// The name of the definition is that given to the derive, if any: two types with the same name need two.
-fn exact_schema(name: &str, payload: Shape, message: Shape) -> Schema {
-    let name = match payload {
-        Shape::Struct(shape) => shape.name,
-        Shape::Enum(shape) => shape.name,
-        _ => name,
-    };
-    Schema::new(&format!("{name}Stamped"), message)
-}
-
-fn all_schemas(
-    exact: Schema,
-    ros: Option<&'static StructShape>,
-    companion: Option<&'static StructShape>,
-) -> Vec<Schema> {
-    let mut schemas = vec![exact];
-    schemas.extend(ros.map(Schema::of));
-    schemas.extend(companion.map(Schema::of));
-    schemas
-}
-
-const fn ros_shape<T: Payload>() -> Option<&'static StructShape> {
-    match &T::ROS {
-        Some(RosLayout { shape: Shape::Struct(shape), .. }) => Some(shape),
-        _ => None,
-    }
-}
-
-const fn ros_companion<T: Payload>() -> Option<(&'static str, &'static StructShape)> {
-    match &T::ROS {
-        Some(RosLayout { companion: Some(RosCompanion { topic, shape: Shape::Struct(shape), .. }), .. }) => {
-            Some((topic, shape))
-        }
-        _ => None,
+        Self::LAYOUTS.ros_type_hash()
     }
 }
 

@@ -61,7 +61,9 @@ impl Replayer {
         let registry = &self.machine.control.topics().registry;
         match (registry.topics().into_iter().find(|topic| topic.path() == path), message) {
             (Some(topic), _) => Ok(topic),
-            (None, Recorded::Message(message)) => registry.topic_of(message).map_err(|error| error.to_string()),
+            (None, Recorded::Message(message)) => {
+                registry.topic_of(message, &mut |_| ()).map_err(|error| error.to_string())
+            }
             (None, Recorded::Bytes(_)) => Err(format!(
                 "something was published at `{path}`, a path made at run time, and the payload is not known: make a \
                  publisher there first, `replay.bus().publisher::<T>(\"{path}\")`"
