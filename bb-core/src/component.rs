@@ -52,7 +52,7 @@ pub use description::{
 };
 pub use estimator::{Estimator, HandleCall, HandleCast, Reply};
 pub(crate) use execution::AnyExecution;
-pub use execution::{CommandInfo, DynamicExecution, ExecutionInfo};
+pub use execution::{ArgumentInfo, CommandInfo, DynamicExecution, ExecutionInfo};
 pub use external::External;
 pub(crate) use field::FromQuantity;
 pub use field::OptionField;

@@ -275,6 +275,8 @@ struct Disarming {
     to_error: bool,
     /// The execution that disarms it.
     by: Option<u64>,
+    /// The caller that disarms it.
+    asked_by: Option<String>,
     /// The numbers and paths of callbacks that have not returned, each as often as it is to run.
     left: Vec<(u64, &'static str)>,
     /// Outcome, for callers that wait for it.

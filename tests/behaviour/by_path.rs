@@ -10,6 +10,8 @@ use std::sync::{Arc, Mutex};
 #[derive(Clone, Debug, Default, PartialEq, Payload)]
 pub(crate) struct Goal {
     pub(crate) name: String,
+    /// How fast.
+    #[payload(unit = "m/s", range = -1.0..=2.0)]
     pub(crate) speed: f64,
     pub(crate) stops: Vec<u8>,
 }
@@ -124,6 +126,16 @@ fn commands_are_listed_with_what_they_take_and_give() -> Result<(), StartError> 
         assert!(arguments.contains(field), "{field} is missing in {arguments}");
     }
     assert!(output.contains("stops") && !output.contains("speed"), "{output}");
+    let list = go.argument_list();
+    let known: Vec<_> = list.iter().map(|argument| (argument.name, argument.doc, argument.unit)).collect();
+    assert_eq!(known, [("name", "", None), ("speed", "How fast.", Some("m/s")), ("stops", "", None)]);
+    assert_eq!((list[1].range.clone(), list[1].default.as_deref()), (Some(-1.0..=2.0), Some("0")));
+    assert_eq!(list[2].default.as_deref(), Some("[]"));
+    let schema = go.argument_schema();
+    let speed = r#""speed":{"type":"number","minimum":-1,"maximum":2,"description":"How fast.","unit":"m/s"}"#;
+    let default = r#""default":{"name":"","speed":0,"stops":[]}"#;
+    assert!(schema.contains(speed) && schema.contains(default), "{schema}");
+    assert!(commands[0].argument_list().is_empty());
     Ok(())
 }
 
@@ -136,6 +148,8 @@ fn a_command_is_started_followed_and_cancelled_by_path() -> Result<(), Failure> 
         refused(bus.start_command("command/go", goal)),
         "`go` is refused: it is not allowed in the state `disarmed`"
     );
+    let fast = r#"{"name": "dock", "speed": 2.5, "stops": []}"#;
+    assert_eq!(refused(bus.start_command("command/go", fast)), "speed: expected a number from -1 to 2, found 2.5");
     assert_eq!(bus.arm(), Ok(()));
     assert_eq!((bus.safety(), bus.state()), (Safety::Armed, "idle"));
     let events = simulation.subscribe(open::command::go);
@@ -246,5 +260,23 @@ fn handlers_of_telemetry_get_every_event_and_may_panic() -> Result<(), StartErro
     let degrades =
         |event: &TelemetryEvent| matches!(event, TelemetryEvent::Transition(change) if change.estimator == DOUBLE);
     assert!(count(degrades) >= 1);
+    Ok(())
+}
+
+#[test]
+fn an_execution_by_path_may_be_awaited() -> Result<(), Failure> {
+    let running = Open::builder().start()?;
+    let bus = running.bus();
+    let runtime = tokio::runtime::Builder::new_current_thread().build()?;
+    let goal = r#"{"name": "dock", "speed": 0.5, "stops": [1, 2]}"#;
+    let ended = runtime.block_on(async {
+        bus.start_command("command/arm", "")?.await?;
+        bus.start_command("command/go", goal)?.await
+    });
+    assert_eq!(ended?, r#"{"name":"dock","stops":2}"#);
+    let failing = bus.start_command("command/go", &goal.replace("0.5", "-0.5"))?;
+    let failed = runtime.block_on(failing).expect_err("it cannot go back").to_string();
+    assert_eq!(failed, "the command failed: it cannot go back");
+    running.stop().ok()?;
     Ok(())
 }

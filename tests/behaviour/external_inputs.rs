@@ -312,25 +312,27 @@ fn random_json(random: &mut Random, shape: Shape) -> Value {
     }
 }
 
-/// A value in a tree of JSON, and its path as errors write it.
-fn random_leaf<'a>(random: &mut Random, value: &'a mut Value, path: &mut String) -> &'a mut Value {
-    match value {
-        Value::Object(members) if !members.is_empty() => {
-            let index = random.below(members.len() as u64) as usize;
-            let Some((name, member)) = members.iter_mut().nth(index) else {
-                unreachable!("it is below the length")
-            };
-            *path += if path.is_empty() { "" } else { "." };
-            *path += name;
-            random_leaf(random, member, path)
+/// Replaces a value in a tree of JSON that holds no other ones. Returns its path as errors write it.
+fn replace_leaf(random: &mut Random, value: &mut Value, other: Value) -> String {
+    let length = match &*value {
+        Value::Object(members) => members.len(),
+        Value::Array(items) => items.len(),
+        _ => 0,
+    };
+    let index = random.below(length.max(1) as u64) as usize;
+    let (step, inner) = match value {
+        Value::Object(members) if length > 0 => match members.iter_mut().nth(index) {
+            Some((name, member)) => (name.clone(), member),
+            None => return String::new(),
+        },
+        Value::Array(items) if length > 0 => (format!("[{index}]"), &mut items[index]),
+        leaf => {
+            *leaf = other;
+            return String::new();
         }
-        Value::Array(items) if !items.is_empty() => {
-            let index = random.below(items.len() as u64) as usize;
-            *path += &format!("[{index}]");
-            random_leaf(random, &mut items[index], path)
-        }
-        leaf => leaf,
-    }
+    };
+    let rest = replace_leaf(random, inner, other);
+    if rest.is_empty() || rest.starts_with('[') { step + &rest } else { format!("{step}.{rest}") }
 }
 
 /// Random payloads of each type, and damaged copies of each.
@@ -382,8 +384,7 @@ fn typed_and_by_path<T: Payload>(bus: &Bus, path: &str, random: &mut Random) -> 
             }
         }
 
-        let mut place = String::new();
-        *random_leaf(random, &mut value, &mut place) = json!({ "wrong": [{}] });
+        let place = replace_leaf(random, &mut value, json!({ "wrong": [{}] }));
         let refused = bus.publish_json(path, &value.to_string()).expect_err("no field is that").to_string();
         let expected = format!("nothing is published at `{path}`: {place}");
         assert!(refused.starts_with(&expected), "{refused}\n{expected}\n{value}");
@@ -450,7 +451,7 @@ fn what_cannot_be_published_by_path_says_why() -> Result<(), Failure> {
     assert_eq!(refused("sensor/radios"), unknown("sensor/radios", "; did you mean `sensor/radio`?"));
     assert_eq!(refused("own/number"), unknown("own/number", ""));
     // From when somebody waits for it.
-    let awaited = simulation.subscribe::<Number>("own/number", Overflow::default())?;
+    let awaited = simulation.bus().subscribe::<Number>("own/number", Overflow::default())?;
     assert_eq!((refused("own/number"), numbers(&awaited)), (Ok(()), vec![1.5]));
     let session = simulation.session("page 1", Rights::ALL);
     let page = session.bus();

@@ -128,7 +128,7 @@ fn a_robot_of_which_everything_hangs_as_it_closes_is_back_and_says_what_it_left(
     within(60, || {
         let mut builder = Sticky::builder();
         builder.journal(|line| {
-            if matches!(line.event, Event::Stop) {
+            if matches!(line.event, Event::Stop { .. }) {
                 HERE.pass("here");
             }
         });

@@ -171,7 +171,7 @@ fn a_set_is_one_entry_of_the_journal_and_the_same_in_a_replay() -> Result<(), Fa
 
     let lines = entries(&lines);
     let sizes = lines.iter().filter_map(|line| match &line.event {
-        Event::Parameters { changes } => Some(changes.len()),
+        Event::Parameters { changes, .. } => Some(changes.len()),
         _ => None,
     });
     assert_eq!(sizes.collect::<Vec<_>>(), [2, 1]);

@@ -395,7 +395,9 @@ fn a_journal_of_another_robot_is_refused_with_its_line() -> Result<(), Failure> 
          robot has `robot Day`"
     );
     let mut replay = Day::builder().replay()?;
-    let gap = replay.play(vec![Entry { number: 3, time: at(0), event: Event::Arm }]).expect_err("two are missing");
+    let gap = replay
+        .play(vec![Entry { number: 3, time: at(0), event: Event::Arm { caller: String::new() } }])
+        .expect_err("two are missing");
     let message = "line 3 of the journal cannot be replayed: it follows line 0; the lines between are missing";
     assert_eq!(gap.to_string(), message);
     Ok(())

@@ -1,6 +1,7 @@
 //! Rights of a caller: each verb of the bus needs its right, and everybody may disarm.
 
 use crate::components::Number;
+use bb_core::journal::Event;
 use bb_core::prelude::*;
 use bb_core::run::Bus;
 use bb_core::{ArmError, DisarmError};
@@ -151,5 +152,73 @@ fn a_command_that_arms_needs_the_right_to_arm_too() -> Result<(), Box<dyn std::e
             }
         }
     }
+    Ok(())
+}
+
+/// Those of the events and of the journal's lines are the same.
+#[test]
+fn changes_of_parameters_and_safety_name_their_caller() -> Result<(), Box<dyn std::error::Error>> {
+    let mut builder = Guarded::builder();
+    let lines = crate::replay::journal(&mut builder);
+    let safety = builder.subscribe(system::SafetyState);
+    let speed = builder.subscribe(guarded::param::speed);
+    let mut robot = builder.simulate()?;
+    let page = robot.for_caller("page 1", Rights::ALL);
+    page.set_parameter("param/speed", 2.0)?;
+    robot.set_parameter(guarded::param::speed, 3.0)?;
+    page.arm()?;
+    robot.for_caller("stop button", Rights::NONE).disarm()?;
+    page.start_command("command/go", "")?;
+    robot.run_for(Duration::from_millis(1));
+    page.start_command("command/stop", "")?;
+    robot.run_for(Duration::from_millis(1));
+    page.arm()?;
+    robot.for_caller("service", Rights::ALL).request_stop()?;
+    robot.stop();
+    let callers: Vec<_> = speed.drain().map(|change| change.payload.caller).collect();
+    assert_eq!(callers, ["page 1", "program"]);
+    let changes: Vec<_> =
+        safety.drain().map(|change| (change.to, change.payload.caller.unwrap_or_default())).collect();
+    let (armed, disarming, disarmed) = (Safety::Armed, Safety::Disarming, Safety::Disarmed);
+    let expected = [
+        (armed, "page 1"),
+        (disarming, "stop button"),
+        (disarmed, "stop button"),
+        (armed, "page 1"),
+        (disarming, "page 1"),
+        (disarmed, "page 1"),
+        (armed, "page 1"),
+        (disarming, "service"),
+        (disarmed, "service"),
+    ];
+    assert_eq!(changes, expected.map(|(to, caller)| (to, caller.to_owned())));
+    let lines = crate::replay::entries(&lines);
+    let written: Vec<_> = lines
+        .iter()
+        .cloned()
+        .filter_map(|line| match line.event {
+            Event::Parameters { caller, .. } => Some(("parameters", caller)),
+            Event::Arm { caller } => Some(("arm", caller)),
+            Event::Disarm { caller, .. } => Some(("disarm", caller)),
+            Event::Stop { caller } => Some(("stop", caller)),
+            _ => None,
+        })
+        .collect();
+    let expected = [
+        ("parameters", "page 1"),
+        ("parameters", "program"),
+        ("arm", "page 1"),
+        ("disarm", "stop button"),
+        ("arm", "page 1"),
+        ("stop", "service"),
+    ];
+    assert_eq!(written, expected.map(|(what, caller)| (what, caller.to_owned())));
+    // A replay publishes the same.
+    let builder = Guarded::builder();
+    let again = builder.subscribe(system::SafetyState);
+    crate::replay::play(builder, &crate::replay::read_back::<Guarded>(&lines)?)?;
+    let again: Vec<_> =
+        again.drain().map(|change| (change.to, change.payload.caller.unwrap_or_default())).collect();
+    assert_eq!(again, changes);
     Ok(())
 }

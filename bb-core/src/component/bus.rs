@@ -363,7 +363,7 @@ impl Bus {
     /// # Errors
     /// What could not be made safe; the safety state is then `error`.
     pub fn disarm(&self) -> Result<(), DisarmError> {
-        self.settled(|robot| robot.disarm(false))
+        self.settled(|robot| robot.disarm(false, &self.caller))
     }
 
     /// Leaves the safety state `error`, even if something still cannot be made safe; the caller must have checked
@@ -374,7 +374,7 @@ impl Bus {
     pub fn force_disarm(&self) -> Result<(), DisarmError> {
         self.check(Right::Arm).map_err(DisarmError::Forbidden)?;
         // Whoever may not force it any more may still disarm.
-        self.settled(|robot| robot.disarm(self.caller.is_valid()))
+        self.settled(|robot| robot.disarm(self.caller.is_valid(), &self.caller))
     }
 
     /// Disarms the robot, cancels its commands, and has its sensors and services stop as soon as it is safe. Does not wait.
@@ -384,7 +384,7 @@ impl Bus {
     pub fn request_stop(&self) -> Result<(), Fault> {
         self.check(Right::Arm)?;
         self.caller.check_valid()?;
-        self.settled(|robot| robot.request_stop());
+        self.settled(|robot| robot.request_stop(&self.caller));
         Ok(())
     }
 

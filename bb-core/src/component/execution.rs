@@ -2,9 +2,13 @@
 
 use super::Fault;
 use crate::declaration::Role;
-use crate::message::codec::Shape;
+use crate::message::codec::{FieldShape, Shape, json_schema, member_of};
 use crate::time::MonotonicTime;
 use std::fmt;
+use std::future::Future;
+use std::ops::RangeInclusive;
+use std::pin::Pin;
+use std::task::{Context, Poll};
 use std::time::Duration;
 
 /// A description of a command, for tools.
@@ -31,6 +35,51 @@ pub struct CommandInfo {
     pub running: usize,
 }
 
+/// One argument of a command, for forms and tables.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct ArgumentInfo {
+    /// Its name.
+    pub name: &'static str,
+    /// Its shape.
+    pub shape: Shape,
+    /// Its doc comment; empty for none.
+    pub doc: &'static str,
+    /// The symbol of its unit, if it has one: `m/s`.
+    pub unit: Option<&'static str>,
+    /// The numbers that it may be, in that unit.
+    pub range: Option<RangeInclusive<f64>>,
+    /// Its default, as JSON.
+    pub default: Option<String>,
+}
+
+impl CommandInfo {
+    /// Its arguments, if they are the fields of a struct.
+    pub fn argument_list(&self) -> Vec<ArgumentInfo> {
+        let Shape::Struct(of) = self.arguments else { return Vec::new() };
+        let describe = |field: &'static FieldShape| ArgumentInfo {
+            name: field.name,
+            shape: field.shape,
+            doc: field.doc,
+            unit: if let [unit] = field.units { Some(unit.symbol) } else { None },
+            range: field.range.map(|range| range.minimum()..=range.maximum()),
+            default: member_of(&self.default_arguments, field.name),
+        };
+        of.fields.iter().filter(|field| field.is_named()).map(describe).collect()
+    }
+
+    /// The JSON Schema of its arguments, with those that it gets if none are given as the `default`.
+    pub fn argument_schema(&self) -> String {
+        let schema = json_schema(self.arguments);
+        match schema.strip_suffix('}') {
+            Some(open) if !self.default_arguments.is_empty() => {
+                format!("{open},\"default\":{}}}", self.default_arguments)
+            }
+            _ => schema,
+        }
+    }
+}
+
 /// An execution of a command that has not ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
@@ -54,6 +103,7 @@ pub(crate) trait AnyExecution: Send {
     fn try_result(&self) -> Option<Result<String, Fault>>;
     fn wait_timeout(&self, timeout: Duration) -> Option<Result<String, Fault>>;
     fn cancel(&self);
+    fn poll(&mut self, context: &mut Context<'_>) -> Poll<Result<String, Fault>>;
 }
 
 impl DynamicExecution {
@@ -79,6 +129,15 @@ impl DynamicExecution {
     /// Cancels the command.
     pub fn cancel(&self) {
         self.0.cancel();
+    }
+}
+
+/// Awaits the result as JSON, on any executor.
+impl Future for DynamicExecution {
+    type Output = Result<String, Fault>;
+
+    fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Self::Output> {
+        self.0.poll(context)
     }
 }
 

@@ -24,7 +24,7 @@ pub(crate) trait Controls: Guardian {
     fn state(&self) -> &'static str;
     fn safety(&self) -> Safety;
     fn arm(&self, caller: &Caller) -> Result<(), ArmError>;
-    fn disarm(&self, force: bool) -> Result<(), DisarmError>;
+    fn disarm(&self, force: bool, caller: &Caller) -> Result<(), DisarmError>;
     fn parameter(&self, path: &str) -> Option<ParameterValue>;
     /// Sets all of them, or none.
     fn set_parameters(&self, changes: Vec<(String, ParameterValue)>, caller: &Caller)
@@ -34,7 +34,7 @@ pub(crate) trait Controls: Guardian {
     fn executions(&self) -> Vec<ExecutionInfo>;
     fn cancel(&self, execution: u64, caller: &Caller) -> Result<(), Fault>;
     /// Disarms the robot and stops its components, without waiting.
-    fn request_stop(&self);
+    fn request_stop(&self, caller: &Caller);
     fn kind_of_run(&self) -> RunKind;
     /// The execution of that number, whose caller it is, changes the operational state.
     fn transition(&self, execution: u64, state: &str, caller: &Caller) -> Result<(), Fault>;

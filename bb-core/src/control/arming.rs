@@ -78,7 +78,7 @@ impl Control {
             self.drop_cancelled();
         }
         // If the wait fails, they are still there below.
-        let step = self.step_once(longest, |state| {
+        let mut step = self.step_once(longest, |state| {
             state.machine.safety != Safety::Disarmed
                 || !state.has_lingering() && state.apart.is_empty()
                 || state.is_stopping
@@ -93,20 +93,23 @@ impl Control {
             // A replay knows nothing of those callbacks, so there is no entry.
             return Err(ArmError::MakingSafe(step.state.being_made_safe().collect()));
         }
-        step.line(Event::Arm);
+        step.asked_by = Some(caller.name().to_owned());
+        step.line(Event::Arm { caller: caller.name().to_owned() });
         step.arm()
     }
 
     /// Replays a request to arm the robot.
-    pub(crate) fn replay_arm(&self) {
+    pub(crate) fn replay_arm(&self, caller: String) {
+        let mut step = self.step();
+        step.asked_by = Some(caller);
         // Whether it succeeds follows from the state.
-        let _ = self.step().arm();
+        let _ = step.arm();
     }
 
     /// Disarms the robot: commands are cancelled and the disarm callbacks run. If not everything could be made safe,
     /// the safety state is `error`; with `force`, that state is left even if something still fails. If the robot is
     /// disarmed already, commands that would arm it are cancelled.
-    pub(crate) fn disarm(&self, force: bool) -> Result<(), DisarmError> {
+    pub(crate) fn disarm(&self, force: bool, caller: &Caller) -> Result<(), DisarmError> {
         if self.0.mode == Mode::Replay {
             return Err(DisarmError::Replay);
         }
@@ -119,7 +122,8 @@ impl Control {
             Safety::Error if !force => return Err(DisarmError::Error),
             _ => {}
         }
-        step.line(Event::Disarm { force });
+        step.asked_by = Some(caller.name().to_owned());
+        step.line(Event::Disarm { force, caller: caller.name().to_owned() });
         step.disarm(force);
         let disarming = step.state.disarming.as_ref();
         let waits_for = disarming.map(|disarming| (disarming.generation, Arc::clone(&disarming.outcome)));
@@ -140,8 +144,9 @@ impl Control {
     }
 
     /// Replays a request to disarm the robot.
-    pub(crate) fn replay_disarm(&self, force: bool) {
+    pub(crate) fn replay_disarm(&self, force: bool, caller: String) {
         let mut step = self.step();
+        step.asked_by = Some(caller);
         if !step.state.is_stopped() {
             step.disarm(force);
         }
@@ -205,12 +210,13 @@ impl Control {
 
     /// Disarms the robot and cancels its commands, without waiting. Nothing is started from now on. Sensors and services are
     /// told to stop once the robot is safe or the time limit has passed.
-    pub(crate) fn begin_stop(&self) {
+    pub(crate) fn begin_stop(&self, caller: &Caller) {
         let mut step = self.step();
         if step.state.is_stopping {
             return;
         }
-        step.line(Event::Stop);
+        step.asked_by = Some(caller.name().to_owned());
+        step.line(Event::Stop { caller: caller.name().to_owned() });
         step.begin_stop();
         step.finish();
         if self.0.mode == Mode::Virtual {
@@ -220,11 +226,12 @@ impl Control {
     }
 
     /// Replays a stop of the robot.
-    pub(crate) fn replay_stop(&self) {
+    pub(crate) fn replay_stop(&self, caller: String) {
         let mut step = self.step();
         if step.state.is_stopping {
             return;
         }
+        step.asked_by = Some(caller);
         step.begin_stop();
         step.finish();
     }
@@ -397,6 +404,7 @@ impl Step<'_> {
             force,
             to_error: false,
             by,
+            asked_by: self.asked_by.clone(),
             left: hooks.iter().map(|callback| (callback.number, callback.path)).collect(),
             errors: Vec::new(),
             outcome: Arc::default(),
@@ -432,6 +440,7 @@ impl Step<'_> {
         self.state.last_disarm = outcome;
         self.state.machine.safety = if is_error { Safety::Error } else { Safety::Disarmed };
         let name = disarming.by.and_then(|id| self.name_of(id));
+        self.asked_by = disarming.asked_by;
         self.publish_machine(name);
         if let Some(id) = disarming.by {
             self.finish_disarming_command(id);

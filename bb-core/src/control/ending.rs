@@ -176,6 +176,7 @@ impl Step<'_> {
         match self.role(command) {
             Role::Disarming if self.state.machine.safety == Safety::Armed => {
                 self.set_phase(index, Phase::Disarming(value, next_state));
+                self.asked_by = self.state.executions.get(index).map(|execution| execution.asked_by.clone());
                 self.begin_disarming(Some(id), name, false);
             }
             Role::Arming if self.state.machine.safety == Safety::Disarmed && self.state.has_lingering() => {
@@ -213,6 +214,7 @@ impl Step<'_> {
         if self.state.machine.safety == Safety::Disarmed && !self.state.is_stopping {
             self.state.machine.safety = Safety::Armed;
             self.state.machine.resting = IDLE;
+            self.asked_by = self.state.executions.get(index).map(|execution| execution.asked_by.clone());
         }
         if self.state.machine.safety == Safety::Armed {
             return self.settle(index, Ok(value), next_state);

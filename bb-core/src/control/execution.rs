@@ -92,6 +92,24 @@ impl Slot {
         }
     }
 
+    fn poll(&self, context: &mut Context<'_>) -> Poll<Result<Value, CommandError>> {
+        // Cloning and dropping wakers is user code: not under the lock.
+        let waker = context.waker().clone();
+        let mut state = lock(&self.state);
+        match state.take() {
+            Some(result) => {
+                drop(state);
+                Poll::Ready(result)
+            }
+            None => {
+                let previous = state.waker.replace(waker);
+                drop(state);
+                drop(previous);
+                Poll::Pending
+            }
+        }
+    }
+
     fn cancel(&self) {
         if let Some(control) = self.control.upgrade() {
             control.cancel(self.id);
@@ -149,21 +167,7 @@ impl<T: 'static> Future for Execution<T> {
     type Output = Result<T, CommandError>;
 
     fn poll(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Self::Output> {
-        // Cloning and dropping wakers is user code: not under the lock.
-        let waker = context.waker().clone();
-        let mut state = lock(&self.slot.state);
-        match state.take() {
-            Some(result) => {
-                drop(state);
-                Poll::Ready(typed(result))
-            }
-            None => {
-                let previous = state.waker.replace(waker);
-                drop(state);
-                drop(previous);
-                Poll::Pending
-            }
-        }
+        self.slot.poll(context).map(typed)
     }
 }
 
@@ -186,6 +190,10 @@ impl AnyExecution for UntypedExecution {
 
     fn cancel(&self) {
         self.0.cancel();
+    }
+
+    fn poll(&mut self, context: &mut Context<'_>) -> Poll<Result<String, Fault>> {
+        self.0.poll(context).map(|result| self.0.json(result))
     }
 }
 

@@ -83,9 +83,9 @@ fn check<const THREADS: usize>(threads: [Thread; THREADS], prepare: fn(&Control)
 
 const DRIVES: Thread = |control, motor| motor.drive(control);
 const DISARMS: Thread = |control, _| {
-    let _ = control.disarm(false);
+    let _ = control.disarm(false, &Caller::PROGRAM);
 };
-const STOPS: Thread = |control, _| control.begin_stop();
+const STOPS: Thread = |control, _| control.begin_stop(&Caller::PROGRAM);
 const ARMS: Thread = |control, _| {
     let _ = control.arm(&Caller::PROGRAM);
 };
@@ -152,7 +152,7 @@ fn an_init_that_fails_while_the_robot_is_disarmed() {
             });
             assert!(failed.is_err());
         });
-        let _ = control.disarm(false);
+        let _ = control.disarm(false, &Caller::PROGRAM);
         starts.join().expect("it does not panic");
         while control.is_disarming() {
             thread::yield_now();
@@ -174,7 +174,7 @@ fn a_callback_that_is_registered_while_the_robot_stops() {
         assert_eq!(control.arm(&Caller::PROGRAM), Ok(()));
         let motor = Motor::default();
         let (stopped, started) = (control.clone(), motor.clone());
-        let (starting, stops) = (control.clone(), thread::spawn(move || stopped.begin_stop()));
+        let (starting, stops) = (control.clone(), thread::spawn(move || stopped.begin_stop(&Caller::PROGRAM)));
         let starts = thread::spawn(move || {
             let disarm = move || {
                 started.0.lock().expect("nobody panicked").is_safe = true;

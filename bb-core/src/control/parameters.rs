@@ -105,7 +105,8 @@ impl Control {
                 continue;
             }
             let values = step.state.parameters.with(changed(&changes));
-            step.line(Event::Parameters { changes: changes.clone() });
+            let caller = caller.name().to_owned();
+            step.line(Event::Parameters { changes: changes.clone(), caller: caller.clone() });
             let mut estimators = Vec::new();
             for component in step.state.bound.iter().filter(|component| is_bound_to_any(component)) {
                 match &component.target {
@@ -120,7 +121,7 @@ impl Control {
             if let Some(keep) = self.0.on_parameters.get() {
                 keep(&changes);
             }
-            step.change_parameters(values, changes);
+            step.change_parameters(values, changes, &caller);
             step.finish();
             return Ok(());
         }
@@ -132,10 +133,10 @@ impl Control {
     }
 
     /// Replays a set of parameters. Components whose options are bound to them are notified by their own lines.
-    pub(crate) fn replay_parameters(&self, changes: Vec<ParameterEntry>) {
+    pub(crate) fn replay_parameters(&self, changes: Vec<ParameterEntry>, caller: &str) {
         let mut step = self.step();
         let values = step.state.parameters.with(changed(&changes));
-        step.change_parameters(values, changes);
+        step.change_parameters(values, changes, caller);
         step.finish();
     }
 
@@ -175,7 +176,7 @@ impl Control {
 
 impl Step<'_> {
     /// Changes the values, and publishes the changes.
-    fn change_parameters(&mut self, values: ParameterValues, changes: Vec<ParameterEntry>) {
+    fn change_parameters(&mut self, values: ParameterValues, changes: Vec<ParameterEntry>, caller: &str) {
         let before = std::mem::replace(&mut self.state.parameters, values);
         let control = self.control;
         for ParameterEntry { parameter, value } in changes {
@@ -183,7 +184,8 @@ impl Step<'_> {
             if let (Some(topic), Some(declared), Some(from)) =
                 (topics.get(parameter), declared.get(parameter), before.all().get(parameter))
             {
-                let change = ParameterChange { path: declared.path, from: from.clone(), to: value };
+                let (path, from, caller) = (declared.path, from.clone(), caller.to_owned());
+                let change = ParameterChange { path, from, to: value, caller };
                 self.publish(topic, change, self.now);
             }
         }

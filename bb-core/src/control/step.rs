@@ -20,6 +20,8 @@ pub(super) struct Step<'a> {
     pub(super) now: MonotonicTime,
     wall_offset_nanos: i64,
     before: Machine,
+    /// The caller whose request changes the safety state.
+    pub(super) asked_by: Option<String>,
     pub(super) effects: Effects,
 }
 
@@ -39,7 +41,7 @@ impl Control {
         let now = self.0.clock.now();
         let wall_offset_nanos = self.0.clock.wall_offset_nanos();
         let before = state.machine;
-        Step { control: self, state, now, wall_offset_nanos, before, effects: Effects::default() }
+        Step { control: self, state, now, wall_offset_nanos, before, asked_by: None, effects: Effects::default() }
     }
 }
 
@@ -73,7 +75,8 @@ impl Step<'_> {
             self.control.0.safety.store(after.safety as u8, Ordering::SeqCst);
             let (from, to) = (before.safety, after.safety);
             self.effects.log(Log::Safety { from, to });
-            self.publish(&topics.safety, SafetyTransition { from, to }, self.now);
+            let caller = self.asked_by.clone();
+            self.publish(&topics.safety, SafetyTransition { from, to, caller }, self.now);
         }
         if before.state() != after.state() {
             let (from, to) = (before.state(), after.state());

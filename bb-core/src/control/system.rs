@@ -282,8 +282,8 @@ impl Controls for Control {
         Self::arm(self, caller)
     }
 
-    fn disarm(&self, force: bool) -> Result<(), DisarmError> {
-        Self::disarm(self, force)
+    fn disarm(&self, force: bool, caller: &Caller) -> Result<(), DisarmError> {
+        Self::disarm(self, force, caller)
     }
 
     fn parameter(&self, path: &str) -> Option<ParameterValue> {
@@ -310,8 +310,8 @@ impl Controls for Control {
         self.cancel_by(execution, caller)
     }
 
-    fn request_stop(&self) {
-        self.begin_stop();
+    fn request_stop(&self, caller: &Caller) {
+        self.begin_stop(caller);
     }
 
     fn kind_of_run(&self) -> RunKind {

@@ -41,6 +41,7 @@ impl fmt::Display for ParameterValue {
 
 /// A parameter that has changed, published at its path: `param/imu/beta`.
 #[derive(Clone, Debug, PartialEq, Payload)]
+#[non_exhaustive]
 pub struct ParameterChange {
     /// Path.
     pub path: &'static str,
@@ -48,4 +49,6 @@ pub struct ParameterChange {
     pub from: ParameterValue,
     /// The new value.
     pub to: ParameterValue,
+    /// Who has set it, named as in [`CommandEvent`](super::CommandEvent).
+    pub caller: String,
 }

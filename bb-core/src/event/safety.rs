@@ -29,12 +29,16 @@ impl fmt::Display for Safety {
 }
 
 /// A change of the safety state, published at `safety`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Payload)]
+#[derive(Clone, Debug, PartialEq, Eq, Payload)]
+#[non_exhaustive]
 pub struct SafetyTransition {
     /// The previous state.
     pub from: Safety,
     /// The new state.
     pub to: Safety,
+    /// Who armed, disarmed or stopped the robot, or started the command that did, named as in
+    /// [`CommandEvent`](super::CommandEvent); `None` if hardware reported an error.
+    pub caller: Option<String>,
 }
 
 /// Reason for the safety state `error`, published at `safety/error`.

@@ -208,6 +208,8 @@ pub enum Event {
     Parameters {
         /// Changed parameters with their new values.
         changes: Vec<ParameterEntry>,
+        /// Who has set them.
+        caller: String,
     },
     /// A command was requested.
     Command {
@@ -239,11 +241,16 @@ pub enum Event {
         execution: u64,
     },
     /// The robot was armed.
-    Arm,
+    Arm {
+        /// Caller that armed it.
+        caller: String,
+    },
     /// The robot was disarmed.
     Disarm {
         /// `true` if the disarming was forced.
         force: bool,
+        /// Caller that disarmed it.
+        caller: String,
     },
     /// The disarm callbacks have returned, or their time limit has passed.
     Disarmed {
@@ -253,7 +260,10 @@ pub enum Event {
     /// Arming gave up waiting for cancelled commands.
     ArmTimeout,
     /// The robot was stopped.
-    Stop,
+    Stop {
+        /// Caller that stopped it.
+        caller: String,
+    },
     /// The transforms of a line's inputs that span moving joints.
     Placed {
         /// The number of that line.

@@ -268,27 +268,27 @@ mod tests {
         let lines: Arc<Mutex<Vec<Entry>>> = Arc::default();
         let sink = Arc::clone(&lines);
         let journal = Journal::new(Arc::new(move |line| sink.lock().expect("no panic").push(line)), 5);
-        journal.write(MonotonicTime::ZERO, 5, Event::Disarm { force: false });
+        journal.write(MonotonicTime::ZERO, 5, Event::Start { island: 0 });
         journal.flush();
-        journal.begin(MonotonicTime::ZERO, Event::Arm);
+        journal.begin(MonotonicTime::ZERO, Event::ArmTimeout);
         journal.start().expect("a thread");
         std::thread::scope(|scope| {
             for _ in 0..4 {
                 scope.spawn(|| {
                     (0..10_000).for_each(|_| {
-                        journal.write(MonotonicTime::ZERO, 5, Event::Arm);
+                        journal.write(MonotonicTime::ZERO, 5, Event::ArmTimeout);
                     })
                 });
             }
         });
-        journal.write(MonotonicTime::ZERO, 6, Event::Stop);
+        journal.write(MonotonicTime::ZERO, 6, Event::Retire { island: 0 });
         journal.close();
         assert!(journal.hand_over(Duration::from_secs(10)));
-        assert_eq!(journal.write(MonotonicTime::ZERO, 6, Event::Stop), 0, "closed");
+        assert_eq!(journal.write(MonotonicTime::ZERO, 6, Event::Retire { island: 0 }), 0, "closed");
         let lines = lines.lock().expect("no panic");
         assert_eq!(lines.len(), 40_004);
         assert!(
-            matches!((&lines[0].event, &lines[1].event), (Event::Arm, Event::Disarm { .. })),
+            matches!((&lines[0].event, &lines[1].event), (Event::ArmTimeout, Event::Start { .. })),
             "it begins first"
         );
         assert!(lines.iter().zip(1..).all(|(line, number)| line.number == number));
@@ -306,9 +306,9 @@ mod tests {
             let _ = hang.lock().map(|hang| hang.recv());
         };
         let journal = Journal::new(Arc::new(sink), 0);
-        journal.begin(MonotonicTime::ZERO, Event::Arm);
+        journal.begin(MonotonicTime::ZERO, Event::ArmTimeout);
         journal.start().expect("a thread");
-        journal.write(MonotonicTime::ZERO, 0, Event::Arm);
+        journal.write(MonotonicTime::ZERO, 0, Event::ArmTimeout);
         while count.load(Ordering::SeqCst) == 0 {
             std::thread::yield_now();
         }
@@ -317,7 +317,7 @@ mod tests {
 
     /// Writes this many lines. Returns how many were accepted.
     fn fill(journal: &Journal, lines: usize) -> usize {
-        (0..lines).filter(|_| journal.write(MonotonicTime::ZERO, 0, Event::Arm) > 0).count()
+        (0..lines).filter(|_| journal.write(MonotonicTime::ZERO, 0, Event::ArmTimeout) > 0).count()
     }
 
     #[test]
@@ -325,11 +325,11 @@ mod tests {
         let (journal, _release) = hanging();
         for _ in 0..=CAPACITY.lines {
             journal.wait_for_room();
-            journal.write(MonotonicTime::ZERO, 0, Event::Arm);
+            journal.write(MonotonicTime::ZERO, 0, Event::ArmTimeout);
         }
         assert!(journal.check().is_some_and(|message| message.starts_with("its sink hangs")));
         assert_eq!(journal.check(), None, "it is said once");
-        assert_eq!(journal.write(MonotonicTime::ZERO, 0, Event::Stop), 0);
+        assert_eq!(journal.write(MonotonicTime::ZERO, 0, Event::Retire { island: 0 }), 0);
     }
 
     #[test]
@@ -407,14 +407,14 @@ mod tests {
         let (release, hang) = std::sync::mpsc::channel::<()>();
         let hang = Mutex::new(hang);
         let sink = move |line: Entry| {
-            if matches!(line.event, Event::Stop) {
+            if matches!(line.event, Event::Retire { .. }) {
                 let _ = hang.lock().map(|hang| hang.recv());
             }
         };
         let journal = Journal::new(Arc::new(sink), 0);
-        journal.begin(MonotonicTime::ZERO, Event::Arm);
+        journal.begin(MonotonicTime::ZERO, Event::ArmTimeout);
         journal.start().expect("a thread");
-        journal.write(MonotonicTime::ZERO, 0, Event::Stop);
+        journal.write(MonotonicTime::ZERO, 0, Event::Retire { island: 0 });
         journal.close();
         let (done, ended) = std::sync::mpsc::channel();
         let handed = journal.clone();
@@ -441,7 +441,7 @@ mod tests {
                 }),
                 0,
             );
-            journal.begin(MonotonicTime::ZERO, Event::Arm);
+            journal.begin(MonotonicTime::ZERO, Event::ArmTimeout);
             if has_thread {
                 journal.start().expect("a thread");
             }

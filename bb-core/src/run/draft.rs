@@ -286,7 +286,7 @@ impl Assembling {
     /// Makes safe what components have started in `init`, and closes and drops them and all else that was `made`; returns why the
     /// robot does not start.
     fn abandon(&self, path: &'static str, fault: Fault, made: impl Send + 'static) -> StartError {
-        self.control.begin_stop();
+        self.control.begin_stop(&Caller::PROGRAM);
         self.control.wait_until_disarmed();
         self.control.drop_hooks();
         self.control.run_on_pool(Lane::User, move || discard(made));

@@ -193,7 +193,7 @@ impl<R: Robot> Live<R> {
 
     /// Disarms the robot, cancels its commands, and tells sensors and services to stop as soon as it is safe. Does not wait.
     pub fn request_stop(&self) {
-        self.settled(|machine| machine.control.begin_stop());
+        self.settled(|machine| machine.control.begin_stop(&Caller::PROGRAM));
     }
 
     /// Makes Ctrl-C, and on Unix the signals `SIGTERM` and `SIGHUP`, call [`Self::request_stop`]. The robot is

@@ -10,7 +10,7 @@ use super::machine::Machine;
 use super::source::AnySource;
 use super::visit::Visitable;
 use super::{Live, Report, Robot};
-use crate::component::{HandleCall, HandleCast};
+use crate::component::{Caller, HandleCall, HandleCast};
 use crate::declaration::ParameterValues;
 use crate::fault::{caught, discard};
 use crate::joints::PlacedInput;
@@ -155,7 +155,7 @@ impl Replayer {
             self.machine.fault("journal", error.to_string());
         }
         let machine = &self.machine;
-        machine.control.replay_stop();
+        machine.control.replay_stop(Caller::PROGRAM.name().to_owned());
         if machine.control.is_disarming() {
             machine.control.disarmed(Vec::new());
         }
@@ -315,22 +315,18 @@ impl Replayer {
             }
             Event::Noted { path, message } => control.note_fault(path, message),
             Event::HardwareError { path, error } => control.note_hardware_error(path, error),
-            Event::Parameters { changes } => control.replay_parameters(changes),
+            Event::Parameters { changes, caller } => control.replay_parameters(changes, &caller),
             Event::Command { command, caller } => control.replay_command(command, caller),
             Event::Ended { execution, end } => control.replay_end(execution, end),
             Event::Transition { execution, state } => control.replay_transition(execution, &state),
             Event::Cancel { execution } => control.cancel(execution),
             Event::Timeout { execution } => control.timed_out(execution),
             Event::Gone { execution } => control.future_dropped(execution),
-            Event::Arm => control.replay_arm(),
-            Event::Disarm { force } => {
-                control.replay_disarm(force);
-            }
+            Event::Arm { caller } => control.replay_arm(caller),
+            Event::Disarm { force, caller } => control.replay_disarm(force, caller),
             Event::Disarmed { errors } => control.disarmed(errors),
             Event::ArmTimeout => control.arm_timeout(),
-            Event::Stop => {
-                control.replay_stop();
-            }
+            Event::Stop { caller } => control.replay_stop(caller),
         }
         // The journal says when islands wake.
         while machine.environment.agenda().take(MonotonicTime::MAX).is_some() {}

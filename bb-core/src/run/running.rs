@@ -4,6 +4,7 @@ use super::machine::Machine;
 use super::source::OpenSources;
 use super::threads::{self, Thread};
 use super::{Live, Report, Robot, StartError};
+use crate::component::Caller;
 use crate::control::is_in_command;
 use crate::schedule::Reserved;
 use std::fmt;
@@ -131,7 +132,7 @@ impl Threads {
             return;
         }
         let start = Instant::now();
-        machine.control.begin_stop();
+        machine.control.begin_stop(&Caller::PROGRAM);
         machine.control.wait_until_disarmed();
         let deadline = self.deadline(start);
         self.join(deadline);

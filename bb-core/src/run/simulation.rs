@@ -4,7 +4,7 @@ use super::machine::Machine;
 use super::source::OpenSources;
 use super::visit::Visitable;
 use super::{Live, Report, Robot, SensorHandle};
-use crate::component::Sensor;
+use crate::component::{Caller, Sensor};
 use crate::time::{Clock, MonotonicTime};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -229,7 +229,7 @@ impl VirtualRun {
             return;
         }
         self.catch_up();
-        machine.control.begin_stop();
+        machine.control.begin_stop(&Caller::PROGRAM);
         machine.control.stop_signal().set();
         self.stop_sources();
         // One thread runs all of this, so nothing can be busy elsewhere.

@@ -7,7 +7,7 @@ use crate::units::Unit;
 use proc_macro2::{Ident, TokenStream};
 use quote::{ToTokens, format_ident, quote, quote_spanned};
 use syn::spanned::Spanned;
-use syn::{Data, DeriveInput, Field, Fields, Generics, LitStr};
+use syn::{Data, DeriveInput, Expr, ExprRange, Field, Fields, Generics, LitStr, RangeLimits};
 
 /// The contents of `#[payload(…)]`.
 #[derive(Default)]
@@ -179,6 +179,8 @@ struct FieldAttributes {
     is_any: bool,
     /// The units of its numbers, each as it was written too.
     units: Vec<(Unit, String)>,
+    /// The ends of the range of its number.
+    range: Option<(Expr, Expr)>,
 }
 
 fn attributes_of(field: &Field, diagnostics: &mut Diagnostics) -> FieldAttributes {
@@ -195,8 +197,23 @@ fn attributes_of(field: &Field, diagnostics: &mut Diagnostics) -> FieldAttribute
                     return Err(syn::Error::new(text.span(), message));
                 }
                 attributes.units.push((unit, text.value()));
+            } else if meta.path.is_ident("range") {
+                let range: Expr = meta.value()?.parse()?;
+                let Expr::Range(ExprRange {
+                    start: Some(start),
+                    end: Some(end),
+                    limits: RangeLimits::Closed(_),
+                    ..
+                }) = range
+                else {
+                    return Err(syn::Error::new_spanned(
+                        range,
+                        "expected a range with both ends: `range = 0.0..=1.0`",
+                    ));
+                };
+                attributes.range = Some((*start, *end));
             } else {
-                return Err(meta.error("expected `non_finite` or `unit = \"m/s\"`"));
+                return Err(meta.error("expected `non_finite`, `unit = \"m/s\"` or `range = 0.0..=1.0`"));
             }
             Ok(())
         });

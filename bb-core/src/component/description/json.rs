@@ -138,7 +138,7 @@ fn command(command: &CommandInfo) -> String {
         ("category", text(command.category)),
         ("allowed_states", states.unwrap_or_else(null)),
         ("timeout_s", optional(command.timeout.map(|timeout| timeout.as_secs_f64()), number)),
-        ("arguments", json_schema(command.arguments)),
+        ("arguments", command.argument_schema()),
         ("defaults", if command.default_arguments.is_empty() { null() } else { command.default_arguments.clone() }),
         ("result", json_schema(command.output)),
     ])

@@ -1,5 +1,7 @@
 //! The meaning of a type's bytes, as constant data.
 
+use std::fmt;
+
 /// The meaning of a type's bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shape {
@@ -41,6 +43,18 @@ pub enum Shape {
     Enum(&'static EnumShape),
 }
 
+impl Shape {
+    /// Returns whether it is a number, or an option of one.
+    pub(super) const fn is_number(self) -> bool {
+        match self {
+            Self::I8 | Self::I16 | Self::I32 | Self::I64 | Self::U8 | Self::U16 | Self::U32 | Self::U64 => true,
+            Self::F32 | Self::F64 => true,
+            Self::Option(of) => of.is_number(),
+            _ => false,
+        }
+    }
+}
+
 /// Shape of a struct, see [`Shape::Struct`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StructShape {
@@ -60,8 +74,37 @@ pub struct FieldShape {
     /// The unit of its numbers, if the field states one: `#[payload(unit = "V")]`. Several if that depends, as for the
     /// position of a joint: rad or m.
     pub units: &'static [FieldUnit],
+    /// The numbers that it may hold, if the field states them: `#[payload(range = 0.0..=1.0)]`, in the unit of the field. What is read from
+    /// JSON is checked; code may hold others.
+    pub range: Option<FieldRange>,
     /// Doc comment, for forms; empty for none.
     pub doc: &'static str,
+}
+
+/// The range of a field's number, both ends included.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub struct FieldRange {
+    /// As bits, so that shapes can be compared.
+    minimum: u64,
+    maximum: u64,
+}
+
+impl FieldRange {
+    /// The smallest number.
+    pub const fn minimum(self) -> f64 {
+        f64::from_bits(self.minimum)
+    }
+
+    /// The largest number.
+    pub const fn maximum(self) -> f64 {
+        f64::from_bits(self.maximum)
+    }
+}
+
+impl fmt::Debug for FieldRange {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:?}..={:?}", self.minimum(), self.maximum())
+    }
 }
 
 /// The unit of a field's numbers.
@@ -90,7 +133,7 @@ pub(super) const NOTHING: &str = "structure_needs_at_least_one_member";
 impl FieldShape {
     /// A field.
     pub const fn new(name: &'static str, shape: Shape) -> Self {
-        Self { name, shape, units: &[], doc: "" }
+        Self { name, shape, units: &[], range: None, doc: "" }
     }
 
     /// Sets the units that a field may have.
@@ -99,10 +142,24 @@ impl FieldShape {
         self
     }
 
+    /// Sets the numbers that a field may hold.
+    #[expect(clippy::panic, reason = "evaluated when the payload is compiled")]
+    pub const fn in_range(mut self, minimum: f64, maximum: f64) -> Self {
+        assert!(self.shape.is_number(), "only a number, or an `Option` of one, has a range");
+        assert!(minimum <= maximum, "the range is empty");
+        self.range = Some(FieldRange { minimum: minimum.to_bits(), maximum: maximum.to_bits() });
+        self
+    }
+
     /// Sets the doc comment of a field.
     pub const fn documented(mut self, doc: &'static str) -> Self {
         self.doc = doc;
         self
+    }
+
+    /// Whether it is a field, not what a struct without fields holds.
+    pub(crate) fn is_named(&self) -> bool {
+        self.name != NOTHING
     }
 
     /// The content of a struct without fields.

@@ -243,7 +243,8 @@ fn events_are_read_back() {
         assert_eq!(decode::<CommandEvent>(&bytes_of(&event)), Ok(event));
     }
     for value in [1.5.into(), 7i64.into(), true.into(), ParameterValue::Text("a".into())] {
-        let change = ParameterChange { path: "param/a", from: value, to: ParameterValue::Integer(1) };
+        let to = ParameterValue::Integer(1);
+        let change = ParameterChange { path: "param/a", from: value, to, caller: "page 1".into() };
         assert_eq!(decode::<ParameterChange>(&bytes_of(&change)), Ok(change));
     }
 }

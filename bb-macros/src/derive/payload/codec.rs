@@ -157,8 +157,9 @@ fn struct_shape(fields: &Fields, text: &TokenStream) -> TokenStream {
     let shapes = fields.iter().zip(fields.members()).map(|(field, member)| {
         let (name, kind) = (text_of(&member), &field.ty);
         // Errors in the attributes have been reported.
-        let units = attributes_of(field, &mut Diagnostics::default()).units;
-        let units: Vec<TokenStream> = units
+        let attributes = attributes_of(field, &mut Diagnostics::default());
+        let units: Vec<TokenStream> = attributes
+            .units
             .into_iter()
             .map(|(unit, symbol)| {
                 let (crate::units::Dimension(exponents), dimension) = (unit.dimension, unit.dimension.name());
@@ -168,7 +169,8 @@ fn struct_shape(fields: &Fields, text: &TokenStream) -> TokenStream {
         let in_units = (!units.is_empty()).then(|| quote!(.in_units(&[#(#units),*])));
         let doc = crate::derive::fields::doc(&field.attrs);
         let documented = (!doc.is_empty()).then(|| quote!(.documented(#doc)));
-        quote!(FieldShape::new(#name, FieldOf::<#kind>::SHAPE) #in_units #documented,)
+        let in_range = attributes.range.map(|(start, end)| quote!(.in_range(#start as f64, #end as f64)));
+        quote!(FieldShape::new(#name, FieldOf::<#kind>::SHAPE) #in_units #in_range #documented,)
     });
     let shapes: TokenStream = if fields.is_empty() { quote!(FieldShape::NOTHING) } else { shapes.collect() };
     quote!(StructShape { name: #text, fields: &[#shapes] })

@@ -147,7 +147,7 @@ fn object(fields: &'static [FieldShape], value: &RawValue, writer: &mut Writer<'
     }
     for (field, value) in fields.iter().zip(values) {
         match value {
-            Some(value) => read(field.shape, value, writer),
+            Some(value) => read(field.shape, value, writer).and_then(|()| in_range(field, value)),
             None if is_optional(field.shape) => {
                 writer.length(0);
                 Ok(())
@@ -160,6 +160,17 @@ fn object(fields: &'static [FieldShape], value: &RawValue, writer: &mut Writer<'
         writer.nothing();
     }
     Ok(())
+}
+
+/// Checks a number, or null, that was read.
+fn in_range(field: &FieldShape, value: &RawValue) -> Result<(), JsonError> {
+    let (Some(range), token) = (field.range, value.get()) else { return Ok(()) };
+    let (minimum, maximum) = (range.minimum(), range.maximum());
+    match token.parse::<f64>() {
+        _ if token == "null" => Ok(()),
+        Ok(number) if (minimum..=maximum).contains(&number) => Ok(()),
+        _ => Err(JsonError::mismatch(format_args!("a number from {minimum} to {maximum}"), found(value))),
+    }
 }
 
 /// An `Option`, also in a tuple struct of its own.

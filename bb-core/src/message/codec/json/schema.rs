@@ -3,7 +3,7 @@
 use super::read::is_optional;
 use super::write::text;
 use super::{Form, INFINITY, NAN, NEGATIVE_INFINITY, range};
-use crate::message::codec::{EnumShape, FieldShape, Shape, StructShape};
+use crate::message::codec::{EnumShape, FieldRange, FieldShape, Shape, StructShape};
 
 /// The JSON Schema (draft 2020-12) of a shape: for forms, and for programs that check what they send.
 ///
@@ -149,7 +149,11 @@ impl Definitions {
             }
             text(field.name, &mut json);
             json.push(':');
-            json.push_str(&annotated(self.schema(field.shape), field));
+            let schema = match field.range {
+                Some(range) => ranged(field.shape, range),
+                None => self.schema(field.shape),
+            };
+            json.push_str(&annotated(schema, field));
         }
         let is_required = |field: &&FieldShape| !is_optional(field.shape);
         let required: Vec<_> = fields.iter().filter(is_required).map(|field| field.name).collect();
@@ -184,6 +188,28 @@ impl Definitions {
             choices.push(choice);
         }
         format!(r#""oneOf":[{}]"#, choices.join(","))
+    }
+}
+
+/// The schema of a number with a range of its own, or of an option of one.
+fn ranged(shape: Shape, of: FieldRange) -> String {
+    let (minimum, maximum) = (of.minimum(), of.maximum());
+    match (shape, range(shape)) {
+        (Shape::Option(inner), _) => format!(r#"{{"anyOf":[{},{{"type":"null"}}]}}"#, ranged(*inner, of)),
+        (_, Some(all)) => {
+            let minimum = (minimum.ceil() as i128).max(*all.start());
+            let maximum = (maximum.floor() as i128).min(*all.end());
+            format!(r#"{{"type":"integer","minimum":{minimum},"maximum":{maximum}}}"#)
+        }
+        (_, None) => {
+            let mut schema = r#"{"type":"number""#.to_owned();
+            for (keyword, end) in [("minimum", minimum), ("maximum", maximum)] {
+                if end.is_finite() {
+                    schema.push_str(&format!(r#","{keyword}":{end}"#));
+                }
+            }
+            schema + "}"
+        }
     }
 }
 

@@ -101,6 +101,13 @@ pub(super) fn members(value: &RawValue) -> Option<Result<Vec<(String, &RawValue)
     })
 }
 
+/// The value of a member of an object, both as JSON.
+pub(crate) fn member_of(object: &str, name: &str) -> Option<String> {
+    let object: &RawValue = serde_json::from_str(object).ok()?;
+    let members = members(object)?.ok()?;
+    members.into_iter().find(|(member, _)| member == name).map(|(_, value)| value.get().to_owned())
+}
+
 struct Members<'a>(Vec<(String, &'a RawValue)>);
 
 impl<'de> Deserialize<'de> for Members<'de> {
