@@ -44,6 +44,7 @@ mod snapshot;
 mod states;
 mod status;
 mod store;
+mod viewers;
 
 pub use error::{Gap, LookupError};
 pub use frames::TransformHandle;
@@ -51,6 +52,7 @@ pub(crate) use route::{InputRoute, RouteOf};
 pub use route::{Latest, PlacedInput, Placement};
 pub use status::{JointRefusal, JointStatistics, JointStatus};
 pub use store::{JointSettings, Joints};
+pub use viewers::{ViewerChannel, ViewerMessage, ViewerMessages};
 
 #[cfg(test)]
 mod tests;

@@ -110,15 +110,12 @@ pub(crate) struct Description {
 impl Description {
     pub(crate) fn of(message: &DynamicMessage, layout: Layout, shared: &Shared) -> Self {
         let path = message.path();
+        let layouts = message.layouts();
         let (topic, schema) = match layout {
-            Layout::Ros => (format!("/{path}"), message.ros_schema().unwrap_or_else(|| message.schema())),
-            Layout::Exact => (format!("/{path}"), message.schema()),
+            Layout::Ros | Layout::Exact => layouts.channel(path),
             // Hidden, as ROS has it, from lists of topics.
-            Layout::Beside => (format!("/{path}/_exact"), message.schema()),
-            Layout::Companion => message.ros_companion().map_or_else(
-                || (format!("/{path}"), message.schema()),
-                |(topic, schema)| (format!("/{path}/{topic}"), schema),
-            ),
+            Layout::Beside => (format!("/{path}/_exact"), layouts.schema()),
+            Layout::Companion => layouts.companion_channel(path).unwrap_or_else(|| layouts.channel(path)),
         };
         let entries = [
             (PATH, path),

@@ -1,7 +1,6 @@
 //! Writes the messages of subscriptions.
 
 mod background;
-mod frames;
 mod names;
 mod options;
 #[cfg(test)]
@@ -16,11 +15,9 @@ use crate::clock::{CLOCK, Clock};
 use crate::error::{RecordingError, RecordingErrorKind, create_error, write_error};
 use crate::file::LIMIT;
 use crate::layout::{Description, Layout, Shared};
-use bb_core::message::codec::encode;
-use bb_core::message::codec::ros::{Text, TransformsMessage};
+use bb_core::joints::{ViewerChannel, ViewerMessage, ViewerMessages};
 use bb_core::message::{Schema, Stamp};
 use bb_core::{DynamicMessage, DynamicSubscription};
-use frames::Frames;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{McapError, Writer};
 use names::Names;
@@ -31,7 +28,7 @@ use std::io::{self, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 pub(crate) use viewers::{channel_of, nanos};
-use viewers::{describe, latched, view};
+use viewers::{describe, view};
 
 /// The destination of a recording.
 pub(crate) trait Output: Write + Seek + Send {}
@@ -73,10 +70,10 @@ pub struct Recorder {
     report: RecorderReport,
     last_flush: Instant,
     names: Names,
-    frames: Option<Frames>,
+    viewers: Option<ViewerMessages>,
     /// Known from the first message on. The frames and the URDF are written with it, since they have its time.
     clock: Option<Clock>,
-    transforms: Option<Viewed>,
+    viewed: HashMap<ViewerChannel, Viewed>,
     bytes: Bytes,
 }
 
@@ -146,10 +143,10 @@ impl Recorder {
         let fail = |error| RecordingError::new(path, write_error(0, error));
         let mut names = Names::default();
         take_names(&mut names, &subscription).map_err(|kind| RecordingError::new(path, kind))?;
-        let robot = options.robot.as_ref().filter(|_| options.transforms);
-        let frames = robot.map(|robot| Frames::new(robot.topology, options.body.clone()));
+        let viewers = options.robot.as_ref();
+        let viewers = viewers.map(|robot| ViewerMessages::new(robot.name, robot.topology, options.body.clone()));
         let mut writer = options.mcap().create(BufWriter::new(output)).map_err(fail)?;
-        describe(&mut writer, &options).and_then(|()| writer.flush()).map_err(fail)?;
+        describe(&mut writer, &options, viewers.as_ref()).and_then(|()| writer.flush()).map_err(fail)?;
         Ok(Self {
             path: path.to_owned(),
             writer: Some(Box::new(writer)),
@@ -160,9 +157,9 @@ impl Recorder {
             report: RecorderReport::default(),
             last_flush: Instant::now(),
             names,
-            frames,
+            viewers,
             clock: None,
-            transforms: None,
+            viewed: HashMap::new(),
             bytes: Bytes::default(),
         })
     }
@@ -350,9 +347,11 @@ impl Recorder {
             writer.write_to_known_channel(&header(id), bytes)?;
         }
         writer.write_to_known_channel(&header(channel.id), main)?;
-        if let Some(frames) = &mut self.frames {
-            let transforms = frames.transforms(message);
-            self.transform(&transforms, log_time, writer)?;
+        if self.options.transforms
+            && let Some(viewers) = &mut self.viewers
+            && let Some(following) = viewers.following(message)
+        {
+            self.view(&following, log_time, writer)?;
         }
         Ok(true)
     }
@@ -361,40 +360,25 @@ impl Recorder {
     fn begin(&mut self, first: &Stamp, writer: &mut FileWriter) -> Result<Clock, WriteFault> {
         let clock = *self.clock.insert(Clock::of(first));
         writer.write_metadata(&Metadata { name: CLOCK.to_owned(), metadata: clock.to_metadata() })?;
-        let Some(robot) = &self.options.robot else { return Ok(clock) };
         let time = first.wall_time;
-        latched(writer, "/robot_description", time, &Text { data: robot.urdf.clone() })?;
-        latched(writer, "/tf_static", time, &TransformsMessage::fixed(robot.topology, time))?;
-        if let Some(frames) = &self.frames {
-            let at_rest = TransformsMessage::moving(robot.topology, frames.at_rest(), time);
-            self.transform(&at_rest, nanos(time), writer)?;
+        let first = self.viewers.as_ref().map_or_else(Vec::new, |viewers| viewers.first(time));
+        let with_transforms = self.options.transforms;
+        for message in first.iter().filter(|message| with_transforms || message.channel.is_latched()) {
+            self.view(message, nanos(time), writer)?;
         }
         Ok(clock)
     }
 
-    /// Writes transforms to `/tf`, if there are any.
-    fn transform(
-        &mut self,
-        transforms: &TransformsMessage,
-        log_time: u64,
-        writer: &mut FileWriter,
-    ) -> Result<(), WriteFault> {
-        if transforms.transforms.is_empty() {
-            return Ok(());
-        }
-        let channel = match &mut self.transforms {
-            Some(channel) => channel,
-            None => {
-                let id = view::<TransformsMessage>(writer, "/tf", "")?;
-                self.transforms.insert(Viewed { id, sequence: 0 })
-            }
+    /// Writes a message for viewers.
+    fn view(&mut self, message: &ViewerMessage, log_time: u64, writer: &mut FileWriter) -> Result<(), WriteFault> {
+        let channel = match self.viewed.entry(message.channel) {
+            Entry::Occupied(entry) => entry.into_mut(),
+            Entry::Vacant(entry) => entry.insert(Viewed { id: view(writer, message.channel)?, sequence: 0 }),
         };
         let header =
             MessageHeader { channel_id: channel.id, sequence: channel.sequence, log_time, publish_time: log_time };
         channel.sequence = channel.sequence.wrapping_add(1);
-        self.bytes.main.clear();
-        encode(transforms, &mut self.bytes.main);
-        Ok(writer.write_to_known_channel(&header, &self.bytes.main)?)
+        Ok(writer.write_to_known_channel(&header, &message.bytes)?)
     }
 
     /// Checks that the file is still there, with all that was in it at the last check.

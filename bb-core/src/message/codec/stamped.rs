@@ -76,6 +76,17 @@ impl Layouts {
         self.companion.map(|(topic, shape)| (topic, Schema::of(shape)))
     }
 
+    /// The topic and the definition by which viewers know the messages at `path`: those of ROS if it has a message for the payload, else
+    /// the exact ones.
+    pub fn channel(&self, path: &str) -> (String, Schema) {
+        (format!("/{path}"), self.ros_schema().unwrap_or_else(|| self.schema()))
+    }
+
+    /// The topic and the definition of the second message, if ROS has two for the payload.
+    pub fn companion_channel(&self, path: &str) -> Option<(String, Schema)> {
+        self.ros_companion().map(|(topic, schema)| (format!("/{path}/{topic}"), schema))
+    }
+
     /// The exact definition, and those of ROS.
     pub(crate) fn schemas(&self) -> Vec<Schema> {
         let companion = self.ros_companion().map(|(_, schema)| schema);

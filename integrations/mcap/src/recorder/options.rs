@@ -47,7 +47,6 @@ pub struct RecorderOptions {
 pub(crate) struct Described {
     pub(crate) name: &'static str,
     pub(crate) topology: &'static Topology,
-    pub(crate) urdf: String,
 }
 
 impl Default for RecorderOptions {
@@ -68,7 +67,7 @@ impl Default for RecorderOptions {
 impl RecorderOptions {
     /// The defaults, with the frames, the URDF and the name of a robot.
     pub fn of<R: Robot>() -> Self {
-        let robot = Described { name: R::NAME, topology: R::TOPOLOGY, urdf: R::to_urdf() };
+        let robot = Described { name: R::NAME, topology: R::TOPOLOGY };
         Self { robot: Some(robot), ..Self::default() }
     }
 
