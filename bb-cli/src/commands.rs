@@ -5,7 +5,7 @@ mod echo;
 mod hz;
 mod info;
 mod new;
-mod plot;
+pub(crate) mod plot;
 mod recover;
 
 use clap::Subcommand;

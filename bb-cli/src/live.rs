@@ -13,9 +13,9 @@ use address::Address;
 use clap::{Args, Subcommand};
 use connection::Robot;
 
-/// The robot that a command is for.
+/// The robot that a command is for, and how it prints what the robot answers.
 #[derive(Debug, Args)]
-pub(crate) struct Where {
+pub(crate) struct Live {
     /// The address that the robot's dashboard has printed; its token gives the right to steer. By default that in the variable `BB_ROBOT`,
     /// else `http://127.0.0.1:8912`.
     #[arg(long, value_name = "ADDRESS", global = true)]
@@ -23,9 +23,12 @@ pub(crate) struct Where {
     /// Of several robots at one address, the name of one.
     #[arg(long, value_name = "NAME", global = true)]
     name: Option<String>,
+    /// Prints JSON instead of text: one value, or one on each line.
+    #[arg(long, global = true)]
+    json: bool,
 }
 
-impl Where {
+impl Live {
     fn connect(&self) -> Result<Robot, String> {
         let address = match (&self.robot, std::env::var("BB_ROBOT")) {
             (Some(address), _) => address.clone(),

@@ -43,6 +43,7 @@ use crate::journal::{Journal, ParameterEntry};
 use crate::lifecycle::Supervision;
 use crate::message::Origin;
 use crate::node::{BindTarget, Check, Mode, NodeEntry, Report, SharedNode};
+use crate::pubsub::DynamicMessage;
 use crate::schedule::{Bell, Deadlines, Pool, Reserve, Sleeper, StopSignal};
 use crate::telemetry::Telemetry;
 use crate::time::{Clock, MonotonicTime};
@@ -220,6 +221,8 @@ struct RunningCommand {
     slot: Arc<Slot>,
     caller: Caller,
     started: MonotonicTime,
+    /// The last that its code has published.
+    progress: Option<DynamicMessage>,
     /// `None` in a replay.
     task: Option<Arc<Task>>,
     phase: Phase,

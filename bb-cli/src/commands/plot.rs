@@ -1,16 +1,14 @@
 //! `bb plot`: fields over time.
 
 mod select;
+mod series;
 mod units;
 
-use crate::periods::Periods;
 use crate::topics::{TopicReader, find, is_named, log_ns, open};
-use bb_core::nalgebra::{Quaternion, UnitQuaternion};
-use bb_mcap::{Bag, Topic, Value};
-use bb_plot::{Line, PALETTE, Panel, Picture, Point};
+use bb_mcap::{Bag, Topic};
+use bb_plot::Picture;
 use clap::Args;
-use select::{Group, Path, groups};
-use std::collections::HashSet;
+pub(crate) use series::{Series, write};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -34,10 +32,8 @@ const EXAMPLES: &str = "Examples:
   bb plot walk.mcap /imu.angular_velocity /imu.linear_acceleration.z --out imu.png
   bb plot walk.mcap '/scan.ranges[0]' --out front.svg";
 
-/// Most viewers cannot open larger pictures.
-const MOST_PANELS: usize = 40;
-
-fn picture(file: &str) -> Result<PathBuf, String> {
+/// The file of a picture, if one can be written there.
+pub(crate) fn picture(file: &str) -> Result<PathBuf, String> {
     let file = PathBuf::from(file);
     Picture::check(&file, "--out").map(|()| file)
 }
@@ -46,10 +42,7 @@ fn picture(file: &str) -> Result<PathBuf, String> {
 struct Chosen<'a> {
     topic: &'a Topic,
     reader: TopicReader,
-    groups: Vec<Group>,
-    /// Times in nanoseconds, and for each group and field the values.
-    times_ns: Vec<i64>,
-    values: Vec<Vec<Vec<Option<f64>>>>,
+    series: Series,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
@@ -59,16 +52,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
         chosen.push(choose(&bag, field)?);
     }
     let broken = read(&bag, &mut chosen)?;
-    let start_ns = chosen.iter().flat_map(|chosen| &chosen.times_ns).min().copied().unwrap_or(0);
-    let panels: Vec<_> = chosen.iter().flat_map(|chosen| panels(chosen, start_ns)).collect();
-    if panels.len() > MOST_PANELS {
-        return Err(format!(
-            "at most {MOST_PANELS} panels are plotted, and these are {}; name fields",
-            panels.len()
-        ));
-    }
     let title = arguments.file.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    Picture { title, panels, panel_size: (1400, 260) }.write(&arguments.out)?;
+    let series: Vec<&Series> = chosen.iter().map(|chosen| &chosen.series).collect();
+    write(title, &series, &arguments.out)?;
     eprintln!("plotted {}", arguments.out.display());
     match broken {
         Some(fault) => Err(fault),
@@ -96,10 +82,8 @@ fn choose<'a>(bag: &'a Bag, field: &str) -> Result<Chosen<'a>, String> {
     let mut messages = bag.messages_in_any_encoding(&[&topic.name]).map_err(|error| error.to_string())?;
     let first = messages.next().ok_or_else(|| in_file(format!("{} has no messages", topic.name)))?;
     let first = reader.read(&first.map_err(|error| error.to_string())?)?;
-    let path = Path::parse(path).map_err(|fault| in_file(format!("{field}: {fault}")))?;
-    let groups = groups(&first, &path).map_err(|fault| in_file(format!("{}: {fault}", topic.name)))?;
-    let values = groups.iter().map(|group| vec![Vec::new(); group.fields.len()]).collect();
-    Ok(Chosen { topic, reader, groups, times_ns: Vec::new(), values })
+    let series = Series::new(&topic.name, &topic.schema, &first, path).map_err(in_file)?;
+    Ok(Chosen { topic, reader, series })
 }
 
 /// Reads the values; returns the damage that cut the file off, if any.
@@ -124,63 +108,10 @@ fn read(bag: &Bag, chosen: &mut [Chosen<'_>]) -> Result<Option<String>, String> 
         progress.add(1);
         for chosen in chosen.iter_mut().filter(|chosen| chosen.topic.name == message.topic) {
             let value = chosen.reader.read(&message)?;
-            chosen.times_ns.push(chosen.reader.stamp_ns(&message).unwrap_or_else(|| log_ns(&message)));
-            for (group, values) in chosen.groups.iter().zip(&mut chosen.values) {
-                for (field, values) in group.fields.iter().zip(values) {
-                    values.push(field.path.of(&value).and_then(Value::as_f64));
-                }
-            }
+            let time_ns = chosen.reader.stamp_ns(&message).unwrap_or_else(|| log_ns(&message));
+            chosen.series.add(time_ns, &value);
         }
     }
     progress.finish();
     Ok(broken)
-}
-
-fn panels(chosen: &Chosen<'_>, start_ns: i64) -> Vec<Panel> {
-    let gaps: HashSet<usize> =
-        Periods::of(&chosen.times_ns).iter().flat_map(|periods| &periods.gaps).map(|gap| gap.after).collect();
-    let points = |values: &mut dyn Iterator<Item = Option<f64>>| {
-        let mut points: Vec<Point> = Vec::new();
-        for (index, (time_ns, value)) in chosen.times_ns.iter().zip(values).enumerate() {
-            let time_s = time_ns.saturating_sub(start_ns) as f64 * 1e-9;
-            points.push((time_s, value));
-            if gaps.contains(&index) {
-                points.push((time_s, None));
-            }
-        }
-        points
-    };
-    let panels = chosen.groups.iter().zip(&chosen.values).map(|(group, values)| {
-        let title = format!("{} {}", chosen.topic.name, group.path);
-        let colour = |index: usize| PALETTE[index % PALETTE.len()];
-        if group.is_quaternion() {
-            let angles = angles(values);
-            let lines = ["roll", "pitch", "yaw"].into_iter().enumerate().map(|(index, name)| {
-                let mut values = angles.iter().map(|angles| angles.map(|angles| angles[index].to_degrees()));
-                Line::degrees(name, colour(index), 1, &points(&mut values))
-            });
-            return Panel::new(format!("{} (deg)", group.axis()), lines.collect()).title(title);
-        }
-        let lines = group.fields.iter().zip(values).enumerate().map(|(index, (field, values))| {
-            Line::new(field.label.clone(), colour(index), 1, &points(&mut values.iter().copied()))
-        });
-        let axis = match (group.axis(), units::of(&chosen.topic.schema, &group.path)) {
-            (name, Some(unit)) => format!("{name} ({unit})"),
-            (name, None) => name,
-        };
-        Panel::new(axis, lines.collect()).title(title)
-    });
-    panels.collect()
-}
-
-/// Roll, pitch and yaw, rad, of the components x, y, z, w of quaternions.
-fn angles(values: &[Vec<Option<f64>>]) -> Vec<Option<[f64; 3]>> {
-    let [x, y, z, w] = values else { return Vec::new() };
-    let of = |index: usize| {
-        let component = |values: &[Option<f64>]| values.get(index).copied().flatten();
-        let read = Quaternion::new(component(w)?, component(x)?, component(y)?, component(z)?);
-        let (roll, pitch, yaw) = UnitQuaternion::try_new(read, 0.5)?.euler_angles();
-        Some([roll, pitch, yaw])
-    };
-    (0..x.len()).map(of).collect()
 }

@@ -1,6 +1,6 @@
 //! `bb arm` and `bb disarm`.
 
-use super::Where;
+use super::Live;
 use crate::say;
 use clap::Args;
 use serde_json::json;
@@ -9,38 +9,32 @@ use serde_json::json;
 #[derive(Debug, Args)]
 pub(crate) struct Arm {
     #[command(flatten)]
-    at: Where,
-    /// Prints an object instead of a word.
-    #[arg(long)]
-    json: bool,
+    live: Live,
 }
 
 /// Disarms a running robot; everybody may.
 #[derive(Debug, Args)]
 pub(crate) struct Disarm {
     #[command(flatten)]
-    at: Where,
+    live: Live,
     /// Leaves the safety state `error`, even if something still cannot be made safe.
     #[arg(long)]
     force: bool,
-    /// Prints an object instead of a word.
-    #[arg(long)]
-    json: bool,
 }
 
 impl Arm {
     pub(super) fn run(&self) -> Result<bool, String> {
-        ask(&self.at, "arm", "armed", self.json)
+        ask(&self.live, "arm", "armed")
     }
 }
 
 impl Disarm {
     pub(super) fn run(&self) -> Result<bool, String> {
-        ask(&self.at, if self.force { "force_disarm" } else { "disarm" }, "disarmed", self.json)
+        ask(&self.live, if self.force { "force_disarm" } else { "disarm" }, "disarmed")
     }
 }
 
-fn ask(at: &Where, op: &str, safety: &str, as_json: bool) -> Result<bool, String> {
-    at.connect()?.ask(op, json!({}))?;
-    say(&if as_json { format!("{}\n", json!({"safety": safety})) } else { format!("{safety}\n") })
+fn ask(live: &Live, op: &str, safety: &str) -> Result<bool, String> {
+    live.connect()?.ask(op, json!({}))?;
+    say(&if live.json { format!("{}\n", json!({"safety": safety})) } else { format!("{safety}\n") })
 }

@@ -1,6 +1,6 @@
 //! `bb command`: commands of a running robot.
 
-use super::Where;
+use super::Live;
 use crate::say;
 use bb_eval::table::aligned;
 use clap::{Args, Subcommand};
@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    at: Where,
+    live: Live,
     #[command(subcommand)]
     what: What,
 }
@@ -18,11 +18,7 @@ pub(crate) struct Arguments {
 #[derive(Debug, Subcommand)]
 enum What {
     /// Prints all commands with their arguments, and what runs.
-    List {
-        /// Prints an object instead of the table.
-        #[arg(long)]
-        json: bool,
-    },
+    List,
     /// Starts one, waits for its end and prints its result. If this is interrupted, the command runs on.
     Run {
         /// The path, such as `command/drive`, or `drive`.
@@ -32,41 +28,39 @@ enum What {
         /// Prints the number of the execution, and does not wait.
         #[arg(long)]
         detach: bool,
-        /// Prints an object instead of the result.
-        #[arg(long)]
-        json: bool,
     },
     /// Cancels what runs, whoever has started it.
     Cancel {
         /// The number of the execution, as `bb command list` and `bb top` print it.
         execution: u64,
-        /// Prints an object instead of a word.
-        #[arg(long)]
-        json: bool,
     },
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
-    let mut robot = arguments.at.connect()?;
+    let mut robot = arguments.live.connect()?;
     match &arguments.what {
-        What::List { json } => {
+        What::List => {
             let executions = robot.report()?["executions"].take();
-            if *json {
+            if arguments.live.json {
                 let commands = &robot.description()["commands"];
                 return say(&format!("{}\n", json!({"commands": commands, "executions": executions})));
             }
             say(&(table(robot.listed("commands")) + &running(&executions)))
         }
-        What::Run { path, arguments, detach, json } => {
+        What::Run { path, arguments: of, detach } => {
             let path = robot.element("commands", "command/", path)?["path"].clone();
             let mut ask = json!({"path": path});
-            if let Some(arguments) = arguments {
-                ask["arguments"] = serde_json::from_str(arguments)
-                    .map_err(|error| format!("the arguments are not JSON: {error}"))?;
+            if let Some(of) = of {
+                ask["arguments"] =
+                    serde_json::from_str(of).map_err(|error| format!("the arguments are not JSON: {error}"))?;
             }
             let execution = robot.ask("start", ask)?["execution"].clone();
             if *detach {
-                let text = if *json { json!({"execution": execution}).to_string() } else { execution.to_string() };
+                let text = if arguments.live.json {
+                    json!({"execution": execution}).to_string()
+                } else {
+                    execution.to_string()
+                };
                 return say(&format!("{text}\n"));
             }
             loop {
@@ -78,13 +72,21 @@ pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
                     return Err(error.to_owned());
                 }
                 let value = &message["value"];
-                let text = if *json { json!({"execution": execution, "value": value}) } else { value.clone() };
+                let text = if arguments.live.json {
+                    json!({"execution": execution, "value": value})
+                } else {
+                    value.clone()
+                };
                 return say(&format!("{text}\n"));
             }
         }
-        What::Cancel { execution, json } => {
+        What::Cancel { execution } => {
             robot.ask("cancel", json!({"execution": execution}))?;
-            say(&if *json { format!("{}\n", json!({"cancelled": execution})) } else { "cancelled\n".to_owned() })
+            say(&if arguments.live.json {
+                format!("{}\n", json!({"cancelled": execution}))
+            } else {
+                "cancelled\n".to_owned()
+            })
         }
     }
 }
@@ -114,6 +116,15 @@ fn table(commands: &[Value]) -> String {
     aligned(&rows, 3, usize::MAX)
 }
 
+/// How far an execution has come, after a comma: `, share 0.25`; empty if it does not say.
+pub(super) fn progress(progress: &Value) -> String {
+    match progress {
+        Value::Null => String::new(),
+        Value::Object(fields) => fields.iter().map(|(name, value)| format!(", {name} {value}")).collect(),
+        value => format!(", {value}"),
+    }
+}
+
 fn running(executions: &Value) -> String {
     let all = executions.as_array().map_or(&[][..], Vec::as_slice);
     if all.is_empty() {
@@ -121,7 +132,8 @@ fn running(executions: &Value) -> String {
     }
     let lines = all.iter().map(|one| {
         let text = |name: &str| one[name].as_str().unwrap_or_default();
-        format!("runs: {} {}, started by {}\n", one["number"], text("path"), text("caller"))
+        let progress = progress(&one["progress"]);
+        format!("runs: {} {}, started by {}{progress}\n", one["number"], text("path"), text("caller"))
     });
     format!("\n{}", lines.collect::<String>())
 }

@@ -1,6 +1,6 @@
 //! `bb param`: parameters of a running robot.
 
-use super::Where;
+use super::Live;
 use super::connection::Robot;
 use crate::say;
 use bb_eval::table::aligned;
@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    at: Where,
+    live: Live,
     #[command(subcommand)]
     what: What,
 }
@@ -19,50 +19,40 @@ pub(crate) struct Arguments {
 #[derive(Debug, Subcommand)]
 enum What {
     /// Prints all parameters with their values, in SI.
-    List {
-        /// Prints an array of objects instead of the table.
-        #[arg(long)]
-        json: bool,
-    },
+    List,
     /// Prints the value of one.
     Get {
         /// The path, such as `param/speed`, or `speed`.
         path: String,
-        /// Prints an object instead of the value.
-        #[arg(long)]
-        json: bool,
     },
     /// Sets parameters all at once, or none of them if one is refused.
     Set {
         /// The paths and values, such as `speed=0.5`. Numbers are in SI.
         #[arg(required = true, value_name = "PATH=VALUE")]
         values: Vec<String>,
-        /// Prints an object instead of lines.
-        #[arg(long)]
-        json: bool,
     },
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
-    let mut robot = arguments.at.connect()?;
+    let mut robot = arguments.live.connect()?;
     match &arguments.what {
-        What::List { json: true } => say(&format!("{}\n", robot.description()["parameters"])),
-        What::List { json: false } => say(&table(robot.listed("parameters"))),
-        What::Get { path, json } => {
+        What::List if arguments.live.json => say(&format!("{}\n", robot.description()["parameters"])),
+        What::List => say(&table(robot.listed("parameters"))),
+        What::Get { path } => {
             let found = robot.element("parameters", "param/", path)?;
-            let text = if *json {
+            let text = if arguments.live.json {
                 json!({"path": found["path"], "value": found["value"]})
             } else {
                 found["value"].clone()
             };
             say(&format!("{text}\n"))
         }
-        What::Set { values, json } => {
+        What::Set { values } => {
             let values =
                 values.iter().map(|text| value(&robot, text)).collect::<Result<serde_json::Map<_, _>, _>>()?;
             let values = Value::Object(values);
             robot.ask("set", json!({"values": values}))?;
-            if *json {
+            if arguments.live.json {
                 return say(&format!("{values}\n"));
             }
             let lines = values.as_object().into_iter().flatten().map(|(path, value)| format!("{path} = {value}\n"));

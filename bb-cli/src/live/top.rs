@@ -1,6 +1,6 @@
 //! `bb top`: what is wrong with a running robot, its health, its topics and what runs, on one screen.
 
-use super::{Where, topic::rates};
+use super::{Live, command::progress, topic::rates};
 use crate::say;
 use clap::Args;
 use serde_json::Value;
@@ -17,21 +17,18 @@ const CLEAR: &str = "\x1b[H\x1b[2J";
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    at: Where,
+    live: Live,
     /// Prints one screen and ends, as it does if the output is not a terminal.
     #[arg(long)]
     once: bool,
     /// Columns; by default those of the terminal.
     #[arg(long, value_name = "N")]
     width: Option<usize>,
-    /// Prints one report as JSON instead.
-    #[arg(long)]
-    json: bool,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
-    let mut robot = arguments.at.connect()?;
-    if arguments.json {
+    let mut robot = arguments.live.connect()?;
+    if arguments.live.json {
         let report = robot.report()?;
         return say(&format!("{report}\n"));
     }
@@ -121,11 +118,12 @@ fn screen(welcome: &Value, report: &Value, rates: &BTreeMap<String, f64>, width:
     for one in &executions {
         let since = span(now - one["started"].as_f64().unwrap_or(now));
         lines.push(format!(
-            "  no. {:<5}{:>8}  {}, by {}",
+            "  no. {:<5}{:>8}  {}, by {}{}",
             one["number"].to_string(),
             since,
             text(one, "path"),
-            text(one, "caller")
+            text(one, "caller"),
+            progress(&one["progress"])
         ));
     }
     let estimators: Vec<Value> = list("estimators").into_iter().filter(|one| !one["health"].is_null()).collect();

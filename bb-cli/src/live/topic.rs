@@ -1,17 +1,20 @@
 //! `bb topic`: topics of a running robot.
 
 use super::connection::Robot;
-use super::{Where, yaml};
+use super::{Live, yaml};
+use crate::commands::plot::{Series, picture, write};
 use crate::say;
 use bb_eval::table::aligned;
+use bb_mcap::Value as Recorded;
 use clap::{Args, Subcommand};
 use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
 
 /// Lists topics of a running robot, and prints their messages and rates.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    at: Where,
+    live: Live,
     #[command(subcommand)]
     what: What,
 }
@@ -19,11 +22,7 @@ pub(crate) struct Arguments {
 #[derive(Debug, Subcommand)]
 enum What {
     /// Prints all topics with their payloads and counts.
-    List {
-        /// Prints an array of objects instead of the table.
-        #[arg(long)]
-        json: bool,
-    },
+    List,
     /// Prints the messages of a topic: the newest, at most sixteen a second.
     Echo {
         /// The path, such as `sensor/base/imu`.
@@ -31,9 +30,6 @@ enum What {
         /// Ends after so many.
         #[arg(long, value_name = "N")]
         limit: Option<u64>,
-        /// Prints an object on each line, with its stamp.
-        #[arg(long)]
-        json: bool,
     },
     /// Prints the rates of topics, from the robot's own counts.
     Hz {
@@ -42,26 +38,33 @@ enum What {
         /// How long to count, in seconds of the robot's clock.
         #[arg(long, default_value_t = 2.0, value_name = "S")]
         seconds: f64,
-        /// Prints an array of objects instead of the table.
-        #[arg(long)]
-        json: bool,
+    },
+    /// Plots fields of messages as they come: at most sixteen a second.
+    Plot {
+        /// What to plot: a field of a topic with all numbers in it, such as `sensor/base/imu.angular_velocity`, or a whole topic.
+        #[arg(value_name = "PATH[.FIELD]", required = true)]
+        fields: Vec<String>,
+        /// How long, in seconds of the robot's clock.
+        #[arg(long, default_value_t = 10.0, value_name = "S")]
+        seconds: f64,
+        /// The SVG or PNG file to write; an existing one is replaced.
+        #[arg(long, value_name = "FILE", value_parser = picture)]
+        out: PathBuf,
     },
     /// Prints what is known of a topic.
     Info {
         /// The path, such as `sensor/base/imu`.
         path: String,
-        /// Prints an object instead of lines.
-        #[arg(long)]
-        json: bool,
     },
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
-    let mut robot = arguments.at.connect()?;
+    let as_json = arguments.live.json;
+    let mut robot = arguments.live.connect()?;
     match &arguments.what {
-        What::List { json } => {
+        What::List => {
             let topics = robot.report()?["topics"].take();
-            if *json {
+            if as_json {
                 return say(&format!("{topics}\n"));
             }
             let head = ["topic", "payload", "messages", "lost"].map(str::to_owned);
@@ -71,9 +74,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
             });
             say(&aligned(&std::iter::once(head).chain(rows).collect::<Vec<_>>(), 2, usize::MAX))
         }
-        What::Echo { path, limit, json } => echo(&mut robot, path, *limit, *json),
-        What::Hz { paths, seconds, json } => hz(&mut robot, paths, *seconds, *json),
-        What::Info { path, json } => info(&mut robot, path, *json),
+        What::Echo { path, limit } => echo(&mut robot, path, *limit, as_json),
+        What::Hz { paths, seconds } => hz(&mut robot, paths, *seconds, as_json),
+        What::Plot { fields, seconds, out } => plot(&mut robot, fields, *seconds, out, as_json),
+        What::Info { path } => info(&mut robot, path, as_json),
     }
 }
 
@@ -100,6 +104,90 @@ fn echo(robot: &mut Robot, path: &str, limit: Option<u64>, as_json: bool) -> Res
         }
     }
     Ok(true)
+}
+
+/// A field that is plotted; its series begins with the first message.
+struct Plotted {
+    path: String,
+    /// The type of ROS's message, which gives the units.
+    ros: String,
+    field: String,
+    series: Option<Series>,
+    messages: u64,
+}
+
+fn plot(robot: &mut Robot, fields: &[String], seconds: f64, out: &Path, as_json: bool) -> Result<bool, String> {
+    let mut all = fields.iter().map(|field| plotted(robot, field)).collect::<Result<Vec<Plotted>, String>>()?;
+    let paths: Vec<&str> = all.iter().map(|one| one.path.as_str()).collect();
+    robot.ask("watch", json!({"paths": paths}))?;
+    let mut span: Option<(f64, f64)> = None;
+    while span.is_none_or(|(first, last)| last - first < seconds) {
+        let frame = robot.next()?;
+        if let Some(time) = frame["report"]["time"].as_f64() {
+            span = Some((span.map_or(time, |(first, _)| first), time));
+        }
+        for one in &mut all {
+            let Some(message) = frame["messages"].get(&one.path) else { continue };
+            if let Some(bytes) = message["too_long"].as_u64() {
+                return Err(format!("a message of {} is too long to be shown: {bytes} bytes as JSON", one.path));
+            }
+            let value = recorded(&message["payload"]);
+            let series = match &mut one.series {
+                Some(series) => series,
+                None => one.series.insert(Series::new(&one.path, &one.ros, &value, &one.field)?),
+            };
+            series.add(message["monotonic_time"].as_i64().unwrap_or_default(), &value);
+            one.messages += 1;
+        }
+    }
+    let silent: Vec<&str> = all.iter().filter(|one| one.series.is_none()).map(|one| one.path.as_str()).collect();
+    if !silent.is_empty() {
+        return Err(format!("nothing came in {seconds} s from {}", silent.join(", ")));
+    }
+    let series: Vec<&Series> = all.iter().filter_map(|one| one.series.as_ref()).collect();
+    write(robot.welcome["robot"].as_str().unwrap_or_default().to_owned(), &series, out)?;
+    let counts: serde_json::Map<_, _> =
+        fields.iter().zip(&all).map(|(field, one)| (field.clone(), one.messages.into())).collect();
+    say(&match as_json {
+        true => format!("{}\n", json!({"file": out, "messages": counts})),
+        false => format!("plotted {}\n", out.display()),
+    })
+}
+
+/// The topic and the field of `sensor/base/imu.angular_velocity`. A path may hold dots: the longest one that is a topic is taken.
+fn plotted(robot: &Robot, text: &str) -> Result<Plotted, String> {
+    let ends = text.match_indices('.').map(|(at, _)| at).chain([text.len()]);
+    let is_topic = |end: &usize| robot.listed("topics").iter().any(|topic| topic["path"] == text[..*end]);
+    let end = ends.rev().find(is_topic);
+    let (path, field) = match end {
+        Some(end) => (&text[..end], text[end..].trim_start_matches('.')),
+        None => text.split_once('.').unwrap_or((text, "")),
+    };
+    let topic = robot.element("topics", "", path)?;
+    let layout = topic["layout"].as_u64().and_then(|number| usize::try_from(number).ok());
+    let ros = layout.and_then(|number| robot.listed("layouts").get(number)?["ros"]["name"].as_str());
+    Ok(Plotted {
+        path: topic["path"].as_str().unwrap_or_default().to_owned(),
+        ros: ros.unwrap_or_default().to_owned(),
+        field: field.to_owned(),
+        series: None,
+        messages: 0,
+    })
+}
+
+/// JSON as a value of a recording.
+fn recorded(value: &Value) -> Recorded {
+    match value {
+        Value::Null => Recorded::List(Vec::new()),
+        Value::Bool(value) => Recorded::Bool(*value),
+        Value::Number(number) => Recorded::F64(number.as_f64().unwrap_or(f64::NAN)),
+        Value::String(text) if matches!(&**text, "NaN" | "Infinity" | "-Infinity") => Recorded::F64(f64::NAN),
+        Value::String(text) => Recorded::Text(text.clone()),
+        Value::Array(items) => Recorded::List(items.iter().map(recorded).collect()),
+        Value::Object(members) => {
+            Recorded::Message(members.iter().map(|(name, value)| (name.as_str().into(), recorded(value))).collect())
+        }
+    }
 }
 
 fn hz(robot: &mut Robot, paths: &[String], seconds: f64, as_json: bool) -> Result<bool, String> {

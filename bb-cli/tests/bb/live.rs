@@ -48,6 +48,12 @@ impl Default for Distance {
     }
 }
 
+/// How much of the way is behind it.
+#[derive(Clone, Copy, Debug, Payload)]
+struct Way {
+    share: f64,
+}
+
 /// Takes as many seconds as metres, and gives twice the metres.
 #[derive(Debug)]
 struct Travel;
@@ -58,6 +64,7 @@ impl Command for Travel {
     type Output = f64;
 
     async fn run(_: NoOptions, of: Distance, context: CommandContext) -> Result<Outcome<f64>, Fault> {
+        context.progress(Way { share: 0.25 })?;
         context.sleep(Duration::from_secs_f64(of.distance)).await;
         Ok(Outcome::done(of.distance * 2.0))
     }
@@ -106,6 +113,8 @@ fn every_command_prints_what_is_stored() -> Result<(), Box<dyn Error>> {
         (&steering, &["topic", "list"]),
         (&steering, &["topic", "info", "sensor/base/level"]),
         (&steering, &["topic", "info", "sensor/base/levle"]),
+        (&steering, &["topic", "plot", "sensor/base/level", "--out", "level.txt"]),
+        (&steering, &["topic", "plot", "sensor/base/level", "sensor/base/levle", "--out", "level.svg"]),
         (&steering, &["param", "list"]),
         (&steering, &["param", "set", "speed=1", "mission=patrol"]),
         (&steering, &["param", "set", "mission=rest", "speed=9"]),
@@ -163,6 +172,7 @@ fn rates_messages_and_results_are_those_of_a_moving_robot() -> Result<(), Box<dy
     let steering = dashboard.url();
     simulation.arm()?;
     let level = simulation.publisher::<Level>("sensor/base/level")?;
+    let picture = Path::new(env!("CARGO_TARGET_TMPDIR")).join("live.svg").display().to_string();
     let is_over = AtomicBool::new(false);
     let end = Instant::now() + Duration::from_secs(120);
     std::thread::scope(|scope| -> Result<(), Box<dyn Error>> {
@@ -186,15 +196,21 @@ fn rates_messages_and_results_are_those_of_a_moving_robot() -> Result<(), Box<dy
             ask(&["topic", "echo", "estimator/base/pass", "--limit", "3"]),
             ask(&["topic", "echo", "estimator/base/pass", "--limit", "2", "--json"]),
             ask(&["top", "--once", "--width", "80"]),
+            ask(&["topic", "plot", "estimator/base/pass.value", "--seconds", "5", "--json", "--out", &picture]),
         ];
         is_over.store(true, Ordering::Relaxed);
         moving.join().map_err(|_| "it panicked")?;
         for output in &outputs {
             assert_eq!(output.code, Some(0), "{}", output.err);
         }
-        let [result, as_json, hz, echo, messages, top] = outputs;
+        let [result, as_json, hz, echo, messages, top, plot] = outputs;
         assert_eq!(result.out, "4.0\n");
         assert_eq!(serde_json::from_str::<Value>(&as_json.out)?["value"], 4.0);
+        let plotted: Value = serde_json::from_str(&plot.out)?;
+        let count = plotted["messages"]["estimator/base/pass.value"].as_u64();
+        assert!(count.is_some_and(|count| count > 2), "{plotted}");
+        let drawn = std::fs::read_to_string(&picture)?;
+        assert!(drawn.starts_with("<svg") && drawn.contains("estimator/base/pass value"), "{drawn}");
         // Each message is one hundredth of a second; the time of a report may be that before its message.
         let hz: Value = serde_json::from_str(&hz.out)?;
         assert!(hz[0]["rate_hz"].as_f64().is_some_and(|rate| (99.0..=101.0).contains(&rate)), "{hz}");

@@ -5,8 +5,8 @@ use super::host::Host;
 use super::{Bus, Caller, Fault, NoOptions, Options};
 use crate::declaration::Role;
 use crate::event::{HardwareError, HealthTransition};
-use crate::message::Field;
-use crate::message::Payload;
+use crate::message::{Field, Payload, Stamped};
+use crate::pubsub::DynamicMessage;
 use crate::schedule::{Alarm, Sleeper};
 use crate::time::MonotonicTime;
 use std::fmt;
@@ -137,7 +137,7 @@ impl CommandContext {
     }
 
     /// Publishes how far it has come at `command/<name>/progress`, where subscriptions to `command` or to everything receive it. A command
-    /// publishes one type there.
+    /// publishes one type there. Those who come late find the last one in [`Bus::executions`].
     ///
     /// ```
     /// use bb_core::prelude::*;
@@ -182,7 +182,10 @@ impl CommandContext {
     /// # Errors
     /// It has published another type there before, or it was cancelled.
     pub fn progress<T: Payload>(&self, progress: T) -> Result<(), Fault> {
-        self.bus.publisher::<T>(&format!("{}/progress", self.hooks.path))?.publish(progress);
+        let publisher = self.bus.publisher::<T>(&format!("{}/progress", self.hooks.path))?;
+        let kept = DynamicMessage::of(publisher.path(), Stamped::new(self.now(), progress.clone()));
+        self.hooks.keep_progress(kept, &self.bus.caller);
+        publisher.publish(progress);
         Ok(())
     }
 
@@ -245,6 +248,12 @@ impl OwnHooks {
     /// Adds a callback, which is dropped once the execution's code has returned.
     pub(crate) fn add(&self, hook: DisarmHook) {
         self.host.controls().on_disarm(self.path, Some(self.execution), hook);
+    }
+
+    fn keep_progress(&self, progress: DynamicMessage, caller: &Caller) {
+        if caller.is_valid() {
+            self.host.controls().keep_progress(self.execution, progress);
+        }
     }
 
     fn transition(&self, state: &str, caller: &Caller) -> Result<(), Fault> {

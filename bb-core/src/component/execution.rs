@@ -92,6 +92,8 @@ pub struct ExecutionInfo {
     pub caller: String,
     /// The time of its start.
     pub started: MonotonicTime,
+    /// What it last gave to [`CommandContext::progress`](crate::CommandContext::progress), as JSON.
+    pub progress: Option<String>,
 }
 
 /// A command that was started by path. Dropping it lets the command run on.

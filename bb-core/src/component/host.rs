@@ -36,6 +36,8 @@ pub(crate) trait Controls: Guardian {
     /// Disarms the robot and stops its components, without waiting.
     fn request_stop(&self, caller: &Caller);
     fn kind_of_run(&self) -> RunKind;
+    /// The execution of that number has come so far.
+    fn keep_progress(&self, execution: u64, progress: DynamicMessage);
     /// The execution of that number, whose caller it is, changes the operational state.
     fn transition(&self, execution: u64, state: &str, caller: &Caller) -> Result<(), Fault>;
     fn start_command(&self, path: &str, arguments: &str, caller: &Caller) -> Result<DynamicExecution, Fault>;

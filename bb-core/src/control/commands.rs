@@ -13,7 +13,9 @@ use crate::event::{
 };
 use crate::fault::Fault;
 use crate::journal::Event;
+use crate::message::codec::member_of;
 use crate::node::Mode;
+use crate::pubsub::DynamicMessage;
 use crate::schedule::Lane;
 use crate::time::MonotonicTime;
 use std::sync::{Arc, PoisonError};
@@ -126,14 +128,31 @@ impl Control {
         let state = self.lock();
         let running = state.executions.iter().filter(|execution| !matches!(execution.phase, Phase::Lingering));
         let infos = running.filter_map(|execution| {
-            Some(ExecutionInfo {
+            let info = ExecutionInfo {
                 number: execution.id,
                 path: self.0.declared.commands.get(execution.command)?.path,
                 caller: execution.asked_by.clone(),
                 started: execution.started,
-            })
+                progress: None,
+            };
+            Some((info, execution.progress.clone()))
         });
-        infos.collect()
+        let infos: Vec<_> = infos.collect();
+        drop(state);
+        // The payload's code runs without the lock.
+        let with_progress = infos.into_iter().map(|(info, progress)| ExecutionInfo {
+            progress: progress.and_then(|message| member_of(&message.to_json(), "payload")),
+            ..info
+        });
+        with_progress.collect()
+    }
+
+    pub(super) fn keep_progress_of(&self, number: u64, progress: DynamicMessage) {
+        let mut state = self.lock();
+        let execution = state.executions.iter_mut().find(|execution| execution.id == number);
+        let previous = execution.and_then(|execution| execution.progress.replace(progress));
+        drop(state);
+        crate::fault::discard(previous);
     }
 
     /// Cancels the execution of that number on behalf of the caller.
@@ -297,6 +316,7 @@ impl Step<'_> {
             slot: Arc::clone(&slot),
             caller,
             started: self.now,
+            progress: None,
             task,
             phase: Phase::Running,
         };

@@ -20,7 +20,7 @@ use crate::journal::JournalLine;
 use crate::message::{Origin, Payload};
 use crate::node::Mode;
 use crate::payload::{BeginMotion, EndMotion};
-use crate::pubsub::{AnyTopic, Registry, Topic};
+use crate::pubsub::{AnyTopic, DynamicMessage, Registry, Topic};
 use crate::schedule::{Bell, Deadlines, Pool, Reserve, Sleeper, StopSignal};
 use crate::time::Clock;
 #[cfg(loom)]
@@ -320,6 +320,10 @@ impl Controls for Control {
             Mode::Virtual => RunKind::Simulation,
             Mode::Replay => RunKind::Replay,
         }
+    }
+
+    fn keep_progress(&self, execution: u64, progress: DynamicMessage) {
+        self.keep_progress_of(execution, progress);
     }
 
     fn transition(&self, execution: u64, state: &str, caller: &Caller) -> Result<(), Fault> {

@@ -48,6 +48,7 @@ fn execution(execution: &ExecutionInfo) -> String {
         ("path", text(execution.path)),
         ("caller", text(&execution.caller)),
         ("started", seconds(execution.started)),
+        ("progress", execution.progress.clone().unwrap_or_else(null)),
     ])
 }
 

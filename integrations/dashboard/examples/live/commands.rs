@@ -35,7 +35,7 @@ impl Command for Pace {
 #[derive(Clone, Copy, Debug, Payload)]
 pub(crate) struct Distance {
     /// How far to drive.
-    #[payload(unit = "m")]
+    #[payload(unit = "m", range = 0.0..=100.0)]
     pub(crate) distance: f64,
     /// How fast.
     pub(crate) gait: Gait,
@@ -74,9 +74,6 @@ impl Command for Travel {
     type Output = Travelled;
 
     async fn run(_: NoOptions, arguments: Distance, context: CommandContext) -> Result<Outcome<Travelled>, Fault> {
-        if arguments.distance.is_nan() || !(0.0..=100.0).contains(&arguments.distance) {
-            return Err(Fault::new(format!("distance: expected 0 to 100 m, found {} m", arguments.distance)));
-        }
         let speed = if arguments.gait == Gait::Careful { 0.3 } else { 1.0 };
         let time = arguments.distance / speed;
         context.set_parameter(rover::param::speed.path(), speed)?;
@@ -93,6 +90,13 @@ pub(crate) struct Sweep {
     pub(crate) times: u8,
 }
 
+/// Progress of [`Look`].
+#[derive(Clone, Copy, Debug, Payload)]
+pub(crate) struct Swept {
+    /// From 0 to 1.
+    pub(crate) share: f64,
+}
+
 /// Turns the camera from side to side.
 #[derive(Debug)]
 pub(crate) struct Look;
@@ -107,7 +111,9 @@ impl Command for Look {
         let turn = |position: f64| {
             motor.send(ActuatorCommand::Position(PositionCommand { position, velocity: None, effort: None }))
         };
-        for _ in 0..arguments.times.max(1) {
+        let sweeps = arguments.times.max(1);
+        for sweep in 0..sweeps {
+            context.progress(Swept { share: f64::from(sweep) / f64::from(sweeps) })?;
             for position in [1.2, -1.2] {
                 turn(position)?;
                 context.sleep(Duration::from_secs(3)).await;
