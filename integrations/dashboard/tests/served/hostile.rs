@@ -2,12 +2,14 @@
 
 use crate::client::{Client, open, stream, token};
 use crate::protocol::options;
-use crate::robot::Cart;
+use crate::robot::{Cart, Level};
 use bb_core::prelude::*;
 use bb_dashboard::Dashboard;
 use serde_json::json;
 use std::error::Error;
-use std::io::{Read, Write};
+use std::io::{BufRead, BufReader, Read, Write};
+use std::process::{Child, Command, Stdio};
+use std::time::Instant;
 use tungstenite::Message;
 
 #[test]
@@ -120,5 +122,106 @@ fn requests_of_one_viewer_are_bounded() -> Result<(), Box<dyn Error>> {
         assert!(error.starts_with("too many requests"), "{id}: {answer}");
     }
     assert_eq!(simulation.safety(), Safety::Armed);
+    Ok(())
+}
+
+/// The variable with the address for a viewer in a process of its own.
+const VIEWER: &str = "BB_TEST_VIEWER";
+
+/// A long text.
+#[derive(Clone, Debug, Payload)]
+struct Long {
+    text: String,
+}
+
+/// What the test below stops and kills: it does nothing without the address.
+#[test]
+#[ignore = "is run by another test, as a process of its own"]
+fn a_viewer_in_a_process_of_its_own() -> Result<(), Box<dyn Error>> {
+    let Ok(address) = std::env::var(VIEWER) else { return Ok(()) };
+    let mut socket = open(address.parse()?)?;
+    socket.send(Message::text(r#"{"op":"hello","version":1}"#))?;
+    socket.send(Message::text(r#"{"op":"watch","id":1,"paths":["sensor/base/level","own/long"]}"#))?;
+    let mut messages = 0;
+    loop {
+        socket.read()?;
+        messages += 1;
+        if messages == 20 {
+            println!("\nwatching");
+        }
+    }
+}
+
+fn signal(viewer: &Child, signal: &str) -> Result<(), Box<dyn Error>> {
+    let status = Command::new("kill").args([signal, &viewer.id().to_string()]).status()?;
+    if status.success() { Ok(()) } else { Err("it is gone".into()) }
+}
+
+/// Resident memory of this process, bytes.
+fn resident() -> Result<u64, Box<dyn Error>> {
+    let pages = std::fs::read_to_string("/proc/self/statm")?;
+    Ok(pages.split(' ').nth(1).ok_or("it has two numbers")?.parse::<u64>()? * 4096)
+}
+
+/// The robot's callbacks, its memory and the next viewer, while a viewer is stopped with full buffers, and after it was killed.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_viewer_that_is_stopped_or_killed_costs_the_robot_nothing() -> Result<(), Box<dyn Error>> {
+    let running = Cart::builder().start()?;
+    let dashboard = Dashboard::serve(&running, options())?;
+    let level = running.publisher::<Level>("sensor/base/level")?;
+    let long = running.publisher::<Long>("own/long")?;
+    let text = "x".repeat(200_000);
+    // The longest of the thousandth part of the callbacks, at 1 kHz beside 3 MB/s of text.
+    let feed = |seconds: f64| {
+        let (start, mut taken) = (Instant::now(), Vec::new());
+        while start.elapsed().as_secs_f64() < seconds {
+            if taken.len() % 50 == 0 {
+                long.publish(Long { text: text.clone() });
+            }
+            let before = Instant::now();
+            level.publish(Level { value: 1.0 });
+            taken.push(before.elapsed());
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        taken.sort_unstable();
+        taken[taken.len() - 1 - taken.len() / 1000]
+    };
+    let alone = feed(2.0);
+    let mut viewer = Command::new(std::env::current_exe()?)
+        .args(["--ignored", "--exact", "hostile::a_viewer_in_a_process_of_its_own", "--nocapture"])
+        .env(VIEWER, dashboard.address().to_string())
+        .stdout(Stdio::piped())
+        .spawn()?;
+    let output = BufReader::new(viewer.stdout.take().ok_or("it is piped")?);
+    let watching = std::thread::spawn(move || output.lines().map_while(Result::ok).any(|line| line == "watching"));
+    let watched = feed(4.0);
+    assert!(watching.is_finished() && watching.join().is_ok_and(|is_watching| is_watching), "it watches");
+    let before = resident()?;
+    signal(&viewer, "-STOP")?;
+    // Longer than a message to it may take.
+    let stopped = feed(7.0);
+    let grown = resident()?.saturating_sub(before);
+    let served = |what: &str| -> Result<(), Box<dyn Error>> {
+        let start = Instant::now();
+        let mut next = Client::reading(&dashboard)?;
+        next.until(|message| message.get("report").map(|_| ()))?;
+        let taken = start.elapsed();
+        println!("{what}: the next viewer is served after {taken:?}");
+        assert!(taken < Duration::from_secs(1), "{what}: {taken:?}");
+        Ok(())
+    };
+    served("stopped")?;
+    signal(&viewer, "-KILL")?;
+    viewer.wait()?;
+    served("killed")?;
+    let killed = feed(2.0);
+    println!(
+        "p99.9 alone {alone:?}, watched {watched:?}, stopped {stopped:?}, killed {killed:?}; {grown} bytes more"
+    );
+    assert!(grown < 20 << 20, "{grown} bytes");
+    // Whoever waited for the viewer would wait for as long as a message to it may take: 5 s.
+    let longest = (10 * alone.max(watched)).max(Duration::from_millis(5));
+    assert!(stopped < longest && killed < longest, "{alone:?} {watched:?} {stopped:?} {killed:?}");
     Ok(())
 }
