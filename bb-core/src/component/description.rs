@@ -5,7 +5,7 @@ mod json;
 use super::CommandInfo;
 use crate::event::ParameterValue;
 use crate::message::codec::{Layouts, Shape};
-use crate::topology::{JointKind, Limit};
+use crate::topology::{JointKind, Limit, Origin, Visual};
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
@@ -69,6 +69,8 @@ pub struct LinkDescription {
     pub parent_joint: Option<&'static str>,
     /// Mass, kg, if declared.
     pub mass: Option<f64>,
+    /// Shapes that viewers draw.
+    pub visuals: &'static [Visual],
 }
 
 /// A joint.
@@ -85,6 +87,8 @@ pub struct JointDescription {
     pub parent: &'static str,
     /// The link that it carries.
     pub child: &'static str,
+    /// Takes points from its frame, which is the child's at rest, to the parent's.
+    pub parent_from_joint: Origin,
     /// Limits.
     pub limit: Option<Limit>,
     /// The joint that it mimics.

@@ -107,6 +107,7 @@ fn links(robot: &RobotDeclaration) -> Vec<LinkDescription> {
         name: link.name,
         parent_joint: link.parent_joint.and_then(|joint| robot.topology.joints.get(joint)).map(|joint| joint.name),
         mass: link.inertial.map(|inertial| inertial.mass),
+        visuals: link.visuals,
     };
     robot.topology.links.iter().map(describe).collect()
 }
@@ -119,6 +120,7 @@ fn joints(robot: &RobotDeclaration) -> Vec<JointDescription> {
         kind: joint.kind,
         parent: link(joint.parent),
         child: link(joint.child),
+        parent_from_joint: joint.parent_from_joint,
         limit: joint.limit,
         mimics: joint.mimic.and_then(|mimic| robot.topology.joints.get(mimic.joint)).map(|joint| joint.name),
         actuators: robot

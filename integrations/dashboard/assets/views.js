@@ -78,6 +78,8 @@ export class Views {
     this.bindPlots();
     this.bindTopics();
     this.bindEvents();
+    find("scene-reset").onclick = () => this.scene?.reset();
+    new MutationObserver(() => this.scene?.paint()).observe(document.documentElement, { attributeFilter: ["data-scheme"] });
   }
 
   get robot() { return this.app.robot; }
@@ -93,6 +95,7 @@ export class Views {
     this.buildParameters();
     this.buildJoints();
     this.buildGraph();
+    this.buildPlace();
     const topics = this.robot.description.topics.map((topic) => topic.path).filter((path) => !/^(param|command)\/|^journal$/.test(path)).sort();
     const chosen = find("plot-topic").value;
     find("plot-topic").replaceChildren(...topics.map((path) => new Option(path, path, false, path === chosen)));
@@ -101,7 +104,8 @@ export class Views {
 
   shown(view) {
     this.view = view;
-    if (view === "plots" || view === "topics") this.app.watch();
+    if (view === "plots" || view === "topics" || view === "scene") this.app.watch();
+    if (view === "scene") this.showScene();
     if (this.robot.report) this.report();
     if (view === "events") this.drawEvents();
   }
@@ -110,6 +114,7 @@ export class Views {
     const paths = new Set(this.plots.map((plot) => plot.path));
     if (find("plot-topic").value && this.view === "plots") paths.add(find("plot-topic").value);
     if (this.topic && this.view === "topics") paths.add(this.topic);
+    if (this.placedBy && this.view === "scene") paths.add(this.placedBy);
     return [...paths];
   }
 
@@ -179,7 +184,12 @@ export class Views {
       return line;
     }, (line, one) => {
       const elapsed = report.time - one.started, limit = limits.get(one.path);
-      set(line.children[3], `runs ${ago(elapsed)}${limit ? ` of at most ${limit} s` : ""}, started by ${one.caller}`);
+      const progress = numbers(one.progress ?? {}), said = progress.map(([name, value]) => ` · ${name} ${short(value)}`).join("");
+      set(line.children[3], `runs ${ago(elapsed)}${limit ? ` of at most ${limit} s` : ""}, started by ${one.caller}${said}`);
+      // One number from 0 to 1 is a share.
+      const share = progress.length === 1 && progress[0][1] >= 0 && progress[0][1] <= 1 ? progress[0][1] : null;
+      line.children[4].classList.toggle("known", share !== null);
+      line.children[4].firstChild.style.width = share === null ? "" : `${share * 100}%`;
     });
   }
 
@@ -362,6 +372,7 @@ export class Views {
   message(path, message) {
     if (path === find("plot-topic").value) this.fields();
     if (path === this.topic) this.showMessage(message);
+    if (path === this.placedBy) this.place(message);
     if (this.isPaused || message.payload === undefined) return;
     for (const plot of this.plots.filter((plot) => plot.path === path)) {
       const found = new Map(numbers(message.payload));
@@ -436,6 +447,41 @@ export class Views {
 
   joints() {
     for (const [name, show] of this.tiles) show(this.robot.joints[name]);
+    if (this.view === "scene") this.scene?.move(this.robot.joints);
+  }
+
+  // ---- 3D
+
+  // The topic that places the root link in the world: one of poses, else of orientations.
+  buildPlace() {
+    const { components, links, topics } = this.robot.description, root = links.find((link) => link.parent_joint === null)?.name;
+    const isOfRoot = (path) => components.some((one) => one.frame === root && (one.path === path || one.topics.includes(path)));
+    const by = (payloads) => topics.find((topic) => payloads.includes(topic.payload) && isOfRoot(topic.path))?.path;
+    this.placedBy = by(["Pose", "PoseWithCovariance", "Odometry"]) ?? by(["Orientation"]);
+    this.scene = null;
+    set(find("scene-note"), this.placedBy ? `Placed by ${this.placedBy}. Drag to turn, scroll to come closer.` : "Drag to turn, scroll to come closer.");
+    if (this.view === "scene") this.showScene();
+  }
+
+  async showScene() {
+    const { description } = this.robot;
+    if (this.scene || !description) return;
+    try {
+      // Half a megabyte, which others need not load.
+      const { RobotScene } = await import("/scene.js");
+      if (this.scene || description !== this.robot.description) return;
+      this.scene = new RobotScene(find("scene-box"), description);
+      this.scene.move(this.robot.joints);
+    } catch (error) {
+      find("scene-box").replaceChildren(make("p", "empty", `It cannot be drawn: ${error.message}`));
+    }
+  }
+
+  place({ payload }) {
+    const pose = payload?.pose ?? payload, at = pose?.position ?? { x: 0, y: 0, z: 0 }, turn = pose?.world_from_body;
+    const numbers = turn && [at.x, at.y, at.z, turn.x, turn.y, turn.z, turn.w];
+    // Others are texts: NaN is not a number of JSON.
+    if (numbers?.every(Number.isFinite)) this.scene?.place({ xyz: numbers.slice(0, 3), quaternion: numbers.slice(3) });
   }
 
   // ---- Topics
@@ -612,7 +658,7 @@ function field(schema, preset) {
   }
   const isNumber = schema.type === "number" || schema.anyOf?.some((one) => one.type === "number");
   if (schema.type === "integer" || isNumber) {
-    const element = Object.assign(make("input"), { type: "number", step: schema.type === "integer" ? 1 : "any", value: typeof preset === "number" ? preset : "", required: true });
+    const element = Object.assign(make("input"), { type: "number", step: schema.type === "integer" ? 1 : "any", min: schema.minimum ?? "", max: schema.maximum ?? "", value: typeof preset === "number" ? preset : "", required: true });
     return { element, read: () => Number(element.value) };
   }
   if (schema.type === "string") {
@@ -631,10 +677,10 @@ function describe({ path, kind, message }) {
   switch (kind) {
     case "HealthTransition": return { kind: "health", text: `${of.estimator}: ${low(of.from)} → ${low(of.to)}, ${low(of.reason)} (${of.source})`, colour: COLOUR[low(of.to)] };
     case "ComponentFault": return { kind: "fault", text: `${of.path}: ${of.message}`, colour: "bad" };
-    case "SafetyTransition": return { kind: "safety", text: `${low(of.from)} → ${low(of.to)}`, colour: of.to === "Error" ? "bad" : of.to === "Armed" ? "act" : "" };
+    case "SafetyTransition": return { kind: "safety", text: `${low(of.from)} → ${low(of.to)}${of.caller ? `, by ${of.caller}` : ""}`, colour: of.to === "Error" ? "bad" : of.to === "Armed" ? "act" : "" };
     case "SafetyError": return { kind: "unsafe", text: `${of.path}: ${of.error.message}`, colour: "bad" };
     case "StateTransition": return { kind: "state", text: `${of.from} → ${of.to}${of.command ? `, by ${of.command}` : ""}`, colour: "" };
-    case "ParameterChange": return { kind: "parameter", text: `${of.path}: ${value(of.from)} → ${value(of.to)}`, colour: "" };
+    case "ParameterChange": return { kind: "parameter", text: `${of.path}: ${value(of.from)} → ${value(of.to)}, by ${of.caller}`, colour: "" };
     case "CommandEvent": {
       const phase = typeof of.phase === "string" ? of.phase : Object.keys(of.phase)[0];
       const refused = of.phase.Refused, failed = of.phase.Failed;

@@ -299,11 +299,16 @@ fn parameters(bus: &Bus) -> String {
     serde_json::Value::Object(values.collect()).to_string()
 }
 
-/// The positions of the joints whose state is known.
+/// The positions of the joints whose state is known, and how they move what they carry.
 fn joints(bus: &Bus) -> String {
     let all = bus.joints().all().into_iter().map(|joint| {
-        let position = joint.position.into_iter().map(serde_json::Value::from).collect::<Vec<_>>();
-        (joint.joint.to_owned(), serde_json::json!({ "position": position, "stale": joint.is_stale }))
+        let declared = bus.topology().joints.iter().find(|declared| declared.name == joint.joint);
+        let motion = declared.map(|declared| {
+            let motion = declared.motion(&joint.position);
+            serde_json::json!({ "xyz": motion.translation.vector.as_slice(), "quaternion": motion.rotation.coords.as_slice() })
+        });
+        let (position, stale) = (joint.position, joint.is_stale);
+        (joint.joint.to_owned(), serde_json::json!({ "position": position, "stale": stale, "motion": motion }))
     });
     serde_json::Value::Object(all.collect()).to_string()
 }

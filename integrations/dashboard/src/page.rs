@@ -15,6 +15,7 @@ pub(crate) const FILES: &[(&str, &str, &str)] = &[
     ("/app.js", SCRIPT, include_str!("../assets/app.js")),
     ("/views.js", SCRIPT, include_str!("../assets/views.js")),
     ("/plot.js", SCRIPT, include_str!("../assets/plot.js")),
+    ("/scene.js", SCRIPT, include_str!("../assets/scene.js")),
     ("/icon.svg", PICTURE, include_str!("../assets/icon.svg")),
 ];
 

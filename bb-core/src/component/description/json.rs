@@ -8,6 +8,7 @@ use crate::component::CommandInfo;
 use crate::event::ParameterValue;
 use crate::message::codec::compose::{array, null, number, object, optional, text};
 use crate::message::codec::{Layouts, Schema, json_schema};
+use crate::topology::{Geometry, Origin, Visual};
 use std::time::Duration;
 
 impl Description {
@@ -37,7 +38,35 @@ fn link(link: &LinkDescription) -> String {
         ("name", text(link.name)),
         ("parent_joint", optional(link.parent_joint, text)),
         ("mass", optional(link.mass, number)),
+        ("visuals", array(&mut link.visuals.iter().map(visual))),
     ])
+}
+
+fn visual(visual: &Visual) -> String {
+    let geometry = match visual.geometry {
+        Geometry::Box(sides) => ("box", numbers(&sides)),
+        Geometry::Cylinder { radius, length } => {
+            ("cylinder", object(&[("radius", number(radius)), ("length", number(length))]))
+        }
+        Geometry::Sphere { radius } => ("sphere", object(&[("radius", number(radius))])),
+        Geometry::Mesh { file, scale } => ("mesh", object(&[("file", text(file)), ("scale", numbers(&scale))])),
+    };
+    let color = visual.material.and_then(|material| material.color);
+    object(&[
+        ("geometry", object(&[geometry])),
+        ("origin", origin(&visual.link_from_shape)),
+        ("color", optional(color, |color| numbers(&color))),
+    ])
+}
+
+/// Translation, and rotation as x, y, z, w.
+fn origin(origin: &Origin) -> String {
+    let rotation = origin.isometry().rotation;
+    object(&[("xyz", numbers(&origin.xyz)), ("quaternion", numbers(rotation.coords.as_slice()))])
+}
+
+fn numbers(numbers: &[f64]) -> String {
+    array(&mut numbers.iter().map(|one| number(*one)))
 }
 
 fn joint(joint: &JointDescription) -> String {
@@ -55,6 +84,7 @@ fn joint(joint: &JointDescription) -> String {
         ("kind", text(joint.kind.name())),
         ("parent", text(joint.parent)),
         ("child", text(joint.child)),
+        ("origin", origin(&joint.parent_from_joint)),
         ("limit", limit.unwrap_or_else(null)),
         ("mimics", optional(joint.mimics, text)),
         ("actuators", array(&mut joint.actuators.iter().map(|path| text(path)))),

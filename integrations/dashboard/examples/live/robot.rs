@@ -45,6 +45,12 @@ robot! {
     }
 
     link base {
+        visual: { box: [0.5 m, 0.34 m, 0.12 m], origin: { xyz: [0 m, 0 m, 0.16 m] }, material: { color: [0.16, 0.38, 0.75, 1] } };
+        visual: { cylinder: { radius: 0.1 m, length: 0.06 m }, origin: { xyz: [0.17 m, 0.2 m, 0.1 m], rpy: [90 deg, 0 deg, 0 deg] }, material: { color: [0.2, 0.22, 0.26, 1] } };
+        visual: { cylinder: { radius: 0.1 m, length: 0.06 m }, origin: { xyz: [0.17 m, -0.2 m, 0.1 m], rpy: [90 deg, 0 deg, 0 deg] }, material: { color: [0.2, 0.22, 0.26, 1] } };
+        visual: { cylinder: { radius: 0.1 m, length: 0.06 m }, origin: { xyz: [-0.17 m, 0.2 m, 0.1 m], rpy: [90 deg, 0 deg, 0 deg] }, material: { color: [0.2, 0.22, 0.26, 1] } };
+        visual: { cylinder: { radius: 0.1 m, length: 0.06 m }, origin: { xyz: [-0.17 m, -0.2 m, 0.1 m], rpy: [90 deg, 0 deg, 0 deg] }, material: { color: [0.2, 0.22, 0.26, 1] } };
+        visual: { cylinder: { radius: 0.025 m, length: 0.2 m }, origin: { xyz: [0.12 m, 0 m, 0.32 m] }, material: { color: [0.62, 0.66, 0.72, 1] } };
         sensor imu: Gyroscope(speed = param::speed, radius = param::radius) { rate: 200 Hz; }
         sensor wheels: Wheels(speed = param::speed, radius = param::radius) { rate: 50 Hz; }
         sensor sonar: Sonar() { rate: 10 Hz; }
@@ -65,11 +71,15 @@ robot! {
             recover_after: 5;
         }
         joint mast: revolute {
+            origin: { xyz: [0.12 m, 0 m, 0.45 m] };
             axis: z;
             limit: { lower: -120 deg, upper: 120 deg, velocity: 60 deg/s, effort: 5 N*m };
             actuator motor: SimulatedActuator(inertia = 0.1, acceleration = 4.0);
             sensor encoder: SimulatedEncoder(resolution = 1e-4) { rate: 50 Hz; }
-            link camera {}
+            link camera {
+                visual: { box: [0.12 m, 0.16 m, 0.08 m], material: { color: [0.9, 0.9, 0.92, 1] } };
+                visual: { cylinder: { radius: 0.03 m, length: 0.05 m }, origin: { xyz: [0.08 m, 0 m, 0 m], rpy: [0 deg, 90 deg, 0 deg] }, material: { color: [0.12, 0.13, 0.15, 1] } };
+            }
         }
     }
 }

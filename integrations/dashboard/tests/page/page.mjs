@@ -5,9 +5,9 @@ import assert from "node:assert/strict";
 import http from "node:http";
 
 const [executablePath, url, robot, shots, picture] = process.argv.slice(2);
-const port = new URL(url).port, VIEWS = ["overview", "plots", "joints", "topics", "events", "graph"];
+const port = new URL(url).port, VIEWS = ["overview", "plots", "joints", "topics", "events", "graph", "scene"];
 const quiet = ["--disable-background-networking", "--disable-component-update", "--disable-sync", "--no-first-run", "--disable-quic"];
-const browser = await chromium.launch({ executablePath, headless: true, args: ["--no-sandbox", ...quiet, "--host-resolver-rules=MAP evil.example 127.0.0.1"] });
+const browser = await chromium.launch({ executablePath, headless: true, args: ["--no-sandbox", "--enable-unsafe-swiftshader", ...quiet, "--host-resolver-rules=MAP evil.example 127.0.0.1"] });
 const said = [];
 const passed = (what) => console.log(`page: ${what}`);
 
@@ -102,6 +102,7 @@ await page.waitForFunction(() => window.dashboard.robot.report.safety === "armed
 await page.fill(`${command("look")} input[name=times]`, "9");
 await page.click(`${command("look")} button`);
 await until(page, "#executions", "command/look");
+await until(page, "#executions", "share 0");
 assert.equal(await page.inputValue(`${command("look")} input[name=times]`), "9", "what was typed stays");
 const other = await open(url);
 await until(other, "#executions", "started by page 1");
@@ -109,9 +110,13 @@ await other.click("#executions .line:has-text(\"command/look\") button");
 await until(page, `${command("look")} .error`, "cancelled");
 await page.waitForFunction(() => !document.querySelector("#executions").textContent.includes("command/look"));
 await other.context().close();
+// The browser refuses what is out of the range that the argument states; the robot would do so too.
 await page.fill(`${command("travel")} input[name=distance]`, "1000");
 await page.click(`${command("travel")} button`);
-await page.waitForFunction((selector) => document.querySelector(selector).textContent !== "", `${command("travel")} .error`);
+assert.equal(await page.evaluate((selector) => document.querySelector(selector).validity.rangeOverflow, `${command("travel")} input[name=distance]`), true);
+await page.evaluate((selector) => { document.querySelector(selector).noValidate = true; document.querySelector(`${selector} input[name=distance]`).value = "1000"; }, command("travel"));
+await page.click(`${command("travel")} button`);
+await until(page, `${command("travel")} .error`, "distance: expected a number from 0 to 100, found 1000");
 passed("commands run, are cancelled by another viewer, and are refused with the reason");
 
 // Plots move, at a rate of their own.
@@ -132,6 +137,16 @@ await page.focus("[aria-label=\"mast, target\"]");
 await page.keyboard.press("End");
 await page.waitForFunction(() => window.dashboard.robot.joints.mast.position[0] > 0.5);
 passed("a joint follows its slider");
+
+// In three dimensions, loaded when it is asked for.
+const asked = page.requested.length;
+await tab(page, "scene");
+await page.waitForFunction(() => window.dashboard.views.scene?.drawn > 3 && window.dashboard.views.scene.trail.length > 1);
+assert.deepEqual(page.requested.slice(asked), [`http://127.0.0.1:${port}/scene.js`]);
+assert.ok(await page.loaded() <= 1e6, "all of it is below a megabyte");
+const mast = await page.evaluate(() => 2 * Math.atan2(window.dashboard.views.scene.joints.get("mast").quaternion.z, window.dashboard.views.scene.joints.get("mast").quaternion.w));
+assert.ok(mast > 0.5, `the camera looks to ${mast} rad`);
+passed("the robot is drawn in three dimensions");
 
 // The keyboard alone.
 await page.keyboard.press("Tab");
@@ -189,6 +204,7 @@ for (const [width, height] of [[1280, 800], [400, 800]]) for (const colorScheme 
       await look.click("#plot-form button[type=submit]");
       await look.waitForFunction(() => window.dashboard.views.plots[0].plot.points.length > 3);
     }
+    if (view === "scene") await look.waitForFunction(() => window.dashboard.views.scene?.drawn > 3);
     if (view === "topics") await look.click("#topic-table tbody tr");
     await look.waitForTimeout(shots ? 1500 : 100);
     const over = await look.evaluate(() => document.documentElement.scrollWidth - innerWidth);
