@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex};
 #[derive(Clone, Debug, Default, PartialEq, Payload)]
 pub(crate) struct Goal {
     pub(crate) name: String,
-    /// How fast.
+    /// Speed of the trip.
     #[payload(unit = "m/s", range = -1.0..=2.0)]
     pub(crate) speed: f64,
     pub(crate) stops: Vec<u8>,
@@ -128,11 +128,12 @@ fn commands_are_listed_with_what_they_take_and_give() -> Result<(), StartError> 
     assert!(output.contains("stops") && !output.contains("speed"), "{output}");
     let list = go.argument_list();
     let known: Vec<_> = list.iter().map(|argument| (argument.name, argument.doc, argument.unit)).collect();
-    assert_eq!(known, [("name", "", None), ("speed", "How fast.", Some("m/s")), ("stops", "", None)]);
+    assert_eq!(known, [("name", "", None), ("speed", "Speed of the trip.", Some("m/s")), ("stops", "", None)]);
     assert_eq!((list[1].range.clone(), list[1].default.as_deref()), (Some(-1.0..=2.0), Some("0.0")));
     assert_eq!(list[2].default.as_deref(), Some("[]"));
     let schema = go.argument_schema();
-    let speed = r#""speed":{"type":"number","minimum":-1,"maximum":2,"description":"How fast.","unit":"m/s"}"#;
+    let speed =
+        r#""speed":{"type":"number","minimum":-1,"maximum":2,"description":"Speed of the trip.","unit":"m/s"}"#;
     let default = r#""default":{"name":"","speed":0.0,"stops":[]}"#;
     assert!(schema.contains(speed) && schema.contains(default), "{schema}");
     assert!(commands[0].argument_list().is_empty());

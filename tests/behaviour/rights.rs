@@ -155,7 +155,7 @@ fn a_command_that_arms_needs_the_right_to_arm_too() -> Result<(), Box<dyn std::e
     Ok(())
 }
 
-/// Those of the events and of the journal's lines are the same.
+/// Events, lines of the journal and a replay name the same callers.
 #[test]
 fn changes_of_parameters_and_safety_name_their_caller() -> Result<(), Box<dyn std::error::Error>> {
     let mut builder = Guarded::builder();

@@ -39,22 +39,22 @@ pub struct CommandInfo {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct ArgumentInfo {
-    /// Its name.
+    /// Name.
     pub name: &'static str,
-    /// Its shape.
+    /// Shape.
     pub shape: Shape,
-    /// Its doc comment; empty for none.
+    /// Doc comment; empty for none.
     pub doc: &'static str,
     /// The symbol of its unit, if it has one: `m/s`.
     pub unit: Option<&'static str>,
     /// The numbers that it may be, in that unit.
     pub range: Option<RangeInclusive<f64>>,
-    /// Its default, as JSON.
+    /// Default, as JSON.
     pub default: Option<String>,
 }
 
 impl CommandInfo {
-    /// Its arguments, if they are the fields of a struct.
+    /// Lists the arguments, if they are the fields of a struct.
     pub fn argument_list(&self) -> Vec<ArgumentInfo> {
         let Shape::Struct(of) = self.arguments else { return Vec::new() };
         let describe = |field: &'static FieldShape| ArgumentInfo {
@@ -92,7 +92,7 @@ pub struct ExecutionInfo {
     pub caller: String,
     /// The time of its start.
     pub started: MonotonicTime,
-    /// What it last gave to [`CommandContext::progress`](crate::CommandContext::progress), as JSON.
+    /// Last value given to [`CommandContext::progress`](crate::CommandContext::progress), as JSON.
     pub progress: Option<String>,
 }
 

@@ -49,6 +49,6 @@ pub struct ParameterChange {
     pub from: ParameterValue,
     /// The new value.
     pub to: ParameterValue,
-    /// Who has set it, named as in [`CommandEvent`](super::CommandEvent).
+    /// Caller that has set it, named as in [`CommandEvent`](super::CommandEvent).
     pub caller: String,
 }

@@ -36,7 +36,7 @@ pub struct SafetyTransition {
     pub from: Safety,
     /// The new state.
     pub to: Safety,
-    /// Who armed, disarmed or stopped the robot, or started the command that did, named as in
+    /// Caller that armed, disarmed or stopped the robot, or started the command that did, named as in
     /// [`CommandEvent`](super::CommandEvent); `None` if hardware reported an error.
     pub caller: Option<String>,
 }

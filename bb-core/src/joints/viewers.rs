@@ -24,7 +24,7 @@ impl ViewerChannel {
     /// All of them.
     pub const ALL: [Self; 3] = [Self::RobotDescription, Self::FixedTransforms, Self::Transforms];
 
-    /// Its topic in ROS: `/tf`.
+    /// Returns the topic in ROS: `/tf`.
     pub const fn topic(self) -> &'static str {
         match self {
             Self::RobotDescription => "/robot_description",
@@ -33,7 +33,7 @@ impl ViewerChannel {
         }
     }
 
-    /// Whether those who subscribe late get the last message: `transient_local` in ROS.
+    /// Returns whether those who subscribe late get the last message: `transient_local` in ROS.
     pub const fn is_latched(self) -> bool {
         !matches!(self, Self::Transforms)
     }
@@ -63,9 +63,9 @@ impl ViewerChannel {
 /// A message of a [`ViewerChannel`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ViewerMessage {
-    /// Its channel.
+    /// Channel.
     pub channel: ViewerChannel,
-    /// Its contents, as CDR.
+    /// Contents, as CDR.
     pub bytes: Vec<u8>,
 }
 
@@ -97,7 +97,7 @@ pub struct ViewerMessages {
 }
 
 impl ViewerMessages {
-    /// Of a robot of that name, placed in the frame `world` by the path `body`, or otherwise by the path that says the most of its root
+    /// Creates the messages of a robot of that name, placed in the frame `world` by the path `body`, or otherwise by the path that says the most of its root
     /// link, the first of several.
     pub fn new(robot: &str, topology: &'static Topology, body: Option<String>) -> Self {
         Self { urdf: topology.to_urdf(robot), frames: Frames::new(topology, body) }

@@ -208,7 +208,7 @@ pub enum Event {
     Parameters {
         /// Changed parameters with their new values.
         changes: Vec<ParameterEntry>,
-        /// Who has set them.
+        /// Caller that has set them.
         caller: String,
     },
     /// A command was requested.
@@ -285,12 +285,12 @@ pub enum Event {
         /// The name of the payload's type; empty if the path was no longer used and made room for another one.
         payload: &'static str,
     },
-    /// From here on, messages at a path that callers publish at are of this one: a path of their choice, or that of a sensor whose
-    /// messages other code publishes. Messages published through a handle of the program's robot are its own and have no such line.
+    /// A caller publishes the messages that follow at a path: one of its choice, or that of a sensor whose messages other code
+    /// publishes. Messages published through a handle of the program's robot are its own and have no such line.
     Publisher {
         /// The path.
         path: &'static str,
-        /// Its name, as in [`CommandEvent`](crate::event::CommandEvent).
+        /// Name of the caller, as in [`CommandEvent`](crate::event::CommandEvent).
         caller: String,
     },
 }

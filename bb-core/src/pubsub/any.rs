@@ -142,9 +142,9 @@ impl fmt::Debug for DynamicMessage {
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
 pub enum Encoded<'a> {
-    /// With its stamp, as [`DynamicMessage::encode`] writes it.
+    /// The message with its stamp, as [`DynamicMessage::encode`] writes it.
     Exact(&'a [u8]),
-    /// In ROS's layout, which has only a wall time.
+    /// The message in ROS's layout, which has only a wall time.
     Ros(&'a [u8]),
     /// The payload alone, as [`encode`](crate::message::codec::encode) writes it.
     Payload(&'a [u8]),

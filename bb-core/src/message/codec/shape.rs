@@ -84,7 +84,7 @@ pub struct FieldShape {
 /// The range of a field's number, both ends included.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct FieldRange {
-    /// As bits, so that shapes can be compared.
+    /// Bits of the number, so that shapes can be compared.
     minimum: u64,
     maximum: u64,
 }
@@ -143,7 +143,6 @@ impl FieldShape {
     }
 
     /// Sets the numbers that a field may hold.
-    #[expect(clippy::panic, reason = "evaluated when the payload is compiled")]
     pub const fn in_range(mut self, minimum: f64, maximum: f64) -> Self {
         assert!(self.shape.is_number(), "only a number, or an `Option` of one, has a range");
         assert!(minimum <= maximum, "the range is empty");
@@ -157,7 +156,7 @@ impl FieldShape {
         self
     }
 
-    /// Whether it is a field, not what a struct without fields holds.
+    /// Returns whether it is a field, not what a struct without fields holds.
     pub(crate) fn is_named(&self) -> bool {
         self.name != NOTHING
     }

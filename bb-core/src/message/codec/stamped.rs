@@ -19,7 +19,7 @@ pub struct Layouts {
 }
 
 impl Layouts {
-    /// Those of a payload.
+    /// Returns the layouts of a payload.
     pub const fn of<T: Payload>() -> Self {
         let (name, payload, exact) = (T::NAME, T::SHAPE, <Stamped<T> as Field>::SHAPE);
         let ros = match &T::ROS {
