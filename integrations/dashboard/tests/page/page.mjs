@@ -215,8 +215,8 @@ for (const [width, height] of [[1280, 800], [400, 800]]) for (const colorScheme 
 }
 passed("every view fits 1280 and 400 pixels");
 
-// Nothing of all that has been said to the console; what follows is.
-assert.deepEqual(said.filter((line) => !line.includes("evil.example")), []);
+// Nothing of all that has been said to the console, but by the browser on its own pictures of the canvas; what follows is.
+assert.deepEqual(said.filter((line) => !/evil.example|GPU stall due to ReadPixels/.test(line)), []);
 
 // The robot stops answering: the page says so.
 process.kill(Number(robot), "SIGKILL");
