@@ -28,7 +28,7 @@
 // Sensor input never causes a panic; a test may panic.
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-#[cfg(any(feature = "smoother", feature = "eskf"))]
+#[cfg(feature = "alloc")]
 extern crate alloc;
 
 pub mod attitude;

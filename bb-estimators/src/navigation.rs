@@ -21,7 +21,7 @@ mod bounds;
 mod camera;
 pub mod chi_square;
 mod consistency;
-#[cfg(feature = "std")]
+#[cfg(feature = "alloc")]
 mod copies;
 mod covariance;
 pub mod eskf;
@@ -31,7 +31,6 @@ mod fused;
 mod fusion;
 mod geodesy;
 mod history;
-mod jump;
 mod layout;
 mod math;
 pub mod measurement;
@@ -39,8 +38,6 @@ pub mod measurement;
 mod noise;
 pub mod planar;
 mod propagate;
-#[cfg(feature = "eskf")]
-mod realignment;
 mod refusal;
 #[cfg(any(feature = "smoother", feature = "eskf"))]
 pub mod smoother;
@@ -56,7 +53,7 @@ pub use alignment::{Alignment, AlignmentParams};
 #[cfg(feature = "smoother")]
 pub use camera::{Camera, Seen, Undistorted};
 pub use consistency::{Consistency, nees};
-#[cfg(feature = "std")]
+#[cfg(feature = "alloc")]
 pub use copies::{Copies, Ways};
 pub use eskf::{Eskf, EskfParams, GaussMarkov, ImuDensities, ImuMean, Start};
 #[cfg(feature = "runtime")]

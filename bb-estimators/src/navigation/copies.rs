@@ -4,7 +4,8 @@
 //!
 //! * **Where it begins.** A heading that is not known begins as six, 60° apart; so does the yaw of an IMU in its vehicle, where wheels
 //!   are declared. The scale of relative poses begins as one that is exact and one that drifts. A copy that is e¹² times less likely
-//!   than the best is dropped, and so is one that has become the same as the best.
+//!   than the best is dropped, and so is one that has become the same as the best. A gap that leaves the attitude unknown begins it
+//!   again: as six headings, or as 24 attitudes, 90° apart, if the tilt is unknown too.
 //! * **How noisy the IMU is on this vehicle.** Once what is left of the first question is small, two more copies have four times the
 //!   white noise, and a quarter. All move on to the multiple of a copy that leads by e³, over the past two minutes. The search begins
 //!   at 16 times the data sheet, since too little confidence heals and too much locks biases in; for the same reason the covariance
@@ -25,21 +26,30 @@ mod search;
 #[cfg(test)]
 mod tests;
 
-use std::vec::Vec;
+use alloc::vec;
+use alloc::vec::Vec;
 
 use nalgebra::{Isometry3, Vector3};
 
 pub(super) use self::filter::{CopiedFilter, Fix, Update, is_same};
 use self::holding::Holding;
-use self::newcomer::Newcomer;
+pub(super) use self::newcomer::Newcomer;
+#[cfg(feature = "smoother")]
+pub(super) use self::newcomer::Settled;
 use self::scatter::Scatter;
 use self::search::Search;
 use super::bounds::is_within;
 use super::chi_square::limit;
 use super::eskf::{Eskf, ImuMean, LONGEST_GAP_S, seconds_between};
 use super::fused::Fused;
+#[cfg(feature = "eskf")]
+use super::math::sqrt;
+#[cfg(feature = "eskf")]
+use super::measurement::GnssPosition;
 use super::propagate::Propagate;
 use super::refusal::Refusal;
+#[cfg(feature = "eskf")]
+use super::state::ROTATION;
 use super::state::States;
 use super::stream::Stream;
 use crate::attitude::ParamsError;
@@ -63,10 +73,10 @@ const IMPLAUSIBLE: f64 = 12.0;
 const IMPOSSIBLE: f64 = 10.0;
 
 /// The largest normalised innovation squared of a position, to each of whose variances [`SLACK`] is added: ten deviations and metres.
-const FAR: f64 = 100.0;
+pub(super) const FAR: f64 = 100.0;
 
 /// Variance that is added to those of a position before [`FAR`] is applied, m².
-const SLACK: f64 = 1.0;
+pub(super) const SLACK: f64 = 1.0;
 
 /// The most starts among which accelerations have a direction: with more, the heading is not known.
 const MOST_UNDECIDED: usize = 6;
@@ -234,21 +244,8 @@ impl<F: CopiedFilter> Copies<F> {
     where
         F: Update<M, D>,
     {
-        self.update_position_as(stream, measurement, measurement)
-    }
-
-    /// Judges a position by what it states, and fuses it with other noise.
-    fn update_position_as<M, const D: usize>(
-        &mut self,
-        stream: &mut Stream,
-        stated: &M,
-        measurement: &M,
-    ) -> Result<Fused, Refusal>
-    where
-        F: Update<M, D>,
-    {
-        let result = self.is_admitted(stated, SLACK, FAR);
-        let result = self.settle(stream, stated, result);
+        let result = self.is_admitted(measurement, SLACK, FAR);
+        let result = self.settle(stream, measurement, result);
         self.fuse(stream, measurement, result)
     }
 
@@ -262,9 +259,15 @@ impl<F: CopiedFilter> Copies<F> {
     where
         F: Update<M, D>,
     {
-        let is_finite = fix.position().iter().all(|x| x.is_finite());
-        let shown = if is_finite { self.scatter.fix(fix) } else { *fix };
-        self.update_position_as(stream, fix, &shown)
+        let result = self.is_admitted(fix, SLACK, FAR);
+        let result = self.settle(stream, fix, result);
+        let shown = self.shown(fix);
+        self.fuse(stream, &shown, result)
+    }
+
+    /// A fix with the noise that the last ones have shown.
+    fn shown<M: Fix>(&mut self, fix: &M) -> M {
+        if fix.position().iter().all(|x| x.is_finite()) { self.scatter.fix(fix) } else { *fix }
     }
 
     /// Adds what a sample of `dt` seconds shows of the acceleration to the scatter of fixes.
@@ -347,11 +350,30 @@ impl<F: CopiedFilter> Copies<F> {
             let best = starts[0].filter;
             let mut is_best = true;
             starts.retain(|begun| {
-                std::mem::take(&mut is_best) || begun.log_likelihood > -IMPLAUSIBLE && !best.is_same(&begun.filter)
+                core::mem::take(&mut is_best) || begun.log_likelihood > -IMPLAUSIBLE && !best.is_same(&begun.filter)
             });
         }
         if let Some(now_ns) = self.time_ns() {
             self.search.go_on(&mut self.starts, now_ns);
+        }
+    }
+
+    /// Begins again in several attitudes if a gap has left it unknown.
+    fn fork(&mut self) {
+        if self.starts.len() > search::MOST_STARTS {
+            self.starts.truncate(1);
+        }
+        let mut forked = Vec::new();
+        for begun in &self.starts {
+            for (filter, prior) in begun.filter.forks() {
+                let log_likelihood = begun.log_likelihood + prior;
+                forked.push(Begun { id: forked.len() as u32, filter, log_likelihood });
+            }
+        }
+        if !forked.is_empty() {
+            self.starts = forked;
+            self.search.orphan();
+            self.newcomer = None;
         }
     }
 
@@ -370,6 +392,53 @@ impl<S: States, const N: usize> Copies<Eskf<S, N>> {
             filter.set_keyframe(id);
             Ok(())
         });
+    }
+
+    /// Fuses a fix of a receiver that may lie: one that the filter refuses shows nothing.
+    ///
+    /// # Errors
+    ///
+    /// The same as [`update`](Self::update).
+    #[cfg(feature = "eskf")]
+    pub(in crate::navigation) fn update_doubted_fix(
+        &mut self,
+        stream: &mut Stream,
+        fix: &GnssPosition,
+    ) -> Result<Fused, Refusal> {
+        let result = self.is_admitted(fix, SLACK, FAR);
+        let shown = self.shown(fix);
+        if let Some(newcomer) = &mut self.newcomer {
+            newcomer.aid(fix, &shown, FAR);
+        }
+        self.fuse(stream, &shown, result)
+    }
+
+    /// The largest standard deviation of the attitude about any axis, rad: of the best copy, or of one that is unknown while others that
+    /// are plausible are far from it.
+    #[cfg(feature = "eskf")]
+    pub(in crate::navigation) fn attitude_deviation(&self) -> f64 {
+        let attitude = |begun: &Begun<Eskf<S, N>>| begun.filter.estimate().map(|at| at.world_from_body);
+        let best = attitude(&self.starts[0]);
+        let is_far = |begun: &Begun<Eskf<S, N>>| {
+            best.zip(attitude(begun)).is_some_and(|(best, other)| best.angle_to(&other) > UNKNOWN)
+        };
+        if self.starts.iter().any(is_far) {
+            return core::f64::consts::PI;
+        }
+        let covariance = self.best().covariance();
+        sqrt((ROTATION..ROTATION + 3).map(|i| covariance[(i, i)]).fold(0.0, f64::max))
+    }
+
+    /// Sets the time, which is known to a standard deviation.
+    #[cfg(feature = "eskf")]
+    pub(in crate::navigation) fn set_clock(&mut self, time_ns: i64, deviation_s: f64) {
+        let before_ns = self.time_ns().unwrap_or(time_ns);
+        self.started_ns = self.started_ns.saturating_add(time_ns.saturating_sub(before_ns));
+        self.starts.iter_mut().for_each(|begun| begun.filter.set_clock(time_ns, deviation_s));
+        self.newcomer = None;
+        self.search.orphan();
+        self.holding.interrupt();
+        self.scatter.interrupt();
     }
 
     /// See [`Eskf::move_world`].
@@ -423,6 +492,7 @@ impl<F: CopiedFilter> Propagate for Copies<F> {
         if time_ns == sample.time_ns {
             self.holding.interrupt();
             self.last = Some(*sample);
+            self.fork();
         }
         Ok(())
     }

@@ -5,7 +5,7 @@
 mod dense;
 mod innovation;
 
-use nalgebra::{Matrix2, Matrix3, SMatrix, Vector3};
+use nalgebra::{Matrix2, Matrix3, SMatrix};
 
 pub(in crate::navigation) use self::dense::Dense;
 use self::dense::is_regular;
@@ -117,51 +117,30 @@ impl<const N: usize> Covariance<N> {
         (0..N).any(|i| self.matrix[(i, i)] > layout.lost[i])
     }
 
-    /// Restores the covariances between those states that are held. The others keep what an update has made of them: together a covariance,
-    /// since that differs from one by `P_h Hᵀ S⁻¹ H P_h`.
-    #[cold]
-    pub(in crate::navigation) fn restore(&mut self, before: &Self, is_held: impl Fn(usize) -> bool) {
-        for i in (0..N).filter(|i| is_held(*i)) {
-            for j in (0..N).filter(|j| is_held(*j)) {
-                self.rows_mut()[i][j] = before.rows()[i][j];
-            }
-        }
-    }
-
     /// Adds to a variance.
     pub(in crate::navigation) fn inflate(&mut self, state: usize, variance: f64) {
         self.rows_mut()[state][state] += variance;
     }
 
     /// Multiplies the matrix.
-    #[cfg(feature = "std")]
+    #[cfg(feature = "alloc")]
     pub(in crate::navigation) fn multiply(&mut self, factor: f64) {
         self.matrix *= factor;
     }
 
     /// Adds a block between three states and three others or the same; its transpose is added too.
-    #[cfg(feature = "std")]
+    #[cfg(feature = "alloc")]
     pub(in crate::navigation) fn add(&mut self, row: usize, column: usize, block: &Matrix3<f64>) {
         let p = self.rows_mut();
         for i in 0..3 {
             for j in 0..3 {
-                let sum = 0.5 * (block[(i, j)] + block[(j, i)]);
-                p[row + i][column + j] += sum;
-                if row != column {
-                    p[column + j][row + i] += sum;
+                if row == column {
+                    p[row + i][column + j] += 0.5 * (block[(i, j)] + block[(j, i)]);
+                } else {
+                    p[row + i][column + j] += block[(i, j)];
+                    p[column + j][row + i] += block[(i, j)];
                 }
             }
-        }
-    }
-
-    /// Adds a common error of three states each, of unit variance times these vectors: `P ← P + v vᵀ`.
-    pub(in crate::navigation) fn inflate_along(&mut self, parts: &[(usize, Vector3<f64>)]) {
-        let mut along = [0.0; N];
-        for (first, part) in parts {
-            along[*first..first + 3].copy_from_slice(part.as_slice());
-        }
-        for (row, x) in self.rows_mut().iter_mut().zip(along) {
-            row.iter_mut().zip(along).for_each(|(entry, y)| *entry += x * y);
         }
     }
 

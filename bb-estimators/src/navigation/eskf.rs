@@ -35,7 +35,7 @@ mod transport;
 #[cfg(feature = "std")]
 pub(super) use elsewhere::{UNMOORED, UNMOORED_HEADING, UNMOORED_SPEED};
 pub use filter::Eskf;
-#[cfg(feature = "std")]
+#[cfg(feature = "alloc")]
 pub(super) use filter::{Doubt, Judged};
 #[cfg(feature = "runtime")]
 pub(crate) use params::imu_params;

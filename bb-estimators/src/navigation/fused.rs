@@ -18,6 +18,4 @@ pub struct Fused {
     pub log_likelihood: f64,
     /// The first component of the whitened innovation.
     pub(crate) whitened: f64,
-    /// The first components of the residual, as far as they observe the position, if the covariance was raised for it.
-    pub(crate) misfit: [f64; 3],
 }

@@ -52,9 +52,6 @@ use crate::navigation::state::{Estimate, States};
 
 /// A measurement with `D` components.
 pub trait Measurement<const D: usize> {
-    /// `false` for a measurement that was linearised before, which the filter does not iterate.
-    const LINEARISES: bool = true;
-
     /// Compares the measurement with the prediction from the estimate.
     ///
     /// # Errors

@@ -45,8 +45,7 @@
 //!
 //! # Errors
 //!
-//! *Degraded*: the input was left out of the estimate, or was fused with the covariance raised; there is an estimate. *Fatal*:
-//! there is no estimate for this tick; the input that caused the failure is excluded from then on. Each success and each failure
+//! *Degraded*: the input was left out of the estimate, or has moved it elsewhere; there is an estimate. *Fatal*: there is no estimate for this tick; the input that caused the failure is excluded from then on. Each success and each failure
 //! is an [`Event`], with its reason. If a late input changes what an earlier one became, that is an event as it would have been at
 //! once, and each is told once. After three seconds without an estimate, exactly one event reports this, and one more
 //! reports when an estimate is available again.
@@ -56,7 +55,6 @@
 //! As in [`navigation`](super). Positions are WGS 84; orientations and covariances are in the tangent frame at the position. The
 //! strategies move to a new world when the robot is more than 5 km from the origin of the current one.
 
-mod agreement;
 mod clock;
 #[cfg(feature = "runtime")]
 mod declared;

@@ -13,14 +13,6 @@ const DIMENSIONS: usize = 7;
 /// The upper bound on the reported misfit.
 const MOST_RAISED: f64 = 1e6;
 
-/// The cosine of the largest angle between misfits in the same direction: 60°. A robot that turns while the gate closes turns what a
-/// wrong heading makes of its way.
-const SAME_DIRECTION: f64 = 0.5;
-
-/// A recovery is long ago once so many times the patience has been fused. A heading that is slightly wrong lets a few measurements
-/// pass after each one.
-const SOON: u64 = 4;
-
 params! {
     /// How the measurements of one sensor are judged.
     pub struct StreamParams {
@@ -30,18 +22,12 @@ params! {
         ///
         /// Small: lets more outliers pass. Large: rejects measurements that would correct a wrong estimate.
         gate: f64 = 1e-4, in 0.0..=1.0;
-        /// How many consecutive measurements the gate rejects before the filter counts as wrong, and not the sensor. The
-        /// next one is fused with the covariance raised to fit it. 0: never.
+        /// Number of consecutive measurements that the gate of a [`FixedLagSmoother`](super::smoother::FixedLagSmoother) rejects before
+        /// the smoother counts as wrong, and not the sensor: the next one is fused with the estimates raised to fit it. 0: never.
         ///
-        /// In `Eskf` and `PlanarEkf`, a position that is off by up to ten deviations a dimension raises position and velocity
-        /// together. Of a larger difference, what explains it best, the position for a fix, is raised alone and loses its
-        /// correlations; all else stays as it is. If the next ones are off in the same direction, position, velocity and
-        /// heading are raised, and if that does not help, the whole attitude. A height does the same to the height, the
-        /// vertical velocity and the barometer's bias, but they keep their correlations. A relative pose raises only the
-        /// way from its keyframe. A filter that should move only where several positions agree is better
-        /// [moved](super::Eskf::relocate).
+        /// Filters do not use it: copies of them have a newcomer where positions agree on another place.
         ///
-        /// Small: a few outliers in a row move the filter. Large: a filter that is off stays so for long.
+        /// Small: a few outliers in a row move the smoother. Large: a smoother that is off stays so for long.
         patience: u32 = 3;
         /// Fraction of valid measurements whose weight is reduced like that of outliers, by Huber's function of their
         /// Mahalanobis distance. 0: none.
@@ -88,7 +74,7 @@ pub(crate) enum Gate {
     /// Measurements that are too far off are rejected.
     Closed,
     /// All measurements pass.
-    #[cfg(feature = "std")]
+    #[cfg(feature = "alloc")]
     Open,
 }
 
@@ -109,14 +95,6 @@ pub struct Stream {
     huber: [f64; DIMENSIONS],
     noise_factor: f64,
     counts: Counts,
-    /// Fused since the last recovery.
-    fused_since_recovery: u64,
-    /// When a measurement was last fused, if the filter tells.
-    fused_ns: Option<i64>,
-    /// The residual of the position at the last recovery.
-    recovered: [f64; 3],
-    /// Whether the last recovery was soon after another, from a misfit in the same direction.
-    has_gone_on: bool,
     consistency: Consistency,
 }
 
@@ -135,10 +113,6 @@ impl Stream {
             huber: core::array::from_fn(|dimension| limit(dimension, params.robust)),
             noise_factor: 1.0,
             counts: Counts::default(),
-            fused_since_recovery: 0,
-            fused_ns: None,
-            recovered: [0.0; 3],
-            has_gone_on: false,
             consistency: Consistency::default(),
         }
     }
@@ -170,52 +144,10 @@ impl Stream {
         self.noise_factor * self.params.variance_factor
     }
 
-    /// Changes [`StreamParams::patience`], for callers that know whether the rejected measurements agree.
-    #[cfg(any(feature = "smoother", feature = "eskf"))]
-    pub(crate) fn set_patience(&mut self, patience: u32) {
-        self.params.patience = patience;
-    }
-
     /// Resets the count of successive rejections, because the filter was relocated.
     #[cfg(any(feature = "std", feature = "smoother", feature = "eskf"))]
     pub(crate) fn forgive(&mut self) {
         self.counts.gate_in_a_row = 0;
-        self.recovered = [0.0; 3];
-        self.has_gone_on = false;
-    }
-
-    /// When [`fused_at`](Self::fused_at) was last called; `None` before the first time.
-    pub(crate) fn fused_ns(&self) -> Option<i64> {
-        self.fused_ns
-    }
-
-    /// Tells the time of a fused measurement, for filters that ask for it.
-    #[inline]
-    pub(crate) fn fused_at(&mut self, time_ns: i64) {
-        self.fused_ns = Some(time_ns);
-    }
-
-    /// Whether a misfit goes on in the direction of the last one, and too few have fitted since to call that a recovery. Outliers
-    /// that end are off in the other direction.
-    pub(crate) fn goes_on(&self, misfit: &[f64; 3]) -> bool {
-        self.fused_since_recovery < u64::from(self.params.patience) && self.is_alike(misfit)
-    }
-
-    /// Whether a misfit goes on even though the last recovery was because of that.
-    pub(crate) fn goes_on_again(&self, misfit: &[f64; 3]) -> bool {
-        self.has_gone_on && self.is_soon() && self.is_alike(misfit)
-    }
-
-    /// Whether the last recovery is not long ago.
-    fn is_soon(&self) -> bool {
-        self.fused_since_recovery < SOON * u64::from(self.params.patience)
-    }
-
-    /// Whether a misfit has the direction of the last one.
-    fn is_alike(&self, misfit: &[f64; 3]) -> bool {
-        let dot = |a: &[f64; 3], b: &[f64; 3]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
-        let lengths = sqrt(dot(&self.recovered, &self.recovered)) * sqrt(dot(misfit, misfit));
-        dot(&self.recovered, misfit) > SAME_DIRECTION * lengths
     }
 
     /// Decides how a measurement is fused, or rejects it.
@@ -260,12 +192,8 @@ impl Stream {
                 if fused.raised > 1.0 {
                     // A measurement that did not fit carries no information about the noise of those that do.
                     self.counts.recoveries += 1;
-                    self.has_gone_on = self.is_soon() && self.is_alike(&fused.misfit);
-                    self.fused_since_recovery = 0;
-                    self.recovered = fused.misfit;
                     return;
                 }
-                self.fused_since_recovery += 1;
                 self.noise_factor = adapt(self.noise_factor, fused.nis / fused.dimension as f64);
                 self.consistency.add(fused);
             }

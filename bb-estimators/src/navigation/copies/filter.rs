@@ -1,8 +1,9 @@
 //! What copies need of a filter.
 
+use alloc::vec;
+use alloc::vec::Vec;
+use core::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
 use core::fmt::Debug;
-use std::vec;
-use std::vec::Vec;
 
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 
@@ -10,12 +11,18 @@ use super::{TURN_DEVIATION, TURNS, UNKNOWN, Ways};
 use crate::attitude::ParamsError;
 use crate::navigation::eskf::{Doubt, Eskf, EskfParams, GaussMarkov, ImuMean, Judged, Start};
 use crate::navigation::fused::Fused;
-use crate::navigation::math::{rotation_vector, sqrt};
+use crate::navigation::math::{rotation, rotation_vector, sqrt};
 use crate::navigation::measurement::{GnssPosition, Measurement};
 use crate::navigation::propagate::Propagate;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{Estimate, Optional, ROTATION, States, offset};
 use crate::navigation::stream::Stream;
+
+/// The deviation of each of the attitudes that cover all, rad: half of the angle between two.
+const ATTITUDE_DEVIATION: f64 = FRAC_PI_4;
+
+/// The deviation of an attitude of which nothing is known, rad: uniform over a turn.
+const UNKNOWABLE: f64 = 1.81;
 
 /// A copy whose state is nearer to that of the best than this part of a deviation is the same.
 const SAME: f64 = 0.5;
@@ -68,6 +75,14 @@ pub trait CopiedFilter: Propagate + Copy + Debug {
 
     /// Forgets the position, and doubts the motion by as much as a filter in the wrong place may have been wrong.
     fn unmoor(&mut self);
+
+    /// Makes the attitude unknown.
+    fn forget_attitude(&mut self) {}
+
+    /// This filter in each way of an attitude that a gap has left unknown, with the log likelihood of each; none if it is known.
+    fn forks(&self) -> Vec<(Self, f64)> {
+        Vec::new()
+    }
 
     /// Counts a new beginning.
     fn begin_again(&mut self);
@@ -153,7 +168,7 @@ impl<S: States, const N: usize> CopiedFilter for Eskf<S, N> {
     /// [`EskfParams::wheel_mounting`].
     fn starts(params: &EskfParams, ways: Ways, start: &Start) -> Result<Vec<Self>, Refusal> {
         let turns = |is_unknown: bool| if is_unknown { TURNS } else { 1 };
-        let angle = |i: u32| core::f64::consts::TAU * f64::from(i) / f64::from(TURNS);
+        let angle = |i: u32| TAU * f64::from(i) / f64::from(TURNS);
         let mounting = offset::<S>(Optional::WheelMounting);
         let is_mounted = mounting.is_none() || params.wheel_mounting.deviation <= UNKNOWN;
         let is_pointed = start.rotation_covariance[(2, 2)] <= UNKNOWN * UNKNOWN;
@@ -236,7 +251,45 @@ impl<S: States, const N: usize> CopiedFilter for Eskf<S, N> {
         self.unmoor();
     }
 
+    fn forget_attitude(&mut self) {
+        self.turn(&UnitQuaternion::identity(), &(Matrix3::identity() * (UNKNOWABLE * UNKNOWABLE)));
+    }
+
+    fn forks(&self) -> Vec<(Self, f64)> {
+        let covariance = self.covariance().fixed_view::<3, 3>(ROTATION, ROTATION).into_owned();
+        let variances = covariance.diagonal();
+        let (turns, deviation) = if variances.x.max(variances.y) > UNKNOWN * UNKNOWN {
+            (attitudes(), ATTITUDE_DEVIATION)
+        } else if variances.z > UNKNOWN * UNKNOWN {
+            ((0..TURNS).map(|turn| turned(2, TAU * f64::from(turn) / f64::from(TURNS))).collect(), TURN_DEVIATION)
+        } else {
+            return Vec::new();
+        };
+        let each = Matrix3::from_diagonal(&variances.map(|own| own.min(deviation * deviation)));
+        let Some(precision) = covariance.try_inverse() else { return Vec::new() };
+        let forked = |turn: &UnitQuaternion<f64>| {
+            let (mut filter, way) = (*self, rotation_vector(turn));
+            filter.turn(turn, &each);
+            (filter, -0.5 * way.dot(&(precision * way)))
+        };
+        turns.iter().map(forked).collect()
+    }
+
     fn begin_again(&mut self) {
         self.begin_again();
     }
+}
+
+/// The rotation by an angle about an axis of the world.
+fn turned(axis: usize, angle: f64) -> UnitQuaternion<f64> {
+    let mut vector = Vector3::zeros();
+    vector[axis] = angle;
+    rotation(&vector)
+}
+
+/// Attitudes that cover all, 90° apart: the 24 that take a cube to itself.
+fn attitudes() -> Vec<UnitQuaternion<f64>> {
+    let tilts = [(0, 0.0), (0, PI), (0, FRAC_PI_2), (0, -FRAC_PI_2), (1, FRAC_PI_2), (1, -FRAC_PI_2)];
+    let tilted = tilts.into_iter().map(|(axis, angle)| turned(axis, angle));
+    tilted.flat_map(|tilt| (0..4).map(move |turn| turned(2, FRAC_PI_2 * f64::from(turn)) * tilt)).collect()
 }

@@ -77,20 +77,21 @@ impl Holding {
 
     /// The doubt in a part, `part_s`, of a gap that lasts `whole_s`.
     pub(super) fn doubt(&self, whole_s: f64, part_s: f64) -> Doubt {
+        let square = |x: f64| x * x;
         let [rotation, velocity] = [0, 1].map(|quantity| {
             let known = |index: usize| self.windows.get(index).filter(|window| window.count >= ENOUGH);
             let Some(first) = known(0) else { return Vector3::repeat(UNKNOWN[quantity] * part_s) };
             let last = (0..LENGTHS).take_while(|index| known(*index).is_some()).last().unwrap_or(0);
             let above = (0..=last).find(|index| length(*index) >= whole_s);
             let squares = match above {
-                Some(0) => first.squares[quantity] * (whole_s / SHORTEST_S).powi(2),
+                Some(0) => first.squares[quantity] * square(whole_s / SHORTEST_S),
                 Some(above) => {
                     let (low, high) =
                         (self.windows[above - 1].squares[quantity], self.windows[above].squares[quantity]);
                     let share = ln(whole_s / length(above - 1)) / core::f64::consts::LN_2;
                     low.zip_map(&high, |low, high| between(low, high, share))
                 }
-                None => self.windows[last].squares[quantity] * (whole_s / length(last)).powi(2),
+                None => self.windows[last].squares[quantity] * square(whole_s / length(last)),
             };
             squares * (RAISED * part_s / whole_s)
         });

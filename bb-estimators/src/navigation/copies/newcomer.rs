@@ -13,22 +13,92 @@ pub(super) const FARTHEST: f64 = 100_000.0;
 
 /// A filter that waits to take over.
 #[derive(Clone, Debug)]
-pub(super) struct Newcomer<F: CopiedFilter> {
-    pub(super) filter: F,
+pub(in crate::navigation) struct Newcomer<F: CopiedFilter> {
+    pub(in crate::navigation) filter: F,
     born_ns: i64,
     /// Time for which it has to fit, s.
     probation_s: f64,
 }
 
+/// What a position decides between a filter and its newcomer.
+#[derive(Debug)]
+pub(in crate::navigation) enum Settled<F: CopiedFilter> {
+    /// The filter keeps its place.
+    Kept,
+    /// The newcomer has fused the position.
+    Left,
+    /// The newcomer has fused the position, and has fitted for long enough.
+    Due(Newcomer<F>),
+    /// It fits neither.
+    Unfit,
+}
+
 impl<F: CopiedFilter> Newcomer<F> {
+    /// A copy of a filter that had been right since a time, as if it were where this position is.
+    pub(in crate::navigation) fn new<M, const D: usize>(
+        filter: F,
+        right_since_ns: i64,
+        measurement: &M,
+    ) -> Option<Self>
+    where
+        F: Update<M, D>,
+    {
+        let born_ns = filter.time_ns()?;
+        let there = |is_turned: bool| {
+            let mut there = filter;
+            there.unmoor();
+            if is_turned {
+                there.forget_attitude();
+            }
+            let _: Fused = there.update_ungated(&mut Stream::default(), measurement).ok()?;
+            Some(there).filter(|there| there.judge(measurement, SLACK).is_ok_and(|judged| judged.nis <= FAR))
+        };
+        // A pose may show that the attitude was wrong as well.
+        let filter = there(false).or_else(|| there(true))?;
+        let age_s = born_ns.saturating_sub(right_since_ns) as f64 * 1e-9;
+        Some(Self { filter, born_ns, probation_s: age_s.min(LONGEST_S) })
+    }
+
+    /// The time since which it has been right.
+    #[cfg(feature = "smoother")]
+    pub(in crate::navigation) fn born_ns(&self) -> i64 {
+        self.born_ns
+    }
+
     /// Fuses a measurement of another sensor, if it fits.
-    pub(super) fn aid<M, const D: usize>(&mut self, own: &M, measurement: &M, most: f64)
+    pub(in crate::navigation) fn aid<M, const D: usize>(&mut self, own: &M, measurement: &M, most: f64)
     where
         F: Update<M, D>,
     {
         if self.filter.judge(own, 0.0).is_ok_and(|judged| judged.nis <= most) {
             let _ = self.filter.update_ungated(&mut Stream::default(), measurement);
         }
+    }
+
+    /// Decides by a position whose log likelihood is `admitted` for the filter, if that admits it.
+    pub(in crate::navigation) fn settle<M, const D: usize>(
+        newcomer: &mut Option<Self>,
+        measurement: &M,
+        admitted: Option<f64>,
+    ) -> Settled<F>
+    where
+        F: Update<M, D>,
+    {
+        if let Some(fitting) = newcomer {
+            let judged = fitting.filter.judge(measurement, SLACK).ok().filter(|judged| judged.nis <= FAR);
+            if judged.is_some_and(|judged| admitted.is_none_or(|ours| judged.log_likelihood > ours)) {
+                let _ = fitting.filter.update_ungated(&mut Stream::default(), measurement);
+                let is_due = newcomer.take_if(|fitting| fitting.is_due());
+                return is_due.map_or(Settled::Left, Settled::Due);
+            }
+            *newcomer = None;
+        }
+        if admitted.is_some() { Settled::Kept } else { Settled::Unfit }
+    }
+
+    fn is_due(&self) -> bool {
+        let now_ns = self.filter.time_ns().unwrap_or(i64::MIN);
+        now_ns.saturating_sub(self.born_ns) as f64 * 1e-9 >= self.probation_s
     }
 }
 
@@ -44,55 +114,26 @@ impl<F: CopiedFilter> Copies<F> {
         F: Update<M, D>,
     {
         let refusal = match admitted {
-            Ok(_) if self.newcomer.is_none() => return admitted,
             Ok(_) => Refusal::Gate { nis: FAR, limit: FAR },
             Err(refusal @ Refusal::Gate { .. }) => refusal,
             Err(_) => return admitted,
         };
-        if let Some(newcomer) = &mut self.newcomer {
-            let judged = newcomer.filter.judge(measurement, SLACK).ok().filter(|judged| judged.nis <= FAR);
-            let is_better = |theirs: f64| admitted.is_err() || admitted.is_ok_and(|ours| theirs > ours);
-            match judged.filter(|judged| is_better(judged.log_likelihood)) {
-                Some(_) => {
-                    let _ = newcomer.filter.update_ungated(&mut Stream::default(), measurement);
-                    return self.take_over(stream, refusal);
-                }
-                None if admitted.is_ok() => {
-                    self.newcomer = None;
-                    return admitted;
-                }
-                None => {}
-            }
+        match Newcomer::settle(&mut self.newcomer, measurement, admitted.ok()) {
+            Settled::Kept => return admitted,
+            Settled::Left => {}
+            Settled::Due(newcomer) => self.take_over(stream, &newcomer),
+            Settled::Unfit => self.newcomer = Newcomer::new(*self.best(), self.started_ns, measurement),
         }
-        self.newcomer = self.found(measurement);
         Err(refusal)
     }
 
-    /// A filter that would have been where this position is.
-    fn found<M, const D: usize>(&self, measurement: &M) -> Option<Newcomer<F>>
-    where
-        F: Update<M, D>,
-    {
-        let mut filter = *self.best();
-        let born_ns = filter.time_ns()?;
-        filter.unmoor();
-        let _: Fused = filter.update_ungated(&mut Stream::default(), measurement).ok()?;
-        let age_s = born_ns.saturating_sub(self.started_ns) as f64 * 1e-9;
-        Some(Newcomer { filter, born_ns, probation_s: age_s.min(LONGEST_S) })
-    }
-
-    /// Lets a newcomer that has fitted for long enough be the filter. It has fused the position, which the filter thus has not.
-    fn take_over(&mut self, stream: &mut Stream, refusal: Refusal) -> Result<f64, Refusal> {
-        let is_due = |newcomer: &mut Newcomer<F>| {
-            let now_ns = newcomer.filter.time_ns().unwrap_or(i64::MIN);
-            now_ns.saturating_sub(newcomer.born_ns) as f64 * 1e-9 >= newcomer.probation_s
-        };
-        let Some(newcomer) = self.newcomer.take_if(is_due) else { return Err(refusal) };
+    /// Lets a newcomer that has fitted for long enough be the filter.
+    fn take_over(&mut self, stream: &mut Stream, newcomer: &Newcomer<F>) {
         if let (Some(there), Some(here)) = (newcomer.filter.position(), self.best().position()) {
             let way = there - here;
             if !is_near(&way) {
                 self.elsewhere = Some(way.norm());
-                return Err(refusal);
+                return;
             }
             self.started_ns = newcomer.born_ns;
         }
@@ -102,6 +143,5 @@ impl<F: CopiedFilter> Copies<F> {
         self.starts[0].log_likelihood = 0.0;
         self.search.orphan();
         stream.forgive();
-        Err(refusal)
     }
 }

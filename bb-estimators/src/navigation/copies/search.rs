@@ -23,7 +23,12 @@ const LEAD: f64 = 3.0;
 const PAUSE_S: f64 = 3.0;
 
 /// The most starts between which the search compares: with more, they say more about each other than about the noise.
-const MOST_STARTS: usize = 2;
+pub(super) const MOST_STARTS: usize = 2;
+
+/// The multiple of the white noise.
+fn multiple(exponent: i32) -> f64 {
+    (0..exponent).fold(1.0, |multiple, _| multiple * STEP)
+}
 
 /// The state of the search.
 #[derive(Clone, Debug)]
@@ -54,12 +59,12 @@ impl<F: CopiedFilter> Search<F> {
 
     /// The multiple at which the search begins.
     pub(super) fn first_multiple(&self) -> f64 {
-        if self.is_on { STEP.powi(FIRST) } else { 1.0 }
+        if self.is_on { multiple(FIRST) } else { 1.0 }
     }
 
     /// The multiple of the noise of all starts.
     pub(super) fn multiple(&self) -> f64 {
-        STEP.powi(self.exponent)
+        multiple(self.exponent)
     }
 
     pub(super) fn filters_mut(&mut self) -> impl Iterator<Item = &mut F> {
@@ -129,7 +134,7 @@ impl<F: CopiedFilter> Search<F> {
             let exponent = self.exponent + step;
             EXPONENTS.contains(&exponent).then(|| {
                 let mut filter = parent.filter;
-                filter.multiply_noise(STEP.powi(exponent));
+                filter.multiply_noise(multiple(exponent));
                 Neighbour { filter, lead: 0.0 }
             })
         });

@@ -1,7 +1,5 @@
 //! Rare operations on a covariance, compiled once for those of all sizes.
 
-use super::Innovation;
-use crate::navigation::layout::Quantities;
 use crate::navigation::math::sqrt;
 use crate::navigation::state::MOST_ERRORS;
 
@@ -22,70 +20,12 @@ pub(in crate::navigation) struct Dense<'a> {
 }
 
 impl Dense<'_> {
-    /// The number of errors.
-    pub(in crate::navigation) fn dimension(&self) -> usize {
-        self.n
-    }
-
-    /// Computes an innovation; `false` if its covariance is not positive definite.
-    pub(in crate::navigation) fn innovation(&self, innovation: &mut Innovation<'_>) -> bool {
-        innovation.decompose(self.p)
-    }
-
-    /// Restores an earlier matrix.
-    pub(in crate::navigation) fn set_matrix(&mut self, before: &[f64]) {
-        self.p.copy_from_slice(before);
-    }
-
     pub(in crate::navigation) fn at(&self, i: usize, j: usize) -> f64 {
         self.p[i * self.n + j]
     }
 
     fn at_mut(&mut self, i: usize, j: usize) -> &mut f64 {
         &mut self.p[i * self.n + j]
-    }
-
-    /// Adds to a variance.
-    pub(in crate::navigation) fn inflate(&mut self, state: usize, variance: f64) {
-        *self.at_mut(state, state) += variance;
-    }
-
-    /// Scales the covariance of a block of states and zeroes its correlations with all other states, so that neither carries
-    /// information about the other.
-    pub(in crate::navigation) fn raise(&mut self, quantities: &Quantities<'_>, block: u8, factor: f64) {
-        for i in 0..self.n {
-            for j in 0..self.n {
-                match (quantities.block(i) == block, quantities.block(j) == block) {
-                    (true, true) => *self.at_mut(i, j) *= factor,
-                    (false, false) => {}
-                    _ => *self.at_mut(i, j) = 0.0,
-                }
-            }
-        }
-        self.bound(quantities);
-    }
-
-    /// Scales the covariance of some states. Their correlation coefficients, also with other states, remain.
-    pub(in crate::navigation) fn scale(
-        &mut self,
-        quantities: &Quantities<'_>,
-        is_scaled: impl Fn(usize) -> bool,
-        factor: f64,
-    ) {
-        let scale = |i: usize| if is_scaled(i) { sqrt(factor) } else { 1.0 };
-        for i in 0..self.n {
-            for j in 0..self.n {
-                *self.at_mut(i, j) *= scale(i) * scale(j);
-            }
-        }
-        self.bound(quantities);
-    }
-
-    /// Clamps variances to bounds that amount to unknown, so that no number overflows.
-    pub(in crate::navigation) fn bound(&mut self, quantities: &Quantities<'_>) {
-        if (0..self.n).any(|i| self.at(i, i) > quantities.lost[i]) {
-            self.shrink(quantities.largest);
-        }
     }
 
     /// Clamps variances to these limits.

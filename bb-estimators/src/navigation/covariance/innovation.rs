@@ -101,10 +101,6 @@ impl Innovation<'_> {
         self.residual.len()
     }
 
-    pub(in crate::navigation) fn residual(&self) -> &[f64] {
-        self.residual
-    }
-
     /// The rows of H, of `n` errors.
     #[inline]
     pub(in crate::navigation) fn rows(&self, n: usize) -> impl Iterator<Item = &[f64]> {
@@ -160,21 +156,6 @@ impl Innovation<'_> {
     #[cold]
     pub(in crate::navigation) fn decompose(&mut self, p: &[f64]) -> bool {
         (self.decompose)(self, p).is_some()
-    }
-
-    /// `Hᵀ S⁻¹` times the residual, of `seen.len()` errors. The whitened residual is used up.
-    pub(in crate::navigation) fn see(&mut self, seen: &mut [f64]) {
-        let d = self.dimension();
-        for i in (0..d).rev() {
-            for k in i + 1..d {
-                self.whitened[i] -= self.lower[k * d + i] * self.whitened[k];
-            }
-            self.whitened[i] *= self.lower[i * d + i];
-        }
-        seen.fill(0.0);
-        for (row, x) in self.jacobian.chunks_exact(seen.len()).zip(self.whitened.iter()) {
-            seen.iter_mut().zip(row).for_each(|(seen, h)| *seen += h * x);
-        }
     }
 }
 

@@ -1,12 +1,12 @@
 //! Changes of the filter's position or frame of reference without a measurement.
 
-use nalgebra::{Isometry3, Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, SMatrix, SVector};
+#[cfg(feature = "alloc")]
+use nalgebra::{Matrix3, UnitQuaternion};
 
 use super::filter::Eskf;
 use crate::navigation::bounds::is_on_earth;
 use crate::navigation::covariance::Covariance;
-#[cfg(feature = "eskf")]
-use crate::navigation::jump::UNKNOWN;
 use crate::navigation::math::unit;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{
@@ -17,13 +17,13 @@ use crate::navigation::state::{
 const COPY: f64 = 1e-11;
 
 /// Errors of a filter in the wrong place, as deviations: anywhere within 10 km, 5 m/s, 3° of tilt and 30° of heading.
-#[cfg(feature = "std")]
+#[cfg(feature = "alloc")]
 pub(in crate::navigation) const UNMOORED: f64 = 1e4;
-#[cfg(feature = "std")]
+#[cfg(feature = "alloc")]
 pub(in crate::navigation) const UNMOORED_SPEED: f64 = 5.0;
-#[cfg(feature = "std")]
+#[cfg(feature = "alloc")]
 const UNMOORED_TILT: f64 = 0.05;
-#[cfg(feature = "std")]
+#[cfg(feature = "alloc")]
 pub(in crate::navigation) const UNMOORED_HEADING: f64 = 0.52;
 
 impl<S: States, const N: usize> Eskf<S, N> {
@@ -88,138 +88,11 @@ impl<S: States, const N: usize> Eskf<S, N> {
         self.upkeep.started(estimate.time_ns);
         self.estimate = Some(estimate);
         self.covariance = adopted;
-        self.jump = None;
         Ok(())
-    }
-
-    /// Relocates a filter that was wrong, m: sets the position and, if given, the velocity (m/s) and the orientation, each with
-    /// its covariance in world axes. The other states keep their covariance but are uncorrelated with the new ones. The keyframe
-    /// and the barometer's bias, which refer to the old position, are reset. The call counts as a reset.
-    ///
-    /// # Errors
-    ///
-    /// Returns [`Refusal::NonFinite`] if a value is not finite, [`Refusal::OutOfRange`] if it is absurdly large, and
-    /// [`Refusal::Noise`] if a covariance is not positive definite. The filter is then unchanged.
-    pub fn relocate(
-        &mut self,
-        position: (Vector3<f64>, Matrix3<f64>),
-        velocity: Option<(Vector3<f64>, Matrix3<f64>)>,
-        world_from_body: Option<(UnitQuaternion<f64>, Matrix3<f64>)>,
-    ) -> Result<(), Refusal> {
-        let mut estimate = self.estimate.ok_or(Refusal::NotStarted)?;
-        let world_from_body = match world_from_body {
-            Some((turned, covariance)) => Some((unit(&turned).ok_or(Refusal::NonFinite)?, covariance)),
-            None => None,
-        };
-        let before = self.covariance;
-        estimate.position = position.0;
-        self.covariance.set(POSITION, &position.1);
-        if let Some((velocity, covariance)) = velocity {
-            estimate.velocity = velocity;
-            self.covariance.set(VELOCITY, &covariance);
-        }
-        if let Some((world_from_body, covariance)) = world_from_body {
-            estimate.world_from_body = world_from_body;
-            self.covariance.set(ROTATION, &covariance);
-        }
-        estimate.keyframe = None;
-        for state in [Optional::Keyframe, Optional::BarometerBias] {
-            let Some(first) = offset::<S>(state) else { continue };
-            for i in first..first + state.dimension() {
-                estimate.optional[i] = 0.0;
-                self.covariance.forget(i, self.params.variance(state));
-            }
-        }
-        let is_there = estimate.is_plausible();
-        let refused = match (estimate.is_finite(), is_there, self.covariance.is_positive_definite()) {
-            (true, true, true) => None,
-            (true, true, false) => Some(Refusal::Noise),
-            (true, false, _) => Some(Refusal::OutOfRange),
-            (false, ..) => Some(Refusal::NonFinite),
-        };
-        if let Some(refusal) = refused {
-            self.covariance = before;
-            return Err(refusal);
-        }
-        self.covariance.bound(&Self::LAYOUT);
-        self.estimate = Some(estimate);
-        self.upkeep.started(estimate.time_ns);
-        if let (Some(jump), Some(_)) = (&mut self.jump, world_from_body) {
-            jump.relocated();
-        }
-        Ok(())
-    }
-
-    /// Whether the attitude is too uncertain to be corrected linearly. Specific forces then do not tell where the body accelerates to: it is
-    /// assumed to keep its velocity, up to the gap noise in the parameters. Measurements correct position and velocity alone, as if their
-    /// gain for all other states were zero (S. F. Schmidt, "Application of state-space methods to navigation problems", Advances in
-    /// Control Systems 3, 1966): the covariance takes the uncertainty of the others into account, and that does not shrink.
-    #[cfg(feature = "eskf")]
-    pub(crate) fn hold_attitude(&mut self, is_held: bool) {
-        self.holds_attitude = is_held;
-    }
-
-    /// Whether an error is one of position or velocity, of the body or of the keyframe.
-    pub(super) fn is_motion(error: usize) -> bool {
-        let of_keyframe = offset::<S>(Optional::Keyframe).map(|first| first..first + 3);
-        error < ROTATION || of_keyframe.is_some_and(|errors| errors.contains(&error))
-    }
-
-    /// The part of an error that is one of position or velocity.
-    #[cold]
-    pub(super) fn of_motion(error: &SVector<f64, N>) -> SVector<f64, N> {
-        SVector::from_fn(|i, _| if Self::is_motion(i) { error[i] } else { 0.0 })
-    }
-
-    /// Sets the attitude and its covariance. It is uncorrelated with all other states, which stay as they are. There is no keyframe afterwards.
-    #[cfg(feature = "eskf")]
-    pub(crate) fn set_attitude(
-        &mut self,
-        world_from_body: &UnitQuaternion<f64>,
-        covariance: &Matrix3<f64>,
-    ) -> Result<(), Refusal> {
-        let world_from_body = unit(world_from_body).ok_or(Refusal::NonFinite)?;
-        let estimate = self.estimate.as_mut().ok_or(Refusal::NotStarted)?;
-        (estimate.world_from_body, estimate.keyframe) = (world_from_body, None);
-        self.covariance.set(ROTATION, covariance);
-        if let Some(first) = offset::<S>(Optional::Keyframe) {
-            let variance = self.params.variance(Optional::Keyframe);
-            (first..first + 6).for_each(|i| self.covariance.forget(i, variance));
-        }
-        if let Some(jump) = &mut self.jump {
-            jump.relocated();
-        }
-        self.covariance.enforce();
-        Ok(())
-    }
-
-    /// Sets the attitude to that of the keyframe and a turn since, which has this variance, rad²: as far as they are known from the keyframe,
-    /// the correlations with other states are those of the keyframe.
-    #[cfg(feature = "eskf")]
-    pub(crate) fn set_attitude_from_keyframe(
-        &mut self,
-        keyframe_from_body: &UnitQuaternion<f64>,
-        variance: f64,
-    ) -> Result<(), Refusal> {
-        let estimate = self.estimate.as_mut().ok_or(Refusal::NotStarted)?;
-        let (Some(keyframe), Some(first)) = (estimate.keyframe, offset::<S>(Optional::Keyframe)) else {
-            return Err(Refusal::NotObservable);
-        };
-        estimate.world_from_body =
-            unit(&(keyframe.world_from_body * keyframe_from_body)).ok_or(Refusal::NonFinite)?;
-        (0..3).for_each(|i| self.covariance.copy(first + 3 + i, ROTATION + i, variance));
-        self.covariance.enforce();
-        Ok(())
-    }
-
-    /// Makes the attitude unknown, and uncorrelated with all other states.
-    #[cfg(feature = "eskf")]
-    pub(crate) fn forget_attitude(&mut self) {
-        self.covariance.set(ROTATION, &(Matrix3::identity() * (UNKNOWN * UNKNOWN)));
     }
 
     /// Forgets the position, and doubts the motion and the attitude by as much as a filter in the wrong place may have been wrong.
-    #[cfg(feature = "std")]
+    #[cfg(feature = "alloc")]
     pub(in crate::navigation) fn unmoor(&mut self) {
         let Some(estimate) = &mut self.estimate else { return };
         estimate.keyframe = None;
@@ -240,8 +113,33 @@ impl<S: States, const N: usize> Eskf<S, N> {
         self.covariance.enforce();
     }
 
+    /// Sets the time, which is known to a standard deviation: the motion is as uncertain as what the body does in that.
+    #[cfg(feature = "eskf")]
+    pub(in crate::navigation) fn set_clock(&mut self, time_ns: i64, deviation_s: f64) {
+        let Some(estimate) = &mut self.estimate else { return };
+        self.upkeep.fixed_ns = self.upkeep.fixed_ns.saturating_add(time_ns.saturating_sub(estimate.time_ns));
+        estimate.time_ns = time_ns;
+        let turned = estimate.world_from_body * estimate.angular_velocity;
+        let ways = [(POSITION, estimate.velocity), (VELOCITY, estimate.acceleration), (ROTATION, turned)];
+        for (index, (row, way)) in ways.iter().enumerate() {
+            for (column, other) in &ways[index..] {
+                self.covariance.add(*row, *column, &(way * other.transpose() * (deviation_s * deviation_s)));
+            }
+        }
+        self.covariance.bound(&Self::LAYOUT);
+        self.covariance.enforce();
+    }
+
+    /// Turns the body in the world, to an attitude with this covariance that is uncorrelated with all other states.
+    #[cfg(feature = "alloc")]
+    pub(in crate::navigation) fn turn(&mut self, turn: &UnitQuaternion<f64>, covariance: &Matrix3<f64>) {
+        let Some(estimate) = &mut self.estimate else { return };
+        estimate.world_from_body = turn * estimate.world_from_body;
+        self.covariance.set(ROTATION, covariance);
+    }
+
     /// Counts a new beginning.
-    #[cfg(feature = "std")]
+    #[cfg(feature = "alloc")]
     pub(in crate::navigation) fn begin_again(&mut self) {
         if let Some(estimate) = &self.estimate {
             self.upkeep.started(estimate.time_ns);
@@ -249,7 +147,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
     }
 
     /// Sets an optional state, and leaves its covariance.
-    #[cfg(feature = "std")]
+    #[cfg(feature = "alloc")]
     pub(in crate::navigation) fn set_optional(&mut self, error: usize, value: f64) {
         if let Some(estimate) = &mut self.estimate {
             estimate.optional[error] = value;
@@ -305,7 +203,6 @@ impl<S: States, const N: usize> Eskf<S, N> {
             self.covariance.transform(first + 3, &rotation);
         }
         self.covariance.enforce();
-        self.jump = self.jump.map(|jump| jump.rotated(&rotation));
         Ok(())
     }
 

@@ -1,6 +1,8 @@
 //! The filter: IMU samples propagate it, and measurements correct it.
 
-use nalgebra::{Matrix3, Matrix6, SMatrix, SVector, Vector3};
+#[cfg(feature = "alloc")]
+use nalgebra::Matrix3;
+use nalgebra::{Matrix6, SMatrix, SVector, Vector3};
 
 use super::params::{EskfParams, ImuDensities};
 use super::propagation::Transition;
@@ -10,15 +12,17 @@ use super::transport::Transport;
 use crate::attitude::ParamsError;
 use crate::navigation::covariance::{Covariance, Innovation, Room};
 use crate::navigation::fused::Fused;
-use crate::navigation::fusion::{Sight, Weighed, misfit};
-use crate::navigation::jump::{BiasJump, Moved, bounded};
+use crate::navigation::fusion::weighed;
 use crate::navigation::layout::Layout;
 use crate::navigation::math::exp;
+#[cfg(feature = "alloc")]
+use crate::navigation::math::skew;
 use crate::navigation::measurement::{Linearised, Measurement};
 use crate::navigation::refusal::Refusal;
+#[cfg(feature = "alloc")]
+use crate::navigation::state::VELOCITY;
 use crate::navigation::state::{
-    Estimate, GYROSCOPE_BIAS, NAVIGATION, Navigation, Optional, POSITION, ROTATION, States, VELOCITY, distinct,
-    offset,
+    Estimate, NAVIGATION, Navigation, Optional, POSITION, ROTATION, States, distinct, offset,
 };
 use crate::navigation::stream::{Gate, Stream};
 use crate::navigation::upkeep::{Upkeep, upkeep_methods};
@@ -57,15 +61,11 @@ pub struct Eskf<S: States = Navigation, const N: usize = NAVIGATION> {
     pub(super) estimate: Option<Estimate<N>>,
     pub(super) covariance: Covariance<N>,
     pub(super) upkeep: Upkeep,
-    /// A jump of the gyroscope's bias that may be the fault of a sensor.
-    pub(super) jump: Option<BiasJump<3>>,
-    /// Whether measurements correct position and velocity alone.
-    pub(super) holds_attitude: bool,
     states: core::marker::PhantomData<S>,
 }
 
 /// Variances of what holding a reading over a gap may have done wrong, per axis of the body.
-#[cfg(feature = "std")]
+#[cfg(feature = "alloc")]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::navigation) struct Doubt {
     /// Rotation, rad².
@@ -75,7 +75,7 @@ pub(in crate::navigation) struct Doubt {
 }
 
 /// A measurement compared with a filter.
-#[cfg(feature = "std")]
+#[cfg(feature = "alloc")]
 #[derive(Clone, Copy, Debug)]
 pub(in crate::navigation) struct Judged {
     /// Normalised innovation squared.
@@ -111,16 +111,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
         let covariance = Covariance::new();
         let states = core::marker::PhantomData;
         let upkeep = Upkeep::default();
-        Ok(Self {
-            params,
-            densities,
-            estimate: None,
-            covariance,
-            upkeep,
-            jump: None,
-            holds_attitude: false,
-            states,
-        })
+        Ok(Self { params, densities, estimate: None, covariance, upkeep, states })
     }
 
     /// The parameters that the filter was created with.
@@ -140,7 +131,6 @@ impl<S: States, const N: usize> Eskf<S, N> {
         self.upkeep.started(start.time_ns);
         self.estimate = Some(estimate);
         self.covariance = covariance;
-        self.jump = None;
         Ok(())
     }
 
@@ -172,19 +162,11 @@ impl<S: States, const N: usize> Eskf<S, N> {
             self.bridge(sample.time_ns, dt)?;
             return Ok(());
         }
-        if self.holds_attitude {
-            self.drift(sample, dt);
-            return Ok(());
-        }
         estimate.time_ns = sample.time_ns;
         estimate.angular_velocity = sample.angular_velocity - estimate.gyroscope_bias;
         estimate.specific_force = sample.specific_force - estimate.accelerometer_bias;
         let transition = Transition::advance(estimate, dt, self.params.gravity);
         average(estimate, dt, self.params.gravity);
-        if let Some(jump) = self.jump {
-            let by_bias = Matrix3::from_fn(|i, k| transition.rotation[i][k]);
-            self.jump = jump.turned(sample.time_ns, &estimate.gyroscope_bias, |way| by_bias * way);
-        }
         transition.apply(self.covariance.rows_mut(), &self.densities);
         self.covariance.bound(&Self::LAYOUT);
         self.decay(dt);
@@ -193,7 +175,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
 
     /// Propagates over a part, `dt` seconds, of a gap in the samples, during which the reading is assumed to be that of `sample`, but
     /// may have been wrong by `doubt`.
-    #[cfg(feature = "std")]
+    #[cfg(feature = "alloc")]
     #[cold]
     pub(in crate::navigation) fn hold(&mut self, sample: &ImuMean, doubt: &Doubt) -> Result<(), Refusal> {
         let estimate = self.estimate.as_mut().ok_or(Refusal::NotStarted)?;
@@ -210,8 +192,17 @@ impl<S: States, const N: usize> Eskf<S, N> {
         average(estimate, dt, self.params.gravity);
         transition.apply(self.covariance.rows_mut(), &self.densities);
         let in_world = |variances: &Vector3<f64>| turned * Matrix3::from_diagonal(variances) * turned.transpose();
-        let velocity = in_world(&doubt.velocity);
-        self.covariance.add(ROTATION, ROTATION, &in_world(&doubt.rotation));
+        let (rotation, velocity) = (in_world(&doubt.rotation), in_world(&doubt.velocity));
+        self.covariance.add(ROTATION, ROTATION, &rotation);
+        // What turns the body in the gap, as a random walk, turns its acceleration.
+        let lever = -skew(&(turned * estimate.specific_force));
+        let by_turn = lever * rotation;
+        let accelerated = by_turn * lever.transpose() * (dt * dt);
+        self.covariance.add(VELOCITY, ROTATION, &(by_turn * (0.5 * dt)));
+        self.covariance.add(POSITION, ROTATION, &(by_turn * (dt * dt / 6.0)));
+        self.covariance.add(VELOCITY, VELOCITY, &(accelerated / 3.0));
+        self.covariance.add(POSITION, VELOCITY, &(accelerated * (dt / 8.0)));
+        self.covariance.add(POSITION, POSITION, &(accelerated * (dt * dt / 20.0)));
         self.covariance.add(VELOCITY, VELOCITY, &velocity);
         self.covariance.add(POSITION, VELOCITY, &(velocity * (0.5 * dt)));
         self.covariance.add(POSITION, POSITION, &(velocity * (dt * dt / 3.0)));
@@ -261,24 +252,9 @@ impl<S: States, const N: usize> Eskf<S, N> {
         Ok(())
     }
 
-    /// Propagates over a sample of the IMU with an unknown attitude, of which only the angular velocity is of use.
-    #[cold]
-    fn drift(&mut self, sample: &ImuMean, dt: f64) {
-        let Some(estimate) = &mut self.estimate else { return };
-        let up = Vector3::new(0.0, 0.0, self.params.gravity);
-        estimate.time_ns = sample.time_ns;
-        estimate.angular_velocity = sample.angular_velocity - estimate.gyroscope_bias;
-        estimate.specific_force = estimate.world_from_body.inverse_transform_vector(&up);
-        let transition = Transition::advance(estimate, dt, self.params.gravity).without_force();
-        let ImuDensities { accelerometer, .. } = self.params.gap_densities();
-        transition.apply(self.covariance.rows_mut(), &ImuDensities { accelerometer, ..self.densities });
-        self.covariance.bound(&Self::LAYOUT);
-        self.decay(dt);
-    }
-
     /// Multiplies the white noise of the IMU, as a deviation. The walks of its biases stay: a multiple of them, found on noise, made
     /// the biases follow every error of the model.
-    #[cfg(feature = "std")]
+    #[cfg(feature = "alloc")]
     pub(in crate::navigation) fn multiply_noise(&mut self, multiple: f64) {
         let densities = self.params.densities();
         self.densities.gyroscope = densities.gyroscope * multiple * multiple;
@@ -286,7 +262,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
     }
 
     /// Multiplies the covariance.
-    #[cfg(feature = "std")]
+    #[cfg(feature = "alloc")]
     pub(in crate::navigation) fn doubt_all(&mut self, factor: f64) {
         self.covariance.multiply(factor);
         self.covariance.bound(&Self::LAYOUT);
@@ -297,7 +273,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
     /// # Errors
     ///
     /// Returns the reason why it cannot be compared.
-    #[cfg(feature = "std")]
+    #[cfg(feature = "alloc")]
     #[inline(never)]
     pub(in crate::navigation) fn judge<M: Measurement<D>, const D: usize>(
         &self,
@@ -329,7 +305,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
     }
 
     /// Like [`update`](Self::update), but bypasses the gate.
-    #[cfg(feature = "std")]
+    #[cfg(feature = "alloc")]
     pub(crate) fn update_ungated<M: Measurement<D>, const D: usize>(
         &mut self,
         stream: &mut Stream,
@@ -348,9 +324,6 @@ impl<S: States, const N: usize> Eskf<S, N> {
         let mut room = Room::new();
         let result = self.fuse(stream, measurement, gate, &mut room);
         stream.count(&result);
-        if let (Ok(_), Some(estimate)) = (&result, &self.estimate) {
-            stream.fused_at(estimate.time_ns);
-        }
         result
     }
 
@@ -374,18 +347,15 @@ impl<S: States, const N: usize> Eskf<S, N> {
         room: &mut Room<D, N>,
     ) -> Result<Fused, Refusal> {
         let mut innovation = self.innovation(stream, measurement, room)?;
-        let weighed =
-            Weighed::new(&mut self.covariance, stream, &mut innovation, gate, &Self::LAYOUT, Self::sight)?;
-        let fused = weighed.fused(&innovation, &Self::LAYOUT);
+        let fused = weighed(&self.covariance, stream, &mut innovation, gate)?;
         let error = innovation.mean();
         // Transported to another state, a height has derivatives with respect to all of the position.
         let is_fix = Self::fixes_position(&innovation);
         if !Self::LAYOUT.admits(&error) {
-            weighed.undo(&mut self.covariance);
             return Err(Refusal::OutOfRange);
         }
-        if weighed.is_raised() || self.holds_attitude || !M::LINEARISES || !self.is_curved(fused.nis) {
-            self.correct(stream, &innovation, &error, weighed.is_raised())?;
+        if !self.is_curved(fused.nis) {
+            self.correct(&innovation, &error)?;
             self.note(is_fix);
             return Ok(fused);
         }
@@ -399,7 +369,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
             // What leads nowhere, from a state that is absurd, is corrected linearly: by a step from the state itself.
             Err(_) => self.step(measurement, factor, &SVector::zeros(), room)?,
         };
-        self.correct(stream, &innovation, &innovation.mean(), false)?;
+        self.correct(&innovation, &innovation.mean())?;
         self.note(is_fix);
         Ok(fused)
     }
@@ -448,104 +418,13 @@ impl<S: States, const N: usize> Eskf<S, N> {
 
     /// Corrects the state by an error, and the covariance by the innovation that led to it.
     #[inline(never)]
-    fn correct(
-        &mut self,
-        stream: &Stream,
-        innovation: &Innovation<'_>,
-        error: &SVector<f64, N>,
-        is_raised: bool,
-    ) -> Result<(), Refusal> {
-        let before = self.holds_attitude.then_some(self.covariance);
-        let error = if self.holds_attitude { Self::of_motion(error) } else { *error };
+    fn correct(&mut self, innovation: &Innovation<'_>, error: &SVector<f64, N>) -> Result<(), Refusal> {
         let estimate = self.estimate.as_ref().ok_or(Refusal::NotStarted)?;
-        let corrected = if is_raised { estimate.corrected::<S>(&error) } else { estimate.composed::<S>(&error) };
-        self.estimate = Some(corrected);
+        self.estimate = Some(estimate.composed::<S>(error));
         self.covariance.update(innovation);
-        match before {
-            Some(before) => self.covariance.restore(&before, |error| !Self::is_motion(error)),
-            None => {
-                let mut alone = error;
-                if is_raised {
-                    for first in [POSITION, VELOCITY] {
-                        alone.fixed_rows_mut::<3>(first).fill(0.0);
-                    }
-                    if let Some(first) = offset::<S>(Optional::Keyframe) {
-                        alone.fixed_rows_mut::<3>(first).fill(0.0);
-                    }
-                }
-                Transport::new::<S, N>(&alone).of_covariance(&mut self.covariance);
-            }
-        }
-        if is_raised {
-            self.doubt(stream, innovation, &error);
-        }
+        Transport::new::<S, N>(error).of_covariance(&mut self.covariance);
         self.covariance.settle(&Self::LAYOUT);
         Ok(())
-    }
-
-    /// A measurement that has overridden its gate corrected `error`, but the sensor may have been wrong. Raises what that made wrong
-    /// and no later measurement of the same sensor can correct.
-    #[cold]
-    #[inline(never)]
-    fn doubt(&mut self, stream: &Stream, innovation: &Innovation<'_>, error: &SVector<f64, N>) {
-        if innovation.rows(N).any(|row| row[GYROSCOPE_BIAS..GYROSCOPE_BIAS + 3].iter().any(|x| *x != 0.0)) {
-            self.doubt_bias(stream, error);
-        }
-        if matches!(Self::sight(innovation), Sight::Relative) {
-            self.doubt_odometry(stream, &misfit(innovation, &Self::LAYOUT), error);
-        }
-        self.covariance.bound(&Self::LAYOUT);
-    }
-
-    /// Raises the attitude by as much as a jump of the gyroscope's bias has turned it.
-    fn doubt_bias(&mut self, stream: &Stream, error: &SVector<f64, N>) {
-        let Some(estimate) = &self.estimate else { return };
-        let (bias, change) = (estimate.gyroscope_bias, error.fixed_rows::<3>(GYROSCOPE_BIAS).into_owned());
-        let in_world = estimate.world_from_body * change;
-        let moved = Moved { now_ns: estimate.time_ns, fused_ns: stream.fused_ns(), bias, change, in_world };
-        let (jump, turned) = BiasJump::follow(self.jump, &moved);
-        self.jump = jump;
-        let turned = self.bounded(&turned);
-        self.covariance.inflate_along(&[(ROTATION, turned)]);
-    }
-
-    /// Raises the pose in the world by as much as a relative pose has moved it: that of the body and that of the keyframe alike, so that
-    /// the relative pose between them stays as well known. The next keyframe is set at the wrong pose.
-    fn doubt_odometry(&mut self, stream: &Stream, misfit: &[f64; 3], error: &SVector<f64, N>) {
-        let Some(estimate) = &self.estimate else { return };
-        let (Some(keyframe), Some(first)) = (estimate.keyframe, offset::<S>(Optional::Keyframe)) else { return };
-        let closed_s = stream.fused_ns().map_or(0.0, |from| estimate.time_ns.saturating_sub(from) as f64 * 1e-9);
-        let way = estimate.position - keyframe.position;
-        let part = |first: usize| error.fixed_rows::<3>(first).into_owned();
-        let (moved, turned) = (part(POSITION) - part(first), part(ROTATION) - part(first + 3));
-        self.covariance.inflate_along(&[(POSITION, moved), (first, moved)]);
-        self.turn_both(first, &way, &turned);
-        if !stream.goes_on(misfit) || closed_s <= 0.0 {
-            return;
-        }
-        // Moved again in the same direction: perhaps it is the velocity that is wrong, by the way over the time of the closed gate.
-        let apart = moved / closed_s;
-        self.covariance.inflate_along(&[(VELOCITY, apart)]);
-        if stream.goes_on_again(misfit) {
-            // And if that did not help, the tilt, by which gravity makes such a velocity in that time.
-            let tilt = apart.norm() / (closed_s * self.params.gravity);
-            for axis in [Vector3::x(), Vector3::y()] {
-                self.turn_both(first, &way, &(axis * tilt));
-            }
-        }
-    }
-
-    /// Raises the attitude of the body and of the keyframe, whose errors begin at `first`, by a common turn about the body, which is
-    /// `way` from the keyframe.
-    fn turn_both(&mut self, first: usize, way: &Vector3<f64>, turned: &Vector3<f64>) {
-        let turned = self.bounded(turned);
-        self.covariance.inflate_along(&[(ROTATION, turned), (first + 3, turned), (first, way.cross(&turned))]);
-    }
-
-    /// The part of a turn that makes the attitude at most unknown.
-    fn bounded(&self, turned: &Vector3<f64>) -> Vector3<f64> {
-        let variance = self.covariance.matrix().fixed_view::<3, 3>(ROTATION, ROTATION).trace();
-        bounded(turned, variance)
     }
 
     /// Whether a measurement observes a horizontal position in the world, rather than one relative to the keyframe.
@@ -555,26 +434,6 @@ impl<S: States, const N: usize> Eskf<S, N> {
             let sees = |first: usize| row[first] != 0.0 || row[first + 1] != 0.0;
             sees(POSITION) && !keyframe.is_some_and(sees)
         })
-    }
-
-    /// What a measurement observes of the position.
-    #[cold]
-    fn sight(innovation: &Innovation<'_>) -> Sight {
-        let sees = |error: usize| innovation.rows(N).any(|row| row[error] != 0.0);
-        if Self::fixes_position(innovation) {
-            return Sight::Position;
-        }
-        if offset::<S>(Optional::Keyframe).is_some_and(|first| (first..first + 3).any(sees)) {
-            return Sight::Relative;
-        }
-        if !sees(POSITION + 2) {
-            let is_heading = innovation.dimension() == 1 || (VELOCITY..ROTATION).any(sees);
-            return if is_heading && sees(ROTATION + 2) { Sight::Heading } else { Sight::Nothing };
-        }
-        // What a barometer measures is the sum of the height and its bias.
-        let bias = offset::<S>(Optional::BarometerBias).filter(|bias| sees(*bias));
-        let motion = [Some(POSITION + 2), Some(VELOCITY + 2), bias];
-        Sight::Height(motion.into_iter().flatten().fold(0, |motion, error| motion | 1 << error))
     }
 
     /// The estimate at the end of the last sample; `None` before the start.

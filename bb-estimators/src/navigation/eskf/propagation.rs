@@ -78,12 +78,6 @@ impl Transition {
         }
     }
 
-    /// The same of a body whose acceleration does not depend on the attitude and the biases.
-    #[cold]
-    pub(super) fn without_force(self) -> Self {
-        Self { position: [[0.0; SOURCES]; 3], velocity: [[0.0; SOURCES]; 3], ..self }
-    }
-
     /// `P ← Φ P Φᵀ + Q`.
     #[inline]
     pub(in crate::navigation) fn apply<const N: usize>(&self, p: &mut [[f64; N]; N], densities: &ImuDensities) {

@@ -5,12 +5,9 @@ mod attack;
 mod cases;
 mod consistency;
 #[cfg(feature = "eskf")]
-mod held;
 mod jacobians;
 mod laws;
-mod patience;
 mod transition;
-mod wrong;
 
 use nalgebra::{SVector, UnitQuaternion, Vector3};
 use proptest::prelude::*;

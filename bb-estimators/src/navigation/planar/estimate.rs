@@ -6,7 +6,7 @@ use super::arc::arc;
 use crate::attitude::MAX_ANGULAR_VELOCITY;
 use crate::navigation::bounds::{MOST_ROTATION, MOST_VARIANCE};
 use crate::navigation::covariance::{Covariance, Innovation};
-use crate::navigation::layout::{Layout, MOST_SCALE};
+use crate::navigation::layout::Layout;
 use crate::navigation::math::{cos, sin, wrapped};
 use crate::navigation::update::Composed;
 
@@ -97,15 +97,12 @@ pub(super) fn left(vector: &Vector2<f64>) -> Vector2<f64> {
 impl Composed<STATES> for PlanarEstimate {
     const LAYOUT: Layout<STATES> = {
         let mut layout = Layout::EMPTY;
-        layout.motion = [0, 2];
-        (layout.attitude, layout.heading) = (1, HEADING);
-        layout.set((POSITION, 2), 0, MOST_VARIANCE);
-        layout.set((HEADING, 1), 1, MOST_ROTATION);
-        layout.set((VELOCITY, 2), 2, MOST_VARIANCE);
-        layout.set((GYROSCOPE_BIAS, 1), 3, MAX_ANGULAR_VELOCITY * MAX_ANGULAR_VELOCITY);
+        layout.set((POSITION, 2), MOST_VARIANCE);
+        layout.set((HEADING, 1), MOST_ROTATION);
+        layout.set((VELOCITY, 2), MOST_VARIANCE);
+        layout.set((GYROSCOPE_BIAS, 1), MAX_ANGULAR_VELOCITY * MAX_ANGULAR_VELOCITY);
         // A hundred times the largest deviation that its parameter accepts.
-        layout.set((WHEEL_SCALE, 1), 4, 1e4);
-        layout.most_jump[WHEEL_SCALE] = MOST_SCALE;
+        layout.set((WHEEL_SCALE, 1), 1e4);
         layout
     };
 

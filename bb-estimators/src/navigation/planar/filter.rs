@@ -242,9 +242,6 @@ impl PlanarEkf {
             Ok(updated.fused)
         });
         stream.count(&result);
-        if let (Ok(_), Some(estimate)) = (&result, &self.estimate) {
-            stream.fused_at(estimate.time_ns);
-        }
         result
     }
 

@@ -102,16 +102,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
             }
         }
         self.dirty = self.dirty.min(index);
-        Ok(Fused {
-            nis: judged.nis,
-            dimension,
-            weight,
-            raised,
-            limit,
-            log_likelihood,
-            whitened: judged.whitened,
-            misfit: [0.0; 3],
-        })
+        Ok(Fused { nis: judged.nis, dimension, weight, raised, limit, log_likelihood, whitened: judged.whitened })
     }
 
     /// Compares a factor with the current estimate. Only the correction of the newest keyframe is recomputed; the

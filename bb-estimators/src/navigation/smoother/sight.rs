@@ -177,7 +177,6 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
             limit: verdict.limit,
             log_likelihood: verdict.log_likelihood,
             whitened: judged.whitened,
-            misfit: [0.0; 3],
         }))
     }
 

@@ -137,6 +137,24 @@ impl<const N: usize> Estimate<N> {
         error
     }
 
+    /// The same estimate of a filter with `M` errors. What that lacks is dropped, and what it has beyond is zero.
+    #[cfg(feature = "eskf")]
+    pub(in crate::navigation) fn resized<const M: usize>(&self) -> Estimate<M> {
+        Estimate {
+            time_ns: self.time_ns,
+            position: self.position,
+            velocity: self.velocity,
+            world_from_body: self.world_from_body,
+            accelerometer_bias: self.accelerometer_bias,
+            gyroscope_bias: self.gyroscope_bias,
+            angular_velocity: self.angular_velocity,
+            specific_force: self.specific_force,
+            acceleration: self.acceleration,
+            keyframe: self.keyframe,
+            optional: SVector::from_fn(|i, _| self.optional.get(i).copied().unwrap_or(0.0)),
+        }
+    }
+
     /// An estimate at rest at the origin, as a placeholder to be filled later.
     #[cfg(feature = "smoother")]
     pub(in crate::navigation) fn unknown() -> Self {

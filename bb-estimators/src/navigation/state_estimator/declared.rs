@@ -62,8 +62,7 @@ use std::time::Duration;
 /// ```
 ///
 /// It starts in one of three ways: at the origin of the options, at the state from the input `warm_start` with its deviations
-/// doubled, or at the first anchor. At the origin it is levelled by the input `attitude`, or once it has been at rest for a second. After
-/// an outage of the IMU, `attitude` tells the strategy `eskf` its attitude again.
+/// doubled, or at the first anchor. At the origin it is levelled by the input `attitude`, or once it has been at rest for a second.
 /// The body is the IMU, with the axes of the link. The joints give the position of the `gnss` antenna in it.
 ///
 /// All relative poses, anchors, fixes and reports on the receiver that arrive between two samples of the IMU are taken together, as
@@ -149,9 +148,7 @@ impl FlightEstimator {
     /// them, or have no use for them.
     fn start(&mut self, inputs: &FlightInputs<'_>) {
         let state = self.estimator.health().state;
-        if let Some(attitude) =
-            inputs.attitude.filter(|attitude| attitude.is_new() && state != HealthState::Tracking)
-        {
+        if let Some(attitude) = inputs.attitude.filter(|attitude| attitude.is_new() && state == HealthState::Init) {
             let _ = self.estimator.add_attitude(input::attitude(attitude.message()));
         }
         if matches!(state, HealthState::Init | HealthState::Lost)

@@ -3,13 +3,12 @@
 
 use alloc::collections::VecDeque;
 
-use super::agreement::Agreement;
 use super::entry::{Entry, Key, Outcome, Payload};
 use super::error::Reason;
 use super::event::StartedFrom;
 use super::factor::ProvidedFactor;
 use super::gate::{Rejection, SpoofGate};
-use super::input::{AttitudeReading, ImuBias, MOST_VELOCITY, TakeoffOrigin};
+use super::input::{ImuBias, MOST_VELOCITY, TakeoffOrigin};
 use super::label::Sources;
 use super::params::{StateEstimatorConfig, ns};
 use super::start::{Starter, warm};
@@ -61,15 +60,6 @@ pub(super) struct Engine<F: ProvidedFactor> {
     independent_ns: Option<i64>,
     /// Number of positions that must still fit.
     unconfirmed: u32,
-    /// Number of times that positions have overruled it since it was last confirmed.
-    overruled: u32,
-    /// Positions of the receiver and of the anchors. One that does not fit overrules the estimate only if earlier ones agree with
-    /// it.
-    fixes: Agreement,
-    anchors: Agreement,
-    /// Normalised innovations squared of the last refused fix and the last refused anchor, over their dimension.
-    refused_fix: f64,
-    refused_anchor: f64,
     left: Option<(Pose, Sources)>,
 }
 
@@ -111,11 +101,6 @@ impl<F: ProvidedFactor> Engine<F> {
             degraded_ns: None,
             independent_ns: None,
             unconfirmed: 0,
-            overruled: 0,
-            fixes: Agreement::default(),
-            anchors: Agreement::default(),
-            refused_fix: 0.0,
-            refused_anchor: 0.0,
             left: None,
         })
     }
@@ -219,7 +204,6 @@ impl<F: ProvidedFactor> Engine<F> {
         (self.key, self.now_ns, self.begun_ns) = (Key::FIRST, None, None);
         self.sources = Sources::default();
         self.gate.forget_times();
-        (self.fixes, self.anchors) = (Agreement::default(), Agreement::default());
         self.marks.clear();
         (self.degraded_ns, self.left) = (None, None);
         // The measurement counts as made now: a receiver must not benefit.
@@ -255,23 +239,23 @@ impl<F: ProvidedFactor> Engine<F> {
         mark.map_or(self.sources, |(_, sources)| *sources)
     }
 
-    /// Advances by one sample of the IMU, or by part of one. A gap may precede it.
+    /// Advances to a time within one sample of the IMU, which began at `since_ns`: at a gap, long before.
     pub(super) fn advance(
         &mut self,
-        key: Key,
+        until_ns: i64,
         sample: &ImuMean,
-        is_gap: bool,
+        since_ns: i64,
         config: &StateEstimatorConfig,
     ) -> Result<(), Reason> {
-        self.key = key;
+        self.key = Key::of_sample(until_ns);
         let is_first = self.now_ns.is_none();
-        self.now_ns = Some(sample.time_ns);
+        self.now_ns = Some(until_ns);
         match &mut self.phase {
             Phase::Starting(starter) => {
-                starter.sample(sample);
+                starter.sample(&ImuMean { time_ns: until_ns, ..*sample });
                 // A sample is a mean since the previous one. The first has none.
                 if let (false, Some(origin)) = (is_first, &self.origin)
-                    && let Some(start) = starter.at_origin(sample.time_ns, origin, config, self.bias.as_ref())
+                    && let Some(start) = starter.at_origin(until_ns, origin, config, self.bias.as_ref())
                 {
                     self.start(&start, StartedFrom::Origin)?;
                 }
@@ -280,15 +264,13 @@ impl<F: ProvidedFactor> Engine<F> {
             Phase::Lost => Ok(()),
             Phase::Running => {
                 let gaps = self.strategy.gaps();
-                let result = self.strategy.propagate(sample, is_gap);
-                let is_missing = is_gap || self.strategy.gaps() != gaps;
-                if is_missing || self.unconfirmed > 0 || !self.strategy.is_converged() {
-                    self.distrust(sample.time_ns);
+                let result = self.strategy.propagate(until_ns, sample, since_ns);
+                if self.strategy.gaps() != gaps || self.unconfirmed > 0 || !self.strategy.is_converged() {
+                    self.distrust(until_ns);
                 }
                 if !self.strategy.is_attitude_known() {
                     // Until the next sample.
-                    let until_ns = sample.time_ns.saturating_add(ns(config.sensors.longest_sample));
-                    self.distrust_until(sample.time_ns, until_ns);
+                    self.distrust_until(until_ns, until_ns.saturating_add(ns(config.sensors.longest_sample)));
                 }
                 match result {
                     Ok(()) if !self.is_bounded() => {
@@ -344,8 +326,7 @@ impl<F: ProvidedFactor> Engine<F> {
             Payload::Attitude(attitude) => {
                 match &mut self.phase {
                     Phase::Starting(starter) => starter.attitude(attitude),
-                    Phase::Running => self.level(attitude),
-                    Phase::Lost => {}
+                    Phase::Running | Phase::Lost => {}
                 }
                 Ok(None)
             }
@@ -367,10 +348,7 @@ impl<F: ProvidedFactor> Engine<F> {
             Ok(Some(fused)) => {
                 let nis = fused.nis / fused.dimension.max(1) as f64;
                 self.nis = Some(nis);
-                if fused.raised > 1.0 {
-                    self.distrust(now_ns);
-                    Outcome::Degraded(Reason::Raised { factor: fused.raised })
-                } else if !self.strategy.is_converged() {
+                if !self.strategy.is_converged() {
                     self.distrust(now_ns);
                     Outcome::Degraded(Reason::NotConverged)
                 } else {
@@ -382,24 +360,6 @@ impl<F: ProvidedFactor> Engine<F> {
             Err(Trouble::Fatal(reason)) => Outcome::Fatal(reason),
         };
         (outcome, rejection)
-    }
-
-    /// An attitude of the flight controller determines one that an outage of the IMU has left unknown.
-    fn level(&mut self, attitude: &AttitudeReading) {
-        let (Some(world), Some((position, _))) = (&self.world, self.strategy.motion()) else { return };
-        if !self.strategy.is_attitude_lost() {
-            return;
-        }
-        let turn = world.local(&position).1.inverse();
-        let matrix = turn.to_rotation_matrix().into_inner();
-        let covariance = matrix * attitude.covariance() * matrix.transpose();
-        self.strategy.level(&(turn * attitude.world_from_body), &covariance);
-        self.realigned(true);
-    }
-
-    /// Counts the jump of an estimate whose attitude was lost, if it is no longer.
-    fn realigned(&mut self, was_lost: bool) {
-        self.resets = self.resets.wrapping_add(u32::from(was_lost && !self.strategy.is_attitude_lost()));
     }
 
     fn start(&mut self, start: &Start, from: StartedFrom) -> Result<(), Reason> {

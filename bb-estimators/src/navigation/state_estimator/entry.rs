@@ -90,7 +90,7 @@ pub(super) enum Outcome {
         /// Normalised innovation squared over its dimension.
         nis: Option<f64>,
     },
-    /// It is not in the estimate, or only with the covariance raised.
+    /// It is not in the estimate, or has moved it.
     Degraded(Reason),
     /// It broke the estimate, which continues without it.
     Fatal(Reason),

@@ -18,10 +18,11 @@ pub enum Reason {
     Gate(Rejection),
     /// The window has no room for more inputs.
     Overflow,
-    /// The measurement was fused after the covariance was raised: it did not fit three times in a row.
-    Raised {
-        /// The factor applied.
-        factor: f64,
+    /// Positions that did not fit have agreed on another place for long enough: the estimate is there now, as uncertain as they
+    /// leave it.
+    Overruled {
+        /// The normalised innovation squared of the last of them, by the estimate before.
+        nis: f64,
     },
     /// Samples of the IMU were missing, and the gap was bridged.
     Bridged,
@@ -48,7 +49,7 @@ impl fmt::Display for Reason {
             Self::Duplicate => f.write_str("there is one of this kind and time already"),
             Self::Gate(rejection) => rejection.fmt(f),
             Self::Overflow => f.write_str("there is no room for more inputs within the window"),
-            Self::Raised { factor } => write!(f, "it does not fit: the covariance was raised by {factor:.1}"),
+            Self::Overruled { nis } => write!(f, "the estimate was in another place (NIS {nis:.0}), and has moved"),
             Self::Bridged => f.write_str("a gap of the IMU was bridged"),
             Self::NotConverged => f.write_str("the iterations have not converged"),
         }
@@ -64,7 +65,7 @@ impl From<Refusal> for Reason {
 /// Error of an `add_…` method.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EstimatorError {
-    /// There still is an estimate: without the input, or with its covariance raised.
+    /// There still is an estimate: without the input, or elsewhere and less certain.
     Degraded(Reason),
     /// There is no estimate for this tick: its numbers are no longer usable, or the window overflowed. An overflow by what the flight
     /// controller sends, [`add_fc_imu`](super::StateEstimator::add_fc_imu), is [`Degraded`](Self::Degraded).

@@ -198,8 +198,7 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
         first
     }
 
-    /// Adds an attitude of the flight controller, which levels the start. With the error-state Kalman filter, it also determines an
-    /// attitude that an outage of the IMU has left unknown.
+    /// Adds an attitude of the flight controller, which levels the start.
     ///
     /// # Errors
     ///

@@ -140,7 +140,7 @@ pub enum EventKind {
         /// Whether it is newer than the last sample of the IMU, and waits for the next one.
         waits: bool,
     },
-    /// An input is not in the estimate, or was fused with the covariance raised.
+    /// An input is not in the estimate, or has moved it.
     Degraded {
         /// The input.
         input: InputKind,

@@ -33,8 +33,8 @@ pub struct EstimatorOutput {
     pub smoothed: bool,
     /// Whether its covariance is not to be trusted, because an input did not fit or was missing. The label does not change.
     pub degraded: bool,
-    /// Number of jumps of the estimate since the first start: it restarted elsewhere, was corrected by measurements that it had refused
-    /// before, or its attitude was determined again after an outage of the IMU. A consumer that differentiates it, or uses it for control, must reset at each jump.
+    /// Number of jumps of the estimate since the first start: it restarted, or went on where positions are that it had
+    /// refused. A consumer that differentiates it, or uses it for control, must reset at each jump.
     pub resets: u32,
     /// Quality of the estimate.
     pub quality: Quality,

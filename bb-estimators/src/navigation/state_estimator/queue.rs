@@ -195,7 +195,7 @@ impl<F: ProvidedFactor> Queue<F> {
             Reason::Refused(Refusal::TooOld { .. }) => counts.too_old += 1,
             Reason::Refused(Refusal::InTheFuture { .. }) => counts.in_the_future += 1,
             Reason::Refused(_) => counts.invalid += 1,
-            Reason::Gate(_) | Reason::Raised { .. } | Reason::Bridged | Reason::NotConverged => {}
+            Reason::Gate(_) | Reason::Overruled { .. } | Reason::Bridged | Reason::NotConverged => {}
         }
         reason
     }
@@ -334,10 +334,10 @@ impl<F: ProvidedFactor> Queue<F> {
             if next > until {
                 break;
             }
-            let is_gap = self.follows_gap(sample_index, config);
+            let since_ns = self.since_ns(sample_index);
             if !is_input {
                 if let Some(sample) = sample {
-                    self.advance(next, &sample, is_gap, config);
+                    self.advance(sample.time_ns, &sample, since_ns, config);
                 }
                 sample_index += 1;
                 continue;
@@ -346,8 +346,7 @@ impl<F: ProvidedFactor> Queue<F> {
                 && let Some(sample) = sample
             {
                 // The sample is a mean, so its parts have the same values.
-                let part = ImuMean { time_ns: next.time_ns, ..sample };
-                self.advance(Key::of_sample(next.time_ns), &part, is_gap, config);
+                self.advance(next.time_ns, &sample, since_ns, config);
             }
             self.apply(input_index, config)?;
             input_index += 1;
@@ -355,21 +354,26 @@ impl<F: ProvidedFactor> Queue<F> {
         Ok(())
     }
 
-    /// Whether a sample is the first after a gap. Inputs may divide the sample into parts of any length.
-    fn follows_gap(&self, index: usize, config: &StateEstimatorConfig) -> bool {
+    /// The time at which a sample begins. Inputs may divide it into parts of any length.
+    fn since_ns(&self, index: usize) -> Option<i64> {
         let before = index.checked_sub(1).and_then(|before| self.samples.get(before));
         // The first sample held follows one that was dropped, or continues from where the engine began.
-        let before_ns = before.map(|before| before.time_ns).or(self.dropped_ns).or(self.engine.begun_ns());
-        let (Some(before_ns), Some(sample)) = (before_ns, self.samples.get(index)) else { return false };
-        sample.time_ns.saturating_sub(before_ns) > ns(config.sensors.longest_sample)
+        before.map(|before| before.time_ns).or(self.dropped_ns).or(self.engine.begun_ns())
     }
 
-    fn advance(&mut self, key: Key, sample: &ImuMean, is_gap: bool, config: &StateEstimatorConfig) {
+    /// Whether a sample is the first after a gap.
+    fn follows_gap(&self, index: usize, config: &StateEstimatorConfig) -> bool {
+        let (Some(since_ns), Some(sample)) = (self.since_ns(index), self.samples.get(index)) else { return false };
+        sample.time_ns.saturating_sub(since_ns) > ns(config.sensors.longest_sample)
+    }
+
+    fn advance(&mut self, until_ns: i64, sample: &ImuMean, since_ns: Option<i64>, config: &StateEstimatorConfig) {
         let was = self.engine.condition();
-        if let Err(reason) = self.engine.advance(key, sample, is_gap, config)
+        let since_ns = since_ns.or(self.engine.now_ns()).unwrap_or(sample.time_ns);
+        if let Err(reason) = self.engine.advance(until_ns, sample, since_ns, config)
             && self.engine.condition() != was
         {
-            let time_ns = sample.time_ns;
+            let time_ns = until_ns;
             if self.broken.is_none_or(|(at_ns, before)| at_ns != time_ns || !before.is_alike(&reason)) {
                 self.told.push(Told::Broken(time_ns, reason));
             }

@@ -9,7 +9,7 @@ mod smoother;
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix6, SMatrix, UnitQuaternion, Vector3};
 
 pub(super) use self::predictor::Predictor;
 use super::factor::ProvidedFactor;
@@ -54,31 +54,18 @@ impl Pose {
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Measured<'a, F> {
     Relative(RelativePose),
-    Anchor(AbsolutePose, Trust),
+    Anchor(AbsolutePose),
     Gnss(GnssPosition, Option<GnssVelocity>, Trust),
     Provided(&'a F),
 }
 
-/// Permission of a position that does not fit.
+/// Permission of a fix that does not fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Trust {
     /// None: it is refused.
     Doubted,
-    /// It may overrule the estimate if [`PATIENCE`] were refused before, since they agree with it.
+    /// It may show that the estimate is in the wrong place.
     Believed,
-}
-
-/// Number of consecutive refusals before a measurement overrules the estimate.
-pub(super) const PATIENCE: u32 = 3;
-
-/// The position to move a wrong estimate to. States that it does not determine are kept.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
-    /// Position of an antenna, as measured.
-    pub(super) position: (Vector3<f64>, Matrix3<f64>),
-    /// Position of the antenna in the body.
-    pub(super) lever_arm: Vector3<f64>,
-    pub(super) velocity: Option<(Vector3<f64>, Matrix3<f64>)>,
 }
 
 /// Why a measurement was not fused.
@@ -108,19 +95,11 @@ pub(super) struct Streams {
 
 impl Streams {
     fn new() -> Self {
-        let of = |patience| Stream::new(StreamParams { patience, ..StreamParams::default() });
-        let (firm, usual) = (of(0), of(PATIENCE));
-        Self { relative: usual, anchors: firm, positions: firm, velocities: firm, provided: usual }
+        let stream = Stream::new(StreamParams { patience: 0, ..StreamParams::default() });
+        // Positions have the gate of the copies.
+        let open = Stream::new(StreamParams { gate: 0.0, ..*stream.params() });
+        Self { relative: stream, anchors: open, positions: open, velocities: stream, provided: stream }
     }
-}
-
-/// Configures a gate for a position.
-fn trusting(stream: &mut Stream, trust: Trust) -> &mut Stream {
-    stream.set_patience(match trust {
-        Trust::Doubted => 0,
-        Trust::Believed => PATIENCE,
-    });
-    stream
 }
 
 /// How much longer than [`keyframe_interval`](super::params::StateEstimatorParams::keyframe_interval) a keyframe may wait for a
@@ -178,6 +157,7 @@ impl Cadence {
 }
 
 /// Raises the covariance of the position by what a body moves in a time with this standard deviation, s.
+#[cfg(feature = "smoother")]
 fn add_time<const N: usize>(covariance: &mut SMatrix<f64, N, N>, velocity: &Vector3<f64>, deviation_s: f64) {
     let way = velocity * deviation_s;
     let mut of_position = covariance.fixed_view_mut::<3, 3>(POSITION, POSITION);
@@ -225,9 +205,9 @@ impl<F: ProvidedFactor> Strategy<F> {
         each!(self, strategy => strategy.start(start))
     }
 
-    /// Advances by one sample. Makes a keyframe if one is due.
-    pub(super) fn propagate(&mut self, sample: &ImuMean, is_gap: bool) -> Result<(), Failure> {
-        each!(self, strategy => strategy.propagate(sample, is_gap))
+    /// Advances to a time within one sample, which began at `since_ns`. Makes a keyframe if one is due.
+    pub(super) fn propagate(&mut self, until_ns: i64, sample: &ImuMean, since_ns: i64) -> Result<(), Failure> {
+        each!(self, strategy => strategy.propagate(until_ns, sample, since_ns))
     }
 
     /// Makes the present state a keyframe: a camera has captured a frame.
@@ -251,7 +231,7 @@ impl<F: ProvidedFactor> Strategy<F> {
         }
     }
 
-    /// Whether the attitude is to be trusted. After an outage of the IMU it is not, until it has been determined again.
+    /// Whether the heading is known. After an outage of the IMU it is not, until it has been determined again.
     pub(super) fn is_attitude_known(&self) -> bool {
         match self {
             // It linearises again until it converges.
@@ -259,29 +239,6 @@ impl<F: ProvidedFactor> Strategy<F> {
             Self::Smoother(_) => true,
             #[cfg(feature = "eskf")]
             Self::Eskf(strategy, _) => strategy.is_attitude_known(),
-        }
-    }
-
-    /// Whether the attitude is too uncertain to be corrected, see [`level`](Self::level).
-    pub(super) fn is_attitude_lost(&self) -> bool {
-        match self {
-            #[cfg(feature = "smoother")]
-            Self::Smoother(_) => false,
-            #[cfg(feature = "eskf")]
-            Self::Eskf(strategy, _) => strategy.is_lost(),
-        }
-    }
-
-    /// Takes the attitude of another source, with its covariance, if it is lost.
-    pub(super) fn level(&mut self, world_from_body: &UnitQuaternion<f64>, covariance: &Matrix3<f64>) {
-        match self {
-            #[cfg(feature = "smoother")]
-            Self::Smoother(_) => {
-                // It is never lost.
-                let _ = (world_from_body, covariance);
-            }
-            #[cfg(feature = "eskf")]
-            Self::Eskf(strategy, _) => strategy.level(world_from_body, covariance),
         }
     }
 
@@ -346,9 +303,9 @@ impl<F: ProvidedFactor> Strategy<F> {
         each!(self, strategy => strategy.streams()).positions.counts().gate_in_a_row
     }
 
-    /// Moves the present state elsewhere. States that do not depend on the position are kept. Keyframes are dropped.
-    pub(super) fn relocate(&mut self, place: &Place) -> Result<(), Refusal> {
-        each!(self, strategy => strategy.relocate(place))
+    /// How often it started, or went on in another place.
+    pub(super) fn resets(&self) -> u32 {
+        each!(self, strategy => strategy.resets())
     }
 
     /// Assigns a new time to the present state, with the standard deviation of that time, s. Keyframes are dropped.

@@ -25,7 +25,7 @@ pub struct FlightInputs<'a> {
     pub gnss: Every<'a, GnssFix>,
     /// The flight controller's reports on that receiver.
     pub gps_health: Every<'a, GpsReport>,
-    /// The flight controller's attitude, which levels the start and, with the strategy `eskf`, follows an outage of the IMU.
+    /// The flight controller's attitude, which levels the start.
     pub attitude: Option<Input<'a, AttitudeReport>>,
     /// The flight controller's own state. The estimator starts from it, and restarts from it when it is lost.
     pub warm_start: Option<Input<'a, WarmStartReport>>,

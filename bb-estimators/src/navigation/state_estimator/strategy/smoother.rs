@@ -7,16 +7,19 @@ use alloc::vec::Vec;
 
 use nalgebra::{Isometry3, Matrix3, SMatrix, UnitQuaternion, Vector3};
 
-use super::{Cadence, Failure, Measured, Place, Pose, Predictor, Streams, add_time, id_of, trusting};
+use super::{Cadence, Failure, Measured, Pose, Predictor, Streams, Trust, add_time, id_of};
 use crate::attitude::ParamsError;
-use crate::navigation::eskf::{ImuMean, Start, seconds_between};
+use crate::navigation::chi_square::limit;
+use crate::navigation::copies::{FAR, Newcomer, SLACK, Settled};
+use crate::navigation::eskf::{Eskf, ImuMean, Start, seconds_between};
 use crate::navigation::fused::Fused;
-use crate::navigation::measurement::{AbsolutePose, GnssPosition, GnssVelocity};
+use crate::navigation::measurement::{AbsolutePose, GnssPosition, GnssVelocity, Measurement};
 use crate::navigation::refusal::Refusal;
 use crate::navigation::smoother::{Factor, FixedLagSmoother, NavigationFactor, Rows, SmootherParams};
-use crate::navigation::state::{Estimate, Optional, POSITION, ROTATION, States, VELOCITY};
+use crate::navigation::state::{Estimate, NAVIGATED, Navigated, Optional, POSITION, ROTATION, States, VELOCITY};
 use crate::navigation::state_estimator::factor::{ProvidedFactor, SMOOTHED, Smoothed};
 use crate::navigation::state_estimator::params::StateEstimatorConfig;
+use crate::navigation::stream::Stream;
 
 #[expect(clippy::large_enum_variant, reason = "factors of providers are as large as theirs are")]
 /// Configuration of a window.
@@ -56,6 +59,13 @@ pub(in crate::navigation::state_estimator) struct SmootherStrategy<F: ProvidedFa
     records: bool,
     left: Option<Pose>,
     is_converged: bool,
+    /// The window's filter as if it had been where positions are that do not fit.
+    newcomer: Option<Newcomer<Eskf<Navigated, NAVIGATED>>>,
+    /// Whether the present becomes the reference of the newcomer's next relative pose.
+    is_next: bool,
+    /// The time since which the window has been in its place.
+    since_ns: i64,
+    resets: u32,
 }
 
 /// Motion from the newest keyframe to the present.
@@ -79,6 +89,10 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
             records: config.params.record_keyframes,
             left: None,
             is_converged: true,
+            newcomer: None,
+            is_next: false,
+            since_ns: i64::MIN,
+            resets: 0,
         })
     }
 
@@ -88,21 +102,42 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
 
     pub(super) fn start(&mut self, start: &Start) -> Result<(), Refusal> {
         self.smoother.start(id_of(start.time_ns), start)?;
-        self.is_converged = true;
-        self.cadence.begin(start.time_ns);
+        self.begun(start.time_ns, start.time_ns);
         // Earlier refusals relate to another estimate.
         self.streams.anchors.forgive();
         Ok(())
     }
 
-    pub(super) fn propagate(&mut self, sample: &ImuMean, is_gap: bool) -> Result<(), Failure> {
-        self.smoother.propagate_part(sample, is_gap)?;
-        if self.cadence.is_due(sample.time_ns) { self.keyframe() } else { Ok(()) }
+    /// The window has begun again, in a place that has been right since a time.
+    fn begun(&mut self, time_ns: i64, since_ns: i64) {
+        self.is_converged = true;
+        self.cadence.begin(time_ns);
+        (self.newcomer, self.since_ns) = (None, since_ns);
+        self.resets = self.resets.wrapping_add(1);
+    }
+
+    /// How often it started, or went on in another place.
+    pub(super) fn resets(&self) -> u32 {
+        self.resets
+    }
+
+    pub(super) fn propagate(&mut self, until_ns: i64, sample: &ImuMean, since_ns: i64) -> Result<(), Failure> {
+        let is_gap = seconds_between(since_ns, sample.time_ns)? > self.smoother.params().sensors.longest_sample;
+        let part = ImuMean { time_ns: until_ns, ..*sample };
+        self.smoother.propagate_part(&part, is_gap)?;
+        if core::mem::take(&mut self.is_next)
+            && let Some(newcomer) = &mut self.newcomer
+        {
+            newcomer.filter.set_keyframe(id_of(self.cadence.camera_ns));
+        }
+        self.newcomer.take_if(|newcomer| newcomer.filter.propagate_part(&part, is_gap).is_err());
+        if self.cadence.is_due(until_ns) { self.keyframe() } else { Ok(()) }
     }
 
     pub(super) fn camera_frame(&mut self) -> Result<(), Failure> {
         self.keyframe()?;
         self.cadence.camera_frame();
+        self.is_next = true;
         Ok(())
     }
 
@@ -148,10 +183,13 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
         let id = id_of(self.cadence.keyframe_ns);
         let fused = match measured {
             Measured::Relative(relative) => {
+                if let Some(newcomer) = &mut self.newcomer {
+                    newcomer.aid(relative, relative, limit(6, self.streams.relative.params().gate));
+                }
                 let factor = Held::Navigation((*relative).into());
                 self.smoother.add(&mut self.streams.relative, id, factor)?
             }
-            Measured::Anchor(anchor, trust) => {
+            Measured::Anchor(anchor) => {
                 let way = self.way()?;
                 let factor = AbsolutePose {
                     position: anchor.position - way.position,
@@ -159,8 +197,9 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
                     position_covariance: anchor.position_covariance + way.covariance,
                     rotation_covariance: anchor.rotation_covariance,
                 };
-                let stream = trusting(&mut self.streams.anchors, *trust);
-                self.smoother.add(stream, id, Held::Navigation(factor.into()))?
+                let admitted = self.admitted(anchor);
+                let admitted = self.settle(anchor, admitted)?;
+                add(&mut self.smoother, &mut self.streams.anchors, id, factor, admitted)?
             }
             Measured::Gnss(position, velocity, trust) => {
                 let way = self.way()?;
@@ -169,8 +208,11 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
                     covariance: position.covariance + way.covariance,
                     ..*position
                 };
-                let stream = trusting(&mut self.streams.positions, *trust);
-                let fused = self.smoother.add(stream, id, Held::Navigation(moved.into()))?;
+                let mut admitted = self.admitted(position);
+                if matches!(trust, Trust::Believed) {
+                    admitted = self.settle(position, admitted)?;
+                }
+                let fused = add(&mut self.smoother, &mut self.streams.positions, id, moved, admitted)?;
                 if let Some(velocity) = velocity {
                     let moved = GnssVelocity { velocity: velocity.velocity - way.velocity, ..*velocity };
                     // A receiver with a good position is trusted even if its velocity is refused.
@@ -189,6 +231,57 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
         };
         self.update()?;
         Ok(fused)
+    }
+
+    /// The log likelihood of a position, if the gate of the filter admits it.
+    fn admitted<M: Measurement<D>, const D: usize>(&self, measurement: &M) -> Result<f64, Refusal> {
+        let judged = self.copied().ok_or(Refusal::Noise)?.judge(measurement, SLACK)?;
+        if judged.nis <= FAR {
+            return Ok(judged.log_likelihood);
+        }
+        Err(Refusal::Gate { nis: judged.nis, limit: FAR })
+    }
+
+    /// Decides between the window and its newcomer by a position. Returns whether the window still admits it.
+    fn settle<M: Measurement<D>, const D: usize>(
+        &mut self,
+        measurement: &M,
+        admitted: Result<f64, Refusal>,
+    ) -> Result<Result<f64, Refusal>, Failure> {
+        let refusal = match admitted {
+            Ok(_) => Refusal::Gate { nis: FAR, limit: FAR },
+            Err(refusal @ Refusal::Gate { .. }) => refusal,
+            Err(_) => return Ok(admitted),
+        };
+        match Newcomer::settle(&mut self.newcomer, measurement, admitted.ok()) {
+            Settled::Kept => return Ok(admitted),
+            Settled::Left => {}
+            Settled::Due(newcomer) => self.take_over(&newcomer)?,
+            Settled::Unfit => {
+                let copied = self.copied();
+                self.newcomer = copied.and_then(|filter| Newcomer::new(filter, self.since_ns, measurement));
+            }
+        }
+        Ok(Err(refusal))
+    }
+
+    /// A filter in the present state, as uncertain as the newest keyframe.
+    fn copied(&self) -> Option<Eskf<Navigated, NAVIGATED>> {
+        let mut filter = Eskf::new(self.smoother.params().sensors).ok()?;
+        filter.adopt::<Smoothed, SMOOTHED>(&self.smoother.predicted()?, &self.smoother.covariance()?).ok()?;
+        Some(filter)
+    }
+
+    /// Restarts the window with the state of a newcomer.
+    fn take_over(&mut self, newcomer: &Newcomer<Eskf<Navigated, NAVIGATED>>) -> Result<(), Refusal> {
+        let filter = &newcomer.filter;
+        let estimate = filter.estimate().ok_or(Refusal::NotStarted)?;
+        let time_ns = estimate.time_ns;
+        self.smoother.adopt::<Navigated, NAVIGATED>(id_of(time_ns), estimate, filter.covariance())?;
+        self.begun(time_ns, newcomer.born_ns());
+        self.streams.anchors.forgive();
+        self.streams.positions.forgive();
+        Ok(())
     }
 
     fn way(&self) -> Result<Way, Refusal> {
@@ -256,35 +349,18 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
             return Err(refusal);
         }
         let mut covariance = self.smoother.covariance().ok_or(Refusal::Noise)?;
-        let estimate = Estimate { time_ns, ..self.smoother.estimate().ok_or(Refusal::NotStarted)? };
+        let now = self.smoother.estimate().ok_or(Refusal::NotStarted)?;
+        let (before_ns, estimate) = (now.time_ns, Estimate { time_ns, ..now });
         add_time(&mut covariance, &estimate.velocity, deviation_s);
+        let since_ns = self.since_ns.saturating_add(time_ns.saturating_sub(before_ns));
         self.smoother.adopt::<Smoothed, SMOOTHED>(id_of(time_ns), &estimate, &covariance)?;
-        self.is_converged = true;
-        self.cadence.begin(time_ns);
-        Ok(())
-    }
-
-    /// The window restarts with the present state.
-    pub(super) fn relocate(&mut self, place: &Place) -> Result<(), Refusal> {
-        if let Err(Failure::Refused(refusal) | Failure::Fatal(refusal)) = self.keyframe() {
-            return Err(refusal);
-        }
-        let mut covariance = self.smoother.covariance().ok_or(Refusal::Noise)?;
-        let mut estimate = self.smoother.estimate().ok_or(Refusal::NotStarted)?;
-        estimate.position = place.position.0 - estimate.world_from_body * place.lever_arm;
-        replace(&mut covariance, POSITION, &place.position.1);
-        if let Some((velocity, of_velocity)) = place.velocity {
-            estimate.velocity = velocity;
-            replace(&mut covariance, VELOCITY, &of_velocity);
-        }
-        self.smoother.adopt::<Smoothed, SMOOTHED>(id_of(estimate.time_ns), &estimate, &covariance)?;
-        self.is_converged = true;
-        self.streams.positions.forgive();
+        self.begun(time_ns, since_ns);
         Ok(())
     }
 
     /// The window restarts with the newest keyframe.
     pub(super) fn move_world(&mut self, new_from_old: &Isometry3<f64>) -> Result<(), Refusal> {
+        self.newcomer.take_if(|newcomer| newcomer.filter.move_world(new_from_old).is_err());
         // Otherwise samples since the newest keyframe would be lost.
         if let Err(Failure::Refused(refusal) | Failure::Fatal(refusal)) = self.keyframe() {
             return Err(refusal);
@@ -308,11 +384,22 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
     }
 }
 
-/// Replaces the covariance of three errors and clears their correlations with all others.
-fn replace(covariance: &mut SMatrix<f64, SMOOTHED, SMOOTHED>, first: usize, by: &Matrix3<f64>) {
-    covariance.rows_mut(first, 3).fill(0.0);
-    covariance.columns_mut(first, 3).fill(0.0);
-    covariance.fixed_view_mut::<3, 3>(first, first).copy_from(by);
+/// Adds a position that is admitted, and counts one that is not.
+fn add<F: ProvidedFactor>(
+    smoother: &mut FixedLagSmoother<Smoothed, SMOOTHED, Held<F>>,
+    stream: &mut Stream,
+    id: u64,
+    factor: impl Into<NavigationFactor>,
+    admitted: Result<f64, Refusal>,
+) -> Result<Fused, Refusal> {
+    match admitted {
+        Ok(_) => smoother.add(stream, id, Held::Navigation(factor.into())),
+        Err(refusal) => {
+            let result = Err(refusal);
+            stream.count(&result);
+            result
+        }
+    }
 }
 
 const _: () = assert!(SMOOTHED == Smoothed::DIMENSION);

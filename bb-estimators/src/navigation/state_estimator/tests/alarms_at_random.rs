@@ -144,7 +144,7 @@ impl Model {
                 EventKind::Added { input: InputKind::Gnss, waits, .. } => !waits,
                 EventKind::Revised { input: InputKind::Gnss } => true,
                 EventKind::Degraded { input: InputKind::Gnss, reason } => {
-                    matches!(reason, Reason::Raised { .. } | Reason::NotConverged)
+                    matches!(reason, Reason::Overruled { .. } | Reason::NotConverged)
                 }
                 // Of a fix, or of an anchor.
                 EventKind::Rejected { .. } => false,

@@ -170,7 +170,7 @@ fn an_anchor_starts_what_has_no_origin() {
 
 #[test]
 fn add_vio_and_add_pose_anchor_say_what_became_of_them() {
-    let flight = Flight::new(3, 1);
+    let flight = Flight::new(4, 1);
     for strategy in StrategyKind::ALL {
         let mut estimator = started(&flight, *strategy);
         assert_eq!(estimator.add_vio(flight.vio[0]), Ok(Added::Waits), "the IMU is not there yet");
@@ -188,8 +188,8 @@ fn add_vio_and_add_pose_anchor_say_what_became_of_them() {
             _ => matches!(refusal, crate::navigation::Refusal::NoKeyframe { .. }),
         };
         assert!(is_right, "{refusal:?}");
-        let anchor = PoseAnchor { time_ns: 30 * STEP, ..flight.anchors[0] };
-        // One second too early, it is far off.
+        let anchor = PoseAnchor { time_ns: 30 * STEP, ..flight.anchors[2] };
+        // Three seconds too early, it is far off.
         assert!(matches!(
             estimator.add_pose_anchor(anchor),
             Err(EstimatorError::Degraded(Reason::Refused(crate::navigation::Refusal::Gate { .. })))

@@ -15,8 +15,6 @@ pub(super) enum Provided {
     Place(NavigationFactor),
     /// This position along x, whatever its value.
     Along(f64),
-    /// Wherever the estimate is, as long as that is within 2 m of this position along x. Otherwise far away.
-    Near(f64),
     /// Always 8 m ahead of the estimate along x, so that iterating does not converge.
     Ahead,
     /// Sets no rows.
@@ -40,8 +38,6 @@ impl<S: States, const N: usize> Factor<S, N> for Provided {
             Self::Elsewhere => return Err(Refusal::OutOfRange),
             Self::Place(factor) => return Factor::<S, N>::linearise(factor, previous, at, rows),
             Self::Along(value) => (value - x, 1.0),
-            Self::Near(value) if (value - x).abs() < 2.0 => (0.0, 1.0),
-            Self::Near(_) => (1e12, 1.0),
             Self::Ahead => (8.0, 0.1),
             Self::Unset => return Ok(()),
             Self::Unnamed => (0.0, 1.0),

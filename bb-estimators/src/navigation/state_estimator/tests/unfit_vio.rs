@@ -1,6 +1,6 @@
 //! Relative poses that do not fit: one alone, several in a row, and a camera that is wrong for seconds.
 
-use super::flight::{FRAME, SECOND};
+use super::flight::FRAME;
 use super::*;
 use crate::navigation::Refusal;
 use nalgebra::Vector3;
@@ -23,7 +23,6 @@ fn flown(
                     assert!(!error.is_fatal(), "{error}");
                     reasons.push(error.reason());
                 }
-                // After a wrong way was believed, a few right ones do not fit.
                 None => ignore(estimator.add_vio(*vio)),
             },
             sent => ignore(sent.to(&mut estimator)),
@@ -52,28 +51,24 @@ fn one_that_does_not_fit_is_refused_and_moves_nothing() {
 }
 
 #[test]
-fn the_fourth_in_a_row_is_believed_with_the_covariance_raised() {
+fn several_in_a_row_are_refused_and_told() {
     for strategy in StrategyKind::ALL {
         let (flight, estimator, reasons, outputs) =
             flown(*strategy, |frame| (100..104).contains(&frame).then(|| Vector3::new(5.0, 0.0, 0.0)));
         let name = strategy.name();
-        assert!(reasons.len() == 4 && reasons[..3].iter().all(is_gated), "{name}: {reasons:?}");
-        assert!(matches!(reasons[3], Reason::Raised { factor } if factor > 100.0), "{name}: {reasons:?}");
-        // From the third refusal on, until five anchors in a row have fitted.
-        let first = outputs.iter().find(|output| output.degraded).unwrap();
-        assert!((102 * FRAME..=104 * FRAME).contains(&first.time_ns), "{name}: {}", first.time_ns);
-        let since = |output: &&EstimatorOutput| output.time_ns > 104 * FRAME;
-        let trusted = outputs.iter().filter(since).find(|output| !output.degraded).unwrap();
-        assert!((15 * SECOND..23 * SECOND).contains(&trusted.time_ns), "{name}: {}", trusted.time_ns);
-        // The smoother also refuses the next right ones, until one of them overrules the wrong way: it is told all the time.
+        assert!(reasons.len() == 4 && reasons.iter().all(is_gated), "{name}: {reasons:?}");
+        // From the third refusal on, for a second.
+        let degraded: Vec<i64> =
+            outputs.iter().filter(|output| output.degraded).map(|output| output.time_ns).collect();
+        assert!((5..=7).contains(&degraded.len()), "{name}: {degraded:?}");
+        assert!(
+            degraded.iter().all(|time_ns| (102 * FRAME..=114 * FRAME).contains(time_ns)),
+            "{name}: {degraded:?}"
+        );
         for output in &outputs {
-            let (error_m, _) = flight.error(output);
-            assert!(output.degraded || error_m < 5.0, "{name}: {error_m} m at {}", output.time_ns);
+            assert!(flight.error(output).0 < 5.0 && output.resets == 0, "{name}: {output:?}");
         }
-        let now = outputs[outputs.len() - 1];
         assert_eq!(estimator.health().state, HealthState::Tracking, "{name}");
-        assert!(now.resets >= 1, "{name}: it has jumped");
-        assert!(flight.error(&now).0 < 4.0, "{name}: {} m", flight.error(&now).0);
     }
 }
 
@@ -87,11 +82,7 @@ fn a_storm_degrades_and_passes() {
         });
         let name = strategy.name();
         assert_eq!(reasons.len(), 30, "{name}");
-        assert!(reasons[..3].iter().all(is_gated), "{name}: {reasons:?}");
-        assert!(
-            reasons.iter().all(|reason| is_gated(reason) || matches!(reason, Reason::Raised { .. })),
-            "{name}: {reasons:?}"
-        );
+        assert!(reasons.iter().all(is_gated), "{name}: {reasons:?}");
         for output in &outputs {
             let (error_m, _) = flight.error(output);
             let is_storm = (83 * FRAME..110 * FRAME).contains(&output.time_ns);
