@@ -20,7 +20,7 @@ fn read(file: &str) -> String {
 }
 
 /// The folders of the crates with code that others use.
-const CRATES: [&str; 11] = [
+const CRATES: [&str; 12] = [
     "bb-macros",
     "bb-core",
     "bb-estimators",
@@ -32,6 +32,7 @@ const CRATES: [&str; 11] = [
     "integrations/metrics",
     "integrations/plot",
     "integrations/redb",
+    "integrations/ros2",
 ];
 
 /// Returns all files of the project below a folder, without those that are built or hidden.
