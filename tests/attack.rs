@@ -1,7 +1,7 @@
 //! An attack on the headings that `Mekf` trusts: random bodies in random fields, sampled by random clocks.
 //!
 //! A heading that the filter trusts should be within three of its standard deviations but for 2 % of a run, in every run. It is
-//! in more than nine of ten; `book/src/explanation/attitude-filter.md` says which are left.
+//! in more than nine of ten; `book/src/laboratory/attitude.md` says which are left.
 
 use bb_core::nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use bb_estimators::attitude::{ImuSample, OrientationError};

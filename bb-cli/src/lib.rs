@@ -1,5 +1,5 @@
 //! The command `bb`: inspects, plots and converts recordings, evaluates filters on them, and creates projects. The
-//! guide is `book/src/how-to/command.md`; that of `bb eval`, which is `bb-eval` on the command line, is `book/src/how-to/evaluate.md`.
+//! guide is `book/src/reference/command.md`; that of `bb eval`, which is `bb-eval` on the command line, is `book/src/how-to/evaluate.md`.
 
 // A robot must not stop because of an unexpected value.
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]

@@ -21,6 +21,27 @@
 //!
 //! Each module uses only those above it in this table.
 //!
+//! ```
+//! use bb_core::prelude::*;
+//!
+//! robot! {
+//!     robot Kite;
+//!     link body { sensor imu: External<Imu>(); }
+//! }
+//!
+//! fn main() -> Result<(), StartError> {
+//!     let builder = Kite::builder();
+//!     let samples = builder.subscribe(kite::sensor::body::imu);
+//!     let mut simulation = builder.simulate()?; // or `start()`, in real time
+//!     let sample = Imu::new([0.0; 3].into(), [0.0, 0.0, 9.81].into());
+//!     simulation.publish(kite::sensor::body::imu, simulation.clock().now(), sample);
+//!     assert_eq!(samples.drain().count(), 1);
+//!     Ok(())
+//! }
+//! ```
+//!
+//! Filters are in `bb-estimators`, recordings in `bb-mcap`. The book in `book/` has a tutorial.
+//!
 //! All stored quantities are SI: metres, seconds, radians, kilograms, tesla.
 
 // A robot must not stop because a value was not what it was assumed to be.

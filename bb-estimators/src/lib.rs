@@ -1,9 +1,43 @@
-//! Attitude filters and their fusion, and navigation.
+//! Attitude filters, and navigation with and without satellites.
 //!
-//! Each algorithm is a plain value, values in, values out, without a runtime: the modules below [`attitude`], in
-//! `f64` or `f32`, and [`navigation`], in `f64`. They build without the feature `runtime` and without the standard
-//! library.
-//! The estimators at the top of this crate wrap attitude filters for `robot!`:
+//! Each algorithm is a plain value, values in, values out:
+//!
+//! | filter | estimates |
+//! |---|---|
+//! | [`MekfFilter`](attitude::MekfFilter), [`VqfFilter`](attitude::VqfFilter), [`MadgwickFilter`](attitude::MadgwickFilter) and others of [`attitude`] | orientation, in `f64` or `f32` |
+//! | [`navigation::Eskf`], with [`navigation::History`] for late measurements | position, velocity, attitude, biases |
+//! | [`navigation::planar::PlanarEkf`] | the same on flat ground |
+//! | [`navigation::FixedLagSmoother`] | the last keyframes, with landmarks |
+//! | `navigation::state_estimator::StateEstimator`, with the feature `smoother` or `eskf` | a flight without satellite navigation |
+//! | [`calibration`] | offsets, scale, misalignment and noise of an IMU |
+//!
+//! ```
+//! use bb_estimators::attitude::{AttitudeFilter, ImuSample, MekfFilter, MekfParams};
+//!
+//! let mut filter = MekfFilter::<f64>::new(MekfParams::default())?;
+//! for step in 0..100 {
+//!     filter.update(&ImuSample {
+//!         time_ns: step * 5_000_000,
+//!         angular_velocity: [0.0, 0.0, 0.1].into(),
+//!         specific_force: [0.0, 0.0, 9.81].into(),
+//!         magnetic_field: None,
+//!     })?;
+//! }
+//! println!("{:?}", filter.world_from_body());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Without the feature `runtime` the crate does not depend on `bb-core`, and without `std` it is `no_std`; attitude filters and `Eskf` do
+//! not allocate:
+//!
+//! ```toml
+//! [dependencies]
+//! bb-estimators = { path = "…/bb-estimators", default-features = false, features = ["std"] }
+//! ```
+//!
+//! # In a robot
+//!
+//! The types at the top of this crate are the same as estimators of `robot!`:
 //!
 //! | declared as | takes | emits |
 //! |---|---|---|
@@ -13,7 +47,6 @@
 //! | `Vqf<Marg, AttitudeOutputs>(…)`, … | as before | `output orientation`, and `output status`: bias, rest, disturbance |
 //! | `Calibrated<Marg>(…)` in a sensor | the sensor's `Imu` or `Marg` | the same, calibrated |
 //! | `OrientationAverage(…)` on a link | `input first` and `input second`: `Orientation` | `Orientation` of the link |
-//!
 //! | `Eskf(…)` on a link | `input imu`, driver, and any of `input gnss`, `input odometry`, `input pose` and `input magnetic_field` | `Odometry` of the link |
 //! | `Eskf<NavigationOutputs>(…)` | as before | `output odometry`, and `output status`: biases, dead reckoning, refusals |
 //! | `Eskf<Odometry, S, { S::DIMENSION }>(…)` | as before, with other [states](navigation::States) `S` than those that its inputs bring | as before |

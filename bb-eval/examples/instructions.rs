@@ -1,4 +1,4 @@
-//! Plays samples in motion through one filter, for callgrind to count; the commands are in `book/src/how-to/attitude.md`.
+//! Plays samples in motion through one filter, for callgrind to count; the commands are in `book/src/laboratory/attitude.md`.
 //!
 //! `instructions FILE FILTER six|nine UPDATES [each]`: in one call, as `benches/peers` counts; with `each` one call an update.
 

@@ -5,6 +5,18 @@
 //! `Recording`, and `play_navigation` navigation filters, each declared in a robot, on a `Drive`, of CSV files or of a
 //! `NavigationBag`; with `plot`, `plot_errors` and `plot_navigation` draw the errors. `bb eval` is this library on the command line; its
 //! guide is `book/src/how-to/evaluate.md`.
+//!
+//! ```
+//! use bb_core::nalgebra::UnitQuaternion;
+//! use bb_eval::Score;
+//!
+//! let truth = UnitQuaternion::identity();
+//! let mut score = Score::default();
+//! score.add(&UnitQuaternion::from_euler_angles(0.0, 0.0, 0.02), Some(&truth), true);
+//! let rms = score.rms().ok_or("no sample has counted")?;
+//! assert!((rms.heading - 0.02_f64.to_degrees()).abs() < 1e-9 && rms.inclination < 1e-9);
+//! # Ok::<(), &str>(())
+//! ```
 
 // A robot must not stop because of an unexpected value.
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]

@@ -304,7 +304,7 @@ pub(crate) fn hash(file: &Path) -> u64 {
     bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
-/// SplitMix64. It is kept although other code uses a crate's generator: the tables of `book/src/how-to/attitude.md` were
+/// SplitMix64. It is kept although other code uses a crate's generator: the tables of `book/src/laboratory/attitude.md` were
 /// measured with its numbers, and a recording has the same variants in every version.
 #[derive(Debug)]
 pub(crate) struct Random(u64);

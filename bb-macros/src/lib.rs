@@ -1,4 +1,5 @@
-//! The `robot!` macro and the derives of `bb-core`, which re-exports them: use them from there.
+//! The `robot!` macro and the derives of `bb-core`, which re-exports them: use them from there, and read its documentation of
+//! `robot!` for the language.
 //!
 //! A robot goes through four phases, each in the folder of its name:
 //!

@@ -85,6 +85,16 @@ fn summary_names_each_page_of_the_book_once() {
 }
 
 #[test]
+fn chapters_of_the_tutorial_are_short() {
+    let chapters =
+        pages().into_iter().filter(|page| page.parent().is_some_and(|folder| folder.ends_with("tutorial")));
+    let lengths: Vec<usize> =
+        chapters.map(|page| std::fs::read_to_string(page).expect("it is there").lines().count()).collect();
+    assert!(lengths.len() == 6 && lengths.iter().all(|length| *length <= 150), "{lengths:?}");
+    assert!(read("README.md").lines().count() <= 150);
+}
+
+#[test]
 fn every_link_leads_to_a_place() {
     let documents = ["ARCHITECTURE.md", "CONTRIBUTING.md", "README.md"].map(|document| root().join(document));
     let mut checked = 0;

@@ -13,10 +13,10 @@ const ACCELEROMETER: f64 = 2e-3;
 const WALK: f64 = 1e-4;
 const RATE: f64 = 100.0;
 
-type Sample = (i64, V<f64>, V<f64>);
+pub(crate) type Sample = (i64, V<f64>, V<f64>);
 
 /// An IMU at rest: white noise, and a gyroscope whose bias walks.
-fn night(seed: u64, seconds: f64) -> Vec<Sample> {
+pub(crate) fn night(seed: u64, seconds: f64) -> Vec<Sample> {
     let mut noise = Noise::new(seed);
     let mut bias = V::new(0.01, -0.02, 0.005);
     let sample = |i: i64| {
@@ -27,7 +27,7 @@ fn night(seed: u64, seconds: f64) -> Vec<Sample> {
     (0..(seconds * RATE) as i64).map(sample).collect()
 }
 
-fn bag(name: &str, samples: &[Sample]) -> PathBuf {
+pub(crate) fn bag(name: &str, samples: &[Sample]) -> PathBuf {
     let mut maker = bags::Maker::new(mcap::WriteOptions::new());
     let topic = maker.topic("/imu", "sensor_msgs/msg/Imu");
     let vector = |v: &V<f64>| Vector3 { x: v.x, y: v.y, z: v.z };

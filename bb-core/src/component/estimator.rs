@@ -2,7 +2,7 @@
 
 use super::{Context, Fault, Info, InputTransforms, Inputs, Options, Outputs, Request, RequestCodec, Termination};
 
-/// Consumes messages and emits derived state. See the crate's README for one from scratch.
+/// Consumes messages and emits derived state. The book has one from scratch, in its chapter on drivers.
 ///
 /// The estimator stays a plain value: it knows no path, no subscriber and no thread, and is tested by calling it.
 ///

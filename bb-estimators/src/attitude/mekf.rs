@@ -3,7 +3,7 @@
 //! F. L. Markley, "Attitude error representations for Kalman filtering", Journal of Guidance, Control, and Dynamics
 //! 26(2), 2003, for the error state; D. Laidig, T. Seel, "VQF: Highly accurate IMU orientation estimation with bias
 //! estimation and magnetic disturbance rejection", Information Fusion 91, 2023, for typical sensor errors, and for
-//! rest and disturbances. `book/src/explanation/attitude-filter.md` has the ablations and the comparison.
+//! rest and disturbances. `book/src/laboratory/attitude.md` has the ablations and the comparison.
 //!
 //! Nine states: the rotation error in the world, the gyroscope's bias, the horizontal velocity, and the lag of the
 //! magnetometer. Samples are integrated at once, errors propagated once per window. The offset of the magnetometer is a

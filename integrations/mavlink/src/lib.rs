@@ -9,6 +9,21 @@
 //! | [`MavlinkHeartbeat`] | [`FlightController`], with the counts of the link | `HEARTBEAT` |
 //! | [`MavlinkSender`], a bridge | sends estimates and texts | `GPS_INPUT` or `ODOMETRY`, `STATUSTEXT`, `HEARTBEAT` |
 //!
+//! ```no_run
+//! use bb_core::prelude::*;
+//! use bb_mavlink::MavlinkImu;
+//!
+//! robot! {
+//!     robot Drone;
+//!     link base { sensor imu: MavlinkImu(link = "udpin:0.0.0.0:14540".into()); }
+//! }
+//!
+//! fn main() -> Result<(), StartError> {
+//!     Drone::builder().start()?.wait();
+//!     Ok(())
+//! }
+//! ```
+//!
 //! All components that name the same [`Address`] share one connection, which one thread reads. It sends a heartbeat
 //! once a second: that of each [`MavlinkSender`], or of the onboard computer (1, 191) if there is none, so that a
 //! peer that waits for a first message answers.

@@ -3,6 +3,24 @@
 //! An [`Exporter`] takes a new report of the robot for each scrape: the robot itself does nothing more than without it.
 //! [`Exporter::render`] gives the text, [`Exporter::serve`] answers `GET /metrics`.
 //!
+//! ```
+//! use bb_core::prelude::*;
+//! use bb_metrics::Exporter;
+//!
+//! robot! {
+//!     robot Counted;
+//!     link base { sensor imu: External<Imu>(); }
+//! }
+//!
+//! fn main() -> Result<(), Box<dyn std::error::Error>> {
+//!     let running = Counted::builder().start()?;
+//!     let server = Exporter::new(running.live()).serve("127.0.0.1:0")?; // until it is dropped
+//!     println!("http://{}/metrics", server.address());
+//!     running.stop().ok()?;
+//!     Ok(())
+//! }
+//! ```
+//!
 //! | metric | labels beside `robot` | what |
 //! |---|---|---|
 //! | `bb_estimator_messages_received_total` | `estimator`, `input` | messages that arrived, the dropped ones included |

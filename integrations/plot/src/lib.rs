@@ -1,4 +1,16 @@
 //! Plots of lines over time or another quantity, as SVG or PNG: a [`Picture`] of panels, or a [`Sheet`] of panels and planes.
+//!
+//! ```
+//! use bb_plot::{Line, PALETTE, Panel, Picture};
+//!
+//! let roll: Vec<_> = (0..100).map(|step| (f64::from(step) * 0.1, Some(f64::from(step).sin()))).collect();
+//! let panel = Panel::new("roll (deg)", vec![Line::new("estimate", PALETTE[0], 1, &roll)]);
+//! let picture = Picture { title: "walk".into(), panels: vec![panel], panel_size: (900, 250) };
+//! let file = std::env::temp_dir().join(format!("bb-plot-{}.svg", std::process::id()));
+//! picture.write(&file)?;
+//! # std::fs::remove_file(file).map_err(|error| error.to_string())?;
+//! # Ok::<(), String>(())
+//! ```
 
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

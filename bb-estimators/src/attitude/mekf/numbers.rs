@@ -1,4 +1,4 @@
-//! All numbers of the filter, each with its unit and its reason. `book/src/explanation/attitude-filter.md` has the ablation: what the errors
+//! All numbers of the filter, each with its unit and its reason. `book/src/laboratory/attitude.md` has the ablation: what the errors
 //! are without a part, or with another value.
 
 use core::f64::consts::PI;
