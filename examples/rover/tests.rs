@@ -21,10 +21,10 @@ fn another_filter_is_four_other_lines() {
     let differ: Vec<_> = one.lines().zip(other.lines()).filter(|(one, other)| one != other).collect();
     assert_eq!((one.lines().count(), differ.len()), (other.lines().count(), 4), "{differ:#?}");
     // Which are these, as the guide shows them.
-    let guide = include_str!("../../docs/planar.md");
+    let guide = include_str!("../../book/src/how-to/planar.md");
     for (one, other) in differ {
-        assert!(guide.contains(&format!("-{}\n", one.trim())), "docs/planar.md lacks -{}", one.trim());
-        assert!(guide.contains(&format!("+{}\n", other.trim())), "docs/planar.md lacks +{}", other.trim());
+        assert!(guide.contains(&format!("-{}\n", one.trim())), "book/src/how-to/planar.md lacks -{}", one.trim());
+        assert!(guide.contains(&format!("+{}\n", other.trim())), "book/src/how-to/planar.md lacks +{}", other.trim());
     }
 }
 

@@ -39,6 +39,6 @@ compiled! {
     TutorialFailingSensors: "book/src/tutorial/4-failing-sensors.md",
     TutorialRover: "book/src/tutorial/5-rover.md",
     TutorialNoSatellites: "book/src/tutorial/6-no-satellites.md",
-    Navigation: "docs/navigation.md",
-    Planar: "docs/planar.md",
+    Navigation: "book/src/how-to/navigation.md",
+    Planar: "book/src/how-to/planar.md",
 }

@@ -240,7 +240,7 @@ mod tests {
             let expected = std::fs::read_to_string(&stored).expect("it is stored");
             assert_eq!(screen, expected, "read it, then store it with UPDATE_TOP=1");
             assert!(
-                width != 80 || include_str!("../../../docs/live.md").contains(&screen),
+                width != 80 || include_str!("../../../book/src/how-to/live.md").contains(&screen),
                 "the guide shows another"
             );
         }

@@ -31,7 +31,7 @@
 //! It listens on the loopback device. A page or a program without the token of the printed address may read, and disarm the robot; with
 //! [`DashboardOptions::read`]` = "token"`, only disarm it. With the token it has the rights of [`DashboardOptions::rights`]. Their calls
 //! have a name, such as `page 3`, in the events and the journal of the robot, and whatever they hold refuses to act once the connection ends.
-//! Requests by another host name or from another site's pages are refused. `docs/live.md` has the protocol, and what is refused and why.
+//! Requests by another host name or from another site's pages are refused. `book/src/how-to/live.md` has the protocol, and what is refused and why.
 
 mod bridge;
 mod connections;
