@@ -20,7 +20,7 @@ pub(crate) struct Live {
     /// else `http://127.0.0.1:8912`.
     #[arg(long, value_name = "ADDRESS", global = true)]
     robot: Option<Address>,
-    /// Of several robots at one address, the name of one.
+    /// Name of one of several robots at the address.
     #[arg(long, value_name = "NAME", global = true)]
     name: Option<String>,
     /// Prints JSON instead of text: one value, or one on each line.

@@ -24,7 +24,11 @@ fn another_filter_is_four_other_lines() {
     let guide = include_str!("../../book/src/how-to/planar.md");
     for (one, other) in differ {
         assert!(guide.contains(&format!("-{}\n", one.trim())), "book/src/how-to/planar.md lacks -{}", one.trim());
-        assert!(guide.contains(&format!("+{}\n", other.trim())), "book/src/how-to/planar.md lacks +{}", other.trim());
+        assert!(
+            guide.contains(&format!("+{}\n", other.trim())),
+            "book/src/how-to/planar.md lacks +{}",
+            other.trim()
+        );
     }
 }
 

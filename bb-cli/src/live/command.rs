@@ -116,7 +116,7 @@ fn table(commands: &[Value]) -> String {
     aligned(&rows, 3, usize::MAX)
 }
 
-/// How far an execution has come, after a comma: `, share 0.25`; empty if it does not say.
+/// Formats the progress of an execution, after a comma: `, share 0.25`; empty if it does not say.
 pub(super) fn progress(progress: &Value) -> String {
     match progress {
         Value::Null => String::new(),

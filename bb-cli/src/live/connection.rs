@@ -19,9 +19,9 @@ pub(super) struct Robot {
     next: u64,
     /// Messages that came while an answer was awaited.
     kept: VecDeque<Value>,
-    /// Whether a report has come. The first is the last one that was made, perhaps before this connection.
+    /// `true` once a report has come. The first is the last one that was made, perhaps before this connection.
     has_report: bool,
-    /// Who it is, what it consists of, and what this connection may do.
+    /// Name and parts of the robot, and the rights of this connection.
     pub(super) welcome: Value,
 }
 
@@ -60,7 +60,7 @@ impl Robot {
         Ok(robot)
     }
 
-    /// What it consists of.
+    /// Parts of the robot.
     pub(super) fn description(&self) -> &Value {
         &self.welcome["description"]
     }

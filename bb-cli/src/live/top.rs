@@ -192,7 +192,7 @@ fn wrapped(text: &str, width: usize) -> impl Iterator<Item = String> {
     lines.into_iter()
 }
 
-/// At most `width` characters, the last of which says that there were more.
+/// Cuts a text to `width` characters, the last of which says that there were more.
 fn cut(text: &str, width: usize) -> String {
     if text.chars().count() <= width {
         return text.to_owned();

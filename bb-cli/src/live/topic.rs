@@ -35,16 +35,16 @@ enum What {
     Hz {
         /// The paths; by default all.
         paths: Vec<String>,
-        /// How long to count, in seconds of the robot's clock.
+        /// Time to count, in seconds of the robot's clock.
         #[arg(long, default_value_t = 2.0, value_name = "S")]
         seconds: f64,
     },
     /// Plots fields of messages as they come: at most sixteen a second.
     Plot {
-        /// What to plot: a field of a topic with all numbers in it, such as `sensor/base/imu.angular_velocity`, or a whole topic.
+        /// Field of a topic with all numbers in it, such as `sensor/base/imu.angular_velocity`, or a whole topic.
         #[arg(value_name = "PATH[.FIELD]", required = true)]
         fields: Vec<String>,
-        /// How long, in seconds of the robot's clock.
+        /// Length of the plot, in seconds of the robot's clock.
         #[arg(long, default_value_t = 10.0, value_name = "S")]
         seconds: f64,
         /// The SVG or PNG file to write; an existing one is replaced.

@@ -26,8 +26,7 @@ fn scratch(name: &str, document: &str) -> PathBuf {
         folder.join("poses.mcap"),
     )
     .expect("copies");
-    std::fs::copy(cart::cart(&format!("guide_cart_{name}.mcap"), true), folder.join("own.mcap"))
-        .expect("copies");
+    std::fs::copy(cart::cart(&format!("guide_cart_{name}.mcap"), true), folder.join("own.mcap")).expect("copies");
     std::fs::write(folder.join("oxts.txt"), oxts()).expect("writes");
     std::fs::create_dir_all(folder.join("Nexus5_AR")).expect("makes");
     for (name, text) in smartphone() {

@@ -13,7 +13,7 @@ use std::time::Instant;
 /// A number.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 struct Level {
-    /// How much.
+    /// Amount.
     value: f64,
 }
 
@@ -37,7 +37,7 @@ impl Estimator for Pass {
 /// Arguments of [`Travel`].
 #[derive(Clone, Copy, Debug, Payload)]
 struct Distance {
-    /// How far.
+    /// Distance.
     #[payload(unit = "m")]
     distance: f64,
 }
@@ -48,7 +48,7 @@ impl Default for Distance {
     }
 }
 
-/// How much of the way is behind it.
+/// Share of the way that is behind it.
 #[derive(Clone, Copy, Debug, Payload)]
 struct Way {
     share: f64,
@@ -73,7 +73,7 @@ impl Command for Travel {
 robot! {
     robot Cart;
     parameters {
-        /// How fast it drives.
+        /// Speed.
         speed: f64 = 0.5 m/s, range: 0 m/s..=1.5 m/s;
         /// Name of the mission.
         mission: String = "survey";
@@ -88,7 +88,7 @@ robot! {
     }
 }
 
-/// What was printed, as in a terminal.
+/// Returns the printed text, as a terminal shows it.
 fn transcript(arguments: &[&str], Output { code, out, err }: Output) -> String {
     let words = arguments
         .iter()

@@ -15,9 +15,9 @@ use crate::params::params;
 mod tests;
 
 params! {
-    /// What is taken for rest, and what the sensors are like.
+    /// Criteria of rest, and accuracy of the sensors at a start from rest.
     pub struct AlignmentParams {
-        /// How long rest must last.
+        /// Least duration of the rest.
         ///
         /// Small: starts soon. Large: the bias of the gyroscope is better known.
         rest_time: f64 = 1.0, in 0.0..=1e6, unit "s";
@@ -96,7 +96,7 @@ impl Alignment {
         Ok(())
     }
 
-    /// How long the body has been at rest, s.
+    /// Returns the time for which the body has been at rest, s.
     pub fn rest_s(&self) -> f64 {
         self.first_ns.map_or(0.0, |first_ns| self.last_ns.saturating_sub(first_ns) as f64 * 1e-9)
     }

@@ -9,12 +9,12 @@ pub(in crate::navigation) const MOST_ROTATION: f64 = 4e5;
 /// The largest component of a position or velocity of anything on the Earth, m or m/s.
 const FARTHEST: f64 = 1e9;
 
-/// Whether a position (m) or velocity (m/s) is possible for something on the Earth. `false` for NaN.
+/// Returns whether a position (m) or velocity (m/s) is possible for something on the Earth. `false` for NaN.
 pub(in crate::navigation) fn is_on_earth<'a>(components: impl IntoIterator<Item = &'a f64>) -> bool {
     is_within(components, FARTHEST)
 }
 
-/// Whether no component exceeds the bound in magnitude. `false` if one is NaN.
+/// Returns whether no component exceeds the bound in magnitude. `false` if one is NaN.
 pub(in crate::navigation) fn is_within<'a>(components: impl IntoIterator<Item = &'a f64>, most: f64) -> bool {
     components.into_iter().all(|x| x.abs() <= most)
 }

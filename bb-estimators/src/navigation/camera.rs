@@ -81,7 +81,7 @@ impl Camera {
         }
     }
 
-    /// Whether every number is finite and all lengths and sizes are positive.
+    /// Returns whether every number is finite and all lengths and sizes are positive.
     pub(in crate::navigation) fn is_sound(&self) -> bool {
         let lengths = [self.focal_length, self.size];
         let finite = |values: &[f64]| values.iter().all(|x| x.is_finite());

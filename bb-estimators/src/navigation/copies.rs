@@ -96,7 +96,7 @@ pub struct Ways {
 pub struct Copies<F: CopiedFilter> {
     params: F::Params,
     ways: Ways,
-    /// At least one once it has started, the best first.
+    /// Copies of the filter, at least one once it has started, the best first.
     starts: Vec<Begun<F>>,
     search: Search<F>,
     newcomer: Option<Newcomer<F>>,

@@ -33,7 +33,7 @@ impl<const N: usize> Covariance<N> {
         &self.matrix
     }
 
-    /// How often a check failed and variances were raised.
+    /// Returns the number of times that a check failed and variances were raised.
     pub(in crate::navigation) fn repairs(&self) -> u64 {
         self.repairs
     }
@@ -239,7 +239,7 @@ impl<const N: usize> Covariance<N> {
         }
     }
 
-    /// Whether a Cholesky decomposition exists.
+    /// Returns whether a Cholesky decomposition exists.
     pub(in crate::navigation) fn is_positive_definite(&self) -> bool {
         is_regular(N, self.rows().as_flattened(), 0.0)
     }

@@ -65,9 +65,9 @@ pub trait Replayed: Clone {
 /// The outcome of adding a measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Placed {
-    /// It was fused.
+    /// Measurement that was fused.
     Fused(Fused),
-    /// It is newer than the last IMU sample and waits for the next.
+    /// Measurement that is newer than the last IMU sample and waits for the next.
     Waits,
 }
 

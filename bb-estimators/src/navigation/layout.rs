@@ -15,7 +15,7 @@ const MOST_DEVIATIONS: f64 = 100.0;
 /// The largest meaningful variance of each error.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::navigation) struct Layout<const N: usize> {
-    /// In the squares of the errors' units.
+    /// Largest variances, in the squares of the errors' units.
     pub(in crate::navigation) largest: [f64; N],
     /// Above this variance the filter is lost.
     pub(in crate::navigation) lost: [f64; N],
@@ -68,7 +68,7 @@ impl<const N: usize> Layout<N> {
         }
     }
 
-    /// Whether a filter can be wrong by this correction. `false` for NaN.
+    /// Returns whether a filter can be wrong by this correction. `false` for NaN.
     #[inline]
     pub(in crate::navigation) fn admits(&self, error: &nalgebra::SVector<f64, N>) -> bool {
         let most = MOST_DEVIATIONS * MOST_DEVIATIONS;

@@ -1,4 +1,4 @@
-//! What a `History` needs of a filter to replay it.
+//! Interface of a filter that a `History` replays.
 
 use super::eskf::{Eskf, ImuMean, LONGEST_GAP_S, seconds_between};
 use super::refusal::Refusal;

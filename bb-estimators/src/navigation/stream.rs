@@ -14,7 +14,7 @@ const DIMENSIONS: usize = 7;
 const MOST_RAISED: f64 = 1e6;
 
 params! {
-    /// How the measurements of one sensor are judged.
+    /// Parameters by which the measurements of one sensor are judged.
     pub struct StreamParams {
         /// Factor on the variance of every measurement.
         variance_factor: f64 = 1.0, in 1e-12..=1e12;
@@ -34,7 +34,7 @@ params! {
         ///
         /// Small: the weights of a least-squares filter. Large: closer to a median.
         robust: f64 = 0.0, in 0.0..=1.0;
-        /// How fast the noise of the sensor adapts to its innovations: the relative change of its variance per
+        /// Speed at which the noise of the sensor adapts to its innovations: the relative change of its variance per
         /// measurement. 0: never.
         ///
         /// Small: the noise is as given. Large: follows each innovation.
@@ -68,7 +68,7 @@ pub struct Counts {
     pub gate_in_a_row: u64,
 }
 
-/// Whether the gate is applied.
+/// Application of the gate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Gate {
     /// Measurements that are too far off are rejected.
@@ -78,7 +78,7 @@ pub(crate) enum Gate {
     Open,
 }
 
-/// How a measurement is fused.
+/// Result of judging a measurement.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Verdict {
     pub(crate) weight: f64,

@@ -38,7 +38,7 @@ pub(super) trait Composed<const N: usize>: Sized {
     /// The variance of the attitude, rad², if a measurement is curved in it.
     fn curvature(innovation: &Innovation<'_>, covariance: &Covariance<N>) -> f64;
 
-    /// Whether a measurement observes a horizontal position in the world.
+    /// Returns whether a measurement observes a horizontal position in the world.
     fn fixes_position(innovation: &Innovation<'_>) -> bool;
 }
 
@@ -47,7 +47,7 @@ pub(super) trait Composed<const N: usize>: Sized {
 pub(super) struct Updated<E> {
     pub(super) estimate: E,
     pub(super) fused: Fused,
-    /// Whether it was a position in the world.
+    /// `true` for a position in the world.
     pub(super) is_fix: bool,
 }
 

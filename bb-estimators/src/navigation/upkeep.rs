@@ -1,11 +1,11 @@
 //! Records of a filter's past, and the queries common to all filters.
 
-/// How often a filter started and bridged gaps, and when its position was last corrected.
+/// Counts of a filter's starts and bridged gaps, and the time at which its position was last corrected.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(in crate::navigation) struct Upkeep {
     pub(in crate::navigation) resets: u32,
     pub(in crate::navigation) gaps: u32,
-    /// When the position was last corrected by a position in the world.
+    /// Time at which the position was last corrected by a position in the world.
     pub(in crate::navigation) fixed_ns: i64,
 }
 
@@ -25,17 +25,17 @@ impl Upkeep {
 /// Methods that report a filter's past, for a filter with the fields `estimate`, `covariance` and `upkeep`.
 macro_rules! upkeep_methods {
     () => {
-        /// Whether the covariance is currently positive definite, by a Cholesky decomposition.
+        /// Returns whether the covariance is currently positive definite, by a Cholesky decomposition.
         pub fn is_consistent(&self) -> bool {
             self.covariance.is_positive_definite()
         }
 
-        /// How often rounding had made the covariance indefinite, so that variances were raised.
+        /// Returns the number of times that rounding had made the covariance indefinite, so that variances were raised.
         pub fn repairs(&self) -> u64 {
             self.covariance.repairs()
         }
 
-        /// How often the filter was started or relocated.
+        /// Returns the number of times that the filter was started or relocated.
         pub fn resets(&self) -> u32 {
             self.upkeep.resets
         }

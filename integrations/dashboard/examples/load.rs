@@ -1,4 +1,4 @@
-//! What viewers cost a robot: ten sensors at 1 kHz in real time, alone, then with a viewer that watches all of them, then under attack.
+//! Cost of viewers for a robot: ten sensors at 1 kHz in real time, alone, then with a viewer that watches all of them, then under attack.
 //!
 //! Prints the processor time of the whole process, how long it takes to publish a message, and the memory. On Linux alone:
 //! `cargo run --release -p bb-dashboard --example load`. `--serve SECONDS` only serves the robot, for a browser, and prints the processor time.
@@ -32,13 +32,13 @@ robot! {
     }
 }
 
-/// What a span of time has cost.
+/// Cost of a span of time.
 #[derive(Clone, Debug)]
 struct Cost {
     cpu_s: f64,
     span_s: f64,
     memory_kib: u64,
-    /// Of ten messages, sorted, ns.
+    /// Durations of ten messages, sorted, ns.
     publishing: Vec<u64>,
 }
 

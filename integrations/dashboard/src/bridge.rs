@@ -5,7 +5,7 @@ use crate::server::{Bridged, Dashboard};
 use bb_core::{Fault, MonotonicTime, Payload, Reading, Service, ServiceContext};
 use std::time::Duration;
 
-/// How long an update without a rate waits.
+/// Time for which an update without a rate waits.
 const WAIT: Duration = Duration::from_millis(100);
 
 /// The viewers of a [`Dashboard`], published when their number has changed.
@@ -13,7 +13,7 @@ const WAIT: Duration = Duration::from_millis(100);
 pub struct DashboardState {
     /// The port that it listens on.
     pub port: u16,
-    /// How many are connected.
+    /// Number of connected viewers.
     pub viewers: u32,
 }
 

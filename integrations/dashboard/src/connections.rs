@@ -17,7 +17,7 @@ use tokio::net::{TcpListener, TcpStream};
 /// Connections that may be open without being a WebSocket.
 const MOST: usize = 64;
 
-/// How long one may take to ask for something.
+/// Time within which a connection must ask for something.
 const IDLE: Duration = Duration::from_secs(10);
 
 /// A listener that keeps a list of what it has accepted.

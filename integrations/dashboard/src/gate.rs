@@ -19,7 +19,7 @@ impl Gate {
         Self { hosts: own.into_iter().chain(further.iter().map(|host| host.to_ascii_lowercase())).collect() }
     }
 
-    /// Whether it is a name with a port.
+    /// Returns whether it is a name with a port.
     pub(crate) fn is_host(host: &str) -> bool {
         let plain = |name: &str| {
             !name.is_empty()

@@ -43,11 +43,11 @@ pub(crate) struct Hub {
     thread: Option<JoinHandle<()>>,
 }
 
-/// What the thread shares with the viewers.
+/// State that the thread shares with the viewers.
 #[derive(Debug)]
 struct Seen {
     newest: Mutex<Newest>,
-    /// By path, the viewers that watch it.
+    /// Viewers that watch each path.
     watched: Mutex<BTreeMap<String, usize>>,
     has_changed: AtomicBool,
     is_over: AtomicBool,
@@ -125,7 +125,7 @@ impl Hub {
         self.seen.has_changed.store(true, Ordering::Release);
     }
 
-    /// What is newer than `position`, as the next frame of a viewer that watches `paths`; `None` if nothing is.
+    /// Returns what is newer than `position`, as the next frame of a viewer that watches `paths`; `None` if nothing is.
     pub(crate) fn frame(&self, position: &mut Position, paths: &[String]) -> Option<String> {
         let newest = lock(&self.seen.newest);
         let before = *position;

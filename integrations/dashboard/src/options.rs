@@ -24,7 +24,7 @@ pub struct DashboardOptions {
     /// Rights of those with the token, separated by spaces, of `parameters`, `commands`, `arm` and `actuators`.
     #[option(default = "parameters commands arm actuators")]
     pub rights: String,
-    /// Whether the address with its token is printed to the standard error when the bridge starts.
+    /// Prints the address with its token to the standard error when the bridge starts.
     #[option(default = true)]
     pub print: bool,
 }

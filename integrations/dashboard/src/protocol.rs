@@ -8,7 +8,7 @@ pub const VERSION: u64 = 1;
 /// The longest message that a client may send.
 pub(crate) const LONGEST: usize = 64 * 1024;
 
-/// How many paths a client may watch at once.
+/// Number of paths that a client may watch at once.
 const MOST_WATCHED: usize = 256;
 
 /// The first message of a client.
@@ -19,7 +19,7 @@ pub(crate) struct Hello {
     pub(crate) robot: Option<String>,
 }
 
-/// What a client asks for, with the number that its answer has.
+/// Request of a client, with the number that its answer has.
 #[derive(Debug, PartialEq)]
 pub(crate) struct Request {
     pub(crate) id: u64,

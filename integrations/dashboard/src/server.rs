@@ -30,7 +30,7 @@ use tokio::sync::watch;
 /// Threads that wait for what a viewer has asked for, such as to disarm.
 const MOST_WAITING: usize = 128;
 
-/// Why no dashboard runs.
+/// Reason for which no dashboard runs.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ServeError {
@@ -42,7 +42,7 @@ pub enum ServeError {
     Address {
         /// The address and port.
         address: SocketAddr,
-        /// What the system says.
+        /// Error of the system.
         source: io::Error,
     },
     /// The system gives no random numbers for the token.
@@ -60,11 +60,11 @@ pub struct Dashboard {
     pub(crate) bridged: Bridged,
 }
 
-/// What a bridge remembers.
+/// State of a bridge.
 #[derive(Debug, Default)]
 pub(crate) struct Bridged {
     pub(crate) viewers: Option<usize>,
-    /// Whether it has a rate, and so must not wait.
+    /// `true` if it has a rate, and so must not wait.
     pub(crate) is_paced: bool,
 }
 
@@ -135,7 +135,7 @@ impl Dashboard {
         format!("{}#token={}", self.reading_url(), self.token.text())
     }
 
-    /// How many viewers are connected.
+    /// Returns the number of connected viewers.
     pub fn viewers(&self) -> usize {
         self.shared.guests.count()
     }

@@ -1,4 +1,4 @@
-//! What all connections use.
+//! State that all connections use.
 
 use crate::connections::Open;
 use crate::gate::Gate;
@@ -7,7 +7,7 @@ use crate::hub::Hub;
 use crate::options::Settings;
 use crate::token::Token;
 
-/// What all connections use.
+/// State that all connections use.
 #[derive(Debug)]
 pub(crate) struct Shared {
     pub(crate) hubs: Vec<Hub>,

@@ -13,9 +13,9 @@ use std::time::Duration;
 use tokio::sync::mpsc;
 use tokio::time::timeout;
 
-/// How long the first message may take.
+/// Time within which the first message must come.
 const FIRST_WITHIN: Duration = Duration::from_secs(5);
-/// How long a message to a viewer may take.
+/// Time within which a message to a viewer must have gone.
 const SENT_WITHIN: Duration = Duration::from_secs(5);
 /// Wrong tokens in a connection.
 const MOST_GUESSES: u32 = 3;
@@ -39,7 +39,7 @@ struct Viewer<'a> {
     waiting: usize,
 }
 
-/// What comes back from a call of the robot.
+/// Answer to a call of the robot.
 enum Answer {
     Text(String),
     Started { id: u64, execution: DynamicExecution },

@@ -1,4 +1,4 @@
-//! What copies need of a filter.
+//! Requirements of copies on their filter.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -30,7 +30,7 @@ const SAME: f64 = 0.5;
 /// A filter of which there can be [`Copies`](super::Copies).
 #[expect(private_interfaces, reason = "implemented here alone")]
 pub trait CopiedFilter: Propagate + Copy + Debug {
-    /// Its parameters.
+    /// Parameters of the filter.
     type Params: Copy + Debug;
     /// The state that it starts with.
     type Start;
@@ -58,7 +58,7 @@ pub trait CopiedFilter: Propagate + Copy + Debug {
     /// The standard deviation of the heading, rad.
     fn heading_deviation(&self) -> f64;
 
-    /// Whether another has come to the same state, and is as sure of it.
+    /// Returns whether another has come to the same state, and is as sure of it.
     fn is_same(&self, other: &Self) -> bool;
 
     /// The longest interval that a sample covers, s; a longer one is a gap.
@@ -79,7 +79,8 @@ pub trait CopiedFilter: Propagate + Copy + Debug {
     /// Makes the attitude unknown.
     fn forget_attitude(&mut self) {}
 
-    /// This filter in each way of an attitude that a gap has left unknown, with the log likelihood of each; none if it is known.
+    /// Returns this filter with each of several attitudes that cover one which a gap has left unknown, with the log likelihood of each;
+    /// none if it is known.
     fn forks(&self) -> Vec<(Self, f64)> {
         Vec::new()
     }

@@ -20,7 +20,7 @@ pub(in crate::navigation) struct Newcomer<F: CopiedFilter> {
     probation_s: f64,
 }
 
-/// What a position decides between a filter and its newcomer.
+/// Decision between a filter and its newcomer by a position.
 #[derive(Debug)]
 pub(in crate::navigation) enum Settled<F: CopiedFilter> {
     /// The filter keeps its place.
@@ -29,7 +29,7 @@ pub(in crate::navigation) enum Settled<F: CopiedFilter> {
     Left,
     /// The newcomer has fused the position, and has fitted for long enough.
     Due(Newcomer<F>),
-    /// It fits neither.
+    /// The position fits neither.
     Unfit,
 }
 

@@ -427,7 +427,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
         Ok(())
     }
 
-    /// Whether a measurement observes a horizontal position in the world, rather than one relative to the keyframe.
+    /// Returns whether a measurement observes a horizontal position in the world, rather than one relative to the keyframe.
     fn fixes_position(innovation: &Innovation<'_>) -> bool {
         let keyframe = offset::<S>(Optional::Keyframe);
         innovation.rows(N).any(|row| {

@@ -118,13 +118,13 @@ imu_params! {
 /// White noise of the IMU and of its biases, as densities squared.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImuDensities {
-    /// Of the accelerometer, m²/s³.
+    /// Noise of the accelerometer, m²/s³.
     pub accelerometer: f64,
-    /// Of the gyroscope, rad²/s.
+    /// Noise of the gyroscope, rad²/s.
     pub gyroscope: f64,
-    /// Of the random walk of the accelerometer's bias, m²/s⁵.
+    /// Noise of the random walk of the accelerometer's bias, m²/s⁵.
     pub accelerometer_bias: f64,
-    /// Of the random walk of the gyroscope's bias, rad²/s³.
+    /// Noise of the random walk of the gyroscope's bias, rad²/s³.
     pub gyroscope_bias: f64,
 }
 

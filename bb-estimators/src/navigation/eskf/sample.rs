@@ -20,7 +20,7 @@ pub struct ImuMean {
 }
 
 impl ImuMean {
-    /// Whether a sensor could have measured these values.
+    /// Checks that a sensor could have measured these values.
     pub(in crate::navigation) fn check(&self) -> Result<(), Refusal> {
         // The range check also rejects NaN.
         let within = |vector: &Vector3<f64>, limit: f64| vector.iter().all(|x| (-limit..=limit).contains(x));

@@ -24,7 +24,7 @@ pub struct Course {
     frame: Option<LocalFrame>,
     is_given: bool,
     track: Track,
-    /// Whether any fixes disagreed.
+    /// `true` if any fixes disagreed.
     is_disputed: bool,
     first_ns: Option<i64>,
     /// Rotation about the up axis, rad, and the time up to which it is integrated.
@@ -104,7 +104,7 @@ impl Course {
         self.track.velocity().filter(|_| self.agree(CONFIRMED, now_ns))
     }
 
-    /// Whether `count` fixes agree, or, after a while, all of them.
+    /// Returns whether `count` fixes agree, or, after a while, all of them.
     fn agree(&self, count: u32, now_ns: i64) -> bool {
         let has_waited = self.first_ns.is_some_and(|first_ns| now_ns.saturating_sub(first_ns) >= LONGEST_WAIT_NS);
         self.track.count() >= count || (has_waited && !self.is_disputed)

@@ -32,7 +32,7 @@ pub(super) enum Measured {
     Gnss(GnssPosition),
     Odometry(BodyVelocity),
     Pose(AbsolutePose),
-    /// With the start of the next relative pose, ns.
+    /// Relative pose, with the start of the next one, ns.
     Relative(RelativePose, i64),
     MagneticField(MagneticHeading),
     Pressure(BarometricHeight),

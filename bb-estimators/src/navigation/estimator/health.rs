@@ -2,7 +2,7 @@
 
 use crate::navigation::stream::Counts;
 
-/// How long the filter is distrusted after a recovery pulled it towards its sensors, ns.
+/// Time for which the filter is distrusted after a recovery pulled it towards its sensors, ns.
 const DISTRUST_NS: i64 = 1_000_000_000;
 
 /// Number of consecutive refusals of one sensor that are more than outliers.
@@ -25,7 +25,7 @@ pub(in crate::navigation) struct Watch {
 /// Limits of an estimate.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::navigation) struct Limits {
-    /// How long the position may be dead-reckoned, s. `None` if no sensor measures it.
+    /// Time for which the position may be dead-reckoned, s. `None` if no sensor measures it.
     pub(in crate::navigation) dead_reckoning_s: Option<f64>,
     /// Standard deviation of the horizontal position, m.
     pub(in crate::navigation) deviation: f64,
@@ -50,7 +50,7 @@ impl Watch {
         Self { limits, recoveries: 0, distrusted_until_ns: i64::MIN, resets: 1, moved_until_ns: i64::MIN }
     }
 
-    /// Why the estimate is not to be trusted, if it is not.
+    /// Returns the reason for which the estimate is not to be trusted, if there is one.
     pub(in crate::navigation) fn look(&mut self, sight: &Sight<'_>) -> Option<&'static str> {
         let recoveries = sight.counts.iter().map(|counts| counts.recoveries).sum();
         // A late measurement may make the filter undo a recovery and then repeat it.

@@ -65,7 +65,7 @@ impl Mounting {
         })
     }
 
-    /// Whether any input measures the position in the world.
+    /// Returns whether any input measures the position in the world.
     pub(super) fn has_positions(&self) -> bool {
         self.has_gnss() || self.pose.is_some()
     }

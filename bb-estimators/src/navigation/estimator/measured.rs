@@ -69,7 +69,7 @@ impl AbsolutePose {
         }
     }
 
-    /// The same pose in another world.
+    /// Returns the pose in another world.
     pub(super) fn moved(&self, new_from_old: &Isometry3<f64>) -> Self {
         let turn = new_from_old.rotation.to_rotation_matrix().into_inner();
         let turned = |covariance: &Matrix3<f64>| turn * covariance * turn.transpose();

@@ -52,8 +52,7 @@ imu_params! {
         barometer_bias: f64 = 10.0, in 0.0..=1e4, unit "m";
         /// Correlation time of the error of the barometric height.
         barometer_bias_time: f64 = 3600.0, in 1e-3..=f64::INFINITY, unit "s";
-        /// How long the position may be dead-reckoned before the estimate counts as unreliable, if the robot has a source of
-        /// fixes or poses.
+        /// Longest dead reckoning of the position before the estimate counts as unreliable, if the robot has a source of fixes or poses.
         longest_dead_reckoning: f64 = 30.0, in 0.0..=f64::INFINITY, unit "s";
         /// Standard deviation of the horizontal position beyond which the estimate counts as unreliable.
         largest_deviation: f64 = 100.0, in 1e-3..=f64::INFINITY, unit "m";

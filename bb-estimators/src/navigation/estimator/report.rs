@@ -30,15 +30,15 @@ pub struct NavigationStatus {
     pub imu_noise: f64,
     /// Fixes by result.
     pub gnss: Verdicts,
-    /// The same for velocities from odometry.
+    /// Velocities from odometry by result.
     pub odometry: Verdicts,
-    /// The same for poses.
+    /// Poses by result.
     pub pose: Verdicts,
-    /// The same for relative poses.
+    /// Relative poses by result.
     pub relative: Verdicts,
-    /// The same for the magnetic field.
+    /// Measurements of the magnetic field by result.
     pub magnetic_field: Verdicts,
-    /// The same for pressures.
+    /// Pressures by result.
     pub pressure: Verdicts,
     /// Scale of the wheels, less 1. 0 if it is not a state.
     pub wheel_scale: f64,
@@ -67,11 +67,11 @@ pub struct NavigationStatus {
 /// A sensor's measurements since the start, by result.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Payload)]
 pub struct Verdicts {
-    /// Those that corrected the estimate.
+    /// Number of measurements that corrected the estimate.
     pub fused: u64,
-    /// Those refused by the gate: too far from the prediction.
+    /// Number of measurements that the gate refused: too far from the prediction.
     pub refused: u64,
-    /// Those that were not finite, too late or in the future.
+    /// Number of measurements that were not finite, too late or in the future.
     pub invalid: u64,
 }
 

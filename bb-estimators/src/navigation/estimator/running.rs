@@ -24,12 +24,12 @@ const MEASUREMENTS: usize = 128;
 const STATES: usize = 8;
 type Past<S, const N: usize> = History<Filter<S, N>, SAMPLES, MEASUREMENTS, STATES>;
 
-/// How far ahead of the IMU a measurement may be stamped, ns.
+/// Largest lead of a measurement's stamp over the IMU, ns.
 const LONGEST_LEAD_NS: i64 = 500_000_000;
 
 /// Interface of a filter to the estimator.
 pub(super) trait Core: Debug + Send {
-    /// Whether all outputs are finite and no variance is negative.
+    /// Returns whether all outputs are finite and no variance is negative.
     fn is_sound(&self) -> bool;
     /// Takes a sample and the other new inputs.
     fn take(
@@ -52,7 +52,7 @@ pub(super) trait Core: Debug + Send {
     /// The distance of positions, m, that are beyond any way of a robot from the filter.
     fn elsewhere(&self) -> Option<f64>;
 
-    /// Why the estimate is not to be trusted, if it is not.
+    /// Returns the reason for which the estimate is not to be trusted, if there is one.
     fn divergence(&mut self) -> Option<&'static str>;
 }
 

@@ -120,7 +120,7 @@ impl Starting {
         self.alignment.at_rest((-mounting.link(), ORIGIN), (options.heading, deviation))
     }
 
-    /// At the last fix, with the velocity of the last ones.
+    /// Returns a start at the last fix, with the velocity of the last ones.
     fn at_fix(
         &mut self,
         given: Option<Start>,
@@ -162,7 +162,7 @@ impl Starting {
         self.alignment.in_motion(position, velocity, heading)
     }
 
-    /// At the last pose.
+    /// Returns a start at the last pose.
     fn at_pose(&self) -> Result<Start, Refusal> {
         let (time_ns, pose) = self.pose.ok_or(Refusal::NotObservable)?;
         let origin = (Vector3::zeros(), ORIGIN);

@@ -4,7 +4,7 @@ use super::input::Mounting;
 use crate::navigation::state::{Optional, States, offset};
 use bb_core::Fault;
 
-/// Whether a set of states can be estimated at all, with any inputs.
+/// Returns whether a set of states can be estimated at all, with any inputs.
 pub(super) const fn is_possible<S: States>() -> bool {
     offset::<S>(Optional::RelativeScale).is_none() || offset::<S>(Optional::Keyframe).is_some()
 }

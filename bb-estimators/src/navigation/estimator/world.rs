@@ -15,7 +15,7 @@ const FARTHEST: f64 = 5000.0;
 /// origin.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct World {
-    /// On the Earth. `None` without satellites.
+    /// Frame of the world on the Earth. `None` without satellites.
     frame: Option<LocalFrame>,
     /// The frame at the start.
     first: Option<LocalFrame>,
@@ -54,13 +54,13 @@ impl World {
             .moved(&self.first_from_frame.inverse())
     }
 
-    /// How far the world's z is below the height above the ellipsoid of its origin, at `position`, m: its plane does not follow the
-    /// ellipsoid.
+    /// Returns the distance of the world's z at `position` below the height above the ellipsoid of its origin, m: its plane does not follow
+    /// the ellipsoid.
     pub(super) fn drop(&self, position: &Vector3<f64>) -> f64 {
         self.frame.map_or(0.0, |frame| frame.geodetic(position).height - frame.origin().height - position.z)
     }
 
-    /// If the filter, at `position`, is far from the origin, moves its world there and returns the transform of coordinates to it.
+    /// Moves the world to the filter if that, at `position`, is far from the origin, and returns the transform of coordinates to it.
     pub(super) fn moves_on(&mut self, position: &Vector3<f64>) -> Option<Isometry3<f64>> {
         let frame = self.frame.as_mut().filter(|_| position.xy().norm() > FARTHEST)?;
         let next = LocalFrame::new(Geodetic { height: frame.origin().height, ..frame.geodetic(position) });

@@ -3,8 +3,8 @@
 #[cfg(feature = "std")]
 use std::boxed::Box;
 
-/// With a heap, the values are allocated there from the beginning. Hundreds of kilobytes are too much for a thread's stack, which
-/// in a build without optimisation holds a copy for each function they pass through.
+/// Storage of the values: with a heap, they are allocated there from the beginning. Hundreds of kilobytes are too much for a thread's
+/// stack, which in a build without optimisation holds a copy for each function they pass through.
 #[cfg(feature = "std")]
 type Slots<T, const N: usize> = Box<[Option<T>]>;
 #[cfg(not(feature = "std"))]

@@ -79,7 +79,7 @@ impl CopiedFilter for PlanarEkf {
         self.estimate().map(|estimate| estimate.position.push(0.0))
     }
 
-    /// That of a curve: nothing shows that of the speed before the wheels do.
+    /// Acceleration of a curve: nothing shows that of the speed before the wheels do.
     fn acceleration(&self) -> Option<Vector3<f64>> {
         let of_curve = |at: &PlanarEstimate| at.world_from_body() * left(&at.velocity) * at.yaw_rate;
         self.estimate().map(|at| of_curve(at).push(0.0))

@@ -61,11 +61,11 @@ params! {
 /// White noise, as densities squared.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Densities {
-    /// Of the gyroscope, rad²/s.
+    /// Noise of the gyroscope, rad²/s.
     pub(super) gyroscope: f64,
-    /// Of the random walk of its bias, rad²/s³.
+    /// Noise of the random walk of its bias, rad²/s³.
     pub(super) bias: f64,
-    /// Of the acceleration forward and to the left, m²/s³.
+    /// Noise of the acceleration forward and to the left, m²/s³.
     pub(super) acceleration: [f64; 2],
 }
 

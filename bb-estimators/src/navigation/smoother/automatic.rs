@@ -15,9 +15,9 @@ use crate::navigation::state::{
 /// An estimate in numbers that carry their derivatives.
 #[derive(Clone, Copy, Debug)]
 pub struct Differentiable<T, const N: usize> {
-    /// In the world, m.
+    /// Position in the world, m.
     pub position: [T; 3],
-    /// In the world, m/s.
+    /// Velocity in the world, m/s.
     pub velocity: [T; 3],
     /// Rotates body coordinates to the world, row by row.
     pub world_from_body: [[T; 3]; 3],

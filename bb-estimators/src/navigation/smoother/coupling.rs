@@ -89,7 +89,7 @@ pub(super) struct Coupling<const N: usize> {
     product: Vec<f64>,
     /// Landmarks that are unknowns of their own.
     points: Points<N>,
-    /// What their elimination leaves on the oldest keyframe.
+    /// Information that their elimination leaves on the oldest keyframe.
     oldest: Information<N>,
 }
 
@@ -118,7 +118,7 @@ impl<const N: usize> Coupling<N> {
         }
     }
 
-    /// Whether it holds any information.
+    /// Returns whether it holds any information.
     pub(super) fn is_tied(&self) -> bool {
         self.idle.is_some()
     }
@@ -184,7 +184,7 @@ impl<const N: usize> Coupling<N> {
         }
     }
 
-    /// Whether a landmark ties a keyframe before this one to it or to one after it.
+    /// Returns whether a landmark ties a keyframe before this one to it or to one after it.
     pub(super) fn spans(&self, index: usize) -> bool {
         let Some(before) = index.checked_sub(1) else { return false };
         let is_seen = self.idle.is_some() && self.unseen > self.first + index as u64;
@@ -275,7 +275,7 @@ impl<const N: usize> Coupling<N> {
         0
     }
 
-    /// Whether anything has changed since the last elimination.
+    /// Returns whether anything has changed since the last elimination.
     pub(super) fn is_changed(&self) -> bool {
         self.changed != usize::MAX
     }
@@ -417,7 +417,7 @@ impl<const N: usize> Coupling<N> {
         self.checkpoint.forget_before(self.first);
     }
 
-    /// The same if nothing is tied.
+    /// Removes the oldest keyframe if nothing is tied.
     pub(super) fn leave_untied(&mut self) {
         self.first += 1;
     }

@@ -17,7 +17,7 @@ use super::matrix::{
 use super::rows::{MOST_ROWS, Rows};
 use crate::navigation::math::ln;
 
-/// How the elimination of a keyframe transforms its ties to later poses.
+/// Transformation of a keyframe's ties to later poses by its elimination.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Carried<const N: usize> {
     /// `Gᵀ (I + M Q)⁻¹`, for the next keyframe.
@@ -153,7 +153,7 @@ impl<const N: usize> Pivot<N> {
         self.back_from(&self.mean, link, &link.offset, next)
     }
 
-    /// The same if the keyframe also has ties to later poses, where `pull` is `C P`.
+    /// Returns the mean of this keyframe, given that of the next, if the keyframe also has ties to later poses, where `pull` is `C P`.
     pub(super) fn back_pulled(&self, link: &Link<N>, next: &[f64; N], pull: &[f64; N]) -> [f64; N] {
         let mut mean = self.mean;
         axpy(&mut mean, -1.0, &self.root.solve_transposed(pull));
@@ -302,8 +302,8 @@ pub(super) fn judge_with<const N: usize>(
     decompose(factor, residual, covariance)
 }
 
-/// The same if no landmark ties keyframes before the later one to it or to those after it. The pivot is that of the previous
-/// keyframe.
+/// Judges a factor of two keyframes if no landmark ties keyframes before the later one to it or to those after it. The pivot is that of the
+/// previous keyframe.
 pub(super) fn judge_pair<const N: usize>(
     factor: &Rows<N>,
     before: &Pivot<N>,

@@ -81,7 +81,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         Some(SMatrix::from_fn(|i, j| covariance[i][j]))
     }
 
-    /// The same, without allocating.
+    /// Returns the covariance of a keyframe, without allocating.
     pub(super) fn covariance_now(&mut self, index: usize) -> Option<Square<N>> {
         if !self.is_tied() {
             return self.covariance_at(index);

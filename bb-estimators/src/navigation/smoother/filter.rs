@@ -68,7 +68,7 @@ pub struct FixedLagSmoother<S: States = Navigation, const N: usize = NAVIGATION,
     pub(super) dirty: usize,
     /// Corrections of keyframes before this one may be out of date.
     pub(super) exact_from: usize,
-    /// Whether the last update has left keyframes to relinearise.
+    /// `true` if the last update has left keyframes to relinearise.
     pub(super) is_pending: bool,
     /// `None` without a camera.
     pub(super) landmarks: Option<Landmarks<N>>,
@@ -249,7 +249,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         self.propagate_part(sample, false)
     }
 
-    /// The same over a part of a sample. A part of a gap is a gap, however short it is.
+    /// Propagates over a part of a sample. A part of a gap is a gap, however short it is.
     pub(in crate::navigation) fn propagate_part(&mut self, sample: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
         let newest = self.window.back().ok_or(Refusal::NotStarted)?;
         sample.check()?;

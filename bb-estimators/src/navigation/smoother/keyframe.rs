@@ -59,7 +59,7 @@ pub(super) struct Keyframe<F, const N: usize> {
     /// The factor that scales the noise of the motion.
     pub(super) raised: f64,
     pub(super) factors: Vec<Held<F>>,
-    /// Whether a factor has a kernel.
+    /// `true` if a factor has a kernel.
     pub(super) is_robust: bool,
     /// Information on this keyframe alone: the prior and the factors.
     pub(super) own: Information<N>,
@@ -71,9 +71,9 @@ pub(super) struct Keyframe<F, const N: usize> {
     pub(super) seen: Information<N>,
     /// Changes whenever the keyframe is relinearised.
     pub(super) version: u32,
-    /// Whether the last iteration relinearised it.
+    /// `true` if the last iteration relinearised it.
     pub(super) has_moved: bool,
-    /// Whether a marginalised landmark is linearised about this keyframe's linearisation point.
+    /// `true` if a marginalised landmark is linearised about this keyframe's linearisation point.
     pub(super) is_fixed: bool,
     pub(super) pivot: Pivot<N>,
 }
@@ -131,12 +131,12 @@ impl<F, const N: usize> Keyframe<F, N> {
         self.point.corrected::<S>(&SVector::from(self.correction))
     }
 
-    /// Whether it may be relinearised elsewhere.
+    /// Returns whether it may be relinearised elsewhere.
     pub(super) fn is_free(&self) -> bool {
         !self.is_fixed && self.prior.is_none_or(|prior| prior.mean.is_some())
     }
 
-    /// Whether the correction exceeds a relinearisation threshold.
+    /// Returns whether the correction exceeds a relinearisation threshold.
     pub(super) fn is_off(&self, params: &SmootherParams) -> bool {
         let beyond = |first: usize, limit: f64| {
             let [x, y, z] = core::array::from_fn(|i| self.correction[first + i]);
@@ -233,7 +233,7 @@ impl<F, const N: usize> Keyframe<F, N> {
         squared
     }
 
-    /// Whether a kernel now gives a different weight.
+    /// Returns whether a kernel now gives a different weight.
     pub(super) fn is_misweighed<S: States>(&self, before: Option<&Self>) -> bool
     where
         F: Factor<S, N>,

@@ -51,18 +51,18 @@ pub(super) struct Landmark {
     pub(super) point: Vector3<f64>,
     /// The mean and inverse variance of the prior; `None` without a guess.
     pub(super) prior: Option<(Vector3<f64>, f64)>,
-    /// Whether the position is known, so that the window uses the landmark.
+    /// `true` if the position is known, so that the window uses the landmark.
     pub(super) is_used: bool,
-    /// Whether observations may still be added. A lost landmark keeps its last observations.
+    /// `true` if observations may still be added. A lost landmark keeps its last observations.
     pub(super) is_open: bool,
-    /// Its number among the landmarks that are unknowns of their own, once its track has outlived the window.
+    /// Number among the landmarks that are unknowns of their own, once its track has outlived the window.
     pub(super) slot: Option<usize>,
     /// The information about such a landmark apart from its observations here, conditioned on everything else.
     pub(super) settled: Matrix3<f64>,
     /// The serial number of the keyframe that saw it last.
     pub(super) last: u64,
     pub(super) refused_in_a_row: u32,
-    /// In chronological order.
+    /// Observations in chronological order.
     pub(super) sights: Vec<Sight>,
     /// L; `None` if V is singular.
     root: Option<Matrix3<f64>>,
@@ -304,7 +304,7 @@ impl Sight {
         self.arm.cross(&part(ROTATION)) - part(POSITION)
     }
 
-    /// As an observation of a landmark that is an unknown of its own.
+    /// Returns it as an observation of a landmark that is an unknown of its own.
     pub(super) fn seen(&self) -> Seen {
         let normal = self.normal();
         let mut tie = [[0.0; POSE]; 3];

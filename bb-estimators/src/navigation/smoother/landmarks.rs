@@ -24,8 +24,8 @@ use triangulation::located;
 /// A landmark is relinearised if the kernel's weight of an observation differs from the current one by more than this.
 const REWEIGHED: f64 = 0.1;
 
-/// How many times its thresholds a landmark must exceed to be relinearised in an update, which then eliminates the keyframes from
-/// its first on once more. With its next observation, it is relinearised for less, at no such cost.
+/// Multiple of its thresholds that a landmark must exceed to be relinearised in an update, which then eliminates the keyframes from its
+/// first on once more. With its next observation, it is relinearised for less, at no such cost.
 const PRESSING: f64 = 3.0;
 
 /// The fraction of good landmarks that are rejected because their directions do not intersect.
@@ -187,8 +187,8 @@ impl<const N: usize> Landmarks<N> {
         }
     }
 
-    /// Whether a landmark must be relinearised: a keyframe was, or the landmark itself moved or its kernel gives another weight
-    /// by `times` the thresholds.
+    /// Returns whether a landmark must be relinearised: a keyframe was, or the landmark itself moved or its kernel gives another weight by
+    /// `times` the thresholds.
     fn is_stale<F>(&self, landmark: &Landmark, window: &Window<F, N>, times: f64) -> bool {
         let first = self.coupling.first;
         let correction = self.correction(landmark, window);

@@ -166,7 +166,7 @@ impl<const N: usize> Root<N> {
         inverse
     }
 
-    /// Whether every direction is determined.
+    /// Returns whether every direction is determined.
     pub(super) fn is_regular(&self) -> bool {
         self.reciprocal.iter().all(|x| *x > 0.0)
     }
@@ -204,7 +204,7 @@ pub(super) fn mirror<const N: usize>(matrix: &mut Square<N>) {
     }
 }
 
-/// Whether every component is finite and not absurd; larger whitened numbers cannot be measurements.
+/// Returns whether every component is finite and not absurd; larger whitened numbers cannot be measurements.
 pub(super) fn is_sound(row: &[f64]) -> bool {
     // A NaN is outside the range.
     row.iter().all(|x| (-1e15..=1e15).contains(x))

@@ -9,14 +9,14 @@ use crate::params::{Params, ParamsError};
 pub struct SmootherParams {
     /// The noise of the IMU and of optional states, gravity and gaps, as of the filter.
     pub sensors: EskfParams,
-    /// How many keyframes are held.
+    /// Number of keyframes that are held.
     ///
     /// Small: measurements that come later are refused, and nothing is corrected in hindsight. Large: costs memory, about
     /// 25 kB a keyframe, and time where much is linearised again. From 2 to 1000.
     ///
     /// Unit: keyframes. Default: 20. Source: two seconds of a visual odometry.
     pub window: usize,
-    /// How many factors a keyframe takes, those to the one before included; more are refused.
+    /// Number of factors that a keyframe takes, those to the one before included; more are refused.
     ///
     /// Small: a provider that floods is stopped sooner. Large: costs memory. From 1 to 10,000.
     ///
@@ -28,13 +28,14 @@ pub struct SmootherParams {
     ///
     /// Unit: rad. Default: 0.01: it leaves 5e-5 rad. Source: below the noise of any attitude.
     pub relinearise_rotation: f64,
-    /// The same of the position. Only factors that are not linear in it need it, ranges for instance.
+    /// Change of the position beyond which a keyframe is linearised again. Only factors that are not linear in it need
+    /// it, ranges for instance.
     ///
     /// Small: as exact as a batch, at its cost. Large: errors of the second order stay. From 0 to 1e9.
     ///
     /// Unit: m. Default: 5. Source: ranges to beacons a hundred metres off, to within 0.1 m.
     pub relinearise_position: f64,
-    /// How often an update may linearise again before it leaves the rest to the next.
+    /// Number of times that an update may linearise again before it leaves the rest to the next.
     ///
     /// Small: bounds the time of an update. Large: as exact as a batch, at its cost. From 0 to 100. At 0 nothing is linearised again,
     /// and an update that moves a keyframe beyond its threshold has not converged.
@@ -67,18 +68,18 @@ impl SmootherParams {
     }
 }
 
-/// How landmarks are used.
+/// Use of landmarks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LandmarkParams {
-    /// How many are held at once; more are refused.
+    /// Number of landmarks that are held at once; more are refused.
     ///
     /// Small: landmarks are refused although their tracks would help. Large: costs memory, about 4 kB each with a window of
     /// 20. From 1 to 100,000.
     ///
     /// Unit: landmarks. Default: 512. Source: 100 in each image, with tracks of 10 keyframes in a window of 20.
     pub landmarks: usize,
-    /// How many landmarks keep what is known of them when their track outlives the window, at most; others begin again
-    /// then, as if unknown.
+    /// Largest number of landmarks that keep what is known of them when their track outlives the window; others begin
+    /// again then, as if unknown.
     ///
     /// Small: long tracks are cut, so the estimate drifts more. Large: costs time, as each is an unknown of its own,
     /// and memory, 0.4 MB at 32 and 150 MB at 1000. From 0 to 1000.
@@ -91,7 +92,7 @@ pub struct LandmarkParams {
     ///
     /// Unit: rad. Default: 0.02. Source: at 0.1° of noise, a distance known to a tenth.
     pub parallax: f64,
-    /// How much an observation weighs that does not fit once it has passed the gate.
+    /// Weight of an observation that does not fit once it has passed the gate.
     ///
     /// Default: Huber's with 1.345·√2, as an observation has two numbers.
     pub kernel: Kernel,

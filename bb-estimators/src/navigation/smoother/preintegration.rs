@@ -88,7 +88,7 @@ impl Columns {
         }
     }
 
-    /// The same for columns whose rotation part is zero.
+    /// Carries columns whose rotation part is zero over a time.
     #[inline]
     fn carried_straight(&self, dt: f64) -> Self {
         Self { position: self.position + self.velocity * dt, ..*self }

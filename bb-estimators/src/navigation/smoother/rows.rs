@@ -17,7 +17,7 @@ pub const MOST_ROWS: usize = 9;
 pub struct Rows<const N: usize> {
     /// Number of rows. Zero unless [`set`](Self::set) has succeeded.
     pub(super) count: usize,
-    /// Whether they involve the previous keyframe.
+    /// `true` if the rows involve the previous keyframe.
     is_pair: bool,
     pub(super) residual: [f64; MOST_ROWS],
     pub(super) previous: [[f64; N]; MOST_ROWS],

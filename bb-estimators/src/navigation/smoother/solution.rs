@@ -17,7 +17,7 @@ pub struct Updated {
     pub eliminated: usize,
     /// Number of keyframe relinearisations, counting repeated ones.
     pub relinearised: usize,
-    /// Whether it has reached the solution. If not, the limit of iterations was reached while a keyframe was still moving by more than
+    /// `true` if it has reached the solution. If not, the limit of iterations was reached while a keyframe was still moving by more than
     /// [`relinearise_rotation`](SmootherParams::relinearise_rotation) or [`relinearise_position`](SmootherParams::relinearise_position)
     /// from one iteration to the next: the covariance is that of another place.
     pub is_converged: bool,
@@ -100,7 +100,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         }
     }
 
-    /// The same, with the correction of the next keyframe as an argument.
+    /// Solves for the correction of a keyframe, given that of the next keyframe.
     pub(super) fn back(&self, index: usize, next: &[f64; N]) -> Option<[f64; N]> {
         let (keyframe, after) = (self.window.get(index)?, self.window.get(index + 1)?);
         let coupling = self.landmarks.as_ref().map(|landmarks| &landmarks.coupling);
@@ -128,7 +128,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         self.exact_from = 0;
     }
 
-    /// Whether landmarks couple keyframes that are not neighbours.
+    /// Returns whether landmarks couple keyframes that are not neighbours.
     pub(super) fn is_tied(&self) -> bool {
         self.landmarks.as_ref().is_some_and(|landmarks| landmarks.coupling.is_tied())
     }
@@ -247,7 +247,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
     }
 }
 
-/// Whether two corrections agree to within a centimetre of position and a hundredth of the rotation threshold for relinearisation.
+/// Returns whether two corrections agree to within a centimetre of position and a hundredth of the rotation threshold for relinearisation.
 fn is_settled<const N: usize>(a: &[f64; N], b: &[f64; N], params: &SmootherParams) -> bool {
     let is_rotation = |i: usize| (ROTATION..ROTATION + 3).contains(&i);
     let limit = |i: usize| SETTLED * if is_rotation(i) { params.relinearise_rotation } else { 1.0 };

@@ -137,7 +137,7 @@ impl<const N: usize> Estimate<N> {
         error
     }
 
-    /// The same estimate of a filter with `M` errors. What that lacks is dropped, and what it has beyond is zero.
+    /// Returns this estimate as one of a filter with `M` errors. States that it lacks are dropped, and further ones are zero.
     #[cfg(feature = "eskf")]
     pub(in crate::navigation) fn resized<const M: usize>(&self) -> Estimate<M> {
         Estimate {
@@ -174,14 +174,14 @@ impl<const N: usize> Estimate<N> {
         }
     }
 
-    /// Whether a filter may start here: no component is absurdly large or NaN.
+    /// Returns whether a filter may start here: no component is absurdly large or NaN.
     pub(in crate::navigation) fn is_plausible(&self) -> bool {
         is_on_earth(self.position.iter().chain(&self.velocity))
             && is_within(&self.accelerometer_bias, MAX_SPECIFIC_FORCE)
             && is_within(&self.gyroscope_bias, MAX_ANGULAR_VELOCITY)
     }
 
-    /// Whether no component is NaN.
+    /// Returns whether no component is NaN.
     pub(in crate::navigation) fn is_finite(&self) -> bool {
         let vectors = [&self.position, &self.velocity, &self.accelerometer_bias, &self.gyroscope_bias];
         vectors.iter().all(|vector| vector.iter().all(|x| x.is_finite()))

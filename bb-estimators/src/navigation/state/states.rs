@@ -29,7 +29,7 @@ pub enum Optional {
     RelativeScale,
     /// Position of the GNSS antenna in the body, m.
     GnssLeverArm,
-    /// How long before its stamp a GNSS measurement was taken, s.
+    /// Time before its stamp at which a GNSS measurement was taken, s.
     GnssDelay,
     /// Scale of the wheel speed, less 1: `measured = (1 + s) true`.
     WheelScale,
@@ -183,7 +183,7 @@ const fn dimension(states: &[Optional]) -> usize {
     sum
 }
 
-/// Whether no state is listed twice.
+/// Returns whether no state is listed twice.
 pub(in crate::navigation) const fn distinct(states: &[Optional]) -> bool {
     let mut i = 0;
     while i < states.len() {

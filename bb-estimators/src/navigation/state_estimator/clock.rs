@@ -12,15 +12,15 @@ const BELIEVED_STAMPS: u32 = 5;
 /// Result for a stamp.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Stamped {
-    /// It is the newest.
+    /// Stamp that is the newest.
     Next,
-    /// It belongs before the newest.
+    /// Stamp before the newest.
     Late,
-    /// It is too far ahead to be believed yet.
+    /// Stamp that is too far ahead to be believed yet.
     Ahead,
-    /// It is too old to be placed.
+    /// Stamp that is too old to be placed.
     TooOld,
-    /// It and the ones before it are old, or repeat the time of others: the clock was set back.
+    /// Stamp of a clock that was set back: it and the ones before it are old, or repeat the time of others.
     SetBack {
         /// Time for which stamps have come from the new clock, ns.
         for_ns: i64,
@@ -101,7 +101,7 @@ impl Clock {
     }
 }
 
-/// Whether a stamp can be the next sample's after `previous_ns`.
+/// Returns whether a stamp can be the next sample's after `previous_ns`.
 pub(super) fn follows(time_ns: i64, previous_ns: i64) -> bool {
     (1..=AGREED_NS).contains(&time_ns.saturating_sub(previous_ns))
 }
@@ -154,7 +154,7 @@ mod tests {
         }
     }
 
-    /// With any time limit for late samples.
+    /// A second ahead is no jump, with any time limit for late samples.
     #[test]
     fn a_second_ahead_is_no_jump() {
         for lateness in [0, 50, 2000] {
@@ -203,7 +203,7 @@ mod tests {
     }
 
     proptest! {
-        /// For any stamps: a jump has enough of them since the last one near the clock, and they rise for half a second.
+        /// A jump needs its evidence: enough stamps since the last one near the clock, which rise for half a second.
         #[test]
         fn a_jump_needs_its_evidence(
             stamps in prop::collection::vec(prop_oneof![

@@ -71,7 +71,7 @@ impl Emission {
         }
     }
 
-    /// Whether an output is due. If so, the next one is scheduled.
+    /// Returns whether an output is due. If so, the next one is scheduled.
     pub(super) fn is_due(&mut self, now_ns: i64) -> bool {
         let next_ns = match self.next_ns {
             // Setting the clock back must not stop the output.
@@ -186,7 +186,7 @@ impl Emission {
         since.map_or(0.0, |(last, since_ns)| last.time_ns.saturating_sub(since_ns) as f64 * 1e-9)
     }
 
-    /// Whether there was no estimate at the last tick.
+    /// Returns whether there was no estimate at the last tick.
     pub(super) fn is_silent(&self) -> bool {
         self.is_silent
     }
@@ -199,8 +199,8 @@ impl Emission {
 /// Margin against rounding, which must not reduce the covariance.
 const ABOVE: f64 = 1.0 + 1e-12;
 
-/// In dead reckoning, the reported covariance must not shrink. Reductions by a relative pose, or by the correlation with the
-/// velocity, are undone. `D P D` with a diagonal D is a covariance if P is one.
+/// Raises a covariance in dead reckoning, where the reported one must not shrink. Reductions by a relative pose, or by the correlation with
+/// the velocity, are undone. `D P D` with a diagonal D is a covariance if P is one.
 fn raise(covariance: &mut Matrix6<f64>, last: &Norm) {
     let now = traces(covariance);
     let factor = |i: usize| if now[i] < last.traces[i] { sqrt(last.traces[i] / now[i]) * ABOVE } else { 1.0 };

@@ -22,7 +22,7 @@ mod measured;
 
 use measured::Trouble;
 
-/// How long an estimate is distrusted after an input that does not fit, s.
+/// Time for which an estimate is distrusted after an input that does not fit, s.
 const DISTRUST: f64 = 1.0;
 
 /// Number of consecutive positions that must fit before an estimate is trusted again after positions overruled it.
@@ -411,7 +411,7 @@ impl<F: ProvidedFactor> Engine<F> {
         }
     }
 
-    /// Whether it is on the Earth and slow enough to be corrected. After corrupt samples, the state may be finite but neither.
+    /// Returns whether it is on the Earth and slow enough to be corrected. After corrupt samples, the state may be finite but neither.
     fn is_bounded(&self) -> bool {
         let Some((position, velocity)) = self.strategy.motion() else { return false };
         position.norm() < FARTHEST && velocity.norm() <= MOST_VELOCITY

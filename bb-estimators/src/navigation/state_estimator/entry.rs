@@ -71,12 +71,12 @@ impl<F> Payload<F> {
         }
     }
 
-    /// Whether it must not be lost: a report of spoofing.
+    /// Returns whether it must not be lost: a report of spoofing.
     pub(super) fn is_alarm(&self) -> bool {
         matches!(self, Self::Health(GpsHealth::Spoofed))
     }
 
-    /// Whether a user has added it. A frame comes with a relative pose, which is reported instead unless the frame fails.
+    /// Returns whether a user has added it. A frame comes with a relative pose, which is reported instead unless the frame fails.
     pub(super) fn is_added(&self) -> bool {
         !matches!(self, Self::Frame)
     }
@@ -85,19 +85,19 @@ impl<F> Payload<F> {
 /// Result of an input.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Outcome {
-    /// It is in the estimate.
+    /// Input that is in the estimate.
     Added {
         /// Normalised innovation squared over its dimension.
         nis: Option<f64>,
     },
-    /// It is not in the estimate, or has moved it.
+    /// The position is not in the estimate, or has moved it.
     Degraded(Reason),
-    /// It broke the estimate, which continues without it.
+    /// Input that broke the estimate, which continues without it.
     Fatal(Reason),
 }
 
 impl Outcome {
-    /// Whether the input became the same, for the same reason. The numbers may differ.
+    /// Returns whether the input became the same, for the same reason. The numbers may differ.
     pub(super) fn is_alike(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Added { .. }, Self::Added { .. }) => true,
@@ -120,12 +120,12 @@ pub(super) struct Entry<F> {
     pub(super) rejection: Option<Rejection>,
 }
 
-/// What is to be told of an input.
+/// Change of an input that is to be reported.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum News {
-    /// It became this, for the first time or instead of something else.
+    /// Result of the input, for the first time or instead of another one.
     Became(Outcome),
-    /// It is in the estimate after all.
+    /// Input that is in the estimate after all.
     Revised,
 }
 

@@ -7,7 +7,7 @@ use core::mem::discriminant;
 use super::gate::Rejection;
 use crate::navigation::refusal::Refusal;
 
-/// Why an input was refused, or which side effect it had.
+/// Reason for which an input was refused, or the side effect that it had.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reason {
     /// The filter or smoother refused it.
@@ -32,7 +32,7 @@ pub enum Reason {
 }
 
 impl Reason {
-    /// Whether it is the same reason, with the same or other numbers.
+    /// Returns whether it is the same reason, with the same or other numbers.
     pub(super) fn is_alike(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Refused(refusal), Self::Refused(other)) => discriminant(refusal) == discriminant(other),
@@ -80,7 +80,7 @@ impl EstimatorError {
         }
     }
 
-    /// Whether there is no estimate for this tick.
+    /// Returns whether there is no estimate for this tick.
     pub fn is_fatal(&self) -> bool {
         matches!(self, Self::Fatal(_))
     }
@@ -97,7 +97,7 @@ impl fmt::Display for EstimatorError {
 
 impl Error for EstimatorError {}
 
-/// Why the take-off origin was refused.
+/// Reason for which the take-off origin was refused.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum OriginError {
     /// There already was a measurement.

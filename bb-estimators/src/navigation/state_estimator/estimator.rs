@@ -24,18 +24,18 @@ use crate::navigation::geodesy::LocalFrame;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::smoother::NavigationFactor;
 
-/// How far the caller's clock may lag behind the IMU's, ns.
+/// Largest lag of the caller's clock behind the IMU's, ns.
 const LONGEST_LAG_NS: i64 = 200_000_000;
 
 /// Result of an input that was accepted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Added {
-    /// It is in the estimate.
+    /// Input that is in the estimate.
     Taken {
         /// Normalised innovation squared over its dimension, if it was measured.
         nis: Option<f64>,
     },
-    /// It is newer than the last sample of the IMU, and waits for the next one.
+    /// Input that is newer than the last sample of the IMU, and waits for the next one.
     Waits,
 }
 

@@ -31,7 +31,7 @@ pub enum InputKind {
 }
 
 impl InputKind {
-    /// Whether it adds to the window of the estimator. All else comes from the flight controller.
+    /// Returns whether it adds to the window of the estimator. All else comes from the flight controller.
     pub(super) const fn is_of_window(self) -> bool {
         match self {
             Self::Vio | Self::Frame | Self::Anchor | Self::Factor => true,
@@ -84,11 +84,11 @@ impl Level {
 /// Source of a start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum StartedFrom {
-    /// From the take-off origin.
+    /// Start from the take-off origin.
     Origin,
     /// Warm, from the last known state of the flight controller, with its covariance inflated.
     FlightController,
-    /// From an anchor.
+    /// Start from an anchor.
     Anchor,
     /// A restart from fixes that agree and are far from the estimate.
     Receiver,
@@ -111,7 +111,7 @@ impl StartedFrom {
 pub struct Event {
     /// Time on the clock of the inputs, ns.
     pub time_ns: i64,
-    /// What happened.
+    /// Kind of the event.
     pub kind: EventKind,
 }
 
@@ -119,14 +119,14 @@ pub struct Event {
 /// Kind of an event.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EventKind {
-    /// It is ready for inputs.
+    /// Estimator that is ready for inputs.
     Ready {
         /// The strategy in use.
         strategy: StrategyKind,
         /// Number of keyframes held.
         window: u32,
     },
-    /// It has started.
+    /// Start of the estimator.
     Started {
         /// Source of the start.
         from: StartedFrom,
@@ -137,7 +137,7 @@ pub enum EventKind {
         input: InputKind,
         /// Normalised innovation squared over its dimension, if it was measured.
         nis: Option<f64>,
-        /// Whether it is newer than the last sample of the IMU, and waits for the next one.
+        /// `true` if it is newer than the last sample of the IMU, and waits for the next one.
         waits: bool,
     },
     /// An input is not in the estimate, or has moved it.
@@ -154,8 +154,8 @@ pub enum EventKind {
         /// The reason.
         reason: Reason,
     },
-    /// With a late input, an earlier one is in the estimate that was reported otherwise. The opposite is reported as it would have
-    /// been at once: as [`Degraded`](Self::Degraded), [`Fatal`](Self::Fatal) or [`Rejected`](Self::Rejected).
+    /// Earlier input that a late one has brought into the estimate, though it was reported otherwise. The opposite is reported as it would
+    /// have been at once: as [`Degraded`](Self::Degraded), [`Fatal`](Self::Fatal) or [`Rejected`](Self::Rejected).
     Revised {
         /// The earlier input.
         input: InputKind,
@@ -181,7 +181,7 @@ pub enum EventKind {
     },
     /// The clock of the IMU was set back. The estimator continues on the new clock, degraded until positions confirm it.
     ClockSetBack {
-        /// By how much, s.
+        /// Time by which it was set back, s.
         seconds: f64,
     },
     /// Samples of the IMU were dropped early because there was no room for more. Late inputs may then be refused even within the
@@ -192,7 +192,7 @@ pub enum EventKind {
     },
     /// The covariance has grown.
     CovarianceGrowing {
-        /// Its norm relative to the steady norm.
+        /// Norm of the covariance relative to the steady norm.
         ratio: f64,
     },
     /// There has been no estimate for two thirds of the time after which the fallback engages.
@@ -203,7 +203,7 @@ pub enum EventKind {
     FallbackRecovered,
     /// A keyframe has left the window.
     Keyframe {
-        /// Its present estimate, for recorders only.
+        /// Present estimate of the keyframe, for recorders only.
         estimate: EstimatorOutput,
     },
 }

@@ -42,13 +42,13 @@ impl GateState {
         }
     }
 
-    /// Whether fixes may be used.
+    /// Returns whether fixes may be used.
     pub fn is_open(self) -> bool {
         self == Self::Open
     }
 }
 
-/// Why a fix is not used, or why the receiver is not let in.
+/// Reason for which a fix is not used, or the receiver is not let in.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Rejection {
     /// The receiver is not reported stable, or there is no report.
@@ -62,7 +62,7 @@ pub enum Rejection {
     },
     /// The receiver was stable for long enough, but no anchor has agreed with it yet.
     AwaitsAnchor,
-    /// It is too far from the estimate: the dwell restarts.
+    /// Fix that is too far from the estimate: the dwell restarts.
     TooFar {
         /// Distance, m.
         distance_m: f64,
@@ -75,12 +75,12 @@ pub enum Rejection {
 }
 
 impl Rejection {
-    /// Whether it is by the same condition, with the same or other numbers.
+    /// Returns whether it is by the same condition, with the same or other numbers.
     pub(super) fn is_alike(&self, other: &Self) -> bool {
         core::mem::discriminant(self) == core::mem::discriminant(other)
     }
 
-    /// Whether it restarts the dwell.
+    /// Returns whether it restarts the dwell.
     pub fn restarts_dwell(&self) -> bool {
         matches!(self, Self::TooFar { .. } | Self::Disagrees { .. })
     }
@@ -157,7 +157,7 @@ impl SpoofGate {
         self.health.is_some_and(|(at_ns, _)| time_ns.saturating_sub(at_ns) <= ns(params.health_gap))
     }
 
-    /// Whether a fix may be used. `offset` is the fix minus the estimate, m.
+    /// Checks that a fix may be used. `offset` is the fix minus the estimate, m.
     pub(super) fn fix(
         &mut self,
         time_ns: i64,

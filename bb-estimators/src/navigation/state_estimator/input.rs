@@ -19,9 +19,9 @@ pub struct ImuBias {
 /// The pose of the body at one camera frame relative to an earlier one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VioOutput {
-    /// When the earlier frame was taken, ns.
+    /// Time at which the earlier frame was taken, ns.
     pub from_ns: i64,
-    /// When the later frame was taken, ns.
+    /// Time at which the later frame was taken, ns.
     pub to_ns: i64,
     /// Position of the body's origin at the later frame, in the axes of the body at the earlier one, m.
     pub translation: Vector3<f64>,
@@ -30,7 +30,7 @@ pub struct VioOutput {
     /// Covariance of the translation, m², and of the rotation vector of the error, rad², both in body axes at the later frame. The
     /// cross-correlation is ignored.
     pub covariance: Matrix6<f64>,
-    /// Its estimate of the biases. It is not treated as a measurement, since it derives from the same IMU samples. When the
+    /// Provider's estimate of the biases. It is not treated as a measurement, since it derives from the same IMU samples. When the
     /// estimator starts or restarts, it uses them as initial values.
     pub bias: Option<ImuBias>,
 }
@@ -38,7 +38,7 @@ pub struct VioOutput {
 /// The pose of the body, from satellite images.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseAnchor {
-    /// When the image was taken, ns.
+    /// Time at which the image was taken, ns.
     pub time_ns: i64,
     /// Number of the provider, if there are several.
     pub provider: u32,
@@ -49,8 +49,8 @@ pub struct PoseAnchor {
     /// Covariance of the position, m², and of the rotation vector of the error, rad², both in the tangent frame. The
     /// cross-correlation is ignored.
     pub covariance: Matrix6<f64>,
-    /// Whether the provider used a cheaper computation of its covariance because it was too hot. The covariance is used unchanged,
-    /// and the quality of the estimate reports it.
+    /// `true` if the provider used a cheaper computation of its covariance because it was too hot. The covariance is used unchanged, and
+    /// the quality of the estimate reports it.
     pub is_covariance_degraded: bool,
 }
 
@@ -88,7 +88,7 @@ pub struct AttitudeReading {
 /// Last known state of the flight controller, from which a warm start begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FlightControllerState {
-    /// Its attitude, with the time of the state.
+    /// Attitude of the flight controller, with the time of the state.
     pub attitude: AttitudeReading,
     /// Position of the body's origin.
     pub position: Geodetic,
@@ -104,13 +104,13 @@ pub struct FlightControllerState {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "runtime", derive(bb_core::Payload))]
 pub enum GpsHealth {
-    /// It has no fix.
+    /// Receiver without a fix.
     NoFix,
-    /// It has an intermittent fix, or is jammed.
+    /// Receiver whose fix is intermittent, or that is jammed.
     Unstable,
-    /// It is stable and shows no sign of spoofing.
+    /// Receiver that is stable and shows no sign of spoofing.
     Stable,
-    /// It is being spoofed.
+    /// Receiver that is being spoofed.
     Spoofed,
 }
 
@@ -155,7 +155,7 @@ pub struct GnssReading {
 pub struct FlightControllerWindow<'a> {
     /// Samples of the IMU, each a mean since the previous one.
     pub imu: &'a [ImuMean],
-    /// Its attitudes.
+    /// Attitudes of the flight controller.
     pub attitudes: &'a [AttitudeReading],
     /// Health of its GNSS receiver.
     pub health: &'a [GpsHealthReading],

@@ -47,7 +47,7 @@ pub(super) struct Sources {
     anchored_ns: Option<i64>,
     /// Time of the newest of these or of the relative poses.
     seen_ns: Option<i64>,
-    /// Whether there was an anchor since the camera was last lost.
+    /// `true` if there was an anchor since the camera was last lost.
     is_grounded: bool,
 }
 

@@ -29,9 +29,9 @@ pub struct EstimatorOutput {
     pub label: SourceLabel,
     /// Time since the last anchor, or since the last fix of a trusted receiver. `None` before the first.
     pub anchor_age_ms: Option<u64>,
-    /// Whether later measurements have corrected it.
+    /// `true` if later measurements have corrected it.
     pub smoothed: bool,
-    /// Whether its covariance is not to be trusted, because an input did not fit or was missing. The label does not change.
+    /// `true` if its covariance is not to be trusted, because an input did not fit or was missing. The label does not change.
     pub degraded: bool,
     /// Number of jumps of the estimate since the first start: it restarted, or went on where positions are that it had
     /// refused. A consumer that differentiates it, or uses it for control, must reset at each jump.
@@ -51,7 +51,7 @@ pub struct Quality {
     pub anchor_age_ms: Option<u64>,
     /// Normalised innovation squared of the last measurement, over its dimension. It is 1 on average if the estimate is consistent.
     pub nis: Option<f64>,
-    /// Whether the provider of the last anchor used a cheaper computation of its covariance.
+    /// `true` if the provider of the last anchor used a cheaper computation of its covariance.
     pub is_anchor_degraded: bool,
 }
 
@@ -66,7 +66,7 @@ pub struct EstimatorHealth {
     pub covariance_growing_s: f64,
     /// State of the gate of the GNSS receiver.
     pub gate: GateState,
-    /// Whether the fallback to the flight controller's own IMU is engaged.
+    /// `true` while the fallback to the flight controller's own IMU is engaged.
     pub is_fallback_engaged: bool,
 }
 
@@ -74,14 +74,14 @@ pub struct EstimatorHealth {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "runtime", derive(bb_core::Payload))]
 pub enum HealthState {
-    /// It has not started.
+    /// Estimator that has not started.
     #[default]
     Init,
-    /// It follows its sensors.
+    /// Estimator that follows its sensors.
     Tracking,
-    /// Its covariance is not to be trusted.
+    /// Estimator whose covariance is not to be trusted.
     Degraded,
-    /// It has no estimate.
+    /// Estimator without an estimate.
     Lost,
 }
 

@@ -23,7 +23,7 @@ impl StrategyKind {
         Self::Eskf,
     ];
 
-    /// Its name: `smoother` or `eskf`.
+    /// Returns the name of the strategy: `smoother` or `eskf`.
     pub const fn name(self) -> &'static str {
         match self {
             #[cfg(feature = "smoother")]
@@ -33,7 +33,7 @@ impl StrategyKind {
         }
     }
 
-    /// Whether later measurements correct its keyframes.
+    /// Returns whether later measurements correct its keyframes.
     pub(super) const fn is_smoothing(self) -> bool {
         match self {
             #[cfg(feature = "smoother")]
@@ -58,9 +58,9 @@ impl Default for StrategyKind {
 params! {
     /// Times and limits of [`StateEstimator`](super::StateEstimator).
     pub struct StateEstimatorParams {
-        /// How many keyframes are held, in the smoother's window or in the filter's history: from 2 to 100.
+        /// Number of keyframes that are held, in the smoother's window or in the filter's history: from 2 to 100.
         window: u32 = 15;
-        /// How late an input may be, behind the newest sample of the IMU, and still be placed where it belongs.
+        /// Largest delay of an input, behind the newest sample of the IMU, with which it is still placed where it belongs.
         ///
         /// Small: what takes longer to compute is refused. Large: costs memory, and time where something is late.
         ///
@@ -77,36 +77,36 @@ params! {
         /// Small: if more come, they are refused as an overflow. A quarter of the room is kept for relative poses, anchors and
         /// factors: a flight controller that floods takes none from them. Large: costs memory, about 700 bytes an input.
         input_rate: f64 = 128.0, in 1.0..=10_000.0, unit "Hz";
-        /// How far ahead of the newest sample of the IMU an input may be stamped.
+        /// Largest lead of an input's stamp over the newest sample of the IMU.
         lead: f64 = 0.5, in 0.0..=10.0, unit "s";
         /// Without camera frames, a keyframe is made after this time. A camera whose frames are farther apart is waited for: for up
         /// to one and a half times the time between its last two frames, and at most a second longer than this.
         keyframe_interval: f64 = 1.0, in 0.05..=10.0, unit "s";
         /// Estimates a second.
         output_rate: f64 = 5.0, in 0.1..=1000.0, unit "Hz";
-        /// How long after the last sample of the IMU there is still an estimate.
+        /// Time after the last sample of the IMU for which there is still an estimate.
         longest_prediction: f64 = 0.2, in 0.0..=1.0, unit "s";
-        /// How long estimates may be missing before the flight controller's own IMU takes over.
+        /// Time for which estimates may be missing before the flight controller's own IMU takes over.
         fallback_after: f64 = 3.0, in 0.1..=60.0, unit "s";
         /// An anchor older than this demotes to `visual_propagated`.
         anchor_age: f64 = 3.0, in 0.1..=600.0, unit "s";
         /// Without a camera's, or a satellite's, measurement for this time it is dead reckoning.
         visual_loss: f64 = 1.0, in 0.05..=60.0, unit "s";
-        /// How long a receiver that was spoofed must be healthy before it may be let in again.
+        /// Time for which a receiver that was spoofed must be healthy before it may be let in again.
         dwell: f64 = 10.0, in 0.0..=600.0, unit "s";
         /// Reports of its health that are farther apart break the dwell.
         health_gap: f64 = 2.0, in 0.05..=60.0, unit "s";
-        /// How far from the next anchor its fix may be to be let in again.
+        /// Largest distance of its fix from the next anchor with which it is let in again.
         anchor_tolerance: f64 = 25.0, in 0.1..=1e4, unit "m";
-        /// How far from the estimate its fix may be to be let in again.
+        /// Largest distance of its fix from the estimate with which it is let in again.
         bounded_distance: f64 = 200.0, in 1.0..=1e6, unit "m";
-        /// What the standard deviations of the flight controller are multiplied by at a warm start.
+        /// Factor of the flight controller's standard deviations at a warm start.
         warm_inflation: f64 = 2.0, in 1.0..=100.0;
         /// Standard deviation of each component of the velocity at take-off.
         takeoff_velocity: f64 = 0.5, in 1e-3..=100.0, unit "m/s";
         /// Heading of the body's x axis at take-off, from east counter-clockwise, if no attitude provides it.
         takeoff_heading: f64 = 0.0, in -7.0..=7.0, unit "rad";
-        /// How well that is known, standard deviation.
+        /// Standard deviation of the heading at take-off.
         takeoff_heading_deviation: f64 = 0.5, in 1e-6..=4.0, unit "rad";
         /// Standard deviation of the accelerometer's bias at the start.
         accelerometer_bias: f64 = 0.2, in 1e-6..=10.0, unit "m/s^2";
@@ -114,8 +114,7 @@ params! {
         gyroscope_bias: f64 = 0.02, in 1e-9..=1.0, unit "rad/s";
         /// A covariance that is larger than the steady one by this factor is warned of.
         growing_covariance: f64 = 2.0, in 1.1..=1e3;
-        /// Whether keyframes that leave the window are events, for a recorder. It costs the smoother the covariance of its oldest
-        /// keyframe.
+        /// Events of keyframes that leave the window, for a recorder. They cost the smoother the covariance of its oldest keyframe.
         record_keyframes: bool = true;
     }
 }
@@ -123,13 +122,13 @@ params! {
 /// Complete configuration of a [`StateEstimator`](super::StateEstimator).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StateEstimatorConfig {
-    /// Which estimator does the work.
+    /// Estimator that does the work.
     pub strategy: StrategyKind,
     /// Times and limits.
     pub params: StateEstimatorParams,
     /// The noise of the IMU, gravity and gaps.
     pub sensors: EskfParams,
-    /// What the ids of frames begin with: another in each flight, for ids that are unique.
+    /// Beginning of the ids of frames: another in each flight, for ids that are unique.
     pub flight: u64,
 }
 

@@ -58,9 +58,9 @@ pub struct QueueCounts {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Sampled {
     Taken,
-    /// It follows a gap.
+    /// Sample after a gap.
     Bridged,
-    /// It is the first: the next one shows whether its stamp can be believed.
+    /// First sample: the next one shows whether its stamp can be believed.
     Waits,
 }
 
@@ -74,7 +74,7 @@ pub(super) enum Told {
     Revised(Key, InputKind),
     /// The gate of the receiver rejected something.
     Rejected(i64, Rejection),
-    /// It has started.
+    /// Start of the estimator.
     Started(i64, StartedFrom),
     /// A keyframe has left the window.
     Left(Pose, Sources),
@@ -142,7 +142,7 @@ impl<F: ProvidedFactor> Queue<F> {
         })
     }
 
-    /// Whether there has been no input yet.
+    /// Returns whether there has been no input yet.
     pub(super) fn is_empty(&self) -> bool {
         self.newest.is_none() && self.first.is_none() && self.inputs.is_empty()
     }
@@ -215,7 +215,7 @@ impl<F: ProvidedFactor> Queue<F> {
         result.map_err(|reason| self.count(reason))
     }
 
-    /// Whether there is a copy from before an input. Within the lateness there always is, unless samples were dropped or the clock
+    /// Returns whether there is a copy from before an input. Within the lateness there always is, unless samples were dropped or the clock
     /// was set back.
     fn reaches(&self, key: Key) -> bool {
         let is_before =
@@ -223,7 +223,7 @@ impl<F: ProvidedFactor> Queue<F> {
         self.copies.front().is_some_and(is_before)
     }
 
-    /// Whether an input may belong to the time of a sample.
+    /// Returns whether an input may belong to the time of a sample.
     fn is_near(&self, input_ns: i64, sample_ns: i64, config: &StateEstimatorConfig) -> bool {
         let (oldest_ns, latest_ns) = (
             sample_ns.saturating_sub(ns(config.params.lateness)),
@@ -361,7 +361,7 @@ impl<F: ProvidedFactor> Queue<F> {
         before.map(|before| before.time_ns).or(self.dropped_ns).or(self.engine.begun_ns())
     }
 
-    /// Whether a sample is the first after a gap.
+    /// Returns whether a sample is the first after a gap.
     fn follows_gap(&self, index: usize, config: &StateEstimatorConfig) -> bool {
         let (Some(since_ns), Some(sample)) = (self.since_ns(index), self.samples.get(index)) else { return false };
         sample.time_ns.saturating_sub(since_ns) > ns(config.sensors.longest_sample)

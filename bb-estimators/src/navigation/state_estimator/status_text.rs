@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-/// At most 50 bytes of ASCII.
+/// Text of at most 50 bytes of ASCII.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct StatusText {
     bytes: [u8; Self::CAPACITY],

@@ -64,11 +64,11 @@ pub(super) enum Measured<'a, F> {
 pub(super) enum Trust {
     /// None: it is refused.
     Doubted,
-    /// It may show that the estimate is in the wrong place.
+    /// The position may show that the estimate is in the wrong place.
     Believed,
 }
 
-/// Why a measurement was not fused.
+/// Reason for which a measurement was not fused.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Failure {
     /// The state is unchanged.
@@ -102,8 +102,8 @@ impl Streams {
     }
 }
 
-/// How much longer than [`keyframe_interval`](super::params::StateEstimatorParams::keyframe_interval) a keyframe may wait for a
-/// slow camera. [`room`](super::params::StateEstimatorParams::room) includes this margin.
+/// Time beyond [`keyframe_interval`](super::params::StateEstimatorParams::keyframe_interval) for which a keyframe may wait for a slow
+/// camera. [`room`](super::params::StateEstimatorParams::room) includes this margin.
 const SLACK_NS: i64 = 1_000_000_000;
 
 /// Timing of keyframes.
@@ -135,7 +135,7 @@ impl Cadence {
         }
     }
 
-    /// How long to wait for the next frame: a keyframe between two frames would separate them.
+    /// Returns the time to wait for the next frame: a keyframe between two frames would separate them.
     fn patience_ns(&self) -> i64 {
         (self.spacing_ns / 2).saturating_mul(3).min(self.interval_ns.saturating_add(SLACK_NS))
     }
@@ -144,12 +144,12 @@ impl Cadence {
         now_ns.saturating_sub(self.camera_ns) <= self.patience_ns().max(at_least_ns)
     }
 
-    /// Whether a keyframe is due without a camera.
+    /// Returns whether a keyframe is due without a camera.
     fn is_due(&self, now_ns: i64) -> bool {
         now_ns.saturating_sub(self.keyframe_ns) >= self.interval_ns && !self.awaits_camera(now_ns, 0)
     }
 
-    /// Whether the camera determines the times of keyframes.
+    /// Returns whether the camera determines the times of keyframes.
     #[cfg(feature = "smoother")]
     fn has_camera(&self, now_ns: i64) -> bool {
         self.awaits_camera(now_ns, self.interval_ns / 2)
@@ -220,7 +220,7 @@ impl<F: ProvidedFactor> Strategy<F> {
         each!(self, strategy => strategy.measure(measured))
     }
 
-    /// Whether the last correction has converged. If not, the covariance is not to be trusted.
+    /// Returns whether the last correction has converged. If not, the covariance is not to be trusted.
     pub(super) fn is_converged(&self) -> bool {
         match self {
             #[cfg(feature = "smoother")]
@@ -231,7 +231,7 @@ impl<F: ProvidedFactor> Strategy<F> {
         }
     }
 
-    /// Whether the heading is known. After an outage of the IMU it is not, until it has been determined again.
+    /// Returns whether the heading is known. After an outage of the IMU it is not, until it has been determined again.
     pub(super) fn is_attitude_known(&self) -> bool {
         match self {
             // It linearises again until it converges.
@@ -303,7 +303,7 @@ impl<F: ProvidedFactor> Strategy<F> {
         each!(self, strategy => strategy.streams()).positions.counts().gate_in_a_row
     }
 
-    /// How often it started, or went on in another place.
+    /// Returns how often it started, or went on in another place.
     pub(super) fn resets(&self) -> u32 {
         each!(self, strategy => strategy.resets())
     }

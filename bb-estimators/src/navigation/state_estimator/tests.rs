@@ -44,7 +44,7 @@ impl EventSink for Events {
 
 type Estimator = StateEstimator<Events>;
 
-/// With factors of outside providers.
+/// Estimator with factors of outside providers.
 type Providing = StateEstimator<Events, Provided>;
 
 fn config(strategy: StrategyKind) -> StateEstimatorConfig {

@@ -75,7 +75,7 @@ impl World {
         self.frame.origin().height + position.z
     }
 
-    /// If a position is far from the origin, moves to a nearer frame. Returns the transform of coordinates to it.
+    /// Moves to a nearer frame if a position is far from the origin. Returns the transform of coordinates to it.
     pub(super) fn moves_on(&mut self, position: &Vector3<f64>) -> Option<Isometry3<f64>> {
         if position.xy().norm() <= FARTHEST {
             return None;

@@ -47,7 +47,7 @@ proptest! {
     }
 }
 
-/// At a steady turn rate, the velocity is the current one. After a turn of 60° on the way, no velocity is clear.
+/// The velocity on an arc is that at its end, at a steady turn rate. After a turn of 60° on the way, no velocity is clear.
 #[test]
 fn the_velocity_on_an_arc_is_that_at_its_end() {
     for (rate, is_clear) in [(0.0, true), (0.25, true), (-0.4, true), (1.1, false)] {

@@ -1,4 +1,4 @@
-//! What the rover can be asked for.
+//! Commands of the rover.
 
 use crate::robot::rover;
 use bb_core::payload::{ActuatorCommand, PositionCommand};
@@ -7,7 +7,7 @@ use bb_core::prelude::*;
 /// Options of [`Pace`].
 #[derive(Clone, Debug, Options)]
 pub(crate) struct PaceOptions {
-    /// How fast the rover is to drive. Unit: m/s.
+    /// Speed that the rover is to drive. Unit: m/s.
     #[option(required, range = 0.0..=1.5, unit = "m/s")]
     pub(crate) speed: f64,
     /// The state that the rover is in then.
@@ -34,10 +34,10 @@ impl Command for Pace {
 /// Arguments of [`Travel`].
 #[derive(Clone, Copy, Debug, Payload)]
 pub(crate) struct Distance {
-    /// How far to drive.
+    /// Distance to drive.
     #[payload(unit = "m", range = 0.0..=100.0)]
     pub(crate) distance: f64,
-    /// How fast.
+    /// Speed.
     pub(crate) gait: Gait,
 }
 
@@ -93,7 +93,7 @@ pub(crate) struct Sweep {
 /// Progress of [`Look`].
 #[derive(Clone, Copy, Debug, Payload)]
 pub(crate) struct Swept {
-    /// From 0 to 1.
+    /// Share of the way, from 0 to 1.
     pub(crate) share: f64,
 }
 

@@ -1,9 +1,9 @@
-//! Where the rover is, and how much room it has.
+//! Position of the rover, and the room before it.
 
 use bb_core::nalgebra::{UnitQuaternion, Vector3};
 use bb_core::prelude::*;
 
-/// What [`DeadReckoning`] takes.
+/// Inputs of [`DeadReckoning`].
 #[derive(Clone, Copy, Debug, Inputs)]
 pub(crate) struct DeadReckoningInputs<'a> {
     imu: Input<'a, Imu>,
@@ -43,7 +43,7 @@ pub(crate) struct Room {
     /// Smoothed distance to the nearest obstacle.
     #[payload(unit = "m")]
     pub(crate) distance: f64,
-    /// Whether it is nearer than the parameter `nearest`.
+    /// `true` if it is nearer than the parameter `nearest`.
     pub(crate) is_near: bool,
 }
 

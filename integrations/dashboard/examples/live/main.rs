@@ -16,7 +16,7 @@ use std::error::Error;
 use std::process::ExitCode;
 use std::time::Instant;
 
-/// What it can be given.
+/// Command line.
 #[derive(Debug, Default, PartialEq)]
 struct Arguments {
     port: Option<u16>,

@@ -7,19 +7,19 @@ use bb_core::prelude::*;
 use bb_estimators::{SimulatedActuator, SimulatedEncoder};
 
 robot! {
-    /// It drives in a circle, at the speed that its commands set.
+    /// Simulated rover that drives in a circle, at the speed that its commands set.
     pub(crate) robot Rover;
 
     parameters {
-        /// How fast it drives.
+        /// Speed.
         speed: f64 = 0 m/s, range: 0 m/s..=1.5 m/s;
         /// Radius of the circle.
         radius: f64 = 2 m, range: 0.5 m..=10 m;
-        /// How far the camera looks to the side when nothing else is asked for.
+        /// Angle of the camera to the side when nothing else is asked for.
         gaze: f64 = 0 deg, range: -90 deg..=90 deg;
         /// Obstacles nearer than this are reported.
         nearest: f64 = 0.4 m, range: 0.1 m..=2 m;
-        /// Whether the lights are on.
+        /// `true` while the lights are on.
         lights: bool = false;
         /// Name of the mission, for the log.
         mission: String = "survey";

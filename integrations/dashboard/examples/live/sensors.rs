@@ -25,7 +25,7 @@ fn seconds(now: MonotonicTime) -> f64 {
 /// Options of the sensors that feel how the rover drives.
 #[derive(Clone, Debug, Options)]
 pub(crate) struct Drive {
-    /// How fast it drives. Unit: m/s.
+    /// Speed. Unit: m/s.
     #[option(required, range = 0.0..=1.5, unit = "m/s")]
     pub(crate) speed: f64,
     /// Radius of its circle. Unit: m.
@@ -119,7 +119,7 @@ impl Sensor for Sonar {
 /// Options of [`Battery`].
 #[derive(Clone, Debug, Options)]
 pub(crate) struct Load {
-    /// How fast the rover drives. Unit: m/s.
+    /// Speed of the rover. Unit: m/s.
     #[option(required, range = 0.0..=1.5, unit = "m/s")]
     pub(crate) speed: f64,
 }

@@ -87,12 +87,12 @@ impl Client {
         }
     }
 
-    /// Why a request is refused.
+    /// Returns the reason for which a request is refused.
     pub(crate) fn refusal(&mut self, op: &str, more: Value) -> String {
         self.ask(op, more).map_or_else(|error| error.to_string(), |answer| format!("not refused: {answer}"))
     }
 
-    /// What `find` makes of the first message that it takes; those before it are kept.
+    /// Returns what `find` makes of the first message that it accepts; those before it are kept.
     pub(crate) fn until<T>(&mut self, find: impl Fn(&Value) -> Option<T>) -> Result<T, Box<dyn Error>> {
         if let Some(index) = self.kept.iter().position(|message| find(message).is_some())
             && let Some(found) = find(&self.kept.remove(index))

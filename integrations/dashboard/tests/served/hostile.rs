@@ -134,7 +134,7 @@ struct Long {
     text: String,
 }
 
-/// What the test below stops and kills: it does nothing without the address.
+/// Viewer that the test below stops and kills: it does nothing without the address.
 #[test]
 #[ignore = "is run by another test, as a process of its own"]
 fn a_viewer_in_a_process_of_its_own() -> Result<(), Box<dyn Error>> {

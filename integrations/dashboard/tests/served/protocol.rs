@@ -1,4 +1,4 @@
-//! What viewers see and may do.
+//! Views and rights of viewers.
 
 use crate::client::{Client, token};
 use crate::robot::{Cart, HTML, Level, cart, other, own};
@@ -16,7 +16,7 @@ fn at(millis: i64) -> MonotonicTime {
     MonotonicTime::from_nanos(millis * 1_000_000)
 }
 
-/// Whoever comes late sees what is wrong, since when and why.
+/// A viewer that comes late sees what is wrong, since when and why.
 #[test]
 fn the_first_report_says_what_is_wrong_and_since_when() -> Result<(), Box<dyn Error>> {
     let mut simulation = Cart::builder().simulate()?;
@@ -133,7 +133,7 @@ fn watched_paths_give_their_newest_message_and_others_none() -> Result<(), Box<d
     Ok(())
 }
 
-/// What a component says is text, however long it is and whatever is in it.
+/// Texts of a component are shown as text, however long they are and whatever is in them.
 #[test]
 fn texts_of_the_robot_arrive_as_they_are() -> Result<(), Box<dyn Error>> {
     let mut simulation = Cart::builder().simulate()?;
@@ -184,7 +184,7 @@ fn one_page_serves_several_robots() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// As a line of `robot!`, in real time.
+/// A dashboard declared by a line of `robot!`, in real time.
 #[test]
 fn a_robot_may_declare_its_dashboard() -> Result<(), Box<dyn Error>> {
     let builder = own::Own::builder();

@@ -2,13 +2,13 @@
 
 use bb_core::prelude::*;
 
-/// What a cruel author of names writes.
+/// Name by a cruel author.
 pub(crate) const HTML: &str = "<img src=x onerror=\"window.broken = true\">";
 
 /// A number.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 pub(crate) struct Level {
-    /// How much.
+    /// Amount.
     pub(crate) value: f64,
 }
 
@@ -35,7 +35,7 @@ impl Estimator for Pass {
 /// Arguments of [`Travel`].
 #[derive(Clone, Copy, Debug, Default, Payload)]
 pub(crate) struct Distance {
-    /// How far.
+    /// Distance.
     #[payload(unit = "m")]
     pub(crate) distance: f64,
 }
@@ -58,7 +58,7 @@ impl Command for Travel {
 robot! {
     pub(crate) robot Cart;
     parameters {
-        /// How fast it drives.
+        /// Speed.
         speed: f64 = 0.5 m/s, range: 0 m/s..=1.5 m/s;
         count: i64 = 3;
     }

@@ -8,7 +8,7 @@ use crate::navigation::state::{NAVIGATION, Navigation, Optional, States, offset}
 use crate::navigation::stream::Stream;
 use nalgebra::{SMatrix, UnitQuaternion, Vector3};
 
-/// In a different order than [`Fewer`], and with states that it lacks.
+/// Optional states in a different order than [`Fewer`], and states that it lacks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct More;
 

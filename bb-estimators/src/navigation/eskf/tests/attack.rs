@@ -19,7 +19,7 @@ fn open() -> Stream {
     Stream::new(StreamParams { gate: 0.0, ..StreamParams::default() })
 }
 
-/// At a whole turn, the Jacobian of the reset is singular.
+/// Corrections by whole turns keep the covariance regular, though there the Jacobian of the reset is singular.
 #[test]
 fn a_correction_by_whole_turns_keeps_the_covariance_regular() {
     for turns in [1.0, 2.0, 3.0] {

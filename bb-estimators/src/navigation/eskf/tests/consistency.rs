@@ -1,4 +1,4 @@
-//! With sensors whose errors match the filter's noise model, its errors match its covariance: for every configuration, over
+//! Consistency: with sensors whose errors match the filter's noise model, its errors match its covariance, for every configuration, over
 //! seeds.
 
 use nalgebra::{UnitQuaternion, Vector3};

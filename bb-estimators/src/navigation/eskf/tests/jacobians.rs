@@ -1,4 +1,4 @@
-//! For every measurement: the residual of an exact measurement is zero, and the Jacobian matches numeric differentiation.
+//! Jacobians of every measurement: the residual of an exact measurement is zero, and the Jacobian matches numeric differentiation.
 
 use nalgebra::{SVector, UnitQuaternion, Vector3};
 use proptest::prelude::*;

@@ -70,7 +70,7 @@ impl Filter {
         largest_deviation(of(0, 0), of(0, 1), of(1, 1))
     }
 
-    /// Whether no emitted value is NaN and no variance is negative.
+    /// Returns whether no emitted value is NaN and no variance is negative.
     pub(super) fn is_sound(&self) -> bool {
         let covariance = self.ekf().covariance();
         let variances =

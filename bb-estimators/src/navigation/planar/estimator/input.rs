@@ -69,7 +69,7 @@ impl Mounting {
         self.antenna.is_some()
     }
 
-    /// Whether something measures the position in the world.
+    /// Returns whether something measures the position in the world.
     pub(super) fn has_positions(&self) -> bool {
         self.has_gnss() || self.body_from_pose.is_some()
     }
@@ -95,17 +95,17 @@ impl Mounting {
         Some(PlanarPosition { position: fix.position.xy(), covariance, lever_arm: self.antenna() })
     }
 
-    /// Whether the robot has wheels.
+    /// Returns whether the robot has wheels.
     pub(super) fn has_wheels(&self) -> bool {
         self.has_wheels
     }
 
-    /// Whether something measures the heading in the world alone.
+    /// Returns whether something measures the heading in the world alone.
     pub(super) fn has_orientation(&self) -> bool {
         self.body_from_orientation.is_some()
     }
 
-    /// Whether something measures poses in the world.
+    /// Returns whether something measures poses in the world.
     pub(super) fn has_poses(&self) -> bool {
         self.body_from_pose.is_some()
     }

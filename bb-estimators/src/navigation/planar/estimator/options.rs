@@ -19,8 +19,8 @@ params! {
         wheel_scale: f64 = 0.02, in 0.0..=1.0;
         /// Correlation time of the scale of the wheels.
         wheel_scale_time: f64 = 1000.0, in 1e-3..=f64::INFINITY, unit "s";
-        /// For a robot that can drive sideways: takes the sideways velocity from the odometry. Otherwise the sideways velocity
-        /// is assumed to be zero.
+        /// Use of the sideways velocity from the odometry, for a robot that can drive sideways. Otherwise the sideways velocity is assumed
+        /// to be zero.
         omnidirectional: bool = false;
         /// Standard deviation of the sideways velocity of a robot that cannot drive sideways.
         sideways_deviation: f64 = 0.05, in 1e-4..=1e3, unit "m/s";
@@ -42,8 +42,7 @@ params! {
         pose_deviation: f64 = 0.5, in 1e-4..=1e3, unit "m";
         /// Standard deviation of the heading of an orientation without a covariance.
         orientation_deviation: f64 = 0.1, in 1e-5..=4.0, unit "rad";
-        /// How long the position may be dead-reckoned before the estimate counts as unreliable, if the robot has a source of
-        /// fixes or poses.
+        /// Longest dead reckoning of the position before the estimate counts as unreliable, if the robot has a source of fixes or poses.
         longest_dead_reckoning: f64 = 30.0, in 0.0..=f64::INFINITY, unit "s";
         /// Standard deviation of the horizontal position beyond which the estimate counts as unreliable.
         largest_deviation: f64 = 100.0, in 1e-3..=f64::INFINITY, unit "m";

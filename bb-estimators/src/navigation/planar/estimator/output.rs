@@ -48,19 +48,19 @@ pub struct PlanarStatus {
     pub horizontal_deviation: f64,
     /// Counts of fixes that were fused and that were rejected.
     pub gnss: Verdicts,
-    /// The same for odometry velocities.
+    /// Counts of odometry velocities by result.
     pub odometry: Verdicts,
-    /// The same for odometry yaw rates.
+    /// Counts of odometry yaw rates by result.
     pub yaw_rate: Verdicts,
-    /// The same for poses.
+    /// Counts of poses by result.
     pub pose: Verdicts,
-    /// The same for orientations.
+    /// Counts of orientations by result.
     pub orientation: Verdicts,
     /// Place of the world's origin on the Earth. `None` without satellites.
     pub world_origin: Option<GeodeticPosition>,
-    /// How often IMU samples were missing for longer than a sample may take.
+    /// Number of times that IMU samples were missing for longer than a sample may take.
     pub gaps: u32,
-    /// How often the filter was wrong and was reset to where fixes or poses agree.
+    /// Number of times that the filter was wrong and was reset to where fixes or poses agree.
     pub resets: u32,
 }
 

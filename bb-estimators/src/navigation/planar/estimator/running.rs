@@ -18,7 +18,7 @@ const MEASUREMENTS: usize = 128;
 const STATES: usize = 16;
 type Past = History<Filter, SAMPLES, MEASUREMENTS, STATES>;
 
-/// How far ahead of the IMU a measurement may be stamped, ns.
+/// Largest lead of a measurement's stamp over the IMU, ns.
 const LONGEST_LEAD_NS: i64 = 500_000_000;
 
 #[derive(Debug)]
@@ -53,7 +53,7 @@ impl Running {
         self.frame
     }
 
-    /// Whether no emitted value is NaN and no variance is negative.
+    /// Returns whether no emitted value is NaN and no variance is negative.
     pub(super) fn is_sound(&self) -> bool {
         self.past.now().is_sound()
     }

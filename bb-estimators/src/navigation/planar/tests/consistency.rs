@@ -1,4 +1,4 @@
-//! With sensors whose errors match the filter's noise model, its errors match its covariance.
+//! Consistency: with sensors whose errors match the filter's noise model, its errors match its covariance.
 
 use nalgebra::{SVector, Vector2, Vector3};
 

@@ -28,7 +28,7 @@ fn stream() -> Stream {
     Stream::new(StreamParams { patience: 0, ..StreamParams::default() })
 }
 
-/// How a sensor is wrong.
+/// Fault of a sensor.
 #[derive(Clone, Copy, Debug)]
 enum Fault {
     None,
@@ -60,7 +60,7 @@ struct Case {
     speed: f64,
     /// The yaw rate: its mean, and the amplitude of its change.
     rate: (f64, f64),
-    /// Of wheels, yaw rate, fixes in units of 10 m, and heading.
+    /// Faults of wheels, yaw rate, fixes in units of 10 m, and heading.
     faults: [Fault; 4],
     /// The direction in which fixes are wrong.
     direction: f64,
@@ -148,7 +148,8 @@ struct Driven {
     deviation: f64,
 }
 
-/// Of wheels, yaw rates, fixes and headings, any may be wrong in any way for up to twelve seconds.
+/// Sensors that were wrong do no harm a minute later: of wheels, yaw rates, fixes and headings, any may be wrong in any
+/// way for up to twelve seconds.
 #[test]
 fn whatever_was_wrong_is_over_a_minute_later() {
     let off = |after_s: f64| -> Vec<(Driven, Case)> {

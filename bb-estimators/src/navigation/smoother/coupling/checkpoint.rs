@@ -1,4 +1,4 @@
-//! What the keyframes before all current tracks leave of Λ, λ and ties, so that an elimination can resume after them.
+//! Parts of Λ, λ and ties that the keyframes before all current tracks leave, so that an elimination can resume after them.
 //!
 //! Marginalising a keyframe does not change what it and those after it leave, and information that is added to later poses
 //! adds to it. It is lost as soon as information on an earlier pose changes, or the link to an earlier keyframe or to its own.
@@ -8,7 +8,7 @@ use alloc::vec::Vec;
 
 use super::{Coupling, POSE};
 
-/// So many keyframes at least must come before a checkpoint.
+/// Least number of keyframes before a checkpoint.
 const LEAST: usize = 2;
 
 /// See the module.

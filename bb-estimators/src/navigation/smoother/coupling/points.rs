@@ -35,7 +35,7 @@ pub(in crate::navigation::smoother) struct Points<const N: usize> {
     /// `[V | W | v]`, then `[R | Y | z]`. Its rows are `width` long.
     work: Vec<f64>,
     width: usize,
-    /// Whether `work` holds the last elimination.
+    /// `true` if `work` holds the last elimination.
     is_eliminated: bool,
     /// The corrections of the landmarks.
     corrections: Vec<f64>,
@@ -179,7 +179,7 @@ impl<const N: usize> Coupling<N> {
         }
     }
 
-    /// Whether the corrections of landmarks need another [`gather`](Self::gather) and
+    /// Returns whether the corrections of landmarks need another [`gather`](Self::gather) and
     /// [`factor_points`](Self::factor_points) to be solved for.
     pub(in crate::navigation::smoother) fn needs_points(&self) -> bool {
         self.points.count > 0 && !self.points.is_eliminated

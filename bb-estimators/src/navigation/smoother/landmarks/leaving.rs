@@ -1,4 +1,4 @@
-//! What happens to landmarks when the oldest keyframe leaves the window.
+//! Landmarks when the oldest keyframe leaves the window.
 //!
 //! A landmark that it saw is one of these:
 //!
@@ -160,7 +160,7 @@ fn unknown(distance: f64) -> f64 {
 }
 
 impl Landmark {
-    /// Its distance from the keyframe that saw it last, m.
+    /// Returns the distance of the landmark from the keyframe that saw it last, m.
     fn distance(&self) -> f64 {
         self.sights.last().map_or(0.0, |sight| sight.arm.norm())
     }

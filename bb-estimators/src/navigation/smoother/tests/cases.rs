@@ -88,7 +88,7 @@ fn a_parameter_out_of_range_is_named() {
     assert!(refused.is_err_and(|error| error.to_string().contains("window")));
 }
 
-/// On a flight that matches the filter's model, the covariance is that of the filter.
+/// The newest covariance is that of the filter on a flight that matches the filter's model.
 #[test]
 fn the_newest_covariance_is_that_of_the_filter() {
     let mut flight = Flight::new(5, 60, 0.0);
@@ -124,8 +124,8 @@ fn the_newest_covariance_is_that_of_the_filter() {
     assert!(error.amax() < 1e-5, "{error}");
 }
 
-/// With a millisecond between keyframes and a position known to a thousand kilometres, the pivot is tiny relative to
-/// its diagonal. It is still correct.
+/// A tiny pivot is no trouble: with a millisecond between keyframes and a position known to a thousand kilometres, it
+/// is tiny relative to its diagonal. It is still correct.
 #[test]
 fn a_tiny_pivot_is_no_trouble() {
     let params = SmootherParams { window: 10, ..SmootherParams::default() };
@@ -256,7 +256,7 @@ fn a_warm_start_may_lack_a_state_that_is_known() {
     assert_eq!(known.adopt::<Navigation, NAVIGATION>(39, &estimate, &covariance), Ok(()));
 }
 
-/// From a filter with other optional states, with all correlations.
+/// A warm start has what the filter has: a filter with other optional states, with all correlations.
 #[test]
 fn a_warm_start_has_what_the_filter_has() {
     let flight = Flight::new(7, 40, 1.0);

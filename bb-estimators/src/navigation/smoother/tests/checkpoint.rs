@@ -33,14 +33,14 @@ fn both(smoother: &mut Smoother) -> Result<(), TestCaseError> {
     Ok(())
 }
 
-/// How a relative pose changes the link between its keyframes.
+/// Effect of a relative pose on the link between its keyframes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Way {
-    /// It adds information.
+    /// Relative pose that adds information.
     Adds,
-    /// Its weight changes with each update.
+    /// Relative pose whose weight changes with each update.
     Robust,
-    /// It fits so badly that the noise of the motion is raised, if its keyframe is the newest.
+    /// Relative pose that fits so badly that the noise of the motion is raised, if its keyframe is the newest.
     Raises,
 }
 
@@ -118,7 +118,7 @@ fn relative_poses_may_follow_the_update() {
     });
 }
 
-/// In the usual order, the update changes the weight last.
+/// The weights of relative poses may change; in the usual order, the update changes them last.
 #[test]
 fn the_weights_of_relative_poses_may_change() {
     compared(24, |smoother, flight, scenery, k| {
@@ -137,7 +137,8 @@ fn the_noise_of_the_newest_motion_may_be_raised() {
     });
 }
 
-/// At each keyframe before the newest in turn, so also at the one where an elimination resumes, which then begins earlier.
+/// Relative poses may come late: at each keyframe before the newest in turn, so also at the one where an elimination resumes, which then
+/// begins earlier.
 #[test]
 fn relative_poses_may_come_late() {
     for way in WAYS {
@@ -154,7 +155,7 @@ fn relative_poses_may_come_late() {
     }
 }
 
-/// What a relative pose changes before its keyframe has seen anything passes over no link.
+/// Changes by a relative pose before its keyframe has seen anything pass over no link.
 #[test]
 fn in_the_usual_order_only_the_newest_is_eliminated() {
     for window in [12, 2 * LONGEST + 12] {

@@ -1,5 +1,5 @@
-//! If the sensors err exactly as the smoother is told, its errors match its covariance, at the newest keyframe and at
-//! the oldest in the window.
+//! Consistency: if the sensors err exactly as the smoother assumes, its errors match its covariance, at the newest
+//! keyframe and at the oldest in the window.
 
 use super::flight::{Flight, sensors};
 use crate::navigation::{NAVIGATION, SmootherParams, nees};

@@ -125,7 +125,7 @@ proptest! {
         }
     }
 
-    /// If the measurement fits, every row matches as well.
+    /// Rows of relative poses match if the measurement fits.
     #[test]
     fn relative_poses(previous in estimate(), at in estimate()) {
         let scale = 1.0 + at.scalar::<Drone>(crate::navigation::Optional::RelativeScale);

@@ -145,7 +145,7 @@ impl Flight {
         flight
     }
 
-    /// The same flight in a world that is turned about its origin, and then moved.
+    /// Returns the flight in a world that is turned about its origin, and then moved.
     pub(super) fn elsewhere(mut self, turn: &UnitQuaternion<f64>, origin: &Vector3<f64>) -> Self {
         let place = |position: &Vector3<f64>| turn * position + origin;
         let start = &mut self.start;

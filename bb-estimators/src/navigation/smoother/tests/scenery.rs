@@ -87,7 +87,7 @@ impl Scenery {
         self.carried(flight, smoother)
     }
 
-    /// The same, with a camera that is set already.
+    /// Flies the whole flight with landmarks and a camera that is set already.
     pub(super) fn carried(&self, flight: &Flight, mut smoother: Smoother) -> Smoother {
         smoother.start(0, &flight.start).unwrap();
         self.observe(&mut smoother, 0);

@@ -40,8 +40,8 @@ proptest! {
     }
 }
 
-/// If the sensors err exactly as the smoother is told, its errors match its covariance, also with tracks that outlive
-/// the window.
+/// Errors are as large as the smoother says if the sensors err exactly as it assumes, also with tracks that outlive the
+/// window.
 #[test]
 fn errors_are_as_large_as_the_smoother_says() {
     const FLIGHTS: u32 = 100;
@@ -90,7 +90,7 @@ fn landmarks_come_and_go() {
     assert!(smoother.landmarks().1 > 5);
 }
 
-/// When landmarks were last seen does not outlive a restart: their room becomes free again.
+/// Room is freed after a restart: the times of the last observations do not outlive it.
 #[test]
 fn room_is_freed_after_a_restart() {
     let flight = Flight::new(17, 60, 1.0);

@@ -103,7 +103,7 @@ fn an_indeterminate_landmark_waits() {
     assert_eq!(smoother.observe(&mut stream, 11, &Observation { landmark: 9999, ..good }), Ok(Sighted::Waiting));
 }
 
-/// When an id is reused for another landmark, the landmark restarts, and the old information stays in use.
+/// An id may be reused for another landmark: the landmark restarts, and the old information stays in use.
 #[test]
 fn an_id_is_reused() {
     let flight = Flight::new(5, 30, 1.0);
@@ -160,8 +160,9 @@ fn without_parallax_landmarks_wait() {
     assert!((smoother.covariance().unwrap() - before).amax() < 1e-12);
 }
 
-/// What moved since a landmark was last seen counts, however long ago that is: after more than a second without any
-/// measurement, its next observation passes the gate, and is as far off as expected.
+/// A landmark may be seen again after a while: motion since its last observation counts, however long ago that is.
+/// After more than a second without any measurement, its next observation passes the gate, and is as far off as
+/// expected.
 #[test]
 fn a_landmark_may_be_seen_again_after_a_while() {
     const LAST: usize = 14;

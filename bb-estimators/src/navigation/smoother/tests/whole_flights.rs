@@ -25,7 +25,7 @@ struct Place {
 /// A landmark as it was linearised last, with its observations by keyframe.
 struct Point {
     id: u64,
-    /// Where the smoother holds it: an id may be used again.
+    /// Address at which the smoother holds it: an id may be used again.
     at: *const Landmark,
     place: Vector3<f64>,
     prior: Option<(Vector3<f64>, f64)>,

@@ -34,7 +34,7 @@ pub struct FlightInputs<'a> {
 /// The pose of the body at a camera frame relative to an earlier one, stamped with the time of the later frame.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 pub struct RelativePoseReading {
-    /// When the earlier frame was taken.
+    /// Time at which the earlier frame was taken.
     pub from: MonotonicTime,
     /// Position of the body's origin at the later frame, in the axes of the body at the earlier one, m.
     pub translation: Vector3<f64>,
@@ -59,7 +59,7 @@ pub struct AnchorReading {
     pub world_from_body: UnitQuaternion<f64>,
     /// Covariance of the position, m², and of the rotation vector of the error, rad², both in the tangent frame.
     pub covariance: Matrix6<f64>,
-    /// Whether the provider used a cheaper computation of its covariance.
+    /// `true` if the provider used a cheaper computation of its covariance.
     pub is_covariance_degraded: bool,
 }
 
@@ -84,7 +84,7 @@ pub struct AttitudeReport {
 /// The flight controller's estimate of its own state.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 pub struct WarmStartReport {
-    /// Its attitude.
+    /// Attitude of the flight controller.
     pub attitude: AttitudeReport,
     /// Position of the body's origin. One without a height is not used.
     pub position: GeodeticPosition,

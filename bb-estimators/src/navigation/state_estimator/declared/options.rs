@@ -14,13 +14,13 @@ pub struct FlightOptions {
     /// Estimates a second.
     #[option(default = 5.0, range = 0.1..=1000.0, unit = "Hz")]
     pub output_rate: f64,
-    /// How many keyframes are held, from 2 to 100.
+    /// Number of keyframes that are held, from 2 to 100.
     #[option(default = 15)]
     pub window: u32,
-    /// Where it takes off; not a number for a start from the first anchor.
+    /// Latitude of the take-off; not a number for a start from the first anchor.
     #[option(default = f64::NAN, unit = "rad")]
     pub origin_latitude: f64,
-    /// Where it takes off.
+    /// Longitude of the take-off.
     #[option(default = 0.0, unit = "rad")]
     pub origin_longitude: f64,
     /// Height of the origin above the ellipsoid.
@@ -41,7 +41,7 @@ pub struct FlightOptions {
     /// Gravity where the robot is.
     #[option(default = 9.80665, range = 1.0..=30.0, unit = "m/s^2")]
     pub gravity: f64,
-    /// What the names of frames begin with: another in each flight.
+    /// Beginning of the names of frames: another in each flight.
     #[option(default = 0)]
     pub flight: u32,
 }

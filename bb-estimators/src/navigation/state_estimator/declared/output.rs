@@ -41,9 +41,9 @@ pub struct FlightEstimate {
     pub label: SourceLabel,
     /// Time since the last anchor, ms.
     pub anchor_age_ms: Option<u64>,
-    /// Whether later measurements have corrected it.
+    /// `true` if later measurements have corrected it.
     pub smoothed: bool,
-    /// Whether its covariance is not to be trusted.
+    /// `true` if its covariance is not to be trusted.
     pub degraded: bool,
     /// Number of jumps of the estimate since the first start.
     pub resets: u32,
@@ -51,7 +51,7 @@ pub struct FlightEstimate {
     pub covariance_norm: f64,
     /// Normalised innovation squared of the last measurement, over its dimension.
     pub nis: Option<f64>,
-    /// Whether the provider of the last anchor used a cheaper computation of its covariance.
+    /// `true` if the provider of the last anchor used a cheaper computation of its covariance.
     pub is_anchor_degraded: bool,
 }
 
@@ -88,9 +88,9 @@ pub struct FlightHealth {
     pub keyframes: u32,
     /// Time for which the norm of the covariance has been growing, s.
     pub covariance_growing_s: f64,
-    /// Whether the GNSS receiver is let in.
+    /// `true` while the GNSS receiver is let in.
     pub is_gate_open: bool,
-    /// Whether the fallback to the flight controller's own IMU is engaged.
+    /// `true` while the fallback to the flight controller's own IMU is engaged.
     pub is_fallback_engaged: bool,
 }
 
@@ -105,7 +105,7 @@ impl FlightHealth {
         }
     }
 
-    /// Whether the change must be published at once.
+    /// Returns whether the change must be published at once.
     pub(super) fn differs(&self, other: &Self) -> bool {
         let Self { state, is_gate_open, is_fallback_engaged, .. } = *self;
         (state, is_gate_open, is_fallback_engaged) != (other.state, other.is_gate_open, other.is_fallback_engaged)

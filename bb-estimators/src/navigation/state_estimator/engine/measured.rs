@@ -84,7 +84,7 @@ impl<F: ProvidedFactor> Engine<F> {
         Err(Reason::Overruled { nis }.into())
     }
 
-    /// Whether an aircraft can be at this height. With the IMU alone, the height may drift out of the range until a position
+    /// Returns whether an aircraft can be at this height. With the IMU alone, the height may drift out of the range until a position
     /// corrects it. After that, it must be within the range.
     fn is_height_plausible(&self) -> bool {
         let (Some((position, _)), Some(world)) = (self.strategy.motion(), &self.world) else { return false };
@@ -162,7 +162,7 @@ impl<F: ProvidedFactor> Engine<F> {
         Ok(Some(fused))
     }
 
-    /// Whether a position is in the estimate.
+    /// Use of a position by the estimate.
     fn is_in(&self, result: &Result<Fused, Trouble>) -> bool {
         matches!(result, Ok(_) | Err(Trouble::Degraded(Reason::Overruled { .. })))
     }
@@ -201,7 +201,7 @@ impl<F: ProvidedFactor> Engine<F> {
     }
 }
 
-/// Why an input is not in the estimate.
+/// Reason for which an input is not in the estimate.
 pub(super) enum Trouble {
     Degraded(Reason),
     Fatal(Reason),

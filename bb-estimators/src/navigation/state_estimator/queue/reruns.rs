@@ -1,4 +1,4 @@
-//! When the engine is run, and run again.
+//! Runs of the engine, and repeated runs.
 //!
 //! Samples of the IMU are many, and each that is late changes all that came since. They are inserted, and the first place at which
 //! one was is remembered. The run is repeated from there when its result is needed: when the estimate is read, when the engine is
@@ -27,7 +27,7 @@ impl<F: ProvidedFactor> Queue<F> {
         has_changed
     }
 
-    /// From now on, inputs other than samples are inserted, and not run. Returns whether they were run until now.
+    /// Inserts inputs other than samples from now on, without running them. Returns whether they were run until now.
     pub(in crate::navigation::state_estimator) fn hold(&mut self) -> bool {
         let were_run = self.held.is_none();
         self.held = self.held.or(Some(i64::MIN));

@@ -64,7 +64,7 @@ impl<F: ProvidedFactor> Queue<F> {
         Ok(if is_gap { Sampled::Bridged } else { Sampled::Taken })
     }
 
-    /// Whether no sample is missing at a time: those before and after it are no farther apart than others.
+    /// Returns whether no sample is missing at a time: those before and after it are no farther apart than others.
     fn is_surplus(&self, time_ns: i64, config: &StateEstimatorConfig) -> bool {
         let index = self.samples.partition_point(|other| other.time_ns < time_ns);
         if self.samples.get(index).is_some_and(|other| other.time_ns == time_ns) {
@@ -165,8 +165,8 @@ impl<F: ProvidedFactor> Queue<F> {
         Ok(Sampled::Taken)
     }
 
-    /// If there is no room for another sample, drops the oldest. Those needed only for late inputs are dropped first, and such
-    /// inputs are then refused as too old.
+    /// Drops the oldest sample if there is no room for another one. Those needed only for late inputs are dropped first, and such inputs
+    /// are then refused as too old.
     fn make_room(&mut self, config: &StateEstimatorConfig) {
         let most = self.rooms.samples;
         if self.samples.len() < most {

@@ -29,7 +29,7 @@ pub(in crate::navigation::state_estimator) struct EskfStrategy {
     window: usize,
     records: bool,
     left: Option<Pose>,
-    /// Whether the present becomes the reference of the next relative pose, once all measurements at this time are fused.
+    /// `true` if the present becomes the reference of the next relative pose, once all measurements at this time are fused.
     is_next: bool,
 }
 
@@ -176,12 +176,12 @@ impl EskfStrategy {
         self.past.len()
     }
 
-    /// How often it started, or a newcomer took over.
+    /// Returns how often it started, or a newcomer took over.
     pub(super) fn resets(&self) -> u32 {
         self.copies.best().resets()
     }
 
-    /// Whether the attitude is known well enough to be corrected linearly.
+    /// Returns whether the attitude is known well enough to be corrected linearly.
     pub(super) fn is_attitude_known(&self) -> bool {
         self.copies.attitude_deviation() <= UNKNOWN
     }

@@ -16,7 +16,7 @@ use nalgebra::SMatrix;
 /// A filter that is never corrected.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::navigation::state_estimator) enum Predictor {
-    /// From a keyframe of the smoother.
+    /// Filter that starts at a keyframe of the smoother.
     #[cfg(feature = "smoother")]
     FromKeyframe(Eskf<Navigation>),
     /// A copy of the filter.

@@ -61,7 +61,7 @@ pub(in crate::navigation::state_estimator) struct SmootherStrategy<F: ProvidedFa
     is_converged: bool,
     /// The window's filter as if it had been where positions are that do not fit.
     newcomer: Option<Newcomer<Eskf<Navigated, NAVIGATED>>>,
-    /// Whether the present becomes the reference of the newcomer's next relative pose.
+    /// `true` if the present becomes the reference of the newcomer's next relative pose.
     is_next: bool,
     /// The time since which the window has been in its place.
     since_ns: i64,
@@ -116,7 +116,7 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
         self.resets = self.resets.wrapping_add(1);
     }
 
-    /// How often it started, or went on in another place.
+    /// Returns how often it started, or went on in another place.
     pub(super) fn resets(&self) -> u32 {
         self.resets
     }

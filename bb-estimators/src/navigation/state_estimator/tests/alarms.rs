@@ -4,7 +4,7 @@ use super::flight::{SECOND, STEP};
 use super::*;
 use crate::navigation::Refusal;
 
-/// In flight for four seconds with a stable receiver, whose gate is open.
+/// Returns an estimator in flight for four seconds with a stable receiver, whose gate is open.
 fn flown(flight: &Flight, strategy: StrategyKind) -> Estimator {
     let mut estimator = started(flight, strategy);
     let sent = flight.sent(true, true, true);
@@ -90,7 +90,8 @@ fn a_report_for_which_there_is_no_room_blocks_all_the_same() {
     }
 }
 
-/// It waits for the IMU, whose clock is then another one: before the first sample, and after the clock was set back.
+/// A report of another clock blocks the gate all the same. It waits for the IMU, whose clock is then another one:
+/// before the first sample, and after the clock was set back.
 #[test]
 fn a_report_of_another_clock_blocks_all_the_same() {
     let flight = Flight::new(8, 1);

@@ -16,7 +16,7 @@ const LENGTH_S: i64 = 6;
 /// The stamp of a report, relative to the IMU's clock when it arrives.
 #[derive(Clone, Copy, Debug)]
 enum Stamp {
-    /// That of the regular report before.
+    /// Stamp of the regular report before.
     Same,
     By(i64),
     Absolute(i64),
@@ -41,9 +41,9 @@ struct Report {
     at_ns: i64,
     stamp: Stamp,
     health: GpsHealth,
-    /// How often it is sent.
+    /// Number of times that it is sent.
     times: usize,
-    /// Whether so many other inputs come first that there is no room.
+    /// `true` if so many other inputs come first that there is no room.
     is_flooded: bool,
 }
 
@@ -57,7 +57,7 @@ fn report() -> impl Strategy<Value = Report> {
         .prop_map(|(at_ns, stamp, health, times, is_flooded)| Report { at_ns, stamp, health, times, is_flooded })
 }
 
-/// Of reports of one time, the worst counts.
+/// Returns the rank of a health: of reports of one time, the worst counts.
 fn badness(health: GpsHealth) -> u8 {
     match health {
         GpsHealth::Stable => 0,
@@ -67,7 +67,7 @@ fn badness(health: GpsHealth) -> u8 {
     }
 }
 
-/// What is known on one clock.
+/// Reports that are known on one clock.
 #[derive(Debug, Default)]
 struct Model {
     /// The worst report of each time.
@@ -121,7 +121,7 @@ impl Model {
         since_ns
     }
 
-    /// Whether an anchor may have let the receiver in after the last report of spoofing.
+    /// Returns whether an anchor may have let the receiver in after the last report of spoofing.
     fn is_let_in(&self, time_ns: i64) -> bool {
         let Some(alarm_ns) = self.last_alarm_ns(time_ns) else { return true };
         self.anchors.iter().filter(|anchor_ns| (alarm_ns..=time_ns).contains(*anchor_ns)).any(|anchor_ns| {

@@ -43,7 +43,7 @@ impl Sent {
         }
     }
 
-    /// On a clock that is behind by `by_ns`.
+    /// Returns the flight on a clock that is behind by `by_ns`.
     pub(super) fn behind(&self, by_ns: i64) -> Self {
         match *self {
             Self::Imu(sample) => Self::Imu(ImuMean { time_ns: sample.time_ns - by_ns, ..sample }),

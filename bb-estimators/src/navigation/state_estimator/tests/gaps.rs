@@ -105,7 +105,7 @@ fn the_gap_of_a_clock_that_is_set_back_is_as_uncertain_if_it_is_divided() {
     }
 }
 
-/// The same for a warm start some time before the first sample.
+/// The gap before the first sample is as uncertain if it is divided, for a warm start some time before it.
 #[test]
 fn the_gap_before_the_first_sample_is_as_uncertain_if_it_is_divided() {
     let flight = Flight::new(4, 2);

@@ -11,7 +11,7 @@ struct Scenario {
     health: fn(i64) -> GpsHealth,
     /// Offset of the fixes, m.
     off: fn(i64) -> f64,
-    /// Whether there are anchors.
+    /// `true` at the times with anchors.
     anchors: fn(i64) -> bool,
 }
 
@@ -236,7 +236,7 @@ fn moved_fixes(strategy: StrategyKind, with_vio: bool) -> Vec<(f64, f64, bool)> 
     outputs
 }
 
-/// With only the IMU and the receiver, a gate that is never overridden would lose the position permanently.
+/// A receiver that is alone with the IMU overrules the estimate: a gate that is never overridden would lose the position permanently.
 #[test]
 fn a_receiver_that_is_alone_overrules_the_estimate() {
     for strategy in StrategyKind::ALL {
@@ -336,7 +336,7 @@ fn a_receiver_that_is_alone_moves_an_estimate_that_is_kilometres_off() {
     }
 }
 
-/// With a camera, fixes do not override the estimate, but it is reported as degraded.
+/// A receiver beside a camera never overrules the estimate, but it is reported as degraded.
 #[test]
 fn a_receiver_beside_a_camera_never_overrules_it() {
     for strategy in StrategyKind::ALL {

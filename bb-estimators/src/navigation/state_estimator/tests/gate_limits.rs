@@ -17,7 +17,7 @@ fn flown(flight: &Flight, strategy: StrategyKind, until_ns: i64) -> Estimator {
     estimator
 }
 
-/// What happens after one time, up to another.
+/// Applies what happens after one time, up to another.
 fn advance(flight: &Flight, estimator: &mut Estimator, from_ns: i64, until_ns: i64) {
     for sent in flight.sent(true, true, true) {
         let time_ns = sent.time_ns();

@@ -6,7 +6,7 @@ use crate::navigation::geodesy::Geodetic;
 use crate::navigation::{GnssPosition, ImuMean, NavigationFactor};
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// At rest, 1 g upwards.
+/// Returns a sample at rest, 1 g upwards.
 fn at_rest(time_ns: i64) -> ImuMean {
     ImuMean { time_ns, angular_velocity: Vector3::zeros(), specific_force: Vector3::new(0.0, 0.0, 9.80665) }
 }

@@ -19,7 +19,7 @@ enum Read {
 
 const READS: [Read; 5] = [Read::Predicted, Read::Current, Read::History, Read::Tick, Read::Frame];
 
-/// What is read, and what is known of it after that.
+/// Returns what is read, and what is known of it after that.
 fn read(estimator: &mut Estimator, read: Read, now_ns: i64) -> impl PartialEq + core::fmt::Debug + use<> {
     let outputs: Vec<EstimatorOutput> = match read {
         Read::Predicted => estimator.predicted(now_ns).into_iter().collect(),
@@ -39,7 +39,7 @@ fn add_all(estimator: &mut Estimator, samples: &[ImuMean]) {
     samples.iter().for_each(|sample| estimator.add_imu(sample).unwrap());
 }
 
-/// In flight for two seconds: 40 samples, every other one, are held back until the end.
+/// Returns an estimator in flight for two seconds, and 40 samples, every other one, that are held back until the end.
 fn with_samples_held_back(flight: &Flight, strategy: StrategyKind) -> (Estimator, Vec<ImuMean>) {
     let is_held = |sample: &ImuMean| {
         (SECOND..SECOND + 80 * STEP).contains(&sample.time_ns) && sample.time_ns % (2 * STEP) == 0
@@ -216,7 +216,7 @@ struct Burst {
     /// One in so many.
     stride: usize,
     late_ns: i64,
-    /// Whether they arrive all at once, and not each as late as the others.
+    /// `true` if they arrive all at once, and not each as late as the others.
     is_at_once: bool,
 }
 
@@ -253,7 +253,7 @@ enum Step {
     Read(Read),
 }
 
-/// How it starts.
+/// Source of the start.
 #[derive(Clone, Copy, Debug)]
 enum From {
     Warm,
@@ -351,8 +351,8 @@ fn add(estimator: &mut Estimator, step: &Step, now_ns: i64) -> Vec<Result<(), Es
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(12))]
 
-    /// It makes no difference whether each late sample is run at once, since somebody reads after each input, or many are run
-    /// together when somebody reads at last: each input becomes the same, and so does what is read. And both are as in order.
+    /// Late samples may be run at any time: each at once, since somebody reads after each input, or many together when somebody reads at
+    /// last: each input becomes the same, and so does what is read. And both are as in order.
     #[test]
     fn it_does_not_matter_when_late_samples_are_run(
         bursts in prop::collection::vec(burst(), 1..6),

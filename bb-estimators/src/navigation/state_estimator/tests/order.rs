@@ -69,7 +69,8 @@ proptest! {
     }
 }
 
-/// For as long as one likes: an input that is late drops no copy that the next one, as late, needs.
+/// Anchors that are always late lose nothing, for as long as one likes: an input that is late drops no copy that the
+/// next one, as late, needs.
 #[test]
 fn anchors_that_are_always_late_lose_nothing() {
     let flight = Flight::new(9, 2);

@@ -7,13 +7,13 @@ use nalgebra::Matrix1;
 #[expect(clippy::large_enum_variant, reason = "there are few of them")]
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Provided {
-    /// It observes nothing.
+    /// Factor that observes nothing.
     Nothing,
-    /// It is out of range at the estimate.
+    /// Factor that is out of range at the estimate.
     Elsewhere,
     /// A position.
     Place(NavigationFactor),
-    /// This position along x, whatever its value.
+    /// Factor that observes this position along x, whatever its value.
     Along(f64),
     /// Always 8 m ahead of the estimate along x, so that iterating does not converge.
     Ahead,

@@ -4,7 +4,7 @@ use super::flight::SECOND;
 use super::*;
 use crate::navigation::{ImuMean, Refusal};
 
-/// With valid settings, nothing is dropped and the stated capacity is not exceeded.
+/// A fast IMU and a long lateness fit: with valid settings, nothing is dropped and the stated capacity is not exceeded.
 #[test]
 fn a_fast_imu_and_a_long_lateness_fit() {
     let flight = Flight::new(4, 3);

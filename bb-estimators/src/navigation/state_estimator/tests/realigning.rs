@@ -5,7 +5,7 @@ use super::*;
 use crate::navigation::math::rotation;
 use nalgebra::Vector3;
 
-/// What became of flights.
+/// Results of flights.
 #[derive(Debug, Default)]
 struct Seen {
     /// Outputs after the outage that are not marked `degraded`, and how many of them are off by more than four deviations on an axis of the
@@ -28,7 +28,7 @@ impl Seen {
         sorted[sorted.len() / 2]
     }
 
-    /// Whether at most one trusted estimate in thirty is off by more than its deviations allow.
+    /// Checks that at most one trusted estimate in thirty is off by more than its deviations allow.
     fn is_honest(&self) -> bool {
         self.wrong * 30 <= self.trusted
     }

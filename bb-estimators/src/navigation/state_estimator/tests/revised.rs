@@ -27,7 +27,7 @@ fn anchor(flight: &Flight, time_ns: i64, off: f64, deviation: f64) -> PoseAnchor
     PoseAnchor { time_ns, position, covariance, world_from_body: truth.world_from_body, ..flight.anchors[0] }
 }
 
-/// What was told of an input: the name of the event, its level and its reason.
+/// Returns the events of an input: the name of the event, its level and its reason.
 fn told(events: &[Event], input: InputKind, time_ns: i64) -> Vec<(&'static str, Level, Option<Reason>)> {
     let of_it = |event: &&Event| {
         let is_input = match event.kind {
@@ -167,7 +167,7 @@ fn a_fix_that_is_rejected_for_another_reason_says_so() {
     }
 }
 
-/// What was warned of and is not so goes to the recorder as well.
+/// Warnings that are revised go to the recorder as well.
 #[test]
 fn fixes_that_are_taken_after_all_are_told_once() {
     let flight = Flight::new(4, 1);

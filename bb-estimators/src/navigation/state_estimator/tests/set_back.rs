@@ -43,7 +43,7 @@ fn a_clock_that_is_set_back_is_followed_and_told() {
     }
 }
 
-/// Until the new clock is believed, there is no estimate for its times: the newest one belongs to the old clock.
+/// An old estimate is not given for the time of a new clock: until that is believed, there is none for its times.
 #[test]
 fn an_old_estimate_is_not_given_for_the_time_of_a_new_clock() {
     let flight = Flight::new(4, 3);
@@ -132,7 +132,8 @@ fn a_covariance_never_grows_for_a_negative_time() {
     }
 }
 
-/// By less than inputs may be late: its stamps repeat a time that other samples cover, and none is new.
+/// A clock that is set back by less than inputs may be late is followed: its stamps repeat a time that other samples
+/// cover, and none is new.
 #[test]
 fn a_clock_that_is_set_back_a_little_is_followed() {
     let flight = Flight::new(20, 2);

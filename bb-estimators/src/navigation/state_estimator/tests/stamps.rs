@@ -45,7 +45,7 @@ struct Burst {
     step_ns: i64,
     /// Offset from the present.
     off_ns: i64,
-    /// Whether it replaces the regular samples of that time.
+    /// `true` if it replaces the regular samples of that time.
     replaces: bool,
 }
 

@@ -8,7 +8,7 @@ use proptest::prelude::*;
 /// Stamps that are far in the future begin here.
 const ELSEWHEN: i64 = 1000 * SECOND;
 
-/// What came while the IMU was silent, and the sample that ends it.
+/// Returns the inputs that came while the IMU was silent, and the sample that ends it, with the estimator.
 fn after_silence(flight: &Flight, strategy: StrategyKind, silent_ns: i64) -> (Estimator, Vec<Sent>) {
     let mut estimator = started(flight, strategy);
     let (from_ns, to_ns) = (SECOND, SECOND + silent_ns);
