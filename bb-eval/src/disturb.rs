@@ -1,6 +1,6 @@
 //! A recording made harder: fixes or the field withheld, messages dropped or late.
 
-use crate::filters::near;
+use crate::suggestion::near;
 use std::str::FromStr;
 
 /// Nanoseconds since the Unix epoch.

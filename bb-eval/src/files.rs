@@ -1,5 +1,6 @@
 //! The recordings that paths name.
 
+use bb_mcap::{RecordingError, RecordingErrorKind};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -78,4 +79,13 @@ fn collect(folder: &Path, found: &mut Vec<PathBuf>) -> io::Result<()> {
 fn is_recording(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     path.extension().is_some_and(|end| end == EXTENSION) || OTHERS.iter().any(|end| name.ends_with(end))
+}
+
+/// The error, with the option that chooses another topic.
+pub(crate) fn said(error: &RecordingError, option: &str) -> String {
+    let kind = error.kind();
+    match kind {
+        RecordingErrorKind::NoTopicOfType { .. } => kind.to_string(),
+        _ => format!("{kind} ({option})"),
+    }
 }

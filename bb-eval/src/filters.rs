@@ -3,8 +3,9 @@
 mod list;
 mod settings;
 
+pub use crate::suggestion::near;
 pub use list::{described, listed, parameters};
-pub use settings::{Setting, Without, near};
+pub use settings::{Setting, Without};
 
 use bb_core::nalgebra::{Matrix3, UnitQuaternion};
 use bb_estimators::attitude::{self, AttitudeFilter, FilterParams, ImuSample, SampleError};

@@ -49,6 +49,7 @@ pub mod report;
 #[cfg(feature = "recordings")]
 mod robot_file;
 mod score;
+mod suggestion;
 #[cfg(feature = "recordings")]
 pub mod table;
 #[cfg(feature = "recordings")]

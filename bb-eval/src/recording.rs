@@ -1,6 +1,7 @@
 //! An opened recording: its samples, its truth, and remarks on it.
 
 use crate::declination::Declination;
+use crate::files::said;
 use crate::frames::{Frames, Mount, TF_STATIC, frame};
 use bb_core::message::codec::ros::TransformsMessage;
 use bb_core::nalgebra::{Rotation3, UnitQuaternion, Vector3};
@@ -338,13 +339,4 @@ fn truth(bag: &Bag, topics: &[Option<&str>]) -> Result<Truth, String> {
 
 fn is_break(error: &RecordingError) -> bool {
     matches!(error.kind(), RecordingErrorKind::Truncated { .. })
-}
-
-/// The error, with the option that chooses another topic.
-pub(crate) fn said(error: &RecordingError, option: &str) -> String {
-    let kind = error.kind();
-    match kind {
-        RecordingErrorKind::NoTopicOfType { .. } => kind.to_string(),
-        _ => format!("{kind} ({option})"),
-    }
 }

@@ -1,6 +1,6 @@
 //! `--robot`: the options of an estimator in the settings file of a robot.
 
-use crate::filters::near;
+use crate::suggestion::near;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 

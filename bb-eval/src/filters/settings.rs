@@ -1,8 +1,9 @@
 //! `--set`: parameters by name.
 
 use super::{Axes, Chosen, MAGNETOMETER};
+use crate::suggestion::near;
 use bb_estimators::attitude::FilterParams;
-use bb_estimators::params::{Params, SetError, nearest};
+use bb_estimators::params::{Params, SetError};
 use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -155,16 +156,6 @@ impl Setting {
         names.dedup();
         let of = filter.as_ref().map_or_else(|| chosen.join(", "), Clone::clone);
         Err(format!("--set {name}: {of} has no parameter `{name}`; {}", near(name, &names)))
-    }
-}
-
-/// A suggestion for a misspelt word.
-pub fn near(word: &str, candidates: &[&str]) -> String {
-    match nearest(word, candidates.iter().copied()) {
-        Some(name) => format!("did you mean `{name}`?"),
-        None if candidates.is_empty() => "there is none".into(),
-        None if candidates.len() == 1 => format!("there is only {}", candidates.join("")),
-        None => format!("there are {}", candidates.join(", ")),
     }
 }
 

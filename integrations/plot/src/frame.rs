@@ -292,7 +292,7 @@ fn rounded(value: f64) -> String {
 /// A number at an axis of this span, with enough digits to distinguish neighbouring ticks.
 fn tick(value: f64, span: f64) -> String {
     // Near zero, what rounding left over has no sign.
-    let value = if value.abs() < span * 1e-9 { 0.0 } else { value };
+    let value = if span.is_finite() && value.abs() < span * 1e-9 { 0.0 } else { value };
     let decimals = (1.0 - span.log10()).ceil();
     match decimals {
         ..=0.0 if span < 1e6 || span.is_infinite() => format!("{value:.0}"),

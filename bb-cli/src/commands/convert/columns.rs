@@ -1,6 +1,6 @@
 //! The contents of the columns.
 
-use super::cells::exact_ns;
+use super::source::exact_ns;
 use super::units::{self, Units};
 use bb_eval::filters::near;
 use std::fmt;

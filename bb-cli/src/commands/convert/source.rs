@@ -113,6 +113,24 @@ fn delimiter(line: &str) -> char {
     ['\t', ';', ',', ' '].into_iter().find(has).unwrap_or(',')
 }
 
+/// A decimal number with a unit as nanoseconds, rounded down, without conversion to a float; `None` if the number or
+/// the unit is not decimal.
+pub(super) fn exact_ns(cell: &str, factor: f64) -> Option<i64> {
+    let units = [(1.0, 9), (1e-3, 6), (1e-6, 3), (1e-9, 0)];
+    let (_, digits) = units.into_iter().find(|(unit, _)| *unit == factor)?;
+    let (whole, part) = cell.split_once('.').unwrap_or((cell, ""));
+    let is_negative = whole.starts_with('-');
+    let whole: i64 = whole.parse().ok()?;
+    if !part.bytes().all(|byte| byte.is_ascii_digit()) {
+        return None;
+    }
+    let kept = &part[..part.len().min(digits)];
+    let scale = |digits: usize| 10_i64.checked_pow(u32::try_from(digits).ok()?);
+    let part =
+        if kept.is_empty() { 0 } else { kept.parse::<i64>().ok()?.checked_mul(scale(digits - kept.len())?)? };
+    whole.checked_mul(scale(digits)?)?.checked_add(if is_negative { -part } else { part })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -132,5 +150,20 @@ mod tests {
         assert_eq!(of("0, 1\n"), b',');
         assert_eq!(of("a;b;c"), b';');
         assert_eq!(of(""), b',');
+    }
+
+    #[test]
+    fn times_keep_their_nanoseconds() {
+        assert_eq!(exact_ns("1403636579758555392", 1e-9), Some(1_403_636_579_758_555_392));
+        assert_eq!(exact_ns("1403636579.758555392", 1.0), Some(1_403_636_579_758_555_392));
+        assert_eq!(exact_ns("1403636579758555.392", 1e-6), Some(1_403_636_579_758_555_392));
+        assert_eq!(exact_ns("12", 1e-3), Some(12_000_000));
+        assert_eq!(exact_ns("-0.25", 1.0), Some(-250_000_000));
+        assert_eq!(exact_ns("0.01", 1.0), Some(10_000_000));
+        // Digits beyond the nanosecond.
+        assert_eq!(exact_ns("1.0000000019", 1.0), Some(1_000_000_001));
+        assert_eq!(exact_ns("1e-3", 1.0), None);
+        assert_eq!(exact_ns("1.-3", 1.0), None);
+        assert_eq!(exact_ns("99999999999999999999", 1.0), None);
     }
 }

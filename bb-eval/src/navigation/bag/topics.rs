@@ -1,8 +1,8 @@
 //! The roles of a bag's topics.
 
 use super::options::{BagOptions, StartFrom};
+use crate::files::said;
 use crate::frames::{POSE_WITH_COVARIANCE, TF_STATIC, TRANSFORM};
-use crate::recording::said;
 use bb_mcap::{Bag, IMU, MAGNETIC_FIELD, ODOMETRY, POSE, RecordingErrorKind, Topic};
 
 pub(crate) const FIX: &str = "sensor_msgs/msg/NavSatFix";

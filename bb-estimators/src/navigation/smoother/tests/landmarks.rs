@@ -282,7 +282,7 @@ proptest! {
             problem.relative_pose(&mut noise, (place - 1) % (keyframes - 1) + 1);
             let (covariance, solution, within) = problem.batch();
             // The noise of the link is inverted once more.
-            let batch = (covariance, solution, 100.0 * within);
+            let batch = (covariance, solution, 1000.0 * within);
             compare(&mut problem.smoother, 0, &batch, keyframes)?;
         }
     }

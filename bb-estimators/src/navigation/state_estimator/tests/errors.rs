@@ -62,8 +62,8 @@ fn degraded_positions_that_agree_on_another_place_move_the_estimate() {
                 overruled.push(anchor.time_ns / SECOND);
             }
         }
-        // It had been right for 4 s, and then they had agreed for as long.
-        assert_eq!(overruled, [8], "{}", strategy.name());
+        // It had been right for 4 s, and then they had agreed for as long; the smoother judges a frame later.
+        assert!(matches!(overruled[..], [8 | 9]), "{}: {overruled:?}", strategy.name());
         let there = estimator.predicted(12 * SECOND).unwrap();
         let error = flight.frame.position(&there.position) - Flight::truth(12 * SECOND).position - off;
         assert!(error.norm() < 5.0 && there.resets == 1, "{}: {error}", strategy.name());
