@@ -48,7 +48,7 @@ pub(crate) const STEPS: &[Step] = &[
         name: "eskf/update_3_with_gate",
         on: Some("eskf/sample"),
         steps: USUAL,
-        stored: 19_644.0,
+        stored: 18_917.0,
         run: |steps| {
             eskf(steps, |filter, stream, reading| {
                 let fix = GnssPosition::new(reading.position, 1.0, 1.0);
@@ -60,7 +60,7 @@ pub(crate) const STEPS: &[Step] = &[
         name: "eskf/update_1_with_gate",
         on: Some("eskf/sample"),
         steps: USUAL,
-        stored: 11_046.0,
+        stored: 10_329.0,
         run: |steps| {
             eskf(steps, |filter, stream, reading| {
                 let height = Height { height: reading.position.z, deviation: 1.0 };

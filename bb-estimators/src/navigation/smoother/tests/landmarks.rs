@@ -281,8 +281,8 @@ proptest! {
         for place in places {
             problem.relative_pose(&mut noise, (place - 1) % (keyframes - 1) + 1);
             let (covariance, solution, within) = problem.batch();
-            // The noise of the link is inverted once more.
-            let batch = (covariance, solution, 1000.0 * within);
+            // The noise of the link is inverted once more, and a precise relative pose beside an imprecise link loses four digits.
+            let batch = (covariance, solution, 1e4 * within);
             compare(&mut problem.smoother, 0, &batch, keyframes)?;
         }
     }
