@@ -122,7 +122,7 @@ fn code_of_the_book_is_compiled() {
     for page in pages() {
         let text = std::fs::read_to_string(&page).expect("it is there");
         let is_code = |line: &str| line.starts_with("```rust") && !line.contains("ignore");
-        let name = plain(&page).strip_prefix(plain(&root())).expect("it is in the project").display().to_string();
+        let name = plain(&page).strip_prefix(plain(root())).expect("it is in the project").display().to_string();
         assert!(
             !text.lines().any(is_code) || compiled.contains(&format!("\"{name}\"")),
             "tests/src/lib.rs does not name {name}"

@@ -32,7 +32,7 @@ mod start;
 mod tests;
 mod transport;
 
-#[cfg(feature = "std")]
+#[cfg(feature = "alloc")]
 pub(super) use elsewhere::{UNMOORED, UNMOORED_HEADING, UNMOORED_SPEED};
 pub use filter::Eskf;
 #[cfg(feature = "alloc")]

@@ -41,7 +41,7 @@
 //! ```
 
 mod arc;
-#[cfg(feature = "std")]
+#[cfg(feature = "alloc")]
 mod copies;
 mod estimate;
 #[cfg(feature = "runtime")]

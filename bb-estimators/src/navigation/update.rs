@@ -6,7 +6,7 @@
 use nalgebra::SVector;
 
 use super::covariance::{Covariance, Innovation, Room};
-#[cfg(feature = "std")]
+#[cfg(feature = "alloc")]
 use super::eskf::Judged;
 use super::fused::Fused;
 use super::fusion::weighed;
@@ -138,7 +138,7 @@ fn corrected<E: Composed<N>, const N: usize>(
 /// # Errors
 ///
 /// Returns the reason why it cannot be compared.
-#[cfg(feature = "std")]
+#[cfg(feature = "alloc")]
 #[inline(never)]
 pub(super) fn judged<E, const D: usize, const N: usize>(
     estimate: &E,

@@ -1,7 +1,7 @@
 //! The planar filter as one of which there are copies.
 
+use alloc::vec::Vec;
 use core::f64::consts::TAU;
-use std::vec::Vec;
 
 use nalgebra::{Matrix2, Vector3};
 

@@ -4,6 +4,7 @@ mod cases;
 mod consistency;
 mod jacobians;
 mod laws;
+#[cfg(feature = "alloc")]
 mod wrong;
 
 use nalgebra::{Vector2, Vector3};

@@ -71,7 +71,7 @@ proptest! {
         at in estimate(), error in proptest::collection::vec(-2.0..2.0, STATES),
         numbers in proptest::collection::vec(-1.0..1.0, STATES * STATES),
     ) {
-        let error = SVector::<f64, STATES>::from_vec(error);
+        let error = SVector::<f64, STATES>::from_column_slice(&error);
         let composed = at.composed(&error);
         let numeric = SMatrix::<f64, STATES, STATES>::from_columns(&core::array::from_fn::<_, STATES, _>(|state| {
             let moved = |step: f64| {
