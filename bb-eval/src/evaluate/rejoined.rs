@@ -69,7 +69,10 @@ mod tests {
     const MS: Time = 1_000_000;
 
     /// Twenty samples 10 ms apart, each with the number of its reading.
-    fn rejoined(disturbances: &Disturbances) -> (Vec<(Time, Option<f64>)>, Result<(), String>) {
+    /// Times of samples, with the field where they have one.
+    type Fields = Vec<(Time, Option<f64>)>;
+
+    fn rejoined(disturbances: &Disturbances) -> (Fields, Result<(), String>) {
         let mut rejoined = Rejoined::new(disturbances, 0).expect("something is disturbed");
         let mut all = Vec::new();
         // In blocks, as a recording is read.
