@@ -45,7 +45,7 @@ impl Bus {
 
     /// Publishes a payload in JSON, measured now, where [`Self::publisher`] would, for callers that do not know its type: at the path of a
     /// sensor declared as [`External`](crate::component::External), of an `external` input, or of the caller's choice if it has a payload
-    /// already. [`TopicDescription::layouts`](super::TopicDescription::layouts) has its JSON Schema.
+    /// already. `TopicDescription::layouts` has its JSON Schema.
     ///
     /// ```
     /// use bb_core::prelude::*;
