@@ -465,7 +465,7 @@ fn what_cannot_be_published_by_path_says_why() -> Result<(), Failure> {
     Ok(())
 }
 
-/// The journal names whoever publishes, once for as long as it is the same.
+/// The journal names the caller that publishes, once for as long as it is the same.
 #[test]
 fn the_journal_names_who_publishes_for_a_sensor() -> Result<(), Failure> {
     let mut builder = Mapped::builder();

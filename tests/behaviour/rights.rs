@@ -59,7 +59,7 @@ const VERBS: [(Right, &str, Verb); 11] = [
     (Right::Publish, "publish_cdr", |bus| Ok(bus.publish_cdr("sensor/base/pan/encoder", &encoded())?)),
     (Right::Publish, "publish_ros", |bus| {
         // There is no such message, which only those learn who may publish.
-        let error = bus.publish_ros("sensor/base/pan/encoder", &[0; 4]).expect_err("it is none").to_string();
+        let error = bus.publish_ros("sensor/base/pan/encoder", &[0; 4]).expect_err("no message").to_string();
         if error.contains("a payload that ROS has a message for") { Ok(()) } else { Err(error.into()) }
     }),
 ];

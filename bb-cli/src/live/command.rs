@@ -29,7 +29,7 @@ enum What {
         #[arg(long)]
         detach: bool,
     },
-    /// Cancels what runs, whoever has started it.
+    /// Cancels a running command, also one that another client has started.
     Cancel {
         /// The number of the execution, as `bb command list` and `bb top` print it.
         execution: u64,

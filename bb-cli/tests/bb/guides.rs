@@ -1,4 +1,4 @@
-//! Commands in the README and in the book: each is run, and prints what stands below it. `UPDATE_GUIDES=1` rewrites that. Those on
+//! Commands in the README and in the book: each is run, and prints what the page shows below it. `UPDATE_GUIDES=1` rewrites that. Those on
 //! recordings that are no part of the checkout are run by a test that needs them, and of cargo's the targets exist.
 
 use crate::common::poses;
@@ -187,7 +187,7 @@ fn blocks<'a>(lines: &[&'a str]) -> Vec<(usize, usize, &'a str)> {
     blocks
 }
 
-/// Tells whether a document shows what is printed; its lines `…` stand for any number of lines.
+/// Tells whether a document shows what is printed; a line `…` matches any number of lines.
 fn is_shown(shown: &str, printed: &str) -> bool {
     let mut rest = printed;
     for (index, part) in shown.split("…\n").enumerate() {

@@ -193,7 +193,7 @@ pub enum TokenError {
         /// Fault.
         error: TypeError,
     },
-    /// A quality of service that is none.
+    /// A quality of service that cannot be read.
     #[error("in the token `{token}`: {error}")]
     Qos {
         /// The text.
@@ -226,7 +226,9 @@ impl FromStr for Token {
         }
         let number = |text: &str| -> Result<u64, TokenError> {
             let digits = text.bytes().all(|letter| letter.is_ascii_digit()).then_some(text);
-            digits.and_then(|digits| digits.parse().ok()).ok_or_else(|| form("a number of it is none"))
+            digits
+                .and_then(|digits| digits.parse().ok())
+                .ok_or_else(|| form("one of its numbers is not a number, or too large"))
         };
         let name = |error| TokenError::Name { token: token(), error };
         let kinds = EndpointKind::NAMES.iter().find(|(_, name)| name == kind);

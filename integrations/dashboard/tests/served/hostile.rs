@@ -220,7 +220,7 @@ fn a_viewer_that_is_stopped_or_killed_costs_the_robot_nothing() -> Result<(), Bo
         "p99.9 alone {alone:?}, watched {watched:?}, stopped {stopped:?}, killed {killed:?}; {grown} bytes more"
     );
     assert!(grown < 20 << 20, "{grown} bytes");
-    // Whoever waited for the viewer would wait for as long as a message to it may take: 5 s.
+    // A callback that waited for the viewer would wait for as long as a message to it may take: 5 s.
     let longest = (10 * alone.max(watched)).max(Duration::from_millis(5));
     assert!(stopped < longest && killed < longest, "{alone:?} {watched:?} {stopped:?} {killed:?}");
     Ok(())

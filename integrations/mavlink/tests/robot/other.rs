@@ -28,7 +28,7 @@ pub(crate) struct Does {
     pub(crate) floods: AtomicBool,
     /// Lead of its clock, ms.
     pub(crate) ahead_ms: AtomicI64,
-    /// `true` if its clock stands still.
+    /// `true` if its clock does not advance.
     pub(crate) is_still: AtomicBool,
     pub(crate) ends: AtomicBool,
 }

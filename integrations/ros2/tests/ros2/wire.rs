@@ -129,10 +129,10 @@ fn what_is_wrong_with_a_token_is_said() {
     for (from, to, expected) in [
         ("@ros2_lv", "@ros2", "`…` is no token: it does not begin with `@ros2_lv`"),
         ("/%/%", "/%/", "`…` is no token: a chunk of it is empty"),
-        ("/0/aa", "/x/aa", "`…` is no token: a number of it is none"),
+        ("/0/aa", "/x/aa", "`…` is no token: one of its numbers is not a number, or too large"),
         ("/0/aa", "/4294967296/aa", "`…` is no token: the domain is too large"),
         ("/aa/", "/é/", "`…` is no token: the session is no hexadecimal number"),
-        ("/5/MP", "/99999999999999999999/MP", "`…` is no token: a number of it is none"),
+        ("/5/MP", "/99999999999999999999/MP", "`…` is no token: one of its numbers is not a number, or too large"),
         ("MP", "MX", "`…` is no token: it is of no known kind"),
         ("/1:2:1,10:,:,:,,", "", "`…` is no token: an endpoint has 13 or 14 chunks"),
         (",,", ",,/a/b", "`…` is no token: an endpoint has 13 or 14 chunks"),
@@ -188,7 +188,7 @@ fn attachments_are_those_of_ros() {
     let labelled = labelled(attachment);
     assert_eq!(labelled.len(), 16 + 8 + 17 + 8 + 11 + 17);
     assert_eq!(Attachment::from_bytes(&labelled), Ok(attachment));
-    let refused = |bytes: &[u8]| Attachment::from_bytes(bytes).expect_err("it is none").to_string();
+    let refused = |bytes: &[u8]| Attachment::from_bytes(bytes).expect_err("no attachment").to_string();
     assert_eq!(refused(&[]), "an attachment of 0 bytes: it is neither one of 33 bytes, nor labelled");
     bytes[16] = 15;
     assert_eq!(refused(&bytes), "an attachment of 33 bytes: its id does not have 16 bytes");

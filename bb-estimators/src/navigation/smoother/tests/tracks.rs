@@ -21,7 +21,8 @@ fn carrying(window: usize) -> Smoother {
 }
 
 proptest! {
-    // The same cases in each run: a track whose first linearisation lies far off may differ (one in some hundred random cases).
+    // The same cases in each run: at some seeds the two differ by metres, such as 11133506992611388537 with a window of 10 and tracks of 21,
+    // and why is not known.
     #![proptest_config(ProptestConfig { cases: 12, rng_seed: RngSeed::Fixed(2), ..ProptestConfig::default() })]
 
     /// Information that leaves the window is not lost, however long the tracks are.
