@@ -4,7 +4,7 @@ use bb_core::message::codec::ros::{Header, TransformStamped};
 use bb_core::message::codec::{Field, Reader};
 use bb_core::nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use bb_mcap::{BagMessage, ODOMETRY, POSE, RecordingError};
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::str::FromStr;
 
 /// The topic of static frames.
@@ -98,6 +98,10 @@ const BASES: [&str; 3] = ["base_link", "base_footprint", "base"];
 impl Frames {
     /// The robot's frame is the nearest one above that of the IMU that is named like one, else the topmost, without
     /// transforms that of the IMU.
+    ///
+    /// # Errors
+    ///
+    /// A transform that is no rotation and translation, or a mount of a frame that none of the topics is in.
     pub(crate) fn new(
         transforms: &[TransformStamped],
         of_topics: &HashMap<String, String>,
@@ -128,7 +132,26 @@ impl Frames {
                 None => break,
             }
         }
-        Ok(Self { edges, mounts: mounts.to_vec(), of_topics, base })
+        let frames = Self { edges, mounts: mounts.to_vec(), of_topics, base };
+        frames.check_mounts()?;
+        Ok(frames)
+    }
+
+    fn check_mounts(&self) -> Result<(), String> {
+        let used = self.of_topics.iter().flat_map(|(topic, frame)| [plain(topic), frame.clone()]);
+        let used: BTreeSet<_> = used.filter(|name| !name.is_empty()).collect();
+        let is_used = |name: &str| used.contains(&plain(name));
+        let is_target = |name: &str| {
+            let is_it = |mount: &Mount| matches!(&mount.at, Place::Frame(frame) if plain(frame) == plain(name));
+            self.mounts.iter().any(is_it)
+        };
+        match self.mounts.iter().find(|Mount { name, .. }| !is_used(name) && !is_target(name)) {
+            Some(Mount { name, .. }) => {
+                let used: Vec<_> = used.into_iter().collect();
+                Err(format!("--mount {name} names no topic that is used, and no frame of one: {}", used.join(", ")))
+            }
+            None => Ok(()),
+        }
     }
 
     /// The frame of `topic`'s data; empty if it names none.
