@@ -1,5 +1,5 @@
 //! The command `bb`.
 
 fn main() -> std::process::ExitCode {
-    bb_cli::run(std::env::args_os())
+    bb_command::run(std::env::args_os())
 }

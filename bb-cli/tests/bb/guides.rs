@@ -337,7 +337,7 @@ fn recorded_commands_of_the_book() {
                 !line.starts_with("bb eval families") && !line.starts_with("cargo run --release --example")
             };
             let lines: Vec<String> = commands(block).into_iter().filter(is_run).collect();
-            let script = lines.join("\n").replace("cargo run --release -p bb-cli --", "bb");
+            let script = lines.join("\n").replace("cargo run --release -p bb-command --", "bb");
             if script.contains("cargo ") || !script.contains('$') {
                 continue;
             }
