@@ -27,8 +27,8 @@ fn arrows_between_crates_point_one_way() {
         ("bb-estimators", "bb-eval"),
         ("bb-eval", "bb-command"),
         ("bb-eval", "bb-macros"),
-        ("examples/attitude", "bb-command"),
-        ("examples/attitude", "clap"),
+        ("demos/attitude", "bb-command"),
+        ("demos/attitude", "clap"),
         ("integrations/plot", "bb-"),
         ("bb-estimators", "bb-mavlink"),
         ("bb-estimators", "bb-mcap"),
@@ -74,7 +74,7 @@ fn the_top_level_is_the_project() {
     crates.sort();
     assert_eq!(
         crates,
-        ["bb-cli", "bb-core", "bb-estimators", "bb-eval", "bb-macros", "benches", "examples", "tests"]
+        ["bb-cli", "bb-core", "bb-estimators", "bb-eval", "bb-macros", "benches", "demos", "examples", "tests"]
     );
 }
 

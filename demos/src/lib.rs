@@ -1,0 +1,1 @@
+//! Robots in whole stories; each is an example target of this crate.

@@ -1,1 +1,0 @@
-//! Small robots that run; each is an example target of this crate.
