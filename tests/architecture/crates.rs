@@ -103,3 +103,24 @@ fn published_crates_are_described() {
         "rust-version {promised} is not checked by {used}"
     );
 }
+
+/// Every published crate has a changelog of the current version, of what it offers and what it does not, and the first page links it.
+#[test]
+fn published_crates_have_changelogs() {
+    let workspace = read("Cargo.toml");
+    let version = workspace.lines().find_map(|line| line.strip_prefix("version = \"")).expect("a version");
+    let version = version.trim_end_matches('"');
+    let overview = read("CHANGELOG.md");
+    for krate in super::CRATES {
+        let manifest = read(&format!("{krate}/Cargo.toml"));
+        let name = manifest.lines().find_map(|line| line.strip_prefix("name = \"")).expect("a name");
+        let name = name.trim_end_matches('"');
+        let changes = read(&format!("{krate}/CHANGELOG.md"));
+        for line in [format!("# Changelog of {name}"), "### Known limits".to_owned()] {
+            assert!(changes.lines().any(|other| other == line), "{krate}/CHANGELOG.md has no line `{line}`");
+        }
+        assert!(changes.contains(&format!("\n## {version}")), "{krate}/CHANGELOG.md has nothing of {version}");
+        let link = format!("({krate}/CHANGELOG.md)");
+        assert!(overview.contains(&format!("| `{name}`")) && overview.contains(&link), "CHANGELOG.md lacks {name}");
+    }
+}
