@@ -273,7 +273,7 @@ fn figures_of_the_readme_are_measured() {
     };
     let is_number = |text: &str| text.starts_with(|first: char| first.is_ascii_digit());
     let measured: String =
-        ["book/src/how-to/navigation.md", "book/src/laboratory/attitude.md", "benches/peers/README.md"]
+        ["book/src/laboratory/navigation.md", "book/src/laboratory/attitude.md", "benches/peers/README.md"]
             .map(read)
             .concat();
     let measured: Vec<&str> = measured.split(|letter: char| !letter.is_ascii_digit() && letter != '.').collect();

@@ -28,7 +28,7 @@ use crate::navigation::stream::{Gate, Stream};
 use crate::navigation::upkeep::{Upkeep, upkeep_methods};
 use crate::params::Params as _;
 
-/// Steps of an iterated correction. Three are as good as five, and two are not (`book/src/how-to/navigation.md`).
+/// Steps of an iterated correction. Three are as good as five, and two are not (`book/src/explanation/navigation-filter.md`).
 const STEPS: usize = 3;
 
 /// A linear correction is exact to two percent below this product of the normalised innovation squared and the variance of
