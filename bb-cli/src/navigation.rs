@@ -82,7 +82,7 @@ fn picture(file: &str) -> Result<PathBuf, String> {
     Ok(file)
 }
 
-/// The results, and the faults.
+/// Results so far, with notes and faults for the error stream.
 #[derive(Default)]
 struct Done {
     scores: Vec<ScoredNavigation>,
@@ -92,7 +92,7 @@ struct Done {
 }
 
 impl Done {
-    /// Prints what is the same for all filters once.
+    /// Adds the lines of a file to a list, each once: many are the same for all filters.
     fn say(list: &mut Vec<String>, file: &Path, lines: Vec<String>) {
         for line in lines {
             let line = format!("{}: {line}", file.display());
@@ -148,7 +148,7 @@ impl NavigationArguments {
         Ok((text, done.faults.is_empty()))
     }
 
-    /// A data set, which tells its start, without it if that is asked for.
+    /// Removes the start that a data set has, if `--start own` asks for that.
     fn started(&self, drive: Drive) -> Drive {
         match self.bag.start {
             Some(StartFrom::Own) => drive.without_start(),

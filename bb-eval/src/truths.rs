@@ -6,13 +6,13 @@ use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, PI};
 
 use crate::filters::Axes;
 
-/// A larger error, rad, makes the convention doubtful,
+/// Error, rad, above which the convention of the truth is in doubt. Another one has to be below it to be named.
 const DOUBTFUL: f64 = 20.0 * PI / 180.0;
-/// and another convention is named if its error is smaller than that, and smaller by this factor.
+/// Factor by which the error in another convention must be smaller for that to be named.
 const CLEARER: f64 = 3.0;
-/// Conventions whose errors differ by less than this, rad, cannot be distinguished.
+/// Difference of errors, rad, below which two conventions cannot be distinguished.
 pub(crate) const ALIKE: f64 = 0.5 * PI / 180.0;
-/// A verdict needs this many samples.
+/// Least number of samples for a verdict.
 const FEWEST: u64 = 3;
 
 /// A convention in which `world_from_body` may have been written instead, and its conversion back.

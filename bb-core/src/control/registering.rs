@@ -150,7 +150,7 @@ impl Control {
         !self.lock().apart.is_empty()
     }
 
-    /// A callback that ran outside of a disarming has returned.
+    /// Notes that a callback which ran outside of a disarming has returned.
     pub(super) fn apart_returned(&self, key: Key, number: u64, error: Option<SafetyError>) {
         let mut step = self.step();
         let Some(apart) = step.state.apart.iter_mut().find(|apart| apart.key == key) else { return };
@@ -171,7 +171,7 @@ impl Control {
         step.finish();
     }
 
-    /// Callbacks that run outside of a disarming have timed out.
+    /// Notes that callbacks which run outside of a disarming have timed out.
     pub(super) fn apart_timeout(&self, key: Key) {
         let mut step = self.step();
         let Some(apart) = step.state.apart.iter_mut().find(|apart| apart.key == key) else { return };

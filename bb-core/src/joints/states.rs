@@ -96,7 +96,7 @@ impl SharedStates {
         has_room
     }
 
-    /// Calls `lookup` until it succeeds, until no new state can change its answer, or until `timeout` expires.
+    /// Calls `lookup` until it succeeds, no new state can change its answer, or `timeout` expires.
     pub(super) fn wait<T>(
         &self,
         timeout: Duration,

@@ -88,13 +88,13 @@ impl<'a> Turn<'a> {
         self.is_observed
     }
 
-    /// A turn of `estimator` begins.
+    /// Notes that a turn of `estimator` begins.
     #[inline]
     pub(super) fn enter(&self, estimator: u32) {
         self.running.store(estimator, Ordering::Relaxed);
     }
 
-    /// Another island was entered in this turn: that time is not charged to the next callback.
+    /// Notes that another island was entered in this turn, whose time is not charged to the next callback.
     #[inline]
     pub fn left_for_another_island(&self) {
         self.timing.interrupt();
@@ -144,8 +144,8 @@ impl<'a> Turn<'a> {
         }
     }
 
-    /// The request that `estimator` is about to answer is not in the journal, so its outputs are recorded instead. The outputs of
-    /// other estimators follow from these.
+    /// Records the outputs of `estimator` in place of the request that it is about to answer, which is not in the journal. The outputs
+    /// of other estimators follow from these.
     pub(super) fn set_unrecorded(&self, estimator: &'static EstimatorDeclaration) {
         self.answering.set(Some(estimator));
     }
@@ -168,7 +168,7 @@ impl<'a> Turn<'a> {
         }
     }
 
-    /// An estimator emits `message` at the publisher with that number.
+    /// Publishes `message`, which an estimator emits, at the publisher with that number.
     #[inline]
     pub fn emit<T: Payload>(&self, publisher: usize, topic: &Topic<T>, message: &Stamped<T>) {
         if T::TELLS_JOINT_POSITION || self.is_observed || topic.is_listened_to() {

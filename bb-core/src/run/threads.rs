@@ -61,7 +61,7 @@ pub(super) fn source(mut source: Box<dyn Source>, machine: &Machine) -> Result<T
                 if due <= environment.clock().now() {
                     source.fire();
                 } else {
-                    // It was woken early, for an order.
+                    // Woken before its time, to carry out a request.
                     source.obey();
                 }
             }

@@ -7,9 +7,9 @@ use super::Origin;
 pub struct Inertial {
     /// Takes points from the frame of the moments, at the centre of mass, to the link's.
     pub link_from_inertia: Origin,
-    /// kg
+    /// Mass, kg.
     pub mass: f64,
-    /// kg·m²: xx, xy, xz, yy, yz, zz.
+    /// Moments about the centre of mass, kg·m²: xx, xy, xz, yy, yz, zz.
     pub inertia: [f64; 6],
 }
 
@@ -20,7 +20,7 @@ pub struct Visual {
     pub link_from_shape: Origin,
     /// The shape.
     pub geometry: Geometry,
-    /// Colour.
+    /// Colour; `None` leaves it to the viewer.
     pub material: Option<Material>,
 }
 
@@ -36,18 +36,18 @@ pub struct Collision {
 /// A shape about the origin of its frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Geometry {
-    /// Lengths along x, y and z, m.
+    /// A box, with its lengths along x, y and z, m.
     Box([f64; 3]),
-    /// Along z.
+    /// A cylinder along z.
     Cylinder {
-        /// m
+        /// Radius, m.
         radius: f64,
-        /// m
+        /// Length, m.
         length: f64,
     },
     /// A sphere.
     Sphere {
-        /// m
+        /// Radius, m.
         radius: f64,
     },
     /// A mesh in a file.

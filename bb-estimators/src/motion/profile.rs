@@ -36,11 +36,11 @@ pub struct Profile {
 /// The position and motion of a joint: rad, rad/s, rad/s²; m, m/s, m/s² where it slides.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct JointPoint {
-    /// rad or m
+    /// Position, rad or m.
     pub position: f64,
-    /// rad/s or m/s
+    /// Velocity, rad/s or m/s.
     pub velocity: f64,
-    /// rad/s² or m/s²
+    /// Acceleration, rad/s² or m/s².
     pub acceleration: f64,
 }
 

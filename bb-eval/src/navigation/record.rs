@@ -19,9 +19,9 @@ pub(crate) struct Estimate {
     /// Velocity in the filter's world, m/s.
     pub(crate) velocity: Vector3<f64>,
     pub(crate) world_from_body: UnitQuaternion<f64>,
-    /// Axes of the link, rad/s.
+    /// Angular velocity in the axes of the link, rad/s.
     pub(crate) angular_velocity: Vector3<f64>,
-    /// Position error, then rotation error, both in the world.
+    /// Covariance of the position error, m², then of the rotation error, rad², both in the world.
     pub(crate) covariance: Matrix6<f64>,
     /// The origin of the filter's world.
     pub(crate) origin: Option<Geodetic>,
@@ -30,7 +30,7 @@ pub(crate) struct Estimate {
 }
 
 impl Estimate {
-    /// `None` without a covariance.
+    /// Converts a message; `None` if it has no covariance.
     pub(crate) fn of(
         time_ns: Time,
         odometry: &Odometry,
@@ -68,7 +68,7 @@ impl Estimate {
     }
 }
 
-/// Fate of the measurements of one input.
+/// Counts of the measurements of one input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Verdict {
     pub(crate) input: &'static str,
@@ -76,7 +76,7 @@ pub(crate) struct Verdict {
     pub(crate) refused: u64,
 }
 
-/// A run.
+/// Record of one run: estimates, health and counts.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Record {
     /// Estimates by time.
@@ -96,7 +96,7 @@ pub(crate) struct Record {
     pub(crate) samples: u64,
     /// The time that the run took.
     pub(crate) seconds: f64,
-    /// True if the filter knows no height, roll and pitch.
+    /// `true` if the filter estimates no height, roll and pitch.
     pub(crate) is_planar: bool,
     /// The time at which virtual time is zero.
     base_ns: Time,

@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Reads the entries of a file, by time, and why the rest of it is not read.
+/// Reads the entries of a file in the order of their times, and the reason if it cannot be read to its end.
 pub(super) fn read(file: &Path, topic: Option<&str>) -> Result<(Vec<Entry>, Option<String>), String> {
     let name = file.to_str().ok_or("the name of the file is not UTF-8")?;
     let log = read_file(name).map_err(|error| format!("cannot be read: {error}"))?;
@@ -98,7 +98,7 @@ fn fixes(gnss: &Columns<'_>) -> Result<Vec<GnssFix>, String> {
     Ok((0..count).map(fix).collect())
 }
 
-/// Forward, left, up.
+/// Turns a vector from forward, right, down to forward, left, up.
 fn body([forward, right, down]: [f64; 3]) -> [f64; 3] {
     [forward, -right, -down]
 }

@@ -1,4 +1,4 @@
-//! Offset of the magnetometer, by iron on the body: the one that is taken off, and a newcomer.
+//! Offset of the magnetometer, by iron on the body: the one that is subtracted, and another that may replace it.
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
@@ -102,7 +102,7 @@ struct Pose<T: Real> {
     age_s: T,
 }
 
-/// The incumbent, whose offset is taken off, and a newcomer with any offset, which replaces it once it explains the fields
+/// The incumbent, whose offset is subtracted, and a newcomer with any offset, which replaces it once it explains the fields
 /// so much better that it outweighs the odds against it.
 ///
 /// So iron that is put on, taken off or moved is one case. A newcomer that has not won for long starts again, since what it
@@ -115,9 +115,9 @@ pub(super) struct HardIron<T: Real> {
     odds: T,
     /// Poses that the newcomer has seen.
     seen: T,
-    /// True if the incumbent has an offset: the first has at most what calibration leaves.
+    /// `true` if the incumbent has an offset; the first one has at most what calibration leaves.
     is_offset: bool,
-    /// True if the user has said that the magnetometer is calibrated, so that there is no newcomer.
+    /// `true` if the user has stated that the magnetometer is calibrated, so that there is no newcomer.
     is_calibrated: bool,
     /// Deviation of the offset when the heading was last doubted for it.
     doubted: T,
@@ -147,12 +147,12 @@ impl<T: Real> HardIron<T> {
         }
     }
 
-    /// The offset to take off, body frame.
+    /// The offset to subtract from a measured field, body frame.
     pub(super) fn offset(&self) -> Vector3<T> {
         self.believed() * self.scale()
     }
 
-    /// The offset that is believed, in units of the field.
+    /// The incumbent's offset, in units of the field; zero if it has none.
     fn believed(&self) -> Vector3<T> {
         if self.is_offset { self.incumbent.offset } else { Vector3::zeros() }
     }
@@ -163,8 +163,8 @@ impl<T: Real> HardIron<T> {
         if self.is_offset { self.incumbent.variance() * scale * scale } else { T::ZERO }
     }
 
-    /// Expected square of the error of the offset along an axis, as a fraction of the field's norm: by even odds at first, the
-    /// newcomer's is the true one.
+    /// Expected square of the error of the offset along an axis, as a fraction of the field's norm. The newcomer's offset is the true
+    /// one with the odds so far, which are even at first.
     pub(super) fn doubt(&self) -> T {
         let known = if self.is_offset { self.incumbent.variance() } else { T::ZERO };
         if self.is_calibrated {
@@ -180,12 +180,12 @@ impl<T: Real> HardIron<T> {
         self.scale.unwrap_or(T::ZERO)
     }
 
-    /// The next pose is not compared with those before.
+    /// Drops the last pose, so that the next one is compared with none before it.
     pub(super) fn interrupt(&mut self) {
         self.pose = None;
     }
 
-    /// Time passes.
+    /// Adds to the age of the last pose.
     pub(super) fn age(&mut self, dt: T) {
         if let Some(pose) = &mut self.pose {
             pose.age_s += dt;

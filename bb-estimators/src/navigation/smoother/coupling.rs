@@ -55,7 +55,7 @@ impl PoseInformation {
     }
 }
 
-/// See the module. Rows are poses of the window, oldest first.
+/// Information Λ on all poses, and the ties C. Rows are poses of the window, oldest first.
 #[derive(Clone, Debug)]
 pub(super) struct Coupling<const N: usize> {
     /// The number of keyframes that fit.
@@ -156,12 +156,12 @@ impl<const N: usize> Coupling<N> {
         self.changed
     }
 
-    /// Restores this after a change of form that left the information what it was.
+    /// Restores the first changed pose, after a change of form that left the information as it was.
     pub(super) fn set_changed(&mut self, changed: usize) {
         self.changed = changed;
     }
 
-    /// The information that couples these poses changes.
+    /// Marks the poses `from` to `to` as changed, and as coupled with each other.
     fn touch(&mut self, from: usize, to: usize) {
         if self.idle.is_none() {
             self.checkpoint.forget();
@@ -174,8 +174,8 @@ impl<const N: usize> Coupling<N> {
         self.unseen = self.unseen.max(self.first + to as u64);
     }
 
-    /// The link between this keyframe and the previous one changes. What the previous one leaves to later poses depends on
-    /// it, unless no landmark ties a keyframe before the link to one after it.
+    /// Marks the link between this keyframe and the previous one as changed. What the previous one leaves to later poses depends
+    /// on it, unless no landmark ties a keyframe before the link to one after it.
     pub(super) fn relink(&mut self, index: usize) {
         if self.spans(index) {
             self.changed = self.changed.min(index);
@@ -280,7 +280,7 @@ impl<const N: usize> Coupling<N> {
         self.changed != usize::MAX
     }
 
-    /// Everything is eliminated.
+    /// Marks everything as eliminated.
     pub(super) fn finish(&mut self) {
         self.changed = usize::MAX;
     }

@@ -36,14 +36,14 @@ pub(super) struct Sight {
     pub(super) precision: f64,
     /// The weight given by the kernel.
     pub(super) weight: f64,
-    /// B and the residual, divided by the noise.
+    /// The Jacobian B and the residual, divided by the noise.
     pub(super) jacobian: Matrix2x3<f64>,
     pub(super) residual: Vector2<f64>,
-    /// d.
+    /// The vector d from the body to the landmark, in the world, m.
     pub(super) arm: Vector3<f64>,
 }
 
-/// See the module.
+/// A landmark with its observations, its prior and the factor L of its normal matrix.
 #[derive(Clone, Debug)]
 pub(super) struct Landmark {
     pub(super) id: u64,
@@ -64,7 +64,7 @@ pub(super) struct Landmark {
     pub(super) refused_in_a_row: u32,
     /// Observations in chronological order.
     pub(super) sights: Vec<Sight>,
-    /// L; `None` if V is singular.
+    /// The Cholesky factor L of V; `None` if V is singular.
     root: Option<Matrix3<f64>>,
     /// `L⁻¹ b`, where b is the information vector of prior and observations.
     vector: Vector3<f64>,
@@ -245,7 +245,7 @@ impl Landmark {
 }
 
 impl Sight {
-    /// N.
+    /// The normal matrix N of this observation.
     pub(super) fn normal(&self) -> Matrix3<f64> {
         self.jacobian.transpose() * self.jacobian * self.weight
     }
