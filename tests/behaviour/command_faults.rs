@@ -13,9 +13,9 @@ use std::task::Poll;
 pub(crate) enum Kind {
     #[default]
     Sleep,
-    /// Wakes itself and never gives way.
+    /// Wakes itself at each poll, and never sleeps.
     Spin,
-    /// Blocks its thread until it may go on.
+    /// Blocks its thread until the test releases it.
     Block,
     /// Sleeps so long that it never ends.
     Endless,
@@ -80,7 +80,7 @@ impl Command for Nested {
     }
 }
 
-/// Arms once it may.
+/// Command that arms once the test releases it.
 #[derive(Debug)]
 pub(crate) struct SlowArm;
 

@@ -1,4 +1,4 @@
-//! Many commands that hang keep none from running that makes the robot safe.
+//! Commands that hang, however many, do not keep others from making the robot safe.
 
 use crate::components::{Number, within};
 use crate::gate::{Gate, Place, Stuck};
@@ -6,37 +6,37 @@ use bb_core::ArmError;
 use bb_core::event::RefusalReason;
 use bb_core::prelude::*;
 
-static HERE: Gate = Gate::new();
+static FROM_HEALTH: Gate = Gate::new();
 
 static CANCELLED: Gate = Gate::new();
 
-/// Place at which commands that health starts hang.
-pub(crate) struct OfHealth;
+/// Gate at which commands hang that a change of health starts.
+pub(crate) struct HealthGate;
 
-impl Place for OfHealth {
-    const GATE: &'static Gate = &HERE;
+impl Place for HealthGate {
+    const GATE: &'static Gate = &FROM_HEALTH;
     const NAME: &'static str = "here";
 }
 
-/// Place at which commands hang that are cancelled.
-pub(crate) struct InVain;
+/// Gate at which commands hang that are cancelled.
+pub(crate) struct CancelledGate;
 
-impl Place for InVain {
+impl Place for CancelledGate {
     const GATE: &'static Gate = &CANCELLED;
     const NAME: &'static str = "here";
 }
 
 static WAITING: Gate = Gate::new();
 
-/// Place at which more commands hang than there are threads.
-pub(crate) struct InLine;
+/// Gate at which more commands hang than there are threads.
+pub(crate) struct QueueGate;
 
-impl Place for InLine {
+impl Place for QueueGate {
     const GATE: &'static Gate = &WAITING;
     const NAME: &'static str = "here";
 }
 
-/// Diverges at a 1.
+/// Estimator that reports a divergence at each 1 that it gets.
 #[derive(Debug)]
 pub(crate) struct Fickle;
 
@@ -60,7 +60,7 @@ robot! {
     commands {
         category many { concurrency: 1000; }
         disarm: Disarm;
-        stuck: Stuck<OfHealth> { category: many; allowed_states: [idle, executing]; }
+        stuck: Stuck<HealthGate> { category: many; allowed_states: [idle, executing]; }
     }
     link base {
         sensor number: External<Number>() { estimator fickle: Fickle() { recover_after: 1; on_degraded: stuck; } }
@@ -70,7 +70,7 @@ robot! {
 #[test]
 fn health_commands_that_hang_keep_none_that_disarms_from_running() {
     within(60, || {
-        HERE.close("here");
+        FROM_HEALTH.close("here");
         let running = Ill::builder().start().expect("it starts");
         running.arm().expect("it may be armed");
         for _ in 0..80 {
@@ -78,11 +78,11 @@ fn health_commands_that_hang_keep_none_that_disarms_from_running() {
                 running.publish(ill::sensor::base::number, running.clock().now(), Number(number));
             }
         }
-        HERE.wait_for(64);
+        FROM_HEALTH.wait_for(64);
         let disarms = running.command(ill::command::disarm, NoArguments).expect("it is armed");
         assert_eq!(disarms.wait_timeout(Duration::from_secs(20)), Some(Ok(())));
         assert_eq!(running.safety(), Safety::Disarmed);
-        HERE.open();
+        FROM_HEALTH.open();
         running.stop();
     });
 }
@@ -107,7 +107,7 @@ robot! {
     robot Full;
     commands {
         category many { concurrency: 1000; }
-        stuck: Stuck<InLine> { allowed_states: [idle, executing]; category: many; }
+        stuck: Stuck<QueueGate> { allowed_states: [idle, executing]; category: many; }
     }
     link base { sensor number: External<Number>(); }
 }
@@ -145,7 +145,7 @@ robot! {
     robot Crowded;
     commands {
         disarm: Disarm;
-        errand: Stuck<InVain> { allowed_states: [idle, executing]; }
+        errand: Stuck<CancelledGate> { allowed_states: [idle, executing]; }
     }
     link base { sensor number: External<Number>(); }
 }

@@ -1,4 +1,4 @@
-//! Estimators and commands look after the safety of the robot as well, and a replay knows what they reported.
+//! Disarm callbacks and hardware errors of estimators and commands, in a run and in its replay.
 
 use crate::components::{Doing, Done, Failure, Number, Source, Task, at, lock};
 use crate::replay::same_again;
@@ -17,7 +17,7 @@ fn braked() -> [u32; 2] {
 const TOO_MUCH: f64 = 100.0;
 const WRONG: f64 = -1.0;
 
-/// Owns a brake, and reports what it sees of the load.
+/// Estimator with a brake, which reports a load that is too heavy as a hardware error.
 #[derive(Debug)]
 pub(crate) struct LoadGuard(SafetyLink);
 
@@ -46,7 +46,7 @@ impl Estimator for LoadGuard {
     }
 }
 
-/// Lifts for a while, with a brake of its own.
+/// Command that takes 10 ms and has a brake of its own.
 fn lift(context: CommandContext) -> Doing {
     Box::pin(async move {
         context.on_disarm(|| {
@@ -58,7 +58,7 @@ fn lift(context: CommandContext) -> Doing {
     })
 }
 
-/// Reports a fault from the beginning.
+/// Reports a hardware error in `init`.
 fn burn(context: &SensorContext) -> Done {
     context.hardware_error("it is burnt");
     Ok(())
@@ -73,7 +73,7 @@ robot! {
     }
 }
 
-/// Brakes are there once.
+/// Locks and resets the counts of brakes, which all tests of this file share.
 fn alone() -> MutexGuard<'static, ()> {
     static ALONE: Mutex<()> = Mutex::new(());
     let guard = lock(&ALONE);
@@ -81,7 +81,7 @@ fn alone() -> MutexGuard<'static, ()> {
     guard
 }
 
-/// Runs it as `script` has it, and again from its journal, which gives the same and moves nothing.
+/// Runs `script` on a robot, then replays its journal: the replay is the same, and applies no brake.
 fn again(script: impl FnOnce(&mut Simulation<Hoist>) -> Result<(), Failure>) -> Result<(), Failure> {
     let _alone = alone();
     same_again(Hoist::builder, |builder| {

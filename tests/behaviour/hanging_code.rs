@@ -1,4 +1,4 @@
-//! Code that hangs, or calls back where it would wait for itself, harms itself alone, and is reported while the robot runs.
+//! Code that hangs, or that calls where it would wait for itself: it is reported while the robot runs, and stops nothing else.
 
 use crate::components::{Doing, Number, Task};
 use crate::gate::{Gate, Place, Stuck};
@@ -7,10 +7,10 @@ use bb_core::run::{ActuatorError, Report};
 use bb_core::{ComponentFault, DisarmError, Live, Running, TelemetryEvent};
 use std::sync::{Arc, Mutex, OnceLock, mpsc};
 
-/// Longer than anything takes that does not hang, however busy the machine.
+/// Time after which code counts as hanging, even on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// A place at which the code of each test hangs.
+/// Gate at which the code of one test hangs.
 struct Hangs(Gate);
 
 impl Hangs {
@@ -24,7 +24,7 @@ impl Hangs {
     }
 }
 
-/// Opened in the end, whatever becomes of the test.
+/// Guard that opens the gate when the test ends, also by a panic.
 struct Open<'a>(&'a Gate);
 
 impl Drop for Open<'_> {
@@ -33,7 +33,7 @@ impl Drop for Open<'_> {
     }
 }
 
-/// Waits for a fault of that path; the message.
+/// Waits for a fault at `path`, and returns its message.
 fn fault_of(faults: &Subscription<ComponentFault>, path: &str) -> String {
     let start = std::time::Instant::now();
     while let Some(fault) = faults.recv_timeout(PATIENCE.saturating_sub(start.elapsed())) {
@@ -49,7 +49,7 @@ mod reports {
 
     static HANG: Hangs = Hangs::new();
 
-    /// Hangs in its command.
+    /// Actuator whose `handle_command` hangs.
     #[derive(Debug)]
     pub(crate) struct Servo;
 
@@ -71,7 +71,7 @@ mod reports {
         }
     }
 
-    /// Hangs.
+    /// Command that hangs.
     pub(crate) struct Wait;
 
     impl Command for Wait {
@@ -247,7 +247,7 @@ mod pools {
 mod reentrance {
     use super::*;
 
-    /// Stopped by its own actuator.
+    /// Robot that its own actuator stops.
     static RUNNING: Mutex<Option<Running<Own>>> = Mutex::new(None);
 
     static LIVE: OnceLock<Mutex<Option<Live<Own>>>> = OnceLock::new();
@@ -262,7 +262,7 @@ mod reentrance {
         }
     }
 
-    /// Sends to itself at 1, disarms the robot at 2, fails at 3, stops the robot at 4.
+    /// Actuator that at 1 sends to itself, at 2 disarms the robot, at 3 fails, and at 4 stops the robot.
     #[derive(Debug)]
     pub(crate) struct Servo;
 

@@ -10,7 +10,7 @@ const PANICS: f64 = -2.0;
 const DIVERGES: f64 = -1.0;
 const IS_SLOW: f64 = 1000.0;
 
-/// Takes its time in the first run, and panics at 3.
+/// Estimator whose first run is slow, and that panics at 3.
 fn slow(_: &mut f64, number: f64) -> Replied {
     assert!(number != 3.0, "it is three");
     if !is_again() {
@@ -19,7 +19,7 @@ fn slow(_: &mut f64, number: f64) -> Replied {
     Ok(Reply::emit(Number(number)))
 }
 
-/// Enters a state after a millisecond.
+/// Command that enters a state after a millisecond.
 fn enter(context: CommandContext, state: &'static str) -> Doing {
     Box::pin(async move {
         context.sleep(Duration::from_millis(1)).await;
@@ -27,7 +27,7 @@ fn enter(context: CommandContext, state: &'static str) -> Doing {
     })
 }
 
-/// Emits what it gets, and then how many it has had since it was made.
+/// Estimator that emits its input, and then the number of inputs since it was created.
 fn echo(count: &mut f64, number: f64) -> Replied {
     *count += 1.0;
     if number == IS_SLOW && !is_again() {

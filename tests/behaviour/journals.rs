@@ -1,4 +1,4 @@
-//! Replays of whatever may happen to a robot, from its journal.
+//! Replays of messages, faults, requests, commands and restarts of a robot, from its journal.
 
 use crate::components::{Done, Failure, Number, Replied, Servo, at, within};
 use crate::gate::Gate;
@@ -22,7 +22,7 @@ pub(crate) struct AdderOptions {
     pub(crate) gain: f64,
 }
 
-/// Adds up, from the second in which it was made on; what it is told by its input may go wrong.
+/// Estimator that adds up its input, from the second of its creation on; some inputs make it fail.
 #[derive(Debug)]
 pub(crate) struct Adder {
     sum: f64,
@@ -85,7 +85,7 @@ impl HandleCast<Add> for Adder {
     }
 }
 
-/// One that it does not hold.
+/// A request that a journal holds by its name alone.
 pub(crate) struct Forget;
 
 impl HandleCast<Forget> for Adder {
@@ -95,7 +95,7 @@ impl HandleCast<Forget> for Adder {
     }
 }
 
-/// Another one, which only makes it unsure.
+/// Another request of that kind, which makes the estimator report a divergence.
 pub(crate) struct Doubt;
 
 impl HandleCast<Doubt> for Adder {
@@ -104,7 +104,7 @@ impl HandleCast<Doubt> for Adder {
     }
 }
 
-/// Last number before it cannot be made safe.
+/// Number after which the actuator cannot be made safe.
 const REFUSES: f64 = 99.0;
 
 fn moves(to: f64) -> Done {
@@ -122,7 +122,7 @@ pub(crate) struct Way {
     pub(crate) tunes: bool,
 }
 
-/// Drives the actuator step by step, publishes how far it is, and sets a parameter as it goes.
+/// Command that drives the actuator step by step, publishes its progress, and sets a parameter at each step.
 #[derive(Debug)]
 pub(crate) struct Drive;
 
@@ -179,7 +179,7 @@ robot! {
     }
 }
 
-/// Lock of the place at which code hangs: one test at a time uses it.
+/// Lock of the gate at which code hangs, which one test uses at a time.
 static ALONE: Mutex<()> = Mutex::new(());
 
 pub(crate) fn alone() -> MutexGuard<'static, ()> {
@@ -187,7 +187,7 @@ pub(crate) fn alone() -> MutexGuard<'static, ()> {
     ALONE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Runs it on virtual time as `script` has it, and again.
+/// Runs `script` on virtual time, and then its replay.
 fn again(
     script: impl FnOnce(&mut Simulation<Again>) -> Result<(), Failure>,
 ) -> Result<(Published, Report), Failure> {
@@ -199,7 +199,7 @@ fn again(
     })
 }
 
-/// Runs it in real time as `script` has it, and again.
+/// Runs `script` in real time, and then its replay.
 fn again_in_real_time(script: impl FnOnce(&Running<Again>)) -> Result<(Published, Report), Failure> {
     same_again(Again::builder, |builder| {
         let running = builder.start()?;

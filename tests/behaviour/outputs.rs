@@ -16,7 +16,7 @@ pub(crate) struct Parts {
     pub(crate) spare: Option<Number>,
 }
 
-/// Publishes even numbers twice.
+/// Estimator that emits each number, and even ones at a second output too.
 #[derive(Debug)]
 pub(crate) struct Split;
 
@@ -116,7 +116,7 @@ pub(crate) struct Samples {
     pub(crate) count: Option<Number>,
 }
 
-/// Takes a batch of samples, the last of which is of the time of the message, 10 ms apart, apart.
+/// Estimator that emits the samples of a batch one by one: 10 ms apart, the last at the time of the message.
 #[derive(Debug)]
 pub(crate) struct Sampler;
 
@@ -139,7 +139,7 @@ impl Estimator for Sampler {
     }
 }
 
-/// A number at the middle of the time since the one before.
+/// Estimator that emits each number at the middle of the time since the previous one.
 #[derive(Debug)]
 pub(crate) struct Middle(Option<MonotonicTime>);
 
@@ -175,7 +175,7 @@ robot! {
     }
 }
 
-/// The milliseconds and the numbers of all messages that wait.
+/// Times in ms and numbers of all waiting messages.
 fn timed(subscription: &Subscription<Number>) -> Vec<(i64, f64)> {
     subscription.drain().map(|number| (number.monotonic_time.as_nanos() / 1_000_000, number.0)).collect()
 }
