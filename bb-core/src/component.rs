@@ -32,6 +32,7 @@ mod service;
 pub(crate) mod setting;
 pub(crate) mod shared;
 mod template;
+mod tenure;
 mod transforms;
 
 pub(crate) use crate::fault::{Fault, Termination};

@@ -7,6 +7,8 @@ use bb_core::message::codec::from_json;
 use bb_core::prelude::*;
 use serde_json::Value;
 use std::error::Error;
+use std::sync::Barrier;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// Emits its input.
 #[derive(Debug)]
@@ -42,6 +44,43 @@ impl Actuator for Jammed {
     fn disarm(&mut self) -> Result<(), Fault> {
         Ok(())
     }
+}
+
+/// Counts its commands, and hangs in a negative one until it is freed.
+#[derive(Debug)]
+pub(crate) struct Counting;
+
+static CARRIED_OUT: AtomicU64 = AtomicU64::new(0);
+static HANGS: AtomicBool = AtomicBool::new(false);
+static IS_FREED: AtomicBool = AtomicBool::new(false);
+
+impl Actuator for Counting {
+    type Options = NoOptions;
+    type Command = Number;
+
+    fn init(_: NoOptions, _: &ActuatorContext) -> Result<Self, Fault> {
+        Ok(Self)
+    }
+    fn handle_command(&mut self, number: &Stamped<Number>) -> Result<(), Fault> {
+        while number.payload.0 < 0.0 && !IS_FREED.load(Ordering::SeqCst) {
+            HANGS.store(true, Ordering::SeqCst);
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        // Long enough for another thread to be between.
+        std::thread::yield_now();
+        CARRIED_OUT.fetch_add(1, Ordering::SeqCst);
+        Ok(())
+    }
+    fn disarm(&mut self) -> Result<(), Fault> {
+        Ok(())
+    }
+}
+
+robot! {
+    robot Steered;
+    parameters { speed: f64 = 1.0; }
+    commands { go: Arm { allowed_states: [disarmed]; } }
+    link base { joint pan: continuous { axis: z; actuator motor: Counting(); sensor encoder: External<Number>(); link head {} } }
 }
 
 /// Arguments of [`Travel`].
@@ -238,6 +277,73 @@ fn nothing_acts_in_the_name_of_a_session_that_has_ended() -> Result<(), Box<dyn 
     bus.disarm()?;
     assert!(bus.arm().is_err());
     assert_eq!(simulation.safety(), Safety::Disarmed);
+    Ok(())
+}
+
+/// Eight threads act in the name of a session until they are refused, 40 times: once its end was waited for, nothing moves, is published or
+/// is set any more. Ending it within one of its own calls, or while an actuator hangs in one, returns.
+#[test]
+fn no_call_of_other_threads_outlives_a_session() -> Result<(), Box<dyn Error>> {
+    let running = Steered::builder().start()?;
+    running.arm()?;
+    let heard = running.bus().subscribe::<Number>("page/number", Overflow::DropOldest { capacity: 1 << 16 })?;
+    let calls = AtomicU64::new(0);
+    let mut rounds = 0;
+    while rounds < 40 || calls.load(Ordering::Relaxed) < 10_000 {
+        rounds += 1;
+        let session = running.session(format!("page {rounds}"), Rights::ALL);
+        let (begin, first) = (Barrier::new(9), calls.load(Ordering::Relaxed));
+        std::thread::scope(|scope| -> Result<(), Box<dyn Error>> {
+            for thread in 0..8_u32 {
+                let (bus, begin, calls) = (session.bus(), &begin, &calls);
+                scope.spawn(move || {
+                    let link = bus.actuator::<Number>("actuator/base/pan/motor").expect("it is there");
+                    let publisher = bus.publisher::<Number>("page/number").expect("it may");
+                    begin.wait();
+                    let mut number = 0.0;
+                    let mut act = || {
+                        number += 1.0;
+                        match thread % 3 {
+                            0 => link.send(Number(number)).is_ok(),
+                            1 => bus.set_parameter("param/speed", number).is_ok(),
+                            _ => {
+                                publisher.publish(Number(number));
+                                bus.publish_json("page/number", "0.5").is_ok()
+                            }
+                        }
+                    };
+                    while act() {
+                        calls.fetch_add(1, Ordering::Relaxed);
+                    }
+                });
+            }
+            begin.wait();
+            while calls.load(Ordering::Relaxed) < first + 100 {
+                std::thread::yield_now();
+            }
+            assert!(session.end_within(Duration::from_secs(60)));
+            let state = || (CARRIED_OUT.load(Ordering::SeqCst), running.bus().parameter("param/speed"));
+            let (at_end, _) = (state(), heard.drain().count());
+            std::thread::sleep(Duration::from_millis(1));
+            assert_eq!((state(), heard.drain().count()), (at_end, 0));
+            Ok(())
+        })?;
+        assert_eq!(heard.drain().count(), 0, "nor while its threads returned");
+    }
+    let session = running.session("page", Rights::ALL);
+    let link = session.actuator::<Number>("actuator/base/pan/motor")?;
+    std::thread::scope(|scope| {
+        let hangs = scope.spawn(|| link.send(Number(-1.0)));
+        while !HANGS.load(Ordering::SeqCst) {
+            std::thread::yield_now();
+        }
+        session.end();
+        assert!(session.set_parameter("param/speed", 0.0).is_err(), "the end does not wait");
+        assert!(!session.end_within(Duration::from_millis(20)), "the motor hangs");
+        IS_FREED.store(true, Ordering::SeqCst);
+        assert!(session.end_within(Duration::from_secs(60)));
+        assert!(hangs.join().expect("it does not panic").is_ok(), "what was begun before is completed");
+    });
     Ok(())
 }
 

@@ -373,8 +373,7 @@ impl Bus {
     /// What could not be made safe again. The safety state is `disarmed` nevertheless. Or the caller may not arm the robot.
     pub fn force_disarm(&self) -> Result<(), DisarmError> {
         self.check(Right::Arm).map_err(DisarmError::Forbidden)?;
-        // Whoever may not force it any more may still disarm.
-        self.settled(|robot| robot.disarm(self.caller.is_valid(), &self.caller))
+        self.settled(|robot| robot.disarm(true, &self.caller))
     }
 
     /// Disarms the robot, cancels its commands, and has its sensors and services stop as soon as it is safe. Does not wait.
@@ -383,9 +382,7 @@ impl Bus {
     /// The caller may not arm the robot.
     pub fn request_stop(&self) -> Result<(), Fault> {
         self.check(Right::Arm)?;
-        self.caller.check_valid()?;
-        self.settled(|robot| robot.request_stop(&self.caller));
-        Ok(())
+        self.settled(|robot| robot.request_stop(&self.caller))
     }
 
     /// The states of the joints, and all frames at any time. Every caller may see where the robot is.

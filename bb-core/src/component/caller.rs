@@ -1,10 +1,11 @@
 //! Callers of a robot, and their rights.
 
 use super::Fault;
+use super::tenure::{Over, Permit, Tenure};
 use crate::event::{Forbidden, Right, Rights};
 use std::borrow::Cow;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 /// A caller of a robot. Handles that were obtained for a caller act in its name.
 #[derive(Clone, Debug)]
@@ -13,30 +14,9 @@ pub(crate) struct Caller {
     rights: Rights,
     /// The execution of a command or the session that it belongs to, after whose end its handles refuse to act, even if code of it still
     /// runs.
-    within: Option<Arc<Within>>,
+    within: Option<Arc<Tenure>>,
     /// `true` for a caller outside of the robot: on virtual time, what follows from its calls is settled before they return.
     is_outside: bool,
-}
-
-/// An execution of a command, or a session.
-#[derive(Debug, Default)]
-struct Within {
-    is_over: AtomicBool,
-    /// The name of a session.
-    session: Option<String>,
-    /// The execution or session in which a session was begun.
-    outer: Option<Arc<Within>>,
-}
-
-impl Within {
-    /// The innermost that is over.
-    fn over(&self) -> Option<&Self> {
-        if self.is_over.load(Ordering::SeqCst) { Some(self) } else { self.outer.as_deref().and_then(Self::over) }
-    }
-
-    fn outermost(&self) -> &Self {
-        self.outer.as_deref().map_or(self, Self::outermost)
-    }
 }
 
 impl Caller {
@@ -79,16 +59,31 @@ impl Caller {
 
     /// Returns the same caller in a session of that name, which [`Self::revoke`] ends.
     pub(crate) fn in_session(&self) -> Self {
-        let within =
-            Within { session: Some(self.name.to_string()), outer: self.within.clone(), ..Within::default() };
-        Self { within: Some(Arc::new(within)), ..self.clone() }
+        let tenure = Tenure::session(self.name.to_string(), self.within.clone());
+        Self { within: Some(Arc::new(tenure)), ..self.clone() }
     }
 
-    /// Makes its handles refuse to act from now on.
+    /// Permits the calling thread to act until the permit is dropped: for an act whose order with [`Self::revoke`] counts.
+    ///
+    /// # Errors
+    /// As [`Self::check_valid`].
+    pub(crate) fn permit(&self) -> Result<Permit<'_>, Fault> {
+        match &self.within {
+            Some(within) => within.permit().map_err(ended),
+            None => Ok(Permit::ENDLESS),
+        }
+    }
+
+    /// Makes its handles refuse to act from now on. A call that holds a permit is completed: [`Self::wait_for_calls`] waits for it.
     pub(crate) fn revoke(&self) {
         if let Some(within) = &self.within {
-            within.is_over.store(true, Ordering::SeqCst);
+            within.end();
         }
+    }
+
+    /// Waits until no other thread acts in its name, at most `timeout`. Returns whether none does.
+    pub(crate) fn wait_for_calls(&self, timeout: Duration) -> bool {
+        self.within.as_ref().is_none_or(|within| within.wait(timeout))
     }
 
     /// Returns whether both are of the same execution of a command, or of the same session outside of commands.
@@ -104,12 +99,13 @@ impl Caller {
     /// # Errors
     /// It is a command that has ended or was cancelled, or a session that has ended.
     pub(crate) fn check_valid(&self) -> Result<(), Fault> {
-        match self.within.as_ref().and_then(|within| within.over()) {
-            None => Ok(()),
-            Some(Within { session: Some(name), .. }) => {
-                Err(Fault::new(format!("the session of `{name}` has ended")))
-            }
-            Some(_) => Err(Fault::new("the command that asks for this has ended or was cancelled")),
-        }
+        self.within.as_ref().and_then(|within| within.over()).map_or(Ok(()), |over| Err(ended(over)))
+    }
+}
+
+fn ended(over: Over<'_>) -> Fault {
+    match over.session {
+        Some(name) => Fault::new(format!("the session of `{name}` has ended")),
+        None => Fault::new("the command that asks for this has ended or was cancelled"),
     }
 }

@@ -251,7 +251,7 @@ impl OwnHooks {
     }
 
     fn keep_progress(&self, progress: DynamicMessage, caller: &Caller) {
-        if caller.is_valid() {
+        if let Ok(_permit) = caller.permit() {
             self.host.controls().keep_progress(self.execution, progress);
         }
     }

@@ -24,6 +24,7 @@ pub(crate) trait Controls: Guardian {
     fn state(&self) -> &'static str;
     fn safety(&self) -> Safety;
     fn arm(&self, caller: &Caller) -> Result<(), ArmError>;
+    /// `force` needs the right to arm, and a caller that has ended only disarms.
     fn disarm(&self, force: bool, caller: &Caller) -> Result<(), DisarmError>;
     fn parameter(&self, path: &str) -> Option<ParameterValue>;
     /// Sets all of them, or none.
@@ -34,7 +35,7 @@ pub(crate) trait Controls: Guardian {
     fn executions(&self) -> Vec<ExecutionInfo>;
     fn cancel(&self, execution: u64, caller: &Caller) -> Result<(), Fault>;
     /// Disarms the robot and stops its components, without waiting.
-    fn request_stop(&self, caller: &Caller);
+    fn request_stop(&self, caller: &Caller) -> Result<(), Fault>;
     fn kind_of_run(&self) -> RunKind;
     /// The execution of that number has come so far.
     fn keep_progress(&self, execution: u64, progress: DynamicMessage);

@@ -85,7 +85,8 @@ impl Control {
                 || state.disarms != disarms
         });
         // The command may have been cancelled while this waited, or the robot disarmed.
-        if !caller.is_valid() || step.state.disarms != disarms {
+        let Ok(_permit) = caller.permit() else { return Err(ArmError::Cancelled) };
+        if step.state.disarms != disarms {
             return Err(ArmError::Cancelled);
         }
         if step.state.machine.safety == Safety::Disarmed && !step.state.is_stopping && !step.state.apart.is_empty()
@@ -108,12 +109,14 @@ impl Control {
 
     /// Disarms the robot: commands are cancelled and the disarm callbacks run. If not everything could be made safe,
     /// the safety state is `error`; with `force`, that state is left even if something still fails. If the robot is
-    /// disarmed already, commands that would arm it are cancelled.
+    /// disarmed already, commands that would arm it are cancelled. Without a permit, the caller may not force it, but still disarm.
     pub(crate) fn disarm(&self, force: bool, caller: &Caller) -> Result<(), DisarmError> {
         if self.0.mode == Mode::Replay {
             return Err(DisarmError::Replay);
         }
         let mut step = self.step();
+        let permit = if force { caller.permit().ok() } else { None };
+        let force = permit.is_some();
         match step.state.machine.safety {
             Safety::Error if step.state.is_stopped() && step.state.last_disarm.is_ok() => {
                 return Err(DisarmError::Error);
@@ -132,6 +135,7 @@ impl Control {
             return Ok(());
         };
         step.finish();
+        drop(permit);
         if is_awaited(self.id()) {
             return Err(DisarmError::Callback);
         }

@@ -71,12 +71,15 @@ impl Control {
         }
         let arguments = command.0.arguments(json)?;
         let step = self.step();
-        if let Err(fault) = caller.check_valid() {
-            // It was cancelled while the arguments were created.
-            drop(step);
-            crate::fault::discard(arguments);
-            return Err(fault);
-        }
+        let _permit = match caller.permit() {
+            Ok(permit) => permit,
+            Err(fault) => {
+                // It was cancelled while the arguments were created.
+                drop(step);
+                crate::fault::discard(arguments);
+                return Err(fault);
+            }
+        };
         let slot = self.request(step, number, Some(arguments), caller.name().to_owned())?;
         Ok(DynamicExecution::new(UntypedExecution(slot)))
     }
@@ -161,6 +164,7 @@ impl Control {
         if !self.executions().iter().any(|execution| execution.number == number) {
             return Err(Fault::new(format!("no execution with the number {number} runs")));
         }
+        let _permit = caller.permit()?;
         self.cancel(number);
         Ok(())
     }

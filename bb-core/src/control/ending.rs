@@ -30,13 +30,13 @@ impl Control {
     /// The execution of that number, whose caller it is, changes the operational state.
     pub(crate) fn transition_by(&self, id: u64, name: &str, caller: &Caller) -> Result<(), Fault> {
         let mut step = self.step();
-        let state = step.may_become(name).and_then(|state| caller.check_valid().map(|()| state));
-        if let Ok(state) = state {
+        let permitted = step.may_become(name).and_then(|state| Ok((state, caller.permit()?)));
+        if let Ok((state, _)) = permitted {
             step.line(Event::Transition { execution: id, state: state.to_owned() });
             step.become_by(id, state);
         }
         step.finish();
-        state.map(drop)
+        permitted.map(drop)
     }
 
     /// Replays a change of the operational state by an execution.

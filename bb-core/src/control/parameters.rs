@@ -93,9 +93,7 @@ impl Control {
                 })?;
             }
             let mut step = self.step();
-            if let Err(fault) = caller.check_valid() {
-                return Err(refuse(first_path, fault.to_string()));
-            }
+            let _permit = caller.permit().map_err(|fault| refuse(first_path, fault.to_string()))?;
             if step.state.parameters_are_final {
                 return Err(refuse(first_path, "the robot has stopped".to_owned()));
             }

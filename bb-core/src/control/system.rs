@@ -310,8 +310,10 @@ impl Controls for Control {
         self.cancel_by(execution, caller)
     }
 
-    fn request_stop(&self, caller: &Caller) {
+    fn request_stop(&self, caller: &Caller) -> Result<(), Fault> {
+        let _permit = caller.permit()?;
         self.begin_stop(caller);
+        Ok(())
     }
 
     fn kind_of_run(&self) -> RunKind {

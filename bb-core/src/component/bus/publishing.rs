@@ -31,7 +31,7 @@ impl Bus {
     /// not publish.
     pub fn publisher<T: Payload>(&self, path: &str) -> Result<Publisher<T>, Fault> {
         self.check(Right::Publish)?;
-        self.caller.check_valid()?;
+        let _permit = self.caller.permit()?;
         if let Some(ExternalSensor { path, frame, payload, enter }) = self.host.external(path) {
             return match enter.downcast::<Weak<Enter<T>>>() {
                 Ok(enter) => Ok(Publisher::of_sensor(path, frame, *enter, Arc::new(self.entrance(path)))),
@@ -213,9 +213,7 @@ impl Gate for Entrance {
     fn pass(&self, publish: &mut dyn FnMut(Stamp)) {
         self.host.while_open(&mut || {
             // After what had to be waited for.
-            if !self.caller.is_valid() {
-                return;
-            }
+            let Ok(_permit) = self.caller.permit() else { return };
             let robot = self.host.controls();
             let clock = robot.clock();
             let monotonic_time = clock.now();

@@ -66,9 +66,8 @@ impl<A: Actuator> Inner<A> {
         if safety != Safety::Armed {
             return Err(ActuatorError::NotArmed(safety));
         }
-        if !caller.is_valid() {
-            return Err(ActuatorError::Cancelled);
-        }
+        // Held while the actuator's own code runs: it acts in the caller's name.
+        let Ok(_permit) = caller.permit() else { return Err(ActuatorError::Cancelled) };
         let clock = self.environment.clock();
         let now = clock.now();
         self.restart_if_due(state, now);
