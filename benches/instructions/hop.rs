@@ -96,6 +96,18 @@ pub(crate) fn measured(messages: usize) -> Result<(), Box<dyn Error>> {
     publish(Measured::builder().simulate()?, measured::sensor::base::imu, messages)
 }
 
+/// Publishes so many at a path of its own, with a journal.
+pub(crate) fn journaled(messages: usize) -> Result<(), Box<dyn Error>> {
+    let mut builder = Direct::builder();
+    builder.journal(|entry| drop(black_box(entry)));
+    let simulation = builder.simulate()?;
+    let publisher = simulation.publisher::<Inertial>("own/imu")?;
+    for _ in 0..messages {
+        publisher.publish(black_box(Inertial { values: [1.0; 10] }));
+    }
+    Ok(())
+}
+
 fn publish<R: Robot>(
     simulation: bb_core::Simulation<R>,
     imu: SensorHandle<R, External<Inertial>>,

@@ -14,6 +14,7 @@ use crate::topology::{GraphFormat, Topology};
 use std::any::Any;
 use std::fmt;
 use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
 
 /// The robot as a whole: its safety, states, parameters and commands. The caller has the rights that it needs.
 pub(crate) trait Controls: Guardian {
@@ -74,8 +75,10 @@ pub(crate) trait Host: Send + Sync {
     fn while_open(&self, publish: &mut dyn FnMut());
     /// Something may be published at a path of one's own, or no more.
     fn note_path(&self, change: PathChange);
-    /// A caller publishes at `path`: a line of the journal, if the one before it was another.
-    fn note_caller(&self, path: &'static str, caller: &str);
+    /// The number of the entrance through which was published last at `path`, if there is a journal.
+    fn last_entrance(&self, path: &'static str) -> Option<Arc<AtomicU64>>;
+    /// A caller publishes at `path` through that entrance: a line of the journal, if the caller before it was another.
+    fn note_caller(&self, path: &'static str, entrance: u64, caller: &str);
     /// A message is published at a path of one's own.
     fn note_own(&self, message: DynamicMessage, now: MonotonicTime);
     /// The sensor at `path`, if other code publishes its messages.

@@ -18,7 +18,8 @@ use crate::sorted::Sorted;
 use crate::time::MonotonicTime;
 use crate::topology::{GraphFormat, Topology};
 use std::any::Any;
-use std::sync::{Arc, Mutex, OnceLock, PoisonError, Weak};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, Weak};
 
 /// Weak, since components with a bus are part of the wiring.
 pub(super) struct RobotHost {
@@ -31,9 +32,18 @@ pub(super) struct RobotHost {
     pub(super) replacements: Replacements,
     pub(super) wired: Place,
     /// The last caller of each path that callers publish at, for the journal.
-    pub(super) callers: Mutex<Sorted<&'static str, String>>,
+    pub(super) callers: Mutex<Sorted<&'static str, LastCaller>>,
     /// The robot once it is assembled, for its report.
     pub(super) machine: Arc<OnceLock<Weak<Machine>>>,
+}
+
+/// The caller that has published last at a path.
+#[derive(Debug, Default)]
+pub(super) struct LastCaller {
+    /// `None` before the first message.
+    name: Option<String>,
+    /// The number of its entrance; 0 for none. Entrances compare it, so that the lock is only taken where it changes.
+    entrance: Arc<AtomicU64>,
 }
 
 impl RobotHost {
@@ -43,6 +53,10 @@ impl RobotHost {
 
     fn is_replaced(&self, path: &str) -> bool {
         self.replacements.contains_key(path)
+    }
+
+    fn callers(&self) -> MutexGuard<'_, Sorted<&'static str, LastCaller>> {
+        self.callers.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Writes a line, if there is a journal.
@@ -101,21 +115,28 @@ impl Host for RobotHost {
         }
     }
 
-    fn note_caller(&self, path: &'static str, caller: &str) {
-        if self.journal.is_none() {
-            return;
-        }
+    fn last_entrance(&self, path: &'static str) -> Option<Arc<AtomicU64>> {
+        self.journal.as_ref()?;
+        Some(Arc::clone(&self.callers().get_or_insert(path, LastCaller::default).entrance))
+    }
+
+    fn note_caller(&self, path: &'static str, entrance: u64, caller: &str) {
         // The line is written under the lock, so that lines of one path are in the order of the callers.
-        let mut callers = self.callers.lock().unwrap_or_else(PoisonError::into_inner);
-        if callers.get(path).is_none_or(|last| last != caller) {
-            callers.insert(path, caller.to_owned());
+        let mut callers = self.callers();
+        let last = callers.get_or_insert(path, LastCaller::default);
+        if last.name.as_deref() != Some(caller) {
+            last.name = Some(caller.to_owned());
             self.note(|| Event::Publisher { path, caller: caller.to_owned() });
         }
+        last.entrance.store(entrance, Ordering::Release);
     }
 
     fn note_path(&self, change: PathChange) {
         if let PathChange::Evicted { path } = change {
-            self.callers.lock().unwrap_or_else(PoisonError::into_inner).remove(path);
+            // Entrances of before find no number of theirs.
+            if let Some(last) = self.callers().remove(path) {
+                last.entrance.store(0, Ordering::Release);
+            }
         }
         self.note(|| match change {
             PathChange::Made { path, payload } => Event::OwnPublisher { path, payload },

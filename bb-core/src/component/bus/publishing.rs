@@ -9,6 +9,7 @@ use crate::message::nearest::nearest_path;
 use crate::message::{Frame, Payload, Stamp};
 use crate::pubsub::{AnyTopic, DynamicMessage, Encoded, Enter, Gate, Publisher, Tell};
 use crate::time::{MonotonicTime, WallTime};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Weak};
 
 impl Bus {
@@ -198,15 +199,27 @@ impl Bus {
     }
 
     fn entrance(&self, path: &'static str) -> Entrance {
-        Entrance { path, host: Arc::clone(&self.host), caller: self.caller.clone() }
+        Entrance {
+            path,
+            host: Arc::clone(&self.host),
+            caller: self.caller.clone(),
+            number: ENTRANCES.fetch_add(1, Ordering::Relaxed),
+            last: self.host.last_entrance(path),
+        }
     }
 }
+
+/// The number of the next entrance. 0 is that of none.
+static ENTRANCES: AtomicU64 = AtomicU64::new(1);
 
 /// Lets a caller publish at a path.
 struct Entrance {
     path: &'static str,
     host: Arc<dyn Host>,
     caller: Caller,
+    number: u64,
+    /// The number of the entrance that was used last at the path, for the journal: while it is this one, the caller is the same.
+    last: Option<Arc<AtomicU64>>,
 }
 
 impl Gate for Entrance {
@@ -231,7 +244,11 @@ impl Gate for Entrance {
     }
 
     fn note_caller(&self) {
-        self.host.note_caller(self.path, self.caller.name());
+        if let Some(last) = &self.last
+            && last.load(Ordering::Acquire) != self.number
+        {
+            self.host.note_caller(self.path, self.number, self.caller.name());
+        }
     }
 
     fn note(&self, message: DynamicMessage, now: MonotonicTime) {
