@@ -436,6 +436,48 @@ fn data_by_path_is_the_typed_message_or_an_error_that_names_the_field() -> Resul
     Ok(())
 }
 
+/// A header's stamp counts within 10 s before and 100 ms after now; what is further away comes from another clock.
+#[test]
+fn a_message_of_ros_is_stamped_by_its_header_or_refused() -> Result<(), Failure> {
+    let mut simulation = Mapped::builder().simulate()?;
+    simulation.run_until(MonotonicTime::from_nanos(60_000_000_000));
+    let bus = simulation.bus();
+    let now = simulation.clock().now();
+    let arrived = bus.subscribe::<Range>("own/range", Overflow::default())?;
+    let wall = simulation.clock().wall_at(now).as_unix_nanos();
+    let range =
+        r#"{"radiation": "Ultrasound", "field_of_view": 0.3, "min_range": 0.02, "max_range": 4, "range": 1.5}"#;
+    let range = from_json::<Range>(range)?;
+    let publish = |age_nanos: Option<i64>| -> Result<i64, String> {
+        let wall_time = age_nanos.map_or(WallTime::default(), |age| WallTime::from_unix_nanos(wall - age));
+        let mut ros = Vec::new();
+        assert!(encode_as_ros(&Stamped { wall_time, ..Stamped::new(now, range) }, &mut ros));
+        bus.publish_ros("own/range", &ros).map_err(|error| error.to_string())?;
+        let message = arrived.try_recv().ok_or("nothing has arrived")?;
+        Ok(now.as_nanos() - message.monotonic_time.as_nanos())
+    };
+    for (age, counted) in [
+        (None, 0),
+        (Some(0), 0),
+        (Some(2_500_000_000), 2_500_000_000),
+        (Some(10_000_000_000), 10_000_000_000),
+        (Some(-100_000_000), 0),
+    ] {
+        assert_eq!(publish(age), Ok(counted), "{age:?}");
+    }
+    let refused =
+        |age, says: &str| (age, format!("nothing is published at `own/range`: the stamp of its header is {says}"));
+    for (age, error) in [
+        refused(10_000_000_001, "10.0 s old by the robot's clock: expected at most 10 s"),
+        refused(3_600_000_000_000, "3600.0 s old by the robot's clock: expected at most 10 s"),
+        refused(-1_500_000_000, "1.5 s ahead of the robot's clock: expected at most 100 ms"),
+    ] {
+        assert_eq!(publish(Some(age)), Err(error));
+    }
+    assert_eq!(arrived.drain().count(), 0);
+    Ok(())
+}
+
 #[test]
 fn what_cannot_be_published_by_path_says_why() -> Result<(), Failure> {
     let simulation = Mapped::builder().simulate()?;

@@ -9,8 +9,14 @@ use crate::message::nearest::nearest_path;
 use crate::message::{Frame, Payload, Stamp};
 use crate::pubsub::{AnyTopic, DynamicMessage, Encoded, Enter, Gate, Publisher, Tell};
 use crate::time::{MonotonicTime, WallTime};
+use std::cell::Cell;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Weak};
+
+/// The largest age of a message in ROS's layout, by its header: what a slow link may take.
+const OLD_NANOS: i64 = 10_000_000_000;
+/// The longest time by which its header may be ahead: what synchronised clocks differ by.
+const AHEAD_NANOS: i64 = 100_000_000;
 
 impl Bus {
     /// Returns a publisher at a path of the caller's choice, such as `mission/progress`: names of letters, digits,
@@ -98,21 +104,31 @@ impl Bus {
     }
 
     /// Publishes a message in ROS's layout, where [`Self::publish_json`] would, in the frame of the sensor. It was measured when its header
-    /// says by the date, but not later than now; now, if the header's stamp is zero.
+    /// says, by the date of this robot's clock: at most 10 s ago, and at most 100 ms ahead, which counts as now. A message without a header,
+    /// or with a stamp of zero, was measured now.
     ///
     /// # Errors
-    /// As [`Self::publish_json`], or ROS has no message for the payload.
+    /// As [`Self::publish_json`], or ROS has no message for the payload, or the header's stamp is further from now: the clock of its sender is
+    /// another one, or the message is of another day.
     pub fn publish_ros(&self, path: &str, message: &[u8]) -> Result<(), Fault> {
         self.publish_encoded(path, |topic, now, frame| {
+            let far = Cell::new(None);
             let stamp = |stamp: Stamp| match stamp.wall_time {
                 wall_time if wall_time == WallTime::default() => Stamp { frame, ..now },
                 wall_time => {
-                    let age = now.wall_time.as_unix_nanos().saturating_sub(wall_time.as_unix_nanos()).max(0);
-                    let monotonic_time = now.monotonic_time.plus_nanos(age.saturating_neg());
+                    let age = now.wall_time.as_unix_nanos().saturating_sub(wall_time.as_unix_nanos());
+                    if !(-AHEAD_NANOS..=OLD_NANOS).contains(&age) {
+                        far.set(Some(age));
+                    }
+                    let monotonic_time = now.monotonic_time.plus_nanos(age.max(0).saturating_neg());
                     Stamp { monotonic_time, wall_time, frame, ..now }
                 }
             };
-            topic.decode(Encoded::Ros(message), &stamp).map_err(|error| error.to_string())
+            let message = topic.decode(Encoded::Ros(message), &stamp).map_err(|error| error.to_string())?;
+            match far.get() {
+                None => Ok(message),
+                Some(age) => Err(not_of_now(age)),
+            }
         })
     }
 
@@ -206,6 +222,21 @@ impl Bus {
             number: ENTRANCES.fetch_add(1, Ordering::Relaxed),
             last: self.host.last_entrance(path),
         }
+    }
+}
+
+/// The error for a message in ROS's layout whose header's stamp is that long ago.
+fn not_of_now(age_nanos: i64) -> String {
+    let seconds = (age_nanos as f64 / 1e9).abs();
+    match age_nanos > 0 {
+        true => format!(
+            "the stamp of its header is {seconds:.1} s old by the robot's clock: expected at most {} s",
+            OLD_NANOS / 1_000_000_000
+        ),
+        false => format!(
+            "the stamp of its header is {seconds:.1} s ahead of the robot's clock: expected at most {} ms",
+            AHEAD_NANOS / 1_000_000
+        ),
     }
 }
 
