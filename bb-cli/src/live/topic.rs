@@ -51,6 +51,15 @@ enum What {
         #[arg(long, value_name = "FILE", value_parser = picture)]
         out: PathBuf,
     },
+    /// Publishes a message, measured now, for a sensor or an input whose messages other code publishes. Needs the right `publish`, which the
+    /// dashboard's option `rights` gives.
+    Pub {
+        /// The path, such as `sensor/base/sonar`.
+        path: String,
+        /// The payload, such as `{"range": 1.5}`, with all its fields.
+        #[arg(value_name = "JSON")]
+        payload: String,
+    },
     /// Prints what is known of a topic.
     Info {
         /// The path, such as `sensor/base/imu`.
@@ -77,8 +86,19 @@ pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
         What::Echo { path, limit } => echo(&mut robot, path, *limit, as_json),
         What::Hz { paths, seconds } => hz(&mut robot, paths, *seconds, as_json),
         What::Plot { fields, seconds, out } => plot(&mut robot, fields, *seconds, out, as_json),
+        What::Pub { path, payload } => publish(&mut robot, path, payload, as_json),
         What::Info { path } => info(&mut robot, path, as_json),
     }
+}
+
+fn publish(robot: &mut Robot, path: &str, payload: &str, as_json: bool) -> Result<bool, String> {
+    let payload: Value =
+        serde_json::from_str(payload).map_err(|error| format!("the payload is not JSON: {error}: `{payload}`"))?;
+    robot.ask("publish", json!({"path": path, "payload": payload}))?;
+    say(&match as_json {
+        true => format!("{}\n", json!({"path": path, "payload": payload})),
+        false => format!("published at {path}\n"),
+    })
 }
 
 fn echo(robot: &mut Robot, path: &str, limit: Option<u64>, as_json: bool) -> Result<bool, String> {

@@ -107,7 +107,12 @@ fn every_command_prints_what_is_stored() -> Result<(), Box<dyn Error>> {
         level.publish(Level { value: step as f64 });
     }
     simulation.run_until(MonotonicTime::from_nanos(90_000_000_000));
-    let dashboard = Dashboard::serve(&simulation, DashboardOptions { port: 0, ..DashboardOptions::defaults() })?;
+    // A path of the program's own, to publish at while the estimator stays lost.
+    let notes = simulation.publisher::<Level>("cart/note")?;
+    let heard = simulation.bus().subscribe::<Level>(notes.path(), Overflow::default())?;
+    let rights = "parameters commands arm actuators publish".to_owned();
+    let dashboard =
+        Dashboard::serve(&simulation, DashboardOptions { port: 0, rights, ..DashboardOptions::defaults() })?;
     let (steering, reading) = (dashboard.url(), dashboard.reading_url());
     let calls: &[(&str, &[&str])] = &[
         (&steering, &["topic", "list"]),
@@ -115,6 +120,12 @@ fn every_command_prints_what_is_stored() -> Result<(), Box<dyn Error>> {
         (&steering, &["topic", "info", "sensor/base/levle"]),
         (&steering, &["topic", "plot", "sensor/base/level", "--out", "level.txt"]),
         (&steering, &["topic", "plot", "sensor/base/level", "sensor/base/levle", "--out", "level.svg"]),
+        (&steering, &["topic", "pub", "cart/note", "{\"value\": 2.5}"]),
+        (&steering, &["topic", "pub", "cart/note", "{\"value\": 3}", "--json"]),
+        (&steering, &["topic", "pub", "cart/note", "{\"value\": \"much\"}"]),
+        (&steering, &["topic", "pub", "cart/note", "value: 2.5"]),
+        (&steering, &["topic", "pub", "sensor/base/levle", "{\"value\": 2.5}"]),
+        (&reading, &["topic", "pub", "cart/note", "{\"value\": 2.5}"]),
         (&steering, &["param", "list"]),
         (&steering, &["param", "set", "speed=1", "mission=patrol"]),
         (&steering, &["param", "set", "mission=rest", "speed=9"]),
@@ -145,6 +156,7 @@ fn every_command_prints_what_is_stored() -> Result<(), Box<dyn Error>> {
         std::fs::write(&stored, &found)?;
     }
     assert_eq!(found, std::fs::read_to_string(stored)?, "read it, then store it with UPDATE_LIVE=1");
+    assert_eq!(heard.drain().map(|note| note.payload.value).collect::<Vec<_>>(), [2.5, 3.0]);
     // What a machine reads is JSON, of the same values.
     let json = |arguments: &[&str]| -> Result<Value, Box<dyn Error>> {
         let at: Vec<&str> = arguments.iter().copied().chain(["--json", "--robot", &steering]).collect();

@@ -21,7 +21,8 @@ pub struct DashboardOptions {
     /// Readers: `open` for all who reach the address, `token` for those with the token.
     #[option(default = "open")]
     pub read: String,
-    /// Rights of those with the token, separated by spaces, of `parameters`, `commands`, `arm` and `actuators`.
+    /// Rights of those with the token, separated by spaces, of `parameters`, `commands`, `arm`, `actuators` and `publish`: messages for sensors
+    /// declared as `External` and for external inputs, which estimators take for measurements.
     #[option(default = "parameters commands arm actuators")]
     pub rights: String,
     /// Prints the address with its token to the standard error when the bridge starts.
@@ -69,7 +70,8 @@ impl DashboardOptions {
     }
 
     fn writer_rights(&self) -> Result<Rights, Fault> {
-        const GIVEN: [Right; 4] = [Right::Parameters, Right::Commands, Right::Arm, Right::Actuators];
+        const GIVEN: [Right; 5] =
+            [Right::Parameters, Right::Commands, Right::Arm, Right::Actuators, Right::Publish];
         let mut rights = vec![Right::Read];
         for name in self.rights.split_whitespace() {
             let right = GIVEN.into_iter().find(|right| right.name() == name).ok_or_else(|| {
@@ -100,8 +102,9 @@ mod tests {
             options.address = "0.0.0.0".into();
             options.read = "token".into();
         });
-        let rights = refused(|options| options.rights = "commands publish".into());
-        assert_eq!(rights, "`rights` has `publish`: expected `parameters`, `commands`, `arm`, `actuators`");
+        let rights = refused(|options| options.rights = "commands read".into());
+        let expected = "`rights` has `read`: expected `parameters`, `commands`, `arm`, `actuators`, `publish`";
+        assert_eq!(rights, expected);
         assert!(refused(|options| options.read = "all".into()).contains("expected `open` or `token`"));
         assert!(refused(|options| options.hosts = "rover.local".into()).contains("with its port"));
         assert!(refused(|options| options.address = "localhost".into()).contains("an IP address"));

@@ -41,6 +41,7 @@ pub(crate) enum Ask {
     Start { path: String, arguments: String },
     Cancel { execution: u64 },
     Send { path: String, command: String },
+    Publish { path: String, payload: String },
 }
 
 /// A message that is none of ours, with the number of the request if it has one.
@@ -115,6 +116,10 @@ fn ask(object: &mut Map<String, Value>) -> Result<Ask, String> {
         "send" => {
             let command = object.remove("command").ok_or("`send` has no `command`")?.to_string();
             Ask::Send { path: text(object, "path")?, command }
+        }
+        "publish" => {
+            let payload = object.remove("payload").ok_or("`publish` has no `payload`")?.to_string();
+            Ask::Publish { path: text(object, "path")?, payload }
         }
         other => return Err(format!("`{other}` is no request")),
     })

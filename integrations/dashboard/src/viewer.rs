@@ -242,6 +242,7 @@ fn perform(session: &Session, id: u64, ask: Ask) -> Answer {
         Ask::Send { path, command } => {
             text(session.send_json(&path, &command).map(|carried_out| format!(r#","command":{carried_out}"#)))
         }
+        Ask::Publish { path, payload } => text(session.publish_json(&path, &payload).map(|()| String::new())),
         // Those are answered without the robot.
         Ask::Ping | Ask::Token(_) | Ask::Describe | Ask::Watch(_) => Ok(String::new()),
     };

@@ -46,6 +46,7 @@ fn readers_disarm_and_do_nothing_else() -> Result<(), Box<dyn Error>> {
     assert_eq!(reader.refusal("start", json!({"path": "command/travel"})), lacks("commands"));
     assert_eq!(reader.refusal("cancel", json!({"execution": 1})), lacks("commands"));
     assert_eq!(reader.refusal("send", json!({"path": "actuator/a", "command": 1})), lacks("actuators"));
+    assert_eq!(reader.refusal("publish", json!({"path": "sensor/base/level", "payload": 1})), lacks("publish"));
     let set = reader.refusal("set", json!({"values": {"param/speed": 1.0}}));
     assert_eq!(set, format!("param/speed is not set: {}", lacks("parameters")));
     assert_eq!(simulation.safety(), Safety::Armed);
