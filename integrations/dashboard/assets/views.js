@@ -67,6 +67,13 @@ function numbers(value, path = "", all = []) {
   return all;
 }
 
+// 14:05:09.250; empty for an event that was too long to be sent.
+function dayTime(date) {
+  if (Number.isNaN(date.getTime())) return "";
+  const two = (number) => String(number).padStart(2, "0");
+  return `${two(date.getHours())}:${two(date.getMinutes())}:${two(date.getSeconds())}.${String(date.getMilliseconds()).padStart(3, "0")}`;
+}
+
 export class Views {
   constructor(app) {
     this.app = app;
@@ -538,7 +545,7 @@ export class Views {
   }
 
   event(event) {
-    this.events.push({ ...describe(event), time: event.message.monotonic_time / 1e9, number: this.counted++ });
+    this.events.push({ ...describe(event), time: event.message.monotonic_time / 1e9, date: new Date(event.message.wall_time / 1e6), number: this.counted++ });
     if (this.events.length > KEPT_EVENTS) this.events.shift();
     if (this.view === "events") this.drawEvents();
   }
@@ -556,7 +563,9 @@ export class Views {
     const filter = find("event-filter").value.trim().toLowerCase();
     const shown = this.events.filter((event) => `${event.kind} ${event.text}`.toLowerCase().includes(filter)).slice(-300).reverse();
     reconcile(find("event-list"), shown, (event) => event.number, (event) => {
-      const time = make("time", "", event.time.toFixed(3));
+      // The time of day, as clocks on the wall and other logs have it; the robot's own is a hint.
+      const time = make("time", "", dayTime(event.date));
+      if (time.textContent) time.title = `${event.date.toISOString()}, ${event.time.toFixed(3)} s of the robot's clock`;
       return make("li", "", time, make("span", `pill ${event.colour}`, event.kind), make("p", "", event.text));
     });
   }
