@@ -55,7 +55,7 @@ class App {
 
   welcome(message) {
     const { description } = message;
-    Object.assign(this.robot, { description, rights: message.rights, caller: message.caller, parameters: Object.fromEntries(description.parameters.map((one) => [one.path, one.value])), messages: new Map(), report: null });
+    Object.assign(this.robot, { description, rights: message.rights, meshes: message.meshes, caller: message.caller, parameters: Object.fromEntries(description.parameters.map((one) => [one.path, one.value])), messages: new Map(), report: null });
     this.history = [];
     this.isLive = true;
     this.retry = 500;

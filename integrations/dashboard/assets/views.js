@@ -465,6 +465,7 @@ export class Views {
     const isOfRoot = (path) => components.some((one) => one.frame === root && (one.path === path || one.topics.includes(path)));
     const by = (payloads) => topics.find((topic) => payloads.includes(topic.payload) && isOfRoot(topic.path))?.path;
     this.placedBy = by(["Pose", "PoseWithCovariance", "Odometry"]) ?? by(["Orientation"]);
+    this.scene?.dispose();
     this.scene = null;
     set(find("scene-note"), this.placedBy ? `Placed by ${this.placedBy}. Drag to turn, scroll to come closer.` : "Drag to turn, scroll to come closer.");
     if (this.view === "scene") this.showScene();
@@ -477,11 +478,20 @@ export class Views {
       // Half a megabyte, which others need not load.
       const { RobotScene } = await import("/scene.js");
       if (this.scene || description !== this.robot.description) return;
-      this.scene = new RobotScene(find("scene-box"), description);
+      this.scene = new RobotScene(find("scene-box"), description, (file) => this.mesh(file));
       this.scene.move(this.robot.joints);
     } catch (error) {
       find("scene-box").replaceChildren(make("p", "empty", `It cannot be drawn: ${error.message}`));
     }
+  }
+
+  // The bytes of a mesh that the robot names; nothing if it is not served.
+  async mesh(file) {
+    const address = this.robot.meshes[file], { token } = this.app;
+    if (!address) return null;
+    const answer = await fetch(address, token ? { headers: { authorization: `Bearer ${token}` } } : {});
+    if (!answer.ok) throw new Error(await answer.text());
+    return answer.arrayBuffer();
   }
 
   place({ payload }) {

@@ -1,16 +1,19 @@
 // The robot in three dimensions: its links as they are declared, moved by its joints and placed by an estimate. The page loads it when its
 // tab is first opened.
 import {
-  AmbientLight, AxesHelper, BoxGeometry, BufferGeometry, Color, CylinderGeometry, DirectionalLight, GridHelper, Group, Line, LineBasicMaterial,
-  Mesh, MeshStandardMaterial, Object3D, PerspectiveCamera, Scene, SphereGeometry, Vector3, WebGLRenderer,
+  AmbientLight, AxesHelper, BoxGeometry, BufferGeometry, Color, CylinderGeometry, DirectionalLight, Fog, Group, Line, LineBasicMaterial,
+  LineSegments, Mesh, MeshStandardMaterial, Object3D, PerspectiveCamera, Scene, SphereGeometry, Vector3, WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import { STLLoader } from "three/examples/jsm/loaders/STLLoader.js";
 
 const TRAIL = 600;
+// The grid, m.
+const GRID = 40, CELL = 0.5;
 
 export class RobotScene {
-  // `box` is filled with a canvas; `description` has the links and joints.
-  constructor(box, description) {
+  // `box` is filled with a canvas; `description` has the links and joints; `load` returns the bytes of the mesh of that name, or nothing.
+  constructor(box, description, load) {
     // Z points up, as in the robot.
     Object3D.DEFAULT_UP.set(0, 0, 1);
     this.box = box;
@@ -25,14 +28,16 @@ export class RobotScene {
     this.robot = new Group();
     this.scene.add(this.robot);
     this.joints = new Map();
+    this.load = load;
     this.build(description);
     this.trail = [];
-    this.line = new Line(new BufferGeometry(), new LineBasicMaterial());
+    this.line = new Line(new BufferGeometry(), new LineBasicMaterial({ fog: false }));
     this.scene.add(this.line);
     this.controls = new OrbitControls(this.camera, this.renderer.domElement);
     this.controls.addEventListener("change", () => this.draw());
     this.reset();
-    new ResizeObserver(() => this.resize()).observe(box);
+    this.observer = new ResizeObserver(() => this.resize());
+    this.observer.observe(box);
     this.paint();
     this.resize();
   }
@@ -52,16 +57,39 @@ export class RobotScene {
     for (const link of links) {
       const group = groups.get(link.name);
       if (!joints.some((joint) => joint.child === link.name)) this.robot.add(group);
-      for (const visual of link.visuals) group.add(shape(visual));
+      for (const visual of link.visuals) {
+        const part = shape(visual);
+        group.add(part);
+        if (visual.geometry.mesh) this.fill(part.children[0], visual.geometry.mesh);
+      }
       if (!isShown) group.add(new Mesh(new SphereGeometry(0.03, 24, 16), material(null)), new AxesHelper(0.12));
     }
+  }
+
+  // Exchanges the mark of a mesh for what its file holds.
+  async fill(part, { file, scale }) {
+    try {
+      const bytes = await this.load?.(file);
+      if (!bytes) return;
+      const body = new STLLoader().parse(bytes);
+      part.geometry.dispose();
+      part.geometry = body;
+      part.scale.set(...scale);
+      part.name = file;
+    } catch (error) {
+      console.warn(`the mesh ${file} is not shown: ${error.message}`);
+      return;
+    }
+    if (!this.isPlaced) this.reset();
+    this.draw();
   }
 
   // Where it is seen from: at an angle, the whole robot in the picture.
   reset() {
     const far = Math.max(1, this.size() * 3);
-    this.camera.position.set(far * 0.8, -far, far * 0.7);
-    this.controls.target.set(0, 0, this.size() * 0.25);
+    const { x, y, z } = this.robot.position;
+    this.camera.position.set(x + far * 0.8, y - far, z + far * 0.7);
+    this.controls.target.set(x, y, z + this.size() * 0.25);
     this.controls.update();
   }
 
@@ -70,7 +98,9 @@ export class RobotScene {
     this.robot.traverse((part) => {
       if (!part.isMesh) return;
       part.geometry.computeBoundingSphere();
-      size = Math.max(size, part.getWorldPosition(new Vector3()).length() + part.geometry.boundingSphere.radius);
+      const { center, radius } = part.geometry.boundingSphere;
+      const middle = part.localToWorld(center.clone()).distanceTo(this.robot.position);
+      size = Math.max(size, middle + radius * Math.max(...part.getWorldScale(new Vector3()).toArray().map(Math.abs)));
     });
     return size;
   }
@@ -92,6 +122,8 @@ export class RobotScene {
     const step = this.robot.position.clone().sub(before);
     this.camera.position.add(step);
     this.controls.target.add(step);
+    this.isPlaced = true;
+    this.follow();
     const last = this.trail.at(-1);
     if (!last || last.distanceTo(this.robot.position) > 0.02) {
       this.trail.push(this.robot.position.clone());
@@ -103,16 +135,34 @@ export class RobotScene {
     this.draw();
   }
 
+  // The grid goes along by whole cells, so that it seems to stay.
+  follow() {
+    const cell = (coordinate) => Math.round(coordinate / CELL) * CELL;
+    this.grid.position.set(cell(this.robot.position.x), cell(this.robot.position.y), 0);
+  }
+
   // The colours of the page.
   paint() {
     const colour = (name) => new Color(getComputedStyle(document.documentElement).getPropertyValue(name).trim());
     this.scene.background = colour("--card");
     this.line.material.color = colour("--blue");
     this.scene.remove(this.grid);
-    this.grid = new GridHelper(40, 80, colour("--soft"), colour("--line"));
-    this.grid.rotation.x = Math.PI / 2;
+    this.grid?.geometry.dispose();
+    this.grid = grid(colour("--line"));
+    // Far lines would flicker.
+    this.scene.fog = new Fog(this.scene.background, 1, 2);
+    this.follow();
     this.scene.add(this.grid);
     this.draw();
+  }
+
+  // Gives the canvas back: a browser has room for few.
+  dispose() {
+    this.observer.disconnect();
+    this.controls.dispose();
+    this.renderer.dispose();
+    this.renderer.forceContextLoss();
+    this.isDue = true;
   }
 
   resize() {
@@ -130,6 +180,9 @@ export class RobotScene {
     requestAnimationFrame(() => {
       this.isDue = false;
       this.drawn = (this.drawn ?? 0) + 1;
+      const far = this.camera.position.distanceTo(this.controls.target);
+      this.scene.fog.near = 1.5 * far;
+      this.scene.fog.far = 1.5 * far + GRID / 3;
       this.renderer.render(this.scene, this.camera);
     });
   }
@@ -142,7 +195,16 @@ function move(group, { xyz, quaternion }) {
 
 function material(colour) {
   const [red, green, blue, opacity] = colour ?? [0.55, 0.6, 0.68, 1];
-  return new MeshStandardMaterial({ color: new Color().setRGB(red, green, blue, "srgb"), opacity, transparent: opacity < 1, roughness: 0.7, metalness: 0.1 });
+  return new MeshStandardMaterial({ color: new Color().setRGB(red, green, blue, "srgb"), opacity, transparent: opacity < 1, roughness: 0.7, metalness: 0.1, fog: false });
+}
+
+// The floor, about its middle. A line for each side of a cell: of one that passes behind the camera, some renderers show nothing.
+function grid(color) {
+  const points = [], half = GRID / 2;
+  for (let along = -half; along < half; along += CELL) for (let across = -half; across <= half; across += CELL) {
+    points.push(new Vector3(along, across, 0), new Vector3(along + CELL, across, 0), new Vector3(across, along, 0), new Vector3(across, along + CELL, 0));
+  }
+  return new LineSegments(new BufferGeometry().setFromPoints(points), new LineBasicMaterial({ color }));
 }
 
 function shape({ geometry, origin, color }) {
@@ -159,7 +221,7 @@ function bodyOf({ box, cylinder, sphere, mesh }) {
   if (box) return new BoxGeometry(...box);
   if (cylinder) return new CylinderGeometry(cylinder.radius, cylinder.radius, cylinder.length, 48);
   if (sphere) return new SphereGeometry(sphere.radius, 48, 24);
-  // The files of meshes are not served; their place is marked.
+  // The place of a mesh is marked until its file has come.
   return new BoxGeometry(...(mesh?.scale ?? [1, 1, 1]).map((factor) => 0.05 * Math.min(Math.max(Math.abs(factor), 0.1), 2)));
 }
 

@@ -38,6 +38,7 @@ mod connections;
 mod gate;
 mod guests;
 mod hub;
+mod meshes;
 mod options;
 mod page;
 mod protocol;

@@ -25,6 +25,10 @@ pub struct DashboardOptions {
     /// declared as `External` and for external inputs, which estimators take for measurements.
     #[option(default = "parameters commands arm actuators")]
     pub rights: String,
+    /// Folder with the files of the meshes that links declare, for the 3D view: STL, at most 16 MiB each. They are read when it starts;
+    /// `package://rover/meshes/body.stl` is `meshes/body.stl` there, or else `body.stl`.
+    #[option(default = "")]
+    pub meshes: String,
     /// Prints the address with its token to the standard error when the bridge starts.
     #[option(default = true)]
     pub print: bool,

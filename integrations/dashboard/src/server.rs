@@ -4,6 +4,7 @@ use crate::connections::{Bounded, Connection, Open};
 use crate::gate::Gate;
 use crate::guests::Guests;
 use crate::hub::Hub;
+use crate::meshes::Meshes;
 use crate::options::DashboardOptions;
 use crate::page;
 use crate::protocol::LONGEST;
@@ -13,8 +14,9 @@ use crate::viewer;
 use axum::Router;
 use axum::extract::connect_info::ConnectInfo;
 use axum::extract::ws::WebSocketUpgrade;
-use axum::extract::{Request, State};
-use axum::http::{HeaderName, HeaderValue, StatusCode};
+use axum::extract::{Path, Request, State};
+use axum::http::header::{AUTHORIZATION, CONTENT_TYPE};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
@@ -84,6 +86,7 @@ impl Dashboard {
     /// As [`Self::serve`].
     pub fn serve_all(robots: &[&Bus], options: DashboardOptions) -> Result<Self, ServeError> {
         let settings = options.settings().map_err(ServeError::Options)?;
+        let meshes = Meshes::read(&options.meshes, robots).map_err(ServeError::Options)?;
         let asked = settings.address;
         let at = |source| ServeError::Address { address: asked, source };
         let listener = TcpListener::bind(asked).map_err(at)?;
@@ -100,7 +103,8 @@ impl Dashboard {
         let open = Open::default();
         let gate = Gate::new(address.port(), &settings.hosts);
         let guests = Guests::default();
-        let shared = Arc::new(Shared { hubs, settings, token: token.clone(), guests, gate, open: open.clone() });
+        let shared =
+            Arc::new(Shared { hubs, meshes, settings, token: token.clone(), guests, gate, open: open.clone() });
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_io()
             .enable_time()
@@ -165,7 +169,7 @@ async fn serve(listener: TcpListener, shared: Arc<Shared>, open: Open, mut stopp
             return;
         }
     };
-    let mut router = Router::new().route("/ws", get(upgrade));
+    let mut router = Router::new().route("/ws", get(upgrade)).route("/mesh/{number}", get(mesh));
     for (path, kind, contents) in page::FILES {
         router = router.route(path, get(move || async move { page::file(kind, contents) }));
     }
@@ -200,6 +204,18 @@ async fn guard(State(shared): State<Arc<Shared>>, request: Request, next: Next) 
         response.headers_mut().insert(HeaderName::from_static(name), HeaderValue::from_static(value));
     }
     response
+}
+
+/// The file of a mesh: for all who may read.
+async fn mesh(State(shared): State<Arc<Shared>>, Path(number): Path<usize>, headers: HeaderMap) -> Response {
+    let given = headers.get(AUTHORIZATION).and_then(|given| given.to_str().ok()?.strip_prefix("Bearer "));
+    if shared.settings.reads_need_token && !given.is_some_and(|given| shared.token.is(given)) {
+        return (StatusCode::UNAUTHORIZED, "to read needs the token\n").into_response();
+    }
+    match shared.meshes.get(number) {
+        Some(bytes) => ([(CONTENT_TYPE, "model/stl")], bytes).into_response(),
+        None => (StatusCode::NOT_FOUND, "there is no such mesh\n").into_response(),
+    }
 }
 
 async fn upgrade(

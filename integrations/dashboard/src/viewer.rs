@@ -120,11 +120,12 @@ impl Viewer<'_> {
     fn welcome(&self) -> String {
         let robots: Vec<String> = self.shared.hubs.iter().map(|hub| quoted(&hub.name)).collect();
         format!(
-            r#"{{"op":"welcome","version":{VERSION},"robot":{},"robots":[{}],"caller":{},"rights":[{}],"description":{}}}"#,
+            r#"{{"op":"welcome","version":{VERSION},"robot":{},"robots":[{}],"caller":{},"rights":[{}],"meshes":{},"description":{}}}"#,
             quoted(&self.hub.name),
             robots.join(","),
             quoted(self.session.caller()),
             self.rights().join(","),
+            self.shared.meshes.addresses(),
             self.session.description().to_json(),
         )
     }

@@ -61,6 +61,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let running = builder.start()?;
     let mut options = DashboardOptions::defaults();
     options.port = arguments.port.unwrap_or(options.port);
+    options.meshes = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/live/meshes").to_owned();
     let dashboard = Dashboard::serve(&running, options)?;
     println!("to steer: {}", dashboard.url());
     println!("to read:  {}", dashboard.reading_url());

@@ -51,6 +51,8 @@ robot! {
         visual: { cylinder: { radius: 0.1 m, length: 0.06 m }, origin: { xyz: [-0.17 m, 0.2 m, 0.1 m], rpy: [90 deg, 0 deg, 0 deg] }, material: { color: [0.2, 0.22, 0.26, 1] } };
         visual: { cylinder: { radius: 0.1 m, length: 0.06 m }, origin: { xyz: [-0.17 m, -0.2 m, 0.1 m], rpy: [90 deg, 0 deg, 0 deg] }, material: { color: [0.2, 0.22, 0.26, 1] } };
         visual: { cylinder: { radius: 0.025 m, length: 0.2 m }, origin: { xyz: [0.12 m, 0 m, 0.32 m] }, material: { color: [0.62, 0.66, 0.72, 1] } };
+        visual: { cylinder: { radius: 0.012 m, length: 0.16 m }, origin: { xyz: [-0.16 m, 0 m, 0.3 m] }, material: { color: [0.62, 0.66, 0.72, 1] } };
+        visual: { mesh: { file: "package://live/dish.stl" }, origin: { xyz: [-0.16 m, 0 m, 0.37 m], rpy: [0 deg, -35 deg, 0 deg] }, material: { color: [0.9, 0.9, 0.92, 1] } };
         sensor imu: Gyroscope(speed = param::speed, radius = param::radius) { rate: 200 Hz; }
         sensor wheels: Wheels(speed = param::speed, radius = param::radius) { rate: 50 Hz; }
         sensor sonar: Sonar() { rate: 10 Hz; }

@@ -145,7 +145,19 @@ passed("a joint follows its slider");
 const asked = page.requested.length;
 await tab(page, "scene");
 await page.waitForFunction(() => window.dashboard.views.scene?.drawn > 3 && window.dashboard.views.scene.trail.length > 1);
-assert.deepEqual(page.requested.slice(asked), [`http://127.0.0.1:${port}/scene.js`]);
+const dish = () => page.evaluate(() => {
+  let vertices = 0;
+  window.dashboard.views.scene.robot.traverse((part) => { if (part.name === "package://live/dish.stl") vertices += part.geometry.getAttribute("position").count; });
+  return vertices;
+});
+await page.waitForFunction(() => window.dashboard.views.scene.robot.getObjectByName("package://live/dish.stl"));
+assert.equal(await dish(), 3 * 64, "all triangles of the mesh");
+assert.deepEqual(page.requested.slice(asked), [`http://127.0.0.1:${port}/scene.js`, `http://127.0.0.1:${port}/mesh/0`]);
+// The grid goes along by whole cells.
+await page.waitForFunction(() => {
+  const { grid, robot } = window.dashboard.views.scene, of = (axis) => Math.abs(grid.position[axis] - robot.position[axis]);
+  return Math.hypot(robot.position.x, robot.position.y) > 0.5 && of("x") <= 0.25 + 1e-9 && of("y") <= 0.25 + 1e-9;
+});
 assert.ok(await page.loaded() <= 1e6, "all of it is below a megabyte");
 const mast = await page.evaluate(() => 2 * Math.atan2(window.dashboard.views.scene.joints.get("mast").quaternion.z, window.dashboard.views.scene.joints.get("mast").quaternion.w));
 assert.ok(mast > 0.5, `the camera looks to ${mast} rad`);

@@ -72,6 +72,20 @@ robot! {
     }
 }
 
+/// A robot whose links name files of meshes.
+pub(crate) mod shaped {
+    use bb_core::prelude::*;
+
+    robot! {
+        pub(crate) robot Shaped;
+        link base {
+            visual: { mesh: { file: "package://shaped/dish.stl" } };
+            visual: { mesh: { file: "package://shaped/../Cargo.toml" } };
+            visual: { mesh: { file: "missing.stl", scale: [1, 1, 2] } };
+        }
+    }
+}
+
 /// Some other robot.
 pub(crate) mod other {
     use bb_core::prelude::*;

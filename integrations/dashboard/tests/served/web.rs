@@ -1,9 +1,11 @@
 //! The page's files, and requests that are refused before they are routed.
 
-use crate::client::request;
+use crate::client::{Client, request, token};
 use crate::protocol::options;
 use crate::robot::Cart;
+use crate::robot::shaped::Shaped;
 use bb_dashboard::{Dashboard, DashboardOptions};
+use serde_json::json;
 use std::error::Error;
 
 const FILES: [&str; 6] = ["/", "/style.css", "/app.js", "/views.js", "/plot.js", "/icon.svg"];
@@ -33,6 +35,40 @@ fn the_page_is_small_and_its_files_forbid_what_it_does_not_need() -> Result<(), 
         bytes += head.len() + body.len();
     }
     assert!(bytes < 1_000_000, "{bytes} bytes");
+    Ok(())
+}
+
+/// Meshes that the robot names are served from the folder, to all who may read; nothing else of it is.
+#[test]
+fn meshes_come_from_the_named_folder_alone() -> Result<(), Box<dyn Error>> {
+    let simulation = Shaped::builder().simulate()?;
+    let meshes = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/live/meshes").to_owned();
+    let dashboard = Dashboard::serve(&simulation, DashboardOptions { meshes: meshes.clone(), ..options() })?;
+    let get = |dashboard: &Dashboard, path: &str, header: &str| {
+        let address = dashboard.address();
+        request(address, &format!("GET {path} HTTP/1.1\nHost: 127.0.0.1:{}{header}", address.port()))
+    };
+    let welcome = Client::reading(&dashboard)?.welcome;
+    assert_eq!(welcome["meshes"], json!({"package://shaped/dish.stl": "/mesh/0"}));
+    let (head, body) = get(&dashboard, "/mesh/0", "")?;
+    assert!(head.starts_with("HTTP/1.1 200 OK") && head.contains("content-type: model/stl"), "{head}");
+    assert_eq!(body, std::fs::read_to_string(format!("{meshes}/dish.stl"))?);
+    for path in ["/mesh/1", "/mesh/", "/mesh/dish.stl", "/mesh/-1", "/mesh/..%2fmain.rs", "/mesh/0/../../main.rs"] {
+        let (head, _) = get(&dashboard, path, "")?;
+        assert!(head.starts_with("HTTP/1.1 4"), "{path}: {head}");
+    }
+    let read = "token".to_owned();
+    let closed = Dashboard::serve(&simulation, DashboardOptions { meshes, read, ..options() })?;
+    for (header, status) in [
+        (String::new(), "401"),
+        ("\nAuthorization: Bearer 0".to_owned(), "401"),
+        (format!("\nAuthorization: Bearer {}", token(&closed)), "200"),
+    ] {
+        let (head, _) = get(&closed, "/mesh/0", &header)?;
+        assert_eq!(head.split(' ').nth(1), Some(status), "{head}");
+    }
+    let wrong = Dashboard::serve(&simulation, DashboardOptions { meshes: "/no/such/folder".into(), ..options() });
+    assert!(wrong.unwrap_err().to_string().ends_with("expected a folder with the files of meshes"));
     Ok(())
 }
 
