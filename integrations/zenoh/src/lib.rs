@@ -1,0 +1,8 @@
+//! A robot as a node of ROS 2, over [zenoh](https://zenoh.io): what `rmw_zenoh_cpp` has on the wire, without ROS.
+
+// A robot must not stop because of what another program sends.
+#![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
+mod session;
+
+pub use session::{Mode, Session, SessionError, SessionSettings};

@@ -1,0 +1,245 @@
+//! The session of zenoh: one for all that has the same settings, opened as it was measured to lose and hide nothing.
+
+use serde_json::{Value, json};
+use std::collections::HashMap;
+use std::fmt;
+use std::ops::Deref;
+use std::path::PathBuf;
+use std::sync::{Arc, LazyLock, Mutex, PoisonError, Weak};
+use thiserror::Error;
+use zenoh::Wait;
+
+/// Time after which a machine that says nothing is gone, in milliseconds. With zenoh's 10 s a cut of 3 s is never reported, and what was
+/// sent during it arrives afterwards, up to 4 s old.
+const LEASE_MS: u32 = 1000;
+/// Signs of life within that time.
+const SIGNS_OF_LIFE: u32 = 4;
+/// Times between two attempts to connect, in milliseconds.
+const RETRIES_MS: (u32, u32) = (200, 1000);
+
+/// Part of a session among others.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Mode {
+    /// A robot that speaks to those it is connected with.
+    #[default]
+    Peer,
+    /// A robot through which others also hear each other: two nodes of ROS 2 that know it alone.
+    Router,
+}
+
+/// Settings of a session. Multicast, gossip and timestamps are off, and the lease is 1 s, unless the file says otherwise.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
+pub struct SessionSettings {
+    /// Part of the session among others.
+    pub mode: Mode,
+    /// Endpoints to listen on: `tcp/127.0.0.1:7447`, with port 0 for any. A session that cannot listen there is not opened.
+    pub listen: Vec<String>,
+    /// Endpoints to connect to, tried again until they answer.
+    pub connect: Vec<String>,
+    /// A file of zenoh's own configuration, in JSON5: what is written there goes before all else. It is the place of certificates, users
+    /// and rights.
+    pub file: Option<PathBuf>,
+}
+
+/// Reason for which there is no session.
+#[derive(Clone, Debug, Error)]
+#[non_exhaustive]
+pub enum SessionError {
+    /// The file of the configuration cannot be read.
+    #[error("the configuration of zenoh in {}: {fault}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// Fault.
+        fault: String,
+    },
+    /// zenoh does not accept the configuration.
+    #[error("zenoh does not accept the configuration: {0}")]
+    Configuration(String),
+    /// The session cannot be opened: the address is taken, or a certificate is missing.
+    #[error("no session of zenoh{at}: {fault}", at = if listen.is_empty() { String::new() } else { format!(" that listens on {}", listen.join(", ")) })]
+    Open {
+        /// The endpoints to listen on.
+        listen: Vec<String>,
+        /// Fault.
+        fault: String,
+    },
+    /// An operation in the session failed.
+    #[error("{what}: {fault}")]
+    Operation {
+        /// The attempt: `declaring the publisher of /tf`.
+        what: String,
+        /// Fault.
+        fault: String,
+    },
+}
+
+impl SessionError {
+    /// Error of an operation that zenoh refuses.
+    pub(crate) fn of(what: impl Into<String>) -> impl FnOnce(zenoh::Error) -> Self {
+        let what = what.into();
+        move |error| Self::Operation { what, fault: error.to_string() }
+    }
+}
+
+impl SessionSettings {
+    /// zenoh's configuration: that which was measured, with that of the file over it.
+    ///
+    /// # Errors
+    /// The file cannot be read, or zenoh does not accept the whole.
+    pub fn configuration(&self) -> Result<zenoh::Config, SessionError> {
+        let (first, longest) = RETRIES_MS;
+        let mut configuration = json!({
+            "mode": match self.mode { Mode::Peer => "peer", Mode::Router => "router" },
+            "listen": { "endpoints": self.listen, "exit_on_failure": true },
+            "connect": {
+                "endpoints": self.connect,
+                "timeout_ms": 0,
+                "exit_on_failure": false,
+                "retry": { "period_init_ms": first, "period_max_ms": longest, "period_increase_factor": 2 },
+            },
+            "scouting": { "multicast": { "enabled": false }, "gossip": { "enabled": false } },
+            // Else what comes from a machine whose clock is ahead is refused, or gets another time.
+            "timestamping": { "enabled": false },
+            "transport": { "link": { "tx": { "lease": LEASE_MS, "keep_alive": SIGNS_OF_LIFE } } },
+        });
+        if let Some(path) = &self.file {
+            let error = |fault: String| SessionError::File { path: path.clone(), fault };
+            let text = std::fs::read_to_string(path).map_err(|fault| error(fault.to_string()))?;
+            let over: Value = json5::from_str(&text).map_err(|fault| error(fault.to_string()))?;
+            if !over.is_object() {
+                return Err(error("expected an object".to_owned()));
+            }
+            lay_over(&mut configuration, over);
+        }
+        zenoh::Config::from_json5(&configuration.to_string())
+            .map_err(|error| SessionError::Configuration(error.to_string()))
+    }
+}
+
+/// Writes what `over` has over `value`; lists are exchanged as a whole.
+fn lay_over(value: &mut Value, over: Value) {
+    match (value, over) {
+        (Value::Object(members), Value::Object(over)) => {
+            for (name, over) in over {
+                lay_over(members.entry(name).or_insert(Value::Null), over);
+            }
+        }
+        (value, over) => *value = over,
+    }
+}
+
+/// A session, shared by all of this process that ask for one with the same settings, and closed with the last of them. It dereferences to
+/// zenoh's.
+#[derive(Clone)]
+pub struct Session(Arc<Opened>);
+
+struct Opened(zenoh::Session);
+
+impl Drop for Opened {
+    fn drop(&mut self) {
+        if let Err(error) = self.0.close().wait() {
+            tracing::warn!(%error, "the session of zenoh was not closed");
+        }
+    }
+}
+
+static SESSIONS: LazyLock<Mutex<HashMap<SessionSettings, Weak<Opened>>>> = LazyLock::new(Mutex::default);
+
+impl Session {
+    /// Returns the session with these settings, which is opened if it is not open yet.
+    ///
+    /// # Errors
+    /// The configuration is not usable, or an endpoint to listen on is taken. That nobody answers at an endpoint to connect to is no error.
+    pub fn open(settings: &SessionSettings) -> Result<Self, SessionError> {
+        let configuration = settings.configuration()?;
+        // Held while it is opened, so that no other thread opens the same.
+        let mut sessions = SESSIONS.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(opened) = sessions.get(settings).and_then(Weak::upgrade) {
+            return Ok(Self(opened));
+        }
+        sessions.retain(|_, opened| opened.strong_count() > 0);
+        let session = zenoh::open(configuration).wait();
+        let session = session
+            .map_err(|error| SessionError::Open { listen: settings.listen.clone(), fault: error.to_string() })?;
+        let opened = Arc::new(Opened(session));
+        sessions.insert(settings.clone(), Arc::downgrade(&opened));
+        Ok(Self(opened))
+    }
+}
+
+impl Deref for Session {
+    type Target = zenoh::Session;
+    fn deref(&self) -> &zenoh::Session {
+        &self.0.0
+    }
+}
+
+impl fmt::Debug for Session {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Session").field(&self.0.0.zid()).finish()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(configuration: &zenoh::Config, key: &str) -> Value {
+        let text = configuration.get_json(key).unwrap_or_else(|error| panic!("{key}: {error}"));
+        serde_json::from_str(&text).unwrap_or_else(|error| panic!("{key}: {error}"))
+    }
+
+    #[test]
+    fn the_defaults_are_those_that_lose_and_hide_nothing() {
+        let listen = vec!["tcp/127.0.0.1:0".to_owned()];
+        let settings = SessionSettings { listen, ..SessionSettings::default() };
+        let configuration = settings.configuration().expect("it is accepted");
+        for (key, expected) in [
+            ("mode", json!("peer")),
+            ("scouting/multicast/enabled", json!(false)),
+            ("scouting/gossip/enabled", json!(false)),
+            ("timestamping/enabled", json!(false)),
+            ("transport/link/tx/lease", json!(1000)),
+            ("transport/link/tx/keep_alive", json!(4)),
+            ("listen/endpoints", json!(["tcp/127.0.0.1:0"])),
+            ("connect/endpoints", json!([])),
+        ] {
+            assert_eq!(read(&configuration, key), expected, "{key}");
+        }
+    }
+
+    #[test]
+    fn a_file_goes_before_the_defaults_and_leaves_the_rest() {
+        let path = std::env::temp_dir().join(format!("bb-zenoh-{}.json5", std::process::id()));
+        let file = "{ mode: 'router', transport: { link: { tx: { lease: 500 } } }, // as in zenoh's own\n \
+                    connect: { endpoints: ['tcp/192.0.2.1:7447'] } }";
+        std::fs::write(&path, file).expect("it is written");
+        let settings = SessionSettings { file: Some(path.clone()), ..SessionSettings::default() };
+        let configuration = settings.configuration().expect("it is accepted");
+        assert_eq!(read(&configuration, "mode"), json!("router"));
+        assert_eq!(read(&configuration, "transport/link/tx/lease"), json!(500));
+        assert_eq!(read(&configuration, "transport/link/tx/keep_alive"), json!(4));
+        assert_eq!(read(&configuration, "connect/endpoints"), json!(["tcp/192.0.2.1:7447"]));
+        for (text, expected) in
+            [("[1]", "expected an object"), ("{", "bb-zenoh-"), ("{ nodes: 7 }", "zenoh does not accept")]
+        {
+            std::fs::write(&path, text).expect("it is written");
+            let error = settings.configuration().expect_err("it is refused").to_string();
+            assert!(error.contains(expected), "{text}: {error}");
+        }
+        std::fs::remove_file(&path).expect("it is removed");
+        assert!(matches!(settings.configuration(), Err(SessionError::File { .. })));
+    }
+
+    #[test]
+    fn the_same_settings_are_the_same_session() {
+        let settings = SessionSettings { listen: vec!["tcp/127.0.0.1:0".into()], ..SessionSettings::default() };
+        let first = Session::open(&settings).expect("it is opened");
+        let second = Session::open(&settings).expect("it is opened");
+        assert_eq!(first.zid(), second.zid());
+        let zid = first.zid();
+        drop((first, second));
+        assert_ne!(Session::open(&settings).expect("it is opened").zid(), zid);
+    }
+}
