@@ -290,7 +290,7 @@ fn random_json(random: &mut Random, shape: Shape) -> Value {
             1 => json!([0.0, -0.0, -1.0, 1e-300][random.below(4) as usize]),
             _ => json!(random.noise()),
         },
-        Shape::I8 | Shape::U8 | Shape::I16 | Shape::U16 => json!(random.below(128)),
+        Shape::I8 | Shape::U8 | Shape::Byte | Shape::I16 | Shape::U16 => json!(random.below(128)),
         Shape::I32 | Shape::U32 | Shape::I64 | Shape::U64 => json!(random.below(1_000_000_000)),
         Shape::Option(of) => {
             if random.below(2) == 0 {

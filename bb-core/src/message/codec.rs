@@ -5,7 +5,7 @@
 //! | what a field of a payload implements | [`Field`]; `#[derive(Payload)]` implements it for structs and enums |
 //! | plain CDR, little endian, as ROS 2 writes it | [`Writer`], [`Reader`] |
 //! | the layout of the bytes | [`Shape`], and as text for other programs [`Schema`] (`ros2msg`) |
-//! | the hash by which ROS 2 tells types apart | [`type_hash`] |
+//! | the hashes by which ROS 2 tells types and services apart | [`type_hash`], [`service_hash`] |
 //! | a message in the layout that ROS has for it | [`RosMessage`] |
 //! | all of these for one payload, without its type | [`Layouts`] |
 //! | a value to JSON and back, and the JSON Schema of a type | [`to_json`], [`from_json`], [`json_schema`] |
@@ -50,7 +50,7 @@ pub use ros::{RosCompanion, RosLayout, RosMessage};
 pub use schema::Schema;
 pub use shape::{EnumShape, FieldRange, FieldShape, FieldUnit, Shape, StructShape};
 pub use stamped::{Layouts, decode_as_ros, decode_companion, encode_as_ros, encode_companion, is_exact_as_ros};
-pub use type_description::{type_description, type_hash};
+pub use type_description::{service_hash, type_description, type_hash};
 pub use writer::Writer;
 
 use super::Finite;

@@ -54,7 +54,13 @@ pub(super) enum Count {
 
 /// The type `name` with the given shape, then every message that it holds.
 pub(super) fn definitions(name: &str, shape: Shape) -> Vec<Definition> {
-    let mut known = Known { sources: vec![(full_name(name), Source::Message(shape))] };
+    definitions_of(&[(name, shape)])
+}
+
+/// The types of these names with their shapes, then every message that they hold.
+pub(super) fn definitions_of(types: &[(&str, Shape)]) -> Vec<Definition> {
+    let sources = types.iter().map(|(name, shape)| (full_name(name), Source::Message(*shape)));
+    let mut known = Known { sources: sources.collect() };
     let mut definitions = Vec::new();
     // A definition may refer to others.
     while let Some((name, source)) = known.sources.get(definitions.len()).cloned() {
@@ -140,6 +146,7 @@ impl Known {
             Shape::Bool => return Element::Primitive(Primitive { name: "bool", id: 15 }),
             Shape::I8 => return Element::Primitive(Primitive { name: "int8", id: 2 }),
             Shape::U8 => return Element::Primitive(Primitive { name: "uint8", id: 3 }),
+            Shape::Byte => return Element::Primitive(Primitive { name: "byte", id: 16 }),
             Shape::I16 => return Element::Primitive(Primitive { name: "int16", id: 4 }),
             Shape::U16 => return Element::Primitive(Primitive { name: "uint16", id: 5 }),
             Shape::I32 => return Element::Primitive(Primitive { name: "int32", id: 6 }),

@@ -65,7 +65,7 @@ fn range(shape: Shape) -> Option<RangeInclusive<i128>> {
         Shape::I16 => (true, 16),
         Shape::I32 => (true, 32),
         Shape::I64 => (true, 64),
-        Shape::U8 => (false, 8),
+        Shape::U8 | Shape::Byte => (false, 8),
         Shape::U16 => (false, 16),
         Shape::U32 => (false, 32),
         Shape::U64 => (false, 64),

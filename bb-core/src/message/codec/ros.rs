@@ -101,8 +101,9 @@ mod tests;
 
 pub(crate) use ros_message;
 pub(crate) use standard::DurationMessage;
+pub(in crate::message::codec) use standard::ServiceEventInfo;
 
-pub use standard::{Header, Text, Time, TransformStamped, TransformsMessage};
+pub use standard::{Byte, Header, Text, Time, TransformStamped, TransformsMessage};
 
 use super::{DecodeError, Field, Reader, Shape, Writer};
 use crate::message::{Payload, Stamped};

@@ -19,6 +19,8 @@ pub enum Shape {
     I64,
     /// An unsigned integer.
     U8,
+    /// Eight bits that ROS calls `byte`, and tells from an unsigned integer.
+    Byte,
     /// An unsigned integer.
     U16,
     /// An unsigned integer.
@@ -47,7 +49,8 @@ impl Shape {
     /// Returns whether it is a number, or an option of one.
     pub(super) const fn is_number(self) -> bool {
         match self {
-            Self::I8 | Self::I16 | Self::I32 | Self::I64 | Self::U8 | Self::U16 | Self::U32 | Self::U64 => true,
+            Self::I8 | Self::I16 | Self::I32 | Self::I64 => true,
+            Self::U8 | Self::Byte | Self::U16 | Self::U32 | Self::U64 => true,
             Self::F32 | Self::F64 => true,
             Self::Option(of) => of.is_number(),
             _ => false,

@@ -47,18 +47,27 @@ impl Layouts {
 
     /// The definition of a message in the exact layout.
     pub fn schema(&self) -> Schema {
+        Schema::new(&self.exact_name(), self.exact)
+    }
+
+    fn exact_name(&self) -> String {
         // The name of the definition is that given to the derive, if any: two types with the same name need two.
         let name = match self.payload {
             Shape::Struct(shape) => shape.name,
             Shape::Enum(shape) => shape.name,
             _ => self.name,
         };
-        Schema::new(&format!("{name}Stamped"), self.exact)
+        format!("{name}Stamped")
     }
 
     /// The name of ROS's message, `sensor_msgs/Imu`, if ROS has one for the payload.
     pub fn ros_name(&self) -> Option<&'static str> {
         self.ros.map(|shape| shape.name)
+    }
+
+    /// The [`type_hash`] of a message in the exact layout.
+    pub fn type_hash(&self) -> String {
+        type_hash(&self.exact_name(), self.exact)
     }
 
     /// ROS's definition of a message, if ROS has one for the payload.

@@ -70,7 +70,7 @@ fn read(shape: Shape, value: &RawValue, writer: &mut Writer<'_>) -> Result<(), J
     if let Some(range) = range(shape) {
         let number = integer(range, shape, value)?;
         match shape {
-            Shape::I8 | Shape::U8 => (number as u8).write(writer),
+            Shape::I8 | Shape::U8 | Shape::Byte => (number as u8).write(writer),
             Shape::I16 | Shape::U16 => (number as u16).write(writer),
             Shape::I32 | Shape::U32 => (number as u32).write(writer),
             _ => (number as u64).write(writer),

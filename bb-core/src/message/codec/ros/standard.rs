@@ -2,7 +2,7 @@
 
 use crate::message::Payload;
 use crate::message::codec::intern::intern;
-use crate::message::codec::{DecodeError, Field, Reader, Writer};
+use crate::message::codec::{DecodeError, Field, Reader, Shape, Writer};
 use crate::message::{Finite, Stamped};
 use crate::time::WallTime;
 use nalgebra::Isometry3;
@@ -64,6 +64,37 @@ impl DurationMessage {
             DecodeError::new(0, "a duration that is not negative", self.sec.to_string()).within("sec")
         })?;
         Ok(Duration::from_secs(seconds) + Duration::from_nanos(self.nanosec.into()))
+    }
+}
+
+/// `service_msgs/msg/ServiceEventInfo`, for the hashes of services.
+#[derive(Clone, Debug, Payload)]
+#[payload(name = "service_msgs/ServiceEventInfo")]
+pub(in crate::message::codec) struct ServiceEventInfo {
+    event_type: u8,
+    stamp: Time,
+    client_gid: [u8; 16],
+    sequence_number: i64,
+}
+
+/// `byte`, for messages of ROS that have one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Byte(pub u8);
+
+impl Finite for Byte {
+    fn is_finite(&self) -> bool {
+        true
+    }
+}
+
+impl Field for Byte {
+    const IS_INLINE: bool = true;
+    const SHAPE: Shape = Shape::Byte;
+    fn write(&self, writer: &mut Writer<'_>) {
+        self.0.write(writer);
+    }
+    fn read(reader: &mut Reader<'_>) -> Result<Self, DecodeError> {
+        u8::read(reader).map(Self)
     }
 }
 

@@ -30,7 +30,7 @@ impl Random {
         match shape {
             Shape::Bool => (self.below(2) == 1).write(writer),
             Shape::Char => 'x'.write(writer),
-            Shape::U8 | Shape::I8 => (self.next() as u8).write(writer),
+            Shape::U8 | Shape::Byte | Shape::I8 => (self.next() as u8).write(writer),
             Shape::U16 | Shape::I16 => (self.next() as u16).write(writer),
             // Nanoseconds are below a second.
             Shape::U32 if name == "nanosec" => ((self.next() % 1_000_000_000) as u32).write(writer),
