@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use std::fmt;
 use std::ops::Deref;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, LazyLock, Mutex, PoisonError, Weak};
 use thiserror::Error;
 use zenoh::Wait;
@@ -134,11 +135,14 @@ fn lay_over(value: &mut Value, over: Value) {
 #[derive(Clone)]
 pub struct Session(Arc<Opened>);
 
-struct Opened(zenoh::Session);
+struct Opened {
+    session: zenoh::Session,
+    numbers: AtomicU64,
+}
 
 impl Drop for Opened {
     fn drop(&mut self) {
-        if let Err(error) = self.0.close().wait() {
+        if let Err(error) = self.session.close().wait() {
             tracing::warn!(%error, "the session of zenoh was not closed");
         }
     }
@@ -162,22 +166,27 @@ impl Session {
         let session = zenoh::open(configuration).wait();
         let session = session
             .map_err(|error| SessionError::Open { listen: settings.listen.clone(), fault: error.to_string() })?;
-        let opened = Arc::new(Opened(session));
+        let opened = Arc::new(Opened { session, numbers: AtomicU64::new(0) });
         sessions.insert(settings.clone(), Arc::downgrade(&opened));
         Ok(Self(opened))
+    }
+
+    /// A number that nothing else in the session has: those of nodes and endpoints.
+    pub(crate) fn next_number(&self) -> u64 {
+        self.0.numbers.fetch_add(1, Ordering::Relaxed)
     }
 }
 
 impl Deref for Session {
     type Target = zenoh::Session;
     fn deref(&self) -> &zenoh::Session {
-        &self.0.0
+        &self.0.session
     }
 }
 
 impl fmt::Debug for Session {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("Session").field(&self.0.0.zid()).finish()
+        f.debug_tuple("Session").field(&self.0.session.zid()).finish()
     }
 }
 

@@ -85,6 +85,11 @@ impl Layouts {
         self.companion.map(|(topic, shape)| (topic, Schema::of(shape)))
     }
 
+    /// The [`type_hash`] of the second message, if ROS has two for the payload.
+    pub fn ros_companion_type_hash(&self) -> Option<String> {
+        self.companion.map(|(_, shape)| type_hash(shape.name, Shape::Struct(shape)))
+    }
+
     /// The topic and the definition by which viewers know the messages at `path`: those of ROS if it has a message for the payload, else
     /// the exact ones.
     pub fn channel(&self, path: &str) -> (String, Schema) {

@@ -1,0 +1,210 @@
+//! The bridge: a running robot as a node of ROS 2.
+
+use crate::clients::Clients;
+use crate::inputs::Inputs;
+use crate::node::RosNode;
+use crate::options::Ros2Options;
+use crate::outputs::Outputs;
+use crate::services::Services;
+use crate::session::{Session, SessionError};
+use bb_core::event::Right;
+use bb_core::{Bus, Fault, MonotonicTime, Payload, Reading, Service, ServiceContext};
+use bb_ros2::{NameError, Node, TypeError};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+use thiserror::Error;
+
+/// Time for which an update without a rate waits.
+const WAIT: Duration = Duration::from_millis(100);
+/// Time between two messages of its state, of a bridge without a rate.
+const STATE: Duration = Duration::from_secs(1);
+
+/// Reason for which a robot is no node.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum Ros2Error {
+    /// An option has an unusable value.
+    #[error("the robot is no node of ROS: {0}")]
+    Options(Fault),
+    /// A name is not one of ROS.
+    #[error("the robot is no node of ROS: {0}")]
+    Name(#[from] NameError),
+    /// The name or the hash of a type is not one of ROS.
+    #[error("the robot is no node of ROS: {0}")]
+    Type(#[from] TypeError),
+    /// zenoh does not do what is asked.
+    #[error("the robot is no node of ROS: {0}")]
+    Session(#[from] SessionError),
+    /// A thread cannot be started.
+    #[error("the robot is no node of ROS, since a thread cannot be started: {0}")]
+    Thread(std::io::Error),
+}
+
+/// Numbers of messages and requests since the start of a [`Ros2Bridge`], published when they have changed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Payload)]
+pub struct Ros2State {
+    /// Messages put to other nodes.
+    pub published: u64,
+    /// Messages of the robot that were not put: the bridge was too slow, or zenoh refused them.
+    pub unpublished: u64,
+    /// Messages of other nodes that the robot took.
+    pub received: u64,
+    /// Messages of other nodes that it did not take: of another type, not to be read, or faster than it takes them.
+    pub refused: u64,
+    /// Requests to services that were answered.
+    pub requests: u64,
+}
+
+/// The counters of a bridge.
+#[derive(Debug, Default)]
+pub(crate) struct Counts {
+    pub(crate) published: AtomicU64,
+    pub(crate) unpublished: AtomicU64,
+    pub(crate) received: AtomicU64,
+    pub(crate) refused: AtomicU64,
+    pub(crate) requests: AtomicU64,
+}
+
+impl Counts {
+    pub(crate) fn add(counter: &AtomicU64, number: u64) {
+        counter.fetch_add(number, Ordering::Relaxed);
+    }
+
+    fn state(&self) -> Ros2State {
+        let read = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
+        Ros2State {
+            published: read(&self.published),
+            unpublished: read(&self.unpublished),
+            received: read(&self.received),
+            refused: read(&self.refused),
+            requests: read(&self.requests),
+        }
+    }
+}
+
+/// A running robot as a node of ROS 2, until it is dropped.
+///
+/// Nothing of the robot waits for the network: the threads of the bridge take from a bounded queue, and what does not fit is counted.
+#[derive(Debug)]
+pub struct Ros2Bridge {
+    // In this order: what others see of it ends first, and the session last.
+    services: Services,
+    inputs: Inputs,
+    is_over: Arc<AtomicBool>,
+    out: Option<JoinHandle<()>>,
+    counts: Arc<Counts>,
+    node: Arc<RosNode>,
+    /// Ends what was begun in the name of other nodes.
+    bus: bb_core::component::Session,
+    reported: Option<Ros2State>,
+    next_report: Instant,
+    /// `true` if it has a rate, and so must not wait.
+    is_paced: bool,
+}
+
+impl Ros2Bridge {
+    /// Makes a robot a node. A [`Running`](bb_core::Running) robot, a [`Simulation`](bb_core::Simulation) and their handles dereference to a
+    /// [`Bus`]; other nodes have at most its rights.
+    ///
+    /// # Errors
+    /// An option has an unusable value, an endpoint to listen on is taken, or nothing can be published or subscribed at one of the paths.
+    pub fn serve(robot: &Bus, options: Ros2Options) -> Result<Self, Ros2Error> {
+        let settings = options.session().map_err(Ros2Error::Options)?;
+        let rights = options.node_rights().map_err(Ros2Error::Options)?;
+        let description = robot.description();
+        let node = match options.node.as_str() {
+            "" => Node::of_robot(&options.namespace, description.robot)?,
+            name => Node::new(&options.namespace, name)?,
+        };
+        let session = Session::open(&settings)?;
+        let node = Arc::new(RosNode::declare(session, options.domain, node)?);
+        let bus = robot.session("ros2", bb_core::event::Rights::ALL);
+        let counts = Arc::<Counts>::default();
+        let is_over = Arc::<AtomicBool>::default();
+        let subscribed = options.subscribed();
+        let inputs =
+            Inputs::start(&bus.for_caller("ros2", [Right::Publish]), &node, &description, &subscribed, &counts)?;
+        let outputs = Outputs::declare(
+            &bus.for_caller("ros2", [Right::Read]),
+            &node,
+            &description,
+            &options.published(),
+            &subscribed,
+            &counts,
+        )?;
+        let over = Arc::clone(&is_over);
+        let out = thread::Builder::new().name("ros2 out".into()).spawn(move || outputs.run(&over));
+        let out = Some(out.map_err(Ros2Error::Thread)?);
+        let clients = Clients::watch(&node, options.domain)?;
+        let services = Services::start(&bus.for_caller("ros2", rights), &node, clients, &description, &counts)?;
+        Ok(Self {
+            services,
+            inputs,
+            is_over,
+            out,
+            counts,
+            node,
+            bus,
+            reported: None,
+            next_report: Instant::now(),
+            is_paced: true,
+        })
+    }
+
+    /// The full name of the node: `/rover`.
+    pub fn node(&self) -> String {
+        self.node.node().full_name()
+    }
+
+    /// The endpoints at which the session is reached.
+    pub fn endpoints(&self) -> Vec<String> {
+        use zenoh::Wait;
+        self.node.session().info().locators().wait().iter().map(ToString::to_string).collect()
+    }
+
+    /// The numbers of messages and requests so far.
+    pub fn state(&self) -> Ros2State {
+        self.counts.state()
+    }
+}
+
+impl Drop for Ros2Bridge {
+    fn drop(&mut self) {
+        self.services.stop();
+        self.inputs.stop();
+        self.is_over.store(true, Ordering::Release);
+        if let Some(out) = self.out.take() {
+            // Its panic was printed.
+            let _ = out.join();
+        }
+        self.bus.end();
+    }
+}
+
+impl Service for Ros2Bridge {
+    type Options = Ros2Options;
+    type Output = Ros2State;
+
+    fn init(options: Ros2Options, context: &ServiceContext) -> Result<Self, Fault> {
+        let mut bridge = Self::serve(&context.bus(), options).map_err(|error| Fault::new(error.to_string()))?;
+        bridge.is_paced = context.period_s().is_some() || context.clock().is_virtual();
+        Ok(bridge)
+    }
+
+    fn update(&mut self, _: MonotonicTime) -> Result<Reading<Ros2State>, Fault> {
+        if !self.is_paced {
+            thread::sleep(WAIT);
+            if Instant::now() < self.next_report {
+                return Ok(Reading::nothing());
+            }
+            self.next_report = Instant::now() + STATE;
+        }
+        let state = self.state();
+        match self.reported.replace(state) == Some(state) {
+            true => Ok(Reading::nothing()),
+            false => Ok(Reading::now(state)),
+        }
+    }
+}

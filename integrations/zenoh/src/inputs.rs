@@ -1,0 +1,101 @@
+//! Topics of other nodes that are inputs of the robot.
+
+use crate::bridge::{Counts, Ros2Error};
+use crate::node::{RosNode, RosSubscription};
+use bb_core::component::Description;
+use bb_core::{Bus, Fault};
+use bb_ros2::Address;
+use std::collections::HashSet;
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::{self, JoinHandle};
+
+/// Messages that wait for the robot, of all inputs. Beyond that they are refused, and counted: what zenoh's threads waited for would be late
+/// as well.
+const WAITING: usize = 1024;
+
+/// A message on its way in; `None` ends the thread.
+type Message = Option<(&'static str, Vec<u8>)>;
+
+/// The subscriptions, and the thread that publishes what they get.
+#[derive(Debug)]
+pub(crate) struct Inputs {
+    subscriptions: Vec<RosSubscription>,
+    messages: SyncSender<Message>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Inputs {
+    pub(crate) fn start(
+        bus: &Bus,
+        node: &RosNode,
+        description: &Description,
+        paths: &[String],
+        counts: &Arc<Counts>,
+    ) -> Result<Self, Ros2Error> {
+        let (messages, waiting) = sync_channel(WAITING);
+        let mut subscriptions = Vec::new();
+        for path in paths {
+            let (path, address) = address(node, description, path)?;
+            let (messages, full) = (messages.clone(), Arc::clone(counts));
+            let receive = move |bytes| {
+                if let Err(TrySendError::Full(_)) = messages.try_send(Some((path, bytes))) {
+                    Counts::add(&full.refused, 1);
+                }
+            };
+            let (refused, hash) = (Arc::clone(counts), address.type_hash);
+            // Each other hash once, of no more than can be of use.
+            let seen = Mutex::new(HashSet::new());
+            let refuse = move |other: &str| {
+                Counts::add(&refused.refused, 1);
+                let mut seen = seen.lock().unwrap_or_else(PoisonError::into_inner);
+                if seen.len() < 16 && seen.insert(other.to_owned()) {
+                    tracing::warn!(path, %hash, other, "messages of another definition of their type are refused");
+                }
+            };
+            subscriptions.push(node.subscription(&address, receive, refuse)?);
+        }
+        let (bus, counts) = (bus.clone(), Arc::clone(counts));
+        let thread = thread::Builder::new().name("ros2 in".into()).spawn(move || publish(&bus, &waiting, &counts));
+        Ok(Self { subscriptions, messages, thread: Some(thread.map_err(Ros2Error::Thread)?) })
+    }
+
+    pub(crate) fn stop(&mut self) {
+        self.subscriptions.clear();
+        let _ = self.messages.send(None);
+        if let Some(thread) = self.thread.take() {
+            // Its panic was printed.
+            let _ = thread.join();
+        }
+    }
+}
+
+/// The address of the messages for a path.
+fn address(node: &RosNode, description: &Description, path: &str) -> Result<(&'static str, Address), Ros2Error> {
+    let refused = |why: &str| Ros2Error::Options(Fault::new(format!("`subscribe` has `{path}`: {why}")));
+    let Some(topic) = description.topic(path) else {
+        return Err(refused("the robot has no topic there"));
+    };
+    if !topic.is_external {
+        return Err(refused("only its own publisher publishes there"));
+    }
+    let (Some(name), Some(hash)) = (topic.layouts.ros_schema(), topic.layouts.ros_type_hash()) else {
+        return Err(refused(&format!("ROS has no message for its payload `{}`", topic.payload)));
+    };
+    let address =
+        Address { name: node.node().topic(path)?, type_name: name.name.parse()?, type_hash: hash.parse()? };
+    Ok((topic.path, address))
+}
+
+/// Publishes what comes, in the robot, until it is to end.
+fn publish(bus: &Bus, waiting: &Receiver<Message>, counts: &Counts) {
+    while let Ok(Some((path, message))) = waiting.recv() {
+        match bus.publish_ros(path, &message) {
+            Ok(()) => Counts::add(&counts.received, 1),
+            Err(error) => {
+                Counts::add(&counts.refused, 1);
+                tracing::warn!(%error, "a message of another node is refused");
+            }
+        }
+    }
+}

@@ -1,0 +1,257 @@
+//! A node on the wire: tokens, publishers, subscriptions and services.
+
+use crate::session::{Session, SessionError};
+use bb_ros2::{Address, Attachment, Endpoint, EndpointKind, Gid, Node, Qos, Token, TypeHash};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use zenoh::Wait;
+use zenoh::liveliness::LivelinessToken;
+use zenoh::pubsub::{Publisher, Subscriber};
+use zenoh::qos::CongestionControl;
+use zenoh::query::{Query, Queryable};
+use zenoh::sample::Locality;
+use zenoh_ext::{AdvancedPublisher, AdvancedPublisherBuilderExt, CacheConfig, MissDetectionConfig};
+
+/// Time between two signs of a latched topic by which its subscriptions see that they have missed the last message.
+const HEARTBEAT: Duration = Duration::from_millis(500);
+
+/// A node of ROS 2 in a session, seen by others until it is dropped.
+#[derive(Debug)]
+pub(crate) struct RosNode {
+    session: Session,
+    domain: u32,
+    node: Node,
+    number: u64,
+    _token: LivelinessToken,
+}
+
+impl RosNode {
+    /// # Errors
+    /// The session is closed.
+    pub(crate) fn declare(session: Session, domain: u32, node: Node) -> Result<Self, SessionError> {
+        let number = session.next_number();
+        let token = Token {
+            domain,
+            session: session.zid().to_string(),
+            node_id: number,
+            id: number,
+            enclave: "/".to_owned(),
+            node: node.clone(),
+            endpoint: None,
+        };
+        let token = declare_token(&session, &token.to_string())?;
+        Ok(Self { session, domain, node, number, _token: token })
+    }
+
+    /// The names of the node.
+    pub(crate) fn node(&self) -> &Node {
+        &self.node
+    }
+
+    /// The session that it is in.
+    pub(crate) fn session(&self) -> &Session {
+        &self.session
+    }
+
+    /// Declares what others know an endpoint by.
+    fn endpoint(
+        &self,
+        kind: EndpointKind,
+        address: &Address,
+        qos: Qos,
+    ) -> Result<(LivelinessToken, Gid), SessionError> {
+        let token = Token {
+            domain: self.domain,
+            session: self.session.zid().to_string(),
+            node_id: self.number,
+            id: self.session.next_number(),
+            enclave: "/".to_owned(),
+            node: self.node.clone(),
+            endpoint: Some(Endpoint { kind, address: address.clone(), qos, backends: None }),
+        };
+        let token = token.to_string();
+        Ok((declare_token(&self.session, &token)?, Gid::of(&token)))
+    }
+
+    /// A publisher; with [`Qos::LATCHED`], those who come late get its last message.
+    ///
+    /// # Errors
+    /// The session is closed.
+    pub(crate) fn publisher(&self, address: &Address, qos: Qos) -> Result<RosPublisher, SessionError> {
+        let key = address.key(self.domain);
+        let failed = SessionError::of(format!("declaring the publisher of {}", address.name));
+        // What is put must arrive: with `Drop`, and with `express`, zenoh loses messages without a word.
+        let plain = self.session.declare_publisher(key).congestion_control(CongestionControl::Block).express(false);
+        let wire = if qos == Qos::LATCHED {
+            let latched = plain
+                .sample_miss_detection(MissDetectionConfig::default().heartbeat(HEARTBEAT))
+                .cache(CacheConfig::default().max_samples(1))
+                .publisher_detection();
+            Wire::Latched(Box::new(latched.wait().map_err(failed)?))
+        } else {
+            Wire::Plain(plain.wait().map_err(failed)?)
+        };
+        let (token, gid) = self.endpoint(EndpointKind::Publisher, address, qos)?;
+        Ok(RosPublisher { wire, name: address.name.clone(), sent: 0, gid, _token: token })
+    }
+
+    /// A subscription to what others publish. `receive` gets the bytes of each message on zenoh's thread, and must not wait; `refuse`, the
+    /// hash of one whose type is another.
+    ///
+    /// # Errors
+    /// The session is closed.
+    pub(crate) fn subscription(
+        &self,
+        address: &Address,
+        receive: impl Fn(Vec<u8>) + Send + Sync + 'static,
+        refuse: impl Fn(&str) + Send + Sync + 'static,
+    ) -> Result<RosSubscription, SessionError> {
+        let hash = address.type_hash.to_string();
+        let subscriber = self.session.declare_subscriber(address.key_of_any_hash(self.domain));
+        let subscriber = subscriber.allowed_origin(Locality::Remote).callback(move |sample| {
+            match other_hash(sample.key_expr().as_str(), &hash) {
+                None => receive(sample.payload().to_bytes().into_owned()),
+                Some(other) => refuse(other),
+            }
+        });
+        let subscriber = subscriber
+            .wait()
+            .map_err(SessionError::of(format!("declaring the subscription to {}", address.name)))?;
+        let (token, _) = self.endpoint(EndpointKind::Subscription, address, Qos::reliable(10))?;
+        Ok(RosSubscription { _subscriber: subscriber, _token: token })
+    }
+
+    /// A service. `answer` gets each request on zenoh's thread, and must not wait.
+    ///
+    /// # Errors
+    /// The session is closed.
+    pub(crate) fn service(
+        &self,
+        address: &Address,
+        answer: impl Fn(Request) + Send + Sync + 'static,
+    ) -> Result<RosService, SessionError> {
+        let hash = address.type_hash.to_string();
+        let queryable = self.session.declare_queryable(address.key_of_any_hash(self.domain)).complete(true);
+        let queryable = queryable.callback(move |query| match other_hash(query.key_expr().as_str(), &hash) {
+            None => answer(Request(query)),
+            Some(other) => {
+                // A client that waits learns why it does in vain.
+                let _ = query.reply_err(format!("the type of the service is {hash}, not {other}")).wait();
+            }
+        });
+        let queryable =
+            queryable.wait().map_err(SessionError::of(format!("declaring the service {}", address.name)))?;
+        let (token, _) = self.endpoint(EndpointKind::Service, address, Qos::reliable(10))?;
+        Ok(RosService { _queryable: queryable, _token: token })
+    }
+}
+
+fn declare_token(session: &Session, token: &str) -> Result<LivelinessToken, SessionError> {
+    let declared = session.liveliness().declare_token(token.to_owned()).wait();
+    declared.map_err(SessionError::of(format!("declaring the token {token}")))
+}
+
+/// The hash at the end of a key, if it is another than ours. Humble has none.
+fn other_hash<'a>(key: &'a str, ours: &str) -> Option<&'a str> {
+    let (_, theirs) = key.rsplit_once('/')?;
+    (theirs != ours && theirs != TypeHash::Unsupported.to_string()).then_some(theirs)
+}
+
+/// The time now as attachments have it, in nanoseconds since the Unix epoch.
+fn wall_ns() -> i64 {
+    SystemTime::now()
+        .duration_since(UNIX_EPOCH)
+        .map_or(0, |since| i64::try_from(since.as_nanos()).unwrap_or(i64::MAX))
+}
+
+/// A publisher.
+#[derive(Debug)]
+pub(crate) struct RosPublisher {
+    wire: Wire,
+    name: String,
+    sent: i64,
+    gid: Gid,
+    _token: LivelinessToken,
+}
+
+enum Wire {
+    Plain(Publisher<'static>),
+    Latched(Box<AdvancedPublisher<'static>>),
+}
+
+impl std::fmt::Debug for Wire {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Plain(_) => "Plain",
+            Self::Latched(_) => "Latched",
+        })
+    }
+}
+
+impl RosPublisher {
+    /// Puts a message in CDR. Waits while a subscriber does not keep up, at most until zenoh closes its link.
+    ///
+    /// # Errors
+    /// The session is closed.
+    pub(crate) fn put(&mut self, message: Vec<u8>) -> Result<(), SessionError> {
+        self.sent += 1;
+        let attachment = Attachment { sequence: self.sent, time_ns: wall_ns(), gid: self.gid }.to_bytes();
+        let put = match &self.wire {
+            Wire::Plain(publisher) => publisher.put(message).attachment(attachment.as_slice()).wait(),
+            Wire::Latched(publisher) => publisher.put(message).attachment(attachment.as_slice()).wait(),
+        };
+        put.map_err(SessionError::of(format!("publishing at {}", self.name)))
+    }
+}
+
+/// A subscription, until it is dropped.
+#[derive(Debug)]
+pub(crate) struct RosSubscription {
+    _subscriber: Subscriber<()>,
+    _token: LivelinessToken,
+}
+
+/// A service, until it is dropped.
+#[derive(Debug)]
+pub(crate) struct RosService {
+    _queryable: Queryable<()>,
+    _token: LivelinessToken,
+}
+
+/// A request to a service, which a client waits for.
+#[derive(Debug)]
+pub(crate) struct Request(Query);
+
+impl Request {
+    /// The request in CDR.
+    pub(crate) fn bytes(&self) -> Vec<u8> {
+        self.0.payload().map_or_else(Vec::new, |payload| payload.to_bytes().into_owned())
+    }
+
+    /// The client, if it says who it is.
+    pub(crate) fn client(&self) -> Option<Gid> {
+        self.attachment().map(|attachment| attachment.gid)
+    }
+
+    fn attachment(&self) -> Option<Attachment> {
+        Attachment::from_bytes(&self.0.attachment()?.to_bytes()).ok()
+    }
+
+    /// Answers. A client of ROS finds its request by the number; one that gave none gets none.
+    pub(crate) fn answer(&self, response: Vec<u8>) {
+        let attachment = self.attachment().map(|asked| Attachment { time_ns: wall_ns(), ..asked }.to_bytes());
+        let mut reply = self.0.reply(self.0.key_expr().clone(), response);
+        if let Some(attachment) = attachment {
+            reply = reply.attachment(attachment.as_slice());
+        }
+        if let Err(error) = reply.wait() {
+            tracing::warn!(%error, service = %self.0.key_expr(), "a client was not answered");
+        }
+    }
+
+    /// Refuses a request that cannot be read.
+    pub(crate) fn refuse(&self, why: String) {
+        if let Err(error) = self.0.reply_err(why).wait() {
+            tracing::warn!(%error, service = %self.0.key_expr(), "a client was not answered");
+        }
+    }
+}

@@ -1,0 +1,283 @@
+//! Topics of the robot, for other nodes.
+
+use crate::bridge::{Counts, Ros2Error};
+use crate::diagnostics::diagnostics;
+use crate::messages::{Clock, DiagnosticArray, Parameter, ParameterEvent};
+use crate::node::{RosNode, RosPublisher};
+use crate::parameters::value_of;
+use bb_core::component::{Description, RunKind};
+use bb_core::event::ParameterChange;
+use bb_core::joints::{ViewerChannel, ViewerMessage, ViewerMessages};
+use bb_core::message::codec::ros::Time;
+use bb_core::message::codec::{Layouts, Shape, encode, type_hash};
+use bb_core::{Bus, DynamicMessage, DynamicSubscription, Field, Overflow, Payload, Select, WallTime};
+use bb_ros2::{Address, Qos, parameter_name};
+use std::collections::HashMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// Messages of the robot that wait for the network.
+const WAITING: usize = 16_384;
+/// Time after which the thread looks whether it is to end.
+const PATIENCE: Duration = Duration::from_millis(20);
+/// Time between two diagnoses.
+const DIAGNOSIS: Duration = Duration::from_secs(1);
+/// Least time between two messages of the clock, on it.
+const TICK_NS: i64 = 10_000_000;
+/// The depth of topics, as ROS has it by default.
+const DEPTH: u64 = 10;
+/// The depth of `/parameter_events`, as ROS has it.
+const EVENTS_DEPTH: u64 = 1000;
+
+/// The publishers of the robot's topics, and what they publish.
+pub(crate) struct Outputs {
+    bus: Bus,
+    node: Arc<RosNode>,
+    counts: Arc<Counts>,
+    /// Paths that are published even if ROS has no message for their payload; all that it has one for, if there are none.
+    named: Vec<String>,
+    /// Paths that other nodes publish, and so are not published.
+    taken: Vec<String>,
+    topics: HashMap<&'static str, Option<Topic>>,
+    viewers: ViewerMessages,
+    viewed: HashMap<ViewerChannel, RosPublisher>,
+    events: RosPublisher,
+    diagnostics: RosPublisher,
+    robot: String,
+    /// In a simulation, with the time that was published last.
+    clock: Option<(RosPublisher, WallTime)>,
+    messages: DynamicSubscription,
+    changes: DynamicSubscription,
+}
+
+/// The publishers of a path.
+struct Topic {
+    main: RosPublisher,
+    /// ROS has no message for the payload.
+    is_exact: bool,
+    companion: Option<RosPublisher>,
+}
+
+impl Outputs {
+    pub(crate) fn declare(
+        bus: &Bus,
+        node: &Arc<RosNode>,
+        description: &Description,
+        named: &[String],
+        taken: &[String],
+        counts: &Arc<Counts>,
+    ) -> Result<Self, Ros2Error> {
+        let selected: Vec<Select<'_>> = named.iter().map(|path| Select::Below(path)).collect();
+        let messages =
+            bus.subscribe_any(Select::AnyOf(&selected), None, Overflow::DropOldest { capacity: WAITING });
+        let changes =
+            bus.subscribe_any(Select::All, ParameterChange::NAME, Overflow::DropOldest { capacity: WAITING });
+        let mut viewed = HashMap::new();
+        for channel in ViewerChannel::ALL {
+            let address = Address {
+                name: channel.topic().to_owned(),
+                type_name: channel.schema().name.parse()?,
+                type_hash: channel.type_hash().parse()?,
+            };
+            let qos = if channel.is_latched() { Qos::LATCHED } else { Qos::reliable(DEPTH) };
+            viewed.insert(channel, node.publisher(&address, qos)?);
+        }
+        let events =
+            node.publisher(&message_of::<ParameterEvent>("/parameter_events")?, Qos::reliable(EVENTS_DEPTH))?;
+        let diagnostics = node.publisher(&message_of::<DiagnosticArray>("/diagnostics")?, Qos::reliable(DEPTH))?;
+        let clock = match description.run {
+            RunKind::Simulation => {
+                let clock = node.publisher(&message_of::<Clock>("/clock")?, Qos::reliable(DEPTH))?;
+                Some((clock, WallTime::default()))
+            }
+            _ => None,
+        };
+        let mut outputs = Self {
+            bus: bus.clone(),
+            node: Arc::clone(node),
+            counts: Arc::clone(counts),
+            named: named.to_vec(),
+            taken: taken.to_vec(),
+            topics: HashMap::new(),
+            viewers: ViewerMessages::new(description.robot, bus.topology(), None),
+            viewed,
+            events,
+            diagnostics,
+            robot: description.robot.to_owned(),
+            clock,
+            messages,
+            changes,
+        };
+        for path in named {
+            if !description.topics.iter().any(|topic| Select::Below(path).includes(topic.path)) {
+                tracing::warn!(path, "nothing is published there, or below, yet");
+            }
+        }
+        for topic in &description.topics {
+            if named.is_empty() || selected.iter().any(|select| select.includes(topic.path)) {
+                let declared = outputs.declare_topic(topic.path, topic.layouts)?;
+                outputs.topics.insert(topic.path, declared);
+            }
+        }
+        Ok(outputs)
+    }
+
+    /// The publishers of a path; `None` if it is not published.
+    fn declare_topic(&self, path: &str, layouts: Layouts) -> Result<Option<Topic>, Ros2Error> {
+        if self.taken.iter().any(|taken| taken == path) {
+            return Ok(None);
+        }
+        let name = match self.node.node().topic(path) {
+            Ok(name) => name,
+            Err(error) => {
+                tracing::warn!(%error, path, "a path is not published");
+                return Ok(None);
+            }
+        };
+        let (schema, hash, is_exact) = match (layouts.ros_schema(), layouts.ros_type_hash()) {
+            (Some(schema), Some(hash)) => (schema, hash, false),
+            _ if self.named.is_empty() => return Ok(None),
+            _ => (layouts.schema(), layouts.type_hash(), true),
+        };
+        let publisher = |name: String, schema: &str, hash: &str| -> Result<RosPublisher, Ros2Error> {
+            let address = Address { name, type_name: schema.parse()?, type_hash: hash.parse()? };
+            Ok(self.node.publisher(&address, Qos::reliable(DEPTH))?)
+        };
+        let companion = match (layouts.ros_companion(), layouts.ros_companion_type_hash()) {
+            (Some((topic, schema)), Some(hash)) if !is_exact => {
+                Some(publisher(format!("{name}/{topic}"), &schema.name, &hash)?)
+            }
+            _ => None,
+        };
+        Ok(Some(Topic { main: publisher(name, &schema.name, &hash)?, is_exact, companion }))
+    }
+
+    /// Publishes until it is to end, and what waits then.
+    pub(crate) fn run(mut self, is_over: &AtomicBool) {
+        let now = self.now();
+        for message in self.viewers.first(now) {
+            self.view(message);
+        }
+        let (mut lost, mut next_diagnosis) = (0, Instant::now());
+        loop {
+            // Before the last look into the queue, so that what was published before the end is put.
+            let is_last = is_over.load(Ordering::Acquire);
+            let waited = Instant::now();
+            match self.messages.recv_timeout(if is_last { Duration::ZERO } else { PATIENCE }) {
+                Some(message) => self.publish(&message),
+                None if is_last => break,
+                // Of a robot that has stopped, nothing comes, and at once.
+                None => std::thread::sleep(PATIENCE.saturating_sub(waited.elapsed())),
+            }
+            while let Some(change) = self.changes.try_recv() {
+                self.tell_change(&change);
+            }
+            self.tick();
+            if Instant::now() >= next_diagnosis {
+                next_diagnosis = Instant::now() + DIAGNOSIS;
+                self.diagnose();
+            }
+            let lagged = self.messages.lagged();
+            if lagged != lost {
+                Counts::add(&self.counts.unpublished, lagged - lost);
+                tracing::warn!(lost = lagged - lost, "messages were published faster than the network takes them");
+                lost = lagged;
+            }
+        }
+    }
+
+    fn publish(&mut self, message: &DynamicMessage) {
+        let path = message.path();
+        if !self.topics.contains_key(path) {
+            let declared = self.declare_topic(path, message.layouts()).unwrap_or_else(|error| {
+                tracing::warn!(%error, path, "a path is not published");
+                None
+            });
+            self.topics.insert(path, declared);
+        }
+        if let Some(Some(topic)) = self.topics.get_mut(path) {
+            let mut bytes = Vec::new();
+            match topic.is_exact {
+                true => message.encode(&mut bytes),
+                false => _ = message.encode_as_ros(&mut bytes),
+            }
+            put(&mut topic.main, bytes, &self.counts);
+            let mut bytes = Vec::new();
+            if let Some(companion) = &mut topic.companion
+                && message.encode_companion(&mut bytes)
+            {
+                put(companion, bytes, &self.counts);
+            }
+        }
+        if let Some(transforms) = self.viewers.following(message) {
+            self.view(transforms);
+        }
+    }
+
+    fn view(&mut self, message: ViewerMessage) {
+        if let Some(publisher) = self.viewed.get_mut(&message.channel) {
+            put(publisher, message.bytes, &self.counts);
+        }
+    }
+
+    fn tell_change(&mut self, change: &DynamicMessage) {
+        let Some(change) = change.downcast::<ParameterChange>() else { return };
+        let Some(name) = parameter_name(change.path) else { return };
+        let event = ParameterEvent {
+            stamp: Time::of(change.wall_time),
+            node: self.node.node().full_name(),
+            new_parameters: Vec::new(),
+            changed_parameters: vec![Parameter { name, value: value_of(&change.to) }],
+            deleted_parameters: Vec::new(),
+        };
+        put(&mut self.events, bytes_of(&event), &self.counts);
+    }
+
+    fn tick(&mut self) {
+        let now = self.now();
+        let Some((clock, last)) = &mut self.clock else { return };
+        if now.as_unix_nanos().saturating_sub(last.as_unix_nanos()) >= TICK_NS {
+            *last = now;
+            put(clock, bytes_of(&Clock { clock: Time::of(now) }), &self.counts);
+        }
+    }
+
+    fn diagnose(&mut self) {
+        let now = self.now();
+        // Not before the robot has started.
+        let Ok(report) = self.bus.report_json() else { return };
+        match diagnostics(&self.robot, &report, Time::of(now)) {
+            Ok(diagnosis) => put(&mut self.diagnostics, bytes_of(&diagnosis), &self.counts),
+            Err(error) => tracing::warn!(%error, "the report cannot be read"),
+        }
+    }
+
+    fn now(&self) -> WallTime {
+        let clock = self.bus.clock();
+        clock.wall_at(clock.now())
+    }
+}
+
+fn put(publisher: &mut RosPublisher, message: Vec<u8>, counts: &Counts) {
+    match publisher.put(message) {
+        Ok(()) => Counts::add(&counts.published, 1),
+        Err(error) => {
+            Counts::add(&counts.unpublished, 1);
+            tracing::warn!(%error, "a message is not published");
+        }
+    }
+}
+
+pub(crate) fn bytes_of<T: Field>(message: &T) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    encode(message, &mut bytes);
+    bytes
+}
+
+/// The address of a message of ROS's own at a topic.
+fn message_of<T: Field>(topic: &str) -> Result<Address, Ros2Error> {
+    let name = if let Shape::Struct(shape) = T::SHAPE { shape.name } else { "" };
+    let type_name = name.replacen('/', "/msg/", 1).parse()?;
+    Ok(Address { name: topic.to_owned(), type_name, type_hash: type_hash(name, T::SHAPE).parse()? })
+}
