@@ -24,11 +24,12 @@ pub enum Mode {
     /// A robot that speaks to those it is connected with.
     #[default]
     Peer,
-    /// A robot through which others also hear each other: two nodes of ROS 2 that know it alone.
+    /// A robot through which others also hear each other: two nodes of ROS 2 that know it alone. They find each other by gossip, which is
+    /// on in `rmw_zenoh_cpp` as long as nobody turns it off.
     Router,
 }
 
-/// Settings of a session. Multicast, gossip and timestamps are off, and the lease is 1 s, unless the file says otherwise.
+/// Settings of a session. Multicast and timestamps are off, gossip is but for a router, and the lease is 1 s, unless the file says otherwise.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub struct SessionSettings {
     /// Part of the session among others.
@@ -90,6 +91,8 @@ impl SessionSettings {
     /// The file cannot be read, or zenoh does not accept the whole.
     pub fn configuration(&self) -> Result<zenoh::Config, SessionError> {
         let (first, longest) = RETRIES_MS;
+        // By what a router tells of the others, two of them hear each other; it connects to none of them itself.
+        let gossip = json!({ "enabled": self.mode == Mode::Router, "autoconnect": [] });
         let mut configuration = json!({
             "mode": match self.mode { Mode::Peer => "peer", Mode::Router => "router" },
             "listen": { "endpoints": self.listen, "exit_on_failure": true },
@@ -99,7 +102,7 @@ impl SessionSettings {
                 "exit_on_failure": false,
                 "retry": { "period_init_ms": first, "period_max_ms": longest, "period_increase_factor": 2 },
             },
-            "scouting": { "multicast": { "enabled": false }, "gossip": { "enabled": false } },
+            "scouting": { "multicast": { "enabled": false }, "gossip": gossip },
             // Else what comes from a machine whose clock is ahead is refused, or gets another time.
             "timestamping": { "enabled": false },
             "transport": { "link": { "tx": { "lease": LEASE_MS, "keep_alive": SIGNS_OF_LIFE } } },
@@ -219,6 +222,15 @@ mod tests {
     }
 
     #[test]
+    fn a_router_tells_of_the_others_and_connects_to_none() {
+        let settings = SessionSettings { mode: Mode::Router, ..SessionSettings::default() };
+        let configuration = settings.configuration().expect("it is accepted");
+        assert_eq!(read(&configuration, "scouting/multicast/enabled"), json!(false));
+        assert_eq!(read(&configuration, "scouting/gossip/enabled"), json!(true));
+        assert_eq!(read(&configuration, "scouting/gossip/autoconnect"), json!([]));
+    }
+
+    #[test]
     fn a_file_goes_before_the_defaults_and_leaves_the_rest() {
         let path = std::env::temp_dir().join(format!("bb-zenoh-{}.json5", std::process::id()));
         let file = "{ mode: 'router', transport: { link: { tx: { lease: 500 } } }, // as in zenoh's own\n \
@@ -227,6 +239,8 @@ mod tests {
         let settings = SessionSettings { file: Some(path.clone()), ..SessionSettings::default() };
         let configuration = settings.configuration().expect("it is accepted");
         assert_eq!(read(&configuration, "mode"), json!("router"));
+        // It is the mode of the settings that decides.
+        assert_eq!(read(&configuration, "scouting/gossip/enabled"), json!(false));
         assert_eq!(read(&configuration, "transport/link/tx/lease"), json!(500));
         assert_eq!(read(&configuration, "transport/link/tx/keep_alive"), json!(4));
         assert_eq!(read(&configuration, "connect/endpoints"), json!(["tcp/192.0.2.1:7447"]));
