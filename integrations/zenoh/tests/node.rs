@@ -1,0 +1,287 @@
+//! The node from the other side, in one process.
+
+use bb_core::event::CommandEvent;
+use bb_core::message::codec::{decode_as_ros, encode};
+use bb_core::nalgebra::Vector3;
+use bb_core::prelude::*;
+use bb_core::{Bus, Options};
+use bb_ros2::{Address, Attachment, Endpoint, EndpointKind, Gid, Node, Qos, Token};
+use bb_zenoh::{Ros2Bridge, Ros2Options, Ros2State, Session, SessionSettings};
+use std::net::TcpListener;
+use std::time::Instant;
+use zenoh::Wait;
+
+/// Enough for a busy machine.
+const PATIENCE: Duration = Duration::from_secs(30);
+
+/// Does nothing.
+struct Rest;
+
+impl Command for Rest {
+    type Options = NoOptions;
+    type Arguments = NoArguments;
+    type Output = ();
+
+    async fn run(_: NoOptions, _: NoArguments, _: CommandContext) -> Result<Outcome<()>, Fault> {
+        Ok(Outcome::done(()))
+    }
+}
+
+robot! {
+    robot SmallCart;
+    parameters { speed: f64 = 0.5 m/s; }
+    commands { rest: Rest { allowed_states: [disarmed, idle]; } }
+    link base {
+        sensor imu: External<Imu>();
+        sensor marg: External<Marg>();
+    }
+}
+
+/// A robot that is a node by itself.
+mod own {
+    use bb_core::prelude::*;
+    use bb_zenoh::Ros2Bridge;
+
+    robot! {
+        pub(crate) robot Own;
+        bridges { bridge ros2: Ros2Bridge(listen = "tcp/127.0.0.1:0", namespace = "/site"); }
+        link base { sensor imu: External<Imu>(); }
+    }
+}
+
+/// A port of its own: with the same settings, it would be the session of another test.
+fn options() -> Ros2Options {
+    let free = TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr()).expect("one is free");
+    Ros2Options { listen: format!("tcp/{free}"), ..Ros2Options::defaults() }
+}
+
+fn bridged(robot: &Bus, options: Ros2Options) -> Ros2Bridge {
+    Ros2Bridge::serve(robot, options).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Another session, which knows the bridge alone.
+fn other(bridge: &Ros2Bridge) -> Session {
+    let settings = SessionSettings { connect: bridge.endpoints(), ..SessionSettings::default() };
+    let session = Session::open(&settings).expect("it is opened");
+    assert!(until(|| session.info().routers_zid().wait().next().is_some()), "it is not connected");
+    session
+}
+
+fn until(mut condition: impl FnMut() -> bool) -> bool {
+    let end = Instant::now() + PATIENCE;
+    while !condition() {
+        if Instant::now() > end {
+            return false;
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    true
+}
+
+fn imu(count: f64) -> Imu {
+    Imu::new(Vector3::zeros(), Vector3::new(count, 0.0, 9.81))
+}
+
+fn tokens(session: &Session) -> Vec<Token> {
+    let replies = session.liveliness().get("@ros2_lv/0/**").wait().expect("it is asked");
+    replies
+        .iter()
+        .map(|reply| reply.result().expect("it is a token").key_expr().as_str().parse().expect("ROS reads it"))
+        .collect()
+}
+
+/// The endpoint of that kind and name.
+fn endpoint(session: &Session, kind: EndpointKind, name: &str) -> Option<Endpoint> {
+    let endpoints = tokens(session).into_iter().filter_map(|token| token.endpoint);
+    endpoints.into_iter().find(|endpoint| endpoint.kind == kind && endpoint.address.name == name)
+}
+
+/// Calls a service without arguments in the name of a client, and returns what it answers: whether it succeeded, and the text.
+fn trigger(session: &Session, name: &str, client: Gid) -> (bool, String) {
+    let service = endpoint(session, EndpointKind::Service, name).expect("it is announced");
+    let attachment = Attachment { sequence: 7, time_ns: 1, gid: client };
+    let replies =
+        session.get(service.address.key(0)).payload([0, 1, 0, 0, 0]).attachment(attachment.to_bytes().as_slice());
+    let reply = replies.timeout(PATIENCE).wait().expect("it is asked").recv().expect("it is answered");
+    let sample = reply.result().unwrap_or_else(|error| panic!("{:?}", error.payload().try_to_string()));
+    let answered =
+        sample.attachment().map(|bytes| Attachment::from_bytes(&bytes.to_bytes()).expect("ROS reads it"));
+    assert_eq!(answered.map(|answered| (answered.sequence, answered.gid)), Some((7, client)));
+    let payload = sample.payload().to_bytes();
+    let text = payload.get(12..payload.len() - 1).expect("it has a text");
+    (payload[4] == 1, String::from_utf8(text.to_vec()).expect("it is text"))
+}
+
+#[test]
+fn every_message_goes_out_with_its_number_and_the_id_of_its_token() {
+    let robot = SmallCart::builder().simulate().expect("it starts");
+    let bridge = bridged(&robot, options());
+    assert_eq!(bridge.node(), "/small_cart");
+    let session = other(&bridge);
+    let token = tokens(&session)
+        .into_iter()
+        .find(|token| token.endpoint.as_ref().is_some_and(|endpoint| endpoint.address.name == "/sensor/base/imu"));
+    let token = token.expect("it is announced");
+    let address = &token.endpoint.as_ref().expect("it is one").address;
+    let messages = session.declare_subscriber(address.key(0)).wait().expect("it is declared");
+    let (seen, publisher) =
+        (|| messages.try_recv().ok().flatten(), robot.publisher("sensor/base/imu").expect("it may"));
+    // The first that comes shows that the subscription is known.
+    let mut first = None;
+    assert!(until(|| {
+        publisher.publish(imu(-1.0));
+        first = seen();
+        first.is_some()
+    }));
+    for count in 0..500 {
+        publisher.publish(imu(f64::from(count)));
+    }
+    let mut sequence =
+        Attachment::from_bytes(&first.expect("it came").attachment().expect("it has one").to_bytes())
+            .expect("it is one")
+            .sequence;
+    let mut counted = 0.0;
+    while counted < 500.0 {
+        let message = messages.recv_timeout(PATIENCE).expect("the session is open").expect("a message is missing");
+        let attachment =
+            Attachment::from_bytes(&message.attachment().expect("it has one").to_bytes()).expect("it is one");
+        assert_eq!((attachment.sequence, attachment.gid), (sequence + 1, Gid::of(&token.to_string())));
+        sequence += 1;
+        let (imu, _) = decode_as_ros::<Imu>(&message.payload().to_bytes()).expect("ROS reads it");
+        if imu.linear_acceleration.x >= 0.0 {
+            assert_eq!(imu.linear_acceleration.x, counted);
+            counted += 1.0;
+        }
+    }
+    assert_eq!(bridge.state().unpublished, 0);
+}
+
+#[test]
+fn what_ros_has_two_messages_for_has_two_topics_and_what_it_has_none_for_only_if_named() {
+    let robot = SmallCart::builder().simulate().expect("it starts");
+    let bridge = bridged(&robot, options());
+    let session = other(&bridge);
+    let kind = |name: &str| {
+        endpoint(&session, EndpointKind::Publisher, name).map(|found| found.address.type_name.to_string())
+    };
+    assert_eq!(kind("/sensor/base/marg").as_deref(), Some("sensor_msgs/msg/Imu"));
+    assert_eq!(kind("/sensor/base/marg/magnetic_field").as_deref(), Some("sensor_msgs/msg/MagneticField"));
+    assert_eq!(kind("/health"), None);
+    assert_eq!(kind("/clock").as_deref(), Some("rosgraph_msgs/msg/Clock"));
+    let latched = endpoint(&session, EndpointKind::Publisher, "/robot_description").expect("it is announced");
+    assert_eq!(latched.qos, Qos::LATCHED);
+
+    let named = bridged(&robot, Ros2Options { publish: "health".into(), node: "named".into(), ..options() });
+    let session = other(&named);
+    let health = endpoint(&session, EndpointKind::Publisher, "/health").expect("it is announced");
+    assert_eq!(health.address.type_name.to_string(), "bb_msgs/msg/HealthTransitionStamped");
+    assert_eq!(endpoint(&session, EndpointKind::Publisher, "/sensor/base/imu"), None);
+}
+
+#[test]
+fn a_caller_has_the_name_of_its_node_and_the_rights_of_the_options() {
+    let robot = SmallCart::builder().start().expect("it starts");
+    let bridge = bridged(&robot, options());
+    let session = other(&bridge);
+    let token = |name: &str| Token {
+        domain: 0,
+        session: session.zid().to_string(),
+        node_id: 0,
+        id: 1,
+        enclave: "/".into(),
+        node: Node::new("/", name).expect("it is a name"),
+        endpoint: Some(Endpoint {
+            kind: EndpointKind::Client,
+            address: Address {
+                name: "/small_cart/rest".into(),
+                ..endpoint(&session, EndpointKind::Service, "/small_cart/rest").expect("it is announced").address
+            },
+            qos: Qos::reliable(10),
+            backends: None,
+        }),
+    };
+    let operator = token("operator").to_string();
+    let _declared = session.liveliness().declare_token(operator.clone()).wait().expect("it is declared");
+    let events = robot.subscribe_any(Select::All, "CommandEvent", Overflow::default());
+    let mut caller = String::new();
+    // The token may come after the first call.
+    assert!(
+        until(|| {
+            assert_eq!(trigger(&session, "/small_cart/rest", Gid::of(&operator)), (true, "{}".to_owned()));
+            let last =
+                events.drain().filter_map(|event| Some(event.downcast::<CommandEvent>()?.caller.clone())).last();
+            caller = last.unwrap_or_default();
+            caller == "ros2 /operator"
+        }),
+        "the caller is `{caller}`"
+    );
+    let (armed, why) = trigger(&session, "/small_cart/arm", Gid::of(&operator));
+    assert!(!armed && why == "the robot was not armed: `ros2 /operator` does not have the right `arm`", "{why}");
+    assert!(trigger(&session, "/small_cart/disarm", Gid([0; 16])).0, "everybody may");
+    drop(bridge);
+    assert_eq!(endpoint(&session, EndpointKind::Service, "/small_cart/rest"), None);
+}
+
+#[test]
+fn only_external_paths_with_a_message_of_ros_are_inputs() {
+    let robot = SmallCart::builder().simulate().expect("it starts");
+    let refused = |subscribe: &str| {
+        let served = Ros2Bridge::serve(&robot, Ros2Options { subscribe: subscribe.into(), ..options() });
+        served.map(|_| ()).expect_err("it is refused").to_string()
+    };
+    assert_eq!(
+        refused("sensor/base/imus"),
+        "the robot is no node of ROS: `subscribe` has `sensor/base/imus`: the robot has no topic there"
+    );
+    assert!(refused("health").contains("only its own publisher publishes there"));
+    let taken = bridged(&robot, options());
+    let listen = taken.endpoints().join(" ");
+    let error = Ros2Bridge::serve(&robot, Ros2Options { listen: listen.clone(), mode: "peer".into(), ..options() });
+    let error = error.map(|_| ()).expect_err("the address is taken").to_string();
+    assert!(error.contains(&format!("no session of zenoh that listens on {listen}")), "{error}");
+}
+
+#[test]
+fn a_message_that_comes_in_is_not_sent_back() {
+    let robot = SmallCart::builder().simulate().expect("it starts");
+    let inputs = robot.subscribe_any(Select::Path("sensor/base/imu"), None, Overflow::default());
+    let bridge = bridged(&robot, Ros2Options { subscribe: "sensor/base/imu".into(), ..options() });
+    let session = other(&bridge);
+    assert_eq!(endpoint(&session, EndpointKind::Publisher, "/sensor/base/imu"), None);
+    let address =
+        endpoint(&session, EndpointKind::Subscription, "/sensor/base/imu").expect("it is announced").address;
+    let mut bytes = Vec::new();
+    let message = Imu::to_ros(&Stamped::new(MonotonicTime::default(), imu(3.0)));
+    encode(&message, &mut bytes);
+    let echoes = session.declare_subscriber("0/sensor/base/imu/**").wait().expect("it is declared");
+    let put = session.declare_publisher(address.key(0)).wait().expect("it is declared");
+    let mut sent = 0;
+    assert!(until(|| {
+        put.put(bytes.clone()).wait().expect("it is put");
+        sent += 1;
+        inputs
+            .try_recv()
+            .is_some_and(|message| message.downcast::<Imu>().is_some_and(|imu| imu.linear_acceleration.x == 3.0))
+    }));
+    assert!(bridge.state().received > 0 && bridge.state().refused == 0);
+    // What it has put comes to its own subscription, and nothing else.
+    std::thread::sleep(Duration::from_millis(100));
+    assert_eq!(echoes.drain().count(), sent);
+}
+
+#[test]
+fn a_robot_declares_that_it_is_a_node_in_one_line() {
+    let builder = own::Own::builder();
+    let states = builder.subscribe(own::own::bridge::ros2);
+    let robot = builder.start().expect("it starts");
+    let publisher = robot.publisher("sensor/base/imu").expect("it may");
+    let mut state = Ros2State::default();
+    assert!(
+        until(|| {
+            publisher.publish(imu(0.0));
+            state = states.try_recv().map_or(state, |state| state.payload);
+            state.published > 10
+        }),
+        "{state:?}"
+    );
+}
