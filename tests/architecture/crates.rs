@@ -57,6 +57,11 @@ fn arrows_between_crates_point_one_way() {
         ("integrations/redb", "bb-estimators"),
         ("integrations/redb", "bb-command"),
         ("integrations/ros2", "bb-"),
+        ("integrations/zenoh", "bb-macros"),
+        ("integrations/zenoh", "bb-estimators"),
+        ("integrations/zenoh", "bb-mcap"),
+        ("integrations/zenoh", "bb-cli"),
+        ("integrations/zenoh", "bb-eval"),
     ] {
         assert!(!depends(krate, on), "{krate} must not depend on {on}");
     }

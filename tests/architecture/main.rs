@@ -20,7 +20,7 @@ fn read(file: &str) -> String {
 }
 
 /// The folders of the crates with code that others use.
-const CRATES: [&str; 12] = [
+const CRATES: [&str; 13] = [
     "bb-macros",
     "bb-core",
     "bb-estimators",
@@ -33,6 +33,7 @@ const CRATES: [&str; 12] = [
     "integrations/plot",
     "integrations/redb",
     "integrations/ros2",
+    "integrations/zenoh",
 ];
 
 /// Returns all files of the project below a folder, without those that are built or hidden.

@@ -1,17 +1,18 @@
 //! A rover that nodes of ROS 2 drive: `cargo run --example rover`, then `ros2 topic list` with `RMW_IMPLEMENTATION=rmw_zenoh_cpp`.
 //!
 //! `--listen ENDPOINT` is another than `tcp/127.0.0.1:7447`, `--rate HERTZ` that of its IMU, and `--simulate` runs on virtual time, a little
-//! faster than the real one.
+//! faster than the real one. `--interfaces FOLDER` writes the package of the types that ROS does not have, and ends.
 
 use bb_core::nalgebra::Vector3;
 use bb_core::prelude::*;
 use bb_core::{Bus, Options};
-use bb_zenoh::{Ros2Bridge, Ros2Options};
+use bb_zenoh::{Ros2Bridge, Ros2Options, write_interfaces};
 use std::error::Error;
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
-/// Where it wants to go.
+/// The way ahead.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 struct Plan {
     /// Metres.
@@ -53,7 +54,7 @@ impl Command for Drive {
     type Output = f64;
 
     async fn run(_: NoOptions, of: Distance, context: CommandContext) -> Result<Outcome<f64>, Fault> {
-        context.bus().publisher("mission/plan")?.publish(Plan { distance: of.distance });
+        context.bus().publisher("sensor/base/plan")?.publish(Plan { distance: of.distance });
         context.sleep(Duration::from_secs_f64(of.distance / 10.0)).await;
         Ok(Outcome::done(of.distance))
     }
@@ -75,7 +76,7 @@ impl Command for GoHome {
 robot! {
     robot Rover;
     parameters {
-        /// How hard it turns.
+        /// Gain of its turns.
         kp: f64 = 1.0, range: 0.0..=10.0;
         gains { ki: f64 = 0.1; }
     }
@@ -86,6 +87,7 @@ robot! {
     link base {
         sensor imu: External<Imu>();
         sensor target: External<Twist>();
+        sensor plan: External<Plan>();
         estimator motion: Follow() { input target: sensor::base::target; }
     }
 }
@@ -95,11 +97,12 @@ struct Arguments {
     listen: String,
     rate: f64,
     is_simulated: bool,
+    interfaces: Option<PathBuf>,
 }
 
 impl Arguments {
     fn parse(mut given: impl Iterator<Item = String>) -> Result<Self, String> {
-        let mut arguments = Self { listen: String::new(), rate: 200.0, is_simulated: false };
+        let mut arguments = Self { listen: String::new(), rate: 200.0, is_simulated: false, interfaces: None };
         while let Some(name) = given.next() {
             let mut value = || given.next().ok_or_else(|| format!("`{name}` needs a value"));
             match name.as_str() {
@@ -109,9 +112,12 @@ impl Arguments {
                     let rate = value.parse().ok().filter(|rate: &f64| (0.1..=1e5).contains(rate));
                     arguments.rate = rate.ok_or_else(|| format!("`{value}` is no rate in hertz"))?;
                 }
+                "--interfaces" => arguments.interfaces = Some(value()?.into()),
                 "--simulate" => arguments.is_simulated = true,
                 other => {
-                    return Err(format!("`{other}` is unknown: expected `--listen`, `--rate` or `--simulate`"));
+                    return Err(format!(
+                        "`{other}` is unknown: expected `--listen`, `--rate`, `--interfaces` or `--simulate`"
+                    ));
                 }
             }
         }
@@ -131,10 +137,17 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
+    if let Some(folder) = &arguments.interfaces {
+        let robot = Rover::builder().simulate()?;
+        for file in write_interfaces(&robot, folder)? {
+            println!("{}", file.display());
+        }
+        return Ok(());
+    }
     let options = Ros2Options {
         listen: arguments.listen.clone(),
         rights: "parameters commands arm".into(),
-        publish: "sensor estimator mission".into(),
+        publish: "sensor estimator".into(),
         subscribe: "sensor/base/target".into(),
         ..Ros2Options::defaults()
     };

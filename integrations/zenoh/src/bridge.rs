@@ -1,88 +1,26 @@
 //! The bridge: a running robot as a node of ROS 2.
 
 use crate::clients::Clients;
+use crate::counts::{Counts, Ros2State};
+use crate::error::Ros2Error;
 use crate::inputs::Inputs;
 use crate::node::RosNode;
 use crate::options::Ros2Options;
 use crate::outputs::Outputs;
 use crate::services::Services;
-use crate::session::{Session, SessionError};
+use crate::session::Session;
 use bb_core::event::Right;
-use bb_core::{Bus, Fault, MonotonicTime, Payload, Reading, Service, ServiceContext};
-use bb_ros2::{NameError, Node, TypeError};
+use bb_core::{Bus, Fault, MonotonicTime, Reading, Service, ServiceContext};
+use bb_ros2::Node;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
-use thiserror::Error;
 
 /// Time for which an update without a rate waits.
 const WAIT: Duration = Duration::from_millis(100);
 /// Time between two messages of its state, of a bridge without a rate.
 const STATE: Duration = Duration::from_secs(1);
-
-/// Reason for which a robot is no node.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum Ros2Error {
-    /// An option has an unusable value.
-    #[error("the robot is no node of ROS: {0}")]
-    Options(Fault),
-    /// A name is not one of ROS.
-    #[error("the robot is no node of ROS: {0}")]
-    Name(#[from] NameError),
-    /// The name or the hash of a type is not one of ROS.
-    #[error("the robot is no node of ROS: {0}")]
-    Type(#[from] TypeError),
-    /// zenoh does not do what is asked.
-    #[error("the robot is no node of ROS: {0}")]
-    Session(#[from] SessionError),
-    /// A thread cannot be started.
-    #[error("the robot is no node of ROS, since a thread cannot be started: {0}")]
-    Thread(std::io::Error),
-}
-
-/// Numbers of messages and requests since the start of a [`Ros2Bridge`], published when they have changed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Payload)]
-pub struct Ros2State {
-    /// Messages put to other nodes.
-    pub published: u64,
-    /// Messages of the robot that were not put: the bridge was too slow, or zenoh refused them.
-    pub unpublished: u64,
-    /// Messages of other nodes that the robot took.
-    pub received: u64,
-    /// Messages of other nodes that it did not take: of another type, not to be read, or faster than it takes them.
-    pub refused: u64,
-    /// Requests to services that were answered.
-    pub requests: u64,
-}
-
-/// The counters of a bridge.
-#[derive(Debug, Default)]
-pub(crate) struct Counts {
-    pub(crate) published: AtomicU64,
-    pub(crate) unpublished: AtomicU64,
-    pub(crate) received: AtomicU64,
-    pub(crate) refused: AtomicU64,
-    pub(crate) requests: AtomicU64,
-}
-
-impl Counts {
-    pub(crate) fn add(counter: &AtomicU64, number: u64) {
-        counter.fetch_add(number, Ordering::Relaxed);
-    }
-
-    fn state(&self) -> Ros2State {
-        let read = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
-        Ros2State {
-            published: read(&self.published),
-            unpublished: read(&self.unpublished),
-            received: read(&self.received),
-            refused: read(&self.refused),
-            requests: read(&self.requests),
-        }
-    }
-}
 
 /// A running robot as a node of ROS 2, until it is dropped.
 ///

@@ -1,4 +1,4 @@
-//! What is wrong with a robot, as `/diagnostics` has it.
+//! The problems of a robot, as `/diagnostics` has it.
 
 use crate::messages::{DiagnosticArray, DiagnosticStatus, KeyValue};
 use bb_core::message::codec::ros::{Byte, Header, Time};

@@ -1,6 +1,7 @@
 //! Topics of other nodes that are inputs of the robot.
 
-use crate::bridge::{Counts, Ros2Error};
+use crate::counts::Counts;
+use crate::error::Ros2Error;
 use crate::node::{RosNode, RosSubscription};
 use bb_core::component::Description;
 use bb_core::{Bus, Fault};

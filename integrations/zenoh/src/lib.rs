@@ -5,8 +5,11 @@
 
 mod bridge;
 mod clients;
+mod counts;
 mod diagnostics;
+mod error;
 mod inputs;
+mod interfaces;
 mod messages;
 mod node;
 mod options;
@@ -15,6 +18,9 @@ mod parameters;
 mod services;
 mod session;
 
-pub use bridge::{Ros2Bridge, Ros2Error, Ros2State};
+pub use bridge::Ros2Bridge;
+pub use counts::Ros2State;
+pub use error::Ros2Error;
+pub use interfaces::write_interfaces;
 pub use options::Ros2Options;
 pub use session::{Mode, Session, SessionError, SessionSettings};

@@ -1,7 +1,15 @@
 //! Messages and services of ROS 2 that are no payloads of robots.
 
-use bb_core::Payload;
+use bb_core::message::codec::encode;
 use bb_core::message::codec::ros::{Byte, Header, Time};
+use bb_core::{Field, Payload};
+
+/// A message in CDR.
+pub(crate) fn bytes_of<T: Field>(message: &T) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    encode(message, &mut bytes);
+    bytes
+}
 
 /// `rosgraph_msgs/msg/Clock`
 #[derive(Clone, Debug, PartialEq, Payload)]
@@ -22,7 +30,7 @@ pub(crate) struct KeyValue {
 #[derive(Clone, Debug, PartialEq, Payload)]
 #[payload(name = "diagnostic_msgs/DiagnosticStatus")]
 pub(crate) struct DiagnosticStatus {
-    /// 0 as it should be, 1 a warning, 2 an error.
+    /// Level: 0 for all is well, 1 for a warning, 2 for an error.
     pub(crate) level: Byte,
     pub(crate) name: String,
     pub(crate) message: String,
@@ -80,7 +88,7 @@ pub(crate) struct ParameterEvent {
 pub(crate) struct FloatRange {
     pub(crate) from_value: f64,
     pub(crate) to_value: f64,
-    /// 0 for all between.
+    /// Step; 0 for all between.
     pub(crate) step: f64,
 }
 
@@ -90,7 +98,7 @@ pub(crate) struct FloatRange {
 pub(crate) struct IntegerRange {
     pub(crate) from_value: i64,
     pub(crate) to_value: i64,
-    /// 1 for all between.
+    /// Step; 1 for all between.
     pub(crate) step: u64,
 }
 
@@ -194,7 +202,6 @@ pub(crate) struct Outcome {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bb_core::Field;
     use bb_core::message::codec::{Shape, service_hash, type_hash};
 
     fn of_message<T: Field>() -> (String, String) {
@@ -202,7 +209,7 @@ mod tests {
         (shape.name.to_owned(), type_hash(shape.name, T::SHAPE))
     }
 
-    /// From the packages' `msg/*.json` and `srv/*.json` in ROS 2 Kilted; `check` compares with those that are installed.
+    /// Hashes from the packages' `msg/*.json` and `srv/*.json` in ROS 2 Kilted; `check` compares with those that are installed.
     #[test]
     fn hashes_are_those_of_ros() {
         let message = |(name, hash): (String, String), expected: &str| {

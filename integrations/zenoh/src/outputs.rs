@@ -1,15 +1,16 @@
 //! Topics of the robot, for other nodes.
 
-use crate::bridge::{Counts, Ros2Error};
+use crate::counts::Counts;
 use crate::diagnostics::diagnostics;
-use crate::messages::{Clock, DiagnosticArray, Parameter, ParameterEvent};
+use crate::error::Ros2Error;
+use crate::messages::{Clock, DiagnosticArray, Parameter, ParameterEvent, bytes_of};
 use crate::node::{RosNode, RosPublisher};
 use crate::parameters::value_of;
 use bb_core::component::{Description, RunKind};
 use bb_core::event::ParameterChange;
 use bb_core::joints::{ViewerChannel, ViewerMessage, ViewerMessages};
 use bb_core::message::codec::ros::Time;
-use bb_core::message::codec::{Layouts, Shape, encode, type_hash};
+use bb_core::message::codec::{Layouts, Shape, type_hash};
 use bb_core::{Bus, DynamicMessage, DynamicSubscription, Field, Overflow, Payload, Select, WallTime};
 use bb_ros2::{Address, Qos, parameter_name};
 use std::collections::HashMap;
@@ -45,7 +46,7 @@ pub(crate) struct Outputs {
     events: RosPublisher,
     diagnostics: RosPublisher,
     robot: String,
-    /// In a simulation, with the time that was published last.
+    /// The publisher of the clock, in a simulation, with the time that was published last.
     clock: Option<(RosPublisher, WallTime)>,
     messages: DynamicSubscription,
     changes: DynamicSubscription,
@@ -267,12 +268,6 @@ fn put(publisher: &mut RosPublisher, message: Vec<u8>, counts: &Counts) {
             tracing::warn!(%error, "a message is not published");
         }
     }
-}
-
-pub(crate) fn bytes_of<T: Field>(message: &T) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    encode(message, &mut bytes);
-    bytes
 }
 
 /// The address of a message of ROS's own at a topic.

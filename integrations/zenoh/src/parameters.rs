@@ -2,9 +2,8 @@
 
 use crate::messages::{
     Below, Descriptor, Descriptors, FloatRange, IntegerRange, ListResult, Listed, Names, Parameter, Parameters,
-    SetAll, SetResult, SetResults, Types, Value, Values,
+    SetAll, SetResult, SetResults, Types, Value, Values, bytes_of,
 };
-use crate::outputs::bytes_of;
 use bb_core::component::ParameterDescription;
 use bb_core::event::ParameterValue;
 use bb_core::message::DecodeError;
@@ -225,7 +224,7 @@ mod tests {
     robot! {
         robot Tuned;
         parameters {
-            /// How fast it goes.
+            /// Speed ahead.
             speed: f64 = 0.5 m/s, range: 0 m/s..=1.5 m/s;
             count: i64 = 3, range: 0..=9;
             name: String = "x";
@@ -273,7 +272,7 @@ mod tests {
         assert_eq!(types, [INTEGER, NOT_SET]);
         let described =
             ask::<Descriptors>(&robot, ParameterService::Describe, &names(&["speed", "count", "none"])).descriptors;
-        assert_eq!((described[0].description.as_str(), described[0].r#type), ("How fast it goes.", DOUBLE));
+        assert_eq!((described[0].description.as_str(), described[0].r#type), ("Speed ahead.", DOUBLE));
         assert_eq!(described[0].additional_constraints, "in SI; declared in m/s");
         assert_eq!(
             described[0].floating_point_range,

@@ -1,10 +1,10 @@
 //! Services: the commands of the robot, and its parameters.
 
-use crate::bridge::{Counts, Ros2Error};
 use crate::clients::Clients;
-use crate::messages::{Nothing, Outcome};
+use crate::counts::Counts;
+use crate::error::Ros2Error;
+use crate::messages::{Nothing, Outcome, bytes_of};
 use crate::node::{Request, RosNode, RosService};
-use crate::outputs::bytes_of;
 use crate::parameters::ParameterService;
 use bb_core::component::{CommandInfo, Description};
 use bb_core::message::codec::{Shape, bytes_to_json, service_hash};
@@ -137,7 +137,7 @@ pub(crate) fn arguments(command: &CommandInfo) -> Option<Shape> {
 }
 
 /// The type of the service for a command with arguments: `bb_msgs/srv/GoHome` for `command/go_home`.
-fn command_type(path: &str) -> String {
+pub(crate) fn command_type(path: &str) -> String {
     let path = path.strip_prefix("command/").unwrap_or(path);
     let mut name = String::new();
     for word in path.split(|letter: char| !letter.is_ascii_alphanumeric()) {

@@ -1,0 +1,46 @@
+//! Numbers of messages and requests.
+
+use bb_core::Payload;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Numbers of messages and requests since the start of a [`Ros2Bridge`](crate::Ros2Bridge), published when they have changed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Payload)]
+pub struct Ros2State {
+    /// Messages put to other nodes.
+    pub published: u64,
+    /// Messages of the robot that were not put: the bridge was too slow, or zenoh refused them.
+    pub unpublished: u64,
+    /// Messages of other nodes that the robot took.
+    pub received: u64,
+    /// Messages of other nodes that it did not take: of another type, not to be read, or faster than it takes them.
+    pub refused: u64,
+    /// Requests to services that were answered.
+    pub requests: u64,
+}
+
+/// The counters of a bridge.
+#[derive(Debug, Default)]
+pub(crate) struct Counts {
+    pub(crate) published: AtomicU64,
+    pub(crate) unpublished: AtomicU64,
+    pub(crate) received: AtomicU64,
+    pub(crate) refused: AtomicU64,
+    pub(crate) requests: AtomicU64,
+}
+
+impl Counts {
+    pub(crate) fn add(counter: &AtomicU64, number: u64) {
+        counter.fetch_add(number, Ordering::Relaxed);
+    }
+
+    pub(crate) fn state(&self) -> Ros2State {
+        let read = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
+        Ros2State {
+            published: read(&self.published),
+            unpublished: read(&self.unpublished),
+            received: read(&self.received),
+            refused: read(&self.refused),
+            requests: read(&self.requests),
+        }
+    }
+}
