@@ -1,0 +1,62 @@
+//! Messages that wait for a sensor.
+
+use super::wire::Attachment;
+use bb_core::MonotonicTime;
+use std::collections::VecDeque;
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Messages that wait; the oldest makes room for another, and shows as a gap in the numbers.
+const CAPACITY: usize = 64;
+
+/// A message as it came.
+#[derive(Clone, Debug)]
+pub(super) struct Arrived {
+    /// Time of arrival, on the local clock.
+    pub(super) arrival: MonotonicTime,
+    /// Hash of its layout.
+    pub(super) hash: String,
+    /// Payload's name by the sender.
+    pub(super) payload: String,
+    /// `None` if it is malformed.
+    pub(super) attachment: Option<Attachment>,
+    pub(super) bytes: Vec<u8>,
+}
+
+/// A bounded queue between zenoh's thread and that of the sensor.
+#[derive(Debug, Default)]
+pub(super) struct Inbox {
+    waiting: Mutex<VecDeque<Arrived>>,
+    changed: Condvar,
+}
+
+impl Inbox {
+    pub(super) fn put(&self, arrived: Arrived) {
+        let mut waiting = self.lock();
+        if waiting.len() >= CAPACITY {
+            waiting.pop_front();
+        }
+        waiting.push_back(arrived);
+        self.changed.notify_one();
+    }
+
+    /// The oldest message; waits for one until `timeout`.
+    pub(super) fn take(&self, timeout: Duration) -> Option<Arrived> {
+        let deadline = Instant::now() + timeout;
+        let mut waiting = self.lock();
+        loop {
+            if let Some(arrived) = waiting.pop_front() {
+                return Some(arrived);
+            }
+            let left = deadline.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return None;
+            }
+            waiting = self.changed.wait_timeout(waiting, left).unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, VecDeque<Arrived>> {
+        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
