@@ -57,7 +57,7 @@ impl Ros2Bridge {
             name => Node::new(&options.namespace, name)?,
         };
         let session = Session::open(&settings)?;
-        let node = Arc::new(RosNode::declare(session, options.domain, node)?);
+        let node = Arc::new(RosNode::declare(session, options.domain, node, options.hashes)?);
         let bus = robot.session("ros2", bb_core::event::Rights::ALL);
         let counts = Arc::<Counts>::default();
         let is_over = Arc::<AtomicBool>::default();

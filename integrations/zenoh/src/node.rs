@@ -21,13 +21,20 @@ pub(crate) struct RosNode {
     domain: u32,
     node: Node,
     number: u64,
+    /// Keys and tokens have the hashes of types, which Humble does not know.
+    has_hashes: bool,
     _token: LivelinessToken,
 }
 
 impl RosNode {
     /// # Errors
     /// The session is closed.
-    pub(crate) fn declare(session: Session, domain: u32, node: Node) -> Result<Self, SessionError> {
+    pub(crate) fn declare(
+        session: Session,
+        domain: u32,
+        node: Node,
+        has_hashes: bool,
+    ) -> Result<Self, SessionError> {
         let number = session.next_number();
         let token = Token {
             domain,
@@ -39,7 +46,7 @@ impl RosNode {
             endpoint: None,
         };
         let token = declare_token(&session, &token.to_string())?;
-        Ok(Self { session, domain, node, number, _token: token })
+        Ok(Self { session, domain, node, number, has_hashes, _token: token })
     }
 
     /// The names of the node.
@@ -50,6 +57,12 @@ impl RosNode {
     /// The session that it is in.
     pub(crate) fn session(&self) -> &Session {
         &self.session
+    }
+
+    /// The address as others know it.
+    fn announced(&self, address: &Address) -> Address {
+        let type_hash = if self.has_hashes { address.type_hash } else { TypeHash::Unsupported };
+        Address { type_hash, ..address.clone() }
     }
 
     /// Declares what others know an endpoint by.
@@ -66,7 +79,7 @@ impl RosNode {
             id: self.session.next_number(),
             enclave: "/".to_owned(),
             node: self.node.clone(),
-            endpoint: Some(Endpoint { kind, address: address.clone(), qos, backends: None }),
+            endpoint: Some(Endpoint { kind, address: self.announced(address), qos, backends: None }),
         };
         let token = token.to_string();
         Ok((declare_token(&self.session, &token)?, Gid::of(&token)))
@@ -77,7 +90,7 @@ impl RosNode {
     /// # Errors
     /// The session is closed.
     pub(crate) fn publisher(&self, address: &Address, qos: Qos) -> Result<RosPublisher, SessionError> {
-        let key = address.key(self.domain);
+        let key = self.announced(address).key(self.domain);
         let failed = SessionError::of(format!("declaring the publisher of {}", address.name));
         // What is put must arrive: with `Drop`, and with `express`, zenoh loses messages without a word.
         let plain = self.session.declare_publisher(key).congestion_control(CongestionControl::Block).express(false);

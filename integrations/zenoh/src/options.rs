@@ -19,6 +19,9 @@ pub struct Ros2Options {
     /// `ROS_DOMAIN_ID`.
     #[option(default = 0)]
     pub domain: u32,
+    /// `true` for hashes of types in keys and tokens, as ROS writes them since Iron. Nodes of Humble have none, and hear only what has none.
+    #[option(default = true)]
+    pub hashes: bool,
     /// Paths that are published, each with all below it. Empty for all that ROS has a message for; a path that is named is published even if it
     /// has none, with a type of `bb_msgs`.
     #[option(default = "")]

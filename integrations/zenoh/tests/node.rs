@@ -5,7 +5,7 @@ use bb_core::message::codec::{decode_as_ros, encode};
 use bb_core::nalgebra::Vector3;
 use bb_core::prelude::*;
 use bb_core::{Bus, Options};
-use bb_ros2::{Address, Attachment, Endpoint, EndpointKind, Gid, Node, Qos, Token};
+use bb_ros2::{Address, Attachment, Endpoint, EndpointKind, Gid, Node, Qos, Token, TypeHash};
 use bb_zenoh::{Ros2Bridge, Ros2Options, Ros2State, Session, SessionSettings};
 use std::net::TcpListener;
 use std::time::Instant;
@@ -176,6 +176,24 @@ fn what_ros_has_two_messages_for_has_two_topics_and_what_it_has_none_for_only_if
     let health = endpoint(&session, EndpointKind::Publisher, "/health").expect("it is announced");
     assert_eq!(health.address.type_name.to_string(), "bb_msgs/msg/HealthTransitionStamped");
     assert_eq!(endpoint(&session, EndpointKind::Publisher, "/sensor/base/imu"), None);
+}
+
+#[test]
+fn a_node_without_hashes_is_one_of_humble() {
+    let robot = SmallCart::builder().start().expect("it starts");
+    let bridge = bridged(&robot, Ros2Options { hashes: false, ..options() });
+    let session = other(&bridge);
+    let endpoints = tokens(&session).into_iter().filter_map(|token| token.endpoint);
+    assert!(endpoints.into_iter().all(|endpoint| endpoint.address.type_hash == TypeHash::Unsupported));
+    let key = "0/sensor/base/imu/sensor_msgs::msg::dds_::Imu_/TypeHashNotSupported";
+    let messages = session.declare_subscriber(key).wait().expect("it is declared");
+    let publisher = robot.publisher("sensor/base/imu").expect("it may");
+    assert!(until(|| {
+        publisher.publish(imu(1.0));
+        messages.try_recv().ok().flatten().is_some()
+    }));
+    let client = Gid([7; 16]);
+    assert_eq!(trigger(&session, "/small_cart/rest", client), (true, "{}".to_owned()));
 }
 
 #[test]
