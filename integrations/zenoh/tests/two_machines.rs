@@ -1,4 +1,4 @@
-//! The example of two machines, as it is run by hand: it takes a quarter of a minute, and fails unless all happened that should.
+//! The example of two machines, as it is run by hand: it takes a third of a minute, and fails unless all happened that should.
 
 #[path = "../examples/two_machines/main.rs"]
 mod story;
