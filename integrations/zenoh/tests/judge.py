@@ -347,20 +347,25 @@ def through(rover):
     listener.close()
 
 
-def gone(rover, with_signal, within):
-    """How long its tokens outlive it. The session's own lease must not be the shorter one: it is zenoh's 10 s."""
-    session = rover.session()
-    seen = Tokens(session)
-    until(lambda: len(seen.alive) >= NUMBER_OF_TOKENS, 10)
-    time.sleep(0.3)
-    number, at = len(seen.alive), time.monotonic()
-    rover.process.send_signal(with_signal)
-    until(lambda: not seen.alive, 20)
-    took = max(seen.gone_at.values(), default=float("inf")) - at
-    check(f"tokens are gone within {within} s of {with_signal.name}", number >= NUMBER_OF_TOKENS and not seen.alive and took <= within,
-          f"{len(seen.gone_at)} of {number} after {took:.3f} s")
-    rover.process.kill()
-    session.close()
+def gone(with_signal, within):
+    """How long its tokens outlive a rover. The lease of the judge's session must not be the shorter one: it is zenoh's 10 s. A busy machine may
+    be late: the least time of three counts."""
+    times = []
+    for _ in range(3):
+        with Rover() as rover:
+            session = rover.session()
+            seen = Tokens(session)
+            until(lambda: len(seen.alive) >= NUMBER_OF_TOKENS, 10)
+            time.sleep(0.3)
+            number, at = len(seen.alive), time.monotonic()
+            rover.process.send_signal(with_signal)
+            is_gone = until(lambda: not seen.alive, 20)
+            times.append(max(seen.gone_at.values()) - at if is_gone and number == NUMBER_OF_TOKENS else float("inf"))
+            rover.process.kill()
+            session.close()
+        if times[-1] <= within:
+            break
+    check(f"tokens are gone within {within} s of {with_signal.name}", min(times) <= within, times)
 
 
 def clock():
@@ -433,9 +438,8 @@ def main():
         latched(rover)
         through(rover)
         back(rover, 400)
-        gone(rover, signal.SIGKILL, 0.1)
-    with Rover() as rover:
-        gone(rover, signal.SIGSTOP, 1.5)
+    gone(signal.SIGKILL, 0.1)
+    gone(signal.SIGSTOP, 1.5)
     clock()
     interfaces()
     with Busy():
