@@ -24,6 +24,24 @@ const STATE: Duration = Duration::from_secs(1);
 
 /// A running robot as a node of ROS 2, until it is dropped.
 ///
+/// ```no_run
+/// use bb_core::prelude::*;
+/// use bb_zenoh::{Ros2Bridge, Ros2Options};
+/// # use bb_core::Options;
+///
+/// robot! { robot Rover; link base { sensor imu: External<Imu>(); } }
+///
+/// fn main() -> Result<(), Box<dyn std::error::Error>> {
+///     let mut running = Rover::builder().start()?;
+///     let node = Ros2Bridge::serve(&running, Ros2Options::defaults())?;
+///     println!("{} at {}", node.node(), node.endpoints().join(" "));
+///     running.wait();
+///     Ok(())
+/// }
+/// ```
+///
+/// Or as a line of the robot: `bridge ros2: Ros2Bridge();`.
+///
 /// Nothing of the robot waits for the network: the threads of the bridge take from a bounded queue, and what does not fit is counted.
 #[derive(Debug)]
 pub struct Ros2Bridge {
