@@ -19,6 +19,8 @@
 //! scatter more than they state get the noise of their scatter (`scatter.rs`).
 
 mod filter;
+#[cfg(any(feature = "smoother", feature = "eskf"))]
+mod flight;
 mod holding;
 mod newcomer;
 mod scatter;
@@ -33,23 +35,15 @@ use nalgebra::{Isometry3, Vector3};
 
 pub(super) use self::filter::{CopiedFilter, Fix, Update, is_same};
 use self::holding::Holding;
-pub(super) use self::newcomer::Newcomer;
-#[cfg(feature = "smoother")]
-pub(super) use self::newcomer::Settled;
+use self::newcomer::Newcomer;
 use self::scatter::Scatter;
 use self::search::Search;
 use super::bounds::is_within;
 use super::chi_square::limit;
 use super::eskf::{Eskf, ImuMean, LONGEST_GAP_S, seconds_between};
 use super::fused::Fused;
-#[cfg(feature = "eskf")]
-use super::math::sqrt;
-#[cfg(feature = "eskf")]
-use super::measurement::GnssPosition;
 use super::propagate::Propagate;
 use super::refusal::Refusal;
-#[cfg(feature = "eskf")]
-use super::state::ROTATION;
 use super::state::States;
 use super::stream::Stream;
 use crate::attitude::ParamsError;
@@ -392,53 +386,6 @@ impl<S: States, const N: usize> Copies<Eskf<S, N>> {
             filter.set_keyframe(id);
             Ok(())
         });
-    }
-
-    /// Fuses a fix of a receiver that may lie: one that the filter refuses shows nothing.
-    ///
-    /// # Errors
-    ///
-    /// The same as [`update`](Self::update).
-    #[cfg(feature = "eskf")]
-    pub(in crate::navigation) fn update_doubted_fix(
-        &mut self,
-        stream: &mut Stream,
-        fix: &GnssPosition,
-    ) -> Result<Fused, Refusal> {
-        let result = self.is_admitted(fix, SLACK, FAR);
-        let shown = self.shown(fix);
-        if let Some(newcomer) = &mut self.newcomer {
-            newcomer.aid(fix, &shown, FAR);
-        }
-        self.fuse(stream, &shown, result)
-    }
-
-    /// The largest standard deviation of the attitude about any axis, rad: of the best copy, or of one that is unknown while others that
-    /// are plausible are far from it.
-    #[cfg(feature = "eskf")]
-    pub(in crate::navigation) fn attitude_deviation(&self) -> f64 {
-        let attitude = |begun: &Begun<Eskf<S, N>>| begun.filter.estimate().map(|at| at.world_from_body);
-        let best = attitude(&self.starts[0]);
-        let is_far = |begun: &Begun<Eskf<S, N>>| {
-            best.zip(attitude(begun)).is_some_and(|(best, other)| best.angle_to(&other) > UNKNOWN)
-        };
-        if self.starts.iter().any(is_far) {
-            return core::f64::consts::PI;
-        }
-        let covariance = self.best().covariance();
-        sqrt((ROTATION..ROTATION + 3).map(|i| covariance[(i, i)]).fold(0.0, f64::max))
-    }
-
-    /// Sets the time, which is known to a standard deviation.
-    #[cfg(feature = "eskf")]
-    pub(in crate::navigation) fn set_clock(&mut self, time_ns: i64, deviation_s: f64) {
-        let before_ns = self.time_ns().unwrap_or(time_ns);
-        self.started_ns = self.started_ns.saturating_add(time_ns.saturating_sub(before_ns));
-        self.starts.iter_mut().for_each(|begun| begun.filter.set_clock(time_ns, deviation_s));
-        self.newcomer = None;
-        self.search.orphan();
-        self.holding.interrupt();
-        self.scatter.interrupt();
     }
 
     /// See [`Eskf::move_world`].

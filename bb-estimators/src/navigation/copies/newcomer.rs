@@ -13,8 +13,8 @@ pub(super) const FARTHEST: f64 = 100_000.0;
 
 /// A filter that waits to take over.
 #[derive(Clone, Debug)]
-pub(in crate::navigation) struct Newcomer<F: CopiedFilter> {
-    pub(in crate::navigation) filter: F,
+pub(super) struct Newcomer<F: CopiedFilter> {
+    pub(super) filter: F,
     born_ns: i64,
     /// Time for which it has to fit, s.
     probation_s: f64,
@@ -22,7 +22,7 @@ pub(in crate::navigation) struct Newcomer<F: CopiedFilter> {
 
 /// Decision between a filter and its newcomer by a position.
 #[derive(Debug)]
-pub(in crate::navigation) enum Settled<F: CopiedFilter> {
+enum Settled<F: CopiedFilter> {
     /// The filter keeps its place.
     Kept,
     /// The newcomer has fused the position.
@@ -35,11 +35,7 @@ pub(in crate::navigation) enum Settled<F: CopiedFilter> {
 
 impl<F: CopiedFilter> Newcomer<F> {
     /// A copy of a filter that had been right since a time, as if it were where this position is.
-    pub(in crate::navigation) fn new<M, const D: usize>(
-        filter: F,
-        right_since_ns: i64,
-        measurement: &M,
-    ) -> Option<Self>
+    fn new<M, const D: usize>(filter: F, right_since_ns: i64, measurement: &M) -> Option<Self>
     where
         F: Update<M, D>,
     {
@@ -59,14 +55,8 @@ impl<F: CopiedFilter> Newcomer<F> {
         Some(Self { filter, born_ns, probation_s: age_s.min(LONGEST_S) })
     }
 
-    /// The time since which it has been right.
-    #[cfg(feature = "smoother")]
-    pub(in crate::navigation) fn born_ns(&self) -> i64 {
-        self.born_ns
-    }
-
     /// Fuses a measurement of another sensor, if it fits.
-    pub(in crate::navigation) fn aid<M, const D: usize>(&mut self, own: &M, measurement: &M, most: f64)
+    pub(super) fn aid<M, const D: usize>(&mut self, own: &M, measurement: &M, most: f64)
     where
         F: Update<M, D>,
     {
@@ -76,11 +66,7 @@ impl<F: CopiedFilter> Newcomer<F> {
     }
 
     /// Decides by a position whose log likelihood is `admitted` for the filter, if that admits it.
-    pub(in crate::navigation) fn settle<M, const D: usize>(
-        newcomer: &mut Option<Self>,
-        measurement: &M,
-        admitted: Option<f64>,
-    ) -> Settled<F>
+    fn settle<M, const D: usize>(newcomer: &mut Option<Self>, measurement: &M, admitted: Option<f64>) -> Settled<F>
     where
         F: Update<M, D>,
     {

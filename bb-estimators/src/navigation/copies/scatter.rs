@@ -44,6 +44,8 @@ pub(super) struct Scatter {
     /// Variances that differences show, m², the newest first.
     variances: [f64; DIFFERENCES],
     count: usize,
+    /// The variance that the last fix got beside its own, m².
+    more: f64,
 }
 
 impl Scatter {
@@ -85,7 +87,13 @@ impl Scatter {
             }
         }
         let shown = self.shown().max(alone);
-        fix.with_noise((shown - stated).max(0.0))
+        self.more = (shown - stated).max(0.0);
+        self.as_shown(fix)
+    }
+
+    /// The last fix with the noise that it got.
+    pub(super) fn as_shown<M: Fix>(&self, fix: &M) -> M {
+        fix.with_noise(self.more)
     }
 
     /// The variance of an axis that the last fixes show, m²; 0 as long as there are few.

@@ -114,7 +114,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
     }
 
     /// Sets the time, which is known to a standard deviation: the motion is as uncertain as what the body does in that.
-    #[cfg(feature = "eskf")]
+    #[cfg(any(feature = "smoother", feature = "eskf"))]
     pub(in crate::navigation) fn set_clock(&mut self, time_ns: i64, deviation_s: f64) {
         let Some(estimate) = &mut self.estimate else { return };
         self.upkeep.fixed_ns = self.upkeep.fixed_ns.saturating_add(time_ns.saturating_sub(estimate.time_ns));

@@ -252,13 +252,10 @@ impl<S: States, const N: usize> Eskf<S, N> {
         Ok(())
     }
 
-    /// Multiplies the white noise of the IMU, as a deviation. The walks of its biases stay: a multiple of them, found on noise, made
-    /// the biases follow every error of the model.
+    /// Multiplies the white noise of the IMU, as a deviation.
     #[cfg(feature = "alloc")]
     pub(in crate::navigation) fn multiply_noise(&mut self, multiple: f64) {
-        let densities = self.params.densities();
-        self.densities.gyroscope = densities.gyroscope * multiple * multiple;
-        self.densities.accelerometer = densities.accelerometer * multiple * multiple;
+        self.densities = self.params.densities().times(multiple);
     }
 
     /// Multiplies the covariance.

@@ -128,6 +128,16 @@ pub struct ImuDensities {
     pub gyroscope_bias: f64,
 }
 
+impl ImuDensities {
+    /// The densities with the white noise of the IMU, as a deviation, multiplied. The walks of its biases stay: a multiple of them, found on
+    /// noise, made the biases follow every error of the model.
+    #[cfg(feature = "alloc")]
+    pub(in crate::navigation) fn times(self, multiple: f64) -> Self {
+        let factor = multiple * multiple;
+        Self { accelerometer: self.accelerometer * factor, gyroscope: self.gyroscope * factor, ..self }
+    }
+}
+
 /// A first-order Gauss–Markov process: a state that varies but stays bounded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GaussMarkov {

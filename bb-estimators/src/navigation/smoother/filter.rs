@@ -15,7 +15,7 @@ use super::params::SmootherParams;
 use super::preintegration::Preintegration;
 use super::scratch::Scratch;
 use crate::attitude::ParamsError;
-use crate::navigation::eskf::{EskfParams, ImuMean, LONGEST_GAP_S, Start, seconds_between};
+use crate::navigation::eskf::{EskfParams, GaussMarkov, ImuMean, LONGEST_GAP_S, Start, seconds_between};
 use crate::navigation::math::unit;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{Estimate, NAVIGATION, Navigation, Optional, States, distinct, offset};
@@ -73,6 +73,8 @@ pub struct FixedLagSmoother<S: States = Navigation, const N: usize = NAVIGATION,
     /// `None` without a camera.
     pub(super) landmarks: Option<Landmarks<N>>,
     pub(super) scratch: Scratch<N>,
+    /// The multiple of the white noise of the IMU, as a deviation.
+    noise: f64,
     pub(super) gaps: u32,
     pub(super) marginalised: u64,
     pub(super) states: PhantomData<S>,
@@ -117,6 +119,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
             is_pending: false,
             landmarks: None,
             scratch: Scratch::new(params.window + 1),
+            noise: 1.0,
             gaps: 0,
             marginalised: 0,
             states: PhantomData,
@@ -137,6 +140,30 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         SmootherParams { sensors, ..self.params }.check()?;
         self.params.sensors = sensors;
         Ok(())
+    }
+
+    /// Sets the multiple of the white noise of the IMU, as a deviation, from now on. If it was smaller, what the window has concluded from
+    /// the IMU was too certain all along: that is weakened by as much.
+    pub(in crate::navigation) fn set_noise(&mut self, multiple: f64) {
+        let factor = (multiple / self.noise) * (multiple / self.noise);
+        self.noise = multiple;
+        if factor > 1.0 {
+            for index in 0..self.window.len() {
+                let Some(keyframe) = self.window.get_mut(index) else { break };
+                keyframe.raised *= factor;
+                if let Some(Prior { information, .. }) = &mut keyframe.prior {
+                    let values = information.matrix.iter_mut().flatten().chain(&mut information.vector);
+                    values.for_each(|x| *x /= factor);
+                }
+                self.linearise(index);
+            }
+            self.dirty = 0;
+        }
+    }
+
+    /// Sets how the scale of relative poses drifts from now on. What is known of it stays.
+    pub(in crate::navigation) fn set_relative_scale(&mut self, process: GaussMarkov) {
+        self.params.sensors.relative_scale = process;
     }
 
     /// Starts or restarts with one keyframe. Optional states are zero, with the standard deviations of the parameters.
@@ -256,7 +283,8 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         let dt = seconds_between(self.time_ns, sample.time_ns)?;
         let sensors = &self.params.sensors;
         if dt <= sensors.longest_sample && !is_gap {
-            self.motion.add(&sample.angular_velocity, &sample.specific_force, dt, &sensors.densities());
+            let densities = sensors.densities().times(self.noise);
+            self.motion.add(&sample.angular_velocity, &sample.specific_force, dt, &densities);
             self.last = *sample;
         } else if dt <= LONGEST_GAP_S {
             // The specific force that cancels gravity.

@@ -124,7 +124,6 @@ impl<const N: usize> Rows<N> {
     }
 
     /// The whitened residual and Jacobian rows of the keyframe.
-    #[cfg(feature = "eskf")]
     pub(in crate::navigation) fn alone(&self) -> (&[f64], &[[f64; N]]) {
         (&self.residual[..self.count], &self.at[..self.count])
     }

@@ -1,7 +1,6 @@
 //! Factors that outside providers add directly to the window.
 
 use crate::navigation::smoother::Factor;
-#[cfg(feature = "eskf")]
 use crate::navigation::state::{NAVIGATED, Navigated};
 use core::fmt::Debug;
 
@@ -34,9 +33,7 @@ macro_rules! provided {
     };
 }
 
-#[cfg(all(feature = "smoother", feature = "eskf"))]
+#[cfg(feature = "smoother")]
 provided!(Factor<Smoothed, SMOOTHED>, Factor<Navigated, NAVIGATED>);
-#[cfg(all(feature = "smoother", not(feature = "eskf")))]
-provided!(Factor<Smoothed, SMOOTHED>);
-#[cfg(all(feature = "eskf", not(feature = "smoother")))]
+#[cfg(not(feature = "smoother"))]
 provided!(Factor<Navigated, NAVIGATED>);

@@ -1,6 +1,5 @@
 //! The two estimation strategies and their common interface.
 
-#[cfg(feature = "eskf")]
 mod eskf;
 mod predictor;
 #[cfg(feature = "smoother")]

@@ -10,10 +10,16 @@ use nalgebra::{Isometry3, SMatrix, UnitQuaternion, Vector3};
 use super::{Cadence, Failure, Measured, Pose, Predictor, Streams, Trust, id_of};
 use crate::attitude::ParamsError;
 use crate::navigation::copies::{Copies, UNKNOWN, Ways};
+#[cfg(feature = "smoother")]
+use crate::navigation::eskf::GaussMarkov;
 use crate::navigation::eskf::{Eskf, ImuMean, Start};
 use crate::navigation::fused::Fused;
+#[cfg(feature = "smoother")]
+use crate::navigation::measurement::GnssPosition;
 use crate::navigation::propagate::Propagate as _;
 use crate::navigation::refusal::Refusal;
+#[cfg(feature = "smoother")]
+use crate::navigation::state::Estimate;
 use crate::navigation::state::{NAVIGATED, Navigated};
 use crate::navigation::state_estimator::factor::ProvidedFactor;
 use crate::navigation::state_estimator::params::StateEstimatorConfig;
@@ -33,6 +39,7 @@ pub(in crate::navigation::state_estimator) struct EskfStrategy {
     is_next: bool,
 }
 
+#[cfg_attr(not(feature = "eskf"), expect(dead_code, reason = "beside the smoother, that is the estimate"))]
 impl EskfStrategy {
     pub(super) fn new(config: &StateEstimatorConfig) -> Result<Self, ParamsError> {
         let window = config.params.window as usize;
@@ -81,7 +88,8 @@ impl EskfStrategy {
         Ok(())
     }
 
-    fn keyframe(&mut self) -> Result<(), Failure> {
+    /// Makes the present a keyframe.
+    pub(super) fn keyframe(&mut self) -> Result<(), Failure> {
         let pose = self.pose().ok_or(Refusal::NotStarted)?;
         if pose.time_ns == self.cadence.keyframe_ns {
             return Ok(());
@@ -135,6 +143,43 @@ impl EskfStrategy {
         best.estimate().map(|estimate| Pose::of(estimate, best.covariance()))
     }
 
+    /// The multiple of the IMU's white noise that fits.
+    #[cfg(feature = "smoother")]
+    pub(super) fn noise(&self) -> f64 {
+        self.copies.noise()
+    }
+
+    /// The drift of the scale of relative poses that fits.
+    #[cfg(feature = "smoother")]
+    pub(super) fn relative_scale(&self) -> GaussMarkov {
+        self.copies.best().params().relative_scale
+    }
+
+    /// The last fix with the noise that it was fused with.
+    #[cfg(feature = "smoother")]
+    pub(super) fn shown(&self, fix: &GnssPosition) -> GnssPosition {
+        self.copies.as_shown(fix)
+    }
+
+    /// Returns whether the velocity of the last fix that had one was fused.
+    #[cfg(feature = "smoother")]
+    pub(super) fn has_fused_velocity(&self) -> bool {
+        self.streams.velocities.counts().gate_in_a_row == 0
+    }
+
+    /// Returns whether the camera determines the times of keyframes.
+    #[cfg(feature = "smoother")]
+    pub(super) fn has_camera(&self) -> bool {
+        self.copies.estimate().is_some_and(|now| self.cadence.has_camera(now.time_ns))
+    }
+
+    /// The present state and its covariance.
+    #[cfg(feature = "smoother")]
+    pub(super) fn state(&self) -> Option<(&Estimate<NAVIGATED>, &SMatrix<f64, NAVIGATED, NAVIGATED>)> {
+        let best = self.copies.best();
+        best.estimate().map(|estimate| (estimate, best.covariance()))
+    }
+
     pub(super) fn motion(&self) -> Option<(Vector3<f64>, Vector3<f64>)> {
         self.copies.estimate().map(|estimate| (estimate.position, estimate.velocity))
     }
@@ -153,7 +198,7 @@ impl EskfStrategy {
 
     pub(super) fn predictor(&self) -> Option<Predictor> {
         self.copies.estimate()?;
-        Some(Predictor::Copy(*self.copies.best()))
+        Some(Predictor::of(self.copies.best()))
     }
 
     pub(super) fn newest(&self) -> Option<Pose> {

@@ -6,49 +6,37 @@ use crate::navigation::eskf::EskfParams;
 use crate::navigation::eskf::{Eskf, ImuMean};
 use crate::navigation::refusal::Refusal;
 #[cfg(feature = "smoother")]
-use crate::navigation::state::{Estimate, Navigation, States};
-#[cfg(feature = "eskf")]
+use crate::navigation::state::{Estimate, States};
 use crate::navigation::state::{NAVIGATED, Navigated};
 #[cfg(feature = "smoother")]
 use nalgebra::SMatrix;
 
-#[allow(clippy::large_enum_variant, reason = "there is one of it, and one variant where one strategy was built")]
 /// A filter that is never corrected.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::navigation::state_estimator) enum Predictor {
-    /// Filter that starts at a keyframe of the smoother.
-    #[cfg(feature = "smoother")]
-    FromKeyframe(Eskf<Navigation>),
-    /// A copy of the filter.
-    #[cfg(feature = "eskf")]
-    Copy(Eskf<Navigated, NAVIGATED>),
-}
-
-macro_rules! each {
-    ($self:expr, $filter:ident => $do:expr) => {
-        match $self {
-            #[cfg(feature = "smoother")]
-            Predictor::FromKeyframe($filter) => $do,
-            #[cfg(feature = "eskf")]
-            Predictor::Copy($filter) => $do,
-        }
-    };
-}
+pub(in crate::navigation::state_estimator) struct Predictor(Eskf<Navigated, NAVIGATED>);
 
 impl Predictor {
+    /// A copy of the filter.
+    pub(super) fn of(filter: &Eskf<Navigated, NAVIGATED>) -> Self {
+        Self(*filter)
+    }
+
+    /// A filter that starts at a keyframe of the smoother.
     #[cfg(feature = "smoother")]
     pub(super) fn from_keyframe<S: States, const N: usize>(
         params: &EskfParams,
+        noise: f64,
         estimate: &Estimate<N>,
         covariance: &SMatrix<f64, N, N>,
     ) -> Option<Self> {
         let mut filter = Eskf::new(*params).ok()?;
+        filter.multiply_noise(noise);
         filter.adopt::<S, N>(estimate, covariance).ok()?;
-        Some(Self::FromKeyframe(filter))
+        Some(Self(filter))
     }
 
     pub(in crate::navigation::state_estimator) fn time_ns(&self) -> i64 {
-        each!(self, filter => filter.estimate().map_or(i64::MIN, |estimate| estimate.time_ns))
+        self.0.estimate().map_or(i64::MIN, |estimate| estimate.time_ns)
     }
 
     pub(in crate::navigation::state_estimator) fn propagate(
@@ -56,10 +44,10 @@ impl Predictor {
         sample: &ImuMean,
         is_gap: bool,
     ) -> Result<(), Refusal> {
-        each!(self, filter => filter.propagate_part(sample, is_gap))
+        self.0.propagate_part(sample, is_gap)
     }
 
     pub(in crate::navigation::state_estimator) fn pose(&self) -> Option<Pose> {
-        each!(self, filter => Some(Pose::of(filter.estimate()?, filter.covariance())))
+        self.0.estimate().map(|estimate| Pose::of(estimate, self.0.covariance()))
     }
 }

@@ -1,4 +1,7 @@
-//! The fixed-lag smoother.
+//! The fixed-lag smoother, beside the filter.
+//!
+//! The [filter](super::eskf) runs with the same inputs. It decides what is fused, finds the noise of the IMU and of fixes and whether the
+//! scale of relative poses drifts, and moves to where positions agree: the window has its noise, and restarts where it has gone.
 //!
 //! Keyframes are the frames of the camera. Without a camera, they are made at intervals, and at measurements. A measurement between
 //! two keyframes is carried back to the earlier one by the motion since then.
@@ -7,19 +10,18 @@ use alloc::vec::Vec;
 
 use nalgebra::{Isometry3, Matrix3, SMatrix, UnitQuaternion, Vector3};
 
-use super::{Cadence, Failure, Measured, Pose, Predictor, Streams, Trust, add_time, id_of};
+use super::eskf::EskfStrategy;
+use super::{Failure, Measured, Pose, Predictor, Streams, add_time, id_of};
 use crate::attitude::ParamsError;
-use crate::navigation::chi_square::limit;
-use crate::navigation::copies::{FAR, Newcomer, SLACK, Settled};
-use crate::navigation::eskf::{Eskf, ImuMean, Start, seconds_between};
+use crate::navigation::eskf::{ImuMean, Start, seconds_between};
 use crate::navigation::fused::Fused;
-use crate::navigation::measurement::{AbsolutePose, GnssPosition, GnssVelocity, Measurement};
+use crate::navigation::measurement::{AbsolutePose, GnssPosition, GnssVelocity};
 use crate::navigation::refusal::Refusal;
 use crate::navigation::smoother::{Factor, FixedLagSmoother, NavigationFactor, Rows, SmootherParams};
 use crate::navigation::state::{Estimate, NAVIGATED, Navigated, Optional, POSITION, ROTATION, States, VELOCITY};
 use crate::navigation::state_estimator::factor::{ProvidedFactor, SMOOTHED, Smoothed};
 use crate::navigation::state_estimator::params::StateEstimatorConfig;
-use crate::navigation::stream::Stream;
+use crate::navigation::stream::{Stream, StreamParams};
 
 #[expect(clippy::large_enum_variant, reason = "factors of providers are as large as theirs are")]
 /// Configuration of a window.
@@ -54,18 +56,12 @@ impl<S: States, const N: usize, F: Factor<S, N>> Factor<S, N> for Held<F> {
 #[derive(Clone, Debug)]
 pub(in crate::navigation::state_estimator) struct SmootherStrategy<F: ProvidedFactor> {
     smoother: FixedLagSmoother<Smoothed, SMOOTHED, Held<F>>,
-    streams: Streams,
-    cadence: Cadence,
+    filter: EskfStrategy,
+    /// A stream without a gate, for measurements that the filter has fused.
+    open: Stream,
     records: bool,
     left: Option<Pose>,
     is_converged: bool,
-    /// The window's filter as if it had been where positions are that do not fit.
-    newcomer: Option<Newcomer<Eskf<Navigated, NAVIGATED>>>,
-    /// `true` if the present becomes the reference of the newcomer's next relative pose.
-    is_next: bool,
-    /// The time since which the window has been in its place.
-    since_ns: i64,
-    resets: u32,
 }
 
 /// Motion from the newest keyframe to the present.
@@ -84,15 +80,11 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
         let params = SmootherParams { sensors: config.sensors, window, ..SmootherParams::default() };
         Ok(Self {
             smoother: FixedLagSmoother::new(params)?,
-            streams: Streams::new(),
-            cadence: Cadence::new(config),
+            filter: EskfStrategy::new(config)?,
+            open: Stream::new(StreamParams { gate: 0.0, patience: 0, ..StreamParams::default() }),
             records: config.params.record_keyframes,
             left: None,
             is_converged: true,
-            newcomer: None,
-            is_next: false,
-            since_ns: i64::MIN,
-            resets: 0,
         })
     }
 
@@ -101,49 +93,46 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
     }
 
     pub(super) fn start(&mut self, start: &Start) -> Result<(), Refusal> {
+        self.filter.start(start)?;
+        self.tune();
         self.smoother.start(id_of(start.time_ns), start)?;
-        self.begun(start.time_ns, start.time_ns);
-        // Earlier refusals relate to another estimate.
-        self.streams.anchors.forgive();
+        self.is_converged = true;
         Ok(())
     }
 
-    /// The window has begun again, in a place that has been right since a time.
-    fn begun(&mut self, time_ns: i64, since_ns: i64) {
-        self.is_converged = true;
-        self.cadence.begin(time_ns);
-        (self.newcomer, self.since_ns) = (None, since_ns);
-        self.resets = self.resets.wrapping_add(1);
+    /// Gives the window what the filter has found: the noise of the IMU, and whether the scale of relative poses drifts.
+    fn tune(&mut self) {
+        self.smoother.set_noise(self.filter.noise());
+        self.smoother.set_relative_scale(self.filter.relative_scale());
     }
 
     /// Returns how often it started, or went on in another place.
     pub(super) fn resets(&self) -> u32 {
-        self.resets
+        self.filter.resets()
     }
 
     pub(super) fn propagate(&mut self, until_ns: i64, sample: &ImuMean, since_ns: i64) -> Result<(), Failure> {
         let is_gap = seconds_between(since_ns, sample.time_ns)? > self.smoother.params().sensors.longest_sample;
-        let part = ImuMean { time_ns: until_ns, ..*sample };
-        self.smoother.propagate_part(&part, is_gap)?;
-        if core::mem::take(&mut self.is_next)
-            && let Some(newcomer) = &mut self.newcomer
-        {
-            newcomer.filter.set_keyframe(id_of(self.cadence.camera_ns));
-        }
-        self.newcomer.take_if(|newcomer| newcomer.filter.propagate_part(&part, is_gap).is_err());
-        if self.cadence.is_due(until_ns) { self.keyframe() } else { Ok(()) }
+        self.smoother.propagate_part(&ImuMean { time_ns: until_ns, ..*sample }, is_gap)?;
+        self.filter.propagate(until_ns, sample, since_ns)?;
+        self.follow()
     }
 
     pub(super) fn camera_frame(&mut self) -> Result<(), Failure> {
-        self.keyframe()?;
-        self.cadence.camera_frame();
-        self.is_next = true;
-        Ok(())
+        self.filter.camera_frame()?;
+        self.follow()
     }
 
     fn keyframe(&mut self) -> Result<(), Failure> {
-        let now_ns = self.smoother.predicted().ok_or(Refusal::NotStarted)?.time_ns;
-        if now_ns == self.cadence.keyframe_ns {
+        self.filter.keyframe()?;
+        self.follow()
+    }
+
+    /// Makes the present a keyframe if the filter did.
+    fn follow(&mut self) -> Result<(), Failure> {
+        let newest_ns = self.smoother.estimate().ok_or(Refusal::NotStarted)?.time_ns;
+        let now_ns = self.filter.keyframe_ns();
+        if newest_ns == now_ns {
             return Ok(());
         }
         self.left = if self.records { self.leaving() } else { None };
@@ -151,7 +140,6 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
             Refusal::NonFinite => Failure::Fatal(refusal),
             _ => Failure::Refused(refusal),
         })?;
-        self.cadence.keyframe_ns = now_ns;
         self.update()
     }
 
@@ -175,112 +163,71 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
     }
 
     pub(super) fn measure(&mut self, measured: &Measured<'_, F>) -> Result<Fused, Failure> {
-        let now_ns = self.smoother.predicted().ok_or(Refusal::NotStarted)?.time_ns;
-        // Without a camera, nothing else determines the times of keyframes.
-        if !self.cadence.has_camera(now_ns) {
+        // Without a camera, nothing else determines the times of keyframes. The dependence of a provider's factor on the present state is
+        // unknown, so it cannot be carried back.
+        if !self.filter.has_camera() || matches!(measured, Measured::Provided(_)) {
             self.keyframe()?;
         }
-        let id = id_of(self.cadence.keyframe_ns);
-        let fused = match measured {
-            Measured::Relative(relative) => {
-                if let Some(newcomer) = &mut self.newcomer {
-                    newcomer.aid(relative, relative, limit(6, self.streams.relative.params().gate));
-                }
-                let factor = Held::Navigation((*relative).into());
-                self.smoother.add(&mut self.streams.relative, id, factor)?
-            }
+        let resets = self.filter.resets();
+        let admitted = self.filter.measure(measured);
+        if self.filter.resets() != resets {
+            self.adopt()?;
+        }
+        let fused = admitted?;
+        self.tune();
+        let id = id_of(self.filter.keyframe_ns());
+        match measured {
+            Measured::Relative(relative) => self.add(id, *relative)?,
             Measured::Anchor(anchor) => {
                 let way = self.way()?;
-                let factor = AbsolutePose {
-                    position: anchor.position - way.position,
-                    world_from_body: anchor.world_from_body * way.now_from_keyframe,
-                    position_covariance: anchor.position_covariance + way.covariance,
-                    rotation_covariance: anchor.rotation_covariance,
-                };
-                let admitted = self.admitted(anchor);
-                let admitted = self.settle(anchor, admitted)?;
-                add(&mut self.smoother, &mut self.streams.anchors, id, factor, admitted)?
+                self.add(
+                    id,
+                    AbsolutePose {
+                        position: anchor.position - way.position,
+                        world_from_body: anchor.world_from_body * way.now_from_keyframe,
+                        position_covariance: anchor.position_covariance + way.covariance,
+                        rotation_covariance: anchor.rotation_covariance,
+                    },
+                )?;
             }
-            Measured::Gnss(position, velocity, trust) => {
+            Measured::Gnss(position, velocity, _) => {
                 let way = self.way()?;
-                let moved = GnssPosition {
-                    position: position.position - way.position,
-                    covariance: position.covariance + way.covariance,
-                    ..*position
-                };
-                let mut admitted = self.admitted(position);
-                if matches!(trust, Trust::Believed) {
-                    admitted = self.settle(position, admitted)?;
+                let shown = self.filter.shown(position);
+                self.add(
+                    id,
+                    GnssPosition {
+                        position: shown.position - way.position,
+                        covariance: shown.covariance + way.covariance,
+                        ..shown
+                    },
+                )?;
+                // A receiver with a good position is trusted even if its velocity is refused.
+                if let Some(velocity) = velocity.filter(|_| self.filter.has_fused_velocity()) {
+                    let _ = self.add(id, GnssVelocity { velocity: velocity.velocity - way.velocity, ..velocity });
                 }
-                let fused = add(&mut self.smoother, &mut self.streams.positions, id, moved, admitted)?;
-                if let Some(velocity) = velocity {
-                    let moved = GnssVelocity { velocity: velocity.velocity - way.velocity, ..*velocity };
-                    // A receiver with a good position is trusted even if its velocity is refused.
-                    let _ = self.smoother.add(&mut self.streams.velocities, id, Held::Navigation(moved.into()));
-                }
-                fused
             }
-            Measured::Provided(factor) => {
-                // The factor's dependence on the present state is unknown, so it cannot be carried back.
-                if now_ns != self.cadence.keyframe_ns {
-                    self.keyframe()?;
-                }
-                let id = id_of(now_ns);
-                self.smoother.add(&mut self.streams.provided, id, Held::Provided((*factor).clone()))?
-            }
-        };
+            Measured::Provided(factor) => self.hold(id, Held::Provided((*factor).clone()))?,
+        }
         self.update()?;
         Ok(fused)
     }
 
-    /// The log likelihood of a position, if the gate of the filter admits it.
-    fn admitted<M: Measurement<D>, const D: usize>(&self, measurement: &M) -> Result<f64, Refusal> {
-        let judged = self.copied().ok_or(Refusal::Noise)?.judge(measurement, SLACK)?;
-        if judged.nis <= FAR {
-            return Ok(judged.log_likelihood);
-        }
-        Err(Refusal::Gate { nis: judged.nis, limit: FAR })
+    /// Adds what the filter has fused.
+    fn add(&mut self, id: u64, factor: impl Into<NavigationFactor>) -> Result<(), Refusal> {
+        self.hold(id, Held::Navigation(factor.into()))
     }
 
-    /// Decides between the window and its newcomer by a position. Returns whether the window still admits it.
-    fn settle<M: Measurement<D>, const D: usize>(
-        &mut self,
-        measurement: &M,
-        admitted: Result<f64, Refusal>,
-    ) -> Result<Result<f64, Refusal>, Failure> {
-        let refusal = match admitted {
-            Ok(_) => Refusal::Gate { nis: FAR, limit: FAR },
-            Err(refusal @ Refusal::Gate { .. }) => refusal,
-            Err(_) => return Ok(admitted),
-        };
-        match Newcomer::settle(&mut self.newcomer, measurement, admitted.ok()) {
-            Settled::Kept => return Ok(admitted),
-            Settled::Left => {}
-            Settled::Due(newcomer) => self.take_over(&newcomer)?,
-            Settled::Unfit => {
-                let copied = self.copied();
-                self.newcomer = copied.and_then(|filter| Newcomer::new(filter, self.since_ns, measurement));
-            }
-        }
-        Ok(Err(refusal))
+    fn hold(&mut self, id: u64, factor: Held<F>) -> Result<(), Refusal> {
+        self.smoother.add(&mut self.open, id, factor).map(|_| ())
     }
 
-    /// A filter in the present state, as uncertain as the newest keyframe.
-    fn copied(&self) -> Option<Eskf<Navigated, NAVIGATED>> {
-        let mut filter = Eskf::new(self.smoother.params().sensors).ok()?;
-        filter.adopt::<Smoothed, SMOOTHED>(&self.smoother.predicted()?, &self.smoother.covariance()?).ok()?;
-        Some(filter)
-    }
-
-    /// Restarts the window with the state of a newcomer.
-    fn take_over(&mut self, newcomer: &Newcomer<Eskf<Navigated, NAVIGATED>>) -> Result<(), Refusal> {
-        let filter = &newcomer.filter;
-        let estimate = filter.estimate().ok_or(Refusal::NotStarted)?;
-        let time_ns = estimate.time_ns;
-        self.smoother.adopt::<Navigated, NAVIGATED>(id_of(time_ns), estimate, filter.covariance())?;
-        self.begun(time_ns, newcomer.born_ns());
-        self.streams.anchors.forgive();
-        self.streams.positions.forgive();
+    /// Restarts the window in the state of the filter, which has gone on in another place.
+    fn adopt(&mut self) -> Result<(), Failure> {
+        self.tune();
+        let (estimate, covariance) = self.filter.state().ok_or(Refusal::NotStarted)?;
+        self.smoother.adopt::<Navigated, NAVIGATED>(id_of(estimate.time_ns), estimate, covariance)?;
+        self.is_converged = true;
+        self.filter.keyframe()?;
         Ok(())
     }
 
@@ -310,7 +257,7 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
     }
 
     pub(super) fn streams(&self) -> &Streams {
-        &self.streams
+        self.filter.streams()
     }
 
     pub(super) fn gaps(&self) -> u32 {
@@ -319,7 +266,8 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
 
     pub(super) fn predictor(&self) -> Option<Predictor> {
         let (estimate, covariance) = (self.smoother.estimate()?, self.smoother.covariance()?);
-        Predictor::from_keyframe::<Smoothed, SMOOTHED>(&self.smoother.params().sensors, &estimate, &covariance)
+        let (sensors, noise) = (&self.smoother.params().sensors, self.filter.noise());
+        Predictor::from_keyframe::<Smoothed, SMOOTHED>(sensors, noise, &estimate, &covariance)
     }
 
     pub(super) fn newest(&self) -> Option<Pose> {
@@ -336,7 +284,7 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
     }
 
     pub(super) fn keyframe_ns(&self) -> i64 {
-        self.cadence.keyframe_ns
+        self.filter.keyframe_ns()
     }
 
     pub(super) fn keyframes(&self) -> usize {
@@ -349,18 +297,15 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
             return Err(refusal);
         }
         let mut covariance = self.smoother.covariance().ok_or(Refusal::Noise)?;
-        let now = self.smoother.estimate().ok_or(Refusal::NotStarted)?;
-        let (before_ns, estimate) = (now.time_ns, Estimate { time_ns, ..now });
+        let estimate = Estimate { time_ns, ..self.smoother.estimate().ok_or(Refusal::NotStarted)? };
         add_time(&mut covariance, &estimate.velocity, deviation_s);
-        let since_ns = self.since_ns.saturating_add(time_ns.saturating_sub(before_ns));
         self.smoother.adopt::<Smoothed, SMOOTHED>(id_of(time_ns), &estimate, &covariance)?;
-        self.begun(time_ns, since_ns);
-        Ok(())
+        self.is_converged = true;
+        self.filter.set_clock(time_ns, deviation_s)
     }
 
     /// The window restarts with the newest keyframe.
     pub(super) fn move_world(&mut self, new_from_old: &Isometry3<f64>) -> Result<(), Refusal> {
-        self.newcomer.take_if(|newcomer| newcomer.filter.move_world(new_from_old).is_err());
         // Otherwise samples since the newest keyframe would be lost.
         if let Err(Failure::Refused(refusal) | Failure::Fatal(refusal)) = self.keyframe() {
             return Err(refusal);
@@ -380,25 +325,8 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
             id_of(estimate.time_ns),
             &estimate,
             &(0.5 * (covariance + covariance.transpose())),
-        )
-    }
-}
-
-/// Adds a position that is admitted, and counts one that is not.
-fn add<F: ProvidedFactor>(
-    smoother: &mut FixedLagSmoother<Smoothed, SMOOTHED, Held<F>>,
-    stream: &mut Stream,
-    id: u64,
-    factor: impl Into<NavigationFactor>,
-    admitted: Result<f64, Refusal>,
-) -> Result<Fused, Refusal> {
-    match admitted {
-        Ok(_) => smoother.add(stream, id, Held::Navigation(factor.into())),
-        Err(refusal) => {
-            let result = Err(refusal);
-            stream.count(&result);
-            result
-        }
+        )?;
+        self.filter.move_world(new_from_old)
     }
 }
 

@@ -1,0 +1,63 @@
+//! Queries of a flight: a receiver that may lie, a clock that is set back, an attitude that a gap may leave unknown.
+
+use super::{Begun, Copies, FAR, SLACK, UNKNOWN};
+use crate::navigation::eskf::Eskf;
+use crate::navigation::fused::Fused;
+use crate::navigation::math::sqrt;
+use crate::navigation::measurement::GnssPosition;
+use crate::navigation::propagate::Propagate as _;
+use crate::navigation::refusal::Refusal;
+use crate::navigation::state::{ROTATION, States};
+use crate::navigation::stream::Stream;
+
+impl<S: States, const N: usize> Copies<Eskf<S, N>> {
+    /// Fuses a fix of a receiver that may lie: one that the filter refuses shows nothing.
+    ///
+    /// # Errors
+    ///
+    /// The same as [`update`](Self::update).
+    pub(in crate::navigation) fn update_doubted_fix(
+        &mut self,
+        stream: &mut Stream,
+        fix: &GnssPosition,
+    ) -> Result<Fused, Refusal> {
+        let result = self.is_admitted(fix, SLACK, FAR);
+        let shown = self.shown(fix);
+        if let Some(newcomer) = &mut self.newcomer {
+            newcomer.aid(fix, &shown, FAR);
+        }
+        self.fuse(stream, &shown, result)
+    }
+
+    /// The largest standard deviation of the attitude about any axis, rad: of the best copy, or of one that is unknown while others that
+    /// are plausible are far from it.
+    pub(in crate::navigation) fn attitude_deviation(&self) -> f64 {
+        let attitude = |begun: &Begun<Eskf<S, N>>| begun.filter.estimate().map(|at| at.world_from_body);
+        let best = attitude(&self.starts[0]);
+        let is_far = |begun: &Begun<Eskf<S, N>>| {
+            best.zip(attitude(begun)).is_some_and(|(best, other)| best.angle_to(&other) > UNKNOWN)
+        };
+        if self.starts.iter().any(is_far) {
+            return core::f64::consts::PI;
+        }
+        let covariance = self.best().covariance();
+        sqrt((ROTATION..ROTATION + 3).map(|i| covariance[(i, i)]).fold(0.0, f64::max))
+    }
+
+    /// Sets the time, which is known to a standard deviation.
+    pub(in crate::navigation) fn set_clock(&mut self, time_ns: i64, deviation_s: f64) {
+        let before_ns = self.time_ns().unwrap_or(time_ns);
+        self.started_ns = self.started_ns.saturating_add(time_ns.saturating_sub(before_ns));
+        self.starts.iter_mut().for_each(|begun| begun.filter.set_clock(time_ns, deviation_s));
+        self.newcomer = None;
+        self.search.orphan();
+        self.holding.interrupt();
+        self.scatter.interrupt();
+    }
+
+    /// The last fix with the noise that it was fused with.
+    #[cfg(feature = "smoother")]
+    pub(in crate::navigation) fn as_shown(&self, fix: &GnssPosition) -> GnssPosition {
+        self.scatter.as_shown(fix)
+    }
+}
