@@ -89,7 +89,7 @@ pub(super) const FAST: f64 = 20.0 * DEGREE;
 /// Part that time without it counts for.
 pub(super) const AT_REST: f64 = 0.1;
 /// Smallest error that contradicts the heading, if the field tells it for seconds, rad.
-pub(super) const CONTRADICTION: f64 = 0.75;
+pub(super) const CONTRADICTION: f64 = 0.9;
 /// A heading is trusted up to this standard deviation, rad: 10°.
 pub(super) const TRUSTED: f64 = 0.175;
 
@@ -99,8 +99,10 @@ pub(super) const TRUSTED: f64 = 0.175;
 pub(super) const TAILS: f64 = 4.0;
 /// Standard deviation of an offset, if there is one: some fields, as of iron in a phone.
 pub(super) const ANY_OFFSET: f64 = 4.2;
-/// Standard deviation of what calibration leaves: 2 µT.
-pub(super) const CALIBRATED: f64 = 0.04;
+/// Standard deviation of what calibration leaves: 1.5 µT.
+pub(super) const CALIBRATED: f64 = 0.03;
+/// Standard deviation of what the field's changes from place to place look like, where the body turns as it moves: 1 µT.
+pub(super) const PLACES: f64 = 0.02;
 /// Scale of the steps, and of the errors of the magnetometer, before any was seen: 3 µT.
 pub(super) const FIELD_WALK: f64 = 0.0625;
 /// The least scale: 0.5 µT.

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use super::numbers::{
-    ANY_OFFSET, CALIBRATED, FIELD_WALK, FIRST_POSES, LATER_ODDS, LEAST_WALK, NEWCOMER_POSES, ODDS, POSE_TURN,
+    ANY_OFFSET, CALIBRATED, FIELD_WALK, FIRST_POSES, LATER_ODDS, LEAST_WALK, NEWCOMER_POSES, ODDS, PLACES, POSE_TURN,
     SCALE_TURN, SHARPER, SHORT_S, TAILS,
 };
 use super::params::Magnetometer;
@@ -89,8 +89,24 @@ impl<T: Real> Hypothesis<T> {
         likelihood
     }
 
+    /// Variance of the offset along an axis, as the poses tell it.
     fn variance(&self) -> T {
         self.of_offset().trace() / T::of(3.0)
+    }
+
+    /// Variance of the offset along an axis, with what the field's changes from place to place look like.
+    fn doubt(&self) -> T {
+        self.variance() + T::of(PLACES * PLACES)
+    }
+
+    /// The offset, as far as it is larger than its deviation.
+    ///
+    /// An estimate of variance `σ²` along each axis, of an offset of unknown variance `τ²`, has the mean square `3 (τ² + σ²)`;
+    /// the part `τ² / (τ² + σ²)` of it is the offset. B. Efron, C. Morris, "Stein's estimation rule and its competitors: an
+    /// empirical Bayes approach", Journal of the American Statistical Association 68, 1973.
+    fn believed(&self) -> Vector3<T> {
+        let (squared, unknown) = (self.offset.norm_squared(), T::of(3.0) * self.doubt());
+        if squared > unknown { self.offset * (T::ONE - unknown / squared) } else { Vector3::zeros() }
     }
 }
 
@@ -115,11 +131,9 @@ pub(super) struct HardIron<T: Real> {
     odds: T,
     /// Poses that the newcomer has seen.
     seen: T,
-    /// `true` if the incumbent has an offset; the first one has at most what calibration leaves.
-    is_offset: bool,
     /// `true` if the user has stated that the magnetometer is calibrated, so that there is no newcomer.
     is_calibrated: bool,
-    /// Deviation of the offset when the heading was last doubted for it.
+    /// Deviation of the offset when the heading was last doubted for it, zero while it is what calibration leaves.
     doubted: T,
     /// The last pose, and sums of how much the field changed and the body turned from pose to pose, squared.
     pose: Option<Pose<T>>,
@@ -131,15 +145,18 @@ pub(super) struct HardIron<T: Real> {
 
 impl<T: Real> HardIron<T> {
     pub(super) fn new(magnetometer: Magnetometer) -> Self {
-        let is_offset = magnetometer == Magnetometer::Uncalibrated;
+        let (deviation, doubted) = match magnetometer {
+            Magnetometer::Uncalibrated => (ANY_OFFSET, ANY_OFFSET),
+            Magnetometer::Auto => (CALIBRATED, 0.0),
+            Magnetometer::Calibrated | Magnetometer::None => (0.0, 0.0),
+        };
         Self {
-            incumbent: Hypothesis::new(if is_offset { ANY_OFFSET } else { CALIBRATED }),
+            incumbent: Hypothesis::new(deviation),
             newcomer: Hypothesis::new(ANY_OFFSET),
             odds: -T::of(ODDS),
             seen: T::ZERO,
-            is_offset,
             is_calibrated: magnetometer == Magnetometer::Calibrated,
-            doubted: T::of(ANY_OFFSET),
+            doubted: T::of(doubted),
             pose: None,
             changed: T::ZERO,
             turned: T::ZERO,
@@ -149,28 +166,22 @@ impl<T: Real> HardIron<T> {
 
     /// The offset to subtract from a measured field, body frame.
     pub(super) fn offset(&self) -> Vector3<T> {
-        self.believed() * self.scale()
+        self.incumbent.believed() * self.scale()
     }
 
-    /// The incumbent's offset, in units of the field; zero if it has none.
-    fn believed(&self) -> Vector3<T> {
-        if self.is_offset { self.incumbent.offset } else { Vector3::zeros() }
-    }
-
-    /// Variance of the offset along an axis, if there is one.
+    /// Variance of the offset along an axis.
     pub(super) fn variance(&self) -> T {
-        let scale = self.scale();
-        if self.is_offset { self.incumbent.variance() * scale * scale } else { T::ZERO }
+        self.incumbent.variance() * self.scale() * self.scale()
     }
 
     /// Expected square of the error of the offset along an axis, as a fraction of the field's norm. The newcomer's offset is the true
     /// one with the odds so far, which are even at first.
     pub(super) fn doubt(&self) -> T {
-        let known = if self.is_offset { self.incumbent.variance() } else { T::ZERO };
+        let known = self.incumbent.doubt();
         if self.is_calibrated {
             return known;
         }
-        let moved = (self.newcomer.offset - self.believed()).norm_squared() / T::of(3.0);
+        let moved = (self.newcomer.offset - self.incumbent.believed()).norm_squared() / T::of(3.0);
         let odds = (self.odds + T::of(ODDS)).min(T::ZERO).exp();
         known + (moved + self.newcomer.variance()) * odds / (T::ONE + odds)
     }
@@ -226,12 +237,11 @@ impl<T: Real> HardIron<T> {
         if !self.is_calibrated {
             self.odds += self.newcomer.observe(rotation, &measured) - of_incumbent;
             self.seen += T::ONE;
-            let moved = (self.newcomer.offset - self.believed()).norm_squared();
+            let moved = (self.newcomer.offset - self.incumbent.believed()).norm_squared();
             let variance = self.newcomer.variance();
             if self.odds > T::ZERO && variance < moved {
                 let newcomer = self.another(rotation, &measured);
                 self.incumbent = core::mem::replace(&mut self.newcomer, newcomer);
-                self.is_offset = true;
                 self.doubted = variance.sqrt();
                 return Some((moved + variance).sqrt() * scale);
             }
@@ -240,7 +250,7 @@ impl<T: Real> HardIron<T> {
             }
         }
         let deviation = self.incumbent.variance().sqrt();
-        if self.is_offset && deviation < T::of(SHARPER) * self.doubted {
+        if deviation < T::of(SHARPER) * self.doubted {
             return Some(scale * core::mem::replace(&mut self.doubted, deviation));
         }
         None
