@@ -3,7 +3,7 @@
 use bb_core::message::codec::ros::{Header, TransformStamped};
 use bb_core::message::codec::{Field, Reader};
 use bb_core::nalgebra::{Isometry3, UnitQuaternion, Vector3};
-use bb_mcap::{BagMessage, ODOMETRY, POSE, RecordingError};
+use bb_mcap::{Bag, BagMessage, ODOMETRY, POSE, RecordingError};
 use std::collections::{BTreeSet, HashMap};
 use std::str::FromStr;
 
@@ -101,7 +101,7 @@ impl Frames {
     ///
     /// # Errors
     ///
-    /// A transform that is no rotation and translation, or a mount of a frame that none of the topics is in.
+    /// A transform that is no rotation and translation.
     pub(crate) fn new(
         transforms: &[TransformStamped],
         of_topics: &HashMap<String, String>,
@@ -132,23 +132,43 @@ impl Frames {
                 None => break,
             }
         }
-        let frames = Self { edges, mounts: mounts.to_vec(), of_topics, base };
-        frames.check_mounts()?;
-        Ok(frames)
+        Ok(Self { edges, mounts: mounts.to_vec(), of_topics, base })
     }
 
-    fn check_mounts(&self) -> Result<(), String> {
-        let used = self.of_topics.iter().flat_map(|(topic, frame)| [plain(topic), frame.clone()]);
-        let used: BTreeSet<_> = used.filter(|name| !name.is_empty()).collect();
-        let is_used = |name: &str| used.contains(&plain(name));
-        let is_target = |name: &str| {
-            let is_it = |mount: &Mount| matches!(&mount.at, Place::Frame(frame) if plain(frame) == plain(name));
-            self.mounts.iter().any(is_it)
+    /// Finds a mount that names nothing in a recording, of whose topics not all need to be used.
+    ///
+    /// # Errors
+    ///
+    /// It names no topic, no frame of one, and none that another mount refers to.
+    pub(crate) fn check_mounts(&self, bag: &Bag) -> Result<(), String> {
+        let is_known = |name: &str| {
+            let is_target = |mount: &Mount| matches!(&mount.at, Place::Frame(frame) if plain(frame) == name);
+            self.of_topics.values().any(|frame| frame == name) || self.mounts.iter().any(is_target)
         };
-        match self.mounts.iter().find(|Mount { name, .. }| !is_used(name) && !is_target(name)) {
+        if self.mounts.iter().all(|mount| is_known(&plain(&mount.name))) {
+            return Ok(());
+        }
+        let mut names = BTreeSet::new();
+        for topic in bag.topics() {
+            names.insert(plain(&topic.name));
+            let first = bag.messages(&[&topic.name]).ok().and_then(|mut messages| messages.next());
+            // Damage is met, and reported, where the messages are read.
+            names.extend(
+                first.and_then(Result::ok).and_then(|message| frame(&message).ok()).map(|name| plain(&name)),
+            );
+        }
+        names.remove("");
+        match self
+            .mounts
+            .iter()
+            .find(|mount| !is_known(&plain(&mount.name)) && !names.contains(&plain(&mount.name)))
+        {
             Some(Mount { name, .. }) => {
-                let used: Vec<_> = used.into_iter().collect();
-                Err(format!("--mount {name} names no topic that is used, and no frame of one: {}", used.join(", ")))
+                let names: Vec<_> = names.into_iter().collect();
+                Err(format!(
+                    "--mount {name} names no topic of the recording and no frame of one: {}",
+                    names.join(", ")
+                ))
             }
             None => Ok(()),
         }

@@ -322,7 +322,9 @@ fn frames(bag: &Bag, topics: &[Option<&str>], imu: &str, mounts: &[Mount]) -> Re
             of_topics.insert((*topic).to_owned(), frame(&message).map_err(fault)?);
         }
     }
-    Frames::new(&transforms, &of_topics, imu, mounts)
+    let frames = Frames::new(&transforms, &of_topics, imu, mounts)?;
+    frames.check_mounts(bag)?;
+    Ok(frames)
 }
 
 /// Reads the truth, up to where the recording is cut off.

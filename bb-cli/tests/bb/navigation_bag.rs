@@ -289,7 +289,7 @@ fn what_is_wrong_with_a_bag_is_said() {
         "frame gps of /fix is not connected to base of the robot in /tf_static, which has base-imu",
     );
     let misspelt = [&["--mount", "gpps=0,0,1"], &truth[..]].concat();
-    let used = "--mount gpps names no topic that is used, and no frame of one: ";
+    let used = "--mount gpps names no topic of the recording and no frame of one: ";
     fault(&fixes, "misspelt.mcap", &misspelt, 1, used);
     for (arguments, said) in [
         (&["--mount", "gps"][..], "no `=` in it"),

@@ -56,6 +56,7 @@ impl NavigationBag {
         messages.check_imu(&topics.imu, &mut notes)?;
         messages.settle_arrivals(&mut notes);
         let frames = Frames::new(&messages.transforms, &messages.frames, &topics.imu, &options.mount)?;
+        frames.check_mounts(&bag)?;
         let mut bag = Self { topics, messages, frames, options: options.clone(), notes: Notes::default() };
         bag.doubt_fixes(&mut notes);
         bag.notes = notes;

@@ -127,6 +127,8 @@ struct Pose<T: Real> {
 pub(super) struct HardIron<T: Real> {
     incumbent: Hypothesis<T>,
     newcomer: Hypothesis<T>,
+    /// The incumbent's offset as far as it is believed, in the unit of the field.
+    offset: Vector3<T>,
     /// Logarithm of the odds of the newcomer.
     odds: T,
     /// Poses that the newcomer has seen.
@@ -153,6 +155,7 @@ impl<T: Real> HardIron<T> {
         Self {
             incumbent: Hypothesis::new(deviation),
             newcomer: Hypothesis::new(ANY_OFFSET),
+            offset: Vector3::zeros(),
             odds: -T::of(ODDS),
             seen: T::ZERO,
             is_calibrated: magnetometer == Magnetometer::Calibrated,
@@ -166,7 +169,7 @@ impl<T: Real> HardIron<T> {
 
     /// The offset to subtract from a measured field, body frame.
     pub(super) fn offset(&self) -> Vector3<T> {
-        self.incumbent.believed() * self.scale()
+        self.offset
     }
 
     /// Variance of the offset along an axis.
@@ -234,6 +237,7 @@ impl<T: Real> HardIron<T> {
         self.pose = Some(Pose { rotation: *rotation, field: *field, age_s: T::ZERO });
         let measured = rotation * (field / scale);
         let of_incumbent = self.incumbent.observe(rotation, &measured);
+        self.offset = self.incumbent.believed() * scale;
         if !self.is_calibrated {
             self.odds += self.newcomer.observe(rotation, &measured) - of_incumbent;
             self.seen += T::ONE;
@@ -242,6 +246,7 @@ impl<T: Real> HardIron<T> {
             if self.odds > T::ZERO && variance < moved {
                 let newcomer = self.another(rotation, &measured);
                 self.incumbent = core::mem::replace(&mut self.newcomer, newcomer);
+                self.offset = self.incumbent.believed() * scale;
                 self.doubted = variance.sqrt();
                 return Some((moved + variance).sqrt() * scale);
             }
