@@ -22,12 +22,14 @@ const STEPS: usize = 3;
 /// the attitude, rad².
 const LINEAR: f64 = 1e-3;
 
-/// A state on a group, corrected by the exponential of an error.
-pub(super) trait Composed<const N: usize>: Sized {
+/// States on a group, corrected by the exponential of an error.
+pub(super) trait Composed<const N: usize> {
+    /// The state.
+    type State;
     /// The properties of its errors.
     const LAYOUT: Layout<N>;
-    /// The state composed with the exponential of an error.
-    fn composed(&self, error: &SVector<f64, N>) -> Self;
+    /// A state composed with the exponential of an error.
+    fn composed(state: &Self::State, error: &SVector<f64, N>) -> Self::State;
 
     /// Takes derivatives with respect to errors of the composed state to those with respect to the error: `H ← H T`.
     fn transport_jacobian(error: &SVector<f64, N>, jacobian: &mut [[f64; N]]);
@@ -44,8 +46,8 @@ pub(super) trait Composed<const N: usize>: Sized {
 
 /// The outcome of an update that has changed the covariance.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Updated<E> {
-    pub(super) estimate: E,
+pub(super) struct Updated<T> {
+    pub(super) estimate: T,
     pub(super) fused: Fused,
     /// `true` for a position in the world.
     pub(super) is_fix: bool,
@@ -60,12 +62,12 @@ pub(super) struct Updated<E> {
 /// Returns the reason why it is refused. The covariance is then unchanged.
 #[inline(always)]
 pub(super) fn updated<E: Composed<N>, const D: usize, const N: usize>(
-    estimate: &E,
+    estimate: &E::State,
     covariance: &mut Covariance<N>,
     stream: &Stream,
     gate: Gate,
-    linearise: impl Fn(&E, &mut Linearised<D, N>) -> Result<(), Refusal>,
-) -> Result<Updated<E>, Refusal> {
+    linearise: impl Fn(&E::State, &mut Linearised<D, N>) -> Result<(), Refusal>,
+) -> Result<Updated<E::State>, Refusal> {
     let mut room = Room::new();
     linearise(estimate, &mut room.model)?;
     let mut innovation = covariance.innovation(&mut room, stream.noise_factor())?;
@@ -77,10 +79,11 @@ pub(super) fn updated<E: Composed<N>, const D: usize, const N: usize>(
     // Transported to another state, a height has derivatives with respect to all of the position.
     let is_fix = E::fixes_position(&innovation);
     if fused.nis * E::curvature(&innovation, covariance) <= LINEAR {
-        let estimate = corrected(estimate, covariance, &innovation, &error);
+        let estimate = corrected::<E, N>(estimate, covariance, &innovation, &error);
         return Ok(Updated { estimate, fused, is_fix });
     }
-    let step = |led: &SVector<f64, N>, room: &mut Room<D, N>| linearised_at(estimate, led, room, &linearise);
+    let step =
+        |led: &SVector<f64, N>, room: &mut Room<D, N>| linearised_at::<E, D, N>(estimate, led, room, &linearise);
     let factor = stream.noise_factor() / fused.weight;
     let mut led = error;
     for _ in 2..STEPS {
@@ -94,24 +97,24 @@ pub(super) fn updated<E: Composed<N>, const D: usize, const N: usize>(
     }
     last?;
     let innovation = covariance.innovation(&mut room, factor)?;
-    let estimate = corrected(estimate, covariance, &innovation, &innovation.mean());
+    let estimate = corrected::<E, N>(estimate, covariance, &innovation, &innovation.mean());
     Ok(Updated { estimate, fused, is_fix })
 }
 
 /// Linearises a measurement for a step of the Gauss–Newton method, at the state composed with `error`, in coordinates of the exponential
 /// at the state itself.
 fn linearised_at<E: Composed<N>, const D: usize, const N: usize>(
-    estimate: &E,
+    estimate: &E::State,
     error: &SVector<f64, N>,
     room: &mut Room<D, N>,
-    linearise: &impl Fn(&E, &mut Linearised<D, N>) -> Result<(), Refusal>,
+    linearise: &impl Fn(&E::State, &mut Linearised<D, N>) -> Result<(), Refusal>,
 ) -> Result<(), Refusal> {
     if !E::LAYOUT.admits(error) {
         return Err(Refusal::OutOfRange);
     }
     let model = &mut room.model;
     *model = Linearised::new();
-    linearise(&estimate.composed(error), model)?;
+    linearise(&E::composed(estimate, error), model)?;
     E::transport_jacobian(error, &mut model.jacobian);
     for (residual, row) in model.residual.iter_mut().zip(&model.jacobian) {
         *residual += row.iter().zip(error.iter()).map(|(h, x)| h * x).sum::<f64>();
@@ -122,15 +125,15 @@ fn linearised_at<E: Composed<N>, const D: usize, const N: usize>(
 /// Corrects the covariance by an innovation, and returns the state corrected by the error that it led to.
 #[inline(always)]
 fn corrected<E: Composed<N>, const N: usize>(
-    estimate: &E,
+    estimate: &E::State,
     covariance: &mut Covariance<N>,
     innovation: &Innovation<'_>,
     error: &SVector<f64, N>,
-) -> E {
+) -> E::State {
     covariance.update(innovation);
     E::transport_covariance(error, covariance);
     covariance.settle(&E::LAYOUT);
-    estimate.composed(error)
+    E::composed(estimate, error)
 }
 
 /// Compares a measurement with a state. `slack` is added to each variance of its noise.

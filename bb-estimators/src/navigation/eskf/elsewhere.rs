@@ -12,6 +12,7 @@ use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{
     Estimate, Keyframe, NAVIGATION, Optional, POSITION, ROTATION, States, VELOCITY, offset,
 };
+use crate::navigation::update::Composed as _;
 
 /// Relative difference in variance between a keyframe and the pose that it copies: 3 µm where a pose is known to a metre.
 const COPY: f64 = 1e-11;

@@ -10,14 +10,13 @@ use super::sample::{ImuMean, LONGEST_GAP_S, seconds_between};
 use super::start::Start;
 use super::transport::Transport;
 use crate::attitude::ParamsError;
-use crate::navigation::covariance::{Covariance, Innovation, Room};
+use crate::navigation::covariance::{Covariance, Innovation};
 use crate::navigation::fused::Fused;
-use crate::navigation::fusion::weighed;
 use crate::navigation::layout::Layout;
 use crate::navigation::math::exp;
 #[cfg(feature = "alloc")]
 use crate::navigation::math::skew;
-use crate::navigation::measurement::{Linearised, Measurement};
+use crate::navigation::measurement::Measurement;
 use crate::navigation::refusal::Refusal;
 #[cfg(feature = "alloc")]
 use crate::navigation::state::VELOCITY;
@@ -25,15 +24,11 @@ use crate::navigation::state::{
     Estimate, NAVIGATION, Navigation, Optional, POSITION, ROTATION, States, distinct, offset,
 };
 use crate::navigation::stream::{Gate, Stream};
+#[cfg(feature = "alloc")]
+use crate::navigation::update::judged;
+use crate::navigation::update::{Composed, updated};
 use crate::navigation::upkeep::{Upkeep, upkeep_methods};
 use crate::params::Params as _;
-
-/// Steps of an iterated correction. Three are as good as five, and two are not (`book/src/explanation/navigation-filter.md`).
-const STEPS: usize = 3;
-
-/// A linear correction is exact to two percent below this product of the normalised innovation squared and the variance of
-/// the attitude, rad².
-const LINEAR: f64 = 1e-3;
 
 /// An error-state Kalman filter with the optional states `S` and `N` errors in total; see the [module](super).
 ///
@@ -94,8 +89,6 @@ fn average<const N: usize>(estimate: &mut Estimate<N>, dt: f64, gravity: f64) {
 }
 
 impl<S: States, const N: usize> Eskf<S, N> {
-    pub(super) const LAYOUT: Layout<N> = Layout::of::<S>();
-
     /// Creates a filter that has not started.
     ///
     /// # Errors
@@ -277,12 +270,9 @@ impl<S: States, const N: usize> Eskf<S, N> {
         measurement: &M,
         slack: f64,
     ) -> Result<Judged, Refusal> {
-        let mut room = Room::new();
-        measurement.linearise::<S, N>(self.estimate.as_ref().ok_or(Refusal::NotStarted)?, &mut room.model)?;
-        (0..D).for_each(|i| room.model.noise[(i, i)] += slack);
-        let innovation = self.covariance.innovation(&mut room, 1.0)?;
-        let nis = innovation.nis();
-        Ok(Judged { nis, log_likelihood: innovation.log_density() - 0.5 * nis })
+        let estimate = self.estimate.as_ref().ok_or(Refusal::NotStarted)?;
+        let linearise = |at: &Estimate<N>, model: &mut _| measurement.linearise::<S, N>(at, model);
+        judged(estimate, &self.covariance, slack, linearise)
     }
 
     /// Corrects the filter with a measurement taken at its current time.
@@ -318,119 +308,17 @@ impl<S: States, const N: usize> Eskf<S, N> {
         measurement: &M,
         gate: Gate,
     ) -> Result<Fused, Refusal> {
-        let mut room = Room::new();
-        let result = self.fuse(stream, measurement, gate, &mut room);
+        let result = self.estimate.as_mut().ok_or(Refusal::NotStarted).and_then(|estimate| {
+            let linearise = |at: &Estimate<N>, model: &mut _| measurement.linearise::<S, N>(at, model);
+            let updated = updated::<Self, D, N>(estimate, &mut self.covariance, stream, gate, linearise)?;
+            *estimate = updated.estimate;
+            if updated.is_fix {
+                self.upkeep.fixed_ns = estimate.time_ns;
+            }
+            Ok(updated.fused)
+        });
         stream.count(&result);
         result
-    }
-
-    #[inline]
-    fn innovation<'a, M: Measurement<D>, const D: usize>(
-        &self,
-        stream: &Stream,
-        measurement: &M,
-        room: &'a mut Room<D, N>,
-    ) -> Result<Innovation<'a>, Refusal> {
-        measurement.linearise::<S, N>(self.estimate.as_ref().ok_or(Refusal::NotStarted)?, &mut room.model)?;
-        self.covariance.innovation(room, stream.noise_factor())
-    }
-
-    #[inline]
-    fn fuse<M: Measurement<D>, const D: usize>(
-        &mut self,
-        stream: &Stream,
-        measurement: &M,
-        gate: Gate,
-        room: &mut Room<D, N>,
-    ) -> Result<Fused, Refusal> {
-        let mut innovation = self.innovation(stream, measurement, room)?;
-        let fused = weighed(&self.covariance, stream, &mut innovation, gate)?;
-        let error = innovation.mean();
-        // Transported to another state, a height has derivatives with respect to all of the position.
-        let is_fix = Self::fixes_position(&innovation);
-        if !Self::LAYOUT.admits(&error) {
-            return Err(Refusal::OutOfRange);
-        }
-        if !self.is_curved(fused.nis) {
-            self.correct(&innovation, &error)?;
-            self.note(is_fix);
-            return Ok(fused);
-        }
-        let factor = stream.noise_factor() / fused.weight;
-        let mut led = error;
-        for _ in 2..STEPS {
-            led = self.step(measurement, factor, &led, room).map_or_else(|_| SVector::zeros(), |step| step.mean());
-        }
-        let innovation = match self.step(measurement, factor, &led, room) {
-            Ok(innovation) => innovation,
-            // What leads nowhere, from a state that is absurd, is corrected linearly: by a step from the state itself.
-            Err(_) => self.step(measurement, factor, &SVector::zeros(), room)?,
-        };
-        self.correct(&innovation, &innovation.mean())?;
-        self.note(is_fix);
-        Ok(fused)
-    }
-
-    /// Notes the time of a position in the world.
-    fn note(&mut self, is_fix: bool) {
-        if let (true, Some(estimate)) = (is_fix, &self.estimate) {
-            self.upkeep.fixed_ns = estimate.time_ns;
-        }
-    }
-
-    /// Returns whether a correction of this normalised innovation squared is so large, in an attitude so uncertain, that a linear one is
-    /// not exact.
-    #[inline]
-    fn is_curved(&self, nis: f64) -> bool {
-        let turned: f64 = (ROTATION..ROTATION + 3).map(|i| self.covariance.matrix()[(i, i)]).sum();
-        nis * turned > LINEAR
-    }
-
-    /// A step of the Gauss–Newton method, in coordinates of the exponential at the state before the correction: the innovation of a
-    /// measurement that is linearised at the state composed with `error`.
-    ///
-    /// B. M. Bell, F. W. Cathey, "The iterated Kalman filter update as a Gauss–Newton method", IEEE Transactions on Automatic Control
-    /// 38(2), 1993.
-    #[inline(never)]
-    fn step<'a, M: Measurement<D>, const D: usize>(
-        &self,
-        measurement: &M,
-        factor: f64,
-        error: &SVector<f64, N>,
-        room: &'a mut Room<D, N>,
-    ) -> Result<Innovation<'a>, Refusal> {
-        if !Self::LAYOUT.admits(error) {
-            return Err(Refusal::OutOfRange);
-        }
-        let estimate = self.estimate.as_ref().ok_or(Refusal::NotStarted)?;
-        let model = &mut room.model;
-        *model = Linearised::new();
-        measurement.linearise::<S, N>(&estimate.composed::<S>(error), model)?;
-        Transport::new::<S, N>(error).of_jacobian(&mut model.jacobian);
-        for (residual, row) in model.residual.iter_mut().zip(&model.jacobian) {
-            *residual += row.iter().zip(error.iter()).map(|(h, x)| h * x).sum::<f64>();
-        }
-        self.covariance.innovation(room, factor)
-    }
-
-    /// Corrects the state by an error, and the covariance by the innovation that led to it.
-    #[inline(never)]
-    fn correct(&mut self, innovation: &Innovation<'_>, error: &SVector<f64, N>) -> Result<(), Refusal> {
-        let estimate = self.estimate.as_ref().ok_or(Refusal::NotStarted)?;
-        self.estimate = Some(estimate.composed::<S>(error));
-        self.covariance.update(innovation);
-        Transport::new::<S, N>(error).of_covariance(&mut self.covariance);
-        self.covariance.settle(&Self::LAYOUT);
-        Ok(())
-    }
-
-    /// Returns whether a measurement observes a horizontal position in the world, rather than one relative to the keyframe.
-    fn fixes_position(innovation: &Innovation<'_>) -> bool {
-        let keyframe = offset::<S>(Optional::Keyframe);
-        innovation.rows(N).any(|row| {
-            let sees = |first: usize| row[first] != 0.0 || row[first + 1] != 0.0;
-            sees(POSITION) && !keyframe.is_some_and(sees)
-        })
     }
 
     /// The estimate at the end of the last sample; `None` before the start.
@@ -476,4 +364,40 @@ impl<S: States, const N: usize> Eskf<S, N> {
     }
 
     upkeep_methods!();
+}
+
+impl<S: States, const N: usize> Composed<N> for Eskf<S, N> {
+    type State = Estimate<N>;
+
+    const LAYOUT: Layout<N> = Layout::of::<S>();
+
+    #[inline]
+    fn composed(state: &Estimate<N>, error: &SVector<f64, N>) -> Estimate<N> {
+        state.composed::<S>(error)
+    }
+
+    #[inline]
+    fn transport_jacobian(error: &SVector<f64, N>, jacobian: &mut [[f64; N]]) {
+        Transport::new::<S, N>(error).of_jacobian(jacobian);
+    }
+
+    #[inline]
+    fn transport_covariance(error: &SVector<f64, N>, covariance: &mut Covariance<N>) {
+        Transport::new::<S, N>(error).of_covariance(covariance);
+    }
+
+    /// All that is measured is turned by the attitude.
+    #[inline]
+    fn curvature(_: &Innovation<'_>, covariance: &Covariance<N>) -> f64 {
+        (ROTATION..ROTATION + 3).map(|i| covariance.matrix()[(i, i)]).sum()
+    }
+
+    /// A position relative to the keyframe is none.
+    fn fixes_position(innovation: &Innovation<'_>) -> bool {
+        let keyframe = offset::<S>(Optional::Keyframe);
+        innovation.rows(N).any(|row| {
+            let sees = |first: usize| row[first] != 0.0 || row[first + 1] != 0.0;
+            sees(POSITION) && !keyframe.is_some_and(sees)
+        })
+    }
 }

@@ -95,6 +95,8 @@ pub(super) fn left(vector: &Vector2<f64>) -> Vector2<f64> {
 /// The errors live on SE(2), with axes turned to those of the world: the heading turns the position error. Velocity, bias and scale are
 /// those of the body, and their errors add.
 impl Composed<STATES> for PlanarEstimate {
+    type State = Self;
+
     const LAYOUT: Layout<STATES> = {
         let mut layout = Layout::EMPTY;
         layout.set((POSITION, 2), MOST_VARIANCE);
@@ -106,11 +108,11 @@ impl Composed<STATES> for PlanarEstimate {
         layout
     };
 
-    fn composed(&self, error: &SVector<f64, STATES>) -> Self {
+    fn composed(state: &Self, error: &SVector<f64, STATES>) -> Self {
         let mut additive = *error;
         let moved = arc(error[HEADING]).0 * error.fixed_rows::<2>(POSITION);
         additive.fixed_rows_mut::<2>(POSITION).copy_from(&moved);
-        self.corrected(&additive)
+        state.corrected(&additive)
     }
 
     #[inline]

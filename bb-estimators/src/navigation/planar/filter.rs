@@ -234,7 +234,8 @@ impl PlanarEkf {
     ) -> Result<Fused, Refusal> {
         let result = self.estimate.as_mut().ok_or(Refusal::NotStarted).and_then(|estimate| {
             let linearise = |at: &PlanarEstimate, model: &mut _| measurement.linearise(at, model);
-            let updated = updated(estimate, &mut self.covariance, stream, gate, linearise)?;
+            let updated =
+                updated::<PlanarEstimate, D, STATES>(estimate, &mut self.covariance, stream, gate, linearise)?;
             *estimate = updated.estimate;
             if updated.is_fix {
                 self.upkeep.fixed_ns = estimate.time_ns;
