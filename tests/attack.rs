@@ -16,7 +16,7 @@ const RUNS: u64 = if cfg!(debug_assertions) { 40 } else { 1000 };
 const MOST: f64 = 0.02;
 
 /// The percentage of runs in which it is for longer; a change that raises it makes the deviations less honest.
-const DISHONEST: u64 = 8;
+const DISHONEST: u64 = 6;
 
 const GRAVITY: f64 = 9.81;
 const DEGREE: f64 = PI / 180.0;
