@@ -34,9 +34,9 @@ mod transport;
 
 #[cfg(feature = "alloc")]
 pub(super) use elsewhere::{UNMOORED, UNMOORED_HEADING, UNMOORED_SPEED};
-pub use filter::Eskf;
 #[cfg(feature = "alloc")]
-pub(super) use filter::{Doubt, Judged};
+pub(super) use filter::Doubt;
+pub use filter::Eskf;
 #[cfg(feature = "runtime")]
 pub(crate) use params::imu_params;
 pub use params::{EskfParams, GaussMarkov, ImuDensities};

@@ -6,8 +6,6 @@
 use nalgebra::SVector;
 
 use super::covariance::{Covariance, Innovation, Room};
-#[cfg(feature = "alloc")]
-use super::eskf::Judged;
 use super::fused::Fused;
 use super::fusion::weighed;
 use super::layout::Layout;
@@ -134,6 +132,15 @@ fn corrected<E: Composed<N>, const N: usize>(
     E::transport_covariance(error, covariance);
     covariance.settle(&E::LAYOUT);
     E::composed(estimate, error)
+}
+
+/// A measurement compared with a filter.
+#[cfg(feature = "alloc")]
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Judged {
+    /// Normalised innovation squared.
+    pub(super) nis: f64,
+    pub(super) log_likelihood: f64,
 }
 
 /// Compares a measurement with a state. `slack` is added to each variance of its noise.

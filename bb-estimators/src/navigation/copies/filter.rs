@@ -9,7 +9,7 @@ use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 
 use super::{TURN_DEVIATION, TURNS, UNKNOWN, Ways};
 use crate::attitude::ParamsError;
-use crate::navigation::eskf::{Doubt, Eskf, EskfParams, GaussMarkov, ImuMean, Judged, Start};
+use crate::navigation::eskf::{Doubt, Eskf, EskfParams, GaussMarkov, ImuMean, Start};
 use crate::navigation::fused::Fused;
 use crate::navigation::math::{rotation, rotation_vector, sqrt};
 use crate::navigation::measurement::{GnssPosition, Measurement};
@@ -17,6 +17,7 @@ use crate::navigation::propagate::Propagate;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{Estimate, Optional, ROTATION, States, offset};
 use crate::navigation::stream::Stream;
+use crate::navigation::update::Judged;
 
 /// The deviation of each of the attitudes that cover all, rad: half of the angle between two.
 const ATTITUDE_DEVIATION: f64 = FRAC_PI_4;

@@ -24,9 +24,9 @@ use crate::navigation::state::{
     Estimate, NAVIGATION, Navigation, Optional, POSITION, ROTATION, States, distinct, offset,
 };
 use crate::navigation::stream::{Gate, Stream};
-#[cfg(feature = "alloc")]
-use crate::navigation::update::judged;
 use crate::navigation::update::{Composed, updated};
+#[cfg(feature = "alloc")]
+use crate::navigation::update::{Judged, judged};
 use crate::navigation::upkeep::{Upkeep, upkeep_methods};
 use crate::params::Params as _;
 
@@ -67,15 +67,6 @@ pub(in crate::navigation) struct Doubt {
     pub(in crate::navigation) rotation: Vector3<f64>,
     /// Change of velocity, m²/s².
     pub(in crate::navigation) velocity: Vector3<f64>,
-}
-
-/// A measurement compared with a filter.
-#[cfg(feature = "alloc")]
-#[derive(Clone, Copy, Debug)]
-pub(in crate::navigation) struct Judged {
-    /// Normalised innovation squared.
-    pub(in crate::navigation) nis: f64,
-    pub(in crate::navigation) log_likelihood: f64,
 }
 
 /// Time over which the acceleration is averaged, s.

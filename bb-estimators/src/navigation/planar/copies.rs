@@ -11,11 +11,12 @@ use super::measurement::{PlanarMeasurement, PlanarPosition};
 use super::params::PlanarParams;
 use crate::attitude::ParamsError;
 use crate::navigation::copies::{CopiedFilter, Fix, TURN_DEVIATION, TURNS, UNKNOWN, Update, Ways, is_same};
-use crate::navigation::eskf::{Doubt, ImuMean, Judged, UNMOORED, UNMOORED_HEADING, UNMOORED_SPEED};
+use crate::navigation::eskf::{Doubt, ImuMean, UNMOORED, UNMOORED_HEADING, UNMOORED_SPEED};
 use crate::navigation::fused::Fused;
 use crate::navigation::math::{sqrt, wrapped};
 use crate::navigation::refusal::Refusal;
 use crate::navigation::stream::{Gate, Stream};
+use crate::navigation::update::Judged;
 use crate::navigation::update::judged;
 
 impl Fix for PlanarPosition {

@@ -72,12 +72,12 @@ proptest! {
         numbers in proptest::collection::vec(-1.0..1.0, STATES * STATES),
     ) {
         let error = SVector::<f64, STATES>::from_column_slice(&error);
-        let composed = at.composed(&error);
+        let composed = PlanarEstimate::composed(&at, &error);
         let numeric = SMatrix::<f64, STATES, STATES>::from_columns(&core::array::from_fn::<_, STATES, _>(|state| {
             let moved = |step: f64| {
                 let mut error = error;
                 error[state] += step;
-                composed.error_to(&at.composed(&error))
+                composed.error_to(&PlanarEstimate::composed(&at, &error))
             };
             (moved(STEP) - moved(-STEP)) / (2.0 * STEP)
         }));
