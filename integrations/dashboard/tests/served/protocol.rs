@@ -7,6 +7,7 @@ use bb_core::prelude::*;
 use bb_dashboard::{Dashboard, DashboardOptions};
 use serde_json::{Value, json};
 use std::error::Error;
+use std::sync::{Arc, Mutex, PoisonError};
 
 pub(crate) fn options() -> DashboardOptions {
     DashboardOptions { port: 0, ..DashboardOptions::defaults() }
@@ -61,7 +62,10 @@ fn readers_disarm_and_do_nothing_else() -> Result<(), Box<dyn Error>> {
 
 #[test]
 fn a_writer_has_the_rights_of_the_options() -> Result<(), Box<dyn Error>> {
-    let simulation = Cart::builder().simulate()?;
+    let (mut builder, lines) = (Cart::builder(), Arc::new(Mutex::new(Vec::new())));
+    let sink = Arc::clone(&lines);
+    builder.journal(move |line| sink.lock().unwrap_or_else(PoisonError::into_inner).push(format!("{line:?}")));
+    let simulation = builder.simulate()?;
     let dashboard = Dashboard::serve(&simulation, DashboardOptions { rights: "parameters".into(), ..options() })?;
     let mut writer = Client::steering(&dashboard)?;
     assert_eq!(writer.welcome["rights"], json!(["read", "parameters"]));
@@ -75,6 +79,11 @@ fn a_writer_has_the_rights_of_the_options() -> Result<(), Box<dyn Error>> {
     let parameters =
         writer.until(|message| message.get("parameters").filter(|all| all["param/count"] == 4).cloned())?;
     assert_eq!(parameters, json!({"param/speed": 1.0, "param/count": 4}));
+    // Who has done it is in the journal, the token that allowed it is not.
+    let token = token(&dashboard);
+    drop((writer, dashboard, simulation));
+    let journal = lines.lock().unwrap_or_else(PoisonError::into_inner).concat();
+    assert!(journal.contains("tester") && !journal.contains(&token), "{journal}");
     Ok(())
 }
 

@@ -30,6 +30,8 @@ fn the_page_is_small_and_its_files_forbid_what_it_does_not_need() -> Result<(), 
         ] {
             assert!(head.lines().any(|other| other == line), "{path} has no `{line}`: {head}");
         }
+        // A cookie would be sent for the pages of other sites too.
+        assert!(!head.to_ascii_lowercase().contains("set-cookie"), "{path}: {head}");
         // The page takes nothing from elsewhere, and nothing in it needs what its policy forbids.
         assert!(!body.contains("https://") && !body.contains("innerHTML") && !body.contains("eval("), "{path}");
         bytes += head.len() + body.len();
