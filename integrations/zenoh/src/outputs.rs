@@ -24,6 +24,8 @@ const WAITING: usize = 16_384;
 const PATIENCE: Duration = Duration::from_millis(20);
 /// Time between two diagnoses.
 const DIAGNOSIS: Duration = Duration::from_secs(1);
+/// Time after the end for which messages that were published before it are put.
+const LAST: Duration = Duration::from_secs(1);
 /// Least time between two messages of the clock, on it.
 const TICK_NS: i64 = 10_000_000;
 /// The depth of topics, as ROS has it by default.
@@ -160,10 +162,15 @@ impl Outputs {
         for message in self.viewers.first(now) {
             self.view(message);
         }
-        let (mut lost, mut next_diagnosis) = (0, Instant::now());
+        let (mut lost, mut next_diagnosis, mut end) = (0, Instant::now(), None);
         loop {
             // Before the last look into the queue, so that what was published before the end is put.
             let is_last = is_over.load(Ordering::Acquire);
+            // A robot that publishes on, or a network that does not take it, does not put the end off.
+            if is_last && Instant::now() > *end.get_or_insert_with(|| Instant::now() + LAST) {
+                tracing::warn!("messages were left at the end of the bridge");
+                break;
+            }
             let waited = Instant::now();
             match self.messages.recv_timeout(if is_last { Duration::ZERO } else { PATIENCE }) {
                 Some(message) => self.publish(&message),

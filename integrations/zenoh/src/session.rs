@@ -6,7 +6,9 @@ use std::fmt;
 use std::ops::Deref;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, LazyLock, Mutex, PoisonError, Weak};
+use std::sync::{Arc, LazyLock, Mutex, PoisonError, Weak, mpsc};
+use std::thread;
+use std::time::Duration;
 use thiserror::Error;
 use zenoh::Wait;
 
@@ -17,6 +19,9 @@ const LEASE_MS: u32 = 1000;
 const SIGNS_OF_LIFE: u32 = 4;
 /// Times between two attempts to connect, in milliseconds.
 const RETRIES_MS: (u32, u32) = (200, 1000);
+
+/// Time for which the end of a session waits for the network.
+const CLOSING: Duration = Duration::from_secs(2);
 
 /// Part of a session among others.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -145,9 +150,19 @@ struct Opened {
 
 impl Drop for Opened {
     fn drop(&mut self) {
-        if let Err(error) = self.session.close().wait() {
-            tracing::warn!(%error, "the session of zenoh was not closed");
-        }
+        // Beside a machine that is frozen, zenoh waits for ten seconds or more, and its sockets linger: that goes on without the robot.
+        let (session, (closed, is_closed)) = (self.session.clone(), mpsc::channel());
+        let closing = thread::Builder::new().name("zenoh close".into()).spawn(move || {
+            // Nobody may wait for it any more.
+            let _ = closed.send(session.close().wait());
+        });
+        let fault = match closing.map(|_| is_closed.recv_timeout(CLOSING)) {
+            Ok(Ok(Ok(()))) => return,
+            Ok(Ok(Err(error))) => error.to_string(),
+            Ok(Err(error)) => error.to_string(),
+            Err(error) => error.to_string(),
+        };
+        tracing::warn!(fault, "the session of zenoh is not closed yet");
     }
 }
 

@@ -6,8 +6,11 @@ use bb_core::nalgebra::Vector3;
 use bb_core::prelude::*;
 use bb_core::{Bus, Options};
 use bb_ros2::{Address, Attachment, Endpoint, EndpointKind, Gid, Node, Qos, Token, TypeHash};
-use bb_zenoh::{Ros2Bridge, Ros2Options, Ros2State, Session, SessionSettings};
-use std::net::TcpListener;
+use bb_zenoh::{Mode, Ros2Bridge, Ros2Options, Ros2State, Session, SessionSettings};
+use std::io::{Read, Write};
+use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 use zenoh::Wait;
 
@@ -302,4 +305,70 @@ fn a_robot_declares_that_it_is_a_node_in_one_line() {
         }),
         "{state:?}"
     );
+}
+
+/// A link to a port through which nothing passes any more once it is frozen, and which is not closed.
+fn link(to: SocketAddr) -> (SocketAddr, Arc<AtomicBool>) {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("one is free");
+    let (address, frozen) = (listener.local_addr().expect("it has one"), Arc::<AtomicBool>::default());
+    let is_frozen = Arc::clone(&frozen);
+    std::thread::spawn(move || {
+        for near in listener.incoming().flatten() {
+            let Ok(far) = TcpStream::connect(to) else { continue };
+            let ways = [(near.try_clone(), far.try_clone()), (Ok(far), Ok(near))];
+            for (from, into) in ways {
+                let (Ok(mut from), Ok(mut into)) = (from, into) else { continue };
+                let is_frozen = Arc::clone(&is_frozen);
+                std::thread::spawn(move || {
+                    let mut buffer = [0; 4096];
+                    while let Ok(read @ 1..) = from.read(&mut buffer) {
+                        while is_frozen.load(Ordering::Relaxed) {
+                            std::thread::sleep(Duration::from_millis(10));
+                        }
+                        if into.write_all(&buffer[..read]).is_err() {
+                            break;
+                        }
+                    }
+                    let _ = into.shutdown(Shutdown::Both);
+                });
+            }
+        }
+    });
+    (address, frozen)
+}
+
+#[test]
+fn the_end_waits_neither_for_a_frozen_router_nor_for_a_robot_that_publishes_on() {
+    let routed = TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr()).expect("one is free");
+    let listen = vec![format!("tcp/{routed}")];
+    let router = Session::open(&SessionSettings { mode: Mode::Router, listen, ..SessionSettings::default() });
+    let router = router.expect("it is opened");
+    let messages = router.declare_subscriber("0/sensor/base/imu/**").wait().expect("it is declared");
+    let (address, frozen) = link(routed);
+    let robot = SmallCart::builder().start().expect("it starts");
+    let connect = format!("tcp/{address}");
+    let bridge = bridged(&robot, Ros2Options { connect, listen: String::new(), ..options() });
+    let publisher = robot.publisher("sensor/base/imu").expect("it may");
+    assert!(until(|| {
+        publisher.publish(imu(0.0));
+        messages.try_recv().ok().flatten().is_some()
+    }));
+    let is_over = AtomicBool::new(false);
+    let took = std::thread::scope(|scope| {
+        scope.spawn(|| {
+            while !is_over.load(Ordering::Relaxed) {
+                (0..20).for_each(|_| publisher.publish(imu(1.0)));
+                std::thread::sleep(Duration::from_millis(1));
+            }
+        });
+        std::thread::sleep(Duration::from_millis(200));
+        frozen.store(true, Ordering::Relaxed);
+        std::thread::sleep(Duration::from_millis(200));
+        let begun = Instant::now();
+        drop(bridge);
+        is_over.store(true, Ordering::Relaxed);
+        begun.elapsed()
+    });
+    assert!(took < Duration::from_secs(6), "{took:?}");
+    frozen.store(false, Ordering::Relaxed);
 }
