@@ -39,7 +39,8 @@ pub struct Ros2Options {
     /// Endpoints to listen on. Empty for the loopback device, where nodes of ROS look for a router; or for none, if it connects to one.
     #[option(default = "")]
     pub listen: String,
-    /// `router`, so that nodes that know the robot alone hear each other, or `peer`. Empty for a router, or for a peer if it connects to one.
+    /// `router`, so that nodes that know the robot alone hear each other, `client` of a router, or `peer`. Empty for a router, or for a client if
+    /// it connects to one and listens nowhere.
     #[option(default = "")]
     pub mode: String,
     /// A file of zenoh's configuration, in JSON5, that goes before all else: certificates, users and rights.
@@ -57,10 +58,11 @@ impl Ros2Options {
             listen => listen,
         };
         let mode = match self.mode.as_str() {
-            "" if has_router => Mode::Peer,
+            "" if listen.is_empty() => Mode::Client,
             "" | "router" => Mode::Router,
+            "client" => Mode::Client,
             "peer" => Mode::Peer,
-            other => return Err(Fault::new(format!("`mode` is `{other}`: expected `router` or `peer`"))),
+            other => return Err(Fault::new(format!("`mode` is `{other}`: expected `router`, `client` or `peer`"))),
         };
         let file = (!self.config.is_empty()).then(|| self.config.clone().into());
         Ok(SessionSettings { mode, listen, connect, file })
@@ -110,15 +112,14 @@ mod tests {
         let alone = settings(|_| ()).expect("they are valid");
         assert_eq!((alone.mode, alone.listen), (Mode::Router, vec![ROUTER.to_owned()]));
         let connected = settings(|options| options.connect = "tcp/192.0.2.1:7447".into()).expect("they are valid");
-        assert_eq!((connected.mode, connected.listen.len(), connected.connect.len()), (Mode::Peer, 0, 1));
+        assert_eq!((connected.mode, connected.listen.len(), connected.connect.len()), (Mode::Client, 0, 1));
         let both = settings(|options| {
             options.connect = "tcp/192.0.2.1:7447".into();
             options.listen = "tcp/127.0.0.1:0".into();
-            options.mode = "router".into();
         });
         assert_eq!(both.map(|both| (both.mode, both.listen.len())), Ok((Mode::Router, 1)));
-        let wrong = settings(|options| options.mode = "client".into());
-        assert_eq!(wrong, Err("`mode` is `client`: expected `router` or `peer`".to_owned()));
+        let wrong = settings(|options| options.mode = "bridge".into());
+        assert_eq!(wrong, Err("`mode` is `bridge`: expected `router`, `client` or `peer`".to_owned()));
     }
 
     #[test]

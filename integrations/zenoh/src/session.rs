@@ -29,6 +29,9 @@ pub enum Mode {
     /// A robot that speaks to those it is connected with.
     #[default]
     Peer,
+    /// A robot that speaks to all that its router knows. A router passes to peers what a client sends, but not what a peer sends of which
+    /// gossip tells it nothing.
+    Client,
     /// A robot through which others also hear each other: two nodes of ROS 2 that know it alone. They find each other by gossip, which is
     /// on in `rmw_zenoh_cpp` as long as nobody turns it off.
     Router,
@@ -99,7 +102,7 @@ impl SessionSettings {
         // By what a router tells of the others, two of them hear each other; it connects to none of them itself.
         let gossip = json!({ "enabled": self.mode == Mode::Router, "autoconnect": [] });
         let mut configuration = json!({
-            "mode": match self.mode { Mode::Peer => "peer", Mode::Router => "router" },
+            "mode": match self.mode { Mode::Peer => "peer", Mode::Client => "client", Mode::Router => "router" },
             "listen": { "endpoints": self.listen, "exit_on_failure": true },
             "connect": {
                 "endpoints": self.connect,

@@ -374,3 +374,53 @@ fn the_end_waits_neither_for_a_frozen_router_nor_for_a_robot_that_publishes_on()
     assert!(took < Duration::from_secs(6), "{took:?}");
     frozen.store(false, Ordering::Relaxed);
 }
+
+/// With `rmw_zenohd` in the middle: it listens, nodes of ROS are peers that find each other by gossip, and the robot is a client.
+#[test]
+fn a_node_and_the_robot_meet_at_a_router_also_after_it_was_started_again() {
+    let routed = TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr()).expect("one is free");
+    let endpoint = format!("tcp/{routed}");
+    let route = || {
+        let listen = vec![endpoint.clone()];
+        let mut router = None;
+        assert!(until(|| {
+            router = Session::open(&SessionSettings {
+                mode: Mode::Router,
+                listen: listen.clone(),
+                ..SessionSettings::default()
+            })
+            .ok();
+            router.is_some()
+        }));
+        router
+    };
+    let router = route();
+    let robot = SmallCart::builder().start().expect("it starts");
+    let options = Ros2Options { connect: endpoint.clone(), listen: String::new(), ..options() };
+    let _bridge = bridged(&robot, options);
+    let file = std::env::temp_dir().join(format!("bb-zenoh-node-{}.json5", std::process::id()));
+    let gossip =
+        "{ scouting: { gossip: { enabled: true, autoconnect: { router: [], peer: ['router', 'peer'] } } } }";
+    std::fs::write(&file, gossip).expect("it is written");
+    let settings = SessionSettings {
+        mode: Mode::Peer,
+        listen: vec!["tcp/127.0.0.1:0".into()],
+        connect: vec![endpoint.clone()],
+        file: Some(file.clone()),
+    };
+    let node = Session::open(&settings).expect("it is opened");
+    std::fs::remove_file(&file).expect("it is removed");
+    let messages = node.declare_subscriber("0/sensor/base/imu/**").wait().expect("it is declared");
+    let publisher = robot.publisher("sensor/base/imu").expect("it may");
+    let meets = || {
+        until(|| {
+            publisher.publish(imu(0.0));
+            messages.try_recv().ok().flatten().is_some()
+        })
+    };
+    assert!(meets(), "not at first");
+    drop(router);
+    while messages.try_recv().ok().flatten().is_some() {}
+    let _router = route();
+    assert!(meets(), "not again");
+}
