@@ -33,7 +33,7 @@ pub struct Ros2Options {
     /// Rights of other nodes, of `parameters`, `commands`, `arm` and `actuators`. All may disarm.
     #[option(default = "parameters commands")]
     pub rights: String,
-    /// Endpoints of zenoh to connect to, such as that of a router: `tcp/192.168.1.2:7447`.
+    /// Endpoints of zenoh to connect to, such as that of a router: `tcp/192.168.1.2:7447`. A client takes the first that answers.
     #[option(default = "")]
     pub connect: String,
     /// Endpoints to listen on. Empty for the loopback device, where nodes of ROS look for a router; or for none, if it connects to one.
