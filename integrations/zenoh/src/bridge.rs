@@ -42,7 +42,8 @@ const STATE: Duration = Duration::from_secs(1);
 ///
 /// Or as a line of the robot: `bridge ros2: Ros2Bridge();`.
 ///
-/// Nothing of the robot waits for the network: the threads of the bridge take from a bounded queue, and what does not fit is counted.
+/// Publishing in the robot does not wait for the network: a thread of the bridge reads a bounded queue, and messages that do not fit are
+/// counted. Dropping the bridge waits for the messages in that queue, and for requests to arm or disarm that have begun.
 #[derive(Debug)]
 pub struct Ros2Bridge {
     // In this order: what others see of it ends first, and the session last.
@@ -65,7 +66,7 @@ impl Ros2Bridge {
     /// [`Bus`]; other nodes have at most its rights.
     ///
     /// # Errors
-    /// An option has an unusable value, an endpoint to listen on is taken, or nothing can be published or subscribed at one of the paths.
+    /// An option has an unusable value, an endpoint to listen on is in use, or nothing can be published or subscribed at one of the paths.
     pub fn serve(robot: &Bus, options: Ros2Options) -> Result<Self, Ros2Error> {
         let settings = options.session().map_err(Ros2Error::Options)?;
         let rights = options.node_rights().map_err(Ros2Error::Options)?;

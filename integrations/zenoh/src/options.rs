@@ -27,7 +27,7 @@ pub struct Ros2Options {
     #[option(default = "")]
     pub publish: String,
     /// Paths of inputs that other nodes publish to: sensors declared as `External`, `external` inputs of estimators, and paths with a known
-    /// payload. Whoever reaches the session can then tell the robot what its sensors see, so there are none by default.
+    /// payload. Every program that reaches the session can then publish there, as a sensor would, so there are none by default.
     #[option(default = "")]
     pub subscribe: String,
     /// Rights of other nodes, of `parameters`, `commands`, `arm` and `actuators`. All may disarm.

@@ -1,4 +1,4 @@
-//! The session of zenoh: one for all that has the same settings, opened as it was measured to lose and hide nothing.
+//! The session of zenoh: one for all that has the same settings, with defaults chosen by measuring what is lost and delayed.
 
 use serde_json::{Value, json};
 use std::collections::HashMap;
@@ -33,11 +33,12 @@ pub enum Mode {
     /// gossip tells it nothing.
     Client,
     /// A robot through which others also hear each other: two nodes of ROS 2 that know it alone. They find each other by gossip, which is
-    /// on in `rmw_zenoh_cpp` as long as nobody turns it off.
+    /// on in `rmw_zenoh_cpp` unless it is turned off there.
     Router,
 }
 
-/// Settings of a session. Multicast and timestamps are off, gossip is but for a router, and the lease is 1 s, unless the file says otherwise.
+/// Settings of a session. Multicast and timestamps are off, gossip is on for a router only, and the lease is
+/// 1 s, unless the file sets them.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub struct SessionSettings {
     /// Part of the session among others.
@@ -66,7 +67,7 @@ pub enum SessionError {
     /// zenoh does not accept the configuration.
     #[error("zenoh does not accept the configuration: {0}")]
     Configuration(String),
-    /// The session cannot be opened: the address is taken, or a certificate is missing.
+    /// The session cannot be opened: the address is in use, or a certificate is missing.
     #[error("no session of zenoh{at}: {fault}", at = if listen.is_empty() { String::new() } else { format!(" that listens on {}", listen.join(", ")) })]
     Open {
         /// The endpoints to listen on.
@@ -175,7 +176,7 @@ impl Session {
     /// Returns the session with these settings, which is opened if it is not open yet.
     ///
     /// # Errors
-    /// The configuration is not usable, or an endpoint to listen on is taken. That nobody answers at an endpoint to connect to is no error.
+    /// The configuration is not usable, or an endpoint to listen on is in use. An endpoint to connect to that does not answer is no error.
     pub fn open(settings: &SessionSettings) -> Result<Self, SessionError> {
         let configuration = settings.configuration()?;
         // Held while it is opened, so that no other thread opens the same.

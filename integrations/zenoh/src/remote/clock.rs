@@ -237,7 +237,8 @@ mod tests {
         }
     }
 
-    /// Asks a peer, one question at a time, and converts a stamp each 5 ms, none of which may be off by more than its bound. Returns the bounds of the stamps after 5 s, sorted, and the least round trip, ns.
+    /// Asks a peer, one question at a time, and converts a stamp each 5 ms, none of which may be off by more than its bound. Returns the
+    /// bounds of the stamps after 5 s, sorted, and the least round trip, ns.
     fn run(link: &mut Link, seconds: i64) -> (Vec<i64>, i64) {
         let mut clock = PeerClock::default();
         let (mut bounds, mut least_trip) = (Vec::new(), i64::MAX);
