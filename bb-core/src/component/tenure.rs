@@ -1,6 +1,6 @@
 //! The time during which a caller may act, and the calls that are being carried out in it.
 //!
-//! What is revoked must not act afterwards, and nobody may wait for a call whose code hangs. So a call holds a permit from its last check
+//! What is revoked must not act afterwards, and a call whose code hangs must block no other thread for good. So a call holds a permit from its last check
 //! until it has acted. To end a tenure is one atomic step, which comes before or after that check and waits for nothing: it is also done
 //! under the lock of the control state. Those who need to know that nothing acts any more wait for the permits that are held,
 //! with a time limit, and not for those of their own thread, since a call may end the tenure that it is made in.
@@ -35,7 +35,7 @@ loom::thread_local! {
     static HELD: RefCell<Vec<usize>> = RefCell::new(Vec::new());
 }
 
-/// `None` in a thread that ends: values that it drops may still call.
+/// Calls with the permits of the calling thread; `None` in a thread that ends: values that it drops may still call.
 fn with_held<T>(call: impl FnOnce(&mut Vec<usize>) -> T) -> Option<T> {
     #[cfg(not(loom))]
     return HELD.try_with(|held| call(&mut held.borrow_mut())).ok();
