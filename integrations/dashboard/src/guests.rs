@@ -32,7 +32,7 @@ pub(crate) struct Seat {
 }
 
 impl Guests {
-    /// A place; if all are taken, that of the oldest viewer without the token. `None` if all have it.
+    /// A place; if none is free, that of the oldest viewer without the token. `None` if all have it.
     pub(crate) fn seat(&self) -> Option<Seat> {
         let mut seats = self.seats();
         if seats.len() >= MOST {

@@ -75,7 +75,7 @@ impl Dashboard {
     /// [`Bus`]; viewers have at most its rights.
     ///
     /// # Errors
-    /// An option has an unusable value, or the address is taken.
+    /// An option has an unusable value, or the address is in use.
     pub fn serve(robot: &Bus, options: DashboardOptions) -> Result<Self, ServeError> {
         Self::serve_all(&[robot], options)
     }
@@ -128,12 +128,12 @@ impl Dashboard {
         self.address
     }
 
-    /// The address for browsers, without the token: whoever opens it may read.
+    /// The address for browsers, without the token: everyone who opens it may read.
     pub fn reading_url(&self) -> String {
         format!("http://{}/", self.address)
     }
 
-    /// The address for browsers, with the token in its fragment, which browsers do not send, log or pass on: whoever opens it has the
+    /// The address for browsers, with the token in its fragment, which browsers do not send, log or pass on: everyone who opens it has the
     /// [rights](DashboardOptions::rights).
     pub fn url(&self) -> String {
         format!("{}#token={}", self.reading_url(), self.token.text())
