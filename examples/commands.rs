@@ -1,6 +1,7 @@
 //! Commands: what a robot does, in which states it may, and what it does then. `cargo run --example commands`
 //!
-//! A command is an `async` function on the robot's clock. Another one can cancel it; code that must run then is in a `Drop`.
+//! A command is an `async` function on the robot's clock. Another one can cancel it; code that must run then is in a `Drop`. The states
+//! *disarmed*, *idle* and *executing* are there in every robot.
 
 use bb_core::prelude::*;
 
@@ -40,8 +41,8 @@ robot! {
     robot Cart;
     states { parked; }
     commands {
-        category motion { concurrency: 1; }
-        arm: Arm;
+        category motion { concurrency: 1; } // one of its commands at a time
+        arm: Arm; // leads from `disarmed` to `idle`
         go: Drive(speed = 0.5 m/s) { allowed_states: [idle, parked]; category: motion; timeout: 10 s; }
         hurry: Drive(speed = 2 m/s) { allowed_states: [idle, executing]; cancel: [motion]; }
     }
@@ -57,7 +58,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("{}", refusal.ok_or("it must be refused while disarmed")?);
 
     simulation.command(cart::command::arm, NoArguments)?;
-    simulation.run_for(Duration::ZERO);
+    simulation.run_for(Duration::ZERO); // what is due now: it is armed
     let slow = simulation.command(cart::command::go, Distance { metres: 2.0 })?;
     simulation.run_for(Duration::from_secs(1));
     let fast = simulation.command(cart::command::hurry, Distance { metres: 2.0 })?;

@@ -1,7 +1,7 @@
 //! A sensor that fails, and what the robot does then. `cargo run --example health`
 //!
 //! The lidar is unplugged for a second. Its driver is closed and opened again until it answers; its estimator is *lost*, which starts
-//! a command, then *degraded*, and *healthy* after some good runs.
+//! a command. The first run afterwards makes it *degraded*, and as many good runs as `recover_after` says, here one, *healthy*.
 
 use bb_core::prelude::*;
 

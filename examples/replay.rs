@@ -4,7 +4,6 @@
 //! without its hardware. Here it is kept in memory; `bb-mcap` writes it to a file, which ROS 2 tools read too.
 
 use bb_core::prelude::*;
-use bb_core::pubsub::Overflow;
 use bb_estimators::{Madgwick, SimulatedImu};
 use std::sync::{Arc, Mutex, PoisonError};
 

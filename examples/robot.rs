@@ -1,6 +1,7 @@
 //! The first robot: one IMU, and an estimator of its attitude. `cargo run --example robot`
 //!
-//! `robot!` declares it, the builder starts it, and handles such as `rover::sensor::base::imu` name what it publishes.
+//! `robot!` declares it, the builder starts it, and handles such as `rover::sensor::base::imu` name what it publishes. The IMU is
+//! simulated; `Mekf<Marg>` is the filter of `hello` with a magnetometer, `Mekf<Imu>` the one without.
 
 use bb_core::prelude::*;
 use bb_estimators::simulation::Motion;
