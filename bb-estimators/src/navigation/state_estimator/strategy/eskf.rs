@@ -24,7 +24,7 @@ use crate::navigation::state::{NAVIGATED, Navigated};
 use crate::navigation::state_estimator::factor::ProvidedFactor;
 use crate::navigation::state_estimator::params::StateEstimatorConfig;
 
-/// See the module.
+/// The copies of the filter, and the poses of the last keyframes.
 #[derive(Clone, Debug)]
 pub(in crate::navigation::state_estimator) struct EskfStrategy {
     copies: Copies<Eskf<Navigated, NAVIGATED>>,

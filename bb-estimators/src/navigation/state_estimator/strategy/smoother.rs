@@ -24,7 +24,7 @@ use crate::navigation::state_estimator::params::StateEstimatorConfig;
 use crate::navigation::stream::{Stream, StreamParams};
 
 #[expect(clippy::large_enum_variant, reason = "factors of providers are as large as theirs are")]
-/// Configuration of a window.
+/// A factor in the window: of this crate, or of a provider.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Held<F> {
     Navigation(NavigationFactor),
@@ -52,7 +52,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> Factor<S, N> for Held<F> {
     }
 }
 
-/// See the module.
+/// The window, and the filter beside it.
 #[derive(Clone, Debug)]
 pub(in crate::navigation::state_estimator) struct SmootherStrategy<F: ProvidedFactor> {
     smoother: FixedLagSmoother<Smoothed, SMOOTHED, Held<F>>,
