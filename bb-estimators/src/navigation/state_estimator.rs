@@ -2,8 +2,8 @@
 //!
 //! [`StateEstimator`] takes samples of the flight controller's IMU, relative poses from a camera and poses from satellite images.
 //! While it can be trusted, the flight controller's satellite receiver is used too. The configuration selects one of two
-//! strategies: the fixed-lag smoother (feature `smoother`, the default) or the error-state Kalman filter (feature `eskf`). Either
-//! can be built without the other.
+//! strategies: the fixed-lag smoother, with the filter beside it (feature `smoother`, the default), or the error-state Kalman filter
+//! alone (feature `eskf`). Either can be built without the other.
 //!
 //! ```
 //! # #[cfg(feature = "std")]
@@ -45,10 +45,11 @@
 //!
 //! # Errors
 //!
-//! *Degraded*: the input was left out of the estimate, or has moved it elsewhere; there is an estimate. *Fatal*: there is no estimate for this tick; the input that caused the failure is excluded from then on. Each success and each failure
-//! is an [`Event`], with its reason. If a late input changes what an earlier one became, that is an event as it would have been at
-//! once, and each is told once. After three seconds without an estimate, exactly one event reports this, and one more
-//! reports when an estimate is available again.
+//! *Degraded*: the input was left out of the estimate, or has moved it elsewhere; there is an estimate. *Fatal*: there is no estimate
+//! for this tick; the input that caused the failure is excluded from then on. Each success and each failure is an [`Event`], with its
+//! reason. If a late input changes what an earlier one became, that is an event as it would have been at once, and each is reported
+//! once. After three seconds without an estimate, exactly one event reports this, and one more reports when an estimate is available
+//! again.
 //!
 //! # Conventions
 //!

@@ -142,8 +142,9 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         Ok(())
     }
 
-    /// Sets the multiple of the white noise of the IMU, as a deviation, from now on. If it was smaller, what the window has concluded from
-    /// the IMU was too certain all along: that is weakened by as much.
+    /// Sets the multiple of the white noise of the IMU, as a deviation, from the next sample on. If it was smaller, what the window has
+    /// concluded was too certain all along: its prior, and the motion between its keyframes, are weakened by as much. Samples since the
+    /// newest keyframe keep their noise.
     pub(in crate::navigation) fn set_noise(&mut self, multiple: f64) {
         let factor = (multiple / self.noise) * (multiple / self.noise);
         self.noise = multiple;
