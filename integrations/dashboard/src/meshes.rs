@@ -15,10 +15,11 @@ const LONGEST: u64 = 16 * 1024 * 1024;
 pub(crate) struct Meshes(BTreeMap<&'static str, Bytes>);
 
 impl Meshes {
-    /// Reads those of `robots` that are in `folder`. One that is missing, or is not an STL, is logged, and its place is marked in the page.
+    /// Reads those of `robots` that are in `folder`. One that is missing, too long, or not named `.stl` is
+    /// logged, and its place is marked in the page.
     ///
     /// # Errors
-    /// `folder` is none.
+    /// `folder` is neither empty nor a folder.
     pub(crate) fn read(folder: &str, robots: &[&Bus]) -> Result<Self, Fault> {
         if folder.is_empty() {
             return Ok(Self::default());
