@@ -14,7 +14,7 @@ pub struct Ros2State {
     pub received: u64,
     /// Messages of other nodes that it did not take: of another type, not to be read, or faster than it takes them.
     pub refused: u64,
-    /// Requests to services that were answered.
+    /// Requests to services that were carried out or denied with a reason; not those that cannot be read, or for which there was no room.
     pub requests: u64,
 }
 

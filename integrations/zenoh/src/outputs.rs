@@ -156,7 +156,7 @@ impl Outputs {
         Ok(Some(Topic { main: publisher(name, &schema.name, &hash)?, is_exact, companion }))
     }
 
-    /// Publishes until it is to end, and what waits then.
+    /// Publishes until it is to end, and the messages that wait then; changes of parameters that wait then may be left out.
     pub(crate) fn run(mut self, is_over: &AtomicBool) {
         let now = self.now();
         for message in self.viewers.first(now) {
