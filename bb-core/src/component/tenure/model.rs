@@ -1,4 +1,5 @@
-//! Model-checks every order in which calls and the end of their tenure can meet: `RUSTFLAGS="--cfg loom"`.
+//! Model-checks the orders in which calls and the end of their tenure can meet, with up to three preemptions:
+//! `RUSTFLAGS="--cfg loom"`.
 
 use super::Tenure;
 use loom::sync::atomic::AtomicBool;
