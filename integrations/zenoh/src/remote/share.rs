@@ -108,7 +108,7 @@ struct Outlet {
 /// The number of a run, random, since two robots may have one name.
 struct RunNumber(u64);
 
-/// Wakes the thread of the bridge.
+/// Waker of the thread of the bridge.
 struct Unpark(Thread);
 
 impl Wake for Unpark {
