@@ -1,7 +1,7 @@
 //! The time during which a caller may act, and the calls that are being carried out in it.
 //!
-//! What is revoked must not act afterwards, and a call whose code hangs must block no other thread for good. So a call holds a permit from its last check
-//! until it has acted. To end a tenure is one atomic step, which comes before or after that check and waits for nothing: it is also done
+//! What is revoked must not act afterwards, and a call whose code hangs must block no other thread for good. So a call holds a permit from its
+//! last check until it has acted. To end a tenure is one atomic step, which comes before or after that check and waits for nothing: it is also done
 //! under the lock of the control state. Those who need to know that nothing acts any more wait for the permits that are held,
 //! with a time limit, and not for those of their own thread, since a call may end the tenure that it is made in.
 
