@@ -25,9 +25,9 @@ pub struct Mount {
 /// A place on the body.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Place {
-    /// The placement of a frame.
+    /// Frame whose placement it has.
     Frame(String),
-    /// Takes its coordinates to those of the IMU.
+    /// Transform of its coordinates to those of the robot.
     Pose(Isometry3<f64>),
 }
 
