@@ -13,7 +13,8 @@ use super::measurement::Linearised;
 use super::refusal::Refusal;
 use super::stream::{Gate, Stream};
 
-/// Steps of an iterated correction. Three are as good as five, and two are not (`book/src/explanation/navigation-filter.md`).
+/// Steps of an iterated correction. Three are as good as five, and two are not. What a single one gives is in
+/// `book/src/explanation/navigation-filter.md`.
 const STEPS: usize = 3;
 
 /// A linear correction is exact to two percent below this product of the normalised innovation squared and the variance of
