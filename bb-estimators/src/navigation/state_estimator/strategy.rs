@@ -224,7 +224,7 @@ impl<F: ProvidedFactor> Strategy<F> {
         match self {
             #[cfg(feature = "smoother")]
             Self::Smoother(strategy) => strategy.is_converged(),
-            // It corrects in one step.
+            // It corrects in a fixed number of steps.
             #[cfg(feature = "eskf")]
             Self::Eskf(..) => true,
         }
