@@ -326,6 +326,8 @@ fn estimates_are_exported() {
     let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR"));
     let export = |name: &str, filter: &str| {
         let to = folder.join(name);
+        // Of an earlier run: recordings are not overwritten.
+        let _ = std::fs::remove_file(&to);
         let arguments = ["--json", "--filter", filter, "--export", to.to_str().expect("is text")];
         let output = eval(&[&walk], &arguments);
         assert_eq!(output.code, Some(0), "{}", output.err);
