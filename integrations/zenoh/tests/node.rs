@@ -375,7 +375,7 @@ fn the_end_waits_neither_for_a_frozen_router_nor_for_a_robot_that_publishes_on()
     frozen.store(false, Ordering::Relaxed);
 }
 
-/// With `rmw_zenohd` in the middle: it listens, nodes of ROS are peers that find each other by gossip, and the robot is a client.
+/// A router in the middle, as `rmw_zenohd` is one: nodes of ROS are peers that find each other by gossip, and the robot is a client.
 #[test]
 fn a_node_and_the_robot_meet_at_a_router_also_after_it_was_started_again() {
     let routed = TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr()).expect("one is free");
