@@ -1,4 +1,4 @@
-//! Each example prints what is stored beside it, and is short.
+//! The ladder of examples: each prints what is stored beside it, and is short.
 //!
 //! `UPDATE_EXPECTED=1 cargo test -p bb-examples` writes the stored outputs.
 

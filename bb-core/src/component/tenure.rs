@@ -167,7 +167,7 @@ impl Tenure {
 pub(crate) struct Permit<'a> {
     /// `None` for a caller without an end.
     tenure: Option<&'a Tenure>,
-    /// Each thread knows its own.
+    /// Keeps the permit on its thread: each thread knows its own.
     _on_one_thread: PhantomData<*const ()>,
 }
 

@@ -297,7 +297,7 @@ def services(rover):
     check("set at once: all or none", answer is not None and not answer.result.successful
           and client.call("get_parameters", "rcl_interfaces/srv/GetParameters", GetParameters,
                           GetParameters.Request(names=names("kp"))).values[0].double_value == 5.5)
-    # Requests that are none: an error or an answer, and the robot lives.
+    # Malformed requests: each gets an error or an answer, and the robot runs on.
     told = 0
     for count in range(300):
         reply = client.raw("set_parameters", "rcl_interfaces/srv/SetParameters", os.urandom(count % 64))

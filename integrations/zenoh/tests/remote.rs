@@ -228,7 +228,7 @@ fn two_robots_of_one_name_are_refused() {
     assert_eq!(rover.readings.drain().count(), 0);
 }
 
-/// Publishes as it is told.
+/// A sensor that counts.
 #[derive(Debug)]
 struct Counter(u64);
 

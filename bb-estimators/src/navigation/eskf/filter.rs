@@ -377,13 +377,13 @@ impl<S: States, const N: usize> Composed<N> for Eskf<S, N> {
         Transport::new::<S, N>(error).of_covariance(covariance);
     }
 
-    /// All that is measured is turned by the attitude.
+    /// The variance of the whole attitude, whatever is measured: each measurement is turned by it.
     #[inline]
     fn curvature(_: &Innovation<'_>, covariance: &Covariance<N>) -> f64 {
         (ROTATION..ROTATION + 3).map(|i| covariance.matrix()[(i, i)]).sum()
     }
 
-    /// A position relative to the keyframe is none.
+    /// A position relative to the keyframe does not count.
     fn fixes_position(innovation: &Innovation<'_>) -> bool {
         let keyframe = offset::<S>(Optional::Keyframe);
         innovation.rows(N).any(|row| {

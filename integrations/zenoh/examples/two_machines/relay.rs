@@ -17,7 +17,7 @@ pub(crate) const JITTER_MS: u64 = 3;
 pub(crate) enum LinkState {
     /// Passes on after the delay.
     Open,
-    /// Nothing is passed on and nothing is closed: a radio out of range.
+    /// Radio out of range: nothing is passed on, and nothing is closed.
     Frozen,
     /// Connections are closed, and new ones refused: a cable pulled out of a switch that notices.
     Closed,

@@ -17,7 +17,7 @@ pub(super) enum Place {
         /// The messages between that have not come. One that comes later is overtaken, and stays among the lost.
         lost: u64,
     },
-    /// Not newer than one before: a repetition, or overtaken.
+    /// Message that is not newer than one before: a repetition, or overtaken.
     Repeated,
     /// Further ahead than messages can have been lost.
     Absurd,

@@ -93,15 +93,15 @@ proptest! {
         found.set_noise(multiple);
         measured(&mut found);
         let process = |process: GaussMarkov| GaussMarkov { deviation: process.deviation * multiple, ..process };
-        let told = sensors();
-        let told = EskfParams {
-            gyroscope_noise: told.gyroscope_noise * multiple,
-            accelerometer_noise: told.accelerometer_noise * multiple,
-            gyroscope_bias_walk: told.gyroscope_bias_walk * multiple,
-            accelerometer_bias_walk: told.accelerometer_bias_walk * multiple,
-            relative_scale: process(told.relative_scale),
-            gnss_lever_arm: process(told.gnss_lever_arm),
-            ..told
+        let known = sensors();
+        let known = EskfParams {
+            gyroscope_noise: known.gyroscope_noise * multiple,
+            accelerometer_noise: known.accelerometer_noise * multiple,
+            gyroscope_bias_walk: known.gyroscope_bias_walk * multiple,
+            accelerometer_bias_walk: known.accelerometer_bias_walk * multiple,
+            relative_scale: process(known.relative_scale),
+            gnss_lever_arm: process(known.gnss_lever_arm),
+            ..known
         };
         let start = Start {
             position_covariance: flight.start.position_covariance * (multiple * multiple),
@@ -111,12 +111,12 @@ proptest! {
             gyroscope_bias_deviation: flight.start.gyroscope_bias_deviation * multiple,
             ..flight.start
         };
-        let mut told = flown(SmootherParams { sensors: told, ..linear(12) }, &start);
-        measured(&mut told);
+        let mut known = flown(SmootherParams { sensors: known, ..linear(12) }, &start);
+        measured(&mut known);
         for id in 0..12 {
-            let (a, b) = (found.smoothed(id).unwrap(), told.smoothed(id).unwrap());
+            let (a, b) = (found.smoothed(id).unwrap(), known.smoothed(id).unwrap());
             prop_assert!(apart(&a, &b) < 1e-7, "{id}: {}", apart(&a, &b));
-            let (a, b) = (found.smoothed_covariance(id).unwrap(), told.smoothed_covariance(id).unwrap());
+            let (a, b) = (found.smoothed_covariance(id).unwrap(), known.smoothed_covariance(id).unwrap());
             prop_assert!(differ(&a, &b) < 1e-7, "{id}: {}", differ(&a, &b));
         }
     }
