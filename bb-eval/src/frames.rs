@@ -143,7 +143,8 @@ impl Frames {
     pub(crate) fn check_mounts(&self, bag: &Bag) -> Result<(), String> {
         let is_known = |name: &str| {
             let is_target = |mount: &Mount| matches!(&mount.at, Place::Frame(frame) if plain(frame) == name);
-            self.of_topics.values().any(|frame| frame == name) || self.mounts.iter().any(is_target)
+            let is_used = |(topic, frame): (&String, &String)| plain(topic) == name || frame == name;
+            self.of_topics.iter().any(is_used) || self.mounts.iter().any(is_target)
         };
         if self.mounts.iter().all(|mount| is_known(&plain(&mount.name))) {
             return Ok(());

@@ -11,8 +11,8 @@ const LONG: Duration = Duration::from_secs(60);
 /// Eight threads that call, in 200 tenures: none acts once the end has been waited for.
 #[test]
 fn no_call_of_eight_threads_outlives_the_end() {
-    let acted = AtomicUsize::new(0);
     for _ in 0..200 {
+        let acted = AtomicUsize::new(0);
         let tenure = Tenure::default();
         let is_silent = AtomicBool::new(false);
         let begin = Barrier::new(9);

@@ -20,19 +20,6 @@ pub(super) struct Newcomer<F: CopiedFilter> {
     probation_s: f64,
 }
 
-/// Decision between a filter and its newcomer by a position.
-#[derive(Debug)]
-enum Settled<F: CopiedFilter> {
-    /// The filter keeps its place.
-    Kept,
-    /// The newcomer has fused the position.
-    Left,
-    /// The newcomer has fused the position, and has fitted for long enough.
-    Due(Newcomer<F>),
-    /// The position fits neither.
-    Unfit,
-}
-
 impl<F: CopiedFilter> Newcomer<F> {
     /// A copy of a filter that had been right since a time, as if it were where this position is.
     fn new<M, const D: usize>(filter: F, right_since_ns: i64, measurement: &M) -> Option<Self>
@@ -65,23 +52,6 @@ impl<F: CopiedFilter> Newcomer<F> {
         }
     }
 
-    /// Decides by a position whose log likelihood is `admitted` for the filter, if that admits it.
-    fn settle<M, const D: usize>(newcomer: &mut Option<Self>, measurement: &M, admitted: Option<f64>) -> Settled<F>
-    where
-        F: Update<M, D>,
-    {
-        if let Some(fitting) = newcomer {
-            let judged = fitting.filter.judge(measurement, SLACK).ok().filter(|judged| judged.nis <= FAR);
-            if judged.is_some_and(|judged| admitted.is_none_or(|ours| judged.log_likelihood > ours)) {
-                let _ = fitting.filter.update_ungated(&mut Stream::default(), measurement);
-                let is_due = newcomer.take_if(|fitting| fitting.is_due());
-                return is_due.map_or(Settled::Left, Settled::Due);
-            }
-            *newcomer = None;
-        }
-        if admitted.is_some() { Settled::Kept } else { Settled::Unfit }
-    }
-
     fn is_due(&self) -> bool {
         let now_ns = self.filter.time_ns().unwrap_or(i64::MIN);
         now_ns.saturating_sub(self.born_ns) as f64 * 1e-9 >= self.probation_s
@@ -104,13 +74,23 @@ impl<F: CopiedFilter> Copies<F> {
             Err(refusal @ Refusal::Gate { .. }) => refusal,
             Err(_) => return admitted,
         };
-        match Newcomer::settle(&mut self.newcomer, measurement, admitted.ok()) {
-            Settled::Kept => return admitted,
-            Settled::Left => {}
-            Settled::Due(newcomer) => self.take_over(stream, &newcomer),
-            Settled::Unfit => self.newcomer = Newcomer::new(*self.best(), self.started_ns, measurement),
+        if let Some(newcomer) = &mut self.newcomer {
+            let judged = newcomer.filter.judge(measurement, SLACK).ok().filter(|judged| judged.nis <= FAR);
+            if judged
+                .is_some_and(|judged| admitted.is_ok_and(|ours| judged.log_likelihood > ours) || admitted.is_err())
+            {
+                let _ = newcomer.filter.update_ungated(&mut Stream::default(), measurement);
+                if let Some(newcomer) = self.newcomer.take_if(|newcomer| newcomer.is_due()) {
+                    self.take_over(stream, &newcomer);
+                }
+                return Err(refusal);
+            }
+            self.newcomer = None;
         }
-        Err(refusal)
+        if admitted.is_err() {
+            self.newcomer = Newcomer::new(*self.best(), self.started_ns, measurement);
+        }
+        admitted
     }
 
     /// Lets a newcomer that has fitted for long enough be the filter.
