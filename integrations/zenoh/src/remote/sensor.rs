@@ -4,7 +4,7 @@ use super::inbox::{Arrived, Inbox};
 use super::peer::{Peer, Peers, Trust, lock};
 use super::settings;
 use super::source::Source;
-use super::tally::{Place, Tally};
+use super::tally::{Number, Place, Tally};
 use super::wire::{Attachment, any_layout, hash_in};
 use crate::session::SessionError;
 use bb_core::component::Counter;
@@ -72,7 +72,8 @@ pub struct RemoteOptions<T: Payload> {
 /// | `refused` | were malformed: each is a fault |
 /// | `lost` | did not come, or after a newer one; the sender or this sensor may have had no room for them |
 ///
-/// `repeated` counts what came again, or after a newer one.
+/// `repeated` counts what came again, or after a newer one. If one message has a wrong number, far ahead, `lost` has as many more, and those
+/// that follow are repetitions until none with a newer number has come for `within`: then their numbers are believed.
 ///
 /// # Faults
 ///
@@ -230,8 +231,10 @@ impl<T: Payload> Remote<T> {
             self.counts.refused.add();
             return Err(self.fault("sends messages without a number: it is not a robot's `Share`"));
         };
-        match lock(&self.tally).place(attachment.session, attachment.sequence) {
-            Place::Newer { lost } => (0..lost).for_each(|_| self.counts.lost.add()),
+        let number =
+            Number { session: attachment.session, sequence: attachment.sequence, arrival: arrived.arrival };
+        match lock(&self.tally).place(number, self.options.within) {
+            Place::Newer { lost } => self.counts.lost.add_many(lost),
             Place::Repeated => {
                 self.counts.repeated.add();
                 return Ok(None);

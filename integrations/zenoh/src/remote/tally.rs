@@ -1,12 +1,30 @@
 //! Accounts for every message of a topic by its number.
 
+use bb_core::MonotonicTime;
+use std::time::Duration;
+
 /// Largest gap that is counted message by message: more than a day at 100 Hz. A larger one is no gap but a sender whose numbers are wrong.
 const LARGEST_GAP: u64 = 1 << 24;
+
+/// Messages in a row whose numbers go on from each other, after which these are believed.
+const FOLLOWING: u32 = 3;
 
 /// The numbers of the messages at one path, of the runs of one sender.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Tally {
-    newest: Option<(u64, u64)>,
+    newest: Option<Number>,
+    /// The last of those that have come since and are not newer, or absurd, and how many of them go on from each other.
+    aside: Option<(u64, u32)>,
+}
+
+/// The number of a message that has arrived.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Number {
+    /// The run of the sender.
+    pub(super) session: u64,
+    pub(super) sequence: u64,
+    /// Time of arrival, on the local clock.
+    pub(super) arrival: MonotonicTime,
 }
 
 /// The place of a message among the others.
@@ -25,19 +43,32 @@ pub(super) enum Place {
 
 impl Tally {
     /// Places the message with that number. Another session is another run of the sender, which counts from its own beginning.
-    pub(super) fn place(&mut self, session: u64, sequence: u64) -> Place {
-        let place = match self.newest {
-            Some((known, newest)) if known == session => match sequence.checked_sub(newest) {
-                None | Some(0) => Place::Repeated,
-                Some(step) if step > LARGEST_GAP => Place::Absurd,
-                Some(step) => Place::Newer { lost: step - 1 },
-            },
-            _ => Place::Newer { lost: 0 },
+    ///
+    /// A number that is wrong makes those that follow look old. So numbers that go on from each other are believed again if none that is
+    /// newer has come for `within`: repetitions that are that late are too old to be taken.
+    pub(super) fn place(&mut self, number: Number, within: Duration) -> Place {
+        let Some(newest) = self.newest.filter(|newest| newest.session == number.session) else {
+            return self.believe(number, 0);
         };
-        if let Place::Newer { .. } = place {
-            self.newest = Some((session, sequence));
+        let place = match number.sequence.checked_sub(newest.sequence) {
+            Some(step @ 1..=LARGEST_GAP) => return self.believe(number, step - 1),
+            None | Some(0) => Place::Repeated,
+            Some(_) => Place::Absurd,
+        };
+        let following = match self.aside {
+            Some((last, count)) if (1..=LARGEST_GAP).contains(&number.sequence.wrapping_sub(last)) => count + 1,
+            _ => 1,
+        };
+        self.aside = Some((number.sequence, following));
+        if following >= FOLLOWING && number.arrival.duration_since(newest.arrival) > within {
+            return self.believe(number, 0);
         }
         place
+    }
+
+    fn believe(&mut self, number: Number, lost: u64) -> Place {
+        *self = Self { newest: Some(number), aside: None };
+        Place::Newer { lost }
     }
 }
 
@@ -45,6 +76,48 @@ impl Tally {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    const WITHIN: Duration = Duration::from_millis(200);
+
+    fn place(tally: &mut Tally, session: u64, sequence: u64, ms: i64) -> Place {
+        let arrival = MonotonicTime::from_nanos(ms * 1_000_000);
+        tally.place(Number { session, sequence, arrival }, WITHIN)
+    }
+
+    /// Messages at 100 Hz, of which one has a number that no message between could have led to, ahead or behind.
+    #[test]
+    fn a_wrong_number_silences_a_sender_for_as_long_as_a_message_may_be_old() {
+        for wrong in [1000 + LARGEST_GAP / 2, 1000 + LARGEST_GAP, 3, u64::MAX] {
+            for at in [0, 500] {
+                let mut tally = Tally::default();
+                let mut silent = Vec::new();
+                for step in 0..1000 {
+                    let sequence = if step == at { wrong } else { 1000 + step };
+                    if !matches!(place(&mut tally, 1, sequence, step as i64 * 10), Place::Newer { .. }) {
+                        silent.push(step);
+                    }
+                }
+                let longest = silent.last().map_or(0, |last| last - at);
+                assert!(longest <= 20, "number {wrong} at {at}: silent for {longest} messages");
+            }
+        }
+    }
+
+    /// A second way by which each message comes, however much later.
+    #[test]
+    fn what_comes_again_is_newer_only_if_it_is_too_old_to_be_taken() {
+        for late_ms in [0, 50, 150] {
+            let mut tally = Tally::default();
+            let first = (0..100).map(|step| (step as i64 * 10, step));
+            let again = (0..100).map(|step| (step as i64 * 10 + late_ms, step));
+            let mut arrivals: Vec<(i64, u64)> = first.chain(again).collect();
+            arrivals.sort();
+            let newer = arrivals
+                .iter()
+                .filter(|(ms, sequence)| matches!(place(&mut tally, 1, *sequence, *ms), Place::Newer { .. }));
+            assert_eq!(newer.count(), 100, "{late_ms} ms later");
+        }
+    }
 
     proptest! {
         /// Runs of a sender, each with messages lost, repeated and moved: between the first and the last that arrive of each run, what was
@@ -70,7 +143,7 @@ mod tests {
                 arrivals.sort();
                 let (mut taken, mut lost, mut repeated) = (Vec::new(), 0, 0);
                 for (_, sequence) in &arrivals {
-                    match tally.place(session, *sequence) {
+                    match place(&mut tally, session, *sequence, 0) {
                         Place::Newer { lost: gap } => {
                             lost += gap;
                             taken.push(*sequence);
@@ -88,10 +161,10 @@ mod tests {
         }
 
         #[test]
-        fn no_number_panics(numbers in proptest::collection::vec((0..3_u64, any::<u64>()), 0..50)) {
+        fn no_number_panics(numbers in proptest::collection::vec((0..3_u64, any::<u64>(), 0..1000_i64), 0..50)) {
             let mut tally = Tally::default();
-            for (session, sequence) in numbers {
-                if let Place::Newer { lost } = tally.place(session, sequence) {
+            for (session, sequence, ms) in numbers {
+                if let Place::Newer { lost } = place(&mut tally, session, sequence, ms) {
                     prop_assert!(lost < LARGEST_GAP);
                 }
             }
