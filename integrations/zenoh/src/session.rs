@@ -6,7 +6,7 @@ use std::fmt;
 use std::ops::Deref;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, LazyLock, Mutex, PoisonError, Weak, mpsc};
+use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError, Weak, mpsc};
 use std::thread;
 use std::time::Duration;
 use thiserror::Error;
@@ -170,7 +170,14 @@ impl Drop for Opened {
     }
 }
 
-static SESSIONS: LazyLock<Mutex<HashMap<SessionSettings, Weak<Opened>>>> = LazyLock::new(Mutex::default);
+/// The session with some settings, locked while it is opened: no other thread opens the same, and none waits that opens another.
+type Slot = Arc<Mutex<Weak<Opened>>>;
+
+static SESSIONS: LazyLock<Mutex<HashMap<SessionSettings, Slot>>> = LazyLock::new(Mutex::default);
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 impl Session {
     /// Returns the session with these settings, which is opened if it is not open yet.
@@ -179,17 +186,23 @@ impl Session {
     /// The configuration is not usable, or an endpoint to listen on is in use. An endpoint to connect to that does not answer is no error.
     pub fn open(settings: &SessionSettings) -> Result<Self, SessionError> {
         let configuration = settings.configuration()?;
-        // Held while it is opened, so that no other thread opens the same.
-        let mut sessions = SESSIONS.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(opened) = sessions.get(settings).and_then(Weak::upgrade) {
+        let slot = {
+            let mut sessions = lock(&SESSIONS);
+            // Those that nobody opens or holds.
+            sessions.retain(|_, slot| {
+                Arc::strong_count(slot) > 1 || slot.try_lock().map_or(true, |opened| opened.strong_count() > 0)
+            });
+            Arc::clone(sessions.entry(settings.clone()).or_default())
+        };
+        let mut last = lock(&slot);
+        if let Some(opened) = last.upgrade() {
             return Ok(Self(opened));
         }
-        sessions.retain(|_, opened| opened.strong_count() > 0);
         let session = zenoh::open(configuration).wait();
         let session = session
             .map_err(|error| SessionError::Open { listen: settings.listen.clone(), fault: error.to_string() })?;
         let opened = Arc::new(Opened { session, numbers: AtomicU64::new(0) });
-        sessions.insert(settings.clone(), Arc::downgrade(&opened));
+        *last = Arc::downgrade(&opened);
         Ok(Self(opened))
     }
 
@@ -215,6 +228,7 @@ impl fmt::Debug for Session {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::net::TcpListener;
 
     fn read(configuration: &zenoh::Config, key: &str) -> Value {
         let text = configuration.get_json(key).unwrap_or_else(|error| panic!("{key}: {error}"));
@@ -272,6 +286,21 @@ mod tests {
         }
         std::fs::remove_file(&path).expect("it is removed");
         assert!(matches!(settings.configuration(), Err(SessionError::File { .. })));
+    }
+
+    /// A client waits for the answer of its router.
+    #[test]
+    fn a_session_that_is_opened_slowly_keeps_no_other_waiting() {
+        let silent = TcpListener::bind("127.0.0.1:0").expect("one is free");
+        let connect = vec![format!("tcp/{}", silent.local_addr().expect("it has one"))];
+        let slow = SessionSettings { mode: Mode::Client, connect, ..SessionSettings::default() };
+        let opening = thread::spawn(move || Session::open(&slow).map(|_| ()));
+        let (_accepted, _) = silent.accept().expect("it connects");
+        let quick = SessionSettings { listen: vec!["tcp/127.0.0.1:0".into(); 2], ..SessionSettings::default() };
+        Session::open(&quick).expect("it is opened");
+        assert!(!opening.is_finished(), "the other was opened meanwhile");
+        drop((_accepted, silent));
+        let _ = opening.join().expect("it does not panic");
     }
 
     #[test]

@@ -39,16 +39,12 @@ impl Peers {
         robot: &str,
         clock: &Clock,
     ) -> Result<Arc<Peer>, SessionError> {
-        let mut peers = lock(&self.0);
-        let key = (settings.clone(), robot.to_owned());
-        if let Some(peer) = peers.get(&key) {
-            return Ok(Arc::clone(peer));
-        }
+        // Opened without the lock: other sensors do not wait for it.
         let session = Session::open(settings)?;
-        let peer = Peer { session, robot: robot.to_owned(), clock: clock.clone(), runs: Arc::default() };
-        let peer = Arc::new(peer);
-        peers.insert(key, Arc::clone(&peer));
-        Ok(peer)
+        let new =
+            || Arc::new(Peer { session, robot: robot.to_owned(), clock: clock.clone(), runs: Arc::default() });
+        let mut peers = lock(&self.0);
+        Ok(Arc::clone(peers.entry((settings.clone(), robot.to_owned())).or_insert_with(new)))
     }
 }
 
