@@ -10,6 +10,8 @@ use bb_core::message::DecodeError;
 use bb_core::message::codec::{Shape, service_hash};
 use bb_core::{Bus, Field};
 use bb_ros2::{parameter_name, parameter_path};
+use std::collections::HashMap;
+use thiserror::Error;
 
 // `rcl_interfaces/msg/ParameterType`
 const NOT_SET: u8 = 0;
@@ -17,6 +19,9 @@ const BOOL: u8 = 1;
 const INTEGER: u8 = 2;
 const DOUBLE: u8 = 3;
 const STRING: u8 = 4;
+
+/// Names or values in one request. `ros2 param` asks for all that a robot has at once.
+const MOST: usize = 4096;
 
 /// A service of parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,52 +71,69 @@ impl ParameterService {
     /// The response to a request, both in CDR. Only the rights of the bus limit it.
     ///
     /// # Errors
-    /// The request cannot be read.
-    pub(crate) fn answer(self, bus: &Bus, request: &[u8]) -> Result<Vec<u8>, DecodeError> {
+    /// The request cannot be read, or has too many names or values.
+    pub(crate) fn answer(self, bus: &Bus, request: &[u8]) -> Result<Vec<u8>, RequestError> {
+        let names = || {
+            let names = request_of::<Names>(request)?.names;
+            bounded(names.len()).map(|()| names)
+        };
+        let parameters = || {
+            let parameters = request_of::<Parameters>(request)?.parameters;
+            bounded(parameters.len()).map(|()| parameters)
+        };
         let described = || bus.description().parameters;
         Ok(match self {
             Self::Get => {
                 let value = |name: &String| {
                     bus.parameter(&parameter_path(name)).map_or_else(Value::default, |value| value_of(&value))
                 };
-                bytes_of(&Values { values: request_of::<Names>(request)?.names.iter().map(value).collect() })
+                bytes_of(&Values { values: names()?.iter().map(value).collect() })
             }
             Self::Types => {
                 let kind =
                     |name: &String| bus.parameter(&parameter_path(name)).map_or(NOT_SET, |value| type_of(&value));
-                bytes_of(&Types { types: request_of::<Names>(request)?.names.iter().map(kind).collect() })
+                bytes_of(&Types { types: names()?.iter().map(kind).collect() })
             }
             Self::Describe => {
-                let known = described();
+                let known: HashMap<_, _> =
+                    described().into_iter().map(|parameter| (parameter.path, parameter)).collect();
                 let describe = |name: &String| {
-                    let path = parameter_path(name);
-                    let found = known.iter().find(|parameter| parameter.path == path);
+                    let found = known.get(parameter_path(name).as_str());
                     found.map_or_else(
                         || Descriptor { name: name.clone(), ..Descriptor::default() },
                         |found| descriptor(name, found),
                     )
                 };
-                bytes_of(&Descriptors {
-                    descriptors: request_of::<Names>(request)?.names.iter().map(describe).collect(),
-                })
+                bytes_of(&Descriptors { descriptors: names()?.iter().map(describe).collect() })
             }
             Self::List => {
                 let Below { prefixes, depth } = request_of(request)?;
+                bounded(prefixes.len())?;
                 let names: Vec<String> =
                     described().iter().filter_map(|parameter| parameter_name(parameter.path)).collect();
                 bytes_of(&Listed { result: listed(names, &prefixes, depth) })
             }
             Self::Set => {
                 let set = |parameter: &Parameter| set(bus, std::slice::from_ref(parameter));
-                bytes_of(&SetResults {
-                    results: request_of::<Parameters>(request)?.parameters.iter().map(set).collect(),
-                })
+                bytes_of(&SetResults { results: parameters()?.iter().map(set).collect() })
             }
-            Self::SetAtomically => {
-                bytes_of(&SetAll { result: set(bus, &request_of::<Parameters>(request)?.parameters) })
-            }
+            Self::SetAtomically => bytes_of(&SetAll { result: set(bus, &parameters()?) }),
         })
     }
+}
+
+/// Reason for which a request has no response.
+#[derive(Debug, Error)]
+pub(crate) enum RequestError {
+    #[error(transparent)]
+    Unreadable(#[from] DecodeError),
+    #[error("the request has {found} names or values, and {MOST} are the most")]
+    TooMany { found: usize },
+}
+
+/// Bounds the response and the work, which a short request could make large.
+fn bounded(found: usize) -> Result<(), RequestError> {
+    if found > MOST { Err(RequestError::TooMany { found }) } else { Ok(()) }
 }
 
 /// Reads a request. What ROS counts as padding at its end may follow.
@@ -147,7 +169,14 @@ fn set(bus: &Bus, parameters: &[Parameter]) -> SetResult {
         let value = match (value.r#type, bus.parameter(&path)) {
             (BOOL, _) => ParameterValue::Bool(value.bool_value),
             // `ros2 param set /rover speed 1` has an integer.
-            (INTEGER, Some(ParameterValue::Float(_))) => ParameterValue::Float(value.integer_value as f64),
+            (INTEGER, Some(ParameterValue::Float(_))) => {
+                let (exact, float) = (value.integer_value, value.integer_value as f64);
+                // Not all above 2^53 are floats.
+                if float as i128 != i128::from(exact) {
+                    return Err(format!("{path} is not set: no float is {exact}"));
+                }
+                ParameterValue::Float(float)
+            }
             (INTEGER, _) => ParameterValue::Integer(value.integer_value),
             (DOUBLE, _) => ParameterValue::Float(value.double_value),
             (STRING, _) => ParameterValue::Text(value.string_value.clone()),
@@ -302,6 +331,18 @@ mod tests {
         let far = Parameters { parameters: vec![parameter("speed", ParameterValue::Float(7.0))] };
         let reason = &ask::<SetResults>(&robot, ParameterService::Set, &far).results[0].reason;
         assert!(reason.contains("expected a number in 0.0..=1.5 m/s, found `7.0`"), "{reason}");
+        // Integers, of which a float is one or is not.
+        let gain = |value: i64| {
+            let set = Parameters { parameters: vec![parameter("gains.kp", ParameterValue::Integer(value))] };
+            let result = ask::<SetAll>(&robot, ParameterService::SetAtomically, &set).result;
+            (result.successful, result.reason)
+        };
+        assert!(gain(1 << 53).0);
+        for value in [(1 << 53) + 1, -(1 << 53) - 1, i64::MAX] {
+            assert_eq!(gain(value), (false, format!("param/gains/kp is not set: no float is {value}")));
+        }
+        assert_eq!(robot.bus().parameter("param/gains/kp"), Some(ParameterValue::Float((1_u64 << 53) as f64)));
+        assert!(gain(i64::MIN).0);
         // A type that no parameter of a robot has.
         let list = Parameters {
             parameters: vec![Parameter { name: "speed".into(), value: Value { r#type: 8, ..Value::default() } }],
@@ -318,6 +359,25 @@ mod tests {
             "{}",
             refused.result.reason
         );
+    }
+
+    /// A name takes few bytes, and its description many.
+    #[test]
+    fn a_request_for_a_million_names_is_refused() {
+        let robot = Tuned::builder().simulate().expect("it starts");
+        let parameter =
+            |name: &str, value: ParameterValue| Parameter { name: name.to_owned(), value: value_of(&value) };
+        for (count, is_answered) in [(MOST, true), (MOST + 1, false), (1_000_000, false)] {
+            let names = bytes_of(&names(&vec![""; count]));
+            for service in [ParameterService::Get, ParameterService::Types, ParameterService::Describe] {
+                assert_eq!(service.answer(&robot, &names).is_ok(), is_answered, "{service:?} of {count}");
+            }
+            let parameters =
+                bytes_of(&Parameters { parameters: vec![parameter("", ParameterValue::Bool(true)); count] });
+            for service in [ParameterService::Set, ParameterService::SetAtomically] {
+                assert_eq!(service.answer(&robot, &parameters).is_ok(), is_answered, "{service:?} of {count}");
+            }
+        }
     }
 
     /// Requests with changed, missing and added bytes: an answer or an error, never a stop, and nothing is set beyond its range.
