@@ -235,11 +235,11 @@ impl Outlet {
         number: u64,
         clock: &Clock,
     ) -> Result<(), SessionError> {
-        let layouts = message.layouts();
-        let key = message_key(robot, path, &layouts.type_hash());
         let publisher = match self.publisher.take() {
             Some(publisher) => publisher,
             None => {
+                // The hash takes longer than the message.
+                let key = message_key(robot, path, &message.layouts().type_hash());
                 let encoding = Encoding::APPLICATION_CDR.with_schema(message.payload_name());
                 // What is put must arrive, or show: with `Drop`, and with `express`, zenoh loses messages without a word.
                 let declared = session.declare_publisher(key.clone()).congestion_control(CongestionControl::Block);
@@ -259,6 +259,6 @@ impl Outlet {
             sent: C::shown(clock.now()),
         };
         let put = publisher.put(bytes).attachment(attachment.to_bytes()).wait();
-        put.map_err(SessionError::of(format!("putting {key}")))
+        put.map_err(|error| SessionError::of(format!("putting {robot}/{path}"))(error))
     }
 }
