@@ -19,6 +19,8 @@ use std::time::{Duration, Instant};
 
 /// Time for which an update without a rate waits.
 const WAIT: Duration = Duration::from_millis(100);
+/// Name of the thread that publishes.
+const OUT: &str = "ros2 out";
 /// Time between two messages of its state, of a bridge without a rate.
 const STATE: Duration = Duration::from_secs(1);
 
@@ -43,14 +45,13 @@ const STATE: Duration = Duration::from_secs(1);
 /// Or as a line of the robot: `bridge ros2: Ros2Bridge();`.
 ///
 /// Publishing in the robot does not wait for the network: a thread of the bridge reads a bounded queue, and messages that do not fit are
-/// counted. Dropping the bridge waits for the messages in that queue, and for requests to arm or disarm that have begun.
+/// counted. Dropping the bridge waits for the messages in that queue, and for requests that have begun, at most for seconds.
 #[derive(Debug)]
 pub struct Ros2Bridge {
     // In this order: what others see of it ends first, and the session last.
     services: Services,
     inputs: Inputs,
-    is_over: Arc<AtomicBool>,
-    out: Option<JoinHandle<()>>,
+    out: Out,
     counts: Arc<Counts>,
     node: Arc<RosNode>,
     /// Ends what was begun in the name of other nodes.
@@ -79,7 +80,6 @@ impl Ros2Bridge {
         let node = Arc::new(RosNode::declare(session, options.domain, node, options.hashes)?);
         let bus = robot.session("ros2", bb_core::event::Rights::ALL);
         let counts = Arc::<Counts>::default();
-        let is_over = Arc::<AtomicBool>::default();
         let subscribed = options.subscribed();
         let inputs =
             Inputs::start(&bus.for_caller("ros2", [Right::Publish]), &node, &description, &subscribed, &counts)?;
@@ -91,15 +91,12 @@ impl Ros2Bridge {
             &subscribed,
             &counts,
         )?;
-        let over = Arc::clone(&is_over);
-        let out = thread::Builder::new().name("ros2 out".into()).spawn(move || outputs.run(&over));
-        let out = Some(out.map_err(Ros2Error::Thread)?);
+        let out = Out::start(outputs)?;
         let clients = Clients::watch(&node, options.domain)?;
         let services = Services::start(&bus.for_caller("ros2", rights), &node, clients, &description, &counts)?;
         Ok(Self {
             services,
             inputs,
-            is_over,
             out,
             counts,
             node,
@@ -131,12 +128,38 @@ impl Drop for Ros2Bridge {
     fn drop(&mut self) {
         self.services.stop();
         self.inputs.stop();
-        self.is_over.store(true, Ordering::Release);
-        if let Some(out) = self.out.take() {
-            // Its panic was printed.
-            let _ = out.join();
-        }
+        self.out.stop();
         self.bus.end();
+    }
+}
+
+/// The thread that publishes, until it is dropped: also if the bridge fails to start after it.
+#[derive(Debug)]
+struct Out {
+    is_over: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Out {
+    fn start(outputs: Outputs) -> Result<Self, Ros2Error> {
+        let is_over = Arc::<AtomicBool>::default();
+        let over = Arc::clone(&is_over);
+        let thread = thread::Builder::new().name(OUT.into()).spawn(move || outputs.run(&over));
+        Ok(Self { is_over, thread: Some(thread.map_err(Ros2Error::Thread)?) })
+    }
+
+    fn stop(&mut self) {
+        self.is_over.store(true, Ordering::Release);
+        if let Some(thread) = self.thread.take() {
+            // Its panic was printed.
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Drop for Out {
+    fn drop(&mut self) {
+        self.stop();
     }
 }
 
@@ -163,5 +186,48 @@ impl Service for Ros2Bridge {
             true => Ok(Reading::nothing()),
             false => Ok(Reading::now(state)),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bb_core::prelude::*;
+
+    /// Arguments.
+    #[derive(Clone, Debug, Default, PartialEq, Payload)]
+    struct Number {
+        value: f64,
+    }
+
+    /// Does nothing.
+    struct Rest;
+
+    impl Command for Rest {
+        type Options = NoOptions;
+        type Arguments = Number;
+        type Output = ();
+
+        async fn run(_: NoOptions, _: Number, _: CommandContext) -> Result<Outcome<()>, Fault> {
+            Ok(Outcome::done(()))
+        }
+    }
+
+    robot! {
+        robot Odd;
+        commands { _1: Rest; }
+        link base;
+    }
+
+    /// The type of the command's service has no valid name, which shows when the thread that publishes runs.
+    #[test]
+    fn a_bridge_that_fails_to_start_late_leaves_no_thread() {
+        let robot = Odd::builder().simulate().expect("it starts");
+        let options = Ros2Options { listen: "tcp/127.0.0.1:0".into(), ..bb_core::Options::defaults() };
+        let error = Ros2Bridge::serve(&robot, options).map(|_| ()).expect_err("the name is invalid").to_string();
+        assert!(error.contains("bb_msgs/srv/1"), "{error}");
+        let threads = std::fs::read_dir("/proc/self/task").expect("it is Linux").flatten();
+        let names = threads.filter_map(|thread| std::fs::read_to_string(thread.path().join("comm")).ok());
+        assert_eq!(names.filter(|name| name.trim() == OUT).count(), 0);
     }
 }

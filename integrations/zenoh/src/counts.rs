@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 pub struct Ros2State {
     /// Messages put to other nodes.
     pub published: u64,
-    /// Messages of the robot that were not put: the bridge was too slow, or zenoh refused them.
+    /// Messages of the robot, and changes of parameters, that were not put: the bridge was too slow, or zenoh refused them.
     pub unpublished: u64,
     /// Messages of other nodes that the robot took.
     pub received: u64,
@@ -16,6 +16,17 @@ pub struct Ros2State {
     pub refused: u64,
     /// Requests to services that were carried out or denied with a reason; not those that cannot be read, or for which there was no room.
     pub requests: u64,
+}
+
+/// Occurrences of one fault, which would fill the log if each was a line of it.
+#[derive(Debug, Default)]
+pub(crate) struct Repetitions(AtomicU64);
+
+impl Repetitions {
+    /// Counts one more, and returns the number if it is to be logged: that of the first, and then each that is twice the one before.
+    pub(crate) fn add(&self) -> Option<u64> {
+        Some(self.0.fetch_add(1, Ordering::Relaxed) + 1).filter(|times| times.is_power_of_two())
+    }
 }
 
 /// The counters of a bridge.
@@ -26,6 +37,8 @@ pub(crate) struct Counts {
     pub(crate) received: AtomicU64,
     pub(crate) refused: AtomicU64,
     pub(crate) requests: AtomicU64,
+    /// Messages that zenoh has refused.
+    pub(crate) not_put: Repetitions,
 }
 
 impl Counts {
@@ -42,5 +55,17 @@ impl Counts {
             refused: read(&self.refused),
             requests: read(&self.requests),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fault_is_logged_at_first_and_then_by_doubling() {
+        let refused = Repetitions::default();
+        let logged: Vec<u64> = (0..1000).filter_map(|_| refused.add()).collect();
+        assert_eq!(logged, [1, 2, 4, 8, 16, 32, 64, 128, 256, 512]);
     }
 }

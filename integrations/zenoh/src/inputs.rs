@@ -1,12 +1,12 @@
 //! Topics of other nodes that are inputs of the robot.
 
-use crate::counts::Counts;
+use crate::counts::{Counts, Repetitions};
 use crate::error::Ros2Error;
 use crate::node::{RosNode, RosSubscription};
 use bb_core::component::Description;
 use bb_core::{Bus, Fault};
 use bb_ros2::Address;
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
@@ -61,6 +61,7 @@ impl Inputs {
         Ok(Self { subscriptions, messages, thread: Some(thread.map_err(Ros2Error::Thread)?) })
     }
 
+    /// Takes no more messages, and publishes those that wait.
     pub(crate) fn stop(&mut self) {
         self.subscriptions.clear();
         let _ = self.messages.send(None);
@@ -68,6 +69,12 @@ impl Inputs {
             // Its panic was printed.
             let _ = thread.join();
         }
+    }
+}
+
+impl Drop for Inputs {
+    fn drop(&mut self) {
+        self.stop();
     }
 }
 
@@ -90,12 +97,15 @@ fn address(node: &RosNode, description: &Description, path: &str) -> Result<(&'s
 
 /// Publishes what comes, in the robot, until it is to end.
 fn publish(bus: &Bus, waiting: &Receiver<Message>, counts: &Counts) {
+    let mut refused = HashMap::<&'static str, Repetitions>::new();
     while let Ok(Some((path, message))) = waiting.recv() {
         match bus.publish_ros(path, &message) {
             Ok(()) => Counts::add(&counts.received, 1),
             Err(error) => {
                 Counts::add(&counts.refused, 1);
-                tracing::warn!(%error, "a message of another node is refused");
+                if let Some(times) = refused.entry(path).or_default().add() {
+                    tracing::warn!(%error, times, "a message of another node is refused");
+                }
             }
         }
     }

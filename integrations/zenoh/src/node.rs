@@ -1,7 +1,9 @@
 //! A node on the wire: tokens, publishers, subscriptions and services.
 
+use crate::counts::Repetitions;
 use crate::session::{Session, SessionError};
 use bb_ros2::{Address, Attachment, Endpoint, EndpointKind, Gid, Node, Qos, Token, TypeHash};
+use std::sync::Arc;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use zenoh::Wait;
 use zenoh::liveliness::LivelinessToken;
@@ -23,6 +25,8 @@ pub(crate) struct RosNode {
     number: u64,
     /// Keys and tokens have the hashes of types, which Humble does not know.
     has_hashes: bool,
+    /// Requests that could not be answered.
+    unanswered: Arc<Repetitions>,
     _token: LivelinessToken,
 }
 
@@ -46,7 +50,7 @@ impl RosNode {
             endpoint: None,
         };
         let token = declare_token(&session, &token.to_string())?;
-        Ok(Self { session, domain, node, number, has_hashes, _token: token })
+        Ok(Self { session, domain, node, number, has_hashes, unanswered: Arc::default(), _token: token })
     }
 
     /// The names of the node.
@@ -142,10 +146,10 @@ impl RosNode {
         address: &Address,
         answer: impl Fn(Request) + Send + Sync + 'static,
     ) -> Result<RosService, SessionError> {
-        let hash = address.type_hash.to_string();
+        let (hash, unanswered) = (address.type_hash.to_string(), Arc::clone(&self.unanswered));
         let queryable = self.session.declare_queryable(address.key_of_any_hash(self.domain)).complete(true);
         let queryable = queryable.callback(move |query| match other_hash(query.key_expr().as_str(), &hash) {
-            None => answer(Request(query)),
+            None => answer(Request { query, unanswered: Arc::clone(&unanswered) }),
             Some(other) => {
                 // A client that waits learns why it does in vain.
                 let _ = query.reply_err(format!("the type of the service is {hash}, not {other}")).wait();
@@ -232,12 +236,15 @@ pub(crate) struct RosService {
 
 /// A request to a service, which a client waits for.
 #[derive(Debug)]
-pub(crate) struct Request(Query);
+pub(crate) struct Request {
+    query: Query,
+    unanswered: Arc<Repetitions>,
+}
 
 impl Request {
     /// The request in CDR.
     pub(crate) fn bytes(&self) -> Vec<u8> {
-        self.0.payload().map_or_else(Vec::new, |payload| payload.to_bytes().into_owned())
+        self.query.payload().map_or_else(Vec::new, |payload| payload.to_bytes().into_owned())
     }
 
     /// The client, if it says who it is.
@@ -246,25 +253,29 @@ impl Request {
     }
 
     fn attachment(&self) -> Option<Attachment> {
-        Attachment::from_bytes(&self.0.attachment()?.to_bytes()).ok()
+        Attachment::from_bytes(&self.query.attachment()?.to_bytes()).ok()
     }
 
     /// Answers. A client of ROS finds its request by the number; one that gave none gets none.
     pub(crate) fn answer(&self, response: Vec<u8>) {
         let attachment = self.attachment().map(|asked| Attachment { time_ns: wall_ns(), ..asked }.to_bytes());
-        let mut reply = self.0.reply(self.0.key_expr().clone(), response);
+        let mut reply = self.query.reply(self.query.key_expr().clone(), response);
         if let Some(attachment) = attachment {
             reply = reply.attachment(attachment.as_slice());
         }
-        if let Err(error) = reply.wait() {
-            tracing::warn!(%error, service = %self.0.key_expr(), "a client was not answered");
-        }
+        self.replied(reply.wait());
     }
 
     /// Refuses a request that cannot be read.
     pub(crate) fn refuse(&self, why: String) {
-        if let Err(error) = self.0.reply_err(why).wait() {
-            tracing::warn!(%error, service = %self.0.key_expr(), "a client was not answered");
+        self.replied(self.query.reply_err(why).wait());
+    }
+
+    fn replied(&self, result: zenoh::Result<()>) {
+        if let Err(error) = result
+            && let Some(times) = self.unanswered.add()
+        {
+            tracing::warn!(%error, times, service = %self.query.key_expr(), "a client was not answered");
         }
     }
 }

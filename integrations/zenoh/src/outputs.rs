@@ -1,6 +1,6 @@
 //! Topics of the robot, for other nodes.
 
-use crate::counts::Counts;
+use crate::counts::{Counts, Repetitions};
 use crate::diagnostics::diagnostics;
 use crate::error::Ros2Error;
 use crate::messages::{Clock, DiagnosticArray, Parameter, ParameterEvent, bytes_of};
@@ -163,6 +163,7 @@ impl Outputs {
             self.view(message);
         }
         let (mut lost, mut next_diagnosis, mut end) = (0, Instant::now(), None);
+        let overrun = Repetitions::default();
         loop {
             // Before the last look into the queue, so that what was published before the end is put.
             let is_last = is_over.load(Ordering::Acquire);
@@ -186,11 +187,13 @@ impl Outputs {
                 next_diagnosis = Instant::now() + DIAGNOSIS;
                 self.diagnose();
             }
-            let lagged = self.messages.lagged();
+            let lagged = self.messages.lagged() + self.changes.lagged();
             if lagged != lost {
                 Counts::add(&self.counts.unpublished, lagged - lost);
-                tracing::warn!(lost = lagged - lost, "messages were published faster than the network takes them");
                 lost = lagged;
+                if let Some(times) = overrun.add() {
+                    tracing::warn!(lost, times, "messages were published faster than the network takes them");
+                }
             }
         }
     }
@@ -272,7 +275,9 @@ fn put(publisher: &mut RosPublisher, message: Vec<u8>, counts: &Counts) {
         Ok(()) => Counts::add(&counts.published, 1),
         Err(error) => {
             Counts::add(&counts.unpublished, 1);
-            tracing::warn!(%error, "a message is not published");
+            if let Some(times) = counts.not_put.add() {
+                tracing::warn!(%error, times, "a message is not published");
+            }
         }
     }
 }

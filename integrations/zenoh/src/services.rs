@@ -1,28 +1,32 @@
 //! Services: the commands of the robot, and its parameters.
 
 use crate::clients::Clients;
-use crate::counts::Counts;
+use crate::counts::{Counts, Repetitions};
 use crate::error::Ros2Error;
 use crate::messages::{Nothing, Outcome, bytes_of};
 use crate::node::{Request, RosNode, RosService};
 use crate::parameters::ParameterService;
 use bb_core::component::{CommandInfo, Description};
 use bb_core::message::codec::{Shape, bytes_to_json, service_hash};
-use bb_core::{Bus, Field};
+use bb_core::{Bus, Field, Role};
 use bb_ros2::Address;
 use std::fmt::Display;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-/// Requests that wait to be looked at.
+/// Requests that wait to be looked at, of all services, and of each that disarms.
 const WAITING: usize = 256;
 /// Commands that clients wait for; each has a thread.
 const MOST_COMMANDS: usize = 32;
 /// Time after which a thread that waits for a command looks whether it is to end.
 const PATIENCE: Duration = Duration::from_millis(50);
+/// Time for which the end waits for requests that have begun: code of the robot may never return.
+const LAST: Duration = Duration::from_secs(2);
+/// Lists of clients that wait to be told that the robot is disarmed; beyond that it is disarmed, and they are not told.
+const UNTOLD: usize = 16;
 /// The service that disarms the robot, and the one that arms it, of robots without commands of these names.
 const DISARM: &str = "disarm";
 const ARM: &str = "arm";
@@ -34,19 +38,21 @@ enum Subject {
     /// The path of the command, and the shape of its arguments if it has any.
     Command(&'static str, Option<Shape>),
     Arm,
-    Disarm,
 }
 
-/// A request with its subject; `None` ends the thread.
-type Asked = Option<(Subject, Request)>;
+/// A request with its subject.
+type Asked = (Subject, Request);
 
-/// The services, and the thread that answers.
+/// The services, and the threads that answer.
 #[derive(Debug)]
 pub(crate) struct Services {
     services: Vec<RosService>,
-    asked: SyncSender<Asked>,
+    /// `None` once it has ended.
+    asked: Option<SyncSender<Asked>>,
+    disarms: Vec<Arc<Disarm>>,
     is_over: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
+    threads: Vec<JoinHandle<()>>,
+    running: Arc<AtomicUsize>,
 }
 
 impl Services {
@@ -57,14 +63,17 @@ impl Services {
         description: &Description,
         counts: &Arc<Counts>,
     ) -> Result<Self, Ros2Error> {
-        let (asked, waiting) = sync_channel(WAITING);
-        let mut services = Vec::new();
+        let (asked, waiting) = sync_channel::<Asked>(WAITING);
+        let full = |request: &Request| request.refuse("too many requests wait".to_owned());
+        let (mut services, mut disarms) = (Vec::new(), Vec::new());
+        let address = |name: String, type_name: &str, type_hash: &str| {
+            Ok::<_, Ros2Error>(Address { name, type_name: type_name.parse()?, type_hash: type_hash.parse()? })
+        };
         let mut declare = |name: String, type_name: &str, type_hash: &str, subject: Subject| {
-            let address = Address { name, type_name: type_name.parse()?, type_hash: type_hash.parse()? };
             let asked = asked.clone();
-            services.push(node.service(&address, move |request| {
-                if let Err(TrySendError::Full(Some((_, request)))) = asked.try_send(Some((subject, request))) {
-                    request.refuse("too many requests wait".to_owned());
+            services.push(node.service(&address(name, type_name, type_hash)?, move |request| {
+                if let Err(TrySendError::Full((_, request))) = asked.try_send((subject, request)) {
+                    full(&request);
                 }
             })?);
             Ok::<(), Ros2Error>(())
@@ -84,41 +93,176 @@ impl Services {
                 }
             };
             names.push(name.clone());
-            match arguments(command) {
-                None => declare(name, trigger, &trigger_hash, Subject::Command(command.path, None))?,
+            let shape = arguments(command);
+            let (type_name, hash) = match shape {
+                None => (trigger.to_owned(), trigger_hash.clone()),
                 Some(shape) => {
                     let type_name = command_type(command.path);
                     let hash = service_hash(&type_name, shape, Outcome::SHAPE);
-                    declare(name, &type_name, &hash, Subject::Command(command.path, Some(shape)))?;
+                    (type_name, hash)
                 }
+            };
+            match command.role {
+                Role::Disarming => disarms.push((address(name, &type_name, &hash)?, Some((command.path, shape)))),
+                _ => declare(name, &type_name, &hash, Subject::Command(command.path, shape))?,
             }
         }
-        for (own, subject) in [(ARM, Subject::Arm), (DISARM, Subject::Disarm)] {
-            let name = node.node().service(own)?;
-            if !names.contains(&name) {
-                declare(name, trigger, &trigger_hash, subject)?;
-            }
+        let name = node.node().service(ARM)?;
+        if !names.contains(&name) {
+            declare(name, trigger, &trigger_hash, Subject::Arm)?;
         }
-        let is_over = Arc::<AtomicBool>::default();
+        let name = node.node().service(DISARM)?;
+        if !names.contains(&name) {
+            disarms.push((address(name, trigger, &trigger_hash)?, None));
+        }
         let worker = Worker {
             bus: bus.clone(),
-            clients,
+            clients: Arc::new(clients),
             counts: Arc::clone(counts),
             running: Arc::default(),
-            is_over: Arc::clone(&is_over),
+            is_over: Arc::default(),
         };
-        let thread = thread::Builder::new().name("ros2 services".into()).spawn(move || worker.run(&waiting));
-        Ok(Self { services, asked, is_over, thread: Some(thread.map_err(Ros2Error::Thread)?) })
+        let mut all = Self {
+            services: Vec::new(),
+            asked: Some(asked),
+            disarms: Vec::new(),
+            is_over: Arc::clone(&worker.is_over),
+            threads: Vec::new(),
+            running: Arc::clone(&worker.running),
+        };
+        for (address, command) in disarms {
+            let disarm = Arc::new(Disarm { command, ..Disarm::default() });
+            let waiting = Arc::clone(&disarm);
+            services.push(node.service(&address, move |request| {
+                if let Some(request) = waiting.put(request) {
+                    full(&request);
+                }
+            })?);
+            all.disarms.push(Arc::clone(&disarm));
+            let (done, untold) = sync_channel(UNTOLD);
+            let worker = worker.clone();
+            all.spawn("ros2 disarm", move || disarm.run(&worker, &done))?;
+            all.spawn("ros2 disarmed", move || tell(&untold))?;
+        }
+        all.services = services;
+        all.spawn("ros2 services", move || worker.run(&waiting))?;
+        Ok(all)
     }
 
+    fn spawn(&mut self, name: &str, run: impl FnOnce() + Send + 'static) -> Result<(), Ros2Error> {
+        self.threads.push(thread::Builder::new().name(name.into()).spawn(run).map_err(Ros2Error::Thread)?);
+        Ok(())
+    }
+
+    /// Takes no more requests, and waits for those that have begun.
     pub(crate) fn stop(&mut self) {
         self.services.clear();
         self.is_over.store(true, Ordering::Release);
-        let _ = self.asked.send(None);
-        if let Some(thread) = self.thread.take() {
-            // Its panic was printed.
-            let _ = thread.join();
+        self.asked = None;
+        for disarm in &self.disarms {
+            disarm.end();
         }
+        let deadline = Instant::now() + LAST;
+        let is_running =
+            || self.threads.iter().any(|thread| !thread.is_finished()) || self.running.load(Ordering::Acquire) != 0;
+        while is_running() {
+            if Instant::now() > deadline {
+                tracing::warn!("requests that the robot has not carried out are left");
+                break;
+            }
+            thread::sleep(Duration::from_millis(2));
+        }
+        self.threads.clear();
+    }
+}
+
+impl Drop for Services {
+    fn drop(&mut self) {
+        self.stop();
+    }
+}
+
+/// Requests of one service to disarm, in a queue of their own, with a thread of their own: whatever else is asked, the robot is disarmed.
+/// If there is no room for one, others wait, and an attempt follows as well.
+#[derive(Debug, Default)]
+struct Disarm {
+    /// The command that disarms, with the robot's own code; `None` without one.
+    command: Option<(&'static str, Option<Shape>)>,
+    state: Mutex<DisarmState>,
+    changed: Condvar,
+}
+
+#[derive(Debug, Default)]
+struct DisarmState {
+    waiting: Vec<Request>,
+    is_over: bool,
+}
+
+impl Disarm {
+    fn lock(&self) -> MutexGuard<'_, DisarmState> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Gives the request back if there is no room for it.
+    fn put(&self, request: Request) -> Option<Request> {
+        let mut state = self.lock();
+        if state.waiting.len() >= WAITING {
+            return Some(request);
+        }
+        state.waiting.push(request);
+        self.changed.notify_one();
+        None
+    }
+
+    fn end(&self) {
+        self.lock().is_over = true;
+        self.changed.notify_one();
+    }
+
+    /// The requests that wait; none once it has ended.
+    fn take(&self) -> Vec<Request> {
+        let mut state = self.lock();
+        while state.waiting.is_empty() && !state.is_over {
+            state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+        std::mem::take(&mut state.waiting)
+    }
+
+    /// Disarms until it has ended. Clients are told on another thread, which waits for the network.
+    fn run(&self, worker: &Worker, done: &SyncSender<(Vec<Request>, Vec<u8>)>) {
+        let untold = Repetitions::default();
+        let carry_out = |requests: Vec<Request>| {
+            let Some(first) = requests.first() else { return };
+            let bus = worker.bus_of(first);
+            let response = match self.command {
+                None => outcome(bus.disarm().map(|()| "disarmed")),
+                Some((path, shape)) => answered(command(&bus, path, shape, &first.bytes(), &worker.is_over)),
+            };
+            Counts::add(&worker.counts.requests, requests.len() as u64);
+            if done.try_send((requests, response)).is_err()
+                && let Some(times) = untold.add()
+            {
+                tracing::warn!(times, "clients are not told that the robot was disarmed");
+            }
+        };
+        loop {
+            let requests = self.take();
+            if requests.is_empty() {
+                return;
+            }
+            match self.command {
+                // Each with its own arguments.
+                Some((_, Some(_))) => requests.into_iter().for_each(|request| carry_out(vec![request])),
+                _ => carry_out(requests),
+            }
+        }
+    }
+}
+
+/// Answers the clients that waited.
+fn tell(done: &Receiver<(Vec<Request>, Vec<u8>)>) {
+    while let Ok((requests, response)) = done.recv() {
+        requests.iter().for_each(|request| request.answer(response.clone()));
     }
 }
 
@@ -148,10 +292,11 @@ pub(crate) fn command_type(path: &str) -> String {
     format!("bb_msgs/srv/{name}")
 }
 
-/// State of the thread that answers.
+/// State of the threads that answer.
+#[derive(Clone)]
 struct Worker {
     bus: Bus,
-    clients: Clients,
+    clients: Arc<Clients>,
     counts: Arc<Counts>,
     /// Number of threads that wait for commands.
     running: Arc<AtomicUsize>,
@@ -160,9 +305,10 @@ struct Worker {
 
 impl Worker {
     fn run(self, waiting: &Receiver<Asked>) {
-        while let Ok(Some((subject, request))) = waiting.recv() {
-            let bus = self.bus.for_caller(self.clients.caller(request.client()), self.bus.rights());
+        while let Ok((subject, request)) = waiting.recv() {
+            let bus = self.bus_of(&request);
             match subject {
+                _ if self.is_over.load(Ordering::Acquire) => request.refuse("the bridge ends".to_owned()),
                 Subject::Parameters(service) => match service.answer(&bus, &request.bytes()) {
                     Ok(response) => {
                         Counts::add(&self.counts.requests, 1);
@@ -170,18 +316,20 @@ impl Worker {
                     }
                     Err(error) => request.refuse(error.to_string()),
                 },
-                // Arming and disarming wait for the robot, and a command for its end.
+                // Arming waits for the robot, and a command for its end.
                 slow => self.begin(bus, slow, request),
             }
         }
-        while self.running.load(Ordering::Acquire) != 0 {
-            thread::sleep(PATIENCE);
-        }
+    }
+
+    /// The bus that acts in the name of the client.
+    fn bus_of(&self, request: &Request) -> Bus {
+        self.bus.for_caller(self.clients.caller(request.client()), self.bus.rights())
     }
 
     /// Answers on a thread of its own.
     fn begin(&self, bus: Bus, subject: Subject, request: Request) {
-        if self.running.fetch_add(1, Ordering::AcqRel) >= MOST_COMMANDS && !matches!(subject, Subject::Disarm) {
+        if self.running.fetch_add(1, Ordering::AcqRel) >= MOST_COMMANDS {
             self.running.fetch_sub(1, Ordering::AcqRel);
             return request.answer(refused("too many commands run"));
         }
@@ -191,11 +339,7 @@ impl Worker {
             let _running = running;
             let response = match subject {
                 Subject::Arm => outcome(bus.arm().map(|()| "armed")),
-                Subject::Disarm => outcome(bus.disarm().map(|()| "disarmed")),
-                Subject::Command(path, shape) => match command(&bus, path, shape, &request.bytes(), &is_over) {
-                    Some(result) => outcome(result),
-                    None => refused("the bridge ends; the command may run on"),
-                },
+                Subject::Command(path, shape) => answered(command(&bus, path, shape, &request.bytes(), &is_over)),
                 Subject::Parameters(_) => return,
             };
             Counts::add(&counts.requests, 1);
@@ -240,6 +384,14 @@ fn command(
         if is_over.load(Ordering::Acquire) {
             return None;
         }
+    }
+}
+
+/// The response to a command.
+fn answered(ended: Option<Result<String, String>>) -> Vec<u8> {
+    match ended {
+        Some(result) => outcome(result),
+        None => refused("the bridge ends; the command may run on"),
     }
 }
 

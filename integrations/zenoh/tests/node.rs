@@ -10,7 +10,7 @@ use bb_zenoh::{Mode, Ros2Bridge, Ros2Options, Ros2State, Session, SessionSetting
 use std::io::{Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Instant;
 use zenoh::Wait;
 
@@ -423,4 +423,120 @@ fn a_node_and_the_robot_meet_at_a_router_also_after_it_was_started_again() {
     while messages.try_recv().ok().flatten().is_some() {}
     let _router = route();
     assert!(meets(), "not again");
+}
+
+/// Takes so many milliseconds to be made safe.
+struct Heavy<const MS: u64>;
+
+impl<const MS: u64> Sensor for Heavy<MS> {
+    type Options = NoOptions;
+    type Output = Imu;
+
+    fn init(_: NoOptions, context: &SensorContext) -> Result<Self, Fault> {
+        context.on_disarm(|| {
+            std::thread::sleep(Duration::from_millis(MS));
+            Ok(())
+        });
+        Ok(Self)
+    }
+
+    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Imu>, Fault> {
+        Ok(Reading::nothing())
+    }
+}
+
+robot! {
+    robot HeavyCart;
+    commands { arm: Arm; }
+    link base { sensor load: Heavy<700>() { rate: 1 Hz; } }
+}
+
+robot! {
+    robot StuckCart;
+    commands { arm: Arm; }
+    link base { sensor load: Heavy<6000>() { rate: 1 Hz; } }
+}
+
+/// Asks a service for nothing but an answer at some time, and does not wait for it.
+fn ask(session: &Session, address: &Address, payload: &[u8], answers: &Arc<AtomicU64>) {
+    let answers = Arc::clone(answers);
+    let asked = session.get(address.key(0)).payload(payload).timeout(PATIENCE).callback(move |reply| {
+        answers.fetch_add(u64::from(reply.result().is_ok()), Ordering::Relaxed);
+    });
+    asked.wait().expect("it is asked");
+}
+
+fn threads() -> usize {
+    std::fs::read_dir("/proc/self/task").expect("it is Linux").count()
+}
+
+#[test]
+fn two_thousand_requests_to_disarm_are_answered_by_few_threads() {
+    let robot = HeavyCart::builder().start().expect("it starts");
+    let bridge = bridged(&robot, options());
+    let session = other(&bridge);
+    let disarm = endpoint(&session, EndpointKind::Service, "/heavy_cart/disarm").expect("it is announced").address;
+    robot.arm().expect("it is armed");
+    let (before, answers) = (threads(), Arc::default());
+    let mut most = 0;
+    for _ in 0..2000 {
+        ask(&session, &disarm, &[0, 1, 0, 0, 0], &answers);
+        most = most.max(threads());
+    }
+    assert!(until(|| robot.safety() == Safety::Disarmed));
+    assert!(most < before + 200, "{most} threads, {before} before");
+    assert!(until(|| answers.load(Ordering::Relaxed) >= 1), "nobody is answered");
+}
+
+/// A client that asks without end for what takes longest to answer.
+#[test]
+fn a_flood_of_requests_does_not_keep_the_robot_from_being_disarmed() {
+    let robot = SmallCart::builder().start().expect("it starts");
+    let bridge = bridged(&robot, options());
+    let session = other(&bridge);
+    let listed = |name: &str| endpoint(&session, EndpointKind::Service, name).expect("it is announced").address;
+    let describe = listed("/small_cart/describe_parameters");
+    // A list of 2,000 names of one letter.
+    let mut names = vec![0, 1, 0, 0];
+    names.extend(2000_u32.to_le_bytes());
+    (0..2000).for_each(|_| names.extend([2, 0, 0, 0, b'x', 0, 0, 0]));
+    let connect = vec![bridge.endpoints()[0].clone(); 2];
+    let flooder = Session::open(&SessionSettings { connect, ..SessionSettings::default() }).expect("it is opened");
+    assert!(until(|| flooder.info().routers_zid().wait().next().is_some()));
+    let (is_over, answers) = (AtomicBool::new(false), Arc::<AtomicU64>::default());
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            while !is_over.load(Ordering::Relaxed) {
+                ask(&flooder, &describe, &names, &answers);
+            }
+        });
+        assert!(until(|| answers.load(Ordering::Relaxed) > 100));
+        let mut slowest = Duration::ZERO;
+        let results: Vec<_> = (0..20)
+            .map(|_| {
+                let begun = Instant::now();
+                let call = || trigger(&session, "/small_cart/disarm", Gid([1; 16]));
+                let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(call));
+                slowest = slowest.max(begun.elapsed());
+                result.map_err(|_| "it was refused")
+            })
+            .collect();
+        is_over.store(true, Ordering::Relaxed);
+        println!("the slowest of 20 took {slowest:?}");
+        assert!(results.iter().all(|result| *result == Ok((true, "disarmed".to_owned()))), "{results:?}");
+    });
+}
+
+#[test]
+fn the_end_does_not_wait_for_what_cannot_be_made_safe() {
+    let robot = StuckCart::builder().start().expect("it starts");
+    let bridge = bridged(&robot, options());
+    let session = other(&bridge);
+    let disarm = endpoint(&session, EndpointKind::Service, "/stuck_cart/disarm").expect("it is announced").address;
+    robot.arm().expect("it is armed");
+    ask(&session, &disarm, &[0, 1, 0, 0, 0], &Arc::default());
+    assert!(until(|| robot.safety() == Safety::Disarming));
+    let begun = Instant::now();
+    drop(bridge);
+    assert!(begun.elapsed() < Duration::from_secs(4), "{:?}", begun.elapsed());
 }
