@@ -58,6 +58,21 @@ fn nothing_is_allocated_from_publish_to_output() -> Result<(), StartError> {
     Ok(())
 }
 
+/// The memory of written lines is used again. It may still grow once, with the lines that wait for the sink's thread at once.
+#[test]
+fn a_journal_allocates_for_no_message() -> Result<(), StartError> {
+    const MESSAGES: u64 = 20_000;
+    let mut builder = TwoImus::builder();
+    builder.journal(drop);
+    let running = builder.start()?;
+    let imu = Imu::new([0.0, 0.0, 0.1].into(), [0.0, 0.0, 9.81].into());
+    let publish = || running.publish(two_imus::sensor::base::inertial, running.clock().now(), imu);
+    (0..MESSAGES).for_each(|_| publish());
+    let allocations = allocation_counter::measure(|| (0..MESSAGES).for_each(|_| publish()));
+    assert!(allocations.count_total < MESSAGES / 100, "{} allocations", allocations.count_total);
+    Ok(())
+}
+
 /// A payload whose clone allocates nothing, although it holds the heap.
 #[derive(Clone, Debug, Payload)]
 struct Shared {

@@ -27,6 +27,7 @@ mod writer;
 
 pub(crate) use checksum::checksum;
 pub use entry::{Callback, End, Entry, Event, JournalLine, ParameterEntry, Recorded, Request, RequestKind};
+pub(crate) use queue::Waiting;
 pub(crate) use reader::decoded;
 pub use reader::{JournalReader, Publishers};
 pub(crate) use writer::Journal;

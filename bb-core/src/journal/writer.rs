@@ -1,8 +1,9 @@
 //! Numbers lines, and hands them to the sink on a separate thread.
 
-use super::queue::{Ended, LONGEST_WAIT, Queue, bytes_of};
+use super::queue::{Ended, LONGEST_WAIT, Queue, Waiting, bytes_of};
 use super::{Entry, Event};
 use crate::fault::{discard, guarded, log_panic};
+use crate::message::Payload;
 use crate::time::MonotonicTime;
 use std::fmt;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -80,28 +81,24 @@ impl Journal {
     /// ended. Never waits for the sink.
     pub(crate) fn write(&self, time: MonotonicTime, wall_offset_nanos: i64, event: Event) -> u64 {
         let bytes = bytes_of(&event);
-        let mut state = self.0.lock();
-        if state.queue.is_full() {
-            self.0.judge(&mut state);
-        }
-        if state.is_closed || state.queue.ended.is_some() {
-            return 0;
-        }
-        let queue = &mut state.queue;
-        if queue.wall_offset_nanos != wall_offset_nanos {
-            queue.wall_offset_nanos = wall_offset_nanos;
-            let line = Event::WallClock { offset_nanos: wall_offset_nanos };
-            let bytes = bytes_of(&line);
-            queue.push(time, line, bytes);
-        }
-        let (number, fills_batch) = queue.push(time, event, bytes);
-        if queue.is_full() {
-            self.0.is_full.store(true, Ordering::Relaxed);
-        }
-        drop(state);
-        if fills_batch {
-            self.0.arrived.notify_one();
-        }
+        let Some(mut state) = self.0.enter(time, wall_offset_nanos) else { return 0 };
+        let number = state.queue.push(time, event, bytes);
+        self.0.leave(state);
+        number
+    }
+
+    /// Writes the line of a message of a publisher, as [`write`](Self::write) does, and takes the message unless the journal has
+    /// ended. It does not allocate once as many messages have waited before.
+    pub(crate) fn write_message<T: Payload>(
+        &self,
+        time: MonotonicTime,
+        wall_offset_nanos: i64,
+        publisher: usize,
+        message: &mut Option<Waiting<T>>,
+    ) -> u64 {
+        let Some(mut state) = self.0.enter(time, wall_offset_nanos) else { return 0 };
+        let number = state.queue.push_message(time, publisher, message);
+        self.0.leave(state);
         number
     }
 
@@ -175,6 +172,38 @@ impl Journal {
 }
 
 impl Inner {
+    /// Takes the lock for one more line, unless the journal has ended.
+    #[inline]
+    fn enter(&self, time: MonotonicTime, wall_offset_nanos: i64) -> Option<MutexGuard<'_, State>> {
+        let mut state = self.lock();
+        if state.queue.is_full() {
+            self.judge(&mut state);
+        }
+        if state.is_closed || state.queue.ended.is_some() {
+            return None;
+        }
+        if state.queue.wall_offset_nanos != wall_offset_nanos {
+            state.queue.wall_offset_nanos = wall_offset_nanos;
+            let line = Event::WallClock { offset_nanos: wall_offset_nanos };
+            let bytes = bytes_of(&line);
+            state.queue.push(time, line, bytes);
+        }
+        Some(state)
+    }
+
+    /// Releases the lock after a line.
+    #[inline]
+    fn leave(&self, state: MutexGuard<'_, State>) {
+        if state.queue.is_full() {
+            self.is_full.store(true, Ordering::Relaxed);
+        }
+        let fills_batch = state.queue.fills_batch();
+        drop(state);
+        if fills_batch {
+            self.arrived.notify_one();
+        }
+    }
+
     fn work(&self) {
         loop {
             let state = self.lock();
@@ -201,7 +230,7 @@ impl Inner {
         state.is_draining = true;
         while let Some(mut batch) = state.queue.take() {
             drop(state);
-            for line in batch.lines.drain(..) {
+            for line in batch.drain() {
                 if let Err(fault) = guarded(|| sink(line)) {
                     self.panics.fetch_add(1, Ordering::Relaxed);
                     log_panic("the journal's sink failed", &fault);
@@ -259,8 +288,10 @@ impl fmt::Debug for Journal {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Recorded;
     use super::super::queue::{BATCH, CAPACITY, MOST};
     use super::*;
+    use crate::message::Stamped;
     use std::sync::atomic::AtomicUsize;
 
     #[test]
@@ -293,6 +324,52 @@ mod tests {
         );
         assert!(lines.iter().zip(1..).all(|(line, number)| line.number == number));
         assert!(matches!(lines[40_002].event, Event::WallClock { offset_nanos: 6 }));
+    }
+
+    #[derive(Clone, Debug, Payload)]
+    struct Number(u64);
+
+    #[derive(Clone, Debug, Payload)]
+    struct Text(String);
+
+    #[test]
+    fn messages_of_several_payloads_keep_their_order_and_their_batches_are_used_again() {
+        let lines: Arc<Mutex<Vec<Entry>>> = Arc::default();
+        let sink = Arc::clone(&lines);
+        let journal = Journal::new(Arc::new(move |line| sink.lock().expect("no panic").push(line)), 0);
+        journal.begin(MonotonicTime::ZERO, Event::ArmTimeout);
+        fn write<T: Payload>(journal: &Journal, path: &'static str, payload: T) -> u64 {
+            let message = Stamped::new(MonotonicTime::ZERO, payload);
+            let mut waiting = Some(Waiting::new(path, message));
+            let line = journal.write_message(MonotonicTime::ZERO, 0, 7, &mut waiting);
+            assert_eq!(waiting.is_some(), line == 0, "it is taken if it is written");
+            line
+        }
+        let count = 3 * BATCH.lines as u64;
+        for value in 0..count {
+            match value % 3 {
+                0 => write(&journal, "a", Number(value)),
+                1 => write(&journal, "b", Text(value.to_string())),
+                _ => journal.write(MonotonicTime::ZERO, 0, Event::Retire { island: value as usize }),
+            };
+            if value % 1_000 == 0 {
+                journal.flush();
+            }
+        }
+        journal.close();
+        assert_eq!(write(&journal, "a", Number(0)), 0, "closed");
+        assert!(journal.hand_over(Duration::from_secs(10)));
+        let lines = lines.lock().expect("no panic");
+        assert!(lines.iter().zip(1..).all(|(line, number)| line.number == number));
+        let values = lines.iter().skip(1).map(|line| match &line.event {
+            Event::Message { publisher: 7, message: Recorded::Message(message) } => match message.path() {
+                "a" => message.downcast::<Number>().expect("a number").0,
+                _ => message.downcast::<Text>().expect("text").0.parse().expect("a number"),
+            },
+            Event::Retire { island } => *island as u64,
+            other => panic!("{other:?}"),
+        });
+        assert!(values.eq(0..count));
     }
 
     /// A journal whose sink hangs at the first line, until the returned sender is dropped.

@@ -10,10 +10,10 @@ use crate::component::{Binding, Guardian, Options, Template};
 use crate::declaration::{EstimatorDeclaration, ParameterValues};
 use crate::fault::{Failed, Fault};
 use crate::joints::Joints;
-use crate::journal::{Event, Journal, Recorded};
+use crate::journal::{Journal, Waiting};
 use crate::lifecycle::Supervision;
 use crate::message::{Origin, Payload, Stamped};
-use crate::pubsub::{AnyTopic as _, DynamicMessage, Topic};
+use crate::pubsub::{AnyTopic as _, Topic};
 use crate::schedule::{Agenda, Door, Lane, Pool};
 use crate::telemetry::Telemetry;
 use crate::time::{Clock, MonotonicTime, Stopwatch};
@@ -442,9 +442,9 @@ impl Environment {
             }
             Some(journal) => {
                 journal.wait_for_room();
-                let recorded = Recorded::Message(DynamicMessage::new(topic.path(), message));
-                let event = Event::Message { publisher, message: recorded };
-                topic.publish_as_written(message, || journal.write(now, self.0.clock.wall_offset_nanos(), event))
+                let mut waiting = Some(Waiting::new(topic.path(), message.clone()));
+                let offset = self.0.clock.wall_offset_nanos();
+                topic.publish_as_written(message, || journal.write_message(now, offset, publisher, &mut waiting))
             }
         }
     }

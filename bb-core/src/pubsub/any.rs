@@ -44,9 +44,19 @@ impl DynamicMessage {
     }
 
     pub(crate) fn of<T: Payload>(path: &'static str, message: Stamped<T>) -> Self {
-        let heap = if T::IS_INLINE { 0 } else { message.payload.heap_bytes() };
-        let bytes = size_of::<Stamped<T>>().saturating_add(heap);
+        let bytes = Self::bytes_of(&message);
+        Self::sized(path, message, bytes)
+    }
+
+    /// A message of which [`bytes_of`](Self::bytes_of) is known: runs no code of the payload.
+    pub(crate) fn sized<T: Payload>(path: &'static str, message: Stamped<T>, bytes: usize) -> Self {
         Self { path, message: Arc::new(message), bytes }
+    }
+
+    /// The bytes that a message holds, on the heap and inline.
+    pub(crate) fn bytes_of<T: Payload>(message: &Stamped<T>) -> usize {
+        let heap = if T::IS_INLINE { 0 } else { message.payload.heap_bytes() };
+        size_of::<Stamped<T>>().saturating_add(heap)
     }
 
     pub(crate) fn bytes(&self) -> usize {
