@@ -13,6 +13,9 @@ macro_rules! numbers {
             fn write(&self, writer: &mut Writer<'_>) {
                 writer.number(self.to_le_bytes());
             }
+            fn write_all(values: &[Self], writer: &mut Writer<'_>) {
+                writer.numbers(values, Self::to_le_bytes);
+            }
             fn read(reader: &mut Reader<'_>) -> Result<Self, DecodeError> {
                 reader.number($expected).map(Self::from_le_bytes)
             }

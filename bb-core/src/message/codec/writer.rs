@@ -27,13 +27,37 @@ impl<'a> Writer<'a> {
     }
 
     /// Appends a number aligned to a multiple of its size.
+    #[inline]
     pub fn number<const SIZE: usize>(&mut self, little_endian: [u8; SIZE]) {
+        self.align(SIZE);
+        self.bytes.extend_from_slice(&little_endian);
+    }
+
+    /// Appends numbers of one size: aligned once, as the others follow.
+    pub(super) fn numbers<T: Copy, const SIZE: usize>(
+        &mut self,
+        values: &[T],
+        little_endian: impl Fn(T) -> [u8; SIZE],
+    ) {
+        if values.is_empty() {
+            return;
+        }
+        self.align(SIZE);
+        let at = self.bytes.len();
+        self.bytes.resize(at + values.len() * SIZE, 0);
+        let room = self.bytes.get_mut(at..).unwrap_or_default();
+        for (room, value) in room.as_chunks_mut::<SIZE>().0.iter_mut().zip(values) {
+            *room = little_endian(*value);
+        }
+    }
+
+    #[inline]
+    fn align(&mut self, size: usize) {
         let length = self.bytes.len() - self.start;
-        let padding = length.next_multiple_of(SIZE) - length;
+        let padding = length.next_multiple_of(size) - length;
         if padding > 0 {
             self.bytes.resize(self.bytes.len() + padding, 0);
         }
-        self.bytes.extend(little_endian);
     }
 
     /// Appends bytes unchanged.
