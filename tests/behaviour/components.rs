@@ -280,6 +280,14 @@ impl Command for Task {
     }
 }
 
+/// The code of a [`Task`] that is done after a millisecond.
+pub(crate) fn at_once(context: CommandContext) -> Doing {
+    Box::pin(async move {
+        context.sleep(Duration::from_millis(1)).await;
+        Ok(Outcome::done(()))
+    })
+}
+
 /// Options of [`Counter`].
 #[derive(Clone, Debug, Options)]
 pub(crate) struct CounterOptions {

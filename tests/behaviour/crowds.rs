@@ -1,6 +1,6 @@
 //! Commands that hang, however many, do not keep others from making the robot safe.
 
-use crate::components::{Number, within};
+use crate::components::{Echo, Number, Replied, within};
 use crate::gate::{Gate, Place, Stuck};
 use bb_core::ArmError;
 use bb_core::event::RefusalReason;
@@ -36,23 +36,10 @@ impl Place for QueueGate {
     const NAME: &'static str = "here";
 }
 
-/// Estimator that reports a divergence at each 1 that it gets.
-#[derive(Debug)]
-pub(crate) struct Fickle;
-
-impl Estimator for Fickle {
-    type Options = NoOptions;
-    type Input = Number;
-    type Output = Number;
-
-    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-
-    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
-        let reply = Reply::none();
-        Ok(if number.0 == 1.0 { reply.diverged("a 1 came") } else { reply })
-    }
+/// Reports a divergence at each 1 that it gets.
+fn fickle(_: &mut f64, number: f64) -> Replied {
+    let reply = Reply::none();
+    Ok(if number == 1.0 { reply.diverged("a 1 came") } else { reply })
 }
 
 robot! {
@@ -63,7 +50,7 @@ robot! {
         stuck: Stuck<HealthGate> { category: many; allowed_states: [idle, executing]; }
     }
     link base {
-        sensor number: External<Number>() { estimator fickle: Fickle() { recover_after: 1; on_degraded: stuck; } }
+        sensor number: External<Number>() { estimator fickle: Echo(input = fickle) { recover_after: 1; on_degraded: stuck; } }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Whatever hangs, hardware is made safe first; and what is not safe, or was cancelled, moves nothing any more.
 
-use crate::components::{Number, at, within};
+use crate::components::{Doing, Done, Number, Pulse, Read, Servo, Source, Task, Update, at, at_once, lock, within};
 use crate::gate::{Gate, PATIENCE, Place, Stuck};
 use bb_core::event::CommandPhase;
 use bb_core::prelude::*;
@@ -22,32 +22,20 @@ static HERE: Gate = Gate::new();
 static STOPPED: (Mutex<bool>, Condvar) = (Mutex::new(false), Condvar::new());
 
 fn set_stopped(stopped: bool) {
-    *STOPPED.0.lock().unwrap_or_else(PoisonError::into_inner) = stopped;
+    *lock(&STOPPED.0) = stopped;
     STOPPED.1.notify_all();
 }
 
 fn is_stopped_within(limit: Duration) -> bool {
-    let stopped = STOPPED.0.lock().unwrap_or_else(PoisonError::into_inner);
+    let stopped = lock(&STOPPED.0);
     let waited = STOPPED.1.wait_timeout_while(stopped, limit, |stopped| !*stopped);
     *waited.unwrap_or_else(PoisonError::into_inner).0
 }
 
 /// Hangs in `read`.
-#[derive(Debug)]
-pub(crate) struct Device;
-
-impl Sensor for Device {
-    type Options = NoOptions;
-    type Output = Number;
-
-    fn init(_: NoOptions, _: &SensorContext) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-
-    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        HERE.pass("a sensor's read");
-        Ok(Reading::now(Number(1.0)))
-    }
+fn read(_: u32, _: MonotonicTime) -> Read {
+    HERE.pass("a sensor's read");
+    Ok(Reading::now(Number(1.0)))
 }
 
 /// Hangs at a message, or at a tick.
@@ -84,82 +72,29 @@ impl Place for InCommands {
     const NAME: &'static str = "a command";
 }
 
-/// Command that is done at once.
-#[derive(Debug)]
-pub(crate) struct Alarm;
-
-impl Command for Alarm {
-    type Options = NoOptions;
-    type Arguments = NoArguments;
-    type Output = ();
-
-    async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
-        context.sleep(Duration::from_millis(1)).await;
-        Ok(Outcome::done(()))
-    }
-}
-
 /// Hangs in `update`.
-#[derive(Debug)]
-pub(crate) struct Steer;
-
-impl Service for Steer {
-    type Options = NoOptions;
-    type Output = Number;
-
-    fn init(_: NoOptions, _: &ServiceContext) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-
-    fn update(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
+fn steer(_: &ServiceContext) -> Result<Update, Fault> {
+    Ok(Box::new(|_| {
         HERE.pass("a service's update");
         Ok(Reading::nothing())
-    }
+    }))
 }
 
-/// Motor that must be stopped.
-#[derive(Debug)]
-pub(crate) struct Motor;
-
-impl Actuator for Motor {
-    type Options = NoOptions;
-    type Command = Number;
-
-    fn init(_: NoOptions, _: &ActuatorContext) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-
-    fn handle_command(&mut self, _: &Stamped<Number>) -> Result<(), Fault> {
-        Ok(())
-    }
-
-    fn disarm(&mut self) -> Result<(), Fault> {
-        set_stopped(true);
-        Ok(())
-    }
+/// Stops the motor, which must be.
+fn stop(_: f64) -> Done {
+    set_stopped(true);
+    Ok(())
 }
 
-/// Another one, which hangs.
-#[derive(Debug)]
-pub(crate) struct Brake;
+/// Another actuator, which hangs.
+fn brake(_: f64) -> Done {
+    HERE.pass("another actuator's command");
+    Ok(())
+}
 
-impl Actuator for Brake {
-    type Options = NoOptions;
-    type Command = Number;
-
-    fn init(_: NoOptions, _: &ActuatorContext) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-
-    fn handle_command(&mut self, _: &Stamped<Number>) -> Result<(), Fault> {
-        HERE.pass("another actuator's command");
-        Ok(())
-    }
-
-    fn disarm(&mut self) -> Result<(), Fault> {
-        HERE.pass("another actuator's disarm");
-        Ok(())
-    }
+fn unbrake(_: f64) -> Done {
+    HERE.pass("another actuator's disarm");
+    Ok(())
 }
 
 robot! {
@@ -169,15 +104,20 @@ robot! {
         category many { concurrency: 8; }
         errand: Stuck<InCommands> { category: many; allowed_states: [idle, executing]; }
         hurried: Stuck<InCommands> { category: many; timeout: 20 ms; allowed_states: [idle, executing]; }
-        alarm: Alarm { allowed_states: [disarmed, idle, executing]; }
+        alarm: Task(run = at_once) { allowed_states: [disarmed, idle, executing]; }
     }
 
-    controllers { controller steer: Steer() { rate: 100 Hz; } }
+    controllers { controller steer: Pulse(init = steer) { rate: 100 Hz; } }
 
     link base {
-        joint tilt: continuous { axis: y; sensor encoder: External<Number>(); actuator brake: Brake(); link lens { } }
-        joint pan: continuous { axis: z; sensor encoder: External<Number>(); actuator motor: Motor(); link head { } }
-        sensor device: Device() { rate: 100 Hz; estimator thinker: Thinker(); }
+        joint tilt: continuous {
+            axis: y;
+            sensor encoder: External<Number>();
+            actuator brake: Servo(command = brake, disarm = unbrake);
+            link lens { }
+        }
+        joint pan: continuous { axis: z; sensor encoder: External<Number>(); actuator motor: Servo(disarm = stop); link head { } }
+        sensor device: Source(read = read) { rate: 100 Hz; estimator thinker: Thinker(); }
         sensor silent: External<Number>() {
             estimator waiting: Thinker() { lost_after: 1 s; on_lost: alarm; }
         }
@@ -188,7 +128,7 @@ robot! {
 static ALONE: Mutex<()> = Mutex::new(());
 
 fn alone() -> MutexGuard<'static, ()> {
-    let guard = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let guard = lock(&ALONE);
     HERE.open();
     guard
 }
@@ -359,36 +299,21 @@ fn a_command_that_blocks_times_out() {
     });
 }
 
-/// Moves; at -1 it fails, and from then on it cannot be made safe.
-#[derive(Debug)]
-pub(crate) struct Winch {
-    is_stuck: bool,
-}
-
 static MOVED: AtomicU32 = AtomicU32::new(0);
 static MADE_SAFE: AtomicU32 = AtomicU32::new(0);
 
-impl Actuator for Winch {
-    type Options = NoOptions;
-    type Command = Number;
+/// Moves; at -1 it fails, and from then on it cannot be made safe.
+fn wind(number: f64) -> Done {
+    MOVED.fetch_add(1, Ordering::SeqCst);
+    if number == -1.0 { Err(Fault::new("the rope is torn")) } else { Ok(()) }
+}
 
-    fn init(_: NoOptions, _: &ActuatorContext) -> Result<Self, Fault> {
-        Ok(Self { is_stuck: false })
+fn hold(last: f64) -> Done {
+    if last == -1.0 {
+        return Err(Fault::new("the brake does not answer"));
     }
-
-    fn handle_command(&mut self, command: &Stamped<Number>) -> Result<(), Fault> {
-        MOVED.fetch_add(1, Ordering::SeqCst);
-        self.is_stuck = command.0 == -1.0;
-        if self.is_stuck { Err(Fault::new("the rope is torn")) } else { Ok(()) }
-    }
-
-    fn disarm(&mut self) -> Result<(), Fault> {
-        if self.is_stuck {
-            return Err(Fault::new("the brake does not answer"));
-        }
-        MADE_SAFE.fetch_add(1, Ordering::SeqCst);
-        Ok(())
-    }
+    MADE_SAFE.fetch_add(1, Ordering::SeqCst);
+    Ok(())
 }
 
 /// Watches a temperature.
@@ -417,40 +342,26 @@ impl Sensor for Thermometer {
 static LENT: Mutex<Option<CommandContext>> = Mutex::new(None);
 
 /// Gives away what it was given, and waits.
-#[derive(Debug)]
-pub(crate) struct Lend;
-
-impl Command for Lend {
-    type Options = NoOptions;
-    type Arguments = NoArguments;
-    type Output = ();
-
-    async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
-        *LENT.lock().unwrap_or_else(PoisonError::into_inner) = Some(context.clone());
+fn lend(context: CommandContext) -> Doing {
+    Box::pin(async move {
+        *lock(&LENT) = Some(context.clone());
         context.sleep(Duration::from_secs(3600)).await;
         Ok(Outcome::done(()))
-    }
+    })
 }
 
 /// Result of a command's last attempt to move.
 static TRIED: Mutex<Option<Result<(), ActuatorError>>> = Mutex::new(None);
 
 /// Hangs, and moves once it is let go.
-#[derive(Debug)]
-pub(crate) struct Late;
-
-impl Command for Late {
-    type Options = NoOptions;
-    type Arguments = NoArguments;
-    type Output = ();
-
-    async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
+fn late(context: CommandContext) -> Doing {
+    Box::pin(async move {
         let winch = context.bus().actuator::<Number>("actuator/base/hook/winch")?;
         winch.send(Number(1.0)).map_err(|error| Fault::new(error.to_string()))?;
         HERE.pass("a command on its way");
-        *TRIED.lock().unwrap_or_else(PoisonError::into_inner) = Some(winch.send(Number(1.0)));
+        *lock(&TRIED) = Some(winch.send(Number(1.0)));
         Ok(Outcome::done(()))
-    }
+    })
 }
 
 robot! {
@@ -460,12 +371,17 @@ robot! {
 
     commands {
         arm: Arm;
-        lend: Lend;
-        late: Late;
+        lend: Task(run = lend);
+        late: Task(run = late);
     }
 
     link base {
-        joint hook: continuous { axis: z; sensor encoder: External<Number>(); actuator winch: Winch(); link load { } }
+        joint hook: continuous {
+            axis: z;
+            sensor encoder: External<Number>();
+            actuator winch: Servo(command = wind, disarm = hold);
+            link load { }
+        }
         sensor thermometer: Thermometer() { rate: 10 Hz; }
     }
 }
@@ -520,7 +436,7 @@ fn what_a_cancelled_command_holds_moves_nothing_even_when_the_robot_is_armed_aga
     assert_eq!(simulation.arm(), Ok(()));
     let lending = simulation.command(crane::command::lend, NoArguments).expect("it is idle");
     simulation.run_until(at(10));
-    let context = LENT.lock().unwrap_or_else(PoisonError::into_inner).take().expect("it runs");
+    let context = lock(&LENT).take().expect("it runs");
     let bus = context.bus();
     let winch = bus.actuator::<Number>("actuator/base/hook/winch").expect("it is declared");
     let progress = bus.publisher::<Number>("progress").expect("it is free");
@@ -560,7 +476,7 @@ fn arming_waits_until_the_code_of_a_cancelled_command_has_returned() {
         let live = running.live();
         std::thread::spawn(move || {
             let is_armed = live.arm();
-            armed.send((is_armed, TRIED.lock().unwrap_or_else(PoisonError::into_inner).clone()))
+            armed.send((is_armed, lock(&TRIED).clone()))
         });
         assert!(is_armed.recv_timeout(Duration::from_millis(300)).is_err(), "its code has not returned");
         assert_eq!(running.safety(), Safety::Disarmed);

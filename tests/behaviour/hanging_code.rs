@@ -1,6 +1,6 @@
 //! Code that hangs, or that calls where it would wait for itself: it is reported while the robot runs, and stops nothing else.
 
-use crate::components::{Doing, Number, Task};
+use crate::components::{Doing, Done, Number, Servo, Task, at_once};
 use crate::gate::{Gate, Place, Stuck};
 use bb_core::prelude::*;
 use bb_core::run::{ActuatorError, Report};
@@ -49,47 +49,20 @@ mod reports {
 
     static HANG: Hangs = Hangs::new();
 
-    /// Actuator whose `handle_command` hangs.
-    #[derive(Debug)]
-    pub(crate) struct Servo;
-
-    impl Actuator for Servo {
-        type Options = NoOptions;
-        type Command = Number;
-
-        fn init(_: NoOptions, _: &ActuatorContext) -> Result<Self, Fault> {
-            Ok(Self)
-        }
-
-        fn handle_command(&mut self, _: &Stamped<Number>) -> Result<(), Fault> {
-            HANG.0.pass("here");
-            Ok(())
-        }
-
-        fn disarm(&mut self) -> Result<(), Fault> {
-            Ok(())
-        }
+    fn hang(_: f64) -> Done {
+        HANG.0.pass("here");
+        Ok(())
     }
 
-    /// Command that hangs.
-    pub(crate) struct Wait;
-
-    impl Command for Wait {
-        type Options = NoOptions;
-        type Arguments = NoArguments;
-        type Output = ();
-
-        async fn run(_: NoOptions, _: NoArguments, _: CommandContext) -> Result<Outcome<()>, Fault> {
-            HANG.0.pass("here");
-            Ok(Outcome::done(()))
-        }
+    fn wait(_: CommandContext) -> Doing {
+        Box::pin(async { hang(0.0).map(Outcome::done) })
     }
 
     robot! {
         robot Reporting;
-        commands { wait: Wait { allowed_states: [idle]; } }
+        commands { wait: Task(run = wait) { allowed_states: [idle]; } }
         link base {
-            joint pan: continuous { axis: z; actuator servo: Servo(); sensor encoder: External<Number>(); link head {} }
+            joint pan: continuous { axis: z; actuator servo: Servo(command = hang); sensor encoder: External<Number>(); link head {} }
         }
     }
 
@@ -166,20 +139,6 @@ mod pools {
         const NAME: &'static str = "here";
     }
 
-    /// Command that runs when an estimator is degraded.
-    pub(crate) struct Halt;
-
-    impl Command for Halt {
-        type Options = NoOptions;
-        type Arguments = NoArguments;
-        type Output = ();
-
-        async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
-            context.sleep(Duration::from_millis(1)).await;
-            Ok(Outcome::done(()))
-        }
-    }
-
     /// Ticks, and diverges at a number.
     #[derive(Debug)]
     pub(crate) struct Ticker;
@@ -208,7 +167,7 @@ mod pools {
         commands {
             category many { concurrency: 1000; }
             stuck: Stuck<InPool> { category: many; allowed_states: [idle, executing]; }
-            halt: Halt { allowed_states: [idle, executing]; }
+            halt: Task(run = at_once) { allowed_states: [idle, executing]; }
         }
         link base {
             sensor number: External<Number>() {
@@ -262,42 +221,26 @@ mod reentrance {
         }
     }
 
-    /// Actuator that at 1 sends to itself, at 2 disarms the robot, at 3 fails, and at 4 stops the robot.
-    #[derive(Debug)]
-    pub(crate) struct Servo;
-
-    impl Actuator for Servo {
-        type Options = NoOptions;
-        type Command = Number;
-
-        fn init(_: NoOptions, _: &ActuatorContext) -> Result<Self, Fault> {
-            Ok(Self)
+    /// At 1 sends to its actuator itself, at 2 disarms the robot, at 3 fails, and at 4 stops the robot.
+    fn turn(number: f64) -> Done {
+        let Some(live) = live() else { return Ok(()) };
+        if number == 1.0 {
+            let sent = live.actuate(own::actuator::base::pan::servo, Number(0.0));
+            assert_eq!(sent, Err(ActuatorError::Inside));
+        } else if number == 2.0 {
+            assert_eq!(live.disarm(), Err(DisarmError::Callback));
+        } else if number == 3.0 {
+            return Err(Fault::new("stalls"));
+        } else if number == 4.0 {
+            let running = RUNNING.lock().map_err(|_| "it panicked")?.take().ok_or("it does not run")?;
+            let start = std::time::Instant::now();
+            let report = running.stop();
+            assert!(start.elapsed() < Duration::from_millis(6500), "{:?}", start.elapsed());
+            assert_eq!(report.safety, Safety::Error, "nobody knows whether it is safe");
+            let paths: Vec<_> = report.faults.iter().map(|fault| fault.path).collect();
+            assert!(paths.contains(&"actuator/base/pan/servo"), "{paths:?}");
         }
-
-        fn handle_command(&mut self, number: &Stamped<Number>) -> Result<(), Fault> {
-            let Some(live) = live() else { return Ok(()) };
-            if number.0 == 1.0 {
-                let sent = live.actuate(own::actuator::base::pan::servo, Number(0.0));
-                assert_eq!(sent, Err(ActuatorError::Inside));
-            } else if number.0 == 2.0 {
-                assert_eq!(live.disarm(), Err(DisarmError::Callback));
-            } else if number.0 == 3.0 {
-                return Err(Fault::new("stalls"));
-            } else if number.0 == 4.0 {
-                let running = RUNNING.lock().map_err(|_| "it panicked")?.take().ok_or("it does not run")?;
-                let start = std::time::Instant::now();
-                let report = running.stop();
-                assert!(start.elapsed() < Duration::from_millis(6500), "{:?}", start.elapsed());
-                assert_eq!(report.safety, Safety::Error, "nobody knows whether it is safe");
-                let paths: Vec<_> = report.faults.iter().map(|fault| fault.path).collect();
-                assert!(paths.contains(&"actuator/base/pan/servo"), "{paths:?}");
-            }
-            Ok(())
-        }
-
-        fn disarm(&mut self) -> Result<(), Fault> {
-            Ok(())
-        }
+        Ok(())
     }
 
     /// Stops the robot, which knows that it cannot wait for this.
@@ -317,7 +260,7 @@ mod reentrance {
         robot Own;
         commands { stop: Task(run = stop) { allowed_states: [disarmed]; } }
         link base {
-            joint pan: continuous { axis: z; actuator servo: Servo(); sensor encoder: External<Number>(); link head {} }
+            joint pan: continuous { axis: z; actuator servo: Servo(command = turn); sensor encoder: External<Number>(); link head {} }
         }
     }
 

@@ -1,7 +1,6 @@
 //! A caller that knows nothing of the robot and comes late: what is wrong, what runs, and what it may change until it leaves.
 
-use crate::components::Number;
-use crate::rights::Servo;
+use crate::components::{Done, Echo, Number, Read, Servo, Source, at};
 use bb_core::component::RunKind;
 use bb_core::message::codec::from_json;
 use bb_core::prelude::*;
@@ -10,77 +9,32 @@ use std::error::Error;
 use std::sync::Barrier;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-/// Emits its input.
-#[derive(Debug)]
-pub(crate) struct Pass;
-
-impl Estimator for Pass {
-    type Options = NoOptions;
-    type Input = Number;
-    type Output = Number;
-
-    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
-        Ok(Reply::emit(number.payload))
-    }
-}
-
 /// Fails at each command.
-#[derive(Debug)]
-pub(crate) struct Jammed;
-
-impl Actuator for Jammed {
-    type Options = NoOptions;
-    type Command = Number;
-
-    fn init(_: NoOptions, _: &ActuatorContext) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-    fn handle_command(&mut self, _: &Stamped<Number>) -> Result<(), Fault> {
-        Err(Fault::new("the gear is jammed"))
-    }
-    fn disarm(&mut self) -> Result<(), Fault> {
-        Ok(())
-    }
+fn jam(_: f64) -> Done {
+    Err(Fault::new("the gear is jammed"))
 }
-
-/// Counts its commands, and hangs in a negative one until it is freed.
-#[derive(Debug)]
-pub(crate) struct Counting;
 
 static CARRIED_OUT: AtomicU64 = AtomicU64::new(0);
 static HANGS: AtomicBool = AtomicBool::new(false);
 static IS_FREED: AtomicBool = AtomicBool::new(false);
 
-impl Actuator for Counting {
-    type Options = NoOptions;
-    type Command = Number;
-
-    fn init(_: NoOptions, _: &ActuatorContext) -> Result<Self, Fault> {
-        Ok(Self)
+/// Counts its commands, and hangs in a negative one until it is freed.
+fn count(number: f64) -> Done {
+    while number < 0.0 && !IS_FREED.load(Ordering::SeqCst) {
+        HANGS.store(true, Ordering::SeqCst);
+        std::thread::sleep(Duration::from_millis(1));
     }
-    fn handle_command(&mut self, number: &Stamped<Number>) -> Result<(), Fault> {
-        while number.payload.0 < 0.0 && !IS_FREED.load(Ordering::SeqCst) {
-            HANGS.store(true, Ordering::SeqCst);
-            std::thread::sleep(Duration::from_millis(1));
-        }
-        // Long enough for another thread to be between.
-        std::thread::yield_now();
-        CARRIED_OUT.fetch_add(1, Ordering::SeqCst);
-        Ok(())
-    }
-    fn disarm(&mut self) -> Result<(), Fault> {
-        Ok(())
-    }
+    // Long enough for another thread to be between.
+    std::thread::yield_now();
+    CARRIED_OUT.fetch_add(1, Ordering::SeqCst);
+    Ok(())
 }
 
 robot! {
     robot Steered;
     parameters { speed: f64 = 1.0; }
     commands { go: Arm { allowed_states: [disarmed]; } }
-    link base { joint pan: continuous { axis: z; actuator motor: Counting(); sensor encoder: External<Number>(); link head {} } }
+    link base { joint pan: continuous { axis: z; actuator motor: Servo(command = count); sensor encoder: External<Number>(); link head {} } }
 }
 
 /// Arguments of [`Travel`].
@@ -128,14 +82,10 @@ robot! {
     }
     link base {
         sensor number: External<Number>();
-        estimator pass: Pass() { input number: sensor::base::number; lost_after: 200 ms; recover_after: 2; }
+        estimator pass: Echo() { input number: sensor::base::number; lost_after: 200 ms; recover_after: 2; }
         joint pan: continuous { axis: z; actuator servo: Servo(); sensor encoder: External<Number>(); link head {} }
-        joint tilt: continuous { axis: z; actuator jammed: Jammed(); sensor encoder: External<Number>(); link eye {} }
+        joint tilt: continuous { axis: z; actuator jammed: Servo(command = jam); sensor encoder: External<Number>(); link eye {} }
     }
-}
-
-fn at(millis: i64) -> MonotonicTime {
-    MonotonicTime::from_nanos(millis * 1_000_000)
 }
 
 fn report(bus: &bb_core::Bus) -> Result<Value, Box<dyn Error>> {
@@ -186,25 +136,14 @@ fn a_late_bus_names_all_that_is_wrong_since_when_and_why() -> Result<(), Box<dyn
 }
 
 /// Fails for half a second, from 0.1 s and from 5 s.
-#[derive(Debug)]
-pub(crate) struct Flaky;
-
-impl Sensor for Flaky {
-    type Options = NoOptions;
-    type Output = Number;
-
-    fn init(_: NoOptions, _: &SensorContext) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-    fn read(&mut self, now: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        let is_loose = (at(100)..at(600)).contains(&now) || (at(5000)..at(5500)).contains(&now);
-        if is_loose { Err(Fault::new("the cable is loose")) } else { Ok(Reading::now(Number(1.0))) }
-    }
+fn loose(_: u32, now: MonotonicTime) -> Read {
+    let is_loose = (at(100)..at(600)).contains(&now) || (at(5000)..at(5500)).contains(&now);
+    if is_loose { Err(Fault::new("the cable is loose")) } else { Ok(Reading::now(Number(1.0))) }
 }
 
 robot! {
     robot Loose;
-    link base { sensor flaky: Flaky() { rate: 100 Hz; } }
+    link base { sensor flaky: Source(read = loose) { rate: 100 Hz; } }
 }
 
 /// Restarts without a reading do not begin it again, and the same fault of before has another beginning.

@@ -1,6 +1,6 @@
 //! Code that hangs when the robot stops is left behind and reported; nobody waits for it for longer than the robot says.
 
-use crate::components::{Number, within};
+use crate::components::{Done, Number, Servo, Source, within};
 use crate::gate::Gate;
 use bb_core::journal::Event;
 use bb_core::prelude::*;
@@ -15,36 +15,6 @@ static HERE: Gate = Gate::new();
 /// Number of times that something was made safe.
 static DISARMED: AtomicU32 = AtomicU32::new(0);
 
-/// Hangs when it is closed.
-#[derive(Debug)]
-pub(crate) struct Clinging;
-
-impl Actuator for Clinging {
-    type Options = NoOptions;
-    type Command = Number;
-
-    fn init(_: NoOptions, _: &ActuatorContext) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-
-    fn handle_command(&mut self, _: &Stamped<Number>) -> Result<(), Fault> {
-        Ok(())
-    }
-
-    fn disarm(&mut self) -> Result<(), Fault> {
-        DISARMED.fetch_add(1, Ordering::SeqCst);
-        Ok(())
-    }
-
-    fn terminate(&mut self, _: Termination<'_>) {
-        HERE.pass("here");
-    }
-}
-
-/// Hangs when it is dropped.
-#[derive(Debug)]
-pub(crate) struct Heavy(Dropping);
-
 /// Value that hangs when it is dropped.
 #[derive(Debug)]
 struct Dropping;
@@ -55,46 +25,19 @@ impl Drop for Dropping {
     }
 }
 
-impl Actuator for Heavy {
-    type Options = NoOptions;
-    type Command = Number;
-
-    fn init(_: NoOptions, _: &ActuatorContext) -> Result<Self, Fault> {
-        Ok(Self(Dropping))
-    }
-
-    fn handle_command(&mut self, _: &Stamped<Number>) -> Result<(), Fault> {
-        let _ = &self.0;
-        Ok(())
-    }
-
-    fn disarm(&mut self) -> Result<(), Fault> {
-        DISARMED.fetch_add(1, Ordering::SeqCst);
-        Ok(())
-    }
+fn disarm(_: f64) -> Done {
+    DISARMED.fetch_add(1, Ordering::SeqCst);
+    Ok(())
 }
 
-/// Measures nothing; its disarm callback owns what hangs when it is dropped.
-#[derive(Debug)]
-pub(crate) struct Owner;
-
-impl Sensor for Owner {
-    type Options = NoOptions;
-    type Output = Number;
-
-    fn init(_: NoOptions, context: &SensorContext) -> Result<Self, Fault> {
-        let owned = Dropping;
-        context.on_disarm(move || {
-            let _ = &owned;
-            DISARMED.fetch_add(1, Ordering::SeqCst);
-            Ok(())
-        });
-        Ok(Self)
-    }
-
-    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        Ok(Reading::nothing())
-    }
+/// Its disarm callback owns what hangs when it is dropped.
+fn own(context: &SensorContext) -> Done {
+    let owned = Dropping;
+    context.on_disarm(move || {
+        let _ = &owned;
+        disarm(0.0)
+    });
+    Ok(())
 }
 
 /// Hangs, unlike what it is woken with.
@@ -117,9 +60,19 @@ impl Wake for Tell {
 robot! {
     robot Sticky;
     link base {
-        sensor owner: Owner() { rate: 10 Hz; }
-        joint pan: continuous { axis: z; actuator clinging: Clinging(); sensor a: External<Number>(); link head {} }
-        joint tilt: continuous { axis: y; actuator heavy: Heavy(); sensor b: External<Number>(); link eye {} }
+        sensor owner: Source(init = own) { rate: 10 Hz; }
+        joint pan: continuous {
+            axis: z;
+            actuator clinging: Servo(disarm = disarm, terminate = |_| HERE.pass("here"));
+            sensor a: External<Number>();
+            link head {}
+        }
+        joint tilt: continuous {
+            axis: y;
+            actuator heavy: Servo(disarm = disarm, dropped = || HERE.pass("here"));
+            sensor b: External<Number>();
+            link eye {}
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Hardware that is started, and commands that arm, while the robot is being disarmed or was.
 
-use crate::components::{Number, within};
+use crate::components::{Doing, Done, Number, Source, Task, lock, within};
 use crate::gate::{Brake, Brakes, Gate, Place, Stuck, wait_until};
 use bb_core::prelude::*;
 use bb_core::{ArmError, DisarmError, Live};
@@ -49,7 +49,7 @@ const UNTIL_AT_GATE: u32 = 2;
 static GATE: Gate = Gate::new();
 
 fn alone() -> MutexGuard<'static, ()> {
-    let alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let alone = lock(&ALONE);
     TURNING.store(0, Ordering::SeqCst);
     MADE.store(0, Ordering::SeqCst);
     FIRST.store(WORKS, Ordering::SeqCst);
@@ -253,13 +253,13 @@ fn what_makes_hardware_safe_cannot_arm_the_robot_meanwhile() {
         GATE.close("init");
         let robot = Scanner::builder().start().expect("it starts");
         assert_eq!((robot.arm(), robot.disarm()), (Ok(()), Ok(())));
-        *ARMS.lock().unwrap_or_else(PoisonError::into_inner) = Some(robot.live());
+        *lock(&ARMS) = Some(robot.live());
         GATE.open();
         wait_until("the second one is made safe", || MADE.load(Ordering::SeqCst) > 1 && turning() == 0);
-        let told = ARMED.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let told = lock(&ARMED).take();
         assert_eq!(told, Some(Err(ArmError::MakingSafe(vec!["sensor/base/lidar"]))));
         wait_until("it may be armed", || robot.arm() == Ok(()));
-        ARMS.lock().unwrap_or_else(PoisonError::into_inner).take();
+        lock(&ARMS).take();
         assert_eq!(robot.stop().safety, Safety::Disarmed);
     });
 }
@@ -344,19 +344,12 @@ impl Command for Go {
     }
 }
 
-/// Command that starts another one.
-#[derive(Debug)]
-pub(crate) struct Mission;
-
-impl Command for Mission {
-    type Options = NoOptions;
-    type Arguments = NoArguments;
-    type Output = ();
-
-    async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
+/// Starts another command.
+fn mission(context: CommandContext) -> Doing {
+    Box::pin(async move {
         context.bus().start_command("command/go", "")?;
         Ok(Outcome::done(()))
-    }
+    })
 }
 
 robot! {
@@ -366,7 +359,7 @@ robot! {
         check: Check;
         block: Stuck<Held> { allowed_states: [idle]; category: other; }
         go: Go { allowed_states: [idle, executing]; category: other; }
-        mission: Mission { allowed_states: [idle]; category: other; }
+        mission: Task(run = mission) { allowed_states: [idle]; category: other; }
     }
     link base { sensor brake: Brake<Slowly>() { rate: 10 Hz; } }
 }
@@ -473,32 +466,20 @@ static SAID: Mutex<Vec<Said>> = Mutex::new(Vec::new());
 static ROBOT: Mutex<Option<Live<Calling>>> = Mutex::new(None);
 
 /// Calls the robot from its callback.
-#[derive(Debug)]
-pub(crate) struct Calls;
-
-impl Sensor for Calls {
-    type Options = NoOptions;
-    type Output = Number;
-
-    fn init(_: NoOptions, context: &SensorContext) -> Result<Self, Fault> {
-        context.on_disarm(|| {
-            let robot = ROBOT.lock().unwrap_or_else(PoisonError::into_inner).clone();
-            if let Some(robot) = robot {
-                SAID.lock().unwrap_or_else(PoisonError::into_inner).push((robot.disarm(), robot.arm()));
-            }
-            Ok(())
-        });
-        Ok(Self)
-    }
-
-    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        Ok(Reading::nothing())
-    }
+fn calls(context: &SensorContext) -> Done {
+    context.on_disarm(|| {
+        let robot = lock(&ROBOT).clone();
+        if let Some(robot) = robot {
+            lock(&SAID).push((robot.disarm(), robot.arm()));
+        }
+        Ok(())
+    });
+    Ok(())
 }
 
 robot! {
     robot Calling;
-    link base { sensor calls: Calls() { rate: 10 Hz; } }
+    link base { sensor calls: Source(init = calls) { rate: 10 Hz; } }
 }
 
 #[test]
@@ -508,8 +489,8 @@ fn a_callback_cannot_wait_for_itself_and_a_replay_obeys_its_journal_alone() -> R
     let lines = Arc::new(Mutex::new(Vec::new()));
     let sink = Arc::clone(&lines);
     let mut builder = Calling::builder();
-    builder.journal(move |line| sink.lock().unwrap_or_else(PoisonError::into_inner).push(line));
-    let called = |robot| *ROBOT.lock().unwrap_or_else(PoisonError::into_inner) = robot;
+    builder.journal(move |line| lock(&sink).push(line));
+    let called = |robot| *lock(&ROBOT) = robot;
     let mut simulation = builder.simulate()?;
     called(Some(simulation.live()));
     assert_eq!(simulation.arm(), Ok(()));
@@ -521,7 +502,7 @@ fn a_callback_cannot_wait_for_itself_and_a_replay_obeys_its_journal_alone() -> R
     assert_eq!((robot.arm(), robot.disarm()), (Ok(()), Ok(())));
     robot.stop();
     called(None);
-    let said = std::mem::take(&mut *SAID.lock().unwrap_or_else(PoisonError::into_inner));
+    let said = std::mem::take(&mut *lock(&SAID));
     // On virtual time and in real time, at the disarming and at the stop.
     let during = (Err(DisarmError::Callback), Err(ArmError::Disarming));
     let stopping = (Err(DisarmError::Callback), Err(ArmError::Stopping));
@@ -529,7 +510,7 @@ fn a_callback_cannot_wait_for_itself_and_a_replay_obeys_its_journal_alone() -> R
 
     let mut replay = Calling::builder().replay()?;
     assert_eq!((replay.arm(), replay.disarm()), (Err(ArmError::Replay), Err(DisarmError::Replay)));
-    replay.play(std::mem::take(&mut *lines.lock().unwrap_or_else(PoisonError::into_inner)))?;
+    replay.play(std::mem::take(&mut *lock(&lines)))?;
     assert_eq!(replay.stop().safety, Safety::Disarmed);
     Ok(())
 }

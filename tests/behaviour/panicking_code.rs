@@ -1,7 +1,7 @@
 //! A panic in a user's code is charged to whom it belongs, at the start too; and what would keep virtual time from going on is
 //! ended.
 
-use crate::components::Number;
+use crate::components::{Number, Source};
 use bb_core::message::codec::{Reader, Shape, Writer};
 use bb_core::message::{DecodeError, Field, Finite};
 use bb_core::prelude::*;
@@ -84,26 +84,9 @@ mod outputs {
         }
     }
 
-    /// Gives numbers.
-    #[derive(Debug)]
-    pub(crate) struct Source;
-
-    impl Sensor for Source {
-        type Options = NoOptions;
-        type Output = Number;
-
-        fn init(_: NoOptions, _: &SensorContext) -> Result<Self, Fault> {
-            Ok(Self)
-        }
-
-        fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-            Ok(Reading::now(Number(1.0)))
-        }
-    }
-
     robot! {
         robot Making;
-        link base { sensor source: Source() { rate: 100 Hz; estimator maker: Maker(); } }
+        link base { sensor source: Source(read = |_, _| Ok(Reading::now(Number(1.0)))) { rate: 100 Hz; estimator maker: Maker(); } }
     }
 
     /// One panic of that code, and what the robot does after it.
@@ -169,26 +152,9 @@ mod outputs {
 mod instants {
     use super::*;
 
-    /// Sensor that is unplugged.
-    #[derive(Debug)]
-    pub(crate) struct Unplugged;
-
-    impl Sensor for Unplugged {
-        type Options = NoOptions;
-        type Output = Number;
-
-        fn init(_: NoOptions, _: &SensorContext) -> Result<Self, Fault> {
-            Ok(Self)
-        }
-
-        fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-            Err(Fault::new("unplugged"))
-        }
-    }
-
     robot! {
         robot Failing;
-        link base { sensor number: Unplugged() { rate: 10 Hz; } }
+        link base { sensor number: Source(read = |_, _| Err(Fault::new("unplugged"))) { rate: 10 Hz; } }
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Reactions: a condition on a field of a topic starts a command.
 
-use crate::components::{Failure, Move, Target, at};
+use crate::components::{Doing, Failure, Move, Target, Task, at};
 use crate::replay::{entries, journal, read_back};
 use bb_core::component::{ReactionEvent, ReactionState};
 use bb_core::event::{CommandEvent, CommandPhase};
@@ -9,25 +9,18 @@ use bb_core::run::Report;
 use bb_core::{DynamicMessage, Stamped};
 
 /// Takes half a second.
-#[derive(Debug)]
-struct Land;
-
-impl Command for Land {
-    type Options = NoOptions;
-    type Arguments = NoArguments;
-    type Output = ();
-
-    async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
+fn land(context: CommandContext) -> Doing {
+    Box::pin(async move {
         context.sleep(Duration::from_millis(500)).await;
         Ok(Outcome::done(()))
-    }
+    })
 }
 
 robot! {
     robot Drone;
     parameters { battery { low: f64 = 11 V, range: 5 V..=15 V; hot: f64 = 330 K; } }
     commands {
-        land: Land { allowed_states: [idle, executing]; cancel: all; }
+        land: Task(run = land) { allowed_states: [idle, executing]; cancel: all; }
         go: Move { allowed_states: [idle, executing]; }
     }
     sensors { sensor battery: External<BatteryState>(); }

@@ -1,31 +1,10 @@
 //! Rights of a caller: each verb of the bus needs its right, and everybody may disarm.
 
-use crate::components::Number;
+use crate::components::{Number, Servo};
 use bb_core::journal::Event;
 use bb_core::prelude::*;
 use bb_core::run::Bus;
 use bb_core::{ArmError, DisarmError};
-
-/// Moves at once.
-#[derive(Debug)]
-pub(crate) struct Servo;
-
-impl Actuator for Servo {
-    type Options = NoOptions;
-    type Command = Number;
-
-    fn init(_: NoOptions, _: &ActuatorContext) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-
-    fn handle_command(&mut self, _: &Stamped<Number>) -> Result<(), Fault> {
-        Ok(())
-    }
-
-    fn disarm(&mut self) -> Result<(), Fault> {
-        Ok(())
-    }
-}
 
 robot! {
     robot Guarded;
