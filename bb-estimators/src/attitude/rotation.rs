@@ -3,7 +3,7 @@
 //! Each keeps the norm up to rounding, and [`renormalised`] removes the rounding once per sample, without a root or a
 //! division.
 
-use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Quaternion, Unit, UnitQuaternion, Vector3};
 
 use super::Real;
 
@@ -122,6 +122,18 @@ pub(super) fn turn_upright<T: Real>(world_from_body: &UnitQuaternion<T>, up: &Ve
         w * q.j + y * q.w - x * q.k,
         w * q.k + x * q.j - y * q.i,
     )
+}
+
+/// The matrix of a rotation: `to_rotation_matrix` of nalgebra for a norm of 1, for two thirds of its instructions.
+#[inline(always)]
+pub(super) fn matrix<T: Real>(world_from_body: &UnitQuaternion<T>) -> Matrix3<T> {
+    let q = world_from_body;
+    let [x, y, z] = [q.i + q.i, q.j + q.j, q.k + q.k];
+    let [xx, yy, zz] = [x * q.i, y * q.j, z * q.k];
+    let [xy, xz, yz] = [x * q.j, x * q.k, y * q.k];
+    let [wx, wy, wz] = [x * q.w, y * q.w, z * q.w];
+    let (one, w) = (T::ONE - zz, T::ONE - xx);
+    Matrix3::new(one - yy, xy - wz, xz + wy, xy + wz, one - xx, yz - wx, xz - wy, yz + wx, w - yy)
 }
 
 /// `orientation` with its norm, which is 1 up to rounding, restored to 1.

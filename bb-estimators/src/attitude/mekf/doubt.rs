@@ -4,7 +4,6 @@
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 
-use super::errors::HEADING;
 use super::field::Field;
 use super::numbers::{ANY_ANGLE, GRAVITY, LONG_S, MEAN_FORCE, OUTLIER, SHORT_S};
 use super::offset::HardIron;
@@ -63,12 +62,12 @@ impl<T: Real> Doubt<T> {
         let Some(field) = field else { return filter };
         let scale = self.surprise.max(T::of(1.0 / (OUTLIER * OUTLIER))).sqrt();
         for axis in 0..3 {
-            filter[(HEADING, axis)] *= scale;
-            filter[(axis, HEADING)] *= scale;
+            filter[(2, axis)] *= scale;
+            filter[(axis, 2)] *= scale;
         }
         // A field that dips turns the heading with the tilt.
         let turned = T::HALF * lean.norm_squared() * field.dip().powi(2);
-        filter[(HEADING, HEADING)] += turned + field.variance(iron.doubt()).min(T::of(ANY_ANGLE));
+        filter.m33 += turned + field.variance(iron.doubt()).min(T::of(ANY_ANGLE));
         filter
     }
 }

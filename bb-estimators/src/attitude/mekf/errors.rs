@@ -5,18 +5,29 @@ use nalgebra::{Matrix3, Vector3};
 use super::window::Window;
 use crate::attitude::Real;
 
-/// Rotation error in the world, rad. Its value is moved into the orientation at the end of each window.
-pub(super) const ROTATION: usize = 0;
-/// About the vertical.
-pub(super) const HEADING: usize = ROTATION + 2;
+// The first five states are all that a field corrects.
+
 /// Bias of the gyroscope in the body frame, rad/s.
-pub(super) const BIAS: usize = 3;
-/// Horizontal velocity, m/s.
-pub(super) const VELOCITY: usize = 6;
+pub(super) const BIAS: [usize; 3] = [0, 1, 2];
 /// Lag of the magnetometer behind the gyroscope, s.
-pub(super) const LAG: usize = 8;
+pub(super) const LAG: usize = 3;
+/// Rotation error about the vertical, rad.
+pub(super) const HEADING: usize = 4;
+/// Rotation error in the world, rad. Its value is moved into the orientation at the end of each window.
+pub(super) const ROTATION: [usize; 3] = [X, Y, HEADING];
+/// Horizontal velocity, m/s.
+pub(super) const VELOCITY: [usize; 2] = [EAST, NORTH];
+
+const BY_FIELD: usize = 5;
+const X: usize = 5;
+const Y: usize = 6;
+pub(super) const EAST: usize = 7;
+pub(super) const NORTH: usize = 8;
 
 const STATES: usize = 9;
+
+/// Length of a row in memory: even, so that a processor that takes two numbers at once takes whole rows.
+const WIDTH: usize = 10;
 
 /// A smaller variance is rounding.
 const LEAST_VARIANCE: f64 = 1e-16;
@@ -25,7 +36,8 @@ const LEAST_VARIANCE: f64 = 1e-16;
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Errors<T: Real> {
     pub(super) value: [T; STATES],
-    covariance: [[T; STATES]; STATES],
+    /// The upper triangle; what is below it is zero.
+    covariance: [[T; WIDTH]; STATES],
 }
 
 /// Variances that a window adds.
@@ -36,22 +48,35 @@ pub(super) struct ProcessNoise<T> {
     pub(super) bias: T,
 }
 
+/// Covariances of all states with one quantity.
+pub(super) type Shared<T> = [T; WIDTH];
+
 impl<T: Real> Errors<T> {
     pub(super) fn new() -> Self {
-        Self { value: [T::ZERO; STATES], covariance: [[T::ZERO; STATES]; STATES] }
+        Self { value: [T::ZERO; STATES], covariance: [[T::ZERO; WIDTH]; STATES] }
+    }
+
+    #[inline(always)]
+    fn at(&self, one: usize, other: usize) -> T {
+        self.covariance[one.min(other)][one.max(other)]
     }
 
     pub(super) fn variance(&self, state: usize) -> T {
         self.covariance[state][state]
     }
 
-    pub(super) fn vector(&self, first: usize) -> Vector3<T> {
-        Vector3::new(self.value[first], self.value[first + 1], self.value[first + 2])
+    pub(super) fn vector(&self, states: [usize; 3]) -> Vector3<T> {
+        states.map(|state| self.value[state]).into()
     }
 
     /// The covariance of three states.
-    pub(super) fn block(&self, first: usize) -> Matrix3<T> {
-        Matrix3::from_fn(|row, column| self.covariance[first + row][first + column])
+    pub(super) fn block(&self, states: [usize; 3]) -> Matrix3<T> {
+        Matrix3::from_fn(|row, column| self.at(states[row], states[column]))
+    }
+
+    /// Standard deviation of the bias along an axis, in the mean.
+    pub(super) fn deviation_of_bias(&self) -> T {
+        (BIAS.iter().map(|state| self.variance(*state)).sum::<T>() / T::of(3.0)).sqrt()
     }
 
     /// Adds to the variance of a state.
@@ -60,11 +85,11 @@ impl<T: Real> Errors<T> {
     }
 
     /// Makes states independent of the others, with this variance.
-    pub(super) fn forget(&mut self, states: core::ops::Range<usize>, variance: T) {
-        for state in states {
-            for other in 0..STATES {
-                self.covariance[state][other] = T::ZERO;
-                self.covariance[other][state] = T::ZERO;
+    pub(super) fn forget(&mut self, states: &[usize], variance: T) {
+        for &state in states {
+            self.covariance[state] = [T::ZERO; WIDTH];
+            for row in &mut self.covariance[..state] {
+                row[state] = T::ZERO;
             }
             self.covariance[state][state] = variance;
         }
@@ -72,9 +97,7 @@ impl<T: Real> Errors<T> {
 
     /// Moves the rotation error out of the state.
     pub(super) fn take_rotation(&mut self) -> Vector3<T> {
-        let rotation = self.vector(ROTATION);
-        self.value[ROTATION..ROTATION + 3].fill(T::ZERO);
-        rotation
+        ROTATION.map(|state| core::mem::replace(&mut self.value[state], T::ZERO)).into()
     }
 
     /// Propagates over a window: `θ -= ∫R dt b`, `v += ∫R f dt + g_z θ × z`.
@@ -82,108 +105,132 @@ impl<T: Real> Errors<T> {
     /// Heading does not enter the velocity: it would let accelerations correct the heading, and through it the bias about
     /// the vertical.
     pub(super) fn propagate(&mut self, window: &Window<T>, noise: &ProcessNoise<T>) {
-        self.value[VELOCITY] += window.force.x;
-        self.value[VELOCITY + 1] += window.force.y;
+        self.value[EAST] += window.force.x;
+        self.value[NORTH] += window.force.y;
         let (turn, lift) = (&window.rotation, window.force.z);
-        // From the left and, the matrix being symmetric, from the right: rows and columns in turn.
-        for is_column in [false, true] {
-            for other in 0..STATES {
-                let at = |state: usize| {
-                    if is_column { self.covariance[other][state] } else { self.covariance[state][other] }
-                };
-                let bias = Vector3::new(at(BIAS), at(BIAS + 1), at(BIAS + 2));
-                let rotation = Vector3::new(at(ROTATION), at(ROTATION + 1), at(ROTATION + 2)) - turn * bias;
-                let east = at(VELOCITY) + lift * at(ROTATION + 1);
-                let north = at(VELOCITY + 1) - lift * at(ROTATION);
-                let mut set = |state: usize, value| {
-                    let (row, column) = if is_column { (other, state) } else { (state, other) };
-                    self.covariance[row][column] = value;
-                };
-                set(ROTATION, rotation.x);
-                set(ROTATION + 1, rotation.y);
-                set(ROTATION + 2, rotation.z);
-                set(VELOCITY, east);
-                set(VELOCITY + 1, north);
+        // Covariances of the new rotation with the old states.
+        let turned: [Vector3<T>; STATES] = core::array::from_fn(|state| {
+            let of = |states: [usize; 3]| Vector3::from(states.map(|one| self.at(one, state)));
+            of(ROTATION) - turn * of(BIAS)
+        });
+        let p = &mut self.covariance;
+        p[EAST][EAST] += lift * (p[Y][EAST] + p[Y][EAST] + lift * p[Y][Y]);
+        p[EAST][NORTH] += lift * (p[Y][NORTH] - p[X][EAST] - lift * p[X][Y]);
+        p[NORTH][NORTH] -= lift * (p[X][NORTH] + p[X][NORTH] - lift * p[X][X]);
+        for state in [0, 1, 2, LAG] {
+            p[state][EAST] += lift * p[state][Y];
+            p[state][NORTH] -= lift * p[state][X];
+        }
+        for (axis, row) in ROTATION.into_iter().enumerate() {
+            for state in [0, 1, 2, LAG] {
+                p[state][row] = turned[state][axis];
             }
+            p[row][EAST] = turned[EAST][axis] + lift * turned[Y][axis];
+            p[row][NORTH] = turned[NORTH][axis] - lift * turned[X][axis];
+            for (other, column) in ROTATION.into_iter().enumerate() {
+                if row <= column {
+                    let of_bias = turned[0][axis] * turn[(other, 0)]
+                        + turned[1][axis] * turn[(other, 1)]
+                        + turned[2][axis] * turn[(other, 2)];
+                    p[row][column] = turned[column][axis] - of_bias;
+                }
+            }
+            p[row][row] += noise.rotation;
+            p[axis][axis] += noise.bias;
         }
-        for axis in 0..3 {
-            self.doubt(ROTATION + axis, noise.rotation);
-            self.doubt(BIAS + axis, noise.bias);
-        }
-        for row in 1..STATES {
-            for column in 0..row {
-                let mean = T::HALF * (self.covariance[row][column] + self.covariance[column][row]);
-                self.covariance[row][column] = mean;
-                self.covariance[column][row] = mean;
+        for (state, row) in p.iter_mut().enumerate() {
+            if row[state] < T::of(LEAST_VARIANCE) {
+                row[state] = T::of(LEAST_VARIANCE);
             }
         }
     }
 
-    /// Corrects the state by a scalar that depends on it by `slopes`: by how much it is more than expected, with which
-    /// variance.
+    /// Covariances of all states with one.
+    #[inline(always)]
+    fn shared(&self, state: usize) -> Shared<T> {
+        core::array::from_fn(|other| if other < STATES { self.at(state, other) } else { T::ZERO })
+    }
+
+    /// Corrects the state by one of it: by how much it is more than expected, with which variance.
     ///
     /// `kept` returns states that are left alone, as in a Schmidt–Kalman filter, with the part of their covariance with the
-    /// scalar that is: for a scalar whose error is not white, or which others know better.
-    pub(super) fn correct<const N: usize, const K: usize>(
+    /// one that is: for a number whose error is not white.
+    #[inline(always)]
+    pub(super) fn correct_one<const STATE: usize, const K: usize>(
         &mut self,
-        slopes: [(usize, T); N],
         residual: T,
         variance: T,
-        kept: impl Fn(&[T; STATES]) -> [(usize, T); K],
+        kept: impl Fn(&Shared<T>) -> [(usize, T); K],
     ) {
-        let mut shared = [T::ZERO; STATES];
-        for (one, row) in shared.iter_mut().zip(&self.covariance) {
-            *one = slopes.iter().map(|(state, slope)| row[*state] * *slope).sum();
-        }
-        let expected: T = slopes.iter().map(|(state, slope)| shared[*state] * *slope).sum();
-        let total = expected + variance;
-        // Rounding, or absurd samples.
-        if total <= T::ZERO || !total.is_finite() {
-            return;
-        }
-        let inverse = T::ONE / total;
-        for row in 0..STATES {
-            let gain = shared[row] * inverse;
-            self.value[row] += gain * residual;
-            #[expect(
-                clippy::needless_range_loop,
-                reason = "an iterator costs a tenth of the filter's instructions"
-            )]
-            for column in row..STATES {
-                let covariance = self.covariance[row][column] - gain * shared[column];
-                self.covariance[row][column] = covariance;
-                self.covariance[column][row] = covariance;
-            }
-        }
+        let shared = self.shared(STATE);
+        let Some(inverse) = self.correct::<STATES>(&shared, shared[STATE] + variance, residual) else { return };
         let kept = kept(&shared);
         for (index, (row, part)) in kept.iter().enumerate() {
             let gain = *part * inverse;
             self.value[*row] -= gain * residual;
             for (column, other) in &kept[index..] {
-                let covariance = self.covariance[*row][*column] + gain * *other;
-                self.covariance[*row][*column] = covariance;
-                self.covariance[*column][*row] = covariance;
+                self.covariance[*row.min(column)][*row.max(column)] += gain * *other;
             }
         }
-        for (state, row) in self.covariance.iter_mut().enumerate() {
-            row[state] = row[state].max(T::of(LEAST_VARIANCE));
+    }
+
+    /// Corrects the state by a field, an angle that depends on it by `slopes`: by how much it is more than expected, with
+    /// which variance. Tilt and velocity are left alone, which gravity knows better.
+    #[inline(always)]
+    pub(super) fn correct_by_field<const N: usize>(&mut self, slopes: [(usize, T); N], residual: T, variance: T) {
+        let mut shared = [T::ZERO; WIDTH];
+        for (state, slope) in slopes {
+            for (one, other) in shared.iter_mut().zip(self.shared(state)) {
+                *one += slope * other;
+            }
         }
+        let expected: T = slopes.iter().map(|(state, slope)| shared[*state] * *slope).sum();
+        self.correct::<BY_FIELD>(&shared, expected + variance, residual);
+    }
+
+    /// Corrects the first states by a number of this total variance. Returns the inverse of that.
+    fn correct<const FIRST: usize>(&mut self, shared: &Shared<T>, total: T, residual: T) -> Option<T> {
+        // Rounding, or absurd samples.
+        if total <= T::ZERO || !total.is_finite() {
+            return None;
+        }
+        let inverse = T::ONE / total;
+        let gain = shared.map(|shared| shared * inverse);
+        for (value, gain) in self.value[..FIRST].iter_mut().zip(gain) {
+            *value += gain * residual;
+        }
+        let p = &mut self.covariance;
+        less::<0, T>(p, &gain, shared);
+        less::<1, T>(p, &gain, shared);
+        less::<2, T>(p, &gain, shared);
+        less::<3, T>(p, &gain, shared);
+        less::<4, T>(p, &gain, shared);
+        if FIRST > BY_FIELD {
+            less::<5, T>(p, &gain, shared);
+            less::<6, T>(p, &gain, shared);
+            less::<7, T>(p, &gain, shared);
+            less::<8, T>(p, &gain, shared);
+        }
+        Some(inverse)
+    }
+}
+
+/// Subtracts from a row of a covariance, a function for each row so that no loop is left.
+#[inline(always)]
+fn less<const ROW: usize, T: Real>(covariance: &mut [[T; WIDTH]; STATES], gain: &Shared<T>, shared: &Shared<T>) {
+    for column in ROW..WIDTH {
+        covariance[ROW][column] -= gain[ROW] * shared[column];
     }
 }
 
 /// Leaves nothing alone.
-pub(super) fn nothing<T: Real>(_: &[T; STATES]) -> [(usize, T); 0] {
+pub(super) fn nothing<T: Real>(_: &Shared<T>) -> [(usize, T); 0] {
     []
-}
-
-/// Leaves tilt and velocity alone, which gravity knows better than a field.
-pub(super) fn tilt_and_velocity<T: Real>(shared: &[T; STATES]) -> [(usize, T); 4] {
-    [ROTATION, ROTATION + 1, VELOCITY, VELOCITY + 1].map(|state| (state, shared[state]))
 }
 
 /// Leaves the heading and the bias about the vertical alone, given in the body frame. Accelerations tell nothing of them
 /// but by their errors, which are not white, and without a magnetometer nothing would mend that.
-pub(super) fn about_vertical<T: Real>(up: &Vector3<T>, shared: &[T; STATES]) -> [(usize, T); 4] {
-    let along = up.x * shared[BIAS] + up.y * shared[BIAS + 1] + up.z * shared[BIAS + 2];
-    [(HEADING, shared[HEADING]), (BIAS, up.x * along), (BIAS + 1, up.y * along), (BIAS + 2, up.z * along)]
+pub(super) fn about_vertical<T: Real>(up: &Vector3<T>, shared: &Shared<T>) -> [(usize, T); 4] {
+    let along = up.x * shared[0] + up.y * shared[1] + up.z * shared[2];
+    [(0, up.x * along), (1, up.y * along), (2, up.z * along), (HEADING, shared[HEADING])]
 }

@@ -1,10 +1,10 @@
 //! One step of the filter: strapdown integration with every sample, errors once per window.
 
-use nalgebra::{Matrix3, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::doubt::Doubt;
 use super::errors::{
-    BIAS, Errors, HEADING, LAG, ProcessNoise, ROTATION, VELOCITY, about_vertical, nothing, tilt_and_velocity,
+    BIAS, EAST, Errors, HEADING, LAG, NORTH, ProcessNoise, ROTATION, Shared, VELOCITY, about_vertical, nothing,
 };
 use super::field::{Field, effective_horizontal};
 use super::numbers::*;
@@ -13,7 +13,7 @@ use super::params::MekfParams;
 use super::rest::Rest;
 use super::window::{MeanField, Window};
 use crate::attitude::initial::heading_error;
-use crate::attitude::rotation::{turn, turn_heading, turn_upright};
+use crate::attitude::rotation::{matrix, renormalised, turn, turn_heading, turn_upright};
 use crate::attitude::state::AttitudeState;
 use crate::attitude::{AttitudeFilter, ImuSample, ParamsError, Real, SampleError};
 use crate::params::Params as _;
@@ -53,14 +53,19 @@ fn square<T: Real>(number: f64) -> T {
     T::of(number * number)
 }
 
+/// The smaller of two numbers, neither of which is NaN.
+fn least<T: Real>(one: T, other: T) -> T {
+    if one < other { one } else { other }
+}
+
 impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
     type Params = MekfParams;
 
     fn new(params: MekfParams) -> Result<Self, ParamsError> {
         params.check()?;
         let mut errors = Errors::new();
-        errors.forget(BIAS..BIAS + 3, square(INITIAL_BIAS));
-        errors.forget(LAG..LAG + 1, square(MAGNETOMETER_LAG));
+        errors.forget(&BIAS, square(INITIAL_BIAS));
+        errors.forget(&[LAG], square(MAGNETOMETER_LAG));
         Ok(Self {
             params,
             state: AttitudeState::new(params.magnetometer.is_used()),
@@ -89,40 +94,45 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
     }
 
     fn update(&mut self, sample: &ImuSample<T>) -> Result<(), SampleError> {
-        let Some(step) = self.state.admit(sample)? else {
-            self.restart(sample);
-            return Ok(());
+        let (mut dt, mut orientation, has_field) = match self.state.admit_usual(sample) {
+            Some(usual) => (usual.dt_s, usual.world_from_body, usual.field.is_some()),
+            None => {
+                let Some(step) = self.state.admit(sample)? else {
+                    self.restart(sample);
+                    return Ok(());
+                };
+                (step.dt_s, step.world_from_body, step.field.is_some())
+            }
         };
-        let (mut dt, mut orientation) = (step.dt_s, step.world_from_body);
         let measured = &sample.angular_velocity;
         if self.period == T::ZERO {
             self.period = dt;
         }
         let longest = self.period * T::of(OUTLIER);
-        self.period += (dt.min(longest) - self.period) * T::of(PERIOD_GAIN);
-        if dt > T::of(GAP_S).max(longest) {
+        self.iron.age(dt);
+        self.period += (least(dt, longest) - self.period) * T::of(PERIOD_GAIN);
+        if dt > longest && dt > T::of(GAP_S) {
             orientation = self.bridge(dt, orientation, measured);
             dt = T::ZERO;
         }
-        let bias = self.errors.vector(BIAS);
-        let rate = measured - bias;
+        let rate = measured - self.errors.vector(BIAS);
         orientation = turn(&orientation, &(rate * dt));
         self.rate = rate;
-        let before = core::mem::replace(&mut self.rotation, *orientation.to_rotation_matrix().matrix());
         let squared_rate = rate.norm_squared();
-        self.squared_rate += (squared_rate - self.squared_rate) * (dt / T::of(BRIEF_S)).min(T::ONE);
-        let deviation = (self.errors.block(BIAS).trace() / T::of(3.0)).sqrt();
-        self.rest.add(dt, measured, &sample.specific_force, &bias, deviation);
+        self.squared_rate += (squared_rate - self.squared_rate) * least(dt * T::of(1.0 / BRIEF_S), T::ONE);
+        self.rest.add(dt, measured, &sample.specific_force, &rate);
+        let before = self.window.halve(dt);
+        self.window.rotation.zip_apply(&self.rotation, |sum, now| *sum += now * before);
+        self.rotation = matrix(&orientation);
         let window = &mut self.window;
-        window.duration += dt;
-        window.rotation += (before + self.rotation) * (T::HALF * dt);
-        window.force += self.rotation * sample.specific_force * dt;
-        window.measured_turn += measured * dt;
+        window.force += self.rotation * (sample.specific_force * dt);
+        if self.rest.is_still() {
+            window.measured_turn += measured * dt;
+        }
         window.squared_rate += squared_rate * dt;
-        self.iron.age(step.dt_s);
-        if step.field.is_some()
+        if has_field
             && let Some(field) = sample.magnetic_field
-            && (self.rest.is_detected() || field != self.last_field)
+            && (field != self.last_field || self.rest.is_detected())
         {
             self.last_field = field;
             orientation = self.add_field(orientation, &rate, &field);
@@ -130,7 +140,7 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
         if self.window.duration >= T::of(WINDOW_S) {
             orientation = self.close_window(orientation);
         }
-        self.state.store(&orientation.into_inner(), None);
+        self.state.keep(orientation, None);
         Ok(())
     }
 
@@ -163,7 +173,7 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
     }
 
     fn is_heading_trusted(&self) -> Option<bool> {
-        let is_trusted = self.is_north_known && self.uncertainty()[(HEADING, HEADING)] < square(TRUSTED);
+        let is_trusted = self.is_north_known && self.uncertainty().m33 < square(TRUSTED);
         self.params.magnetometer.is_used().then_some(is_trusted)
     }
 
@@ -199,27 +209,29 @@ impl<T: Real> MekfFilter<T> {
         self.begin();
         if self.is_north_known
             && let Some(field) = sample.magnetic_field
+            && let Some(orientation) = self.state.world_from_body()
         {
-            self.iron.observe(&self.rotation, &field);
+            self.iron.observe(&orientation, &self.rotation, &field);
         }
     }
 
     /// Doubts the orientation, and forgets what was in relation to it. What is known of the sensors stays.
     fn begin(&mut self) {
         let Some(orientation) = self.state.world_from_body() else { return };
-        self.rotation = *orientation.to_rotation_matrix().matrix();
-        self.errors.forget(ROTATION..ROTATION + 3, square(UNKNOWN));
+        self.rotation = matrix(&orientation);
+        self.errors.forget(&ROTATION, square(UNKNOWN));
         // Without a magnetometer there is no north to be off from.
         if !self.params.magnetometer.is_used() {
-            self.errors.forget(HEADING..HEADING + 1, T::ZERO);
+            self.errors.forget(&[HEADING], T::ZERO);
         } else if !self.is_north_known {
-            self.errors.forget(HEADING..HEADING + 1, T::of(ANY_ANGLE));
+            self.errors.forget(&[HEADING], T::of(ANY_ANGLE));
         }
-        self.errors.forget(VELOCITY..VELOCITY + 2, square(INITIAL_VELOCITY));
-        self.errors.value[VELOCITY..VELOCITY + 2].fill(T::ZERO);
+        self.errors.forget(&VELOCITY, square(INITIAL_VELOCITY));
+        VELOCITY.iter().for_each(|state| self.errors.value[*state] = T::ZERO);
         self.window = Window::new();
         (self.force, self.force_s) = (Vector3::zeros(), T::ZERO);
         self.missed = T::ZERO;
+        self.rest.expect(self.errors.deviation_of_bias());
         self.doubt.begin();
         self.iron.interrupt();
     }
@@ -232,13 +244,13 @@ impl<T: Real> MekfFilter<T> {
         let mean = (self.rate + measured - self.errors.vector(BIAS)) * T::HALF;
         let lasting = T::of(BRIEF_S) * (T::ONE - (-dt / T::of(BRIEF_S)).exp());
         let orientation = turn(&orientation, &(mean * lasting));
-        self.rotation = *orientation.to_rotation_matrix().matrix();
+        self.rotation = matrix(&orientation);
         self.doubt.begin();
         let turned = (self.squared_rate * dt * dt).min(T::of(ANY_ANGLE));
-        for axis in 0..3 {
-            self.errors.doubt(ROTATION + axis, turned);
+        for state in ROTATION {
+            self.errors.doubt(state, turned);
         }
-        for state in [VELOCITY, VELOCITY + 1] {
+        for state in VELOCITY {
             self.errors.doubt(state, dt * dt);
         }
         self.iron.interrupt();
@@ -253,8 +265,10 @@ impl<T: Real> MekfFilter<T> {
         field: &Vector3<T>,
     ) -> UnitQuaternion<T> {
         // Poses compare fields of one time, and not of the time of a magnetometer that lags.
-        let prompt = field - rate.cross(field) * self.errors.value[LAG];
-        if let Some(error) = self.iron.observe(&self.rotation, &prompt) {
+        let prompt = || field - rate.cross(field) * self.errors.value[LAG];
+        if self.iron.is_due(&orientation)
+            && let Some(error) = self.iron.observe(&orientation, &self.rotation, &prompt())
+        {
             let horizontal =
                 self.field.as_ref().map_or(T::ZERO, Field::horizontal).max(T::of(0.1) * self.iron.scale());
             let ratio = error / horizontal;
@@ -264,13 +278,13 @@ impl<T: Real> MekfFilter<T> {
         let field = field - self.iron.offset();
         let in_world = self.rotation * field;
         if self.is_north_known {
-            self.window.add_field(&in_world, &(self.rotation * rate.cross(&field)));
+            self.window.add_field(&in_world, &(self.rotation.fixed_rows::<2>(0) * rate.cross(&field)));
             return orientation;
         }
         let Some(error) = heading_error(&in_world.normalize()) else { return orientation };
         let orientation = turn_heading(&orientation, error - T::of(self.params.declination));
-        self.rotation = *orientation.to_rotation_matrix().matrix();
-        self.errors.forget(HEADING..HEADING + 1, square(UNKNOWN));
+        self.rotation = matrix(&orientation);
+        self.errors.forget(&[HEADING], square(UNKNOWN));
         self.is_north_known = true;
         self.window = Window::new();
         self.iron.interrupt();
@@ -285,19 +299,19 @@ impl<T: Real> MekfFilter<T> {
 
     /// Ends a window: propagates the errors, and corrects them by what it tells.
     fn close_window(&mut self, orientation: UnitQuaternion<T>) -> UnitQuaternion<T> {
-        let window = core::mem::replace(&mut self.window, Window::new());
-        let dt = window.duration;
+        self.window.rotation += self.rotation * self.window.half;
+        let dt = self.window.duration;
         let noise = ProcessNoise {
-            rotation: square::<T>(GYROSCOPE_NOISE) * dt + square::<T>(TURN_NOISE) * window.squared_rate,
+            rotation: square::<T>(GYROSCOPE_NOISE) * dt + square::<T>(TURN_NOISE) * self.window.squared_rate,
             bias: square::<T>(BIAS_DRIFT) * dt,
         };
-        self.errors.propagate(&window, &noise);
-        let force = window.force / dt;
+        self.errors.propagate(&self.window, &noise);
+        let force = self.window.force / dt;
         if self.is_overturned(dt, &force) {
             return self.level(orientation);
         }
         let acceleration = force - Vector3::z() * T::of(GRAVITY);
-        let [east, north] = [self.errors.value[VELOCITY], self.errors.value[VELOCITY + 1]];
+        let [east, north] = VELOCITY.map(|state| self.errors.value[state]);
         let part = (dt / T::of(SHORT_S)).min(T::ONE);
         self.squared_acceleration += (acceleration.norm_squared() - self.squared_acceleration) * part;
         self.squared_velocity += (east * east + north * north - self.squared_velocity) * part;
@@ -306,26 +320,29 @@ impl<T: Real> MekfFilter<T> {
             + square::<T>(ACCELERATION_LASTS_S) * self.squared_acceleration;
         let variance = T::TWO * T::of(VELOCITY_LASTS_S) * squared / dt;
         let up = self.rotation.row(2).transpose();
-        for state in [VELOCITY, VELOCITY + 1] {
-            let value = self.errors.value[state];
-            if self.params.magnetometer.is_used() {
-                self.errors.correct([(state, T::ONE)], -value, variance, nothing);
-            } else {
-                self.errors.correct([(state, T::ONE)], -value, variance, |shared| about_vertical(&up, shared));
-            }
+        if self.params.magnetometer.is_used() {
+            self.errors.correct_one::<EAST, 0>(-east, variance, nothing);
+            self.errors.correct_one::<NORTH, 0>(-self.errors.value[NORTH], variance, nothing);
+        } else {
+            let kept = |shared: &Shared<T>| about_vertical(&up, shared);
+            self.errors.correct_one::<EAST, 4>(-east, variance, kept);
+            self.errors.correct_one::<NORTH, 4>(-self.errors.value[NORTH], variance, kept);
         }
-        let corrected = Vector2::new(self.errors.value[ROTATION], self.errors.value[ROTATION + 1]);
+        let corrected = self.errors.vector(ROTATION).xy();
         self.doubt.correct_tilt(dt, corrected);
         if self.rest.is_detected() {
-            self.fuse_rest(dt, &(window.measured_turn / dt));
+            self.fuse_rest(dt, &(self.window.measured_turn / dt));
         }
         if self.is_north_known
-            && let Some(mean) = window.mean_field()
+            && let Some(mean) = self.window.mean_field()
         {
-            self.fuse_field(dt, &mean, window.squared_rate / dt);
+            self.fuse_field(dt, &mean, self.window.squared_rate / dt);
         }
-        let orientation = turn(&UnitQuaternion::identity(), &self.errors.take_rotation()) * orientation;
-        self.rotation = *orientation.to_rotation_matrix().matrix();
+        self.window = Window::new();
+        self.rest.expect(self.errors.deviation_of_bias());
+        let turned = turn(&UnitQuaternion::identity(), &self.errors.take_rotation());
+        let orientation = renormalised(&(turned * orientation));
+        self.rotation = matrix(&orientation);
         orientation
     }
 
@@ -354,10 +371,10 @@ impl<T: Real> MekfFilter<T> {
         let residual = mean - self.errors.vector(BIAS);
         let known = self.errors.block(BIAS).trace() + T::of(3.0) * square::<T>(REST_BIAS);
         let doubt = (T::of(3.0) * residual.norm_squared() / (known * square::<T>(OUTLIER))).max(T::ONE);
-        for axis in 0..3 {
-            let residual = mean[axis] - self.errors.value[BIAS + axis];
-            self.errors.correct([(BIAS + axis, T::ONE)], residual, square::<T>(REST_BIAS) / dt * doubt, nothing);
-        }
+        let variance = square::<T>(REST_BIAS) / dt * doubt;
+        self.errors.correct_one::<0, 0>(mean.x - self.errors.value[0], variance, nothing);
+        self.errors.correct_one::<1, 0>(mean.y - self.errors.value[1], variance, nothing);
+        self.errors.correct_one::<2, 0>(mean.z - self.errors.value[2], variance, nothing);
     }
 
     /// The angle of the field to north.
@@ -374,14 +391,16 @@ impl<T: Real> MekfFilter<T> {
         let (east, north) = (field.x / horizontal, field.y / horizontal);
         let dip = field.z / horizontal;
         let slopes = [
-            (ROTATION + 2, T::ONE),
-            (ROTATION + 1, -north * dip),
-            (ROTATION, -east * dip),
+            (HEADING, T::ONE),
+            (ROTATION[1], -north * dip),
+            (ROTATION[0], -east * dip),
             (LAG, (north * rate.x - east * rate.y) / horizontal),
         ];
         let expected: T = slopes.iter().map(|(state, slope)| self.errors.value[*state] * *slope).sum();
         let mut residual = field.x.atan2(field.y) - T::of(self.params.declination) - expected;
-        residual = residual.sin().atan2(residual.cos());
+        if residual.abs() > T::pi() {
+            residual -= T::two_pi() * (residual / T::two_pi()).round();
+        }
         let offset = square::<T>(DISTURBANCE) * self.iron.variance() / (horizontal * horizontal);
         let noise = verdict.noise + offset;
         // A heading that the field has contradicted for long is not known.
@@ -396,6 +415,6 @@ impl<T: Real> MekfFilter<T> {
         let variance = self.errors.variance(HEADING);
         self.doubt.miss_heading(dt, self.missed, variance, noise);
         reference.follow(variance / (variance + noise / dt), dt, moved_s);
-        self.errors.correct(slopes, residual, noise / dt, tilt_and_velocity);
+        self.errors.correct_by_field(slopes, residual, noise / dt);
     }
 }

@@ -1,6 +1,6 @@
 //! Offset of the magnetometer, by iron on the body: the one that is subtracted, and another that may replace it.
 
-use nalgebra::{Matrix3, SMatrix, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::numbers::{
     ANY_OFFSET, CALIBRATED, FIELD_WALK, FIRST_POSES, LATER_ODDS, LEAST_WALK, NEWCOMER_POSES, ODDS, PLACES,
@@ -11,87 +11,85 @@ use crate::attitude::Real;
 
 /// One hypothesis: the world's field walks from pose to pose, with the steps of Student's distribution, and the body
 /// adds an offset. In units of the field.
+///
+/// Its state is the field that the present pose is to measure, in the world frame, rather than the world's field: the poses
+/// measure it directly, with errors that are the same along all axes, so that the equations of the update are short.
 #[derive(Clone, Debug, PartialEq)]
 struct Hypothesis<T: Real> {
-    field: Vector3<T>,
+    expected: Vector3<T>,
     offset: Vector3<T>,
-    /// Covariance of field and offset.
-    covariance: SMatrix<T, 6, 6>,
+    /// Covariances of the expected field, of the offset with it, and of the offset.
+    of_expected: Matrix3<T>,
+    of_both: Matrix3<T>,
+    of_offset: Matrix3<T>,
     /// Scale of a step, squared, as learnt.
     step: T,
     poses: T,
 }
 
+/// Determinant of the covariance of a measured field and squared distance from the expected one, over its scale.
+struct Surprise<T> {
+    determinant: T,
+    squared: T,
+}
+
 impl<T: Real> Hypothesis<T> {
     fn new(deviation: f64) -> Self {
-        let mut covariance = SMatrix::<T, 6, 6>::zeros();
-        covariance.fixed_view_mut::<3, 3>(3, 3).fill_diagonal(T::of(deviation * deviation));
-        let step = T::of(FIELD_WALK * FIELD_WALK);
-        Self { field: Vector3::zeros(), offset: Vector3::zeros(), covariance, step, poses: T::ZERO }
-    }
-
-    fn of_offset(&self) -> Matrix3<T> {
-        self.covariance.fixed_view::<3, 3>(3, 3).into_owned()
+        Self {
+            expected: Vector3::zeros(),
+            offset: Vector3::zeros(),
+            of_expected: Matrix3::zeros(),
+            of_both: Matrix3::zeros(),
+            of_offset: Matrix3::from_diagonal_element(T::of(deviation * deviation)),
+            step: T::of(FIELD_WALK * FIELD_WALK),
+            poses: T::ZERO,
+        }
     }
 
     /// Begins with a pose: nothing is known of the world's field but what this field tells.
-    fn begin(&mut self, rotation: &Matrix3<T>, measured: &Vector3<T>) {
-        self.field = measured - rotation * self.offset;
-        let of_offset = self.of_offset();
-        let across = rotation * of_offset;
-        let of_field = across * rotation.transpose() + Matrix3::from_diagonal_element(self.step);
-        self.covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&of_field);
-        self.covariance.fixed_view_mut::<3, 3>(0, 3).copy_from(&-across);
-        self.covariance.fixed_view_mut::<3, 3>(3, 0).copy_from(&-across.transpose());
+    fn begin(&mut self, measured: &Vector3<T>) {
+        self.expected = *measured;
+        self.of_expected = Matrix3::from_diagonal_element(self.step);
+        self.of_both = Matrix3::zeros();
     }
 
-    /// Adds the next pose, with the field measured in it in the world frame. Returns the logarithm of its likelihood.
-    fn observe(&mut self, rotation: &Matrix3<T>, measured: &Vector3<T>) -> T {
-        let residual = measured - self.field - rotation * self.offset;
+    /// Adds the next pose, by how its rotation differs from that of the last one, with the field measured in it in the world
+    /// frame. `None` if the covariance is singular.
+    fn observe(&mut self, turned: &Matrix3<T>, measured: &Vector3<T>) -> Option<Surprise<T>> {
+        self.expected += turned * self.offset;
+        let moved = turned * self.of_offset;
+        let half = turned * (self.of_both + moved.transpose() * T::HALF);
+        let mut of_expected = self.of_expected + half + half.transpose();
+        self.of_both += moved.transpose();
+        let residual = measured - self.expected;
         // A step and an error of the magnetometer have one scale.
         let (walk, white) = (self.step, self.step);
-        let shared = |covariance: &SMatrix<T, 6, 6>| {
-            covariance.fixed_columns::<3>(0) + covariance.fixed_columns::<3>(3) * rotation.transpose()
-        };
-        let expected = |shared: &SMatrix<T, 6, 3>| {
-            shared.fixed_rows::<3>(0) + rotation * shared.fixed_rows::<3>(3) + Matrix3::from_diagonal_element(white)
-        };
-        let mut with = shared(&self.covariance);
-        let total = expected(&with) + Matrix3::from_diagonal_element(walk);
-        let Some(inverse) = total.try_inverse() else { return T::ZERO };
+        of_expected += Matrix3::from_diagonal_element(walk);
+        let (mut inverse, determinant) = inverse_of_symmetric(&of_expected, white)?;
         let squared = residual.dot(&(inverse * residual));
         let (tails, freedom) = (T::of(TAILS), T::of(TAILS + 3.0));
-        let likelihood = -T::HALF * total.determinant().ln() - T::HALF * freedom * (squared / tails).ln_1p();
         let weight = freedom / (tails + squared);
         self.poses += T::ONE;
         let learnt = weight * squared / T::of(3.0) - T::ONE;
         self.step *= T::ONE + learnt / (self.poses + T::of(FIRST_POSES));
         self.step = self.step.max(T::of(LEAST_WALK * LEAST_WALK));
         // A step that is too large for the scale is one, rather than an error of the sensor.
-        let walked = walk / weight.min(T::ONE);
-        for axis in 0..3 {
-            self.covariance[(axis, axis)] += walked;
-            with[(axis, axis)] += walked;
+        if weight < T::ONE {
+            of_expected += Matrix3::from_diagonal_element(walk / weight - walk);
+            (inverse, _) = inverse_of_symmetric(&of_expected, white)?;
         }
-        let Some(inverse) = expected(&with).try_inverse() else { return T::ZERO };
-        let gain = with * inverse;
-        let correction = gain * residual;
-        self.field += correction.fixed_rows::<3>(0);
-        self.offset += correction.fixed_rows::<3>(3);
-        for row in 0..6 {
-            for column in row..6 {
-                let known: T = (0..3).map(|axis| gain[(row, axis)] * with[(column, axis)]).sum();
-                let covariance = self.covariance[(row, column)] - known;
-                self.covariance[(row, column)] = covariance;
-                self.covariance[(column, row)] = covariance;
-            }
-        }
-        likelihood
+        let gain = self.of_both * inverse;
+        self.expected = measured - inverse * residual * white;
+        self.offset += gain * residual;
+        self.of_offset -= gain * self.of_both.transpose();
+        self.of_both = gain * white;
+        self.of_expected = (Matrix3::identity() - inverse * white) * white;
+        Some(Surprise { determinant, squared })
     }
 
     /// Variance of the offset along an axis, as the poses tell it.
     fn variance(&self) -> T {
-        self.of_offset().trace() / T::of(3.0)
+        self.of_offset.trace() / T::of(3.0)
     }
 
     /// Variance of the offset along an axis, with what the field's changes from place to place look like.
@@ -113,9 +111,18 @@ impl<T: Real> Hypothesis<T> {
 /// A pose with the field measured in it, body frame.
 #[derive(Clone, Debug, PartialEq)]
 struct Pose<T: Real> {
+    orientation: UnitQuaternion<T>,
     rotation: Matrix3<T>,
     field: Vector3<T>,
     age_s: T,
+}
+
+impl<T: Real> Pose<T> {
+    /// Twice the versine of the angle to another pose, for a small angle its square.
+    fn squared_angle(&self, orientation: &UnitQuaternion<T>) -> T {
+        let cosine = self.orientation.coords.dot(&orientation.coords);
+        T::of(4.0) * (T::ONE - cosine * cosine)
+    }
 }
 
 /// The incumbent, whose offset is subtracted, and a newcomer with any offset, which replaces it once it explains the fields
@@ -206,52 +213,65 @@ impl<T: Real> HardIron<T> {
         }
     }
 
-    /// Adds a field. Poses in one field show an offset by how it turns, whatever the heading.
+    /// Returns whether the body has turned enough since the last pose for another, or that is too old.
+    pub(super) fn is_due(&self, orientation: &UnitQuaternion<T>) -> bool {
+        self.pose.as_ref().is_none_or(|pose| {
+            pose.age_s > T::of(SHORT_S) || pose.squared_angle(orientation) >= T::of(POSE_TURN * POSE_TURN)
+        })
+    }
+
+    /// Adds a field in a pose that is due. Poses in one field show an offset by how it turns, whatever the heading.
     ///
     /// Returns by how much the heading so far was wrong for the offset, in the unit of the field, when another offset is
     /// found, or the same is known much better than when this was said before.
-    pub(super) fn observe(&mut self, rotation: &Matrix3<T>, field: &Vector3<T>) -> Option<T> {
+    pub(super) fn observe(
+        &mut self,
+        orientation: &UnitQuaternion<T>,
+        rotation: &Matrix3<T>,
+        field: &Vector3<T>,
+    ) -> Option<T> {
         let Some(pose) = &self.pose else {
-            self.begin(rotation, field);
+            self.begin(orientation, rotation, field);
             return None;
         };
-        // Twice the versine of the angle between the poses, for a small angle its square.
-        let squared_turn = T::of(3.0) - rotation.dot(&pose.rotation);
         if pose.age_s > T::of(SHORT_S) {
-            self.begin(rotation, field);
-            return None;
-        }
-        if squared_turn < T::of(POSE_TURN * POSE_TURN) {
+            self.begin(orientation, rotation, field);
             return None;
         }
         let Some(scale) = self.scale else {
             // Of a field in any direction, two thirds turn.
             self.changed += (field - pose.field).norm_squared();
-            self.turned += squared_turn * T::of(2.0 / 3.0);
+            self.turned += pose.squared_angle(orientation) * T::of(2.0 / 3.0);
             if self.turned > T::of(SCALE_TURN * SCALE_TURN) && self.changed > T::ZERO {
                 self.scale = Some((self.changed / self.turned).sqrt());
             }
-            self.begin(rotation, field);
+            self.begin(orientation, rotation, field);
             return None;
         };
-        self.pose = Some(Pose { rotation: *rotation, field: *field, age_s: T::ZERO });
+        let turned = rotation - pose.rotation;
+        self.pose = Some(Pose { orientation: *orientation, rotation: *rotation, field: *field, age_s: T::ZERO });
         let measured = rotation * (field / scale);
-        let of_incumbent = self.incumbent.observe(rotation, &measured);
+        let of_incumbent = self.incumbent.observe(&turned, &measured);
         self.offset = self.incumbent.believed() * scale;
         if !self.is_calibrated {
-            self.odds += self.newcomer.observe(rotation, &measured) - of_incumbent;
+            if let (Some(one), Some(other)) = (self.newcomer.observe(&turned, &measured), of_incumbent) {
+                let tails = T::of(TAILS);
+                let nearer = (tails + other.squared) / (tails + one.squared);
+                self.odds += T::HALF * (other.determinant / one.determinant).ln()
+                    + T::HALF * T::of(TAILS + 3.0) * nearer.ln();
+            }
             self.seen += T::ONE;
             let moved = (self.newcomer.offset - self.incumbent.believed()).norm_squared();
             let variance = self.newcomer.variance();
             if self.odds > T::ZERO && variance < moved {
-                let newcomer = self.another(rotation, &measured);
+                let newcomer = self.another(&measured);
                 self.incumbent = core::mem::replace(&mut self.newcomer, newcomer);
                 self.offset = self.incumbent.believed() * scale;
                 self.doubted = variance.sqrt();
                 return Some((moved + variance).sqrt() * scale);
             }
             if self.seen > T::of(NEWCOMER_POSES) && self.odds < -T::of(ODDS) {
-                self.newcomer = self.another(rotation, &measured);
+                self.newcomer = self.another(&measured);
             }
         }
         let deviation = self.incumbent.variance().sqrt();
@@ -262,21 +282,36 @@ impl<T: Real> HardIron<T> {
     }
 
     /// A newcomer that begins with this pose.
-    fn another(&mut self, rotation: &Matrix3<T>, measured: &Vector3<T>) -> Hypothesis<T> {
+    fn another(&mut self, measured: &Vector3<T>) -> Hypothesis<T> {
         self.odds = -T::of(LATER_ODDS);
         self.seen = T::ZERO;
         let mut newcomer = Hypothesis::new(ANY_OFFSET);
         newcomer.step = self.incumbent.step;
-        newcomer.begin(rotation, measured);
+        newcomer.begin(measured);
         newcomer
     }
 
-    fn begin(&mut self, rotation: &Matrix3<T>, field: &Vector3<T>) {
-        self.pose = Some(Pose { rotation: *rotation, field: *field, age_s: T::ZERO });
+    fn begin(&mut self, orientation: &UnitQuaternion<T>, rotation: &Matrix3<T>, field: &Vector3<T>) {
+        self.pose = Some(Pose { orientation: *orientation, rotation: *rotation, field: *field, age_s: T::ZERO });
         if let Some(scale) = self.scale {
             let measured = rotation * (field / scale);
-            self.incumbent.begin(rotation, &measured);
-            self.newcomer.begin(rotation, &measured);
+            self.incumbent.begin(&measured);
+            self.newcomer.begin(&measured);
         }
     }
+}
+
+/// The inverse of a symmetric matrix with `white` added to its diagonal, and the determinant; `None` if it has none.
+#[inline(always)]
+fn inverse_of_symmetric<T: Real>(matrix: &Matrix3<T>, white: T) -> Option<(Matrix3<T>, T)> {
+    let [xx, yy, zz] = [matrix.m11 + white, matrix.m22 + white, matrix.m33 + white];
+    let [xy, xz, yz] = [matrix.m12, matrix.m13, matrix.m23];
+    let [of_xx, of_xy, of_xz] = [yy * zz - yz * yz, yz * xz - xy * zz, xy * yz - yy * xz];
+    let determinant = xx * of_xx + xy * of_xy + xz * of_xz;
+    if determinant <= T::ZERO {
+        return None;
+    }
+    let one = T::ONE / determinant;
+    let [of_yy, of_yz, of_zz] = [xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy];
+    Some((Matrix3::new(of_xx, of_xy, of_xz, of_xy, of_yy, of_yz, of_xz, of_yz, of_zz) * one, determinant))
 }

@@ -1,6 +1,6 @@
 //! Sums over the samples of a window.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector2, Vector3};
 
 use crate::attitude::Real;
 
@@ -9,6 +9,8 @@ use crate::attitude::Real;
 pub(super) struct Window<T: Real> {
     /// s.
     pub(super) duration: T,
+    /// Half of the time since the last sample, s, which the present rotation counts for so far.
+    pub(super) half: T,
     /// Integral of `world_from_body`, s.
     pub(super) rotation: Matrix3<T>,
     /// Integral of the specific force, m/s.
@@ -20,32 +22,40 @@ pub(super) struct Window<T: Real> {
     /// Sum of the magnetic fields.
     field: Vector3<T>,
     /// Sum of the fields' rates of change seen by a sensor that lags.
-    field_rate: Vector3<T>,
+    field_rate: Vector2<T>,
     fields: T,
 }
 
-/// The mean field of a window, in the world frame, and how it changes by a second of lag.
+/// The mean field of a window, in the world frame, and how its horizontal part changes by a second of lag.
 #[derive(Clone, Copy)]
 pub(super) struct MeanField<T: Real> {
     pub(super) field: Vector3<T>,
-    pub(super) rate: Vector3<T>,
+    pub(super) rate: Vector2<T>,
 }
 
 impl<T: Real> Window<T> {
     pub(super) fn new() -> Self {
         Self {
             duration: T::ZERO,
+            half: T::ZERO,
             rotation: Matrix3::zeros(),
             force: Vector3::zeros(),
             measured_turn: Vector3::zeros(),
             squared_rate: T::ZERO,
             field: Vector3::zeros(),
-            field_rate: Vector3::zeros(),
+            field_rate: Vector2::zeros(),
             fields: T::ZERO,
         }
     }
 
-    pub(super) fn add_field(&mut self, field: &Vector3<T>, rate: &Vector3<T>) {
+    /// Adds a sample of `dt` seconds. Returns how long the rotation before it counts.
+    pub(super) fn halve(&mut self, dt: T) -> T {
+        self.duration += dt;
+        let half = T::HALF * dt;
+        core::mem::replace(&mut self.half, half) + half
+    }
+
+    pub(super) fn add_field(&mut self, field: &Vector3<T>, rate: &Vector2<T>) {
         self.field += field;
         self.field_rate += rate;
         self.fields += T::ONE;
@@ -53,7 +63,7 @@ impl<T: Real> Window<T> {
 
     pub(super) fn forget_fields(&mut self) {
         self.field = Vector3::zeros();
-        self.field_rate = Vector3::zeros();
+        self.field_rate = Vector2::zeros();
         self.fields = T::ZERO;
     }
 
