@@ -1,4 +1,4 @@
-//! A bad link on loopback: TCP with a delay each way, which can be cut.
+//! A bad link on loopback: TCP with a delay each way, which can be cut, also in the middle of a message.
 
 use std::io::{Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
@@ -10,6 +10,9 @@ use std::time::{Duration, Instant};
 /// Delay each way, and how far it varies.
 pub(crate) const DELAY_MS: u64 = 5;
 pub(crate) const JITTER_MS: u64 = 3;
+
+/// Time for which a link that is cut waits for a message to be cut in the middle.
+const CUTTING: Duration = Duration::from_millis(50);
 
 /// State of a link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,6 +63,7 @@ impl Relay {
     pub(crate) fn set(&self, state: LinkState) {
         self.state.store(state as u8, Ordering::SeqCst);
         if state == LinkState::Closed {
+            thread::sleep(CUTTING);
             for stream in self.streams.lock().unwrap_or_else(PoisonError::into_inner).drain(..) {
                 let _ = stream.shutdown(Shutdown::Both);
             }
@@ -104,10 +108,19 @@ impl Relay {
         thread::spawn(move || {
             for (due, bytes) in receiver {
                 thread::sleep(due.saturating_duration_since(Instant::now()));
+                let mut rest = bytes.as_slice();
+                if !relay.is(LinkState::Open) {
+                    // A link that is cut does not wait for the end of a message.
+                    let (half, other) = rest.split_at(rest.len() / 2);
+                    rest = other;
+                    if to.write_all(half).is_err() {
+                        break;
+                    }
+                }
                 while relay.is(LinkState::Frozen) {
                     thread::sleep(Duration::from_millis(5));
                 }
-                if to.write_all(&bytes).is_err() {
+                if relay.is(LinkState::Closed) || to.write_all(rest).is_err() {
                     break;
                 }
             }
