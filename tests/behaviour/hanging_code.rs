@@ -221,7 +221,7 @@ mod reentrance {
         }
     }
 
-    /// At 1 sends to its actuator itself, at 2 disarms the robot, at 3 fails, and at 4 stops the robot.
+    /// Sends at 1 to its actuator itself, at 2 disarms the robot, at 3 fails, and at 4 stops the robot.
     fn turn(number: f64) -> Done {
         let Some(live) = live() else { return Ok(()) };
         if number == 1.0 {

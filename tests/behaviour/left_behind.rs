@@ -30,7 +30,7 @@ fn disarm(_: f64) -> Done {
     Ok(())
 }
 
-/// Its disarm callback owns what hangs when it is dropped.
+/// Registers a disarm callback that owns what hangs when it is dropped.
 fn own(context: &SensorContext) -> Done {
     let owned = Dropping;
     context.on_disarm(move || {

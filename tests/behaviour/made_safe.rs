@@ -6,7 +6,7 @@ use bb_core::prelude::*;
 use bb_core::{ArmError, DisarmError, Live};
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, Ordering};
 use std::sync::mpsc::channel;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard};
 
 /// The devices of these tests are there once.
 static ALONE: Mutex<()> = Mutex::new(());
