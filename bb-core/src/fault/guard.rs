@@ -2,6 +2,7 @@
 
 use super::Fault;
 use std::any::Any;
+use std::mem::needs_drop;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::task::Waker;
 
@@ -46,8 +47,11 @@ pub(crate) fn log_panic(what: &'static str, fault: &Fault) {
 }
 
 /// Drops a user's value and catches a panic of its `Drop`.
+#[inline]
 pub(crate) fn discard<T>(value: T) {
-    if let Err(fault) = guarded(|| drop(value)) {
+    if needs_drop::<T>()
+        && let Err(fault) = guarded(|| drop(value))
+    {
         log_panic("a value panicked when it was dropped", &fault);
     }
 }

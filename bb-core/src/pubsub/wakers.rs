@@ -1,8 +1,8 @@
 //! Work left until no lock is held: waking tasks and dropping messages. Both run user code.
 
+use crate::fault::{discard, wake};
 use std::any::Any;
-use std::mem::{forget, needs_drop};
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::mem::needs_drop;
 use std::task::Waker;
 
 /// Wakers to wake and messages to drop, collected while locks may be held. Call [`run`](Self::run) when none is held;
@@ -74,46 +74,9 @@ impl Drop for Wakers {
     }
 }
 
-/// Wakes a task. A panic in its waker is logged; then this returns false.
-pub(super) fn wake(waker: Waker) -> bool {
-    contain("a waker", || waker.wake())
-}
-
-/// Drops a message or a waker. A panic in its `Drop` is logged.
-#[inline]
-pub(super) fn discard<M>(value: M) {
-    if needs_drop::<M>() {
-        contain("a message's or a waker's `Drop`", || drop(value));
-    }
-}
-
-/// Runs user code that must not end the calling thread; returns whether it has not panicked.
-#[inline]
-fn contain(what: &'static str, call: impl FnOnce()) -> bool {
-    let called = catch_unwind(AssertUnwindSafe(call));
-    let has_returned = called.is_ok();
-    if let Err(panic) = called {
-        log(what, panic);
-    }
-    has_returned
-}
-
-#[cold]
-fn log(what: &'static str, panic: Box<dyn Any + Send>) {
-    let message = panic.downcast_ref::<&str>().copied();
-    let message = message.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
-    let logged = catch_unwind(AssertUnwindSafe(|| {
-        tracing::error!(panic = message.unwrap_or("no message"), "{what} panicked");
-    }));
-    // The logger may panic, and so may the value carried by a panic when dropped. The value of such a second panic is leaked.
-    let dropped = catch_unwind(AssertUnwindSafe(|| drop(panic)));
-    logged.err().into_iter().chain(dropped.err()).for_each(forget);
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::panic::panic_any;
     use std::sync::Arc;
     use std::sync::atomic::{AtomicUsize, Ordering};
     use std::task::Wake;
@@ -121,19 +84,10 @@ mod tests {
     /// Counts its wakes and drops, and panics in each of them.
     struct Faulty(Arc<AtomicUsize>);
 
-    /// A panic whose value panics as well.
-    struct Payload;
-
-    impl Drop for Payload {
-        fn drop(&mut self) {
-            panic!("in the payload of a panic");
-        }
-    }
-
     impl Wake for Faulty {
         fn wake(self: Arc<Self>) {
             self.0.fetch_add(1, Ordering::SeqCst);
-            panic_any(Payload);
+            panic!("in a waker");
         }
     }
 

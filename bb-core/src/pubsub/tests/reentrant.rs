@@ -125,7 +125,7 @@ fn wakers_are_replaced_woken_and_dropped_without_a_lock() {
         assert!(matches!(next.poll(&mut Context::from_waker(&nosy())), Poll::Pending));
     }
     for waker in AnyTopic::close(topic) {
-        crate::pubsub::wakers::wake(waker);
+        crate::fault::wake(waker);
     }
     assert_eq!(woken.load(Ordering::SeqCst), 10);
 }
