@@ -1,8 +1,6 @@
 //! The common interface of all components, whatever trait they implement.
 
-use super::stand_in::{
-    AnyEstimator, AnySensor, AnyService, StandIn, make_actuator, make_estimator, make_sensor, make_service,
-};
+use super::stand_in::{AnyEstimator, AnySensor, StandIn, make_actuator, make_estimator, make_sensor};
 use crate::component::{
     Actuator, ActuatorContext, Context, Counts, Estimator, Info, InputTransforms, Inputs, Options, Reading, Reply,
     Sensor, SensorContext, Service, ServiceContext,
@@ -152,7 +150,7 @@ pub enum AsSensor<S: Sensor> {
     Replaced(StandInSensor<S::Output>),
 }
 
-/// The replacement of a sensor.
+/// The replacement of a sensor or a service.
 #[doc(hidden)]
 pub struct StandInSensor<T>(Box<dyn AnySensor<T>>);
 
@@ -205,22 +203,12 @@ pub enum AsService<S: Service> {
     /// The declared service.
     Declared(S),
     /// A replacement.
-    Replaced(StandInService<S::Output>),
+    Replaced(StandInSensor<S::Output>),
 }
-
-/// The replacement of a service.
-#[doc(hidden)]
-pub struct StandInService<T>(Box<dyn AnyService<T>>);
 
 impl<S: Service> fmt::Debug for AsService<S> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("AsService").finish_non_exhaustive()
-    }
-}
-
-impl<T> fmt::Debug for StandInService<T> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("StandInService").finish_non_exhaustive()
     }
 }
 
@@ -230,9 +218,7 @@ impl<S: Service> Component for AsService<S> {
 
     fn make(options: impl FnOnce() -> Result<S::Options, Fault>, context: &ServiceContext) -> Result<Self, Fault> {
         match context.replacement() {
-            Some(replacement) => {
-                make_service(&replacement, context).map(|made| Self::Replaced(StandInService(made)))
-            }
+            Some(replacement) => make_sensor(&replacement, context).map(|made| Self::Replaced(StandInSensor(made))),
             None => S::init(options()?, context).map(Self::Declared),
         }
     }
@@ -252,7 +238,7 @@ impl<S: Service> Component for AsService<S> {
     fn close(&mut self, reason: Termination<'_>) {
         match self {
             Self::Declared(service) => service.terminate(reason),
-            Self::Replaced(StandInService(service)) => service.terminate(reason),
+            Self::Replaced(StandInSensor(service)) => service.terminate(reason),
         }
     }
 }
@@ -350,7 +336,7 @@ impl<S: Service> Periodic for AsService<S> {
     fn read(&mut self, now: MonotonicTime) -> Result<Reading<S::Output>, Fault> {
         match self {
             Self::Declared(service) => service.update(now),
-            Self::Replaced(StandInService(service)) => service.update(now),
+            Self::Replaced(StandInSensor(service)) => service.read(now),
         }
     }
 

@@ -12,10 +12,6 @@ use std::any::type_name;
 use std::sync::Arc;
 
 type Make<C, T> = Box<dyn Fn(&C) -> Result<T, Fault> + Send + Sync>;
-type MakeEstimator<I, O> = Make<Context, Box<dyn AnyEstimator<I, O>>>;
-type MakeSensor<T> = Make<SensorContext, Box<dyn AnySensor<T>>>;
-type MakeService<T> = Make<ServiceContext, Box<dyn AnyService<T>>>;
-type MakeActuator<T> = Make<ActuatorContext, Box<dyn StandIn<T>>>;
 
 /// An estimator that takes `I` and emits `O`.
 pub(crate) trait AnyEstimator<I: Inputs, O>: Send {
@@ -26,16 +22,10 @@ pub(crate) trait AnyEstimator<I: Inputs, O>: Send {
     fn terminate(&mut self, reason: Termination<'_>);
 }
 
-/// A sensor that publishes `T`.
+/// A sensor or a service that publishes `T`.
 pub(crate) trait AnySensor<T>: Send {
     fn read(&mut self, now: MonotonicTime) -> Result<Reading<T>, Fault>;
     fn starts_at(&self) -> Option<MonotonicTime>;
-    fn terminate(&mut self, reason: Termination<'_>);
-}
-
-/// A service that publishes `T`.
-pub(crate) trait AnyService<T>: Send {
-    fn update(&mut self, now: MonotonicTime) -> Result<Reading<T>, Fault>;
     fn terminate(&mut self, reason: Termination<'_>);
 }
 
@@ -55,7 +45,7 @@ where
 {
     let options = Arc::new(options);
     let shown = Arc::clone(&options);
-    let make: MakeEstimator<E::Input, E::Output> = Box::new(move |context| {
+    let make: Make<Context, Box<dyn AnyEstimator<E::Input, E::Output>>> = Box::new(move |context| {
         options.validate().map_err(Fault::permanent)?;
         Ok(Box::new(E::init(E::Options::clone(&options), context)?))
     });
@@ -68,7 +58,7 @@ pub(crate) fn replacement_of_sensor<S: Sensor>(options: S::Options) -> Replaceme
 where
     S::Options: Sync,
 {
-    let make: MakeSensor<S::Output> = Box::new(move |context| {
+    let make: Make<SensorContext, Box<dyn AnySensor<S::Output>>> = Box::new(move |context| {
         options.validate().map_err(Fault::permanent)?;
         Ok(Box::new(S::init(options.clone(), context)?))
     });
@@ -80,9 +70,9 @@ pub(crate) fn replacement_of_service<S: Service>(options: S::Options) -> Replace
 where
     S::Options: Sync,
 {
-    let make: MakeService<S::Output> = Box::new(move |context| {
+    let make: Make<ServiceContext, Box<dyn AnySensor<S::Output>>> = Box::new(move |context| {
         options.validate().map_err(Fault::permanent)?;
-        Ok(Box::new(S::init(options.clone(), context)?))
+        Ok(Box::new(Serving(S::init(options.clone(), context)?)))
     });
     Replacement::new(make, publishes::<S::Output>())
 }
@@ -92,7 +82,7 @@ pub(crate) fn replacement_of_actuator<A: Actuator>(options: A::Options) -> Repla
 where
     A::Options: Sync,
 {
-    let make: MakeActuator<A::Command> = Box::new(move |context| {
+    let make: Make<ActuatorContext, Box<dyn StandIn<A::Command>>> = Box::new(move |context| {
         options.validate().map_err(Fault::permanent)?;
         Ok(Box::new(A::init(options.clone(), context)?))
     });
@@ -104,26 +94,15 @@ pub(super) fn make_estimator<I: Inputs, O: Outputs>(
     replacement: &Replacement,
     context: &Context,
 ) -> Result<Box<dyn AnyEstimator<I, O>>, Fault> {
-    let make = replacement.make::<MakeEstimator<I, O>>();
-    make.ok_or_else(|| other(replacement, &takes_and_emits::<I, O>()))?(context)
+    made(replacement, context, takes_and_emits::<I, O>)
 }
 
-/// Creates the replacement of a sensor that publishes `T`.
-pub(super) fn make_sensor<T: Payload>(
+/// Creates the replacement of a sensor or, with its context, of a service, which publishes `T`.
+pub(super) fn make_sensor<C: 'static, T: Payload>(
     replacement: &Replacement,
-    context: &SensorContext,
+    context: &C,
 ) -> Result<Box<dyn AnySensor<T>>, Fault> {
-    let make = replacement.make::<MakeSensor<T>>();
-    make.ok_or_else(|| other(replacement, &publishes::<T>()))?(context)
-}
-
-/// Creates the replacement of a service that publishes `T`.
-pub(super) fn make_service<T: Payload>(
-    replacement: &Replacement,
-    context: &ServiceContext,
-) -> Result<Box<dyn AnyService<T>>, Fault> {
-    let make = replacement.make::<MakeService<T>>();
-    make.ok_or_else(|| other(replacement, &publishes::<T>()))?(context)
+    made(replacement, context, publishes::<T>)
 }
 
 /// Creates the replacement of an actuator that takes `T`.
@@ -131,12 +110,20 @@ pub(super) fn make_actuator<T: Payload>(
     replacement: &Replacement,
     context: &ActuatorContext,
 ) -> Result<Box<dyn StandIn<T>>, Fault> {
-    let make = replacement.make::<MakeActuator<T>>();
-    make.ok_or_else(|| other(replacement, &takes::<T>()))?(context)
+    made(replacement, context, takes::<T>)
 }
 
-fn other(replacement: &Replacement, declared: &str) -> Fault {
-    Fault::permanent(format!("its replacement {}, and what is declared {declared}", replacement.does()))
+/// Creates a replacement, unless it is of another type than what is declared, which does what `declared` says.
+fn made<C: 'static, T: 'static>(
+    replacement: &Replacement,
+    context: &C,
+    declared: fn() -> String,
+) -> Result<T, Fault> {
+    let make = replacement.make::<Make<C, T>>().ok_or_else(|| {
+        let (does, declared) = (replacement.does(), declared());
+        Fault::permanent(format!("its replacement {does}, and what is declared {declared}"))
+    })?;
+    make(context)
 }
 
 fn publishes<T: Payload>() -> String {
@@ -188,13 +175,20 @@ impl<S: Sensor> AnySensor<S::Output> for S {
     }
 }
 
-impl<S: Service> AnyService<S::Output> for S {
-    fn update(&mut self, now: MonotonicTime) -> Result<Reading<S::Output>, Fault> {
-        Service::update(self, now)
+/// A service, which is called as a sensor is.
+struct Serving<S>(S);
+
+impl<S: Service> AnySensor<S::Output> for Serving<S> {
+    fn read(&mut self, now: MonotonicTime) -> Result<Reading<S::Output>, Fault> {
+        self.0.update(now)
+    }
+
+    fn starts_at(&self) -> Option<MonotonicTime> {
+        None
     }
 
     fn terminate(&mut self, reason: Termination<'_>) {
-        Service::terminate(self, reason);
+        self.0.terminate(reason);
     }
 }
 
