@@ -49,7 +49,7 @@ pub(super) struct ProcessNoise<T> {
 }
 
 /// Covariances of all states with one quantity.
-pub(super) type Shared<T> = [T; WIDTH];
+type Shared<T> = [T; WIDTH];
 
 impl<T: Real> Errors<T> {
     pub(super) fn new() -> Self {
@@ -109,9 +109,15 @@ impl<T: Real> Errors<T> {
         self.value[NORTH] += window.force.y;
         let (turn, lift) = (&window.rotation, window.force.z);
         // Covariances of the new rotation with the old states.
-        let turned: [Vector3<T>; STATES] = core::array::from_fn(|state| {
-            let of = |states: [usize; 3]| Vector3::from(states.map(|one| self.at(one, state)));
-            of(ROTATION) - turn * of(BIAS)
+        let turned: [Shared<T>; 3] = core::array::from_fn(|axis| {
+            let mut row = self.shared(ROTATION[axis]);
+            for bias in BIAS {
+                let (of_bias, part) = (self.shared(bias), turn[(axis, bias)]);
+                for state in 0..WIDTH {
+                    row[state] -= part * of_bias[state];
+                }
+            }
+            row
         });
         let p = &mut self.covariance;
         p[EAST][EAST] += lift * (p[Y][EAST] + p[Y][EAST] + lift * p[Y][Y]);
@@ -123,16 +129,16 @@ impl<T: Real> Errors<T> {
         }
         for (axis, row) in ROTATION.into_iter().enumerate() {
             for state in [0, 1, 2, LAG] {
-                p[state][row] = turned[state][axis];
+                p[state][row] = turned[axis][state];
             }
-            p[row][EAST] = turned[EAST][axis] + lift * turned[Y][axis];
-            p[row][NORTH] = turned[NORTH][axis] - lift * turned[X][axis];
+            p[row][EAST] = turned[axis][EAST] + lift * turned[axis][Y];
+            p[row][NORTH] = turned[axis][NORTH] - lift * turned[axis][X];
             for (other, column) in ROTATION.into_iter().enumerate() {
                 if row <= column {
-                    let of_bias = turned[0][axis] * turn[(other, 0)]
-                        + turned[1][axis] * turn[(other, 1)]
-                        + turned[2][axis] * turn[(other, 2)];
-                    p[row][column] = turned[column][axis] - of_bias;
+                    let of_bias = turned[axis][0] * turn[(other, 0)]
+                        + turned[axis][1] * turn[(other, 1)]
+                        + turned[axis][2] * turn[(other, 2)];
+                    p[row][column] = turned[axis][column] - of_bias;
                 }
             }
             p[row][row] += noise.rotation;
@@ -153,23 +159,20 @@ impl<T: Real> Errors<T> {
 
     /// Corrects the state by one of it: by how much it is more than expected, with which variance.
     ///
-    /// `kept` returns states that are left alone, as in a Schmidt–Kalman filter, with the part of their covariance with the
-    /// one that is: for a number whose error is not white.
+    /// If the vertical is given, in the body frame, the heading and the bias about it are left alone, as in a Schmidt–Kalman
+    /// filter: accelerations tell nothing of them but by their errors, which are not white, and without a magnetometer
+    /// nothing would mend that.
     #[inline(always)]
-    pub(super) fn correct_one<const STATE: usize, const K: usize>(
-        &mut self,
-        residual: T,
-        variance: T,
-        kept: impl Fn(&Shared<T>) -> [(usize, T); K],
-    ) {
+    pub(super) fn correct_one<const STATE: usize>(&mut self, residual: T, variance: T, up: Option<&Vector3<T>>) {
         let shared = self.shared(STATE);
-        let Some(inverse) = self.correct::<STATES>(&shared, shared[STATE] + variance, residual) else { return };
-        let kept = kept(&shared);
+        let inverse = self.correct::<STATES>(&shared, shared[STATE] + variance, residual);
+        let (Some(inverse), Some(up)) = (inverse, up) else { return };
+        let along = up.x * shared[0] + up.y * shared[1] + up.z * shared[2];
+        let kept = [(0, up.x * along), (1, up.y * along), (2, up.z * along), (HEADING, shared[HEADING])];
         for (index, (row, part)) in kept.iter().enumerate() {
-            let gain = *part * inverse;
-            self.value[*row] -= gain * residual;
+            self.value[*row] -= *part * inverse * residual;
             for (column, other) in &kept[index..] {
-                self.covariance[*row.min(column)][*row.max(column)] += gain * *other;
+                self.covariance[*row][*column] += *part * inverse * *other;
             }
         }
     }
@@ -221,16 +224,4 @@ fn less<const ROW: usize, T: Real>(covariance: &mut [[T; WIDTH]; STATES], gain: 
     for column in ROW..WIDTH {
         covariance[ROW][column] -= gain[ROW] * shared[column];
     }
-}
-
-/// Leaves nothing alone.
-pub(super) fn nothing<T: Real>(_: &Shared<T>) -> [(usize, T); 0] {
-    []
-}
-
-/// Leaves the heading and the bias about the vertical alone, given in the body frame. Accelerations tell nothing of them
-/// but by their errors, which are not white, and without a magnetometer nothing would mend that.
-pub(super) fn about_vertical<T: Real>(up: &Vector3<T>, shared: &Shared<T>) -> [(usize, T); 4] {
-    let along = up.x * shared[0] + up.y * shared[1] + up.z * shared[2];
-    [(0, up.x * along), (1, up.y * along), (2, up.z * along), (HEADING, shared[HEADING])]
 }

@@ -3,9 +3,7 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::doubt::Doubt;
-use super::errors::{
-    BIAS, EAST, Errors, HEADING, LAG, NORTH, ProcessNoise, ROTATION, Shared, VELOCITY, about_vertical, nothing,
-};
+use super::errors::{BIAS, EAST, Errors, HEADING, LAG, NORTH, ProcessNoise, ROTATION, VELOCITY};
 use super::field::{Field, effective_horizontal};
 use super::numbers::*;
 use super::offset::HardIron;
@@ -320,14 +318,9 @@ impl<T: Real> MekfFilter<T> {
             + square::<T>(ACCELERATION_LASTS_S) * self.squared_acceleration;
         let variance = T::TWO * T::of(VELOCITY_LASTS_S) * squared / dt;
         let up = self.rotation.row(2).transpose();
-        if self.params.magnetometer.is_used() {
-            self.errors.correct_one::<EAST, 0>(-east, variance, nothing);
-            self.errors.correct_one::<NORTH, 0>(-self.errors.value[NORTH], variance, nothing);
-        } else {
-            let kept = |shared: &Shared<T>| about_vertical(&up, shared);
-            self.errors.correct_one::<EAST, 4>(-east, variance, kept);
-            self.errors.correct_one::<NORTH, 4>(-self.errors.value[NORTH], variance, kept);
-        }
+        let kept = (!self.params.magnetometer.is_used()).then_some(&up);
+        self.errors.correct_one::<EAST>(-east, variance, kept);
+        self.errors.correct_one::<NORTH>(-self.errors.value[NORTH], variance, kept);
         let corrected = self.errors.vector(ROTATION).xy();
         self.doubt.correct_tilt(dt, corrected);
         if self.rest.is_detected() {
@@ -372,9 +365,9 @@ impl<T: Real> MekfFilter<T> {
         let known = self.errors.block(BIAS).trace() + T::of(3.0) * square::<T>(REST_BIAS);
         let doubt = (T::of(3.0) * residual.norm_squared() / (known * square::<T>(OUTLIER))).max(T::ONE);
         let variance = square::<T>(REST_BIAS) / dt * doubt;
-        self.errors.correct_one::<0, 0>(mean.x - self.errors.value[0], variance, nothing);
-        self.errors.correct_one::<1, 0>(mean.y - self.errors.value[1], variance, nothing);
-        self.errors.correct_one::<2, 0>(mean.z - self.errors.value[2], variance, nothing);
+        self.errors.correct_one::<0>(mean.x - self.errors.value[0], variance, None);
+        self.errors.correct_one::<1>(mean.y - self.errors.value[1], variance, None);
+        self.errors.correct_one::<2>(mean.z - self.errors.value[2], variance, None);
     }
 
     /// The angle of the field to north.

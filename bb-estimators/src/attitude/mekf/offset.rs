@@ -57,10 +57,10 @@ impl<T: Real> Hypothesis<T> {
     /// frame. `None` if the covariance is singular.
     fn observe(&mut self, turned: &Matrix3<T>, measured: &Vector3<T>) -> Option<Surprise<T>> {
         self.expected += turned * self.offset;
-        let moved = turned * self.of_offset;
-        let half = turned * (self.of_both + moved.transpose() * T::HALF);
+        let moved = self.of_offset * turned.transpose();
+        let half = turned * (self.of_both + moved * T::HALF);
         let mut of_expected = self.of_expected + half + half.transpose();
-        self.of_both += moved.transpose();
+        self.of_both += moved;
         let residual = measured - self.expected;
         // A step and an error of the magnetometer have one scale.
         let (walk, white) = (self.step, self.step);
