@@ -304,8 +304,10 @@ fn parameters_and_actuators_take_json() -> Result<(), Box<dyn Error>> {
         let refused = set(path, json).expect_err(json);
         assert!(refused.starts_with(&format!("{path} is not set: ")), "{refused}");
     }
-    let unknown = set("param/trun", r#""x""#).expect_err("there is none");
-    assert_eq!(unknown, "param/trun is not set: no such parameter is declared; did you mean `param/turn`?");
+    for json in [r#""x""#, "1.0"] {
+        let unknown = set("param/trun", json).expect_err("there is none");
+        assert_eq!(unknown, "param/trun is not set: no such parameter is declared; did you mean `param/turn`?");
+    }
     // All or none.
     assert!(simulation.set_parameters_json([("param/turn", "0.5"), ("param/count", "x")]).is_err());
     assert_eq!(simulation.bus().parameter("param/turn"), Some(1.0.into()));

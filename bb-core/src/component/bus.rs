@@ -253,8 +253,9 @@ impl Bus {
                 Some(ParameterValue::Bool(_)) => from_json::<bool>(json).map(ParameterValue::Bool),
                 Some(ParameterValue::Integer(_)) => from_json::<i64>(json).map(ParameterValue::Integer),
                 Some(ParameterValue::Float(_)) => from_json::<f64>(json).map(ParameterValue::Float),
-                // Of one that does not exist, the path is refused.
-                Some(ParameterValue::Text(_)) | None => from_json::<String>(json).map(ParameterValue::Text),
+                Some(ParameterValue::Text(_)) => from_json::<String>(json).map(ParameterValue::Text),
+                // Of one that does not exist, the path is refused, whatever the value.
+                None => Ok(ParameterValue::Text(String::new())),
             };
             match read {
                 Ok(value) => Ok((path.to_owned(), value)),
