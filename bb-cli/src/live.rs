@@ -5,6 +5,7 @@ mod arming;
 mod command;
 mod connection;
 mod param;
+mod ros2;
 mod top;
 mod topic;
 mod yaml;
@@ -47,6 +48,7 @@ pub(crate) enum LiveCommand {
     Command(command::Arguments),
     Arm(arming::Arm),
     Disarm(arming::Disarm),
+    Ros2(ros2::Arguments),
 }
 
 impl LiveCommand {
@@ -59,6 +61,7 @@ impl LiveCommand {
             Self::Command(arguments) => command::run(arguments),
             Self::Arm(arguments) => arguments.run(),
             Self::Disarm(arguments) => arguments.run(),
+            Self::Ros2(arguments) => ros2::run(arguments),
         }
     }
 }

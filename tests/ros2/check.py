@@ -9,6 +9,7 @@ import importlib
 import json
 import math
 import pathlib
+import shutil
 import struct
 import sys
 
@@ -172,6 +173,52 @@ def check_jsonschema(lines):
     return len(lines)
 
 
+def hashes_of(package, folder):
+    """The hashes by which ROS knows the types of a package of `.msg` and `.srv` files, as its build makes them."""
+    from rosidl_adapter.msg import convert_msg_to_idl
+    from rosidl_adapter.srv import convert_srv_to_idl
+    from rosidl_generator_type_description import generate_type_hash
+
+    converters = {"msg": convert_msg_to_idl, "srv": convert_srv_to_idl}
+    files = [file for kind in converters for file in sorted(package.glob(f"{kind}/*.{kind}"))]
+    for file in files:
+        kind = file.suffix[1:]
+        converters[kind](package, package.name, file.relative_to(package), folder / kind)
+    share = pathlib.Path(sys.prefix, "share")
+    arguments = {
+        "package_name": package.name,
+        "output_dir": str(folder),
+        "idl_tuples": [f"{folder}:{file.parent.name}/{file.stem}.idl" for file in files],
+        "include_paths": [f"{name.name}:{name}" for name in share.iterdir() if name.is_dir()],
+    }
+    settings = folder / "arguments.json"
+    settings.write_text(json.dumps(arguments))
+    hashes = {}
+    for path in generate_type_hash(str(settings)):
+        entries = json.loads(pathlib.Path(path).read_text())["type_hashes"]
+        hashes.update({entry["type_name"]: entry["hash_string"] for entry in entries})
+    return hashes
+
+
+def check_interfaces(folder):
+    """The package of a robot's own types, whose hashes a changed name changes."""
+    lines = [json.loads(line) for line in pathlib.Path(folder, "interfaces.jsonl").read_text().splitlines()]
+    package = pathlib.Path(folder, "bb_msgs")
+    found = hashes_of(package, pathlib.Path(folder, "hashed"))
+    for line in lines:
+        if found.get(line["name"]) != line["hash"]:
+            raise Mismatch(f"{line['name']}: hash {line['hash']}, {found.get(line['name'])} there")
+    other = pathlib.Path(folder, "renamed", "bb_msgs")
+    shutil.copytree(package, other)
+    nested = other / "msg" / "Nested.msg"
+    nested.write_text(nested.read_text().replace(" names", " words"))
+    renamed = hashes_of(other, pathlib.Path(folder, "rehashed"))
+    changed = {name for name in found if renamed[name] != found[name]}
+    if not {"bb_msgs/msg/Nested", "bb_msgs/msg/EverythingStamped", "bb_msgs/srv/GoFar"} <= changed:
+        raise Mismatch(f"a renamed field changes the hashes of {sorted(changed)} alone")
+    return len(lines)
+
+
 def main():
     folder = sys.argv[2]
     ros, exact = (
@@ -187,6 +234,7 @@ def main():
     check_times(recording)
     topics = check_moving_arm(pathlib.Path(folder, "moving_arm.mcap"))
     print(f"ros2: all messages of {topics} topics of a moving arm have times of this century")
+    print(f"ros2: rosidl gives {check_interfaces(folder)} types of a robot's own the same type hashes")
     print(f"ros2: jsonschema accepts {check_jsonschema(ros + exact)} values and their schemas")
     return 0
 

@@ -4,7 +4,9 @@ use crate::common::{Output, bb};
 use bb_core::Options as _;
 use bb_core::prelude::*;
 use bb_dashboard::{Dashboard, DashboardOptions};
+use bb_mcap::{Recorder, RecorderOptions};
 use serde_json::Value;
+use std::collections::BTreeMap;
 use std::error::Error;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -173,6 +175,71 @@ fn every_command_prints_what_is_stored() -> Result<(), Box<dyn Error>> {
     // Half a second after the last message.
     let since = json(&["top"])?["problems"][0]["since"].as_f64();
     assert!(since.is_some_and(|since| (since - 1.4).abs() < 1e-9), "{since:?}");
+    Ok(())
+}
+
+/// Every file of a folder and those below it, by name.
+fn files(folder: &Path) -> Result<BTreeMap<String, String>, Box<dyn Error>> {
+    let mut found = BTreeMap::new();
+    for entry in std::fs::read_dir(folder)? {
+        let path = entry?.path();
+        let name = path.file_name().unwrap_or_default().display().to_string();
+        match path.is_dir() {
+            true => found.extend(files(&path)?.into_iter().map(|(below, text)| (format!("{name}/{below}"), text))),
+            false => _ = found.insert(name, std::fs::read_to_string(path)?),
+        }
+    }
+    Ok(found)
+}
+
+/// The package of a running robot is what is stored, and that of its recording has the messages of it that were recorded.
+#[test]
+fn interfaces_are_those_of_the_robot_and_of_its_recording() -> Result<(), Box<dyn Error>> {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("interfaces");
+    _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder)?;
+    let recording = folder.join("cart.mcap");
+    let mut simulation = Cart::builder().simulate()?;
+    let all = simulation.subscribe_any(Select::All, None, Overflow::default());
+    let mut recorder = Recorder::new(&recording, all, RecorderOptions::of::<Cart>())?;
+    let dashboard = Dashboard::serve(&simulation, DashboardOptions { port: 0, ..DashboardOptions::defaults() })?;
+    simulation.publisher::<Level>("sensor/base/level")?.publish(Level { value: 1.0 });
+    simulation.arm()?;
+    simulation.run_for(Duration::from_secs(1));
+    let (robot, live) = (dashboard.reading_url(), folder.join("live"));
+    let output = bb(&["ros2", "interfaces", &live.display().to_string(), "--robot", &robot]);
+    assert_eq!(output.code, Some(0), "{}", output.err);
+    drop((dashboard, simulation));
+    recorder.drain()?;
+    recorder.finish()?;
+    let found = files(&live)?;
+    let printed: Vec<String> = found.keys().map(|name| live.join(name).display().to_string()).collect();
+    assert_eq!(output.out.lines().collect::<Vec<_>>(), printed);
+    // What the robot declares; the types of bb-core are in the package too.
+    let own = ["CMakeLists.txt", "package.xml", "msg/Level.msg", "msg/LevelStamped.msg", "srv/Travel.srv"];
+    let mut text = String::new();
+    for name in own {
+        text += &format!("== {name}\n");
+        let is_own = |line: &&str| !line.starts_with("  \"msg/") || own.iter().any(|name| line.contains(name));
+        let lines = found.get(&format!("bb_msgs/{name}")).ok_or(name)?.lines().filter(is_own);
+        lines.for_each(|line| text += &format!("{line}\n"));
+    }
+    let stored = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/bb/interfaces.txt");
+    if std::env::var_os("UPDATE_LIVE").is_some() {
+        std::fs::write(&stored, &text)?;
+    }
+    assert_eq!(text, std::fs::read_to_string(stored)?, "read it, then store it with UPDATE_LIVE=1");
+    let recorded = folder.join("recorded").display().to_string();
+    let output = bb(&["ros2", "interfaces", &recorded, "--json", "--recording", &recording.display().to_string()]);
+    assert_eq!(output.code, Some(0), "{}", output.err);
+    let printed: Value = serde_json::from_str(&output.out)?;
+    let recorded = files(Path::new(&recorded))?;
+    assert_eq!(printed["files"].as_array().map(Vec::len), Some(recorded.len()));
+    assert!(recorded.contains_key("bb_msgs/msg/LevelStamped.msg"), "{:?}", recorded.keys());
+    for (name, text) in recorded.iter().filter(|(name, _)| name.starts_with("bb_msgs/msg/")) {
+        assert_eq!(Some(text), found.get(name), "{name}");
+    }
+    assert!(!recorded.keys().any(|name| name.starts_with("bb_msgs/srv/")), "{:?}", recorded.keys());
     Ok(())
 }
 

@@ -2,7 +2,7 @@
 
 use super::Fault;
 use crate::declaration::Role;
-use crate::message::codec::{FieldShape, Shape, json_schema, member_of};
+use crate::message::codec::{FieldShape, Schema, Shape, json_schema, member_of};
 use crate::time::MonotonicTime;
 use std::fmt;
 use std::future::Future;
@@ -66,6 +66,20 @@ impl CommandInfo {
             default: member_of(&self.default_arguments, field.name),
         };
         of.fields.iter().filter(|field| field.is_named()).map(describe).collect()
+    }
+
+    /// The shape of its arguments; `None` if there are no values to give.
+    pub fn argument_shape(&self) -> Option<Shape> {
+        match self.arguments {
+            Shape::Struct(_) if self.argument_list().is_empty() => None,
+            shape => Some(shape),
+        }
+    }
+
+    /// The definition of its arguments as a message of ROS, and those of all types it refers to; `None` as for [`Self::argument_shape`].
+    pub fn argument_definition(&self) -> Option<String> {
+        // The name is in no definition; this one is no payload's.
+        self.argument_shape().map(|shape| Schema::new("bb_msgs/srv/Arguments_Request", shape).text)
     }
 
     /// The JSON Schema of its arguments, with those that it gets if none are given as the `default`.

@@ -169,6 +169,7 @@ fn command(command: &CommandInfo) -> String {
         ("allowed_states", states.unwrap_or_else(null)),
         ("timeout_s", optional(command.timeout.map(|timeout| timeout.as_secs_f64()), number)),
         ("arguments", command.argument_schema()),
+        ("definition", optional(command.argument_definition().as_deref(), text)),
         ("defaults", if command.default_arguments.is_empty() { null() } else { command.default_arguments.clone() }),
         ("result", json_schema(command.output)),
     ])

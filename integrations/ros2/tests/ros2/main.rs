@@ -1,3 +1,4 @@
 //! Tests of what crosses zenoh.
 
+mod interfaces;
 mod wire;
