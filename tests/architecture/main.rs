@@ -20,13 +20,14 @@ fn read(file: &str) -> String {
 }
 
 /// The folders of the crates with code that others use.
-const CRATES: [&str; 13] = [
+const CRATES: [&str; 14] = [
     "bb-macros",
     "bb-core",
     "bb-estimators",
     "bb-eval",
     "bb-cli",
     "integrations/dashboard",
+    "integrations/foxglove",
     "integrations/mavlink",
     "integrations/mcap",
     "integrations/metrics",

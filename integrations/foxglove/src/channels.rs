@@ -1,0 +1,207 @@
+//! The topics of the robot as channels, with what viewers expect beside them. Each is subscribed to in the robot while a client is subscribed to it.
+
+use bb_core::joints::{ViewerChannel, ViewerMessage, ViewerMessages};
+use bb_core::message::Schema;
+use bb_core::{Bus, DynamicMessage, Overflow, Select, WallTime};
+use foxglove::websocket::{ChannelView, Client, ServerListener};
+use foxglove::{ChannelId, Context, FoxgloveError, PartialMetadata, RawChannel};
+use std::collections::{HashMap, HashSet};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use tokio::task::AbortHandle;
+
+/// Messages of a topic that wait to be encoded.
+const WAITING: usize = 16_384;
+
+/// The messages of a channel.
+#[derive(Clone, Copy, Debug)]
+enum Source {
+    /// Messages of a path, as recordings have them.
+    Path {
+        path: &'static str,
+        is_ros: bool,
+    },
+    /// Second messages of a path.
+    Companion(&'static str),
+    Viewer(ViewerChannel),
+}
+
+/// A channel and the clients that are subscribed to it.
+struct Entry {
+    channel: Arc<RawChannel>,
+    source: Source,
+    clients: usize,
+    /// The task that encodes.
+    task: Option<AbortHandle>,
+}
+
+/// The channels.
+pub(crate) struct Channels {
+    bus: Bus,
+    robot: &'static str,
+    context: Arc<Context>,
+    entries: Mutex<HashMap<ChannelId, Entry>>,
+    paths: Mutex<HashSet<&'static str>>,
+    counts: Counts,
+}
+
+/// Numbers of messages.
+#[derive(Debug, Default)]
+pub(crate) struct Counts {
+    pub(crate) encoded: AtomicU64,
+    /// Messages that came faster than they were encoded.
+    pub(crate) unencoded: AtomicU64,
+}
+
+impl Channels {
+    pub(crate) fn new(bus: Bus, context: Arc<Context>) -> Result<Arc<Self>, FoxgloveError> {
+        let robot = bus.description().robot;
+        let channels = Arc::new(Self {
+            bus,
+            robot,
+            context,
+            entries: Mutex::default(),
+            paths: Mutex::default(),
+            counts: Counts::default(),
+        });
+        for channel in ViewerChannel::ALL {
+            channels.add(channel.topic(), channel.schema(), Source::Viewer(channel))?;
+        }
+        channels.refresh()?;
+        Ok(channels)
+    }
+
+    pub(crate) fn counts(&self) -> &Counts {
+        &self.counts
+    }
+
+    /// Adds the channels of paths that have been created since.
+    pub(crate) fn refresh(&self) -> Result<(), FoxgloveError> {
+        let mut paths = lock(&self.paths);
+        if self.bus.paths().iter().all(|path| paths.contains(path)) {
+            return Ok(());
+        }
+        for topic in self.bus.description().topics.iter().filter(|topic| paths.insert(topic.path)) {
+            let (path, layouts) = (topic.path, topic.layouts);
+            let (name, schema) = layouts.channel(path);
+            self.add(&name, schema, Source::Path { path, is_ros: layouts.ros_name().is_some() })?;
+            if let Some((name, schema)) = layouts.companion_channel(path) {
+                self.add(&name, schema, Source::Companion(path))?;
+            }
+        }
+        Ok(())
+    }
+
+    fn add(&self, topic: &str, schema: Schema, source: Source) -> Result<(), FoxgloveError> {
+        // Before it is announced.
+        let mut entries = lock(&self.entries);
+        let schema = foxglove::Schema::new(schema.name, Schema::ENCODING, schema.text.into_bytes());
+        let channel = self.context.channel_builder(topic).message_encoding(Schema::MESSAGE_ENCODING).schema(schema);
+        let channel = channel.build_raw()?;
+        entries.insert(channel.id(), Entry { channel, source, clients: 0, task: None });
+        Ok(())
+    }
+
+    /// Encodes the messages of a path until it is aborted.
+    async fn encode(self: Arc<Self>, channel: Arc<RawChannel>, source: Source) {
+        let path = match source {
+            Source::Path { path, .. } | Source::Companion(path) => Some(path),
+            Source::Viewer(_) => None,
+        };
+        let select = path.map_or(Select::All, Select::Path);
+        let mut messages = self.bus.subscribe_any(select, None, Overflow::DropOldest { capacity: WAITING });
+        let mut viewers = self.viewers();
+        let mut lost = 0;
+        while let Some(message) = messages.recv_async().await {
+            let mut bytes = Vec::new();
+            let is_there = match source {
+                Source::Path { is_ros: true, .. } => message.encode_as_ros(&mut bytes),
+                Source::Path { is_ros: false, .. } => {
+                    message.encode(&mut bytes);
+                    true
+                }
+                Source::Companion(_) => message.encode_companion(&mut bytes),
+                Source::Viewer(_) => viewers.following(&message).map(|message| bytes = message.bytes).is_some(),
+            };
+            if is_there {
+                self.log(&channel, &bytes, wall_time(&message), None);
+            }
+            let lagged = messages.lagged();
+            if lagged > lost {
+                self.counts.unencoded.fetch_add(lagged - lost, Ordering::Relaxed);
+                tracing::warn!(
+                    lost = lagged - lost,
+                    topic = channel.topic(),
+                    "messages came faster than they are encoded"
+                );
+                lost = lagged;
+            }
+            // A fast path leaves the thread to the clients.
+            tokio::task::yield_now().await;
+        }
+    }
+
+    /// Sends a client the messages that it needs of a channel before others.
+    fn greet(&self, client: &Client, channel: &RawChannel, of: ViewerChannel) {
+        let clock = self.bus.clock();
+        let now = clock.wall_at(clock.now());
+        for ViewerMessage { channel: which, bytes } in self.viewers().first(now) {
+            if which == of {
+                self.log(channel, &bytes, now, Some(client));
+            }
+        }
+    }
+
+    fn log(&self, channel: &RawChannel, bytes: &[u8], time: WallTime, client: Option<&Client>) {
+        self.counts.encoded.fetch_add(1, Ordering::Relaxed);
+        // The protocol has no times before 1970.
+        let log_time = Some(u64::try_from(time.as_unix_nanos()).unwrap_or(0));
+        let sink = client.and_then(Client::sink_id);
+        channel.log_with_meta_to_sink(bytes, PartialMetadata { log_time }, sink);
+    }
+
+    fn viewers(&self) -> ViewerMessages {
+        ViewerMessages::new(self.robot, self.bus.topology(), None)
+    }
+}
+
+fn wall_time(message: &DynamicMessage) -> WallTime {
+    message.stamp().wall_time
+}
+
+/// Tells the channels of subscriptions, on the server's thread.
+pub(crate) struct Watch(pub(crate) Arc<Channels>);
+
+impl ServerListener for Watch {
+    fn on_subscribe(&self, client: Client, view: ChannelView) {
+        let channels = &self.0;
+        let mut entries = lock(&channels.entries);
+        let Some(entry) = entries.get_mut(&view.id()) else { return };
+        entry.clients += 1;
+        if let Source::Viewer(of) = entry.source {
+            channels.greet(&client, &entry.channel, of);
+            if of.is_latched() {
+                return;
+            }
+        }
+        if entry.task.is_none() {
+            let task = Arc::clone(channels).encode(Arc::clone(&entry.channel), entry.source);
+            entry.task = Some(tokio::spawn(task).abort_handle());
+        }
+    }
+
+    fn on_unsubscribe(&self, _: Client, view: ChannelView) {
+        let mut entries = lock(&self.0.entries);
+        let Some(entry) = entries.get_mut(&view.id()) else { return };
+        entry.clients = entry.clients.saturating_sub(1);
+        if entry.clients == 0
+            && let Some(task) = entry.task.take()
+        {
+            task.abort();
+        }
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

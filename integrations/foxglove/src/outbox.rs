@@ -1,0 +1,249 @@
+//! The queue of one client. The server's own queue drops messages without saying so; it is read without delay, so that messages wait, and
+//! are counted, here.
+
+use std::collections::VecDeque;
+use std::io::{Error, ErrorKind, Result};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+use tokio::io::{AsyncBufReadExt, AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt, BufReader};
+use tokio::sync::Notify;
+
+/// Messages that wait for a client, at most.
+const MOST_MESSAGES: usize = 1024;
+/// Bytes of these messages, at most, unless one message alone is longer.
+const MOST_BYTES: usize = 16 * 1024 * 1024;
+/// Frames that are no messages of topics and wait, at most: they are never dropped, and with more the client is disconnected.
+const MOST_OTHERS: usize = 4096;
+/// Time between two warnings.
+const WARNING: Duration = Duration::from_secs(1);
+
+/// The final frame of a message of bytes or of text, as a server sends it.
+const BINARY: u8 = 0x82;
+const TEXT: u8 = 0x81;
+/// The first byte of the message of a topic.
+const MESSAGE_DATA: u8 = 1;
+
+/// The queue of a client.
+#[derive(Debug)]
+pub(crate) struct Outbox<'a> {
+    waiting: Mutex<Waiting>,
+    has_changed: Notify,
+    lost: &'a AtomicU64,
+}
+
+#[derive(Debug, Default)]
+struct Waiting {
+    frames: VecDeque<Frame>,
+    messages: usize,
+    /// Bytes of the messages.
+    bytes: usize,
+    lost: u64,
+    is_over: bool,
+}
+
+#[derive(Debug, PartialEq)]
+struct Frame {
+    bytes: Vec<u8>,
+    is_message: bool,
+}
+
+impl<'a> Outbox<'a> {
+    /// Creates a queue that adds to the number of `lost` messages.
+    pub(crate) fn new(lost: &'a AtomicU64) -> Self {
+        Self { waiting: Mutex::default(), has_changed: Notify::new(), lost }
+    }
+
+    /// Carries what the server sends to the client, until the server ends.
+    pub(crate) async fn relay(
+        &self,
+        server: impl AsyncRead + Unpin,
+        client: impl AsyncWrite + Unpin,
+    ) -> Result<()> {
+        let filled = async {
+            let read = self.fill(BufReader::new(server)).await;
+            self.waiting().is_over = true;
+            self.has_changed.notify_one();
+            Ok(read)
+        };
+        let (read, ()) = tokio::try_join!(filled, self.empty(client))?;
+        read
+    }
+
+    async fn fill(&self, mut server: impl AsyncRead + AsyncBufReadExt + Unpin) -> Result<()> {
+        let mut answer = Vec::new();
+        while !answer.ends_with(b"\r\n\r\n") {
+            if server.read_until(b'\n', &mut answer).await? == 0 {
+                break;
+            }
+        }
+        self.push(Frame { bytes: answer, is_message: false })?;
+        while let Some(frame) = frame(&mut server).await? {
+            self.push(frame)?;
+        }
+        Ok(())
+    }
+
+    /// Adds a frame, in the place of the oldest messages if there is no room.
+    fn push(&self, frame: Frame) -> Result<()> {
+        let mut waiting = self.waiting();
+        if frame.is_message {
+            while waiting.messages > 0
+                && (waiting.messages >= MOST_MESSAGES || waiting.bytes + frame.bytes.len() > MOST_BYTES)
+            {
+                let oldest = waiting.frames.iter().position(|frame| frame.is_message);
+                let Some(oldest) = oldest.and_then(|oldest| waiting.frames.remove(oldest)) else { break };
+                waiting.messages -= 1;
+                waiting.bytes -= oldest.bytes.len();
+                waiting.lost += 1;
+                self.lost.fetch_add(1, Ordering::Relaxed);
+            }
+            waiting.messages += 1;
+            waiting.bytes += frame.bytes.len();
+        } else if waiting.frames.len() - waiting.messages >= MOST_OTHERS {
+            return Err(Error::new(ErrorKind::TimedOut, "it does not read"));
+        }
+        waiting.frames.push_back(frame);
+        self.has_changed.notify_one();
+        Ok(())
+    }
+
+    fn pop(&self) -> Option<Frame> {
+        let mut waiting = self.waiting();
+        let frame = waiting.frames.pop_front()?;
+        if frame.is_message {
+            waiting.messages -= 1;
+            waiting.bytes -= frame.bytes.len();
+        }
+        Some(frame)
+    }
+
+    async fn empty(&self, mut client: impl AsyncWrite + Unpin) -> Result<()> {
+        let (mut reported, mut next) = (0, Instant::now());
+        loop {
+            let (lost, is_over) = {
+                let waiting = self.waiting();
+                (waiting.lost, waiting.is_over)
+            };
+            let frame = self.pop();
+            if lost > reported && (frame.is_none() || Instant::now() >= next) {
+                client.write_all(&warning(lost)).await?;
+                (reported, next) = (lost, Instant::now() + WARNING);
+            }
+            match frame {
+                Some(frame) => client.write_all(&frame.bytes).await?,
+                None if is_over => return Ok(()),
+                None => self.has_changed.notified().await,
+            }
+        }
+    }
+
+    fn waiting(&self) -> MutexGuard<'_, Waiting> {
+        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// The next frame of a server, which does not mask them; `None` at the end.
+async fn frame(server: &mut (impl AsyncRead + AsyncBufReadExt + Unpin)) -> Result<Option<Frame>> {
+    if server.fill_buf().await?.is_empty() {
+        return Ok(None);
+    }
+    let mut bytes = vec![0; 2];
+    server.read_exact(&mut bytes).await?;
+    let length = bytes[1] & 0x7f;
+    let more = match length {
+        126 => 2,
+        127 => 8,
+        _ => 0,
+    };
+    let mut extended = [0; 8];
+    server.read_exact(&mut extended[8 - more..]).await?;
+    bytes.extend_from_slice(&extended[8 - more..]);
+    let length = if more == 0 { u64::from(length) } else { u64::from_be_bytes(extended) };
+    let head = bytes.len();
+    // As it comes: a length alone reserves nothing.
+    if server.take(length).read_to_end(&mut bytes).await? as u64 != length {
+        return Err(Error::from(ErrorKind::UnexpectedEof));
+    }
+    let is_message = bytes[0] == BINARY && bytes.get(head) == Some(&MESSAGE_DATA);
+    Ok(Some(Frame { bytes, is_message }))
+}
+
+/// The frame of a warning, in the place of the one before.
+fn warning(lost: u64) -> Vec<u8> {
+    let text = format!(
+        r#"{{"op":"status","level":1,"id":"lost","message":"messages lost, the oldest first, as this client reads too slowly: {lost}"}}"#
+    );
+    // It is longer than 125 bytes, or not.
+    let mut frame = match u8::try_from(text.len()) {
+        Ok(short @ ..126) => vec![TEXT, short],
+        _ => [&[TEXT, 126][..], &(text.len() as u16).to_be_bytes()].concat(),
+    };
+    frame.extend_from_slice(text.as_bytes());
+    frame
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn message(number: u32, length: usize) -> Vec<u8> {
+        let mut payload = vec![MESSAGE_DATA];
+        payload.extend_from_slice(&number.to_be_bytes());
+        payload.resize(length, 0);
+        let mut frame = match length {
+            0..126 => vec![BINARY, length as u8],
+            126..65536 => [&[BINARY, 126][..], &(length as u16).to_be_bytes()].concat(),
+            _ => [&[BINARY, 127][..], &(length as u64).to_be_bytes()].concat(),
+        };
+        frame.extend(payload);
+        frame
+    }
+
+    fn run<T>(future: impl Future<Output = T>) -> T {
+        tokio::runtime::Builder::new_current_thread().enable_time().build().expect("it starts").block_on(future)
+    }
+
+    #[test]
+    fn frames_are_carried_bit_for_bit() {
+        let mut stream = b"HTTP/1.1 101 Switching Protocols\r\na: b\r\n\r\n".to_vec();
+        for length in [5, 125, 126, 127, 65535, 65536, 100_000] {
+            stream.extend(message(1, length));
+            stream.extend(warning(7));
+        }
+        stream.extend([0x89, 0, 0x88, 2, 3, 0xe8]);
+        let (lost, mut carried) = (AtomicU64::new(0), Vec::new());
+        run(Outbox::new(&lost).relay(&stream[..], &mut carried)).expect("it ends");
+        assert!(carried == stream);
+        // An end within a frame is an error, after all before it.
+        let mut carried = Vec::new();
+        assert!(run(Outbox::new(&lost).relay(&stream[..stream.len() - 1], &mut carried)).is_err());
+        assert!(carried == stream[..stream.len() - 4]);
+    }
+
+    #[test]
+    fn the_oldest_messages_are_lost_and_counted_and_nothing_else() {
+        for (length, kept) in [(16, MOST_MESSAGES), (1024 * 1024, 15), (MOST_BYTES + 1, 1)] {
+            let lost = AtomicU64::new(0);
+            let outbox = Outbox::new(&lost);
+            let (count, mut sent) = (kept as u32 + 5, Vec::new());
+            for number in 0..count {
+                if number == 2 {
+                    outbox.push(Frame { bytes: vec![TEXT, 0], is_message: false }).expect("there is room");
+                }
+                let bytes = message(number, length);
+                outbox.push(Frame { bytes, is_message: true }).expect("there is room");
+            }
+            outbox.waiting().is_over = true;
+            run(outbox.empty(&mut sent)).expect("it ends");
+            let mut expected = [warning(5), vec![TEXT, 0]].concat();
+            (5..count).for_each(|number| expected.extend(message(number, length)));
+            assert!(sent == expected, "{length}");
+            assert_eq!(lost.into_inner(), 5);
+        }
+        let lost = AtomicU64::new(0);
+        let outbox = Outbox::new(&lost);
+        let text = || outbox.push(Frame { bytes: vec![TEXT, 0], is_message: false });
+        assert_eq!((0..).take_while(|_| text().is_ok()).count(), MOST_OTHERS);
+    }
+}
