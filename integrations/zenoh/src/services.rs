@@ -6,10 +6,10 @@ use crate::error::Ros2Error;
 use crate::messages::{Nothing, Outcome, bytes_of};
 use crate::node::{Request, RosNode, RosService};
 use crate::parameters::ParameterService;
-use bb_core::component::{CommandInfo, Description};
+use bb_core::component::Description;
 use bb_core::message::codec::{Shape, bytes_to_json, service_hash};
 use bb_core::{Bus, Field, Role};
-use bb_ros2::Address;
+use bb_ros2::{Address, command_type};
 use std::fmt::Display;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
@@ -93,7 +93,7 @@ impl Services {
                 }
             };
             names.push(name.clone());
-            let shape = arguments(command);
+            let shape = command.argument_shape();
             let (type_name, hash) = match shape {
                 None => (trigger.to_owned(), trigger_hash.clone()),
                 Some(shape) => {
@@ -272,26 +272,6 @@ fn trigger() -> (&'static str, String) {
     (NAME, service_hash(NAME, Nothing::SHAPE, Outcome::SHAPE))
 }
 
-/// The shape of a command's arguments, if it has any.
-pub(crate) fn arguments(command: &CommandInfo) -> Option<Shape> {
-    match command.arguments {
-        Shape::Struct(_) if command.argument_list().is_empty() => None,
-        shape => Some(shape),
-    }
-}
-
-/// The type of the service for a command with arguments: `bb_msgs/srv/GoHome` for `command/go_home`.
-pub(crate) fn command_type(path: &str) -> String {
-    let path = path.strip_prefix("command/").unwrap_or(path);
-    let mut name = String::new();
-    for word in path.split(|letter: char| !letter.is_ascii_alphanumeric()) {
-        let mut letters = word.chars();
-        name.extend(letters.next().map(|first| first.to_ascii_uppercase()));
-        name.push_str(letters.as_str());
-    }
-    format!("bb_msgs/srv/{name}")
-}
-
 /// State of the threads that answer.
 #[derive(Clone)]
 struct Worker {
@@ -405,22 +385,5 @@ fn outcome(result: Result<impl Display, impl Display>) -> Vec<u8> {
     match result {
         Ok(result) => bytes_of(&Outcome { success: true, message: result.to_string() }),
         Err(error) => refused(&error.to_string()),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use bb_ros2::TypeName;
-
-    #[test]
-    fn a_command_gives_its_service_a_valid_type() {
-        for (path, expected) in
-            [("command/go_home", "GoHome"), ("command/arm/reach", "ArmReach"), ("command/go", "Go")]
-        {
-            let name = command_type(path);
-            assert_eq!(name, format!("bb_msgs/srv/{expected}"));
-            assert!(name.parse::<TypeName>().is_ok());
-        }
     }
 }
