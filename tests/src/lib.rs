@@ -32,7 +32,6 @@ compiled! {
     Requests: "book/src/how-to/requests.md",
     Settings: "book/src/how-to/settings.md",
     Topics: "book/src/how-to/topics.md",
-    Health: "book/src/reference/health.md",
     TutorialAttitude: "book/src/tutorial/1-attitude.md",
     TutorialTwoImus: "book/src/tutorial/2-two-imus.md",
     TutorialDriver: "book/src/tutorial/3-driver.md",
