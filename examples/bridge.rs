@@ -29,7 +29,7 @@ impl Service for Telegram {
     type Output = Sent;
 
     fn init(options: TelegramOptions, context: &ServiceContext) -> Result<Self, Fault> {
-        // A path that nobody publishes, or another payload, keeps the robot from starting.
+        // A path without a publisher, or another payload, keeps the robot from starting.
         let attitude = context.bus().subscribe(&options.from, Overflow::KeepLatest)?.matched()?;
         Ok(Self { attitude, sent: 0 })
     }

@@ -35,7 +35,7 @@ fn texts(subscription: &DynamicSubscription) -> Messages {
     heard
 }
 
-/// Subscriptions that do not get everything.
+/// Subscriptions that lose messages on purpose.
 struct Few {
     /// The newest of each path, at a highest rate.
     rated: DynamicSubscription,
@@ -90,7 +90,7 @@ fn room() -> Overflow {
     Overflow::DropOldest { capacity: Overflow::MAX_CAPACITY }
 }
 
-/// A robot of that seed: some days panics escalate, and on others the budgets are wide.
+/// A robot of this seed: with some seeds panics escalate, with others the budgets are wide.
 fn builder(random: &mut Random) -> bb_core::Builder<Weathered> {
     let mut builder = Weathered::builder();
     builder.supervision().max_restarts = [3, 10, 1_000_000][random.below(3) as usize];
@@ -186,7 +186,7 @@ fn real_day(seed: u64) -> Result<bool, Box<dyn Error>> {
 const HAPPENS: [&str; 4] =
     ["weather/front", "estimator/base/squall", "controller/gale starts", "controller/calm starts"];
 
-/// Notes what has happened.
+/// Records which of the events have happened.
 fn note(heard: &Messages) {
     let starts = |caller: &str| {
         let texts = heard.iter().filter(|(path, _)| path.starts_with("command/")).flat_map(|(_, texts)| texts);
@@ -200,7 +200,7 @@ fn note(heard: &Messages) {
 
 static HAPPENED: Mutex<BTreeSet<&'static str>> = Mutex::new(BTreeSet::new());
 
-/// Plays the journal; false, with the first difference, if something is not the same.
+/// Replays the journal. Prints the first difference and returns `false` if messages or counts differ.
 fn is_same_again(
     seed: u64,
     lines: &Lines,
@@ -247,7 +247,7 @@ fn from_environment(name: &str) -> Option<u64> {
     std::env::var(name).ok()?.parse().ok()
 }
 
-/// Runs so many days, or as many as fit into `BB_STRESS_SECONDS`.
+/// Runs `few` days, or as many as fit into `BB_STRESS_SECONDS`.
 fn days(kind: &str, few: u64, day: fn(u64) -> Result<bool, Box<dyn Error>>) {
     std::panic::set_hook(Box::new(|info| {
         let of_test = std::thread::current().name().is_some_and(|name| name.contains("days"));

@@ -9,7 +9,7 @@ use std::error::Error;
 use std::hint::black_box;
 use std::path::Path;
 
-/// Number of samples that are read whatever the number of updates, so that the difference of two runs is the filter's alone.
+/// Number of samples that are read for any number of updates, so that the difference of two runs is the filter's alone.
 const SAMPLES: usize = 20_000;
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -1,4 +1,4 @@
-//! Averages over recordings, each with the same weight, whatever its length.
+//! Averages over recordings, with equal weights for recordings of all lengths.
 
 use crate::score::Degrees;
 

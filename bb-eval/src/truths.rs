@@ -138,7 +138,7 @@ mod tests {
             &|truth| (ned * truth * flu).inverse(),
             &|truth| enu_from_nwu().inverse() * truth,
             &|truth| truth * flu,
-            // What is w, x, y, z is read as x, y, z, w; and the other way round.
+            // The components in the other order: w, x, y, z and x, y, z, w.
             &|truth| quaternion(truth.k, truth.w, truth.i, truth.j),
             &|truth| quaternion(truth.i, truth.j, truth.k, truth.w),
         ];

@@ -11,7 +11,7 @@ pub(crate) fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a s
         let longest = name.chars().count().max(candidate.chars().count());
         (distance <= limit && distance < longest).then_some((distance, candidate))
     });
-    // Of two that are equally near, prefers one that differs only in case.
+    // Prefers a name that differs only in case among equally near ones.
     near.min_by_key(|(distance, candidate)| (*distance, !candidate.eq_ignore_ascii_case(name)))
         .map(|(_, candidate)| candidate)
 }

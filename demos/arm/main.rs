@@ -1,6 +1,6 @@
 //! A six-axis arm that loses the IMU at its tip while it moves.
 //!
-//! It follows a path; an estimator across its six joints tells how the tip accelerates. The tip's IMU is unplugged in the
+//! It follows a path; an estimator across its six joints estimates the acceleration of the tip. The tip's IMU is unplugged in the
 //! middle of a leg: the estimator is lost, and the command that this starts stops the arm. When the IMU is back and the
 //! estimator has recovered, the arm goes on to the end of its path. On virtual time, which takes a moment and gives the
 //! same output every time; with `--real-time` live. With `--record` it writes a recording that Foxglove and RViz can show. It

@@ -61,7 +61,7 @@ impl Outcome {
         let rms = first.and_then(|series| series.score.rms());
         let number = |of: fn(&Degrees) -> f64| rms.map_or_else(|| "null".to_owned(), |rms| of(&rms).to_string());
         let samples = first.map_or(0, Series::len);
-        // How many of them were compared with the truth.
+        // Number of estimates that were compared with the truth.
         let scored = first.map_or(0, |series| series.score.count());
         format!(
             "{{\"filter\":\"{}\",\"samples\":{samples},\"scored\":{scored},\"total_deg\":{},\"heading_deg\":{},\"inclination_deg\":{},\"seconds\":{}}}\n",

@@ -1,4 +1,4 @@
-//! The flight happens as it is told, with both strategies, and its recorder holds it.
+//! The flight has the events of its description, with both strategies, and so has its recording.
 
 use crate::again;
 use crate::drone::{fly, fly_again};

@@ -1,4 +1,4 @@
-//! The way of the drone: sums of sinusoids, along which it speeds up from rest.
+//! Trajectory of the drone: sums of sinusoids, along which it accelerates from rest.
 
 use bb_core::nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
@@ -49,7 +49,7 @@ pub(crate) fn motion(t: f64) -> Motion {
     let [s, speed, change] = progress(t);
     let [position, first, second] = way(s);
     let acceleration = second * (speed * speed) + first * change;
-    // Its thrust carries it, and it looks where it goes.
+    // The thrust points up, and the drone faces its direction of motion.
     let up = (acceleration + Vector3::new(0.0, 0.0, GRAVITY)).normalize();
     let ahead = (first - up * first.dot(&up)).normalize();
     let rotation = Matrix3::from_columns(&[ahead, up.cross(&ahead), up]);

@@ -3,7 +3,7 @@
 use clap::Parser;
 use std::path::PathBuf;
 
-/// Drives a rover through a minute without satellites, and compares what it knows with what is true.
+/// Drives a rover through a minute without satellites, and compares its estimate with the truth.
 #[derive(Debug, Parser)]
 #[command(name = "rover")]
 pub(crate) struct Arguments {

@@ -71,7 +71,7 @@ pub(crate) fn simulated(drive: &Drive) -> Result<Outcome, StartError> {
     Ok(Outcome::new(FILTER, drive, &odometry.drain().collect::<Vec<_>>(), &health.drain().collect::<Vec<_>>()))
 }
 
-/// An odometry whose pose nobody reads.
+/// An odometry whose pose is not used.
 fn counted(twist: Twist) -> Odometry {
     let pose = Pose { position: Vector3::zeros(), world_from_body: UnitQuaternion::identity(), covariance: None };
     Odometry { pose, twist }

@@ -1,4 +1,4 @@
-//! A rover that stands, starts, and drives curves at changing speed for three minutes.
+//! A rover that rests, starts, and drives curves at changing speed for three minutes.
 
 use crate::drive::{Drive, Event, fix};
 use bb_core::nalgebra::{Matrix6, UnitQuaternion, Vector3};

@@ -12,7 +12,7 @@ use std::io::Write;
 struct Story<'a> {
     events: DynamicSubscription,
     poses: Subscription<Pose>,
-    /// Line that has happened after what is written so far.
+    /// The next line to write.
     next: Option<Line>,
     lines: Vec<Line>,
     out: &'a mut dyn Write,
@@ -23,7 +23,7 @@ pub(crate) fn on_virtual_time(builder: Builder<Rover>, out: &mut dyn Write) -> R
     let mut simulation = builder.simulate()?;
     for (time, deed) in script::steps() {
         simulation.run_until(time);
-        story.go_on(time)?;
+        story.write_until(time)?;
         story.take_place(&simulation, time, deed)?;
     }
     simulation.run_until(script::END);
@@ -67,8 +67,8 @@ impl<'a> Story<'a> {
         Ok(())
     }
 
-    /// Writes down what has happened before `time`.
-    fn go_on(&mut self, time: MonotonicTime) -> std::io::Result<()> {
+    /// Writes the events before `time`.
+    fn write_until(&mut self, time: MonotonicTime) -> std::io::Result<()> {
         loop {
             if self.next.is_none() {
                 self.next = self.events.try_recv().and_then(|message| Line::of(&message));
@@ -80,10 +80,10 @@ impl<'a> Story<'a> {
         }
     }
 
-    /// Writes down what happens before `time`, as it does.
+    /// Writes the events as they happen, until `time`.
     fn wait_until(&mut self, robot: &Live<Rover>, time: MonotonicTime) -> std::io::Result<()> {
         loop {
-            self.go_on(time)?;
+            self.write_until(time)?;
             let left = time.duration_since(robot.clock().now());
             if left.is_zero() {
                 return Ok(());
@@ -96,7 +96,7 @@ impl<'a> Story<'a> {
     }
 
     fn end(mut self) -> Result<Vec<Line>, Box<dyn Error>> {
-        self.go_on(MonotonicTime::MAX)?;
+        self.write_until(MonotonicTime::MAX)?;
         if let Some(pose) = self.poses.try_recv() {
             let (x, y) = (pose.position.x, pose.position.y);
             let yaw_deg = pose.world_from_body.euler_angles().2.to_degrees();

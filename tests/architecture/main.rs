@@ -1,5 +1,5 @@
-//! Claims of ARCHITECTURE.md: every path in it exists, arrows between crates, folders and files point one way, and of the runtime only that
-//! is public which its users name, and doc comments open with a phrase.
+//! Claims of ARCHITECTURE.md: its paths exist, dependencies of crates, folders and files point one way, the public items of the runtime
+//! are those that users need, and doc comments open with a phrase.
 
 mod circles;
 mod comments;

@@ -10,7 +10,7 @@ use tracing::{Event, Level, Metadata, Subscriber, span};
 #[derive(Clone, Copy, Debug, Payload)]
 struct Number(f64);
 
-/// Fails at negative numbers, and refuses to be told so.
+/// Square root, which fails at negative numbers.
 #[derive(Debug)]
 struct Root;
 
@@ -28,7 +28,7 @@ impl Estimator for Root {
     }
 }
 
-/// Cannot be made safe.
+/// Sensor whose disarm callback fails.
 #[derive(Debug)]
 struct Saw;
 
@@ -67,11 +67,11 @@ mod harmless {
     }
 }
 
-/// Keeps each event in a line.
+/// Subscriber that keeps each event as a line.
 #[derive(Clone, Default)]
 struct Lines(Arc<Mutex<Vec<String>>>);
 
-/// Calls `test` with what is logged meanwhile.
+/// Returns the events during `test`.
 fn logged(
     test: impl FnOnce() -> Result<(), Box<dyn std::error::Error>>,
 ) -> Result<Vec<String>, Box<dyn std::error::Error>> {
@@ -188,7 +188,7 @@ fn changes_in_their_order() -> Result<(), Box<dyn std::error::Error>> {
         now = to.to_owned();
         all += 1;
     }
-    // At the least those of the stop: armed, disarming, disarmed.
+    // At least those of the stop: armed, disarming, disarmed.
     assert!(all >= 3 && now == "disarmed", "{all} changes, then {now}");
     Ok(())
 }

@@ -149,18 +149,24 @@ impl JointBounds {
         exceeded.effort |= hold(effort, -self.effort, self.effort);
     }
 
+    /// Checks a position against the limits.
+    ///
     /// # Errors
     /// The position exceeds the limits by more than rounding explains.
     pub fn check_position(&self, position: f64) -> Result<(), OutOfBounds> {
         check(LimitedQuantity::Position, position, self.lower, self.upper)
     }
 
+    /// Checks a velocity against the limits.
+    ///
     /// # Errors
     /// The velocity exceeds the limits by more than rounding explains.
     pub fn check_velocity(&self, velocity: f64) -> Result<(), OutOfBounds> {
         check(LimitedQuantity::Velocity, velocity, -self.velocity, self.velocity)
     }
 
+    /// Checks a torque or force against the limits.
+    ///
     /// # Errors
     /// The torque or force exceeds the limits by more than rounding explains.
     pub fn check_effort(&self, effort: f64) -> Result<(), OutOfBounds> {

@@ -5,14 +5,14 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use super::{About, AttitudeFilter, ImuSample, ParamsError, Real, SampleError};
 use crate::params::{Parameter, Params, Value};
 
-/// Writes what there is one variant a filter of.
+/// Generates the enums with one variant for each filter.
 macro_rules! any {
     ($($module:ident $estimator:ident $filter:ident $params:ident;)*) => {
         /// The parameters of one of the filters.
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub enum FilterParams {
             $(
-                #[doc = concat!("Of [`", stringify!($filter), "`](super::", stringify!($filter), ").")]
+                #[doc = concat!("Parameters of [`", stringify!($filter), "`](super::", stringify!($filter), ").")]
                 $estimator(super::$params),
             )*
         }

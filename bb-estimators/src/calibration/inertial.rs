@@ -75,7 +75,7 @@ pub fn gyroscope(rests: &[Rest]) -> Result<GyroscopeFit, CalibrationError> {
     if !offset.iter().chain(spread.iter()).all(|value| value.is_finite()) {
         return Err(CalibrationError::NonFinite);
     }
-    // Of the mean over all samples, and over the rests as far as they differ by more.
+    // The deviation of the mean over all samples, or over the rests if they differ by more.
     let of_noise = noise / (samples * samples);
     let others = rests.len().saturating_sub(1).max(1) as f64;
     let deviation = spread.map(|variance| ComplexField::sqrt((variance / others).max(of_noise)));

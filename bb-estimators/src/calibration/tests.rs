@@ -63,7 +63,7 @@ fn squared_errors(fit: &Linear, truth: &Linear, offset: &Vector3<f64>, matrix: &
 }
 
 #[test]
-fn an_accelerometers_errors_are_found_as_well_as_the_fit_says() {
+fn accelerometer_fit_reports_its_deviations() {
     const SAMPLES: u64 = 200;
     const NOISE: f64 = 0.05;
     let mut squares = Vec::new();
@@ -73,7 +73,7 @@ fn an_accelerometers_errors_are_found_as_well_as_the_fit_says() {
         let rests: Vec<_> = (0..60)
             .map(|_| {
                 let truth = random.direction() * GRAVITY;
-                // The mean of the noise, and what wanders by 0.2 mg.
+                // The mean of the noise, and a bias that wanders by 0.2 mg.
                 let noise = random.vector((NOISE * NOISE / SAMPLES as f64 + 2e-3 * 2e-3).sqrt());
                 rest(reading(&sensor, &truth) + noise, NOISE, SAMPLES)
             })
@@ -138,7 +138,7 @@ fn too_few_directions_are_counted_and_named() {
 }
 
 #[test]
-fn a_gyroscopes_offset_is_the_mean_over_all_rests() {
+fn gyroscope_offset_is_the_mean_over_all_rests() {
     let mut random = Random::new(1);
     let truth = Vector3::new(0.01, -0.02, 0.005);
     let mut squares = Vec::new();
@@ -155,13 +155,13 @@ fn a_gyroscopes_offset_is_the_mean_over_all_rests() {
         let errors = (fit.offset - truth).component_div(&fit.deviation);
         squares.push(errors.norm_squared() / 3.0);
     }
-    // The deviation is the greater of two estimates of the same, and so a little too large.
+    // The deviation is the greater of two estimates, and so a little too large.
     let mean = squares.iter().sum::<f64>() / squares.len() as f64;
     assert!((0.6..1.1).contains(&mean), "{mean}");
 }
 
 #[test]
-fn a_magnetometers_iron_is_found_as_well_as_the_fit_says() {
+fn magnetometer_fit_reports_its_deviations() {
     const NORM: f64 = 48e-6;
     // The noise for which the deviations hold: 0.5 %, ten measurements alike.
     let noise = 0.005 * 10_f64.sqrt() * NORM;

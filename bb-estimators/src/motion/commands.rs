@@ -151,7 +151,7 @@ fn planned(
     let known = bus.joints();
     let mut from: Vec<JointPoint> = Vec::with_capacity(joints.len());
     let mut limits = Vec::with_capacity(joints.len());
-    // What each actuator will check its part against.
+    // The limits against which each actuator will check its part.
     let mut declared = Vec::with_capacity(joints.len());
     for name in joints {
         let joint = bus.topology().joint(name).ok_or_else(|| Fault::new(format!("there is no joint `{name}`")))?;

@@ -350,7 +350,7 @@ impl Plant {
         let velocity = self.state.point.velocity;
         let inertia = self.inertia() / STEP_S;
         let end = self.drivetrain.damping * self.damped_at();
-        // What drives it on, but for dry friction.
+        // The driving force without dry friction.
         let left = (inertia - self.drivetrain.damping + end) * velocity + effort - self.load.effort;
         let left = (left.abs() - self.drivetrain.friction).max(0.0).copysign(left);
         (left / (inertia + end) - velocity) / STEP_S

@@ -71,7 +71,7 @@ impl Drive {
     }
 }
 
-/// Place of the world of a data set on the Earth: any will do.
+/// Place of the world of a data set on the Earth, chosen freely.
 const PLACE: [f64; 3] = [48.0, 11.0, 500.0];
 
 impl DataSet {

@@ -42,7 +42,7 @@ impl Errors {
         }
         let arm = world_from_body * antenna;
         let mut jacobian = Matrix6::identity();
-        // Of θ × arm.
+        // The derivative of θ × arm.
         let turned: Matrix3<f64> = -arm.cross_matrix();
         jacobian.fixed_view_mut::<3, 3>(0, 3).copy_from(&turned);
         let covariance = jacobian * covariance * jacobian.transpose();

@@ -260,7 +260,7 @@ fn planar(
             What::Gnss(fix) => simulation.live().publish(base::gnss, time, fix),
             What::Odometry(odometry) => simulation.live().publish(base::odometry, time, odometry),
             What::Pose(pose) => simulation.live().publish(base::pose, time, pose),
-            // Of a state to start from, the heading.
+            // The heading of a state to start from.
             What::Start(Odometry { pose, .. }) => {
                 let covariance = pose.covariance.map(|of| of.fixed_view::<3, 3>(3, 3).into_owned());
                 let orientation = Orientation { world_from_body: pose.world_from_body, covariance };

@@ -35,8 +35,8 @@ pub(crate) struct Instant {
     pub(crate) is_scored: bool,
 }
 
-/// Deviations that the filter claims, of which an offset of the truth's world is more.
-const CLAIMS: f64 = 2.0;
+/// Multiple of the filter's deviations above which a constant error counts as an offset of the truth's world.
+const OFFSET_DEVIATIONS: f64 = 2.0;
 
 pub(super) struct Scoring<'a> {
     feed: &'a Feed,
@@ -84,7 +84,7 @@ impl<'a> Scoring<'a> {
     /// An estimate in the world of the truth.
     fn known(&self, estimate: &Estimate) -> Known {
         let own = estimate.origin.map(LocalFrame::new);
-        // Of the same world, exactly.
+        // An estimate in the world of the truth needs no conversion.
         let elsewhere = own.filter(|own| self.world != Some(*own));
         let moved = elsewhere.zip(self.world).map(|(own, world)| own.other_from_self(&world));
         let Some(moved) = moved else {
@@ -227,9 +227,9 @@ impl<'a> Scoring<'a> {
         let (all, left) = (rms(&Vector3::zeros()), rms(&mean));
         let claimed =
             scored().filter_map(|instant| Some(instant.known?.covariance.fixed_view::<3, 3>(0, 0).trace()));
-        // What the filter says of its own error is no other world.
+        // An error within the filter's deviations is no offset of the world.
         let claimed = claimed.sum::<f64>() / moved.len().max(1) as f64;
-        (LEFT * left < all && mean.norm_squared() > CLAIMS * CLAIMS * claimed).then(|| {
+        (LEFT * left < all && mean.norm_squared() > OFFSET_DEVIATIONS * OFFSET_DEVIATIONS * claimed).then(|| {
             format!(
                 "the world of the truth begins elsewhere than that of the filter, at its first fix: {left:.2} m of {all:.2} m are \
                  left without a constant offset; say where it begins with --origin, or use --align heading"

@@ -52,7 +52,7 @@ impl Part {
         }
     }
 
-    /// The trait that its type implements, and the constant of `bb_core::stub::Probe` that tells whether it does.
+    /// The trait that its type implements, and the constant of `bb_core::stub::Probe` that is `true` if it does.
     pub(super) fn contract(self) -> (TokenStream, [TokenStream; 2]) {
         match self {
             Self::Sensor(_) => (quote!(::bb_core::Sensor), [quote!(IS_SENSOR), quote!(IMPLEMENTS_SENSOR)]),

@@ -28,8 +28,10 @@ impl Gate {
         host.rsplit_once(':').is_some_and(|(name, port)| plain(name) && port.parse::<u16>().is_ok())
     }
 
+    /// Checks the headers of a request.
+    ///
     /// # Errors
-    /// Why a request with these headers is refused.
+    /// The reason for which the request is refused.
     pub(crate) fn check(&self, headers: &HeaderMap) -> Result<(), (StatusCode, &'static str)> {
         let mut hosts = headers.get_all(HOST).iter();
         let (host, second) = (hosts.next(), hosts.next());

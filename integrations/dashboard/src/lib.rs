@@ -24,13 +24,13 @@
 //! Or as a line of the robot, which prints the address when it starts: `bridge dashboard: Dashboard(port = 8912);`.
 //!
 //! Nothing of the robot waits for a viewer. Without one, the robot's threads hand over its events alone, which are rare. With viewers, one
-//! thread takes the newest message of each path that somebody watches, at most sixteen times a second, and one thread speaks to the browsers.
+//! thread takes the newest message of each watched path, at most sixteen times a second, and one thread speaks to the browsers.
 //!
 //! # Who may do what
 //!
 //! It listens on the loopback device. A page or a program without the token of the printed address may read, and disarm the robot; with
 //! [`DashboardOptions::read`]` = "token"`, only disarm it. With the token it has the rights of [`DashboardOptions::rights`]. Their calls
-//! have a name, such as `page 3`, in the events and the journal of the robot, and whatever they hold refuses to act once the connection ends.
+//! have a name, such as `page 3`, in the events and the journal of the robot, and everything obtained through a connection refuses to act once it ends.
 //! Requests by another host name or from another site's pages are refused. `book/src/how-to/live.md` has the protocol, and what is refused and why.
 
 mod bridge;

@@ -10,13 +10,13 @@ use std::path::{Component, Path, PathBuf};
 /// The longest file that is served.
 const LONGEST: u64 = 16 * 1024 * 1024;
 
-/// The files that are served, by the name that the robot gives each. What is served is only what was read here: no request names a file.
+/// The served files by their names in the declaration. They are read once: no request names a path.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Meshes(BTreeMap<&'static str, Bytes>);
 
 impl Meshes {
-    /// Reads those of `robots` that are in `folder`. One that is missing, too long, or not named `.stl` is
-    /// logged, and its place is marked in the page.
+    /// Reads the meshes of `robots` from `folder`. One that is missing, too long, or not named `.stl` is logged, and marked in
+    /// the page.
     ///
     /// # Errors
     /// `folder` is neither empty nor a folder.
@@ -38,7 +38,7 @@ impl Meshes {
         Ok(Self(read))
     }
 
-    /// The file of that number, from 0.
+    /// The file with this number, from 0.
     pub(crate) fn get(&self, number: usize) -> Option<Bytes> {
         self.0.values().nth(number).cloned()
     }
@@ -51,7 +51,7 @@ impl Meshes {
     }
 }
 
-/// The files that the links of a robot name for what viewers draw.
+/// The mesh files that the links of a robot declare.
 fn declared(robot: &Bus) -> impl Iterator<Item = &'static str> {
     let visuals = robot.description().links.into_iter().flat_map(|link| link.visuals);
     visuals.filter_map(|visual| match visual.geometry {
@@ -62,7 +62,7 @@ fn declared(robot: &Bus) -> impl Iterator<Item = &'static str> {
 
 fn contents(folder: &Path, file: &str) -> Result<Bytes, String> {
     if !Path::new(file).extension().is_some_and(|extension| extension.eq_ignore_ascii_case("stl")) {
-        return Err("only STL is".to_owned());
+        return Err("it is not an STL".to_owned());
     }
     let path = found(folder, file).ok_or("it is not in the folder")?;
     let mut bytes = Vec::new();
@@ -74,8 +74,8 @@ fn contents(folder: &Path, file: &str) -> Result<Bytes, String> {
     }
 }
 
-/// The place of a file in the folder: `package://rover/meshes/body.stl` is `meshes/body.stl`, or else `body.stl`. `None` if it is not in
-/// it, also where a link of the file system leads out.
+/// The place of a file in the folder: `package://rover/meshes/body.stl` is `meshes/body.stl`, or else `body.stl`. `None` if it is not in the
+/// folder, which symbolic links do not extend.
 fn found(folder: &Path, file: &str) -> Option<PathBuf> {
     let below = match file.strip_prefix("package://") {
         Some(in_package) => in_package.split_once('/')?.1,
@@ -124,7 +124,7 @@ mod tests {
         {
             assert_eq!(read(file), missing, "{file}");
         }
-        assert_eq!(read("notes.txt"), Err("only STL is".to_owned()));
+        assert_eq!(read("notes.txt"), Err("it is not an STL".to_owned()));
         std::fs::remove_dir_all(root)?;
         Ok(())
     }

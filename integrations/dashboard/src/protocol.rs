@@ -44,7 +44,7 @@ pub(crate) enum Ask {
     Publish { path: String, payload: String },
 }
 
-/// A message that is none of ours, with the number of the request if it has one.
+/// A malformed message, with the number of the request if it has one.
 #[derive(Debug, PartialEq)]
 pub(crate) struct Malformed {
     pub(crate) id: Option<u64>,
@@ -52,6 +52,8 @@ pub(crate) struct Malformed {
 }
 
 impl Hello {
+    /// Parses the first message of a client.
+    ///
     /// # Errors
     /// It is not a `hello` of this version.
     pub(crate) fn parse(text: &str) -> Result<Self, String> {
@@ -73,8 +75,10 @@ impl Hello {
 }
 
 impl Request {
+    /// Parses a request.
+    ///
     /// # Errors
-    /// It is no request.
+    /// It is not a request.
     pub(crate) fn parse(text: &str) -> Result<Self, Malformed> {
         let mut object = object(text).map_err(|error| Malformed { id: None, error })?;
         let id = object.get("id").and_then(Value::as_u64);

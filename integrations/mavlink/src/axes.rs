@@ -85,7 +85,7 @@ mod tests {
             prop_assert!(ned_from_frd(&world_from_body(&rotation)).angle_to(&rotation) < 1e-7);
         }
 
-        /// Body vectors are the same in the world, whatever axes they are computed in.
+        /// Body vectors are the same in the world in both conventions of axes.
         #[test]
         fn rotations_agree_with_vectors(ned_from_frd in rotations(), frd in vectors()) {
             let by_ned = swap_world(&(ned_from_frd * frd));

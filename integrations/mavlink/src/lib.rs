@@ -41,7 +41,7 @@
 //! A driver returns an error, which the robot publishes at `fault` before it restarts the driver, if
 //!
 //! - no message, or none with a value, has come for `timeout`; the error says since when, and whether heartbeats still come,
-//! - the flight controller's clock goes back or jumps ahead by more than a second, stands still for `timeout`, or its stamps stay
+//! - the flight controller's clock goes back or jumps ahead by more than a second, does not advance for `timeout`, or its stamps stay
 //!   more than a second behind for two seconds,
 //! - the link fails, because the serial device was unplugged, for example.
 //!

@@ -9,7 +9,7 @@ mod reading;
 mod shared;
 
 pub(crate) use inbox::{Inbox, Received};
-pub(crate) use shared::Voice;
+pub(crate) use shared::Identity;
 
 use crate::transport;
 use crate::{Address, AddressError};
@@ -131,19 +131,23 @@ impl Link {
         self.shared.listen(peer, ids, capacity)
     }
 
-    /// Registers a sender with these ids, which sends heartbeats until the voice is dropped.
-    pub(crate) fn voice(&self, system_id: u8, component_id: u8) -> Arc<Voice> {
-        self.shared.voice((system_id, component_id))
+    /// Registers a sender with these ids, which sends heartbeats until the identity is dropped.
+    pub(crate) fn identity(&self, system_id: u8, component_id: u8) -> Arc<Identity> {
+        self.shared.identity((system_id, component_id))
     }
 
     /// Sends a message. Returns `false` if no receiver is known.
     ///
+    /// Checks that the link works.
+    ///
     /// # Errors
     /// The link has failed.
-    pub(crate) fn send(&self, voice: &Voice, message: &MavMessage) -> Result<bool, LinkError> {
-        self.shared.send(voice, message)
+    pub(crate) fn send(&self, identity: &Identity, message: &MavMessage) -> Result<bool, LinkError> {
+        self.shared.send(identity, message)
     }
 
+    /// Checks that the link works.
+    ///
     /// # Errors
     /// The link has failed.
     pub(crate) fn check(&self) -> Result<(), LinkError> {

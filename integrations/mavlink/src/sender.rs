@@ -9,7 +9,7 @@ mod text;
 
 pub use options::MavlinkSenderOptions;
 
-use crate::link::{Link, Voice};
+use crate::link::{Identity, Link};
 use bb_core::time::Clock;
 use bb_core::{Fault, MonotonicTime, Overflow, Payload, Reading, Service, ServiceContext, Subscription};
 use bb_estimators::navigation::state_estimator::FlightEvents;
@@ -48,7 +48,7 @@ pub struct MavlinkSent {
 #[derive(Debug)]
 pub struct MavlinkSender {
     link: Link,
-    voice: Arc<Voice>,
+    identity: Arc<Identity>,
     source: Source,
     texts: Option<Subscription<FlightEvents>>,
     kind: Kind,
@@ -75,7 +75,7 @@ impl Service for MavlinkSender {
         };
         let link = Link::open(&options.link)?;
         Ok(Self {
-            voice: link.voice(options.system_id, options.component_id),
+            identity: link.identity(options.system_id, options.component_id),
             link,
             source,
             texts,
@@ -137,7 +137,7 @@ impl MavlinkSender {
     }
 
     fn send(&mut self, message: &MavMessage) -> Result<(), Fault> {
-        let is_heard = self.link.send(&self.voice, message)?;
+        let is_heard = self.link.send(&self.identity, message)?;
         self.sent.unheard += u64::from(!is_heard);
         Ok(())
     }

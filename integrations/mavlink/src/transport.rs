@@ -114,7 +114,7 @@ impl Reader {
     }
 }
 
-/// A timeout; or, for a connected socket, nobody listens at the other side yet.
+/// A timeout; or, for a connected socket, a peer that does not listen yet.
 fn is_passing(error: &io::Error) -> bool {
     use io::ErrorKind::{ConnectionRefused, ConnectionReset, Interrupted, TimedOut, WouldBlock};
     matches!(error.kind(), WouldBlock | TimedOut | Interrupted | ConnectionRefused | ConnectionReset)

@@ -27,8 +27,8 @@ impl Clock {
         Self { wall_minus_monotonic_ns: wall.wrapping_sub(first.monotonic_time.as_nanos()), shift_ns: 0 }
     }
 
-    /// The log time of a message, by its monotonic time: the times of a recording are those of one clock, whatever the machine's date
-    /// was set to in between.
+    /// The log time of a message, by its monotonic time: the times of a recording are those of one clock, also if the machine's date
+    /// was set in between.
     pub(crate) fn logged(&self, stamp: &Stamp) -> WallTime {
         let monotonic = stamp.monotonic_time.as_nanos();
         WallTime::from_unix_nanos(monotonic.wrapping_add(self.wall_minus_monotonic_ns))

@@ -459,8 +459,8 @@ impl From<io::Error> for WriteFault {
     }
 }
 
-/// Refuses two types with one name before the run rather than at the first message, when nobody watches a recorder's
-/// errors.
+/// Refuses two types with one name before the run rather than at the first message, when a recorder's errors are
+/// easily missed.
 fn take_names(names: &mut Names, subscription: &DynamicSubscription) -> Result<(), RecordingErrorKind> {
     for (path, schemas) in subscription.schemas() {
         schemas.iter().try_for_each(|schema| names.take(path, schema))?;

@@ -127,7 +127,7 @@ impl BagWriter {
     /// Writing failed.
     pub fn finish(mut self) -> Result<u64, RecordingError> {
         let (path, messages) = (self.path, self.messages);
-        // What it has of the messages is not known: it was never flushed.
+        // The number of messages in it is unknown: it was never flushed.
         let fail = |error| RecordingError::new(&path, write_error(0, error));
         self.writer.finish().map_err(fail)?;
         self.writer.into_inner().flush().map_err(|cause| fail(cause.into()))?;

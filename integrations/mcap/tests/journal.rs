@@ -81,7 +81,7 @@ fn outputs(subscription: &Subscription<Number>) -> Outputs {
 #[test]
 fn a_recorded_journal_runs_again() -> Result<(), Box<dyn Error>> {
     let file = std::env::temp_dir().join(format!("bb-journal-{}.mcap", std::process::id()));
-    // What a killed run has left behind.
+    // The file of a killed run.
     let _ = std::fs::remove_file(&file);
     let room = Overflow::DropOldest { capacity: 100_000 };
     let mut builder = Counting::builder();

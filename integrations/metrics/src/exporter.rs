@@ -35,7 +35,7 @@ impl<R: Robot> Exporter<R> {
     /// Answers `GET /metrics` at `address`, `"127.0.0.1:9464"` say, on a thread of its own, until the server is
     /// dropped. With port 0 the system chooses one; [`Server::address`] tells which.
     ///
-    /// There is no encryption and no password: whoever reaches the address reads the counts. At the loopback device, requests by another
+    /// There is no encryption and no password: everyone who reaches the address can read the counts. At the loopback device, requests by another
     /// host name than its own are refused, so that pages of other sites cannot read them in a browser.
     ///
     /// # Errors

@@ -1,7 +1,7 @@
 //! The threads that answer requests.
 //!
 //! Each connection has a thread for two seconds at most. When [`MOST`] are open, a further one closes the oldest: clients that
-//! send nothing keep nobody waiting, and cost no more than these threads.
+//! send nothing delay no other client, and cost no more than these threads.
 
 use crate::request;
 use std::collections::VecDeque;

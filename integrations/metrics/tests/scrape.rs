@@ -7,7 +7,7 @@ use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::sync::{Mutex, PoisonError};
 
-/// Forwards its input; fails, or reports divergence, when told to.
+/// Estimator that forwards its input, fails, or reports divergence, by the value of the input.
 struct Judge(SafetyLink);
 
 /// Estimator that is left out.

@@ -96,7 +96,7 @@ fn write(file: &Path, title: &str, rows: &[Row<'_>], panel_size: (u32, u32)) -> 
 fn draw<B: DrawingBackend>(root: DrawingArea<B, Shift>, title: &str, rows: &[Row<'_>]) -> Drawn<B> {
     root.fill(&WHITE)?;
     let mut rest = root.titled(title, ("sans-serif", 24))?;
-    // The same for all of a column, so that their time axes have equal length.
+    // One width for all panels of a column, so that their time axes have equal length.
     let legend = |column: usize| {
         let frames = rows.iter().filter_map(|row| row.frames.get(column).filter(|_| row.frames.len() > 1));
         frames.map(|frame| frame.legend_width(&rest)).max().unwrap_or(0)
@@ -194,7 +194,7 @@ mod tests {
         svg
     }
 
-    /// A spike of a thousand leaves the rest its height, and is told; without being asked for, nothing is cut.
+    /// A spike is cut, with a label, if the panel asks for it, so that the other values remain visible.
     #[test]
     fn a_spike_does_not_flatten_the_axis() {
         let value = |index: i32| if (50..52).contains(&index) { 1000.0 } else { f64::from(index % 7) };
@@ -204,7 +204,7 @@ mod tests {
             let data = numbers(svg, "polyline", "points").into_iter().filter(|points| points.len() > 100);
             let mut ys: Vec<f64> = data.flat_map(|points| points.into_iter().skip(1).step_by(2)).collect();
             ys.sort_by(f64::total_cmp);
-            // Of all but the spike.
+            // The range of all values but the spike.
             ys[ys.len() - 1] - ys[ys.len() / 20]
         };
         let cut = drawn(Part::Panel(panel().cut_spikes()), "cut");

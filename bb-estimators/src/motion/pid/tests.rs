@@ -89,7 +89,7 @@ proptest! {
         for (setpoint, measurement, step_s) in steps {
             let terms = pid.update(setpoint, measurement, step_s);
             prop_assert!((minimum..=maximum).contains(&terms.output), "{:?}", terms);
-            // What the other terms do not take of the output's range.
+            // The part of the output's range that the other terms leave.
             let others = terms.proportional + terms.derivative;
             let most = (maximum - others).max(others - minimum).max(0.0) + 1e-9 * (1.0 + others.abs());
             prop_assert!(terms.integral.abs() <= most, "{:?}", terms);

@@ -44,7 +44,7 @@ const PLAIN: Drivetrain = Drivetrain {
 };
 
 proptest! {
-    /// Whatever it is told, and whenever.
+    /// Random commands at random times.
     #[test]
     fn limits_hold_under_random_commands(
         drivetrain in drivetrains(), commands in proptest::collection::vec((goals(), 1_i64..800), 1..12),

@@ -49,7 +49,7 @@ impl Topics {
         let gnss = choose(FIX, &options.gnss_topic, "--gnss-topic")?;
         let odometry = choose(ODOMETRY, &options.odometry_topic, "--odometry-topic")?;
         let pose = choose(POSE_WITH_COVARIANCE, &options.pose_topic, "--pose-topic")?;
-        // A magnetometer that nobody has calibrated makes a filter worse: only a named one is used.
+        // An uncalibrated magnetometer makes a filter worse: only a named one is used.
         let magnetic_field = match options.mag_topic.as_deref() {
             Some(name) => only(bag, MAGNETIC_FIELD, Some(name), "--mag-topic", &[])?,
             None => None,

@@ -1,10 +1,10 @@
-//! Simulated sensors of a rover that drives in a circle, with troubles that come again in every [`CYCLE`].
+//! Simulated sensors of a rover that drives in a circle, with faults that repeat in every [`CYCLE`].
 
 use bb_core::nalgebra::Vector3;
 use bb_core::prelude::*;
 use std::ops::Range as Span;
 
-/// After this time, everything happens again.
+/// Period of the faults.
 pub(crate) const CYCLE: Duration = Duration::from_secs(40);
 
 /// The wheels' encoders say nothing.
@@ -22,7 +22,7 @@ fn seconds(now: MonotonicTime) -> f64 {
     now.seconds_since(MonotonicTime::ZERO)
 }
 
-/// Options of the sensors that feel how the rover drives.
+/// Options of the sensors that measure the motion of the rover.
 #[derive(Clone, Debug, Options)]
 pub(crate) struct Drive {
     /// Speed. Unit: m/s.
@@ -33,7 +33,7 @@ pub(crate) struct Drive {
     pub(crate) radius: f64,
 }
 
-/// An IMU without a bias, whose numbers tremble.
+/// An IMU without a bias, with a periodic disturbance.
 #[derive(Debug)]
 pub(crate) struct Gyroscope(Drive);
 
@@ -49,9 +49,11 @@ impl Sensor for Gyroscope {
         if is_in(&UNPLUGGED, now) {
             return Ok(Reading::nothing());
         }
-        let (speed, tremble) = (self.0.speed, (seconds(now) * 31.0).sin() * 0.02);
-        let angular_velocity = Vector3::new(tremble, -tremble / 2.0, speed / self.0.radius + tremble / 4.0);
-        let linear_acceleration = Vector3::new(tremble, speed * speed / self.0.radius, 9.81 + 4.0 * tremble);
+        let (speed, disturbance) = (self.0.speed, (seconds(now) * 31.0).sin() * 0.02);
+        let angular_velocity =
+            Vector3::new(disturbance, -disturbance / 2.0, speed / self.0.radius + disturbance / 4.0);
+        let linear_acceleration =
+            Vector3::new(disturbance, speed * speed / self.0.radius, 9.81 + 4.0 * disturbance);
         Ok(Reading::now(Imu::new(angular_velocity, linear_acceleration)))
     }
 

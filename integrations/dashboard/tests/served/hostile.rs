@@ -1,4 +1,4 @@
-//! Clients that send garbage, or nothing, or too much: the next one is served.
+//! Clients that send garbage, nothing or too much, beside which others are served.
 
 use crate::client::{Client, open, stream, token};
 use crate::protocol::options;
@@ -13,7 +13,7 @@ use std::time::Instant;
 use tungstenite::Message;
 
 #[test]
-fn a_wrong_token_ends_the_connection_at_the_third_time() -> Result<(), Box<dyn Error>> {
+fn the_third_wrong_token_closes_the_connection() -> Result<(), Box<dyn Error>> {
     let simulation = Cart::builder().simulate()?;
     let dashboard = Dashboard::serve(&simulation, options())?;
     let mut right = token(&dashboard);
@@ -30,7 +30,7 @@ fn a_wrong_token_ends_the_connection_at_the_third_time() -> Result<(), Box<dyn E
 }
 
 #[test]
-fn garbage_ends_its_connection_alone() -> Result<(), Box<dyn Error>> {
+fn garbage_closes_only_its_own_connection() -> Result<(), Box<dyn Error>> {
     let simulation = Cart::builder().simulate()?;
     let dashboard = Dashboard::serve(&simulation, options())?;
     let mut watching = Client::reading(&dashboard)?;
@@ -41,7 +41,7 @@ fn garbage_ends_its_connection_alone() -> Result<(), Box<dyn Error>> {
         socket.send(Message::text(first))?;
         let end = (0..4)
             .find_map(|_| socket.read().map_or_else(|_| Some(()), |message| message.is_close().then_some(())));
-        assert!(end.is_some(), "{:.20} is answered by an end", first);
+        assert!(end.is_some(), "{:.20} closes the connection", first);
     }
     for then in
         [Message::text("{"), Message::text("{}"), Message::binary(vec![1, 2, 3]), Message::text(long.clone())]
@@ -52,7 +52,7 @@ fn garbage_ends_its_connection_alone() -> Result<(), Box<dyn Error>> {
         let _ = socket.send(then);
         while socket.read().is_ok_and(|message| !message.is_close()) {}
     }
-    // A frame of 1 GiB is announced, and none follows.
+    // The header of a frame of 1 GiB without its payload.
     let mut socket = open(dashboard.address())?;
     socket.get_mut().write_all(&[0x81, 0xff, 0, 0, 0, 0, 0x40, 0, 0, 0, 1, 2, 3, 4])?;
     let mut rest = Vec::new();
@@ -71,9 +71,9 @@ fn garbage_ends_its_connection_alone() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Silent connections are closed to make room, and readers for those who come after them; nobody with the token is.
+/// The oldest silent connections and readers are closed to make room, but never a client with the token.
 #[test]
-fn however_many_connect_the_next_is_served() -> Result<(), Box<dyn Error>> {
+fn new_clients_are_served_beside_300_silent_ones() -> Result<(), Box<dyn Error>> {
     let simulation = Cart::builder().simulate()?;
     let dashboard = Dashboard::serve(&simulation, options())?;
     let mut steering = Client::steering(&dashboard)?;
@@ -97,7 +97,7 @@ fn however_many_connect_the_next_is_served() -> Result<(), Box<dyn Error>> {
     )?;
     assert!(page.0.starts_with("HTTP/1.1 200"));
     drop((silent, readers));
-    // Once all places are those of writers, a further viewer is refused rather than one of them closed.
+    // If all places are taken by writers, a further viewer is refused.
     let mut writers: Vec<Client> = (0..15).map(|_| Client::steering(&dashboard)).collect::<Result<_, _>>()?;
     assert!(Client::reading(&dashboard).is_err());
     for writer in &mut writers {
@@ -107,7 +107,7 @@ fn however_many_connect_the_next_is_served() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// A viewer that reads nothing loses its connection, and nobody else anything.
+/// Requests beyond the limit of one viewer are refused.
 #[test]
 fn requests_of_one_viewer_are_bounded() -> Result<(), Box<dyn Error>> {
     let simulation = Cart::builder().simulate()?;
@@ -125,7 +125,7 @@ fn requests_of_one_viewer_are_bounded() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The variable with the address for a viewer in a process of its own.
+/// Environment variable with the address for the viewer in another process.
 const VIEWER: &str = "BB_TEST_VIEWER";
 
 /// A long text.
@@ -134,10 +134,10 @@ struct Long {
     text: String,
 }
 
-/// Viewer that the test below stops and kills: it does nothing without the address.
+/// Viewer that the test below stops and kills; does nothing without the address.
 #[test]
-#[ignore = "is run by another test, as a process of its own"]
-fn a_viewer_in_a_process_of_its_own() -> Result<(), Box<dyn Error>> {
+#[ignore = "run by another test in a process of its own"]
+fn viewer_in_another_process() -> Result<(), Box<dyn Error>> {
     let Ok(address) = std::env::var(VIEWER) else { return Ok(()) };
     let mut socket = open(address.parse()?)?;
     socket.send(Message::text(r#"{"op":"hello","version":1}"#))?;
@@ -163,7 +163,7 @@ fn resident() -> Result<u64, Box<dyn Error>> {
     Ok(pages.split(' ').nth(1).ok_or("it has two numbers")?.parse::<u64>()? * 4096)
 }
 
-/// The robot's callbacks, its memory and the next viewer, while a viewer is stopped with full buffers, and after it was killed.
+/// Latency of callbacks, memory and the next viewer, while a viewer is stopped with full buffers, and after it was killed.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_viewer_that_is_stopped_or_killed_costs_the_robot_nothing() -> Result<(), Box<dyn Error>> {
@@ -172,7 +172,7 @@ fn a_viewer_that_is_stopped_or_killed_costs_the_robot_nothing() -> Result<(), Bo
     let level = running.publisher::<Level>("sensor/base/level")?;
     let long = running.publisher::<Long>("own/long")?;
     let text = "x".repeat(200_000);
-    // The longest of the thousandth part of the callbacks, at 1 kHz beside 3 MB/s of text.
+    // The 99.9th percentile of the callbacks' durations, at 1 kHz beside 3 MB/s of text.
     let feed = |seconds: f64| {
         let (start, mut taken) = (Instant::now(), Vec::new());
         while start.elapsed().as_secs_f64() < seconds {
@@ -189,7 +189,7 @@ fn a_viewer_that_is_stopped_or_killed_costs_the_robot_nothing() -> Result<(), Bo
     };
     let alone = feed(2.0);
     let mut viewer = Command::new(std::env::current_exe()?)
-        .args(["--ignored", "--exact", "hostile::a_viewer_in_a_process_of_its_own", "--nocapture"])
+        .args(["--ignored", "--exact", "hostile::viewer_in_another_process", "--nocapture"])
         .env(VIEWER, dashboard.address().to_string())
         .stdout(Stdio::piped())
         .spawn()?;

@@ -87,7 +87,7 @@ fn a_writer_has_the_rights_of_the_options() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// A command that somebody has started runs until it ends, or until anybody else cancels it.
+/// A command runs until it ends, or until any client cancels it.
 #[test]
 fn commands_are_started_awaited_and_cancelled_by_another() -> Result<(), Box<dyn Error>> {
     let mut simulation = Cart::builder().simulate()?;
@@ -143,7 +143,7 @@ fn watched_paths_give_their_newest_message_and_others_none() -> Result<(), Box<d
     Ok(())
 }
 
-/// Texts of a component are shown as text, however long they are and whatever is in them.
+/// Texts of a component are shown as text, also long ones and those with markup.
 #[test]
 fn texts_of_the_robot_arrive_as_they_are() -> Result<(), Box<dyn Error>> {
     let mut simulation = Cart::builder().simulate()?;

@@ -62,9 +62,9 @@ fn say_hello(shared: &Shared) {
         // The version of the protocol, which the specification fixes.
         mavlink_version: 3,
     });
-    for voice in shared.voices() {
+    for identity in shared.identities() {
         // A failed write is counted, and the next read reports why.
-        let _ = shared.send(&voice, &heartbeat);
+        let _ = shared.send(&identity, &heartbeat);
     }
 }
 

@@ -13,16 +13,16 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
-/// A sender: system and component, and how many frames they have sent.
+/// Identity of a sender: system, component, and the number of its next frame.
 #[derive(Debug)]
-pub(crate) struct Voice {
+pub(crate) struct Identity {
     system_id: u8,
     component_id: u8,
     sequence: Arc<AtomicU8>,
 }
 
 /// The default sender: the onboard computer of the first vehicle.
-const DEFAULT_VOICE: (u8, u8) = (1, 191);
+const DEFAULT_IDENTITY: (u8, u8) = (1, 191);
 
 #[derive(Debug)]
 pub(crate) struct Shared {
@@ -32,9 +32,9 @@ pub(crate) struct Shared {
     state: Mutex<State>,
     /// `None` once the link has failed.
     writer: Mutex<Option<Writer>>,
-    voices: Mutex<Vec<Weak<Voice>>>,
+    identities: Mutex<Vec<Weak<Identity>>>,
     /// Used when there is no other sender; a sender that chooses its ids continues its numbering.
-    default_voice: Arc<Voice>,
+    default_identity: Arc<Identity>,
 }
 
 #[derive(Debug, Default)]
@@ -60,8 +60,8 @@ impl Shared {
             is_stopping: AtomicBool::new(false),
             state: Mutex::default(),
             writer: Mutex::new(Some(writer)),
-            voices: Mutex::default(),
-            default_voice: Arc::new(Voice::new(DEFAULT_VOICE, Arc::default())),
+            identities: Mutex::default(),
+            default_identity: Arc::new(Identity::new(DEFAULT_IDENTITY, Arc::default())),
         }
     }
 
@@ -92,37 +92,37 @@ impl Shared {
         inbox
     }
 
-    /// A voice with these ids: the existing one, if there is one.
-    pub(super) fn voice(&self, ids: (u8, u8)) -> Arc<Voice> {
-        let mut voices = self.voices.lock().unwrap_or_else(PoisonError::into_inner);
-        voices.retain(|voice| voice.strong_count() > 0);
-        if let Some(voice) = voices.iter().filter_map(Weak::upgrade).find(|voice| voice.ids() == ids) {
-            return voice;
+    /// The identity with these ids, which users share.
+    pub(super) fn identity(&self, ids: (u8, u8)) -> Arc<Identity> {
+        let mut identities = self.identities.lock().unwrap_or_else(PoisonError::into_inner);
+        identities.retain(|identity| identity.strong_count() > 0);
+        if let Some(identity) = identities.iter().filter_map(Weak::upgrade).find(|identity| identity.ids() == ids) {
+            return identity;
         }
-        let is_default = ids == DEFAULT_VOICE;
-        let sequence = if is_default { Arc::clone(&self.default_voice.sequence) } else { Arc::default() };
-        let voice = Arc::new(Voice::new(ids, sequence));
-        voices.push(Arc::downgrade(&voice));
-        voice
+        let is_default = ids == DEFAULT_IDENTITY;
+        let sequence = if is_default { Arc::clone(&self.default_identity.sequence) } else { Arc::default() };
+        let identity = Arc::new(Identity::new(ids, sequence));
+        identities.push(Arc::downgrade(&identity));
+        identity
     }
 
-    fn living(&self) -> Vec<Arc<Voice>> {
-        let voices = self.voices.lock().unwrap_or_else(PoisonError::into_inner);
-        voices.iter().filter_map(Weak::upgrade).collect()
+    fn living(&self) -> Vec<Arc<Identity>> {
+        let identities = self.identities.lock().unwrap_or_else(PoisonError::into_inner);
+        identities.iter().filter_map(Weak::upgrade).collect()
     }
 
-    /// All voices that send heartbeats: at least one, so that the peer learns of us.
-    pub(super) fn voices(&self) -> Vec<Arc<Voice>> {
+    /// All identities that send heartbeats: at least one, so that the peer learns of us.
+    pub(super) fn identities(&self) -> Vec<Arc<Identity>> {
         let living = self.living();
-        if living.is_empty() { vec![Arc::clone(&self.default_voice)] } else { living }
+        if living.is_empty() { vec![Arc::clone(&self.default_identity)] } else { living }
     }
 
     /// Sends a message. Returns `false` if no receiver is known.
-    pub(super) fn send(&self, voice: &Voice, message: &MavMessage) -> Result<bool, LinkError> {
+    pub(super) fn send(&self, identity: &Identity, message: &MavMessage) -> Result<bool, LinkError> {
         let mut writer = self.writer.lock().unwrap_or_else(PoisonError::into_inner);
         let Some(open) = writer.as_mut() else { return Err(self.failure()) };
         let mut frame = MAVLinkV2MessageRaw::new();
-        frame.serialize_message(voice.header(), message);
+        frame.serialize_message(identity.header(), message);
         let sent = open.write(frame.raw_bytes());
         drop(writer);
         let mut state = self.state();
@@ -133,7 +133,8 @@ impl Shared {
         sent.map_err(|error| LinkError::Failed { address: self.address.clone(), source: Arc::new(error) })
     }
 
-    /// Returns whether its sender is to be answered: it sent a message, and a driver listens to it, or there is no driver.
+    /// Delivers a message to the inboxes. Returns whether its sender becomes the peer: if a driver listens to it, or there is no
+    /// driver.
     pub(super) fn deliver(&self, item: Item, arrival: MonotonicTime) -> bool {
         let mut state = self.state();
         match item {
@@ -180,7 +181,7 @@ impl Shared {
     }
 
     pub(super) fn fail(&self, failure: LinkError) {
-        // Both ends are closed before users are told, since they may then open the device again.
+        // Both ends are closed before users learn of it, since they may then open the device again.
         *self.writer.lock().unwrap_or_else(PoisonError::into_inner) = None;
         let mut state = self.state();
         for inbox in state.inboxes.iter().filter_map(Weak::upgrade) {
@@ -229,7 +230,7 @@ impl State {
     }
 }
 
-impl Voice {
+impl Identity {
     fn new((system_id, component_id): (u8, u8), sequence: Arc<AtomicU8>) -> Self {
         Self { system_id, component_id, sequence }
     }

@@ -99,7 +99,7 @@ fn a_port_can_be_opened_again_at_once() {
     let free = UdpSocket::bind("127.0.0.1:0").and_then(|socket| socket.local_addr()).expect("a port is free");
     for _ in 0..5 {
         let link = Link::open(&format!("udpin:{free}")).expect("it is closed when it is dropped");
-        assert_eq!(link.send(&link.voice(1, 191), &time(1)).ok(), Some(false), "nobody is known");
+        assert_eq!(link.send(&link.identity(1, 191), &time(1)).ok(), Some(false), "nobody is known");
     }
 }
 
@@ -122,10 +122,10 @@ fn a_link_that_waits_answers_the_one_that_drivers_listen_to() {
         std::thread::sleep(Duration::from_millis(1));
     }
     assert_eq!((link.statistics().messages, link.statistics().bytes_skipped), (2, 5));
-    let voice = link.voice(3, 4);
+    let identity = link.identity(3, 4);
     let mut buffer = [0; 300];
     loop {
-        let _ = link.send(&voice, &time(8));
+        let _ = link.send(&identity, &time(8));
         let length = other.socket.recv(&mut buffer).expect("it answers");
         let (header, message) =
             MavlinkReader::new(&buffer[..length]).read_any_message::<MavMessage>().expect("it is a frame");
@@ -196,25 +196,25 @@ fn noise_other_dialects_and_gaps_are_counted() {
 }
 
 #[test]
-fn voices_say_hello_and_number_their_frames() {
+fn identities_send_heartbeats_and_number_their_frames() {
     let (other, address) = Other::new();
     let link = Link::open(&address).expect("it opens");
-    let [one, two] = [5, 6].map(|component_id| link.voice(9, component_id));
-    assert!(Arc::ptr_eq(&one, &link.voice(9, 5)), "the same ids are the same voice");
+    let [one, two] = [5, 6].map(|component_id| link.identity(9, component_id));
+    assert!(Arc::ptr_eq(&one, &link.identity(9, 5)), "the same ids are the same identity");
     for _ in 0..3 {
-        for voice in [&one, &two] {
-            link.send(voice, &time(1)).expect("it is open");
+        for identity in [&one, &two] {
+            link.send(identity, &time(1)).expect("it is open");
         }
     }
     let mut numbers: HashMap<u8, Vec<u8>> = HashMap::new();
-    let mut hellos = 0;
-    while numbers.values().map(Vec::len).sum::<usize>() < 6 || hellos < 2 {
+    let mut heartbeats = 0;
+    while numbers.values().map(Vec::len).sum::<usize>() < 6 || heartbeats < 2 {
         let mut buffer = [0; 300];
-        let length = other.socket.recv(&mut buffer).expect("they speak");
+        let length = other.socket.recv(&mut buffer).expect("a frame arrives");
         let (header, message) =
             MavlinkReader::new(&buffer[..length]).read_any_message::<MavMessage>().expect("it is a frame");
         if header.system_id == 9 {
-            hellos += usize::from(matches!(message, MavMessage::HEARTBEAT(_)));
+            heartbeats += usize::from(matches!(message, MavMessage::HEARTBEAT(_)));
             numbers.entry(header.component_id).or_default().push(header.sequence);
         }
     }
@@ -227,7 +227,7 @@ fn voices_say_hello_and_number_their_frames() {
 }
 
 #[test]
-fn what_cannot_be_opened_says_why() {
+fn links_that_cannot_be_opened_name_the_reason() {
     let taken = UdpSocket::bind("127.0.0.1:0").expect("a port is free");
     let address = format!("udpin:{}", taken.local_addr().expect("it is bound"));
     let message = Link::open(&address).expect_err("it is taken").to_string();
@@ -241,22 +241,21 @@ fn what_cannot_be_opened_says_why() {
     );
 }
 
-/// A voice that is dropped says nothing more: beside another one, nobody hears that of the onboard computer; without one, it is there
-/// again, and its numbers go on.
+/// An identity sends heartbeats until it is dropped. The default one sends them if there is no other, and continues its numbers.
 #[test]
-fn a_voice_that_is_dropped_says_nothing_more() {
+fn dropped_identities_send_no_heartbeats() {
     let (_other, address) = Other::new();
     let link = Link::open(&address).expect("it opens");
-    let ids = || link.shared.voices().iter().map(|voice| voice.header().component_id).collect::<Vec<_>>();
+    let ids = || link.shared.identities().iter().map(|identity| identity.header().component_id).collect::<Vec<_>>();
     assert_eq!(ids(), [191], "the default");
-    let odometry = link.voice(1, 197);
-    let onboard = link.voice(1, 191);
-    assert!(Arc::ptr_eq(&onboard, &link.voice(1, 191)), "one for all who choose it");
+    let odometry = link.identity(1, 197);
+    let onboard = link.identity(1, 191);
+    assert!(Arc::ptr_eq(&onboard, &link.identity(1, 191)), "shared by those that choose it");
     assert_eq!(ids(), [197, 191]);
     let before = onboard.header().sequence;
     drop(onboard);
     assert_eq!(ids(), [197]);
     drop(odometry);
     assert_eq!(ids(), [191]);
-    assert!(link.shared.voices()[0].header().sequence > before, "its numbers go on");
+    assert!(link.shared.identities()[0].header().sequence > before, "its numbers continue");
 }

@@ -63,7 +63,7 @@ impl OdometryFrame {
         frame
     }
 
-    /// `None` if a value is not finite.
+    /// The message for a flight estimate. `None` if a value is not finite.
     pub(super) fn of_flight(&mut self, estimate: &FlightEstimate, wall: WallTime) -> Option<ODOMETRY_DATA> {
         let position = &estimate.position;
         let here = Geodetic {
@@ -74,11 +74,11 @@ impl OdometryFrame {
         let is_on_earth = [here.latitude, here.longitude, here.height].iter().all(|value| value.is_finite());
         is_on_earth.then_some(())?;
         let origin = self.origin(&here, estimate);
-        // Horizontal there is not horizontal here.
+        // The horizontal planes of the two places differ.
         let origin_from_here = LocalFrame::new(here).other_from_self(&origin).rotation;
         let world_from_body = origin_from_here * estimate.world_from_body;
         let body_from_here = estimate.world_from_body.inverse();
-        // Of the position in the world, of the orientation as a small rotation of the body.
+        // The position is in the world; the orientation is a small rotation of the body.
         let covariance = turned(
             &estimate.covariance,
             origin_from_here.to_rotation_matrix().matrix(),
@@ -96,10 +96,10 @@ impl OdometryFrame {
         .message(wall, self.frame_id, MavEstimatorType::MAV_ESTIMATOR_TYPE_VIO)
     }
 
-    /// `None` if a value is not finite.
+    /// The message for an odometry. `None` if a value is not finite.
     pub(super) fn of_odometry(&self, estimate: &Odometry, wall: WallTime) -> Option<ODOMETRY_DATA> {
         let Odometry { pose, twist } = estimate;
-        // Of the orientation, about the axes of the world; MAVLink has those of the body.
+        // The orientation is about the axes of the world; MAVLink has those of the body.
         let body_from_world = pose.world_from_body.inverse().to_rotation_matrix();
         let in_body = |covariance| turned(&covariance, &Matrix3::identity(), body_from_world.matrix());
         Motion {
@@ -174,7 +174,7 @@ impl Motion {
     }
 }
 
-/// Row by row. An unknown one begins with NaN.
+/// The upper triangle of a covariance, row by row. An unknown one begins with NaN.
 fn upper_triangle(covariance: Option<Matrix6<f64>>) -> [f32; 21] {
     let mut entries = [0.0; 21];
     let Some(covariance) = covariance else {
@@ -206,7 +206,7 @@ mod tests {
         let message = frame.of_flight(&estimate(), NOW).expect("it can be sent");
         assert!((message.x - 111.2).abs() < 0.1 && message.y.abs() < 1e-3, "{} {}", message.x, message.y);
         assert!((message.z + 47.5).abs() < 0.01, "{}", message.z);
-        // To the north-west: forward is by a right angle and a half to the left of east, half a one to the left of north.
+        // Forward points north-west: 135° to the left of east, 45° to the left of north.
         let yaw = 2.0 * message.q[3].atan2(message.q[0]).to_degrees();
         assert!((yaw.rem_euclid(360.0) - 315.0).abs() < 0.01, "{yaw}");
         // 2 m/s to the north and 1 m/s to the west are 3/√2 m/s forward and 1/√2 m/s to the right.
@@ -232,7 +232,7 @@ mod tests {
         assert_eq!(message.time_usec, 1_795_305_600_000_000);
     }
 
-    /// Ten degrees to the east on the equator, what is up there leans to the east by ten degrees.
+    /// Ten degrees to the east on the equator, the vertical leans to the east by ten degrees.
     #[test]
     fn level_far_away_is_not_level_at_the_origin() {
         let origin = Geodetic { latitude: 0.0, longitude: 0.0, height: 0.0 };
@@ -285,17 +285,17 @@ mod tests {
             (message.x.round(), message.reset_counter)
         };
         assert_eq!(sent(&mut frame, &estimate()), (0.0, 0));
-        // It flies there: the origin was right.
+        // Without a jump, the origin stays.
         let (there, _) = sent(&mut frame, &away(&estimate()));
         assert!((there - 4500.0).abs() < 20.0, "{there}");
-        // A jump back is a reset, and shows that it was not.
+        // A jump is a reset, and makes the origin provisional.
         let back = FlightEstimate { degraded: true, resets: 254, ..estimate() };
         assert_eq!(sent(&mut frame, &back), (0.0, 254));
         let moved = FlightEstimate { degraded: false, ..away(&back) };
         assert_eq!(sent(&mut frame, &moved), (0.0, 255));
-        // A small jump is a reset, and no reason to move; the count goes round.
+        // A small jump is a reset, but does not move the origin; the count wraps.
         assert_eq!(sent(&mut frame, &FlightEstimate { resets: 255, ..moved }), (0.0, 0));
-        // One that was given stays.
+        // An origin from the options stays.
         let origin = Geodetic { latitude: 0.8, longitude: 0.2, height: 0.0 };
         let mut given = OdometryFrame::new(Some(LocalFrame::new(origin)), NED);
         let (before, _) = sent(&mut given, &estimate());
@@ -304,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn the_name_of_the_frame_changes_no_number() {
+    fn ned_and_frd_differ_in_the_frame_id_only() {
         let sent =
             |frame_id| OdometryFrame::new(None, frame_id).of_flight(&estimate(), NOW).expect("it can be sent");
         let [ned, frd] = [NED, MavFrame::MAV_FRAME_LOCAL_FRD].map(sent);
@@ -326,7 +326,7 @@ mod tests {
         assert_eq!([message.vx, message.vy, message.vz], [1.0, -2.0, -3.0]);
         assert_eq!([message.rollspeed, message.pitchspeed, message.yawspeed], [0.1, -0.2, -0.3]);
         assert!(message.pose_covariance[0].is_nan());
-        // A sign for each of the two axes that is turned round.
+        // The sign changes with each of the two axes that is reversed.
         let signs = [1.0, -1.0, -1.0, 1.0, -1.0, -1.0];
         let mut at = 0;
         for row in 0..6 {
@@ -359,11 +359,11 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_finite_is_not_sent() {
+    fn non_finite_estimates_are_not_sent() {
         let mut wrong = estimate();
         wrong.velocity.x = f64::NAN;
         assert_eq!(OdometryFrame::new(None, NED).of_flight(&wrong, NOW), None);
-        // It is finite, but not in single precision.
+        // Finite, but not in single precision.
         wrong = estimate();
         wrong.velocity.x = 1e39;
         assert_eq!(OdometryFrame::new(None, NED).of_flight(&wrong, NOW), None);
@@ -371,6 +371,6 @@ mod tests {
         wrong.position.latitude_rad = f64::NAN;
         let mut frame = OdometryFrame::new(None, NED);
         assert_eq!(frame.of_flight(&wrong, NOW), None);
-        assert!(matches!(frame.origin, Origin::Unknown), "it is no origin either");
+        assert!(matches!(frame.origin, Origin::Unknown), "it does not become the origin");
     }
 }

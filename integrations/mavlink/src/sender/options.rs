@@ -39,7 +39,7 @@ pub struct MavlinkSenderOptions {
     /// `GPS_INPUT`: with a larger horizontal standard deviation, it says that there is no fix.
     #[option(default = 100.0, range = 0.1..=1e6, unit = "m")]
     pub no_fix_beyond: f64,
-    /// `GPS_INPUT`: which receiver of the flight controller it stands for.
+    /// `GPS_INPUT`: number of the receiver, as the flight controller counts them.
     #[option(default = 0)]
     pub gps_id: u8,
     /// `GPS_INPUT`: how many satellites it claims; flight controllers refuse a receiver with few.

@@ -114,7 +114,7 @@ fn spoofing(text: &STATUSTEXT_DATA) -> Option<bool> {
         let last = before.iter().rev().find(|word| !BETWEEN.contains(word));
         last.is_some_and(|word| NOT.contains(word))
     };
-    // What else is said then is about something else, as in "spoofing detected, IMU ok".
+    // Further words are about something else, as in "spoofing detected, IMU ok".
     let beside = at.saturating_sub(1)..words.len();
     let mut found = beside.filter(|i| FOUND.contains(&words[*i])).map(|i| !is_denied(&words[..i])).peekable();
     let has_ended = match found.peek() {

@@ -104,6 +104,8 @@ impl Stream {
         &self.link
     }
 
+    /// Checks that messages with values arrive.
+    ///
     /// # Errors
     /// There has been no message, or none with a value, for too long.
     pub(super) fn check_silence(&self) -> Result<(), Fault> {

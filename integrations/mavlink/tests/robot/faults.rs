@@ -1,31 +1,31 @@
 //! Streams that stop, have wrong clocks or flood, and wrong options.
 
 use super::{LONG, drone, fault_of_imu};
-use crate::other::Other;
+use crate::other::FlightController;
 use bb_core::prelude::*;
 use std::sync::atomic::Ordering;
 
 #[test]
 fn a_stream_that_stops_is_reported_and_comes_back() {
-    let other = Other::new();
+    let other = FlightController::new();
     let builder = drone(&other.address);
     let faults = builder.subscribe(system::Faults);
     let readings = builder.subscribe(drone::sensor::base::imu);
     let running = builder.start().expect("the link can be opened");
     readings.recv_timeout(LONG).expect("it measures");
 
-    other.does.is_mute.store(true, Ordering::Release);
+    other.behaviour.is_mute.store(true, Ordering::Release);
     let stopped = fault_of_imu(&faults, "no HIGHRES_IMU for ");
     assert!(stopped.contains(" s: heartbeats still come, the last "), "{stopped}");
     // The restarted driver has seen none.
     let again = fault_of_imu(&faults, "no HIGHRES_IMU in the ");
     assert!(again.contains(" s since the driver started: "), "{again}");
 
-    other.does.is_mute.store(false, Ordering::Release);
+    other.behaviour.is_mute.store(false, Ordering::Release);
     readings.drain().for_each(drop);
     readings.recv_timeout(LONG).expect("it measures again");
 
-    other.does.is_empty.store(true, Ordering::Release);
+    other.behaviour.is_empty.store(true, Ordering::Release);
     let empty = fault_of_imu(&faults, "HIGHRES_IMU arrives, but for ");
     assert!(
         empty.ends_with(
@@ -33,7 +33,7 @@ fn a_stream_that_stops_is_reported_and_comes_back() {
         ),
         "{empty}"
     );
-    other.does.is_empty.store(false, Ordering::Release);
+    other.behaviour.is_empty.store(false, Ordering::Release);
     readings.drain().for_each(drop);
     readings.recv_timeout(LONG).expect("it measures again");
     let report = running.stop();
@@ -43,9 +43,9 @@ fn a_stream_that_stops_is_reported_and_comes_back() {
 
 #[test]
 fn a_flight_controller_that_is_gone_is_distinguished_from_a_stream_that_stops() {
-    let other = Other::new();
-    other.does.is_dead.store(true, Ordering::Release);
-    other.does.is_mute.store(true, Ordering::Release);
+    let other = FlightController::new();
+    other.behaviour.is_dead.store(true, Ordering::Release);
+    other.behaviour.is_mute.store(true, Ordering::Release);
     let builder = drone(&other.address);
     let faults = builder.subscribe(system::Faults);
     let _running = builder.start().expect("the link can be opened");
@@ -55,7 +55,7 @@ fn a_flight_controller_that_is_gone_is_distinguished_from_a_stream_that_stops() 
 
 #[test]
 fn a_clock_that_jumps_is_reported_and_readings_go_on() {
-    let other = Other::new();
+    let other = FlightController::new();
     let mut builder = drone(&other.address);
     // So that nothing else restarts the driver, which would then not know the previous clock.
     builder.options(drone::sensor::base::imu).timeout = LONG;
@@ -67,7 +67,7 @@ fn a_clock_that_jumps_is_reported_and_readings_go_on() {
     {
         readings.drain().for_each(drop);
         readings.recv_timeout(LONG).expect("it measures");
-        other.does.ahead_ms.store(ahead_ms, Ordering::Release);
+        other.behaviour.ahead_ms.store(ahead_ms, Ordering::Release);
         fault_of_imu(&faults, said);
     }
     readings.drain().for_each(drop);
@@ -77,8 +77,8 @@ fn a_clock_that_jumps_is_reported_and_readings_go_on() {
 
 #[test]
 fn a_clock_that_stands_still_is_reported() {
-    let other = Other::new();
-    other.does.is_still.store(true, Ordering::Release);
+    let other = FlightController::new();
+    other.behaviour.is_still.store(true, Ordering::Release);
     let builder = drone(&other.address);
     let faults = builder.subscribe(system::Faults);
     let _running = builder.start().expect("the link can be opened");
@@ -88,8 +88,8 @@ fn a_clock_that_stands_still_is_reported() {
 
 #[test]
 fn a_flood_holds_up_neither_readings_nor_the_stop() {
-    let other = Other::new();
-    other.does.floods.store(true, Ordering::Release);
+    let other = FlightController::new();
+    other.behaviour.floods.store(true, Ordering::Release);
     let builder = drone(&other.address);
     let readings = builder.subscribe(drone::sensor::base::imu);
     let running = builder.start().expect("the link can be opened");
@@ -103,7 +103,7 @@ fn a_flood_holds_up_neither_readings_nor_the_stop() {
 
 #[test]
 fn options_that_are_wrong_say_so_at_the_start() {
-    let other = Other::new();
+    let other = FlightController::new();
     let fails = |change: &dyn Fn(&mut bb_core::Builder<super::Drone>)| {
         let mut builder = drone(&other.address);
         change(&mut builder);

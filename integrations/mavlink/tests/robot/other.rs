@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 
 /// Behaviour of the flight controller, which tests switch.
 #[derive(Debug, Default)]
-pub(crate) struct Does {
+pub(crate) struct Behaviour {
     /// Sends no `HIGHRES_IMU`.
     pub(crate) is_mute: AtomicBool,
     /// Sends `HIGHRES_IMU` that has no values.
@@ -34,26 +34,26 @@ pub(crate) struct Does {
 }
 
 /// Sends everything a hundred times a second, until it is dropped.
-pub(crate) struct Other {
+pub(crate) struct FlightController {
     pub(crate) address: String,
-    pub(crate) does: Arc<Does>,
+    pub(crate) behaviour: Arc<Behaviour>,
     pub(crate) received: Receiver<(MavHeader, MavMessage)>,
     thread: Option<JoinHandle<()>>,
 }
 
-impl Other {
+impl FlightController {
     pub(crate) fn new() -> Self {
         let socket = UdpSocket::bind("127.0.0.1:0").expect("a port is free");
         let address = format!("udpout:{}", socket.local_addr().expect("it is bound"));
         socket.set_read_timeout(Some(Duration::from_millis(10))).expect("it can be set");
         let (hears, received) = channel();
-        let does = Arc::new(Does::default());
-        let told = Arc::clone(&does);
+        let behaviour = Arc::new(Behaviour::default());
+        let shared = Arc::clone(&behaviour);
         let thread = thread::spawn(move || {
             let (start, mut sequence, mut buffer, mut peer) = (Instant::now(), 0_u8, [0; 2048], None);
-            while !told.ends.load(Ordering::Acquire) {
+            while !shared.ends.load(Ordering::Acquire) {
                 // Without a peer, or in the pauses.
-                let listens = peer.is_none() || !told.floods.load(Ordering::Acquire);
+                let listens = peer.is_none() || !shared.floods.load(Ordering::Acquire);
                 if listens && let Ok((length, from)) = socket.recv_from(&mut buffer) {
                     peer = Some(from);
                     if let Ok(frame) = MavlinkReader::new(&buffer[..length]).read_any_message() {
@@ -62,7 +62,7 @@ impl Other {
                     continue;
                 }
                 let Some(peer) = peer else { continue };
-                for message in messages(&told, start) {
+                for message in messages(&shared, start) {
                     let header = MavHeader { system_id: 1, component_id: 1, sequence };
                     sequence = sequence.wrapping_add(1);
                     let mut frame = Vec::new();
@@ -72,7 +72,7 @@ impl Other {
                 }
             }
         });
-        Self { address, does, received, thread: Some(thread) }
+        Self { address, behaviour, received, thread: Some(thread) }
     }
 
     /// The next message that fits.
@@ -82,26 +82,26 @@ impl Other {
     }
 }
 
-impl Drop for Other {
+impl Drop for FlightController {
     fn drop(&mut self) {
-        self.does.ends.store(true, Ordering::Release);
+        self.behaviour.ends.store(true, Ordering::Release);
         let _ = self.thread.take().map(JoinHandle::join);
     }
 }
 
-fn messages(does: &Does, start: Instant) -> Vec<MavMessage> {
-    let elapsed = if does.is_still.load(Ordering::Acquire) { 0 } else { start.elapsed().as_millis() as i64 };
+fn messages(behaviour: &Behaviour, start: Instant) -> Vec<MavMessage> {
+    let elapsed = if behaviour.is_still.load(Ordering::Acquire) { 0 } else { start.elapsed().as_millis() as i64 };
     // It has been running for some time.
-    let millis = (1_000_000 + elapsed + does.ahead_ms.load(Ordering::Acquire)) as u64;
+    let millis = (1_000_000 + elapsed + behaviour.ahead_ms.load(Ordering::Acquire)) as u64;
     let mut messages = vec![scaled(millis as u32), attitude(millis as u32), fix(millis * 1_000)];
-    if !does.is_mute.load(Ordering::Acquire) {
-        messages.push(high_res(millis * 1_000, !does.is_empty.load(Ordering::Acquire)));
+    if !behaviour.is_mute.load(Ordering::Acquire) {
+        messages.push(high_res(millis * 1_000, !behaviour.is_empty.load(Ordering::Acquire)));
     }
-    if does.is_spoofed.load(Ordering::Acquire) {
+    if behaviour.is_spoofed.load(Ordering::Acquire) {
         let text = "GPS 1: spoofing indicated".into();
         messages.push(MavMessage::STATUSTEXT(STATUSTEXT_DATA { text, ..Default::default() }));
     }
-    if !does.is_dead.load(Ordering::Acquire) {
+    if !behaviour.is_dead.load(Ordering::Acquire) {
         messages.push(heartbeat());
     }
     messages

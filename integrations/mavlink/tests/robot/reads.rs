@@ -1,7 +1,7 @@
 //! Messages that the drivers publish.
 
 use super::{Drone, LONG, drone};
-use crate::other::Other;
+use crate::other::FlightController;
 use bb_core::nalgebra::Vector3;
 use bb_core::prelude::*;
 use bb_estimators::navigation::state_estimator::GpsHealth;
@@ -9,7 +9,7 @@ use std::sync::atomic::Ordering;
 
 #[test]
 fn all_sensors_of_one_link_publish_in_the_axes_of_the_framework() {
-    let other = Other::new();
+    let other = FlightController::new();
     let builder = drone(&other.address);
     let imu = builder.subscribe(drone::sensor::base::imu);
     let other_imu = builder.subscribe(drone::sensor::base::other_imu);
@@ -41,24 +41,30 @@ fn all_sensors_of_one_link_publish_in_the_axes_of_the_framework() {
 
     assert_eq!(gps_health.recv_timeout(LONG).map(|report| report.health), Some(GpsHealth::Stable));
 
-    let said = heartbeats.recv_timeout(LONG).expect("it comes");
-    assert_eq!((said.vehicle_type, said.autopilot, said.custom_mode, said.is_armed), (2, 3, 5, true));
-    assert!(said.link.messages > 0 && said.link.sent > 0 && said.link.bytes_skipped == 0, "{said:?}");
+    let heartbeat = heartbeats.recv_timeout(LONG).expect("it comes");
+    assert_eq!(
+        (heartbeat.vehicle_type, heartbeat.autopilot, heartbeat.custom_mode, heartbeat.is_armed),
+        (2, 3, 5, true)
+    );
+    assert!(
+        heartbeat.link.messages > 0 && heartbeat.link.sent > 0 && heartbeat.link.bytes_skipped == 0,
+        "{heartbeat:?}"
+    );
     drop(running);
 }
 
 #[test]
-fn a_receiver_that_is_said_to_be_spoofed_is_so_for_a_while() {
-    let other = Other::new();
+fn reported_spoofing_lasts_for_spoofed_for() {
+    let other = FlightController::new();
     let mut builder = drone(&other.address);
     builder.options(drone::sensor::base::gps_health).spoofed_for = Duration::from_millis(300);
     let reports = builder.subscribe(drone::sensor::base::gps_health);
     let _running = builder.start().expect("the link can be opened");
     let becomes = |health| std::iter::from_fn(|| reports.recv_timeout(LONG)).find(|report| report.health == health);
     assert!(becomes(GpsHealth::Stable).is_some());
-    other.does.is_spoofed.store(true, Ordering::Release);
+    other.behaviour.is_spoofed.store(true, Ordering::Release);
     let from = becomes(GpsHealth::Spoofed).expect("it says so").monotonic_time;
-    other.does.is_spoofed.store(false, Ordering::Release);
+    other.behaviour.is_spoofed.store(false, Ordering::Release);
     let to = becomes(GpsHealth::Stable).expect("it is over").monotonic_time;
     assert!(to.seconds_since(from) > 0.3, "{from} {to}");
 }

@@ -1,7 +1,7 @@
 //! Messages that the bridge sends.
 
 use super::{LONG, drone, estimate, text};
-use crate::other::Other;
+use crate::other::FlightController;
 use bb_core::nalgebra::{Matrix6, UnitQuaternion, Vector3};
 use bb_core::payload::{Pose, Twist};
 use bb_core::prelude::*;
@@ -11,7 +11,7 @@ use mavlink::dialects::common::{MavFrame, MavMessage, MavSeverity};
 
 #[test]
 fn an_estimate_arrives_and_a_stale_one_does_not() {
-    let other = Other::new();
+    let other = FlightController::new();
     let builder = drone(&other.address);
     let sent = builder.subscribe(drone::bridge::position);
     let running = builder.start().expect("the link can be opened");
@@ -39,7 +39,7 @@ fn an_estimate_arrives_and_a_stale_one_does_not() {
 
 #[test]
 fn texts_arrive_with_their_severities() {
-    let other = Other::new();
+    let other = FlightController::new();
     let running = drone(&other.address).start().expect("the link can be opened");
     let now = Clock::real().now();
     let long = "x".repeat(60);
@@ -69,7 +69,7 @@ fn texts_arrive_with_their_severities() {
 /// The estimator says how often its estimate has jumped, and the origin may move on besides.
 #[test]
 fn resets_of_the_estimate_are_counted_in_its_odometry() {
-    let other = Other::new();
+    let other = FlightController::new();
     let mut builder = drone(&other.address);
     builder.options(drone::bridge::odometry).source = "sensor/base/estimate".into();
     builder.options(drone::bridge::odometry).frame = "local_frd".into();
@@ -92,7 +92,7 @@ fn resets_of_the_estimate_are_counted_in_its_odometry() {
 
 #[test]
 fn odometry_of_any_estimator_arrives_and_both_bridges_say_that_they_are_there() {
-    let other = Other::new();
+    let other = FlightController::new();
     let running = drone(&other.address).start().expect("the link can be opened");
     let pose = Pose {
         position: Vector3::new(1.0, 2.0, 3.0),

@@ -50,7 +50,7 @@ fn what_was_flushed_survives_a_kill() {
         }
         child.kill().expect("it runs on");
         child.wait().expect("it was killed");
-        // What it said before it was killed counts as well.
+        // Output before the kill counts as well.
         while let Some(more) = safe() {
             last = more;
         }

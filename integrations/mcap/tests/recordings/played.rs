@@ -102,7 +102,7 @@ fn a_recorded_sensor_may_be_as_late_as_it_was() -> Result<(), Failure> {
 fn a_recorded_estimator_emits_what_it_emitted() -> Result<(), Failure> {
     let (file, first) = recorded("played_estimator")?;
     let mut builder = Walker::builder();
-    // Its algorithm would now give something else.
+    // The algorithm would now give another result.
     builder.options(walker::sensor::base::imu::tilt).beta = 0.9;
     builder.options(walker::sensor::base::imu::other).tilt_time_constant = 0.5;
     builder.replace_sensor::<PlayedSensor<Marg>>(IMU, PlayedOptions::of(&file))?;

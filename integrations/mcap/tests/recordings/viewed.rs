@@ -226,7 +226,7 @@ fn a_name_of_its_own_keeps_a_type_apart() {
     assert_eq!(read.next().expect("there is one").expect("it is whole"), message);
 }
 
-/// A payload as large as it is told.
+/// A payload of a given size.
 #[derive(Clone, Debug, PartialEq, Payload)]
 pub(crate) struct Blob {
     bytes: Vec<u8>,
