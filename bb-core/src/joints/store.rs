@@ -35,9 +35,30 @@ impl Default for JointSettings {
     }
 }
 
-/// The states of a robot's joints, and its frames at any time. See the [module](super). Clones share the same state.
+/// The states of a robot's joints, and its frames at any time, by the rules of the [module](super). Clones share the same state.
 ///
 /// It is returned by [`Bus::joints`](crate::Bus::joints).
+///
+/// ```
+/// use bb_core::prelude::*;
+///
+/// robot! {
+///     robot Watcher;
+///     link base {
+///         joint neck: continuous { axis: z; sensor encoder: External<JointState>(); link head; }
+///     }
+/// }
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let mut simulation = Watcher::builder().simulate()?;
+/// let base_from_head = simulation.joints().between("base", "head")?;
+/// assert!(base_from_head.latest().is_err(), "no state of the neck has arrived");
+/// let state = JointState { position: 0.5, velocity: None, effort: None };
+/// simulation.publish(watcher::sensor::base::neck::encoder, MonotonicTime::ZERO, state);
+/// assert!((base_from_head.latest()?.transform.rotation.angle() - 0.5).abs() < 1e-12);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone)]
 pub struct Joints(Arc<Inner>);
 

@@ -6,7 +6,30 @@ use crate::topology::{Inertial, Joint, JointKind, Topology};
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 use std::ops::Range;
 
-/// The kinematics of a robot. See the [module](super) for coordinates and frames.
+/// The kinematics of a robot, with the coordinates and frames of the [module](super).
+///
+/// ```
+/// use bb_core::kinematics::Kinematics;
+/// use bb_core::prelude::*;
+///
+/// robot! {
+///     robot Crane;
+///     link base {
+///         joint slew: continuous {
+///             axis: z;
+///             link boom { joint end: fixed { origin: { xyz: [2 m, 0 m, 0 m] }; link hook; } }
+///         }
+///     }
+/// }
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let kinematics = Kinematics::new(Crane::TOPOLOGY)?;
+/// let (base, hook) = (kinematics.link("base").ok_or("a link")?, kinematics.link("hook").ok_or("a link")?);
+/// let base_from_hook = kinematics.chain(base, hook)?.transform(&[90_f64.to_radians()])?;
+/// assert!((base_from_hook.translation.y - 2.0).abs() < 1e-12);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Kinematics {
     /// The bodies moved by joints, each after its parent.
