@@ -7,6 +7,23 @@ use bb_core::payload::JointTrajectory;
 /// The part of a [`JointTrajectory`] that belongs to one joint, at any time since its start. Between two points it is
 /// a polynomial: of fifth degree if both have velocities and accelerations, of third if both have velocities,
 /// otherwise a straight line.
+///
+/// ```
+/// use bb_core::payload::{JointTrajectory, TrajectoryPoint};
+/// use bb_estimators::motion::JointPath;
+/// use std::time::Duration;
+///
+/// let point = |position, seconds| TrajectoryPoint {
+///     positions: vec![position],
+///     time_from_start: Duration::from_secs(seconds),
+///     ..TrajectoryPoint::default()
+/// };
+/// let trajectory =
+///     JointTrajectory { joint_names: vec!["lift".to_owned()].into(), points: vec![point(0.0, 0), point(0.4, 2)].into() };
+/// let lift = JointPath::of(&trajectory, "lift")?;
+/// assert_eq!((lift.duration_s(), lift.at(1.0).position), (2.0, 0.2));
+/// # Ok::<(), bb_core::Fault>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointPath {
     points: Vec<Knot>,
@@ -21,6 +38,8 @@ struct Knot {
 }
 
 impl JointPath {
+    /// Creates the path of `joint`.
+    ///
     /// # Errors
     /// The joint is not named, there are no points, a point lacks its position, or times do not increase.
     pub fn of(trajectory: &JointTrajectory, joint: &str) -> Result<Self, Fault> {

@@ -26,6 +26,25 @@ pub struct PidParams {
 /// 3.5 and 13. The derivative is that of the measurement, so a setpoint jump causes no kick, through a first-order
 /// low-pass. While the output is at a limit, the integral is drawn to the value at which the output is just there.
 /// Steps may have any length.
+///
+/// ```
+/// use bb_estimators::motion::{Pid, PidParams};
+///
+/// let mut pid = Pid::new(PidParams {
+///     proportional: 2.0,
+///     integral: 0.5,
+///     derivative: 0.0,
+///     derivative_filter_s: 0.0,
+///     minimum: -1.0,
+///     maximum: 1.0,
+///     tracking_s: 1.0,
+/// });
+/// let (mut position, step_s) = (0.0, 0.01);
+/// for _ in 0..2000 {
+///     position += pid.update(1.0, position, step_s).output * step_s; // a joint that moves at the velocity of the output
+/// }
+/// assert!((position - 1.0_f64).abs() < 0.02);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pid {
     params: PidParams,

@@ -23,6 +23,16 @@ pub enum Pace {
 
 /// A motion from one position to another: position, velocity and acceleration at any time since its start. Units are rad
 /// where the joint turns and m where it slides.
+///
+/// ```
+/// use bb_estimators::motion::{Easing, Pace, Profile};
+///
+/// // From 0 to 1 rad within 2 s, of which a quarter each is acceleration and deceleration.
+/// let profile = Profile::new(Easing::Trapezoidal, 0.0, 1.0, Pace::Duration(2.0), None);
+/// let half = profile.at(1.0);
+/// assert!((half.position - 0.5).abs() < 1e-12 && half.acceleration == 0.0);
+/// assert_eq!(profile.at(3.0).position, 1.0);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Profile {
     easing: Easing,

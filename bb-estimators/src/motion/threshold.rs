@@ -2,6 +2,14 @@
 
 /// Switch with hysteresis: on at or above one threshold, off at or below a lower one, and unchanged between them: for a
 /// fan, a heater (reversed), a pump.
+///
+/// ```
+/// use bb_estimators::motion::Threshold;
+///
+/// let mut fan = Threshold::new(60.0, 50.0).ok_or("`off_at` is above `on_at`")?;
+/// assert_eq!([55.0, 60.0, 55.0, 50.0].map(|celsius| fan.update(celsius)), [false, true, true, false]);
+/// # Ok::<(), &str>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Threshold {
     on_at: f64,

@@ -28,6 +28,28 @@ const MOST_WORK: u64 = 1000;
 /// would a rigid robot. Otherwise each joint moves independently, with the inertia that its actuator is given.
 ///
 /// The root link rests at the origin of the world, whose z points up, unless [`Self::move_root`] moves it.
+///
+/// ```
+/// use bb_core::nalgebra::Isometry3;
+/// use bb_core::prelude::*;
+/// use bb_estimators::SimulatedLinkImu;
+/// use bb_estimators::simulation::SimulatedWorld;
+///
+/// robot! {
+///     robot Cart;
+///     link base { sensor imu: SimulatedLinkImu() { rate: 100 Hz; } }
+/// }
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let mut simulation = Cart::builder().simulate()?;
+/// let world = simulation.shared(|| SimulatedWorld::new(Cart::TOPOLOGY));
+/// world.move_root(MonotonicTime::ZERO, |time_s| Isometry3::translation(0.5 * time_s * time_s, 0.0, 0.0));
+/// simulation.run_for(Duration::from_secs(2)); // its IMU measures 1 m/s² ahead
+/// let truth = world.pose("base", simulation.clock().now())?;
+/// assert!((truth.translation.x - 2.0).abs() < 1e-9);
+/// # Ok(())
+/// # }
+/// ```
 pub struct SimulatedWorld {
     topology: &'static Topology,
     state: Mutex<State>,
@@ -40,7 +62,7 @@ pub(super) struct State {
     pub(super) coupling: Option<Coupling>,
     /// The beginning of the present step of all plants, if they are coupled.
     time: MonotonicTime,
-    /// The clock of the run, once an actuator has told it.
+    /// The clock of the run, known from the first actuator on.
     clock: Option<Clock>,
     /// Time at which the run begins, as far as is known: nothing moves before.
     start: MonotonicTime,
@@ -249,6 +271,8 @@ impl SimulatedWorld {
         }
     }
 
+    /// Checks that a sensor is plugged in.
+    ///
     /// # Errors
     /// The sensor is unplugged.
     pub(super) fn check_plugged(&self, path: &str) -> Result<(), Fault> {
@@ -258,7 +282,7 @@ impl SimulatedWorld {
         Ok(())
     }
 
-    /// Tells it the clock of the run, whose joints rest until its [`start`](Clock::start).
+    /// Sets the clock of the run, whose joints rest until its [`start`](Clock::start).
     pub(super) fn set_clock(&self, clock: &Clock) {
         self.lock().clock.get_or_insert_with(|| clock.clone());
     }
