@@ -32,6 +32,42 @@ pub struct FlightOptions {
     /// An anchor older than this demotes to `visual_propagated`.
     #[option(default = 3.0, range = 0.1..=600.0, unit = "s")]
     pub anchor_age: f64,
+    /// Largest delay of an input behind the newest sample of the IMU with which it is still placed where it belongs.
+    #[option(default = 2.0, range = 0.05..=10.0, unit = "s")]
+    pub lateness: f64,
+    /// Largest lead of an input's stamp over the newest sample of the IMU.
+    #[option(default = 0.5, range = 0.0..=10.0, unit = "s")]
+    pub lead: f64,
+    /// Time after which a keyframe is made without camera frames.
+    #[option(default = 1.0, range = 0.05..=10.0, unit = "s")]
+    pub keyframe_interval: f64,
+    /// Time after the last sample of the IMU for which there is still an estimate.
+    #[option(default = 0.2, range = 0.0..=1.0, unit = "s")]
+    pub longest_prediction: f64,
+    /// Time for which estimates may be missing before the flight controller's own IMU takes over.
+    #[option(default = 3.0, range = 0.1..=60.0, unit = "s")]
+    pub fallback_after: f64,
+    /// Without a camera's, or a satellite's, measurement for this time it is `dead_reckoned`.
+    #[option(default = 1.0, range = 0.05..=60.0, unit = "s")]
+    pub visual_loss: f64,
+    /// Time for which a receiver that was spoofed must be healthy before it may be let in again.
+    #[option(default = 10.0, range = 0.0..=600.0, unit = "s")]
+    pub dwell: f64,
+    /// Reports of its health that are farther apart break the dwell.
+    #[option(default = 2.0, range = 0.05..=60.0, unit = "s")]
+    pub health_gap: f64,
+    /// Largest distance of its fix from the next anchor with which it is let in again.
+    #[option(default = 25.0, range = 0.1..=1e4, unit = "m")]
+    pub anchor_tolerance: f64,
+    /// Largest distance of its fix from the estimate with which it is let in again.
+    #[option(default = 200.0, range = 1.0..=1e6, unit = "m")]
+    pub bounded_distance: f64,
+    /// Factor of the flight controller's standard deviations at a warm start.
+    #[option(default = 2.0, range = 1.0..=100.0)]
+    pub warm_inflation: f64,
+    /// A covariance that is larger than the steady one by this factor is warned of.
+    #[option(default = 2.0, range = 1.1..=1e3)]
+    pub growing_covariance: f64,
     /// White noise of the gyroscope, rad/s/√Hz.
     #[option(default = 1.7e-4, range = 1e-9..=10.0)]
     pub gyroscope_noise: f64,
@@ -41,7 +77,7 @@ pub struct FlightOptions {
     /// Gravity where the robot is.
     #[option(default = 9.80665, range = 1.0..=30.0, unit = "m/s^2")]
     pub gravity: f64,
-    /// Beginning of the names of frames: another in each flight.
+    /// Beginning of the names of frames; 0 for one that is made from the first sample of the IMU, another in each flight.
     #[option(default = 0)]
     pub flight: u32,
 }
@@ -57,6 +93,18 @@ impl FlightOptions {
             window: self.window,
             takeoff_heading: self.heading,
             anchor_age: self.anchor_age,
+            lateness: self.lateness,
+            lead: self.lead,
+            keyframe_interval: self.keyframe_interval,
+            longest_prediction: self.longest_prediction,
+            fallback_after: self.fallback_after,
+            visual_loss: self.visual_loss,
+            dwell: self.dwell,
+            health_gap: self.health_gap,
+            anchor_tolerance: self.anchor_tolerance,
+            bounded_distance: self.bounded_distance,
+            warm_inflation: self.warm_inflation,
+            growing_covariance: self.growing_covariance,
             ..StateEstimatorParams::default()
         };
         let sensors = EskfParams {
@@ -72,5 +120,26 @@ impl FlightOptions {
         let (latitude, longitude) = (self.origin_latitude, self.origin_longitude);
         let position = Geodetic { latitude, longitude, height: self.origin_height };
         (!latitude.is_nan()).then(|| TakeoffOrigin::new(position))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn defaults_are_those_of_the_library() {
+        let FlightOptions { gravity, .. } = FlightOptions::defaults();
+        let config = FlightOptions::defaults().config().unwrap();
+        let sensors = EskfParams { gravity, ..config.sensors };
+        assert_eq!(config, StateEstimatorConfig { sensors, ..StateEstimatorConfig::default() });
+    }
+
+    #[test]
+    fn options_reach_the_estimator() {
+        let options =
+            FlightOptions { dwell: 4.0, anchor_tolerance: 7.0, fallback_after: 1.5, ..FlightOptions::defaults() };
+        let StateEstimatorParams { dwell, anchor_tolerance, fallback_after, .. } = options.config().unwrap().params;
+        assert_eq!([dwell, anchor_tolerance, fallback_after], [4.0, 7.0, 1.5]);
     }
 }
