@@ -71,6 +71,11 @@ impl Emission {
         }
     }
 
+    /// Sets the number of a flight that has none.
+    pub(super) fn name_flight(&mut self, number: u64) {
+        self.ids.name(number);
+    }
+
     /// Returns whether an output is due. If so, the next one is scheduled.
     pub(super) fn is_due(&mut self, now_ns: i64) -> bool {
         let next_ns = match self.next_ns {

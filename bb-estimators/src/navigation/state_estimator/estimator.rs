@@ -14,7 +14,7 @@ use super::input::{
     TakeoffOrigin, VioOutput,
 };
 use super::label::{SourceLabel, Sources};
-use super::output::{EstimatorHealth, EstimatorOutput, HealthState};
+use super::output::{EstimatorHealth, EstimatorOutput, HealthState, number_of};
 use super::params::{StateEstimatorConfig, ns};
 use super::queue::{Queue, QueueCounts, Sampled, Told};
 use super::strategy::Pose;
@@ -178,6 +178,9 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
     fn add_samples(&mut self, samples: &[ImuMean]) -> Result<(), EstimatorError> {
         let mut first = Ok(());
         let mut waits = false;
+        if let Some(sample) = samples.first() {
+            self.emission.name_flight(number_of(sample));
+        }
         for sample in samples {
             let sampled = self.queue.add_sample(sample, &self.config);
             let result = match sampled {
@@ -424,6 +427,16 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
         let (history, is_smoothed) = self.queue.engine_mut().history(most);
         let poses: Vec<(Pose, Sources)> = history.collect();
         poses.iter().filter_map(|(pose, sources)| self.describe_past(pose, sources, is_smoothed)).collect()
+    }
+
+    /// Reports the keyframes that are still in the window as events, the oldest first: for a recorder, at the end of a flight.
+    pub fn finish(&mut self) {
+        let mut last = self.smoothed_history(usize::MAX);
+        last.reverse();
+        last.extend(self.current_estimate());
+        for estimate in last {
+            self.tell(estimate.time_ns, EventKind::Keyframe { estimate });
+        }
     }
 
     /// The last innovation does not belong to a past keyframe.

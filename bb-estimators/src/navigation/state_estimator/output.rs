@@ -5,6 +5,7 @@ use uuid::{Builder, Uuid};
 
 use super::gate::GateState;
 use super::label::SourceLabel;
+use crate::navigation::eskf::ImuMean;
 use crate::navigation::geodesy::Geodetic;
 
 /// One estimate.
@@ -47,7 +48,7 @@ pub struct Quality {
     pub label: SourceLabel,
     /// Frobenius norm of the covariance, of m² and rad².
     pub covariance_norm: f64,
-    /// Time since the last anchor. `None` before the first.
+    /// Time since the last anchor, or since the last fix of a trusted receiver. `None` before the first.
     pub anchor_age_ms: Option<u64>,
     /// Normalised innovation squared of the last measurement, over its dimension. It is 1 on average if the estimate is consistent.
     pub nis: Option<f64>,
@@ -97,6 +98,18 @@ impl HealthState {
     }
 }
 
+/// Number of a flight that was given none: a hash of a sample of its IMU, whose noise no other flight has. A replay has the same.
+pub(super) fn number_of(sample: &ImuMean) -> u64 {
+    let readings = sample.angular_velocity.iter().chain(&sample.specific_force).map(|x| x.to_bits());
+    // SplitMix64.
+    readings.fold(sample.time_ns as u64, |hash, bits| {
+        let mixed = (hash ^ bits).wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        mixed ^ (mixed >> 31)
+    })
+}
+
 /// Generates frame ids: the number of the flight and a count, as a UUID of version 8.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FrameIds {
@@ -107,6 +120,13 @@ pub(super) struct FrameIds {
 impl FrameIds {
     pub(super) fn new(flight: u64) -> Self {
         Self { flight, count: 0 }
+    }
+
+    /// Sets the number of the flight, if it has none.
+    pub(super) fn name(&mut self, number: u64) {
+        if self.flight == 0 {
+            self.flight = number;
+        }
     }
 
     pub(super) fn next(&mut self) -> Uuid {
@@ -135,5 +155,28 @@ mod tests {
         assert_eq!(first.get_version_num(), 8);
         assert_eq!(one.next().to_string(), "01234567-89ab-80cd-80ef-000000000002");
         assert_ne!(first, other.next());
+    }
+
+    /// Of flights that were given no number, by the noise of the first sample of the IMU.
+    #[test]
+    fn ids_differ_by_flight_without_a_number() {
+        let sample = |bits: u64| ImuMean {
+            time_ns: 0,
+            angular_velocity: Vector3::zeros(),
+            specific_force: Vector3::new(0.0, 0.0, f64::from_bits(9.8_f64.to_bits() + bits)),
+        };
+        let id = |bits: u64| {
+            let mut ids = FrameIds::new(0);
+            ids.name(number_of(&sample(bits)));
+            ids.next()
+        };
+        let mut ids: Vec<_> = (0..1000).map(id).collect();
+        assert_eq!(ids[7], id(7), "a replay has the same");
+        ids.sort_unstable();
+        ids.dedup();
+        assert_eq!(ids.len(), 1000);
+        let mut told = FrameIds::new(5);
+        told.name(number_of(&sample(1)));
+        assert_eq!(told.next(), FrameIds::new(5).next(), "a number that was given stays");
     }
 }

@@ -128,7 +128,7 @@ pub struct StateEstimatorConfig {
     pub params: StateEstimatorParams,
     /// The noise of the IMU, gravity and gaps.
     pub sensors: EskfParams,
-    /// Beginning of the ids of frames: another in each flight, for ids that are unique.
+    /// Beginning of the ids of frames. 0: a number that is made from the first sample of the IMU, another in each flight.
     pub flight: u64,
 }
 

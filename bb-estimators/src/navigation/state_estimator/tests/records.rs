@@ -125,6 +125,21 @@ fn status_texts_have_at_most_fifty_characters() {
     );
 }
 
+/// At the end of a flight, the keyframes that are still in the window follow those that have left it.
+#[test]
+fn a_recorder_has_every_keyframe_at_the_end() {
+    let flight = Flight::new(6, 3);
+    for strategy in StrategyKind::ALL {
+        let mut estimator = started(&flight, *strategy);
+        flight.sent(true, true, false).iter().for_each(|sent| ignore(sent.to(&mut estimator)));
+        let newest_ns = estimator.current_estimate().unwrap().time_ns;
+        estimator.finish();
+        let times: Vec<i64> = kinds(estimator.sink(), "keyframe").map(|event| event.time_ns).collect();
+        let expected: Vec<i64> = (0..=newest_ns / FRAME).map(|i| i * FRAME).collect();
+        assert_eq!(times, expected, "{}", strategy.name());
+    }
+}
+
 #[test]
 fn keyframes_that_leave_the_window_go_to_the_recorder_once_and_in_order() {
     let flight = Flight::new(8, 4);
