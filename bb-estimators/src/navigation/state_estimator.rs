@@ -83,7 +83,8 @@ mod world;
 #[cfg(feature = "runtime")]
 pub use declared::{
     AnchorReading, AttitudeReport, FlightEstimate, FlightEstimator, FlightEvent, FlightEvents, FlightHealth,
-    FlightInputs, FlightOptions, FlightOutputs, GpsReport, RelativePoseReading, TracingSink, WarmStartReport,
+    FlightInputs, FlightOptions, FlightOutputs, GpsReport, HealthSnapshot, RelativePoseReading, SmoothedHistory,
+    TracingSink, WarmStartReport,
 };
 pub use error::{EstimatorError, OriginError, Reason};
 pub use estimator::{Added, StateEstimator};

@@ -11,8 +11,8 @@ pub use options::FlightOptions;
 pub use output::{FlightEstimate, FlightEvent, FlightEvents, FlightHealth, FlightOutputs};
 
 use super::{EstimatorOutput, Event, EventKind, EventSink, HealthState, Level, StateEstimator};
-use bb_core::component::{Info, Request};
-use bb_core::{Context, Estimator, Fault, Reply};
+use bb_core::component::{HandleCall, Info, Request, RequestCodec};
+use bb_core::{Context, Estimator, Fault, Payload, Reply, Termination};
 use input::Mounting;
 use std::time::Duration;
 
@@ -160,6 +160,41 @@ impl FlightEstimator {
     }
 }
 
+/// Request for the last keyframes before the newest, in reverse order of time: see
+/// [`StateEstimator::smoothed_history`]. They are for recorders, and not to be flown with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Payload)]
+pub struct SmoothedHistory {
+    /// The most keyframes that are wanted.
+    pub most: u32,
+}
+
+/// Request for the present health, see [`StateEstimator::health`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct HealthSnapshot;
+
+impl HandleCall<SmoothedHistory> for FlightEstimator {
+    type Response = Vec<FlightEstimate>;
+
+    // What late samples have changed is recomputed for the answer.
+    const RECORD: Option<RequestCodec<SmoothedHistory>> = Some(RequestCodec::bytes());
+
+    fn handle_call(
+        &mut self,
+        request: SmoothedHistory,
+    ) -> Result<(Vec<FlightEstimate>, Reply<FlightOutputs>), Fault> {
+        let history = self.estimator.smoothed_history(request.most as usize);
+        Ok((history.iter().map(FlightEstimate::of).collect(), Reply::none()))
+    }
+}
+
+impl HandleCall<HealthSnapshot> for FlightEstimator {
+    type Response = FlightHealth;
+
+    fn handle_call(&mut self, _: HealthSnapshot) -> Result<(FlightHealth, Reply<FlightOutputs>), Fault> {
+        Ok((FlightHealth::of(&self.estimator.health()), Reply::none()))
+    }
+}
+
 impl Estimator for FlightEstimator {
     type Options = FlightOptions;
     type Input = FlightInputs<'static>;
@@ -205,6 +240,11 @@ impl Estimator for FlightEstimator {
         Ok(self.reply(sample.time_ns))
     }
 
+    /// Passes the last keyframes to `tracing`: nothing can be published any more.
+    fn terminate(&mut self, _: Termination<'_>) {
+        self.estimator.finish();
+    }
+
     fn handle_info(&mut self, _: Info) -> Result<Reply<FlightOutputs>, Fault> {
         self.ticks += 1;
         if self.ticks < 2 {
@@ -221,8 +261,31 @@ const SLOWEST_LOOK: Duration = Duration::from_millis(50);
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::navigation::Refusal;
     use crate::navigation::state_estimator::{GateState, InputKind, Reason};
+    use crate::navigation::{ImuMean, Refusal};
+    use bb_core::Options as _;
+    use nalgebra::{Isometry3, Vector3};
+
+    #[test]
+    fn history_and_health_are_answered() {
+        let options = FlightOptions { origin_latitude: 0.8, ..FlightOptions::defaults() };
+        let mut estimator =
+            FlightEstimator::init(options, &Context::for_test(&[("imu", Isometry3::identity())])).unwrap();
+        let ask = |estimator: &mut FlightEstimator| {
+            let (history, _) = estimator.handle_call(SmoothedHistory { most: 3 }).unwrap();
+            (history, estimator.handle_call(HealthSnapshot).unwrap().0)
+        };
+        let (history, health) = ask(&mut estimator);
+        assert_eq!((history.len(), health.state, health.keyframes), (0, HealthState::Init, 0));
+        for i in 0..1200 {
+            let specific_force = Vector3::new(0.0, 0.0, 9.80665);
+            let sample = ImuMean { time_ns: i * 5_000_000, angular_velocity: Vector3::zeros(), specific_force };
+            let _ = estimator.estimator.add_imu(&sample);
+        }
+        let (history, health) = ask(&mut estimator);
+        assert!(history.len() == 3 && health.keyframes > 3 && health.state != HealthState::Init, "{health:?}");
+        assert!(history.is_sorted_by(|a, b| a.time > b.time), "{history:?}");
+    }
 
     #[test]
     fn errors_and_warnings_have_room_in_a_full_message() {

@@ -82,6 +82,8 @@ mod tests {
             from: None,
             to: None,
             status_text: None,
+            window: None,
+            cov_inflation: None,
             keyframe: None,
         };
         let of = |level, kind| severity(&event(level, kind)) as u8;

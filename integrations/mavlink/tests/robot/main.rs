@@ -105,6 +105,8 @@ fn text(level: Level, text: &str) -> FlightEvent {
         from: None,
         to: None,
         status_text: Some(text.into()),
+        window: None,
+        cov_inflation: None,
         keyframe: None,
     }
 }

@@ -12,7 +12,8 @@ use crate::navigation::state_estimator::{Event, EventKind, EventSink, Level};
 /// | `input`, `reason` | the input, and why it is not in the estimate |
 /// | `from`, `to` | the old and the new value of a change |
 /// | `nis` | normalised innovation squared of a measurement, over its dimension |
-/// | `ratio` | growth of a covariance |
+/// | `window` | number of keyframes of an estimator that is ready |
+/// | `cov_inflation` | factor by which a covariance has grown |
 /// | `waits` | whether an input is ahead of the IMU |
 /// | `status_text` | text for the ground station |
 #[derive(Clone, Copy, Debug, Default)]
@@ -25,14 +26,10 @@ impl EventSink for TracingSink {
                 if !tracing::enabled!($level) {
                     return;
                 }
-                let Parts { input, reason, from, to } = Parts::of(&event.kind);
+                let Parts { input, reason, from, to, window, cov_inflation } = Parts::of(&event.kind);
                 let (nis, waits) = match event.kind {
                     EventKind::Added { nis, waits, .. } => (nis, Some(waits)),
                     _ => (None, None),
-                };
-                let ratio = match event.kind {
-                    EventKind::CovarianceGrowing { ratio } => Some(ratio),
-                    _ => None,
                 };
                 let text = event.status_text();
                 tracing::event!(
@@ -44,7 +41,8 @@ impl EventSink for TracingSink {
                     from,
                     to,
                     nis,
-                    ratio,
+                    window,
+                    cov_inflation,
                     waits,
                     status_text = text.as_ref().map(|text| text.as_str()),
                     "state estimator"

@@ -39,7 +39,7 @@ pub struct FlightEstimate {
     pub covariance: Matrix6<f64>,
     /// Source of the estimate.
     pub label: SourceLabel,
-    /// Time since the last anchor, ms.
+    /// Time since the last anchor, or since the last fix of a trusted receiver, ms.
     pub anchor_age_ms: Option<u64>,
     /// `true` if later measurements have corrected it.
     pub smoothed: bool,
@@ -139,6 +139,10 @@ pub struct FlightEvent {
     pub from: Option<String>,
     /// New value of a change, or the source of a start.
     pub to: Option<String>,
+    /// Number of keyframes of an estimator that is ready.
+    pub window: Option<u32>,
+    /// Factor by which a covariance has grown.
+    pub cov_inflation: Option<f64>,
     /// Text for the ground station, at most 50 characters.
     pub status_text: Option<String>,
     /// The keyframe that has left the window.
@@ -148,7 +152,7 @@ pub struct FlightEvent {
 impl FlightEvent {
     pub(super) fn of(event: &Event) -> Self {
         let owned = |text: Option<&'static str>| text.map(str::to_owned);
-        let Parts { input, reason, from, to } = Parts::of(&event.kind);
+        let Parts { input, reason, from, to, window, cov_inflation } = Parts::of(&event.kind);
         Self {
             time: MonotonicTime::from_nanos(event.time_ns),
             level: event.level(),
@@ -157,6 +161,8 @@ impl FlightEvent {
             reason,
             from: owned(from),
             to: owned(to),
+            window,
+            cov_inflation,
             status_text: event.status_text().map(|text| text.as_str().to_owned()),
             keyframe: match &event.kind {
                 EventKind::Keyframe { estimate } => Some(FlightEstimate::of(estimate)),
@@ -173,6 +179,8 @@ pub(super) struct Parts {
     pub(super) reason: Option<String>,
     pub(super) from: Option<&'static str>,
     pub(super) to: Option<&'static str>,
+    pub(super) window: Option<u32>,
+    pub(super) cov_inflation: Option<f64>,
 }
 
 impl Parts {
@@ -189,10 +197,12 @@ impl Parts {
             EventKind::Label { from, to } => Self { from: Some(from.name()), to: Some(to.name()), ..none },
             EventKind::Gate { from, to } => Self { from: Some(from.name()), to: Some(to.name()), ..none },
             EventKind::Started { from } => Self { from: Some(from.name()), ..none },
-            EventKind::Ready { strategy, .. } => Self { to: Some(strategy.name()), ..none },
+            EventKind::Ready { strategy, window } => {
+                Self { to: Some(strategy.name()), window: Some(*window), ..none }
+            }
+            EventKind::CovarianceGrowing { ratio } => Self { cov_inflation: Some(*ratio), ..none },
             EventKind::ClockSetBack { .. }
             | EventKind::SamplesDropped { .. }
-            | EventKind::CovarianceGrowing { .. }
             | EventKind::FallbackImminent
             | EventKind::FallbackEngaged
             | EventKind::FallbackRecovered
