@@ -103,7 +103,8 @@ pub(crate) fn angles(rotation: &UnitQuaternion<f64>) -> String {
 /// Factor by which an error must shrink without a constant for that constant to explain it.
 pub(crate) const LEFT: f64 = 3.0;
 
-/// Returns the constant rotation that explains a large error of the orientation: one that leaves less than a third of it.
+/// Returns the constant rotation that explains a large error of the orientation: one that leaves less than a third of it. `is_world` says
+/// whether what else is known of the world allows that it is turned.
 pub(crate) fn cause(
     rms: f64,
     of_body: &Turns,
@@ -111,6 +112,7 @@ pub(crate) fn cause(
     base_from_imu: &Isometry3<f64>,
     imu: &str,
     align: Align,
+    is_world: impl Fn(&UnitQuaternion<f64>) -> bool,
 ) -> Option<String> {
     const LARGE: f64 = 15.0;
     if rms.to_degrees() < LARGE {
@@ -127,6 +129,13 @@ pub(crate) fn cause(
         (_, Some((heading, mean)), _)
             if align == Align::None && body.is_none_or(|body| mean.spread <= body.spread) =>
         {
+            if !is_world(&heading.rotation) {
+                return Some(format!(
+                    "the filter's heading is off by {:.1} deg throughout while its positions agree with the truth: the filter is wrong, \
+                     not the truth's world",
+                    self::heading(&heading.rotation).to_degrees()
+                ));
+            }
             Some(format!(
                 "the truth's world is turned about the vertical by {:.1} deg to the filter's, which leaves {:.1} of {:.1} deg: \
                  --align heading, or --declination for a compass",
@@ -148,7 +157,7 @@ pub(crate) fn cause(
                 angles(&(body.rotation * base_from_imu.rotation))
             ))
         }
-        (None, _, Some(world)) if align == Align::None => Some(format!(
+        (None, _, Some(world)) if align == Align::None && is_world(&world.rotation) => Some(format!(
             "the truth's world is turned by {} to the filter's, which leaves {:.1} of {:.1} deg: --align full",
             said(&world),
             world.spread.to_degrees(),
@@ -161,6 +170,24 @@ pub(crate) fn cause(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_turned_world_is_named_only_if_positions_allow_it() {
+        let off = UnitQuaternion::from_euler_angles(0.0, 0.0, 2.6);
+        let (mut of_body, mut of_world) = (Turns::default(), Turns::default());
+        for index in 0..100 {
+            let truth = UnitQuaternion::from_euler_angles(0.3 * f64::from(index % 7), 0.2, 0.1 * f64::from(index));
+            let estimate = off * truth;
+            of_body.add(&(truth.inverse() * estimate));
+            of_world.add(&(estimate * truth.inverse()));
+        }
+        let said = |allows: bool| {
+            cause(2.6, &of_body, &of_world, &Isometry3::identity(), "imu", Align::None, |_| allows)
+                .expect("it is large")
+        };
+        assert!(said(true).contains("--align heading"), "{}", said(true));
+        assert!(said(false).starts_with("the filter's heading is off by 149.0 deg"), "{}", said(false));
+    }
 
     #[test]
     fn the_mean_and_the_spread_are_those_of_the_rotations() {

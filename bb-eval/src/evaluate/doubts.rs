@@ -42,7 +42,8 @@ pub(super) fn truth_doubt(recording: &Recording, players: &[Player], align: Alig
         let rms = player.score.rms()?.total.to_radians();
         let least = spread(player).min(player.of_world.mean().map_or(f64::INFINITY, |turn| turn.spread));
         let base_from_imu = Isometry3::from_parts(Default::default(), recording.base_from_imu());
-        let said = cause(rms, &player.of_body, &player.of_world, &base_from_imu, &recording.imu_name, align)?;
+        let said =
+            cause(rms, &player.of_body, &player.of_world, &base_from_imu, &recording.imu_name, align, |_| true)?;
         // A convention that fits alike is the more telling one, but for an inverse: on a plane, that of a turned body looks like
         // another turned body.
         let is_closer = |(_, verdict): &(&Player, Verdict)| match verdict.name.starts_with("inverse") {

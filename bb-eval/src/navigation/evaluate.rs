@@ -37,6 +37,9 @@ pub struct Played {
     pub trace: Option<Trace>,
 }
 
+/// Reason for which a deviation of fixes changes nothing.
+const GIVEN: &str = ": it is that of fixes without a covariance, and these have one";
+
 /// Runs a filter on a recording. `progress` is called for each sample of the IMU.
 ///
 /// # Errors
@@ -65,7 +68,8 @@ pub fn play_navigation(
     for (setting, others) in settings.each(filter) {
         // The only proof that works for every option of every filter.
         if is_same(&record, &robot::run(filter, &feed, &others, &mut || {})?) {
-            doubts.push(format!("{setting} changes nothing on this recording"));
+            let why = if setting.to_string().contains("gnss_deviation") { GIVEN } else { "" };
+            doubts.push(format!("{setting} changes nothing on this recording{why}"));
         }
     }
     doubts.extend(refused(&record));

@@ -254,7 +254,19 @@ impl<'a> Scoring<'a> {
         }
         let rms = (square / f64::max(count, 1.0)).sqrt();
         let base_from_imu = self.feed.mounts[0].unwrap_or_else(Isometry3::identity);
-        cause(rms, &of_body, &of_world, &base_from_imu, imu, align)
+        let is_world = |turn: &UnitQuaternion<f64>| !self.contradicts(instants, turn);
+        cause(rms, &of_body, &of_world, &base_from_imu, imu, align, is_world)
+    }
+
+    /// Returns whether the positions speak against a turn of the truth's world: with it, the tracks differ by far more than without.
+    fn contradicts(&self, instants: &[Instant], turn: &UnitQuaternion<f64>) -> bool {
+        let apart = |turn: &UnitQuaternion<f64>| {
+            let scored = instants.iter().filter(|instant| instant.is_scored);
+            let moved: Vec<Vector3<f64>> = scored.filter_map(|instant| self.moved(instant, turn)).collect();
+            let mean = moved.iter().sum::<Vector3<f64>>() / moved.len().max(1) as f64;
+            moved.iter().map(|moved| (moved - mean).norm_squared()).sum::<f64>()
+        };
+        apart(turn) > LEFT * LEFT * apart(&UnitQuaternion::identity())
     }
 
     fn state(&self, time_ns: Time) -> State {
