@@ -21,7 +21,8 @@
 //! }
 //! ```
 //!
-//! Or as a line of the robot, which prints the address when it starts: `bridge dashboard: Dashboard(port = 8912);`.
+//! Or as a line of the robot, which prints the address when it starts:
+//! `bridges { bridge dashboard: Dashboard(port = 8912); }`.
 //!
 //! Nothing of the robot waits for a viewer. Without one, the robot's threads hand over its events alone, which are rare. With viewers, one
 //! thread takes the newest message of each watched path, at most sixteen times a second, and one thread speaks to the browsers.

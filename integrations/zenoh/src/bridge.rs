@@ -42,7 +42,7 @@ const STATE: Duration = Duration::from_secs(1);
 /// }
 /// ```
 ///
-/// Or as a line of the robot: `bridge ros2: Ros2Bridge();`.
+/// Or as a line of the robot: `bridges { bridge ros2: Ros2Bridge(); }`.
 ///
 /// Publishing in the robot does not wait for the network: a thread of the bridge reads a bounded queue, and messages that do not fit are
 /// counted. Dropping the bridge waits for the messages in that queue, and for requests that have begun, at most for seconds.

@@ -23,7 +23,7 @@ const LOST_AFTER: Duration = Duration::from_millis(500);
 const HELD_UP_S: f64 = 0.4;
 /// Time from one message to the next.
 const PERIOD: Duration = Duration::from_millis(10);
-/// What a thread may wait for a processor of a busy machine.
+/// Time that a thread may wait for a processor of a busy machine.
 const BUSY: Duration = Duration::from_millis(200);
 
 /// Time since the start of this process.
@@ -387,7 +387,7 @@ fn read_forever(endpoint: String) {
     }
 }
 
-/// What its tick was late by in a time, of 1000 the one before the greatest, and the number of ticks.
+/// Lateness of its tick over a time, the 99.9th percentile, and the number of ticks.
 fn late(ticks: &Ticks, meanwhile: impl FnOnce()) -> (Duration, usize) {
     let lock = || ticks.0.lock().expect("nobody has panicked");
     lock().clear();

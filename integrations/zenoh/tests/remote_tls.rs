@@ -79,7 +79,7 @@ fn changed(template: &str, folder: &Path, name: &str, changes: &[(&str, &str)]) 
     path
 }
 
-/// What somebody with a certificate can do.
+/// Rights that a client with a certificate turns out to have.
 #[derive(Debug, PartialEq)]
 struct Done {
     has_session: bool,

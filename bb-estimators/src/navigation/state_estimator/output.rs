@@ -157,7 +157,7 @@ mod tests {
         assert_ne!(first, other.next());
     }
 
-    /// Of flights that were given no number, by the noise of the first sample of the IMU.
+    /// Number of a flight that was given none, from the noise of the first sample of the IMU.
     #[test]
     fn ids_differ_by_flight_without_a_number() {
         let sample = |bits: u64| ImuMean {

@@ -125,7 +125,7 @@ fn status_texts_have_at_most_fifty_characters() {
     );
 }
 
-/// At the end of a flight, the keyframes that are still in the window follow those that have left it.
+/// Keyframes that are still in the window follow, at the end of a flight, those that have left it.
 #[test]
 fn a_recorder_has_every_keyframe_at_the_end() {
     let flight = Flight::new(6, 3);
