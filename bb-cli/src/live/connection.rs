@@ -53,8 +53,8 @@ impl Robot {
         };
         robot.welcome = robot.receive()?;
         if address.token.is_some() && robot.welcome["rights"].as_array().is_some_and(|rights| rights.len() < 2) {
-            return Err(failed(
-                "the token is wrong, or of a run before; take the address that the dashboard prints".into(),
+            return Err(format!(
+                "the robot at {host} does not know the token, which may be of a run before; take the address that the dashboard prints"
             ));
         }
         Ok(robot)

@@ -206,7 +206,8 @@ export class Views {
     for (const command of commands) {
       const start = make("button", "", "Start");
       start.disabled = !this.app.may("commands") || (command.role === "arming" && !this.app.may("arm"));
-      const states = command.allowed_states ? `in ${command.allowed_states.join(", ") || "no state"}` : "";
+      const roles = { arming: "in disarmed", disarming: "in all but disarmed" };
+      const states = command.allowed_states ? `in ${command.allowed_states.join(", ") || "no state"}` : roles[command.role] || "in idle";
       const fields = make("div", "fields"), error = make("p", "error");
       const read = form(command.arguments, command.defaults, fields);
       const body = make("form", "", make("div", "head", make("div", "", make("span", "path", command.path.replace(/^command\//, "")), make("p", "note", states)), start), fields, error);
