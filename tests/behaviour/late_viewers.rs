@@ -305,7 +305,7 @@ fn parameters_and_actuators_take_json() -> Result<(), Box<dyn Error>> {
         assert!(refused.starts_with(&format!("{path} is not set: ")), "{refused}");
     }
     for json in [r#""x""#, "1.0"] {
-        let unknown = set("param/trun", json).expect_err("there is none");
+        let unknown = set("param/trun", json).expect_err("it is unknown");
         assert_eq!(unknown, "param/trun is not set: no such parameter is declared; did you mean `param/turn`?");
     }
     // All or none.
@@ -316,7 +316,7 @@ fn parameters_and_actuators_take_json() -> Result<(), Box<dyn Error>> {
     assert_eq!(refused.to_string(), "the robot is not armed (disarmed)");
     simulation.arm()?;
     assert_eq!(from_json::<Number>(&simulation.send_json("actuator/base/pan/servo", "1.5")?)?, Number(1.5));
-    let near = simulation.send_json("actuator/base/pan/server", "1").expect_err("there is none");
+    let near = simulation.send_json("actuator/base/pan/server", "1").expect_err("it is unknown");
     assert_eq!(
         near.to_string(),
         "no actuator is at `actuator/base/pan/server`; did you mean `actuator/base/pan/servo`?"

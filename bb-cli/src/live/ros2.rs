@@ -57,7 +57,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
 fn recorded(file: &Path) -> Result<Interfaces, String> {
     let bag = topics::open(file)?;
     let mut interfaces = Interfaces::default();
-    // The exact message of a payload that ROS has one for is written beside that one, below its topic, and for ourselves.
+    // A payload that ROS has a message for is written a second time in its exact layout, which only this project reads.
     let is_for_ros = |name: &str| !name.ends_with("/_exact");
     for topic in bag.topics().iter().filter(|topic| is_for_ros(&topic.name)) {
         if *topic.definition_encoding == *Schema::ENCODING {

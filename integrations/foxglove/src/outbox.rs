@@ -174,7 +174,7 @@ fn warning(lost: u64) -> Vec<u8> {
     let text = format!(
         r#"{{"op":"status","level":1,"id":"lost","message":"messages lost, the oldest first, as this client reads too slowly: {lost}"}}"#
     );
-    // It is longer than 125 bytes, or not.
+    // A length above 125 takes two bytes more.
     let mut frame = match u8::try_from(text.len()) {
         Ok(short @ ..126) => vec![TEXT, short],
         _ => [&[TEXT, 126][..], &(text.len() as u16).to_be_bytes()].concat(),

@@ -59,7 +59,7 @@ fn set(bus: &Bus, given: &[Parameter]) -> Result<(), String> {
     bus.set_parameters_json(pairs).map_err(|error| error.to_string())
 }
 
-/// The new value that an event of the robot tells.
+/// The new value of a parameter, if the event is a change of one.
 pub(crate) fn changed(event: &DynamicMessage) -> Option<Parameter> {
     let change = event.downcast::<ParameterChange>()?;
     Some(parameter(change.path, &change.to))
