@@ -14,7 +14,7 @@ impl Counter {
         self.0.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Adds so many.
+    /// Adds a number of events at once.
     pub fn add_many(&self, number: u64) {
         self.0.fetch_add(number, Ordering::Relaxed);
     }
