@@ -8,7 +8,8 @@ use bb_core::nalgebra::{UnitQuaternion, Vector2, Vector3};
 use bb_estimators::attitude::{AttitudeFilter, ImuSample, MekfFilter, VqfFilter};
 use bb_estimators::navigation::planar::{PlanarEkf, PlanarParams, PlanarPosition, PlanarStart};
 use bb_estimators::navigation::{
-    Eskf, EskfParams, GnssPosition, Height, ImuMean, Navigation, Refusal, SmootherParams, Start, Stream,
+    Eskf, EskfParams, Fused, GnssPosition, Height, History, ImuMean, Navigation, Refusal, Replayed, SmootherParams,
+    Start, Stream,
 };
 use std::error::Error;
 use std::hint::black_box;
@@ -70,6 +71,8 @@ pub(crate) const STEPS: &[Step] = &[
             })
         },
     },
+    // Late by a sample, so that two samples and two heights are replayed.
+    Step { name: "eskf/late_height", on: Some("eskf/sample"), steps: USUAL, stored: 39_443.0, run: late },
     Step {
         name: "planar/sample",
         on: None,
@@ -122,6 +125,46 @@ fn eskf(
         correct(&mut filter, &mut stream, reading)?;
     }
     black_box(filter);
+    Ok(())
+}
+
+/// A filter with the stream of its heights.
+#[derive(Clone)]
+struct Flying(Eskf<Navigation>, Stream);
+
+impl Replayed for Flying {
+    type Filter = Eskf<Navigation>;
+    type Measurement = Height;
+
+    fn filter(&self) -> &Self::Filter {
+        &self.0
+    }
+
+    fn filter_mut(&mut self) -> &mut Self::Filter {
+        &mut self.0
+    }
+
+    fn update(&mut self, height: &Height) -> Result<Fused, Refusal> {
+        self.0.update(&mut self.1, height)
+    }
+}
+
+/// The filter takes a sample, and a height at the one before.
+fn late(steps: usize) -> Result<(), Box<dyn Error>> {
+    let readings = readings(LONG);
+    let (origin, level) = (Vector3::zeros(), UnitQuaternion::identity());
+    let mut filter = Eskf::<Navigation>::new(EskfParams::default())?;
+    filter.start(&Start::at(0, (origin, 1.0), (origin, 0.1), (level, 0.05)))?;
+    let mut history = History::<_, 512, 128, 8>::new(Flying(filter, Stream::default()), 0)?;
+    let mut before: Option<&Reading> = None;
+    for reading in readings.iter().take(steps) {
+        history.propagate(black_box(&sample(reading)))?;
+        if let Some(Reading { time_ns, position, .. }) = before.replace(reading) {
+            let height = Height { height: position.z, deviation: 1.0 };
+            passed(history.update(*time_ns, black_box(&height)))?;
+        }
+    }
+    black_box(history);
     Ok(())
 }
 

@@ -39,7 +39,6 @@ use self::newcomer::Newcomer;
 use self::scatter::Scatter;
 use self::search::Search;
 use super::bounds::is_within;
-use super::chi_square::limit;
 use super::eskf::{Eskf, ImuMean, LONGEST_GAP_S, seconds_between};
 use super::fused::Fused;
 use super::propagate::Propagate;
@@ -217,7 +216,7 @@ impl<F: CopiedFilter> Copies<F> {
     where
         F: Update<M, D>,
     {
-        let most = limit(D, stream.params().gate);
+        let most = stream.gate(D);
         let result = self.is_admitted(own, 0.0, most);
         if let Some(newcomer) = &mut self.newcomer {
             newcomer.aid(own, measurement, most);

@@ -75,8 +75,8 @@ pub enum Placed {
 ///
 /// With the feature `std`, these are on the heap, allocated when the history is created; without it, they are stored inline.
 ///
-/// The history covers about `SAMPLES` samples. More states cost memory and save time: a late measurement costs its own delay plus
-/// half the time between two states.
+/// The history covers about `SAMPLES` samples. A measurement that is less late than the one before it costs the time since that one;
+/// else it costs its own delay plus half the time between two states, of which more take memory.
 #[derive(Clone, Debug)]
 pub struct History<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES: usize> {
     now: F,
@@ -85,6 +85,8 @@ pub struct History<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize,
     /// Each with the number of samples since the previous one.
     states: Ring<F, STATES>,
     since_state: usize,
+    /// State before the last late measurement, with the number of samples since the last of `states`: the next one is seldom older.
+    recent: Option<(F, usize)>,
     longest_lead_ns: i64,
     counts: Arrivals,
 }
@@ -126,6 +128,7 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
             measurements: Ring::new(),
             states,
             since_state: 0,
+            recent: None,
             longest_lead_ns,
             counts: Arrivals::default(),
         })
@@ -145,6 +148,7 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
         self.states.clear();
         self.states.push(started.clone());
         self.since_state = 0;
+        self.recent = None;
         self.now = started;
         Ok(())
     }
@@ -196,27 +200,33 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
         }
         // The last state that is not after the measurement: the measurements in that state are not newer.
         let is_before = |state: &F| time_of(state).is_some_and(|state_ns| state_ns <= time_ns);
-        let found = self.states.rposition(is_before);
-        let Some((index, state)) = found.and_then(|index| Some((index, self.states.get(index)?.clone()))) else {
+        let found = self.states.count_while(is_before).checked_sub(1);
+        let Some((index, state)) = found.and_then(|index| Some((index, self.states.get(index)?))) else {
             self.counts.too_old += 1;
             return Err(Refusal::TooOld { time_ns });
         };
+        let recent = self.recent.take().filter(|(recent, _)| is_before(recent) && time_of(recent) > time_of(state));
+        let is_recent = recent.is_some();
+        (self.now, self.since_state) = recent.unwrap_or_else(|| (state.clone(), 0));
         let place = self.insert(time_ns, measurement);
         self.counts.late += 1;
         self.counts.longest_delay_ns = self.counts.longest_delay_ns.max(now_ns.saturating_sub(time_ns));
         self.states.truncate(index + 1);
-        self.now = state;
-        self.since_state = 0;
         let from = time_of(&self.now).ok_or(Refusal::NotStarted)?;
-        let first = self.samples.position(|sample| sample.time_ns > from).unwrap_or(self.samples.len());
+        let first = self.samples.count_while(|sample| sample.time_ns <= from);
         let mut result = Err(Refusal::NotStarted);
         if from == time_ns {
             result = self.now.update(measurement);
-            self.states.truncate(index);
-            self.states.push(self.now.clone());
+            if !is_recent {
+                self.states.truncate(index);
+                self.states.push(self.now.clone());
+            }
         }
         for i in first..self.samples.len() {
             let Some(sample) = self.samples.get(i).copied() else { break };
+            if self.recent.is_none() && sample.time_ns >= time_ns {
+                self.recent = Some((self.now.clone(), self.since_state));
+            }
             if let Some(of_it) = self.advance(&sample, Some(place)) {
                 result = of_it;
             }
@@ -227,7 +237,8 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
 
     fn has_measurements_until(&self, time_ns: i64) -> bool {
         let now_ns = time_of(&self.now).unwrap_or(i64::MAX);
-        self.measurements.iter().any(|(at, _)| (now_ns.saturating_add(1)..=time_ns).contains(at))
+        let first = self.measurements.count_while(|(at, _)| *at <= now_ns);
+        self.measurements.get(first).is_some_and(|(at, _)| *at <= time_ns)
     }
 
     /// Makes room for a measurement: removes the oldest, and with it the states that do not include it yet. Returns `false` if
@@ -244,6 +255,7 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
         while self.states.get(0).and_then(time_of).is_some_and(|state_ns| state_ns < left_ns) {
             self.states.pop_front();
         }
+        self.recent.take_if(|(state, _)| time_of(state).is_some_and(|state_ns| state_ns < left_ns));
         if self.states.len() == 0 {
             self.states.push(self.now.clone());
             self.since_state = 0;
@@ -253,7 +265,7 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
 
     /// Inserts a measurement after those that are not newer, and returns its index.
     fn insert(&mut self, time_ns: i64, measurement: &F::Measurement) -> usize {
-        let place = self.measurements.iter().filter(|(at, _)| *at <= time_ns).count();
+        let place = self.measurements.count_while(|(at, _)| *at <= time_ns);
         self.measurements.insert(place, (time_ns, *measurement));
         place
     }
@@ -262,9 +274,10 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
     fn advance(&mut self, sample: &ImuMean, place: Option<usize>) -> Option<Result<Fused, Refusal>> {
         let mut result = None;
         let from = time_of(&self.now).unwrap_or(i64::MAX);
-        for (index, (time_ns, measurement)) in self.measurements.iter().enumerate() {
-            if *time_ns <= from || *time_ns > sample.time_ns {
-                continue;
+        for index in self.measurements.count_while(|(at, _)| *at <= from)..self.measurements.len() {
+            let Some((time_ns, measurement)) = self.measurements.get(index) else { break };
+            if *time_ns > sample.time_ns {
+                break;
             }
             if time_of(&self.now) != Some(*time_ns) {
                 let _ = self.now.filter_mut().propagate_until(*time_ns, sample, from);

@@ -150,6 +150,12 @@ impl Stream {
         self.counts.gate_in_a_row = 0;
     }
 
+    /// The largest normalised innovation squared that the gate accepts.
+    #[inline]
+    pub(super) fn gate(&self, dimension: usize) -> f64 {
+        self.gates.get(dimension).copied().unwrap_or_else(|| limit(dimension, self.params.gate))
+    }
+
     /// Decides how a measurement is fused, or rejects it.
     #[inline(always)]
     pub(crate) fn weigh(
@@ -160,8 +166,7 @@ impl Stream {
         gate: Gate,
     ) -> Result<Verdict, Refusal> {
         let log_likelihood = log_density - 0.5 * nis;
-        let kept = dimension.min(DIMENSIONS - 1);
-        let most = if kept == dimension { self.gates[kept] } else { limit(dimension, self.params.gate) };
+        let most = self.gate(dimension);
         if nis > most && matches!(gate, Gate::Closed) {
             let StreamParams { patience, .. } = self.params;
             if patience > 0 && self.counts.gate_in_a_row >= u64::from(patience) {
@@ -170,7 +175,7 @@ impl Stream {
             }
             return Err(Refusal::Gate { nis, limit: most });
         }
-        let huber = if kept == dimension { self.huber[kept] } else { limit(dimension, self.params.robust) };
+        let huber = self.huber.get(dimension).copied().unwrap_or_else(|| limit(dimension, self.params.robust));
         let weight = if nis > huber { sqrt(huber / nis) } else { 1.0 };
         Ok(Verdict { weight, raised: 1.0, limit: most, log_likelihood })
     }

@@ -43,16 +43,10 @@ impl<T, const N: usize> Ring<T, N> {
         self.slots[(self.first + index) % N].as_ref()
     }
 
-    pub(super) fn iter(&self) -> impl Iterator<Item = &T> {
-        (0..self.len).filter_map(|index| self.get(index))
-    }
-
-    pub(super) fn position(&self, is: impl Fn(&T) -> bool) -> Option<usize> {
-        (0..self.len).find(|index| self.get(*index).is_some_and(&is))
-    }
-
-    pub(super) fn rposition(&self, is: impl Fn(&T) -> bool) -> Option<usize> {
-        (0..self.len).rev().find(|index| self.get(*index).is_some_and(&is))
+    /// The number of values at the front for which a condition holds, which holds for none after them. The search begins at the back.
+    pub(super) fn count_while(&self, holds: impl Fn(&T) -> bool) -> usize {
+        let last = (0..self.len).rev().find(|index| self.get(*index).is_some_and(&holds));
+        last.map_or(0, |index| index + 1)
     }
 
     /// Appends a value; the oldest is removed if there is no room.
@@ -100,7 +94,7 @@ mod tests {
     use super::*;
 
     fn all(ring: &Ring<i32, 4>) -> Vec<i32> {
-        ring.iter().copied().collect()
+        (0..ring.len()).filter_map(|index| ring.get(index).copied()).collect()
     }
 
     #[test]
@@ -113,7 +107,7 @@ mod tests {
         assert_eq!(all(&ring), [2, 4, 5, 6]);
         ring.insert(1, 3);
         assert_eq!(all(&ring), [2, 3, 4, 5]);
-        assert_eq!((ring.position(|x| *x > 3), ring.rposition(|x| *x < 5)), (Some(2), Some(2)));
+        assert_eq!((ring.count_while(|x| *x < 5), ring.count_while(|x| *x < 0)), (3, 0));
         ring.truncate(2);
         assert_eq!((all(&ring), ring.len()), (vec![2, 3], 2));
         ring.insert(2, 7);
