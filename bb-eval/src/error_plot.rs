@@ -109,8 +109,10 @@ fn bands(evaluation: &Evaluation, runs: &[crate::Run]) -> Vec<Band> {
     }
     disturbed.retain(|(from_s, to_s)| to_s - from_s > OFF_S);
     let times = runs.first().map_or(&[][..], |run| &run.errors);
-    let silences = evaluation.fields.windows(2).map(|pair| (pair[0].0, pair[1].0));
-    let silences = silences.filter(|(from_s, to_s)| to_s - from_s > OFF_S);
+    let read = evaluation.fields.iter().map(|(time_s, _)| *time_s);
+    // A field that is read no more is missing to the end.
+    let end_s = times.last().map(|(time_s, _)| *time_s).filter(|_| !evaluation.fields.is_empty());
+    let silences = read.clone().zip(read.skip(1).chain(end_s)).filter(|(from_s, to_s)| to_s - from_s > OFF_S);
     let gaps = times.windows(2).filter(|pair| pair[1].0 - pair[0].0 > GAP_S).map(|pair| (pair[0].0, pair[1].0));
     let disturbed = disturbed.into_iter().map(|times| band("disturbed field", DISTURBED, times));
     let silences = silences.map(|times| band("no field", NO_FIELD, times));

@@ -97,7 +97,7 @@ const BASES: [&str; 3] = ["base_link", "base_footprint", "base"];
 
 impl Frames {
     /// The robot's frame is the nearest one above that of the IMU that is named like one, else the topmost, without
-    /// transforms that of the IMU.
+    /// transforms that of the IMU, or one named like it if the IMU has a mount.
     ///
     /// # Errors
     ///
@@ -131,6 +131,12 @@ impl Frames {
                 Some(parent) => base = parent,
                 None => break,
             }
+        }
+        // An IMU that is mounted by hand is mounted on another frame than its own.
+        let is_imu = |mount: &Mount| [imu_topic, &base].map(plain).contains(&plain(&mount.name));
+        if edges.is_empty() && mounts.iter().any(is_imu) {
+            let is_used = |name: &&str| of_topics.values().any(|frame| frame == name);
+            base = BASES.into_iter().find(is_used).unwrap_or_default().to_owned();
         }
         Ok(Self { edges, mounts: mounts.to_vec(), of_topics, base })
     }
@@ -180,37 +186,58 @@ impl Frames {
         self.of_topics.get(topic).map_or("", String::as_str)
     }
 
-    /// Transforms coordinates from the frame of `topic`'s data to the robot's.
+    /// Transforms coordinates from the frame of `topic`'s data to the robot's. A frame that nothing places is taken to be the
+    /// robot's; `unplaced` names those.
     ///
     /// # Errors
     ///
     /// Its frame is not connected to that of the robot.
-    pub(crate) fn base_from(&self, topic: &str, notes: &mut Vec<String>) -> Result<Isometry3<f64>, String> {
-        let of = |topic: &str| self.of_topic(topic).to_owned();
-        let frame = match self.mount(topic) {
-            Some(Place::Pose(pose)) => return Ok(*pose),
+    pub(crate) fn base_from(&self, topic: &str) -> Result<Isometry3<f64>, String> {
+        self.placed(topic).map(Option::unwrap_or_default)
+    }
+
+    /// Names the frames of topics that nothing places.
+    pub(crate) fn unplaced(&self, topics: &[&str]) -> Option<String> {
+        let named = topics.iter().filter(|topic| self.placed(topic) == Ok(None));
+        let named: Vec<&str> = named.copied().collect();
+        let first = self.frame_of(named.first()?);
+        let of: Vec<_> = named.iter().map(|topic| format!("{} of {topic}", self.frame_of(topic))).collect();
+        let (of, verb) = (of.join(", "), if named.len() > 1 { "are" } else { "is" });
+        Some(format!(
+            "nothing says where {of} {verb} ({TF_STATIC} is not there): taken to be at the robot's origin; say where with \
+             --mount {first}=X,Y,Z"
+        ))
+    }
+
+    /// The frame of `topic`'s data, as a mount names it.
+    fn frame_of(&self, topic: &str) -> String {
+        match self.mount(topic) {
             Some(Place::Frame(frame)) => plain(frame),
-            None => of(topic),
-        };
-        if let Some(Place::Pose(pose)) = self.mount(&frame) {
-            return Ok(*pose);
+            _ => self.of_topic(topic).to_owned(),
+        }
+    }
+
+    /// Transforms coordinates from the frame of `topic`'s data to the robot's; `None` if there are no transforms that could.
+    fn placed(&self, topic: &str) -> Result<Option<Isometry3<f64>>, String> {
+        let frame = self.frame_of(topic);
+        let mounted = [topic, &frame].into_iter().find_map(|name| match self.mount(name) {
+            Some(Place::Pose(pose)) => Some(*pose),
+            _ => None,
+        });
+        if mounted.is_some() {
+            return Ok(mounted);
         }
         if frame.is_empty() || frame == self.base {
-            return Ok(Isometry3::identity());
+            return Ok(Some(Isometry3::identity()));
         }
-        if let Some(pose) = self.path(&self.base, &frame) {
-            return Ok(pose);
-        }
-        let way_out = format!("say where it is with --mount {frame}=X,Y,Z");
-        if self.edges.is_empty() {
-            notes.push(format!(
-                "nothing tells where {frame} of {topic} is ({TF_STATIC} is not there): taken to be at the robot's origin; {way_out}"
-            ));
-            return Ok(Isometry3::identity());
+        let path = self.path(&self.base, &frame);
+        if path.is_some() || self.edges.is_empty() {
+            return Ok(path);
         }
         let known: Vec<_> = self.edges.iter().map(|(parent, child, _)| format!("{parent}-{child}")).collect();
         Err(format!(
-            "frame {frame} of {topic} is not connected to {} of the robot in {TF_STATIC}, which has {}; {way_out}",
+            "frame {frame} of {topic} is not connected to {} of the robot in {TF_STATIC}, which has {}; say where it is with \
+             --mount {frame}=X,Y,Z",
             if self.base.is_empty() { "the frame without a name" } else { &self.base },
             known.join(", ")
         ))

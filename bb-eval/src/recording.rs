@@ -120,10 +120,11 @@ impl Recording {
         }
         let named = [Some(&*imu.name), magnetic, poses.as_deref().ok()];
         let frames = frames(&bag, &named, &imu.name, &topics.mounts)?;
-        let mut notes = Vec::new();
-        let mut base_from = |topic: &str| frames.base_from(topic, &mut notes).map(|pose| pose.rotation);
+        let mut notes: Vec<String> =
+            frames.unplaced(&named.into_iter().flatten().collect::<Vec<_>>()).into_iter().collect();
+        let base_from = |topic: &str| frames.base_from(topic).map(|pose| pose.rotation);
         let base_from_imu = base_from(&imu.name)?;
-        let base_from_magnetometer = magnetic.map(&mut base_from).transpose()?.unwrap_or_default();
+        let base_from_magnetometer = magnetic.map(base_from).transpose()?.unwrap_or_default();
         let base_from_truth = poses.as_deref().map_or_else(|_| Ok(UnitQuaternion::identity()), base_from)?;
         // As estimators of a robot turn them, to the last bit.
         let turned =

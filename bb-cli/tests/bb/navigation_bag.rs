@@ -104,7 +104,10 @@ fn sensors_are_where_the_transforms_or_the_options_say() {
     let output = bb(&[&["eval", "navigation", "--json", text(&untold)], &options[..]].concat());
     let wrong: Vec<Value> = serde_json::from_str(&output.out).expect("an array");
     assert!(number(&wrong[0], "position_m") > 2.0 * number(&told[0], "position_m"), "{}", wrong[0]);
-    assert!(output.err.contains("nothing tells where gps of /fix is"), "{}", output.err);
+    assert!(output.err.contains("nothing says where gps of /fix, base of /wheels are"), "{}", output.err);
+    // Where the IMU has a mount, that is on the base.
+    let output = bb(&[&["eval", "navigation", text(&untold)], &options[..], &["--mount", "imu=0,0,0"]].concat());
+    assert!(output.err.contains("nothing says where gps of /fix is"), "{}", output.err);
 }
 
 #[test]

@@ -79,9 +79,10 @@ impl NavigationBag {
     /// A frame that is not connected, or no state to start from; in words.
     pub fn drive(&self) -> Result<Drive, String> {
         let mut notes = self.notes.clone();
-        let feed = self.feed(&mut notes)?;
-        let truth = self.truth(&mut notes)?;
+        let feed = self.feed()?;
+        let truth = self.truth()?;
         let declination = self.declination(&mut notes.notes)?;
+        notes.notes.extend(self.frames.unplaced(&self.topics.all()));
         let Notes { notes, doubts } = notes;
         // The name of the IMU as `--mount` takes it.
         let imu = match self.frames.of_topic(&self.topics.imu) {
@@ -115,13 +116,13 @@ impl NavigationBag {
         declination.at(place, time_ns, notes).map(Some)
     }
 
-    fn truth(&self, notes: &mut Notes) -> Result<RecordedTruth, String> {
+    fn truth(&self) -> Result<RecordedTruth, String> {
         let topic = match (&self.topics.truth, &self.topics.no_truth) {
             (Some(topic), _) => Ok(topic.clone()),
             (None, why) => Err(why.clone().unwrap_or_else(|| "there is no topic of it".to_owned())),
         };
         let base_from_part = match &topic {
-            Ok(topic) => self.frames.base_from(topic, &mut notes.notes)?,
+            Ok(topic) => self.frames.base_from(topic)?,
             Err(_) => Isometry3::identity(),
         };
         Ok(RecordedTruth { messages: self.messages.truth.clone(), base_from_part, topic })

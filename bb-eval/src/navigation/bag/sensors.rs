@@ -28,7 +28,7 @@ type Drifting = (Time, Time, Isometry3<f64>, Option<(f64, f64)>);
 
 impl NavigationBag {
     /// The messages for the inputs of a filter.
-    pub(super) fn feed(&self, notes: &mut Notes) -> Result<Feed, String> {
+    pub(super) fn feed(&self) -> Result<Feed, String> {
         let topics = &self.topics;
         let mut mounts = [None; INPUTS.len()];
         let of_inputs = [
@@ -40,12 +40,12 @@ impl NavigationBag {
             &topics.magnetic_field,
         ];
         for (mount, topic) in mounts.iter_mut().zip(of_inputs) {
-            *mount = topic.as_ref().map(|topic| self.frames.base_from(topic, &mut notes.notes)).transpose()?;
+            *mount = topic.as_ref().map(|topic| self.frames.base_from(topic)).transpose()?;
         }
         let mut messages = self.messages.inputs.clone();
         messages.extend(self.relative()?);
         let world = self.world();
-        let start = self.start(world.as_ref(), notes)?;
+        let start = self.start(world.as_ref())?;
         mounts[6] = start.is_some().then(Isometry3::identity);
         messages.extend(start);
         let mut feed = Feed { messages, mounts, world };
@@ -91,13 +91,13 @@ impl NavigationBag {
     }
 
     /// The state that a filter is given to start from, at the time of the first sample after it.
-    fn start(&self, world: Option<&LocalFrame>, notes: &mut Notes) -> Result<Option<Message>, String> {
+    fn start(&self, world: Option<&LocalFrame>) -> Result<Option<Message>, String> {
         let first_ns = self.messages.stamps(0).next().unwrap_or(0);
         let state = match (&self.options.start, &self.topics.start) {
             (Some(StartFrom::Own), _) | (None, None) => return Ok(None),
             (Some(StartFrom::Truth), _) => {
                 let base_from_truth = match &self.topics.truth {
-                    Some(topic) => self.frames.base_from(topic, &mut notes.notes)?,
+                    Some(topic) => self.frames.base_from(topic)?,
                     None => Isometry3::identity(),
                 };
                 let track = TrueTrack::new(&self.messages.truth, &base_from_truth, world);
@@ -105,7 +105,7 @@ impl NavigationBag {
                     .ok_or("the truth tells no orientation to start with; choose --start own, or a topic")?
             }
             (_, Some(topic)) => {
-                self.of_topic(topic, notes)?.ok_or_else(|| format!("{topic} holds no pose to start from"))?
+                self.of_topic(topic)?.ok_or_else(|| format!("{topic} holds no pose to start from"))?
             }
             (Some(StartFrom::Topic(name)), None) => return Err(format!("{name}: no such topic")),
         };
@@ -114,9 +114,9 @@ impl NavigationBag {
         Ok(Some(Message { arrival_ns: stamp_ns, stamp_ns, what: What::Start(odometry) }))
     }
 
-    fn of_topic(&self, topic: &str, notes: &mut Notes) -> Result<Option<(Time, Odometry)>, String> {
+    fn of_topic(&self, topic: &str) -> Result<Option<(Time, Odometry)>, String> {
         let Some((time_ns, pose, twist)) = self.messages.start else { return Ok(None) };
-        let base_from_part = self.frames.base_from(topic, &mut notes.notes)?;
+        let base_from_part = self.frames.base_from(topic)?;
         let part = Isometry3::from_parts(pose.position.into(), pose.world_from_body);
         let Some(world_from_part) = isometry(&part) else { return Ok(None) };
         let world_from_base = world_from_part * base_from_part.inverse();
