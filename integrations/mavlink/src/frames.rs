@@ -5,7 +5,7 @@
 //! as lost.
 
 use mavlink::consts::{self, v1, v2};
-use mavlink::dialects::common::MavMessage;
+use mavlink::dialects::ardupilotmega::MavMessage;
 use mavlink::{MAV_STX, MAV_STX_V2, MavHeader, MavlinkVersion, Message, calculate_crc};
 
 /// Frame that was found.
@@ -188,7 +188,7 @@ impl Layout {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mavlink::dialects::common::{HEARTBEAT_DATA, SYSTEM_TIME_DATA};
+    use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, SYSTEM_TIME_DATA};
     use mavlink::write_versioned_msg;
     use proptest::prelude::*;
 
@@ -207,9 +207,9 @@ mod tests {
         std::iter::from_fn(|| framer.next()).collect()
     }
 
-    /// A frame of ArduPilot's dialect: AHRS, 163.
+    /// A frame of the dialect `ualberta`: NAV_FILTER_BIAS, 220.
     fn unknown(sequence: u8) -> Vec<u8> {
-        let mut bytes = vec![MAV_STX_V2, 28, 0, 0, sequence, 7, 9, 163, 0, 0];
+        let mut bytes = vec![MAV_STX_V2, 28, 0, 0, sequence, 7, 9, 220, 0, 0];
         bytes.extend([0x11; 30]);
         bytes
     }
@@ -228,7 +228,7 @@ mod tests {
         // The noise looks like a frame of another dialect that ends with the real one.
         let (real, item) = frame(MavlinkVersion::V2, 1);
         let length = u8::try_from(real.len()).expect("it is short") - 2;
-        let mut bytes = vec![MAV_STX_V2, length, 0, 0, 0, 1, 1, 163, 0, 0];
+        let mut bytes = vec![MAV_STX_V2, length, 0, 0, 0, 1, 1, 220, 0, 0];
         bytes.extend(&real);
         let mut framer = Framer::default();
         framer.push(&bytes);
@@ -343,8 +343,8 @@ mod tests {
         prop_oneof![
             Just(frame(MavlinkVersion::V2, 1).0),
             Just(frame(MavlinkVersion::V1, 2).0),
-            (0..60_u8).prop_map(|length| vec![MAV_STX_V2, length, 0, 0, 0, 1, 1, 163, 0, 0]),
-            (0..60_u8).prop_map(|length| vec![MAV_STX, length, 0, 1, 1, 163]),
+            (0..60_u8).prop_map(|length| vec![MAV_STX_V2, length, 0, 0, 0, 1, 1, 220, 0, 0]),
+            (0..60_u8).prop_map(|length| vec![MAV_STX, length, 0, 1, 1, 220]),
             proptest::collection::vec(any::<u8>(), 0..20),
         ]
     }

@@ -52,7 +52,7 @@
 //! # Limits
 //!
 //! Frames are not signed, and signatures are not checked. Clocks are not synchronised by `TIMESYNC`: `ODOMETRY` and
-//! `GPS_INPUT` carry the date of this machine. The dialect `common` has no report of spoofing; see
+//! `GPS_INPUT` carry the date of this machine. The dialect `ardupilotmega` has no report of spoofing; see
 //! [`MavlinkGpsHealth`].
 
 // A robot must not stop because of an unexpected value.

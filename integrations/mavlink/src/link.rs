@@ -15,7 +15,7 @@ use crate::transport;
 use crate::{Address, AddressError};
 use bb_core::{MonotonicTime, Payload};
 use mavlink::MavHeader;
-use mavlink::dialects::common::MavMessage;
+use mavlink::dialects::ardupilotmega::MavMessage;
 use shared::Shared;
 use std::collections::HashMap;
 use std::io;
@@ -49,7 +49,7 @@ pub enum LinkError {
 /// Counts of a link since it was opened.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Payload)]
 pub struct LinkStatistics {
-    /// Messages of the dialect `common`.
+    /// Messages of the dialect `ardupilotmega`, which includes `common`.
     pub messages: u64,
     /// Frames of other dialects.
     pub unknown: u64,

@@ -287,10 +287,14 @@ mod tests {
         assert!(history.is_sorted_by(|a, b| a.time > b.time), "{history:?}");
     }
 
+    fn event(time_ns: i64, kind: EventKind) -> Event {
+        Event { time_ns, frame_id: uuid::Uuid::nil(), spoof_block: false, kind }
+    }
+
     #[test]
     fn errors_and_warnings_have_room_in_a_full_message() {
         let mut sink = Sink::default();
-        let mut tell = |time_ns: i64, kind: EventKind| sink.event(&Event { time_ns, kind });
+        let mut tell = |time_ns: i64, kind: EventKind| sink.event(&event(time_ns, kind));
         let reason = Reason::Refused(Refusal::NonFinite);
         (0..300).for_each(|time_ns| tell(time_ns, EventKind::Revised { input: InputKind::Gnss }));
         (300..600).for_each(|time_ns| tell(time_ns, EventKind::Degraded { input: InputKind::Vio, reason }));
@@ -302,7 +306,7 @@ mod tests {
         assert_eq!((lost, count(Level::Error), events.len()), (44, 2, 256 + 300 + 3));
         assert!(events.is_sorted_by_key(|event| event.time));
         // The next message has room again.
-        sink.event(&Event { time_ns: 603, kind: EventKind::Revised { input: InputKind::Gnss } });
+        sink.event(&event(603, EventKind::Revised { input: InputKind::Gnss }));
         assert_eq!((sink.events.lost, sink.take().events.len()), (0, 1));
     }
 }

@@ -26,6 +26,7 @@ pub(super) struct Emission {
     period_ns: i64,
     next_ns: Option<i64>,
     ids: FrameIds,
+    last_id: Uuid,
     watchdog: Watchdog,
     is_silent: bool,
     last: Option<Norm>,
@@ -62,6 +63,7 @@ impl Emission {
             period_ns: ns(1.0 / config.params.output_rate).max(1),
             next_ns: None,
             ids: FrameIds::new(config.flight),
+            last_id: Uuid::nil(),
             watchdog: Watchdog::default(),
             is_silent: false,
             last: None,
@@ -74,6 +76,11 @@ impl Emission {
     /// Sets the number of a flight that has none.
     pub(super) fn name_flight(&mut self, number: u64) {
         self.ids.name(number);
+    }
+
+    /// Id of the last output; nil before the first.
+    pub(super) fn last_id(&self) -> Uuid {
+        self.last_id
     }
 
     /// Returns whether an output is due. If so, the next one is scheduled.
@@ -140,7 +147,8 @@ impl Emission {
         started: Option<(i64, StartedFrom)>,
         params: &StateEstimatorParams,
     ) -> (EstimatorOutput, Option<f64>) {
-        let mut output = EstimatorOutput { frame_id: self.ids.next(), emitted_ns: now_ns, ..estimate };
+        self.last_id = self.ids.next();
+        let mut output = EstimatorOutput { frame_id: self.last_id, emitted_ns: now_ns, ..estimate };
         if let Some(last) = self.last
             && output.label == SourceLabel::DeadReckoned
             && last.label == SourceLabel::DeadReckoned

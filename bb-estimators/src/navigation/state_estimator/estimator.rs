@@ -51,6 +51,15 @@ pub struct StateEstimator<K = (), F: ProvidedFactor = NavigationFactor> {
     label: SourceLabel,
     gate: GateState,
     has_failed: bool,
+    added: Counts,
+}
+
+/// Numbers of inputs that were added since the last estimate.
+#[derive(Clone, Copy, Debug, Default)]
+struct Counts {
+    imu: u32,
+    vio: u32,
+    poses: u32,
 }
 
 impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
@@ -69,6 +78,7 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
             label: SourceLabel::default(),
             gate: GateState::default(),
             has_failed: false,
+            added: Counts::default(),
         };
         this.tell(0, EventKind::Ready { strategy: config.strategy, window: config.params.window });
         Ok(this)
@@ -290,7 +300,16 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
     }
 
     fn tell(&mut self, time_ns: i64, kind: EventKind) {
-        self.sink.event(&Event { time_ns, kind });
+        if let EventKind::Added { input, waits: false, .. } = kind {
+            match input {
+                InputKind::Imu => self.added.imu += 1,
+                InputKind::Vio => self.added.vio += 1,
+                InputKind::Anchor => self.added.poses += 1,
+                _ => {}
+            }
+        }
+        let spoof_block = !self.queue.engine().gate().state().is_open();
+        self.sink.event(&Event { time_ns, frame_id: self.emission.last_id(), spoof_block, kind });
     }
 
     /// Passes on the reports of the queue.
@@ -368,6 +387,9 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
             if let Some(ratio) = warning {
                 self.tell(now_ns, EventKind::CovarianceGrowing { ratio });
             }
+            let Counts { imu, vio, poses } = core::mem::take(&mut self.added);
+            let smoothed = u32::try_from(self.queue.engine().keyframes()).unwrap_or(u32::MAX);
+            self.tell(now_ns, EventKind::Emitted { imu, vio, poses, smoothed });
             output
         });
         if let Some(kind) = self.emission.watch(now_ns, output.is_some(), &self.config.params) {

@@ -6,6 +6,7 @@ use super::label::SourceLabel;
 use super::output::EstimatorOutput;
 use super::params::StrategyKind;
 use super::status_text::StatusText;
+use uuid::Uuid;
 
 /// Kind of an input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -111,6 +112,10 @@ impl StartedFrom {
 pub struct Event {
     /// Time on the clock of the inputs, ns.
     pub time_ns: i64,
+    /// Id of the last estimate emitted before; nil before the first.
+    pub frame_id: Uuid,
+    /// `true` while the gate of the GNSS receiver is not open.
+    pub spoof_block: bool,
     /// Kind of the event.
     pub kind: EventKind,
 }
@@ -201,6 +206,17 @@ pub enum EventKind {
     FallbackEngaged,
     /// There is an estimate again.
     FallbackRecovered,
+    /// An estimate was emitted, with the numbers of inputs that were added since the one before.
+    Emitted {
+        /// Batches of samples of the IMU.
+        imu: u32,
+        /// Relative poses.
+        vio: u32,
+        /// Poses from satellite images.
+        poses: u32,
+        /// Number of keyframes held.
+        smoothed: u32,
+    },
     /// A keyframe has left the window.
     Keyframe {
         /// Present estimate of the keyframe, for recorders only.
@@ -227,6 +243,7 @@ impl EventKind {
             Self::FallbackImminent => "fallback_imminent",
             Self::FallbackEngaged => "fallback_engaged",
             Self::FallbackRecovered => "fallback_recovered",
+            Self::Emitted { .. } => "emitted",
             Self::Keyframe { .. } => "keyframe",
         }
     }
@@ -250,7 +267,7 @@ impl Event {
             // It takes a warning back, and belongs wherever the warning went.
             | EventKind::Revised { .. }
             | EventKind::FallbackRecovered => Level::Info,
-            EventKind::Added { .. } | EventKind::Keyframe { .. } => Level::Debug,
+            EventKind::Added { .. } | EventKind::Emitted { .. } | EventKind::Keyframe { .. } => Level::Debug,
         }
     }
 
@@ -284,6 +301,7 @@ impl Event {
             | EventKind::Added { .. }
             | EventKind::Degraded { .. }
             | EventKind::Revised { .. }
+            | EventKind::Emitted { .. }
             | EventKind::Keyframe { .. } => return None,
         })
     }

@@ -4,7 +4,7 @@ use super::LinkError;
 use super::shared::Shared;
 use crate::frames::{Framer, Item, begins_with_message};
 use crate::transport::{LONGEST_READ, Reader};
-use mavlink::dialects::common::{HEARTBEAT_DATA, MavAutopilot, MavMessage, MavModeFlag, MavState, MavType};
+use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot, MavMessage, MavModeFlag, MavState, MavType};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 

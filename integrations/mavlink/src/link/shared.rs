@@ -7,7 +7,7 @@ use crate::frames::Item;
 use crate::transport::Writer;
 use bb_core::MonotonicTime;
 use bb_core::time::Clock;
-use mavlink::dialects::common::{HEARTBEAT_DATA, MavMessage};
+use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavMessage};
 use mavlink::{MAVLinkV2MessageRaw, MavHeader, Message, MessageData};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};

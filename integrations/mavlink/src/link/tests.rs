@@ -1,7 +1,7 @@
 //! Links over the loopback device, with frames that the crate `mavlink` writes.
 
 use super::*;
-use mavlink::dialects::common::{HEARTBEAT_DATA, HIGHRES_IMU_DATA, SYSTEM_TIME_DATA};
+use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, HIGHRES_IMU_DATA, SYSTEM_TIME_DATA};
 use mavlink::{MavlinkReader, MavlinkVersion, MessageData, write_versioned_msg};
 use std::net::UdpSocket;
 
@@ -180,8 +180,8 @@ fn noise_other_dialects_and_gaps_are_counted() {
     other.meet();
     other.send(1, &time(0));
     other.socket.send(&[0; 17]).expect("it is on the loopback device");
-    // A frame of ArduPilot's dialect, which is numbered 1.
-    let unknown = [&[0xfd, 2, 0, 0, 1, 1, 1, 163, 0, 0][..], &[0x11; 4]].concat();
+    // A frame of another dialect, which is numbered 1.
+    let unknown = [&[0xfd, 2, 0, 0, 1, 1, 1, 220, 0, 0][..], &[0x11; 4]].concat();
     other.socket.send(&unknown).expect("it is on the loopback device");
     // A frame that is cut off holds up none that follows.
     other.socket.send(&[0xfd, 255, 0, 0, 2, 1, 1, 2, 0, 0, 9]).expect("it is on the loopback device");

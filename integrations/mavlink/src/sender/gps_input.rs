@@ -4,7 +4,7 @@ use crate::axes::swap_world;
 use bb_core::nalgebra::Vector3;
 use bb_core::time::WallTime;
 use bb_estimators::navigation::state_estimator::FlightEstimate;
-use mavlink::dialects::common::{GPS_INPUT_DATA, GpsFixType, GpsInputIgnoreFlags};
+use mavlink::dialects::ardupilotmega::{GPS_INPUT_DATA, GpsFixType, GpsInputIgnoreFlags};
 
 /// Values that the estimate does not contain.
 #[derive(Clone, Debug)]

@@ -4,7 +4,7 @@ use super::gps_input::GpsInput;
 use super::odometry::OdometryFrame;
 use super::source::Estimate;
 use bb_core::time::WallTime;
-use mavlink::dialects::common::MavMessage;
+use mavlink::dialects::ardupilotmega::MavMessage;
 
 /// The kind of message.
 #[derive(Clone, Debug)]

@@ -6,7 +6,7 @@ use bb_core::payload::Odometry;
 use bb_core::time::WallTime;
 use bb_estimators::navigation::state_estimator::FlightEstimate;
 use bb_estimators::navigation::{Geodetic, LocalFrame};
-use mavlink::dialects::common::{MavEstimatorType, MavFrame, ODOMETRY_DATA};
+use mavlink::dialects::ardupilotmega::{MavEstimatorType, MavFrame, ODOMETRY_DATA};
 
 /// A larger jump of the estimate, m, shows that the origin was far from the robot.
 const JUMP: f64 = 1000.0;

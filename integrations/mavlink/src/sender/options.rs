@@ -5,7 +5,7 @@ use super::kind::Kind;
 use super::odometry::OdometryFrame;
 use bb_core::{Fault, Options};
 use bb_estimators::navigation::{Geodetic, LocalFrame};
-use mavlink::dialects::common::MavFrame;
+use mavlink::dialects::ardupilotmega::MavFrame;
 use std::time::Duration;
 
 /// Options of [`MavlinkSender`](super::MavlinkSender).
@@ -32,6 +32,12 @@ pub struct MavlinkSenderOptions {
     /// An estimate that is older is not sent.
     #[option(default = Duration::from_millis(500))]
     pub max_age: Duration,
+    /// Set of sources (1 to 3) that ArduPilot's filter is to use while there are estimates; 0 leaves it alone.
+    #[option(default = 0, range = 0..=3)]
+    pub source_set: u8,
+    /// Set of sources while the estimator's fallback is engaged, of which the events of `texts` tell.
+    #[option(default = 1, range = 1..=3)]
+    pub fallback_source_set: u8,
     /// `GPS_INPUT`: height of the geoid above the ellipsoid, where the robot is. Not a number where it is not known:
     /// the height is then marked to be ignored, since MAVLink wants the one above the sea.
     #[option(default = f64::NAN, unit = "m")]
@@ -79,6 +85,11 @@ impl MavlinkSenderOptions {
             return Err(Fault::permanent(format!(
                 "it cannot speak as system {system}, component {component}: both ids are from 1 to 255"
             )));
+        }
+        if self.source_set > 0 && self.texts.is_empty() {
+            return Err(Fault::permanent(
+                "source_set is given, but no events that tell of the fallback: name them in `texts`",
+            ));
         }
         match self.message.as_str() {
             "gps_input" => Ok(Kind::GpsInput(GpsInput {

@@ -1,7 +1,7 @@
 //! `STATUSTEXT`.
 
 use bb_estimators::navigation::state_estimator::{FlightEvent, Level};
-use mavlink::dialects::common::{MavSeverity, STATUSTEXT_DATA};
+use mavlink::dialects::ardupilotmega::{MavSeverity, STATUSTEXT_DATA};
 
 /// Characters in one message.
 const CHUNK: usize = 50;
@@ -75,6 +75,8 @@ mod tests {
     fn severities_are_those_of_the_levels() {
         let event = |level, kind: &str| FlightEvent {
             time: MonotonicTime::ZERO,
+            frame_id: [0; 16],
+            spoof_block: false,
             level,
             kind: kind.to_owned(),
             input: None,

@@ -8,7 +8,7 @@ use bb_core::nalgebra::{Quaternion, UnitQuaternion};
 use bb_core::payload::Orientation;
 use bb_core::{Fault, MonotonicTime, Options, Reading, Sensor, SensorContext};
 use mavlink::MessageData;
-use mavlink::dialects::common::{ATTITUDE_QUATERNION_DATA, MavMessage};
+use mavlink::dialects::ardupilotmega::{ATTITUDE_QUATERNION_DATA, MavMessage};
 use std::time::Duration;
 
 /// Options of [`MavlinkAttitude`].

@@ -7,7 +7,7 @@ use bb_core::nalgebra::{Matrix3, Vector3};
 use bb_core::payload::{GeodeticPosition, GnssFix, GnssServices, GnssStatus};
 use bb_core::{Fault, MonotonicTime, Options, Reading, Sensor, SensorContext};
 use mavlink::MessageData;
-use mavlink::dialects::common::{GPS_RAW_INT_DATA, GpsFixType, MavMessage};
+use mavlink::dialects::ardupilotmega::{GPS_RAW_INT_DATA, GpsFixType, MavMessage};
 use std::time::Duration;
 
 /// Options of [`MavlinkGnss`].

@@ -5,7 +5,7 @@ use crate::link::Peer;
 use bb_core::{Fault, MonotonicTime, Options, Reading, Sensor, SensorContext};
 use bb_estimators::navigation::state_estimator::{GpsHealth, GpsReport};
 use mavlink::MessageData;
-use mavlink::dialects::common::{GPS_RAW_INT_DATA, GpsFixType, MavMessage, STATUSTEXT_DATA};
+use mavlink::dialects::ardupilotmega::{GPS_RAW_INT_DATA, GpsFixType, MavMessage, STATUSTEXT_DATA};
 use std::time::Duration;
 
 /// Options of [`MavlinkGpsHealth`].
@@ -39,7 +39,7 @@ pub struct MavlinkGpsHealthOptions {
 
 /// The health of the flight controller's receiver, with each `GPS_RAW_INT`, as input for the state estimator.
 ///
-/// The dialect `common` has no message about spoofing. So the receiver counts as spoofed for a while after a
+/// The dialect `ardupilotmega` has no message about spoofing. So the receiver counts as spoofed for a while after a
 /// `STATUSTEXT` that reports it, as "GPS1: spoofing indicated", unless another one reports its end, as "spoofing
 /// cleared".
 #[derive(Debug)]

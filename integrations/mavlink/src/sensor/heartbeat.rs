@@ -4,7 +4,7 @@ use super::stream::Stream;
 use crate::link::{LinkStatistics, Peer};
 use bb_core::{Fault, MonotonicTime, Options, Payload, Reading, Sensor, SensorContext};
 use mavlink::MessageData;
-use mavlink::dialects::common::{HEARTBEAT_DATA, MavMessage, MavModeFlag};
+use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavMessage, MavModeFlag};
 use std::time::Duration;
 
 /// Options of [`MavlinkHeartbeat`].
@@ -82,7 +82,7 @@ fn flight_controller(data: &HEARTBEAT_DATA, link: LinkStatistics) -> FlightContr
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mavlink::dialects::common::{MavAutopilot, MavState, MavType};
+    use mavlink::dialects::ardupilotmega::{MavAutopilot, MavState, MavType};
 
     #[test]
     fn numbers_are_those_of_the_specification() {

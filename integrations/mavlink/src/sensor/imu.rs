@@ -8,7 +8,7 @@ use bb_core::nalgebra::Vector3;
 use bb_core::payload::Imu;
 use bb_core::{Fault, MonotonicTime, Options, Reading, Sensor, SensorContext};
 use mavlink::MessageData;
-use mavlink::dialects::common::{HIGHRES_IMU_DATA, HighresImuUpdatedFlags, MavMessage, SCALED_IMU2_DATA};
+use mavlink::dialects::ardupilotmega::{HIGHRES_IMU_DATA, HighresImuUpdatedFlags, MavMessage, SCALED_IMU2_DATA};
 use std::time::Duration;
 
 /// Options of [`MavlinkImu`].

@@ -1,6 +1,7 @@
 //! A whole robot beside a simulated flight controller on the loopback device, with frames of the crate `mavlink`.
 
 mod faults;
+mod flight;
 mod other;
 mod pymavlink;
 mod reads;
@@ -98,6 +99,8 @@ fn estimate(time: MonotonicTime, longitude_deg: f64) -> FlightEstimate {
 fn text(level: Level, text: &str) -> FlightEvent {
     FlightEvent {
         time: MonotonicTime::ZERO,
+        frame_id: [0; 16],
+        spoof_block: false,
         level,
         kind: "label".into(),
         input: None,

@@ -1,15 +1,15 @@
 //! A flight controller.
 
-use mavlink::dialects::common::{
-    ATTITUDE_QUATERNION_DATA, GPS_RAW_INT_DATA, GpsFixType, HEARTBEAT_DATA, HIGHRES_IMU_DATA,
-    HighresImuUpdatedFlags, MavAutopilot, MavMessage, MavModeFlag, MavState, MavType, SCALED_IMU2_DATA,
+use mavlink::dialects::ardupilotmega::{
+    ATTITUDE_QUATERNION_DATA, COMMAND_ACK_DATA, GPS_RAW_INT_DATA, GpsFixType, HEARTBEAT_DATA, HIGHRES_IMU_DATA,
+    HighresImuUpdatedFlags, MavAutopilot, MavMessage, MavModeFlag, MavResult, MavState, MavType, SCALED_IMU2_DATA,
     STATUSTEXT_DATA,
 };
 use mavlink::{MavHeader, MavlinkReader, MavlinkVersion, write_versioned_msg};
 use std::net::UdpSocket;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
 use std::sync::mpsc::{Receiver, channel};
+use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -30,6 +30,8 @@ pub(crate) struct Behaviour {
     pub(crate) ahead_ms: AtomicI64,
     /// `true` if its clock does not advance.
     pub(crate) is_still: AtomicBool,
+    /// Answer to commands, if it answers.
+    pub(crate) answer: Mutex<Option<MavResult>>,
     pub(crate) ends: AtomicBool,
 }
 
@@ -51,18 +53,28 @@ impl FlightController {
         let shared = Arc::clone(&behaviour);
         let thread = thread::spawn(move || {
             let (start, mut sequence, mut buffer, mut peer) = (Instant::now(), 0_u8, [0; 2048], None);
+            let mut commanded = None;
             while !shared.ends.load(Ordering::Acquire) {
                 // Without a peer, or in the pauses.
                 let listens = peer.is_none() || !shared.floods.load(Ordering::Acquire);
                 if listens && let Ok((length, from)) = socket.recv_from(&mut buffer) {
                     peer = Some(from);
-                    if let Ok(frame) = MavlinkReader::new(&buffer[..length]).read_any_message() {
-                        let _ = hears.send(frame);
+                    let Ok(frame) = MavlinkReader::new(&buffer[..length]).read_any_message() else { continue };
+                    let answer = *shared.answer.lock().expect("nobody panics with it");
+                    commanded = match (&frame.1, answer) {
+                        (MavMessage::COMMAND_LONG(asked), Some(result)) => Some((asked.command, result)),
+                        _ => None,
+                    };
+                    let _ = hears.send(frame);
+                    if commanded.is_none() {
+                        continue;
                     }
-                    continue;
                 }
                 let Some(peer) = peer else { continue };
-                for message in messages(&shared, start) {
+                let answer = commanded.take().map(|(command, result)| {
+                    MavMessage::COMMAND_ACK(COMMAND_ACK_DATA { command, result, ..COMMAND_ACK_DATA::default() })
+                });
+                for message in messages(&shared, start).into_iter().chain(answer) {
                     let header = MavHeader { system_id: 1, component_id: 1, sequence };
                     sequence = sequence.wrapping_add(1);
                     let mut frame = Vec::new();

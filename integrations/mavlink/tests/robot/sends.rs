@@ -5,9 +5,10 @@ use crate::other::FlightController;
 use bb_core::nalgebra::{Matrix6, UnitQuaternion, Vector3};
 use bb_core::payload::{Pose, Twist};
 use bb_core::prelude::*;
-use bb_estimators::navigation::state_estimator::{FlightEstimate, FlightEvents, Level};
+use bb_estimators::navigation::state_estimator::{FlightEstimate, FlightEvent, FlightEvents, Level};
+use bb_mavlink::MavlinkSent;
 use mavlink::MavHeader;
-use mavlink::dialects::common::{MavFrame, MavMessage, MavSeverity};
+use mavlink::dialects::ardupilotmega::{MavCmd, MavFrame, MavMessage, MavResult, MavSeverity};
 
 #[test]
 fn an_estimate_arrives_and_a_stale_one_does_not() {
@@ -64,6 +65,50 @@ fn texts_arrive_with_their_severities() {
             (MavSeverity::MAV_SEVERITY_INFO, Ok(10), 1, 1),
         ]
     );
+}
+
+/// A command is repeated until it is answered, and follows the fallback.
+#[test]
+fn sources_are_switched_for_estimates_and_for_the_fallback() {
+    let other = FlightController::new();
+    let mut builder = drone(&other.address);
+    let options = builder.options(drone::bridge::position);
+    (options.source_set, options.fallback_source_set) = (2, 3);
+    let sent = builder.subscribe(drone::bridge::position);
+    let running = builder.start().expect("the link can be opened");
+    let live = running.live();
+    let commanded = || {
+        let set = other.hears(|_, message| match message {
+            MavMessage::COMMAND_LONG(data) => {
+                Some((data.command, data.target_component, data.param1, data.confirmation))
+            }
+            _ => None,
+        });
+        let (command, component, set, confirmation) = set.expect("it is sent");
+        assert_eq!((command, component), (MavCmd::MAV_CMD_SET_EKF_SOURCE_SET, 1));
+        (set, confirmation)
+    };
+    let answer = |result| *other.behaviour.answer.lock().expect("nobody panics with it") = Some(result);
+    let counts = |is: &dyn Fn(&MavlinkSent) -> bool| {
+        std::iter::from_fn(|| sent.recv_timeout(LONG))
+            .find(|sent| is(&sent.payload))
+            .expect("it is counted")
+            .payload
+    };
+    let tell = |kind: &str| {
+        let events = vec![FlightEvent { kind: kind.into(), ..text(Level::Error, kind) }];
+        live.publish(drone::sensor::base::events, Clock::real().now(), FlightEvents { events, lost: 0 });
+    };
+    let now = Clock::real().now();
+    live.publish(drone::sensor::base::estimate, now, estimate(now, 11.0));
+    assert_eq!((commanded(), commanded()), ((2.0, 0), (2.0, 1)), "again, as there was no answer");
+    answer(MavResult::MAV_RESULT_ACCEPTED);
+    assert_eq!(counts(&|sent| sent.source_set > 0).source_set, 2);
+    tell("fallback_engaged");
+    assert_eq!(counts(&|sent| sent.source_set != 2).source_set, 3);
+    answer(MavResult::MAV_RESULT_DENIED);
+    tell("fallback_recovered");
+    assert_eq!(counts(&|sent| sent.source_sets_refused > 0).source_set, 3, "the one before holds");
 }
 
 /// The estimator says how often its estimate has jumped, and the origin may move on besides.

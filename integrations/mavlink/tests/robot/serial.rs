@@ -3,7 +3,7 @@
 use bb_core::prelude::*;
 use bb_estimators::navigation::state_estimator::FlightEstimate;
 use bb_mavlink::{MavlinkHeartbeat, MavlinkImu, MavlinkSender};
-use mavlink::dialects::common::{HEARTBEAT_DATA, MavMessage, SCALED_IMU2_DATA};
+use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavMessage, SCALED_IMU2_DATA};
 use mavlink::{MavHeader, MavlinkReader, MavlinkVersion, write_versioned_msg};
 use serialport::{SerialPort, TTYPort};
 use std::io::Write;

@@ -127,6 +127,10 @@ pub struct FlightEvents {
 pub struct FlightEvent {
     /// Time of the event.
     pub time: MonotonicTime,
+    /// The bytes of the UUID of the last estimate emitted before; zeros before the first.
+    pub frame_id: [u8; 16],
+    /// `true` while the gate of the GNSS receiver is not open.
+    pub spoof_block: bool,
     /// Severity.
     pub level: Level,
     /// Name of the kind of event.
@@ -155,6 +159,8 @@ impl FlightEvent {
         let Parts { input, reason, from, to, window, cov_inflation } = Parts::of(&event.kind);
         Self {
             time: MonotonicTime::from_nanos(event.time_ns),
+            frame_id: *event.frame_id.as_bytes(),
+            spoof_block: event.spoof_block,
             level: event.level(),
             kind: event.kind.name().to_owned(),
             input: owned(input),
@@ -206,6 +212,7 @@ impl Parts {
             | EventKind::FallbackImminent
             | EventKind::FallbackEngaged
             | EventKind::FallbackRecovered
+            | EventKind::Emitted { .. }
             | EventKind::Keyframe { .. } => none,
         }
     }

@@ -4,6 +4,7 @@ use super::flight::{FRAME, SECOND, STEP};
 use super::*;
 use crate::navigation::Refusal;
 use nalgebra::Vector3;
+use uuid::Uuid;
 
 /// A flight with every kind of fault.
 fn bad_day(strategy: StrategyKind) -> Estimator {
@@ -76,7 +77,7 @@ fn levels_are_those_of_the_design() {
             "degraded" | "rejected" | "covariance_growing" => Level::Warn,
             "gate" if is_blocking(event) => Level::Warn,
             "ready" | "started" | "gate" | "label" | "revised" | "fallback_recovered" => Level::Info,
-            "added" | "keyframe" => Level::Debug,
+            "added" | "emitted" | "keyframe" => Level::Debug,
             other => panic!("{other}"),
         };
         for event in estimator.sink() {
@@ -103,6 +104,7 @@ fn status_texts_have_at_most_fifty_characters() {
         Rejection::TooFar { distance_m: huge },
         Rejection::Disagrees { distance_m: huge },
     ];
+    let event = |kind| Event { time_ns: 0, frame_id: Uuid::nil(), spoof_block: false, kind };
     let texts = rejections.map(|rejection| EventKind::Rejected { rejection }).into_iter().chain([
         EventKind::CovarianceGrowing { ratio: huge },
         EventKind::FallbackImminent,
@@ -114,15 +116,12 @@ fn status_texts_have_at_most_fifty_characters() {
         EventKind::Fatal { input: InputKind::WarmStart, reason: Reason::Overflow },
     ]);
     for kind in texts {
-        let text = Event { time_ns: 0, kind }.status_text().unwrap();
+        let text = event(kind).status_text().unwrap();
         assert!((10..=50).contains(&text.as_str().len()) && text.as_str().starts_with("NAV "), "{text}");
     }
     // Texts with typical numbers are not truncated.
     let usual = EventKind::Rejected { rejection: Rejection::Disagrees { distance_m: 123.4 } };
-    assert_eq!(
-        Event { time_ns: 0, kind: usual }.status_text().unwrap().as_str(),
-        "NAV GPS rejected: anchor 123 m off"
-    );
+    assert_eq!(event(usual).status_text().unwrap().as_str(), "NAV GPS rejected: anchor 123 m off");
 }
 
 /// Keyframes that are still in the window follow, at the end of a flight, those that have left it.
@@ -166,6 +165,37 @@ fn keyframes_that_leave_the_window_go_to_the_recorder_once_and_in_order() {
         assert_eq!(times, expected);
         assert!(left.iter().all(|estimate| estimate.smoothed == strategy.is_smoothing()));
         assert!(left[20..].iter().all(|estimate| flight.error(estimate).0 < 3.0));
+    }
+}
+
+/// Each estimate comes with an event of its id, the inputs since the one before, and the depth of the window.
+#[test]
+fn an_estimate_says_what_was_added() {
+    let flight = Flight::new(8, 4);
+    for strategy in StrategyKind::ALL {
+        let mut estimator = started(&flight, *strategy);
+        let mut ids = Vec::new();
+        for sent in &flight.sent(true, true, false) {
+            sent.to(&mut estimator).unwrap();
+            if let Sent::Imu(sample) = sent {
+                ids.extend(estimator.tick(sample.time_ns).map(|output| output.frame_id));
+            }
+        }
+        let last_ns = kinds(estimator.sink(), "emitted").last().unwrap().time_ns;
+        let is_added = |event: &&Event, wanted: InputKind| {
+            let EventKind::Added { input, waits, .. } = event.kind else { return false };
+            input == wanted && !waits && event.time_ns <= last_ns
+        };
+        let added = |input| estimator.sink().iter().filter(|event| is_added(event, input)).count() as u32;
+        let expected = [InputKind::Imu, InputKind::Vio, InputKind::Anchor].map(added);
+        let (mut sums, mut deepest) = ([0; 3], 0);
+        for (event, id) in kinds(estimator.sink(), "emitted").zip(&ids) {
+            let EventKind::Emitted { imu, vio, poses, smoothed } = event.kind else { unreachable!() };
+            assert_eq!(event.frame_id, *id);
+            sums = [sums[0] + imu, sums[1] + vio, sums[2] + poses];
+            deepest = deepest.max(smoothed);
+        }
+        assert_eq!((sums, deepest), (expected, 15), "{}", strategy.name());
     }
 }
 
