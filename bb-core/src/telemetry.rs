@@ -36,7 +36,7 @@ pub enum TelemetryEvent {
         path: &'static str,
         /// The message's stamp.
         stamp: Stamp,
-        /// Time from the stamp, which is that of the driver's message unless it is [`Timed`](crate::Timed), to the emission.
+        /// Time from the stamp, which is that of the driving input's message unless it is [`Timed`](crate::Timed), to the emission.
         age: Duration,
     },
     /// A callback returned.

@@ -1,7 +1,7 @@
 //! The input of an estimator: one payload, or a struct with a field per input.
 //!
-//! The estimator gets the driver's message by reference. Every other input has a [`Slot`] that keeps its latest
-//! message, or all messages since the last dispatch. When the driver's message arrives, [`InputAt::snapshot`] checks
+//! The estimator gets the driving input's message by reference. Every other input has a [`Slot`] that keeps its latest
+//! message, or all messages since the last dispatch. When the driving input's message arrives, [`InputAt::snapshot`] checks
 //! the slots against its time, and builds the estimator's input struct or names the input that was missing or too old.
 
 mod every;
@@ -87,7 +87,7 @@ pub trait InputAt<const I: FieldIndex>: Inputs {
     /// The payload it takes.
     type Payload: Payload;
 
-    /// Store of the input's messages until the driver arrives.
+    /// Store of the input's messages until the driving input arrives.
     type Slot: Slot<Self::Payload>;
 
     /// Returns the input's slot; `None` if the estimator takes only a single payload, which needs no cache.

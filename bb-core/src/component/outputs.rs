@@ -52,10 +52,10 @@ pub trait Outputs: Sized + Send + 'static {
     type Only: EmittedAt<Self>;
 }
 
-/// A payload with a time of its own, for an output that is not of the time of the driver's message: that of a sensor with a known
+/// A payload with a time of its own, for an output that is not of the time of the driving input's message: that of a sensor with a known
 /// delay, an interpolation, a sample of a batch.
 ///
-/// An output without one is stamped with the time of the driver's message, or with the current time in reply to anything else.
+/// An output without one is stamped with the time of the driving input's message, or with the current time in reply to anything else.
 /// Subscribers get the messages in the order in which they are published. An estimator takes those of an input in the order
 /// of their times: an earlier one is dropped as *out of order*, and one that is more than a second ahead of the clock as *clock
 /// skew*; both are counted. The frame is always that of the estimator's place, which the transforms of its consumers are computed

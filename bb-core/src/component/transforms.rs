@@ -81,12 +81,12 @@ impl<'a> InputTransforms<'a> {
         Self { inputs, driver_time: MonotonicTime::ZERO }
     }
 
-    /// Returns the same transforms, for a message of the driver with this stamp.
+    /// Returns the same transforms, for a message of the driving input with this stamp.
     pub fn at(self, driver_time: MonotonicTime) -> Self {
         Self { driver_time, ..self }
     }
 
-    /// The stamp of the driver's message, which is also that of the output.
+    /// The stamp of the driving input's message, which is also that of the output.
     pub fn driver_time(&self) -> MonotonicTime {
         self.driver_time
     }

@@ -71,7 +71,7 @@ pub(super) struct InputCounters {
     /// Messages that did not fit in the inbox. Their publishers count them, while another thread may hold the estimator. They are
     /// not included in the other two counters.
     overflowed: AtomicU64,
-    /// The age of the driver's messages, in nanoseconds, when the callback they led to returned.
+    /// The age of the driving input's messages, in nanoseconds, when the callback they led to returned.
     pub(super) age: Option<Latency>,
 }
 
@@ -220,7 +220,7 @@ pub struct InputStatistics {
     pub source: &'static str,
     /// Messages that arrived, including dropped ones.
     pub received: u64,
-    /// The age of the driver's messages, from their stamp to the return of the callback they led to. It is measured in the same way
+    /// The age of the driving input's messages, from their stamp to the return of the callback they led to. It is measured in the same way
     /// as [`EstimatorStatistics::latency`].
     pub age: LatencyStatistics,
     dropped: [u64; REASONS],

@@ -5,8 +5,8 @@
 //! | healthy | a bad completion, a dispatch dropped for sync, a restart | degraded | what was bad | `on_degraded` |
 //! | degraded | `recover_after` consecutive good completions | healthy | recovered | `on_recovered` |
 //! | degraded | anything bad | degraded, count back to 0 | – | – |
-//! | healthy, degraded | no run completed on a message of the driver for `lost_after` | lost | lost | `on_lost` |
-//! | lost | first run completed on a message of the driver | degraded, that completion counts if good | recovered | none |
+//! | healthy, degraded | no run completed on a message of the driving input for `lost_after` | lost | lost | `on_lost` |
+//! | lost | first run completed on a message of the driving input | degraded, that completion counts if good | recovered | none |
 //!
 //! The watchdog, which waits for no user code, decides whether an estimator is lost. It notifies the estimator by an entry of its
 //! island. A run completed before the estimator takes that entry counts as the first one after the loss.
@@ -20,9 +20,9 @@ pub(super) enum Event {
     Good,
     /// Any event that degrades the estimator.
     Bad(HealthReason),
-    /// No run was completed on a message of the driver for `lost_after`.
+    /// No run was completed on a message of the driving input for `lost_after`.
     Silence,
-    /// A run was completed on a message of the driver.
+    /// A run was completed on a message of the driving input.
     Run,
 }
 

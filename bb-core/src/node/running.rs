@@ -84,7 +84,7 @@ impl<E: Estimator> Node<E> {
         node
     }
 
-    /// Takes a message of the driver, which is the declared input number `input` and the algorithm's field `F`. If no required input
+    /// Takes a message of the driving input, which is the declared input number `input` and the algorithm's field `F`. If no required input
     /// is missing, the estimator runs. Returns whether there is an output in `emitted`.
     #[inline(never)]
     pub fn receive<F: TakenAt<E::Input>>(

@@ -38,7 +38,7 @@ impl Field<'_> {
         }
     }
 
-    /// The message of the driver, as the field.
+    /// The message of the driving input, as the field.
     fn driver(&self) -> TokenStream {
         match self.kind {
             Kind::Required => quote!(::bb_core::__private::Input::new(message)),

@@ -39,7 +39,7 @@ fn inputs<'a>(robot: &'a Robot, estimator: &'a Estimator) -> impl Iterator<Item 
     })
 }
 
-/// Returns whether each message of the driver comes with one of this input: both derive from the same message, or whenever the
+/// Returns whether each message of the driving input comes with one of this input: both derive from the same message, or whenever the
 /// driver's sensor is due, the other's is due too and read before it.
 fn is_in_step(robot: &Robot, source: PublisherId, driver: PublisherId) -> bool {
     if robot.trigger(source) == robot.trigger(driver) {

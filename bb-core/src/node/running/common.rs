@@ -22,7 +22,7 @@ pub(super) struct Common {
     pub(super) number: u32,
     pub(super) declaration: &'static EstimatorDeclaration,
     pub(super) template: Stamp,
-    /// Greatest age of a message of the driver when it arrives.
+    /// Greatest age of a message of the driving input when it arrives.
     pub(super) stale_after_nanos: Option<i64>,
     /// A run is not measured if its number has one of these bits.
     pub(super) unmeasured: u64,

@@ -14,7 +14,7 @@ use crate::telemetry::TelemetryEvent;
 use crate::time::MonotonicTime;
 
 impl Common {
-    /// Begins a run on a message of the driver, and the measurement of its duration if it is measured: all runs where a latency budget
+    /// Begins a run on a message of the driving input, and the measurement of its duration if it is measured: all runs where a latency budget
     /// is declared or a telemetry handler listens, else every 64th.
     #[inline]
     pub(super) fn begin(&self, turn: &Turn<'_>) -> Option<Begun> {
@@ -31,7 +31,7 @@ impl Common {
         (self.unmeasured == 0).then(|| turn.timing().begin(turn.environment()))
     }
 
-    /// Completes a run on the driver's message of `time`, which came at that input.
+    /// Completes a run on the driving input's message of `time`, which came at that input.
     #[inline]
     pub(super) fn complete(
         &mut self,
@@ -208,7 +208,7 @@ impl Common {
         }
     }
 
-    /// Finds the transforms for a dispatch on a message of the driver; returns `false` if the dispatch is dropped.
+    /// Finds the transforms for a dispatch on a message of the driving input; returns `false` if the dispatch is dropped.
     pub(super) fn place(&mut self, driver_time: MonotonicTime, turn: &Turn<'_>) -> bool {
         turn.timing().interrupt();
         match self.placing.place(driver_time, &self.admission, turn) {

@@ -65,7 +65,7 @@ impl Placing {
         )))
     }
 
-    /// Finds the transforms of the inputs for a dispatch on a message of the driver. `admission` knows when the other inputs were
+    /// Finds the transforms of the inputs for a dispatch on a message of the driving input. `admission` knows when the other inputs were
     /// measured.
     pub(super) fn place(
         &mut self,

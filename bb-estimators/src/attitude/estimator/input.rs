@@ -20,7 +20,7 @@ pub trait InertialInput: Inputs {
 /// An IMU and a magnetometer that are two sensors, on one link or on two across fixed joints.
 #[derive(Clone, Copy, Debug, Inputs)]
 pub struct InertialInputs<'a> {
-    /// The inertial sensor: the driver.
+    /// The inertial sensor, the driving input.
     pub imu: Input<'a, Imu>,
     /// The magnetometer; each of its readings is used once.
     pub magnetic_field: Option<Input<'a, MagneticField>>,

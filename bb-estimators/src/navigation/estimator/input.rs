@@ -11,7 +11,7 @@ use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
 /// The inputs of [`EskfEstimator`](super::EskfEstimator).
 #[derive(Clone, Copy, Debug, Inputs)]
 pub struct NavigationInputs<'a> {
-    /// The inertial sensor: the driver.
+    /// The inertial sensor, the driving input.
     pub imu: Input<'a, Imu>,
     /// Satellite navigation.
     pub gnss: Option<Input<'a, GnssFix>>,

@@ -15,7 +15,7 @@ use nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3};
 /// The inputs of [`FlightEstimator`](super::FlightEstimator).
 #[derive(Clone, Copy, Debug, Inputs)]
 pub struct FlightInputs<'a> {
-    /// The inertial sensor: the driver.
+    /// The inertial sensor, the driving input.
     pub imu: Input<'a, Imu>,
     /// Visual-inertial odometry.
     pub vio: Every<'a, RelativePoseReading>,
