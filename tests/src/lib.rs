@@ -15,7 +15,6 @@ macro_rules! compiled {
 // A test of the architecture checks that each page of the book with code is here.
 compiled! {
     Readme: "README.md",
-    FromBeamBots: "book/src/coming-from/beam-bots.md",
     Actuators: "book/src/how-to/actuators.md",
     Attitude: "book/src/how-to/attitude.md",
     Calibrate: "book/src/how-to/calibrate.md",
