@@ -1,5 +1,5 @@
-//! Every row of the health table, on virtual time: what becomes of it, which command it starts, what is published; and what counts as
-//! a good run of an estimator.
+//! Every row of the health table, on virtual time: the new state, the command that starts, and what is published; and which runs of an
+//! estimator count as good.
 
 use crate::components::{Ask, Doing, Done, Echo, Number, Replied, Snapshot, Task, at};
 use bb_core::HealthTransition;
@@ -13,7 +13,7 @@ fn watch(_: &mut f64, number: f64) -> Replied {
     Ok(if number < 0.0 { reply.diverged("negative") } else { reply })
 }
 
-/// Leads to a state, as the reaction to a change of health that it is told.
+/// A command that enters a state, in reaction to the change of health in its context.
 fn enter(context: CommandContext, next: &'static str) -> Doing {
     Box::pin(async move {
         context.health().ok_or("no health has changed")?;
@@ -90,7 +90,7 @@ impl Run {
     }
 }
 
-/// Each row says what happens, and what of it is seen: the changes of an estimator since the last time, and the robot's state.
+/// Rows of events and their effects: the changes of the estimator's health since the row before, and the robot's state.
 #[test]
 fn each_row_of_the_table() -> Result<(), StartError> {
     let rows = [
@@ -171,14 +171,14 @@ fn latencies_and_ages_of_messages_are_counted() -> Result<(), StartError> {
         (watch.latency.count, watch.latency.longest, watch.inputs[0].age.count, watch.inputs[0].age.longest)
     };
     assert_eq!((of(&run).0, of(&run).1), (2, Duration::from_millis(2)));
-    // A message that is old when it comes is older when its callback is over.
+    // The age of a message grows until its callback returns.
     run.simulation.run_until(at(run.now + 5));
     run.simulation.publish(watched::sensor::base::number, at(run.now), Number(1.0));
     assert_eq!((of(&run).2, of(&run).3), (3, Duration::from_micros(5999)));
     Ok(())
 }
 
-/// Messages that are refused all along: the statistics say why the estimator is lost.
+/// All messages are refused: the statistics give the reason why the estimator is lost.
 #[test]
 fn a_loss_after_refused_messages_has_their_reason() -> Result<(), StartError> {
     let mut run = Run::start()?;
@@ -206,7 +206,7 @@ fn a_command_gets_the_change_and_a_refused_one_is_counted_and_changes_nothing() 
     let builder = Watched::builder();
     let events = builder.subscribe(watched::command::slow_down);
     let mut run = Run { transitions: builder.subscribe(system::Health), simulation: builder.simulate()?, now: 0 };
-    // Not armed, so that nothing may start.
+    // Disarmed, so that no command may start.
     run.number(-1.0);
     assert_eq!(run.changes(WATCH), ["healthy -> degraded: diverged"]);
     let event = events.try_recv().expect("the refusal is published");
@@ -261,7 +261,7 @@ fn changes(health: &Subscription<bb_core::HealthTransition>) -> Vec<(i64, Health
     health.drain().map(|change| (change.time.as_nanos() / 1_000_000, change.to, change.reason)).collect()
 }
 
-/// Asks and tells it again and again, while it ticks.
+/// Sends calls and casts repeatedly while the estimator ticks.
 fn keep_busy(simulation: &mut Simulation<Industrious>, until: i64) {
     while simulation.clock().now() < at(until) {
         simulation.call(industrious::sensor::base::number::busy, Ask).expect("it answers");

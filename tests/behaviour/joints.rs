@@ -21,7 +21,7 @@ pub(crate) struct Spot {
     pub(crate) x: Vector3<f64>,
 }
 
-/// Says where its input is.
+/// Publishes the position of its input.
 #[derive(Debug, Default)]
 pub(crate) struct Spotter {
     frame_from_camera: Isometry3<f64>,
@@ -97,7 +97,7 @@ impl Estimator for Fusion {
     }
 }
 
-/// Passes on the position of a joint beyond another that moves, though it knows of fixed transforms only.
+/// Passes on the position of a joint across another that moves, although it handles fixed transforms only.
 #[derive(Debug)]
 struct Watch;
 
@@ -226,7 +226,7 @@ fn what_is_unknown_or_too_old_drops_the_dispatch_and_is_never_zero() -> Result<(
         "estimator/base/spot healthy -> degraded (no transform; sensor/base/shoulder/arm/lift/carriage/camera)";
     assert_eq!(changes, [format!("0.001000000 s: {shown}")]);
     assert_eq!(spots.drain().count(), 1);
-    // Good again.
+    // The next run is good.
     simulation.publish(SHOULDER, at(104), joint(0.0));
     simulation.publish(LIFT, at(104), joint(1.0));
     simulation.publish(CAMERA, at(105), Pixel(1.0));
@@ -360,7 +360,7 @@ fn what_does_not_fit_is_refused_and_counted() -> Result<(), StartError> {
         simulation.publish(reach::sensor::bus, at(ms), states);
     };
     simulation.run_until(at(5000));
-    // By name and by path; what follows another is not told.
+    // By name and by path; mimic joints are not named.
     bus(&mut simulation, 10, &["shoulder", "base/shoulder/arm/lift", "counter"], &[0.1, 0.2, 0.3]);
     bus(&mut simulation, 10, &["shoulder"], &[0.2]);
     bus(&mut simulation, 9, &["shoulder"], &[0.2]);

@@ -1,4 +1,4 @@
-//! Timers, ticks and continues that ask for the impossible.
+//! Timers, ticks, continues and readings with times that never come.
 
 use crate::components::{Echo, EchoOptions, Number, Source, at, within};
 use bb_core::prelude::*;
@@ -8,7 +8,7 @@ robot! {
     link base {
         sensor number: External<Number>() { estimator asking: Echo(); }
         sensor other: External<Number>() { estimator beside: Echo(); }
-        // Wants to be read at a time that never comes.
+        // The next reading is due at a time that never comes.
         sensor never: Source(read = |_, _| Ok(Reading::now(Number(1.0)).next_at(MonotonicTime::MAX)));
     }
 }

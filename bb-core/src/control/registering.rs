@@ -35,7 +35,7 @@ impl Control {
             Owner::Execution(id) => step.state.executions.iter().any(|execution| execution.id == id),
             _ => true,
         };
-        // One that a callback registers runs at the next disarming.
+        // A callback that registers another: that one runs at the next disarming.
         let is_callback = is_callback(self.id());
         let is_last = step.state.is_stopped();
         if !is_known || is_callback && is_last {
@@ -57,8 +57,8 @@ impl Control {
         self.wait_apart(key);
     }
 
-    /// A thread for a callback of a component, so that it never has to wait for others. There may be any number of commands: theirs
-    /// get threads when they run.
+    /// Reserves a thread for a callback of a component, so that it never waits for others. Callbacks of commands, whose number is not
+    /// bounded, get threads when they run.
     fn place_for(&self, path: &'static str, owner: Owner) -> Option<Reserved> {
         if self.0.mode != Mode::Real || matches!(owner, Owner::Execution(_)) {
             return None;

@@ -1,7 +1,7 @@
 //! A rover that nodes of ROS 2 drive: `cargo run --example rover`, then `ros2 topic list` with `RMW_IMPLEMENTATION=rmw_zenoh_cpp`.
 //!
-//! `--listen ENDPOINT` is another than `tcp/127.0.0.1:7447`, `--rate HERTZ` that of its IMU, and `--simulate` runs on virtual time, a little
-//! faster than the real one. `--interfaces FOLDER` writes the package of the types that ROS does not have, and ends.
+//! `--listen ENDPOINT` replaces `tcp/127.0.0.1:7447`, `--rate HERTZ` sets the rate of the IMU, and `--simulate` runs on virtual time, a
+//! little faster than real time. `--interfaces FOLDER` writes the package of the types that ROS does not have, and exits.
 
 use bb_core::nalgebra::Vector3;
 use bb_core::prelude::*;
@@ -20,7 +20,7 @@ struct Plan {
     distance: f64,
 }
 
-/// Tells how it moves from how it is to move.
+/// Publishes the motion that follows from the commanded one.
 struct Follow;
 
 impl Estimator for Follow {

@@ -1,4 +1,4 @@
-//! Queries of a flight: a receiver that may lie, a clock that is set back, an attitude that a gap may leave unknown.
+//! Operations that only flights need: fixes of a receiver that may be spoofed, a clock that is set back, the certainty of the attitude.
 
 use super::{Begun, Copies, FAR, SLACK, UNKNOWN};
 use crate::navigation::eskf::Eskf;
@@ -11,7 +11,7 @@ use crate::navigation::state::{ROTATION, States};
 use crate::navigation::stream::Stream;
 
 impl<S: States, const N: usize> Copies<Eskf<S, N>> {
-    /// Fuses a fix of a receiver that may lie: one that the filter refuses shows nothing.
+    /// Fuses a fix of a receiver that may be spoofed: unlike others, one that the filter refuses founds no newcomer.
     ///
     /// # Errors
     ///

@@ -17,7 +17,7 @@ use crate::navigation::stream::{Counts, Stream, StreamParams};
 use bb_core::Fault;
 use nalgebra::{Isometry3, Vector3};
 
-/// See the [module](self).
+/// Copies of the filter, and a stream for each sensor.
 #[derive(Clone, Debug)]
 pub(super) struct Filter<S: States, const N: usize> {
     copies: Copies<Eskf<S, N>>,

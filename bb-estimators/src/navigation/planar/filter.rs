@@ -104,7 +104,7 @@ impl PlanarStart {
     }
 }
 
-/// The filter; see the [module](super).
+/// An extended Kalman filter on a plane; the [module](super) has an example.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlanarEkf {
     params: PlanarParams,

@@ -1,8 +1,9 @@
 //! The gate of landmarks: compares an observation with the estimated position of its landmark.
 //!
-//! The error that all keyframes have in common also moves the landmark, except for the part held by its prior. What remains
-//! is the error of the motion since the keyframe that saw it last: with the keyframe a at `x_a = T x + n`, composed of the
-//! links between the two, it is `(T - R) x + n`, where R is how the pose of a moves if the two are one rigid body.
+//! An error that all keyframes share also moves the landmark, except for the part held by its prior, and so does not count. The
+//! gate uses the error of the motion between this keyframe, with error x, and the one that saw the landmark last. The links between
+//! them give the earlier keyframe the error `x_a = T x + n`. If both moved as one rigid body, it would be `R x`. The difference,
+//! `(T - R) x + n`, is the error of the motion.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -94,7 +95,7 @@ impl<const N: usize> Judging<N> {
         if other < at {
             self.ways_back(at, other, window)
         } else {
-            // For an observation that comes late: the biases and the velocity are hardly known better there.
+            // A late observation: the biases and the velocity there are hardly known better.
             self.ways_back(other, at, window)
         }?;
         self.ways.get(other).copied().flatten()

@@ -45,7 +45,7 @@ pub(super) struct Prior<const N: usize> {
 /// The keyframes of the window, oldest first.
 pub(super) type Window<F, const N: usize> = VecDeque<Box<Keyframe<F, N>>>;
 
-/// See the module.
+/// A keyframe of the window.
 #[derive(Clone, Debug)]
 pub(super) struct Keyframe<F, const N: usize> {
     pub(super) id: u64,

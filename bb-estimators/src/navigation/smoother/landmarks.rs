@@ -31,7 +31,7 @@ const PRESSING: f64 = 3.0;
 /// The fraction of good landmarks that are rejected because their directions do not intersect.
 const UNFIT: f64 = 1e-4;
 
-/// See the module.
+/// The landmarks of a window.
 #[derive(Clone, Debug)]
 pub(super) struct Landmarks<const N: usize> {
     pub(super) camera: Camera,

@@ -31,7 +31,7 @@ const CONFIRMATIONS: u32 = 5;
 /// Largest possible distance from the origin, m: beyond the other side of the Earth.
 const FARTHEST: f64 = 1.4e7;
 
-/// See the module.
+/// The deterministic part of the estimator.
 #[derive(Clone, Debug)]
 pub(super) struct Engine<F: ProvidedFactor> {
     /// The key of the last input that was applied.

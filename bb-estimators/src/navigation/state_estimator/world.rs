@@ -9,7 +9,7 @@ use crate::navigation::measurement::{AbsolutePose, GnssPosition, GnssVelocity};
 /// Largest distance of the strategy from its origin, m. At that distance, down differs by 0.8 mrad.
 const FARTHEST: f64 = 5000.0;
 
-/// See the module.
+/// The tangent frame of the strategy.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct World {
     frame: LocalFrame,

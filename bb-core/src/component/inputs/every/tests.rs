@@ -46,7 +46,7 @@ proptest! {
             let none = slot.take();
             prop_assert_eq!((none.len(), none.lost(), none.last().is_none()), (0, 0, true));
         }
-        // After one more, none that was seen is kept.
+        // Messages that a run has seen are dropped with the next one that arrives.
         slot.store(&message(number, number as i64));
         prop_assert_eq!(slot.messages.len(), 1);
     }

@@ -13,7 +13,7 @@ use crate::navigation::refusal::Refusal;
 use crate::navigation::stream::{Counts, Stream, StreamParams};
 use bb_core::Fault;
 
-/// See the [module](self).
+/// Copies of the filter, and a stream for each sensor.
 #[derive(Clone, Debug)]
 pub(super) struct Filter {
     copies: Copies<PlanarEkf>,

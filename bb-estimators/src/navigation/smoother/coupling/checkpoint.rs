@@ -11,7 +11,7 @@ use super::{Coupling, POSE};
 /// Least number of keyframes before a checkpoint.
 const LEAST: usize = 2;
 
-/// See the module.
+/// The state of an elimination after the keyframes before all current tracks.
 #[derive(Clone, Debug)]
 pub(super) struct Checkpoint {
     /// The serial number of the first keyframe that is not eliminated; `None` if there is no checkpoint.

@@ -22,7 +22,7 @@ use crate::navigation::smoother::elimination::Carried;
 use crate::navigation::smoother::link::Information;
 use crate::navigation::smoother::matrix::zeros;
 
-/// See the module. Columns after those of the landmarks are all errors of the oldest keyframe, then the poses after it.
+/// Landmarks that are unknowns of the system. Columns after those of the landmarks are all errors of the oldest keyframe, then the poses after it.
 #[derive(Clone, Debug)]
 pub(in crate::navigation::smoother) struct Points<const N: usize> {
     capacity: usize,

@@ -147,7 +147,7 @@ impl<F: ProvidedFactor> Engine<F> {
         }
         let world = self.world.ok_or(Refusal::NotStarted)?;
         let measured = world.anchor(anchor);
-        // As the fixes are compared: what the anchor corrects is no difference between the two.
+        // Like fixes, anchors are compared with the estimate before they correct it.
         let before = self.strategy.motion();
         let result = self.measure(&Measured::Anchor(measured));
         if self.is_in(&result) {
@@ -183,14 +183,14 @@ impl<F: ProvidedFactor> Engine<F> {
             return Err(Refusal::NotStarted.into());
         };
         let (measured, velocity) = world.fix(fix);
-        // Anchors, with which it is compared, are positions of the body.
+        // The fix is compared with anchors, which are positions of the body.
         let antenna = self.strategy.attitude().map_or_else(Vector3::zeros, |attitude| attitude * fix.lever_arm);
         let offset = measured.position - antenna - position;
         if let Err(rejected) = self.gate.fix(fix.time_ns, &offset, &config.params) {
             *rejection = Some(rejected);
             return Err(Trouble::Degraded(Reason::Gate(rejected)));
         }
-        // With a camera or anchors, the receiver overrules nothing: a spoofer can be patient.
+        // While there is a camera or an anchor, fixes must not move the estimate: a spoofer can wait for the time that a newcomer needs.
         let is_alone = self.independent_ns.is_none_or(|at_ns| fix.time_ns.saturating_sub(at_ns) > ALONE_NS);
         let trust = if is_alone { Trust::Believed } else { Trust::Doubted };
         let result = self.measure(&Measured::Gnss(measured, velocity, trust));
