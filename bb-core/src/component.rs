@@ -40,7 +40,7 @@ pub use actuator::Actuator;
 pub(crate) use actuator_link::{Accepts, AcceptsJson};
 pub use actuator_link::{ActuatorError, ActuatorLink};
 pub(crate) use binding::Binding;
-pub use bus::{Bus, Session};
+pub use bus::{Bus, DisarmQueue, Session};
 pub(crate) use caller::Caller;
 pub(crate) use command::OwnHooks;
 pub use command::{Arm, Command, CommandContext, Disarm, NoArguments, Outcome, Sleep};
@@ -74,7 +74,7 @@ pub use reaction::{Reaction, ReactionEvent, ReactionOptions, ReactionState};
 pub use record::RequestCodec;
 pub use reference::{CommandPath, Number, TopicField};
 pub use sensor::{Next, Reading, Sensor};
-pub use service::Service;
+pub use service::{Service, StateReport};
 
 pub(crate) use setting::{Setting, SettingKind, quantity};
 pub(crate) use template::Template;

@@ -1,8 +1,10 @@
 //! The robot by path, for code that does not know its type: commands, controllers, bridges, dashboards.
 
+mod disarm_queue;
 mod publishing;
 mod session;
 
+pub use disarm_queue::DisarmQueue;
 pub use session::Session;
 
 use super::host::{Controls, Host};

@@ -3,6 +3,13 @@
 use super::{Fault, Options, Reading, ServiceContext, Termination};
 use crate::message::Payload;
 use crate::time::MonotonicTime;
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// Time for which an update without a rate waits.
+const WAIT: Duration = Duration::from_millis(100);
+/// Time between two states of a service without a rate.
+const STATE: Duration = Duration::from_secs(1);
 
 /// A controller or a bridge: it runs beside the dataflow and reaches everything by path, through [`ServiceContext::bus`].
 ///
@@ -45,5 +52,50 @@ pub trait Service: Sized + Send + 'static {
     /// Cleans up before it stops or is restarted; not called after a panic.
     fn terminate(&mut self, reason: Termination<'_>) {
         let _ = reason;
+    }
+}
+
+/// The state of a bridge that does its work on threads of its own: published when it has changed, at most once a second without a `rate`.
+///
+/// ```
+/// use bb_core::component::StateReport;
+/// use bb_core::prelude::*;
+///
+/// let mut report = StateReport::default();
+/// assert_eq!(report.update(3.0), Reading::now(3.0));
+/// assert_eq!(report.update(3.0), Reading::nothing());
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct StateReport<T> {
+    last: Option<T>,
+    next: Option<Instant>,
+    /// `true` if it has a rate, and so must not wait.
+    is_paced: bool,
+}
+
+impl<T> Default for StateReport<T> {
+    fn default() -> Self {
+        Self { last: None, next: None, is_paced: false }
+    }
+}
+
+impl<T: Clone + PartialEq> StateReport<T> {
+    /// Creates it for the service of that context.
+    pub fn new(context: &ServiceContext) -> Self {
+        Self { is_paced: context.period_s().is_some() || context.clock().is_virtual(), ..Self::default() }
+    }
+
+    /// The reading of an update with this state; without a rate, waits for a tenth of a second if there is none.
+    pub fn update(&mut self, state: T) -> Reading<T> {
+        let is_due = self.is_paced || self.next.is_none_or(|next| Instant::now() >= next);
+        if is_due && self.last.as_ref() != Some(&state) {
+            self.next = Some(Instant::now() + STATE);
+            self.last = Some(state.clone());
+            return Reading::now(state);
+        }
+        if !self.is_paced {
+            thread::sleep(WAIT);
+        }
+        Reading::nothing()
     }
 }

@@ -1,5 +1,6 @@
 //! Rights of a caller at a robot.
 
+use crate::fault::Fault;
 use std::fmt;
 
 /// Something that a caller may do with a robot. Everybody may disarm it.
@@ -63,6 +64,20 @@ impl Rights {
     /// Returns whether this right is among them.
     pub const fn contains(self, right: Right) -> bool {
         self.0 & 1 << right as u8 != 0
+    }
+
+    /// The right to read, and those named, separated by spaces, as the option `rights` of a bridge has them.
+    ///
+    /// # Errors
+    /// A name is none of those `given`.
+    pub fn parse(names: &str, given: &[Right]) -> Result<Self, Fault> {
+        let right = |name: &str| {
+            given.iter().find(|right| right.name() == name).copied().ok_or_else(|| {
+                let names = given.iter().map(|right| format!("`{right}`")).collect::<Vec<_>>().join(", ");
+                Fault::new(format!("`rights` has `{name}`: expected {names}"))
+            })
+        };
+        std::iter::once(Ok(Right::Read)).chain(names.split_whitespace().map(right)).collect()
     }
 
     /// The rights that are in both sets.

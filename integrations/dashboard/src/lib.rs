@@ -48,7 +48,6 @@ mod shared;
 mod token;
 mod viewer;
 
-pub use bridge::DashboardState;
 pub use options::DashboardOptions;
 pub use protocol::VERSION;
-pub use server::{Dashboard, ServeError};
+pub use server::{Dashboard, DashboardState, ServeError};

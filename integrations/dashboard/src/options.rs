@@ -74,17 +74,10 @@ impl DashboardOptions {
     }
 
     fn writer_rights(&self) -> Result<Rights, Fault> {
-        const GIVEN: [Right; 5] =
-            [Right::Parameters, Right::Commands, Right::Arm, Right::Actuators, Right::Publish];
-        let mut rights = vec![Right::Read];
-        for name in self.rights.split_whitespace() {
-            let right = GIVEN.into_iter().find(|right| right.name() == name).ok_or_else(|| {
-                let names = GIVEN.map(|right| format!("`{right}`")).join(", ");
-                Fault::new(format!("`rights` has `{name}`: expected {names}"))
-            })?;
-            rights.push(right);
-        }
-        Ok(rights.into_iter().collect())
+        Rights::parse(
+            &self.rights,
+            &[Right::Parameters, Right::Commands, Right::Arm, Right::Actuators, Right::Publish],
+        )
     }
 }
 

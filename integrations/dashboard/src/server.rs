@@ -20,7 +20,8 @@ use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
-use bb_core::Bus;
+use bb_core::component::StateReport;
+use bb_core::{Bus, Payload};
 use std::fmt;
 use std::io;
 use std::net::{SocketAddr, TcpListener};
@@ -52,6 +53,15 @@ pub enum ServeError {
     Token(getrandom::Error),
 }
 
+/// The viewers of a [`Dashboard`], published when their number has changed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Payload)]
+pub struct DashboardState {
+    /// The port that it listens on.
+    pub port: u16,
+    /// Number of connected viewers.
+    pub viewers: u32,
+}
+
 /// A dashboard, served until it is dropped.
 pub struct Dashboard {
     address: SocketAddr,
@@ -59,15 +69,7 @@ pub struct Dashboard {
     shared: Arc<Shared>,
     stop: watch::Sender<bool>,
     thread: Option<JoinHandle<()>>,
-    pub(crate) bridged: Bridged,
-}
-
-/// State of a bridge.
-#[derive(Debug, Default)]
-pub(crate) struct Bridged {
-    pub(crate) viewers: Option<usize>,
-    /// `true` if it has a rate, and so must not wait.
-    pub(crate) is_paced: bool,
+    pub(crate) report: StateReport<DashboardState>,
 }
 
 impl Dashboard {
@@ -120,7 +122,7 @@ impl Dashboard {
             runtime.shutdown_background();
         };
         let thread = thread::Builder::new().name("dashboard".into()).spawn(run).map_err(at)?;
-        Ok(Self { address, token, shared, stop, thread: Some(thread), bridged: Bridged::default() })
+        Ok(Self { address, token, shared, stop, thread: Some(thread), report: StateReport::default() })
     }
 
     /// The address it listens on.

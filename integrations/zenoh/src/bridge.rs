@@ -9,20 +9,16 @@ use crate::options::Ros2Options;
 use crate::outputs::Outputs;
 use crate::services::Services;
 use crate::session::Session;
+use bb_core::component::StateReport;
 use bb_core::event::Right;
 use bb_core::{Bus, Fault, MonotonicTime, Reading, Service, ServiceContext};
 use bb_ros2::Node;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
-use std::time::{Duration, Instant};
 
-/// Time for which an update without a rate waits.
-const WAIT: Duration = Duration::from_millis(100);
 /// Name of the thread that publishes.
 const OUT: &str = "ros2 out";
-/// Time between two messages of its state, of a bridge without a rate.
-const STATE: Duration = Duration::from_secs(1);
 
 /// A running robot as a node of ROS 2, until it is dropped.
 ///
@@ -56,10 +52,7 @@ pub struct Ros2Bridge {
     node: Arc<RosNode>,
     /// Ends what was begun in the name of other nodes.
     bus: bb_core::component::Session,
-    reported: Option<Ros2State>,
-    next_report: Instant,
-    /// `true` if it has a rate, and so must not wait.
-    is_paced: bool,
+    report: StateReport<Ros2State>,
 }
 
 impl Ros2Bridge {
@@ -94,17 +87,7 @@ impl Ros2Bridge {
         let out = Out::start(outputs)?;
         let clients = Clients::watch(&node, options.domain)?;
         let services = Services::start(&bus.for_caller("ros2", rights), &node, clients, &description, &counts)?;
-        Ok(Self {
-            services,
-            inputs,
-            out,
-            counts,
-            node,
-            bus,
-            reported: None,
-            next_report: Instant::now(),
-            is_paced: true,
-        })
+        Ok(Self { services, inputs, out, counts, node, bus, report: StateReport::default() })
     }
 
     /// The full name of the node: `/rover`.
@@ -169,23 +152,13 @@ impl Service for Ros2Bridge {
 
     fn init(options: Ros2Options, context: &ServiceContext) -> Result<Self, Fault> {
         let mut bridge = Self::serve(&context.bus(), options).map_err(|error| Fault::new(error.to_string()))?;
-        bridge.is_paced = context.period_s().is_some() || context.clock().is_virtual();
+        bridge.report = StateReport::new(context);
         Ok(bridge)
     }
 
     fn update(&mut self, _: MonotonicTime) -> Result<Reading<Ros2State>, Fault> {
-        if !self.is_paced {
-            thread::sleep(WAIT);
-            if Instant::now() < self.next_report {
-                return Ok(Reading::nothing());
-            }
-            self.next_report = Instant::now() + STATE;
-        }
         let state = self.state();
-        match self.reported.replace(state) == Some(state) {
-            true => Ok(Reading::nothing()),
-            false => Ok(Reading::now(state)),
-        }
+        Ok(self.report.update(state))
     }
 }
 

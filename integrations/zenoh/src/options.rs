@@ -70,16 +70,7 @@ impl Ros2Options {
 
     /// The rights of other nodes, with those that the bridge needs itself.
     pub(crate) fn node_rights(&self) -> Result<Rights, Fault> {
-        const GIVEN: [Right; 4] = [Right::Parameters, Right::Commands, Right::Arm, Right::Actuators];
-        let mut rights = vec![Right::Read];
-        for name in self.rights.split_whitespace() {
-            let right = GIVEN.into_iter().find(|right| right.name() == name).ok_or_else(|| {
-                let names = GIVEN.map(|right| format!("`{right}`")).join(", ");
-                Fault::new(format!("`rights` has `{name}`: expected {names}"))
-            })?;
-            rights.push(right);
-        }
-        Ok(rights.into_iter().collect())
+        Rights::parse(&self.rights, &[Right::Parameters, Right::Commands, Right::Arm, Right::Actuators])
     }
 
     /// The paths to publish; none for all that ROS has a message for.

@@ -6,18 +6,18 @@ use crate::error::Ros2Error;
 use crate::messages::{Nothing, Outcome, bytes_of};
 use crate::node::{Request, RosNode, RosService};
 use crate::parameters::ParameterService;
-use bb_core::component::Description;
+use bb_core::component::{Description, DisarmQueue};
 use bb_core::message::codec::{Shape, bytes_to_json, service_hash};
 use bb_core::{Bus, Field, Role};
 use bb_ros2::{Address, command_type};
 use std::fmt::Display;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-/// Requests that wait to be looked at, of all services, and of each that disarms.
+/// Requests that wait to be looked at, of all services but those that disarm.
 const WAITING: usize = 256;
 /// Commands that clients wait for; each has a thread.
 const MOST_COMMANDS: usize = 32;
@@ -49,7 +49,6 @@ pub(crate) struct Services {
     services: Vec<RosService>,
     /// `None` once it has ended.
     asked: Option<SyncSender<Asked>>,
-    disarms: Vec<Arc<Disarm>>,
     is_over: Arc<AtomicBool>,
     threads: Vec<JoinHandle<()>>,
     running: Arc<AtomicUsize>,
@@ -125,24 +124,19 @@ impl Services {
         let mut all = Self {
             services: Vec::new(),
             asked: Some(asked),
-            disarms: Vec::new(),
             is_over: Arc::clone(&worker.is_over),
             threads: Vec::new(),
             running: Arc::clone(&worker.running),
         };
         for (address, command) in disarms {
-            let disarm = Arc::new(Disarm { command, ..Disarm::default() });
-            let waiting = Arc::clone(&disarm);
-            services.push(node.service(&address, move |request| {
-                if let Some(request) = waiting.put(request) {
-                    full(&request);
-                }
-            })?);
-            all.disarms.push(Arc::clone(&disarm));
             let (done, untold) = sync_channel(UNTOLD);
-            let worker = worker.clone();
-            all.spawn("ros2 disarm", move || disarm.run(&worker, &done))?;
+            let disarm = Disarm { worker: worker.clone(), command, done, untold: Repetitions::default() };
+            let started = DisarmQueue::start("ros2 disarm", move |requests| disarm.run(requests));
+            let (queue, thread) = started.map_err(Ros2Error::Thread)?;
+            all.threads.push(thread);
             all.spawn("ros2 disarmed", move || tell(&untold))?;
+            let put = move |request| _ = queue.put(request).map_err(|request| full(&request));
+            services.push(node.service(&address, put)?);
         }
         all.services = services;
         all.spawn("ros2 services", move || worker.run(&waiting))?;
@@ -159,9 +153,6 @@ impl Services {
         self.services.clear();
         self.is_over.store(true, Ordering::Release);
         self.asked = None;
-        for disarm in &self.disarms {
-            disarm.end();
-        }
         let deadline = Instant::now() + LAST;
         let is_running =
             || self.threads.iter().any(|thread| !thread.is_finished()) || self.running.load(Ordering::Acquire) != 0;
@@ -182,79 +173,36 @@ impl Drop for Services {
     }
 }
 
-/// Requests of one service to disarm, in a queue of their own, with a thread of their own: whatever else is asked, the robot is disarmed.
-/// If there is no room for one, others wait, and an attempt follows as well.
-#[derive(Debug, Default)]
+/// Disarms, and hands over what is to be answered: another thread waits for the network.
 struct Disarm {
+    worker: Worker,
     /// The command that disarms, with the robot's own code; `None` without one.
     command: Option<(&'static str, Option<Shape>)>,
-    state: Mutex<DisarmState>,
-    changed: Condvar,
-}
-
-#[derive(Debug, Default)]
-struct DisarmState {
-    waiting: Vec<Request>,
-    is_over: bool,
+    done: SyncSender<(Vec<Request>, Vec<u8>)>,
+    untold: Repetitions,
 }
 
 impl Disarm {
-    fn lock(&self) -> MutexGuard<'_, DisarmState> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Gives the request back if there is no room for it.
-    fn put(&self, request: Request) -> Option<Request> {
-        let mut state = self.lock();
-        if state.waiting.len() >= WAITING {
-            return Some(request);
+    fn run(&self, requests: Vec<Request>) {
+        match self.command {
+            // Each with its own arguments.
+            Some((_, Some(_))) => requests.into_iter().for_each(|request| self.carry_out(vec![request])),
+            _ => self.carry_out(requests),
         }
-        state.waiting.push(request);
-        self.changed.notify_one();
-        None
     }
 
-    fn end(&self) {
-        self.lock().is_over = true;
-        self.changed.notify_one();
-    }
-
-    /// The requests that wait; none once it has ended.
-    fn take(&self) -> Vec<Request> {
-        let mut state = self.lock();
-        while state.waiting.is_empty() && !state.is_over {
-            state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
-        }
-        std::mem::take(&mut state.waiting)
-    }
-
-    /// Disarms until it has ended. Clients are told on another thread, which waits for the network.
-    fn run(&self, worker: &Worker, done: &SyncSender<(Vec<Request>, Vec<u8>)>) {
-        let untold = Repetitions::default();
-        let carry_out = |requests: Vec<Request>| {
-            let Some(first) = requests.first() else { return };
-            let bus = worker.bus_of(first);
-            let response = match self.command {
-                None => outcome(bus.disarm().map(|()| "disarmed")),
-                Some((path, shape)) => answered(command(&bus, path, shape, &first.bytes(), &worker.is_over)),
-            };
-            Counts::add(&worker.counts.requests, requests.len() as u64);
-            if done.try_send((requests, response)).is_err()
-                && let Some(times) = untold.add()
-            {
-                tracing::warn!(times, "clients are not told that the robot was disarmed");
-            }
+    fn carry_out(&self, requests: Vec<Request>) {
+        let (worker, Some(first)) = (&self.worker, requests.first()) else { return };
+        let bus = worker.bus_of(first);
+        let response = match self.command {
+            None => outcome(bus.disarm().map(|()| "disarmed")),
+            Some((path, shape)) => answered(command(&bus, path, shape, &first.bytes(), &worker.is_over)),
         };
-        loop {
-            let requests = self.take();
-            if requests.is_empty() {
-                return;
-            }
-            match self.command {
-                // Each with its own arguments.
-                Some((_, Some(_))) => requests.into_iter().for_each(|request| carry_out(vec![request])),
-                _ => carry_out(requests),
-            }
+        Counts::add(&worker.counts.requests, requests.len() as u64);
+        if self.done.try_send((requests, response)).is_err()
+            && let Some(times) = self.untold.add()
+        {
+            tracing::warn!(times, "clients are not told that the robot was disarmed");
         }
     }
 }
