@@ -60,7 +60,7 @@ impl Estimator for Heading {
 
 /// Arguments of [`Drive`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Payload)]
-struct Distance {
+pub(crate) struct Distance {
     /// Metres, ahead.
     #[payload(unit = "m", range = 0.0..=10.0)]
     distance: f64,
@@ -68,7 +68,7 @@ struct Distance {
 
 /// Drives ahead: a metre in a tenth of a second.
 #[derive(Debug)]
-struct Drive;
+pub(crate) struct Drive;
 
 impl Command for Drive {
     type Options = NoOptions;
@@ -76,6 +76,9 @@ impl Command for Drive {
     type Output = f64;
 
     async fn run(_: NoOptions, of: Distance, context: CommandContext) -> Result<Outcome<f64>, Fault> {
+        if of.distance == 0.0 {
+            return Err(Fault::new("it has nowhere to go"));
+        }
         context.sleep(Duration::from_secs_f64(of.distance / 10.0)).await;
         Ok(Outcome::done(of.distance))
     }

@@ -39,16 +39,18 @@ struct Entry {
 pub(crate) struct Channels {
     bus: Bus,
     robot: &'static str,
-    context: Arc<Context>,
+    pub(crate) context: Arc<Context>,
     entries: Mutex<HashMap<ChannelId, Entry>>,
     paths: Mutex<HashSet<&'static str>>,
-    counts: Counts,
+    pub(crate) counts: Counts,
 }
 
 /// Numbers of messages.
 #[derive(Debug, Default)]
 pub(crate) struct Counts {
     pub(crate) encoded: AtomicU64,
+    /// Messages that slow clients have lost.
+    pub(crate) lost: AtomicU64,
     /// Messages that came faster than they were encoded.
     pub(crate) unencoded: AtomicU64,
 }
@@ -69,10 +71,6 @@ impl Channels {
         }
         channels.refresh()?;
         Ok(channels)
-    }
-
-    pub(crate) fn counts(&self) -> &Counts {
-        &self.counts
     }
 
     /// Adds the channels of paths that have been created since.

@@ -1,13 +1,11 @@
 //! The door in front of Foxglove's server, which itself takes every connection: requests by a name that DNS rebinding leads here, and from the pages
 //! of other sites, are refused before it sees a byte of them.
 
-use crate::outbox::Outbox;
+use crate::clients::Clients;
 use std::io::{Error, ErrorKind};
-use std::net::{Ipv4Addr, SocketAddr};
 use std::sync::Arc;
-use std::sync::atomic::AtomicU64;
 use std::time::Duration;
-use tokio::io::{AsyncReadExt, AsyncWriteExt, copy};
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 use tokio::sync::Semaphore;
 use tokio::time::timeout;
@@ -20,22 +18,19 @@ const LONGEST_HEAD: usize = 16 * 1024;
 const PATIENCE: Duration = Duration::from_secs(5);
 const END: &[u8] = b"\r\n\r\n";
 
-/// The door, and the place of the server behind it.
-#[derive(Debug)]
+/// The door, and the clients that it has let in.
 pub(crate) struct Door {
     origins: Vec<String>,
-    server: SocketAddr,
+    pub(crate) clients: Clients,
     room: Semaphore,
-    /// Messages that slow clients have lost.
-    pub(crate) lost: AtomicU64,
 }
 
 /// A refused request: its status, and the reason.
 type Refused = (u16, String);
 
 impl Door {
-    pub(crate) fn new(origins: Vec<String>, server: SocketAddr) -> Self {
-        Self { origins, server, room: Semaphore::new(MOST_CONNECTIONS), lost: AtomicU64::new(0) }
+    pub(crate) fn new(origins: Vec<String>, clients: Clients) -> Self {
+        Self { origins, clients, room: Semaphore::new(MOST_CONNECTIONS) }
     }
 
     /// Serves a connection until one of both sides ends it.
@@ -49,60 +44,47 @@ impl Door {
             Ok(Ok(head)) => head,
             Ok(Err(_)) | Err(_) => return,
         };
-        if let Err(refused) = self.check(&head) {
+        if let Err(refused) = check(&head, &self.origins) {
             tracing::warn!(why = refused.1, "a client of Foxglove's bridge is refused");
             return refuse(client, refused).await;
         }
-        if let Err(error) = self.connect(client, &head).await {
+        if let Err(error) = self.clients.serve(client, &head).await {
             tracing::debug!(%error, "a client of Foxglove's bridge is gone");
         }
     }
+}
 
-    async fn connect(&self, client: TcpStream, head: &[u8]) -> std::io::Result<()> {
-        let mut server = TcpStream::connect(self.server).await?;
-        server.set_nodelay(true)?;
-        server.write_all(head).await?;
-        let (mut from_client, to_client) = client.into_split();
-        let (from_server, mut to_server) = server.into_split();
-        let outbox = Outbox::new(&self.lost);
-        tokio::select! {
-            ended = copy(&mut from_client, &mut to_server) => ended.map(|_| ()),
-            ended = outbox.relay(from_server, to_client) => ended,
-        }
+/// # Errors
+/// The reason for which a request with this head is refused.
+fn check(head: &[u8], origins: &[String]) -> Result<(), Refused> {
+    let malformed = || (400, "this is no request for a WebSocket".to_owned());
+    let head = std::str::from_utf8(head).map_err(|_| malformed())?;
+    let mut lines = head.trim_end_matches("\r\n").split("\r\n");
+    if !lines.next().is_some_and(|line| line.starts_with("GET ")) {
+        return Err(malformed());
     }
-
-    /// # Errors
-    /// The reason for which a request with this head is refused.
-    fn check(&self, head: &[u8]) -> Result<(), Refused> {
-        let malformed = || (400, "this is no request for a WebSocket".to_owned());
-        let head = std::str::from_utf8(head).map_err(|_| malformed())?;
-        let mut lines = head.trim_end_matches("\r\n").split("\r\n");
-        if !lines.next().is_some_and(|line| line.starts_with("GET ")) {
+    let mut host = None;
+    for line in lines {
+        // Neither a line that continues another nor one that another reader would divide.
+        let (name, value) = line.split_once(':').ok_or_else(malformed)?;
+        if name.is_empty()
+            || name.contains(|letter: char| !letter.is_ascii_graphic())
+            || line.contains(['\r', '\n'])
+        {
             return Err(malformed());
         }
-        let mut host = None;
-        for line in lines {
-            // Neither a line that continues another nor one that another reader would divide.
-            let (name, value) = line.split_once(':').ok_or_else(malformed)?;
-            if name.is_empty()
-                || name.contains(|letter: char| !letter.is_ascii_graphic())
-                || line.contains(['\r', '\n'])
-            {
-                return Err(malformed());
-            }
-            let value = value.trim();
-            if name.eq_ignore_ascii_case("host") && (host.replace(value).is_some() || !is_loopback(value)) {
-                return Err((403, format!("the host name `{value}` is not one of the loopback device")));
-            }
-            if name.eq_ignore_ascii_case("origin") && !self.origins.contains(&value.to_ascii_lowercase()) {
-                return Err((
-                    403,
-                    format!("pages of `{value}` may not connect; see the option `origins` of the bridge"),
-                ));
-            }
+        let value = value.trim();
+        if name.eq_ignore_ascii_case("host") && (host.replace(value).is_some() || !is_loopback(value)) {
+            return Err((403, format!("the host name `{value}` is not one of the loopback device")));
         }
-        host.map(|_| ()).ok_or_else(malformed)
+        if name.eq_ignore_ascii_case("origin") && !origins.contains(&value.to_ascii_lowercase()) {
+            return Err((
+                403,
+                format!("pages of `{value}` may not connect; see the option `origins` of the bridge"),
+            ));
+        }
     }
+    host.map(|_| ()).ok_or_else(malformed)
 }
 
 /// Returns whether it is a name of the loopback device, with any port: `ssh -L` gives it another.
@@ -144,23 +126,13 @@ async fn refuse(mut client: TcpStream, (status, why): Refused) {
     let _ = timeout(PATIENCE, client.write_all(answer.as_bytes())).await;
 }
 
-/// Addresses to put the server at, the best first. All of 127.0.0.0/8 is this machine, but not by every system: at one of 16 million addresses, and at a
-/// port that the system chooses, no page finds it by trying.
-pub(crate) fn hidden_addresses() -> [Ipv4Addr; 2] {
-    use std::hash::{BuildHasher, RandomState};
-    // Its keys are random numbers of the system's.
-    let [a, b, c, ..] = RandomState::new().hash_one(0_u8).to_ne_bytes();
-    [Ipv4Addr::new(127, a, b, c.clamp(1, 254)), Ipv4Addr::LOCALHOST]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn status(lines: &[&str]) -> u16 {
-        let door = Door::new(vec!["https://app.foxglove.dev".to_owned()], ([127, 0, 0, 1], 1).into());
         let head = format!("GET / HTTP/1.1\r\n{}\r\n\r\n", lines.join("\r\n"));
-        door.check(head.as_bytes()).map_or_else(|(status, _)| status, |()| 0)
+        check(head.as_bytes(), &["https://app.foxglove.dev".to_owned()]).map_or_else(|(status, _)| status, |()| 0)
     }
 
     #[test]
@@ -218,13 +190,12 @@ mod tests {
         for case in cases {
             assert_eq!(status(case), 400, "{case:?}");
         }
-        let door = Door::new(Vec::new(), ([127, 0, 0, 1], 1).into());
         for head in [
             &b"POST / HTTP/1.1\r\nHost: localhost\r\n\r\n"[..],
             b"\r\n\r\n",
             b"GET / HTTP/1.1\r\nHost: \xff\r\n\r\n",
         ] {
-            assert_eq!(door.check(head).map_err(|(status, _)| status), Err(400), "{head:?}");
+            assert_eq!(check(head, &[]).map_err(|(status, _)| status), Err(400), "{head:?}");
         }
     }
 }

@@ -24,8 +24,8 @@
 //! # Who may do what
 //!
 //! It listens on the loopback device alone, without encryption; from another machine, it is reached by `ssh -L`. Every program of this machine may
-//! read. Parameters and commands are there if [`FoxgloveOptions::rights`] has them, and then for every such program: there is no token, as the
-//! protocol has none. Clients never publish.
+//! read and disarm. Parameters and commands are there if [`FoxgloveOptions::rights`] has them, and then for every such program: there is no token, as
+//! the protocol has none. Clients never publish. What a client has asked for is not done any more once it has left.
 //!
 //! Foxglove's server itself checks neither `Host` nor `Origin`, so that the page of any site could open it in the browser of someone who runs a robot.
 //! A door in front of it therefore refuses requests by another name than those of the loopback device, and those of pages that
@@ -36,14 +36,13 @@
 
 mod bridge;
 mod channels;
+mod clients;
 mod door;
 mod options;
 mod outbox;
 mod parameters;
 mod server;
 mod services;
-mod state;
 
 pub use options::FoxgloveOptions;
-pub use server::{Foxglove, ServeError};
-pub use state::FoxgloveState;
+pub use server::{Foxglove, FoxgloveState, ServeError};

@@ -13,23 +13,14 @@ pub struct FoxgloveOptions {
     /// the browser.
     #[option(default = "https://app.foxglove.dev")]
     pub origins: String,
-    /// Rights of all clients, of `parameters`, `commands` and `arm`. By default they only read topics.
+    /// Rights of all clients, of `parameters`, `commands` and `arm`. By default they only read topics. All may disarm.
     #[option(default = "")]
     pub rights: String,
 }
 
 impl FoxgloveOptions {
     pub(crate) fn client_rights(&self) -> Result<Rights, Fault> {
-        const GIVEN: [Right; 3] = [Right::Parameters, Right::Commands, Right::Arm];
-        let mut rights = vec![Right::Read];
-        for name in self.rights.split_whitespace() {
-            let right = GIVEN.into_iter().find(|right| right.name() == name).ok_or_else(|| {
-                let names = GIVEN.map(|right| format!("`{right}`")).join(", ");
-                Fault::new(format!("`rights` has `{name}`: expected {names}"))
-            })?;
-            rights.push(right);
-        }
-        Ok(rights.into_iter().collect())
+        Rights::parse(&self.rights, &[Right::Parameters, Right::Commands, Right::Arm])
     }
 
     pub(crate) fn page_origins(&self) -> Result<Vec<String>, Fault> {

@@ -7,21 +7,28 @@ use foxglove::websocket::{
     AnyClient, GetParametersResponder, Parameter, ParameterHandler, ParameterType, ParameterValue,
     SetParametersResponder,
 };
-use tokio::sync::mpsc::UnboundedSender;
 
-/// Answers requests for parameters.
-pub(crate) struct Parameters {
-    pub(crate) bus: Bus,
-    /// Takes values that all clients should know.
-    pub(crate) news: UnboundedSender<Vec<Parameter>>,
-}
+/// Answers requests of a client for parameters.
+#[derive(Clone)]
+pub(crate) struct Parameters(pub(crate) Bus);
 
 impl Parameters {
     /// The values of these parameters; of all if there are no names.
     fn values(&self, names: &[String]) -> Vec<Parameter> {
-        let all = self.bus.description().parameters;
+        let all = self.0.description().parameters;
         let chosen = all.iter().filter(|one| names.is_empty() || names.iter().any(|name| name == one.path));
         chosen.map(|ParameterDescription { path, value, .. }| parameter(path, value)).collect()
+    }
+
+    /// Sets parameters, all or none.
+    fn set_all(&self, given: &[Parameter]) -> Result<(), String> {
+        let json = |parameter: &Parameter| match &parameter.value {
+            Some(value) => serde_json::to_string(value).map_err(|error| error.to_string()),
+            None => Err(format!("{}: a parameter cannot be removed", parameter.name)),
+        };
+        let values = given.iter().map(json).collect::<Result<Vec<String>, String>>()?;
+        let pairs = given.iter().zip(&values).map(|(parameter, value)| (parameter.name.as_str(), value.as_str()));
+        self.0.set_parameters_json(pairs).map_err(|error| error.to_string())
     }
 }
 
@@ -31,32 +38,17 @@ impl ParameterHandler for Parameters {
     }
 
     fn set(&self, client: AnyClient, given: Vec<Parameter>, _: Option<String>, responder: SetParametersResponder) {
-        let this =
-            Self { bus: self.bus.for_caller(caller(client.id()), self.bus.rights()), news: self.news.clone() };
+        let this = self.clone();
         // It waits for the robot.
         tokio::task::spawn_blocking(move || {
-            let result = set(&this.bus, &given);
-            let names: Vec<String> = given.into_iter().map(|parameter| parameter.name).collect();
-            let values = if names.is_empty() { Vec::new() } else { this.values(&names) };
-            if let Err(why) = result {
+            if let Err(why) = this.set_all(&given) {
                 // An answer has no place for a reason; to the protocol, it is the old value alone that refuses.
                 client.send_warning(why);
-                let _ = this.news.send(values.clone());
             }
-            responder.respond(values);
+            let names: Vec<String> = given.into_iter().map(|parameter| parameter.name).collect();
+            responder.respond(if names.is_empty() { Vec::new() } else { this.values(&names) });
         });
     }
-}
-
-/// Sets parameters, all or none.
-fn set(bus: &Bus, given: &[Parameter]) -> Result<(), String> {
-    let json = |parameter: &Parameter| match &parameter.value {
-        Some(value) => serde_json::to_string(value).map_err(|error| error.to_string()),
-        None => Err(format!("{}: a parameter cannot be removed", parameter.name)),
-    };
-    let values = given.iter().map(json).collect::<Result<Vec<String>, String>>()?;
-    let pairs = given.iter().zip(&values).map(|(parameter, value)| (parameter.name.as_str(), value.as_str()));
-    bus.set_parameters_json(pairs).map_err(|error| error.to_string())
 }
 
 /// The new value of a parameter, if the event is a change of one.
@@ -74,9 +66,4 @@ fn parameter(path: &str, value: &bb_core::ParameterValue) -> Parameter {
         bb_core::ParameterValue::Text(value) => (None, ParameterValue::String(value.clone())),
     };
     Parameter { name: path.to_owned(), r#type, value: Some(value) }
-}
-
-/// The name by which the robot knows a client: `foxglove 3`.
-pub(crate) fn caller(client: foxglove::websocket::ClientId) -> String {
-    format!("foxglove {client}")
 }

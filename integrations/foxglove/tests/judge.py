@@ -4,6 +4,7 @@
 chooses. Ends with 1 if something is not as it is to be."""
 
 import asyncio
+import contextlib
 import importlib
 import json
 import os
@@ -15,39 +16,18 @@ import sys
 import time
 
 import websockets
+from judging import Program, check, end, free_port, python
 from rclpy.serialization import deserialize_message
 
 ROVER, LAYOUT = sys.argv[1], sys.argv[2]
 RATE, SECONDS = 200, 8
 PATIENCE = 20
-failures = []
 
 
-def check(what, is_so, found=""):
-    print(("ok    " if is_so else "WRONG ") + what + (f": {found}" if found != "" else ""), flush=True)
-    if not is_so:
-        failures.append(what)
-
-
-def free_port():
-    with socket.socket() as found:
-        found.bind(("127.0.0.1", 0))
-        return found.getsockname()[1]
-
-
-class Rover:
-    """A rover, and its end."""
-
+class Rover(Program):
     def __init__(self, rights="parameters commands arm"):
         self.port = free_port()
-        self.process = subprocess.Popen([ROVER, "--port", str(self.port), "--rights", rights])
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.process.kill()
-        self.process.wait()
+        super().__init__(ROVER, "--port", str(self.port), "--rights", rights)
 
     def cpu_s(self):
         """Seconds of processor time so far."""
@@ -193,8 +173,8 @@ async def nothing_is_writable_by_default():
         client = await Client().open(rover)
         await client.subscribe("/sensor/base/imu", 1)
         await client.until(lambda: len(client.messages) > 10)
-        check("no services and no parameters unless opted in", not client.services and client.info["capabilities"] == [],
-              client.info["capabilities"])
+        check("no parameters, and no service but to disarm, unless opted in", set(client.services) == {"/disarm"}
+              and client.info["capabilities"] == ["services"], client.info["capabilities"])
         await client.send(op="setParameters", parameters=[{"name": "param/speed", "value": 1.0}], id="a")
         status = await client.text("status")
         check("a set is refused", status["level"] == 2, status["message"])
@@ -236,8 +216,9 @@ async def a_stopped_and_a_killed_client_cost_nothing():
     with Rover() as rover:
         client = await Client().open(rover)
         await client.subscribe("/sensor/base/imu", 1)
-        others = [subprocess.Popen([sys.executable, "-c", STOPPED, f"ws://127.0.0.1:{rover.port}"], stdout=subprocess.PIPE) for _ in range(4)]
-        try:
+        with contextlib.ExitStack() as stack:
+            url = f"ws://127.0.0.1:{rover.port}"
+            others = [stack.enter_context(python(STOPPED, url, stdout=subprocess.PIPE)).process for _ in range(4)]
             for other in others:
                 other.stdout.readline()
             for other, kind in zip(others, [signal.SIGSTOP, signal.SIGSTOP, signal.SIGKILL, signal.SIGKILL]):
@@ -248,10 +229,6 @@ async def a_stopped_and_a_killed_client_cost_nothing():
             imu = class_of("sensor_msgs/msg/Imu")
             counted = [deserialize_message(data, imu).linear_acceleration.x for _, _, data in client.messages]
             check("beside two stopped and two killed clients, another loses nothing", counted == [counted[0] + n for n in range(len(counted))])
-        finally:
-            for other in others:
-                other.kill()
-                other.wait()
 
 
 def idle_costs_nothing():
@@ -289,7 +266,4 @@ async def main():
 
 
 asyncio.run(main())
-if failures:
-    print(f"foxglove: {len(failures)} wrong: {', '.join(failures)}")
-    sys.exit(1)
-print("foxglove: all is as it is to be")
+end()
