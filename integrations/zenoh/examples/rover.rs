@@ -1,4 +1,5 @@
-//! A rover that nodes of ROS 2 drive: `cargo run --example rover`, then `ros2 topic list` with `RMW_IMPLEMENTATION=rmw_zenoh_cpp`.
+//! A rover that nodes of ROS 2 drive: `cargo run --example rover`, then `drive_rover.py` beside
+//! this file, or `ros2 topic list`, with `RMW_IMPLEMENTATION=rmw_zenoh_cpp`.
 //!
 //! `--listen ENDPOINT` replaces `tcp/127.0.0.1:7447`, `--rate HERTZ` sets the rate of the IMU, and `--simulate` runs on virtual time, a
 //! little faster than real time. `--interfaces FOLDER` writes the package of the types that ROS does not have, and exits.
@@ -60,6 +61,20 @@ impl Command for Drive {
     }
 }
 
+/// Turns around.
+struct Turn;
+
+impl Command for Turn {
+    type Options = NoOptions;
+    type Arguments = NoArguments;
+    type Output = ();
+
+    async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
+        context.sleep(Duration::from_millis(200)).await;
+        Ok(Outcome::done(()))
+    }
+}
+
 /// Goes back to where it was.
 struct GoHome;
 
@@ -82,6 +97,7 @@ robot! {
     }
     commands {
         drive: Drive;
+        turn: Turn;
         go_home: GoHome;
     }
     link base {

@@ -1,16 +1,16 @@
 //! Rights by certificates, by the templates in `access/`: who has none of the authority's, or one that is over, gets no session, and who has
 //! one does what its name may.
 
+use crate::kit::{PATIENCE, changed, connected, folder, free_address};
 use bb_core::Options;
 use bb_core::message::codec::encode;
 use bb_core::nalgebra::Vector3;
 use bb_core::prelude::*;
-use bb_zenoh::{Ros2Bridge, Ros2Options, Session, SessionSettings};
+use bb_zenoh::{Ros2Bridge, Ros2Options};
 use rcgen::{
     BasicConstraints, CertificateParams, DistinguishedName, DnType, ExtendedKeyUsagePurpose, IsCa, Issuer, KeyPair,
     date_time_ymd,
 };
-use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use zenoh::Wait;
@@ -25,8 +25,6 @@ robot! {
 
 /// Time for which somebody who may not tries.
 const TRIES: Duration = Duration::from_secs(3);
-/// Enough for a busy machine.
-const PATIENCE: Duration = Duration::from_secs(20);
 
 /// An authority that signs certificates.
 struct Authority {
@@ -66,19 +64,6 @@ fn named(name: Option<&str>) -> DistinguishedName {
     names
 }
 
-/// A template with other texts in it, as a file of its own.
-fn changed(template: &str, folder: &Path, name: &str, changes: &[(&str, &str)]) -> PathBuf {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("access").join(template);
-    let mut text = std::fs::read_to_string(path).expect("the template is there");
-    for (from, to) in changes {
-        assert!(text.contains(from), "{template} does not have {from}");
-        text = text.replace(from, to);
-    }
-    let path = folder.join(name);
-    std::fs::write(&path, text).expect("it is written");
-    path
-}
-
 /// Rights that a client with a certificate turns out to have.
 #[derive(Debug, PartialEq)]
 struct Done {
@@ -92,8 +77,7 @@ const NOTHING: Done = Done { has_session: false, reads: false, writes: false, ca
 
 #[test]
 fn a_certificate_says_who_reads_and_who_writes() {
-    let folder = std::env::temp_dir().join(format!("bb-zenoh-tls-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).expect("it is made");
+    let folder = folder("tls");
     let (ours, foreign) = (Authority::new("our authority"), Authority::new("another authority"));
     std::fs::write(folder.join("ca.pem"), &ours.pem).expect("it is written");
     for (authority, file, name, last_year) in [
@@ -108,8 +92,7 @@ fn a_certificate_says_who_reads_and_who_writes() {
         authority.sign(&folder, file, name, last_year);
     }
     let here = folder.to_str().expect("it is text");
-    let port = TcpListener::bind("127.0.0.1:0").and_then(|socket| socket.local_addr()).expect("one is free").port();
-    let endpoint = format!("tls/127.0.0.1:{port}");
+    let endpoint = format!("tls/{}", free_address());
     let config = changed("tls-robot.json5", &folder, "robot.json5", &[("/etc/robot", here)]);
     let robot = Rover::builder().start().expect("it starts");
     let options = Ros2Options {
@@ -134,14 +117,12 @@ fn a_certificate_says_who_reads_and_who_writes() {
         format!("0/sensor/base/target/{package}::msg::dds_::{message}_/{}", hash.expect("ROS has one"));
 
     let can = |config: PathBuf| {
-        let settings =
-            SessionSettings { connect: vec![endpoint.clone()], file: Some(config), ..SessionSettings::default() };
-        let session = Session::open(&settings).expect("it is opened, whom it reaches or not");
+        let is_operator = config.ends_with("operator.json5");
+        let session = connected(vec![endpoint.clone()], Some(config));
         let messages = session.declare_subscriber("0/sensor/base/imu/**").wait().expect("it is declared");
         let (begun, before) = (Instant::now(), bridge.state().received);
         let mut done = NOTHING;
         // Who may do all need not try for longer, and is not in a hurry.
-        let is_operator = settings.file.as_ref().is_some_and(|file| file.ends_with("operator.json5"));
         let longest = if is_operator { PATIENCE } else { TRIES };
         while begun.elapsed() < longest
             && done != (Done { has_session: true, reads: true, writes: true, calls: true })

@@ -1,19 +1,12 @@
 //! A remote sensor whose peer does what it should not, over loopback.
 
+use crate::kit::{Counter, Number, connected, free_endpoint, until};
 use bb_core::message::codec::encode;
 use bb_core::prelude::*;
-use bb_zenoh::{Remote, Session, SessionSettings, Share};
-use std::net::TcpListener;
+use bb_zenoh::{Remote, Session, Share};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
-use std::time::Instant;
 use zenoh::Wait;
-
-/// A number.
-#[derive(Clone, Debug, PartialEq, Payload)]
-struct Number {
-    value: u64,
-}
 
 /// A payload of another shape.
 #[derive(Clone, Debug, PartialEq, Payload)]
@@ -41,11 +34,9 @@ struct Peer {
 }
 
 impl Peer {
-    fn start(port: u16, number: u64, ahead: i64) -> Self {
+    fn start(endpoint: &str, number: u64, ahead: i64) -> Self {
         // The same settings would be the same session: a peer with another number lists the endpoint twice.
-        let connect = vec![format!("tcp/127.0.0.1:{port}"); 1 + number as usize % 2];
-        let session =
-            Session::open(&SessionSettings { connect, ..SessionSettings::default() }).expect("it is opened");
+        let session = connected(vec![endpoint.to_owned(); 1 + number as usize % 2], None);
         let clock = Clock::real();
         let of_answers = clock.clone();
         let answers = session.declare_queryable("bb/Mast/@clock").callback(move |query| {
@@ -88,18 +79,17 @@ struct Listening {
     robot: Running<Rover>,
     readings: Subscription<Number>,
     faults: Subscription<bb_core::ComponentFault>,
-    port: u16,
+    endpoint: String,
 }
 
 impl Listening {
     fn start() -> Self {
-        let port =
-            TcpListener::bind("127.0.0.1:0").and_then(|socket| socket.local_addr()).expect("one is free").port();
+        let endpoint = free_endpoint();
         let mut builder = Rover::builder();
-        builder.options(rover::sensor::base::number).listen = format!("tcp/127.0.0.1:{port}");
+        builder.options(rover::sensor::base::number).listen = endpoint.clone();
         let readings = builder.subscribe(rover::sensor::base::number);
         let faults = builder.subscribe(system::Faults);
-        Self { robot: builder.start().expect("it starts"), readings, faults, port }
+        Self { robot: builder.start().expect("it starts"), readings, faults, endpoint }
     }
 
     fn count(&self, name: &str) -> u64 {
@@ -108,12 +98,12 @@ impl Listening {
 
     /// Lets the peer act until it is so.
     fn until(&self, mut act: impl FnMut(), mut is_so: impl FnMut(&Self) -> bool) {
-        let begun = Instant::now();
-        while !is_so(self) {
-            assert!(begun.elapsed() < Duration::from_secs(30), "it did not become so");
+        let is_so = || {
             act();
-            std::thread::sleep(Duration::from_millis(10));
-        }
+            std::thread::sleep(Duration::from_millis(8));
+            is_so(self)
+        };
+        assert!(until(is_so), "it did not become so");
     }
 
     /// Lets the peer act until a fault says this of it, and none of its messages was taken.
@@ -132,7 +122,7 @@ impl Listening {
 #[test]
 fn every_message_of_a_peer_is_accounted_for() {
     let rover = Listening::start();
-    let peer = Peer::start(rover.port, 7, -123_456_789_000);
+    let peer = Peer::start(&rover.endpoint, 7, -123_456_789_000);
     let mut sequence = 0;
     rover.until(
         || {
@@ -181,7 +171,7 @@ fn every_message_of_a_peer_is_accounted_for() {
 fn what_is_malformed_is_refused_by_name() {
     let rover = Listening::start();
     rover.refuses("nothing has been heard of it", || ());
-    let peer = Peer::start(rover.port, 7, 5_000_000_000);
+    let peer = Peer::start(&rover.endpoint, 7, 5_000_000_000);
     let hash = Stamped::<Number>::LAYOUTS.type_hash();
     let sequence = AtomicU64::new(0);
     let next = || sequence.fetch_add(1, Ordering::Relaxed);
@@ -211,7 +201,7 @@ fn what_is_malformed_is_refused_by_name() {
 #[test]
 fn two_robots_of_one_name_are_refused() {
     let rover = Listening::start();
-    let peers = [Peer::start(rover.port, 2, 0), Peer::start(rover.port, 3, 1_000_000_000)];
+    let peers = [Peer::start(&rover.endpoint, 2, 0), Peer::start(&rover.endpoint, 3, 1_000_000_000)];
     let mut sequence = 0;
     let mut act = || {
         sequence += 1;
@@ -228,24 +218,6 @@ fn two_robots_of_one_name_are_refused() {
     assert_eq!(rover.readings.drain().count(), 0);
 }
 
-/// A sensor that counts.
-#[derive(Debug)]
-struct Counter(u64);
-
-impl Sensor for Counter {
-    type Options = NoOptions;
-    type Output = Number;
-
-    fn init(_: NoOptions, _: &SensorContext) -> Result<Self, Fault> {
-        Ok(Self(0))
-    }
-
-    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        self.0 += 1;
-        Ok(Reading::now(Number { value: self.0 }))
-    }
-}
-
 robot! {
     robot Mast;
     commands { arm: Arm; }
@@ -258,12 +230,10 @@ robot! {
 fn a_robot_shares_what_it_selects_and_nothing_else() {
     let rover = Listening::start();
     let mut builder = Mast::builder();
-    builder.options(mast::bridge::net).connect = format!("tcp/127.0.0.1:{}", rover.port);
+    builder.options(mast::bridge::net).connect = rover.endpoint.clone();
     let mast = builder.start().expect("it starts");
     // Listens to all that crosses.
-    let session =
-        SessionSettings { connect: vec![format!("tcp/127.0.0.1:{}", rover.port); 3], ..Default::default() };
-    let session = Session::open(&session).expect("it is opened");
+    let session = connected(vec![rover.endpoint.clone(); 3], None);
     let keys: Arc<Mutex<std::collections::BTreeSet<String>>> = Arc::default();
     let seen = Arc::clone(&keys);
     let listener = session.declare_subscriber("bb/**").callback(move |sample| {

@@ -1,38 +1,14 @@
 //! Rights between robots, by the templates in `access/`: a robot without a password, with a wrong one, and with that of another user reads
 //! nothing, and none writes.
 
+use crate::kit::{Counter, Number, changed, connected, folder, free_endpoint};
 use bb_core::prelude::*;
 use bb_zenoh::{Remote, Session, SessionSettings, Share, Source};
-use std::net::TcpListener;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 use zenoh::Wait;
-
-/// A number.
-#[derive(Clone, Debug, PartialEq, Payload)]
-struct Number {
-    value: u64,
-}
-
-/// A sensor that counts.
-#[derive(Debug)]
-struct Counter(u64);
-
-impl Sensor for Counter {
-    type Options = NoOptions;
-    type Output = Number;
-
-    fn init(_: NoOptions, _: &SensorContext) -> Result<Self, Fault> {
-        Ok(Self(0))
-    }
-
-    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        self.0 += 1;
-        Ok(Reading::now(Number { value: self.0 }))
-    }
-}
 
 robot! {
     robot Mast;
@@ -47,28 +23,13 @@ robot! {
     }
 }
 
-/// A template with other texts in it, as a file of its own.
-fn changed(template: &str, name: &str, folder: &Path, changes: &[(&str, &str)]) -> PathBuf {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("access").join(template);
-    let mut text = std::fs::read_to_string(path).expect("the template is there");
-    for (from, to) in changes {
-        assert!(text.contains(from), "{template} does not have {from}");
-        text = text.replace(from, to);
-    }
-    let path = folder.join(name);
-    std::fs::write(&path, text).expect("it is written");
-    path
-}
-
 #[test]
 fn a_reader_needs_its_password_and_nobody_writes() {
-    let folder = std::env::temp_dir().join(format!("bb-zenoh-access-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).expect("it is made");
-    let users = changed("users.txt", "users.txt", &folder, &[]);
+    let folder = folder("access");
+    let users = changed("users.txt", &folder, "users.txt", &[]);
     let users = users.to_str().expect("it is text");
-    let config = changed("mast.json5", "mast.json5", &folder, &[("/etc/robot/users.txt", users)]);
-    let port = TcpListener::bind("127.0.0.1:0").and_then(|socket| socket.local_addr()).expect("one is free").port();
-    let endpoint = format!("tcp/127.0.0.1:{port}");
+    let config = changed("mast.json5", &folder, "mast.json5", &[("/etc/robot/users.txt", users)]);
+    let endpoint = free_endpoint();
 
     let mut builder = Mast::builder();
     let options = builder.options(mast::bridge::net);
@@ -91,9 +52,7 @@ fn a_reader_needs_its_password_and_nobody_writes() {
         options.connect = endpoint.clone();
         options.config = config.clone().unwrap_or_default();
         let robot = builder.start().expect("it starts");
-        let session =
-            SessionSettings { connect: vec![endpoint.clone()], file: config, ..SessionSettings::default() };
-        let session = Session::open(&session).expect("it is opened");
+        let session = connected(vec![endpoint.clone()], config);
         let (begun, mut read) = (Instant::now(), 0);
         while begun.elapsed() < longest && read < 50 {
             session.put("bb/Mast/target/speed", vec![1, 2, 3]).wait().expect("it is put");
@@ -102,10 +61,10 @@ fn a_reader_needs_its_password_and_nobody_writes() {
         }
         read
     };
-    let right = changed("rover.json5", "right.json5", &folder, &[]);
-    let wrong = changed("rover.json5", "wrong.json5", &folder, &[("change me", "guessed")]);
+    let right = changed("rover.json5", &folder, "right.json5", &[]);
+    let wrong = changed("rover.json5", &folder, "wrong.json5", &[("change me", "guessed")]);
     let visitor = [("\"rover\"", "\"visitor\""), ("change me", "change me too")];
-    let visitor = changed("rover.json5", "visitor.json5", &folder, &visitor);
+    let visitor = changed("rover.json5", &folder, "visitor.json5", &visitor);
     assert!(read_by(Some(right.clone()), Duration::from_secs(30)) >= 50, "a reader reads");
     for (config, who) in [(None, "nobody"), (Some(wrong), "a guesser"), (Some(visitor), "a visitor")] {
         assert_eq!(read_by(config, Duration::from_secs(3)), 0, "{who} reads");

@@ -1,5 +1,7 @@
 //! The node from the other side, in one process.
 
+use crate::kit::{PATIENCE, connected, folder, free_address, free_endpoint, router, until};
+use crate::relay::{LinkState, Relay};
 use bb_core::event::CommandEvent;
 use bb_core::message::codec::{decode_as_ros, encode};
 use bb_core::nalgebra::Vector3;
@@ -7,15 +9,10 @@ use bb_core::prelude::*;
 use bb_core::{Bus, Options};
 use bb_ros2::{Address, Attachment, Endpoint, EndpointKind, Gid, Node, Qos, Token, TypeHash};
 use bb_zenoh::{Mode, Ros2Bridge, Ros2Options, Ros2State, Session, SessionSettings};
-use std::io::{Read, Write};
-use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Instant;
 use zenoh::Wait;
-
-/// Enough for a busy machine.
-const PATIENCE: Duration = Duration::from_secs(30);
 
 /// Does nothing.
 struct Rest;
@@ -54,8 +51,7 @@ mod own {
 
 /// A port of its own: with the same settings, it would be the session of another test.
 fn options() -> Ros2Options {
-    let free = TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr()).expect("one is free");
-    Ros2Options { listen: format!("tcp/{free}"), ..Ros2Options::defaults() }
+    Ros2Options { listen: free_endpoint(), ..Ros2Options::defaults() }
 }
 
 fn bridged(robot: &Bus, options: Ros2Options) -> Ros2Bridge {
@@ -64,21 +60,9 @@ fn bridged(robot: &Bus, options: Ros2Options) -> Ros2Bridge {
 
 /// Another session, which knows the bridge alone.
 fn other(bridge: &Ros2Bridge) -> Session {
-    let settings = SessionSettings { connect: bridge.endpoints(), ..SessionSettings::default() };
-    let session = Session::open(&settings).expect("it is opened");
+    let session = connected(bridge.endpoints(), None);
     assert!(until(|| session.info().routers_zid().wait().next().is_some()), "it is not connected");
     session
-}
-
-fn until(mut condition: impl FnMut() -> bool) -> bool {
-    let end = Instant::now() + PATIENCE;
-    while !condition() {
-        if Instant::now() > end {
-            return false;
-        }
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    true
 }
 
 fn imu(count: f64) -> Imu {
@@ -309,46 +293,14 @@ fn a_robot_declares_that_it_is_a_node_in_one_line() {
     );
 }
 
-/// A link to a port through which nothing passes any more once it is frozen, and which is not closed.
-fn link(to: SocketAddr) -> (SocketAddr, Arc<AtomicBool>) {
-    let listener = TcpListener::bind("127.0.0.1:0").expect("one is free");
-    let (address, frozen) = (listener.local_addr().expect("it has one"), Arc::<AtomicBool>::default());
-    let is_frozen = Arc::clone(&frozen);
-    std::thread::spawn(move || {
-        for near in listener.incoming().flatten() {
-            let Ok(far) = TcpStream::connect(to) else { continue };
-            let ways = [(near.try_clone(), far.try_clone()), (Ok(far), Ok(near))];
-            for (from, into) in ways {
-                let (Ok(mut from), Ok(mut into)) = (from, into) else { continue };
-                let is_frozen = Arc::clone(&is_frozen);
-                std::thread::spawn(move || {
-                    let mut buffer = [0; 4096];
-                    while let Ok(read @ 1..) = from.read(&mut buffer) {
-                        while is_frozen.load(Ordering::Relaxed) {
-                            std::thread::sleep(Duration::from_millis(10));
-                        }
-                        if into.write_all(&buffer[..read]).is_err() {
-                            break;
-                        }
-                    }
-                    let _ = into.shutdown(Shutdown::Both);
-                });
-            }
-        }
-    });
-    (address, frozen)
-}
-
 #[test]
 fn the_end_waits_neither_for_a_frozen_router_nor_for_a_robot_that_publishes_on() {
-    let routed = TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr()).expect("one is free");
-    let listen = vec![format!("tcp/{routed}")];
-    let router = Session::open(&SessionSettings { mode: Mode::Router, listen, ..SessionSettings::default() });
-    let router = router.expect("it is opened");
+    let routed = free_address();
+    let router = router(&format!("tcp/{routed}"));
     let messages = router.declare_subscriber("0/sensor/base/imu/**").wait().expect("it is declared");
-    let (address, frozen) = link(routed);
+    let relay = Relay::start(routed).expect("it listens");
     let robot = SmallCart::builder().start().expect("it starts");
-    let connect = format!("tcp/{address}");
+    let connect = format!("tcp/127.0.0.1:{}", relay.port());
     let bridge = bridged(&robot, Ros2Options { connect, listen: String::new(), ..options() });
     let publisher = robot.publisher("sensor/base/imu").expect("it may");
     assert!(until(|| {
@@ -364,7 +316,7 @@ fn the_end_waits_neither_for_a_frozen_router_nor_for_a_robot_that_publishes_on()
             }
         });
         std::thread::sleep(Duration::from_millis(200));
-        frozen.store(true, Ordering::Relaxed);
+        relay.set(LinkState::Frozen);
         std::thread::sleep(Duration::from_millis(200));
         let begun = Instant::now();
         drop(bridge);
@@ -372,33 +324,18 @@ fn the_end_waits_neither_for_a_frozen_router_nor_for_a_robot_that_publishes_on()
         begun.elapsed()
     });
     assert!(took < Duration::from_secs(6), "{took:?}");
-    frozen.store(false, Ordering::Relaxed);
+    relay.set(LinkState::Open);
 }
 
 /// A router in the middle, as `rmw_zenohd` is one: nodes of ROS are peers that find each other by gossip, and the robot is a client.
 #[test]
 fn a_node_and_the_robot_meet_at_a_router_also_after_it_was_started_again() {
-    let routed = TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr()).expect("one is free");
-    let endpoint = format!("tcp/{routed}");
-    let route = || {
-        let listen = vec![endpoint.clone()];
-        let mut router = None;
-        assert!(until(|| {
-            router = Session::open(&SessionSettings {
-                mode: Mode::Router,
-                listen: listen.clone(),
-                ..SessionSettings::default()
-            })
-            .ok();
-            router.is_some()
-        }));
-        router
-    };
-    let router = route();
+    let endpoint = free_endpoint();
+    let first_router = router(&endpoint);
     let robot = SmallCart::builder().start().expect("it starts");
     let options = Ros2Options { connect: endpoint.clone(), listen: String::new(), ..options() };
     let _bridge = bridged(&robot, options);
-    let file = std::env::temp_dir().join(format!("bb-zenoh-node-{}.json5", std::process::id()));
+    let file = folder("node").join("gossip.json5");
     let gossip =
         "{ scouting: { gossip: { enabled: true, autoconnect: { router: [], peer: ['router', 'peer'] } } } }";
     std::fs::write(&file, gossip).expect("it is written");
@@ -419,9 +356,9 @@ fn a_node_and_the_robot_meet_at_a_router_also_after_it_was_started_again() {
         })
     };
     assert!(meets(), "not at first");
-    drop(router);
+    drop(first_router);
     while messages.try_recv().ok().flatten().is_some() {}
-    let _router = route();
+    let _router = router(&endpoint);
     assert!(meets(), "not again");
 }
 
@@ -466,8 +403,11 @@ fn ask(session: &Session, address: &Address, payload: &[u8], answers: &Arc<Atomi
     asked.wait().expect("it is asked");
 }
 
+/// Number of the threads of bridges.
 fn threads() -> usize {
-    std::fs::read_dir("/proc/self/task").expect("it is Linux").count()
+    let tasks = std::fs::read_dir("/proc/self/task").expect("it is Linux").flatten();
+    let name = |task: std::fs::DirEntry| std::fs::read_to_string(task.path().join("comm")).ok();
+    tasks.filter_map(name).filter(|name| name.starts_with("ros2 ")).count()
 }
 
 #[test]
@@ -500,8 +440,7 @@ fn a_flood_of_requests_does_not_keep_the_robot_from_being_disarmed() {
     let mut names = vec![0, 1, 0, 0];
     names.extend(2000_u32.to_le_bytes());
     (0..2000).for_each(|_| names.extend([2, 0, 0, 0, b'x', 0, 0, 0]));
-    let connect = vec![bridge.endpoints()[0].clone(); 2];
-    let flooder = Session::open(&SessionSettings { connect, ..SessionSettings::default() }).expect("it is opened");
+    let flooder = connected(vec![bridge.endpoints()[0].clone(); 2], None);
     assert!(until(|| flooder.info().routers_zid().wait().next().is_some()));
     let (is_over, answers) = (AtomicBool::new(false), Arc::<AtomicU64>::default());
     std::thread::scope(|scope| {

@@ -1,13 +1,10 @@
 //! Several machines over a link that is cut, floods, or has a peer that is stopped: every message is accounted for, none that is too old is
 //! taken, and the robots go on.
 
-#[path = "../examples/two_machines/relay.rs"]
-mod relay;
-
+use crate::kit::{connected, folder, free_address, free_endpoint, router, until};
+use crate::relay::{LinkState, Relay};
 use bb_core::prelude::*;
-use bb_zenoh::{Mode, Remote, Session, SessionSettings, Share, Source};
-use relay::{LinkState, Relay};
-use std::net::TcpListener;
+use bb_zenoh::{Remote, Share, Source};
 use std::path::PathBuf;
 use std::process::{Child, Command as Process, Stdio};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -30,17 +27,6 @@ const BUSY: Duration = Duration::from_millis(200);
 fn now() -> Duration {
     static BEGUN: LazyLock<Instant> = LazyLock::new(Instant::now);
     BEGUN.elapsed()
-}
-
-fn until(mut condition: impl FnMut() -> bool) -> bool {
-    let begun = Instant::now();
-    while !condition() {
-        if begun.elapsed() > Duration::from_secs(30) {
-            return false;
-        }
-        thread::sleep(Duration::from_millis(2));
-    }
-    true
 }
 
 /// A measurement, with the time at which it was made by the clock of the process.
@@ -115,11 +101,6 @@ robot! {
         estimator judge: Judge() { input beat: sensor::base::beat; lost_after: 500 ms; }
         sensor tick: Tick() { rate: 500 Hz; }
     }
-}
-
-fn free_endpoint() -> (u16, String) {
-    let port = TcpListener::bind("127.0.0.1:0").and_then(|socket| socket.local_addr()).expect("one is free").port();
-    (port, format!("tcp/127.0.0.1:{port}"))
 }
 
 /// A mast that listens.
@@ -241,9 +222,9 @@ impl Drop for Beating {
 
 /// Cuts the link for a while, and checks what the rover has made of it.
 fn cut(state: LinkState, length: Duration) {
-    let (port, endpoint) = free_endpoint();
-    let mast = mast(&endpoint);
-    let relay = Relay::start(([127, 0, 0, 1], port).into()).expect("it listens");
+    let address = free_address();
+    let mast = mast(&format!("tcp/{address}"));
+    let relay = Relay::start(address).expect("it listens");
     let rover = Listening::start(&format!("tcp/127.0.0.1:{}", relay.port()));
     let beating = Beating::start(&mast, PERIOD, 0);
     assert!(until(|| rover.last().is_some()), "nothing is taken");
@@ -311,19 +292,9 @@ fn every_message_is_accounted_for_after_a_long_cut() {
 /// A mast and a rover that are clients of a router, and do not know each other.
 #[test]
 fn robots_meet_at_a_router_also_after_it_was_started_again() {
-    let (_, endpoint) = free_endpoint();
-    let route = || {
-        let settings =
-            SessionSettings { mode: Mode::Router, listen: vec![endpoint.clone()], ..SessionSettings::default() };
-        let mut router = None;
-        assert!(until(|| {
-            router = Session::open(&settings).ok();
-            router.is_some()
-        }));
-        router
-    };
-    let router = route();
-    let config = std::env::temp_dir().join(format!("bb-zenoh-client-{}.json5", std::process::id()));
+    let endpoint = free_endpoint();
+    let first_router = router(&endpoint);
+    let config = folder("client").join("client.json5");
     std::fs::write(&config, "{ mode: \"client\" }").expect("it is written");
     let mut builder = Mast::builder();
     let options = builder.options(mast::bridge::net);
@@ -340,9 +311,9 @@ fn robots_meet_at_a_router_also_after_it_was_started_again() {
     let received = after[0] - before[0];
     assert_eq!((received, after[1] - before[1]), (last - first, 0), "not all is taken");
     rover.health.drain().for_each(drop);
-    drop(router);
+    drop(first_router);
     assert!(rover.becomes(HealthState::Lost).is_some(), "the end of the router is not noticed");
-    let _router = route();
+    let _router = router(&endpoint);
     assert!(rover.becomes(HealthState::Healthy).is_some(), "they do not meet again");
     let (last, after) = beating.settled(&rover, NAMES);
     let counts: [u64; 5] = std::array::from_fn(|index| after[index] - before[index]);
@@ -379,8 +350,7 @@ impl Drop for OtherProcess {
 
 /// Reads all that the mast says, until it is killed.
 fn read_forever(endpoint: String) {
-    let session = SessionSettings { connect: vec![endpoint], ..SessionSettings::default() };
-    let session = Session::open(&session).expect("it is opened");
+    let session = connected(vec![endpoint], None);
     let _all = session.declare_subscriber("bb/**").callback(|_| ()).wait().expect("it is declared");
     loop {
         thread::sleep(Duration::from_secs(1));
@@ -417,16 +387,15 @@ fn a_peer_that_is_stopped_takes_nothing_from_the_others() {
     if let Ok(endpoint) = std::env::var(PEER_OF) {
         return read_forever(endpoint);
     }
-    let (_, endpoint) = free_endpoint();
+    let endpoint = free_endpoint();
     let mast = mast(&endpoint);
     // The same settings would be the same session.
     let rovers = [endpoint.clone(), format!("{endpoint} {endpoint}")].map(|endpoint| Listening::start(&endpoint));
-    let peer = OtherProcess::reading("a_peer_that_is_stopped_takes_nothing_from_the_others", &endpoint);
+    let peer = OtherProcess::reading("link::a_peer_that_is_stopped_takes_nothing_from_the_others", &endpoint);
     // 200 Hz of 20 kB, so that the buffers of the one that is stopped are full at once.
     let beating = Beating::start(&mast, Duration::from_millis(5), 20_000);
     assert!(until(|| rovers.iter().all(|rover| rover.last().is_some())), "nothing is taken");
-    let session = SessionSettings { connect: vec![endpoint.clone(); 3], ..SessionSettings::default() };
-    let session = Session::open(&session).expect("it is opened");
+    let session = connected(vec![endpoint.clone(); 3], None);
     assert!(until(|| session.info().peers_zid().wait().next().is_some()));
     thread::sleep(Duration::from_secs(1));
     let ticks = mast.shared(Ticks::default);
@@ -448,9 +417,9 @@ fn a_peer_that_is_stopped_takes_nothing_from_the_others() {
 
 #[test]
 fn the_robot_ticks_on_during_a_cut_and_a_flood() {
-    let (port, endpoint) = free_endpoint();
-    let mast = mast(&endpoint);
-    let relay = Relay::start(([127, 0, 0, 1], port).into()).expect("it listens");
+    let address = free_address();
+    let mast = mast(&format!("tcp/{address}"));
+    let relay = Relay::start(address).expect("it listens");
     let rover = Listening::start(&format!("tcp/127.0.0.1:{}", relay.port()));
     let beating = Beating::start(&mast, PERIOD, 0);
     assert!(until(|| rover.last().is_some()), "nothing is taken");
