@@ -40,15 +40,28 @@ impl Live {
     }
 }
 
+/// Commands of one kind.
+#[derive(Debug, Args)]
+pub(crate) struct Group<What: Subcommand> {
+    #[command(flatten)]
+    live: Live,
+    #[command(subcommand)]
+    what: What,
+}
+
 #[derive(Debug, Subcommand)]
 pub(crate) enum LiveCommand {
     Top(top::Arguments),
-    Topic(topic::Arguments),
-    Param(param::Arguments),
-    Command(command::Arguments),
+    /// Lists topics of a running robot, and prints their messages and rates.
+    Topic(Group<topic::What>),
+    /// Lists, reads and sets parameters of a running robot.
+    Param(Group<param::What>),
+    /// Lists, starts and cancels commands of a running robot.
+    Command(Group<command::What>),
     Arm(arming::Arm),
     Disarm(arming::Disarm),
-    Ros2(ros2::Arguments),
+    /// Writes files for programs of ROS 2.
+    Ros2(Group<ros2::What>),
 }
 
 impl LiveCommand {

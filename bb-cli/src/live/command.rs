@@ -1,22 +1,13 @@
 //! `bb command`: commands of a running robot.
 
-use super::Live;
+use super::Group;
 use crate::say;
 use bb_eval::table::aligned;
-use clap::{Args, Subcommand};
+use clap::Subcommand;
 use serde_json::{Value, json};
 
-/// Lists, starts and cancels commands of a running robot.
-#[derive(Debug, Args)]
-pub(crate) struct Arguments {
-    #[command(flatten)]
-    live: Live,
-    #[command(subcommand)]
-    what: What,
-}
-
 #[derive(Debug, Subcommand)]
-enum What {
+pub(crate) enum What {
     /// Prints all commands with their arguments, and what runs.
     List,
     /// Starts one, waits for its end and prints its result. If this is interrupted, the command runs on.
@@ -36,7 +27,7 @@ enum What {
     },
 }
 
-pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
+pub(super) fn run(arguments: &Group<What>) -> Result<bool, String> {
     let mut robot = arguments.live.connect()?;
     match &arguments.what {
         What::List => {

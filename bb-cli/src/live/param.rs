@@ -1,23 +1,14 @@
 //! `bb param`: parameters of a running robot.
 
-use super::Live;
+use super::Group;
 use super::connection::Robot;
 use crate::say;
 use bb_eval::table::aligned;
-use clap::{Args, Subcommand};
+use clap::Subcommand;
 use serde_json::{Value, json};
 
-/// Lists, reads and sets parameters of a running robot.
-#[derive(Debug, Args)]
-pub(crate) struct Arguments {
-    #[command(flatten)]
-    live: Live,
-    #[command(subcommand)]
-    what: What,
-}
-
 #[derive(Debug, Subcommand)]
-enum What {
+pub(crate) enum What {
     /// Prints all parameters with their values, in SI.
     List,
     /// Prints the value of one.
@@ -33,7 +24,7 @@ enum What {
     },
 }
 
-pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
+pub(super) fn run(arguments: &Group<What>) -> Result<bool, String> {
     let mut robot = arguments.live.connect()?;
     match &arguments.what {
         What::List if arguments.live.json => say(&format!("{}\n", robot.description()["parameters"])),

@@ -1,26 +1,17 @@
 //! `bb ros2`: files for programs of ROS 2.
 
-use super::Live;
+use super::Group;
 use super::connection::Robot;
 use crate::{say, topics};
 use bb_core::message::Schema;
 use bb_ros2::Interfaces;
-use clap::{Args, Subcommand};
+use clap::Subcommand;
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Writes files for programs of ROS 2.
-#[derive(Debug, Args)]
-pub(crate) struct Arguments {
-    #[command(flatten)]
-    live: Live,
-    #[command(subcommand)]
-    what: What,
-}
-
 #[derive(Debug, Subcommand)]
-enum What {
+pub(crate) enum What {
     /// Writes the package `bb_msgs`, for `colcon build`: a `.msg` for each payload that ROS has no message for, and a `.srv` for each command with
     /// arguments.
     Interfaces {
@@ -33,7 +24,7 @@ enum What {
     },
 }
 
-pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
+pub(super) fn run(arguments: &Group<What>) -> Result<bool, String> {
     let What::Interfaces { folder, recording } = &arguments.what;
     let interfaces = match recording {
         Some(file) => recorded(file)?,

@@ -1,26 +1,17 @@
 //! `bb topic`: topics of a running robot.
 
 use super::connection::Robot;
-use super::{Live, yaml};
+use super::{Group, yaml};
 use crate::commands::plot::{Series, picture, write};
 use crate::say;
 use bb_eval::table::aligned;
 use bb_mcap::Value as Recorded;
-use clap::{Args, Subcommand};
+use clap::Subcommand;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-/// Lists topics of a running robot, and prints their messages and rates.
-#[derive(Debug, Args)]
-pub(crate) struct Arguments {
-    #[command(flatten)]
-    live: Live,
-    #[command(subcommand)]
-    what: What,
-}
-
 #[derive(Debug, Subcommand)]
-enum What {
+pub(crate) enum What {
     /// Prints all topics with their payloads and counts.
     List,
     /// Prints the messages of a topic: the newest, at most sixteen a second.
@@ -67,7 +58,7 @@ enum What {
     },
 }
 
-pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
+pub(super) fn run(arguments: &Group<What>) -> Result<bool, String> {
     let as_json = arguments.live.json;
     let mut robot = arguments.live.connect()?;
     match &arguments.what {
