@@ -12,7 +12,7 @@ use std::io::{self, Error};
 use std::net::{Ipv4Addr, SocketAddr};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::{Duration, SystemTime};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use tokio::io::{AsyncWriteExt, copy};
 use tokio::net::TcpStream;
 use tokio::time::timeout;
@@ -41,7 +41,7 @@ impl Clients {
     /// # Errors
     /// The system has no thread.
     pub(crate) fn new(bus: Bus, channels: Arc<Channels>) -> io::Result<Self> {
-        let session = format!("{:?}", SystemTime::now());
+        let session = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos()).to_string();
         Ok(Self { bus, channels, disarms: disarms()?, session, begun: AtomicU64::new(0), open: Arc::default() })
     }
 

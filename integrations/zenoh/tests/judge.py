@@ -9,7 +9,6 @@ import io
 import json
 import os
 import signal
-import socket
 import struct
 import subprocess
 import sys
