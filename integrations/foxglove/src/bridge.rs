@@ -16,12 +16,7 @@ impl Service for Foxglove {
     }
 
     fn update(&mut self, _: MonotonicTime) -> Result<Reading<FoxgloveState>, Fault> {
-        let state = FoxgloveState {
-            port: self.address().port(),
-            clients: u32::try_from(self.clients()).unwrap_or(u32::MAX),
-            encoded: self.encoded(),
-            lost: self.lost(),
-        };
+        let state = self.state();
         Ok(self.report.update(state))
     }
 }

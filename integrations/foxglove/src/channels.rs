@@ -2,7 +2,7 @@
 
 use bb_core::joints::{ViewerChannel, ViewerMessage, ViewerMessages};
 use bb_core::message::Schema;
-use bb_core::{Bus, DynamicMessage, Overflow, Select, WallTime};
+use bb_core::{Bus, Overflow, Select, WallTime};
 use foxglove::websocket::{ChannelView, Client, ServerListener};
 use foxglove::{ChannelId, Context, FoxgloveError, PartialMetadata, RawChannel};
 use std::collections::{HashMap, HashSet};
@@ -38,33 +38,22 @@ struct Entry {
 /// The channels.
 pub(crate) struct Channels {
     bus: Bus,
-    robot: &'static str,
     pub(crate) context: Arc<Context>,
     entries: Mutex<HashMap<ChannelId, Entry>>,
-    paths: Mutex<HashSet<&'static str>>,
-    pub(crate) counts: Counts,
-}
-
-/// Numbers of messages.
-#[derive(Debug, Default)]
-pub(crate) struct Counts {
+    /// Messages that were encoded.
     pub(crate) encoded: AtomicU64,
-    /// Messages that slow clients have lost.
+    /// Messages that slow clients have lost, or that came faster than they were encoded.
     pub(crate) lost: AtomicU64,
-    /// Messages that came faster than they were encoded.
-    pub(crate) unencoded: AtomicU64,
 }
 
 impl Channels {
     pub(crate) fn new(bus: Bus, context: Arc<Context>) -> Result<Arc<Self>, FoxgloveError> {
-        let robot = bus.description().robot;
         let channels = Arc::new(Self {
             bus,
-            robot,
             context,
             entries: Mutex::default(),
-            paths: Mutex::default(),
-            counts: Counts::default(),
+            encoded: AtomicU64::default(),
+            lost: AtomicU64::default(),
         });
         for channel in ViewerChannel::ALL {
             channels.add(channel.topic(), channel.schema(), Source::Viewer(channel))?;
@@ -75,11 +64,15 @@ impl Channels {
 
     /// Adds the channels of paths that have been created since.
     pub(crate) fn refresh(&self) -> Result<(), FoxgloveError> {
-        let mut paths = lock(&self.paths);
-        if self.bus.paths().iter().all(|path| paths.contains(path)) {
+        let path_of = |entry: &Entry| match entry.source {
+            Source::Path { path, .. } => Some(path),
+            _ => None,
+        };
+        let known: HashSet<&str> = lock(&self.entries).values().filter_map(path_of).collect();
+        if self.bus.paths().iter().all(|path| known.contains(path)) {
             return Ok(());
         }
-        for topic in self.bus.description().topics.iter().filter(|topic| paths.insert(topic.path)) {
+        for topic in self.bus.description().topics.iter().filter(|topic| !known.contains(topic.path)) {
             let (path, layouts) = (topic.path, topic.layouts);
             let (name, schema) = layouts.channel(path);
             self.add(&name, schema, Source::Path { path, is_ros: layouts.ros_name().is_some() })?;
@@ -122,11 +115,11 @@ impl Channels {
                 Source::Viewer(_) => viewers.following(&message).map(|message| bytes = message.bytes).is_some(),
             };
             if is_there {
-                self.log(&channel, &bytes, wall_time(&message), None);
+                self.log(&channel, &bytes, message.stamp().wall_time, None);
             }
             let lagged = messages.lagged();
             if lagged > lost {
-                self.counts.unencoded.fetch_add(lagged - lost, Ordering::Relaxed);
+                self.lost.fetch_add(lagged - lost, Ordering::Relaxed);
                 tracing::warn!(
                     lost = lagged - lost,
                     topic = channel.topic(),
@@ -151,7 +144,7 @@ impl Channels {
     }
 
     fn log(&self, channel: &RawChannel, bytes: &[u8], time: WallTime, client: Option<&Client>) {
-        self.counts.encoded.fetch_add(1, Ordering::Relaxed);
+        self.encoded.fetch_add(1, Ordering::Relaxed);
         // The protocol has no times before 1970.
         let log_time = Some(u64::try_from(time.as_unix_nanos()).unwrap_or(0));
         let sink = client.and_then(Client::sink_id);
@@ -159,12 +152,8 @@ impl Channels {
     }
 
     fn viewers(&self) -> ViewerMessages {
-        ViewerMessages::new(self.robot, self.bus.topology(), None)
+        ViewerMessages::new(self.bus.description().robot, self.bus.topology(), None)
     }
-}
-
-fn wall_time(message: &DynamicMessage) -> WallTime {
-    message.stamp().wall_time
 }
 
 /// Tells the channels of subscriptions, on the server's thread.

@@ -65,7 +65,7 @@ impl Clients {
             server.write_all(head).await?;
             let (mut from_client, to_client) = client.into_split();
             let (from_server, mut to_server) = server.into_split();
-            let outbox = Outbox::new(&self.channels.counts.lost);
+            let outbox = Outbox::new(&self.channels.lost);
             tokio::select! {
                 ended = copy(&mut from_client, &mut to_server) => ended.map(|_| ()),
                 ended = outbox.relay(from_server, to_client) => ended,

@@ -12,7 +12,7 @@ use std::fmt;
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 use tokio::net::TcpListener;
@@ -52,9 +52,9 @@ pub struct FoxgloveState {
     pub port: u16,
     /// Number of connected clients.
     pub clients: u32,
-    /// Number of messages that have been encoded.
+    /// Number of messages that have been encoded, for any number of clients each.
     pub encoded: u64,
-    /// Number of messages that slow clients have lost, or that came faster than they could be encoded.
+    /// Number of messages that slow clients have lost, those of each client added, or that came faster than they could be encoded.
     pub lost: u64,
 }
 
@@ -110,20 +110,16 @@ impl Foxglove {
         self.address
     }
 
-    /// Returns the number of connected clients.
-    pub fn clients(&self) -> usize {
-        self.door.clients.count()
-    }
-
-    /// Returns the number of messages that have been encoded, for any number of clients each.
-    pub fn encoded(&self) -> u64 {
-        self.door.clients.channels.counts.encoded.load(Ordering::Relaxed)
-    }
-
-    /// Returns the number of messages that slow clients have lost, those of each client added, and that came faster than they could be encoded.
-    pub fn lost(&self) -> u64 {
-        let counts = &self.door.clients.channels.counts;
-        counts.lost.load(Ordering::Relaxed) + counts.unencoded.load(Ordering::Relaxed)
+    /// Clients and messages so far.
+    pub fn state(&self) -> FoxgloveState {
+        let Clients { channels, .. } = &self.door.clients;
+        let count = |number: &AtomicU64| number.load(Ordering::Relaxed);
+        FoxgloveState {
+            port: self.address.port(),
+            clients: u32::try_from(self.door.clients.count()).unwrap_or(u32::MAX),
+            encoded: count(&channels.encoded),
+            lost: count(&channels.lost),
+        }
     }
 }
 

@@ -76,7 +76,7 @@ fn a_client_that_does_not_read_loses_the_oldest_and_costs_nobody_else() {
         assert_eq!(number(&bytes), count);
     }
     assert!(longest < Duration::from_secs(1), "a publisher waited for {longest:?}");
-    assert!(foxglove.lost() > 0, "the system holds all {COUNT} messages");
+    assert!(foxglove.state().lost > 0, "the system holds all {COUNT} messages");
     let (mut numbers, mut told) = (Vec::new(), None);
     while numbers.last() != Some(&(COUNT - 1)) {
         match slow.next() {
@@ -93,7 +93,7 @@ fn a_client_that_does_not_read_loses_the_oldest_and_costs_nobody_else() {
     // Each is received or counted; what is missing is before what is there.
     assert!(numbers.is_sorted());
     let received = numbers.len() as u64;
-    assert_eq!((told, received + foxglove.lost()), (Some(foxglove.lost()), u64::from(COUNT)));
+    assert_eq!((told, received + foxglove.state().lost), (Some(foxglove.state().lost), u64::from(COUNT)));
     let gaps = numbers.windows(2).filter(|two| two[1] != two[0] + 1).count();
     assert_eq!((gaps, numbers[0]), (1, 0), "what the system held, a gap, and the newest");
 }
@@ -232,7 +232,7 @@ fn what_a_client_has_asked_for_is_not_done_once_it_has_left() {
     client.send(json!({"op": "getParameters", "parameterNames": []}));
     client.text("status");
     drop(client);
-    assert!(until(|| foxglove.clients() == 0));
+    assert!(until(|| foxglove.state().clients == 0));
     MAY_END[1].store(true, Ordering::Relaxed);
     let waited = Instant::now();
     while waited.elapsed() < Duration::from_millis(300) {

@@ -62,7 +62,7 @@ fn channels_are_those_of_a_recording_and_messages_its_bytes() {
         sent[usize::from(!is_ros)].push((message.stamp().wall_time.as_unix_nanos() as u64, bytes));
     }
     assert!(received == sent, "the messages differ");
-    assert_eq!((foxglove.encoded(), foxglove.lost()), (1000, 0));
+    assert_eq!((foxglove.state().encoded, foxglove.state().lost), (1000, 0));
     // A path that is created later.
     robot.publisher::<Level>("rover/note").expect("it is a path of its own");
     client.announced("/rover/note");
@@ -77,10 +77,10 @@ fn nothing_is_encoded_while_no_client_is_subscribed() {
     let is_subscribed = || !robot.subscribers("sensor/base/imu").is_empty();
     publish();
     let (mut one, mut other) = (Client::connect(&foxglove), Client::connect(&foxglove));
-    assert!(until(|| foxglove.clients() == 2));
+    assert!(until(|| foxglove.state().clients == 2));
     publish();
     assert!(!is_subscribed());
-    assert_eq!(foxglove.encoded(), 0);
+    assert_eq!(foxglove.state().encoded, 0);
     // Once for both.
     one.subscribe("/sensor/base/imu", 1);
     assert!(until(is_subscribed));
@@ -92,7 +92,7 @@ fn nothing_is_encoded_while_no_client_is_subscribed() {
     for client in [&mut one, &mut other] {
         (0..100).for_each(|_| _ = client.message());
     }
-    assert_eq!(foxglove.encoded(), 100);
+    assert_eq!(foxglove.state().encoded, 100);
     // One leaves, by a word or without.
     one.send(json!({"op": "unsubscribe", "subscriptionIds": [1]}));
     publish();
@@ -102,11 +102,11 @@ fn nothing_is_encoded_while_no_client_is_subscribed() {
         imus.publish(imu(0));
         !is_subscribed()
     }));
-    let encoded = foxglove.encoded();
+    let encoded = foxglove.state().encoded;
     assert!(encoded >= 200, "{encoded}");
     publish();
     std::thread::sleep(Duration::from_millis(50));
-    assert_eq!(foxglove.encoded(), encoded);
+    assert_eq!(foxglove.state().encoded, encoded);
 }
 
 #[test]
