@@ -427,7 +427,8 @@ def script(rover):
     relay = Relay(session)
     threading.Thread(target=rclpy.spin, args=[relay], daemon=True).start()
     root = Path(__file__).parents[3]
-    run = subprocess.run([sys.executable, root / "integrations/zenoh/examples/drive_rover.py"], capture_output=True, text=True, timeout=60)
+    command = ["timeout", "60", sys.executable, root / "integrations/zenoh/examples/drive_rover.py"]
+    run = subprocess.run(command, capture_output=True, text=True)
     shown = (root / "book/src/how-to/ros2.md").read_text().split("```text\n")[1].split("```")[0]
     check("the script of the guide drives the rover", (run.returncode, run.stdout) == (0, shown), run.stdout + run.stderr[-2000:])
     session.close()
