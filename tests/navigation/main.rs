@@ -1,5 +1,6 @@
 //! Robots that navigate with the filters of `bb_estimators`, whose sensors fail.
 
+mod false_covariances;
 mod optional_states;
 mod planar;
 mod rover;

@@ -37,6 +37,7 @@ pub(super) use self::filter::{CopiedFilter, Fix, Update, is_same};
 use self::holding::Holding;
 use self::newcomer::Newcomer;
 use self::scatter::Scatter;
+pub(super) use self::scatter::UNSEEN;
 use self::search::Search;
 use super::bounds::is_within;
 use super::eskf::{Eskf, ImuMean, LONGEST_GAP_S, seconds_between};
@@ -70,9 +71,6 @@ pub(super) const FAR: f64 = 100.0;
 
 /// Variance that is added to those of a position before [`FAR`] is applied, m².
 pub(super) const SLACK: f64 = 1.0;
-
-/// The most starts among which accelerations have a direction: with more, the heading is not known.
-const MOST_UNDECIDED: usize = 6;
 
 /// Further differences between the copies.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -147,7 +145,7 @@ impl<F: CopiedFilter> Copies<F> {
         };
         self.starts = (0..).zip(filters).map(begun).collect();
         self.newcomer = None;
-        self.scatter = Scatter::default();
+        self.scatter.interrupt();
         self.elsewhere = None;
         self.started_ns = self.time_ns().unwrap_or(0);
         Ok(())
@@ -265,10 +263,9 @@ impl<F: CopiedFilter> Copies<F> {
 
     /// Adds what a sample of `dt` seconds shows of the acceleration to the scatter of fixes.
     fn scatter(&mut self, dt: f64) {
-        if self.starts.len() > MOST_UNDECIDED || self.heading_deviation() > UNKNOWN {
-            self.scatter.interrupt();
-        } else if let Some(acceleration) = self.best().acceleration() {
-            self.scatter.propagate(&acceleration, dt);
+        match self.best().acceleration() {
+            Some(acceleration) => self.scatter.propagate(&acceleration, dt, self.heading_deviation() > UNKNOWN),
+            None => self.scatter.interrupt(),
         }
     }
 

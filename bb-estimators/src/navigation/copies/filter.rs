@@ -50,7 +50,7 @@ pub trait CopiedFilter: Propagate + Copy + Debug {
     /// The position in the world, m.
     fn position(&self) -> Option<Vector3<f64>>;
 
-    /// The acceleration in the world that the last sample shows, m/s².
+    /// The acceleration in the world that the last sample shows, m/s², in a heading that may be wrong; `None` if the tilt is not known.
     fn acceleration(&self) -> Option<Vector3<f64>>;
 
     /// The angle about the vertical to the attitude of another, rad.
@@ -215,7 +215,9 @@ impl<S: States, const N: usize> CopiedFilter for Eskf<S, N> {
 
     fn acceleration(&self) -> Option<Vector3<f64>> {
         let fall = Vector3::new(0.0, 0.0, self.params().gravity);
-        self.estimate().map(|estimate| estimate.world_from_body * estimate.specific_force - fall)
+        let tilts = [ROTATION, ROTATION + 1].map(|i| self.covariance()[(i, i)]);
+        let known = self.estimate().filter(|_| tilts.iter().all(|variance| *variance < UNKNOWN * UNKNOWN));
+        known.map(|estimate| estimate.world_from_body * estimate.specific_force - fall)
     }
 
     fn turn_to(&self, other: &Self) -> f64 {

@@ -2,7 +2,8 @@
 //!
 //! The mean velocities between three fixes differ by what the body accelerated, which no correction of the filter touches. What is left
 //! is the noise of the fixes, `σ² (1/t₁² + (1/t₁ + 1/t₂)² + 1/t₂²)` per axis. A receiver whose fixes scatter more than they state gets
-//! the noise of its scatter; otherwise the filter would blame the IMU, and follow every fix.
+//! the noise of its scatter; otherwise the filter would blame the IMU, and follow every fix. While the heading is unknown, the fixes decide
+//! between headings: they are then compared with the motion in the heading that suits them best.
 
 use nalgebra::Vector3;
 
@@ -11,18 +12,26 @@ use super::Fix;
 /// Error of the acceleration by a wrong attitude, a lever arm and a bias, m/s². Scatter counts beyond that.
 const ALLOWED: f64 = 1.0;
 
-/// The number of differences whose median counts: an outlier spoils three, a jump two.
+/// The number of differences that count, of which an outlier spoils three, and a jump two.
 const DIFFERENCES: usize = 9;
 
-/// The number from which it counts.
-const ENOUGH: usize = 5;
+/// The place among them, from the smallest, of the one that is the variance: the largest that an outlier leaves, and for three axes as
+/// often above the variance as below.
+const PLACE: usize = 5;
+
+/// The factor to which nine differences, each of which shares two fixes with the next, tell the variance: a receiver that states no less
+/// than that is believed.
+const KNOWN: f64 = 2.0;
+
+/// The variance of a fix that has not yet shown its own, m²: a receiver may state centimetres and scatter by metres.
+pub(in crate::navigation) const UNSEEN: f64 = 9.0;
 
 /// A fix whose difference shows this many times the usual variance gets the whole difference as its noise: nine are three
 /// deviations.
 const CLEAR: f64 = 9.0;
 
-/// The longest time between two fixes that are compared, s.
-const LONGEST_S: f64 = 5.0;
+/// The longest time between two fixes that are compared, s: in a longer one, noise of [`UNSEEN`] does not show beside [`ALLOWED`].
+const LONGEST_S: f64 = 3.5;
 
 /// The way between two fixes.
 #[derive(Clone, Copy, Debug, Default)]
@@ -31,10 +40,12 @@ struct Leg {
     /// Change of the velocity, m/s, and of the position from rest, m, by the acceleration alone.
     velocity: Vector3<f64>,
     position: Vector3<f64>,
+    /// `true` if the heading of the acceleration is not known.
+    is_turned: bool,
 }
 
 /// Differences of the last fixes.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Scatter {
     /// The fix before, and the leg since.
     last: Option<Vector3<f64>>,
@@ -48,17 +59,25 @@ pub(super) struct Scatter {
     more: f64,
 }
 
+impl Default for Scatter {
+    fn default() -> Self {
+        let variances = [UNSEEN; DIFFERENCES];
+        Self { last: None, leg: Leg::default(), before: None, variances, count: 0, more: 0.0 }
+    }
+}
+
 impl Scatter {
-    /// Adds a sample of `dt` seconds with this acceleration in the world, m/s².
+    /// Adds a sample of `dt` seconds with this acceleration in the world, m/s², whose heading may be wrong.
     #[inline]
-    pub(super) fn propagate(&mut self, acceleration: &Vector3<f64>, dt: f64) {
+    pub(super) fn propagate(&mut self, acceleration: &Vector3<f64>, dt: f64, is_turned: bool) {
         let leg = &mut self.leg;
         leg.position += leg.velocity * dt + acceleration * (0.5 * dt * dt);
         leg.velocity += acceleration * dt;
         leg.seconds += dt;
+        leg.is_turned |= is_turned;
     }
 
-    /// Forgets the fixes, whose differences would not show noise: after a gap, or while the heading is unknown.
+    /// Forgets the fixes, whose differences would not show noise: after a gap, or while the tilt is unknown.
     pub(super) fn interrupt(&mut self) {
         (self.last, self.before, self.leg) = (None, None, Leg::default());
     }
@@ -77,17 +96,25 @@ impl Scatter {
             let (one, other) = (1.0 / earlier.seconds, 1.0 / leg.seconds);
             let by_noise = one * one + (one + other) * (one + other) + other * other;
             let allowed = ALLOWED * 0.5 * (earlier.seconds + leg.seconds);
-            let excess = ((mean - mean_before - expected).norm() - allowed).max(0.0);
+            let change = mean - mean_before;
+            let mut beside = change - expected;
+            if earlier.is_turned || leg.is_turned {
+                // In the heading that suits them best.
+                beside = Vector3::new(change.xy().norm() - expected.xy().norm(), 0.0, beside.z);
+            }
+            let excess = (beside.norm_squared() - allowed * allowed).max(0.0);
             self.variances.rotate_right(1);
-            self.variances[0] = excess * excess / (M::AXES * by_noise);
+            self.variances[0] = excess / (M::AXES * by_noise);
             self.count = (self.count + 1).min(DIFFERENCES);
             if self.variances[0] > CLEAR * stated.max(self.shown()) {
                 // As if this fix alone made the difference.
-                alone = excess * excess * leg.seconds * leg.seconds / M::AXES;
+                alone = excess * leg.seconds * leg.seconds / M::AXES;
             }
         }
-        let shown = self.shown().max(alone);
-        self.more = (shown - stated).max(0.0);
+        // Fixes that are far from each other never show their noise.
+        let shown = if is_near || self.count == DIFFERENCES { self.shown() } else { 0.0 };
+        let shown = shown.max(alone);
+        self.more = if shown > KNOWN * stated { shown - stated } else { 0.0 };
         self.as_shown(fix)
     }
 
@@ -96,15 +123,11 @@ impl Scatter {
         fix.with_noise(self.more)
     }
 
-    /// The variance of an axis that the last fixes show, m²; 0 as long as there are few.
+    /// The variance of an axis that the last fixes show, m².
     fn shown(&self) -> f64 {
-        if self.count < ENOUGH {
-            return 0.0;
-        }
         let mut sorted = self.variances;
-        let sorted = &mut sorted[..self.count];
         sorted.sort_by(f64::total_cmp);
-        sorted[self.count / 2]
+        sorted[PLACE]
     }
 }
 
@@ -120,7 +143,7 @@ mod tests {
         for step in 0..5000_usize {
             let angle = 0.01 * 0.3 * step as f64;
             let direction = Vector3::new(angle.cos(), angle.sin(), 0.0);
-            scatter.propagate(&(direction * -2.0), 0.01);
+            scatter.propagate(&(direction * -2.0), 0.01, false);
             if step % 20 == 0 {
                 let away = if is_outlier(step / 20) { Vector3::repeat(50.0) } else { Vector3::zeros() };
                 let position = direction * (2.0 / 0.09) + noise.vector(real) + away;

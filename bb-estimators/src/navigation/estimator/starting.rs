@@ -5,7 +5,7 @@ use super::input::{Mounting, NavigationInputs};
 use super::options::NavigationOptions;
 use super::world::World;
 use crate::navigation::alignment::{Alignment, AlignmentParams};
-use crate::navigation::copies::UNKNOWN;
+use crate::navigation::copies::{UNKNOWN, UNSEEN};
 use crate::navigation::eskf::{ImuMean, Start};
 use crate::navigation::geodesy::LocalFrame;
 use crate::navigation::measurement::AbsolutePose;
@@ -27,7 +27,7 @@ const ORIGIN: f64 = 0.01;
 /// The largest standard deviation of a heading that nothing measures, rad: the world is turned so that it is right.
 const BY_DEFINITION: f64 = 0.1;
 
-/// Standard deviation of the velocity of a robot in motion of which nothing else is known, m/s.
+/// Standard deviation of the velocity of a robot in motion, m/s.
 const MOVING: f64 = 5.0;
 
 /// The longest time that a given state is moved on, s: after that it is too uncertain to start from.
@@ -137,7 +137,9 @@ impl Starting {
         let antenna = start.world_from_body * mounting.antenna();
         let age_s = start.time_ns.saturating_sub(fix.time_ns) as f64 * 1e-9;
         let position = fix.position + start.velocity * age_s - antenna;
-        let position_covariance = fix.covariance + start.velocity_covariance * (age_s * age_s);
+        // A single fix shows nothing of its noise.
+        let own = fix.covariance + Matrix3::identity() * UNSEEN;
+        let position_covariance = own + start.velocity_covariance * (age_s * age_s);
         Ok(Start { position, position_covariance, ..start })
     }
 
@@ -157,9 +159,9 @@ impl Starting {
                 return Err(Refusal::NotObservable);
             }
         }
-        // The mean over some time is not the velocity now.
-        let velocity = velocity.map_or((Vector3::zeros(), MOVING), |(mean, deviation)| (mean, deviation + 1.0));
-        self.alignment.in_motion(position, velocity, heading)
+        // The mean over some time is not the velocity now, and the fixes may be worse than they state.
+        let mean = velocity.map_or_else(Vector3::zeros, |(mean, _)| mean);
+        self.alignment.in_motion(position, (mean, MOVING), heading)
     }
 
     /// Returns a start at the last pose.
