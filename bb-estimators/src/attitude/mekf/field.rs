@@ -2,9 +2,7 @@
 
 use nalgebra::{Vector2, Vector3};
 
-use super::numbers::{
-    AT_REST, BRIEF_S, CALIBRATED, DISTURBANCE, HEADING_NOISE, LONG_S, NEW_FIELD_S, SAME_FIELD, SHORT_S,
-};
+use super::numbers::{BRIEF_S, CALIBRATED, DISTURBANCE, HEADING_NOISE, LONG_S, NEW_FIELD_S, SAME_FIELD, SHORT_S};
 use crate::attitude::Real;
 
 /// The reference, as horizontal and vertical part.
@@ -87,8 +85,7 @@ impl<T: Real> Field<T> {
         let mut squared = (plane - self.reference).norm_squared() / self.reference.norm_squared();
         let mut is_calm = squared < same;
         if (plane - self.candidate).norm_squared() < same * self.candidate.norm_squared() {
-            // A field of a body at rest may be that of the place.
-            self.lasted_s += moved_s.max(dt * T::of(AT_REST));
+            self.lasted_s += moved_s;
         } else {
             self.lasted_s = T::ZERO;
             self.candidate = plane;

@@ -109,7 +109,7 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
         let longest = self.period * T::of(OUTLIER);
         self.iron.age(dt);
         self.period += (least(dt, longest) - self.period) * T::of(PERIOD_GAIN);
-        if dt > longest && dt > T::of(GAP_S) {
+        if dt > longest {
             orientation = self.bridge(dt, orientation, measured);
             dt = T::ZERO;
         }
@@ -243,16 +243,11 @@ impl<T: Real> MekfFilter<T> {
         let lasting = T::of(BRIEF_S) * (T::ONE - (-dt / T::of(BRIEF_S)).exp());
         let orientation = turn(&orientation, &(mean * lasting));
         self.rotation = matrix(&orientation);
-        self.doubt.begin();
         let turned = (self.squared_rate * dt * dt).min(T::of(ANY_ANGLE));
         for state in ROTATION {
             self.errors.doubt(state, turned);
         }
-        for state in VELOCITY {
-            self.errors.doubt(state, dt * dt);
-        }
         self.iron.interrupt();
-        self.rest.interrupt();
         orientation
     }
 

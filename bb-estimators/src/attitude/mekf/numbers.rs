@@ -47,16 +47,13 @@ pub(super) const SHORT_S: f64 = 5.0;
 pub(super) const LONG_S: f64 = 20.0;
 /// Length of a window, s: at most, a hand turns by a tenth of a radian in it.
 pub(super) const WINDOW_S: f64 = 0.03;
-/// A longer time between samples is a gap, s: several periods of the slowest sensors.
-pub(super) const GAP_S: f64 = 0.08;
 
 // Doubt.
 
-/// Number of standard deviations beyond which a deviation is not due to chance.
+/// Number of standard deviations beyond which a deviation is not due to chance, and of mean periods beyond which a time between
+/// samples is a gap.
 pub(super) const OUTLIER: f64 = 4.0;
-
-/// Part of the mean period of the samples that each sample counts for. A time of `OUTLIER` periods is a gap as well: it is the
-/// longer one where a sensor is slow.
+/// Part of the mean period of the samples that each sample counts for.
 pub(super) const PERIOD_GAIN: f64 = 0.0625;
 /// Standard deviation of an orientation from one sample in motion, rad.
 pub(super) const UNKNOWN: f64 = 1.0;
@@ -86,8 +83,6 @@ pub(super) const SAME_FIELD: f64 = 0.1;
 pub(super) const NEW_FIELD_S: f64 = 2.0;
 /// The angular velocity of a body that leaves its place, rad/s.
 pub(super) const FAST: f64 = 20.0 * DEGREE;
-/// Part that time without it counts for.
-pub(super) const AT_REST: f64 = 0.1;
 /// Smallest error that contradicts the heading, if the field tells it for seconds, rad.
 pub(super) const CONTRADICTION: f64 = 0.9;
 /// A heading is trusted up to this standard deviation, rad: 10°.

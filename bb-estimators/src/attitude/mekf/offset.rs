@@ -230,14 +230,10 @@ impl<T: Real> HardIron<T> {
         rotation: &Matrix3<T>,
         field: &Vector3<T>,
     ) -> Option<T> {
-        let Some(pose) = &self.pose else {
+        let Some(pose) = self.pose.as_ref().filter(|pose| pose.age_s <= T::of(SHORT_S)) else {
             self.begin(orientation, rotation, field);
             return None;
         };
-        if pose.age_s > T::of(SHORT_S) {
-            self.begin(orientation, rotation, field);
-            return None;
-        }
         let Some(scale) = self.scale else {
             // Of a field in any direction, two thirds turn.
             self.changed += (field - pose.field).norm_squared();

@@ -44,9 +44,4 @@ impl<T: Real> Rest<T> {
     pub(super) fn is_detected(&self) -> bool {
         self.still_s > T::of(REST_TIME_S)
     }
-
-    /// Forgets what was seen: before a gap it tells nothing about the time after it.
-    pub(super) fn interrupt(&mut self) {
-        self.still_s = T::ZERO;
-    }
 }
