@@ -1,6 +1,7 @@
 //! The clients: each has a server of Foxglove's for itself, and a session of the robot that ends when it leaves.
 
 use crate::channels::{Channels, Watch};
+use crate::inbound;
 use crate::outbox::Outbox;
 use crate::parameters::{Parameters, changed};
 use crate::services::{Disarms, disarms, services};
@@ -13,7 +14,7 @@ use std::net::{Ipv4Addr, SocketAddr};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
-use tokio::io::{AsyncWriteExt, copy};
+use tokio::io::AsyncWriteExt;
 use tokio::net::TcpStream;
 use tokio::time::timeout;
 
@@ -63,11 +64,11 @@ impl Clients {
             let mut server = TcpStream::connect(address).await?;
             server.set_nodelay(true)?;
             server.write_all(head).await?;
-            let (mut from_client, to_client) = client.into_split();
-            let (from_server, mut to_server) = server.into_split();
+            let (from_client, to_client) = client.into_split();
+            let (from_server, to_server) = server.into_split();
             let outbox = Outbox::new(&self.channels.lost);
             tokio::select! {
-                ended = copy(&mut from_client, &mut to_server) => ended.map(|_| ()),
+                ended = inbound::relay(from_client, to_server) => ended,
                 ended = outbox.relay(from_server, to_client) => ended,
             }
         };

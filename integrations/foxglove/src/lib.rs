@@ -38,6 +38,7 @@ mod bridge;
 mod channels;
 mod clients;
 mod door;
+mod inbound;
 mod options;
 mod outbox;
 mod parameters;

@@ -13,7 +13,8 @@ use tokio::sync::Notify;
 const MOST_MESSAGES: usize = 1024;
 /// Bytes of these messages, at most, unless one message alone is longer.
 const MOST_BYTES: usize = 16 * 1024 * 1024;
-/// Frames that are no messages of topics and wait, at most: they are never dropped, and with more the client is disconnected.
+/// Frames that are no messages of topics and wait, at most, with no more than [`MOST_BYTES`]: they are never dropped, and with more the client is
+/// disconnected.
 const MOST_OTHERS: usize = 4096;
 /// Time between two warnings.
 const WARNING: Duration = Duration::from_secs(1);
@@ -36,8 +37,9 @@ pub(crate) struct Outbox<'a> {
 struct Waiting {
     frames: VecDeque<Frame>,
     messages: usize,
-    /// Bytes of the messages.
+    /// Bytes of the messages, and of the other frames.
     bytes: usize,
+    other_bytes: usize,
     lost: u64,
     is_over: bool,
 }
@@ -100,8 +102,11 @@ impl<'a> Outbox<'a> {
             }
             waiting.messages += 1;
             waiting.bytes += frame.bytes.len();
-        } else if waiting.frames.len() - waiting.messages >= MOST_OTHERS {
-            return Err(Error::new(ErrorKind::TimedOut, "it does not read"));
+        } else {
+            waiting.other_bytes += frame.bytes.len();
+            if waiting.frames.len() - waiting.messages >= MOST_OTHERS || waiting.other_bytes > MOST_BYTES {
+                return Err(Error::new(ErrorKind::TimedOut, "it does not read"));
+            }
         }
         waiting.frames.push_back(frame);
         self.has_changed.notify_one();
@@ -114,6 +119,8 @@ impl<'a> Outbox<'a> {
         if frame.is_message {
             waiting.messages -= 1;
             waiting.bytes -= frame.bytes.len();
+        } else {
+            waiting.other_bytes -= frame.bytes.len();
         }
         Some(frame)
     }

@@ -54,6 +54,37 @@ fn services_are_there_by_right_alone() {
     }
 }
 
+/// A long message would be parsed on the thread that carries the requests of all clients.
+#[test]
+fn a_client_with_too_long_a_message_is_disconnected() {
+    let robot = Rover::builder().simulate().expect("it starts");
+    let foxglove = served(&robot, "");
+    let parts = |total: usize, part: usize| {
+        let mut client = Client::connect(&foxglove);
+        let mut frames = Vec::new();
+        for at in (0..total).step_by(part) {
+            let (first, last) = (u8::from(at == 0), u8::from(at + part >= total));
+            let length = u64::try_from(part).expect("it is short").to_be_bytes();
+            frames.extend([last << 7 | first, 0xff]);
+            frames.extend(length);
+            frames.extend([0; 4]);
+            frames.extend(std::iter::repeat_n(b' ', part));
+        }
+        // It may be gone before it has sent all.
+        let _ = client.socket.get_mut().write_all(&frames);
+        loop {
+            match client.socket.read() {
+                Err(_) => return true,
+                // It is no JSON, which the server says.
+                Ok(message) if message.is_text() && message.to_string().contains("\"status\"") => return false,
+                Ok(_) => {}
+            }
+        }
+    };
+    assert!(!parts(65_536, 65_536) && !parts(65_536, 1024), "as long as allowed");
+    assert!(parts(65_537, 65_537) && parts(128 * 1024, 1024), "in one frame, and in many");
+}
+
 #[test]
 fn a_client_that_does_not_read_loses_the_oldest_and_costs_nobody_else() {
     const COUNT: u32 = 4000;
