@@ -39,9 +39,9 @@ def robot(rng):
         axis = rng.normal(size=3)
         if rng.random() < 0.4:
             axis = np.eye(3)[rng.integers(3)] * rng.choice([-1.0, 1.0])
-        if kind == "planar" and axis[2] < -0.9:
-            axis = -axis  # half a turn has no shortest rotation
         axis = axis / np.linalg.norm(axis)
+        if kind == "planar" and axis[2] < -0.9:
+            axis = -axis  # half a turn has no shortest rotation, and Eigen's is inexact near it
         joint = {
             "kind": kind,
             "parent": int(rng.integers(max(0, child - 3), child)),

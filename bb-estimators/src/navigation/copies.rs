@@ -37,6 +37,7 @@ pub(super) use self::filter::{CopiedFilter, Fix, Update, is_same};
 use self::holding::Holding;
 use self::newcomer::Newcomer;
 use self::scatter::Scatter;
+#[cfg(feature = "runtime")]
 pub(super) use self::scatter::UNSEEN;
 use self::search::Search;
 use super::bounds::is_within;
