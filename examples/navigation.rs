@@ -48,7 +48,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let Some(last) = positions.drain().last().filter(|_| second % 4 == 0) else { continue };
         let truth = world.pose("base", last.monotonic_time)?.translation.vector;
         let off = (last.pose.position.xy() - truth.xy()).norm();
-        println!("{second} s: {:.0} m to the east, within 1 m: {}", last.pose.position.x, off < 1.0);
+        println!("{second} s: {:.1} m to the east, within 1 m: {}", last.pose.position.x, off < 1.0);
     }
     simulation.stop().ok()?;
     Ok(())

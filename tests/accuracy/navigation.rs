@@ -31,7 +31,7 @@ const KNOWN: [Known; 16] = [
     ("simflight_stress", "eskf", &[], 1.113, 4.0..7.0),
     ("simflight_stress", "state-smoother", &[], 1.028, 4.0..7.0),
     ("kitti_s2", "eskf", &[], 0.578, 1.0..4.0),
-    ("kitti_s5", "eskf", &[], 1.864, 1.0..4.0),
+    ("kitti_s5", "eskf", &[], 1.794, 1.0..4.0),
     ("kitti_s10", "eskf", &[], 8.617, 1.0..4.0),
     ("kitti_s2", "state-eskf", EACH, 0.422, 1.0..4.0),
     ("kitti_s5", "state-eskf", EACH, 1.868, 1.0..4.0),
