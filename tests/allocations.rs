@@ -253,10 +253,7 @@ fn nothing_is_allocated_at_a_keyframe() -> Result<(), Box<dyn std::error::Error>
     assert_eq!(allocations.count_total, 0);
     // It has seen all of it.
     let counts = poses.counts();
-    assert!(
-        counts.gate > 20 && counts.recoveries > 0 && counts.invalid > 20 && counts.not_applicable > 20,
-        "{counts:?}"
-    );
+    assert!(counts.gate > 20 && counts.invalid > 20 && counts.not_applicable > 20, "{counts:?}");
     let seen = sights.counts();
     assert!(seen.fused + seen.weighed_down > 500 && seen.gate > 20 && seen.not_applicable > 100, "{seen:?}");
     assert!(moved > 100 && smoother.gaps() > 7 && smoother.marginalised() > 350, "{moved}");

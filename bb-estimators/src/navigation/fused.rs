@@ -9,10 +9,7 @@ pub struct Fused {
     pub dimension: usize,
     /// The weight of the measurement: 1 unless [`StreamParams::robust`](super::StreamParams::robust) reduced it.
     pub weight: f64,
-    /// The normalised innovation squared relative to its mean, which is about the factor by which the covariance was raised
-    /// beforehand. 1 unless the gate's patience had run out.
-    pub raised: f64,
-    /// The threshold of the gate, which holds unless the gate was overridden.
+    /// The threshold of the gate of its stream.
     pub limit: f64,
     /// Log likelihood of the innovation, up to a constant that depends only on the dimension; for model comparison.
     pub log_likelihood: f64,

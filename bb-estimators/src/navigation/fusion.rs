@@ -21,11 +21,7 @@ pub(super) fn weighed<const N: usize>(
     if nis.is_nan() {
         return Err(Refusal::NonFinite);
     }
-    let Verdict { weight, raised, limit, log_likelihood } =
-        stream.weigh(nis, dimension, innovation.log_density(), gate)?;
-    if raised > 1.0 {
-        return Err(Refusal::Gate { nis, limit });
-    }
+    let Verdict { weight, limit, log_likelihood } = stream.weigh(nis, dimension, innovation.log_density(), gate)?;
     if weight < 1.0 {
         innovation.soften(weight);
         if !innovation.decompose(covariance.matrix().as_slice()) {
@@ -33,5 +29,5 @@ pub(super) fn weighed<const N: usize>(
         }
     }
     let whitened = innovation.first_whitened();
-    Ok(Fused { nis, dimension, weight, raised, limit, log_likelihood, whitened })
+    Ok(Fused { nis, dimension, weight, limit, log_likelihood, whitened })
 }

@@ -10,9 +10,6 @@ use crate::params::params;
 /// The largest measurement dimension whose gate thresholds are cached.
 const DIMENSIONS: usize = 7;
 
-/// The upper bound on the reported misfit.
-const MOST_RAISED: f64 = 1e6;
-
 params! {
     /// Parameters by which the measurements of one sensor are judged.
     pub struct StreamParams {
@@ -22,25 +19,11 @@ params! {
         ///
         /// Small: lets more outliers pass. Large: rejects measurements that would correct a wrong estimate.
         gate: f64 = 1e-4, in 0.0..=1.0;
-        /// Number of consecutive measurements that the gate of a [`FixedLagSmoother`](super::smoother::FixedLagSmoother) rejects before
-        /// the smoother counts as wrong, and not the sensor: the next one is fused with the estimates raised to fit it. 0: never.
-        ///
-        /// Filters do not use it: copies of them have a newcomer where positions agree on another place.
-        ///
-        /// Small: a few outliers in a row move the smoother. Large: a smoother that is off stays so for long.
-        patience: u32 = 3;
         /// Fraction of valid measurements whose weight is reduced like that of outliers, by Huber's function of their
         /// Mahalanobis distance. 0: none.
         ///
         /// Small: the weights of a least-squares filter. Large: closer to a median.
         robust: f64 = 0.0, in 0.0..=1.0;
-        /// Speed at which the noise of the sensor adapts to its innovations: the relative change of its variance per
-        /// measurement. 0: never.
-        ///
-        /// Small: the noise is as given. Large: follows each innovation.
-        adaptation: f64 = 0.0, in 0.0..=1.0;
-        /// Largest ratio of the adapted variance to the given one.
-        most_adaptation: f64 = 100.0, in 1.0..=1e12;
     }
 }
 
@@ -62,8 +45,6 @@ pub struct Counts {
     pub late: u64,
     /// [`Refusal::InTheFuture`].
     pub future: u64,
-    /// Fused after [`StreamParams::patience`] overrode the gate; included in those fused.
-    pub recoveries: u64,
     /// Rejected by the gate since the last fused measurement.
     pub gate_in_a_row: u64,
 }
@@ -82,7 +63,6 @@ pub(crate) enum Gate {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Verdict {
     pub(crate) weight: f64,
-    pub(crate) raised: f64,
     pub(crate) limit: f64,
     pub(crate) log_likelihood: f64,
 }
@@ -93,7 +73,6 @@ pub struct Stream {
     params: StreamParams,
     gates: [f64; DIMENSIONS],
     huber: [f64; DIMENSIONS],
-    noise_factor: f64,
     counts: Counts,
     consistency: Consistency,
 }
@@ -111,7 +90,6 @@ impl Stream {
             params,
             gates: core::array::from_fn(|dimension| limit(dimension, params.gate)),
             huber: core::array::from_fn(|dimension| limit(dimension, params.robust)),
-            noise_factor: 1.0,
             counts: Counts::default(),
             consistency: Consistency::default(),
         }
@@ -122,13 +100,6 @@ impl Stream {
         &self.params
     }
 
-    /// Changes [`StreamParams::variance_factor`], for a value learnt elsewhere.
-    pub fn set_variance_factor(&mut self, factor: f64) {
-        if factor > 0.0 && factor.is_finite() {
-            self.params.variance_factor = factor;
-        }
-    }
-
     /// Counts of its measurements, by outcome.
     pub fn counts(&self) -> &Counts {
         &self.counts
@@ -137,11 +108,6 @@ impl Stream {
     /// Consistency of the measurements that the gate accepted.
     pub fn consistency(&self) -> &Consistency {
         &self.consistency
-    }
-
-    /// The current factor on its variance, from [`StreamParams::variance_factor`] and [`StreamParams::adaptation`].
-    pub fn noise_factor(&self) -> f64 {
-        self.noise_factor * self.params.variance_factor
     }
 
     /// Resets the count of successive rejections, because the filter was relocated.
@@ -168,24 +134,15 @@ impl Stream {
         let log_likelihood = log_density - 0.5 * nis;
         let most = self.gate(dimension);
         if nis > most && matches!(gate, Gate::Closed) {
-            let StreamParams { patience, .. } = self.params;
-            if patience > 0 && self.counts.gate_in_a_row >= u64::from(patience) {
-                let raised = (nis / dimension as f64).min(MOST_RAISED);
-                return Ok(Verdict { weight: 1.0, raised, limit: most, log_likelihood });
-            }
             return Err(Refusal::Gate { nis, limit: most });
         }
         let huber = self.huber.get(dimension).copied().unwrap_or_else(|| limit(dimension, self.params.robust));
         let weight = if nis > huber { sqrt(huber / nis) } else { 1.0 };
-        Ok(Verdict { weight, raised: 1.0, limit: most, log_likelihood })
+        Ok(Verdict { weight, limit: most, log_likelihood })
     }
 
     #[inline]
     pub(crate) fn count(&mut self, result: &Result<Fused, Refusal>) {
-        let adapt = |factor: f64, share: f64| {
-            let change = self.params.adaptation * (share - 1.0);
-            (factor * (1.0 + change.clamp(-0.5, 1.0))).clamp(1.0, self.params.most_adaptation.max(1.0))
-        };
         match result {
             Ok(fused) => {
                 if fused.weight < 1.0 {
@@ -194,12 +151,6 @@ impl Stream {
                     self.counts.fused += 1;
                 }
                 self.counts.gate_in_a_row = 0;
-                if fused.raised > 1.0 {
-                    // A measurement that did not fit carries no information about the noise of those that do.
-                    self.counts.recoveries += 1;
-                    return;
-                }
-                self.noise_factor = adapt(self.noise_factor, fused.nis / fused.dimension as f64);
                 self.consistency.add(fused);
             }
             Err(Refusal::Gate { .. }) => {

@@ -69,7 +69,7 @@ pub(super) fn updated<E: Composed<N>, const D: usize, const N: usize>(
 ) -> Result<Updated<E::State>, Refusal> {
     let mut room = Room::new();
     linearise(estimate, &mut room.model)?;
-    let mut innovation = covariance.innovation(&mut room, stream.noise_factor())?;
+    let mut innovation = covariance.innovation(&mut room, stream.params().variance_factor)?;
     let fused = weighed(covariance, stream, &mut innovation, gate)?;
     let error = innovation.mean();
     if !E::LAYOUT.admits(&error) {
@@ -83,7 +83,7 @@ pub(super) fn updated<E: Composed<N>, const D: usize, const N: usize>(
     }
     let step =
         |led: &SVector<f64, N>, room: &mut Room<D, N>| linearised_at::<E, D, N>(estimate, led, room, &linearise);
-    let factor = stream.noise_factor() / fused.weight;
+    let factor = stream.params().variance_factor / fused.weight;
     let mut led = error;
     for _ in 2..STEPS {
         let next = step(&led, &mut room).and_then(|()| Ok(covariance.innovation(&mut room, factor)?.mean()));

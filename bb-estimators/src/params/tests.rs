@@ -121,11 +121,16 @@ fn an_error_names_parameter_value_range_and_unit() {
     );
     assert_eq!(fault("rest_bias", "1"), "`rest_bias` is `1`: write `true` or `false`");
     let fault = |name, text| StreamParams::default().set(name, text).unwrap_err().to_string();
-    assert_eq!(fault("patience", "-1"), "`patience` is `-1`: write a whole number from 0");
     assert_eq!(fault("delay", "1"), {
         let names = StreamParams::PARAMETERS.iter().map(|row| format!("`{}`", row.name)).collect::<Vec<_>>();
         format!("there is no parameter `delay`; choose one of {}", names.join(", "))
     });
+    #[cfg(any(feature = "smoother", feature = "eskf"))]
+    {
+        let mut params = crate::navigation::state_estimator::StateEstimatorParams::default();
+        let fault = params.set("window", "-1").unwrap_err().to_string();
+        assert_eq!(fault, "`window` is `-1`: write a whole number from 0");
+    }
     let fault = |name, text| EskfParams::default().set(name, text).unwrap_err().to_string();
     assert_eq!(
         fault("gnss_lever_arm", "1 m for"),

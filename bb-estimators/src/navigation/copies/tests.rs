@@ -8,7 +8,7 @@ use crate::navigation::measurement::{BodyVelocity, GnssPosition};
 use crate::navigation::noise::Noise;
 use crate::navigation::propagate::Propagate;
 use crate::navigation::state::{Aided, POSITION, States, Vehicle};
-use crate::navigation::stream::{Stream, StreamParams};
+use crate::navigation::stream::Stream;
 use crate::navigation::{GaussMarkov, Refusal, nees};
 
 const STEP_NS: i64 = 20_000_000;
@@ -103,7 +103,7 @@ impl Car {
 }
 
 fn stream() -> Stream {
-    Stream::new(StreamParams { patience: 0, ..StreamParams::default() })
+    Stream::default()
 }
 
 /// Copies that know the noise of the car's own IMU, and those of fixes and wheels.

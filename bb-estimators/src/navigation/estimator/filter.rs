@@ -13,7 +13,7 @@ use crate::navigation::measurement::{
 };
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{Estimate, POSITION, States};
-use crate::navigation::stream::{Counts, Stream, StreamParams};
+use crate::navigation::stream::{Counts, Stream};
 use bb_core::Fault;
 use nalgebra::{Isometry3, Vector3};
 
@@ -63,7 +63,7 @@ impl<S: States, const N: usize> Filter<S, N> {
     pub(super) fn new(options: &NavigationOptions, start: &Start) -> Result<Self, Fault> {
         let mut copies = Copies::new(options.params(), Ways { noise: true, scale: true })?;
         copies.start(start).map_err(|refusal| Fault::new(refusal.to_string()))?;
-        let stream = Stream::new(StreamParams { patience: 0, ..StreamParams::default() });
+        let stream = Stream::default();
         let correlation = Correlation::new(options.odometry_correlation);
         Ok(Self { copies, streams: [stream; SENSORS], correlation })
     }

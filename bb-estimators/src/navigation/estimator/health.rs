@@ -2,7 +2,7 @@
 
 use crate::navigation::stream::Counts;
 
-/// Time for which the filter is distrusted after a recovery pulled it towards its sensors, ns.
+/// Time for which the filter is distrusted after it has moved, ns.
 const DISTRUST_NS: i64 = 1_000_000_000;
 
 /// Number of consecutive refusals of one sensor that are more than outliers.
@@ -15,8 +15,6 @@ const UNKNOWN_HEADING: f64 = 0.5;
 #[derive(Clone, Copy, Debug)]
 pub(in crate::navigation) struct Watch {
     limits: Limits,
-    recoveries: u64,
-    distrusted_until_ns: i64,
     /// Number of resets already seen. 1 after the start.
     resets: u32,
     moved_until_ns: i64,
@@ -47,17 +45,11 @@ pub(in crate::navigation) struct Sight<'a> {
 
 impl Watch {
     pub(in crate::navigation) fn new(limits: Limits) -> Self {
-        Self { limits, recoveries: 0, distrusted_until_ns: i64::MIN, resets: 1, moved_until_ns: i64::MIN }
+        Self { limits, resets: 1, moved_until_ns: i64::MIN }
     }
 
     /// Returns the reason for which the estimate is not to be trusted, if there is one.
     pub(in crate::navigation) fn look(&mut self, sight: &Sight<'_>) -> Option<&'static str> {
-        let recoveries = sight.counts.iter().map(|counts| counts.recoveries).sum();
-        // A late measurement may make the filter undo a recovery and then repeat it.
-        if recoveries > self.recoveries {
-            self.distrusted_until_ns = sight.now_ns.saturating_add(DISTRUST_NS);
-        }
-        self.recoveries = recoveries;
         if sight.resets > self.resets {
             self.resets = sight.resets;
             self.moved_until_ns = sight.now_ns.saturating_add(DISTRUST_NS);
@@ -65,8 +57,7 @@ impl Watch {
         if sight.now_ns < self.moved_until_ns {
             return Some("it was wrong, and began again where positions agree");
         }
-        let is_storm = sight.counts.iter().any(|counts| counts.gate_in_a_row >= STORM);
-        if sight.now_ns < self.distrusted_until_ns || is_storm {
+        if sight.counts.iter().any(|counts| counts.gate_in_a_row >= STORM) {
             return Some("its sensors do not agree with it");
         }
         if self.limits.dead_reckoning_s.is_some_and(|longest_s| sight.dead_reckoning_s > longest_s) {

@@ -49,8 +49,8 @@ fn drone() -> Drone {
     let mut filter = Eskf::new(EskfParams::default()).unwrap();
     let rest = Vector3::zeros();
     filter.start(&Start::at(0, (rest, 2.0), (rest, 0.5), (UnitQuaternion::identity(), 0.1))).unwrap();
-    let adaptive = StreamParams { adaptation: 0.02, ..StreamParams::default() };
-    Drone { filter, positions: Stream::new(adaptive), velocities: Stream::default() }
+    let robust = StreamParams { robust: 0.05, ..StreamParams::default() };
+    Drone { filter, positions: Stream::new(robust), velocities: Stream::default() }
 }
 
 fn sample(i: i64) -> ImuMean {

@@ -151,7 +151,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         if factor > 1.0 {
             for index in 0..self.window.len() {
                 let Some(keyframe) = self.window.get_mut(index) else { break };
-                keyframe.raised *= factor;
+                keyframe.imu_noise *= factor;
                 if let Some(Prior { information, .. }) = &mut keyframe.prior {
                     let values = information.matrix.iter_mut().flatten().chain(&mut information.vector);
                     values.for_each(|x| *x /= factor);

@@ -14,10 +14,8 @@ use crate::navigation::stream::{Gate, Stream, Verdict};
 impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
     /// Adds a measurement at a keyframe of the window. Measurements may arrive in any order.
     ///
-    /// `stream` is the stream of the sensor: its gate decides, and its counts and statistics record the result. After
-    /// [`patience`](crate::navigation::StreamParams::patience) refusals at the newest keyframe, the window is assumed
-    /// to be wrong: it restarts at that keyframe with its covariance raised. If the factor also depends on the previous
-    /// keyframe, only the noise of the motion between the two is raised.
+    /// `stream` is the stream of the sensor: its gate decides, and its counts and statistics record the result. A window
+    /// that is wrong refuses what is right; [`adopt`](Self::adopt) restarts it.
     ///
     /// # Errors
     ///
@@ -55,7 +53,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         if let Some(landmarks) = &mut self.landmarks {
             landmarks.judging.forget();
         }
-        let trust = 1.0 / stream.noise_factor();
+        let trust = 1.0 / stream.params().variance_factor;
         let mut rows = Rows::new();
         let keyframe = self.window.get(index).ok_or(missing)?;
         if keyframe.factors.len() >= self.params.factors {
@@ -72,22 +70,15 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         rows.weigh(trust);
         let (judged, dimension) = (self.judged(index, &rows, factor.previous().is_some()), rows.count);
         let judged = judged.ok_or(Refusal::NonFinite)?;
-        let Verdict { weight, raised, limit, log_likelihood, .. } =
+        let Verdict { weight, limit, log_likelihood } =
             stream.weigh(judged.nis, dimension, judged.log_density, Gate::Closed)?;
-        let mut index = index;
-        if raised > 1.0 {
-            if index + 1 != self.window.len() {
-                return Err(Refusal::Gate { nis: judged.nis, limit });
-            }
-            index = self.raise(raised, factor.previous().is_some());
-        }
         let is_robust = kernel != Kernel::Squares;
         let ties = factor.previous().is_some();
         let held = Held { factor, kernel, trust: trust * weight, weight: 1.0 };
         if let Some(keyframe) = self.window.get_mut(index) {
             keyframe.factors.push(held);
             keyframe.is_robust |= is_robust;
-            if is_robust || raised > 1.0 {
+            if is_robust {
                 self.linearise(index);
             } else {
                 rows.weigh(weight);
@@ -102,7 +93,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
             }
         }
         self.dirty = self.dirty.min(index);
-        Ok(Fused { nis: judged.nis, dimension, weight, raised, limit, log_likelihood, whitened: judged.whitened })
+        Ok(Fused { nis: judged.nis, dimension, weight, limit, log_likelihood, whitened: judged.whitened })
     }
 
     /// Compares a factor with the current estimate. Only the correction of the newest keyframe is recomputed; the
@@ -143,28 +134,13 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         Some(correction)
     }
 
-    /// Raises the covariance of the newest keyframe, or the noise of the motion to it. Returns the new index of that keyframe.
+    /// Restarts the window at its newest keyframe, with its covariance. The window must be solved.
     #[cold]
-    fn raise(&mut self, factor: f64, way: bool) -> usize {
-        let newest = self.window.len() - 1;
-        if way {
-            if let Some(keyframe) = self.window.get_mut(newest) {
-                keyframe.raised *= factor;
-            }
-            return newest;
-        }
-        self.collapse(factor);
-        0
-    }
-
-    /// Restarts the window at its newest keyframe with its covariance raised by this factor. The window must be solved.
-    #[cold]
-    pub(super) fn collapse(&mut self, factor: f64) {
+    pub(super) fn collapse(&mut self) {
         let Some(keyframe) = self.window.back() else { return };
         let newest = self.window.len() - 1;
         let (id, point) = (keyframe.id, keyframe.estimate::<S>());
         let mut information = keyframe.known();
-        information.matrix.iter_mut().flatten().for_each(|x| *x /= factor);
         information.vector = [0.0; N];
         self.marginalised = self.marginalised.wrapping_add(newest as u64);
         self.spare.extend(self.window.drain(..));

@@ -106,7 +106,7 @@ pub struct LandmarkParams {
     ///
     /// Small: a few wrong matches cost a landmark. Large: an id that was reused is refused for longer. From 1 to 1000.
     ///
-    /// Unit: observations. Default: 3. Source: the patience of a stream.
+    /// Unit: observations. Default: 3.
     pub patience: u32,
 }
 

@@ -72,7 +72,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
             // Without its ties, what landmarks say about each keyframe alone would be too much.
             self.eliminate(self.window.len());
             self.solve_all();
-            self.collapse(1.0);
+            self.collapse();
         }
         self.landmarks = Some(landmarks);
         self.window.iter_mut().for_each(|keyframe| keyframe.seen = super::link::Information::none());
@@ -97,8 +97,8 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
     /// Adds an observation of a landmark at a keyframe of the window. Observations may arrive in any order. For best
     /// results, add them after the other measurements of that keyframe, since the gate uses the keyframe's estimate.
     ///
-    /// The gate of `stream` compares the observation with the estimated position of the landmark. The stream's patience
-    /// is not used: after [`LandmarkParams::patience`] refusals in a row, the landmark is restarted.
+    /// The gate of `stream` compares the observation with the estimated position of the landmark. After
+    /// [`LandmarkParams::patience`] refusals in a row, the landmark is restarted.
     ///
     /// # Errors
     ///
@@ -127,7 +127,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
             return Err(Refusal::NotStarted);
         };
         let serial = landmarks.coupling.first + at as u64;
-        let mut sight = sighted(&landmarks.camera, seen, serial, stream.noise_factor())?;
+        let mut sight = sighted(&landmarks.camera, seen, serial, stream.params().variance_factor)?;
         let (index, is_new) = match landmarks.find(seen.landmark) {
             Some(index) => (index, false),
             None => (landmarks.begin(seen.landmark, seen.guess).ok_or(Refusal::Full { id })?, true),
@@ -153,10 +153,6 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         let log_density = judged.map_or(0.0, |judged| judged.log_density);
         let verdict = judged.and_then(|judged| {
             let verdict = stream.weigh(judged.nis, 2, log_density, Gate::Closed)?;
-            // The window is never adapted to a landmark: an observation cannot override its gate.
-            if verdict.raised > 1.0 {
-                return Err(Refusal::Gate { nis: judged.nis, limit: verdict.limit });
-            }
             Ok((judged, verdict))
         });
         let (judged, verdict) = match verdict {
@@ -173,7 +169,6 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
             nis: judged.nis,
             dimension: 2,
             weight: verdict.weight,
-            raised: 1.0,
             limit: verdict.limit,
             log_likelihood: verdict.log_likelihood,
             whitened: judged.whitened,

@@ -94,7 +94,7 @@ pub(super) struct Streams {
 
 impl Streams {
     fn new() -> Self {
-        let stream = Stream::new(StreamParams { patience: 0, ..StreamParams::default() });
+        let stream = Stream::default();
         // Positions have the gate of the copies.
         let open = Stream::new(StreamParams { gate: 0.0, ..*stream.params() });
         Self { relative: stream, anchors: open, positions: open, velocities: stream, provided: stream }

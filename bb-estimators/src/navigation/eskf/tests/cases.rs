@@ -127,24 +127,6 @@ fn an_outlier_weighs_less_where_it_is_asked_for() {
     assert!(weight < 0.5 && robust < 0.75 * plain, "{weight} {robust} {plain}");
 }
 
-#[test]
-fn the_noise_of_a_sensor_adapts() {
-    let mut filter: Plain = started();
-    let mut stream = Stream::new(StreamParams { gate: 0.0, adaptation: 0.05, ..StreamParams::default() });
-    for i in 1..4000 {
-        let rest = ImuMean {
-            time_ns: i * 10_000_000,
-            angular_velocity: Vector3::zeros(),
-            specific_force: Vector3::new(0.0, 0.0, EskfParams::default().gravity),
-        };
-        filter.propagate(&rest).unwrap();
-        // Five times the stated deviation.
-        let noise = 5.0 * if i % 2 == 0 { 1.0 } else { -1.0 };
-        filter.update(&mut stream, &GnssPosition::new(Vector3::repeat(noise), 1.0, 1.0)).unwrap();
-    }
-    assert!((15.0..40.0).contains(&stream.noise_factor()), "{}", stream.noise_factor());
-}
-
 /// Repeated updates that remove nearly all variance; a long flight in the release build, see `docs`.
 #[test]
 fn the_covariance_stays_positive_definite() {

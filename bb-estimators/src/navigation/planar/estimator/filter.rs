@@ -10,7 +10,7 @@ use crate::navigation::planar::estimate::{POSITION, PlanarEstimate};
 use crate::navigation::planar::filter::{PlanarEkf, PlanarStart};
 use crate::navigation::planar::measurement::{PlanarHeading, PlanarPose, PlanarPosition, WheelVelocity, YawRate};
 use crate::navigation::refusal::Refusal;
-use crate::navigation::stream::{Counts, Stream, StreamParams};
+use crate::navigation::stream::{Counts, Stream};
 use bb_core::Fault;
 
 /// Copies of the filter, and a stream for each sensor.
@@ -50,7 +50,7 @@ impl Filter {
         let mut copies = Copies::new(options.params(), Ways { noise: true, scale: false })?;
         copies.start(start).map_err(|refusal| Fault::new(refusal.to_string()))?;
         let correlation = Correlation::new(options.odometry_correlation);
-        let stream = Stream::new(StreamParams { patience: 0, ..StreamParams::default() });
+        let stream = Stream::default();
         let (gnss, odometry, yaw_rate, pose, orientation) = (stream, stream, stream, stream, stream);
         Ok(Self { copies, correlation, gnss, odometry, yaw_rate, pose, orientation })
     }

@@ -7,7 +7,7 @@ use crate::navigation::copies::{Copies, Ways};
 use crate::navigation::math::{cos, sin, sqrt, wrapped};
 use crate::navigation::noise::Noise;
 use crate::navigation::propagate::Propagate;
-use crate::navigation::{ImuMean, Stream, StreamParams};
+use crate::navigation::{ImuMean, Stream};
 
 const DT: f64 = 0.01;
 const WHEELS: f64 = 0.05;
@@ -25,7 +25,7 @@ fn copies(start: &PlanarStart) -> Copies<PlanarEkf> {
 }
 
 fn stream() -> Stream {
-    Stream::new(StreamParams { patience: 0, ..StreamParams::default() })
+    Stream::default()
 }
 
 /// Fault of a sensor.

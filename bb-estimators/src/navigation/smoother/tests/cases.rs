@@ -161,38 +161,6 @@ fn a_gap_grows_the_covariance_and_is_counted() {
     assert!(estimate.position.norm() < 0.1, "{}", estimate.position);
 }
 
-#[test]
-fn a_gate_that_refuses_all_gives_way() {
-    let mut smoother = at_rest(SmootherParams::default(), 0.5, 12);
-    let mut stream = Stream::default();
-    let far = GnssPosition::new(Vector3::new(300.0, 0.0, 0.0), 1.0, 1.0);
-    for i in 0..3 {
-        let refused = smoother.add(&mut stream, 11, far);
-        assert!(matches!(refused, Err(Refusal::Gate { .. })), "{i}");
-    }
-    let fused = smoother.add(&mut stream, 11, far).unwrap();
-    assert!(fused.raised > 1.0 && stream.counts().recoveries == 1);
-    for k in 12..20 {
-        wait(&mut smoother, k);
-        let _ = smoother.add(&mut stream, k, far);
-        smoother.update().unwrap();
-    }
-    let position = smoother.estimate().unwrap().position;
-    assert!((position.x - 300.0).abs() < 3.0, "{position}");
-    // Relative poses that disagree with the IMU: the noise of the motion is raised instead.
-    let mut stream = Stream::default();
-    let jump = |id| RelativePose::new(id, (Vector3::new(5.0, 0.0, 0.0), 0.01), (level(), 0.01));
-    for _ in 0..3 {
-        assert!(matches!(smoother.add(&mut stream, 19, jump(18)), Err(Refusal::Gate { .. })));
-    }
-    let before = smoother.keyframes().len();
-    assert!(smoother.add(&mut stream, 19, jump(18)).unwrap().raised > 1.0);
-    smoother.update().unwrap();
-    let way = smoother.smoothed(19).unwrap().position - smoother.smoothed(18).unwrap().position;
-    // Most of the jump; the velocity before is as well known as it was.
-    assert!((3.0..5.1).contains(&way.x) && smoother.keyframes().len() == before, "{way}");
-}
-
 /// The final position after a second at rest at the origin, where one of many poses is 40 m off.
 fn with_an_outlier(kernel: Kernel, at: u64) -> f64 {
     let mut smoother = at_rest(SmootherParams::default(), 30.0, 1);

@@ -81,7 +81,7 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
         Ok(Self {
             smoother: FixedLagSmoother::new(params)?,
             filter: EskfStrategy::new(config)?,
-            open: Stream::new(StreamParams { gate: 0.0, patience: 0, ..StreamParams::default() }),
+            open: Stream::new(StreamParams { gate: 0.0, ..StreamParams::default() }),
             records: config.params.record_keyframes,
             left: None,
             is_converged: true,
