@@ -41,7 +41,7 @@ use self::scatter::Scatter;
 pub(super) use self::scatter::UNSEEN;
 use self::search::Search;
 use super::bounds::is_within;
-use super::eskf::{Eskf, ImuMean, LONGEST_GAP_S, seconds_between};
+use super::eskf::{Doubt, Eskf, ImuMean, LONGEST_GAP_S, seconds_between};
 use super::fused::Fused;
 use super::propagate::Propagate;
 use super::refusal::Refusal;
@@ -93,6 +93,7 @@ pub struct Copies<F: CopiedFilter> {
     search: Search<F>,
     newcomer: Option<Newcomer<F>>,
     started_ns: i64,
+    changes: u32,
     holding: Holding,
     scatter: Scatter,
     /// The last whole sample.
@@ -125,6 +126,7 @@ impl<F: CopiedFilter> Copies<F> {
             search: Search::new(ways.noise),
             newcomer: None,
             started_ns: 0,
+            changes: 0,
             holding: Holding::default(),
             scatter: Scatter::default(),
             last: None,
@@ -160,6 +162,12 @@ impl<F: CopiedFilter> Copies<F> {
     /// The estimate of the best copy; `None` before the start.
     pub fn estimate(&self) -> Option<&F::Estimate> {
         self.best().estimate()
+    }
+
+    /// Number of times that another filter became the best.
+    #[cfg(feature = "smoother")]
+    pub(in crate::navigation) fn changes(&self) -> u32 {
+        self.changes
     }
 
     /// The number of copies that began in different ways and are all plausible.
@@ -333,6 +341,7 @@ impl<F: CopiedFilter> Copies<F> {
         if let Some((best, most)) = likelihoods.max_by(better) {
             if most > starts[0].log_likelihood + BETTER {
                 starts.swap(0, best);
+                self.changes = self.changes.wrapping_add(1);
             }
             let most = starts[0].log_likelihood;
             starts.iter_mut().for_each(|begun| begun.log_likelihood -= most);
@@ -345,7 +354,8 @@ impl<F: CopiedFilter> Copies<F> {
             });
         }
         if let Some(now_ns) = self.time_ns() {
-            self.search.go_on(&mut self.starts, now_ns);
+            let has_moved = self.search.go_on(&mut self.starts, now_ns);
+            self.changes = self.changes.wrapping_add(u32::from(has_moved));
         }
     }
 
@@ -363,9 +373,40 @@ impl<F: CopiedFilter> Copies<F> {
         }
         if !forked.is_empty() {
             self.starts = forked;
+            self.changes = self.changes.wrapping_add(1);
             self.search.orphan();
             self.newcomer = None;
         }
+    }
+
+    /// The reading that is held until `time_ns`, and the doubt in it, if a sample since `since_ns` follows a gap.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal`] if the filter has not started, the sample is not fit, or the gap is too long.
+    #[inline]
+    pub(in crate::navigation) fn held(
+        &self,
+        time_ns: i64,
+        sample: &ImuMean,
+        since_ns: i64,
+    ) -> Result<Option<(ImuMean, Doubt)>, Refusal> {
+        let whole_s = seconds_between(since_ns, sample.time_ns)?;
+        if whole_s <= self.best().longest_sample() {
+            return Ok(None);
+        }
+        let part_s = seconds_between(self.time_ns().ok_or(Refusal::NotStarted)?, time_ns)?;
+        sample.check()?;
+        if whole_s > LONGEST_GAP_S {
+            return Err(Refusal::Gap { seconds: whole_s });
+        }
+        let last = self.last.as_ref().unwrap_or(sample);
+        let held = ImuMean {
+            time_ns,
+            angular_velocity: (last.angular_velocity + sample.angular_velocity) * 0.5,
+            specific_force: (last.specific_force + sample.specific_force) * 0.5,
+        };
+        Ok(Some((held, self.holding.doubt(whole_s, part_s))))
     }
 
     /// Calls a function for each filter.
@@ -412,27 +453,17 @@ impl<F: CopiedFilter> Propagate for Copies<F> {
     }
 
     fn propagate_until(&mut self, time_ns: i64, sample: &ImuMean, since_ns: i64) -> Result<(), Refusal> {
-        let whole_s = seconds_between(since_ns, sample.time_ns)?;
-        let part_s = seconds_between(self.time_ns().ok_or(Refusal::NotStarted)?, time_ns)?;
-        let mut part = ImuMean { time_ns, ..*sample };
-        if whole_s <= self.best().longest_sample() {
+        let Some((held, doubt)) = self.held(time_ns, sample, since_ns)? else {
+            let part_s = seconds_between(self.time_ns().ok_or(Refusal::NotStarted)?, time_ns)?;
+            let part = ImuMean { time_ns, ..*sample };
             self.each(|filter| filter.propagate(&part))?;
             self.holding.add(&part, part_s);
             self.scatter(part_s);
             self.last = Some(part);
             return Ok(());
-        }
-        sample.check()?;
-        if whole_s > LONGEST_GAP_S {
-            return Err(Refusal::Gap { seconds: whole_s });
-        }
-        if let Some(last) = &self.last {
-            part.angular_velocity = (last.angular_velocity + sample.angular_velocity) * 0.5;
-            part.specific_force = (last.specific_force + sample.specific_force) * 0.5;
-        }
+        };
         self.scatter.interrupt();
-        let doubt = self.holding.doubt(whole_s, part_s);
-        self.each(|filter| filter.hold(&part, &doubt))?;
+        self.each(|filter| filter.hold(&held, &doubt))?;
         if time_ns == sample.time_ns {
             self.holding.interrupt();
             self.last = Some(*sample);

@@ -93,22 +93,22 @@ impl<F: CopiedFilter> Search<F> {
         }
     }
 
-    /// Moves to a neighbour that leads, and makes new neighbours where there are none.
-    pub(super) fn go_on(&mut self, starts: &mut [Begun<F>], now_ns: i64) {
+    /// Moves to a neighbour that leads, and makes new neighbours where there are none. Returns whether it has moved.
+    pub(super) fn go_on(&mut self, starts: &mut [Begun<F>], now_ns: i64) -> bool {
         if !self.is_on || starts.len() > MOST_STARTS {
-            return;
+            return false;
         }
         let since = |time_ns: i64| now_ns.saturating_sub(time_ns) as f64 * 1e-9;
         let Some(parent) = starts.iter().position(|begun| self.is_child_of(begun.id)) else {
             self.fork(&starts[0]);
             (self.moved_ns, self.compared_ns) = (now_ns, now_ns);
-            return;
+            return false;
         };
         let kept = exp(-since(self.compared_ns) / PAST_S);
         self.compared_ns = now_ns;
         self.neighbours.iter_mut().flatten().for_each(|neighbour| neighbour.lead *= kept);
         if since(self.moved_ns) < PAUSE_S {
-            return;
+            return false;
         }
         for (index, up) in [(0, 1), (1, -1)] {
             let Some(neighbour) = self.neighbours[index].take_if(|neighbour| neighbour.lead > LEAD) else {
@@ -124,8 +124,9 @@ impl<F: CopiedFilter> Search<F> {
                 }
             }
             self.fork(&starts[parent]);
-            return;
+            return true;
         }
+        false
     }
 
     fn fork(&mut self, parent: &Begun<F>) {

@@ -15,7 +15,9 @@ use super::params::SmootherParams;
 use super::preintegration::Preintegration;
 use super::scratch::Scratch;
 use crate::attitude::ParamsError;
-use crate::navigation::eskf::{EskfParams, GaussMarkov, ImuMean, LONGEST_GAP_S, Start, seconds_between};
+use crate::navigation::eskf::{
+    Doubt, EskfParams, GaussMarkov, ImuDensities, ImuMean, LONGEST_GAP_S, Start, seconds_between,
+};
 use crate::navigation::math::unit;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{Estimate, NAVIGATION, Navigation, Optional, States, distinct, offset};
@@ -142,24 +144,9 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         Ok(())
     }
 
-    /// Sets the multiple of the white noise of the IMU, as a deviation, from the next sample on. If it was smaller, what the window has
-    /// concluded was too certain all along: its prior, and the motion between its keyframes, are weakened by as much. Samples since the
-    /// newest keyframe keep their noise.
+    /// Sets the multiple of the white noise of the IMU, as a deviation, from the next sample on.
     pub(in crate::navigation) fn set_noise(&mut self, multiple: f64) {
-        let factor = (multiple / self.noise) * (multiple / self.noise);
         self.noise = multiple;
-        if factor > 1.0 {
-            for index in 0..self.window.len() {
-                let Some(keyframe) = self.window.get_mut(index) else { break };
-                keyframe.imu_noise *= factor;
-                if let Some(Prior { information, .. }) = &mut keyframe.prior {
-                    let values = information.matrix.iter_mut().flatten().chain(&mut information.vector);
-                    values.for_each(|x| *x /= factor);
-                }
-                self.linearise(index);
-            }
-            self.dirty = 0;
-        }
     }
 
     /// Sets how the scale of relative poses drifts from now on. What is known of it stays.
@@ -274,33 +261,43 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
     /// [`Refusal`] if the smoother has not started, a value is not finite or absurdly large, time does not increase, or
     /// the gap is longer than a minute. The smoother is then unchanged.
     pub fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
-        self.propagate_part(sample, false)
-    }
-
-    /// Propagates over a part of a sample. A part of a gap is a gap, however short it is.
-    pub(in crate::navigation) fn propagate_part(&mut self, sample: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
         let newest = self.window.back().ok_or(Refusal::NotStarted)?;
         sample.check()?;
         let dt = seconds_between(self.time_ns, sample.time_ns)?;
         let sensors = &self.params.sensors;
-        if dt <= sensors.longest_sample && !is_gap {
-            let densities = sensors.densities().times(self.noise);
-            self.motion.add(&sample.angular_velocity, &sample.specific_force, dt, &densities);
-            self.last = *sample;
-        } else if dt <= LONGEST_GAP_S {
-            // The specific force that cancels gravity.
-            let up = Vector3::new(0.0, 0.0, sensors.gravity);
-            let now = newest.estimate::<S>().world_from_body * self.motion.rotation();
-            let force = now.inverse_transform_vector(&up) + self.motion.accelerometer_bias();
-            let rest = *self.motion.gyroscope_bias();
-            self.motion.add(&rest, &force, dt, &sensors.gap_densities());
-            self.last = ImuMean { time_ns: sample.time_ns, angular_velocity: rest, specific_force: force };
-            self.gaps = self.gaps.wrapping_add(1);
-        } else {
+        if dt <= sensors.longest_sample {
+            self.integrate(sample, dt, &sensors.densities().times(self.noise));
+            return Ok(());
+        }
+        if dt > LONGEST_GAP_S {
             return Err(Refusal::Gap { seconds: dt });
         }
-        self.time_ns = sample.time_ns;
+        // The specific force that cancels gravity.
+        let up = Vector3::new(0.0, 0.0, sensors.gravity);
+        let now = newest.estimate::<S>().world_from_body * self.motion.rotation();
+        let specific_force = now.inverse_transform_vector(&up) + self.motion.accelerometer_bias();
+        let angular_velocity = *self.motion.gyroscope_bias();
+        let rest = ImuMean { time_ns: sample.time_ns, angular_velocity, specific_force };
+        self.integrate(&rest, dt, &sensors.gap_densities());
+        self.gaps = self.gaps.wrapping_add(1);
         Ok(())
+    }
+
+    /// Propagates over a part of a gap, during which the reading is assumed to be that of `sample`, but may have been wrong by `doubt`.
+    pub(in crate::navigation) fn hold(&mut self, sample: &ImuMean, doubt: &Doubt) -> Result<(), Refusal> {
+        sample.check()?;
+        let dt = seconds_between(self.time_ns, sample.time_ns)?;
+        let mut densities = self.params.sensors.densities().times(self.noise);
+        densities.gyroscope += doubt.rotation.max() / dt;
+        densities.accelerometer += doubt.velocity.max() / dt;
+        self.integrate(sample, dt, &densities);
+        self.gaps = self.gaps.wrapping_add(1);
+        Ok(())
+    }
+
+    fn integrate(&mut self, sample: &ImuMean, dt: f64, densities: &ImuDensities) {
+        self.motion.add(&sample.angular_velocity, &sample.specific_force, dt, densities);
+        (self.last, self.time_ns) = (*sample, sample.time_ns);
     }
 
     /// Adds a keyframe at the current time. If the window is full, the oldest keyframe is marginalised and its

@@ -56,8 +56,6 @@ pub(super) struct Keyframe<F, const N: usize> {
     pub(super) prior: Option<Prior<N>>,
     /// The motion from the previous keyframe.
     pub(super) motion: Preintegration,
-    /// The factor that scales the noise of the motion.
-    pub(super) imu_noise: f64,
     pub(super) factors: Vec<Held<F>>,
     /// `true` if a factor has a kernel.
     pub(super) is_robust: bool,
@@ -86,7 +84,6 @@ impl<F, const N: usize> Keyframe<F, N> {
             correction: [0.0; N],
             prior: None,
             motion: Preintegration::new(point.accelerometer_bias, point.gyroscope_bias),
-            imu_noise: 1.0,
             factors: Vec::with_capacity(factors),
             is_robust: false,
             own: Information::none(),
@@ -107,7 +104,6 @@ impl<F, const N: usize> Keyframe<F, N> {
         self.correction = [0.0; N];
         self.prior = None;
         self.motion = *motion;
-        self.imu_noise = 1.0;
         self.factors.clear();
         self.is_robust = false;
         self.own = Information::none();
@@ -172,8 +168,7 @@ impl<F, const N: usize> Keyframe<F, N> {
             }
         }
         if let Some(before) = before {
-            let sensors = &params.sensors;
-            self.link = Link::of_motion::<S>(&before.point, &self.point, &self.motion, sensors, self.imu_noise);
+            self.link = Link::of_motion::<S>(&before.point, &self.point, &self.motion, &params.sensors);
         }
         let mut rows = Rows::new();
         for index in 0..self.factors.len() {

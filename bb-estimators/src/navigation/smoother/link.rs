@@ -132,7 +132,7 @@ impl<const N: usize> Link<N> {
         Self { back: zeros(), offset: [0.0; N], noise: zeros(), information: Information::none() }
     }
 
-    /// The link by the motion, linearised about these estimates; its noise is multiplied by `imu_noise`.
+    /// The link by the motion, linearised about these estimates.
     ///
     /// The derivatives of position and velocity with respect to rotation are taken from the estimates, not from the
     /// measured motion. Rotating and moving the whole world, which no IMU observes, then changes nothing here either,
@@ -143,7 +143,6 @@ impl<const N: usize> Link<N> {
         to: &Estimate<N>,
         motion: &Preintegration,
         params: &EskfParams,
-        imu_noise: f64,
     ) -> Self {
         let corrected = Corrected::new(from, motion);
         let seconds = motion.seconds();
@@ -203,11 +202,6 @@ impl<const N: usize> Link<N> {
         for (index, kept, gained) in wandering::<S>(seconds, params) {
             back[index][index] = 1.0 / kept;
             noise[index][index] = gained / (kept * kept);
-        }
-        if imu_noise > 1.0 {
-            for row in &mut noise {
-                row.iter_mut().for_each(|x| *x *= imu_noise);
-            }
         }
         let error: [f64; N] = core::array::from_fn(|i| -error[i]);
         Self { offset: times(&back, &error), back, noise, information: Information::none() }

@@ -60,7 +60,7 @@ pub(super) struct Engine<F: ProvidedFactor> {
     independent_ns: Option<i64>,
     /// Number of positions that must still fit.
     unconfirmed: u32,
-    left: Option<(Pose, Sources)>,
+    left: VecDeque<(Pose, Sources)>,
 }
 
 #[expect(clippy::large_enum_variant, reason = "there is one of it in an engine")]
@@ -101,7 +101,7 @@ impl<F: ProvidedFactor> Engine<F> {
             degraded_ns: None,
             independent_ns: None,
             unconfirmed: 0,
-            left: None,
+            left: VecDeque::new(),
         })
     }
 
@@ -205,7 +205,8 @@ impl<F: ProvidedFactor> Engine<F> {
         self.sources = Sources::default();
         self.gate.forget_times();
         self.marks.clear();
-        (self.degraded_ns, self.left) = (None, None);
+        self.degraded_ns = None;
+        self.left.clear();
         // The measurement counts as made now: a receiver must not benefit.
         self.independent_ns = self.independent_ns.and(Some(sample_ns));
         match self.phase {
@@ -231,7 +232,7 @@ impl<F: ProvidedFactor> Engine<F> {
     }
 
     pub(super) fn take_left(&mut self) -> Option<(Pose, Sources)> {
-        self.left.take()
+        self.left.pop_front()
     }
 
     fn sources_at(&self, time_ns: i64) -> Sources {
@@ -387,8 +388,8 @@ impl<F: ProvidedFactor> Engine<F> {
         if !matches!(self.phase, Phase::Running) {
             return;
         }
-        if let Some(pose) = self.strategy.take_left() {
-            self.left = Some((pose, self.sources_at(pose.time_ns)));
+        while let Some(pose) = self.strategy.take_left() {
+            self.left.push_back((pose, self.sources_at(pose.time_ns)));
         }
         let keyframe_ns = self.strategy.keyframe_ns();
         match self.marks.back_mut() {

@@ -404,11 +404,11 @@ impl<F: ProvidedFactor> Queue<F> {
 
     /// Collects the reports of the engine. Those already made in an earlier run are skipped.
     fn look(&mut self) {
-        if let Some((pose, sources)) = self.engine.take_left()
-            && pose.time_ns > self.left_ns
-        {
-            self.left_ns = pose.time_ns;
-            self.told.push(Told::Left(pose, sources));
+        while let Some((pose, sources)) = self.engine.take_left() {
+            if pose.time_ns > self.left_ns {
+                self.left_ns = pose.time_ns;
+                self.told.push(Told::Left(pose, sources));
+            }
         }
         if let Some(started) = self.engine.started()
             && !self.started.contains(&started)

@@ -271,7 +271,7 @@ impl<F: ProvidedFactor> Strategy<F> {
         each!(self, strategy => strategy.history(most))
     }
 
-    /// The keyframe that left the window at the last frame, if any.
+    /// The next of the keyframes that have left the window, if any.
     pub(super) fn take_left(&mut self) -> Option<Pose> {
         each!(self, strategy => strategy.take_left())
     }

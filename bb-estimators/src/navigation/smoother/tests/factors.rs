@@ -110,7 +110,7 @@ proptest! {
     fn the_world_may_turn(from in estimate(), off in error(), samples in 1_usize..40, turn in vector(2.0)) {
         let motion = motion(samples, turn, Vector3::new(3.0, -1.0, 9.0));
         let to = predicted::<Drone, N>(&from, &motion, &sensors()).corrected::<Drone>(&(off * 0.3));
-        let link = Link::<N>::of_motion::<Drone>(&from, &to, &motion, &sensors(), 1.0);
+        let link = Link::<N>::of_motion::<Drone>(&from, &to, &motion, &sensors());
         let back = SMatrix::<f64, N, N>::from_fn(|i, j| link.back[i][j]);
         let apart = (back * turned(&to) - turned(&from)).amax();
         prop_assert!(apart < 1e-9, "{apart}");
@@ -165,7 +165,7 @@ proptest! {
         let params = sensors();
         let there = |from: &Estimate<N>| predicted::<Drone, N>(from, &motion, &params);
         let to = there(&from);
-        let link = Link::<N>::of_motion::<Drone>(&from, &to, &motion, &params, 1.0);
+        let link = Link::<N>::of_motion::<Drone>(&from, &to, &motion, &params);
         let error = |error: &Error| to.error_to::<Drone>(&there(&from.corrected::<Drone>(error)));
         let back = SMatrix::<f64, N, N>::from_fn(|i, j| link.back[i][j]);
         let mut forward = SMatrix::<f64, N, N>::zeros();

@@ -11,7 +11,7 @@ use super::{Cadence, Failure, Measured, Pose, Predictor, Streams, Trust, id_of};
 use crate::attitude::ParamsError;
 use crate::navigation::copies::{Copies, UNKNOWN, Ways};
 #[cfg(feature = "smoother")]
-use crate::navigation::eskf::GaussMarkov;
+use crate::navigation::eskf::{Doubt, GaussMarkov};
 use crate::navigation::eskf::{Eskf, ImuMean, Start};
 use crate::navigation::fused::Fused;
 #[cfg(feature = "smoother")]
@@ -141,6 +141,23 @@ impl EskfStrategy {
     fn pose(&self) -> Option<Pose> {
         let best = self.copies.best();
         best.estimate().map(|estimate| Pose::of(estimate, best.covariance()))
+    }
+
+    /// See [`Copies::held`].
+    #[cfg(feature = "smoother")]
+    pub(super) fn held(
+        &self,
+        until_ns: i64,
+        sample: &ImuMean,
+        since_ns: i64,
+    ) -> Result<Option<(ImuMean, Doubt)>, Refusal> {
+        self.copies.held(until_ns, sample, since_ns)
+    }
+
+    /// Number of times that another copy of the filter became the best.
+    #[cfg(feature = "smoother")]
+    pub(super) fn changes(&self) -> u32 {
+        self.copies.changes()
     }
 
     /// The multiple of the IMU's white noise that fits.

@@ -1,11 +1,13 @@
 //! The fixed-lag smoother, beside the filter.
 //!
 //! The [filter](super::eskf) runs with the same inputs. It decides what is fused, finds the noise of the IMU and of fixes and whether the
-//! scale of relative poses drifts, and moves to where positions agree: the window has its noise, and restarts where it has gone.
+//! scale of relative poses drifts, and moves to where positions agree. Whenever another of its copies becomes the best, the window restarts
+//! in that copy's state, with its noise: what it has concluded with the noise of the one before is not as certain as it believes, or less.
 //!
 //! Keyframes are the frames of the camera. Without a camera, they are made at intervals, and at measurements. A measurement between
 //! two keyframes is carried back to the earlier one by the motion since then.
 
+use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 
 use nalgebra::{Isometry3, Matrix3, SMatrix, UnitQuaternion, Vector3};
@@ -57,10 +59,12 @@ impl<S: States, const N: usize, F: Factor<S, N>> Factor<S, N> for Held<F> {
 pub(in crate::navigation::state_estimator) struct SmootherStrategy<F: ProvidedFactor> {
     smoother: FixedLagSmoother<Smoothed, SMOOTHED, Held<F>>,
     filter: EskfStrategy,
+    /// The changes of the best copy that the window has followed.
+    changes: u32,
     /// A stream without a gate, for measurements that the filter has fused.
     open: Stream,
     records: bool,
-    left: Option<Pose>,
+    left: VecDeque<Pose>,
     is_converged: bool,
 }
 
@@ -81,9 +85,10 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
         Ok(Self {
             smoother: FixedLagSmoother::new(params)?,
             filter: EskfStrategy::new(config)?,
+            changes: 0,
             open: Stream::new(StreamParams { gate: 0.0, ..StreamParams::default() }),
             records: config.params.record_keyframes,
-            left: None,
+            left: VecDeque::new(),
             is_converged: true,
         })
     }
@@ -95,6 +100,7 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
     pub(super) fn start(&mut self, start: &Start) -> Result<(), Refusal> {
         self.filter.start(start)?;
         self.tune();
+        self.changes = self.filter.changes();
         self.smoother.start(id_of(start.time_ns), start)?;
         self.is_converged = true;
         Ok(())
@@ -112,8 +118,10 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
     }
 
     pub(super) fn propagate(&mut self, until_ns: i64, sample: &ImuMean, since_ns: i64) -> Result<(), Failure> {
-        let is_gap = seconds_between(since_ns, sample.time_ns)? > self.smoother.params().sensors.longest_sample;
-        self.smoother.propagate_part(&ImuMean { time_ns: until_ns, ..*sample }, is_gap)?;
+        match self.filter.held(until_ns, sample, since_ns)? {
+            Some((held, doubt)) => self.smoother.hold(&held, &doubt)?,
+            None => self.smoother.propagate(&ImuMean { time_ns: until_ns, ..*sample })?,
+        }
         self.filter.propagate(until_ns, sample, since_ns)?;
         self.follow()
     }
@@ -135,7 +143,9 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
         if newest_ns == now_ns {
             return Ok(());
         }
-        self.left = if self.records { self.leaving() } else { None };
+        if self.smoother.keyframes().len() >= self.smoother.params().window {
+            self.leave(1);
+        }
         self.smoother.add_keyframe(id_of(now_ns)).map_err(|refusal| match refusal {
             Refusal::NonFinite => Failure::Fatal(refusal),
             _ => Failure::Refused(refusal),
@@ -143,13 +153,13 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
         self.update()
     }
 
-    /// The oldest keyframe, if the next one will replace it.
-    fn leaving(&mut self) -> Option<Pose> {
-        if self.smoother.keyframes().len() < self.smoother.params().window {
-            return None;
+    /// Keeps the oldest keyframes, which are about to leave the window, for the recorder.
+    fn leave(&mut self, most: usize) {
+        if self.records {
+            let oldest: Vec<u64> = self.smoother.keyframes().take(most).collect();
+            let leaving: Vec<Pose> = oldest.into_iter().filter_map(|id| self.smoothed(id)).collect();
+            self.left.extend(leaving);
         }
-        let oldest = self.smoother.keyframes().next()?;
-        self.smoothed(oldest)
     }
 
     fn smoothed(&mut self, id: u64) -> Option<Pose> {
@@ -169,12 +179,15 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
             self.keyframe()?;
         }
         let resets = self.filter.resets();
-        let admitted = self.filter.measure(measured);
-        if self.filter.resets() != resets {
+        let fused = self.filter.measure(measured);
+        // A relative pose ends where the next one begins: in between, the window would lose one.
+        let is_between = self.filter.has_camera() && !matches!(measured, Measured::Relative(_));
+        let is_other = self.filter.changes() != self.changes && !is_between;
+        if (is_other || self.filter.resets() != resets) && !matches!(fused, Err(Failure::Fatal(_))) {
             self.adopt()?;
+            return fused;
         }
-        let fused = admitted?;
-        self.tune();
+        let fused = fused?;
         let id = id_of(self.filter.keyframe_ns());
         match measured {
             Measured::Relative(relative) => self.add(id, *relative)?,
@@ -221,9 +234,13 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
         self.smoother.add(&mut self.open, id, factor).map(|_| ())
     }
 
-    /// Restarts the window in the state of the filter, which has gone on in another place.
+    /// Restarts the window in the state of the filter, which is another copy than before.
     fn adopt(&mut self) -> Result<(), Failure> {
+        let now_ns = self.filter.state().ok_or(Refusal::NotStarted)?.0.time_ns;
+        let past = self.smoother.keyframes().take_while(|id| *id < id_of(now_ns)).count();
+        self.leave(past);
         self.tune();
+        self.changes = self.filter.changes();
         let (estimate, covariance) = self.filter.state().ok_or(Refusal::NotStarted)?;
         self.smoother.adopt::<Navigated, NAVIGATED>(id_of(estimate.time_ns), estimate, covariance)?;
         self.is_converged = true;
@@ -280,7 +297,7 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
     }
 
     pub(super) fn take_left(&mut self) -> Option<Pose> {
-        self.left.take()
+        self.left.pop_front()
     }
 
     pub(super) fn keyframe_ns(&self) -> i64 {
