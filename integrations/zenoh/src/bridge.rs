@@ -85,8 +85,8 @@ impl Ros2Bridge {
             &counts,
         )?;
         let out = Out::start(outputs)?;
-        let clients = Clients::watch(&node, options.domain)?;
-        let services = Services::start(&bus.for_caller("ros2", rights), &node, clients, &description, &counts)?;
+        let clients = Clients::watch(&bus.for_caller("ros2", rights), &node, options.domain)?;
+        let services = Services::start(&node, clients, &description, &counts)?;
         Ok(Self { services, inputs, out, counts, node, bus, report: StateReport::default() })
     }
 

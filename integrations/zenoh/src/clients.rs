@@ -1,7 +1,9 @@
-//! The nodes on the other side, by the ids of their clients.
+//! The clients on the other side: each acts in a session of the robot that ends when its token is gone.
 
 use crate::node::RosNode;
 use crate::session::SessionError;
+use bb_core::Bus;
+use bb_core::component::Session;
 use bb_ros2::{EndpointKind, Gid, Token, tokens_of};
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -9,19 +11,33 @@ use zenoh::Wait;
 use zenoh::pubsub::Subscriber;
 use zenoh::sample::SampleKind;
 
-/// The names of the nodes that have clients of services, by the ids of these.
+/// Clients that are remembered, those that are gone included.
+const MOST: usize = 4096;
+
+/// The clients of services that other nodes have.
 #[derive(Debug)]
 pub(crate) struct Clients {
-    names: Arc<Mutex<HashMap<Gid, String>>>,
+    bus: Bus,
+    known: Arc<Mutex<HashMap<Gid, Client>>>,
     _tokens: Subscriber<()>,
 }
 
+#[derive(Debug)]
+struct Client {
+    session: Session,
+    /// A request can come after the end of the token, as zenoh sends tokens first: it is refused, not taken for one of nobody.
+    is_gone: bool,
+}
+
 impl Clients {
+    /// Begins sessions of `bus`.
+    ///
     /// # Errors
-    /// The session is closed.
-    pub(crate) fn watch(node: &RosNode, domain: u32) -> Result<Self, SessionError> {
-        let names = Arc::<Mutex<HashMap<Gid, String>>>::default();
-        let known = Arc::clone(&names);
+    /// The session of zenoh is closed.
+    pub(crate) fn watch(bus: &Bus, node: &RosNode, domain: u32) -> Result<Self, SessionError> {
+        let known = Arc::<Mutex<HashMap<Gid, Client>>>::default();
+        let clients = Arc::clone(&known);
+        let begin = bus.clone();
         let tokens = node.session().liveliness().declare_subscriber(tokens_of(domain)).history(true);
         let tokens = tokens.callback(move |sample| {
             let key = sample.key_expr().as_str();
@@ -30,20 +46,34 @@ impl Clients {
             if token.endpoint.is_none_or(|endpoint| endpoint.kind != EndpointKind::Client) {
                 return;
             }
-            let mut known = known.lock().unwrap_or_else(PoisonError::into_inner);
+            let gid = Gid::of(key);
+            let mut clients = clients.lock().unwrap_or_else(PoisonError::into_inner);
             match sample.kind() {
-                SampleKind::Put => known.insert(Gid::of(key), token.node.full_name()),
-                SampleKind::Delete => known.remove(&Gid::of(key)),
-            };
+                SampleKind::Delete => {
+                    if let Some(client) = clients.get_mut(&gid) {
+                        client.session.end();
+                        client.is_gone = true;
+                    }
+                }
+                SampleKind::Put => {
+                    if clients.len() >= MOST {
+                        clients.retain(|_, client| !client.is_gone);
+                    }
+                    // A token is also repeated.
+                    if clients.get(&gid).is_none_or(|client| client.is_gone) {
+                        let session = begin.session(format!("ros2 {}", token.node.full_name()), begin.rights());
+                        clients.insert(gid, Client { session, is_gone: false });
+                    }
+                }
+            }
         });
         let tokens = tokens.wait().map_err(SessionError::of("watching the tokens of other nodes"))?;
-        Ok(Self { names, _tokens: tokens })
+        Ok(Self { bus: bus.clone(), known, _tokens: tokens })
     }
 
-    /// The name by which the robot knows the caller: `ros2 /operator`.
-    pub(crate) fn caller(&self, client: Option<Gid>) -> String {
-        let names = self.names.lock().unwrap_or_else(PoisonError::into_inner);
-        let name = client.and_then(|client| names.get(&client));
-        name.map_or_else(|| "ros2".to_owned(), |name| format!("ros2 {name}"))
+    /// The bus that acts in the name of a client, `ros2 /operator`, while that is there; of one that no node has, `ros2`, without an end.
+    pub(crate) fn bus(&self, client: Option<Gid>) -> Bus {
+        let known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        client.and_then(|client| known.get(&client)).map_or_else(|| self.bus.clone(), |client| client.session.bus())
     }
 }

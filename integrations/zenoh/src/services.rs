@@ -40,8 +40,8 @@ enum Subject {
     Arm,
 }
 
-/// A request with its subject.
-type Asked = (Subject, Request);
+/// A request with its subject, and the bus of the client that was there when it came.
+type Asked = (Subject, Bus, Request);
 
 /// The services, and the threads that answer.
 #[derive(Debug)]
@@ -56,22 +56,23 @@ pub(crate) struct Services {
 
 impl Services {
     pub(crate) fn start(
-        bus: &Bus,
         node: &RosNode,
         clients: Clients,
         description: &Description,
         counts: &Arc<Counts>,
     ) -> Result<Self, Ros2Error> {
         let (asked, waiting) = sync_channel::<Asked>(WAITING);
+        let clients = Arc::new(clients);
         let full = |request: &Request| request.refuse("too many requests wait".to_owned());
         let (mut services, mut disarms) = (Vec::new(), Vec::new());
         let address = |name: String, type_name: &str, type_hash: &str| {
             Ok::<_, Ros2Error>(Address { name, type_name: type_name.parse()?, type_hash: type_hash.parse()? })
         };
         let mut declare = |name: String, type_name: &str, type_hash: &str, subject: Subject| {
-            let asked = asked.clone();
+            let (asked, clients) = (asked.clone(), Arc::clone(&clients));
             services.push(node.service(&address(name, type_name, type_hash)?, move |request| {
-                if let Err(TrySendError::Full((_, request))) = asked.try_send((subject, request)) {
+                let bus = clients.bus(request.client());
+                if let Err(TrySendError::Full((_, _, request))) = asked.try_send((subject, bus, request)) {
                     full(&request);
                 }
             })?);
@@ -115,8 +116,7 @@ impl Services {
             disarms.push((address(name, trigger, &trigger_hash)?, None));
         }
         let worker = Worker {
-            bus: bus.clone(),
-            clients: Arc::new(clients),
+            clients: Arc::clone(&clients),
             counts: Arc::clone(counts),
             running: Arc::default(),
             is_over: Arc::default(),
@@ -193,7 +193,9 @@ impl Disarm {
 
     fn carry_out(&self, requests: Vec<Request>) {
         let (worker, Some(first)) = (&self.worker, requests.first()) else { return };
-        let bus = worker.bus_of(first);
+        // Also in the name of a client that has left.
+        let all = worker.clients.bus(None);
+        let bus = all.for_caller(worker.clients.bus(first.client()).caller(), all.rights());
         let response = match self.command {
             None => outcome(bus.disarm().map(|()| "disarmed")),
             Some((path, shape)) => answered(command(&bus, path, shape, &first.bytes(), &worker.is_over)),
@@ -223,7 +225,6 @@ fn trigger() -> (&'static str, String) {
 /// State of the threads that answer.
 #[derive(Clone)]
 struct Worker {
-    bus: Bus,
     clients: Arc<Clients>,
     counts: Arc<Counts>,
     /// Number of threads that wait for commands.
@@ -233,8 +234,7 @@ struct Worker {
 
 impl Worker {
     fn run(self, waiting: &Receiver<Asked>) {
-        while let Ok((subject, request)) = waiting.recv() {
-            let bus = self.bus_of(&request);
+        while let Ok((subject, bus, request)) = waiting.recv() {
             match subject {
                 _ if self.is_over.load(Ordering::Acquire) => request.refuse("the bridge ends".to_owned()),
                 Subject::Parameters(service) => match service.answer(&bus, &request.bytes()) {
@@ -248,11 +248,6 @@ impl Worker {
                 slow => self.begin(bus, slow, request),
             }
         }
-    }
-
-    /// The bus that acts in the name of the client.
-    fn bus_of(&self, request: &Request) -> Bus {
-        self.bus.for_caller(self.clients.caller(request.client()), self.bus.rights())
     }
 
     /// Answers on a thread of its own.

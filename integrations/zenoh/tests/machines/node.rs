@@ -83,6 +83,25 @@ fn endpoint(session: &Session, kind: EndpointKind, name: &str) -> Option<Endpoin
     endpoints.into_iter().find(|endpoint| endpoint.kind == kind && endpoint.address.name == name)
 }
 
+/// The token of a client of a service, which a node of that name has.
+fn client_of(session: &Session, service: &str, node: &str) -> String {
+    let token = Token {
+        domain: 0,
+        session: session.zid().to_string(),
+        node_id: 0,
+        id: 1,
+        enclave: "/".into(),
+        node: Node::new("/", node).expect("it is a name"),
+        endpoint: Some(Endpoint {
+            kind: EndpointKind::Client,
+            address: endpoint(session, EndpointKind::Service, service).expect("it is announced").address,
+            qos: Qos::reliable(10),
+            backends: None,
+        }),
+    };
+    token.to_string()
+}
+
 /// Calls a service without arguments in the name of a client, and returns what it answers: whether it succeeded, and the text.
 fn trigger(session: &Session, name: &str, client: Gid) -> (bool, String) {
     let service = endpoint(session, EndpointKind::Service, name).expect("it is announced");
@@ -188,24 +207,7 @@ fn a_caller_has_the_name_of_its_node_and_the_rights_of_the_options() {
     let robot = SmallCart::builder().start().expect("it starts");
     let bridge = bridged(&robot, options());
     let session = other(&bridge);
-    let token = |name: &str| Token {
-        domain: 0,
-        session: session.zid().to_string(),
-        node_id: 0,
-        id: 1,
-        enclave: "/".into(),
-        node: Node::new("/", name).expect("it is a name"),
-        endpoint: Some(Endpoint {
-            kind: EndpointKind::Client,
-            address: Address {
-                name: "/small_cart/rest".into(),
-                ..endpoint(&session, EndpointKind::Service, "/small_cart/rest").expect("it is announced").address
-            },
-            qos: Qos::reliable(10),
-            backends: None,
-        }),
-    };
-    let operator = token("operator").to_string();
+    let operator = client_of(&session, "/small_cart/rest", "operator");
     let _declared = session.liveliness().declare_token(operator.clone()).wait().expect("it is declared");
     let events = robot.subscribe_any(Select::All, "CommandEvent", Overflow::default());
     let mut caller = String::new();
@@ -360,6 +362,73 @@ fn a_node_and_the_robot_meet_at_a_router_also_after_it_was_started_again() {
     while messages.try_recv().ok().flatten().is_some() {}
     let _router = router(&endpoint);
     assert!(meets(), "not again");
+}
+
+/// Goes on when it is cancelled, until the test lets it end.
+struct Stuck;
+
+static IS_INSIDE: AtomicBool = AtomicBool::new(false);
+static MAY_END: AtomicBool = AtomicBool::new(false);
+
+impl Command for Stuck {
+    type Options = NoOptions;
+    type Arguments = NoArguments;
+    type Output = ();
+
+    async fn run(_: NoOptions, _: NoArguments, _: CommandContext) -> Result<Outcome<()>, Fault> {
+        IS_INSIDE.store(true, Ordering::Relaxed);
+        while !MAY_END.load(Ordering::Relaxed) {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        Ok(Outcome::done(()))
+    }
+}
+
+robot! {
+    robot Left;
+    commands { stuck: Stuck; }
+    link base;
+}
+
+#[test]
+fn what_a_client_has_asked_for_is_not_done_once_it_has_left() {
+    let robot = Left::builder().start().expect("it starts");
+    let bridge = bridged(&robot, Ros2Options { rights: "arm parameters".into(), ..options() });
+    // Arming waits for a command that was cancelled.
+    robot.arm().expect("it is armed");
+    robot.bus().start_command("command/stuck", "").expect("it is started");
+    assert!(until(|| IS_INSIDE.load(Ordering::Relaxed)));
+    robot.disarm().expect("it is disarmed");
+
+    let session = other(&bridge);
+    let node = connected(vec![bridge.endpoints()[0].clone(); 2], None);
+    let address = |name: &str| endpoint(&session, EndpointKind::Service, name).expect("it is announced").address;
+    assert!(until(|| node.info().routers_zid().wait().next().is_some()));
+    let client = client_of(&node, "/left/arm", "operator");
+    let declared = node.liveliness().declare_token(client.clone()).wait().expect("it is declared");
+    let is_there = || tokens(&session).iter().any(|token| token.to_string() == client);
+    assert!(until(is_there));
+    let attachment = Attachment { sequence: 1, time_ns: 1, gid: Gid::of(&client) }.to_bytes();
+    let arm = node.get(address("/left/arm").key(0)).payload([0, 1, 0, 0, 0]).attachment(attachment.as_slice());
+    arm.callback(|_| ()).timeout(PATIENCE).wait().expect("it is asked");
+    // Requests are looked at in their order. This one has no prefixes.
+    let answers = Arc::default();
+    ask(
+        &node,
+        &address("/left/list_parameters"),
+        &[[0, 1, 0, 0], [0; 4], [0; 4], [0; 4], [0; 4]].concat(),
+        &answers,
+    );
+    assert!(until(|| answers.load(Ordering::Relaxed) == 1));
+    drop((declared, node));
+    assert!(until(|| !is_there()));
+    MAY_END.store(true, Ordering::Relaxed);
+    let waited = Instant::now();
+    while waited.elapsed() < Duration::from_millis(300) {
+        assert_eq!(robot.safety(), Safety::Disarmed);
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    assert_eq!(trigger(&session, "/left/arm", Gid([1; 16])), (true, "armed".to_owned()));
 }
 
 /// Takes so many milliseconds to be made safe.
