@@ -3,7 +3,9 @@
 use crate::counts::Repetitions;
 use crate::session::{Session, SessionError};
 use bb_ros2::{Address, Attachment, Endpoint, EndpointKind, Gid, Node, Qos, Token, TypeHash};
+use std::fmt::Display;
 use std::sync::Arc;
+use std::sync::mpsc::{SyncSender, TrySendError};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use zenoh::Wait;
 use zenoh::liveliness::LivelinessToken;
@@ -137,22 +139,27 @@ impl RosNode {
         Ok(RosSubscription { _subscriber: subscriber, _token: token })
     }
 
-    /// A service. `answer` gets each request on zenoh's thread, and must not wait.
+    /// A service. `answer` gets each request on zenoh's thread, and must not wait; refused requests go to `refusals`.
     ///
     /// # Errors
     /// The session is closed.
     pub(crate) fn service(
         &self,
         address: &Address,
+        refusals: &SyncSender<Refusal>,
         answer: impl Fn(Request) + Send + Sync + 'static,
     ) -> Result<RosService, SessionError> {
-        let (hash, unanswered) = (address.type_hash.to_string(), Arc::clone(&self.unanswered));
+        let hash = address.type_hash.to_string();
+        let (refusals, unanswered) = (refusals.clone(), Arc::clone(&self.unanswered));
         let queryable = self.session.declare_queryable(address.key_of_any_hash(self.domain)).complete(true);
-        let queryable = queryable.callback(move |query| match other_hash(query.key_expr().as_str(), &hash) {
-            None => answer(Request { query, unanswered: Arc::clone(&unanswered) }),
-            Some(other) => {
-                // A client that waits learns why it does in vain.
-                let _ = query.reply_err(format!("the type of the service is {hash}, not {other}")).wait();
+        let queryable = queryable.callback(move |query| {
+            let wrong = other_hash(query.key_expr().as_str(), &hash);
+            // A client that waits learns why it does in vain.
+            let wrong = wrong.map(|other| format!("the type of the service is {hash}, not {other}"));
+            let request = Request { query, unanswered: Arc::clone(&unanswered), refusals: refusals.clone() };
+            match wrong {
+                None => answer(request),
+                Some(why) => request.refuse(why),
             }
         });
         let queryable =
@@ -239,6 +246,19 @@ pub(crate) struct RosService {
 pub(crate) struct Request {
     query: Query,
     unanswered: Arc<Repetitions>,
+    refusals: SyncSender<Refusal>,
+}
+
+/// A request that is refused, and the reason.
+#[derive(Debug)]
+pub(crate) struct Refusal(Request, String);
+
+impl Refusal {
+    /// Tells the client, and waits for the network.
+    pub(crate) fn tell(self) {
+        let Self(request, why) = self;
+        request.replied(request.query.reply_err(why).wait());
+    }
 }
 
 impl Request {
@@ -266,15 +286,23 @@ impl Request {
         self.replied(reply.wait());
     }
 
-    /// Refuses a request that cannot be read.
-    pub(crate) fn refuse(&self, why: String) {
-        self.replied(self.query.reply_err(why).wait());
+    /// Refuses it without waiting: zenoh's threads, which receive for all clients, must not wait for one that does not read. Only the end of a
+    /// request that comes while too many wait to be refused is sent by the calling thread.
+    pub(crate) fn refuse(self, why: impl Into<String>) {
+        let refusals = self.refusals.clone();
+        if let Err(TrySendError::Full(Refusal(request, _))) = refusals.try_send(Refusal(self, why.into())) {
+            request.unanswered("too many are to be told that they are refused");
+        }
     }
 
     fn replied(&self, result: zenoh::Result<()>) {
-        if let Err(error) = result
-            && let Some(times) = self.unanswered.add()
-        {
+        if let Err(error) = result {
+            self.unanswered(error);
+        }
+    }
+
+    fn unanswered(&self, error: impl Display) {
+        if let Some(times) = self.unanswered.add() {
             tracing::warn!(%error, times, service = %self.query.key_expr(), "a client was not answered");
         }
     }

@@ -4,7 +4,7 @@ use crate::clients::Clients;
 use crate::counts::{Counts, Repetitions};
 use crate::error::Ros2Error;
 use crate::messages::{Nothing, Outcome, bytes_of};
-use crate::node::{Request, RosNode, RosService};
+use crate::node::{Refusal, Request, RosNode, RosService};
 use crate::parameters::ParameterService;
 use bb_core::component::{Description, DisarmQueue};
 use bb_core::message::codec::{Shape, bytes_to_json, service_hash};
@@ -19,6 +19,8 @@ use std::time::{Duration, Instant};
 
 /// Requests that wait to be looked at, of all services but those that disarm.
 const WAITING: usize = 256;
+/// Refused requests whose clients are to be told.
+const REFUSED: usize = 1024;
 /// Commands that clients wait for; each has a thread.
 const MOST_COMMANDS: usize = 32;
 /// Time after which a thread that waits for a command looks whether it is to end.
@@ -63,17 +65,18 @@ impl Services {
     ) -> Result<Self, Ros2Error> {
         let (asked, waiting) = sync_channel::<Asked>(WAITING);
         let clients = Arc::new(clients);
-        let full = |request: &Request| request.refuse("too many requests wait".to_owned());
+        let (refusals, refused_requests) = sync_channel(REFUSED);
+        let full = |request: Request| request.refuse("too many requests wait");
         let (mut services, mut disarms) = (Vec::new(), Vec::new());
         let address = |name: String, type_name: &str, type_hash: &str| {
             Ok::<_, Ros2Error>(Address { name, type_name: type_name.parse()?, type_hash: type_hash.parse()? })
         };
         let mut declare = |name: String, type_name: &str, type_hash: &str, subject: Subject| {
             let (asked, clients) = (asked.clone(), Arc::clone(&clients));
-            services.push(node.service(&address(name, type_name, type_hash)?, move |request| {
+            services.push(node.service(&address(name, type_name, type_hash)?, &refusals, move |request| {
                 let bus = clients.bus(request.client());
                 if let Err(TrySendError::Full((_, _, request))) = asked.try_send((subject, bus, request)) {
-                    full(&request);
+                    full(request);
                 }
             })?);
             Ok::<(), Ros2Error>(())
@@ -135,9 +138,10 @@ impl Services {
             let (queue, thread) = started.map_err(Ros2Error::Thread)?;
             all.threads.push(thread);
             all.spawn("ros2 disarmed", move || tell(&untold))?;
-            let put = move |request| _ = queue.put(request).map_err(|request| full(&request));
-            services.push(node.service(&address, put)?);
+            let put = move |request| _ = queue.put(request).map_err(full);
+            services.push(node.service(&address, &refusals, put)?);
         }
+        all.spawn("ros2 refused", move || refused_requests.iter().for_each(Refusal::tell))?;
         all.services = services;
         all.spawn("ros2 services", move || worker.run(&waiting))?;
         Ok(all)
@@ -236,7 +240,7 @@ impl Worker {
     fn run(self, waiting: &Receiver<Asked>) {
         while let Ok((subject, bus, request)) = waiting.recv() {
             match subject {
-                _ if self.is_over.load(Ordering::Acquire) => request.refuse("the bridge ends".to_owned()),
+                _ if self.is_over.load(Ordering::Acquire) => request.refuse("the bridge ends"),
                 Subject::Parameters(service) => match service.answer(&bus, &request.bytes()) {
                     Ok(response) => {
                         Counts::add(&self.counts.requests, 1);

@@ -114,7 +114,12 @@ impl SessionSettings {
             "scouting": { "multicast": { "enabled": false }, "gossip": gossip },
             // Else what comes from a machine whose clock is ahead is refused, or gets another time.
             "timestamping": { "enabled": false },
-            "transport": { "link": { "tx": { "lease": LEASE_MS, "keep_alive": SIGNS_OF_LIFE } } },
+            "transport": { "link": { "tx": {
+                "lease": LEASE_MS,
+                "keep_alive": SIGNS_OF_LIFE,
+                // A machine that takes nothing for as long is gone as well: threads that send, and those that receive, wait for it.
+                "queue": { "congestion_control": { "block": { "wait_before_close": LEASE_MS * 1000 } } },
+            } } },
         });
         if let Some(path) = &self.file {
             let error = |fault: String| SessionError::File { path: path.clone(), fault };
@@ -247,6 +252,7 @@ mod tests {
             ("timestamping/enabled", json!(false)),
             ("transport/link/tx/lease", json!(1000)),
             ("transport/link/tx/keep_alive", json!(4)),
+            ("transport/link/tx/queue/congestion_control/block/wait_before_close", json!(1_000_000)),
             ("listen/endpoints", json!(["tcp/127.0.0.1:0"])),
             ("connect/endpoints", json!([])),
         ] {

@@ -322,14 +322,14 @@ fn robots_meet_at_a_router_also_after_it_was_started_again() {
 }
 
 /// Environment of this program as a robot that reads, and is stopped.
-const PEER_OF: &str = "BB_ZENOH_TEST_PEER_OF";
+pub(crate) const PEER_OF: &str = "BB_ZENOH_TEST_PEER_OF";
 
 /// A program that ends with this one.
-struct OtherProcess(Child);
+pub(crate) struct OtherProcess(Child);
 
 impl OtherProcess {
-    /// Subscribes to all of the mast, in this program started again.
-    fn reading(test: &str, endpoint: &str) -> Self {
+    /// Runs one test of this program started again, as a peer of that endpoint.
+    pub(crate) fn peer_of(test: &str, endpoint: &str) -> Self {
         let mut program = Process::new(std::env::current_exe().expect("it is this one"));
         program.args(["--exact", test]).env(PEER_OF, endpoint).stdin(Stdio::null()).stdout(Stdio::null());
         Self(program.spawn().expect("it starts"))
@@ -391,7 +391,7 @@ fn a_peer_that_is_stopped_takes_nothing_from_the_others() {
     let mast = mast(&endpoint);
     // The same settings would be the same session.
     let rovers = [endpoint.clone(), format!("{endpoint} {endpoint}")].map(|endpoint| Listening::start(&endpoint));
-    let peer = OtherProcess::reading("link::a_peer_that_is_stopped_takes_nothing_from_the_others", &endpoint);
+    let peer = OtherProcess::peer_of("link::a_peer_that_is_stopped_takes_nothing_from_the_others", &endpoint);
     // 200 Hz of 20 kB, so that the buffers of the one that is stopped are full at once.
     let beating = Beating::start(&mast, Duration::from_millis(5), 20_000);
     assert!(until(|| rovers.iter().all(|rover| rover.last().is_some())), "nothing is taken");

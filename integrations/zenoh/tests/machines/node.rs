@@ -1,6 +1,7 @@
 //! The node from the other side, in one process.
 
 use crate::kit::{PATIENCE, connected, folder, free_address, free_endpoint, router, until};
+use crate::link::{OtherProcess, PEER_OF};
 use crate::relay::{LinkState, Relay};
 use bb_core::event::CommandEvent;
 use bb_core::message::codec::{decode_as_ros, encode};
@@ -533,6 +534,49 @@ fn a_flood_of_requests_does_not_keep_the_robot_from_being_disarmed() {
         println!("the slowest of 20 took {slowest:?}");
         assert!(results.iter().all(|result| *result == Ok((true, "disarmed".to_owned()))), "{results:?}");
     });
+}
+
+/// Asks in three sessions for what is refused at length, and takes no answer.
+fn ask_without_reading(endpoint_of_robot: String) {
+    let sessions: Vec<Session> =
+        (1..=3).map(|count| connected(vec![endpoint_of_robot.clone(); count], None)).collect();
+    assert!(until(|| sessions.iter().all(|session| session.info().routers_zid().wait().next().is_some())));
+    let rest = endpoint(&sessions[0], EndpointKind::Service, "/small_cart/rest").expect("it is announced").address;
+    let other = rest.key(0).replace(&rest.type_hash.to_string(), &"x".repeat(20_000));
+    loop {
+        for session in &sessions {
+            let asked = session.get(&other).timeout(PATIENCE).callback(|_| {
+                loop {
+                    std::thread::sleep(PATIENCE);
+                }
+            });
+            // Its connection may be closed meanwhile.
+            let _ = asked.wait();
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+#[test]
+fn clients_that_do_not_read_do_not_keep_the_robot_from_being_disarmed() {
+    if let Ok(endpoint) = std::env::var(PEER_OF) {
+        return ask_without_reading(endpoint);
+    }
+    let robot = SmallCart::builder().start().expect("it starts");
+    let bridge = bridged(&robot, options());
+    let session = other(&bridge);
+    let test = "node::clients_that_do_not_read_do_not_keep_the_robot_from_being_disarmed";
+    let _peer = OtherProcess::peer_of(test, &bridge.endpoints()[0]);
+    let begun = Instant::now();
+    let mut slowest = Duration::ZERO;
+    while begun.elapsed() < Duration::from_secs(6) {
+        let asked = Instant::now();
+        assert_eq!(trigger(&session, "/small_cart/disarm", Gid([1; 16])), (true, "disarmed".to_owned()));
+        slowest = slowest.max(asked.elapsed());
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    println!("the slowest took {slowest:?}");
+    assert!(slowest < Duration::from_secs(2), "{slowest:?}");
 }
 
 #[test]
