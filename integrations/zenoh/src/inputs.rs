@@ -7,13 +7,17 @@ use bb_core::component::Description;
 use bb_core::{Bus, Fault};
 use bb_ros2::Address;
 use std::collections::{HashMap, HashSet};
-use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 
 /// Messages that wait for the robot, of all inputs. Beyond that they are refused, and counted: what zenoh's threads waited for would be late
 /// as well.
 const WAITING: usize = 1024;
+
+/// Bytes of these messages, at most, unless one message alone is longer.
+const WAITING_BYTES: usize = 16 * 1024 * 1024;
 
 /// A message on its way in; `None` ends the thread.
 type Message = Option<(&'static str, Vec<u8>)>;
@@ -35,12 +39,17 @@ impl Inputs {
         counts: &Arc<Counts>,
     ) -> Result<Self, Ros2Error> {
         let (messages, waiting) = sync_channel(WAITING);
+        let waiting_bytes = Arc::<AtomicUsize>::default();
         let mut subscriptions = Vec::new();
         for path in paths {
             let (path, address) = address(node, description, path)?;
-            let (messages, full) = (messages.clone(), Arc::clone(counts));
-            let receive = move |bytes| {
-                if let Err(TrySendError::Full(_)) = messages.try_send(Some((path, bytes))) {
+            let (messages, full, all) = (messages.clone(), Arc::clone(counts), Arc::clone(&waiting_bytes));
+            let receive = move |bytes: Vec<u8>| {
+                let length = bytes.len();
+                let before = all.fetch_add(length, Ordering::Relaxed);
+                let is_room = before == 0 || before.saturating_add(length) <= WAITING_BYTES;
+                if !is_room || messages.try_send(Some((path, bytes))).is_err() {
+                    all.fetch_sub(length, Ordering::Relaxed);
                     Counts::add(&full.refused, 1);
                 }
             };
@@ -57,7 +66,9 @@ impl Inputs {
             subscriptions.push(node.subscription(&address, receive, refuse)?);
         }
         let (bus, counts) = (bus.clone(), Arc::clone(counts));
-        let thread = thread::Builder::new().name("ros2 in".into()).spawn(move || publish(&bus, &waiting, &counts));
+        let thread = thread::Builder::new()
+            .name("ros2 in".into())
+            .spawn(move || publish(&bus, &waiting, &waiting_bytes, &counts));
         Ok(Self { subscriptions, messages, thread: Some(thread.map_err(Ros2Error::Thread)?) })
     }
 
@@ -96,9 +107,10 @@ fn address(node: &RosNode, description: &Description, path: &str) -> Result<(&'s
 }
 
 /// Publishes what comes, in the robot, until it is to end.
-fn publish(bus: &Bus, waiting: &Receiver<Message>, counts: &Counts) {
+fn publish(bus: &Bus, waiting: &Receiver<Message>, waiting_bytes: &AtomicUsize, counts: &Counts) {
     let mut refused = HashMap::<&'static str, Repetitions>::new();
     while let Ok(Some((path, message))) = waiting.recv() {
+        waiting_bytes.fetch_sub(message.len(), Ordering::Relaxed);
         match bus.publish_ros(path, &message) {
             Ok(()) => Counts::add(&counts.received, 1),
             Err(error) => {

@@ -8,6 +8,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{SyncSender, TrySendError};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use zenoh::Wait;
+use zenoh::bytes::ZBytes;
 use zenoh::liveliness::LivelinessToken;
 use zenoh::pubsub::{Publisher, Subscriber};
 use zenoh::qos::CongestionControl;
@@ -17,6 +18,9 @@ use zenoh_ext::{AdvancedPublisher, AdvancedPublisherBuilderExt, CacheConfig, Mis
 
 /// Time between two signs of a latched topic by which its subscriptions see that they have missed the last message.
 const HEARTBEAT: Duration = Duration::from_millis(500);
+
+/// Bytes of a request, at most, as of a client of Foxglove: far more than one needs.
+const MOST_BYTES: usize = 64 * 1024;
 
 /// A node of ROS 2 in a session, seen by others until it is dropped.
 #[derive(Debug)]
@@ -149,17 +153,18 @@ impl RosNode {
         refusals: &SyncSender<Refusal>,
         answer: impl Fn(Request) + Send + Sync + 'static,
     ) -> Result<RosService, SessionError> {
-        let hash = address.type_hash.to_string();
+        let (hash, name) = (address.type_hash.to_string(), address.name.clone());
         let (refusals, unanswered) = (refusals.clone(), Arc::clone(&self.unanswered));
         let queryable = self.session.declare_queryable(address.key_of_any_hash(self.domain)).complete(true);
         let queryable = queryable.callback(move |query| {
-            let wrong = other_hash(query.key_expr().as_str(), &hash);
+            let (request, size) = Request::take(query, &unanswered, &refusals);
             // A client that waits learns why it does in vain.
-            let wrong = wrong.map(|other| format!("the type of the service is {hash}, not {other}"));
-            let request = Request { query, unanswered: Arc::clone(&unanswered), refusals: refusals.clone() };
-            match wrong {
+            match other_hash(request.query.key_expr().as_str(), &hash).map(str::to_owned) {
+                _ if size > MOST_BYTES => {
+                    request.refuse(format!("a request to {name} has {size} bytes: send at most {MOST_BYTES}"));
+                }
                 None => answer(request),
-                Some(why) => request.refuse(why),
+                Some(other) => request.refuse(format!("the type of the service is {hash}, not {other}")),
             }
         });
         let queryable =
@@ -244,7 +249,10 @@ pub(crate) struct RosService {
 /// A request to a service, which a client waits for.
 #[derive(Debug)]
 pub(crate) struct Request {
+    /// Without its contents.
     query: Query,
+    bytes: Vec<u8>,
+    attachment: Option<Attachment>,
     unanswered: Arc<Repetitions>,
     refusals: SyncSender<Refusal>,
 }
@@ -262,23 +270,39 @@ impl Refusal {
 }
 
 impl Request {
+    /// Takes the contents out of a query, whose buffers may be those of more than it, and returns the number of bytes that came. What is too
+    /// long is not kept.
+    fn take(mut query: Query, unanswered: &Arc<Repetitions>, refusals: &SyncSender<Refusal>) -> (Self, usize) {
+        let payload = query.payload_mut().map(std::mem::take).unwrap_or_default();
+        let attachment = query.attachment_mut().map(std::mem::take);
+        let more = query.key_expr().as_str().len() + query.parameters().as_str().len();
+        let size = payload.len() + attachment.as_ref().map_or(0, ZBytes::len) + more;
+        let is_kept = size <= MOST_BYTES;
+        let request = Self {
+            query,
+            bytes: if is_kept { payload.to_bytes().into_owned() } else { Vec::new() },
+            attachment: attachment
+                .filter(|_| is_kept)
+                .and_then(|bytes| Attachment::from_bytes(&bytes.to_bytes()).ok()),
+            unanswered: Arc::clone(unanswered),
+            refusals: refusals.clone(),
+        };
+        (request, size)
+    }
+
     /// The request in CDR.
-    pub(crate) fn bytes(&self) -> Vec<u8> {
-        self.query.payload().map_or_else(Vec::new, |payload| payload.to_bytes().into_owned())
+    pub(crate) fn bytes(&self) -> &[u8] {
+        &self.bytes
     }
 
     /// The client, if it says who it is.
     pub(crate) fn client(&self) -> Option<Gid> {
-        self.attachment().map(|attachment| attachment.gid)
-    }
-
-    fn attachment(&self) -> Option<Attachment> {
-        Attachment::from_bytes(&self.query.attachment()?.to_bytes()).ok()
+        self.attachment.map(|attachment| attachment.gid)
     }
 
     /// Answers. A client of ROS finds its request by the number; one that gave none gets none.
     pub(crate) fn answer(&self, response: Vec<u8>) {
-        let attachment = self.attachment().map(|asked| Attachment { time_ns: wall_ns(), ..asked }.to_bytes());
+        let attachment = self.attachment.map(|asked| Attachment { time_ns: wall_ns(), ..asked }.to_bytes());
         let mut reply = self.query.reply(self.query.key_expr().clone(), response);
         if let Some(attachment) = attachment {
             reply = reply.attachment(attachment.as_slice());

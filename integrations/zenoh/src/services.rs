@@ -202,7 +202,7 @@ impl Disarm {
         let bus = all.for_caller(worker.clients.bus(first.client()).caller(), all.rights());
         let response = match self.command {
             None => outcome(bus.disarm().map(|()| "disarmed")),
-            Some((path, shape)) => answered(command(&bus, path, shape, &first.bytes(), &worker.is_over)),
+            Some((path, shape)) => answered(command(&bus, path, shape, first.bytes(), &worker.is_over)),
         };
         Counts::add(&worker.counts.requests, requests.len() as u64);
         if self.done.try_send((requests, response)).is_err()
@@ -241,7 +241,7 @@ impl Worker {
         while let Ok((subject, bus, request)) = waiting.recv() {
             match subject {
                 _ if self.is_over.load(Ordering::Acquire) => request.refuse("the bridge ends"),
-                Subject::Parameters(service) => match service.answer(&bus, &request.bytes()) {
+                Subject::Parameters(service) => match service.answer(&bus, request.bytes()) {
                     Ok(response) => {
                         Counts::add(&self.counts.requests, 1);
                         request.answer(response);
@@ -266,7 +266,7 @@ impl Worker {
             let _running = running;
             let response = match subject {
                 Subject::Arm => outcome(bus.arm().map(|()| "armed")),
-                Subject::Command(path, shape) => answered(command(&bus, path, shape, &request.bytes(), &is_over)),
+                Subject::Command(path, shape) => answered(command(&bus, path, shape, request.bytes(), &is_over)),
                 Subject::Parameters(_) => return,
             };
             Counts::add(&counts.requests, 1);

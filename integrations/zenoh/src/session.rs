@@ -17,6 +17,8 @@ use zenoh::Wait;
 const LEASE_MS: u32 = 1000;
 /// Signs of life within that time.
 const SIGNS_OF_LIFE: u32 = 4;
+/// Bytes of a message in parts, at most: zenoh keeps up to 1 GiB of each that has begun. Longer ones are dropped.
+const MOST_BYTES: usize = 16 * 1024 * 1024;
 /// Times between two attempts to connect, in milliseconds.
 const RETRIES_MS: (u32, u32) = (200, 1000);
 
@@ -37,8 +39,8 @@ pub enum Mode {
     Router,
 }
 
-/// Settings of a session. Multicast and timestamps are off, gossip is on for a router only, and the lease is
-/// 1 s, unless the file sets them.
+/// Settings of a session. Multicast and timestamps are off, gossip is on for a router only, the lease is 1 s, and messages have at most 16 MiB,
+/// unless the file sets them.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub struct SessionSettings {
     /// Part of the session among others.
@@ -114,12 +116,15 @@ impl SessionSettings {
             "scouting": { "multicast": { "enabled": false }, "gossip": gossip },
             // Else what comes from a machine whose clock is ahead is refused, or gets another time.
             "timestamping": { "enabled": false },
-            "transport": { "link": { "tx": {
-                "lease": LEASE_MS,
-                "keep_alive": SIGNS_OF_LIFE,
-                // A machine that takes nothing for as long is gone as well: threads that send, and those that receive, wait for it.
-                "queue": { "congestion_control": { "block": { "wait_before_close": LEASE_MS * 1000 } } },
-            } } },
+            "transport": { "link": {
+                "tx": {
+                    "lease": LEASE_MS,
+                    "keep_alive": SIGNS_OF_LIFE,
+                    // A machine that takes nothing for as long is gone as well: threads that send, and those that receive, wait for it.
+                    "queue": { "congestion_control": { "block": { "wait_before_close": LEASE_MS * 1000 } } },
+                },
+                "rx": { "max_message_size": MOST_BYTES },
+            } },
         });
         if let Some(path) = &self.file {
             let error = |fault: String| SessionError::File { path: path.clone(), fault };
@@ -253,6 +258,7 @@ mod tests {
             ("transport/link/tx/lease", json!(1000)),
             ("transport/link/tx/keep_alive", json!(4)),
             ("transport/link/tx/queue/congestion_control/block/wait_before_close", json!(1_000_000)),
+            ("transport/link/rx/max_message_size", json!(16_777_216)),
             ("listen/endpoints", json!(["tcp/127.0.0.1:0"])),
             ("connect/endpoints", json!([])),
         ] {

@@ -9,6 +9,9 @@ use std::time::{Duration, Instant};
 /// Messages that wait; the oldest makes room for another, and shows as a gap in the numbers.
 const CAPACITY: usize = 64;
 
+/// Bytes of these messages, at most, unless one message alone is longer.
+const MOST_BYTES: usize = 16 * 1024 * 1024;
+
 /// A message as it came.
 #[derive(Clone, Debug)]
 pub(super) struct Arrived {
@@ -33,7 +36,10 @@ pub(super) struct Inbox {
 impl Inbox {
     pub(super) fn put(&self, arrived: Arrived) {
         let mut waiting = self.lock();
-        if waiting.len() >= CAPACITY {
+        let bytes = |waiting: &VecDeque<Arrived>| waiting.iter().map(|message| message.bytes.len()).sum::<usize>();
+        while !waiting.is_empty()
+            && (waiting.len() >= CAPACITY || bytes(&waiting) + arrived.bytes.len() > MOST_BYTES)
+        {
             waiting.pop_front();
         }
         waiting.push_back(arrived);

@@ -536,6 +536,41 @@ fn a_flood_of_requests_does_not_keep_the_robot_from_being_disarmed() {
     });
 }
 
+#[test]
+fn requests_that_are_too_long_are_refused_by_name() {
+    let robot = SmallCart::builder().start().expect("it starts");
+    let bridge = bridged(&robot, options());
+    let session = other(&bridge);
+    let rest = endpoint(&session, EndpointKind::Service, "/small_cart/rest").expect("it is announced").address;
+    let key = rest.key(0);
+    let ask = |payload: usize, attachment: usize, parameters: usize| {
+        let selector = format!("{key}?{}", "x".repeat(parameters));
+        let asked = session.get(selector).payload(vec![0; payload]).attachment(vec![0; attachment]);
+        let reply = asked.timeout(PATIENCE).wait().expect("it is asked").recv().expect("it is answered");
+        let told =
+            reply.result().map_err(|error| error.payload().try_to_string().expect("it is text").into_owned());
+        told.map(|_| ())
+    };
+    let left = 65_536 - key.len();
+    for (payload, attachment, parameters) in [
+        (left, 0, 0),
+        (0, left, 0),
+        (0, 0, left),
+        (left + 1, 0, 0),
+        (left, 33, 0),
+        (1, 0, left),
+        (10_000_000, 0, 0),
+    ] {
+        let size = payload + attachment + parameters + key.len();
+        let expected = if size <= 65_536 {
+            Ok(())
+        } else {
+            Err(format!("a request to /small_cart/rest has {size} bytes: send at most 65536"))
+        };
+        assert_eq!(ask(payload, attachment, parameters), expected, "{payload} {attachment} {parameters}");
+    }
+}
+
 /// Asks in three sessions for what is refused at length, and takes no answer.
 fn ask_without_reading(endpoint_of_robot: String) {
     let sessions: Vec<Session> =
