@@ -17,6 +17,8 @@ use zenoh::Wait;
 const LEASE_MS: u32 = 1000;
 /// Signs of life within that time.
 const SIGNS_OF_LIFE: u32 = 4;
+/// Time that a machine has to introduce itself, in milliseconds. Of those that say nothing, 100 keep all others out until then, zenoh's 10 s.
+const ACCEPT_MS: u32 = 2000;
 /// Bytes of a message in parts, at most: zenoh keeps up to 1 GiB of each that has begun. Longer ones are dropped.
 const MOST_BYTES: usize = 16 * 1024 * 1024;
 /// Times between two attempts to connect, in milliseconds.
@@ -116,7 +118,7 @@ impl SessionSettings {
             "scouting": { "multicast": { "enabled": false }, "gossip": gossip },
             // Else what comes from a machine whose clock is ahead is refused, or gets another time.
             "timestamping": { "enabled": false },
-            "transport": { "link": {
+            "transport": { "unicast": { "accept_timeout": ACCEPT_MS }, "link": {
                 "tx": {
                     "lease": LEASE_MS,
                     "keep_alive": SIGNS_OF_LIFE,
@@ -258,6 +260,7 @@ mod tests {
             ("transport/link/tx/lease", json!(1000)),
             ("transport/link/tx/keep_alive", json!(4)),
             ("transport/link/tx/queue/congestion_control/block/wait_before_close", json!(1_000_000)),
+            ("transport/unicast/accept_timeout", json!(2000)),
             ("transport/link/rx/max_message_size", json!(16_777_216)),
             ("listen/endpoints", json!(["tcp/127.0.0.1:0"])),
             ("connect/endpoints", json!([])),

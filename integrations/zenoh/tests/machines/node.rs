@@ -10,6 +10,7 @@ use bb_core::prelude::*;
 use bb_core::{Bus, Options};
 use bb_ros2::{Address, Attachment, Endpoint, EndpointKind, Gid, Node, Qos, Token, TypeHash};
 use bb_zenoh::{Mode, Ros2Bridge, Ros2Options, Ros2State, Session, SessionSettings};
+use std::net::TcpStream;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Instant;
@@ -363,6 +364,20 @@ fn a_node_and_the_robot_meet_at_a_router_also_after_it_was_started_again() {
     while messages.try_recv().ok().flatten().is_some() {}
     let _router = router(&endpoint);
     assert!(meets(), "not again");
+}
+
+#[test]
+fn connections_that_say_nothing_keep_a_node_out_for_seconds_at_most() {
+    let robot = SmallCart::builder().start().expect("it starts");
+    let bridge = bridged(&robot, options());
+    let endpoint = bridge.endpoints().remove(0);
+    let address = endpoint.strip_prefix("tcp/").expect("it is TCP");
+    let silent: Vec<_> = (0..200).filter_map(|_| TcpStream::connect(address).ok()).collect();
+    let begun = Instant::now();
+    other(&bridge);
+    let took = begun.elapsed();
+    println!("a node beside {} connections that say nothing was let in after {took:?}", silent.len());
+    assert!(took < Duration::from_secs(6), "{took:?}");
 }
 
 /// Goes on when it is cancelled, until the test lets it end.
