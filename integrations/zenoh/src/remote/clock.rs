@@ -37,6 +37,8 @@ pub(crate) struct Converted {
     pub(crate) time: MonotonicTime,
     /// Largest distance to the true time.
     pub(crate) bound: Duration,
+    /// Earliest local time at which it can have been, also if the peer's clock was put forward after its last answer.
+    pub(crate) since: MonotonicTime,
 }
 
 /// The clock of a peer, as the last exchanges limit it.
@@ -48,8 +50,7 @@ pub(crate) struct PeerClock {
     /// them by a linear function of time as they age, which leaves the corners corners.
     highest: Vec<Limit>,
     lowest: Vec<Limit>,
-    /// Time of the last question.
-    last: Option<MonotonicTime>,
+    last: Option<Exchange>,
     estimate: Option<Estimate>,
     restarts: u64,
 }
@@ -119,7 +120,7 @@ impl PeerClock {
         if exchange.heard < exchange.asked || exchange.answered < exchange.received {
             return;
         }
-        if self.last.is_some_and(|last| exchange.asked < last) {
+        if self.last.is_some_and(|last| exchange.asked < last.asked) {
             return;
         }
         self.limit(exchange);
@@ -132,7 +133,7 @@ impl PeerClock {
 
     fn limit(&mut self, exchange: Exchange) {
         let Exchange { asked, received, answered, heard } = exchange;
-        self.last = Some(asked);
+        self.last = Some(exchange);
         let base = *self.base.get_or_insert(received.nanos_since(asked));
         let highest = Limit { time: asked, difference: received.nanos_since(asked).saturating_sub(base) as f64 };
         let lowest = Limit { time: heard, difference: answered.nanos_since(heard).saturating_sub(base) as f64 };
@@ -148,7 +149,10 @@ impl PeerClock {
 
     /// A time of the peer on the local clock; `None` before the first exchange.
     pub(crate) fn local(&self, peer: MonotonicTime) -> Option<Converted> {
-        let estimate = self.estimate.as_ref()?;
+        let (estimate, last) = (self.estimate.as_ref()?, self.last?);
+        // What the peer stamps after it has answered is after the question. Of a time before that, the distance is known: a clock that was
+        // put forward makes it longer.
+        let since = last.asked.plus_nanos(peer.nanos_since(last.answered).min(0));
         let middle = estimate.base as f64 + (estimate.least + estimate.most) / 2.0;
         // The difference is that at the local time, which is known to within the bound: it changes over that by its slope.
         let about = peer.plus_nanos((-middle) as i64);
@@ -158,7 +162,7 @@ impl PeerClock {
         // Two are lost to rounding.
         let bound = Duration::from_nanos(((most - least) / 2.0 * (1.0 + 2.0 * slope)).ceil() as u64)
             .saturating_add(Duration::from_nanos(2));
-        Some(Converted { time, bound })
+        Some(Converted { time, bound, since })
     }
 }
 
@@ -288,6 +292,9 @@ mod tests {
             let error = converted.time.nanos_since(at(measured)).abs();
             let bound = converted.bound.as_nanos() as i64;
             assert!(error <= bound, "at {now}: {error} beyond {bound}");
+            // It gains at most 500 ppm.
+            let early = at(measured).nanos_since(converted.since);
+            assert!((-MS / 100..120 * MS).contains(&early), "at {now}: {early} before");
             if now >= 5_000 * MS {
                 bounds.push(bound);
             }
@@ -374,6 +381,21 @@ mod tests {
             assert_eq!(clock.restarts(), u64::from(!wrong.is_empty()), "{wrong:?}");
             let is_right = |(ms, error): &(i64, i64)| (10_000..11_000).contains(ms) && *error < MS / 5;
             assert!(wrong.iter().all(is_right), "{wrong:?}");
+        }
+    }
+
+    /// Stamps that arrive before the clock is asked again are converted by what it was before.
+    #[test]
+    fn a_clock_that_is_put_forward_makes_nothing_younger_than_it_can_be() {
+        for forward in [0, 150, 3_000] {
+            let mut link = Link::new(-7_000 * MS, 0.0, (MS, 3 * MS), (MS, 3 * MS), 1);
+            let mut clock = PeerClock::default();
+            (0..100).for_each(|n| clock.add(link.exchange(n * 20 * MS)));
+            link.offset += forward * MS;
+            for measured in (1_990..3_000).map(|ms| ms * MS) {
+                let converted = clock.local(at(link.peer(measured))).expect("it is known");
+                assert!(converted.since <= at(measured), "{measured}, put forward by {forward} ms: {converted:?}");
+            }
         }
     }
 

@@ -41,7 +41,8 @@ pub struct RemoteOptions<T: Payload> {
     /// Longest time without a reading; after it, the sensor fails.
     #[option(default = Duration::from_millis(500))]
     pub timeout: Duration,
-    /// Greatest age of a reading when it is taken, with the error of its stamp; older ones are dropped.
+    /// Greatest age of a reading when it is taken, with the error of its stamp; older ones are dropped. So are those that may be older if
+    /// the other clock was put forward after its last answer: it should exceed a round trip by 50 ms.
     #[option(default = Duration::from_millis(200))]
     pub within: Duration,
     /// Greatest error of a stamp on the local clock; readings whose stamp may be further off are dropped. Half a round trip can be
@@ -67,7 +68,7 @@ pub struct RemoteOptions<T: Payload> {
 /// | count | messages |
 /// |---|---|
 /// | `received` | were taken |
-/// | `stale` | were older than `within` |
+/// | `stale` | were older than `within`, or may have been |
 /// | `unsure` | had a stamp that could not be converted to within `clock_within`, or came from a run too soon after another |
 /// | `refused` | were malformed: each is a fault |
 /// | `lost` | did not come, or after a newer one; the sender or this sensor may have had no room for them |
@@ -280,7 +281,7 @@ impl<T: Payload> Remote<T> {
         // It was measured before it arrived.
         let time = converted.time.min(arrived.arrival);
         let now = self.clock.now();
-        let age = now.duration_since(time).saturating_add(converted.bound);
+        let age = now.duration_since(time).saturating_add(converted.bound).max(now.duration_since(converted.since));
         if age > self.options.within {
             self.counts.stale.add();
             self.dropped = Some((arrived.arrival, Dropped::Stale { age }));

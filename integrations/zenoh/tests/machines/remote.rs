@@ -3,8 +3,8 @@
 use crate::kit::{Counter, Number, connected, free_endpoint, until};
 use bb_core::message::codec::encode;
 use bb_core::prelude::*;
-use bb_zenoh::{Remote, Session, Share};
-use std::sync::atomic::{AtomicU64, Ordering};
+use bb_zenoh::{Remote, RemoteOptions, Session, Share};
+use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use zenoh::Wait;
 
@@ -28,7 +28,8 @@ struct Peer {
     session: Session,
     clock: Clock,
     /// Time that its clock is ahead, ns.
-    ahead: i64,
+    ahead: Arc<AtomicI64>,
+    answers: Arc<AtomicBool>,
     number: u64,
     _answers: zenoh::query::Queryable<()>,
 }
@@ -38,18 +39,22 @@ impl Peer {
         // The same settings would be the same session: a peer with another number lists the endpoint twice.
         let session = connected(vec![endpoint.to_owned(); 1 + number as usize % 2], None);
         let clock = Clock::real();
-        let of_answers = clock.clone();
+        let (ahead, is_answering) = (Arc::new(AtomicI64::new(ahead)), Arc::new(AtomicBool::new(true)));
+        let (of_answers, ahead_then, answers_then) = (clock.clone(), Arc::clone(&ahead), Arc::clone(&is_answering));
         let answers = session.declare_queryable("bb/Mast/@clock").callback(move |query| {
-            let now = (of_answers.now().as_nanos() + ahead) as u64;
+            if !answers_then.load(Ordering::Relaxed) {
+                return;
+            }
+            let now = (of_answers.now().as_nanos() + ahead_then.load(Ordering::Relaxed)) as u64;
             let answer: Vec<u8> = [number, now, now].iter().flat_map(|part| part.to_le_bytes()).collect();
             query.reply("bb/Mast/@clock", answer).wait().expect("it is answered");
         });
         let answers = answers.wait().expect("it is declared");
-        Self { session, clock, ahead, number, _answers: answers }
+        Self { session, clock, ahead, answers: is_answering, number, _answers: answers }
     }
 
     fn now(&self) -> i64 {
-        self.clock.now().as_nanos() + self.ahead
+        self.clock.now().as_nanos() + self.ahead.load(Ordering::Relaxed)
     }
 
     /// Puts a message of the right shape, measured `ago` before, with that number.
@@ -84,9 +89,15 @@ struct Listening {
 
 impl Listening {
     fn start() -> Self {
+        Self::start_with(|_| ())
+    }
+
+    fn start_with(change: impl FnOnce(&mut RemoteOptions<Number>)) -> Self {
         let endpoint = free_endpoint();
         let mut builder = Rover::builder();
-        builder.options(rover::sensor::base::number).listen = endpoint.clone();
+        let options = builder.options(rover::sensor::base::number);
+        options.listen = endpoint.clone();
+        change(options);
         let readings = builder.subscribe(rover::sensor::base::number);
         let faults = builder.subscribe(system::Faults);
         Self { robot: builder.start().expect("it starts"), readings, faults, endpoint }
@@ -165,6 +176,32 @@ fn every_message_of_a_peer_is_accounted_for() {
     }
     let clock = Clock::real();
     assert!(readings.iter().all(|reading| reading.monotonic_time <= clock.now()));
+}
+
+/// A link that held all up for 303 ms, in which the clock of the peer was put forward: by that clock, the message is 153 ms old.
+#[test]
+fn a_clock_that_is_put_forward_makes_no_old_message_fresh() {
+    let rover = Listening::start_with(|options| {
+        options.within = Duration::from_millis(200);
+        options.timeout = Duration::from_secs(20);
+    });
+    let peer = Peer::start(&rover.endpoint, 7, 0);
+    let mut sequence = 0;
+    let mut put = |ago_ms| {
+        sequence += 1;
+        peer.put(sequence, Duration::from_millis(ago_ms));
+    };
+    rover.until(|| put(0), |rover| rover.count("received") > 20);
+    peer.answers.store(false, Ordering::Relaxed);
+    std::thread::sleep(Duration::from_millis(303));
+    peer.ahead.fetch_add(150_000_000, Ordering::Relaxed);
+    let before = ["received", "stale"].map(|name| rover.count(name));
+    put(303);
+    rover.until(|| (), |rover| rover.count("received") + rover.count("stale") > before[0] + before[1]);
+    assert_eq!(rover.count("received"), before[0], "it is taken");
+    // It recovers.
+    peer.answers.store(true, Ordering::Relaxed);
+    rover.until(|| put(0), |rover| rover.count("received") > before[0]);
 }
 
 #[test]
