@@ -220,15 +220,8 @@ fn subscribe(peer: &Peer, path: &str, inbox: &Arc<Inbox>, clock: &Clock) -> Resu
 impl<T: Payload> Remote<T> {
     /// The reading in a message; `None` if it is counted as dropped.
     fn judge(&mut self, arrived: &Arrived) -> Result<Option<Reading<T>>, Fault> {
-        if arrived.hash != self.hash {
-            self.counts.refused.add();
-            let (theirs, ours) = (if arrived.payload.is_empty() { "?" } else { &arrived.payload }, T::NAME);
-            let (there, here) = (&arrived.hash, &self.hash);
-            return Err(self.fault(format!(
-                "publishes `{theirs}` in the layout {there}, and `{ours}` has {here} here: build both robots from one definition"
-            )));
-        }
         let Some(attachment) = arrived.attachment else {
+            lock(&self.tally).add_unnumbered();
             self.counts.refused.add();
             return Err(self.fault("sends messages without a number: it is not a robot's `Share`"));
         };
@@ -244,6 +237,14 @@ impl<T: Payload> Remote<T> {
                 self.counts.refused.add();
                 return Err(self.fault(format!("sends number {}, far ahead of the last", attachment.sequence)));
             }
+        }
+        if arrived.hash != self.hash {
+            self.counts.refused.add();
+            let (theirs, ours) = (if arrived.payload.is_empty() { "?" } else { &arrived.payload }, T::NAME);
+            let (there, here) = (&arrived.hash, &self.hash);
+            return Err(self.fault(format!(
+                "publishes `{theirs}` in the layout {there}, and `{ours}` has {here} here: build both robots from one definition"
+            )));
         }
         match self.peer.trust(attachment.session) {
             Trust::Alone => self.convert(arrived, attachment),

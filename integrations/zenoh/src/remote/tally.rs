@@ -15,6 +15,8 @@ pub(super) struct Tally {
     newest: Option<Number>,
     /// The last of those that have come since and are not newer, or absurd, and how many of them go on from each other.
     aside: Option<(u64, u32)>,
+    /// Messages without a right number that have come since the newest: of those missing before the next, these are not lost.
+    unnumbered: u64,
 }
 
 /// The number of a message that has arrived.
@@ -42,6 +44,11 @@ pub(super) enum Place {
 }
 
 impl Tally {
+    /// Counts a message whose number is missing or wrong, and that is accounted for.
+    pub(super) fn add_unnumbered(&mut self) {
+        self.unnumbered = self.unnumbered.saturating_add(1);
+    }
+
     /// Places the message with that number. Another session is another run of the sender, which counts from its own beginning.
     ///
     /// A number that is wrong makes those that follow look old. So numbers that go on from each other are believed again if none that is
@@ -51,9 +58,14 @@ impl Tally {
             return self.believe(number, 0);
         };
         let place = match number.sequence.checked_sub(newest.sequence) {
-            Some(step @ 1..=LARGEST_GAP) => return self.believe(number, step - 1),
+            Some(step @ 1..=LARGEST_GAP) => {
+                return self.believe(number, (step - 1).saturating_sub(self.unnumbered));
+            }
             None | Some(0) => Place::Repeated,
-            Some(_) => Place::Absurd,
+            Some(_) => {
+                self.add_unnumbered();
+                Place::Absurd
+            }
         };
         let following = match self.aside {
             Some((last, count)) if (1..=LARGEST_GAP).contains(&number.sequence.wrapping_sub(last)) => count + 1,
@@ -67,7 +79,7 @@ impl Tally {
     }
 
     fn believe(&mut self, number: Number, lost: u64) -> Place {
-        *self = Self { newest: Some(number), aside: None };
+        *self = Self { newest: Some(number), aside: None, unnumbered: 0 };
         Place::Newer { lost }
     }
 }

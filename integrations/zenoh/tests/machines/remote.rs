@@ -205,6 +205,45 @@ fn a_clock_that_is_put_forward_makes_no_old_message_fresh() {
 }
 
 #[test]
+fn what_is_malformed_is_refused_and_not_lost_as_well() {
+    let rover = Listening::start_with(|options| options.timeout = Duration::from_secs(20));
+    let peer = Peer::start(&rover.endpoint, 7, 0);
+    let mut sequence = 0;
+    let counts = || ["received", "stale", "unsure", "refused", "lost"].map(|name| rover.count(name));
+    let (hash, other) = (Stamped::<Number>::LAYOUTS.type_hash(), Stamped::<Text>::LAYOUTS.type_hash());
+    let mut sent = 0;
+    let layouts = [(&hash, Some(0)), (&other, Some(0)), (&hash, Some(1 << 40)), (&hash, None), (&other, None)];
+    for malformed in std::iter::once(None).chain(layouts.map(Some)) {
+        if let Some((hash, ahead)) = malformed {
+            let refused = rover.count("refused");
+            sequence += 1;
+            peer.put_raw(hash, vec![1, 2, 3], ahead.map(|ahead: u64| (sequence + ahead, peer.now())));
+            rover.until(|| (), |rover| rover.count("refused") > refused);
+        }
+        // The sensor is restarted after a fault; what comes meanwhile is lost.
+        let received = rover.count("received");
+        let mut put = || {
+            sequence += 1;
+            peer.put(sequence, Duration::ZERO);
+        };
+        rover.until(&mut put, |rover| rover.count("received") > received + 20);
+        let mut now = 0;
+        // What is under way arrives.
+        assert!(until(|| {
+            std::thread::sleep(Duration::from_millis(300));
+            let before = std::mem::replace(&mut now, counts().iter().sum());
+            now == before
+        }));
+        match malformed {
+            // What came before the first is not known.
+            None => sent = sequence - now,
+            Some(_) => assert_eq!(sequence - now, sent, "{malformed:?}: {:?}", counts()),
+        }
+    }
+    assert_eq!(rover.count("refused"), 5);
+}
+
+#[test]
 fn what_is_malformed_is_refused_by_name() {
     let rover = Listening::start();
     rover.refuses("nothing has been heard of it", || ());
