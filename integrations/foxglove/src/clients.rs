@@ -9,15 +9,18 @@ use bb_core::event::{ParameterChange, Right};
 use bb_core::{Bus, Overflow, Payload, Select};
 use foxglove::{FoxgloveError, WebSocketServer, WebSocketServerHandle};
 use std::future::pending;
-use std::io::{self, Error};
+use std::io::{self, Error, ErrorKind};
 use std::net::{Ipv4Addr, SocketAddr};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use tokio::io::AsyncWriteExt;
 use tokio::net::TcpStream;
+use tokio::sync::Notify;
 use tokio::time::timeout;
 
+/// Time after which a client that shows no sign of life has left; it is pinged each second.
+const SILENCE: Duration = Duration::from_secs(3);
 /// Time that a server has to end.
 const LAST: Duration = Duration::from_millis(200);
 /// Messages that a server keeps until the outbox takes them.
@@ -67,9 +70,11 @@ impl Clients {
             let (from_client, to_client) = client.into_split();
             let (from_server, to_server) = server.into_split();
             let outbox = Outbox::new(&self.channels.lost);
+            let pulse = Notify::new();
             tokio::select! {
-                ended = inbound::relay(from_client, to_server) => ended,
-                ended = outbox.relay(from_server, to_client) => ended,
+                ended = inbound::relay(from_client, to_server, &pulse) => ended,
+                ended = outbox.relay(from_server, to_client, &pulse) => ended,
+                () = until_silent(&pulse) => Err(Error::new(ErrorKind::TimedOut, "it does not answer")),
             }
         };
         let ended = tokio::select! {
@@ -96,6 +101,11 @@ impl Clients {
         let handle = server.start().await?;
         Ok((SocketAddr::from((host, handle.port())), handle))
     }
+}
+
+/// Waits until a client has shown no sign of life for [`SILENCE`]: it is frozen, or its cable is cut.
+async fn until_silent(pulse: &Notify) {
+    while timeout(SILENCE, pulse.notified()).await.is_ok() {}
 }
 
 /// Sends the changes of parameters to a client, for ever; it sees none if it has no right to set them.

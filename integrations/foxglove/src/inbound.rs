@@ -2,20 +2,26 @@
 
 use std::io::{Error, ErrorKind, Result};
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt, copy};
+use tokio::sync::Notify;
 
 /// Bytes of a client's message, at most: far more than a request needs.
 const MOST_BYTES: u64 = 64 * 1024;
 
-/// Carries the frames of a client to its server, until it ends.
+/// Carries the frames of a client to its server, until it ends. Each is a sign of life: `pulse`.
 ///
 /// # Errors
 /// The connection fails, or a message is longer than [`MOST_BYTES`].
-pub(crate) async fn relay(mut client: impl AsyncRead + Unpin, mut server: impl AsyncWrite + Unpin) -> Result<()> {
+pub(crate) async fn relay(
+    mut client: impl AsyncRead + Unpin,
+    mut server: impl AsyncWrite + Unpin,
+    pulse: &Notify,
+) -> Result<()> {
     let mut message = 0_u64;
     loop {
         // RFC 6455, 5.2: flags and opcode, length, longer length, mask.
         let mut head = [0; 14];
         client.read_exact(&mut head[..2]).await?;
+        pulse.notify_one();
         let [flags, short] = [head[0], head[1]];
         let is_last = flags & 0x80 != 0;
         let is_control = flags & 0x08 != 0;

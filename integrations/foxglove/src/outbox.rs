@@ -8,6 +8,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use tokio::io::{AsyncBufReadExt, AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt, BufReader};
 use tokio::sync::Notify;
+use tokio::time::timeout;
 
 /// Messages that wait for a client, at most.
 const MOST_MESSAGES: usize = 1024;
@@ -18,10 +19,16 @@ const MOST_BYTES: usize = 16 * 1024 * 1024;
 const MOST_OTHERS: usize = 4096;
 /// Time between two warnings.
 const WARNING: Duration = Duration::from_secs(1);
+/// Time between two questions whether the client is there.
+const PING: Duration = Duration::from_secs(1);
+/// Time that a write takes if it waits for the client to read, which is a sign of life: what the system holds may delay the answer to a ping.
+const HELD: Duration = Duration::from_millis(20);
 
 /// The final frame of a message of bytes or of text, as a server sends it.
 const BINARY: u8 = 0x82;
 const TEXT: u8 = 0x81;
+/// A frame that every client answers by itself.
+const PING_FRAME: [u8; 2] = [0x89, 0];
 /// The first byte of the message of a topic.
 const MESSAGE_DATA: u8 = 1;
 
@@ -56,11 +63,12 @@ impl<'a> Outbox<'a> {
         Self { waiting: Mutex::default(), has_changed: Notify::new(), lost }
     }
 
-    /// Carries what the server sends to the client, until the server ends.
+    /// Carries what the server sends to the client, until the server ends, and pings. That the client reads is a sign of life: `pulse`.
     pub(crate) async fn relay(
         &self,
         server: impl AsyncRead + Unpin,
         client: impl AsyncWrite + Unpin,
+        pulse: &Notify,
     ) -> Result<()> {
         let filled = async {
             let read = self.fill(BufReader::new(server)).await;
@@ -68,7 +76,7 @@ impl<'a> Outbox<'a> {
             self.has_changed.notify_one();
             Ok(read)
         };
-        let (read, ()) = tokio::try_join!(filled, self.empty(client))?;
+        let (read, ()) = tokio::try_join!(filled, self.empty(client, pulse))?;
         read
     }
 
@@ -125,8 +133,10 @@ impl<'a> Outbox<'a> {
         Some(frame)
     }
 
-    async fn empty(&self, mut client: impl AsyncWrite + Unpin) -> Result<()> {
+    async fn empty(&self, mut client: impl AsyncWrite + Unpin, pulse: &Notify) -> Result<()> {
         let (mut reported, mut next) = (0, Instant::now());
+        // After the answer to the request for a WebSocket.
+        let mut next_ping = None;
         loop {
             let (lost, is_over) = {
                 let waiting = self.waiting();
@@ -137,10 +147,23 @@ impl<'a> Outbox<'a> {
                 client.write_all(&warning(lost)).await?;
                 (reported, next) = (lost, Instant::now() + WARNING);
             }
+            let now = Instant::now();
+            if next_ping.is_some_and(|at| at <= now) {
+                client.write_all(&PING_FRAME).await?;
+                next_ping = Some(now + PING);
+            }
             match frame {
                 Some(frame) => client.write_all(&frame.bytes).await?,
                 None if is_over => return Ok(()),
-                None => self.has_changed.notified().await,
+                None => {
+                    let wait = next_ping.map_or(Duration::MAX, |at| at.saturating_duration_since(now));
+                    let _ = timeout(wait, self.has_changed.notified()).await;
+                    continue;
+                }
+            }
+            next_ping.get_or_insert(now + PING);
+            if now.elapsed() > HELD {
+                pulse.notify_one();
             }
         }
     }
@@ -220,11 +243,11 @@ mod tests {
         }
         stream.extend([0x89, 0, 0x88, 2, 3, 0xe8]);
         let (lost, mut carried) = (AtomicU64::new(0), Vec::new());
-        run(Outbox::new(&lost).relay(&stream[..], &mut carried)).expect("it ends");
+        run(Outbox::new(&lost).relay(&stream[..], &mut carried, &Notify::new())).expect("it ends");
         assert!(carried == stream);
         // An end within a frame is an error, after all before it.
         let mut carried = Vec::new();
-        assert!(run(Outbox::new(&lost).relay(&stream[..stream.len() - 1], &mut carried)).is_err());
+        assert!(run(Outbox::new(&lost).relay(&stream[..stream.len() - 1], &mut carried, &Notify::new())).is_err());
         assert!(carried == stream[..stream.len() - 4]);
     }
 
@@ -242,7 +265,7 @@ mod tests {
                 outbox.push(Frame { bytes, is_message: true }).expect("there is room");
             }
             outbox.waiting().is_over = true;
-            run(outbox.empty(&mut sent)).expect("it ends");
+            run(outbox.empty(&mut sent, &Notify::new())).expect("it ends");
             let mut expected = [warning(5), vec![TEXT, 0]].concat();
             (5..count).for_each(|number| expected.extend(message(number, length)));
             assert!(sent == expected, "{length}");

@@ -9,6 +9,7 @@ use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
+use tungstenite::Message;
 
 fn parameter(robot: &Bus, path: &str) -> ParameterValue {
     let description = robot.description();
@@ -98,7 +99,13 @@ fn a_client_that_does_not_read_loses_the_oldest_and_costs_nobody_else() {
     }
     let levels = robot.publisher("sensor/base/level").expect("it is there");
     let mut longest = Duration::ZERO;
+    let mut shown = Instant::now();
     for count in 0..COUNT {
+        // It is not frozen.
+        if shown.elapsed() > Duration::from_secs(1) {
+            slow.socket.send(Message::Pong(Vec::new().into())).expect("it is connected");
+            shown = Instant::now();
+        }
         let start = Instant::now();
         levels.publish(Level { value: f64::from(count), picture: vec![0; 30_000] });
         longest = longest.max(start.elapsed());
@@ -250,6 +257,27 @@ fn a_flood_of_requests_does_not_keep_the_robot_from_being_disarmed() {
     let took = begun.elapsed();
     assert!(took < Duration::from_secs(2), "{took:?}");
     MAY_END[0].store(true, Ordering::Relaxed);
+}
+
+#[test]
+fn a_client_that_shows_no_sign_of_life_is_ended() {
+    let robot = Rover::builder().simulate().expect("it starts");
+    let foxglove = served(&robot, "");
+    let (mut frozen, mut alive) = (Client::connect(&foxglove), Client::connect(&foxglove));
+    let begun = Instant::now();
+    alive.socket.get_mut().set_read_timeout(Some(Duration::from_millis(50))).expect("it may");
+    let mut ended = None;
+    while begun.elapsed() < Duration::from_secs(8) {
+        // It answers pings by reading, and says nothing else.
+        _ = alive.socket.read();
+        if foxglove.state().clients == 1 {
+            ended.get_or_insert(begun.elapsed());
+        }
+    }
+    let ended = ended.expect("it is ended");
+    assert!((Duration::from_millis(2500)..Duration::from_secs(6)).contains(&ended), "{ended:?}");
+    assert_eq!(foxglove.state().clients, 1, "the other one is there");
+    while frozen.socket.read().is_ok() {}
 }
 
 #[test]
