@@ -20,7 +20,7 @@ const SIGNS_OF_LIFE: u32 = 4;
 /// Time that a machine has to introduce itself, in milliseconds. Of those that say nothing, 100 keep all others out until then, zenoh's 10 s.
 const ACCEPT_MS: u32 = 2000;
 /// Bytes of a message in parts, at most: zenoh keeps up to 1 GiB of each that has begun. Longer ones are dropped.
-const MOST_BYTES: usize = 16 * 1024 * 1024;
+const MOST_BYTES: usize = 64 * 1024 * 1024;
 /// Times between two attempts to connect, in milliseconds.
 const RETRIES_MS: (u32, u32) = (200, 1000);
 
@@ -41,7 +41,7 @@ pub enum Mode {
     Router,
 }
 
-/// Settings of a session. Multicast and timestamps are off, gossip is on for a router only, the lease is 1 s, and messages have at most 16 MiB,
+/// Settings of a session. Multicast and timestamps are off, gossip is on for a router only, the lease is 1 s, and messages have at most 64 MiB,
 /// unless the file sets them.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub struct SessionSettings {
@@ -261,7 +261,7 @@ mod tests {
             ("transport/link/tx/keep_alive", json!(4)),
             ("transport/link/tx/queue/congestion_control/block/wait_before_close", json!(1_000_000)),
             ("transport/unicast/accept_timeout", json!(2000)),
-            ("transport/link/rx/max_message_size", json!(16_777_216)),
+            ("transport/link/rx/max_message_size", json!(67_108_864)),
             ("listen/endpoints", json!(["tcp/127.0.0.1:0"])),
             ("connect/endpoints", json!([])),
         ] {
