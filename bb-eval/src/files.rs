@@ -1,6 +1,7 @@
 //! The recordings that paths name.
 
-use bb_mcap::{RecordingError, RecordingErrorKind};
+use bb_estimators::params::nearest;
+use bb_mcap::{Bag, RecordingError, RecordingErrorKind};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -81,11 +82,20 @@ fn is_recording(path: &Path) -> bool {
     path.extension().is_some_and(|end| end == EXTENSION) || OTHERS.iter().any(|end| name.ends_with(end))
 }
 
-/// The error, with the option that chooses another topic.
-pub(crate) fn said(error: &RecordingError, option: &str) -> String {
+/// The error, with the option that chooses another topic. If no topic has the name, the error suggests the nearest one of a
+/// `fitting` type, and lists all of these.
+pub(crate) fn said(bag: &Bag, fitting: &[&str], error: &RecordingError, option: &str) -> String {
     let kind = error.kind();
+    let fits = bag.topics().iter().filter(|topic| fitting.contains(&&*topic.schema));
+    let (names, listed): (Vec<&str>, Vec<String>) =
+        fits.map(|topic| (&*topic.name, format!("{} ({})", topic.name, topic.schema))).unzip();
     match kind {
         RecordingErrorKind::NoTopicOfType { .. } => kind.to_string(),
+        RecordingErrorKind::NoTopic { topic, .. } if !names.is_empty() => {
+            let near = nearest(topic, names).map(|near| format!(" did you mean `{near}`?")).unwrap_or_default();
+            let there = if listed.len() == 1 { "there is only" } else { "there are" };
+            format!("no topic {topic} ({option});{near} of a fitting type {there} {}", listed.join(", "))
+        }
         _ => format!("{kind} ({option})"),
     }
 }

@@ -9,7 +9,9 @@ use bb_core::payload::GnssFix;
 use bb_core::time::MonotonicTime;
 use bb_estimators::attitude::ImuSample;
 use bb_estimators::navigation::Geodetic;
-use bb_mcap::{Bag, IMU, MOVING, MargSamples, ODOMETRY, POSE, RecordingError, RecordingErrorKind, Topic, Truth};
+use bb_mcap::{
+    Bag, IMU, MAGNETIC_FIELD, MOVING, MargSamples, ODOMETRY, POSE, RecordingError, RecordingErrorKind, Topic, Truth,
+};
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -81,11 +83,15 @@ impl Recording {
     /// It is not a recording, lacks a topic, or has several matching ones; in words.
     pub fn open(file: &Path, topics: &Topics, axes: Axes, before_motion_s: Option<f64>) -> Result<Self, String> {
         let bag = Bag::open(file).map_err(|error| error.kind().to_string())?;
-        let imu = bag.choose(IMU, topics.imu.as_deref()).map_err(|error| said(&error, "--imu-topic"))?;
+        let imu =
+            bag.choose(IMU, topics.imu.as_deref()).map_err(|error| said(&bag, &[IMU], &error, "--imu-topic"))?;
         let magnetometer = match bag.magnetometer_of(&imu.name, topics.magnetometer.as_deref()) {
             _ if axes == Axes::Six => None,
             Ok(topic) => Some(topic),
-            Err(error) => return Err(format!("{}; without one, choose --axes 6", said(&error, "--mag-topic"))),
+            Err(error) => {
+                let said = said(&bag, &[MAGNETIC_FIELD], &error, "--mag-topic");
+                return Err(format!("{said}; without one, choose --axes 6"));
+            }
         };
         let poses = poses(&bag, topics.truth.as_deref())?;
         let moving = moving(&bag, &topics.moving)?;
@@ -169,7 +175,8 @@ impl Recording {
     /// It is not a recording, lacks the topic, or has several matching ones; in words.
     pub fn inertial(file: &Path, topics: &Topics) -> Result<Self, String> {
         let bag = Bag::open(file).map_err(|error| error.kind().to_string())?;
-        let imu = bag.choose(IMU, topics.imu.as_deref()).map_err(|error| said(&error, "--imu-topic"))?;
+        let imu =
+            bag.choose(IMU, topics.imu.as_deref()).map_err(|error| said(&bag, &[IMU], &error, "--imu-topic"))?;
         let samples = MargSamples::read(&bag, &imu.name, None).map_err(|error| error.kind().to_string())?;
         Ok(Self {
             imu_name: imu.name.to_string(),
@@ -276,12 +283,13 @@ fn poses(bag: &Bag, name: Option<&str>) -> Result<Result<String, String>, String
         Ok(topic) => return Ok(Ok(topic.name.to_string())),
         Err(error) => error,
     };
+    let said = || said(bag, &[POSE, ODOMETRY], &error, "--truth");
     match error.kind() {
         RecordingErrorKind::OtherType { .. } if bag.choose(ODOMETRY, name).is_ok() => {
             Ok(Ok(name.unwrap_or_default().to_owned()))
         }
-        RecordingErrorKind::NoTopicOfType { .. } => Ok(Err(said(&error, "--truth"))),
-        _ => Err(said(&error, "--truth")),
+        RecordingErrorKind::NoTopicOfType { .. } => Ok(Err(said())),
+        _ => Err(said()),
     }
 }
 
@@ -292,15 +300,17 @@ fn moving(bag: &Bag, topic: &MovingTopic) -> Result<Option<String>, String> {
         MovingTopic::ByType => None,
         MovingTopic::Named(name) => Some(&**name),
     };
-    match bag.choose(MOVING, name) {
-        Ok(topic) => Ok(Some(topic.name.to_string())),
-        Err(error) => match error.kind() {
-            RecordingErrorKind::NoTopicOfType { .. } => Ok(None),
-            RecordingErrorKind::SeveralTopicsOfType { .. } => {
-                Err(format!("{}, or score all of it with --moving-topic none", said(&error, "--moving-topic")))
-            }
-            _ => Err(said(&error, "--moving-topic")),
-        },
+    let error = match bag.choose(MOVING, name) {
+        Ok(topic) => return Ok(Some(topic.name.to_string())),
+        Err(error) => error,
+    };
+    let said = said(bag, &[MOVING], &error, "--moving-topic");
+    match error.kind() {
+        RecordingErrorKind::NoTopicOfType { .. } => Ok(None),
+        RecordingErrorKind::SeveralTopicsOfType { .. } => {
+            Err(format!("{said}, or score all of it with --moving-topic none"))
+        }
+        _ => Err(said),
     }
 }
 

@@ -173,8 +173,13 @@ fn topics_are_named_where_several_fit() {
     assert!(output.err.contains(
         "twice.mcap: the messages of /mag are sensor_msgs/msg/MagneticField, and sensor_msgs/msg/Imu is needed"
     ));
-    let output = eval(&[&file], &["--imu-topic", "/gone"]);
-    assert!(output.err.contains("no topic /gone; the bag has /imu (sensor_msgs/msg/Imu)"), "{}", output.err);
+    for (topic, said) in [
+        ("/gone", "no topic /gone (--imu-topic); of a fitting type there "),
+        ("/imuu", "no topic /imuu (--imu-topic); did you mean `/imu`? of a fitting type there "),
+    ] {
+        let output = eval(&[&file], &["--imu-topic", topic]);
+        assert!(output.err.contains(said) && output.err.contains("/imu (sensor_msgs/msg/Imu)"), "{}", output.err);
+    }
 }
 
 #[test]

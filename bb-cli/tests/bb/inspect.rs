@@ -390,13 +390,14 @@ fn fields_are_plotted_with_their_units() {
         assert_eq!(output.code, Some(0), "{}", output.err);
         assert!(std::fs::read_to_string(out).expect("is written").contains(title), "{field}");
     }
-    let output = bb(&["plot", name, "/imu.angular_velocty", "--out", out]);
-    assert_eq!(output.code, Some(1));
-    assert!(
-        output.err.ends_with("/imu: no field `angular_velocty`; did you mean `angular_velocity`?\n"),
-        "{}",
-        output.err
-    );
+    for (field, fault) in [
+        ("/imu.angular_velocty", "/imu: no field `angular_velocty`; did you mean `angular_velocity`?\n"),
+        ("/imuu.angular_velocity", "no topic /imuu; did you mean `/imu`?\n"),
+    ] {
+        let output = bb(&["plot", name, field, "--out", out]);
+        assert_eq!(output.code, Some(1));
+        assert!(output.err.ends_with(fault), "{}", output.err);
+    }
     let output = bb(&["plot", name, "/imu", "--out", "x.jpg"]);
     assert_eq!(output.code, Some(2));
     assert!(output.err.contains("--out writes an SVG or a PNG: call the file x.svg or .png"), "{}", output.err);

@@ -253,10 +253,12 @@ fn what_is_wrong_with_a_bag_is_said() {
         "two_imus.mcap",
         &["--imu-topic", "/imi"],
         1,
-        "no topic /imi; the bag has /imu (sensor_msgs/msg/Imu)",
+        "no topic /imi (--imu-topic); did you mean `/imu`? of a fitting type there are /imu (sensor_msgs/msg/Imu), ",
     );
     fault(&fixes, "typed.mcap", &["--imu-topic", "/fix"], 1, "sensor_msgs/msg/NavSatFix");
     fault(&fixes, "truths.mcap", &["--truth", "/imu"], 1, "(--truth)");
+    let near = "no topic /thruth (--truth); did you mean `/truth`? of a fitting type there are ";
+    fault(&fixes, "truths.mcap", &["--truth", "/thruth"], 1, near);
     let two = Bagged { wheels: true, relative: true, ..fixes };
     fault(&two, "two_odometries.mcap", &truth, 1, "leave them out with --odometry-topic none");
     let grown = Bagged { relative: true, flat: true, ..Bagged::default() };

@@ -32,7 +32,9 @@ pub(super) struct Topics {
 
 impl Topics {
     pub(super) fn choose(bag: &Bag, options: &BagOptions) -> Result<Self, String> {
-        let imu = bag.choose(IMU, options.imu_topic.as_deref()).map_err(|error| said(&error, "--imu-topic"))?;
+        let imu = bag
+            .choose(IMU, options.imu_topic.as_deref())
+            .map_err(|error| said(bag, &[IMU], &error, "--imu-topic"))?;
         let imu = imu.name.to_string();
         let mut used: Vec<String> = Vec::new();
         let start = start(bag, options)?;
@@ -93,7 +95,7 @@ fn only(
     match name {
         Some(NONE) => return Ok(None),
         Some(name) => {
-            let topic = bag.choose(schema, Some(name)).map_err(|error| said(&error, option))?;
+            let topic = bag.choose(schema, Some(name)).map_err(|error| said(bag, &[schema], &error, option))?;
             return Ok(Some(topic.name.to_string()));
         }
         None => {}
@@ -122,7 +124,9 @@ fn start(bag: &Bag, options: &BagOptions) -> Result<Option<String>, String> {
         }
     };
     let topic = bag.choose(ODOMETRY, Some(name)).or_else(|_| bag.choose(POSE_WITH_COVARIANCE, Some(name)));
-    topic.map(|topic| Some(topic.name.to_string())).map_err(|error| said(&error, "--start"))
+    topic
+        .map(|topic| Some(topic.name.to_string()))
+        .map_err(|error| said(bag, &[ODOMETRY, POSE_WITH_COVARIANCE], &error, "--start"))
 }
 
 /// The topic of the truth, or why there is none.
@@ -138,7 +142,7 @@ fn truth(bag: &Bag, name: Option<&str>, used: &[String]) -> Result<(Option<Strin
                 RecordingErrorKind::OtherType { .. } => {
                     format!("{}, {TRANSFORM}, {ODOMETRY} or {FIX} (--truth)", error.kind())
                 }
-                kind => format!("{kind} (--truth)"),
+                _ => said(bag, &[POSE, TRANSFORM, ODOMETRY, FIX], &error, "--truth"),
             })?;
             return Ok((Some(topic.name.to_string()), None));
         }
