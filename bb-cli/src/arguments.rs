@@ -18,7 +18,7 @@ use clap::{Args, CommandFactory, Parser, Subcommand};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-/// State estimation for robots that are declared.
+/// Inspects, plots and converts recordings, scores filters on them, and shows running robots.
 #[derive(Debug, Parser)]
 #[command(name = "bb", version)]
 struct Bb {
