@@ -11,7 +11,6 @@ mod families;
 mod live;
 mod navigation;
 mod noise;
-mod periods;
 mod topics;
 mod values;
 

@@ -2,6 +2,7 @@
 
 use crate::evaluate::Evaluation;
 use crate::filters::Axes;
+use crate::periods::Periods;
 use crate::report::name;
 use bb_core::nalgebra::UnitQuaternion;
 use bb_plot::{Band, Colour, Line, PALETTE, Panel, Picture, Point};
@@ -18,9 +19,7 @@ const GAP: Colour = (245, 190, 190);
 const DISTURBED: Colour = (255, 236, 200);
 /// Times without a reading of the field.
 const NO_FIELD: Colour = (225, 225, 240);
-/// A longer time without samples is a gap, s,
-const GAP_S: f64 = 0.2;
-/// and a field is disturbed if its strength is off by this part, or missing, for this long, s.
+/// A field is disturbed if its strength is off by this part, or missing, for this long, s.
 const OFF: f64 = 0.15;
 const OFF_S: f64 = 0.5;
 
@@ -113,7 +112,10 @@ fn bands(evaluation: &Evaluation, runs: &[crate::Run]) -> Vec<Band> {
     // A field that is read no more is missing to the end.
     let end_s = times.last().map(|(time_s, _)| *time_s).filter(|_| !evaluation.fields.is_empty());
     let silences = read.clone().zip(read.skip(1).chain(end_s)).filter(|(from_s, to_s)| to_s - from_s > OFF_S);
-    let gaps = times.windows(2).filter(|pair| pair[1].0 - pair[0].0 > GAP_S).map(|pair| (pair[0].0, pair[1].0));
+    let stamps: Vec<i64> = times.iter().map(|(time_s, _)| (time_s * 1e9) as i64).collect();
+    let gaps = Periods::of(&stamps).map(|periods| periods.gaps).unwrap_or_default();
+    let gaps =
+        gaps.iter().filter_map(|gap| times.get(gap.after).map(|(from_s, _)| (*from_s, from_s + gap.length_s)));
     let disturbed = disturbed.into_iter().map(|times| band("disturbed field", DISTURBED, times));
     let silences = silences.map(|times| band("no field", NO_FIELD, times));
     disturbed.chain(silences).chain(gaps.map(|times| band("no IMU", GAP, times))).collect()

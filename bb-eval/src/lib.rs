@@ -41,6 +41,8 @@ pub mod filters;
 mod frames;
 #[cfg(feature = "recordings")]
 mod navigation;
+#[cfg(feature = "recordings")]
+mod periods;
 mod progress;
 #[cfg(feature = "recordings")]
 mod recording;
@@ -89,6 +91,8 @@ pub use navigation::{
 };
 #[cfg(feature = "plot")]
 pub use navigation::{Drawn, plot_navigation};
+#[cfg(feature = "recordings")]
+pub use periods::{Gap, Jitter, Periods};
 pub use progress::Progress;
 #[cfg(feature = "recordings")]
 pub use recording::{End, MovingTopic, Recording, Topics};

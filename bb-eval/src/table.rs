@@ -25,3 +25,8 @@ pub fn aligned<const N: usize>(rows: &[[String; N]], words: usize, gap: usize) -
     }
     text
 }
+
+/// A number of things: `1 gap`, `3 gaps`.
+pub fn counted(count: usize, one: &str, many: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
+}

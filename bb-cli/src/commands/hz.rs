@@ -1,7 +1,7 @@
 //! `bb hz`: the rates of topics.
 
-use crate::periods::Periods;
 use crate::topics::{TopicReader, find, is_of_events, log_ns, open};
+use bb_eval::Periods;
 use bb_eval::table::aligned;
 use clap::Args;
 use serde::Serialize;

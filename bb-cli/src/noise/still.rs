@@ -1,10 +1,11 @@
 //! The part of a recording in which the IMU is at rest and no samples are missing.
 
 use super::{AXES, Sample};
+use bb_eval::table::counted;
 use std::ops::Range;
 
-/// A longer time between two samples, in periods, is a gap.
-const GAP: f64 = 1.5;
+/// After a longer time between two samples, in periods, samples are missing.
+const MISSING: f64 = 1.5;
 
 /// Motion is detected in windows of this length, s.
 const WINDOW_S: f64 = 1.0;
@@ -54,7 +55,7 @@ pub(super) fn still(samples: &[Sample]) -> Result<Still, String> {
         return Err("the stamps of the samples do not grow".into());
     }
     let mut warnings = Vec::new();
-    let mut breaks = gaps(samples, usual, &at, &mut warnings);
+    let mut breaks = missing(samples, usual, &at, &mut warnings);
     let window = ((WINDOW_S * 1e9 / usual as f64) as usize).max(8);
     moved(samples, window, &at, &mut breaks, &mut warnings);
     breaks.sort_by_key(|part| part.start);
@@ -79,24 +80,24 @@ pub(super) fn still(samples: &[Sample]) -> Result<Still, String> {
 }
 
 /// The boundaries between parts, as ranges of samples that belong to neither.
-fn gaps(
+fn missing(
     samples: &[Sample],
     usual: i64,
     at: &dyn Fn(usize) -> f64,
     warnings: &mut Vec<String>,
 ) -> Vec<Range<usize>> {
     let mut breaks = Vec::new();
-    let (mut gaps, mut back, mut numbers) = ((0, 0.0, 0.0), (0, 0.0), (0, 0.0));
+    let (mut missing, mut back, mut numbers) = ((0, 0.0, 0.0), (0, 0.0), (0, 0.0));
     for (index, pair) in samples.windows(2).enumerate() {
         let period = pair[1].time_ns - pair[0].time_ns;
         if period <= 0 {
             back = (back.0 + 1, if back.0 == 0 { at(index + 1) } else { back.1 });
             breaks.push(index + 1..index + 1);
-        } else if period as f64 > GAP * usual as f64 {
-            if gaps.0 == 0 {
-                gaps = (0, period as f64 * 1e-9, at(index));
+        } else if period as f64 > MISSING * usual as f64 {
+            if missing.0 == 0 {
+                missing = (0, period as f64 * 1e-9, at(index));
             }
-            gaps.0 += 1;
+            missing.0 += 1;
             breaks.push(index + 1..index + 1);
         }
     }
@@ -106,8 +107,10 @@ fn gaps(
             breaks.push(index..index + 1);
         }
     }
-    if gaps.0 > 0 {
-        warnings.push(format!("{} gaps, the first of {:.3} s after {:.2} s", gaps.0, gaps.1, gaps.2));
+    if missing.0 > 0 {
+        let (count, first_s, at_s) = missing;
+        let times = counted(count, "time", "times");
+        warnings.push(format!("samples are missing {times}, first for {first_s:.3} s after {at_s:.2} s"));
     }
     if back.0 > 0 {
         warnings.push(format!("the time runs back {} times, first at {:.2} s", back.0, back.1));

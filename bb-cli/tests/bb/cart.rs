@@ -410,6 +410,11 @@ fn a_recording_with_faults_is_scored_by_one_command() {
     // It starts from rest, is told the gap by the IMU, and the outage by ages.
     assert!(row["started_s"].as_f64().expect("is known") < 3.0, "{row}");
     assert!(row["gaps"].as_u64().expect("is counted") >= 1, "{row}");
+    // As many as `bb info` counts.
+    let info: Vec<Value> = serde_json::from_str(&bb(&["info", "--json", file]).out).expect("an array");
+    let topics = info[0]["topics"].as_array().expect("a list");
+    let imu = topics.iter().find(|topic| topic["name"] == "/imu").expect("is there");
+    assert_eq!(row["gaps"], imu["gaps"]);
     let seconds = |state: &str| {
         let states = row["states"].as_array().expect("a list");
         let of = states.iter().find(|of| of["state"] == state);

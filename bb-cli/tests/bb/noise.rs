@@ -135,7 +135,7 @@ fn what_is_no_rest_is_named_and_left_out() {
     gaps.drain(4000..4100);
     gaps[200].1.x = f64::NAN;
     let (_, said) = noise(&bag("gaps.mcap", &gaps));
-    assert!(said.contains("1 gaps, the first of 1.010 s after 39.99 s"), "{said}");
+    assert!(said.contains("samples are missing 1 time, first for 1.010 s after 39.99 s"), "{said}");
     assert!(
         said.contains("1 samples are no numbers, the first at 2.00 s")
             && said.contains("taken from 41.0 to 120.0 s"),

@@ -92,7 +92,6 @@ pub(crate) struct Record {
     /// Measurements refused, of a filter that does not count them by input.
     pub(crate) refused: u64,
     pub(crate) resets: u32,
-    pub(crate) gaps: u32,
     pub(crate) samples: u64,
     /// The time that the run took.
     pub(crate) seconds: f64,

@@ -1,7 +1,7 @@
 //! The output of `bb eval navigation`.
 
 use super::score::{NavigationScore, Spread};
-use crate::table::aligned;
+use crate::table::{aligned, counted};
 use serde::Serialize;
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -129,8 +129,11 @@ fn fared(score: &NavigationScore) -> String {
     for fate in &score.fates {
         let _ = writeln!(text, "  {}: {} fused, {} refused", fate.input, fate.fused, fate.refused);
     }
-    if score.resets > 0 || score.gaps > 0 {
-        let _ = writeln!(text, "  begun again elsewhere {} times; {} gaps of the IMU", score.resets, score.gaps);
+    if score.resets > 0 {
+        let _ = writeln!(text, "  begun again elsewhere {} times", score.resets);
+    }
+    if score.gaps > 0 {
+        let _ = writeln!(text, "  {} in the samples of the IMU", counted(score.gaps, "gap", "gaps"));
     }
     if score.silent > 0 {
         let _ = writeln!(text, "  no estimate at {} instants with truth", score.silent);

@@ -216,10 +216,10 @@ fn spatial(
     });
     simulation.stop();
     finish(&mut record, health.drain(), &reasons);
-    if let Some(NavigationStatus { gnss, odometry, pose, relative, magnetic_field, resets, gaps, .. }) = last {
+    if let Some(NavigationStatus { gnss, odometry, pose, relative, magnetic_field, resets, .. }) = last {
         let verdicts = [gnss, odometry, pose, relative, magnetic_field];
         record.verdicts = INPUTS.into_iter().skip(1).zip(verdicts).map(|(input, of)| verdict(input, &of)).collect();
-        (record.resets, record.gaps) = (resets, gaps);
+        record.resets = resets;
     }
     Ok(record)
 }
@@ -280,10 +280,10 @@ fn planar(
     simulation.stop();
     finish(&mut record, health.drain(), &reasons);
     record.is_planar = true;
-    if let Some(PlanarStatus { gnss, odometry, pose, resets, gaps, .. }) = last {
+    if let Some(PlanarStatus { gnss, odometry, pose, resets, .. }) = last {
         let verdicts = [gnss, odometry, pose];
         record.verdicts = INPUTS.into_iter().skip(1).zip(verdicts).map(|(input, of)| verdict(input, &of)).collect();
-        (record.resets, record.gaps) = (resets, gaps);
+        record.resets = resets;
     }
     Ok(record)
 }

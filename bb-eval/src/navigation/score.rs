@@ -134,8 +134,8 @@ pub struct NavigationScore {
     pub refused: u64,
     /// Number of times that the filter was wrong and began again elsewhere.
     pub resets: u32,
-    /// Number of times that samples of the IMU were missing.
-    pub gaps: u32,
+    /// Number of gaps in the samples of the IMU, as [`Periods`](crate::Periods) counts them.
+    pub gaps: usize,
     /// Time of the run per sample of the IMU, with the robot around the filter, µs.
     pub us_per_imu_sample: f64,
 }
@@ -157,6 +157,7 @@ pub(crate) struct Scores<'a> {
     pub(crate) states: Vec<(State, f64)>,
     pub(crate) fix_period_s: f64,
     pub(crate) sample_s: f64,
+    pub(crate) gaps: usize,
     pub(crate) record: &'a Record,
 }
 
@@ -214,7 +215,7 @@ impl Scores<'_> {
             refused: record.refused + fates.iter().map(|fate| fate.refused).sum::<u64>(),
             fates,
             resets: record.resets,
-            gaps: record.gaps,
+            gaps: self.gaps,
             us_per_imu_sample: record.seconds * 1e6 / record.samples.max(1) as f64,
         }
     }

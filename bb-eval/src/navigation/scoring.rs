@@ -8,6 +8,7 @@ use super::feed::{Feed, Time, What};
 use super::record::{Estimate, Record};
 use super::score::{NavigationScore, Scored, Scores};
 use super::trace::{Innovation, Row, Sensor, State, Trace};
+use crate::periods::{Gap, Periods};
 use crate::turns::{Align, LEFT, Turn, Turns, angles, cause};
 use bb_core::nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector3};
 use bb_estimators::navigation::{Geodetic, GnssPosition, LocalFrame};
@@ -20,9 +21,6 @@ const OLDEST_NS: i64 = 200_000_000;
 
 /// Instants at the start that are not scored: a tenth of all, but at most this many.
 const MOST_LEFT_OUT: usize = 50;
-
-/// Samples of the IMU farther apart than this many of their periods have a gap between them.
-const GAP: i64 = 5;
 
 /// An instant at which the truth is known.
 #[derive(Clone, Copy, Debug)]
@@ -300,6 +298,7 @@ impl<'a> Scoring<'a> {
             states: self.durations(),
             fix_period_s: period(self.anchors.iter().copied()) as f64 * 1e-9,
             sample_s: period(self.imu_stamps.iter().copied()) as f64 * 1e-9,
+            gaps: self.gaps().len(),
             record: self.record,
         }
         .score()
@@ -365,8 +364,18 @@ impl<'a> Scoring<'a> {
             fixes: self.fixes().map(|(_, fix)| fix.position).collect(),
             health: self.states.iter().map(|(time, state)| (self.seconds(*time), state.name())).collect(),
             outages: spans(&self.anchors, 3 * period(self.anchors.iter().copied())),
-            gaps: spans(&self.imu_stamps, GAP * period(self.imu_stamps.iter().copied())),
+            gaps: self.gaps(),
         }
+    }
+
+    /// The gaps in the samples of the IMU, from and to. They are counted in the order of arrival, as those of a recording are.
+    fn gaps(&self) -> Vec<(f64, f64)> {
+        let samples = self.feed.messages.iter().filter(|message| matches!(message.what, What::Imu(_)));
+        let stamps: Vec<Time> = samples.map(|message| message.stamp_ns).collect();
+        let gaps = Periods::of(&stamps).map(|periods| periods.gaps).unwrap_or_default();
+        let ends =
+            |gap: &Gap| Some((self.seconds(*stamps.get(gap.after)?), self.seconds(*stamps.get(gap.after + 1)?)));
+        gaps.iter().filter_map(ends).collect()
     }
 
     /// The fixes that the filter got, in the world of the truth, each with its stamp.

@@ -3,7 +3,7 @@
 use super::date::date;
 use super::remark::Remark;
 use super::scan::{Content, TopicContent};
-use crate::periods::Periods;
+use bb_eval::Periods;
 use bb_eval::table::aligned;
 use serde::Serialize;
 

@@ -1,7 +1,8 @@
 //! Remarks on the times of a topic.
 
 use super::remark::{Remark, Subject};
-use crate::periods::Periods;
+use bb_eval::Periods;
+use bb_eval::table::counted;
 
 /// The times of the messages of a topic.
 #[derive(Debug, Default)]
@@ -136,10 +137,6 @@ impl Times {
 
 fn seconds(ns: i64) -> f64 {
     ns as f64 * 1e-9
-}
-
-fn counted(count: usize, one: &str, many: &str) -> String {
-    format!("{count} {}", if count == 1 { one } else { many })
 }
 
 #[cfg(test)]

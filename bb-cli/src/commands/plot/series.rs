@@ -2,8 +2,8 @@
 
 use super::select::{Group, Path, groups};
 use super::units;
-use crate::periods::Periods;
 use bb_core::nalgebra::{Quaternion, UnitQuaternion};
+use bb_eval::Periods;
 use bb_mcap::Value;
 use bb_plot::{Line, PALETTE, Panel, Picture, Point};
 use std::collections::HashSet;

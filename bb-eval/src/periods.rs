@@ -4,42 +4,49 @@ use serde::Serialize;
 
 /// Statistics of the times between messages.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub(crate) struct Periods {
-    pub(crate) mean_s: f64,
-    pub(crate) min_s: f64,
-    pub(crate) max_s: f64,
-    /// The standard deviation.
-    pub(crate) std_s: f64,
-    pub(crate) median_s: f64,
+pub struct Periods {
+    /// The mean, s.
+    pub mean_s: f64,
+    /// The shortest, s.
+    pub min_s: f64,
+    /// The longest, s.
+    pub max_s: f64,
+    /// The standard deviation, s.
+    pub std_s: f64,
+    /// The median, s.
+    pub median_s: f64,
     /// `true` if messages come at a rate; unknown if there are few.
-    pub(crate) regular: Option<bool>,
+    pub regular: Option<bool>,
     /// Periods that differ from another, if they do by much; known only if they come regularly.
     #[serde(skip)]
-    pub(crate) jitter: Option<Jitter>,
+    pub jitter: Option<Jitter>,
     /// Gaps in the messages; known only if they come regularly.
     #[serde(skip)]
-    pub(crate) gaps: Vec<Gap>,
+    pub gaps: Vec<Gap>,
     /// Indices of the messages after which time goes backwards.
     #[serde(skip)]
-    pub(crate) backward: Vec<usize>,
+    pub backward: Vec<usize>,
     /// The number of messages with the same time as the previous one.
     #[serde(skip)]
-    pub(crate) repeated: usize,
+    pub repeated: usize,
 }
 
 /// The deviation of one period in ten from a multiple of the shortest usual period.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Jitter {
-    pub(crate) period_s: f64,
-    pub(crate) deviation_s: f64,
+pub struct Jitter {
+    /// The shortest usual period, s.
+    pub period_s: f64,
+    /// The deviation, s.
+    pub deviation_s: f64,
 }
 
 /// A time without messages.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Gap {
+pub struct Gap {
     /// The index of the message before it.
-    pub(crate) after: usize,
-    pub(crate) length_s: f64,
+    pub after: usize,
+    /// Length, s.
+    pub length_s: f64,
 }
 
 /// A period longer than this many medians is a gap.
@@ -56,7 +63,7 @@ const FEWEST: usize = 8;
 impl Periods {
     /// Computes the periods from the times of messages in order, nanoseconds; `None` if there are fewer than two. Times
     /// that go back do not count as periods.
-    pub(crate) fn of(times_ns: &[i64]) -> Option<Self> {
+    pub fn of(times_ns: &[i64]) -> Option<Self> {
         let seconds = |ns: i64| ns as f64 * 1e-9;
         let steps = || times_ns.windows(2).map(|pair| seconds(pair[1].saturating_sub(pair[0])));
         let mut sorted: Vec<f64> = steps().filter(|step| *step >= 0.0).collect();
@@ -86,17 +93,17 @@ impl Periods {
     }
 
     /// Returns the periods as those of events: they have no rate, and so no gaps.
-    pub(crate) fn of_events(self) -> Self {
+    pub fn of_events(self) -> Self {
         Self { regular: Some(false), jitter: None, gaps: Vec::new(), ..self }
     }
 
     /// Messages per second, if they come at a rate.
-    pub(crate) fn rate_hz(&self) -> Option<f64> {
+    pub fn rate_hz(&self) -> Option<f64> {
         (self.mean_s > 0.0 && self.regular != Some(false)).then(|| 1.0 / self.mean_s)
     }
 
     /// The rate with this many decimals, for a table.
-    pub(crate) fn rate_in_words(&self, decimals: usize) -> String {
+    pub fn rate_in_words(&self, decimals: usize) -> String {
         match (self.rate_hz(), self.regular) {
             (Some(rate), _) => format!("{rate:.decimals$} Hz"),
             (None, Some(false)) => "irregular".to_owned(),
