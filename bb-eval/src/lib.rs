@@ -40,6 +40,8 @@ pub mod filters;
 #[cfg(feature = "recordings")]
 mod frames;
 #[cfg(feature = "recordings")]
+pub mod motion;
+#[cfg(feature = "recordings")]
 mod navigation;
 #[cfg(feature = "recordings")]
 mod periods;

@@ -1,14 +1,11 @@
 //! `bb info`: the contents of recordings, and anything that looks wrong in them.
 
 mod date;
-mod latency;
-mod motion;
 mod offset;
 mod quantities;
 mod remark;
 mod report;
 mod scan;
-mod scatter;
 mod signals;
 mod times;
 

@@ -293,6 +293,17 @@ fn what_is_wrong_with_a_bag_is_said() {
         1,
         "frame gps of /fix is not connected to base of the robot in /tf_static, which has base-imu",
     );
+    // In the words of `bb info`.
+    let sure = Bagged { sure: true, ..fixes };
+    let bag = Drive::new(9, 300).bag("sure.mcap", &sure);
+    let info: Vec<Value> = serde_json::from_str(&bb(&["info", "--json", text(&bag)]).out).expect("an array");
+    let topics = info[0]["topics"].as_array().expect("a list");
+    let of_fixes = topics.iter().find(|topic| topic["name"] == "/fix").expect("is there");
+    let remark = &of_fixes["remarks"][0];
+    assert_eq!(remark["subject"], "covariance", "{of_fixes}");
+    let output = bb(&[&["eval", "navigation", text(&bag)], &truth[..]].concat());
+    let said = format!("note: {}: /fix: {}\n", bag.display(), remark["text"].as_str().expect("is text"));
+    assert!(output.err.contains(&said), "{said}: {}", output.err);
     let misspelt = [&["--mount", "gpps=0,0,1"], &truth[..]].concat();
     let used = "--mount gpps names no topic of the recording and no frame of one: ";
     fault(&fixes, "misspelt.mcap", &misspelt, 1, used);

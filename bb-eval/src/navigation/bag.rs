@@ -59,6 +59,7 @@ impl NavigationBag {
         frames.check_mounts(&bag)?;
         let mut bag = Self { topics, messages, frames, options: options.clone(), notes: Notes::default() };
         bag.doubt_fixes(&mut notes);
+        bag.doubt_covariances(&mut notes);
         bag.notes = notes;
         Ok(bag)
     }

@@ -1,12 +1,12 @@
 //! Remarks on several topics together.
 
-use super::motion::{Motion, Sample};
+use super::offset;
 use super::remark::{Remark, Subject};
-use super::scatter::{Fix, Oddities, oddities};
-use super::{latency, offset};
 use bb_core::nalgebra::{UnitQuaternion, Vector3};
 use bb_core::payload::{GnssFix, Imu, MagneticField, Odometry, Pose};
-use bb_estimators::navigation::{Geodetic, LocalFrame};
+use bb_estimators::navigation::Geodetic;
+use bb_eval::motion::scatter::{Oddities, oddities, position, track};
+use bb_eval::motion::{Motion, Sample, latency};
 use bb_mcap::{BagMessage, IMU, MAGNETIC_FIELD, ODOMETRY, POSE, RecordingError};
 
 const FIX: &str = "sensor_msgs/msg/NavSatFix";
@@ -61,14 +61,7 @@ impl Signal {
             }
             Self::Fixes(all) => {
                 let (fix, time) = message.payload::<GnssFix>()?;
-                let position = fix.position.and_then(|at| {
-                    let at =
-                        Geodetic { latitude: at.latitude_rad, longitude: at.longitude_rad, height: at.altitude? };
-                    [at.latitude, at.longitude, at.height].iter().all(|value| value.is_finite()).then_some(at)
-                });
-                let variance = fix.position_covariance.map(|covariance| covariance.trace());
-                let variance = variance.filter(|variance| variance.is_finite() && *variance > 0.0);
-                all.extend(position.map(|position| (time.as_unix_nanos(), position, variance)));
+                all.extend(position(&fix).map(|(position, variance)| (time.as_unix_nanos(), position, variance)));
             }
             Self::Orientations(all) => {
                 let (pose, time) = match &*message.schema {
@@ -135,45 +128,15 @@ pub(super) fn remarks(signal: &Signal, reference: Option<&Reference<'_>>, start_
             remarks.extend(latency.map(|latency_s| late(latency_s, "the turns")));
         }
         Signal::Fixes(fixes) => {
-            let Some((_, origin, _)) = fixes.first() else { return remarks };
-            let frame = LocalFrame::new(*origin);
-            let mut track: Vec<Fix> = Vec::with_capacity(fixes.len());
-            for (time_ns, position, variance) in fixes {
-                let fix =
-                    Fix { time_s: seconds(*time_ns), position: frame.position(position), variance: *variance };
-                if track.last().is_none_or(|last| last.time_s < fix.time_s) {
-                    track.push(fix);
-                }
-            }
+            let track = track(fixes, zero_ns);
             let Oddities { scatter, latency_s } = oddities(&track, reference.map(|reference| &reference.motion));
             remarks.extend(latency_s.map(|latency_s| late(latency_s, "the accelerations")));
             remarks.extend(scatter.map(|found| {
                 let since_s = zero_ns.saturating_sub(start_ns) as f64 * 1e-9;
-                let about = match reference {
-                    Some(reference) => format!("the motion that {} measures", reference.imu),
-                    None => "any motion of a vehicle".to_owned(),
-                };
-                Remark::new(
-                    Subject::Covariance,
-                    format!(
-                        "{} of {} fixes, from {:.1} s to {:.1} s, scatter by {} about {about}, and state {}",
-                        found.count,
-                        track.len(),
-                        found.from_s + since_s,
-                        found.to_s + since_s,
-                        length(found.measured_m),
-                        length(found.stated_m)
-                    ),
-                )
+                let said = found.in_words(since_s, reference.map(|reference| reference.imu));
+                Remark::new(Subject::Covariance, said)
             }));
         }
     }
     remarks
-}
-
-fn length(metres: f64) -> String {
-    match metres < 0.1 {
-        true => format!("{:.1} cm", metres * 100.0),
-        false => format!("{metres:.1} m"),
-    }
 }

@@ -4,6 +4,7 @@ use super::NavigationBag;
 use super::notes::Notes;
 use super::options::StartFrom;
 use super::truth::{TrueTrack, isometry};
+use crate::motion::{self, Motion, scatter};
 use crate::navigation::data::Truth;
 use crate::navigation::feed::{Feed, INPUTS, Message, Time, What};
 use bb_core::nalgebra::{Isometry3, Matrix6, Vector3};
@@ -73,6 +74,28 @@ impl NavigationBag {
         let without = fixes.iter().filter(|fix| Geodetic::of_fix(fix, 0.0).is_none()).count() - nowhere.len();
         if without > 0 {
             notes.push(format!("{without} of {count} fixes have no position"));
+        }
+    }
+
+    /// Says if fixes scatter more than their covariances state, as `bb info` does.
+    pub(super) fn doubt_covariances(&self, notes: &mut Notes) {
+        let sample = |message: &Message| match &message.what {
+            What::Imu(imu) => Some((message.stamp_ns, imu.angular_velocity, imu.linear_acceleration)),
+            _ => None,
+        };
+        let samples: Vec<motion::Sample> = self.messages.inputs.iter().filter_map(sample).collect();
+        let start_ns = self.messages.inputs.iter().map(|message| message.arrival_ns).min();
+        let Some(((zero_ns, ..), start_ns)) = samples.first().copied().zip(start_ns) else { return };
+        let position = |(time_ns, fix): (Time, &GnssFix)| {
+            let (position, variance) = scatter::position(fix)?;
+            Some((time_ns, position, variance))
+        };
+        let positions: Vec<_> = self.fixes().filter_map(position).collect();
+        let track = scatter::track(&positions, zero_ns);
+        if let Some(found) = scatter::oddities(&track, Some(&Motion::new(&samples, zero_ns))).scatter {
+            let topic = self.topics.gnss.as_deref().unwrap_or_default();
+            let since_s = zero_ns.saturating_sub(start_ns) as f64 * 1e-9;
+            notes.push(format!("{topic}: {}", found.in_words(since_s, Some(&self.topics.imu))));
         }
     }
 

@@ -6,9 +6,11 @@
 //! whatever gravity is; the rest is the scatter of the fixes. It is normalised, so that independent errors have the
 //! deviation in it that they have in a fix.
 
+use super::Motion;
 use super::latency::best;
-use super::motion::Motion;
 use bb_core::nalgebra::Vector3;
+use bb_core::payload::GnssFix;
+use bb_estimators::navigation::{Geodetic, LocalFrame};
 
 /// Fixes are taken about this far apart, s, and not beyond this.
 const SPACING_S: f64 = 1.0;
@@ -34,29 +36,88 @@ const FEWEST: usize = 5;
 
 /// A fix.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Fix {
-    pub(super) time_s: f64,
+pub struct Fix {
+    /// Time since the zero of the motion, s.
+    pub time_s: f64,
     /// Position in a frame whose axes are straight, m.
-    pub(super) position: Vector3<f64>,
+    pub position: Vector3<f64>,
     /// The sum of the variances of its axes, if it states them.
-    pub(super) variance: Option<f64>,
+    pub variance: Option<f64>,
 }
 
 /// Remarks on fixes.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Oddities {
-    pub(super) scatter: Option<Scatter>,
-    pub(super) latency_s: Option<f64>,
+pub struct Oddities {
+    /// Scatter that the covariances do not state.
+    pub scatter: Option<Scatter>,
+    /// Time by which the fixes are stamped late, s.
+    pub latency_s: Option<f64>,
 }
 
 /// Fixes that scatter more than they state.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Scatter {
-    pub(super) count: usize,
-    pub(super) from_s: f64,
-    pub(super) to_s: f64,
-    pub(super) measured_m: f64,
-    pub(super) stated_m: f64,
+pub struct Scatter {
+    /// Number of those that do.
+    pub count: usize,
+    /// Number of all fixes.
+    pub all: usize,
+    /// Time of the first of those that do, s.
+    pub from_s: f64,
+    /// Time of the last, s.
+    pub to_s: f64,
+    /// Scatter, m.
+    pub measured_m: f64,
+    /// Deviation that their covariances state, m.
+    pub stated_m: f64,
+}
+
+impl Scatter {
+    /// Describes it, with times from `since_s` before the zero of the motion on, and the IMU that measured the motion.
+    pub fn in_words(&self, since_s: f64, imu: Option<&str>) -> String {
+        let about = match imu {
+            Some(imu) => format!("the motion that {imu} measures"),
+            None => "any motion of a vehicle".to_owned(),
+        };
+        format!(
+            "{} of {} fixes, from {:.1} s to {:.1} s, scatter by {} about {about}, and state {}",
+            self.count,
+            self.all,
+            self.from_s + since_s,
+            self.to_s + since_s,
+            length(self.measured_m),
+            length(self.stated_m)
+        )
+    }
+}
+
+fn length(metres: f64) -> String {
+    match metres < 0.1 {
+        true => format!("{:.1} cm", metres * 100.0),
+        false => format!("{metres:.1} m"),
+    }
+}
+
+/// Returns the position of a fix, and the sum of the variances of its axes if it states them; `None` if it has no height.
+pub fn position(fix: &GnssFix) -> Option<(Geodetic, Option<f64>)> {
+    let at = fix.position?;
+    let at = Geodetic { latitude: at.latitude_rad, longitude: at.longitude_rad, height: at.altitude? };
+    let variance = fix.position_covariance.map(|covariance| covariance.trace());
+    let is_finite = [at.latitude, at.longitude, at.height].iter().all(|value| value.is_finite());
+    is_finite.then_some((at, variance.filter(|variance| variance.is_finite() && *variance > 0.0)))
+}
+
+/// Fixes about the first of them, by the time in seconds since `zero_ns`; those not after the one before are left out.
+pub fn track(positions: &[(i64, Geodetic, Option<f64>)], zero_ns: i64) -> Vec<Fix> {
+    let Some((_, origin, _)) = positions.first() else { return Vec::new() };
+    let frame = LocalFrame::new(*origin);
+    let mut track: Vec<Fix> = Vec::with_capacity(positions.len());
+    for (time_ns, position, variance) in positions {
+        let time_s = time_ns.saturating_sub(zero_ns) as f64 * 1e-9;
+        if track.last().is_none_or(|last| last.time_s < time_s) {
+            track.push(Fix { time_s, position: frame.position(position), variance: *variance });
+        }
+    }
+    track
 }
 
 struct Group {
@@ -118,7 +179,7 @@ impl Group {
 }
 
 /// Compares fixes, in the order of their times, with the motion.
-pub(super) fn oddities(fixes: &[Fix], motion: Option<&Motion>) -> Oddities {
+pub fn oddities(fixes: &[Fix], motion: Option<&Motion>) -> Oddities {
     let mut groups: Vec<Group> = (0..fixes.len()).filter_map(|first| Group::from(fixes, first)).collect();
     if let Some(motion) = motion {
         groups.retain(|group| {
@@ -171,6 +232,7 @@ fn scatter(fixes: &[Fix], groups: &[Group], motion: Option<&Motion>, latency_s: 
     let count = times().count();
     (count >= FEWEST).then_some(Scatter {
         count,
+        all: fixes.len(),
         from_s: times().next()?,
         to_s: times().next_back()?,
         measured_m: (measured / off).sqrt(),

@@ -1,4 +1,8 @@
-//! The motion that an IMU measures, in an inertial frame that is level and true to north only by chance.
+//! The motion that an IMU measures, in an inertial frame that is level and true to north only by chance, and what other sensors
+//! show beside it.
+
+pub mod latency;
+pub mod scatter;
 
 use bb_core::nalgebra::{UnitQuaternion, Vector3};
 
@@ -6,11 +10,11 @@ use bb_core::nalgebra::{UnitQuaternion, Vector3};
 const LONGEST_S: f64 = 0.2;
 
 /// A sample: stamp in nanoseconds, angular velocity, specific force.
-pub(super) type Sample = (i64, Vector3<f64>, Vector3<f64>);
+pub type Sample = (i64, Vector3<f64>, Vector3<f64>);
 
 /// The integrated motion. Its way falls with gravity, which third differences do not see.
 #[derive(Debug, Default)]
-pub(super) struct Motion {
+pub struct Motion {
     points: Vec<Point>,
     /// The times of the points that have no motion behind them.
     breaks: Vec<f64>,
@@ -28,7 +32,7 @@ struct Point {
 
 impl Motion {
     /// Integrates samples; those that are not finite, or not after the one before, are left out.
-    pub(super) fn new(samples: &[Sample], zero_ns: i64) -> Self {
+    pub fn new(samples: &[Sample], zero_ns: i64) -> Self {
         let mut motion = Self::default();
         let mut last: Option<(Point, Vector3<f64>)> = None;
         for (time_ns, rate, force) in samples {
@@ -67,7 +71,7 @@ impl Motion {
     }
 
     /// Returns whether the motion over this time is known all along.
-    pub(super) fn is_whole(&self, from_s: f64, to_s: f64) -> bool {
+    pub fn is_whole(&self, from_s: f64, to_s: f64) -> bool {
         let next = self.breaks.partition_point(|time_s| *time_s < from_s);
         self.at(from_s).is_some()
             && self.at(to_s).is_some()
@@ -75,13 +79,13 @@ impl Motion {
     }
 
     /// The orientation at a time.
-    pub(super) fn turned(&self, time_s: f64) -> Option<UnitQuaternion<f64>> {
+    pub fn turned(&self, time_s: f64) -> Option<UnitQuaternion<f64>> {
         let (before, after, part) = self.at(time_s)?;
         Some(before.inertial_from_body.nlerp(&after.inertial_from_body, part))
     }
 
     /// The way fallen and moved at a time.
-    pub(super) fn way(&self, time_s: f64) -> Option<Vector3<f64>> {
+    pub fn way(&self, time_s: f64) -> Option<Vector3<f64>> {
         let (before, _, _) = self.at(time_s)?;
         let dt = time_s - before.time_s;
         Some(before.way + before.velocity * dt + before.force * (0.5 * dt * dt))

@@ -1,6 +1,6 @@
 //! The time by which a sensor is stamped later than the IMU, from what both measure of one motion.
 
-use super::motion::Motion;
+use super::Motion;
 use bb_core::nalgebra::{UnitQuaternion, Vector3};
 
 /// Turns are compared over this time, s.
@@ -51,7 +51,7 @@ pub(super) fn best(
 }
 
 /// Latency in words.
-pub(super) fn remark(latency_s: f64, imu: &str, what: &str) -> String {
+pub fn remark(latency_s: f64, imu: &str, what: &str) -> String {
     let order = if latency_s > 0.0 { "after" } else { "before" };
     let ms = latency_s.abs() * 1e3;
     format!("its stamps are {ms:.0} ms {order} those of {imu} for the same motion, as {what} of both show")
@@ -99,14 +99,14 @@ fn of_turns(
 }
 
 /// The latency of orientations, whichever frames they are between: angles are compared.
-pub(super) fn of_orientations(poses: &[(f64, UnitQuaternion<f64>)], motion: &Motion) -> Option<f64> {
+pub fn of_orientations(poses: &[(f64, UnitQuaternion<f64>)], motion: &Motion) -> Option<f64> {
     let times_s: Vec<f64> = poses.iter().map(|(time_s, _)| *time_s).collect();
     let turned = |from: usize, to: usize| (poses[to].1.inverse() * poses[from].1).angle();
     of_turns(&times_s, motion, turned, |from, to, end_from_start| (turned(from, to) - end_from_start.angle()).abs())
 }
 
 /// The latency of a field that is fixed in the world. Values that repeat the one before are no measurements.
-pub(super) fn of_field(fields: &[(f64, Vector3<f64>)], offset: &Vector3<f64>, motion: &Motion) -> Option<f64> {
+pub fn of_field(fields: &[(f64, Vector3<f64>)], offset: &Vector3<f64>, motion: &Motion) -> Option<f64> {
     let mut measured: Vec<(f64, Vector3<f64>)> = fields.to_vec();
     measured.dedup_by(|next, last| next.1 == last.1);
     let times_s: Vec<f64> = measured.iter().map(|(time_s, _)| *time_s).collect();
