@@ -12,7 +12,7 @@ use std::sync::{Mutex, PoisonError};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
 pub enum DropReason {
-    /// The driver arrived, but this input had not yet arrived or was too old.
+    /// The driving input arrived, but this input had not yet arrived or was too old.
     SyncMiss,
     /// The message was older than the last one of its input.
     OutOfOrder,
@@ -24,9 +24,9 @@ pub enum DropReason {
     Stopped,
     /// The estimator was busy and its inbox full.
     Overflow,
-    /// The driver arrived, but the state of a joint between this input and the output was unknown or too old.
+    /// The driving input arrived, but the state of a joint between this input and the output was unknown or too old.
     NoTransform,
-    /// The message waited for the driver, and newer ones took its place. Only an input of the type [`Every`](crate::Every) keeps
+    /// The message waited for the driving input, and newer ones took its place. Only an input of the type [`Every`](crate::Every) keeps
     /// several.
     Displaced,
 }
@@ -202,7 +202,7 @@ pub struct EstimatorStatistics {
     /// The reason of its last divergence.
     pub last_divergence: Option<&'static str>,
     /// The input and the reason of the last dropped message or run, if the estimator has not run since. It explains why an
-    /// estimator is lost although its driver publishes.
+    /// estimator is lost although its driving input arrives.
     pub last_drop: Option<(&'static str, DropReason)>,
     /// Reason for which the estimator is not running, if so.
     pub stopped: Option<String>,

@@ -149,7 +149,7 @@ impl<E: Estimator> Node<E> {
         }
     }
 
-    /// Keeps a message of an input that is not the driver until the driver's next message.
+    /// Keeps a message of another input until the next one of the driving input.
     #[inline(never)]
     pub fn hold<F: TakenAt<E::Input>>(
         &mut self,

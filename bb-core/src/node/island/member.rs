@@ -37,7 +37,7 @@ pub trait Member {
         turn: &Turn<'_>,
     );
 
-    /// The slots of its inputs. A single input is the driver's, whose message is not kept.
+    /// The slots of its inputs. A single input is the driving one, whose message is not kept.
     fn cache() -> <InputOf<Self> as Inputs>::Cache {
         Default::default()
     }
@@ -75,7 +75,7 @@ pub fn start<M: Member>(
     Node::new(M::NUMBER, options.of(component), binding, M::cache, environment)
 }
 
-/// The turn of an estimator: delivers a message to its driver, the declared input with that number, publishes what it emits, and lets it
+/// The turn of an estimator: delivers a message to its driving input, which has this number, publishes what it emits, and lets it
 /// continue if it asks to.
 ///
 /// A panic in the turn, whatever in it panics, is one of the estimator. The turns of those that take its outputs catch their own.
@@ -103,7 +103,7 @@ pub fn receive<M: Member, F: TakenAt<InputOf<M>>>(
     }
 }
 
-/// The turn of an estimator that gets a message of another input than the driver's.
+/// The turn of an estimator that gets a message of another input than the driving one.
 #[inline]
 pub fn hold<M: Member, F: TakenAt<InputOf<M>>>(
     island: &mut M::State,

@@ -115,8 +115,8 @@ impl Common {
         }
     }
 
-    /// Measures a callback that has begun; returns a reason if it exceeded its budget. `driver` is the input passed to the callback
-    /// and the message's stamp.
+    /// Measures a callback that has begun; returns a reason if it exceeded its budget. `driver` is the driving input and the
+    /// stamp of its message.
     pub(super) fn measure(
         &mut self,
         begun: Begun,
