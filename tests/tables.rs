@@ -1,4 +1,4 @@
-//! Tables in the guides that are made from the list of filters, from their parameters and from their figures.
+//! Tables in the guides that are made from the documentation of code, and from the figures of filters.
 //! `UPDATE_DOCS=1 cargo test -p bb-tests --test robots tables` renews them.
 
 // The accuracy tests use the rest of it.
@@ -10,9 +10,6 @@ mod known;
 mod known_families;
 
 use bb_estimators::attitude::{AnyFilter, AnyParams, AttitudeFilter, FilterParams, ImuSample};
-use bb_estimators::navigation::planar::{PlanarOptions, PlanarParams};
-use bb_estimators::navigation::{AlignmentParams, EskfParams, NavigationOptions, StreamParams};
-use bb_estimators::params::{Kind, Params};
 use bb_eval::Axes;
 use known::{Errors, Row};
 use std::error::Error;
@@ -39,15 +36,6 @@ fn hold(file: &str, name: &str, table: &str) {
     } else {
         assert_eq!(now, table, "{file}: the table `{name}` is another; UPDATE_DOCS=1 renews it");
     }
-}
-
-#[test]
-fn the_filters_and_when_to_take_them() {
-    let mut table = String::from("| filter | when to use it | idea |\n|---|---|---|\n");
-    for filter in filters() {
-        let _ = writeln!(table, "| `{}` | {} | {} |", filter.estimator(), filter.about().when, filter.about().idea);
-    }
-    hold("book/src/how-to/attitude.md", "filters", &table);
 }
 
 #[test]
@@ -158,45 +146,6 @@ fn what_filters_reach_on_families() -> Result<(), Box<dyn Error>> {
     }
     hold("book/src/laboratory/attitude.md", "families", &table);
     Ok(())
-}
-
-#[test]
-fn the_parameters() {
-    let mut text = String::new();
-    let eskf = (EskfParams::default(), NavigationOptions::default());
-    let (alignment, stream) = (AlignmentParams::default(), StreamParams::default());
-    let planar = (PlanarParams::default(), PlanarOptions::default());
-    let other: [(&str, &dyn Params); 6] = [
-        ("`Eskf` in `robot!` (`NavigationOptions`)", &eskf.1),
-        ("The navigation filter by itself (`EskfParams`)", &eskf.0),
-        ("Its start (`AlignmentParams`)", &alignment),
-        ("Its sensors (`StreamParams`)", &stream),
-        ("`PlanarEkf` in `robot!` (`PlanarOptions`)", &planar.1),
-        ("The planar filter by itself (`PlanarParams`)", &planar.0),
-    ];
-    for filter in filters() {
-        section(&mut text, &format!("`{}`", filter.estimator()), &filter);
-    }
-    for (title, params) in other {
-        section(&mut text, title, params);
-    }
-    hold("book/src/reference/parameters.md", "parameters", &text);
-}
-
-fn section(text: &mut String, title: &str, params: &dyn Params) {
-    let _ = write!(text, "\n## {title}\n\n| parameter | default | range | unit | |\n|---|---|---|---|---|\n");
-    for row in params.parameters() {
-        let value = params.get(row.name).expect("it is there");
-        let range = match row.kind {
-            Kind::Switch | Kind::Count => String::new(),
-            Kind::Choice(names) => names.join(", "),
-            Kind::Number | Kind::Process => row.range.to_string(),
-        };
-        let summary = row.summary().split_whitespace().collect::<Vec<_>>().join(" ");
-        // Links are those of the code's documentation.
-        let summary = summary.replace("[`", "`").replace("`]", "`");
-        let _ = writeln!(text, "| `{}` | {value} | {range} | {} | {summary} |", row.name, row.unit);
-    }
 }
 
 /// Documentation of code as a page: links to items become their names, and headings go below the title.

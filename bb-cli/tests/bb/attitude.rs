@@ -391,8 +391,6 @@ fn a_wrong_use_has_exit_code_2_and_a_way_out() {
     }
     assert_eq!(bb(&["eval", "attitude"]).code, Some(2));
     assert_eq!(bb(&[]).code, Some(2));
-    assert_eq!(bb(&["eval", "attitude", "--help"]).code, Some(0));
-    assert!(bb(&["--help"]).out.starts_with("Inspects, plots and converts recordings"));
 }
 
 #[test]

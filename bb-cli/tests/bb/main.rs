@@ -8,6 +8,7 @@ mod common;
 mod convert;
 mod doubts;
 mod guides;
+mod help;
 mod inspect;
 mod live;
 mod navigation;
