@@ -1,6 +1,6 @@
 //! Parameters of algorithms. Documentation, default, range and unit of each are stated once, in `params!`, and everything
 //! else is derived from there: the struct, its [`Default`], the options in `robot!`, the check at run time, setting by name
-//! from a text, and what the command and the guides print.
+//! from a text, and what the command prints.
 //!
 //! ```
 //! use bb_estimators::attitude::MadgwickParams;

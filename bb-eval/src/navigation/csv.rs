@@ -9,7 +9,18 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 impl DataSet {
-    /// Reads the files of a prefix, `folder/name` for `folder/name_imu.csv` and the others.
+    /// Reads the files of a prefix, `folder/name` for `folder/name_imu.csv` and the others. Each has a header row:
+    ///
+    /// | file | columns |
+    /// |---|---|
+    /// | `_imu` | t, angular velocity (rad/s), specific force (m/s²), dt: means over dt |
+    /// | `_keyframes` | k, t, imu_start (the first sample after the keyframe), truth_row, eval (1: score it) |
+    /// | `_truth` | t, position, quaternion (w first), velocity; NaN where unknown |
+    /// | `_vio`, optional | k_from, k_to, t_to, translation, quaternion, sigma_rot, sigma_t |
+    /// | `_anchor`, optional | k, t, position, quaternion, sigma_p, sigma_rot, is_outlier (not read) |
+    /// | `_gps`, optional | k, t, position, sigma_h, sigma_v; used if there is no `_vio` |
+    /// | `_init` | position, quaternion, velocity, biases of gyroscope and accelerometer, sigma_rot, sigma_p, sigma_v, sigma_bg, sigma_ba |
+    /// | `_noise` | densities of gyroscope, its random walk, accelerometer, its random walk; gravity |
     ///
     /// # Errors
     ///
