@@ -1,19 +1,13 @@
-//! Lines over two axes, with labels and a legend.
+//! Lines over two axes, with labels.
 
 use super::Drawn;
 use super::band::Band;
 use super::line::Line;
 use plotters::coord::Shift;
 use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 /// Font of labels, and its size in pixels.
-const FONT: (&str, u32) = ("sans-serif", 14);
-
-/// The key of a line in the legend, its distance to what is beside it, and the height of a row; pixels.
-const KEY: i32 = 18;
-const SPACE: i32 = 8;
-const ROW: i32 = 20;
+pub(super) const FONT: (&str, u32) = ("sans-serif", 14);
 
 /// Margin around the axes, pixels.
 const MARGIN: u32 = 6;
@@ -83,19 +77,8 @@ impl Frame<'_> {
         })
     }
 
-    /// Returns the first band of each label.
-    fn labels(&self) -> Vec<&Band> {
-        let mut bands: Vec<&Band> = Vec::new();
-        for band in self.bands {
-            if bands.iter().all(|known| known.label != band.label) {
-                bands.push(band);
-            }
-        }
-        bands
-    }
-
     /// Returns the value at which the axis is cut, if values are far beyond those of most points.
-    fn cut(&self) -> Option<Cut> {
+    pub(super) fn cut(&self) -> Option<Cut> {
         if !self.cuts_spikes {
             return None;
         }
@@ -128,18 +111,6 @@ impl Frame<'_> {
         is_whole.then_some(count as usize)
     }
 
-    /// The width of the legend, in pixels.
-    pub(super) fn legend_width<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> u32 {
-        let font = FONT.into_font().into_text_style(area);
-        let width = |line: &Line| area.estimate_text_size(&line.label, &font).map_or(0, |(width, _)| width);
-        let text = |text: &str| area.estimate_text_size(text, &font).map_or(0, |(width, _)| width);
-        let others =
-            self.labels().into_iter().map(|band| text(&band.label)).chain(self.cut().map(|cut| text(&cut.said)));
-        let widest = self.shown().map(width).chain(others).max().unwrap_or(0);
-        // The estimate is rough: add a tenth.
-        widest + widest / 10 + (KEY + 3 * SPACE).unsigned_abs()
-    }
-
     /// Returns the first and the last time, if this is over time.
     pub(super) fn times(&self) -> Option<(f64, f64)> {
         let times = || self.shown().flat_map(|line| &line.runs).flatten().map(|(time_s, _)| *time_s);
@@ -147,21 +118,12 @@ impl Frame<'_> {
         self.is_over_time.then_some((first, last))
     }
 
-    /// Draws it, with the legend in the `legend_width` pixels at the right, beside the data. `times` is the time axis.
+    /// Draws it without its title. `times` is the time axis.
     pub(super) fn draw<B: DrawingBackend>(
         &self,
         area: &DrawingArea<B, Shift>,
-        legend_width: u32,
         times: Option<(f64, f64)>,
     ) -> Drawn<B> {
-        let area = match self.title.is_empty() {
-            true => area.clone(),
-            false => area.titled(self.title, ("sans-serif", 17))?,
-        };
-        let width = area.dim_in_pixel().0;
-        let (area, legend) = area.split_horizontally(width.saturating_sub(legend_width));
-        self.draw_legend(&legend)?;
-
         let points = self.shown().flat_map(|line| &line.runs).flat_map(|run| self.placed(run));
         let (mut start, mut end, mut low, mut high) = (f64::MAX, f64::MIN, f64::MAX, f64::MIN);
         for (x, y) in points {
@@ -196,7 +158,7 @@ impl Frame<'_> {
             (low, high) = widened(low, high, per_pixel * height);
         }
         let (low, high) = (low, high);
-        let mut chart = ChartBuilder::on(&area)
+        let mut chart = ChartBuilder::on(area)
             .margin(MARGIN)
             .x_label_area_size(X_LABELS)
             .y_label_area_size(Y_LABELS)
@@ -245,40 +207,18 @@ impl Frame<'_> {
         }
         Ok(())
     }
-
-    fn draw_legend<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> Drawn<B> {
-        let font = FONT.into_font().into_text_style(area).pos(Pos::new(HPos::Left, VPos::Center));
-        let text = |label: &str, middle: i32| Text::new(label.to_owned(), (2 * SPACE + KEY, middle), font.clone());
-        let mut middle = ROW;
-        for line in self.shown() {
-            area.draw(&PathElement::new([(SPACE, middle), (SPACE + KEY, middle)], stroke(line)))?;
-            area.draw(&text(&line.label, middle))?;
-            middle += ROW;
-        }
-        for band in self.labels() {
-            let (red, green, blue) = band.colour;
-            let key = [(SPACE, middle - ROW / 3), (SPACE + KEY, middle + ROW / 3)];
-            area.draw(&Rectangle::new(key, RGBColor(red, green, blue).filled()))?;
-            area.draw(&text(&band.label, middle))?;
-            middle += ROW;
-        }
-        if let Some(cut) = self.cut() {
-            area.draw(&text(&cut.said, middle))?;
-        }
-        Ok(())
-    }
 }
 
-fn stroke(line: &Line) -> ShapeStyle {
+pub(super) fn stroke(line: &Line) -> ShapeStyle {
     let (red, green, blue) = line.colour;
     RGBColor(red, green, blue).stroke_width(line.width)
 }
 
 /// The ends of an axis that is cut, and what is beyond them.
-struct Cut {
+pub(super) struct Cut {
     low: f64,
     high: f64,
-    said: String,
+    pub(super) said: String,
 }
 
 /// Three digits of a number.

@@ -16,6 +16,7 @@
 
 mod band;
 mod frame;
+mod legend;
 mod line;
 mod palette;
 mod panel;
@@ -29,6 +30,7 @@ pub use panel::Panel;
 pub use plane::{Part, Plane, Sheet};
 
 use frame::{Frame, Row};
+use legend::Legend;
 
 use plotters::coord::Shift;
 use plotters::prelude::*;
@@ -96,27 +98,28 @@ fn write(file: &Path, title: &str, rows: &[Row<'_>], panel_size: (u32, u32)) -> 
 fn draw<B: DrawingBackend>(root: DrawingArea<B, Shift>, title: &str, rows: &[Row<'_>]) -> Drawn<B> {
     root.fill(&WHITE)?;
     let mut rest = root.titled(title, ("sans-serif", 24))?;
+    let legends = Legend::all(rows);
     // One width for all panels of a column, so that their time axes have equal length.
-    let legend = |column: usize| {
-        let frames = rows.iter().filter_map(|row| row.frames.get(column).filter(|_| row.frames.len() > 1));
-        frames.map(|frame| frame.legend_width(&rest)).max().unwrap_or(0)
+    let width = |column: usize, is_alone: bool| {
+        let column = legends.iter().filter(|row| (row.len() == 1) == is_alone).filter_map(|row| row.get(column));
+        column.map(|legend| legend.width(&rest)).max().unwrap_or(0)
     };
-    let alone = rows.iter().filter_map(|row| row.frames.first().filter(|_| row.frames.len() == 1));
-    let alone = alone.map(|frame| frame.legend_width(&rest)).max().unwrap_or(0);
+    let alone = width(0, true);
     let columns = rows.iter().map(|row| row.frames.len()).max().unwrap_or(0);
-    let legends: Vec<u32> = (0..columns).map(legend).collect();
+    let widths: Vec<u32> = (0..columns).map(|column| width(column, false)).collect();
     let times = rows.iter().flat_map(|row| &row.frames).filter_map(Frame::times);
     let times = times.reduce(|all, one| (all.0.min(one.0), all.1.max(one.1))).filter(|(first, last)| first < last);
     let height = rest.dim_in_pixel().1;
     let panels: u32 = rows.iter().map(|row| row.height).sum();
-    for row in rows {
+    for (row, legends) in rows.iter().zip(&legends) {
         let (area, below) = rest.split_vertically(height * row.height / panels.max(1));
-        match &row.frames[..] {
-            [frame] => frame.draw(&area, alone, times)?,
-            frames => {
-                for ((frame, area), legend) in frames.iter().zip(area.split_evenly((1, frames.len()))).zip(&legends)
-                {
-                    frame.draw(&area, *legend, times)?;
+        match (&row.frames[..], &legends[..]) {
+            ([frame], [legend]) => legend.draw_with(frame, &area, alone, times)?,
+            (frames, legends) => {
+                let beside = legends.iter().zip(&widths);
+                let areas = area.split_evenly((1, frames.len()));
+                for ((frame, area), (legend, width)) in frames.iter().zip(areas).zip(beside) {
+                    legend.draw_with(frame, &area, *width, times)?;
                 }
             }
         }
@@ -179,7 +182,7 @@ mod tests {
         assert!(right > 500.0, "the data take most of the room: {right}");
         let is_legend = |text: &&str| text.contains("truth") || text.contains("estimate");
         let legends: Vec<_> = svg.split("<text ").filter(is_legend).collect();
-        assert_eq!(legends.len(), 4);
+        assert_eq!(legends.len(), 2, "once in the picture");
         for legend in legends {
             let left = numbers(&format!("<text {legend}"), "text", "x")[0][0];
             assert!(left > right, "{left} {right}");
@@ -221,10 +224,10 @@ mod tests {
         let panel = panel.shade(&[band((10.0, 20.0)), band((90.0, 500.0))]);
         let two = Part::Row(vec![Part::Panel(panel.clone()), Part::Panel(panel)]);
         let svg = drawn(two, "bands");
-        assert_eq!(svg.matches("outage").count(), 2, "once for each panel");
+        assert_eq!(svg.matches("outage").count(), 1, "once in the picture");
         let filled: Vec<_> = svg.match_indices("#FADCB4").map(|(at, _)| at).collect();
-        assert_eq!(filled.len(), 6, "two bands and a key for each panel");
-        assert!(filled[5] < svg.rfind("<polyline").expect("has lines"));
+        assert_eq!(filled.len(), 5, "two bands for each panel, and a key");
+        assert!(filled[4] < svg.rfind("<polyline").expect("has lines"));
         // The second panel is beside the first.
         let lefts: Vec<f64> = numbers(&svg, "rect", "x").into_iter().flatten().collect();
         assert!(lefts.iter().any(|x| *x > 450.0) && lefts.iter().all(|x| *x < 900.0), "{lefts:?}");

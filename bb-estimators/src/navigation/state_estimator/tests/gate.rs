@@ -309,7 +309,8 @@ fn a_receiver_that_is_alone_moves_an_estimate_that_is_kilometres_off() {
                 }
                 sent => sent.to(&mut estimator),
             });
-            let newest = estimator.sink().iter().rev().take(12);
+            // With it, the keyframes of the window leave.
+            let newest = estimator.sink().iter().rev().take(40);
             let mut raised = newest.filter_map(|event| match event.kind {
                 EventKind::Degraded { reason: Reason::Overruled { nis: factor }, .. } => {
                     Some((event.time_ns, factor))
