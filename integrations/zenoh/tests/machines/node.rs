@@ -575,22 +575,20 @@ fn requests_that_are_too_long_are_refused_by_name() {
     let key = rest.key(0);
     let ask = |payload: usize, attachment: usize, parameters: usize| {
         let selector = format!("{key}?{}", "x".repeat(parameters));
-        let asked = session.get(selector).payload(vec![0; payload]).attachment(vec![0; attachment]);
-        let reply = asked.timeout(PATIENCE).wait().expect("it is asked").recv().expect("it is answered");
+        let once = || {
+            let asked = session.get(&selector).payload(vec![0; payload]).attachment(vec![0; attachment]);
+            asked.timeout(PATIENCE).wait().expect("it is asked").recv().ok()
+        };
+        // On a busy machine a link may be closed that stands still for a second.
+        let reply = (0..3).find_map(|_| once()).expect("it is answered");
         let told =
             reply.result().map_err(|error| error.payload().try_to_string().expect("it is text").into_owned());
         told.map(|_| ())
     };
     let left = 65_536 - key.len();
-    for (payload, attachment, parameters) in [
-        (left, 0, 0),
-        (0, left, 0),
-        (0, 0, left),
-        (left + 1, 0, 0),
-        (left, 33, 0),
-        (1, 0, left),
-        (10_000_000, 0, 0),
-    ] {
+    for (payload, attachment, parameters) in
+        [(left, 0, 0), (0, left, 0), (0, 0, left), (left + 1, 0, 0), (left, 33, 0), (1, 0, left), (1_000_000, 0, 0)]
+    {
         let size = payload + attachment + parameters + key.len();
         let expected = if size <= 65_536 {
             Ok(())
