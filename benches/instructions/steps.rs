@@ -84,7 +84,7 @@ pub(crate) const STEPS: &[Step] = &[
         name: "planar/position_with_gate",
         on: Some("planar/sample"),
         steps: USUAL,
-        stored: 5885.0,
+        stored: 5732.0,
         run: |steps| {
             planar(steps, |filter, stream, reading| {
                 let fix = PlanarPosition::new(reading.position.xy(), 1.0);
