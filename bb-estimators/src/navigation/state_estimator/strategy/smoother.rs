@@ -2,7 +2,7 @@
 //!
 //! The [filter](super::eskf) runs with the same inputs. It decides what is fused, finds the noise of the IMU and of fixes and whether the
 //! scale of relative poses drifts, and moves to where positions agree. Whenever another of its copies becomes the best, the window restarts
-//! in that copy's state, with its noise: what it has concluded with the noise of the one before is not as certain as it believes, or less.
+//! in that copy's state, with its noise: what it has concluded with another noise is more or less certain than its covariance says.
 //!
 //! Keyframes are the frames of the camera. Without a camera, they are made at intervals, and at measurements. A measurement between
 //! two keyframes is carried back to the earlier one by the motion since then.
