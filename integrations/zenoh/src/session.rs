@@ -17,8 +17,10 @@ use zenoh::Wait;
 const LEASE_MS: u32 = 1000;
 /// Signs of life within that time.
 const SIGNS_OF_LIFE: u32 = 4;
-/// Time that a machine has to introduce itself, in milliseconds. Of those that say nothing, 100 keep all others out until then, zenoh's 10 s.
+/// Time that a machine has to introduce itself, in milliseconds, and the number of those that have it at the same time: as many say nothing keep
+/// all others out until then, and for as long as they come again. zenoh's are 10 s and 100; it has as many sessions, at most, and each is an open file.
 const ACCEPT_MS: u32 = 2000;
+const ACCEPTED: usize = 1000;
 /// Bytes of a message in parts, at most: zenoh keeps up to 1 GiB of each that has begun. Longer ones are dropped.
 const MOST_BYTES: usize = 64 * 1024 * 1024;
 /// Times between two attempts to connect, in milliseconds.
@@ -49,7 +51,7 @@ pub struct SessionSettings {
     pub mode: Mode,
     /// Endpoints to listen on: `tcp/127.0.0.1:7447`, with port 0 for any. A session that cannot listen there is not opened.
     pub listen: Vec<String>,
-    /// Endpoints to connect to, tried again until they answer.
+    /// Endpoints to connect to, tried again until they answer. A session of a client is not opened unless one answers at once.
     pub connect: Vec<String>,
     /// A file of zenoh's own configuration, in JSON5: what is written there goes before all else. It is the place of certificates, users
     /// and rights.
@@ -111,14 +113,12 @@ impl SessionSettings {
             "listen": { "endpoints": self.listen, "exit_on_failure": true },
             "connect": {
                 "endpoints": self.connect,
-                "timeout_ms": 0,
-                "exit_on_failure": false,
                 "retry": { "period_init_ms": first, "period_max_ms": longest, "period_increase_factor": 2 },
             },
             "scouting": { "multicast": { "enabled": false }, "gossip": gossip },
             // Else what comes from a machine whose clock is ahead is refused, or gets another time.
             "timestamping": { "enabled": false },
-            "transport": { "unicast": { "accept_timeout": ACCEPT_MS }, "link": {
+            "transport": { "unicast": { "accept_timeout": ACCEPT_MS, "accept_pending": ACCEPTED }, "link": {
                 "tx": {
                     "lease": LEASE_MS,
                     "keep_alive": SIGNS_OF_LIFE,
@@ -195,7 +195,7 @@ impl Session {
     /// Returns the session with these settings, which is opened if it is not open yet.
     ///
     /// # Errors
-    /// The configuration is not usable, or an endpoint to listen on is in use. An endpoint to connect to that does not answer is no error.
+    /// The configuration is not usable, an endpoint to listen on is in use, or the router of a client does not answer.
     pub fn open(settings: &SessionSettings) -> Result<Self, SessionError> {
         let configuration = settings.configuration()?;
         let slot = {
@@ -261,6 +261,7 @@ mod tests {
             ("transport/link/tx/keep_alive", json!(4)),
             ("transport/link/tx/queue/congestion_control/block/wait_before_close", json!(1_000_000)),
             ("transport/unicast/accept_timeout", json!(2000)),
+            ("transport/unicast/accept_pending", json!(1000)),
             ("transport/link/rx/max_message_size", json!(67_108_864)),
             ("listen/endpoints", json!(["tcp/127.0.0.1:0"])),
             ("connect/endpoints", json!([])),
@@ -316,6 +317,25 @@ mod tests {
         assert!(!opening.is_finished(), "the other was opened meanwhile");
         drop((_accepted, silent));
         let _ = opening.join().expect("it does not panic");
+    }
+
+    #[test]
+    fn an_endpoint_that_does_not_answer_yet_is_tried_again() {
+        let free =
+            TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr()).expect("one is free");
+        let endpoint = vec![format!("tcp/{free}")];
+        for mode in [Mode::Peer, Mode::Router] {
+            let early = SessionSettings { mode, connect: endpoint.clone(), ..SessionSettings::default() };
+            let early = Session::open(&early).expect("it is opened");
+            let late =
+                SessionSettings { mode: Mode::Router, listen: endpoint.clone(), ..SessionSettings::default() };
+            let _late = Session::open(&late).expect("it is opened");
+            let waited = std::time::Instant::now();
+            while early.info().routers_zid().wait().next().is_none() {
+                assert!(waited.elapsed() < Duration::from_secs(30), "{mode:?}");
+                thread::sleep(Duration::from_millis(10));
+            }
+        }
     }
 
     #[test]
