@@ -122,8 +122,9 @@ impl SessionSettings {
                 "tx": {
                     "lease": LEASE_MS,
                     "keep_alive": SIGNS_OF_LIFE,
-                    // A machine that takes nothing for as long is gone as well: threads that send, and those that receive, wait for it.
-                    "queue": { "congestion_control": { "block": { "wait_before_close": LEASE_MS * 1000 } } },
+                    // A machine that takes nothing for half as long is gone as well: threads that send wait for it, and so do zenoh's that receive, as
+                    // they answer, or wait for routes that one that sends holds. Meanwhile they do not see the signs of life of all others.
+                    "queue": { "congestion_control": { "block": { "wait_before_close": LEASE_MS * 1000 / 2 } } },
                 },
                 "rx": { "max_message_size": MOST_BYTES },
             } },
@@ -259,7 +260,7 @@ mod tests {
             ("timestamping/enabled", json!(false)),
             ("transport/link/tx/lease", json!(1000)),
             ("transport/link/tx/keep_alive", json!(4)),
-            ("transport/link/tx/queue/congestion_control/block/wait_before_close", json!(1_000_000)),
+            ("transport/link/tx/queue/congestion_control/block/wait_before_close", json!(500_000)),
             ("transport/unicast/accept_timeout", json!(2000)),
             ("transport/unicast/accept_pending", json!(1000)),
             ("transport/link/rx/max_message_size", json!(67_108_864)),

@@ -154,25 +154,29 @@ fn a_flood_of_requests_does_not_keep_the_robot_from_being_disarmed() {
     });
 }
 
-/// Asks in three sessions for what is refused at length, and takes no answer.
+/// Asks in three sessions for what is refused at length, more often than it can be, and takes no answer.
 fn ask_without_reading(endpoint_of_robot: String) {
     let sessions: Vec<Session> =
         (1..=3).map(|count| connected(vec![endpoint_of_robot.clone(); count], None)).collect();
     assert!(until(|| sessions.iter().all(|session| session.info().routers_zid().wait().next().is_some())));
     let rest = announced(&sessions[0], EndpointKind::Service, "/small_cart/rest").address;
-    let other = rest.key(0).replace(&rest.type_hash.to_string(), &"x".repeat(20_000));
-    loop {
+    let other = rest.key(0).replace(&rest.type_hash.to_string(), &"x".repeat(2_000));
+    std::thread::scope(|scope| {
         for session in &sessions {
-            let asked = session.get(&other).timeout(PATIENCE).callback(|_| {
+            scope.spawn(|| {
                 loop {
-                    std::thread::sleep(PATIENCE);
+                    let asked = session.get(&other).timeout(PATIENCE).callback(|_| {
+                        loop {
+                            std::thread::sleep(PATIENCE);
+                        }
+                    });
+                    // Its connection may be closed meanwhile.
+                    let _ = asked.wait();
+                    std::thread::sleep(Duration::from_micros(100));
                 }
             });
-            // Its connection may be closed meanwhile.
-            let _ = asked.wait();
         }
-        std::thread::sleep(Duration::from_millis(5));
-    }
+    });
 }
 
 #[test]
@@ -188,16 +192,16 @@ fn clients_that_do_not_read_do_not_keep_the_robot_from_being_disarmed() {
     let _peer = OtherProcess::peer_of(test, &bridge.endpoints()[0]);
     let begun = Instant::now();
     let mut slowest = Duration::ZERO;
-    while begun.elapsed() < Duration::from_secs(6) {
+    while begun.elapsed() < Duration::from_secs(10) {
         let asked = Instant::now();
-        // A thread that receives may be held up for as long as a link lives without a sign of life: then it is made again.
+        // Its link is closed only if a busy machine gives no sign of life.
         let answer = std::iter::repeat_with(|| triggered(&session, &disarm, Gid([1; 16])));
-        assert_eq!(answer.take(20).flatten().next(), Some((true, "disarmed".to_owned())));
+        assert_eq!(answer.take(2).flatten().next(), Some((true, "disarmed".to_owned())));
         slowest = slowest.max(asked.elapsed());
         std::thread::sleep(Duration::from_millis(20));
     }
     println!("the slowest took {slowest:?}");
-    assert!(slowest < Duration::from_secs(4), "{slowest:?}");
+    assert!(slowest < Duration::from_secs(2), "{slowest:?}");
 }
 
 #[test]
