@@ -18,25 +18,10 @@ pub(crate) async fn relay(
 ) -> Result<()> {
     let mut message = 0_u64;
     loop {
-        // RFC 6455, 5.2: flags and opcode, length, longer length, mask.
-        let mut head = [0; 14];
-        client.read_exact(&mut head[..2]).await?;
+        let (head, length) = head(&mut client).await?;
         pulse.notify_one();
-        let [flags, short] = [head[0], head[1]];
-        let is_last = flags & 0x80 != 0;
-        let is_control = flags & 0x08 != 0;
-        let wide = match short & 0x7f {
-            126 => 2,
-            127 => 8,
-            _ => 0,
-        };
-        let masked = if short & 0x80 != 0 { 4 } else { 0 };
-        let rest = &mut head[2..2 + wide + masked];
-        client.read_exact(rest).await?;
-        let length = match wide {
-            0 => u64::from(short & 0x7f),
-            _ => rest[..wide].iter().fold(0, |length, byte| length << 8 | u64::from(*byte)),
-        };
+        let is_last = head[0] & 0x80 != 0;
+        let is_control = head[0] & 0x08 != 0;
         let before = if is_control { 0 } else { message };
         if before.saturating_add(length) > MOST_BYTES {
             return Err(Error::new(ErrorKind::InvalidData, "its message is too long"));
@@ -44,9 +29,30 @@ pub(crate) async fn relay(
         if !is_control {
             message = if is_last { 0 } else { before + length };
         }
-        server.write_all(&head[..2 + wide + masked]).await?;
+        server.write_all(&head).await?;
         if copy(&mut (&mut client).take(length), &mut server).await? < length {
             return Err(ErrorKind::UnexpectedEof.into());
         }
     }
+}
+
+/// The head of a frame, and the number of bytes after it.
+pub(crate) async fn head(from: &mut (impl AsyncRead + Unpin)) -> Result<(Vec<u8>, u64)> {
+    // RFC 6455, 5.2: flags and opcode, length, longer length, mask.
+    let mut head = vec![0; 2];
+    from.read_exact(&mut head).await?;
+    let short = head[1] & 0x7f;
+    let wide = match short {
+        126 => 2,
+        127 => 8,
+        _ => 0,
+    };
+    let masked = if head[1] & 0x80 != 0 { 4 } else { 0 };
+    head.resize(2 + wide + masked, 0);
+    from.read_exact(&mut head[2..]).await?;
+    let length = match wide {
+        0 => u64::from(short),
+        _ => head[2..2 + wide].iter().fold(0, |length, byte| length << 8 | u64::from(*byte)),
+    };
+    Ok((head, length))
 }

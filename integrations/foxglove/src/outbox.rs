@@ -1,6 +1,7 @@
 //! The queue of one client. The server's own queue drops messages without saying so; it is read without delay, so that messages wait, and
 //! are counted, here.
 
+use crate::inbound::head;
 use std::collections::VecDeque;
 use std::io::{Error, ErrorKind, Result};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -173,23 +174,12 @@ impl<'a> Outbox<'a> {
     }
 }
 
-/// The next frame of a server, which does not mask them; `None` at the end.
+/// The next frame of a server; `None` at the end.
 async fn frame(server: &mut (impl AsyncRead + AsyncBufReadExt + Unpin)) -> Result<Option<Frame>> {
     if server.fill_buf().await?.is_empty() {
         return Ok(None);
     }
-    let mut bytes = vec![0; 2];
-    server.read_exact(&mut bytes).await?;
-    let length = bytes[1] & 0x7f;
-    let more = match length {
-        126 => 2,
-        127 => 8,
-        _ => 0,
-    };
-    let mut extended = [0; 8];
-    server.read_exact(&mut extended[8 - more..]).await?;
-    bytes.extend_from_slice(&extended[8 - more..]);
-    let length = if more == 0 { u64::from(length) } else { u64::from_be_bytes(extended) };
+    let (mut bytes, length) = head(server).await?;
     let head = bytes.len();
     // As it comes: a length alone reserves nothing.
     if server.take(length).read_to_end(&mut bytes).await? as u64 != length {
