@@ -104,7 +104,9 @@ impl Runs {
         });
         let run = &mut self.heard[index];
         run.last = run.last.max(now);
-        run
+        // The next question may be due as of one that does not answer: until then, all that it measures could be as old as the one before.
+        self.next_question = self.next_question.min(now + self.pace(now));
+        &mut self.heard[index]
     }
 
     fn answer(&mut self, answer: ClockAnswer, asked: MonotonicTime, heard: MonotonicTime) {
@@ -236,6 +238,13 @@ mod tests {
         assert_eq!(runs.trust(2, at(300)), Trust::New);
         runs.hear(2, at(1100));
         assert_eq!(runs.trust(2, at(1100)), Trust::Alone);
+    }
+
+    #[test]
+    fn one_that_is_heard_is_asked_as_one_that_is_there() {
+        let mut runs = Runs { next_question: at(1000) + UNANSWERED, ..Runs::default() };
+        runs.hear(1, at(1005));
+        assert_eq!(runs.next_question, at(1005) + FIRST);
     }
 
     #[test]
