@@ -1,12 +1,12 @@
 //! The clients on the other side: each acts in a session of the robot that ends when its token is gone.
 
 use crate::node::RosNode;
-use crate::session::SessionError;
+use crate::session::{SessionError, lock};
 use bb_core::Bus;
 use bb_core::component::Session;
 use bb_ros2::{EndpointKind, Gid, Token, tokens_of};
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use zenoh::Wait;
 use zenoh::pubsub::Subscriber;
 use zenoh::sample::SampleKind;
@@ -47,7 +47,7 @@ impl Clients {
                 return;
             }
             let gid = Gid::of(key);
-            let mut clients = clients.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut clients = lock(&clients);
             match sample.kind() {
                 SampleKind::Delete => {
                     if let Some(client) = clients.get_mut(&gid) {
@@ -73,7 +73,7 @@ impl Clients {
 
     /// The bus that acts in the name of a client, `ros2 /operator`, while that is there; of one that no node has, `ros2`, without an end.
     pub(crate) fn bus(&self, client: Option<Gid>) -> Bus {
-        let known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = lock(&self.known);
         client.and_then(|client| known.get(&client)).map_or_else(|| self.bus.clone(), |client| client.session.bus())
     }
 }

@@ -6,10 +6,10 @@ use crate::node::{RosNode, RosSubscription};
 use bb_core::component::Description;
 use bb_core::{Bus, Fault};
 use bb_ros2::Address;
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 
 /// Messages that wait for the robot, of all inputs. Beyond that they are refused, and counted: what zenoh's threads waited for would be late
@@ -54,13 +54,11 @@ impl Inputs {
                 }
             };
             let (refused, hash) = (Arc::clone(counts), address.type_hash);
-            // Each other hash once, of no more than can be of use.
-            let seen = Mutex::new(HashSet::new());
+            let of_other_type = Repetitions::default();
             let refuse = move |other: &str| {
                 Counts::add(&refused.refused, 1);
-                let mut seen = seen.lock().unwrap_or_else(PoisonError::into_inner);
-                if seen.len() < 16 && seen.insert(other.to_owned()) {
-                    tracing::warn!(path, %hash, other, "messages of another definition of their type are refused");
+                if let Some(times) = of_other_type.add() {
+                    tracing::warn!(path, %hash, other, times, "a message of another definition of its type is refused");
                 }
             };
             subscriptions.push(node.subscription(&address, receive, refuse)?);

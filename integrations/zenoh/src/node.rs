@@ -193,7 +193,6 @@ fn wall_ns() -> i64 {
 }
 
 /// A publisher.
-#[derive(Debug)]
 pub(crate) struct RosPublisher {
     wire: Wire,
     name: String,
@@ -205,15 +204,6 @@ pub(crate) struct RosPublisher {
 enum Wire {
     Plain(Publisher<'static>),
     Latched(Box<AdvancedPublisher<'static>>),
-}
-
-impl std::fmt::Debug for Wire {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Plain(_) => "Plain",
-            Self::Latched(_) => "Latched",
-        })
-    }
 }
 
 impl RosPublisher {

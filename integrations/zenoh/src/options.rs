@@ -1,6 +1,6 @@
 //! The options of the bridge.
 
-use crate::session::{Mode, SessionSettings};
+use crate::session::{Mode, SessionSettings, list};
 use bb_core::event::{Right, Rights};
 use bb_core::{Fault, Options};
 
@@ -82,10 +82,6 @@ impl Ros2Options {
     pub(crate) fn subscribed(&self) -> Vec<String> {
         list(&self.subscribe)
     }
-}
-
-fn list(text: &str) -> Vec<String> {
-    text.split_whitespace().map(str::to_owned).collect()
 }
 
 #[cfg(test)]

@@ -53,12 +53,11 @@ pub use share::{OwnClock, ShownClock};
 pub use share::{Share, ShareOptions, SharedMessages};
 pub use source::Source;
 
-use crate::session::SessionSettings;
+use crate::session::{SessionSettings, list};
 use std::path::Path;
 
 /// The session of components with these options.
 fn settings(listen: &str, connect: &str, config: &Path) -> SessionSettings {
-    let endpoints = |text: &str| text.split_whitespace().map(str::to_owned).collect();
     let file = Some(config.to_owned()).filter(|path| !path.as_os_str().is_empty());
-    SessionSettings { listen: endpoints(listen), connect: endpoints(connect), file, ..SessionSettings::default() }
+    SessionSettings { listen: list(listen), connect: list(connect), file, ..SessionSettings::default() }
 }

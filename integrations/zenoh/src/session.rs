@@ -122,8 +122,8 @@ impl SessionSettings {
                 "tx": {
                     "lease": LEASE_MS,
                     "keep_alive": SIGNS_OF_LIFE,
-                    // A machine that takes nothing for half as long is gone as well: threads that send wait for it, and so do zenoh's that receive, as
-                    // they answer, or wait for routes that one that sends holds. Meanwhile they do not see the signs of life of all others.
+                    // A machine that takes nothing for half as long is gone as well: threads that send wait for it, and so do zenoh's that receive, when
+                    // they answer or declare. Meanwhile they do not see the signs of life of all others.
                     "queue": { "congestion_control": { "block": { "wait_before_close": LEASE_MS * 1000 / 2 } } },
                 },
                 "rx": { "max_message_size": MOST_BYTES },
@@ -141,6 +141,11 @@ impl SessionSettings {
         zenoh::Config::from_json5(&configuration.to_string())
             .map_err(|error| SessionError::Configuration(error.to_string()))
     }
+}
+
+/// The endpoints, or paths, that are separated by spaces.
+pub(crate) fn list(text: &str) -> Vec<String> {
+    text.split_whitespace().map(str::to_owned).collect()
 }
 
 /// Writes what `over` has over `value`; lists are exchanged as a whole.
@@ -188,7 +193,8 @@ type Slot = Arc<Mutex<Weak<Opened>>>;
 
 static SESSIONS: LazyLock<Mutex<HashMap<SessionSettings, Slot>>> = LazyLock::new(Mutex::default);
 
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+/// Locks it also if a thread has panicked that held it.
+pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 

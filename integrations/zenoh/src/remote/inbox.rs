@@ -1,10 +1,11 @@
 //! Messages that wait for a sensor.
 
 use super::wire::Attachment;
+use crate::session::lock;
 use bb_core::MonotonicTime;
 use std::collections::VecDeque;
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant};
+use std::sync::{Condvar, Mutex, PoisonError};
+use std::time::Duration;
 
 /// Messages that wait; the oldest makes room for another, and shows as a gap in the numbers.
 const CAPACITY: usize = 64;
@@ -35,7 +36,7 @@ pub(super) struct Inbox {
 
 impl Inbox {
     pub(super) fn put(&self, arrived: Arrived) {
-        let mut waiting = self.lock();
+        let mut waiting = lock(&self.waiting);
         let bytes = |waiting: &VecDeque<Arrived>| waiting.iter().map(|message| message.bytes.len()).sum::<usize>();
         while !waiting.is_empty()
             && (waiting.len() >= CAPACITY || bytes(&waiting) + arrived.bytes.len() > MOST_BYTES)
@@ -48,21 +49,7 @@ impl Inbox {
 
     /// The oldest message; waits for one until `timeout`.
     pub(super) fn take(&self, timeout: Duration) -> Option<Arrived> {
-        let deadline = Instant::now() + timeout;
-        let mut waiting = self.lock();
-        loop {
-            if let Some(arrived) = waiting.pop_front() {
-                return Some(arrived);
-            }
-            let left = deadline.saturating_duration_since(Instant::now());
-            if left.is_zero() {
-                return None;
-            }
-            waiting = self.changed.wait_timeout(waiting, left).unwrap_or_else(PoisonError::into_inner).0;
-        }
-    }
-
-    fn lock(&self) -> MutexGuard<'_, VecDeque<Arrived>> {
-        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
+        let waited = self.changed.wait_timeout_while(lock(&self.waiting), timeout, |waiting| waiting.is_empty());
+        waited.unwrap_or_else(PoisonError::into_inner).0.pop_front()
     }
 }

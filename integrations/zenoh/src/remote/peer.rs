@@ -2,11 +2,11 @@
 
 use super::clock::{Converted, Exchange, PeerClock};
 use super::wire::{ClockAnswer, clock_key};
-use crate::session::{Session, SessionError, SessionSettings};
+use crate::session::{Session, SessionError, SessionSettings, lock};
 use bb_core::MonotonicTime;
 use bb_core::time::Clock;
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use zenoh::Wait;
 use zenoh::query::{ConsolidationMode, QueryTarget};
@@ -14,7 +14,8 @@ use zenoh::query::{ConsolidationMode, QueryTarget};
 /// Exchanges after which a clock is known well.
 const FIRST_EXCHANGES: u64 = 50;
 /// Times from one question to the next: at first, then, and while nobody answers. With delays of 5 ± 3 ms, of 100 bounds 99 are within
-/// 0.8 ms of half of the least round trip with a question each 50 ms, 0.5 ms with 20 ms, 0.4 ms with 10 ms and 0.2 ms with 2 ms.
+/// 0.8 ms of half of the least round trip with a question each 50 ms, 0.5 ms with 20 ms, 0.4 ms with 10 ms and 0.2 ms with 2 ms. On a link it
+/// is the same as in a model without threads: it is the delays that vary, and between its two times, a peer takes 2 µs.
 const FIRST: Duration = Duration::from_millis(10);
 const LATER: Duration = Duration::from_millis(20);
 const UNANSWERED: Duration = Duration::from_millis(200);
@@ -215,10 +216,6 @@ impl Peer {
     pub(super) fn last_heard(&self) -> Option<MonotonicTime> {
         lock(&self.runs).heard.iter().map(|run| run.last).max()
     }
-}
-
-pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[cfg(test)]

@@ -1,12 +1,12 @@
 //! The sensor.
 
 use super::inbox::{Arrived, Inbox};
-use super::peer::{Peer, Peers, Trust, lock};
+use super::peer::{Peer, Peers, Trust};
 use super::settings;
 use super::source::Source;
 use super::tally::{Number, Place, Tally};
 use super::wire::{Attachment, any_layout, hash_in};
-use crate::session::SessionError;
+use crate::session::{SessionError, lock};
 use bb_core::component::Counter;
 use bb_core::message::codec::decode;
 use bb_core::time::Clock;

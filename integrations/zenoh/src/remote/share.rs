@@ -2,7 +2,7 @@
 
 use super::settings;
 use super::wire::{Attachment, ClockAnswer, clock_key, message_key};
-use crate::session::{Session, SessionError};
+use crate::session::{Session, SessionError, list};
 use bb_core::pubsub::DynamicSubscription;
 use bb_core::time::Clock;
 use bb_core::{
@@ -136,7 +136,7 @@ impl<C: ShownClock> Service for Share<C> {
             session,
             number,
             robot,
-            paths: options.paths.split_whitespace().map(str::to_owned).collect(),
+            paths: list(&options.paths),
             outlets: BTreeMap::new(),
             _answers: answers,
             refreshed: None,

@@ -1,4 +1,4 @@
-//! What the robot publishes, and what it takes.
+//! Topics that the robot publishes, and those that it takes.
 
 use super::{SmallCart, announced, bridged, endpoint, imu, options, other, tokens, trigger};
 use crate::kit::{PATIENCE, until};
