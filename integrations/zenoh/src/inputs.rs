@@ -2,7 +2,7 @@
 
 use crate::counts::{Counts, Repetitions};
 use crate::error::Ros2Error;
-use crate::node::{RosNode, RosSubscription};
+use crate::node::{RosNode, RosSubscription, address};
 use bb_core::component::Description;
 use bb_core::{Bus, Fault};
 use bb_ros2::Address;
@@ -42,7 +42,7 @@ impl Inputs {
         let waiting_bytes = Arc::<AtomicUsize>::default();
         let mut subscriptions = Vec::new();
         for path in paths {
-            let (path, address) = address(node, description, path)?;
+            let (path, address) = input(node, description, path)?;
             let (messages, full, all) = (messages.clone(), Arc::clone(counts), Arc::clone(&waiting_bytes));
             let receive = move |bytes: Vec<u8>| {
                 let length = bytes.len();
@@ -87,8 +87,8 @@ impl Drop for Inputs {
     }
 }
 
-/// The address of the messages for a path.
-fn address(node: &RosNode, description: &Description, path: &str) -> Result<(&'static str, Address), Ros2Error> {
+/// The path of an input, and the address of the messages for it.
+fn input(node: &RosNode, description: &Description, path: &str) -> Result<(&'static str, Address), Ros2Error> {
     let refused = |why: &str| Ros2Error::Options(Fault::new(format!("`subscribe` has `{path}`: {why}")));
     let Some(topic) = description.topic(path) else {
         return Err(refused("the robot has no topic there"));
@@ -99,9 +99,7 @@ fn address(node: &RosNode, description: &Description, path: &str) -> Result<(&'s
     let (Some(name), Some(hash)) = (topic.layouts.ros_schema(), topic.layouts.ros_type_hash()) else {
         return Err(refused(&format!("ROS has no message for its payload `{}`", topic.payload)));
     };
-    let address =
-        Address { name: node.node().topic(path)?, type_name: name.name.parse()?, type_hash: hash.parse()? };
-    Ok((topic.path, address))
+    Ok((topic.path, address(node.node().topic(path)?, &name.name, &hash)?))
 }
 
 /// Publishes what comes, in the robot, until it is to end.

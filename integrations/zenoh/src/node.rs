@@ -2,7 +2,7 @@
 
 use crate::counts::Repetitions;
 use crate::session::{Session, SessionError};
-use bb_ros2::{Address, Attachment, Endpoint, EndpointKind, Gid, Node, Qos, Token, TypeHash};
+use bb_ros2::{Address, Attachment, Endpoint, EndpointKind, Gid, Node, Qos, Token, TypeError, TypeHash};
 use std::fmt::Display;
 use std::sync::Arc;
 use std::sync::mpsc::{SyncSender, TrySendError};
@@ -172,6 +172,11 @@ impl RosNode {
         let (token, _) = self.endpoint(EndpointKind::Service, address, Qos::reliable(10))?;
         Ok(RosService { _queryable: queryable, _token: token })
     }
+}
+
+/// An address by the texts of its type.
+pub(crate) fn address(name: String, type_name: &str, type_hash: &str) -> Result<Address, TypeError> {
+    Ok(Address { name, type_name: type_name.parse()?, type_hash: type_hash.parse()? })
 }
 
 fn declare_token(session: &Session, token: &str) -> Result<LivelinessToken, SessionError> {

@@ -4,7 +4,7 @@ use crate::counts::{Counts, Repetitions};
 use crate::diagnostics::diagnostics;
 use crate::error::Ros2Error;
 use crate::messages::{Clock, DiagnosticArray, Parameter, ParameterEvent, bytes_of};
-use crate::node::{RosNode, RosPublisher};
+use crate::node::{RosNode, RosPublisher, address};
 use crate::parameters::value_of;
 use bb_core::component::{Description, RunKind};
 use bb_core::event::ParameterChange;
@@ -78,11 +78,7 @@ impl Outputs {
             bus.subscribe_any(Select::All, ParameterChange::NAME, Overflow::DropOldest { capacity: WAITING });
         let mut viewed = HashMap::new();
         for channel in ViewerChannel::ALL {
-            let address = Address {
-                name: channel.topic().to_owned(),
-                type_name: channel.schema().name.parse()?,
-                type_hash: channel.type_hash().parse()?,
-            };
+            let address = address(channel.topic().to_owned(), &channel.schema().name, &channel.type_hash())?;
             let qos = if channel.is_latched() { Qos::LATCHED } else { Qos::reliable(DEPTH) };
             viewed.insert(channel, node.publisher(&address, qos)?);
         }
@@ -144,8 +140,7 @@ impl Outputs {
             _ => (layouts.schema(), layouts.type_hash(), true),
         };
         let publisher = |name: String, schema: &str, hash: &str| -> Result<RosPublisher, Ros2Error> {
-            let address = Address { name, type_name: schema.parse()?, type_hash: hash.parse()? };
-            Ok(self.node.publisher(&address, Qos::reliable(DEPTH))?)
+            Ok(self.node.publisher(&address(name, schema, hash)?, Qos::reliable(DEPTH))?)
         };
         let companion = match (layouts.ros_companion(), layouts.ros_companion_type_hash()) {
             (Some((topic, schema)), Some(hash)) if !is_exact => {
@@ -285,6 +280,5 @@ fn put(publisher: &mut RosPublisher, message: Vec<u8>, counts: &Counts) {
 /// The address of a message of ROS's own at a topic.
 fn message_of<T: Field>(topic: &str) -> Result<Address, Ros2Error> {
     let name = if let Shape::Struct(shape) = T::SHAPE { shape.name } else { "" };
-    let type_name = name.replacen('/', "/msg/", 1).parse()?;
-    Ok(Address { name: topic.to_owned(), type_name, type_hash: type_hash(name, T::SHAPE).parse()? })
+    Ok(address(topic.to_owned(), &name.replacen('/', "/msg/", 1), &type_hash(name, T::SHAPE))?)
 }

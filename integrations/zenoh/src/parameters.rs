@@ -7,7 +7,7 @@ use crate::messages::{
 use bb_core::component::ParameterDescription;
 use bb_core::event::ParameterValue;
 use bb_core::message::DecodeError;
-use bb_core::message::codec::{Shape, service_hash};
+use bb_core::message::codec::service_hash;
 use bb_core::{Bus, Field};
 use bb_ros2::{parameter_name, parameter_path};
 use std::collections::HashMap;
@@ -38,9 +38,9 @@ impl ParameterService {
     pub(crate) const ALL: [Self; 6] =
         [Self::Get, Self::Types, Self::Describe, Self::List, Self::Set, Self::SetAtomically];
 
-    /// Name of the service below the node, type, and the shapes of request and response.
-    const fn declaration(self) -> (&'static str, &'static str, Shape, Shape) {
-        match self {
+    /// The name of the service below the node, and the name and the hash of its type.
+    pub(crate) fn declaration(self) -> (&'static str, String, String) {
+        let (name, kind, request, response) = match self {
             Self::Get => ("get_parameters", "GetParameters", Names::SHAPE, Values::SHAPE),
             Self::Types => ("get_parameter_types", "GetParameterTypes", Names::SHAPE, Types::SHAPE),
             Self::Describe => ("describe_parameters", "DescribeParameters", Names::SHAPE, Descriptors::SHAPE),
@@ -49,23 +49,10 @@ impl ParameterService {
             Self::SetAtomically => {
                 ("set_parameters_atomically", "SetParametersAtomically", Parameters::SHAPE, SetAll::SHAPE)
             }
-        }
-    }
-
-    /// The name of the service below the node.
-    pub(crate) const fn name(self) -> &'static str {
-        self.declaration().0
-    }
-
-    /// The name of its type.
-    pub(crate) fn type_name(self) -> String {
-        format!("rcl_interfaces/srv/{}", self.declaration().1)
-    }
-
-    /// The hash of its type.
-    pub(crate) fn type_hash(self) -> String {
-        let (_, _, request, response) = self.declaration();
-        service_hash(&self.type_name(), request, response)
+        };
+        let type_name = format!("rcl_interfaces/srv/{kind}");
+        let type_hash = service_hash(&type_name, request, response);
+        (name, type_name, type_hash)
     }
 
     /// The response to a request, both in CDR. Only the rights of the bus limit it.

@@ -4,12 +4,12 @@ use crate::clients::Clients;
 use crate::counts::{Counts, Repetitions};
 use crate::error::Ros2Error;
 use crate::messages::{Nothing, Outcome, bytes_of};
-use crate::node::{Refusal, Request, RosNode, RosService};
+use crate::node::{Refusal, Request, RosNode, RosService, address};
 use crate::parameters::ParameterService;
 use bb_core::component::{Description, DisarmQueue};
 use bb_core::message::codec::{Shape, bytes_to_json, service_hash};
 use bb_core::{Bus, Field, Role};
-use bb_ros2::{Address, command_type};
+use bb_ros2::command_type;
 use std::fmt::Display;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -68,9 +68,6 @@ impl Services {
         let (refusals, refused_requests) = sync_channel(REFUSED);
         let full = |request: Request| request.refuse("too many requests wait");
         let (mut services, mut disarms) = (Vec::new(), Vec::new());
-        let address = |name: String, type_name: &str, type_hash: &str| {
-            Ok::<_, Ros2Error>(Address { name, type_name: type_name.parse()?, type_hash: type_hash.parse()? })
-        };
         let mut declare = |name: String, type_name: &str, type_hash: &str, subject: Subject| {
             let (asked, clients) = (asked.clone(), Arc::clone(&clients));
             services.push(node.service(&address(name, type_name, type_hash)?, &refusals, move |request| {
@@ -82,8 +79,8 @@ impl Services {
             Ok::<(), Ros2Error>(())
         };
         for service in ParameterService::ALL {
-            let name = node.node().service(service.name())?;
-            declare(name, &service.type_name(), &service.type_hash(), Subject::Parameters(service))?;
+            let (name, type_name, type_hash) = service.declaration();
+            declare(node.node().service(name)?, &type_name, &type_hash, Subject::Parameters(service))?;
         }
         let (trigger, trigger_hash) = trigger();
         let mut names = Vec::new();
