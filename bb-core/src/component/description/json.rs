@@ -6,8 +6,8 @@ use super::{
 };
 use crate::component::CommandInfo;
 use crate::event::ParameterValue;
-use crate::message::codec::compose::{array, null, number, object, optional, text};
-use crate::message::codec::{Layouts, Schema, json_schema};
+use crate::message::codec::compose::{Object, object};
+use crate::message::codec::{Layouts, json_schema};
 use crate::topology::{Geometry, Origin, Visual};
 use std::time::Duration;
 
@@ -16,174 +16,172 @@ impl Description {
     /// elements have a `path`. The `layout` of a topic is an index of the list `layouts`.
     pub fn to_json(&self) -> String {
         let mut layouts: Vec<Layouts> = Vec::new();
-        let topics: Vec<String> = self.topics.iter().map(|of| topic(of, &mut layouts)).collect();
-        object(&[
-            ("robot", text(self.robot)),
-            ("run", text(self.run.name())),
-            ("states", array(&mut self.states.iter().map(|state| text(state)))),
-            ("links", array(&mut self.links.iter().map(link))),
-            ("joints", array(&mut self.joints.iter().map(joint))),
-            ("components", array(&mut self.components.iter().map(component))),
-            ("topics", array(&mut topics.into_iter())),
-            ("layouts", array(&mut layouts.iter().map(layout))),
-            ("parameters", array(&mut self.parameters.iter().map(parameter))),
-            ("commands", array(&mut self.commands.iter().map(command))),
-        ])
+        for topic in &self.topics {
+            if !layouts.contains(&topic.layouts) {
+                layouts.push(topic.layouts);
+            }
+        }
+        let topics: Vec<_> = self.topics.iter().map(|topic| (topic, layouts.as_slice())).collect();
+        object(|json| {
+            json.text("robot", self.robot);
+            json.text("run", self.run.name());
+            json.texts("states", &self.states);
+            json.objects("links", &self.links, link);
+            json.objects("joints", &self.joints, joint);
+            json.objects("components", &self.components, component);
+            json.objects("topics", &topics, topic);
+            json.objects("layouts", &layouts, layout);
+            json.objects("parameters", &self.parameters, parameter);
+            json.objects("commands", &self.commands, command);
+        })
     }
 }
 
-fn link(link: &LinkDescription) -> String {
-    object(&[
-        ("path", text(&link.path)),
-        ("name", text(link.name)),
-        ("parent_joint", optional(link.parent_joint, text)),
-        ("mass", optional(link.mass, number)),
-        ("visuals", array(&mut link.visuals.iter().map(visual))),
-    ])
+fn link(link: &LinkDescription, json: &mut Object<'_>) {
+    json.text("path", &link.path);
+    json.text("name", link.name);
+    json.optional_text("parent_joint", link.parent_joint);
+    json.optional_number("mass", link.mass);
+    json.objects("visuals", link.visuals, visual);
 }
 
-fn visual(visual: &Visual) -> String {
-    let geometry = match visual.geometry {
-        Geometry::Box(sides) => ("box", numbers(&sides)),
-        Geometry::Cylinder { radius, length } => {
-            ("cylinder", object(&[("radius", number(radius)), ("length", number(length))]))
-        }
-        Geometry::Sphere { radius } => ("sphere", object(&[("radius", number(radius))])),
-        Geometry::Mesh { file, scale } => ("mesh", object(&[("file", text(file)), ("scale", numbers(&scale))])),
-    };
-    let color = visual.material.and_then(|material| material.color);
-    object(&[
-        ("geometry", object(&[geometry])),
-        ("origin", origin(&visual.link_from_shape)),
-        ("color", optional(color, |color| numbers(&color))),
-    ])
+fn visual(visual: &Visual, json: &mut Object<'_>) {
+    json.object("geometry", |json| match visual.geometry {
+        Geometry::Box(sides) => json.numbers("box", &sides),
+        Geometry::Cylinder { radius, length } => json.object("cylinder", |json| {
+            json.number("radius", radius);
+            json.number("length", length);
+        }),
+        Geometry::Sphere { radius } => json.object("sphere", |json| json.number("radius", radius)),
+        Geometry::Mesh { file, scale } => json.object("mesh", |json| {
+            json.text("file", file);
+            json.numbers("scale", &scale);
+        }),
+    });
+    origin(&visual.link_from_shape, json);
+    match visual.material.and_then(|material| material.color) {
+        Some(color) => json.numbers("color", &color),
+        None => json.null("color"),
+    }
 }
 
 /// Translation, and rotation as x, y, z, w.
-fn origin(origin: &Origin) -> String {
-    let rotation = origin.isometry().rotation;
-    object(&[("xyz", numbers(&origin.xyz)), ("quaternion", numbers(rotation.coords.as_slice()))])
-}
-
-fn numbers(numbers: &[f64]) -> String {
-    array(&mut numbers.iter().map(|one| number(*one)))
-}
-
-fn joint(joint: &JointDescription) -> String {
-    let limit = joint.limit.map(|limit| {
-        object(&[
-            ("lower", optional(limit.lower, number)),
-            ("upper", optional(limit.upper, number)),
-            ("velocity", optional(limit.velocity, number)),
-            ("effort", optional(limit.effort, number)),
-        ])
+fn origin(origin: &Origin, json: &mut Object<'_>) {
+    json.object("origin", |json| {
+        json.numbers("xyz", &origin.xyz);
+        json.numbers("quaternion", origin.isometry().rotation.coords.as_slice());
     });
-    object(&[
-        ("path", text(&joint.path)),
-        ("name", text(joint.name)),
-        ("kind", text(joint.kind.name())),
-        ("parent", text(joint.parent)),
-        ("child", text(joint.child)),
-        ("origin", origin(&joint.parent_from_joint)),
-        ("limit", limit.unwrap_or_else(null)),
-        ("mimics", optional(joint.mimics, text)),
-        ("actuators", array(&mut joint.actuators.iter().map(|path| text(path)))),
-    ])
 }
 
-fn component(component: &ComponentDescription) -> String {
-    object(&[
-        ("path", text(component.path)),
-        ("kind", text(component.kind.name())),
-        ("frame", text(component.frame)),
-        ("rate_hz", rate(component.period)),
-        ("inputs", array(&mut component.inputs.iter().map(input))),
-        ("topics", array(&mut component.topics.iter().map(|path| text(path)))),
-        ("command", optional(component.command, json_schema)),
-        ("replaced", component.is_replaced.to_string()),
-    ])
+fn joint(joint: &JointDescription, json: &mut Object<'_>) {
+    json.text("path", &joint.path);
+    json.text("name", joint.name);
+    json.text("kind", joint.kind.name());
+    json.text("parent", joint.parent);
+    json.text("child", joint.child);
+    origin(&joint.parent_from_joint, json);
+    match joint.limit {
+        Some(limit) => json.object("limit", |json| {
+            json.optional_number("lower", limit.lower);
+            json.optional_number("upper", limit.upper);
+            json.optional_number("velocity", limit.velocity);
+            json.optional_number("effort", limit.effort);
+        }),
+        None => json.null("limit"),
+    }
+    json.optional_text("mimics", joint.mimics);
+    json.texts("actuators", &joint.actuators);
 }
 
-fn input(input: &InputDescription) -> String {
-    object(&[
-        ("name", text(input.name)),
-        ("source", text(input.source)),
-        ("driver", input.is_driver.to_string()),
-        ("optional", input.is_optional.to_string()),
-    ])
+fn component(component: &ComponentDescription, json: &mut Object<'_>) {
+    json.text("path", component.path);
+    json.text("kind", component.kind.name());
+    json.text("frame", component.frame);
+    json.optional_number("rate_hz", component.period.map(rate));
+    json.objects("inputs", &component.inputs, input);
+    json.texts("topics", &component.topics);
+    json.json("command", component.command.map(json_schema).as_deref().unwrap_or("null"));
+    json.flag("replaced", component.is_replaced);
 }
 
-fn topic(topic: &TopicDescription, layouts: &mut Vec<Layouts>) -> String {
-    let known = layouts.iter().position(|layouts| *layouts == topic.layouts);
-    let layout = known.unwrap_or_else(|| {
-        layouts.push(topic.layouts);
-        layouts.len() - 1
+fn input(input: &InputDescription, json: &mut Object<'_>) {
+    json.text("name", input.name);
+    json.text("source", input.source);
+    json.flag("driver", input.is_driver);
+    json.flag("optional", input.is_optional);
+}
+
+/// A topic, with its place in the list of layouts.
+fn topic((topic, layouts): &(&TopicDescription, &[Layouts]), json: &mut Object<'_>) {
+    let layout = layouts.iter().position(|layouts| *layouts == topic.layouts).unwrap_or(0);
+    json.text("path", topic.path);
+    json.text("payload", topic.payload);
+    json.optional_number("rate_hz", topic.period.map(rate));
+    json.flag("external", topic.is_external);
+    json.count("layout", layout as u64);
+}
+
+fn layout(layouts: &Layouts, json: &mut Object<'_>) {
+    json.json("schema", &layouts.json_schema());
+    json.object("exact", |json| {
+        let schema = layouts.schema();
+        json.text("name", &schema.name);
+        json.text("definition", &schema.text);
     });
-    object(&[
-        ("path", text(topic.path)),
-        ("payload", text(topic.payload)),
-        ("rate_hz", rate(topic.period)),
-        ("external", topic.is_external.to_string()),
-        ("layout", layout.to_string()),
-    ])
+    match layouts.ros_schema() {
+        Some(schema) => json.object("ros", |json| {
+            json.text("name", &schema.name);
+            json.optional_text("hash", layouts.ros_type_hash().as_deref());
+            json.text("definition", &schema.text);
+        }),
+        None => json.null("ros"),
+    }
+    match layouts.ros_companion() {
+        Some((topic, schema)) => json.object("companion", |json| {
+            json.text("topic", topic);
+            json.text("name", &schema.name);
+            json.text("definition", &schema.text);
+        }),
+        None => json.null("companion"),
+    }
 }
 
-fn layout(layouts: &Layouts) -> String {
-    let definition = |schema: &Schema| [("name", text(&schema.name)), ("definition", text(&schema.text))];
-    let ros = layouts.ros_schema().map(|schema| {
-        let [name, definition] = definition(&schema);
-        object(&[name, ("hash", optional(layouts.ros_type_hash(), |hash| text(&hash))), definition])
-    });
-    let companion = layouts.ros_companion().map(|(topic, schema)| {
-        let [name, definition] = definition(&schema);
-        object(&[("topic", text(topic)), name, definition])
-    });
-    object(&[
-        ("schema", layouts.json_schema()),
-        ("exact", object(&definition(&layouts.schema()))),
-        ("ros", ros.unwrap_or_else(null)),
-        ("companion", companion.unwrap_or_else(null)),
-    ])
+fn parameter(parameter: &ParameterDescription, json: &mut Object<'_>) {
+    json.text("path", parameter.path);
+    json.text("doc", parameter.doc.trim());
+    json.text("type", parameter.default.type_name());
+    value("value", &parameter.value, json);
+    value("default", &parameter.default, json);
+    json.text("unit", parameter.unit);
+    json.optional_number("minimum", parameter.range.as_ref().map(|range| *range.start()));
+    json.optional_number("maximum", parameter.range.as_ref().map(|range| *range.end()));
+    json.json("schema", &parameter.schema);
 }
 
-fn parameter(parameter: &ParameterDescription) -> String {
-    object(&[
-        ("path", text(parameter.path)),
-        ("doc", text(parameter.doc.trim())),
-        ("type", text(parameter.default.type_name())),
-        ("value", value(&parameter.value)),
-        ("default", value(&parameter.default)),
-        ("unit", text(parameter.unit)),
-        ("minimum", optional(parameter.range.as_ref().map(|range| *range.start()), number)),
-        ("maximum", optional(parameter.range.as_ref().map(|range| *range.end()), number)),
-        ("schema", parameter.schema.clone()),
-    ])
+fn command(command: &CommandInfo, json: &mut Object<'_>) {
+    json.text("path", command.path);
+    json.text("role", command.role.name());
+    json.text("category", command.category);
+    match command.allowed_states {
+        Some(states) => json.texts("allowed_states", states),
+        None => json.null("allowed_states"),
+    }
+    json.optional_number("timeout_s", command.timeout.map(|timeout| timeout.as_secs_f64()));
+    json.json("arguments", &command.argument_schema());
+    json.optional_text("definition", command.argument_definition().as_deref());
+    json.json("defaults", if command.default_arguments.is_empty() { "null" } else { &command.default_arguments });
+    json.json("result", &json_schema(command.output));
 }
 
-fn command(command: &CommandInfo) -> String {
-    let states = command.allowed_states.map(|states| array(&mut states.iter().map(|state| text(state))));
-    object(&[
-        ("path", text(command.path)),
-        ("role", text(command.role.name())),
-        ("category", text(command.category)),
-        ("allowed_states", states.unwrap_or_else(null)),
-        ("timeout_s", optional(command.timeout.map(|timeout| timeout.as_secs_f64()), number)),
-        ("arguments", command.argument_schema()),
-        ("definition", optional(command.argument_definition().as_deref(), text)),
-        ("defaults", if command.default_arguments.is_empty() { null() } else { command.default_arguments.clone() }),
-        ("result", json_schema(command.output)),
-    ])
+fn rate(period: Duration) -> f64 {
+    1.0 / period.as_secs_f64()
 }
 
-fn rate(period: Option<Duration>) -> String {
-    optional(period.map(|period| 1.0 / period.as_secs_f64()), number)
-}
-
-fn value(value: &ParameterValue) -> String {
+fn value(name: &str, value: &ParameterValue, json: &mut Object<'_>) {
     match value {
-        ParameterValue::Bool(value) => value.to_string(),
-        ParameterValue::Integer(value) => value.to_string(),
-        ParameterValue::Float(value) => number(*value),
-        ParameterValue::Text(value) => text(value),
+        ParameterValue::Bool(value) => json.flag(name, *value),
+        ParameterValue::Integer(value) => json.json(name, &value.to_string()),
+        ParameterValue::Float(value) => json.number(name, *value),
+        ParameterValue::Text(value) => json.text(name, value),
     }
 }

@@ -1,54 +1,112 @@
-//! JSON put together from parts that are JSON already.
+//! JSON objects written member by member into one text.
 
-use super::to_json;
+use super::write;
+use std::fmt::Write as _;
 
-/// A string.
-pub(crate) fn text(text: &str) -> String {
-    to_json(&text.to_owned())
-}
+/// An object that is being written.
+pub(crate) struct Object<'a>(&'a mut String);
 
-/// A number; `null` for what JSON has no number for.
-pub(crate) fn number(number: f64) -> String {
-    if number.is_finite() { to_json(&number) } else { null() }
-}
-
-/// `null`
-pub(crate) fn null() -> String {
-    "null".to_owned()
-}
-
-/// A value or `null`.
-pub(crate) fn optional<T>(value: Option<T>, write: impl FnOnce(T) -> String) -> String {
-    value.map_or_else(null, write)
-}
-
-/// An array of JSON values.
-pub(crate) fn array(elements: &mut dyn Iterator<Item = String>) -> String {
-    let mut json = "[".to_owned();
-    for element in elements {
-        separate(&mut json);
-        json.push_str(&element);
-    }
-    json.push(']');
+/// One object.
+pub(crate) fn object(write: impl FnOnce(&mut Object<'_>)) -> String {
+    let mut json = String::new();
+    enclosed(&mut json, write);
     json
 }
 
-/// An object of JSON values.
-pub(crate) fn object(members: &[(&str, String)]) -> String {
-    let mut json = "{".to_owned();
-    for (name, value) in members {
-        separate(&mut json);
-        json.push_str(&text(name));
-        json.push(':');
-        json.push_str(value);
+impl Object<'_> {
+    /// Writes a value that is JSON already.
+    pub(crate) fn json(&mut self, name: &str, value: &str) {
+        self.value_of(name).push_str(value);
     }
+
+    pub(crate) fn text(&mut self, name: &str, value: &str) {
+        write::text(value, self.value_of(name));
+    }
+
+    pub(crate) fn texts(&mut self, name: &str, values: &[&str]) {
+        self.array(name, values, |value, json| write::text(value, json));
+    }
+
+    pub(crate) fn flag(&mut self, name: &str, value: bool) {
+        self.json(name, if value { "true" } else { "false" });
+    }
+
+    pub(crate) fn count(&mut self, name: &str, value: u64) {
+        // Writing to a string cannot fail.
+        let _ = write!(self.value_of(name), "{value}");
+    }
+
+    /// Writes a number; `null` for what JSON has no number for.
+    pub(crate) fn number(&mut self, name: &str, value: f64) {
+        number(value, self.value_of(name));
+    }
+
+    pub(crate) fn numbers(&mut self, name: &str, values: &[f64]) {
+        self.array(name, values, |value, json| number(*value, json));
+    }
+
+    pub(crate) fn null(&mut self, name: &str) {
+        self.json(name, "null");
+    }
+
+    /// Writes a text; `null` for none.
+    pub(crate) fn optional_text(&mut self, name: &str, value: Option<&str>) {
+        match value {
+            Some(value) => self.text(name, value),
+            None => self.null(name),
+        }
+    }
+
+    /// Writes a number; `null` for none.
+    pub(crate) fn optional_number(&mut self, name: &str, value: Option<f64>) {
+        match value {
+            Some(value) => self.number(name, value),
+            None => self.null(name),
+        }
+    }
+
+    pub(crate) fn object(&mut self, name: &str, write: impl FnOnce(&mut Object<'_>)) {
+        enclosed(self.value_of(name), write);
+    }
+
+    /// Writes an array of objects.
+    pub(crate) fn objects<T>(&mut self, name: &str, elements: &[T], write: fn(&T, &mut Object<'_>)) {
+        self.array(name, elements, |element, json| enclosed(json, |object| write(element, object)));
+    }
+
+    fn array<T>(&mut self, name: &str, elements: &[T], write: impl Fn(&T, &mut String)) {
+        let json = self.value_of(name);
+        json.push('[');
+        for (index, element) in elements.iter().enumerate() {
+            if index > 0 {
+                json.push(',');
+            }
+            write(element, json);
+        }
+        json.push(']');
+    }
+
+    /// Begins a member, and returns where its value is written.
+    fn value_of(&mut self, name: &str) -> &mut String {
+        // No value ends so: the object has just begun.
+        if !self.0.ends_with('{') {
+            self.0.push(',');
+        }
+        write::text(name, self.0);
+        self.0.push(':');
+        self.0
+    }
+}
+
+fn enclosed(json: &mut String, write: impl FnOnce(&mut Object<'_>)) {
+    json.push('{');
+    write(&mut Object(json));
     json.push('}');
-    json
 }
 
-/// A comma, but not before the first.
-fn separate(json: &mut String) {
-    if json.len() > 1 {
-        json.push(',');
+fn number(value: f64, json: &mut String) {
+    match value.is_finite() {
+        true => json.push_str(&format!("{value:?}")),
+        false => json.push_str("null"),
     }
 }
