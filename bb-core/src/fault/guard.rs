@@ -33,11 +33,17 @@ pub(crate) fn caught<T>(call: impl FnOnce() -> Result<T, Fault>) -> Result<T, Fa
 
 /// Calls code that returns no fault, and turns a panic into a fault.
 pub(crate) fn guarded(call: impl FnOnce()) -> Result<(), Fault> {
-    let called = caught(|| {
-        call();
-        Ok(())
-    });
-    called.map_err(|failed| failed.fault)
+    let mut call = Some(call);
+    guarded_once(&mut || {
+        if let Some(call) = call.take() {
+            call();
+        }
+    })
+}
+
+/// The body of [`guarded`], which is compiled once.
+fn guarded_once(call: &mut dyn FnMut()) -> Result<(), Fault> {
+    catch_unwind(AssertUnwindSafe(call)).map_err(of_panic)
 }
 
 /// Logs a panic of code that no component is charged with. The logger may panic as well.
