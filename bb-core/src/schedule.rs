@@ -8,6 +8,8 @@ mod pool;
 mod reserve;
 mod sleeper;
 mod stop;
+#[cfg_attr(loom, allow(dead_code))]
+mod thread;
 
 pub(crate) use agenda::Agenda;
 pub(crate) use bell::Bell;
@@ -17,3 +19,4 @@ pub(crate) use pool::{Lane, Pool};
 pub(crate) use reserve::{Reserve, Reserved};
 pub(crate) use sleeper::{Alarm, Sleeper};
 pub(crate) use stop::StopSignal;
+pub(crate) use thread::start_thread;

@@ -4,6 +4,7 @@ use crate::component::{Fault, ParameterStore};
 use crate::control::Control;
 use crate::event::ParameterValue;
 use crate::fault::{caught, discard, guarded};
+use crate::schedule::start_thread;
 use crate::sorted::Sorted;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -104,7 +105,7 @@ impl Keeper {
             }
             watched.turn(|state| state.has_ended = true);
         };
-        std::thread::Builder::new().name(PATH.to_owned()).spawn(run).map_err(Fault::from)?;
+        start_thread(PATH, Box::new(run))?;
         Ok(Self::Apart(desk))
     }
 

@@ -1,5 +1,7 @@
 //! Signals that stop a robot.
 
+#[cfg(unix)]
+use crate::schedule::start_thread;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -58,7 +60,7 @@ fn handle_signals() -> std::io::Result<()> {
             }
         }
     };
-    std::thread::Builder::new().name("signals".to_owned()).spawn(run).map(drop)
+    start_thread("signals", Box::new(run)).map(drop)
 }
 
 /// `signal-hook` cannot wait for signals here, and does not hear that a console is closed.

@@ -9,6 +9,7 @@ use crate::component::Fault;
 use crate::control::Control;
 use crate::declaration::WorkerDeclaration;
 use crate::fault::guarded;
+use crate::schedule::start_thread;
 use crate::time::MonotonicTime;
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -30,7 +31,10 @@ pub(super) fn serve(machine: &Arc<Machine>) -> Result<(), StartError> {
                 served.fault(name, format!("its thread runs as any other: {message}"));
             }
             while let Some(island) = served.island(number).filter(|island| !island.has_retired()) {
-                survive(&served, name, || island.serve());
+                // A panic not caught for any component, for example in a payload's code, must not end a thread that serves others.
+                if let Err(fault) = guarded(|| island.serve()) {
+                    served.fault(name, fault.to_string());
+                }
             }
         })?;
     }
@@ -103,17 +107,9 @@ pub(super) fn since(entered_at: Option<MonotonicTime>, now: MonotonicTime) -> St
 }
 
 fn spawn(path: &'static str, run: impl FnOnce() + Send + 'static) -> Result<Thread, StartError> {
-    let thread = std::thread::Builder::new().name(path.to_owned());
-    match thread.spawn(run) {
+    match start_thread(path, Box::new(run)) {
         Ok(thread) => Ok((path, thread)),
         Err(error) => Err(StartError::component(path, Fault::from(error))),
-    }
-}
-
-/// A panic not caught for any component, for example in a payload's code, must not end a thread that serves others.
-fn survive(machine: &Machine, path: &'static str, run: impl FnOnce()) {
-    if let Err(fault) = guarded(run) {
-        machine.fault(path, fault.to_string());
     }
 }
 

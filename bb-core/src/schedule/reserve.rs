@@ -75,7 +75,7 @@ impl Reserve {
         state.free += 1;
         drop(state);
         let reserve = self.clone();
-        let started = std::thread::Builder::new().name("disarm".to_owned()).spawn(move || reserve.work());
+        let started = super::start_thread("disarm", Box::new(move || reserve.work()));
         started.map(drop).inspect_err(|_| {
             let mut state = self.lock();
             state.threads -= 1;

@@ -1,8 +1,9 @@
 //! Requests to disarm from a network, apart from all others.
 
+use crate::schedule::start_thread;
 use std::io;
 use std::sync::mpsc::{SyncSender, sync_channel};
-use std::thread::{self, JoinHandle};
+use std::thread::JoinHandle;
 
 /// Requests that wait, at most.
 const MOST: usize = 256;
@@ -48,7 +49,7 @@ impl<R: Send + 'static> DisarmQueue<R> {
                 carry_out(std::iter::once(first).chain(waiting.try_iter().take(MOST)).collect());
             }
         };
-        Ok((Self(sender), thread::Builder::new().name(name.into()).spawn(run)?))
+        Ok((Self(sender), start_thread(name, Box::new(run))?))
     }
 
     /// Adds a request, and does not wait.

@@ -7,7 +7,7 @@ mod real {
     use std::time::{Duration, Instant};
 
     pub(in super::super) fn spawn(name: String, run: super::Run) -> std::io::Result<()> {
-        std::thread::Builder::new().name(name).spawn(run).map(drop)
+        crate::schedule::start_thread(&name, run).map(drop)
     }
 
     /// Waits until the thread is unparked, `longest` at most. Returns whether it timed out.
