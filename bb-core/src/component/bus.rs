@@ -407,16 +407,23 @@ impl Bus {
         result
     }
 
-    /// All topics with a publisher.
-    fn with_topics<T: Default>(&self, call: impl FnOnce(&[&dyn AnyTopic]) -> T) -> T {
+    /// Calls `call` with all topics that have a publisher.
+    fn with_topics<T: Default>(&self, mut call: impl FnMut(&[&dyn AnyTopic]) -> T) -> T {
+        let mut result = T::default();
+        self.visit_topics(&mut |topics| result = call(topics));
+        result
+    }
+
+    /// The body of [`Self::with_topics`], which is compiled once.
+    fn visit_topics(&self, visit: &mut dyn FnMut(&[&dyn AnyTopic])) {
         let made = self.host.registry().published_topics();
-        let mut call = Some(call);
-        let mut result = None;
         self.host.with_topics(&mut |topics| {
-            let all: Vec<&dyn AnyTopic> = topics.iter().copied().chain(made.iter().map(|topic| &**topic)).collect();
-            result = call.take().map(|call| call(&all));
+            let mut all = topics.to_vec();
+            for topic in &made {
+                all.push(&**topic);
+            }
+            visit(&all);
         });
-        result.unwrap_or_default()
     }
 }
 

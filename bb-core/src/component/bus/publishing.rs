@@ -80,7 +80,7 @@ impl Bus {
     /// payload there is not known; the robot has stopped, the session or the command of this bus has ended, or the caller may not
     /// publish.
     pub fn publish_json(&self, path: &str, payload: &str) -> Result<(), Fault> {
-        self.publish_encoded(path, |topic, now, frame| {
+        self.publish_encoded(path, &|topic, now, frame| {
             let bytes = json_to_bytes(payload, topic.layouts().payload()).map_err(|error| error.to_string())?;
             let stamp = move |_| Stamp { frame, ..now };
             match topic.decode(Encoded::Payload(&bytes), &stamp) {
@@ -97,7 +97,7 @@ impl Bus {
     /// # Errors
     /// As [`Self::publish_json`].
     pub fn publish_cdr(&self, path: &str, message: &[u8]) -> Result<(), Fault> {
-        self.publish_encoded(path, |topic, now, frame| {
+        self.publish_encoded(path, &|topic, now, frame| {
             let decoded = topic.decode(Encoded::Exact(message), &|stamp| stamp.completed(now, frame));
             decoded.map_err(|error| error.to_string())
         })
@@ -111,7 +111,7 @@ impl Bus {
     /// As [`Self::publish_json`], or ROS has no message for the payload, or the header's stamp is further from now: the clock of its sender is
     /// another one, or the message is of another day.
     pub fn publish_ros(&self, path: &str, message: &[u8]) -> Result<(), Fault> {
-        self.publish_encoded(path, |topic, now, frame| {
+        self.publish_encoded(path, &|topic, now, frame| {
             let far = Cell::new(None);
             let stamp = |stamp: Stamp| match stamp.wall_time {
                 wall_time if wall_time == WallTime::default() => Stamp { frame, ..now },
@@ -136,7 +136,7 @@ impl Bus {
     fn publish_encoded(
         &self,
         path: &str,
-        decode: impl Fn(&dyn AnyTopic, Stamp, Frame) -> Result<DynamicMessage, String>,
+        decode: &dyn Fn(&dyn AnyTopic, Stamp, Frame) -> Result<DynamicMessage, String>,
     ) -> Result<(), Fault> {
         self.check(Right::Publish)?;
         self.caller.check_valid()?;
@@ -157,11 +157,10 @@ impl Bus {
                     topics.iter().find(|topic| topic.path() == path).map(|topic| decode(*topic, now, frame))
                 }),
             };
-            let Some(decoded) = decoded else { return };
-            let handed_out = decoded
-                .map_err(refused)
-                .and_then(|message| self.hand_out(&entrance, &message, sensor.is_some(), now.monotonic_time));
-            published = Some(handed_out);
+            published = decoded.map(|decoded| match decoded {
+                Ok(message) => self.hand_out(&entrance, &message, sensor.is_some(), now.monotonic_time),
+                Err(why) => Err(refused(why)),
+            });
         });
         published.unwrap_or_else(|| {
             self.caller.check_valid()?;
