@@ -45,6 +45,7 @@ use crate::message::Origin;
 use crate::node::{BindTarget, Check, Mode, NodeEntry, Report, SharedNode};
 use crate::pubsub::DynamicMessage;
 use crate::schedule::{Bell, Deadlines, Pool, Reserve, Sleeper, StopSignal};
+use crate::sorted::Sorted;
 use crate::telemetry::Telemetry;
 use crate::time::{Clock, MonotonicTime};
 use budgets::Budgets;
@@ -55,7 +56,7 @@ use faults::{Faults, SafetyErrors};
 #[cfg(loom)]
 use loom::sync::{Condvar, Mutex as StateMutex, MutexGuard, atomic::AtomicU8};
 use machine::Machine;
-use std::collections::{HashMap, VecDeque};
+use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicU64};
 use std::sync::{Arc, Mutex, OnceLock, Weak};
 #[cfg(not(loom))]
@@ -115,7 +116,7 @@ struct Inner {
     /// Disarm callbacks to be run by the loop of a simulation.
     pending_hooks: Mutex<VecDeque<(u64, Vec<Arc<Callback>>)>>,
     /// Reports of islands in a replay, until the journal says that they were processed.
-    reports: Mutex<HashMap<usize, VecDeque<Report>>>,
+    reports: Mutex<Sorted<usize, VecDeque<Report>>>,
     faults: Mutex<Faults>,
     safety_errors: Mutex<SafetyErrors>,
     /// A sensor or a service got an order, on virtual time.

@@ -1,8 +1,8 @@
 //! The replacement of a declared component.
 
 use crate::message::JointSide;
+use crate::sorted::Sorted;
 use std::any::Any;
-use std::collections::HashMap;
 use std::fmt;
 use std::sync::Arc;
 
@@ -79,4 +79,4 @@ impl fmt::Debug for Replacement {
 }
 
 /// The replacements of a robot's components, by the path of the declared one.
-pub(crate) type Replacements = Arc<HashMap<&'static str, Replacement>>;
+pub(crate) type Replacements = Arc<Sorted<&'static str, Replacement>>;

@@ -1,13 +1,13 @@
 //! Values that components of a run share.
 
+use crate::sorted::Sorted;
 use std::any::{Any, TypeId};
-use std::collections::HashMap;
 use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// One value of each type.
 #[derive(Default)]
-pub(crate) struct SharedValues(Mutex<HashMap<TypeId, Arc<dyn Any + Send + Sync>>>);
+pub(crate) struct SharedValues(Mutex<Sorted<TypeId, Arc<dyn Any + Send + Sync>>>);
 
 impl SharedValues {
     /// The value of type `T`, created if it does not exist yet.
@@ -18,7 +18,7 @@ impl SharedValues {
         // Not under the lock, since it is user code. If two are created at the same time, the first is kept.
         let made = Arc::new(make());
         let mut values = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let kept = Arc::clone(values.entry(TypeId::of::<T>()).or_insert_with(|| Arc::clone(&made) as _));
+        let kept = Arc::clone(values.get_or_insert(TypeId::of::<T>(), || Arc::clone(&made) as _));
         drop(values);
         kept.downcast().unwrap_or(made)
     }

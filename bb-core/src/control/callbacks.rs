@@ -171,16 +171,15 @@ impl Hooks {
 
     /// All callbacks; those with a thread come first.
     pub(super) fn all(&self) -> Vec<Arc<Callback>> {
-        let (with, without): (Vec<_>, Vec<_>) =
-            self.all.iter().map(|hook| Arc::clone(&hook.callback)).partition(|callback| callback.place.is_some());
-        [with, without].concat()
+        let mut all = self.fitting(&|hook| hook.callback.place.is_some());
+        all.extend(self.fitting(&|hook| hook.callback.place.is_none()));
+        all
     }
 
     /// The path of a component whose callback has no thread.
     pub(super) fn without_thread(&self) -> Option<&'static str> {
-        let of_component = |hook: &&Hook| !matches!(hook.owner, Owner::Execution(_));
-        let mut without = self.all.iter().filter(of_component).filter(|hook| hook.callback.place.is_none());
-        without.next().map(|hook| hook.callback.path)
+        let is_without = |hook: &&Hook| hook.callback.place.is_none() && !matches!(hook.owner, Owner::Execution(_));
+        self.all.iter().find(is_without).map(|hook| hook.callback.path)
     }
 
     /// The component at `path` was created, or has taken new options: callbacks from `first` on are new. Returns its current ones. A
@@ -188,7 +187,7 @@ impl Hooks {
     /// too many, the failure is loud; with one too few, it shows only when hardware burns.
     pub(super) fn succeeded(&mut self, path: &str, first: u64, is_made: bool) -> (Vec<Arc<Callback>>, Forgotten) {
         let has_new = self.give_new_to(path, first, if is_made { Owner::Component } else { Owner::Options });
-        let old = self.take(|hook| {
+        let old = self.take(&|hook| {
             let is_replaced = match hook.owner {
                 Owner::Options => is_made || has_new,
                 Owner::Component | Owner::FailedInit => is_made,
@@ -196,9 +195,8 @@ impl Hooks {
             };
             is_replaced && hook.callback.path == path && hook.callback.number < first
         });
-        let is_own = |hook: &&Hook| matches!(hook.owner, Owner::Actuator | Owner::Component | Owner::Options);
-        let own = self.all.iter().filter(|hook| hook.callback.path == path).filter(is_own);
-        (own.map(|hook| Arc::clone(&hook.callback)).collect(), old)
+        let is_own = |hook: &Hook| matches!(hook.owner, Owner::Actuator | Owner::Component | Owner::Options);
+        (self.fitting(&|hook| hook.callback.path == path && is_own(hook)), old)
     }
 
     /// The component at `path` could not be created. Returns the callbacks it had registered from `first` on; they replace those of
@@ -206,46 +204,52 @@ impl Hooks {
     pub(super) fn failed(&mut self, path: &str, first: u64) -> (Vec<Arc<Callback>>, Forgotten) {
         let has_new = self.give_new_to(path, first, Owner::FailedInit);
         let of_failed = |hook: &Hook| hook.callback.path == path && hook.owner == Owner::FailedInit;
-        let old = self.take(|hook| has_new && of_failed(hook) && hook.callback.number < first);
-        let new = self.all.iter().filter(|hook| of_failed(hook) && hook.callback.number >= first);
-        (new.map(|hook| Arc::clone(&hook.callback)).collect(), old)
+        let old = self.take(&|hook| has_new && of_failed(hook) && hook.callback.number < first);
+        (self.fitting(&|hook| of_failed(hook) && hook.callback.number >= first), old)
     }
 
     /// Sets the owner of those that the component has registered from `first` on. Returns whether there are any.
     fn give_new_to(&mut self, path: &str, first: u64, owner: Owner) -> bool {
-        let is_new = |hook: &&mut Hook| {
+        let mut has_new = false;
+        for hook in &mut self.all {
             let of_component = matches!(hook.owner, Owner::Component | Owner::Options);
-            of_component && hook.callback.path == path && hook.callback.number >= first
-        };
-        self.all.iter_mut().filter(is_new).map(|hook| hook.owner = owner).count() > 0
+            if of_component && hook.callback.path == path && hook.callback.number >= first {
+                hook.owner = owner;
+                has_new = true;
+            }
+        }
+        has_new
     }
 
     /// Returns whether callbacks of a failed `init` of the component at `path` have not returned.
     pub(super) fn hang(&self, path: &str) -> bool {
-        let mut failed =
-            self.all.iter().filter(|hook| hook.callback.path == path && hook.owner == Owner::FailedInit);
-        failed.any(|hook| hook.callback.runs().is_running)
+        let of_failed = |hook: &Hook| hook.callback.path == path && hook.owner == Owner::FailedInit;
+        self.all.iter().any(|hook| of_failed(hook) && hook.callback.runs().is_running)
     }
 
-    fn take(&mut self, fits: impl Fn(&Hook) -> bool) -> Forgotten {
+    fn fitting(&self, fits: &dyn Fn(&Hook) -> bool) -> Vec<Arc<Callback>> {
+        self.all.iter().filter(|hook| fits(hook)).map(|hook| Arc::clone(&hook.callback)).collect()
+    }
+
+    fn take(&mut self, fits: &dyn Fn(&Hook) -> bool) -> Forgotten {
         self.all.extract_if(.., |hook| fits(hook)).map(|hook| hook.callback).collect()
     }
 
     pub(super) fn take_one(&mut self, number: u64) -> Forgotten {
-        self.take(|hook| hook.callback.number == number)
+        self.take(&|hook| hook.callback.number == number)
     }
 
     pub(super) fn take_of_execution(&mut self, execution: u64) -> Forgotten {
-        self.take(|hook| hook.owner == Owner::Execution(execution))
+        self.take(&|hook| hook.owner == Owner::Execution(execution))
     }
 
     /// Removes those of a component that is given up.
     pub(super) fn take_failed(&mut self, path: &str) -> Forgotten {
-        self.take(|hook| hook.callback.path == path && hook.owner == Owner::FailedInit)
+        self.take(&|hook| hook.callback.path == path && hook.owner == Owner::FailedInit)
     }
 
     pub(super) fn take_all(&mut self) -> Forgotten {
-        self.take(|_| true)
+        self.take(&|_| true)
     }
 }
 

@@ -381,10 +381,6 @@ impl ActuatorTopics {
             end_motion: Topic::new(end_motion),
         }
     }
-
-    fn all(&self) -> [&dyn AnyTopic; 3] {
-        [&*self.commands, &self.begin_motion, &self.end_motion]
-    }
 }
 
 impl fmt::Debug for ActuatorTopics {
@@ -410,12 +406,20 @@ impl SystemTopics {
     }
 
     pub(crate) fn all(&self) -> Vec<&dyn AnyTopic> {
+        let mut all: Vec<&dyn AnyTopic> = Vec::new();
+        for ActuatorTopics { commands, begin_motion, end_motion } in &self.actuators {
+            all.extend([&**commands as &dyn AnyTopic, begin_motion, end_motion]);
+        }
         let fixed: [&dyn AnyTopic; 6] =
             [&self.state, &self.safety, &self.safety_error, &self.health, &self.fault, &self.journal];
-        let commands = self.commands.iter().map(|topic| topic as &dyn AnyTopic);
-        let parameters = self.parameters.iter().map(|topic| topic as &dyn AnyTopic);
-        let actuators = self.actuators.iter().flat_map(ActuatorTopics::all);
-        actuators.chain(fixed).chain(commands).chain(parameters).collect()
+        all.extend(fixed);
+        for topic in &self.commands {
+            all.push(topic);
+        }
+        for topic in &self.parameters {
+            all.push(topic);
+        }
+        all
     }
 
     /// The topic of the commands of the actuator with that number, if they are of type `T`.

@@ -28,11 +28,12 @@ pub(crate) struct RobotDeclaration {
 impl RobotDeclaration {
     /// The paths of all components, in the order of their options.
     pub(crate) fn component_paths(&self) -> Vec<&'static str> {
-        let sensors = self.sensors.iter().map(|declared| declared.path);
-        let estimators = self.estimators.iter().map(|declared| declared.path);
-        let actuators = self.actuators.iter().map(|declared| declared.path);
-        let services = self.services.iter().map(|declared| declared.path);
-        let commands = self.commands.iter().map(|declared| declared.path);
-        sensors.chain(estimators).chain(actuators).chain(services).chain(commands).collect()
+        let mut paths = Vec::new();
+        paths.extend(self.sensors.iter().map(|declared| declared.path));
+        paths.extend(self.estimators.iter().map(|declared| declared.path));
+        paths.extend(self.actuators.iter().map(|declared| declared.path));
+        paths.extend(self.services.iter().map(|declared| declared.path));
+        paths.extend(self.commands.iter().map(|declared| declared.path));
+        paths
     }
 }

@@ -9,10 +9,10 @@ use super::status::{JointStatistics, JointStatus, REFUSALS};
 use crate::kinematics::{Kinematics, KinematicsError};
 use crate::message::{Frame, JointReading, Payload, Stamp, Stamped};
 use crate::pubsub::{Select, Tell};
+use crate::sorted::Sorted;
 use crate::time::{Clock, MonotonicTime, nanos_of};
 use crate::topology::{JointKind, Topology};
 use nalgebra::Isometry3;
-use std::collections::HashMap;
 use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
@@ -68,9 +68,9 @@ struct Inner {
     settings: JointSettings,
     clock: Clock,
     /// Numbers of joints by name and by path.
-    names: HashMap<String, usize>,
+    names: Sorted<String, usize>,
     /// The frames of components, by path.
-    components: HashMap<&'static str, Frame>,
+    components: Sorted<&'static str, Frame>,
     routes: Routes,
     states: SharedStates,
 }
@@ -81,17 +81,17 @@ impl Joints {
         topology: &'static Topology,
         settings: JointSettings,
         clock: Clock,
-        components: HashMap<&'static str, Frame>,
+        components: Sorted<&'static str, Frame>,
         estimators: &[Vec<RouteOf>],
     ) -> Result<Self, KinematicsError> {
         let kinematics = Kinematics::new(topology)?;
-        let names =
-            topology.joints.iter().enumerate().flat_map(|(number, joint)| {
-                [(joint.name.to_owned(), number), (topology.joint_path(joint), number)]
-            });
+        let mut names = Sorted::default();
+        for (number, joint) in topology.joints.iter().enumerate() {
+            names.insert(joint.name.to_owned(), number);
+            names.insert(topology.joint_path(joint), number);
+        }
         let routes = Routes::new(topology, &kinematics, nanos_of(settings.stale_after), estimators);
         let states = SharedStates::new(topology, settings.states, settings.history);
-        let names = names.collect();
         Ok(Self(Arc::new(Inner { topology, kinematics, settings, clock, names, components, routes, states })))
     }
 
@@ -99,7 +99,7 @@ impl Joints {
     #[cfg(all(test, loom))]
     pub(crate) fn of_none(clock: Clock) -> Self {
         const NONE: Topology = Topology { links: &[], joints: &[] };
-        let joints = Self::new(&NONE, JointSettings::default(), clock, HashMap::new(), &[]);
+        let joints = Self::new(&NONE, JointSettings::default(), clock, Sorted::default(), &[]);
         joints.expect("nothing is wrong with no joints")
     }
 
@@ -181,7 +181,7 @@ impl Joints {
     }
 
     pub(super) fn components(&self) -> impl Iterator<Item = &'static str> + '_ {
-        self.0.components.keys().copied()
+        self.0.components.iter().map(|(path, _)| *path)
     }
 
     pub(crate) fn routes(&self) -> &Routes {

@@ -4,11 +4,11 @@ use super::*;
 use crate::kinematics::{Frames, Kinematics};
 use crate::message::{Frame, JointPositions, JointReading, Stamp};
 use crate::message::{Payload, Stamped};
+use crate::sorted::Sorted;
 use crate::time::{Clock, MonotonicTime};
 use crate::topology::{Joint, JointKind, Link, Mimic, Origin, Topology};
 use nalgebra::{Isometry3, Vector3};
 use proptest::prelude::*;
-use std::collections::HashMap;
 
 /// A position of a joint of any kind.
 #[derive(Clone, Debug, Payload)]
@@ -91,7 +91,7 @@ proptest! {
         let topology: &'static Topology = Box::leak(Box::new(topology(&drawn)));
         let kinematics = Kinematics::new(topology).expect("it is a tree");
         let clock = Clock::virtual_at(MonotonicTime::ZERO);
-        let joints = Joints::new(topology, JointSettings::default(), clock, HashMap::new(), &[]).expect("it is a tree");
+        let joints = Joints::new(topology, JointSettings::default(), clock, Sorted::default(), &[]).expect("it is a tree");
         let positions = &values[..kinematics.positions()];
         for joint in topology.joints {
             let range = kinematics.joint(joint.name).expect("it has one").positions.clone();

@@ -43,7 +43,7 @@ pub use error::DecodeError;
 pub use intern::MAX_NAME_BYTES;
 pub(crate) use intern::intern;
 pub(crate) use json::compose;
-pub(crate) use json::{Definitions, document, member, member_of};
+pub(crate) use json::{Definitions, document, elements_of, member, member_of, members_of};
 pub use json::{JsonError, bytes_to_json, from_json, json_schema, json_to_bytes, to_json};
 pub use reader::Reader;
 pub use ros::{RosCompanion, RosLayout, RosMessage};

@@ -29,9 +29,9 @@ use crate::message::{Origin, Stamp};
 use crate::node::{Environment, EnvironmentParts, Mode, SharedNode};
 use crate::pubsub::{AnyTopic, Delivery, DynamicSubscription, Payloads, Registry, Select};
 use crate::schedule::{Agenda, Lane};
+use crate::sorted::Sorted;
 use crate::telemetry::{Handler, Telemetry};
 use crate::time::{Clock, WallTime};
-use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, Weak};
 use std::time::Instant;
@@ -48,7 +48,7 @@ pub(super) struct Draft {
     pub(super) joints: JointSettings,
     pub(super) journal: Option<Sink>,
     pub(super) telemetry: Vec<Handler>,
-    pub(super) replacements: HashMap<&'static str, Replacement>,
+    pub(super) replacements: Sorted<&'static str, Replacement>,
     pub(super) kept: Option<Kept>,
     pub(super) node: &'static str,
 }
@@ -73,7 +73,7 @@ impl Draft {
             joints: JointSettings::default(),
             journal: None,
             telemetry: Vec::new(),
-            replacements: HashMap::new(),
+            replacements: Sorted::default(),
             kept: None,
             node: "local",
         }
@@ -87,7 +87,7 @@ impl Draft {
         if let Some(slot) = parameters.get_mut(number) {
             *slot = value;
         }
-        let is_replaced = |path: &str| self.replacements.contains_key(path);
+        let is_replaced = |path: &str| self.replacements.get(path).is_some();
         let refused = refused_by_bound(self.robot, &mut self.options, &is_replaced, &parameters, declared.path);
         if let Some(message) = refused {
             return Err(ParameterError { path: declared.path.to_owned(), message });

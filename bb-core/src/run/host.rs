@@ -52,7 +52,7 @@ impl RobotHost {
     }
 
     fn is_replaced(&self, path: &str) -> bool {
-        self.replacements.contains_key(path)
+        self.replacements.get(path).is_some()
     }
 
     fn callers(&self) -> MutexGuard<'_, Sorted<&'static str, LastCaller>> {

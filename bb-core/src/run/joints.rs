@@ -6,8 +6,8 @@ use crate::joints::{JointSettings, Joints, RouteOf};
 use crate::kinematics::KinematicsError;
 use crate::message::Frame;
 use crate::pubsub::AnyTopic;
+use crate::sorted::Sorted;
 use crate::time::Clock;
-use std::collections::HashMap;
 
 pub(super) fn known_joints(
     robot: &RobotDeclaration,
@@ -15,34 +15,40 @@ pub(super) fn known_joints(
     settings: JointSettings,
     clock: Clock,
 ) -> Result<Joints, KinematicsError> {
-    let sensors = robot.sensors.iter().map(|declared| (declared.path, declared.frame));
-    let actuators = robot.actuators.iter().map(|declared| (declared.path, Frame::new(declared.joint)));
-    let estimators = robot.estimators.iter().flat_map(|declared| {
-        let outputs = declared.outputs.iter().map(|path| (*path, declared.frame));
-        [(declared.path, declared.frame)].into_iter().chain(outputs)
-    });
-    let frames: HashMap<&'static str, Frame> = sensors.chain(actuators).chain(estimators).collect();
-    let frameless = topics.iter().filter(|topic| !topic.depends_on_frame()).map(|topic| topic.path());
-    let frameless: Vec<&'static str> = frameless.collect();
+    let mut frames = Sorted::default();
+    for declared in robot.sensors {
+        frames.insert(declared.path, declared.frame);
+    }
+    for declared in robot.actuators {
+        frames.insert(declared.path, Frame::new(declared.joint));
+    }
+    for declared in robot.estimators {
+        frames.insert(declared.path, declared.frame);
+        for output in declared.outputs {
+            frames.insert(*output, declared.frame);
+        }
+    }
     let routes: Vec<Vec<RouteOf>> =
-        robot.estimators.iter().map(|declared| routes(declared, &frames, &frameless)).collect();
+        robot.estimators.iter().map(|declared| routes(declared, &frames, topics)).collect();
     Joints::new(robot.topology, settings, clock, frames, &routes)
 }
 
 /// The inputs across moving joints whose transforms are asked for.
 fn routes(
     declared: &EstimatorDeclaration,
-    frames: &HashMap<&'static str, Frame>,
-    frameless: &[&'static str],
+    frames: &Sorted<&'static str, Frame>,
+    topics: &[&dyn AnyTopic],
 ) -> Vec<RouteOf> {
-    let moving = declared.inputs.iter().filter(|input| input.frame_from_input.is_none());
-    let placed = moving.filter(|input| !frameless.contains(&input.source));
     // Inputs fused in one dispatch are as close in time as the estimator requires.
     let others = declared.inputs.iter().filter(|input| !input.driver);
     let tolerance_nanos = others.filter_map(|input| input.tolerance_nanos).min();
-    let route = placed.filter_map(|input| {
-        let source = *frames.get(input.source)?;
-        Some(RouteOf { input: input.index, source, target: declared.frame, tolerance_nanos })
-    });
-    route.collect()
+    let mut routes = Vec::new();
+    for input in declared.inputs.iter().filter(|input| input.frame_from_input.is_none()) {
+        let has_frame = topics.iter().all(|topic| topic.path() != input.source || topic.depends_on_frame());
+        if let Some(source) = frames.get(input.source).filter(|_| has_frame) {
+            let (input, source, target) = (input.index, *source, declared.frame);
+            routes.push(RouteOf { input, source, target, tolerance_nanos });
+        }
+    }
+    routes
 }

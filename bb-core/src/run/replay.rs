@@ -17,6 +17,7 @@ use crate::joints::PlacedInput;
 use crate::journal::{Callback, Entry, Event, Publishers, Request};
 use crate::node::{Key, Missing, NodeEntry, Replayed, know_calls, know_casts};
 use crate::pubsub::AnyTopic;
+use crate::sorted::Sorted;
 use crate::time::MonotonicTime;
 use std::collections::{HashMap, VecDeque};
 use std::fmt;
@@ -33,7 +34,7 @@ pub struct Replay<R: Robot> {
 struct Replayer {
     machine: Arc<Machine>,
     /// The sensors and services, by publisher.
-    sources: HashMap<usize, Box<dyn AnySource>>,
+    sources: Sorted<usize, Box<dyn AnySource>>,
     /// Lines not played yet: the line of a measured turn waits for the line with the durations of its callbacks.
     waiting: VecDeque<Entry>,
     measured: HashMap<u64, Vec<Callback>>,
@@ -43,7 +44,7 @@ struct Replayer {
     has_begun: bool,
     is_virtual: bool,
     /// The last request to each island that the journal does not hold, by line and type.
-    unrecorded: HashMap<usize, (u64, String)>,
+    unrecorded: Sorted<usize, (u64, String)>,
     /// Turns that had not ended when the journal ended.
     cut: Vec<ReplayError>,
     /// Reason for which nothing more is played.
@@ -110,7 +111,7 @@ impl Replayer {
             sources: machine.wired.sources().by_publisher(),
             has_begun: false,
             is_virtual: false,
-            unrecorded: HashMap::new(),
+            unrecorded: Sorted::default(),
             cut: Vec::new(),
             refused: None,
             machine,

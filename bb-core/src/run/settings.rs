@@ -77,13 +77,15 @@ impl Draft {
 
     fn set_from_toml(&mut self, name: &str, text: &str) -> Result<(), SettingsError> {
         let names = assign::names(self);
-        let assignments =
-            file::read(name, text, |path| match (names.get(path).is_some(), assign::is_beginning(&names, path)) {
-                (true, true) => file::Known::Both,
-                (true, false) => file::Known::Setting,
-                (false, true) => file::Known::Table,
-                (false, false) => file::Known::No,
-            })?;
+        let assignments = file::read(name, text, &|path| match (
+            names.get(path).is_some(),
+            assign::is_beginning(&names, path),
+        ) {
+            (true, true) => file::Known::Both,
+            (true, false) => file::Known::Setting,
+            (false, true) => file::Known::Table,
+            (false, false) => file::Known::No,
+        })?;
         assign::assign(self, &assignments)
     }
 }

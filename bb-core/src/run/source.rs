@@ -14,8 +14,8 @@ use crate::lifecycle::{AfterFault, HostHandle, Periodic, Recipe, Slot};
 use crate::message::{Payload as _, Stamp, Stamped};
 use crate::node::{BindTarget, Environment};
 use crate::pubsub::{DynamicMessage, Enter};
+use crate::sorted::Sorted;
 use crate::time::{Clock, MonotonicTime};
-use std::collections::HashMap;
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -111,8 +111,12 @@ impl Sources {
     }
 
     /// Returns the sources by the number of the publisher.
-    pub(super) fn by_publisher(self) -> HashMap<usize, Box<dyn AnySource>> {
-        self.0.into_iter().map(|source| (source.publisher(), source)).collect()
+    pub(super) fn by_publisher(self) -> Sorted<usize, Box<dyn AnySource>> {
+        let mut sources = Sorted::default();
+        for source in self.0 {
+            sources.insert(source.publisher(), source);
+        }
+        sources
     }
 }
 

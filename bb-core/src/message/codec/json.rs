@@ -27,7 +27,7 @@ pub use error::JsonError;
 pub use read::{from_json, json_to_bytes};
 pub use schema::json_schema;
 pub(crate) use schema::{Definitions, document, member};
-pub(crate) use token::member_of;
+pub(crate) use token::{elements_of, member_of, members_of};
 pub use write::{bytes_to_json, to_json};
 
 use super::shape::{FieldShape, NOTHING, Shape};

@@ -1,14 +1,15 @@
 //! Comparison of a replay with its journal.
 
 use super::lock;
-use std::collections::{HashMap, VecDeque};
+use crate::sorted::Sorted;
+use std::collections::VecDeque;
 use std::sync::Mutex;
 
 /// State used by a replay and its comparison with the journal.
 #[derive(Debug, Default)]
 pub(crate) struct Comparison {
     /// Outputs of islands: publisher and checksum, in order.
-    outputs: Mutex<HashMap<usize, VecDeque<(usize, u64)>>>,
+    outputs: Mutex<Sorted<usize, VecDeque<(usize, u64)>>>,
     missing: Mutex<Option<Missing>>,
 }
 
@@ -23,7 +24,7 @@ pub(crate) struct Missing {
 
 impl Comparison {
     pub(crate) fn add(&self, island: usize, publisher: usize, checksum: u64) {
-        lock(&self.outputs).entry(island).or_default().push_back((publisher, checksum));
+        lock(&self.outputs).get_or_insert(island, VecDeque::new).push_back((publisher, checksum));
     }
 
     /// Takes the first output of an island that has not been compared yet.

@@ -1,6 +1,7 @@
 //! Problems of a robot at the moment, with their beginning and their reason, the worst first.
 
 use super::Report;
+use crate::control::ReportedSafetyError;
 use crate::event::{HealthReason, HealthState, Safety};
 use crate::time::MonotonicTime;
 use std::fmt;
@@ -88,7 +89,8 @@ impl Report {
     pub fn problems(&self) -> Vec<Problem> {
         let mut problems = self.unsafe_components();
         for estimator in &self.estimators {
-            let since = estimator.last_transition.map(|transition| transition.time);
+            let last = estimator.last_transition;
+            let since = last.map(|last| last.time);
             // One that was left out is not part of the robot.
             let Some(health) = estimator.health else { continue };
             if let Some(stopped) = &estimator.stopped {
@@ -100,22 +102,14 @@ impl Report {
                 HealthState::Degraded => Severity::Degraded,
                 HealthState::Lost => Severity::Lost,
             };
-            let mut reason = match estimator.last_transition {
-                Some(transition) => reason_of(transition.reason, transition.source),
-                None => String::new(),
-            };
+            let mut reason = last.map_or_else(String::new, |last| reason_of(last.reason, last.source));
             if let Some((input, drop)) = estimator.last_drop {
                 reason += &format!("; `{input}` was dropped last: {}", drop.name());
             }
-            if let (Some(HealthReason::NoTransform), Some(gap)) =
-                (estimator.last_transition.map(|transition| transition.reason), &estimator.last_gap)
-            {
-                reason += &format!("; {gap}");
-            }
-            if let (Some(HealthReason::Diverged), Some(divergence)) =
-                (estimator.last_transition.map(|transition| transition.reason), estimator.last_divergence)
-            {
-                reason += &format!("; {divergence}");
+            match (last.map(|last| last.reason), &estimator.last_gap, estimator.last_divergence) {
+                (Some(HealthReason::NoTransform), Some(gap), _) => reason += &format!("; {gap}"),
+                (Some(HealthReason::Diverged), _, Some(divergence)) => reason += &format!("; {divergence}"),
+                _ => {}
             }
             problems.push(problem(estimator.path, severity, since, reason));
         }
@@ -126,18 +120,14 @@ impl Report {
         }
         for actuator in &self.actuators {
             if let Some(reason) = &actuator.stopped {
-                problems.push(problem(
-                    actuator.path,
-                    Severity::Stopped,
-                    self.failed_since(actuator.path),
-                    reason.clone(),
-                ));
+                let since = self.failed_since(actuator.path);
+                problems.push(problem(actuator.path, Severity::Stopped, since, reason.clone()));
             }
         }
         for command in &self.commands {
             if let (Some(since), Some(refusal)) = (command.refused_at, &command.last_refusal) {
                 let path = format!("command/{}", command.name);
-                problems.push(problem(path, Severity::Refused, Some(since), refusal.to_string()));
+                problems.push(problem(&path, Severity::Refused, Some(since), refusal.to_string()));
             }
         }
         problems.sort_by_key(|problem| (problem.severity, problem.since.map(std::cmp::Reverse)));
@@ -152,11 +142,11 @@ impl Report {
         if self.safety_errors.is_empty() {
             return vec![problem("safety", Severity::Unsafe, None, "the robot could not be made safe".to_owned())];
         }
-        let errors = self.safety_errors.iter();
-        let errors = errors.map(|error| {
-            problem(error.last.path, Severity::Unsafe, Some(error.last_time), error.last.error.to_string())
-        });
-        errors.collect()
+        let mut errors = Vec::new();
+        for ReportedSafetyError { last, last_time, .. } in &self.safety_errors {
+            errors.push(problem(last.path, Severity::Unsafe, Some(*last_time), last.error.to_string()));
+        }
+        errors
     }
 
     /// The time of the last fault of a component.
@@ -165,8 +155,8 @@ impl Report {
     }
 }
 
-fn problem(path: impl Into<String>, severity: Severity, since: Option<MonotonicTime>, reason: String) -> Problem {
-    Problem { path: path.into(), severity, since, reason }
+fn problem(path: &str, severity: Severity, since: Option<MonotonicTime>, reason: String) -> Problem {
+    Problem { path: path.to_owned(), severity, since, reason }
 }
 
 /// A change of health in words.

@@ -116,7 +116,7 @@ pub(super) fn assign(draft: &mut Draft, assignments: &[Assignment]) -> Result<()
             if let Some(message) = refused_by_bound(
                 robot,
                 &mut draft.options,
-                &|path| draft.replacements.contains_key(path),
+                &|path| draft.replacements.get(path).is_some(),
                 &parameters,
                 &assignment.path,
             ) {

@@ -7,7 +7,6 @@ use crate::message::nearest::nearest;
 use crate::run::draft::Draft;
 use crate::run::{Builder, Robot};
 use crate::sorted::Sorted;
-use std::collections::BTreeMap;
 use std::ffi::{OsStr, OsString};
 
 /// The files to load.
@@ -51,13 +50,16 @@ impl<R: Robot> Builder<R> {
         variables: impl IntoIterator<Item = (N, V)>,
     ) -> Result<(), SettingsError> {
         // In the order of their names: that of the environment is arbitrary.
-        let variables = variables.into_iter().map(|(name, value)| (name.into(), value.into()));
-        self.draft.load_environment(&variables.collect())
+        let mut sorted = Sorted::default();
+        for (name, value) in variables {
+            sorted.insert(name.into(), value.into());
+        }
+        self.draft.load_environment(&sorted)
     }
 }
 
 impl Draft {
-    fn load_environment(&mut self, variables: &BTreeMap<OsString, OsString>) -> Result<(), SettingsError> {
+    fn load_environment(&mut self, variables: &Sorted<OsString, OsString>) -> Result<(), SettingsError> {
         if let Some(files) = variables.get(OsStr::new(CONFIG)) {
             for file in std::env::split_paths(files).filter(|file| !file.as_os_str().is_empty()) {
                 self.load_file(&file)?;
@@ -70,7 +72,7 @@ impl Draft {
         }
         let mut assignments: Vec<Assignment> = Vec::new();
         let mut problems = Vec::new();
-        for (name, value) in variables {
+        for (name, value) in variables.iter() {
             let Some(name) = name.to_str() else {
                 if name.as_encoded_bytes().starts_with(SET.as_bytes()) {
                     let place = Place::Variable(name.to_string_lossy().into());

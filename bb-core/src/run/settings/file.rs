@@ -26,46 +26,41 @@ pub(super) enum Known {
 pub(super) fn read(
     name: &str,
     text: &str,
-    is_known: impl Fn(&str) -> Known,
+    is_known: &dyn Fn(&str) -> Known,
 ) -> Result<Vec<Assignment>, SettingsError> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let (table, errors) = DeTable::parse_recoverable(text);
     let mut places = Places { name: name.into(), rest: text, at: 0, line: 1, column: 1 };
-    if !errors.is_empty() {
-        let errors = errors.iter().map(|error| (error.span().map_or(0, |span| span.start), error));
-        let mut errors: Vec<_> = errors.collect();
-        errors.sort_by_key(|(start, _)| *start);
-        let problem = |(start, error): (usize, &toml::de::Error)| {
-            SettingProblem::new(places.next(start), "", error.message())
-        };
-        return Err(SettingsError::new(errors.into_iter().map(problem).collect()));
-    }
     let mut reader = Reader { is_known, found: Vec::new() };
-    reader.table("", table.get_ref());
+    for error in &errors {
+        let start = error.span().map_or(0, |span| span.start);
+        reader.found.push(Found { start, path: String::new(), text: error.message().to_owned() });
+    }
+    if errors.is_empty() {
+        reader.table("", table.get_ref());
+    }
     let mut found = reader.found;
     found.sort_by_key(|found| found.start);
-    let mut problems = Vec::new();
+    let (mut assignments, mut problems) = (Vec::new(), Vec::new());
     let mut seen = HashSet::new();
-    for Found { path, start, .. } in &found {
-        if !seen.insert(path) {
-            problems.push((*start, path));
+    for Found { start, path, text } in found {
+        let place = places.next(start);
+        if !errors.is_empty() {
+            problems.push(SettingProblem::new(place, "", text));
+        } else if !seen.insert(path.clone()) {
+            problems.push(SettingProblem::new(place, &path, "is set twice in this file"));
+        } else {
+            assignments.push(Assignment { place, path, json: text, text: None });
         }
     }
-    if !problems.is_empty() {
-        let problem = |(start, path): (usize, &String)| {
-            SettingProblem::new(places.next(start), path, "is set twice in this file")
-        };
-        return Err(SettingsError::new(problems.into_iter().map(problem).collect()));
-    }
-    let assignment = |Found { start, path, json }| Assignment { place: places.next(start), path, json, text: None };
-    Ok(found.into_iter().map(assignment).collect())
+    if problems.is_empty() { Ok(assignments) } else { Err(SettingsError::new(problems)) }
 }
 
-/// A setting, and its place in the text.
+/// A part of the text: a setting with its value as JSON, or an error in the syntax.
 struct Found {
     start: usize,
     path: String,
-    json: String,
+    text: String,
 }
 
 /// Finds lines and columns, in the order of the text: a file may have hundreds of thousands of settings.
@@ -93,12 +88,12 @@ impl Places<'_> {
     }
 }
 
-struct Reader<F> {
-    is_known: F,
+struct Reader<'a> {
+    is_known: &'a dyn Fn(&str) -> Known,
     found: Vec<Found>,
 }
 
-impl<F: Fn(&str) -> Known> Reader<F> {
+impl Reader<'_> {
     fn table(&mut self, above: &str, table: &DeTable<'_>) {
         for (key, value) in table {
             let path = match above {
@@ -122,7 +117,7 @@ impl<F: Fn(&str) -> Known> Reader<F> {
         // An error about a name points at the name, and an error about a value at the value.
         let is_name_known = matches!((self.is_known)(&path), Known::Setting | Known::Both);
         let start = if is_name_known { value.span().start } else { start };
-        self.found.push(Found { start, path, json: json(value.get_ref()) });
+        self.found.push(Found { start, path, text: json(value.get_ref()) });
     }
 }
 

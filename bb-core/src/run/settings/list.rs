@@ -4,9 +4,10 @@ use super::assign::{NULL_TEXT, names};
 use crate::component::{OptionField, SettingKind};
 use crate::declaration::{Range, unit};
 use crate::event::ParameterValue;
-use crate::message::codec::to_json;
+use crate::message::codec::{elements_of, members_of, to_json};
 use crate::run::bound::bound_to;
 use crate::run::draft::Draft;
+use crate::sorted::Sorted;
 use std::fmt;
 
 /// All settings of a robot with their values. Its `Display` is a TOML file, with the doc, the range and the unit of each.
@@ -116,34 +117,36 @@ fn limits(range: Option<Range>, unit: &str) -> String {
 
 /// JSON as TOML, which has no null and other objects.
 fn toml(json: &str) -> Option<String> {
-    let value: serde_json::Value = serde_json::from_str(json).ok()?;
-    of_value(&value)
-}
-
-fn of_value(value: &serde_json::Value) -> Option<String> {
-    use serde_json::Value;
-    match value {
-        Value::Null => None,
-        Value::Bool(value) => Some(value.to_string()),
-        Value::Number(number) => Some(number.to_string()),
-        Value::String(text) => Some(quoted(text)),
-        Value::Array(items) => {
-            let items: Option<Vec<String>> = items.iter().map(of_value).collect();
-            Some(format!("[{}]", items?.join(", ")))
+    match json.chars().next()? {
+        'n' => None,
+        '[' => {
+            let mut items = Vec::new();
+            for item in elements_of(json)? {
+                items.push(toml(item.get())?);
+            }
+            Some(format!("[{}]", items.join(", ")))
         }
-        Value::Object(members) => {
+        '{' => {
+            let mut members = Sorted::default();
             // A null value is left out: it is optional.
-            let members = members.iter().filter(|(_, value)| !value.is_null());
-            let members: Option<Vec<String>> =
-                members.map(|(name, value)| Some(format!("{} = {}", quoted(name), of_value(value)?))).collect();
-            Some(format!("{{ {} }}", members?.join(", ")))
+            for (name, value) in members_of(json)?.iter().filter(|(_, value)| value.get() != "null") {
+                members.insert(quoted(name), toml(value.get())?);
+            }
+            let members: Vec<String> = members.iter().map(|(name, value)| format!("{name} = {value}")).collect();
+            Some(format!("{{ {} }}", members.join(", ")))
         }
+        '"' => Some(without_delete(json)),
+        _ => Some(json.to_owned()),
     }
 }
 
-/// A string in quotation marks, as in JSON, but TOML does not allow DEL in it either.
 fn quoted(text: &str) -> String {
-    to_json(&text.to_owned()).replace('\u{7f}', "\\u007F")
+    without_delete(&to_json(&text.to_owned()))
+}
+
+/// A string in quotation marks is the same in JSON and in TOML, except that TOML does not allow DEL in it.
+fn without_delete(json: &str) -> String {
+    json.replace('\u{7f}', "\\u007F")
 }
 
 impl fmt::Display for SettingsList {

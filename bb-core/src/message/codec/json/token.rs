@@ -103,9 +103,18 @@ pub(super) fn members(value: &RawValue) -> Option<Result<Vec<(String, &RawValue)
 
 /// The value of a member of an object, both as JSON.
 pub(crate) fn member_of(object: &str, name: &str) -> Option<String> {
-    let object: &RawValue = serde_json::from_str(object).ok()?;
-    let members = members(object)?.ok()?;
+    let members = members_of(object)?;
     members.into_iter().find(|(member, _)| member == name).map(|(_, value)| value.get().to_owned())
+}
+
+/// The members of an object that is JSON.
+pub(crate) fn members_of(object: &str) -> Option<Vec<(String, &RawValue)>> {
+    members(serde_json::from_str(object).ok()?)?.ok()
+}
+
+/// The elements of an array that is JSON.
+pub(crate) fn elements_of(array: &str) -> Option<Vec<&RawValue>> {
+    serde_json::from_str(array).ok()
 }
 
 struct Members<'a>(Vec<(String, &'a RawValue)>);
