@@ -162,7 +162,7 @@ pub mod __private {
         InputDeclaration, ParameterDeclaration, ParameterDefault, Range, SensorDeclaration, WorkerDeclaration,
     };
     pub use crate::event::CategoryDeclaration;
-    pub use crate::lifecycle::{AsSensor, AsService, Periodic};
+    pub use crate::lifecycle::Serving;
     pub use crate::message::codec::derive::{FieldOf, NotField, is_any, is_finite};
     pub use crate::message::codec::{
         DecodeError, EnumShape, FieldShape, FieldUnit, Reader, RosLayout, Shape, StructShape, Writer,

@@ -13,13 +13,12 @@
 
 mod adapter;
 mod backoff;
+mod serving;
 mod slot;
 mod stand_in;
 
-pub(crate) use adapter::{AsActuator, AsEstimator, Component, HostHandle};
-pub use adapter::{AsSensor, AsService, Periodic};
+pub(crate) use adapter::{AsActuator, AsEstimator, AsSensor, Component};
 pub use backoff::Supervision;
+pub use serving::Serving;
 pub(crate) use slot::{AfterFault, Recipe, Slot};
-pub(crate) use stand_in::{
-    replacement_of_actuator, replacement_of_estimator, replacement_of_sensor, replacement_of_service,
-};
+pub(crate) use stand_in::{replacement_of_actuator, replacement_of_estimator, replacement_of_sensor};

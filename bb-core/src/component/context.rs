@@ -266,50 +266,30 @@ impl ComponentContext {
     }
 }
 
-macro_rules! component_context {
-    ($(#[$doc:meta])* $name:ident, $declaration:ty) => {
-        $(#[$doc])*
-        #[derive(Clone, Debug)]
-        pub struct $name {
-            common: ComponentContext,
-            declaration: &'static $declaration,
-            counters: Counts,
-        }
-
-        impl $name {
-            pub(crate) fn new(declaration: &'static $declaration, host: Arc<dyn Host>) -> Self {
-                let common = ComponentContext::new(declaration.path, host);
-                Self { common, declaration, counters: Counts::default() }
-            }
-
-            pub(crate) fn counters(&self) -> &Counts {
-                &self.counters
-            }
-
-            /// The component's count of that name, for the report ([`SourceStatistics`](crate::run::SourceStatistics)) and the
-            /// metrics. It goes on when the component is restarted.
-            pub fn counter(&self, name: &'static str) -> Counter {
-                self.counters.get(name)
-            }
-        }
-
-        impl Deref for $name {
-            type Target = ComponentContext;
-            fn deref(&self) -> &ComponentContext {
-                &self.common
-            }
-        }
-    };
+/// A sensor's context at its start.
+#[derive(Clone, Debug)]
+pub struct SensorContext {
+    common: ComponentContext,
+    declaration: &'static SensorDeclaration,
+    counters: Counts,
 }
 
-component_context! {
-    /// A sensor's context at its start.
-    SensorContext, SensorDeclaration
+impl Deref for SensorContext {
+    type Target = ComponentContext;
+    fn deref(&self) -> &ComponentContext {
+        &self.common
+    }
 }
 
-component_context! {
-    /// The context of a controller or a bridge at its start.
-    ServiceContext, SensorDeclaration
+/// The context of a controller or a bridge at its start: that of a sensor without a place.
+#[derive(Clone, Debug)]
+pub struct ServiceContext(SensorContext);
+
+impl Deref for ServiceContext {
+    type Target = ComponentContext;
+    fn deref(&self) -> &ComponentContext {
+        &self.0
+    }
 }
 
 /// An actuator's context at its start.
@@ -330,6 +310,21 @@ impl Deref for ActuatorContext {
 }
 
 impl SensorContext {
+    pub(crate) fn new(declaration: &'static SensorDeclaration, host: Arc<dyn Host>) -> Self {
+        let common = ComponentContext::new(declaration.path, host);
+        Self { common, declaration, counters: Counts::default() }
+    }
+
+    pub(crate) fn counters(&self) -> &Counts {
+        &self.counters
+    }
+
+    /// The component's count of that name, for the report ([`SourceStatistics`](crate::run::SourceStatistics)) and the
+    /// metrics. It goes on when the component is restarted.
+    pub fn counter(&self, name: &'static str) -> Counter {
+        self.counters.get(name)
+    }
+
     /// The frame of what it publishes.
     pub fn frame(&self) -> Frame {
         self.declaration.frame
@@ -337,7 +332,7 @@ impl SensorContext {
 
     /// The declared period in seconds, if it has a `rate`.
     pub fn period_s(&self) -> Option<f64> {
-        period_s(self.declaration)
+        self.declaration.period_nanos.map(|nanos| nanos as f64 * 1e-9)
     }
 
     /// Topics, actuators, parameters and commands, by path: for a sensor whose readings are computed from what others
@@ -354,14 +349,24 @@ impl SensorContext {
 }
 
 impl ServiceContext {
+    pub(crate) fn of(context: &SensorContext) -> Self {
+        Self(context.clone())
+    }
+
+    /// The component's count of that name, for the report ([`SourceStatistics`](crate::run::SourceStatistics)) and the
+    /// metrics. It goes on when the component is restarted.
+    pub fn counter(&self, name: &'static str) -> Counter {
+        self.0.counter(name)
+    }
+
     /// The declared period in seconds, if it has a `rate`.
     pub fn period_s(&self) -> Option<f64> {
-        period_s(self.declaration)
+        self.0.period_s()
     }
 
     /// Topics, actuators, parameters and commands, by path.
     pub fn bus(&self) -> Bus {
-        self.common.bus()
+        self.0.bus()
     }
 }
 
@@ -425,8 +430,4 @@ impl ActuatorContext {
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-fn period_s(declaration: &SensorDeclaration) -> Option<f64> {
-    declaration.period_nanos.map(|nanos| nanos as f64 * 1e-9)
 }

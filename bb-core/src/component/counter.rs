@@ -27,7 +27,7 @@ impl Counter {
 
 /// All counters of a component, by name. Clones are the same.
 #[derive(Clone, Debug, Default)]
-pub struct Counts(Arc<Mutex<Vec<(&'static str, Counter)>>>);
+pub(crate) struct Counts(Arc<Mutex<Vec<(&'static str, Counter)>>>);
 
 impl Counts {
     /// The counter of that name, made by the first who asks: a restarted component goes on counting.

@@ -2,7 +2,6 @@
 
 use crate::sorted::Sorted;
 use std::any::{Any, TypeId};
-use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// One value of each type.
@@ -28,11 +27,5 @@ impl SharedValues {
         let found = values.get(&TypeId::of::<T>()).map(Arc::clone)?;
         drop(values);
         found.downcast().ok()
-    }
-}
-
-impl fmt::Debug for SharedValues {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("SharedValues").finish_non_exhaustive()
     }
 }

@@ -14,7 +14,6 @@ use crate::event::{HardwareError, HardwareErrorKind, SafetyError};
 use crate::fault::caught;
 use crate::schedule::Reserved;
 use std::cell::RefCell;
-use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// One disarm callback.
@@ -118,12 +117,6 @@ impl Callback {
 
     fn runs(&self) -> MutexGuard<'_, Runs> {
         self.runs.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl fmt::Debug for Callback {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Callback").field("number", &self.number).field("path", &self.path).finish_non_exhaustive()
     }
 }
 

@@ -8,7 +8,6 @@ use crate::journal::End;
 use crate::schedule::Lane;
 use crate::time::MonotonicTime;
 use std::any::Any;
-use std::fmt;
 use std::future::Future;
 use std::pin::Pin;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -222,11 +221,5 @@ impl Task {
 impl Wake for Task {
     fn wake(self: Arc<Self>) {
         self.schedule();
-    }
-}
-
-impl fmt::Debug for Task {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Task").field("id", &self.id).finish_non_exhaustive()
     }
 }

@@ -2,17 +2,15 @@
 
 use super::stand_in::{AnyEstimator, AnySensor, StandIn, make_actuator, make_estimator, make_sensor};
 use crate::component::{
-    Actuator, ActuatorContext, Context, Counts, Estimator, Info, InputTransforms, Inputs, Options, Reading, Reply,
-    Sensor, SensorContext, Service, ServiceContext,
+    Actuator, ActuatorContext, Context, Estimator, Info, InputTransforms, Inputs, Options, Reading, Reply,
+    Sensor, SensorContext,
 };
-use crate::declaration::SensorDeclaration;
 use crate::fault::{Fault, Termination};
-use crate::message::{Payload, Stamped};
+use crate::message::Stamped;
 use crate::time::MonotonicTime;
-use std::fmt;
 
 /// A component as seen by its `Slot`.
-pub trait Component: Sized + Send + 'static {
+pub(crate) trait Component: Sized + Send + 'static {
     /// Options of the component.
     type Options: Options;
     /// The context for its start.
@@ -36,33 +34,6 @@ pub trait Component: Sized + Send + 'static {
     /// Closes it.
     fn close(&mut self, reason: Termination<'_>);
 }
-
-/// A component that is called at a rate and publishes its readings: a sensor or a service.
-pub trait Periodic: Component {
-    /// Payload that the component publishes.
-    type Output: Payload;
-
-    /// Returns the context of the component.
-    #[doc(hidden)]
-    fn context(declaration: &'static SensorDeclaration, host: HostHandle) -> Self::Context;
-    /// Counters of the component.
-    #[doc(hidden)]
-    fn counters(context: &Self::Context) -> &Counts;
-    /// Takes one reading.
-    ///
-    /// # Errors
-    /// Why it cannot be taken.
-    fn read(&mut self, now: MonotonicTime) -> Result<Reading<Self::Output>, Fault>;
-    /// Returns the time at which the component wants to be read first.
-    fn starts_at(&self) -> Option<MonotonicTime>;
-    /// `true` if other code publishes the component's messages.
-    #[doc(hidden)]
-    const IS_EXTERNAL: bool = false;
-}
-
-/// The robot, for contexts.
-#[derive(Clone, Debug)]
-pub struct HostHandle(pub(crate) std::sync::Arc<dyn crate::component::Host>);
 
 /// Calls the component, whichever it is.
 macro_rules! whichever {
@@ -142,27 +113,18 @@ impl<E: Estimator> Component for AsEstimator<E> {
 }
 
 /// A sensor, or its replacement.
-#[doc(hidden)]
-pub enum AsSensor<S: Sensor> {
-    /// The declared sensor.
+pub(crate) enum AsSensor<S: Sensor> {
     Declared(S),
-    /// A replacement.
-    Replaced(StandInSensor<S::Output>),
+    Replaced(Box<dyn AnySensor<S::Output>>),
 }
 
-/// The replacement of a sensor or a service.
-#[doc(hidden)]
-pub struct StandInSensor<T>(Box<dyn AnySensor<T>>);
-
-impl<S: Sensor> fmt::Debug for AsSensor<S> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("AsSensor").finish_non_exhaustive()
+impl<S: Sensor> AsSensor<S> {
+    pub(crate) fn read(&mut self, now: MonotonicTime) -> Result<Reading<S::Output>, Fault> {
+        whichever!(self, own => own.read(now), other => other.read(now))
     }
-}
 
-impl<T> fmt::Debug for StandInSensor<T> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("StandInSensor").finish_non_exhaustive()
+    pub(crate) fn starts_at(&self) -> Option<MonotonicTime> {
+        whichever!(self, own => own.starts_at(), other => other.starts_at())
     }
 }
 
@@ -172,7 +134,7 @@ impl<S: Sensor> Component for AsSensor<S> {
 
     fn make(options: impl FnOnce() -> Result<S::Options, Fault>, context: &SensorContext) -> Result<Self, Fault> {
         match context.replacement() {
-            Some(replacement) => make_sensor(&replacement, context).map(|made| Self::Replaced(StandInSensor(made))),
+            Some(replacement) => make_sensor(&replacement, context).map(Self::Replaced),
             None => S::init(options()?, context).map(Self::Declared),
         }
     }
@@ -190,56 +152,7 @@ impl<S: Sensor> Component for AsSensor<S> {
     }
 
     fn close(&mut self, reason: Termination<'_>) {
-        match self {
-            Self::Declared(sensor) => sensor.terminate(reason),
-            Self::Replaced(StandInSensor(sensor)) => sensor.terminate(reason),
-        }
-    }
-}
-
-/// A controller or a bridge, or its replacement.
-#[doc(hidden)]
-pub enum AsService<S: Service> {
-    /// The declared service.
-    Declared(S),
-    /// A replacement.
-    Replaced(StandInSensor<S::Output>),
-}
-
-impl<S: Service> fmt::Debug for AsService<S> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("AsService").finish_non_exhaustive()
-    }
-}
-
-impl<S: Service> Component for AsService<S> {
-    type Options = S::Options;
-    type Context = ServiceContext;
-
-    fn make(options: impl FnOnce() -> Result<S::Options, Fault>, context: &ServiceContext) -> Result<Self, Fault> {
-        match context.replacement() {
-            Some(replacement) => make_sensor(&replacement, context).map(|made| Self::Replaced(StandInSensor(made))),
-            None => S::init(options()?, context).map(Self::Declared),
-        }
-    }
-
-    fn change(
-        &mut self,
-        options: impl FnOnce() -> Result<S::Options, Fault>,
-        context: &ServiceContext,
-    ) -> Result<(), Fault> {
-        match self {
-            Self::Declared(service) => service.handle_options(options()?, context),
-            // The options belong to the replaced component.
-            Self::Replaced(_) => Ok(()),
-        }
-    }
-
-    fn close(&mut self, reason: Termination<'_>) {
-        match self {
-            Self::Declared(service) => service.terminate(reason),
-            Self::Replaced(StandInSensor(service)) => service.terminate(reason),
-        }
+        whichever!(self, own => own.terminate(reason), other => other.terminate(reason));
     }
 }
 
@@ -292,55 +205,5 @@ impl<A: Actuator> Component for AsActuator<A> {
 
     fn close(&mut self, reason: Termination<'_>) {
         whichever!(self, own => own.terminate(reason), other => other.terminate(reason));
-    }
-}
-
-impl<S: Sensor> Periodic for AsSensor<S> {
-    type Output = S::Output;
-    const IS_EXTERNAL: bool = S::IS_EXTERNAL;
-
-    fn context(declaration: &'static SensorDeclaration, host: HostHandle) -> SensorContext {
-        SensorContext::new(declaration, host.0)
-    }
-
-    fn counters(context: &SensorContext) -> &Counts {
-        context.counters()
-    }
-
-    fn read(&mut self, now: MonotonicTime) -> Result<Reading<S::Output>, Fault> {
-        match self {
-            Self::Declared(sensor) => sensor.read(now),
-            Self::Replaced(StandInSensor(sensor)) => sensor.read(now),
-        }
-    }
-
-    fn starts_at(&self) -> Option<MonotonicTime> {
-        match self {
-            Self::Declared(sensor) => sensor.starts_at(),
-            Self::Replaced(StandInSensor(sensor)) => sensor.starts_at(),
-        }
-    }
-}
-
-impl<S: Service> Periodic for AsService<S> {
-    type Output = S::Output;
-
-    fn context(declaration: &'static SensorDeclaration, host: HostHandle) -> ServiceContext {
-        ServiceContext::new(declaration, host.0)
-    }
-
-    fn counters(context: &ServiceContext) -> &Counts {
-        context.counters()
-    }
-
-    fn read(&mut self, now: MonotonicTime) -> Result<Reading<S::Output>, Fault> {
-        match self {
-            Self::Declared(service) => service.update(now),
-            Self::Replaced(StandInSensor(service)) => service.read(now),
-        }
-    }
-
-    fn starts_at(&self) -> Option<MonotonicTime> {
-        None
     }
 }

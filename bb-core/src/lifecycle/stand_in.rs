@@ -3,7 +3,7 @@
 use crate::component::replacement::Replacement;
 use crate::component::{
     Actuator, ActuatorContext, Context, Estimator, Info, InputTransforms, Inputs, Options, Outputs, Reading, Reply,
-    Sensor, SensorContext, Service, ServiceContext,
+    Sensor, SensorContext,
 };
 use crate::fault::{Fault, Termination};
 use crate::message::{Payload, Stamped};
@@ -61,18 +61,6 @@ where
     let make: Make<SensorContext, Box<dyn AnySensor<S::Output>>> = Box::new(move |context| {
         options.validate().map_err(Fault::permanent)?;
         Ok(Box::new(S::init(options.clone(), context)?))
-    });
-    Replacement::new(make, publishes::<S::Output>())
-}
-
-/// A service of type `S`, with options, to replace another one.
-pub(crate) fn replacement_of_service<S: Service>(options: S::Options) -> Replacement
-where
-    S::Options: Sync,
-{
-    let make: Make<ServiceContext, Box<dyn AnySensor<S::Output>>> = Box::new(move |context| {
-        options.validate().map_err(Fault::permanent)?;
-        Ok(Box::new(Serving(S::init(options.clone(), context)?)))
     });
     Replacement::new(make, publishes::<S::Output>())
 }
@@ -172,23 +160,6 @@ impl<S: Sensor> AnySensor<S::Output> for S {
 
     fn terminate(&mut self, reason: Termination<'_>) {
         Sensor::terminate(self, reason);
-    }
-}
-
-/// A service, which is called as a sensor is.
-struct Serving<S>(S);
-
-impl<S: Service> AnySensor<S::Output> for Serving<S> {
-    fn read(&mut self, now: MonotonicTime) -> Result<Reading<S::Output>, Fault> {
-        self.0.update(now)
-    }
-
-    fn starts_at(&self) -> Option<MonotonicTime> {
-        None
-    }
-
-    fn terminate(&mut self, reason: Termination<'_>) {
-        self.0.terminate(reason);
     }
 }
 

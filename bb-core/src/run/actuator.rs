@@ -85,7 +85,7 @@ impl<A: Actuator> ActuatorNode<A> {
         assembly: &Assembly,
     ) -> Self {
         let options = options.of::<A::Options>(component);
-        let host = Arc::clone(&assembly.host.0);
+        let host = Arc::clone(&assembly.host);
         let side = host.replacement(declaration.path).map_or(A::SIDE, |replacement| replacement.side());
         let context = ActuatorContext::new(declaration, host, side);
         let environment = assembly.environment.clone();

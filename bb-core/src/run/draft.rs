@@ -24,7 +24,6 @@ use crate::event::ParameterValue;
 use crate::fault::{Failed, caught, discard, guarded};
 use crate::joints::JointSettings;
 use crate::journal::{Event, Journal, Sink};
-use crate::lifecycle::HostHandle;
 use crate::message::{Origin, Stamp};
 use crate::node::{Environment, EnvironmentParts, Mode, SharedNode};
 use crate::pubsub::{AnyTopic, Delivery, DynamicSubscription, Payloads, Registry, Select};
@@ -258,7 +257,7 @@ impl Assembling {
         let assembly = Assembly {
             environment: self.environment.clone(),
             control: self.control.clone(),
-            host: HostHandle(Arc::clone(&self.host)),
+            host: Arc::clone(&self.host),
         };
         caught(|| {
             let wired = Arc::new(unwired.wire(options, &assembly));

@@ -7,7 +7,6 @@ use crate::fault::{caught, discard, guarded};
 use crate::schedule::start_thread;
 use crate::sorted::Sorted;
 use std::collections::BTreeMap;
-use std::fmt;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -181,17 +180,5 @@ impl Work {
                 false
             }
         }
-    }
-}
-
-impl fmt::Debug for Keeper {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Keeper").finish_non_exhaustive()
-    }
-}
-
-impl fmt::Debug for Kept {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Kept").field("values", &self.values).finish_non_exhaustive()
     }
 }

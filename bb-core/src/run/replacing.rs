@@ -4,9 +4,7 @@ use super::draft::Draft;
 use super::{Builder, Robot};
 use crate::component::replacement::Replacement;
 use crate::component::{Actuator, Estimator, Fault, Sensor, Service};
-use crate::lifecycle::{
-    replacement_of_actuator, replacement_of_estimator, replacement_of_sensor, replacement_of_service,
-};
+use crate::lifecycle::{Serving, replacement_of_actuator, replacement_of_estimator, replacement_of_sensor};
 use crate::message::nearest::nearest_path;
 
 impl<R: Robot> Builder<R> {
@@ -46,7 +44,7 @@ impl<R: Robot> Builder<R> {
         S::Options: Sync,
     {
         let declared = self.draft.robot.services.iter().map(|declared| declared.path).collect();
-        self.draft.replace("controller or bridge", declared, path, replacement_of_service::<S>(options))
+        self.draft.replace("controller or bridge", declared, path, replacement_of_sensor::<Serving<S>>(options))
     }
 
     /// Replaces the estimator at `path` with one of type `E`: another algorithm, a model of it, or one that plays back

@@ -6,17 +6,16 @@ mod shared;
 use self::shared::Order;
 pub(super) use self::shared::SharedSource;
 pub use self::shared::SourceStatistics;
-use crate::component::{Binding, ExternalSensor, Next, OptionsList};
+use crate::component::{Binding, ExternalSensor, Host, Next, OptionsList, Sensor, SensorContext};
 use crate::control::{ComponentOrder, Control};
 use crate::declaration::SensorDeclaration;
 use crate::fault::{Failed, Fault, Termination, Then, caught};
-use crate::lifecycle::{AfterFault, HostHandle, Periodic, Recipe, Slot};
+use crate::lifecycle::{AfterFault, AsSensor, Recipe, Slot};
 use crate::message::{Payload as _, Stamp, Stamped};
 use crate::node::{BindTarget, Environment};
 use crate::pubsub::{DynamicMessage, Enter};
 use crate::sorted::Sorted;
 use crate::time::{Clock, MonotonicTime};
-use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Shared state from which components are created.
@@ -24,7 +23,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 pub struct Assembly {
     pub(super) environment: Environment,
     pub(super) control: Control,
-    pub(super) host: HostHandle,
+    pub(super) host: Arc<dyn Host>,
 }
 
 impl Assembly {
@@ -64,9 +63,9 @@ const FARTHEST_NANOS: i64 = 86_400_000_000_000;
 /// Readings at one instant of virtual time before the sensor is taken to be stuck.
 const STUCK_AFTER: u32 = 1_000_000;
 
-struct Running<S: Periodic> {
-    slot: Slot<S>,
-    context: S::Context,
+struct Running<S: Sensor> {
+    slot: Slot<AsSensor<S>>,
+    context: SensorContext,
     declaration: &'static SensorDeclaration,
     control: Control,
     environment: Environment,
@@ -86,7 +85,7 @@ pub struct Sources(Vec<Box<dyn AnySource>>);
 
 impl Sources {
     /// Adds one; its readings go to `publish`. `component` is the number of its options, and `publisher` that of its topic.
-    pub fn add<S: Periodic, W: Send + Sync + 'static>(
+    pub fn add<S: Sensor, W: Send + Sync + 'static>(
         &mut self,
         wiring: &Arc<W>,
         declaration: &'static SensorDeclaration,
@@ -155,7 +154,7 @@ pub(super) trait AnySource: Send + Sync {
     fn as_external(&self) -> ExternalSensor;
 }
 
-struct OfType<S: Periodic> {
+struct OfType<S: Sensor> {
     declaration: &'static SensorDeclaration,
     component: usize,
     publisher: usize,
@@ -163,7 +162,7 @@ struct OfType<S: Periodic> {
     publish: Publish<S::Output>,
 }
 
-impl<S: Periodic> AnySource for OfType<S> {
+impl<S: Sensor> AnySource for OfType<S> {
     fn publisher(&self) -> usize {
         self.publisher
     }
@@ -188,16 +187,16 @@ impl<S: Periodic> AnySource for OfType<S> {
 
 impl Assembly {
     /// Makes a sensor or a service; its readings go to `publish`.
-    fn source<S: Periodic>(
+    fn source<S: Sensor>(
         &self,
         declaration: &'static SensorDeclaration,
         options: &S::Options,
         binding: Binding<S::Options>,
         publish: &Publish<S::Output>,
     ) -> Option<Box<dyn Source>> {
-        let context = S::context(declaration, self.host.clone());
+        let context = SensorContext::new(declaration, Arc::clone(&self.host));
         let shared =
-            SharedSource::new(declaration.path, declaration.period_nanos.is_some(), S::counters(&context).clone());
+            SharedSource::new(declaration.path, declaration.period_nanos.is_some(), context.counters().clone());
         let tell = {
             let (source, control) = (shared.clone(), self.control.downgrade());
             move |order| {
@@ -210,7 +209,7 @@ impl Assembly {
         let tell_of_options = tell.clone();
         let target = BindTarget::Other(Box::new(move || tell_of_options(Order::Options)));
         self.environment.bind(declaration.path, options, binding, target);
-        let mut slot = Slot::<S>::new(Recipe::new(options, binding), self.environment.supervision());
+        let mut slot = Slot::<AsSensor<S>>::new(Recipe::new(options, binding), self.environment.supervision());
         let parameters = self.control.parameters();
         let made = self.environment.make(declaration.path, || {
             let made = self.control.replacing_hooks(declaration.path, true, || slot.make(&context, &parameters));
@@ -239,7 +238,7 @@ impl Assembly {
     }
 }
 
-impl<S: Periodic> Running<S> {
+impl<S: Sensor> Running<S> {
     fn clock(&self) -> &Clock {
         self.environment.clock()
     }
@@ -379,7 +378,7 @@ fn next_on_grid(due: MonotonicTime, period: i64, now: MonotonicTime) -> (Monoton
     (next, (next.nanos_since(due) / period - 1).max(0).unsigned_abs())
 }
 
-impl<S: Periodic> Source for Running<S> {
+impl<S: Sensor> Source for Running<S> {
     fn path(&self) -> &'static str {
         self.declaration.path
     }
@@ -458,12 +457,6 @@ impl<S: Periodic> Source for Running<S> {
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-impl fmt::Debug for dyn Source {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("Source").field(&self.path()).finish()
-    }
 }
 
 #[cfg(test)]

@@ -8,7 +8,6 @@
 use crate::fault::guarded;
 #[cfg(not(loom))]
 use std::collections::VecDeque;
-use std::fmt;
 use std::sync::Arc;
 #[cfg(not(loom))]
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -132,12 +131,6 @@ impl Drop for Reserved {
             self.0.lock().places -= 1;
             self.0.0.changed.notify_one();
         }
-    }
-}
-
-impl fmt::Debug for Reserved {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("Reserved")
     }
 }
 

@@ -16,10 +16,13 @@ pub(super) fn robot_impl(verified: &Verified<'_>, types: &Types<'_>) -> TokenStr
     let (robot, name) = (verified.robot, verified.name);
     let (text, this) = (name.to_string(), types.robot());
     let sensors = order::sensors(verified).into_iter().map(|id| {
-        source(types, Part::Sensor(id), robot.sensors[id].publisher, quote!(AsSensor), quote!(&__SENSORS[#id]))
+        let kind = types.part(Part::Sensor(id));
+        source(types, Part::Sensor(id), robot.sensors[id].publisher, quote!(#kind), quote!(&__SENSORS[#id]))
     });
     let services = robot.services.enumerate().map(|(id, service)| {
-        source(types, Part::Service(id), service.publisher, quote!(AsService), quote!(&__SERVICES[#id]))
+        let kind = types.part(Part::Service(id));
+        let sensor = quote!(__private::Serving<#kind>);
+        source(types, Part::Service(id), service.publisher, sensor, quote!(&__SERVICES[#id]))
     });
     let sources: Vec<TokenStream> = sensors.chain(services).collect();
     // In groups: rustc takes longer for one function with all of them.
@@ -106,18 +109,18 @@ pub(super) fn robot_impl(verified: &Verified<'_>, types: &Types<'_>) -> TokenStr
     }
 }
 
-/// One sensor or service, whose readings go to its publisher.
+/// One sensor, or service as a sensor, whose readings go to its publisher.
 fn source(
     types: &Types<'_>,
     part: Part,
     publisher: PublisherId,
-    wrapper: TokenStream,
+    sensor: TokenStream,
     declaration: TokenStream,
 ) -> TokenStream {
     let (component, publish) = (part.position(types.model()), types.publisher(publisher));
-    let (kind, binding) = (types.part(part), binding(types, part));
+    let binding = binding(types, part);
     quote! {
-        sources.add::<__private::#wrapper<#kind>, __Wiring>(
+        sources.add::<#sensor, __Wiring>(
             wiring,
             #declaration,
             #component,

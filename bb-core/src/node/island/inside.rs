@@ -2,7 +2,6 @@
 
 use crate::node::environment::RobotId;
 use std::cell::RefCell;
-use std::fmt;
 use std::ops::{Deref, DerefMut};
 
 #[cfg(not(loom))]
@@ -39,12 +38,6 @@ impl Drop for Inside {
     #[inline]
     fn drop(&mut self) {
         with(Vec::pop);
-    }
-}
-
-impl<G> fmt::Debug for Within<G> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("Within")
     }
 }
 

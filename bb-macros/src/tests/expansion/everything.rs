@@ -1280,7 +1280,7 @@ const _: () = {
     fn __sources_0(sources: &mut __private::Sources, wiring: &__private::Arc<__Wiring>) {
         sources
             .add::<
-                __private::AsSensor<__Rover_2_11__sensor_battery>,
+                __Rover_2_11__sensor_battery,
                 __Wiring,
             >(
                 wiring,
@@ -1292,7 +1292,7 @@ const _: () = {
             );
         sources
             .add::<
-                __private::AsSensor<__Rover_2_11__sensor_base_pan_encoder>,
+                __Rover_2_11__sensor_base_pan_encoder,
                 __Wiring,
             >(
                 wiring,
@@ -1304,7 +1304,7 @@ const _: () = {
             );
         sources
             .add::<
-                __private::AsSensor<__Rover_2_11__sensor_base_imu>,
+                __Rover_2_11__sensor_base_imu,
                 __Wiring,
             >(
                 wiring,
@@ -1316,7 +1316,7 @@ const _: () = {
             );
         sources
             .add::<
-                __private::AsService<__Rover_2_11__controller_stability>,
+                __private::Serving<__Rover_2_11__controller_stability>,
                 __Wiring,
             >(
                 wiring,
@@ -1328,7 +1328,7 @@ const _: () = {
             );
         sources
             .add::<
-                __private::AsService<__Rover_2_11__bridge_ros>,
+                __private::Serving<__Rover_2_11__bridge_ros>,
                 __Wiring,
             >(
                 wiring,
