@@ -4,7 +4,7 @@ mod guard;
 mod termination;
 mod value;
 
-pub(crate) use guard::{Failed, Panic, caught, discard, guarded, log_panic, of_panic, retire, wake};
+pub(crate) use guard::{Failed, Panic, caught, discard, guarded, lock, log_panic, of_panic, retire, wake};
 pub use termination::Termination;
 pub use value::Fault;
 pub(crate) use value::Then;

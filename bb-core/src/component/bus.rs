@@ -16,7 +16,7 @@ use crate::event::{ArmError, DisarmError, Forbidden, ParameterValue, Right, Righ
 use crate::joints::Joints;
 use crate::message::Payload;
 use crate::message::codec::from_json;
-use crate::message::nearest::nearest_path;
+use crate::message::nearest::{did_you_mean, nearest_path};
 use crate::pubsub::{
     AnyTopic, Delivery, DynamicSubscription, Payloads, Select, SubscriberStatistics, Subscription, Topic,
     unmatched_at,
@@ -171,8 +171,7 @@ impl Bus {
     }
 
     fn no_actuator(&self, path: &str) -> Fault {
-        let near = nearest_path(path, self.actuators());
-        let hint = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+        let hint = did_you_mean(nearest_path(path, self.actuators()));
         Fault::new(format!("no actuator is at `{path}`{hint}"))
     }
 

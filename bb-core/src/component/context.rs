@@ -7,6 +7,7 @@ use super::replacement::Replacement;
 use super::{Bus, Caller, Counter, Counts, Fault, Request, SafetyLink};
 use crate::declaration::{ActuatorDeclaration, EstimatorDeclaration, InputDeclaration, SensorDeclaration};
 use crate::event::HardwareError;
+use crate::fault::lock;
 use crate::message::{Frame, JointSide};
 use crate::payload::{BeginMotion, EndMotion, MotionEnd};
 use crate::time::{Clock, MonotonicTime};
@@ -14,7 +15,7 @@ use crate::topology::{Limit, Topology, Transform, Transmission};
 use nalgebra::Isometry3;
 use std::cell::RefCell;
 use std::ops::Deref;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 /// An estimator's context at its start: its place in the robot, and where its inputs come from.
 #[derive(Debug)]
@@ -426,8 +427,4 @@ impl ActuatorContext {
     pub(crate) fn end_current_motion(&self, end: MotionEnd, position: impl FnOnce(&BeginMotion) -> f64) {
         lock(&self.reports).end_current(end, position);
     }
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

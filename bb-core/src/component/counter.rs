@@ -1,7 +1,8 @@
 //! Counters of a sensor or a service.
 
+use crate::fault::lock;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
 /// A count of a sensor or a service, which the report and the metrics list: see
 /// [`ServiceContext::counter`](super::ServiceContext::counter). Clones are the same.
@@ -32,7 +33,7 @@ pub(crate) struct Counts(Arc<Mutex<Vec<(&'static str, Counter)>>>);
 impl Counts {
     /// The counter of that name, made by the first who asks: a restarted component goes on counting.
     pub(super) fn get(&self, name: &'static str) -> Counter {
-        let mut counters = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut counters = lock(&self.0);
         if let Some((_, counter)) = counters.iter().find(|(known, _)| *known == name) {
             return counter.clone();
         }
@@ -42,7 +43,7 @@ impl Counts {
     }
 
     pub(crate) fn all(&self) -> Vec<(&'static str, u64)> {
-        let counters = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let counters = lock(&self.0);
         counters.iter().map(|(name, counter)| (*name, counter.get())).collect()
     }
 }

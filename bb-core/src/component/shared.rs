@@ -1,8 +1,9 @@
 //! Values that components of a run share.
 
+use crate::fault::lock;
 use crate::sorted::Sorted;
 use std::any::{Any, TypeId};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
 /// One value of each type.
 #[derive(Default)]
@@ -16,14 +17,14 @@ impl SharedValues {
         }
         // Not under the lock, since it is user code. If two are created at the same time, the first is kept.
         let made = Arc::new(make());
-        let mut values = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut values = lock(&self.0);
         let kept = Arc::clone(values.get_or_insert(TypeId::of::<T>(), || Arc::clone(&made) as _));
         drop(values);
         kept.downcast().unwrap_or(made)
     }
 
     fn find<T: Send + Sync + 'static>(&self) -> Option<Arc<T>> {
-        let values = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let values = lock(&self.0);
         let found = values.get(&TypeId::of::<T>()).map(Arc::clone)?;
         drop(values);
         found.downcast().ok()

@@ -2,8 +2,8 @@
 
 use super::{Binding, Options};
 use crate::declaration::ParameterValues;
-use crate::fault::{Fault, caught};
-use std::sync::{Mutex, PoisonError};
+use crate::fault::{Fault, caught, lock};
+use std::sync::Mutex;
 
 /// Options for any thread: they are `Send`, but need not be `Sync`.
 pub(crate) struct Template<O>(Mutex<O>);
@@ -17,7 +17,7 @@ impl<O: Options> Template<O> {
 
     /// The options with the parameter values applied and validated; the error says why not.
     pub(crate) fn bound(&self, binding: &Binding<O>, values: &ParameterValues) -> Result<O, String> {
-        let options = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let options = lock(&self.0);
         let bound = caught(|| binding.bound(&options, values).map_err(Fault::new));
         bound.map_err(|failed| failed.fault.to_string())
     }

@@ -11,10 +11,10 @@
 use super::{Control, Key, State};
 use crate::component::DisarmHook;
 use crate::event::{HardwareError, HardwareErrorKind, SafetyError};
-use crate::fault::caught;
+use crate::fault::{caught, lock};
 use crate::schedule::Reserved;
 use std::cell::RefCell;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 /// One disarm callback.
 pub(super) struct Callback {
@@ -63,7 +63,7 @@ impl Callback {
 
     /// Returns true if the caller is to run it. If it runs already, that thread runs it once more.
     fn begin(&self, reason: Reason) -> bool {
-        let mut runs = self.runs();
+        let mut runs = lock(&self.runs);
         let is_running = std::mem::replace(&mut runs.is_running, true);
         if is_running {
             runs.waiting.push(reason);
@@ -100,7 +100,7 @@ impl Callback {
     /// The reasons to run once more that somebody still waits for; once no reason is left, it is no longer running.
     fn wanted(&self, control: &Control) -> Vec<Reason> {
         loop {
-            let mut runs = self.runs();
+            let mut runs = lock(&self.runs);
             let mut waiting = std::mem::take(&mut runs.waiting);
             if waiting.is_empty() {
                 runs.is_running = false;
@@ -113,10 +113,6 @@ impl Callback {
                 return waiting;
             }
         }
-    }
-
-    fn runs(&self) -> MutexGuard<'_, Runs> {
-        self.runs.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -217,7 +213,7 @@ impl Hooks {
     /// Returns whether callbacks of a failed `init` of the component at `path` have not returned.
     pub(super) fn hang(&self, path: &str) -> bool {
         let of_failed = |hook: &Hook| hook.callback.path == path && hook.owner == Owner::FailedInit;
-        self.all.iter().any(|hook| of_failed(hook) && hook.callback.runs().is_running)
+        self.all.iter().any(|hook| of_failed(hook) && lock(&hook.callback.runs).is_running)
     }
 
     fn fitting(&self, fits: &dyn Fn(&Hook) -> bool) -> Vec<Arc<Callback>> {
@@ -385,7 +381,7 @@ mod tests {
         let ((begin, started), (release, released)) = (mpsc::channel(), mpsc::channel::<()>());
         let code = Mutex::new((begin, released));
         let code = move || {
-            let code = code.lock().unwrap_or_else(PoisonError::into_inner);
+            let code = lock(&code);
             code.0.send(()).expect("the test waits");
             // Until the test drops the other end.
             let _ = code.1.recv();

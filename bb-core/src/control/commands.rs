@@ -11,14 +11,15 @@ use crate::declaration::{CommandDeclaration, Role};
 use crate::event::{
     CategoryDeclaration, CommandEvent, CommandPhase, HealthTransition, Refusal, RefusalReason, Right, Safety,
 };
-use crate::fault::Fault;
+use crate::fault::{Fault, lock};
 use crate::journal::Event;
 use crate::message::codec::member_of;
+use crate::message::nearest::{did_you_mean, nearest_path};
 use crate::node::Mode;
 use crate::pubsub::DynamicMessage;
 use crate::schedule::Lane;
 use crate::time::MonotonicTime;
-use std::sync::{Arc, PoisonError};
+use std::sync::Arc;
 use std::time::Duration;
 
 /// Executions whose code has not returned.
@@ -62,8 +63,7 @@ impl Control {
         let number = self.0.declared.commands.iter().position(|declared| declared.path == path);
         let Some((number, command)) = number.and_then(|number| Some((number, self.0.commands.get(number)?))) else {
             let paths = self.0.declared.commands.iter().map(|declared| declared.path);
-            let near = crate::message::nearest::nearest_path(path, paths);
-            let hint = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+            let hint = did_you_mean(nearest_path(path, paths));
             return Err(Fault::new(format!("no command is at `{path}`{hint}")));
         };
         if command.0.role() == Role::Arming {
@@ -208,12 +208,12 @@ impl Control {
 
     /// Polls each command that can make progress once, on virtual time.
     pub(crate) fn poll_ready(&self) {
-        let ready = std::mem::take(&mut *self.0.ready.lock().unwrap_or_else(PoisonError::into_inner));
+        let ready = std::mem::take(&mut *lock(&self.0.ready));
         ready.into_iter().for_each(|task| task.run());
     }
 
     pub(crate) fn has_ready(&self) -> bool {
-        !self.0.ready.lock().unwrap_or_else(PoisonError::into_inner).is_empty()
+        !lock(&self.0.ready).is_empty()
     }
 }
 

@@ -6,7 +6,7 @@ use super::execution::{CommandError, Slot};
 use super::task::{EndedCode, Task, Value};
 use super::{Control, Wired};
 use crate::event::{ComponentFault, HealthTransition, Refusal, Safety, SafetyError};
-use crate::fault::discard;
+use crate::fault::{discard, lock};
 use crate::node::Mode;
 use crate::pubsub::Wakers;
 use crate::schedule::Lane;
@@ -14,7 +14,7 @@ use crate::telemetry::TelemetryEvent;
 use crate::time::MonotonicTime;
 use std::collections::VecDeque;
 use std::sync::atomic::Ordering;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 /// Effects of an entry, see the [module](self).
@@ -268,8 +268,4 @@ fn write_log(log: &Log) {
             tracing::warn!(command = refusal.command, %refusal, "command refused");
         }
     }
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -17,7 +17,7 @@ use crate::declaration::Role;
 use crate::event::{CommandPhase, Safety};
 use crate::fault::Fault;
 use crate::journal::{End, Event};
-use crate::message::nearest::nearest;
+use crate::message::nearest::{did_you_mean, nearest};
 use crate::node::Mode;
 use std::sync::Arc;
 
@@ -248,8 +248,7 @@ impl Step<'_> {
     fn may_become(&self, name: &str) -> Result<&'static str, Fault> {
         let Some(state) = self.state_named(name) else {
             let states = self.control.0.declared.states.iter().copied().chain([IDLE]);
-            let near = nearest(name, states);
-            let hint = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+            let hint = did_you_mean(nearest(name, states));
             return Err(Fault::new(format!("no state `{name}` is declared{hint}")));
         };
         match self.state.machine.safety {

@@ -3,12 +3,12 @@
 use super::WeakControl;
 use super::task::Value;
 use crate::component::AnyExecution;
-use crate::fault::Fault;
+use crate::fault::{Fault, lock};
 use std::fmt;
 use std::future::Future;
 use std::marker::PhantomData;
 use std::pin::Pin;
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::task::{Context, Poll, Waker};
 use std::time::{Duration, Instant};
 
@@ -195,10 +195,6 @@ impl AnyExecution for UntypedExecution {
     fn poll(&mut self, context: &mut Context<'_>) -> Poll<Result<String, Fault>> {
         self.0.poll(context).map(|result| self.0.json(result))
     }
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl<T> fmt::Debug for Execution<T> {

@@ -6,18 +6,17 @@ use super::step::Step;
 use super::{ComponentOrder, Control};
 use crate::declaration::{ParameterValues, Supervisor};
 use crate::event::{HardwareError, HardwareErrorKind, HealthReason, HealthState, HealthTransition, SafetyError};
-use crate::fault::Failed;
+use crate::fault::{Failed, lock};
 use crate::journal::Event;
 use crate::node::{BindTarget, Check, HealthReport, Mode, NodeEntry, Overseer, Report};
-use crate::sorted::Sorted;
 use crate::time::MonotonicTime;
 use std::collections::VecDeque;
-use std::sync::{Arc, MutexGuard, PoisonError};
+use std::sync::Arc;
 
 impl Overseer for Control {
     fn report(&self, estimator: usize, report: Report) {
         if self.0.mode == Mode::Replay {
-            self.reports().get_or_insert(estimator, VecDeque::new).push_back(report);
+            lock(&self.0.reports).get_or_insert(estimator, VecDeque::new).push_back(report);
             return;
         }
         self.process_report(estimator, report);
@@ -47,13 +46,9 @@ impl Overseer for Control {
 }
 
 impl Control {
-    fn reports(&self) -> MutexGuard<'_, Sorted<usize, VecDeque<Report>>> {
-        self.0.reports.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// Processes the first waiting report of an estimator in a replay; returns false if there is none.
     pub(crate) fn replay_report(&self, estimator: usize) -> bool {
-        let report = self.reports().get_mut(&estimator).and_then(VecDeque::pop_front);
+        let report = lock(&self.0.reports).get_mut(&estimator).and_then(VecDeque::pop_front);
         match report {
             Some(report) => {
                 self.process_report(estimator, report);

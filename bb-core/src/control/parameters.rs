@@ -6,6 +6,7 @@ use crate::component::Caller;
 use crate::declaration::{ParameterError, ParameterValues};
 use crate::event::{ParameterChange, ParameterValue};
 use crate::journal::{Event, ParameterEntry};
+use crate::message::nearest::{did_you_mean, nearest_path};
 use crate::node::{BindTarget, Check, NodeEntry};
 use std::sync::Arc;
 
@@ -40,8 +41,7 @@ impl Control {
     fn parameter_number(&self, path: &str) -> Result<usize, ParameterError> {
         let paths = self.0.declared.parameters.iter().map(|parameter| parameter.path);
         paths.clone().position(|declared| declared == path).ok_or_else(|| {
-            let near = crate::message::nearest::nearest_path(path, paths);
-            let hint = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+            let hint = did_you_mean(nearest_path(path, paths));
             ParameterError { path: path.to_owned(), message: format!("no such parameter is declared{hint}") }
         })
     }

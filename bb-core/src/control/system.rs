@@ -15,7 +15,7 @@ use crate::event::{
     ArmError, CommandEvent, ComponentFault, DisarmError, HealthTransition, ParameterChange, ParameterValue, Safety,
     SafetyError, SafetyTransition, StateTransition,
 };
-use crate::fault::{Fault, wake};
+use crate::fault::{Fault, lock, wake};
 use crate::journal::JournalLine;
 use crate::message::{Origin, Payload};
 use crate::node::Mode;
@@ -203,7 +203,7 @@ impl Control {
 
     fn summary(&self, state: &State) -> Summary {
         let (faults, all_faults) = {
-            let faults = self.0.faults.lock().unwrap_or_else(PoisonError::into_inner);
+            let faults = lock(&self.0.faults);
             (faults.newest(), faults.count())
         };
         Summary {
@@ -212,7 +212,7 @@ impl Control {
             safety: state.machine.safety,
             faults,
             all_faults,
-            safety_errors: self.0.safety_errors.lock().unwrap_or_else(PoisonError::into_inner).all(),
+            safety_errors: lock(&self.0.safety_errors).all(),
             logger_panics: self.0.logger_panics.load(Ordering::Relaxed),
             waker_panics: self.0.waker_panics.load(Ordering::Relaxed),
         }

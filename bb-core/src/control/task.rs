@@ -3,14 +3,14 @@
 use super::WeakControl;
 use super::callbacks::Inside;
 use crate::component::Outcome;
-use crate::fault::{Fault, caught, discard};
+use crate::fault::{Fault, caught, discard, lock};
 use crate::journal::End;
 use crate::schedule::Lane;
 use crate::time::MonotonicTime;
 use std::any::Any;
 use std::future::Future;
 use std::pin::Pin;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::task::{Context, Poll, Wake, Waker};
 
 /// The result of a command, whatever its type.
@@ -72,7 +72,7 @@ impl Task {
 
     /// Schedules it to be polled.
     pub(super) fn schedule(self: &Arc<Self>) {
-        let mut state = self.lock();
+        let mut state = lock(&self.state);
         match state.code {
             Code::Done => return,
             Code::Polled => {
@@ -90,18 +90,18 @@ impl Task {
 
     /// Ensures that the code is not entered any more. Call this before [`Self::cancel`], which cannot be called under a lock.
     pub(super) fn mark_cancelled(&self) {
-        self.lock().is_cancelled = true;
+        lock(&self.state).is_cancelled = true;
     }
 
     /// Returns whether the code may still act: a thread is inside, or the future is to be dropped.
     pub(super) fn may_act(&self) -> bool {
-        matches!(self.lock().code, Code::Polled | Code::Future(_))
+        matches!(lock(&self.state).code, Code::Polled | Code::Future(_))
     }
 
     /// Drops the future as soon as its code yields.
     pub(super) fn cancel(self: &Arc<Self>) {
         let Some(control) = self.control.upgrade() else { return };
-        let mut state = self.lock();
+        let mut state = lock(&self.state);
         state.is_cancelled = true;
         // It may be waiting for a thread of its lane, and all of these may hang. On virtual time, nothing waits for
         // long.
@@ -113,7 +113,7 @@ impl Task {
     /// Polls it once. User code runs here: a panic fails the command.
     pub(super) fn run(self: &Arc<Self>) {
         let Some(control) = self.control.upgrade() else { return };
-        let mut state = self.lock();
+        let mut state = lock(&self.state);
         state.is_scheduled = false;
         let code = std::mem::replace(&mut state.code, Code::Polled);
         let is_cancelled = state.is_cancelled;
@@ -125,7 +125,7 @@ impl Task {
         let ended = match code {
             // A late wake: another thread is polling it, or it has ended.
             Code::Polled | Code::Done => {
-                let mut state = self.lock();
+                let mut state = lock(&self.state);
                 if matches!(code, Code::Done) {
                     state.code = Code::Done;
                 }
@@ -138,7 +138,7 @@ impl Task {
                     Code::Polled | Code::Done => {}
                 }
                 drop(inside);
-                self.lock().code = Code::Done;
+                lock(&self.state).code = Code::Done;
                 return control.future_dropped(self.id);
             }
             Code::New(starter) => match caught(starter) {
@@ -150,15 +150,15 @@ impl Task {
         drop(inside);
         match ended {
             Some(ended) => {
-                self.lock().code = Code::Done;
+                lock(&self.state).code = Code::Done;
                 control.code_returned(self.id, ended);
             }
             None => {
-                let mut state = self.lock();
+                let mut state = lock(&self.state);
                 let is_due = std::mem::take(&mut state.is_woken) || state.is_cancelled;
                 drop(state);
                 if let Some(fault) = self.is_stuck(control.clock().now(), control.is_virtual()) {
-                    let code = std::mem::replace(&mut self.lock().code, Code::Done);
+                    let code = std::mem::replace(&mut lock(&self.state).code, Code::Done);
                     if let Code::Future(future) = code {
                         discard(future);
                     }
@@ -177,7 +177,7 @@ impl Task {
         let polled = caught(|| Ok(future.as_mut().poll(&mut Context::from_waker(&waker))));
         let ended = match polled {
             Ok(Poll::Pending) => {
-                self.lock().code = Code::Future(future);
+                lock(&self.state).code = Code::Future(future);
                 return None;
             }
             Ok(Poll::Ready(ended)) => ended,
@@ -192,7 +192,7 @@ impl Task {
         if !is_virtual {
             return None;
         }
-        let mut state = self.lock();
+        let mut state = lock(&self.state);
         state.polled = if state.polled.0 == now { (now, state.polled.1 + 1) } else { (now, 1) };
         (state.polled.1 >= STUCK_AFTER).then(|| {
             Fault::new(format!(
@@ -204,17 +204,13 @@ impl Task {
 
     /// Returns the time at which the thread that is inside the code entered it.
     pub(super) fn entered_at(&self) -> Option<MonotonicTime> {
-        let state = self.lock();
+        let state = lock(&self.state);
         state.entered.filter(|_| matches!(state.code, Code::Polled))
     }
 
     /// The lane of the pool that runs it, or drops its future.
     pub(super) fn lane(&self) -> Lane {
-        if self.lock().is_cancelled { Lane::User } else { self.lane }
-    }
-
-    fn lock(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+        if lock(&self.state).is_cancelled { Lane::User } else { self.lane }
     }
 }
 

@@ -4,6 +4,7 @@ use super::Fault;
 use std::any::Any;
 use std::mem::needs_drop;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::task::Waker;
 
 /// The value carried by a panic.
@@ -44,6 +45,11 @@ pub(crate) fn guarded(call: impl FnOnce()) -> Result<(), Fault> {
 /// The body of [`guarded`], which is compiled once.
 fn guarded_once(call: &mut dyn FnMut()) -> Result<(), Fault> {
     catch_unwind(AssertUnwindSafe(call)).map_err(of_panic)
+}
+
+/// Locks a mutex, also after a panic of code that held it.
+pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Logs a panic of code that no component is charged with. The logger may panic as well.

@@ -3,6 +3,7 @@
 use super::error::{Gap, Missing};
 use super::history::{History, State};
 use super::status::{JointRefusal, REFUSALS};
+use crate::fault::lock;
 use crate::time::{MonotonicTime, nanos_of};
 use crate::topology::Topology;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -52,7 +53,7 @@ impl SharedStates {
     }
 
     pub(super) fn lock(&self) -> MutexGuard<'_, States> {
-        self.states.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.states)
     }
 
     /// Adds a state that arrived at `now`. Returns the reason if the state is the first to be refused for it.

@@ -2,8 +2,8 @@
 
 use super::stand_in::{AnyEstimator, AnySensor, StandIn, make_actuator, make_estimator, make_sensor};
 use crate::component::{
-    Actuator, ActuatorContext, Context, Estimator, Info, InputTransforms, Inputs, Options, Reading, Reply,
-    Sensor, SensorContext,
+    Actuator, ActuatorContext, Context, Estimator, Info, InputTransforms, Inputs, Options, Reading, Reply, Sensor,
+    SensorContext,
 };
 use crate::fault::{Fault, Termination};
 use crate::message::Stamped;

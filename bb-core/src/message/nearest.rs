@@ -45,6 +45,11 @@ fn nearest_path_of<'a>(path: &str, known: &mut dyn Iterator<Item = &'a str>) -> 
     nearest(path, near).or(same_last)
 }
 
+/// The end of a message on a misspelt name: empty if no other is near.
+pub(crate) fn did_you_mean(near: Option<&str>) -> String {
+    near.map_or_else(String::new, |near| format!("; did you mean `{near}`?"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

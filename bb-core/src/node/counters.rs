@@ -4,9 +4,10 @@ use super::count::Count;
 use super::latency::{Latency, LatencyStatistics};
 use crate::declaration::EstimatorDeclaration;
 use crate::event::{HealthState, HealthTransition};
+use crate::fault::lock;
 use crate::joints::LookupError;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, PoisonError};
 
 /// Reason for which a message or a dispatch was dropped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -136,7 +137,7 @@ impl Counters {
 
     pub(super) fn diverge(&self, reason: &'static str) {
         self.diverged.increment();
-        *self.last_divergence.lock().unwrap_or_else(PoisonError::into_inner) = Some(reason);
+        *lock(&self.last_divergence) = Some(reason);
     }
 
     pub(super) fn statistics(
@@ -166,7 +167,7 @@ impl Counters {
             health,
             last_transition,
             latency: self.latency.statistics(),
-            last_divergence: *self.last_divergence.lock().unwrap_or_else(PoisonError::into_inner),
+            last_divergence: *lock(&self.last_divergence),
             last_drop: self.last_drop(declaration),
             stopped,
             last_gap,

@@ -8,7 +8,7 @@ use super::shared::SharedNode;
 use crate::component::replacement::{Replacement, Replacements};
 use crate::component::{Binding, Guardian, Options, Template};
 use crate::declaration::{EstimatorDeclaration, ParameterValues};
-use crate::fault::{Failed, Fault};
+use crate::fault::{Failed, Fault, lock};
 use crate::joints::Joints;
 use crate::journal::{Journal, Waiting};
 use crate::lifecycle::Supervision;
@@ -20,7 +20,7 @@ use crate::time::{Clock, MonotonicTime, Stopwatch};
 use std::collections::VecDeque;
 use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, OnceLock, PoisonError};
 use std::time::Instant;
 
 /// The robot as its estimators see it: the control state records their reports without blocking.
@@ -455,10 +455,6 @@ impl Environment {
             node.overflow(input);
         }
     }
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl fmt::Debug for Environment {

@@ -4,11 +4,12 @@ use super::EstimatorStatistics;
 use super::counters::Counters;
 use crate::declaration::EstimatorDeclaration;
 use crate::event::{HealthState, HealthTransition};
+use crate::fault::lock;
 use crate::joints::{LookupError, PlacedInput, Placement};
 use crate::time::MonotonicTime;
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicI64, AtomicU8, AtomicU32, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 /// Counters, published health, and why the estimator is not running. Clones share the same state.
 #[derive(Clone, Debug)]
@@ -182,8 +183,4 @@ impl SharedNode {
     pub(super) fn pretended_latency_nanos(&self) -> i64 {
         self.0.pretended_latency_nanos.load(Ordering::Relaxed)
     }
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -20,7 +20,7 @@ use super::source::Assembly;
 use crate::component::{Accepts, Actuator, ActuatorContext, ActuatorError, Binding, Caller, OptionsList};
 use crate::control::{ComponentOrder, Control};
 use crate::declaration::ActuatorDeclaration;
-use crate::fault::{Failed, Fault, Termination, caught};
+use crate::fault::{Failed, Fault, Termination, caught, lock};
 use crate::lifecycle::{AfterFault, AsActuator, Recipe, Slot};
 use crate::node::{BindTarget, Environment, Mode};
 use crate::payload::MotionEnd;
@@ -28,7 +28,7 @@ use crate::pubsub::{AnyTopic, Topic, Wakers};
 use crate::schedule::Lane;
 use crate::time::MonotonicTime;
 use std::fmt;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+use std::sync::{Arc, Mutex, Weak};
 use std::task::Waker;
 
 /// An actuator in the wiring.
@@ -331,8 +331,4 @@ impl<A: Actuator> fmt::Debug for ActuatorNode<A> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("ActuatorNode").field("path", &self.0.declaration.path).finish_non_exhaustive()
     }
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

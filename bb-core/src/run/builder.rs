@@ -44,7 +44,7 @@ impl<R: Robot> Builder<R> {
         parameter: ParameterHandle<R, T>,
         value: T,
     ) -> Result<(), ParameterError> {
-        self.draft.set_parameter(parameter.number(), value.into_value())
+        self.draft.set_parameter(parameter.number, value.into_value())
     }
 
     /// Returns the settings of the restarts of components that fail, to be changed.

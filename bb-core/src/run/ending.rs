@@ -3,6 +3,7 @@
 
 use super::machine::Machine;
 use super::threads::since;
+use crate::fault::lock;
 use crate::journal::Journal;
 use crate::node::Replayed;
 use crate::pubsub::AnyTopic as _;
@@ -64,12 +65,12 @@ impl Machine {
             self.control.run_on_pool(Lane::Robot, move || {
                 let left = deadline.saturating_duration_since(Instant::now());
                 if machine.wired.actuator(number).is_none_or(|actuator| actuator.terminate(left)) {
-                    busy.0.lock().unwrap_or_else(PoisonError::into_inner).retain(|other| *other != number);
+                    lock(&busy.0).retain(|other| *other != number);
                     busy.1.notify_all();
                 }
             });
         }
-        let left = busy.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let left = lock(&busy.0);
         let longest = deadline.saturating_duration_since(Instant::now());
         let left = busy.1.wait_timeout_while(left, longest, |left| !left.is_empty());
         let left = left.unwrap_or_else(PoisonError::into_inner).0.clone();
@@ -103,7 +104,7 @@ impl Machine {
     pub(super) fn end(&self, deadline: Instant) {
         // What is accepted is stored.
         self.control.close_parameters();
-        let keeper = self.keeper.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let keeper = lock(&self.keeper).take();
         if let Some(keeper) = keeper {
             let stored_by = deadline.checked_sub(LEAST_TO_CLOSE).unwrap_or(deadline);
             keeper.finish(&self.control, stored_by.max(Instant::now() + LEAST_TO_STOP));

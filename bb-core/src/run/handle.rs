@@ -50,7 +50,7 @@ macro_rules! handle {
         $(#[$doc])*
         pub struct $name<R: Robot, $($component: $bound),+> {
             path: &'static str,
-            $($field: $type,)*
+            $(pub(super) $field: $type,)*
             of: PhantomData<fn() -> (R, $($component),+)>,
         }
 
@@ -109,41 +109,14 @@ handle! {
     }
 }
 
-macro_rules! service_handle {
-    ($(#[$doc:meta])* $name:ident) => {
-        handle! {
-            $(#[$doc])*
-            $name<S: Service> { publisher: usize, component: usize }
-        }
-
-        #[diagnostic::do_not_recommend]
-        impl<R: Robot, S: Service> Publisher<R> for $name<R, S> {
-            type Payload = S::Output;
-            fn path(self) -> &'static str {
-                self.path
-            }
-            fn topic<'a>(self, topics: &'a R::Topics, _: &'a SystemTopics) -> &'a Topic<S::Output> {
-                topic::<R, _>(topics, self.publisher)
-            }
-        }
-
-        impl<R: Robot, S: Service> Configurable<R> for $name<R, S> {
-            type Options = S::Options;
-            fn options(self, options: &mut OptionsList) -> &mut S::Options {
-                options.of_mut(self.component)
-            }
-        }
-    };
-}
-
-service_handle! {
+handle! {
     /// Names a controller of the robot `R`.
-    ControllerHandle
+    ControllerHandle<S: Service> { publisher: usize, component: usize }
 }
 
-service_handle! {
+handle! {
     /// Names a bridge of the robot `R`.
-    BridgeHandle
+    BridgeHandle<S: Service> { publisher: usize, component: usize }
 }
 
 handle! {
@@ -161,41 +134,34 @@ handle! {
     ParameterHandle<T: ParameterType> { number: usize }
 }
 
-impl<R: Robot, A: Actuator> ActuatorHandle<R, A> {
-    pub(super) fn node(self, wiring: &R::Wiring) -> &ActuatorNode<A> {
-        (self.node)(wiring)
-    }
-}
-
-impl<R: Robot, A: Actuator> Configurable<R> for ActuatorHandle<R, A> {
-    type Options = A::Options;
-    fn options(self, options: &mut OptionsList) -> &mut A::Options {
-        options.of_mut(self.component)
-    }
-}
-
-impl<R: Robot, C: Command> CommandHandle<R, C> {
-    pub(super) fn number(self) -> usize {
-        self.number
-    }
-}
-
-impl<R: Robot, C: Command> Configurable<R> for CommandHandle<R, C> {
-    type Options = C::Options;
-    fn options(self, options: &mut OptionsList) -> &mut C::Options {
-        options.of_mut(self.component)
-    }
-}
-
 impl<R: Robot, T: ParameterType> ParameterHandle<R, T> {
     /// A new value for it, for [`Bus::set_parameters`](crate::Bus::set_parameters).
     pub fn to(self, value: impl Into<T>) -> (&'static str, ParameterValue) {
         (self.path, value.into().into_value())
     }
+}
 
-    pub(super) fn number(self) -> usize {
-        self.number
-    }
+macro_rules! publisher {
+    ($($handle:ident<$($component:ident: $bound:path),+> publishes $payload:ty;)*) => { $(
+        #[diagnostic::do_not_recommend]
+        impl<R: Robot, $($component: $bound),+> Publisher<R> for $handle<R, $($component),+> {
+            type Payload = $payload;
+            fn path(self) -> &'static str {
+                self.path
+            }
+            fn topic<'a>(self, topics: &'a R::Topics, _: &'a SystemTopics) -> &'a Topic<$payload> {
+                topic::<R, _>(topics, self.publisher)
+            }
+        }
+    )* };
+}
+
+publisher! {
+    SensorHandle<S: Sensor> publishes S::Output;
+    EstimatorHandle<E: Estimator, T: Payload> publishes T;
+    OutputHandle<T: Payload> publishes T;
+    ControllerHandle<S: Service> publishes S::Output;
+    BridgeHandle<S: Service> publishes S::Output;
 }
 
 macro_rules! system_publisher {
@@ -264,39 +230,6 @@ impl<R: Robot, S: Sensor> SensorHandle<R, S> {
     }
 }
 
-#[diagnostic::do_not_recommend]
-impl<R: Robot, S: Sensor> Publisher<R> for SensorHandle<R, S> {
-    type Payload = S::Output;
-    fn path(self) -> &'static str {
-        self.path
-    }
-    fn topic<'a>(self, topics: &'a R::Topics, _: &'a SystemTopics) -> &'a Topic<S::Output> {
-        topic::<R, _>(topics, self.publisher)
-    }
-}
-
-#[diagnostic::do_not_recommend]
-impl<R: Robot, E: Estimator, T: Payload> Publisher<R> for EstimatorHandle<R, E, T> {
-    type Payload = T;
-    fn path(self) -> &'static str {
-        self.path
-    }
-    fn topic<'a>(self, topics: &'a R::Topics, _: &'a SystemTopics) -> &'a Topic<T> {
-        topic::<R, _>(topics, self.publisher)
-    }
-}
-
-#[diagnostic::do_not_recommend]
-impl<R: Robot, T: Payload> Publisher<R> for OutputHandle<R, T> {
-    type Payload = T;
-    fn path(self) -> &'static str {
-        self.path
-    }
-    fn topic<'a>(self, topics: &'a R::Topics, _: &'a SystemTopics) -> &'a Topic<T> {
-        topic::<R, _>(topics, self.publisher)
-    }
-}
-
 macro_rules! visitable {
     ($($handle:ident<$($component:ident: $bound:path),+>),*) => { $(
         impl<R: Robot, $($component: $bound),+> Visitable<R> for $handle<R, $($component),+> {
@@ -319,23 +252,23 @@ pub trait Configurable<R: Robot>: Copy {
     fn options(self, options: &mut OptionsList) -> &mut Self::Options;
 }
 
-impl<R: Robot, S: Sensor> Configurable<R> for SensorHandle<R, S> {
-    type Options = S::Options;
-    fn options(self, options: &mut OptionsList) -> &mut S::Options {
-        options.of_mut(self.component)
-    }
+macro_rules! configurable {
+    ($($handle:ident<$($component:ident: $bound:path),+> by $options:ty;)*) => { $(
+        impl<R: Robot, $($component: $bound),+> Configurable<R> for $handle<R, $($component),+> {
+            type Options = $options;
+            fn options(self, options: &mut OptionsList) -> &mut $options {
+                options.of_mut(self.component)
+            }
+        }
+    )* };
 }
 
-impl<R: Robot, E: Estimator, T: Payload> Configurable<R> for EstimatorHandle<R, E, T> {
-    type Options = E::Options;
-    fn options(self, options: &mut OptionsList) -> &mut E::Options {
-        options.of_mut(self.component)
-    }
-}
-
-impl<R: Robot, E: Estimator> Configurable<R> for EstimatorOfSeveralHandle<R, E> {
-    type Options = E::Options;
-    fn options(self, options: &mut OptionsList) -> &mut E::Options {
-        options.of_mut(self.component)
-    }
+configurable! {
+    SensorHandle<S: Sensor> by S::Options;
+    EstimatorHandle<E: Estimator, T: Payload> by E::Options;
+    EstimatorOfSeveralHandle<E: Estimator> by E::Options;
+    ActuatorHandle<A: Actuator> by A::Options;
+    ControllerHandle<S: Service> by S::Options;
+    BridgeHandle<S: Service> by S::Options;
+    CommandHandle<C: Command> by C::Options;
 }

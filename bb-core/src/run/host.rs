@@ -9,6 +9,7 @@ use crate::component::shared::SharedValues;
 use crate::component::{AcceptsJson, Controls, Description, ExternalSensor, Host};
 use crate::control::{Control, Islands, Wired};
 use crate::declaration::{RobotDeclaration, graph};
+use crate::fault::lock;
 use crate::joints::Joints;
 use crate::journal::{Event, Journal, Recorded};
 use crate::node::NodeEntry;
@@ -19,7 +20,7 @@ use crate::time::MonotonicTime;
 use crate::topology::{GraphFormat, Topology};
 use std::any::Any;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, Weak};
+use std::sync::{Arc, Mutex, OnceLock, Weak};
 
 /// Weak, since components with a bus are part of the wiring.
 pub(super) struct RobotHost {
@@ -53,10 +54,6 @@ impl RobotHost {
 
     fn is_replaced(&self, path: &str) -> bool {
         self.replacements.get(path).is_some()
-    }
-
-    fn callers(&self) -> MutexGuard<'_, Sorted<&'static str, LastCaller>> {
-        self.callers.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Writes a line, if there is a journal.
@@ -117,12 +114,12 @@ impl Host for RobotHost {
 
     fn last_entrance(&self, path: &'static str) -> Option<Arc<AtomicU64>> {
         self.journal.as_ref()?;
-        Some(Arc::clone(&self.callers().get_or_insert(path, LastCaller::default).entrance))
+        Some(Arc::clone(&lock(&self.callers).get_or_insert(path, LastCaller::default).entrance))
     }
 
     fn note_caller(&self, path: &'static str, entrance: u64, caller: &str) {
         // The line is written under the lock, so that lines of one path are in the order of the callers.
-        let mut callers = self.callers();
+        let mut callers = lock(&self.callers);
         let last = callers.get_or_insert(path, LastCaller::default);
         if last.name.as_deref() != Some(caller) {
             last.name = Some(caller.to_owned());
@@ -134,7 +131,7 @@ impl Host for RobotHost {
     fn note_path(&self, change: PathChange) {
         if let PathChange::Evicted { path } = change {
             // Entrances of before find no number of theirs.
-            if let Some(last) = self.callers().remove(path) {
+            if let Some(last) = lock(&self.callers).remove(path) {
                 last.entrance.store(0, Ordering::Release);
             }
         }

@@ -3,11 +3,11 @@
 use crate::component::{Fault, ParameterStore};
 use crate::control::Control;
 use crate::event::ParameterValue;
-use crate::fault::{caught, discard, guarded};
+use crate::fault::{caught, discard, guarded, lock};
 use crate::schedule::start_thread;
 use crate::sorted::Sorted;
 use std::collections::BTreeMap;
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// The path at which faults of a store are reported.
@@ -43,13 +43,9 @@ struct State {
 }
 
 impl Desk {
-    fn lock(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// Changes the state, and wakes those who wait for it.
     fn turn(&self, change: impl FnOnce(&mut State)) {
-        change(&mut self.lock());
+        change(&mut lock(&self.state));
         self.turned.notify_all();
     }
 }
@@ -118,7 +114,7 @@ impl Keeper {
             Self::Apart(desk) => {
                 desk.turn(|state| state.is_closed = true);
                 let left = deadline.saturating_duration_since(Instant::now()).min(STORED_WITHIN);
-                let waited = desk.turned.wait_timeout_while(desk.lock(), left, |state| !state.has_ended);
+                let waited = desk.turned.wait_timeout_while(lock(&desk.state), left, |state| !state.has_ended);
                 if !waited.unwrap_or_else(PoisonError::into_inner).0.has_ended {
                     control.note_fault(PATH, "the store of parameters did not return in time".to_owned());
                 }
@@ -150,7 +146,7 @@ impl Work {
         loop {
             let idle = |state: &mut State| !state.is_due && !state.is_closed;
             let desk = Arc::clone(&self.desk);
-            let mut state = desk.turned.wait_while(desk.lock(), idle).unwrap_or_else(PoisonError::into_inner);
+            let mut state = desk.turned.wait_while(lock(&desk.state), idle).unwrap_or_else(PoisonError::into_inner);
             if !std::mem::take(&mut state.is_due) {
                 break;
             }
@@ -162,11 +158,11 @@ impl Work {
 
     /// Stores a change that came with the end, or one that was not stored before. Whether all is stored then.
     fn store_rest(&mut self, is_stored: bool) -> bool {
-        if is_stored && self.desk.lock().changed.len() == 0 { true } else { self.store() }
+        if is_stored && lock(&self.desk.state).changed.len() == 0 { true } else { self.store() }
     }
 
     fn store(&mut self) -> bool {
-        let changed = std::mem::take(&mut self.desk.lock().changed);
+        let changed = std::mem::take(&mut lock(&self.desk.state).changed);
         for (number, value) in changed.into_entries() {
             if let Some(path) = self.control.parameter_path(number) {
                 self.values.insert(path.to_owned(), value);

@@ -131,7 +131,7 @@ impl<R: Robot> Live<R> {
         command: CommandHandle<R, C>,
         arguments: C::Arguments,
     ) -> Result<Execution<C::Output>, Refusal> {
-        self.settled(|machine| machine.control.execute(command.number(), Box::new(arguments)))
+        self.settled(|machine| machine.control.execute(command.number, Box::new(arguments)))
     }
 
     /// Sends a command to an actuator, and returns once it has been carried out.
@@ -143,12 +143,12 @@ impl<R: Robot> Live<R> {
         actuator: ActuatorHandle<R, A>,
         command: A::Command,
     ) -> Result<(), ActuatorError> {
-        self.settled(|_| actuator.node(&self.wiring).send(command))
+        self.settled(|_| (actuator.node)(&self.wiring).send(command))
     }
 
     /// The value of a parameter.
     pub fn parameter<T: ParameterType>(&self, parameter: ParameterHandle<R, T>) -> T {
-        self.machine.control.parameters().get(parameter.number())
+        self.machine.control.parameters().get(parameter.number)
     }
 
     /// Sets a parameter. The change is published and reaches the options bound to it.
@@ -160,7 +160,7 @@ impl<R: Robot> Live<R> {
         parameter: ParameterHandle<R, T>,
         value: T,
     ) -> Result<(), ParameterError> {
-        let entry = ParameterEntry { parameter: parameter.number(), value: value.into_value() };
+        let entry = ParameterEntry { parameter: parameter.number, value: value.into_value() };
         self.settled(|machine| machine.control.set_parameters(vec![entry], &Caller::PROGRAM))
     }
 

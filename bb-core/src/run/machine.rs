@@ -8,13 +8,14 @@ use super::{Panics, Report};
 use crate::component::{Bus, Fault, Host};
 use crate::control::{Control, ReportedFault, Summary};
 use crate::declaration::RobotDeclaration;
+use crate::fault::lock;
 use crate::journal::{Event, Journal};
 use crate::node::{AnyIsland, CallError, Environment, NodeEntry, Visit};
 use crate::pubsub::{AnyTopic, TopicStatistics};
 use crate::telemetry::Telemetry;
 use crate::time::MonotonicTime;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock};
 
 /// A robot that has been assembled.
 pub(super) struct Machine {
@@ -94,7 +95,7 @@ impl Machine {
     }
 
     pub(super) fn shared_sources(&self) -> Vec<SharedSource> {
-        self.sources.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        lock(&self.sources).clone()
     }
 
     pub(super) fn islands(&self) -> impl Iterator<Item = &dyn AnyIsland> {
@@ -141,7 +142,7 @@ impl Machine {
         let topics = self.topics();
         let estimators: Vec<_> = self.environment.nodes().iter().map(|node| node.statistics()).collect();
         let made = self.control.topics().registry.statistics();
-        let sources = self.sources.lock().unwrap_or_else(PoisonError::into_inner);
+        let sources = lock(&self.sources);
         let topics: Vec<_> = topics.iter().map(|topic| topic.statistics()).chain(made).collect();
         let panics = self.panics(&topics, &control);
         let Summary { commands, state, safety, faults, all_faults, safety_errors, .. } = control;

@@ -5,7 +5,7 @@ use super::{Builder, Robot};
 use crate::component::replacement::Replacement;
 use crate::component::{Actuator, Estimator, Fault, Sensor, Service};
 use crate::lifecycle::{Serving, replacement_of_actuator, replacement_of_estimator, replacement_of_sensor};
-use crate::message::nearest::nearest_path;
+use crate::message::nearest::{did_you_mean, nearest_path};
 
 impl<R: Robot> Builder<R> {
     /// Replaces the sensor at `path`, or the other code at the path of an `external` input, with one of type `S`: a driver with a simulated sensor, or with one that plays
@@ -75,8 +75,7 @@ impl Draft {
         replacement: Replacement,
     ) -> Result<(), Fault> {
         let Some(path) = declared.iter().find(|other| **other == path) else {
-            let near = nearest_path(path, declared.iter().copied());
-            let hint = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+            let hint = did_you_mean(nearest_path(path, declared.iter().copied()));
             return Err(Fault::new(format!("no {kind} is at `{path}`{hint}")));
         };
         self.replacements.insert(path, replacement);

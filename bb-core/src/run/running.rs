@@ -6,6 +6,7 @@ use super::threads::{self, Thread};
 use super::{Live, Report, Robot, StartError};
 use crate::component::Caller;
 use crate::control::is_in_command;
+use crate::fault::lock;
 use crate::schedule::Reserved;
 use std::fmt;
 use std::ops::Deref;
@@ -117,7 +118,7 @@ impl Threads {
         for (path, thread) in std::mem::take(&mut self.sources) {
             let Err(message) = threads::join(thread, deadline) else { continue };
             self.has_waited = true;
-            let sources = machine.sources.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+            let sources = lock(&machine.sources);
             let entered =
                 sources.iter().find(|source| source.path() == path).and_then(|source| source.entered_at());
             drop(sources);

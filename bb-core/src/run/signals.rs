@@ -1,8 +1,9 @@
 //! Signals that stop a robot.
 
 #[cfg(unix)]
+use crate::fault::lock;
 use crate::schedule::start_thread;
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 /// Signals that arrive within this time are one: some parents send each twice, to the process and to its group.
@@ -33,14 +34,14 @@ pub(super) fn stop_on_signals(
     wait_until_safe: impl Fn() + Send + 'static,
     is_over: impl Fn() -> bool + Send + 'static,
 ) -> std::io::Result<()> {
-    let mut handled = HANDLED.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut handled = lock(&HANDLED);
     if !*handled {
         handle_signals()?;
         *handled = true;
     }
     let entry =
         Entry { stop: Box::new(stop), wait_until_safe: Box::new(wait_until_safe), is_over: Box::new(is_over) };
-    let mut stopping = STOPPING.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut stopping = lock(&STOPPING);
     stopping.robots.retain(|robot| !(robot.is_over)());
     stopping.robots.push(entry);
     // Signals for robots of before are not for this one.
@@ -78,7 +79,7 @@ fn handle_signals() -> std::io::Result<()> {
 
 /// Takes a signal. Returns whether the process is to end now.
 fn ends_the_process() -> bool {
-    let mut stopping = STOPPING.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut stopping = lock(&STOPPING);
     let first = match stopping.first {
         Some(first) => first,
         None => {

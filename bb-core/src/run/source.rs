@@ -16,7 +16,7 @@ use crate::node::{BindTarget, Environment};
 use crate::pubsub::{DynamicMessage, Enter};
 use crate::sorted::Sorted;
 use crate::time::{Clock, MonotonicTime};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
 /// Shared state from which components are created.
 #[derive(Clone, Debug)]
@@ -453,10 +453,6 @@ impl<S: Sensor> Source for Running<S> {
     fn shared(&self) -> SharedSource {
         self.shared.clone()
     }
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[cfg(test)]

@@ -1,9 +1,10 @@
 //! Times at which to wake each island: for timers, ticks and restarts.
 
 use super::Bell;
+use crate::fault::lock;
 use crate::sorted::Sorted;
 use crate::time::MonotonicTime;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 /// Islands with something due, ordered by time and then by number, so the order is the same in every run.
 #[derive(Clone, Debug)]
@@ -30,7 +31,7 @@ impl Agenda {
         if time == MonotonicTime::MAX {
             return;
         }
-        let mut entries = self.lock();
+        let mut entries = lock(&self.entries);
         if entries.of.len() <= island {
             entries.of.resize(island + 1, None);
         }
@@ -49,22 +50,18 @@ impl Agenda {
     }
 
     pub(crate) fn next(&self) -> Option<MonotonicTime> {
-        self.lock().next()
+        lock(&self.entries).next()
     }
 
     /// Takes the first island that is due at `now`.
     pub(crate) fn take(&self, now: MonotonicTime) -> Option<usize> {
-        let mut entries = self.lock();
+        let mut entries = lock(&self.entries);
         entries.next().filter(|time| *time <= now)?;
         let ((_, island), ()) = entries.by_time.pop_first()?;
         if let Some(slot) = entries.of.get_mut(island) {
             *slot = None;
         }
         Some(island)
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Entries> {
-        self.entries.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -93,7 +90,7 @@ mod tests {
         agenda.wake_at(at(500), 3);
         agenda.wake_at(at(100), 1);
         agenda.wake_at(MonotonicTime::MAX, 0);
-        assert_eq!(agenda.lock().by_time.len(), 2);
+        assert_eq!(lock(&agenda.entries).by_time.len(), 2);
         assert_eq!((agenda.take(at(99)), agenda.next()), (None, Some(at(100))));
         let taken: Vec<_> = std::iter::from_fn(|| agenda.take(at(1_000_000))).collect();
         assert_eq!(taken, [1, 3]);

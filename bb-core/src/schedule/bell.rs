@@ -1,5 +1,6 @@
 //! Wakes the thread that keeps time.
 
+use crate::fault::lock;
 use crate::time::{Clock, MonotonicTime};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::Duration;
@@ -10,13 +11,13 @@ pub(crate) struct Bell(Arc<(Mutex<bool>, Condvar)>);
 
 impl Bell {
     pub(crate) fn ring(&self) {
-        *self.0.0.lock().unwrap_or_else(PoisonError::into_inner) = true;
+        *lock(&self.0.0) = true;
         self.0.1.notify_all();
     }
 
     /// Waits until it rings or `due` has come, `longest` at most.
     pub(crate) fn wait_until(&self, clock: &Clock, due: Option<MonotonicTime>, longest: Duration) {
-        let has_rung = self.0.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let has_rung = lock(&self.0.0);
         let wait = due.map_or(longest, |due| due.duration_since(clock.now()).min(longest));
         let waited = self.0.1.wait_timeout_while(has_rung, wait, |has_rung| !*has_rung);
         *waited.unwrap_or_else(PoisonError::into_inner).0 = false;

@@ -1,9 +1,10 @@
 //! Deadlines by key, in the order of their times.
 
 use super::Bell;
+use crate::fault::lock;
 use crate::sorted::Sorted;
 use crate::time::MonotonicTime;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::Mutex;
 
 /// Deadlines by key, at most one for each; equal times are in the order of the keys.
 #[derive(Debug)]
@@ -25,7 +26,7 @@ impl<K: Ord + Copy> Deadlines<K> {
 
     /// Sets the deadline of `key`, in place of the one it had. The last instant never comes.
     pub(crate) fn set(&self, key: K, time: MonotonicTime) {
-        let mut entries = self.lock();
+        let mut entries = lock(&self.entries);
         entries.remove(key);
         if time == MonotonicTime::MAX {
             return;
@@ -40,23 +41,19 @@ impl<K: Ord + Copy> Deadlines<K> {
     }
 
     pub(crate) fn clear(&self, key: K) {
-        self.lock().remove(key);
+        lock(&self.entries).remove(key);
     }
 
     pub(crate) fn next(&self) -> Option<MonotonicTime> {
-        self.lock().by_time.first().map(|(time, _)| *time)
+        lock(&self.entries).by_time.first().map(|(time, _)| *time)
     }
 
     /// Takes the first deadline that has come.
     pub(crate) fn take(&self, now: MonotonicTime) -> Option<(MonotonicTime, K)> {
-        let mut entries = self.lock();
+        let mut entries = lock(&self.entries);
         let (time, key) = *entries.by_time.first().filter(|(time, _)| *time <= now)?;
         entries.remove(key);
         Some((time, key))
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Entries<K>> {
-        self.entries.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

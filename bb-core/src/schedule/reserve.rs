@@ -5,7 +5,7 @@
 //! a [`Reserve`] of their own with one place, since there may be any number of them: they get further threads when they are submitted,
 //! and if none can be started, they wait for the next of these threads that becomes free.
 
-use crate::fault::guarded;
+use crate::fault::{guarded, lock};
 #[cfg(not(loom))]
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -48,7 +48,7 @@ pub(crate) struct Reserved(Reserve);
 impl Reserve {
     /// Keeps one more thread.
     pub(crate) fn place(&self) -> std::io::Result<Reserved> {
-        let mut state = self.lock();
+        let mut state = lock(&self.0.state);
         state.places += 1;
         let place = Reserved(self.clone());
         if state.threads < state.places {
@@ -59,7 +59,7 @@ impl Reserve {
 
     /// Runs a job on a thread of its own.
     pub(crate) fn run(&self, job: Job) {
-        let mut state = self.lock();
+        let mut state = lock(&self.0.state);
         state.jobs.push_back(job);
         if state.jobs.len() <= state.free {
             self.0.changed.notify_one();
@@ -76,21 +76,21 @@ impl Reserve {
         let reserve = self.clone();
         let started = super::start_thread("disarm", Box::new(move || reserve.work()));
         started.map(drop).inspect_err(|_| {
-            let mut state = self.lock();
+            let mut state = lock(&self.0.state);
             state.threads -= 1;
             state.free -= 1;
         })
     }
 
     fn work(&self) {
-        let mut state = self.lock();
+        let mut state = lock(&self.0.state);
         loop {
             if let Some(job) = state.jobs.pop_front() {
                 state.free -= 1;
                 drop(state);
                 // A callback's own panics are caught where it is called.
                 let _ = guarded(job);
-                state = self.lock();
+                state = lock(&self.0.state);
                 state.free += 1;
             } else if state.threads > state.places {
                 state.threads -= 1;
@@ -105,11 +105,7 @@ impl Reserve {
     /// The number of threads that take the next job.
     #[cfg(test)]
     pub(crate) fn free(&self) -> usize {
-        self.lock().free
-    }
-
-    fn lock(&self) -> MutexGuard<'_, State> {
-        self.0.state.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.0.state).free
     }
 }
 
@@ -128,7 +124,7 @@ impl Drop for Reserved {
     fn drop(&mut self) {
         #[cfg(not(loom))]
         {
-            self.0.lock().places -= 1;
+            lock(&self.0.0.state).places -= 1;
             self.0.0.changed.notify_one();
         }
     }
@@ -145,8 +141,8 @@ mod tests {
 
     fn threads(reserve: &Reserve, count: usize) {
         let start = Instant::now();
-        while reserve.lock().threads != count {
-            assert!(start.elapsed() < LONG, "{} threads", reserve.lock().threads);
+        while lock(&reserve.0.state).threads != count {
+            assert!(start.elapsed() < LONG, "{} threads", lock(&reserve.0.state).threads);
             std::thread::sleep(Duration::from_millis(1));
         }
     }
@@ -155,7 +151,7 @@ mod tests {
     fn there_are_as_many_threads_as_places_and_jobs_and_none_is_left_behind() {
         let reserve = Reserve::default();
         let mut places: Vec<_> = (0..3).map(|_| reserve.place().expect("there are threads")).collect();
-        assert_eq!(reserve.lock().threads, 3, "before any job");
+        assert_eq!(lock(&reserve.0.state).threads, 3, "before any job");
         let (release, blocked) = mpsc::channel::<()>();
         let blocked = Arc::new(Mutex::new(blocked));
         let (started, running) = mpsc::channel();
@@ -169,13 +165,13 @@ mod tests {
         }
         let mut begun: Vec<_> = (0..5).map(|_| running.recv_timeout(LONG).expect("all run at once")).collect();
         begun.sort_unstable();
-        assert_eq!((begun, reserve.lock().threads), (vec![0, 1, 2, 3, 4], 5));
+        assert_eq!((begun, lock(&reserve.0.state).threads), (vec![0, 1, 2, 3, 4], 5));
         drop(release);
         threads(&reserve, 3);
         places.pop();
         threads(&reserve, 2);
         drop(places);
         threads(&reserve, 0);
-        assert_eq!(reserve.lock().free, 0);
+        assert_eq!(lock(&reserve.0.state).free, 0);
     }
 }

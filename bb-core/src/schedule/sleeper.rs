@@ -1,9 +1,10 @@
 //! Futures that wait for a time, in the order of their times and then of their numbers.
 
 use super::{Bell, Lane};
+use crate::fault::lock;
 use crate::sorted::Sorted;
 use crate::time::MonotonicTime;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::task::Waker;
 
 /// The alarms that are set. Clones share them.
@@ -36,7 +37,7 @@ impl Sleeper {
 
     /// Sets an alarm in place of `set`, the one that was set before, if any.
     pub(crate) fn wake_at(&self, time: MonotonicTime, set: Option<Alarm>, waker: Waker) -> Alarm {
-        let mut alarms = self.lock();
+        let mut alarms = lock(&self.alarms);
         let alarm = set.unwrap_or((time, alarms.next_number));
         alarms.next_number += 1;
         let replaced = alarms.set.insert(alarm, (self.lane, waker));
@@ -51,23 +52,19 @@ impl Sleeper {
     }
 
     pub(crate) fn forget(&self, alarm: Alarm) {
-        let waker = self.lock().set.remove(&alarm);
+        let waker = lock(&self.alarms).set.remove(&alarm);
         drop(waker);
     }
 
     pub(crate) fn next(&self) -> Option<MonotonicTime> {
-        self.lock().set.first().map(|(time, _)| *time)
+        lock(&self.alarms).set.first().map(|(time, _)| *time)
     }
 
     /// Takes the waker of the first alarm whose time has come.
     pub(crate) fn take(&self, now: MonotonicTime) -> Option<(Lane, Waker)> {
-        let mut alarms = self.lock();
+        let mut alarms = lock(&self.alarms);
         alarms.set.first().filter(|(time, _)| *time <= now)?;
         alarms.set.pop_first().map(|(_, waker)| waker)
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Alarms> {
-        self.alarms.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -85,10 +82,10 @@ mod tests {
             alarm = Some(sleeper.wake_at(hour, alarm, waker.clone()));
         }
         sleeper.wake_at(MonotonicTime::ZERO, None, waker.clone());
-        let set = sleeper.lock().set.len();
+        let set = lock(&sleeper.alarms).set.len();
         assert_eq!((set, sleeper.next()), (2, Some(MonotonicTime::ZERO)));
         assert!(sleeper.take(MonotonicTime::ZERO).is_some() && sleeper.take(MonotonicTime::ZERO).is_none());
         alarm.into_iter().for_each(|alarm| sleeper.forget(alarm));
-        assert_eq!(sleeper.lock().set.len(), 0);
+        assert_eq!(lock(&sleeper.alarms).set.len(), 0);
     }
 }

@@ -1,7 +1,8 @@
 //! Tells the threads of a robot to stop, and wakes those that sleep.
 
+use crate::fault::lock;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::thread::Thread;
 use std::time::Duration;
 
@@ -19,12 +20,12 @@ struct Shared {
 impl StopSignal {
     /// The calling thread is woken when the signal is set.
     pub(crate) fn register(&self) {
-        self.0.threads.lock().unwrap_or_else(PoisonError::into_inner).push(std::thread::current());
+        lock(&self.0.threads).push(std::thread::current());
     }
 
     pub(crate) fn set(&self) {
         self.0.is_set.store(true, Ordering::SeqCst);
-        for thread in &*self.0.threads.lock().unwrap_or_else(PoisonError::into_inner) {
+        for thread in &*lock(&self.0.threads) {
             thread.unpark();
         }
     }

@@ -5,7 +5,7 @@ use crate::component::host::{ExternalSensor, Host};
 use crate::component::{Caller, Fault};
 use crate::event::Right;
 use crate::message::codec::json_to_bytes;
-use crate::message::nearest::nearest_path;
+use crate::message::nearest::{did_you_mean, nearest_path};
 use crate::message::{Frame, Payload, Stamp};
 use crate::pubsub::{AnyTopic, DynamicMessage, Encoded, Enter, Gate, Publisher, Tell};
 use crate::time::{MonotonicTime, WallTime};
@@ -199,8 +199,7 @@ impl Bus {
         }
         let own = self.host.registry().topics();
         let known = self.host.externals().into_iter().chain(own.iter().map(|topic| topic.path()));
-        let near = nearest_path(path, known);
-        let hint = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+        let hint = did_you_mean(nearest_path(path, known));
         refused(&format!("its payload is not known, since nobody has published or subscribed there{hint}"))
     }
 

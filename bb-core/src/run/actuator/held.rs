@@ -2,7 +2,8 @@
 //! attempt to enter once more is refused. Code of several actuators that wait for each other on several threads hangs.
 
 use crate::control::{Inside, is_in_actuator};
-use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
+use crate::fault::lock;
+use std::sync::{Mutex, MutexGuard, TryLockError};
 
 /// Lock around an actuator's state, see the [module](self). Its address identifies the actuator, so it must not be moved while it is used.
 pub(super) struct Guarded<S> {
@@ -28,7 +29,7 @@ impl<S> Guarded<S> {
         if is_in_actuator(self.address()) {
             return None;
         }
-        Some(self.held(self.state.lock().unwrap_or_else(PoisonError::into_inner)))
+        Some(self.held(lock(&self.state)))
     }
 
     /// Enters as [`Self::enter`] does, without waiting.

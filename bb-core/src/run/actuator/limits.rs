@@ -1,12 +1,12 @@
 //! Enforces the limits of an actuator's joint on its commands, and counts how often this happens.
 
 use crate::component::ActuatorContext;
-use crate::fault::{Fault, caught};
+use crate::fault::{Fault, caught, lock};
 use crate::joints::Joints;
 use crate::message::{Exceeded, JointBounds, LimitedQuantity, OutOfBounds, Payload};
 use std::fmt;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, PoisonError};
 
 const QUANTITIES: usize = LimitedQuantity::ALL.len();
 
@@ -89,13 +89,13 @@ impl Counts {
     pub(super) fn statistics(&self, path: &'static str) -> ActuatorStatistics {
         let load = |all: &[AtomicU64; QUANTITIES]| std::array::from_fn(|index| all[index].load(Ordering::Relaxed));
         let commands = self.commands.load(Ordering::Relaxed);
-        let stopped = self.stopped.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let stopped = lock(&self.stopped).clone();
         ActuatorStatistics { path, commands, limited: load(&self.limited), refused: load(&self.refused), stopped }
     }
 
     /// Notes why it does not run; `None` once it runs.
     pub(super) fn note_stopped(&self, reason: Option<String>) {
-        *self.stopped.lock().unwrap_or_else(PoisonError::into_inner) = reason;
+        *lock(&self.stopped) = reason;
     }
 }
 

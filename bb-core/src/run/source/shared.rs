@@ -1,7 +1,7 @@
 //! The part of a source that other threads reach.
 
-use super::lock;
 use crate::component::Counts;
+use crate::fault::lock;
 use crate::run::occupied::{Entered, Occupied};
 use crate::time::{Clock, MonotonicTime};
 use std::sync::atomic::{AtomicU64, Ordering};
