@@ -27,7 +27,7 @@ pub use island::{
     Alone, Inlet, Island, IslandOf, IslandState, IslandWiring, Key, Member, Solo, act, alone, emit, enter,
     enter_alone, hold, island as island_of, publish_to, receive, start, start_alone,
 };
-pub(crate) use island::{AnyIsland, CallError, Replayed, islands_in};
+pub(crate) use island::{AnyIsland, CallError, Replayed};
 pub use latency::LatencyStatistics;
 pub(crate) use requests::{know_calls, know_casts};
 pub use running::Node;

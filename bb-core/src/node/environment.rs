@@ -91,8 +91,6 @@ struct Inner {
     clock: Clock,
     origin: Origin,
     door: Door,
-    /// The time that all components see in their first `init`.
-    start: MonotonicTime,
     has_journal: bool,
     has_telemetry: bool,
     /// The line of the journal that is being replayed.
@@ -112,15 +110,8 @@ impl Opaque for Shared {
 }
 
 struct Shared {
-    overseer: Arc<dyn Overseer>,
-    supervision: Supervision,
-    agenda: Agenda,
-    pool: Pool,
+    parts: EnvironmentParts,
     nodes: Box<[SharedNode]>,
-    journal: Option<Journal>,
-    telemetry: Option<Telemetry>,
-    joints: Joints,
-    replacements: Replacements,
     /// Drains an island, once the robot is wired.
     drain: OnceLock<Drain>,
     /// Islands with waiting entries, on virtual time.
@@ -148,57 +139,35 @@ pub(crate) struct EnvironmentParts {
     pub(crate) telemetry: Option<Telemetry>,
     pub(crate) joints: Joints,
     pub(crate) replacements: Replacements,
+    /// The time that all components see in their first `init`.
     pub(crate) start: MonotonicTime,
 }
 
 impl Environment {
     pub(crate) fn new(parts: EnvironmentParts, nodes: Box<[SharedNode]>) -> Self {
-        let EnvironmentParts {
-            mode,
-            clock,
-            origin,
-            overseer,
-            supervision,
-            agenda,
-            pool,
-            journal,
-            telemetry,
-            joints,
-            replacements,
-            start,
-        } = parts;
-        if mode == Mode::Real {
+        if parts.mode == Mode::Real {
             Stopwatch::prepare();
         }
-        let (has_journal, has_telemetry) = (journal.is_some(), telemetry.is_some());
-        let shared = Shared {
-            overseer,
-            supervision,
-            agenda,
-            pool,
-            nodes,
-            journal,
-            telemetry,
-            joints,
-            replacements,
-            drain: OnceLock::new(),
-            posted: Mutex::default(),
-            refusal: Mutex::default(),
-            facts: Mutex::default(),
-            declared_facts: Mutex::default(),
-            replayed: Comparison::default(),
-            retired: Default::default(),
-        };
+        let has_journal = parts.journal.is_some();
         Self(Arc::new(Inner {
-            mode,
-            clock,
-            origin,
+            mode: parts.mode,
+            clock: parts.clock.clone(),
+            origin: parts.origin,
             door: Door::new(has_journal),
-            start,
             has_journal,
-            has_telemetry,
+            has_telemetry: parts.telemetry.is_some(),
             replayed_line: AtomicU64::new(0),
-            shared: Box::new(shared),
+            shared: Box::new(Shared {
+                parts,
+                nodes,
+                drain: OnceLock::new(),
+                posted: Mutex::default(),
+                refusal: Mutex::default(),
+                facts: Mutex::default(),
+                declared_facts: Mutex::default(),
+                replayed: Comparison::default(),
+                retired: Default::default(),
+            }),
         }))
     }
 
@@ -255,7 +224,7 @@ impl Environment {
                 Err(fault) => return self.refuse(path, fault),
             };
             let check = move |values: &ParameterValues| template.bound(&binding, values).map(drop);
-            self.shared().overseer.bind(path, binding.parameters, Box::new(check), target);
+            self.shared().parts.overseer.bind(path, binding.parameters, Box::new(check), target);
         }
     }
 
@@ -289,7 +258,7 @@ impl Environment {
         match self.0.mode {
             Mode::Real => {
                 let environment = self.clone();
-                self.shared().pool.submit(Lane::Robot, move || environment.drain(island));
+                self.shared().parts.pool.submit(Lane::Robot, move || environment.drain(island));
             }
             Mode::Virtual => lock(&self.shared().posted).push_back(island),
             Mode::Replay => {}
@@ -356,30 +325,30 @@ impl Environment {
     }
 
     pub(crate) fn overseer(&self) -> &Arc<dyn Overseer> {
-        &self.shared().overseer
+        &self.shared().parts.overseer
     }
 
     pub(crate) fn supervision(&self) -> Supervision {
-        self.shared().supervision
+        self.shared().parts.supervision
     }
 
     pub(crate) fn agenda(&self) -> &Agenda {
-        &self.shared().agenda
+        &self.shared().parts.agenda
     }
 
     pub(crate) fn pool(&self) -> &Pool {
-        &self.shared().pool
+        &self.shared().parts.pool
     }
 
     /// The states of the joints.
     #[inline]
     pub(crate) fn joints(&self) -> &Joints {
-        &self.shared().joints
+        &self.shared().parts.joints
     }
 
     /// The replacement of the component at `path`, if there is one.
     pub(crate) fn replacement(&self, path: &str) -> Option<&Replacement> {
-        self.shared().replacements.get(path)
+        self.shared().parts.replacements.get(path)
     }
 
     /// The entry point for messages.
@@ -389,7 +358,7 @@ impl Environment {
     }
 
     pub(crate) fn start(&self) -> MonotonicTime {
-        self.0.start
+        self.shared().parts.start
     }
 
     /// Identifies the robot, as long as it lives.
@@ -400,12 +369,12 @@ impl Environment {
 
     #[inline]
     pub(crate) fn journal(&self) -> Option<&Journal> {
-        if self.0.has_journal { self.shared().journal.as_ref() } else { None }
+        if self.0.has_journal { self.shared().parts.journal.as_ref() } else { None }
     }
 
     #[inline]
     pub(crate) fn telemetry(&self) -> Option<&Telemetry> {
-        if self.0.has_telemetry { self.shared().telemetry.as_ref() } else { None }
+        if self.0.has_telemetry { self.shared().parts.telemetry.as_ref() } else { None }
     }
 
     /// Returns whether individual messages are observed by a journal, a telemetry handler or the comparison of a replay.
@@ -433,7 +402,7 @@ impl Environment {
         now: MonotonicTime,
     ) -> u64 {
         if T::TELLS_JOINT_POSITION {
-            self.shared().joints.hear(message, now);
+            self.shared().parts.joints.hear(message, now);
         }
         match self.journal() {
             None => {

@@ -26,7 +26,8 @@ mod waiting;
 
 pub use self::alone::{Alone, Inlet, Solo, enter_alone, publish_to, start_alone};
 pub use self::any::IslandOf;
-pub(crate) use self::any::{AnyIsland, IslandIn, Replayed, islands_in};
+use self::any::Placed;
+pub(crate) use self::any::{AnyIsland, Replayed};
 use self::inbox::Inbox;
 use self::inside::{Within, is_inside};
 pub use self::member::{Member, act, alone, emit, enter, hold, island, receive, start};

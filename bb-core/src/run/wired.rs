@@ -10,7 +10,7 @@ use super::{Robot, StartError};
 use crate::component::{ExternalSensor, Fault, OptionsList};
 use crate::control::Prepared;
 use crate::declaration::RobotDeclaration;
-use crate::node::{AnyIsland, islands_in};
+use crate::node::AnyIsland;
 use crate::pubsub::{AnyTopic, DynamicMessage};
 use crate::time::MonotonicTime;
 use std::any::Any;
@@ -81,7 +81,7 @@ impl<R: Robot> Unwired for Parts<R> {
         let topics = std::mem::replace(&mut self.topics, R::topics());
         let wiring = Arc::new(R::wire(topics, options, assembly));
         self.wiring = Some(Arc::clone(&wiring));
-        let islands = islands_in(&wiring, R::ISLANDS);
+        let islands = R::ISLANDS.iter().map(|island| island(&wiring)).collect();
         Wired { islands, parts: Box::new(WiringOf::<R>(wiring)), external: OnceLock::new() }
     }
 

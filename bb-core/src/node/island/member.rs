@@ -1,7 +1,7 @@
 //! An estimator in its island. The expansion of `robot!` provides its location and the destinations of its outputs. The code that
 //! uses them is here, once for all estimators.
 
-use super::{Island, IslandIn, IslandState, Key};
+use super::{AnyIsland, IslandState, Key, Placed};
 use crate::component::{Binding, EmittedAt, Estimator, Inputs, OptionsList, Outputs, TakenAt};
 use crate::fault::Panic;
 use crate::message::{Payload, Stamp, Stamped};
@@ -10,6 +10,7 @@ use crate::node::{Arrival, Next, Node, Turn};
 use crate::pubsub::{DynamicMessage, Topic, counted_bytes};
 use crate::time::MonotonicTime;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
 
 type WiringOf<M> = <<M as Member>::State as IslandState>::Wiring;
 type InputOf<M> = <<M as Member>::Estimator as Estimator>::Input;
@@ -212,9 +213,9 @@ pub fn enter<S: IslandState, T: Payload>(
 }
 
 /// The type-erased form of an island of a wiring.
-pub fn island<S: IslandState + 'static>(wiring: &S::Wiring) -> &dyn IslandIn<S::Wiring>
+pub fn island<S: IslandState + 'static>(wiring: &Arc<S::Wiring>) -> Box<dyn AnyIsland>
 where
-    Island<S>: IslandIn<S::Wiring>,
+    Placed<S>: AnyIsland,
 {
-    S::find(wiring)
+    Box::new(Placed::<S>(Arc::clone(wiring)))
 }
