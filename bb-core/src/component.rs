@@ -42,7 +42,6 @@ pub use actuator_link::{ActuatorError, ActuatorLink};
 pub(crate) use binding::Binding;
 pub use bus::{Bus, DisarmQueue, Session};
 pub(crate) use caller::Caller;
-pub(crate) use command::OwnHooks;
 pub use command::{Arm, Command, CommandContext, Disarm, NoArguments, Outcome, Sleep};
 pub use context::{ActuatorContext, ComponentContext, Context, SensorContext, ServiceContext};
 pub use counter::Counter;

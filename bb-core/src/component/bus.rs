@@ -11,11 +11,10 @@ use super::host::{Controls, Host};
 use super::{
     Accepts, ActuatorLink, Caller, CommandInfo, Description, DynamicExecution, ExecutionInfo, Fault, RunKind,
 };
-use crate::declaration::ParameterError;
+use crate::declaration::{ParameterError, parameter_from_json};
 use crate::event::{ArmError, DisarmError, Forbidden, ParameterValue, Right, Rights, Safety};
 use crate::joints::Joints;
 use crate::message::Payload;
-use crate::message::codec::from_json;
 use crate::message::nearest::{did_you_mean, nearest_path};
 use crate::pubsub::{
     AnyTopic, Delivery, DynamicSubscription, Payloads, Select, SubscriberStatistics, Subscription, Topic,
@@ -47,7 +46,7 @@ use std::sync::Arc;
 /// ```
 #[derive(Clone)]
 pub struct Bus {
-    host: Arc<dyn Host>,
+    pub(super) host: Arc<dyn Host>,
     pub(super) caller: Caller,
 }
 
@@ -250,12 +249,9 @@ impl Bus {
         values: impl IntoIterator<Item = (&'a str, &'a str)>,
     ) -> Result<(), ParameterError> {
         let parse = |(path, json): (&'a str, &'a str)| {
+            // Of one that does not exist, the path is refused, whatever the value.
             let read = match self.host.controls().parameter(path) {
-                Some(ParameterValue::Bool(_)) => from_json::<bool>(json).map(ParameterValue::Bool),
-                Some(ParameterValue::Integer(_)) => from_json::<i64>(json).map(ParameterValue::Integer),
-                Some(ParameterValue::Float(_)) => from_json::<f64>(json).map(ParameterValue::Float),
-                Some(ParameterValue::Text(_)) => from_json::<String>(json).map(ParameterValue::Text),
-                // Of one that does not exist, the path is refused, whatever the value.
+                Some(like) => parameter_from_json(&like, json),
                 None => Ok(ParameterValue::Text(String::new())),
             };
             match read {

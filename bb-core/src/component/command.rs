@@ -1,15 +1,13 @@
 //! The contract of a command.
 
-use super::guardian::DisarmHook;
-use super::host::Host;
-use super::{Bus, Caller, Fault, NoOptions, Options};
+use super::host::Controls;
+use super::{Bus, Fault, NoOptions, Options};
 use crate::declaration::Role;
 use crate::event::{HardwareError, HealthTransition};
 use crate::message::{Field, Payload, Stamped};
 use crate::pubsub::DynamicMessage;
 use crate::schedule::{Alarm, Sleeper};
 use crate::time::MonotonicTime;
-use std::fmt;
 use std::future::Future;
 use std::ops::Deref;
 use std::pin::Pin;
@@ -112,7 +110,9 @@ pub struct CommandContext {
     pub(crate) health: Option<HealthTransition>,
     pub(crate) bus: Bus,
     pub(crate) sleeper: Sleeper,
-    pub(crate) hooks: Arc<OwnHooks>,
+    pub(crate) path: &'static str,
+    /// The number of the execution.
+    pub(crate) execution: u64,
 }
 
 impl CommandContext {
@@ -182,9 +182,11 @@ impl CommandContext {
     /// # Errors
     /// It has published another type there before, or it was cancelled.
     pub fn progress<T: Payload>(&self, progress: T) -> Result<(), Fault> {
-        let publisher = self.bus.publisher::<T>(&format!("{}/progress", self.hooks.path))?;
+        let publisher = self.bus.publisher::<T>(&format!("{}/progress", self.path))?;
         let kept = DynamicMessage::of(publisher.path(), Stamped::new(self.now(), progress.clone()));
-        self.hooks.keep_progress(kept, &self.bus.caller);
+        if let Ok(_permit) = self.bus.caller.permit() {
+            self.controls().keep_progress(self.execution, kept);
+        }
         publisher.publish(progress);
         Ok(())
     }
@@ -204,25 +206,29 @@ impl CommandContext {
     /// # Errors
     /// No such state is declared, the robot is not armed, or the command was cancelled or has timed out.
     pub fn transition(&self, state: &str) -> Result<(), Fault> {
-        self.hooks.transition(state, &self.bus.caller)
+        self.controls().transition(self.execution, state, &self.bus.caller)
     }
 
     /// Registers a callback that makes hardware safe when the robot is disarmed while this command runs. It is
     /// removed when the command's code has returned. All callbacks run concurrently, each on its own thread, and
     /// must return within 5 s. One that fails or takes longer leads to the safety state `error`.
     pub fn on_disarm(&self, hook: impl Fn() -> Result<(), Fault> + Send + Sync + 'static) {
-        self.hooks.add(Arc::new(hook));
+        self.controls().on_disarm(self.path, Some(self.execution), Arc::new(hook));
     }
 
     /// Reports that hardware is in a dangerous state: the robot is disarmed, its safety state becomes `error`, and the error
     /// is published at `safety/error`. Give a text, or a [`HardwareError`] with a kind and a quantity.
     pub fn hardware_error(&self, error: impl Into<HardwareError>) {
-        self.hooks.hardware_error(error.into());
+        self.controls().hardware_error(self.path, error.into());
     }
 
     /// Topics, actuators, parameters and commands, by path.
     pub fn bus(&self) -> Bus {
         self.bus.clone()
+    }
+
+    fn controls(&self) -> &dyn Controls {
+        self.bus.host.controls()
     }
 }
 
@@ -230,44 +236,6 @@ impl Deref for CommandContext {
     type Target = Bus;
     fn deref(&self) -> &Bus {
         &self.bus
-    }
-}
-
-/// The disarm callbacks of one execution of a command: they are kept until its code has returned.
-pub(crate) struct OwnHooks {
-    path: &'static str,
-    host: Arc<dyn Host>,
-    execution: u64,
-}
-
-impl OwnHooks {
-    pub(crate) fn new(path: &'static str, host: Arc<dyn Host>, execution: u64) -> Self {
-        Self { path, host, execution }
-    }
-
-    /// Adds a callback, which is dropped once the execution's code has returned.
-    pub(crate) fn add(&self, hook: DisarmHook) {
-        self.host.controls().on_disarm(self.path, Some(self.execution), hook);
-    }
-
-    fn keep_progress(&self, progress: DynamicMessage, caller: &Caller) {
-        if let Ok(_permit) = caller.permit() {
-            self.host.controls().keep_progress(self.execution, progress);
-        }
-    }
-
-    fn transition(&self, state: &str, caller: &Caller) -> Result<(), Fault> {
-        self.host.controls().transition(self.execution, state, caller)
-    }
-
-    pub(crate) fn hardware_error(&self, error: HardwareError) {
-        self.host.controls().hardware_error(self.path, error);
-    }
-}
-
-impl fmt::Debug for OwnHooks {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("OwnHooks").field(&self.path).finish()
     }
 }
 

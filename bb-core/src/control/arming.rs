@@ -11,7 +11,7 @@
 use super::callbacks::{Reason, is_awaited};
 use super::machine::IDLE;
 use super::step::Step;
-use super::{Control, Disarming, Limit, Phase, RunningCommand, State};
+use super::{Control, Disarming, Limit, RunningCommand, State};
 use crate::component::Caller;
 use crate::event::{ArmError, DisarmError, HardwareError, HardwareErrorKind, Safety, SafetyError};
 use crate::journal::Event;
@@ -35,7 +35,7 @@ const MARGIN: Duration = Duration::from_secs(1);
 impl State {
     /// Returns whether the code of a cancelled command has not returned yet.
     pub(super) fn has_lingering(&self) -> bool {
-        self.executions.iter().any(|execution| matches!(execution.phase, Phase::Lingering))
+        self.executions.iter().any(RunningCommand::is_lingering)
     }
 
     /// Returns whether the code of a command, or a disarm callback outside of a disarming, has not returned.
@@ -390,7 +390,7 @@ impl Step<'_> {
     /// The paths of commands that were cancelled and whose code has not returned.
     fn lingering(&self) -> Vec<&'static str> {
         let executions = self.state.executions.iter();
-        let lingering = executions.filter(|execution| matches!(execution.phase, Phase::Lingering));
+        let lingering = executions.filter(|execution| execution.is_lingering());
         lingering.filter_map(|execution| self.declared(execution.command)).map(|declared| declared.path).collect()
     }
 

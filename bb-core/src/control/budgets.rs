@@ -9,7 +9,6 @@ use crate::declaration::Supervisor;
 use crate::lifecycle::Supervision;
 use crate::time::MonotonicTime;
 use crate::topology::Topology;
-use std::collections::VecDeque;
 
 /// The decision of a supervisor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,19 +25,22 @@ pub(super) enum Verdict {
 #[derive(Debug)]
 pub(super) struct Budgets {
     settings: Supervision,
-    parents: Box<[Option<Supervisor>]>,
+    parents: Vec<Option<Supervisor>>,
     /// The most recent panics that each has allowed.
-    panics: Vec<VecDeque<MonotonicTime>>,
+    panics: Vec<Vec<MonotonicTime>>,
 }
 
 impl Budgets {
     pub(super) fn new(topology: &Topology, settings: Supervision) -> Self {
         let links = topology.links.len();
-        let of_links =
-            topology.links.iter().map(|link| Some(link.parent_joint.map_or(0, |joint| 1 + links + joint)));
-        let of_joints = topology.joints.iter().map(|joint| Some(1 + joint.parent));
-        let parents: Box<[_]> = std::iter::once(None).chain(of_links).chain(of_joints).collect();
-        let panics = vec![VecDeque::new(); parents.len()];
+        let mut parents = vec![None];
+        for link in topology.links {
+            parents.push(Some(link.parent_joint.map_or(0, |joint| 1 + links + joint)));
+        }
+        for joint in topology.joints {
+            parents.push(Some(1 + joint.parent));
+        }
+        let panics = vec![Vec::new(); parents.len()];
         Self { settings, parents, panics }
     }
 
@@ -50,7 +52,7 @@ impl Budgets {
             let Some(past) = self.panics.get_mut(current) else { return Verdict::GiveUp };
             past.retain(|time| now.duration_since(*time) < self.settings.within);
             if past.len() < self.settings.max_restarts {
-                past.push_back(now);
+                past.push(now);
                 return verdict;
             }
             // Until some of these have expired, further panics escalate at once.

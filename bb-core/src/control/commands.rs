@@ -6,7 +6,7 @@ use super::execution::{Execution, Slot, UntypedExecution};
 use super::step::Step;
 use super::task::{Task, Value};
 use super::{Control, Limit, Phase, RunningCommand};
-use crate::component::{Bus, Caller, CommandContext, CommandInfo, DynamicExecution, ExecutionInfo, OwnHooks};
+use crate::component::{Bus, Caller, CommandContext, CommandInfo, DynamicExecution, ExecutionInfo};
 use crate::declaration::{CommandDeclaration, Role};
 use crate::event::{
     CategoryDeclaration, CommandEvent, CommandPhase, HealthTransition, Refusal, RefusalReason, Right, Safety,
@@ -104,14 +104,14 @@ impl Control {
     }
 
     pub(crate) fn infos(&self) -> Vec<CommandInfo> {
-        let state = self.lock();
-        let running = state.executions.iter().filter(|execution| !matches!(execution.phase, Phase::Lingering));
-        let running: Vec<usize> = running.map(|execution| execution.command).collect();
-        drop(state);
-        let declared = self.0.declared.commands.iter();
-        let infos = declared.zip(&self.0.commands).enumerate().map(|(number, (declared, command))| {
+        let mut running = vec![0; self.0.declared.commands.len()];
+        for execution in self.lock().executions.iter().filter(|execution| !execution.is_lingering()) {
+            running[execution.command] += 1;
+        }
+        let mut infos = Vec::new();
+        for ((declared, command), running) in self.0.declared.commands.iter().zip(&self.0.commands).zip(running) {
             let (arguments, output) = command.0.shapes();
-            CommandInfo {
+            infos.push(CommandInfo {
                 path: declared.path,
                 role: command.0.role(),
                 arguments,
@@ -120,34 +120,33 @@ impl Control {
                 allowed_states: declared.allowed_states,
                 category: self.category(declared).name,
                 timeout: declared.timeout_nanos.map(|nanos| Duration::from_nanos(nanos.max(0).unsigned_abs())),
-                running: running.iter().filter(|command| **command == number).count(),
-            }
-        });
-        infos.collect()
+                running,
+            });
+        }
+        infos
     }
 
     /// The executions that have not ended, in the order of their numbers.
     pub(crate) fn executions(&self) -> Vec<ExecutionInfo> {
         let state = self.lock();
-        let running = state.executions.iter().filter(|execution| !matches!(execution.phase, Phase::Lingering));
-        let infos = running.filter_map(|execution| {
-            let info = ExecutionInfo {
+        let (mut infos, mut messages) = (Vec::new(), Vec::new());
+        for execution in state.executions.iter().filter(|execution| !execution.is_lingering()) {
+            let Some(declared) = self.0.declared.commands.get(execution.command) else { continue };
+            infos.push(ExecutionInfo {
                 number: execution.id,
-                path: self.0.declared.commands.get(execution.command)?.path,
+                path: declared.path,
                 caller: execution.asked_by.clone(),
                 started: execution.started,
                 progress: None,
-            };
-            Some((info, execution.progress.clone()))
-        });
-        let infos: Vec<_> = infos.collect();
+            });
+            messages.push(execution.progress.clone());
+        }
         drop(state);
         // The payload's code runs without the lock.
-        let with_progress = infos.into_iter().map(|(info, progress)| ExecutionInfo {
-            progress: progress.and_then(|message| member_of(&message.to_json(), "payload")),
-            ..info
-        });
-        with_progress.collect()
+        for (info, message) in infos.iter_mut().zip(messages) {
+            info.progress = message.and_then(|message| member_of(&message.to_json(), "payload"));
+        }
+        infos
     }
 
     pub(super) fn keep_progress_of(&self, number: u64, progress: DynamicMessage) {
@@ -200,7 +199,7 @@ impl Control {
     pub(super) fn drop_cancelled(&self) {
         let lingering: Vec<_> = {
             let state = self.lock();
-            let lingering = state.executions.iter().filter(|execution| matches!(execution.phase, Phase::Lingering));
+            let lingering = state.executions.iter().filter(|execution| execution.is_lingering());
             lingering.filter_map(|execution| execution.task.clone()).collect()
         };
         lingering.into_iter().for_each(|task| task.run());
@@ -233,7 +232,7 @@ impl Step<'_> {
 
     /// The position of an execution that has not ended.
     pub(super) fn running(&self, id: u64) -> Option<usize> {
-        self.position(id).filter(|index| !matches!(self.state.executions[*index].phase, Phase::Lingering))
+        self.position(id).filter(|index| !self.state.executions[*index].is_lingering())
     }
 
     /// The name of an execution's command.
@@ -243,10 +242,9 @@ impl Step<'_> {
     }
 
     /// The numbers of executions that have not ended and match.
-    pub(super) fn not_ended(&self, fits: impl Fn(&Self, &RunningCommand) -> bool) -> Vec<u64> {
-        let executions = self.state.executions.iter();
-        let executions = executions.filter(|execution| !matches!(execution.phase, Phase::Lingering));
-        executions.filter(|execution| fits(self, execution)).map(|execution| execution.id).collect()
+    pub(super) fn not_ended(&self, fits: &dyn Fn(&RunningCommand) -> bool) -> Vec<u64> {
+        let fits = |execution: &&RunningCommand| !execution.is_lingering() && fits(execution);
+        self.state.executions.iter().filter(fits).map(|execution| execution.id).collect()
     }
 
     /// Starts a command, or returns why it cannot be started.
@@ -270,8 +268,8 @@ impl Step<'_> {
             self.refuse(number, refusal.clone(), asked_by, health);
             return Err(refusal);
         }
-        let cancelled: Vec<u64> = self.not_ended(|step, execution| {
-            step.declared(execution.command).is_some_and(|other| declared.cancel.includes(other.category))
+        let cancelled = self.not_ended(&|execution| {
+            self.declared(execution.command).is_some_and(|other| declared.cancel.includes(other.category))
         });
         for id in cancelled {
             self.cancel_one(id);
@@ -294,12 +292,12 @@ impl Step<'_> {
                 let gone = || Fault::new("the robot is gone");
                 let control = weak.upgrade().ok_or_else(gone)?;
                 let prepared = control.0.commands.get(number).ok_or_else(gone)?;
-                let host = control.host()?;
                 let context = CommandContext {
                     name: declared.name,
                     health,
-                    hooks: Arc::new(OwnHooks::new(declared.path, Arc::clone(&host), id)),
-                    bus: Bus::new(host, caller),
+                    path: declared.path,
+                    execution: id,
+                    bus: Bus::new(control.host()?, caller),
                     sleeper: control.0.sleeper.in_lane(lane),
                 };
                 prepared.0.start(arguments, &control.parameters(), context)
@@ -342,8 +340,8 @@ impl Step<'_> {
         if !declared.allowed(role, self.state.machine.state()) {
             return Err(RefusalReason::State);
         }
-        let running = self.not_ended(|step, execution| {
-            step.declared(execution.command).is_some_and(|other| other.category == declared.category)
+        let running = self.not_ended(&|execution| {
+            self.declared(execution.command).is_some_and(|other| other.category == declared.category)
         });
         let concurrency = self.control.category(declared).concurrency;
         if running.len() >= concurrency && !declared.cancel.includes(declared.category) {
@@ -381,7 +379,7 @@ impl Step<'_> {
     /// Returns whether another command may start. A command that hangs leaves an execution running each time it is started and cancelled.
     fn has_room(&self, role: Role, of_health: bool) -> Result<(), RefusalReason> {
         let executions = self.state.executions.iter();
-        let lingering = executions.filter(|execution| matches!(execution.phase, Phase::Lingering)).count();
+        let lingering = executions.filter(|execution| execution.is_lingering()).count();
         let most = if of_health { 2 * MOST_LINGERING } else { MOST_LINGERING };
         if role == Role::Disarming || lingering < most { Ok(()) } else { Err(RefusalReason::Hanging) }
     }

@@ -95,8 +95,10 @@ impl Effects {
     pub(super) fn run(self, control: &Control) {
         let Self { wakers, logs: _, has_lines, begun, cancelled, results, callbacks, dropped, wired, ended } = self;
         // Hardware comes first.
-        let here: Vec<_> =
-            callbacks.into_iter().map(|(reason, all)| (reason, control.start_callbacks(reason, all))).collect();
+        let mut here = Vec::new();
+        for (reason, all) in callbacks {
+            here.push((reason, control.start_callbacks(reason, all)));
+        }
         // Before anything that may block: until then, no other thread writes lines.
         if has_lines {
             control.start_writing_logs();
@@ -109,14 +111,16 @@ impl Effects {
             let counted = control.clone();
             control.run_on_pool(Lane::User, move || counted.count_waker_panics(wakers.run()));
         }
-        let results: Vec<_> = results.into_iter().map(|(slot, result)| slot.set(result)).collect();
-        if !(results.is_empty() && dropped.is_empty()) {
+        let (mut dropped, mut woken) = (dropped, Vec::new());
+        for (slot, result) in results {
+            let (waker, late) = slot.set(result);
+            woken.extend(waker);
+            dropped.extend(late);
+        }
+        if !(woken.is_empty() && dropped.is_empty()) {
             let woken_by = control.clone();
             control.run_on_pool(Lane::User, move || {
-                for (waker, late) in results {
-                    waker.into_iter().for_each(|waker| woken_by.wake(waker));
-                    late.into_iter().for_each(discard);
-                }
+                woken.into_iter().for_each(|waker| woken_by.wake(waker));
                 dropped.into_iter().for_each(discard);
             });
         }

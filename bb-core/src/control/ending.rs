@@ -126,6 +126,11 @@ impl Control {
 }
 
 impl RunningCommand {
+    /// Returns whether it is settled, and its code has yet to return.
+    pub(super) fn is_lingering(&self) -> bool {
+        matches!(self.phase, Phase::Lingering)
+    }
+
     /// Returns whether the command's code has not returned, or its future is to be dropped.
     pub(super) fn is_inside(&self) -> bool {
         self.task.as_ref().is_some_and(|task| task.may_act())
@@ -135,14 +140,14 @@ impl RunningCommand {
 impl Step<'_> {
     /// Cancels every command but one.
     pub(super) fn cancel_all(&mut self, but: Option<u64>) {
-        for id in self.not_ended(|_, execution| Some(execution.id) != but) {
+        for id in self.not_ended(&|execution| Some(execution.id) != but) {
             self.cancel_one(id);
         }
     }
 
     /// Cancels a command that would arm the robot.
     pub(super) fn cancel_arming(&mut self) {
-        for id in self.not_ended(|step, execution| step.role(execution.command) == Role::Arming) {
+        for id in self.not_ended(&|execution| self.role(execution.command) == Role::Arming) {
             self.cancel_one(id);
         }
     }
@@ -337,7 +342,7 @@ impl Step<'_> {
     /// that.
     pub(super) fn forget_lingering(&mut self, id: u64) {
         let Some(index) = self.position(id) else { return };
-        if !matches!(self.state.executions[index].phase, Phase::Lingering) {
+        if !self.state.executions[index].is_lingering() {
             return;
         }
         let arming = |execution: &RunningCommand| matches!(execution.phase, Phase::Arming(..));

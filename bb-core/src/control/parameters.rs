@@ -26,11 +26,11 @@ impl Control {
         changes: Vec<(String, ParameterValue)>,
         caller: &Caller,
     ) -> Result<(), ParameterError> {
-        let changes: Result<Vec<_>, _> = changes
-            .into_iter()
-            .map(|(path, value)| Ok(ParameterEntry { parameter: self.parameter_number(&path)?, value }))
-            .collect();
-        self.set_parameters(changes?, caller)
+        let mut entries = Vec::new();
+        for (path, value) in changes {
+            entries.push(ParameterEntry { parameter: self.parameter_number(&path)?, value });
+        }
+        self.set_parameters(entries, caller)
     }
 
     /// The path of a parameter.
@@ -74,23 +74,23 @@ impl Control {
         loop {
             let (before, checks) = {
                 let state = self.lock();
-                let bound = state.bound.iter().filter(|component| is_bound_to_any(component));
-                let checks: Vec<_> = bound
-                    .map(|component| (component.path, component.parameters, Arc::clone(&component.check)))
-                    .collect();
+                let mut checks = Vec::new();
+                for component in state.bound.iter().filter(|component| is_bound_to_any(component)) {
+                    checks.push((component.path, component.parameters, Arc::clone(&component.check)));
+                }
                 (state.parameters.clone(), checks)
             };
             let values = before.with(changed(&changes));
             for (path, bound_to, check) in &checks {
-                check(&values).map_err(|message| {
-                    // Of several that the component is bound to, the one that it also refuses alone.
-                    let mut bound = changes.iter().filter(|change| bound_to.contains(&change.parameter));
-                    let first = bound.clone().next();
-                    let refused =
-                        bound.find(|change| check(&before.with(changed(std::slice::from_ref(change)))).is_err());
-                    let parameter = refused.or(first).map_or(first_path, |change| path_of(change.parameter));
-                    refuse(parameter, format!("{path} would refuse it: {message}"))
-                })?;
+                let Err(message) = check(&values) else { continue };
+                // Of several that the component is bound to, the one that it also refuses alone.
+                let bound: Vec<_> = changes.iter().filter(|change| bound_to.contains(&change.parameter)).collect();
+                let refuses = |change: &&&ParameterEntry| {
+                    check(&before.with(changed(std::slice::from_ref(**change)))).is_err()
+                };
+                let refused = bound.iter().find(refuses).or(bound.first());
+                let parameter = refused.map_or(first_path, |change| path_of(change.parameter));
+                return Err(refuse(parameter, format!("{path} would refuse it: {message}")));
             }
             let mut step = self.step();
             let _permit = caller.permit().map_err(|fault| refuse(first_path, fault.to_string()))?;

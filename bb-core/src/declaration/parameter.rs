@@ -2,6 +2,7 @@
 
 use super::Range;
 use crate::event::ParameterValue;
+use crate::message::codec::{JsonError, from_json};
 use std::fmt;
 use std::sync::Arc;
 
@@ -42,6 +43,16 @@ impl From<ParameterDefault> for ParameterValue {
             ParameterDefault::Text(value) => Self::Text(value.to_owned()),
         }
     }
+}
+
+/// A value of the same type as `like`, from JSON in SI.
+pub(crate) fn parameter_from_json(like: &ParameterValue, json: &str) -> Result<ParameterValue, JsonError> {
+    Ok(match like {
+        ParameterValue::Bool(_) => ParameterValue::Bool(from_json(json)?),
+        ParameterValue::Integer(_) => ParameterValue::Integer(from_json(json)?),
+        ParameterValue::Float(_) => ParameterValue::Float(from_json(json)?),
+        ParameterValue::Text(_) => ParameterValue::Text(from_json(json)?),
+    })
 }
 
 /// The types of parameters.

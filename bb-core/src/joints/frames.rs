@@ -48,11 +48,10 @@ impl Joints {
     }
 
     fn unknown_frame(&self, name: &str) -> LookupError {
-        let topology = self.topology();
-        let frames =
-            topology.links.iter().map(|link| link.name).chain(topology.joints.iter().map(|joint| joint.name));
-        let nearest = nearest(name, frames.chain(self.components()));
-        LookupError::UnknownFrame { name: name.to_owned(), nearest: nearest.map(str::to_owned) }
+        let mut frames: Vec<&str> = self.topology().links.iter().map(|link| link.name).collect();
+        frames.extend(self.topology().joints.iter().map(|joint| joint.name));
+        frames.extend(self.components());
+        LookupError::UnknownFrame { name: name.to_owned(), nearest: nearest(name, frames).map(str::to_owned) }
     }
 }
 

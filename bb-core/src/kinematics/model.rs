@@ -87,25 +87,18 @@ impl Kinematics {
     /// that it cannot follow. Robots that `robot!` declares have none of these errors.
     pub fn new(topology: &Topology) -> Result<Self, KinematicsError> {
         topology.joints.iter().try_for_each(check_limit)?;
-        let mut positions = 0;
-        let mut velocities = 0;
-        let own: Vec<JointCoordinates> = topology
-            .joints
-            .iter()
-            .map(|joint| {
-                let (q, v) = if joint.mimic.is_some() { (0, 0) } else { degrees(joint.kind) };
-                let coordinates = JointCoordinates {
-                    positions: positions..positions + q,
-                    velocities: velocities..velocities + v,
-                };
-                positions += q;
-                velocities += v;
-                coordinates
-            })
-            .collect();
-        let followed: Vec<Followed> =
-            (0..topology.joints.len()).map(|joint| follow(topology, joint)).collect::<Result<_, _>>()?;
-
+        let (mut positions, mut velocities) = (0, 0);
+        let (mut own, mut followed, mut owners) = (Vec::new(), Vec::new(), Vec::new());
+        for (number, joint) in topology.joints.iter().enumerate() {
+            let (q, v) = if joint.mimic.is_some() { (0, 0) } else { degrees(joint.kind) };
+            if q > 0 {
+                owners.push(Owner { kind: joint.kind, position: positions, velocity: velocities });
+            }
+            let (first, rate) = (positions, velocities);
+            (positions, velocities) = (positions + q, velocities + v);
+            own.push(JointCoordinates { positions: first..positions, velocities: rate..velocities });
+            followed.push(follow(topology, number)?);
+        }
         let mut carried_by = vec![None; topology.links.len()];
         for (number, joint) in topology.joints.iter().enumerate() {
             match carried_by.get_mut(joint.child) {
@@ -146,27 +139,24 @@ impl Kinematics {
                 break;
             }
         }
-        let links = topology.links.iter().zip(placed).map(|(link, placed)| {
+        let mut links = Vec::new();
+        for (link, placed) in topology.links.iter().zip(placed) {
             let (body, body_from_link) = placed.ok_or(KinematicsError::Unreachable { link: link.name })?;
-            Ok(Placement { name: link.name, body, body_from_link, inertial: link.inertial })
-        });
-        let links = links.collect::<Result<_, _>>()?;
-        let joints = topology
-            .joints
-            .iter()
-            .zip(&followed)
-            .map(|(joint, followed)| (joint.name, own[followed.joint].clone()));
-        let joints = joints.collect();
+            links.push(Placement { name: link.name, body, body_from_link, inertial: link.inertial });
+        }
+        let mut joints = Vec::new();
+        for (joint, followed) in topology.joints.iter().zip(&followed) {
+            joints.push((joint.name, own[followed.joint].clone()));
+        }
         let bounds = bounds(topology, &own, &followed, positions);
-        let owners = topology.joints.iter().zip(&own).filter(|(_, own)| !own.positions.is_empty());
-        let owners = owners
-            .map(|(joint, own)| Owner {
-                kind: joint.kind,
-                position: own.positions.start,
-                velocity: own.velocities.start,
-            })
-            .collect();
-        Ok(Self { bodies: bodies.into(), links, joints, bounds, velocities, owners })
+        Ok(Self {
+            bodies: bodies.into(),
+            links: links.into(),
+            joints: joints.into(),
+            bounds,
+            velocities,
+            owners: owners.into(),
+        })
     }
 
     /// The length of a position.

@@ -84,34 +84,6 @@ impl<E: Estimator> AsEstimator<E> {
     }
 }
 
-impl<E: Estimator> Component for AsEstimator<E> {
-    type Options = E::Options;
-    type Context = Context;
-
-    fn make(options: impl FnOnce() -> Result<E::Options, Fault>, context: &Context) -> Result<Self, Fault> {
-        match context.replacement() {
-            Some(replacement) => make_estimator(replacement, context).map(Self::Replaced),
-            None => E::init(options()?, context).map(Self::Declared),
-        }
-    }
-
-    fn change(
-        &mut self,
-        options: impl FnOnce() -> Result<E::Options, Fault>,
-        context: &Context,
-    ) -> Result<(), Fault> {
-        match self {
-            Self::Declared(estimator) => estimator.handle_options(options()?, context),
-            // The options belong to the replaced component.
-            Self::Replaced(_) => Ok(()),
-        }
-    }
-
-    fn close(&mut self, reason: Termination<'_>) {
-        whichever!(self, own => own.terminate(reason), other => other.terminate(reason));
-    }
-}
-
 /// A sensor, or its replacement.
 pub(crate) enum AsSensor<S: Sensor> {
     Declared(S),
@@ -125,34 +97,6 @@ impl<S: Sensor> AsSensor<S> {
 
     pub(crate) fn starts_at(&self) -> Option<MonotonicTime> {
         whichever!(self, own => own.starts_at(), other => other.starts_at())
-    }
-}
-
-impl<S: Sensor> Component for AsSensor<S> {
-    type Options = S::Options;
-    type Context = SensorContext;
-
-    fn make(options: impl FnOnce() -> Result<S::Options, Fault>, context: &SensorContext) -> Result<Self, Fault> {
-        match context.replacement() {
-            Some(replacement) => make_sensor(&replacement, context).map(Self::Replaced),
-            None => S::init(options()?, context).map(Self::Declared),
-        }
-    }
-
-    fn change(
-        &mut self,
-        options: impl FnOnce() -> Result<S::Options, Fault>,
-        context: &SensorContext,
-    ) -> Result<(), Fault> {
-        match self {
-            Self::Declared(sensor) => sensor.handle_options(options()?, context),
-            // The options belong to the replaced component.
-            Self::Replaced(_) => Ok(()),
-        }
-    }
-
-    fn close(&mut self, reason: Termination<'_>) {
-        whichever!(self, own => own.terminate(reason), other => other.terminate(reason));
     }
 }
 
@@ -180,30 +124,40 @@ impl<A: Actuator> AsActuator<A> {
     }
 }
 
-impl<A: Actuator> Component for AsActuator<A> {
-    type Options = A::Options;
-    type Context = ActuatorContext;
+macro_rules! component {
+    ($($wrapper:ident of $contract:ident, made by $make:ident in $context:ty;)*) => { $(
+        impl<C: $contract> Component for $wrapper<C> {
+            type Options = C::Options;
+            type Context = $context;
 
-    fn make(options: impl FnOnce() -> Result<A::Options, Fault>, context: &ActuatorContext) -> Result<Self, Fault> {
-        match context.replacement() {
-            Some(replacement) => make_actuator(&replacement, context).map(Self::Replaced),
-            None => A::init(options()?, context).map(Self::Declared),
+            fn make(options: impl FnOnce() -> Result<C::Options, Fault>, context: &$context) -> Result<Self, Fault> {
+                match context.replacement() {
+                    Some(replacement) => $make(&replacement, context).map(Self::Replaced),
+                    None => C::init(options()?, context).map(Self::Declared),
+                }
+            }
+
+            fn change(
+                &mut self,
+                options: impl FnOnce() -> Result<C::Options, Fault>,
+                context: &$context,
+            ) -> Result<(), Fault> {
+                match self {
+                    Self::Declared(component) => component.handle_options(options()?, context),
+                    // The options belong to the replaced component.
+                    Self::Replaced(_) => Ok(()),
+                }
+            }
+
+            fn close(&mut self, reason: Termination<'_>) {
+                whichever!(self, own => own.terminate(reason), other => other.terminate(reason));
+            }
         }
-    }
+    )* };
+}
 
-    fn change(
-        &mut self,
-        options: impl FnOnce() -> Result<A::Options, Fault>,
-        context: &ActuatorContext,
-    ) -> Result<(), Fault> {
-        match self {
-            Self::Declared(actuator) => actuator.handle_options(options()?, context),
-            // The options belong to the replaced component.
-            Self::Replaced(_) => Ok(()),
-        }
-    }
-
-    fn close(&mut self, reason: Termination<'_>) {
-        whichever!(self, own => own.terminate(reason), other => other.terminate(reason));
-    }
+component! {
+    AsEstimator of Estimator, made by make_estimator in Context;
+    AsSensor of Sensor, made by make_sensor in SensorContext;
+    AsActuator of Actuator, made by make_actuator in ActuatorContext;
 }

@@ -12,7 +12,7 @@ use crate::fault::{Failed, Fault, lock};
 use crate::joints::Joints;
 use crate::journal::{Journal, Waiting};
 use crate::lifecycle::Supervision;
-use crate::message::{Origin, Payload, Stamped};
+use crate::message::{Frame, Origin, Payload, Stamp, Stamped};
 use crate::pubsub::{AnyTopic as _, Topic};
 use crate::schedule::{Agenda, Door, Lane, Pool};
 use crate::telemetry::Telemetry;
@@ -389,6 +389,11 @@ impl Environment {
 
     pub(crate) fn set_replayed_line(&self, line: u64) {
         self.0.replayed_line.store(line, Ordering::Relaxed);
+    }
+
+    /// The stamp of a message that the robot publishes, measured at that time.
+    pub(crate) fn stamp(&self, monotonic_time: MonotonicTime, frame: Frame) -> Stamp {
+        Stamp { monotonic_time, wall_time: self.0.clock.wall_at(monotonic_time), frame, origin: self.0.origin }
     }
 
     /// Passes a message of a sensor or a service to its subscribers and writes it to the journal, if there is one. Returns the line

@@ -59,10 +59,15 @@ impl Timers {
     }
 
     pub(super) fn next(&self) -> Option<MonotonicTime> {
-        let timers = self.timers.iter().map(|(_, time)| *time);
-        let all = timers.chain(self.timeout).chain(self.tick.map(|(_, time)| time));
+        let mut next = self.timeout.unwrap_or(MonotonicTime::MAX);
+        if let Some((_, time)) = self.tick {
+            next = next.min(time);
+        }
+        for (_, time) in &self.timers {
+            next = next.min(*time);
+        }
         // The last instant is never reached.
-        all.min().filter(|time| *time < MonotonicTime::MAX)
+        (next < MonotonicTime::MAX).then_some(next)
     }
 
     /// Takes the request that is due first, and the time at which it was due.

@@ -7,29 +7,33 @@ use crate::pubsub::AnyTopic;
 /// The declaration, and the values of parameters.
 pub(super) fn describe(robot: &RobotDeclaration, topics: &[&dyn AnyTopic], control: &Control) -> Vec<String> {
     let mut facts = vec![format!("robot {}", robot.name)];
-    facts.extend(topics.iter().map(|topic| format!("{} publishes {}", topic.path(), topic.payload_name())));
+    for topic in topics {
+        facts.push(format!("{} publishes {}", topic.path(), topic.payload_name()));
+    }
     for declared in robot.estimators {
-        let inputs: Vec<_> =
-            declared.inputs.iter().map(|input| (input.source, input.driver, input.optional)).collect();
-        let tolerances: Vec<_> =
-            declared.inputs.iter().map(|input| (input.tolerance_nanos, input.stale_after_nanos)).collect();
+        let (mut inputs, mut tolerances) = (Vec::new(), Vec::new());
+        for input in declared.inputs {
+            inputs.push((input.source, input.driver, input.optional));
+            tolerances.push((input.tolerance_nanos, input.stale_after_nanos));
+        }
         facts.push(format!(
             "{}: island {}, supervisor {}, inputs {inputs:?}, tolerances {tolerances:?}, {:?}",
             declared.path, declared.island, declared.supervisor, declared.health
         ));
     }
-    facts.extend(robot.actuators.iter().map(|declared| format!("{} moves {}", declared.path, declared.joint)));
+    for declared in robot.actuators {
+        facts.push(format!("{} moves {}", declared.path, declared.joint));
+    }
     facts.push(format!("states {:?}", robot.states));
-    facts.extend(robot.categories.iter().map(|category| format!("{category:?}")));
-    facts.extend(robot.commands.iter().map(|declared| format!("{declared:?}")));
-    let parameters = control.parameters();
-    facts.extend(
-        robot
-            .parameters
-            .iter()
-            .zip(parameters.all())
-            .map(|(declared, value)| format!("{} = {value}", declared.path)),
-    );
+    for category in robot.categories {
+        facts.push(format!("{category:?}"));
+    }
+    for declared in robot.commands {
+        facts.push(format!("{declared:?}"));
+    }
+    for (declared, value) in robot.parameters.iter().zip(control.parameters().all()) {
+        facts.push(format!("{} = {value}", declared.path));
+    }
     facts
 }
 

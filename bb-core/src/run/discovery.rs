@@ -20,48 +20,37 @@ pub(super) fn discover(
     is_replaced: &dyn Fn(&str) -> bool,
     is_external: &dyn Fn(&str) -> bool,
 ) -> Description {
-    let paths: Vec<_> = topics.iter().map(|topic| topic.path()).collect();
-    let sources = robot.sensors.iter().chain(robot.services);
-    let sources = sources.map(|declared| ComponentDescription {
-        path: declared.path,
-        kind: kind(declared.path),
-        frame: declared.frame.name(),
-        period: period(declared),
-        inputs: Vec::new(),
-        topics: published(&paths, declared.path, &[]),
-        command: None,
-        is_replaced: is_replaced(declared.path),
-    });
-    let estimators = robot.estimators.iter().map(|declared| ComponentDescription {
-        path: declared.path,
-        kind: ComponentKind::Estimator,
-        frame: declared.frame.name(),
+    let describe = |path: &'static str, kind, frame, outputs: &[&'static str]| ComponentDescription {
+        path,
+        kind,
+        frame,
         period: None,
-        inputs: declared
-            .inputs
-            .iter()
-            .map(|input| InputDescription {
+        inputs: Vec::new(),
+        topics: published(topics, path, outputs),
+        command: None,
+        is_replaced: is_replaced(path),
+    };
+    let mut components = Vec::new();
+    for declared in robot.sensors.iter().chain(robot.services) {
+        let component = describe(declared.path, kind(declared.path), declared.frame.name(), &[]);
+        components.push(ComponentDescription { period: period(declared), ..component });
+    }
+    for declared in robot.estimators {
+        let mut component =
+            describe(declared.path, ComponentKind::Estimator, declared.frame.name(), declared.outputs);
+        for input in declared.inputs {
+            component.inputs.push(InputDescription {
                 name: input.name,
                 source: input.source,
                 is_driver: input.driver,
                 is_optional: input.optional,
-            })
-            .collect(),
-        topics: published(&paths, declared.path, declared.outputs),
-        command: None,
-        is_replaced: is_replaced(declared.path),
-    });
-    let actuators = robot.actuators.iter().map(|declared| ComponentDescription {
-        path: declared.path,
-        kind: ComponentKind::Actuator,
-        frame: declared.joint,
-        period: None,
-        inputs: Vec::new(),
-        topics: published(&paths, declared.path, &[]),
-        command: None,
-        is_replaced: is_replaced(declared.path),
-    });
-    let components: Vec<_> = sources.chain(estimators).chain(actuators).collect();
+            });
+        }
+        components.push(component);
+    }
+    for declared in robot.actuators {
+        components.push(describe(declared.path, ComponentKind::Actuator, declared.joint, &[]));
+    }
     let topics = topics.iter().map(|topic| TopicDescription {
         path: topic.path(),
         payload: topic.payload_name(),
@@ -69,6 +58,8 @@ pub(super) fn discover(
         is_external: is_external(topic.path()),
         period: components.iter().find(|component| component.path == topic.path()).and_then(|found| found.period),
     });
+    let mut states = vec!["disarmed", "idle", "executing"];
+    states.extend(robot.states);
     Description {
         robot: robot.name,
         run,
@@ -78,7 +69,7 @@ pub(super) fn discover(
         components,
         parameters: parameters(robot, values),
         commands,
-        states: ["disarmed", "idle", "executing"].into_iter().chain(robot.states.iter().copied()).collect(),
+        states,
     }
 }
 
@@ -95,10 +86,15 @@ fn period(declared: &SensorDeclaration) -> Option<Duration> {
 }
 
 /// The topics at these paths, at the path of the component itself, and those of its motions.
-fn published(paths: &[&'static str], own: &'static str, outputs: &[&'static str]) -> Vec<&'static str> {
-    let is_motion =
-        |path: &str| path.strip_prefix(own).is_some_and(|rest| matches!(rest, "/begin_motion" | "/end_motion"));
-    paths.iter().copied().filter(|path| *path == own || outputs.contains(path) || is_motion(path)).collect()
+fn published(topics: &[&dyn AnyTopic], own: &'static str, outputs: &[&'static str]) -> Vec<&'static str> {
+    let mut paths = Vec::new();
+    for path in topics.iter().map(|topic| topic.path()) {
+        let is_own = matches!(path.strip_prefix(own), Some("" | "/begin_motion" | "/end_motion"));
+        if is_own || outputs.contains(&path) {
+            paths.push(path);
+        }
+    }
+    paths
 }
 
 fn links(robot: &RobotDeclaration) -> Vec<LinkDescription> {
@@ -134,17 +130,18 @@ fn joints(robot: &RobotDeclaration) -> Vec<JointDescription> {
 }
 
 fn parameters(robot: &RobotDeclaration, values: &[ParameterValue]) -> Vec<ParameterDescription> {
-    let describe = |(number, declared): (usize, &'static crate::declaration::ParameterDeclaration)| {
+    let mut parameters = Vec::new();
+    for (number, declared) in robot.parameters.iter().enumerate() {
         let default = ParameterValue::from(declared.default);
-        ParameterDescription {
+        parameters.push(ParameterDescription {
             path: declared.path,
             doc: declared.doc,
-            value: values.get(number).cloned().unwrap_or_else(|| default.clone()),
+            value: values.get(number).unwrap_or(&default).clone(),
             default,
             unit: declared.unit,
             range: declared.range.map(|range| range.start..=range.end),
             schema: parameter_schema(declared),
-        }
-    };
-    robot.parameters.iter().enumerate().map(describe).collect()
+        });
+    }
+    parameters
 }

@@ -59,9 +59,9 @@ impl Draft {
         unwired: &dyn Unwired,
     ) -> Self {
         let mut system = SystemTopics::new(robot);
-        let topics = unwired.topics().into_iter().chain(system.all());
-        let paths: Vec<&'static str> = topics.map(|topic| topic.path()).collect();
-        system.registry = Registry::new(paths);
+        let mut topics = unwired.topics();
+        topics.extend(system.all());
+        system.registry = Registry::new(topics.iter().map(|topic| topic.path()));
         Self {
             robot,
             declared_options,
@@ -187,8 +187,11 @@ impl Assembling {
         let journal = sink.map(|sink| Journal::new(sink, clock.wall_offset_nanos()));
         let handlers = std::mem::take(&mut draft.telemetry);
         let telemetry = (!handlers.is_empty()).then(|| Telemetry::new(handlers, robot.estimators));
-        let nodes = robot.estimators.iter().enumerate();
-        let nodes: Box<[SharedNode]> = nodes.map(|(number, declared)| SharedNode::new(number, declared)).collect();
+        let mut nodes = Vec::new();
+        for (number, declared) in robot.estimators.iter().enumerate() {
+            nodes.push(SharedNode::new(number, declared));
+        }
+        let nodes: Box<[SharedNode]> = nodes.into();
         let control = Control::new(Parts {
             declared: robot,
             mode,
@@ -272,7 +275,7 @@ impl Assembling {
     /// Writes the first line of the journal, and lets its sink begin.
     fn begin_journal(&self, facts: &[String]) -> Result<(), (&'static str, Fault)> {
         let Some(journal) = self.environment.journal() else { return Ok(()) };
-        let declaration = facts.iter().cloned().chain(self.environment.facts()).collect();
+        let declaration = [facts, &self.environment.facts()].concat();
         let wall_offset_nanos = self.environment.clock().wall_offset_nanos();
         let begin = Event::Begin { declaration, wall_offset_nanos, is_virtual: self.mode == Mode::Virtual };
         journal.begin(self.environment.start(), begin);

@@ -10,7 +10,7 @@ use crate::event::{
     StateTransition,
 };
 use crate::journal::JournalLine;
-use crate::message::{Frame, Payload, Stamp, Stamped};
+use crate::message::{Frame, Payload, Stamped};
 use crate::pubsub::Topic;
 
 use crate::time::MonotonicTime;
@@ -221,13 +221,6 @@ system_topic! {
 handle! {
     /// Names one output of an estimator of the robot `R`.
     OutputHandle<T: Payload> { publisher: usize }
-}
-
-impl<R: Robot, S: Sensor> SensorHandle<R, S> {
-    /// Publishes `payload` with the stamp, in the sensor's frame.
-    pub(super) fn publish(self, wiring: &R::Wiring, stamp: Stamp, payload: S::Output, now: MonotonicTime) {
-        (self.publish)(wiring, &Stamp { frame: self.frame, ..stamp }.message(payload), now);
-    }
 }
 
 macro_rules! visitable {

@@ -163,10 +163,13 @@ impl Host for RobotHost {
     }
 
     fn takers(&self, path: &str) -> Vec<(&'static str, &'static str)> {
-        let estimators = self.robot.estimators.iter();
-        let inputs =
-            estimators.flat_map(|declared| declared.inputs.iter().map(move |input| (declared.path, input)));
-        inputs.filter(|(_, input)| input.source == path).map(|(path, input)| (path, input.name)).collect()
+        let mut takers = Vec::new();
+        for declared in self.robot.estimators {
+            for input in declared.inputs.iter().filter(|input| input.source == path) {
+                takers.push((declared.path, input.name));
+            }
+        }
+        takers
     }
 
     fn actuator(&self, path: &str) -> Option<(&'static str, Box<dyn Any>)> {

@@ -9,7 +9,6 @@ use crate::control::Execution;
 use crate::declaration::{ParameterError, ParameterType};
 use crate::event::Refusal;
 use crate::journal::{Event, ParameterEntry, RequestKind};
-use crate::message::Stamp;
 use crate::node::{Node, NodeEntry, Turn, know_calls, know_casts};
 use crate::pubsub::{Delivery, Overflow, Subscription};
 use crate::time::MonotonicTime;
@@ -175,14 +174,8 @@ impl<R: Robot> Live<R> {
         self.settled(|machine| {
             let environment = &machine.environment;
             let Some(_inside) = environment.door().enter() else { return };
-            let clock = environment.clock();
-            let stamp = Stamp {
-                monotonic_time: time,
-                wall_time: clock.wall_at(time),
-                origin: environment.origin(),
-                ..Stamp::default()
-            };
-            sensor.publish(&self.wiring, stamp, payload, clock.now());
+            let stamp = environment.stamp(time, sensor.frame);
+            (sensor.publish)(&self.wiring, &stamp.message(payload), environment.clock().now());
         });
     }
 

@@ -140,10 +140,10 @@ impl Machine {
 
     pub(super) fn report_of(&self, control: Summary) -> Report {
         let topics = self.topics();
-        let estimators: Vec<_> = self.environment.nodes().iter().map(|node| node.statistics()).collect();
-        let made = self.control.topics().registry.statistics();
+        let estimators = self.environment.nodes().iter().map(|node| node.statistics()).collect();
         let sources = lock(&self.sources);
-        let topics: Vec<_> = topics.iter().map(|topic| topic.statistics()).chain(made).collect();
+        let mut topics: Vec<_> = topics.iter().map(|topic| topic.statistics()).collect();
+        topics.extend(self.control.topics().registry.statistics());
         let panics = self.panics(&topics, &control);
         let Summary { commands, state, safety, faults, all_faults, safety_errors, .. } = control;
         Report {

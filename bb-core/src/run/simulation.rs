@@ -23,11 +23,14 @@ pub struct Simulation<R: Robot> {
     live: Live<R>,
 }
 
+/// The numbers of sources by the times at which they are due, the earliest first.
+type Due = BinaryHeap<Reverse<(MonotonicTime, usize)>>;
+
 /// A run on virtual time, without the type of its robot.
 struct VirtualRun {
     machine: Arc<Machine>,
     sources: OpenSources,
-    due: BinaryHeap<Reverse<(MonotonicTime, usize)>>,
+    due: Due,
 }
 
 /// Kind of the next event that is due.
@@ -108,8 +111,7 @@ impl VirtualRun {
         // Faults of hardware errors that components reported during `init`.
         while machine.control.run_pending_hooks() {}
         sources.iter_mut().for_each(|source| source.begin());
-        let due = sources.iter().enumerate().filter_map(|(index, source)| Some(Reverse((source.due()?, index))));
-        let due = due.collect();
+        let due = due_of(&sources);
         machine.settle();
         Self { machine, sources, due }
     }
@@ -211,9 +213,7 @@ impl VirtualRun {
         for source in &mut self.sources {
             source.obey();
         }
-        let due =
-            self.sources.iter().enumerate().filter_map(|(index, source)| Some(Reverse((source.due()?, index))));
-        self.due = due.collect();
+        self.due = due_of(&self.sources);
     }
 
     fn stop_sources(&mut self) {
@@ -239,6 +239,16 @@ impl VirtualRun {
         machine.settle();
         machine.end(std::time::Instant::now() + super::running::STOP_WITHIN);
     }
+}
+
+fn due_of(sources: &OpenSources) -> Due {
+    let mut due = Due::new();
+    for (index, source) in sources.iter().enumerate() {
+        if let Some(time) = source.due() {
+            due.push(Reverse((time, index)));
+        }
+    }
+    due
 }
 
 impl<R: Robot> Deref for Simulation<R> {

@@ -11,7 +11,7 @@ use crate::control::{ComponentOrder, Control};
 use crate::declaration::SensorDeclaration;
 use crate::fault::{Failed, Fault, Termination, Then, caught};
 use crate::lifecycle::{AfterFault, AsSensor, Recipe, Slot};
-use crate::message::{Payload as _, Stamp, Stamped};
+use crate::message::{Payload as _, Stamped};
 use crate::node::{BindTarget, Environment};
 use crate::pubsub::{DynamicMessage, Enter};
 use crate::sorted::Sorted;
@@ -254,13 +254,7 @@ impl<S: Sensor> Running<S> {
         };
         let now = self.clock().now();
         if let Some(payload) = reading.payload.take() {
-            let monotonic_time = reading.time.unwrap_or(now);
-            let stamp = Stamp {
-                monotonic_time,
-                wall_time: self.clock().wall_at(monotonic_time),
-                frame: self.declaration.frame,
-                origin: self.environment.origin(),
-            };
+            let stamp = self.environment.stamp(reading.time.unwrap_or(now), self.declaration.frame);
             *next = reading.next;
             // A source left running may return after the robot has stopped.
             if let Some(_inside) = self.environment.door().enter() {

@@ -205,10 +205,12 @@ impl Bus {
 
     /// The error for a payload that is not that of an external input or sensor.
     fn other_payload(&self, path: &str, taken: &str, offered: &str) -> Fault {
-        let takers = self.host.takers(path);
-        let takers = takers.iter().map(|(estimator, input)| format!("the input `{input}` of `{estimator}`"));
-        let takers = takers.collect::<Vec<_>>().join(" and ");
-        let takers = if takers.is_empty() { "the robot".to_owned() } else { takers };
+        let mut takers = String::new();
+        for (estimator, input) in self.host.takers(path) {
+            let and = if takers.is_empty() { "" } else { " and " };
+            takers += &format!("{and}the input `{input}` of `{estimator}`");
+        }
+        let takers = if takers.is_empty() { "the robot" } else { &takers };
         Fault::new(format!("cannot publish `{offered}` at `{path}`: {takers} takes `{taken}`"))
     }
 

@@ -8,7 +8,7 @@ use crate::event::Safety;
 use crate::fault::{Fault, caught, guarded};
 use crate::journal::{Event, Recorded};
 use crate::message::codec::{from_json, to_json};
-use crate::message::{Finite, Frame, Payload, Stamp, Stamped};
+use crate::message::{Finite, Frame, Payload, Stamped};
 use crate::pubsub::{DynamicMessage, Wakers};
 
 impl<A: Actuator> Accepts<A::Command> for Inner<A> {
@@ -79,13 +79,7 @@ impl<A: Actuator> Inner<A> {
             return Err(ActuatorError::Stopped);
         }
         self.limit(state, &mut command)?;
-        let stamp = Stamp {
-            monotonic_time: now,
-            wall_time: clock.wall_at(now),
-            frame: Frame::new(self.declaration.joint),
-            origin: self.environment.origin(),
-        };
-        let message = stamp.message(command);
+        let message = self.environment.stamp(now, Frame::new(self.declaration.joint)).message(command);
         let at_motor = self.at_motor(state, &message)?;
         let Some(actuator) = state.slot.running() else { return Err(ActuatorError::Stopped) };
         state.may_move = true;

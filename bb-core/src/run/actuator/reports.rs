@@ -3,7 +3,7 @@
 use crate::component::{ActuatorContext, MotionReport};
 use crate::control::ActuatorTopics;
 use crate::journal::{Event, Recorded};
-use crate::message::{Frame, Payload, Stamp, Stamped};
+use crate::message::{Frame, Payload, Stamped};
 use crate::node::Environment;
 use crate::pubsub::{AnyTopic as _, DynamicMessage, Topic, Wakers};
 
@@ -19,14 +19,7 @@ pub(super) fn publish_reports(
         return;
     }
     let Some(_inside) = environment.door().enter() else { return };
-    let clock = environment.clock();
-    let now = clock.now();
-    let stamp = Stamp {
-        monotonic_time: now,
-        wall_time: clock.wall_at(now),
-        frame: Frame::new(context.joint()),
-        origin: environment.origin(),
-    };
+    let stamp = environment.stamp(environment.clock().now(), Frame::new(context.joint()));
     for report in reports {
         match report {
             MotionReport::Begin(motion) => {

@@ -2,9 +2,9 @@
 
 use super::error::{Place, SettingProblem, SettingsError};
 use crate::component::{AnyOptions, OptionsList, quantity};
-use crate::declaration::{ParameterDeclaration, ParameterDefault, RobotDeclaration, unit};
+use crate::declaration::{ParameterDeclaration, ParameterDefault, RobotDeclaration, parameter_from_json, unit};
 use crate::event::ParameterValue;
-use crate::message::codec::{from_json, to_json};
+use crate::message::codec::to_json;
 use crate::message::nearest::{nearest, nearest_path};
 use crate::run::bound::{bound_to, fields, refused_by_bound};
 use crate::run::draft::Draft;
@@ -178,20 +178,12 @@ fn option(options: &mut dyn AnyOptions, field: usize, assignment: &Assignment) -
 }
 
 fn parameter(declared: &ParameterDeclaration, assignment: &Assignment) -> Result<ParameterValue, String> {
-    let read = |json: &str| -> Result<ParameterValue, String> {
-        let value = match declared.default {
-            ParameterDefault::Bool(_) => from_json::<bool>(json).map(ParameterValue::Bool),
-            ParameterDefault::Integer(_) => from_json::<i64>(json).map(ParameterValue::Integer),
-            ParameterDefault::Text(_) => from_json::<String>(json).map(ParameterValue::Text),
-            ParameterDefault::Float(_) if declared.unit.is_empty() => {
-                from_json::<f64>(json).map(ParameterValue::Float)
-            }
-            ParameterDefault::Float(_) => {
-                let (exponents, _) = unit::parse_unit(declared.unit)?;
-                return quantity(json, exponents).map(ParameterValue::Float);
-            }
-        };
-        value.map_err(|error| error.to_string())
+    let read = |json: &str| match declared.default {
+        ParameterDefault::Float(_) if !declared.unit.is_empty() => {
+            let (exponents, _) = unit::parse_unit(declared.unit)?;
+            quantity(json, exponents).map(ParameterValue::Float)
+        }
+        default => parameter_from_json(&default.into(), json).map_err(|error| error.to_string()),
     };
     let value = read(&assignment.json);
     let value = match (&value, &assignment.text) {
@@ -204,14 +196,8 @@ fn parameter(declared: &ParameterDeclaration, assignment: &Assignment) -> Result
 
 /// Returns the fault of a path that names no setting.
 fn unknown(names: &Sorted<String, ()>, paths: &[&str], path: &str) -> String {
-    let below = |component: &str| {
-        let start = format!("{component}/");
-        let fields =
-            names.iter().filter_map(|(name, ())| name.strip_prefix(&start)).filter(|name| !name.contains('/'));
-        fields.map(str::to_owned).collect::<Vec<_>>()
-    };
     if paths.contains(&path) {
-        let options = below(path);
+        let options = options_of(names, path);
         return match options.is_empty() {
             true => "is a component without options".to_owned(),
             false => format!("is a component; its options are {}", options.join(", ")),
@@ -220,9 +206,8 @@ fn unknown(names: &Sorted<String, ()>, paths: &[&str], path: &str) -> String {
     if let Some((component, name)) = path.rsplit_once('/')
         && paths.contains(&component)
     {
-        let options = below(component);
-        let near = nearest(name, options.iter().map(String::as_str));
-        return match near {
+        let options = options_of(names, component);
+        return match nearest(name, options.iter().copied()) {
             Some(near) => format!("there is no such option; did you mean `{near}`?"),
             None if options.is_empty() => format!("there is no such option; {component} has none"),
             None => format!("there is no such option; the options of {component} are {}", options.join(", ")),
@@ -232,4 +217,16 @@ fn unknown(names: &Sorted<String, ()>, paths: &[&str], path: &str) -> String {
         Some(near) => format!("there is no such setting; did you mean `{near}`?"),
         None => "there is no such setting; `--list` shows all".to_owned(),
     }
+}
+
+/// The names of a component's options.
+fn options_of<'a>(names: &'a Sorted<String, ()>, component: &str) -> Vec<&'a str> {
+    let mut options = Vec::new();
+    for (name, ()) in names.iter() {
+        match name.rsplit_once('/') {
+            Some((path, option)) if path == component => options.push(option),
+            _ => {}
+        }
+    }
+    options
 }

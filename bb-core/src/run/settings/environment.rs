@@ -107,13 +107,11 @@ fn variable(path: &str) -> String {
 fn path_of<'a>(known: &'a Sorted<String, Vec<String>>, suffix: &str) -> Result<&'a str, String> {
     let capitals = suffix.to_uppercase();
     let Some(paths) = known.get(&capitals) else {
-        let near = nearest(&capitals, known.iter().map(|(name, _)| name.as_str()))
-            .and_then(|near| known.get(near)?.first());
-        let hint = near.map_or_else(
-            || "; `--list` shows all".to_owned(),
-            |near| format!("; did you mean `{SET}{}`?", variable(near)),
-        );
-        return Err(format!("there is no such setting{hint}"));
+        let near = nearest(&capitals, known.iter().map(|(name, _)| name.as_str()));
+        return Err(match near.and_then(|near| known.get(near)?.first()) {
+            Some(near) => format!("there is no such setting; did you mean `{SET}{}`?", variable(near)),
+            None => "there is no such setting; `--list` shows all".to_owned(),
+        });
     };
     // Names that differ by their case, or by where a `/` is.
     let exact: Vec<&String> = paths.iter().filter(|path| variable(path) == suffix).collect();
