@@ -91,13 +91,8 @@ impl Control {
     }
 
     /// Records a fault that is not a component's failure, or a component that hangs. It is kept, published and
-    /// logged, and has no other consequence.
-    pub(crate) fn note_fault(&self, path: &'static str, message: String) {
-        self.note_fault_now(path, message);
-    }
-
-    /// Records a fault as [`Self::note_fault`] does; returns the time at which it is reported.
-    pub(crate) fn note_fault_now(&self, path: &'static str, message: String) -> MonotonicTime {
+    /// logged, and has no other consequence. Returns the time at which it is reported.
+    pub(crate) fn note_fault(&self, path: &'static str, message: String) -> MonotonicTime {
         let mut step = self.step();
         let now = step.now;
         step.note_fault(path, message);

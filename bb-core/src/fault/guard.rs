@@ -61,9 +61,15 @@ pub(crate) fn log_panic(what: &'static str, fault: &Fault) {
 /// Drops a user's value and catches a panic of its `Drop`.
 #[inline]
 pub(crate) fn discard<T>(value: T) {
-    if needs_drop::<T>()
-        && let Err(fault) = guarded(|| drop(value))
-    {
+    if needs_drop::<T>() {
+        let mut value = Some(value);
+        discard_once(&mut || drop(value.take()));
+    }
+}
+
+/// The body of [`discard`], which is compiled once.
+fn discard_once(release: &mut dyn FnMut()) {
+    if let Err(fault) = guarded_once(release) {
         log_panic("a value panicked when it was dropped", &fault);
     }
 }

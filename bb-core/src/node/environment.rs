@@ -14,7 +14,7 @@ use crate::journal::{Journal, Waiting};
 use crate::lifecycle::Supervision;
 use crate::message::{Frame, Origin, Payload, Stamp, Stamped};
 use crate::pubsub::{AnyTopic as _, Topic};
-use crate::schedule::{Agenda, Door, Lane, Pool};
+use crate::schedule::{Agenda, Door, Lane, Pool, start_thread};
 use crate::telemetry::Telemetry;
 use crate::time::{Clock, MonotonicTime, Stopwatch};
 use std::collections::VecDeque;
@@ -146,7 +146,8 @@ pub(crate) struct EnvironmentParts {
 impl Environment {
     pub(crate) fn new(parts: EnvironmentParts, nodes: Box<[SharedNode]>) -> Self {
         if parts.mode == Mode::Real {
-            Stopwatch::prepare();
+            // Without the thread, the clock is read.
+            let _ = start_thread("bb-counter", Box::new(Stopwatch::prepare));
         }
         let has_journal = parts.journal.is_some();
         Self(Arc::new(Inner {

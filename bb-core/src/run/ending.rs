@@ -49,7 +49,7 @@ impl Machine {
     /// Stops all estimators in order, on virtual time. The journal's line of the stop implies it.
     pub(super) fn retire_quietly(&self) {
         let now = self.environment.clock().now();
-        for island in self.islands() {
+        for island in self.islands().filter(|island| !island.has_retired()) {
             island.replay(now, Replayed::Retire);
         }
     }

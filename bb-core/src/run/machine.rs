@@ -174,7 +174,7 @@ impl Machine {
 
     /// Records a fault of a component that did not return.
     pub(super) fn fault(&self, path: &'static str, message: String) -> ReportedFault {
-        let now = self.control.note_fault_now(path, message.clone());
+        let now = self.control.note_fault(path, message.clone());
         ReportedFault { path, message, count: 1, first_time: now, last_time: now }
     }
 }

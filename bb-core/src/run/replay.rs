@@ -160,19 +160,11 @@ impl Replayer {
         if machine.control.is_disarming() {
             machine.control.disarmed(Vec::new());
         }
-        self.retire();
+        self.machine.retire_quietly();
         machine.end(std::time::Instant::now());
     }
 
     /// Stops the estimators that still run, in order.
-    fn retire(&self) {
-        let machine = &self.machine;
-        let now = machine.environment.clock().now();
-        for island in machine.islands().filter(|island| !island.has_retired()) {
-            island.replay(now, Replayed::Retire);
-        }
-    }
-
     fn advance(&mut self, to_the_end: bool) -> Result<(), ReplayError> {
         while let Some(entry) = self.waiting.front() {
             if !to_the_end && self.is_open(entry) {
@@ -298,7 +290,7 @@ impl Replayer {
                     || (self.is_virtual && control.is_stopping() && {
                         // On virtual time, the stop implies that estimators are retired, in order; this one failed in
                         // doing so.
-                        self.retire();
+                        self.machine.retire_quietly();
                         control.replay_report(estimator)
                     });
                 if !is_reported {
@@ -314,7 +306,7 @@ impl Replayer {
             Event::Failed { path, supervisor, message, panicked } => {
                 control.component_failed(path, supervisor, message, panicked);
             }
-            Event::Noted { path, message } => control.note_fault(path, message),
+            Event::Noted { path, message } => drop(control.note_fault(path, message)),
             Event::HardwareError { path, error } => control.note_hardware_error(path, error),
             Event::Parameters { changes, caller } => control.replay_parameters(changes, &caller),
             Event::Command { command, caller } => control.replay_command(command, caller),

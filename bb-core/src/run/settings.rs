@@ -27,7 +27,6 @@ pub use error::{SettingProblem, SettingsError};
 pub use list::SettingsList;
 pub(super) use schema::settings_schema;
 
-#[cfg(feature = "toml")]
 use super::draft::Draft;
 use super::{Builder, Robot};
 use assign::Assignment;
@@ -49,7 +48,7 @@ impl<R: Robot> Builder<R> {
     /// All problems, each with its line and column.
     #[cfg(feature = "toml")]
     pub fn load_settings(&mut self, file: impl AsRef<std::path::Path>) -> Result<(), SettingsError> {
-        self.draft.load_settings(file.as_ref())
+        self.draft.load_file(file.as_ref())
     }
 
     /// Sets options and parameters from TOML text, as [`Builder::load_settings`] does from a file; errors name it `name`.
@@ -69,7 +68,7 @@ impl<R: Robot> Builder<R> {
 
 #[cfg(feature = "toml")]
 impl Draft {
-    fn load_settings(&mut self, file: &std::path::Path) -> Result<(), SettingsError> {
+    fn load_file(&mut self, file: &std::path::Path) -> Result<(), SettingsError> {
         let name = file.display().to_string();
         let text = std::fs::read_to_string(file).map_err(|error| SettingsError::of_file(&name, &error))?;
         self.set_from_toml(&name, &text)
@@ -77,15 +76,20 @@ impl Draft {
 
     fn set_from_toml(&mut self, name: &str, text: &str) -> Result<(), SettingsError> {
         let names = assign::names(self);
-        let assignments = file::read(name, text, &|path| match (
-            names.get(path).is_some(),
-            assign::is_beginning(&names, path),
-        ) {
+        let known = |path: &str| match (names.get(path).is_some(), assign::is_beginning(&names, path)) {
             (true, true) => file::Known::Both,
             (true, false) => file::Known::Setting,
             (false, true) => file::Known::Table,
             (false, false) => file::Known::No,
-        })?;
+        };
+        let assignments = file::read(name, text, &known)?;
         assign::assign(self, &assignments)
+    }
+}
+
+#[cfg(not(feature = "toml"))]
+impl Draft {
+    fn load_file(&mut self, _: &std::path::Path) -> Result<(), SettingsError> {
+        Err(SettingsError::one(Place::Code, "", "a file of settings needs the feature `toml` of `bb-core`"))
     }
 }

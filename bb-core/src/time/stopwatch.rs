@@ -23,19 +23,14 @@ pub(crate) enum Reading {
 static COUNTER: OnceLock<quanta::Clock> = OnceLock::new();
 
 impl Stopwatch {
-    /// Starts calibrating the counter, unless done already: up to 200 ms of a busy machine and a pause of 50 ms, on a
-    /// separate thread.
+    /// Calibrates the counter, unless done already: up to 200 ms of a busy machine and a pause of 50 ms. Until then, the clock is read.
     pub(crate) fn prepare() {
         static ONCE: Once = Once::new();
         ONCE.call_once(|| {
-            let find = || {
-                let counter = quanta::Clock::new();
-                if is_right(&counter) {
-                    COUNTER.get_or_init(|| counter);
-                }
-            };
-            // If the thread cannot be started, the clock is read.
-            let _ = std::thread::Builder::new().name("bb-counter".into()).spawn(find);
+            let counter = quanta::Clock::new();
+            if is_right(&counter) {
+                COUNTER.get_or_init(|| counter);
+            }
         });
     }
 

@@ -31,7 +31,8 @@ impl<A: Actuator> Accepts<A::Command> for Inner<A> {
             Ok(None) => return,
             Err(failed) => {
                 let message = format!("its command to stop {}", failed.fault);
-                return self.control.note_fault(self.declaration.path, message);
+                self.control.note_fault(self.declaration.path, message);
+                return;
             }
         };
         let mut wakers = Wakers::default();

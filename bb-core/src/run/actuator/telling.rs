@@ -44,7 +44,7 @@ impl<A: Actuator> Inner<A> {
                 let error = HardwareError::new(HardwareErrorKind::NotMadeSafe, message);
                 self.control.note_hardware_error(path, error);
             }
-            Change::MessageFailed(message) => self.control.note_fault(path, message),
+            Change::MessageFailed(message) => drop(self.control.note_fault(path, message)),
             Change::Log(write) => write(),
         }
     }

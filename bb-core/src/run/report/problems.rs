@@ -4,6 +4,7 @@ use super::Report;
 use crate::control::ReportedSafetyError;
 use crate::event::{HealthReason, HealthState, Safety};
 use crate::time::MonotonicTime;
+use std::cmp::Reverse;
 use std::fmt;
 
 /// Severity of a [`Problem`]. The worst compares as the least.
@@ -94,7 +95,7 @@ impl Report {
             // One that was left out is not part of the robot.
             let Some(health) = estimator.health else { continue };
             if let Some(stopped) = &estimator.stopped {
-                problems.push(problem(estimator.path, Severity::Stopped, since, stopped.clone()));
+                add(&mut problems, estimator.path, Severity::Stopped, since, stopped.clone());
                 continue;
             }
             let severity = match health {
@@ -111,42 +112,41 @@ impl Report {
                 (Some(HealthReason::Diverged), _, Some(divergence)) => reason += &format!("; {divergence}"),
                 _ => {}
             }
-            problems.push(problem(estimator.path, severity, since, reason));
+            add(&mut problems, estimator.path, severity, since, reason);
         }
         for source in self.sources.iter().filter(|source| source.failing_since.is_some()) {
             let reason =
                 source.stopped.clone().unwrap_or_else(|| "it was restarted, and has not been read yet".to_owned());
-            problems.push(problem(source.path, Severity::Stopped, source.failing_since, reason));
+            add(&mut problems, source.path, Severity::Stopped, source.failing_since, reason);
         }
         for actuator in &self.actuators {
             if let Some(reason) = &actuator.stopped {
                 let since = self.failed_since(actuator.path);
-                problems.push(problem(actuator.path, Severity::Stopped, since, reason.clone()));
+                add(&mut problems, actuator.path, Severity::Stopped, since, reason.clone());
             }
         }
         for command in &self.commands {
             if let (Some(since), Some(refusal)) = (command.refused_at, &command.last_refusal) {
                 let path = format!("command/{}", command.name);
-                problems.push(problem(&path, Severity::Refused, Some(since), refusal.to_string()));
+                add(&mut problems, &path, Severity::Refused, Some(since), refusal.to_string());
             }
         }
-        problems.sort_by_key(|problem| (problem.severity, problem.since.map(std::cmp::Reverse)));
         problems
     }
 
     /// The causes of the safety state `error`, if the robot is in it.
     fn unsafe_components(&self) -> Vec<Problem> {
+        let mut problems = Vec::new();
         if self.safety != Safety::Error {
-            return Vec::new();
+            return problems;
         }
         if self.safety_errors.is_empty() {
-            return vec![problem("safety", Severity::Unsafe, None, "the robot could not be made safe".to_owned())];
+            add(&mut problems, "safety", Severity::Unsafe, None, "the robot could not be made safe".to_owned());
         }
-        let mut errors = Vec::new();
         for ReportedSafetyError { last, last_time, .. } in &self.safety_errors {
-            errors.push(problem(last.path, Severity::Unsafe, Some(*last_time), last.error.to_string()));
+            add(&mut problems, last.path, Severity::Unsafe, Some(*last_time), last.error.to_string());
         }
-        errors
+        problems
     }
 
     /// The time of the last fault of a component.
@@ -155,8 +155,12 @@ impl Report {
     }
 }
 
-fn problem(path: &str, severity: Severity, since: Option<MonotonicTime>, reason: String) -> Problem {
-    Problem { path: path.to_owned(), severity, since, reason }
+/// Adds a problem behind those that are worse, or as bad and newer.
+fn add(problems: &mut Vec<Problem>, path: &str, severity: Severity, since: Option<MonotonicTime>, reason: String) {
+    let rank = |problem: &Problem| (problem.severity, problem.since.map(Reverse));
+    let problem = Problem { path: path.to_owned(), severity, since, reason };
+    let place = problems.partition_point(|other| rank(other) <= rank(&problem));
+    problems.insert(place, problem);
 }
 
 /// A change of health in words.

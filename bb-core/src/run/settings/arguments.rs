@@ -9,7 +9,6 @@ use crate::run::draft::Draft;
 use crate::run::{Builder, Robot};
 use std::ffi::OsString;
 use std::io::{ErrorKind, Write};
-use std::path::Path;
 
 impl<R: Robot> Builder<R> {
     /// Takes the settings out of a program's arguments and returns the others:
@@ -73,16 +72,6 @@ impl Draft {
             say(&format!("{}\n", settings_schema(self.robot, (self.declared_options)())))?;
         }
         Ok((!read.lists && !read.shows_schema).then_some(read.others))
-    }
-
-    #[cfg(feature = "toml")]
-    pub(super) fn load_file(&mut self, file: &Path) -> Result<(), SettingsError> {
-        self.load_settings(file)
-    }
-
-    #[cfg(not(feature = "toml"))]
-    pub(super) fn load_file(&mut self, _: &Path) -> Result<(), SettingsError> {
-        Err(wrong("a file of settings needs the feature `toml` of `bb-core`"))
     }
 }
 
