@@ -8,7 +8,7 @@ mod pool;
 mod reserve;
 mod sleeper;
 mod stop;
-#[cfg_attr(loom, allow(dead_code))]
+
 mod thread;
 
 pub(crate) use agenda::Agenda;

@@ -5,7 +5,9 @@
 //! a [`Reserve`] of their own with one place, since there may be any number of them: they get further threads when they are submitted,
 //! and if none can be started, they wait for the next of these threads that becomes free.
 
-use crate::fault::{guarded, lock};
+use crate::fault::guarded;
+#[cfg(not(loom))]
+use crate::fault::lock;
 #[cfg(not(loom))]
 use std::collections::VecDeque;
 use std::sync::Arc;

@@ -18,6 +18,9 @@ const OLD_NANOS: i64 = 10_000_000_000;
 /// The longest time by which its header may be ahead: what synchronised clocks differ by.
 const AHEAD_NANOS: i64 = 100_000_000;
 
+/// Makes a message of a topic with the stamp of now, in a frame.
+type Decode<'a> = dyn Fn(&dyn AnyTopic, Stamp, Frame) -> Result<DynamicMessage, String> + 'a;
+
 impl Bus {
     /// Returns a publisher at a path of the caller's choice, such as `mission/progress`: names of letters, digits,
     /// `_`, `-` and `.`, separated by `/`. Existing subscriptions to everything, or to a subtree with this path,
@@ -133,11 +136,7 @@ impl Bus {
     }
 
     /// Publishes what `decode` makes of it at the topic of that path, with the stamp of now and the frame of the sensor.
-    fn publish_encoded(
-        &self,
-        path: &str,
-        decode: &dyn Fn(&dyn AnyTopic, Stamp, Frame) -> Result<DynamicMessage, String>,
-    ) -> Result<(), Fault> {
+    fn publish_encoded(&self, path: &str, decode: &Decode<'_>) -> Result<(), Fault> {
         self.check(Right::Publish)?;
         self.caller.check_valid()?;
         let sensor = self.host.external(path);

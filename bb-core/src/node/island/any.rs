@@ -1,6 +1,6 @@
 //! A type-erased island: the interface used by the runtime.
 
-use super::{CallError, Key, NodeEntry};
+use super::{CallError, IslandState, Key, NodeEntry};
 use crate::declaration::IslandDeclaration;
 use crate::journal::Event;
 use crate::node::act::Visit;
@@ -8,9 +8,8 @@ use crate::pubsub::DynamicMessage;
 use crate::time::MonotonicTime;
 use std::sync::Arc;
 
-use super::{Island, IslandState};
 #[cfg(not(loom))]
-use super::{IslandWiring, RELAXED, inbox::Pending, inside::is_inside, processing::for_all};
+use super::{Island, IslandWiring, RELAXED, inbox::Pending, inside::is_inside, processing::for_all};
 #[cfg(not(loom))]
 use crate::node::act::Act;
 #[cfg(not(loom))]
@@ -70,8 +69,8 @@ pub type IslandOf<W> = fn(&Arc<W>) -> Box<dyn AnyIsland>;
 #[allow(missing_debug_implementations)]
 pub struct Placed<S: IslandState>(pub(super) Arc<S::Wiring>);
 
+#[cfg(not(loom))]
 impl<S: IslandState> Placed<S> {
-    #[cfg(not(loom))]
     fn parts(&self) -> (&Island<S>, &S::Wiring) {
         (S::find(&self.0), &self.0)
     }
