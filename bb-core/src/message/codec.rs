@@ -103,7 +103,10 @@ pub trait Field: Finite + Sized {
         // A length from outside reserves only as much as the remaining bytes can hold.
         let mut values = Vec::with_capacity(length.min(reader.left() / size_of::<Self>().max(1)));
         for index in 0..length {
-            values.push(Self::read(reader).map_err(|error| error.at_index(index))?);
+            match Self::read(reader) {
+                Ok(value) => values.push(value),
+                Err(error) => return Err(error.at_index(index)),
+            }
         }
         Ok(values)
     }

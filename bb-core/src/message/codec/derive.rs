@@ -37,13 +37,12 @@ impl<T: Field> FieldOf<T> {
         value.write(writer);
     }
 
-    /// Reads it.
+    /// Reads it, as the field of that name.
     ///
     /// # Errors
-    /// The field's error.
-    #[inline]
-    pub fn read(reader: &mut Reader<'_>) -> Result<T, DecodeError> {
-        T::read(reader)
+    /// The field's error, with its name.
+    pub fn read(reader: &mut Reader<'_>, name: &'static str) -> Result<T, DecodeError> {
+        reader.field(name)
     }
 }
 
@@ -67,7 +66,7 @@ pub trait NotField<T> {
     ///
     /// # Errors
     /// Always.
-    fn read(reader: &mut Reader<'_>) -> Result<T, DecodeError> {
+    fn read(reader: &mut Reader<'_>, _: &'static str) -> Result<T, DecodeError> {
         Err(reader.error("a field", "none"))
     }
 }

@@ -50,7 +50,7 @@ impl<'a> Reader<'a> {
     ///
     /// # Errors
     /// More is left.
-    pub(super) fn end_message(&self) -> Result<(), DecodeError> {
+    pub(crate) fn end_message(&self) -> Result<(), DecodeError> {
         match self.left() {
             0..=PADDING => Ok(()),
             left => Err(self.error("the end", format!("{left} more bytes"))),
@@ -124,7 +124,10 @@ impl<'a> Reader<'a> {
     /// # Errors
     /// The field's error, with its name.
     pub fn field<T: Field>(&mut self, name: &'static str) -> Result<T, DecodeError> {
-        T::read(self).map_err(|error| error.within(name))
+        match T::read(self) {
+            Ok(value) => Ok(value),
+            Err(error) => Err(error.within(name)),
+        }
     }
 
     /// Reads a list of at most one element. Returns whether it has one.

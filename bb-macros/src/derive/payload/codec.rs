@@ -5,18 +5,10 @@
 //! const IS_INLINE: bool = true && FieldOf::<f64>::IS_INLINE;
 //! fn heap_bytes(&self) -> usize { match self { Self { rate: f0 } => 0 + FieldOf::<f64>::heap_bytes(f0) } }
 //! fn write(…) { match self { Self { rate: f0 } => { FieldOf::write(f0, writer); } } }
-//! fn read(…) {
-//!     let (error, field);
-//!     'read: {
-//!         let rate = match FieldOf::<f64>::read(reader) { Ok(f) => f, Err(e) => { (error, field) = (e, "rate"); break 'read } };
-//!         return Ok(Self { rate });
-//!     }
-//!     Err(error.within(field))
-//! }
+//! fn read(…) { Ok(Self { rate: match FieldOf::<f64>::read(reader, "rate") { Ok(value) => value, Err(error) => return Err(error) } }) }
 //! ```
 //!
-//! `read` is the largest function of a payload. One exit that names the field, in place of a `?` and a `map_err` for each,
-//! is a third of the code that is compiled.
+//! `read` is the largest function of a payload. What names the field in an error is compiled once for each type, and not for each field.
 
 use super::{attributes_of, patterns};
 use crate::diagnostics::Diagnostics;
@@ -81,7 +73,7 @@ fn of_struct(fields: &Fields, text: &TokenStream) -> Parts {
         write: quote!(Self { #patterns } => { #writes #nothing }),
         read: match fields.is_empty() {
             true => quote!(reader.nothing().map(|()| Self { #reads })),
-            false => fallible(&quote!(::core::result::Result::Ok(Self { #reads }))),
+            false => quote!(::core::result::Result::Ok(Self { #reads })),
         },
     }
 }
@@ -135,21 +127,7 @@ fn of_enum(data: &DataEnum, text: &TokenStream) -> Parts {
         shape: quote!(Shape::Enum(&EnumShape { name: #text, variants: &[#shapes] })),
         heap_bytes: sums,
         write,
-        read: match lists {
-            0 => read,
-            _ => fallible(&read),
-        },
-    }
-}
-
-/// The code that results in `read`, or breaks out of it with an error and the field that it is in.
-fn fallible(read: &TokenStream) -> TokenStream {
-    quote! {
-        let (error, field): (::bb_core::__private::DecodeError, &'static str);
-        'read: {
-            return { #read };
-        }
-        ::core::result::Result::Err(error.within(field))
+        read,
     }
 }
 
@@ -194,12 +172,9 @@ fn heap_bytes(fields: &Fields) -> TokenStream {
 fn reads(fields: &Fields, within: &str) -> TokenStream {
     let reads = fields.iter().zip(fields.members()).map(|(field, member)| {
         let (path, kind) = (format!("{within}{}", text_of(&member)), &field.ty);
-        quote!(#member: match FieldOf::<#kind>::read(reader) {
+        quote!(#member: match FieldOf::<#kind>::read(reader, #path) {
             ::core::result::Result::Ok(value) => value,
-            ::core::result::Result::Err(why) => {
-                (error, field) = (why, #path);
-                break 'read;
-            }
+            ::core::result::Result::Err(error) => return ::core::result::Result::Err(error),
         },)
     });
     reads.collect()

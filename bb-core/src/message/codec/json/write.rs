@@ -8,9 +8,13 @@ use std::fmt::Write as _;
 pub fn to_json<T: Field>(value: &T) -> String {
     let mut bytes = Vec::new();
     value.write(&mut Writer::new(&mut bytes));
+    written_to_json(&bytes, T::SHAPE)
+}
+
+fn written_to_json(bytes: &[u8], shape: Shape) -> String {
     let mut json = String::new();
     // Bytes written just now can be read.
-    let _ = write(T::SHAPE, &mut Reader::new(&bytes), &mut json);
+    let _ = write(shape, &mut Reader::new(bytes), &mut json);
     json
 }
 

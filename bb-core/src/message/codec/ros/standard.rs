@@ -116,7 +116,11 @@ impl Header {
 
     /// The header of a message whose values are in another frame.
     pub fn in_frame<T>(message: &Stamped<T>, frame: &str) -> Self {
-        Self { stamp: Time::of(message.wall_time), frame_id: frame.to_owned() }
+        Self::at(message.wall_time, frame)
+    }
+
+    fn at(time: WallTime, frame: &str) -> Self {
+        Self { stamp: Time::of(time), frame_id: frame.to_owned() }
     }
 
     /// Writes a header without creating it.
