@@ -3,7 +3,7 @@
 use super::engine::Engine;
 use super::event::{EventKind, StartedFrom};
 use super::factor::ProvidedFactor;
-use super::fallback::{Fallback, Watchdog};
+use super::fallback::Watchdog;
 use super::input::check_position;
 use super::label::{SourceLabel, Sources};
 use super::output::{EstimatorOutput, FrameIds, Quality};
@@ -186,11 +186,7 @@ impl Emission {
         params: &StateEstimatorParams,
     ) -> Option<EventKind> {
         self.is_silent = !has_estimate;
-        Some(match self.watchdog.tick(now_ns, has_estimate, params)? {
-            Fallback::Imminent => EventKind::FallbackImminent,
-            Fallback::Engaged => EventKind::FallbackEngaged,
-            Fallback::Recovered => EventKind::FallbackRecovered,
-        })
+        self.watchdog.tick(now_ns, has_estimate, params)
     }
 
     /// Time for which the norm of the covariance has been growing, s.

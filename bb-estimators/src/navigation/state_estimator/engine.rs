@@ -3,8 +3,8 @@
 
 use alloc::collections::VecDeque;
 
-use super::entry::{Entry, Key, Outcome, Payload};
-use super::error::Reason;
+use super::entry::{Entry, Key, Payload};
+use super::error::{EstimatorError, Outcome, Reason};
 use super::event::StartedFrom;
 use super::factor::ProvidedFactor;
 use super::gate::{Rejection, SpoofGate};
@@ -12,15 +12,13 @@ use super::input::{ImuBias, MOST_VELOCITY, TakeoffOrigin};
 use super::label::Sources;
 use super::params::{StateEstimatorConfig, ns};
 use super::start::{Starter, warm};
-use super::strategy::{Failure, Measured, Pose, Predictor, Strategy};
+use super::strategy::{Measured, Pose, Predictor, Strategy};
 use super::world::World;
 use crate::attitude::ParamsError;
 use crate::navigation::eskf::{ImuMean, Start};
 use crate::navigation::refusal::Refusal;
 
 mod measured;
-
-use measured::Trouble;
 
 /// Time for which an estimate is distrusted after an input that does not fit, s.
 const DISTRUST: f64 = 1.0;
@@ -279,15 +277,12 @@ impl<F: ProvidedFactor> Engine<F> {
                         return Err(Refusal::OutOfRange.into());
                     }
                     Ok(()) => self.after(config),
-                    Err(Failure::Refused(Refusal::Gap { seconds })) => {
-                        self.phase = Phase::Lost;
-                        return Err(Refusal::Gap { seconds }.into());
+                    Err(error) => {
+                        if error.is_fatal() || matches!(error.reason(), Reason::Refused(Refusal::Gap { .. })) {
+                            self.phase = Phase::Lost;
+                        }
+                        return Err(error.reason());
                     }
-                    Err(Failure::Fatal(refusal)) => {
-                        self.phase = Phase::Lost;
-                        return Err(refusal.into());
-                    }
-                    Err(Failure::Refused(refusal)) => return Err(refusal.into()),
                 }
                 Ok(())
             }
@@ -310,7 +305,7 @@ impl<F: ProvidedFactor> Engine<F> {
         // Reports before the first sample count as well.
         let is_told = matches!(entry.payload, Payload::Attitude(_) | Payload::Health(_) | Payload::Frame);
         let Some(now_ns) = self.now_ns.or(is_told.then_some(entry.key.time_ns)) else {
-            return (Outcome::Degraded(Refusal::NotStarted.into()), None);
+            return (Err(Refusal::NotStarted.into()), None);
         };
         let mut rejection = None;
         let result = match &entry.payload {
@@ -321,7 +316,7 @@ impl<F: ProvidedFactor> Engine<F> {
                 } else {
                     let world = *self.world.get_or_insert_with(|| World::new(state.position));
                     let start = warm(now_ns, state, &world, config, self.bias.as_ref());
-                    self.start(&start, StartedFrom::FlightController).map(|()| None).map_err(Trouble::from)
+                    self.start(&start, StartedFrom::FlightController).map(|()| None).map_err(EstimatorError::from)
                 }
             }
             Payload::Attitude(attitude) => {
@@ -336,7 +331,7 @@ impl<F: ProvidedFactor> Engine<F> {
                 Ok(None)
             }
             Payload::Frame => match self.phase {
-                Phase::Running => self.strategy.frame().map(|()| None).map_err(Trouble::from),
+                Phase::Running => self.strategy.frame().map(|()| None),
                 _ => Ok(None),
             },
             Payload::Vio(vio) => self.vio(vio, config),
@@ -345,21 +340,16 @@ impl<F: ProvidedFactor> Engine<F> {
             Payload::Provided(_, factor) => self.measure(&Measured::Provided(factor)).map(Some),
         };
         self.after(config);
-        let outcome = match result {
-            Ok(Some(fused)) => {
-                let nis = fused.nis / fused.dimension.max(1) as f64;
-                self.nis = Some(nis);
-                if !self.strategy.is_converged() {
-                    self.distrust(now_ns);
-                    Outcome::Degraded(Reason::NotConverged)
-                } else {
-                    Outcome::Added { nis: Some(nis) }
-                }
+        let outcome = result.and_then(|fused| {
+            let Some(fused) = fused else { return Ok(None) };
+            let nis = fused.nis / fused.dimension.max(1) as f64;
+            self.nis = Some(nis);
+            if !self.strategy.is_converged() {
+                self.distrust(now_ns);
+                return Err(Reason::NotConverged.into());
             }
-            Ok(None) => Outcome::Added { nis: None },
-            Err(Trouble::Degraded(reason)) => Outcome::Degraded(reason),
-            Err(Trouble::Fatal(reason)) => Outcome::Fatal(reason),
-        };
+            Ok(Some(nis))
+        });
         (outcome, rejection)
     }
 

@@ -1,7 +1,7 @@
 //! Inputs in the order in which they are applied.
 
-use super::error::Reason;
-use super::event::InputKind;
+use super::error::{EstimatorError, Outcome, Reason};
+use super::event::{EventKind, InputKind};
 use super::gate::Rejection;
 use super::input::{AttitudeReading, FlightControllerState, GnssReading, GpsHealth, PoseAnchor, VioOutput};
 
@@ -82,33 +82,6 @@ impl<F> Payload<F> {
     }
 }
 
-/// Result of an input.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Outcome {
-    /// Input that is in the estimate.
-    Added {
-        /// Normalised innovation squared over its dimension.
-        nis: Option<f64>,
-    },
-    /// The position is not in the estimate, or has moved it.
-    Degraded(Reason),
-    /// Input that broke the estimate, which continues without it.
-    Fatal(Reason),
-}
-
-impl Outcome {
-    /// Returns whether the input became the same, for the same reason. The numbers may differ.
-    pub(super) fn is_alike(&self, other: &Self) -> bool {
-        match (self, other) {
-            (Self::Added { .. }, Self::Added { .. }) => true,
-            (Self::Degraded(reason), Self::Degraded(other)) | (Self::Fatal(reason), Self::Fatal(other)) => {
-                reason.is_alike(other)
-            }
-            _ => false,
-        }
-    }
-}
-
 /// An input at its position in the queue.
 #[derive(Clone, Debug)]
 pub(super) struct Entry<F> {
@@ -120,34 +93,30 @@ pub(super) struct Entry<F> {
     pub(super) rejection: Option<Rejection>,
 }
 
-/// Change of an input that is to be reported.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum News {
-    /// Result of the input, for the first time or instead of another one.
-    Became(Outcome),
-    /// Input that is in the estimate after all.
-    Revised,
-}
-
 impl<F> Entry<F> {
     /// Takes what it has become, and returns what is news of that.
-    pub(super) fn became(
-        &mut self,
-        outcome: Outcome,
-        rejection: Option<Rejection>,
-    ) -> (Option<News>, Option<Rejection>) {
-        let is_news = self.outcome.is_none_or(|before| !before.is_alike(&outcome));
+    pub(super) fn became(&mut self, outcome: Outcome, rejection: Option<Rejection>) -> [Option<EventKind>; 2] {
+        let input = self.payload.kind();
+        let is_alike = |before: Outcome| match (before, outcome) {
+            (Ok(_), Ok(_)) => true,
+            (Err(before), Err(error)) => before.is_alike(&error),
+            _ => false,
+        };
+        let is_news = self.outcome.is_none_or(|before| !is_alike(before));
         let news = match (self.outcome, outcome) {
-            (None, Outcome::Added { .. }) if !self.payload.is_added() => None,
+            (None, Ok(_)) if !self.payload.is_added() => None,
             // An anchor may be in the estimate, and let the receiver in after all.
-            (Some(_), Outcome::Added { .. }) if is_news || (self.rejection.is_some() && rejection.is_none()) => {
-                Some(News::Revised)
+            (Some(_), Ok(_)) => {
+                let is_revised = is_news || (self.rejection.is_some() && rejection.is_none());
+                is_revised.then_some(EventKind::Revised { input })
             }
-            (_, outcome) => is_news.then_some(News::Became(outcome)),
+            // The rejection reports it.
+            (_, Err(EstimatorError::Degraded(Reason::Gate(_)))) => None,
+            _ => is_news.then_some(EventKind::of(input, outcome)),
         };
         let is_same = |rejection: &Rejection| self.rejection.is_some_and(|before| before.is_alike(rejection));
         let rejected = rejection.filter(|rejection| !is_same(rejection));
         (self.outcome, self.rejection) = (Some(outcome), rejection);
-        (news, rejected)
+        [news, rejected.map(|rejection| EventKind::Rejected { rejection })]
     }
 }

@@ -84,6 +84,28 @@ impl EstimatorError {
     pub fn is_fatal(&self) -> bool {
         matches!(self, Self::Fatal(_))
     }
+
+    /// The error of numbers that are no longer usable.
+    pub(super) fn fatal(refusal: Refusal) -> Self {
+        Self::Fatal(refusal.into())
+    }
+
+    /// Returns whether it is the same error for the same reason, with the same or other numbers.
+    pub(super) fn is_alike(&self, other: &Self) -> bool {
+        self.is_fatal() == other.is_fatal() && self.reason().is_alike(&other.reason())
+    }
+}
+
+impl From<Reason> for EstimatorError {
+    fn from(reason: Reason) -> Self {
+        Self::Degraded(reason)
+    }
+}
+
+impl From<Refusal> for EstimatorError {
+    fn from(refusal: Refusal) -> Self {
+        Self::Degraded(refusal.into())
+    }
 }
 
 impl fmt::Display for EstimatorError {
@@ -96,6 +118,10 @@ impl fmt::Display for EstimatorError {
 }
 
 impl Error for EstimatorError {}
+
+/// What became of an input: its normalised innovation squared over its dimension, if it was measured, or why it is not in the estimate
+/// or has moved it. After a fatal error, the estimate continues without the input.
+pub(super) type Outcome = Result<Option<f64>, EstimatorError>;
 
 /// Reason for which the take-off origin was refused.
 #[derive(Clone, Copy, Debug, PartialEq)]

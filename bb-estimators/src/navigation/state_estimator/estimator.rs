@@ -4,7 +4,7 @@ use alloc::vec::Vec;
 
 use super::emission::Emission;
 use super::engine::Condition;
-use super::entry::{Key, Outcome, Payload};
+use super::entry::{Key, Payload};
 use super::error::{EstimatorError, OriginError, Reason};
 use super::event::{Event, EventKind, EventSink, InputKind};
 use super::factor::ProvidedFactor;
@@ -16,7 +16,7 @@ use super::input::{
 use super::label::{SourceLabel, Sources};
 use super::output::{EstimatorHealth, EstimatorOutput, HealthState, number_of};
 use super::params::{StateEstimatorConfig, ns};
-use super::queue::{Queue, QueueCounts, Sampled, Told};
+use super::queue::{Queue, QueueCounts, Told};
 use super::strategy::Pose;
 use crate::attitude::ParamsError;
 use crate::navigation::eskf::ImuMean;
@@ -193,15 +193,11 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
         }
         for sample in samples {
             let sampled = self.queue.add_sample(sample, &self.config);
-            let result = match sampled {
-                Ok(Sampled::Taken | Sampled::Waits) => Ok(()),
-                Ok(Sampled::Bridged) => Err(EstimatorError::Degraded(Reason::Bridged)),
-                Err(reason) => Err(EstimatorError::Degraded(reason)),
-            };
-            waits = sampled == Ok(Sampled::Waits);
+            waits = sampled == Ok(true);
+            let result = sampled.map(drop).map_err(EstimatorError::from);
             self.drain();
             if let Err(error) = result {
-                self.fail(sample.time_ns, InputKind::Imu, error);
+                self.tell(sample.time_ns, EventKind::of(InputKind::Imu, Err(error)));
             }
             first = first.and(result);
         }
@@ -267,7 +263,7 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
             Ok(key) => self.became(key, input),
             Err(reason) => {
                 let error = failed(input, reason);
-                self.fail(time_ns, input, error);
+                self.tell(time_ns, EventKind::of(input, Err(error)));
                 Err(error)
             }
         }
@@ -276,9 +272,7 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
     /// Result of an input that is in the queue.
     fn became(&mut self, key: Key, input: InputKind) -> Result<Added, EstimatorError> {
         match self.queue.outcome(key) {
-            Some(Outcome::Added { nis }) => Ok(Added::Taken { nis }),
-            Some(Outcome::Degraded(reason)) => Err(EstimatorError::Degraded(reason)),
-            Some(Outcome::Fatal(reason)) => Err(EstimatorError::Fatal(reason)),
+            Some(outcome) => outcome.map(|nis| Added::Taken { nis }),
             None => {
                 self.tell(key.time_ns, EventKind::Added { input, nis: None, waits: true });
                 Ok(Added::Waits)
@@ -286,27 +280,13 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
         }
     }
 
-    fn fail(&mut self, time_ns: i64, input: InputKind, error: EstimatorError) {
-        let reason = error.reason();
-        self.has_failed |= error.is_fatal();
-        self.tell(
-            time_ns,
-            if error.is_fatal() {
-                EventKind::Fatal { input, reason }
-            } else {
-                EventKind::Degraded { input, reason }
-            },
-        );
-    }
-
     fn tell(&mut self, time_ns: i64, kind: EventKind) {
-        if let EventKind::Added { input, waits: false, .. } = kind {
-            match input {
-                InputKind::Imu => self.added.imu += 1,
-                InputKind::Vio => self.added.vio += 1,
-                InputKind::Anchor => self.added.poses += 1,
-                _ => {}
-            }
+        match kind {
+            EventKind::Added { input: InputKind::Imu, waits: false, .. } => self.added.imu += 1,
+            EventKind::Added { input: InputKind::Vio, waits: false, .. } => self.added.vio += 1,
+            EventKind::Added { input: InputKind::Anchor, waits: false, .. } => self.added.poses += 1,
+            EventKind::Fatal { .. } => self.has_failed = true,
+            _ => {}
         }
         let spoof_block = !self.queue.engine().gate().state().is_open();
         self.sink.event(&Event { time_ns, frame_id: self.emission.last_id(), spoof_block, kind });
@@ -317,27 +297,7 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
         let mut told = core::mem::take(&mut self.queue.told);
         for told in told.drain(..) {
             match told {
-                Told::Taken(key, input, Outcome::Added { nis }) => {
-                    self.tell(key.time_ns, EventKind::Added { input, nis, waits: false });
-                }
-                // The rejection event already reports it.
-                Told::Taken(_, _, Outcome::Degraded(Reason::Gate(_))) => {}
-                Told::Taken(key, input, Outcome::Degraded(reason)) => {
-                    self.fail(key.time_ns, input, EstimatorError::Degraded(reason));
-                }
-                Told::Taken(key, input, Outcome::Fatal(reason)) => {
-                    self.fail(key.time_ns, input, EstimatorError::Fatal(reason));
-                }
-                Told::Revised(key, input) => self.tell(key.time_ns, EventKind::Revised { input }),
-                Told::Rejected(time_ns, rejection) => self.tell(time_ns, EventKind::Rejected { rejection }),
-                Told::Started(time_ns, from) => self.tell(time_ns, EventKind::Started { from }),
-                Told::Broken(time_ns, reason) => {
-                    self.fail(time_ns, InputKind::Imu, EstimatorError::Fatal(reason));
-                }
-                Told::Dropped(time_ns, count) => self.tell(time_ns, EventKind::SamplesDropped { count }),
-                Told::SetBack(time_ns, by_ns) => {
-                    self.tell(time_ns, EventKind::ClockSetBack { seconds: by_ns as f64 * 1e-9 });
-                }
+                Told::Event(time_ns, kind) => self.tell(time_ns, kind),
                 Told::Left(pose, sources) => {
                     let is_smoothed = self.is_smoothing();
                     if let Some(estimate) = self.describe_past(&pose, &sources, is_smoothed) {

@@ -1,6 +1,6 @@
 //! Events of the state estimator: values for logs and recorders, and texts for the ground station.
 
-use super::error::Reason;
+use super::error::{EstimatorError, Outcome, Reason};
 use super::gate::{GateState, Rejection};
 use super::label::SourceLabel;
 use super::output::EstimatorOutput;
@@ -225,6 +225,15 @@ pub enum EventKind {
 }
 
 impl EventKind {
+    /// The report of what became of an input.
+    pub(super) fn of(input: InputKind, outcome: Outcome) -> Self {
+        match outcome {
+            Ok(nis) => Self::Added { input, nis, waits: false },
+            Err(EstimatorError::Degraded(reason)) => Self::Degraded { input, reason },
+            Err(EstimatorError::Fatal(reason)) => Self::Fatal { input, reason },
+        }
+    }
+
     /// The name in logs and recordings.
     pub const fn name(&self) -> &'static str {
         match self {

@@ -1,17 +1,7 @@
 //! Fallback when there is no estimate for too long.
 
+use super::event::EventKind;
 use super::params::{StateEstimatorParams, ns};
-
-/// A change caused by a tick with or without an estimate.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Fallback {
-    /// Two thirds of the time have passed.
-    Imminent,
-    /// The flight controller's own IMU takes over.
-    Engaged,
-    /// There is an estimate again.
-    Recovered,
-}
 
 /// Measures the time without an estimate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -33,11 +23,11 @@ impl Watchdog {
         now_ns: i64,
         has_estimate: bool,
         params: &StateEstimatorParams,
-    ) -> Option<Fallback> {
+    ) -> Option<EventKind> {
         if has_estimate {
             let was_engaged = self.is_engaged;
             *self = Self { last_ns: Some(now_ns), ..Self::default() };
-            return was_engaged.then_some(Fallback::Recovered);
+            return was_engaged.then_some(EventKind::FallbackRecovered);
         }
         // If the clock was set back, the time is measured from there.
         let last_ns = self.last_ns.unwrap_or(now_ns).min(now_ns);
@@ -45,11 +35,11 @@ impl Watchdog {
         let without_ns = now_ns.saturating_sub(last_ns);
         if !self.is_engaged && without_ns >= ns(params.fallback_after) {
             (self.is_engaged, self.is_warned) = (true, true);
-            return Some(Fallback::Engaged);
+            return Some(EventKind::FallbackEngaged);
         }
         if !self.is_warned && without_ns >= ns(params.fallback_after * 2.0 / 3.0) {
             self.is_warned = true;
-            return Some(Fallback::Imminent);
+            return Some(EventKind::FallbackImminent);
         }
         None
     }

@@ -9,11 +9,10 @@ use alloc::vec::Vec;
 
 use super::clock::Clock;
 use super::engine::Engine;
-use super::entry::{Entry, Key, News, Outcome, Payload};
-use super::error::Reason;
-use super::event::{InputKind, StartedFrom};
+use super::entry::{Entry, Key, Payload};
+use super::error::{EstimatorError, Outcome, Reason};
+use super::event::{EventKind, InputKind, StartedFrom};
 use super::factor::ProvidedFactor;
-use super::gate::Rejection;
 use super::input::TakeoffOrigin;
 use super::label::Sources;
 use super::params::{Rooms, StateEstimatorConfig, ns};
@@ -54,36 +53,14 @@ pub struct QueueCounts {
     pub set_back: u64,
 }
 
-/// Result of a sample of the IMU.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Sampled {
-    Taken,
-    /// Sample after a gap.
-    Bridged,
-    /// First sample: the next one shows whether its stamp can be believed.
-    Waits,
-}
-
 #[expect(clippy::large_enum_variant, reason = "its room is taken once")]
 /// Reports of the queue.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Told {
-    /// An input was applied for the first time, or again and became something worse or else.
-    Taken(Key, InputKind, Outcome),
-    /// An input was applied again, and is in the estimate after all.
-    Revised(Key, InputKind),
-    /// The gate of the receiver rejected something.
-    Rejected(i64, Rejection),
-    /// Start of the estimator.
-    Started(i64, StartedFrom),
+    /// An event, with its time.
+    Event(i64, EventKind),
     /// A keyframe has left the window.
     Left(Pose, Sources),
-    /// An IMU sample broke the estimate.
-    Broken(i64, Reason),
-    /// Samples were dropped early.
-    Dropped(i64, u64),
-    /// The clock of the IMU was set back, by this many ns.
-    SetBack(i64, i64),
 }
 
 /// See the module.
@@ -187,6 +164,10 @@ impl<F: ProvidedFactor> Queue<F> {
         [self.samples.len(), self.inputs.len(), self.copies.len()]
     }
 
+    fn tell(&mut self, time_ns: i64, kind: EventKind) {
+        self.told.push(Told::Event(time_ns, kind));
+    }
+
     fn count(&mut self, reason: Reason) -> Reason {
         let counts = &mut self.counts;
         match reason {
@@ -205,12 +186,9 @@ impl<F: ProvidedFactor> Queue<F> {
         self.count(refusal.into())
     }
 
-    /// Takes a sample of the IMU.
-    pub(super) fn add_sample(
-        &mut self,
-        sample: &ImuMean,
-        config: &StateEstimatorConfig,
-    ) -> Result<Sampled, Reason> {
+    /// Takes a sample of the IMU. Returns whether it waits: the one after the first shows whether the stamp of the first can be believed.
+    /// One that follows a gap is taken as well, and [`Reason::Bridged`].
+    pub(super) fn add_sample(&mut self, sample: &ImuMean, config: &StateEstimatorConfig) -> Result<bool, Reason> {
         let result = self.place_sample(sample, config);
         result.map_err(|reason| self.count(reason))
     }
@@ -375,7 +353,7 @@ impl<F: ProvidedFactor> Queue<F> {
         {
             let time_ns = until_ns;
             if self.broken.is_none_or(|(at_ns, before)| at_ns != time_ns || !before.is_alike(&reason)) {
-                self.told.push(Told::Broken(time_ns, reason));
+                self.tell(time_ns, EventKind::Fatal { input: InputKind::Imu, reason });
             }
             self.broken = Some((time_ns, reason));
         }
@@ -384,18 +362,14 @@ impl<F: ProvidedFactor> Queue<F> {
 
     fn apply(&mut self, index: usize, config: &StateEstimatorConfig) -> Result<(), Key> {
         let Some(entry) = self.inputs.get_mut(index) else { return Ok(()) };
-        if matches!(entry.outcome, Some(Outcome::Fatal(_))) {
+        if matches!(entry.outcome, Some(Err(EstimatorError::Fatal(_)))) {
             return Ok(());
         }
         let (outcome, rejection) = self.engine.apply(entry, config);
-        let (key, kind) = (entry.key, entry.payload.kind());
-        let (news, rejection) = entry.became(outcome, rejection);
-        self.told.extend(news.map(|news| match news {
-            News::Revised => Told::Revised(key, kind),
-            News::Became(outcome) => Told::Taken(key, kind, outcome),
-        }));
-        self.told.extend(rejection.map(|rejection| Told::Rejected(key.time_ns, rejection)));
-        if matches!(outcome, Outcome::Fatal(_)) {
+        let key = entry.key;
+        let news = entry.became(outcome, rejection);
+        self.told.extend(news.into_iter().flatten().map(|kind| Told::Event(key.time_ns, kind)));
+        if matches!(outcome, Err(EstimatorError::Fatal(_))) {
             return Err(key);
         }
         self.look();
@@ -415,7 +389,7 @@ impl<F: ProvidedFactor> Queue<F> {
         {
             self.started.push(started);
             let (time_ns, from) = started;
-            self.told.push(Told::Started(time_ns, from));
+            self.tell(time_ns, EventKind::Started { from });
         }
     }
 

@@ -11,6 +11,7 @@ use alloc::vec::Vec;
 use nalgebra::{Isometry3, Matrix6, SMatrix, UnitQuaternion, Vector3};
 
 pub(super) use self::predictor::Predictor;
+use super::error::EstimatorError;
 use super::factor::ProvidedFactor;
 use super::params::{StateEstimatorConfig, StrategyKind, ns};
 use crate::attitude::ParamsError;
@@ -65,21 +66,6 @@ pub(super) enum Trust {
     Doubted,
     /// The position may show that the estimate is in the wrong place.
     Believed,
-}
-
-/// Reason for which a measurement was not fused.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Failure {
-    /// The state is unchanged.
-    Refused(Refusal),
-    /// The numbers are no longer usable.
-    Fatal(Refusal),
-}
-
-impl From<Refusal> for Failure {
-    fn from(refusal: Refusal) -> Self {
-        Self::Refused(refusal)
-    }
 }
 
 /// A gate per kind of measurement.
@@ -205,17 +191,22 @@ impl<F: ProvidedFactor> Strategy<F> {
     }
 
     /// Advances to a time within one sample, which began at `since_ns`. Makes a keyframe if one is due.
-    pub(super) fn propagate(&mut self, until_ns: i64, sample: &ImuMean, since_ns: i64) -> Result<(), Failure> {
+    pub(super) fn propagate(
+        &mut self,
+        until_ns: i64,
+        sample: &ImuMean,
+        since_ns: i64,
+    ) -> Result<(), EstimatorError> {
         each!(self, strategy => strategy.propagate(until_ns, sample, since_ns))
     }
 
     /// Makes the present state a keyframe: a camera has captured a frame.
-    pub(super) fn frame(&mut self) -> Result<(), Failure> {
+    pub(super) fn frame(&mut self) -> Result<(), EstimatorError> {
         each!(self, strategy => strategy.camera_frame())
     }
 
     /// Fuses a measurement at the present time.
-    pub(super) fn measure(&mut self, measured: &Measured<'_, F>) -> Result<Fused, Failure> {
+    pub(super) fn measure(&mut self, measured: &Measured<'_, F>) -> Result<Fused, EstimatorError> {
         each!(self, strategy => strategy.measure(measured))
     }
 
@@ -308,12 +299,12 @@ impl<F: ProvidedFactor> Strategy<F> {
     }
 
     /// Assigns a new time to the present state, with the standard deviation of that time, s. Keyframes are dropped.
-    pub(super) fn set_clock(&mut self, time_ns: i64, deviation_s: f64) -> Result<(), Refusal> {
+    pub(super) fn set_clock(&mut self, time_ns: i64, deviation_s: f64) -> Result<(), EstimatorError> {
         each!(self, strategy => strategy.set_clock(time_ns, deviation_s))
     }
 
     /// Moves to another world.
-    pub(super) fn move_world(&mut self, new_from_old: &Isometry3<f64>) -> Result<(), Refusal> {
+    pub(super) fn move_world(&mut self, new_from_old: &Isometry3<f64>) -> Result<(), EstimatorError> {
         each!(self, strategy => strategy.move_world(new_from_old))
     }
 }

@@ -6,14 +6,14 @@ use super::{CONFIRMATIONS, Engine, Phase};
 use crate::navigation::fused::Fused;
 use crate::navigation::measurement::RelativePose;
 use crate::navigation::refusal::Refusal;
-use crate::navigation::state_estimator::error::Reason;
+use crate::navigation::state_estimator::error::{EstimatorError, Reason};
 use crate::navigation::state_estimator::event::StartedFrom;
 use crate::navigation::state_estimator::factor::ProvidedFactor;
 use crate::navigation::state_estimator::gate::Rejection;
 use crate::navigation::state_estimator::input::{GnssReading, HEIGHTS, PoseAnchor, VioOutput, blocks};
 use crate::navigation::state_estimator::params::StateEstimatorConfig;
 use crate::navigation::state_estimator::start::at_anchor;
-use crate::navigation::state_estimator::strategy::{Failure, Measured, Trust, id_of};
+use crate::navigation::state_estimator::strategy::{Measured, Trust, id_of};
 use crate::navigation::state_estimator::world::World;
 
 /// Normalised innovation squared over the dimension up to which a position fits.
@@ -33,7 +33,7 @@ const FAR: f64 = 1000.0;
 const ALONE_NS: i64 = 60_000_000_000;
 
 impl<F: ProvidedFactor> Engine<F> {
-    pub(super) fn measure(&mut self, measured: &Measured<'_, F>) -> Result<Fused, Trouble> {
+    pub(super) fn measure(&mut self, measured: &Measured<'_, F>) -> Result<Fused, EstimatorError> {
         if !matches!(self.phase, Phase::Running) {
             return Err(Refusal::NotStarted.into());
         }
@@ -59,13 +59,13 @@ impl<F: ProvidedFactor> Engine<F> {
             self.independent_ns = self.now_ns;
         }
         if !self.is_bounded() || (!is_relative && !self.is_height_plausible()) {
-            return Err(Trouble::Fatal(Refusal::OutOfRange.into()));
+            return Err(EstimatorError::fatal(Refusal::OutOfRange));
         }
         Ok(fused)
     }
 
     /// The estimate has gone on where positions are that it had refused, the last of them with this result.
-    fn moved(&mut self, result: &Result<Fused, Failure>, is_fix: bool) -> Result<Fused, Trouble> {
+    fn moved(&mut self, result: &Result<Fused, EstimatorError>, is_fix: bool) -> Result<Fused, EstimatorError> {
         self.gate.moved();
         self.marks.clear();
         self.unconfirmed = CONFIRMATIONS;
@@ -78,7 +78,7 @@ impl<F: ProvidedFactor> Engine<F> {
         }
         let nis = match result {
             Ok(fused) => fused.nis,
-            Err(Failure::Refused(Refusal::Gate { nis, .. })) => *nis,
+            Err(EstimatorError::Degraded(Reason::Refused(Refusal::Gate { nis, .. }))) => *nis,
             Err(_) => 0.0,
         };
         Err(Reason::Overruled { nis }.into())
@@ -92,10 +92,12 @@ impl<F: ProvidedFactor> Engine<F> {
     }
 
     /// Updates the trust in the estimate from the result of a position.
-    fn weigh_position(&mut self, result: &Result<Fused, Failure>, is_repeated: bool) {
+    fn weigh_position(&mut self, result: &Result<Fused, EstimatorError>, is_repeated: bool) {
         let is_far = |nis: f64| nis > FAR * 6.0;
         let is_doubtful = match result {
-            Err(Failure::Refused(Refusal::Gate { nis, .. })) => is_repeated || is_far(*nis),
+            Err(EstimatorError::Degraded(Reason::Refused(Refusal::Gate { nis, .. }))) => {
+                is_repeated || is_far(*nis)
+            }
             _ => false,
         };
         match result {
@@ -108,7 +110,11 @@ impl<F: ProvidedFactor> Engine<F> {
         }
     }
 
-    pub(super) fn vio(&mut self, vio: &VioOutput, config: &StateEstimatorConfig) -> Result<Option<Fused>, Trouble> {
+    pub(super) fn vio(
+        &mut self,
+        vio: &VioOutput,
+        config: &StateEstimatorConfig,
+    ) -> Result<Option<Fused>, EstimatorError> {
         self.bias = vio.bias.or(self.bias);
         let [translation_covariance, rotation_covariance] = blocks(&vio.covariance);
         let fused = self.measure(&Measured::Relative(RelativePose {
@@ -128,7 +134,7 @@ impl<F: ProvidedFactor> Engine<F> {
         anchor: &PoseAnchor,
         config: &StateEstimatorConfig,
         rejection: &mut Option<Rejection>,
-    ) -> Result<Option<Fused>, Trouble> {
+    ) -> Result<Option<Fused>, EstimatorError> {
         let can_start = match self.phase {
             Phase::Lost => true,
             Phase::Starting(_) => self.origin.is_none(),
@@ -163,8 +169,8 @@ impl<F: ProvidedFactor> Engine<F> {
     }
 
     /// Use of a position by the estimate.
-    fn is_in(&self, result: &Result<Fused, Trouble>) -> bool {
-        matches!(result, Ok(_) | Err(Trouble::Degraded(Reason::Overruled { .. })))
+    fn is_in(&self, result: &Result<Fused, EstimatorError>) -> bool {
+        matches!(result, Ok(_) | Err(EstimatorError::Degraded(Reason::Overruled { .. })))
     }
 
     fn start_at(&mut self, now_ns: i64, anchor: &PoseAnchor, config: &StateEstimatorConfig) -> Result<(), Reason> {
@@ -177,7 +183,7 @@ impl<F: ProvidedFactor> Engine<F> {
         fix: &GnssReading,
         config: &StateEstimatorConfig,
         rejection: &mut Option<Rejection>,
-    ) -> Result<Option<Fused>, Trouble> {
+    ) -> Result<Option<Fused>, EstimatorError> {
         let motion = self.strategy.motion().filter(|_| matches!(self.phase, Phase::Running));
         let (Some(world), Some((position, _))) = (self.world, motion) else {
             return Err(Refusal::NotStarted.into());
@@ -188,7 +194,7 @@ impl<F: ProvidedFactor> Engine<F> {
         let offset = measured.position - antenna - position;
         if let Err(rejected) = self.gate.fix(fix.time_ns, &offset, &config.params) {
             *rejection = Some(rejected);
-            return Err(Trouble::Degraded(Reason::Gate(rejected)));
+            return Err(EstimatorError::Degraded(Reason::Gate(rejected)));
         }
         // While there is a camera or an anchor, fixes must not move the estimate: a spoofer can wait for the time that a newcomer needs.
         let is_alone = self.independent_ns.is_none_or(|at_ns| fix.time_ns.saturating_sub(at_ns) > ALONE_NS);
@@ -198,32 +204,5 @@ impl<F: ProvidedFactor> Engine<F> {
             self.sources.anchored(fix.time_ns, &config.params);
         }
         Ok(Some(result?))
-    }
-}
-
-/// Reason for which an input is not in the estimate.
-pub(super) enum Trouble {
-    Degraded(Reason),
-    Fatal(Reason),
-}
-
-impl From<Failure> for Trouble {
-    fn from(failure: Failure) -> Self {
-        match failure {
-            Failure::Refused(refusal) => Self::Degraded(refusal.into()),
-            Failure::Fatal(refusal) => Self::Fatal(refusal.into()),
-        }
-    }
-}
-
-impl From<Refusal> for Trouble {
-    fn from(refusal: Refusal) -> Self {
-        Self::Degraded(refusal.into())
-    }
-}
-
-impl From<Reason> for Trouble {
-    fn from(reason: Reason) -> Self {
-        Self::Degraded(reason)
     }
 }

@@ -1,13 +1,13 @@
 //! Samples of the IMU: which are taken, where they are put, and which leave when there is no room.
 
-use super::{Queue, Sampled, Told};
+use super::{Queue, Told};
 use crate::navigation::eskf::ImuMean;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state_estimator::clock::{Stamped, follows};
 use crate::navigation::state_estimator::engine::Condition;
-use crate::navigation::state_estimator::entry::{Entry, Key, Outcome};
+use crate::navigation::state_estimator::entry::{Entry, Key};
 use crate::navigation::state_estimator::error::Reason;
-use crate::navigation::state_estimator::event::InputKind;
+use crate::navigation::state_estimator::event::{EventKind, InputKind};
 use crate::navigation::state_estimator::factor::ProvidedFactor;
 use crate::navigation::state_estimator::params::{StateEstimatorConfig, ns};
 
@@ -18,11 +18,7 @@ const LONGEST_TAIL_NS: i64 = 250_000_000;
 const LEAVING: usize = 8;
 
 impl<F: ProvidedFactor> Queue<F> {
-    pub(super) fn place_sample(
-        &mut self,
-        sample: &ImuMean,
-        config: &StateEstimatorConfig,
-    ) -> Result<Sampled, Reason> {
+    pub(super) fn place_sample(&mut self, sample: &ImuMean, config: &StateEstimatorConfig) -> Result<bool, Reason> {
         sample.check()?;
         let time_ns = sample.time_ns;
         let Some(newest) = self.newest else { return self.place_first(sample, config) };
@@ -39,7 +35,7 @@ impl<F: ProvidedFactor> Queue<F> {
             Stamped::TooOld => return Err(Refusal::TooOld { time_ns }.into()),
             Stamped::SetBack { for_ns } => {
                 self.set_back(sample, for_ns, newest.time_ns, config);
-                return Ok(Sampled::Bridged);
+                return Err(Reason::Bridged);
             }
         }
         self.make_room(config);
@@ -61,7 +57,7 @@ impl<F: ProvidedFactor> Queue<F> {
         } else if let Some(last) = self.inputs.iter().rev().find(|entry| waits(entry)).map(|entry| entry.key) {
             self.settle(last.time_ns, config);
         }
-        Ok(if is_gap { Sampled::Bridged } else { Sampled::Taken })
+        if is_gap { Err(Reason::Bridged) } else { Ok(false) }
     }
 
     /// Returns whether no sample is missing at a time: those before and after it are no farther apart than others.
@@ -86,7 +82,7 @@ impl<F: ProvidedFactor> Queue<F> {
 
     /// The first sample sets the time, once another stamp agrees with its own. Two stamps are not enough to discard earlier
     /// reports: that takes as many as a jump of the clock.
-    fn place_first(&mut self, sample: &ImuMean, config: &StateEstimatorConfig) -> Result<Sampled, Reason> {
+    fn place_first(&mut self, sample: &ImuMean, config: &StateEstimatorConfig) -> Result<bool, Reason> {
         let time_ns = sample.time_ns;
         let before = self.first.take();
         let is_believed = self.clock.doubt(time_ns).is_some() || self.inputs.is_empty();
@@ -96,16 +92,15 @@ impl<F: ProvidedFactor> Queue<F> {
         }
         if let Some(first) = before {
             // Neither is known to be wrong, but the later one may still be confirmed.
-            let (key, refusal) = (Key::of_sample(first.time_ns), stranger(first.time_ns, time_ns));
-            let reason = self.count(refusal.into());
-            self.told.push(Told::Taken(key, InputKind::Imu, Outcome::Degraded(reason)));
+            let reason = self.count(stranger(first.time_ns, time_ns).into());
+            self.tell(first.time_ns, EventKind::Degraded { input: InputKind::Imu, reason });
         }
         if self.inputs.iter().any(|entry| self.is_near(entry.key.time_ns, time_ns, config)) {
             self.begin(sample, config);
-            return Ok(Sampled::Taken);
+            return Ok(false);
         }
         self.first = Some(*sample);
-        Ok(Sampled::Waits)
+        Ok(true)
     }
 
     fn begin(&mut self, sample: &ImuMean, config: &StateEstimatorConfig) {
@@ -124,7 +119,8 @@ impl<F: ProvidedFactor> Queue<F> {
                 is_alarmed |= entry.payload.is_alarm();
                 self.counts.too_old += 1;
                 let reason = Refusal::TooOld { time_ns: entry.key.time_ns }.into();
-                self.told.push(Told::Taken(entry.key, entry.payload.kind(), Outcome::Degraded(reason)));
+                let kind = EventKind::Degraded { input: entry.payload.kind(), reason };
+                self.told.push(Told::Event(entry.key.time_ns, kind));
             }
         }
         self.engine.set_clock_back(sample.time_ns, for_ns, config);
@@ -135,7 +131,8 @@ impl<F: ProvidedFactor> Queue<F> {
         self.left_ns = i64::MIN;
         (self.started, self.broken) = (self.engine.started().into_iter().collect(), None);
         self.counts.set_back += 1;
-        self.told.push(Told::SetBack(sample.time_ns, newest_ns.saturating_sub(sample.time_ns)));
+        let seconds = newest_ns.saturating_sub(sample.time_ns) as f64 * 1e-9;
+        self.tell(sample.time_ns, EventKind::ClockSetBack { seconds });
         self.newest = Some(*sample);
         self.samples.push_back(*sample);
         if is_alarmed {
@@ -145,7 +142,7 @@ impl<F: ProvidedFactor> Queue<F> {
     }
 
     /// Inserts a sample at its place. The engine is not run: more such samples may follow.
-    fn place_late_sample(&mut self, sample: &ImuMean, config: &StateEstimatorConfig) -> Result<Sampled, Reason> {
+    fn place_late_sample(&mut self, sample: &ImuMean, config: &StateEstimatorConfig) -> Result<bool, Reason> {
         let time_ns = sample.time_ns;
         if self.samples.binary_search_by_key(&time_ns, |other| other.time_ns).is_ok() {
             return Err(Reason::Duplicate);
@@ -162,7 +159,7 @@ impl<F: ProvidedFactor> Queue<F> {
         self.samples.insert(index, *sample);
         self.counts.late += 1;
         self.change(from);
-        Ok(Sampled::Taken)
+        Ok(false)
     }
 
     /// Drops the oldest sample if there is no room for another one. Those needed only for late inputs are dropped first, and such inputs
@@ -190,17 +187,17 @@ impl<F: ProvidedFactor> Queue<F> {
             self.dropped_ns = last.map(|sample| sample.time_ns).or(self.dropped_ns);
         }
         self.predict(config);
-        let dropped = held.saturating_sub(self.samples.len()) as u64;
-        self.counts.dropped += dropped;
-        self.told.push(Told::Dropped(newest_ns, dropped));
+        let count = held.saturating_sub(self.samples.len()) as u64;
+        self.counts.dropped += count;
+        self.tell(newest_ns, EventKind::SamplesDropped { count });
     }
 
     /// Drops inputs that came before the IMU and do not match its time.
     fn drop_strangers(&mut self, time_ns: i64, config: &StateEstimatorConfig) {
         let mut index = 0;
         while let Some(entry) = self.inputs.get(index) {
-            let (key, kind, is_added) = (entry.key, entry.payload.kind(), entry.payload.is_added());
-            if self.is_near(key.time_ns, time_ns, config) {
+            let (at_ns, input, is_added) = (entry.key.time_ns, entry.payload.kind(), entry.payload.is_added());
+            if self.is_near(at_ns, time_ns, config) {
                 index += 1;
                 continue;
             }
@@ -208,8 +205,8 @@ impl<F: ProvidedFactor> Queue<F> {
                 self.block(config);
             }
             if is_added {
-                let reason = self.count(stranger(key.time_ns, time_ns).into());
-                self.told.push(Told::Taken(key, kind, Outcome::Degraded(reason)));
+                let reason = self.count(stranger(at_ns, time_ns).into());
+                self.tell(at_ns, EventKind::Degraded { input, reason });
             }
         }
     }

@@ -7,7 +7,7 @@ use alloc::vec::Vec;
 
 use nalgebra::{Isometry3, SMatrix, UnitQuaternion, Vector3};
 
-use super::{Cadence, Failure, Measured, Pose, Predictor, Streams, Trust, id_of};
+use super::{Cadence, Measured, Pose, Predictor, Streams, Trust, id_of};
 use crate::attitude::ParamsError;
 use crate::navigation::copies::{Copies, UNKNOWN, Ways};
 #[cfg(feature = "smoother")]
@@ -21,6 +21,7 @@ use crate::navigation::refusal::Refusal;
 #[cfg(feature = "smoother")]
 use crate::navigation::state::Estimate;
 use crate::navigation::state::{NAVIGATED, Navigated};
+use crate::navigation::state_estimator::error::EstimatorError;
 use crate::navigation::state_estimator::factor::ProvidedFactor;
 use crate::navigation::state_estimator::params::StateEstimatorConfig;
 
@@ -72,7 +73,12 @@ impl EskfStrategy {
         self.past.extend(self.pose());
     }
 
-    pub(super) fn propagate(&mut self, until_ns: i64, sample: &ImuMean, since_ns: i64) -> Result<(), Failure> {
+    pub(super) fn propagate(
+        &mut self,
+        until_ns: i64,
+        sample: &ImuMean,
+        since_ns: i64,
+    ) -> Result<(), EstimatorError> {
         if self.is_next {
             self.is_next = false;
             self.copies.set_keyframe(id_of(self.cadence.camera_ns));
@@ -81,7 +87,7 @@ impl EskfStrategy {
         if self.cadence.is_due(until_ns) { self.keyframe() } else { Ok(()) }
     }
 
-    pub(super) fn camera_frame(&mut self) -> Result<(), Failure> {
+    pub(super) fn camera_frame(&mut self) -> Result<(), EstimatorError> {
         self.keyframe()?;
         self.cadence.camera_frame();
         self.is_next = true;
@@ -89,13 +95,13 @@ impl EskfStrategy {
     }
 
     /// Makes the present a keyframe.
-    pub(super) fn keyframe(&mut self) -> Result<(), Failure> {
+    pub(super) fn keyframe(&mut self) -> Result<(), EstimatorError> {
         let pose = self.pose().ok_or(Refusal::NotStarted)?;
         if pose.time_ns == self.cadence.keyframe_ns {
             return Ok(());
         }
         if !pose.is_finite() {
-            return Err(Failure::Fatal(Refusal::NonFinite));
+            return Err(EstimatorError::fatal(Refusal::NonFinite));
         }
         self.cadence.keyframe_ns = pose.time_ns;
         self.past.push_back(pose);
@@ -105,7 +111,10 @@ impl EskfStrategy {
         Ok(())
     }
 
-    pub(super) fn measure<F: ProvidedFactor>(&mut self, measured: &Measured<'_, F>) -> Result<Fused, Failure> {
+    pub(super) fn measure<F: ProvidedFactor>(
+        &mut self,
+        measured: &Measured<'_, F>,
+    ) -> Result<Fused, EstimatorError> {
         let Self { copies, streams, .. } = self;
         let result = match measured {
             Measured::Relative(pose) => copies.update(&mut streams.relative, pose),
@@ -129,8 +138,8 @@ impl EskfStrategy {
     }
 
     /// Keeps what was fused, in the newest keyframe if it belongs to that.
-    fn kept(&mut self, fused: Fused) -> Result<Fused, Failure> {
-        let pose = self.pose().filter(Pose::is_finite).ok_or(Failure::Fatal(Refusal::NonFinite))?;
+    fn kept(&mut self, fused: Fused) -> Result<Fused, EstimatorError> {
+        let pose = self.pose().filter(Pose::is_finite).ok_or(EstimatorError::fatal(Refusal::NonFinite))?;
         // A measurement at a keyframe belongs to that keyframe.
         if let Some(newest) = self.past.back_mut().filter(|newest| newest.time_ns == pose.time_ns) {
             *newest = pose;
@@ -248,13 +257,13 @@ impl EskfStrategy {
         self.copies.attitude_deviation() <= UNKNOWN
     }
 
-    pub(super) fn set_clock(&mut self, time_ns: i64, deviation_s: f64) -> Result<(), Refusal> {
+    pub(super) fn set_clock(&mut self, time_ns: i64, deviation_s: f64) -> Result<(), EstimatorError> {
         self.copies.set_clock(time_ns, deviation_s);
         self.begin(time_ns);
         Ok(())
     }
 
-    pub(super) fn move_world(&mut self, new_from_old: &Isometry3<f64>) -> Result<(), Refusal> {
+    pub(super) fn move_world(&mut self, new_from_old: &Isometry3<f64>) -> Result<(), EstimatorError> {
         self.copies.move_world(new_from_old)?;
         let turn = new_from_old.rotation.to_rotation_matrix().into_inner();
         for pose in &mut self.past {
@@ -270,9 +279,9 @@ impl EskfStrategy {
 }
 
 /// A correction that would move the filter farther than any distance on the Earth is fatal, as it is for the smoother.
-fn absurd(refusal: Refusal) -> Failure {
+fn absurd(refusal: Refusal) -> EstimatorError {
     match refusal {
-        Refusal::OutOfRange => Failure::Fatal(refusal),
-        _ => Failure::Refused(refusal),
+        Refusal::OutOfRange => EstimatorError::fatal(refusal),
+        _ => refusal.into(),
     }
 }

@@ -13,7 +13,7 @@ use alloc::vec::Vec;
 use nalgebra::{Isometry3, Matrix3, SMatrix, UnitQuaternion, Vector3};
 
 use super::eskf::EskfStrategy;
-use super::{Failure, Measured, Pose, Predictor, Streams, add_time, id_of};
+use super::{Measured, Pose, Predictor, Streams, add_time, id_of};
 use crate::attitude::ParamsError;
 use crate::navigation::eskf::{ImuMean, Start, seconds_between};
 use crate::navigation::fused::Fused;
@@ -21,6 +21,7 @@ use crate::navigation::measurement::{AbsolutePose, GnssPosition, GnssVelocity};
 use crate::navigation::refusal::Refusal;
 use crate::navigation::smoother::{Factor, FixedLagSmoother, NavigationFactor, Rows, SmootherParams};
 use crate::navigation::state::{Estimate, NAVIGATED, Navigated, Optional, POSITION, ROTATION, States, VELOCITY};
+use crate::navigation::state_estimator::error::EstimatorError;
 use crate::navigation::state_estimator::factor::{ProvidedFactor, SMOOTHED, Smoothed};
 use crate::navigation::state_estimator::params::StateEstimatorConfig;
 use crate::navigation::stream::{Stream, StreamParams};
@@ -117,7 +118,12 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
         self.filter.resets()
     }
 
-    pub(super) fn propagate(&mut self, until_ns: i64, sample: &ImuMean, since_ns: i64) -> Result<(), Failure> {
+    pub(super) fn propagate(
+        &mut self,
+        until_ns: i64,
+        sample: &ImuMean,
+        since_ns: i64,
+    ) -> Result<(), EstimatorError> {
         match self.filter.held(until_ns, sample, since_ns)? {
             Some((held, doubt)) => self.smoother.hold(&held, &doubt)?,
             None => self.smoother.propagate(&ImuMean { time_ns: until_ns, ..*sample })?,
@@ -126,18 +132,18 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
         self.follow()
     }
 
-    pub(super) fn camera_frame(&mut self) -> Result<(), Failure> {
+    pub(super) fn camera_frame(&mut self) -> Result<(), EstimatorError> {
         self.filter.camera_frame()?;
         self.follow()
     }
 
-    fn keyframe(&mut self) -> Result<(), Failure> {
+    fn keyframe(&mut self) -> Result<(), EstimatorError> {
         self.filter.keyframe()?;
         self.follow()
     }
 
     /// Makes the present a keyframe if the filter did.
-    fn follow(&mut self) -> Result<(), Failure> {
+    fn follow(&mut self) -> Result<(), EstimatorError> {
         let newest_ns = self.smoother.estimate().ok_or(Refusal::NotStarted)?.time_ns;
         let now_ns = self.filter.keyframe_ns();
         if newest_ns == now_ns {
@@ -147,8 +153,8 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
             self.leave(1);
         }
         self.smoother.add_keyframe(id_of(now_ns)).map_err(|refusal| match refusal {
-            Refusal::NonFinite => Failure::Fatal(refusal),
-            _ => Failure::Refused(refusal),
+            Refusal::NonFinite => EstimatorError::fatal(refusal),
+            _ => refusal.into(),
         })?;
         self.update()
     }
@@ -167,12 +173,12 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
         Some(Pose::of(&self.smoother.smoothed(id)?, &covariance))
     }
 
-    fn update(&mut self) -> Result<(), Failure> {
-        self.is_converged = self.smoother.update().map_err(Failure::Fatal)?.is_converged;
+    fn update(&mut self) -> Result<(), EstimatorError> {
+        self.is_converged = self.smoother.update().map_err(EstimatorError::fatal)?.is_converged;
         Ok(())
     }
 
-    pub(super) fn measure(&mut self, measured: &Measured<'_, F>) -> Result<Fused, Failure> {
+    pub(super) fn measure(&mut self, measured: &Measured<'_, F>) -> Result<Fused, EstimatorError> {
         // Without a camera, nothing else determines the times of keyframes. The dependence of a provider's factor on the present state is
         // unknown, so it cannot be carried back.
         if !self.filter.has_camera() || matches!(measured, Measured::Provided(_)) {
@@ -183,7 +189,7 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
         // A relative pose ends where the next one begins: in between, the window would lose one.
         let is_between = self.filter.has_camera() && !matches!(measured, Measured::Relative(_));
         let is_other = self.filter.changes() != self.changes && !is_between;
-        if (is_other || self.filter.resets() != resets) && !matches!(fused, Err(Failure::Fatal(_))) {
+        if (is_other || self.filter.resets() != resets) && !matches!(fused, Err(EstimatorError::Fatal(_))) {
             self.adopt()?;
             return fused;
         }
@@ -235,7 +241,7 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
     }
 
     /// Restarts the window in the state of the filter, which is another copy than before.
-    fn adopt(&mut self) -> Result<(), Failure> {
+    fn adopt(&mut self) -> Result<(), EstimatorError> {
         let now_ns = self.filter.state().ok_or(Refusal::NotStarted)?.0.time_ns;
         let past = self.smoother.keyframes().take_while(|id| *id < id_of(now_ns)).count();
         self.leave(past);
@@ -309,10 +315,8 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
     }
 
     /// The window restarts with the newest keyframe.
-    pub(super) fn set_clock(&mut self, time_ns: i64, deviation_s: f64) -> Result<(), Refusal> {
-        if let Err(Failure::Refused(refusal) | Failure::Fatal(refusal)) = self.keyframe() {
-            return Err(refusal);
-        }
+    pub(super) fn set_clock(&mut self, time_ns: i64, deviation_s: f64) -> Result<(), EstimatorError> {
+        self.keyframe()?;
         let mut covariance = self.smoother.covariance().ok_or(Refusal::Noise)?;
         let estimate = Estimate { time_ns, ..self.smoother.estimate().ok_or(Refusal::NotStarted)? };
         add_time(&mut covariance, &estimate.velocity, deviation_s);
@@ -322,11 +326,9 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
     }
 
     /// The window restarts with the newest keyframe.
-    pub(super) fn move_world(&mut self, new_from_old: &Isometry3<f64>) -> Result<(), Refusal> {
+    pub(super) fn move_world(&mut self, new_from_old: &Isometry3<f64>) -> Result<(), EstimatorError> {
         // Otherwise samples since the newest keyframe would be lost.
-        if let Err(Failure::Refused(refusal) | Failure::Fatal(refusal)) = self.keyframe() {
-            return Err(refusal);
-        }
+        self.keyframe()?;
         let covariance = self.smoother.covariance().ok_or(Refusal::Noise)?;
         let mut estimate = self.smoother.estimate().ok_or(Refusal::NotStarted)?;
         estimate.position = new_from_old.transform_point(&estimate.position.into()).coords;

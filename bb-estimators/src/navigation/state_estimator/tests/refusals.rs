@@ -1,7 +1,7 @@
 //! Each reason for which an input is not in the estimate is provoked, counted and reported.
 
 use super::flight::{FRAME, SECOND, STEP};
-use super::strategy::{Failure, Measured, Strategy};
+use super::strategy::{Measured, Strategy};
 use super::*;
 use crate::navigation::eskf::Start;
 use crate::navigation::geodesy::Geodetic;
@@ -197,7 +197,9 @@ fn a_start_forgets_which_anchors_were_refused() {
             rotation_covariance: Matrix3::identity(),
         };
         let refused = strategy.measure(&Measured::Anchor(far));
-        assert!(matches!(refused, Err(Failure::Refused(Refusal::Gate { .. }))), "{refused:?}");
+        let Err(EstimatorError::Degraded(Reason::Refused(Refusal::Gate { .. }))) = refused else {
+            panic!("{refused:?}")
+        };
         assert_eq!(strategy.refused_positions(), 1);
         strategy.start(&Start { time_ns: 2 * SECOND, ..start }).unwrap();
         assert_eq!(strategy.refused_positions(), 0);

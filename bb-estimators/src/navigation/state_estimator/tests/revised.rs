@@ -1,6 +1,6 @@
 //! A late input may change what earlier ones became. The events say so as they would have at once, and nothing twice.
 
-use super::entry::{Entry, News, Outcome, Payload};
+use super::entry::{Entry, Payload};
 use super::flight::{FRAME, SECOND, STEP};
 use super::*;
 use crate::navigation::geodesy::Geodetic;
@@ -140,14 +140,14 @@ fn a_frame_is_told_if_it_fails() {
     let payload = Payload::<Provided>::Frame;
     let mut frame = Entry { key: payload.key(SECOND), payload, outcome: None, rejection: None };
     assert_eq!(frame.payload.kind(), InputKind::Frame);
-    let added = Outcome::Added { nis: None };
-    let fatal = Outcome::Fatal(Reason::Refused(Refusal::NonFinite));
-    let degraded = Outcome::Degraded(Reason::Refused(Refusal::NonFinite));
-    assert_eq!(frame.became(added, None), (None, None));
-    assert_eq!(frame.became(degraded, None), (Some(News::Became(degraded)), None));
-    assert_eq!(frame.became(degraded, None), (None, None));
-    assert_eq!(frame.became(added, None), (Some(News::Revised), None));
-    assert_eq!(frame.became(fatal, None), (Some(News::Became(fatal)), None));
+    let (added, reason) = (Ok(None), Reason::Refused(Refusal::NonFinite));
+    let (fatal, degraded) = (Err(EstimatorError::Fatal(reason)), Err(EstimatorError::Degraded(reason)));
+    let input = InputKind::Frame;
+    assert_eq!(frame.became(added, None), [None, None]);
+    assert_eq!(frame.became(degraded, None), [Some(EventKind::Degraded { input, reason }), None]);
+    assert_eq!(frame.became(degraded, None), [None, None]);
+    assert_eq!(frame.became(added, None), [Some(EventKind::Revised { input }), None]);
+    assert_eq!(frame.became(fatal, None), [Some(EventKind::Fatal { input, reason }), None]);
 }
 
 /// A rejection by another condition is another rejection.

@@ -1,6 +1,5 @@
 //! Factors of outside providers.
 
-use super::super::Failure;
 use super::absurd;
 use crate::navigation::copies::Copies;
 use crate::navigation::eskf::Eskf;
@@ -9,6 +8,7 @@ use crate::navigation::measurement::{Linearised, Measurement};
 use crate::navigation::refusal::Refusal;
 use crate::navigation::smoother::{Factor, Rows};
 use crate::navigation::state::{Estimate, NAVIGATED, Navigated, States};
+use crate::navigation::state_estimator::error::EstimatorError;
 use crate::navigation::state_estimator::factor::ProvidedFactor;
 use crate::navigation::stream::Stream;
 use nalgebra::SMatrix;
@@ -18,7 +18,7 @@ pub(super) fn update<F: ProvidedFactor>(
     copies: &mut Copies<Eskf<Navigated, NAVIGATED>>,
     stream: &mut Stream,
     factor: &F,
-) -> Result<Fused, Failure> {
+) -> Result<Fused, EstimatorError> {
     if let Some(id) = Factor::<Navigated, NAVIGATED>::previous(factor) {
         return Err(Refusal::NoKeyframe { id }.into());
     }
