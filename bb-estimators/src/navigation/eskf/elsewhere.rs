@@ -76,12 +76,10 @@ impl<S: States, const N: usize> Eskf<S, N> {
                 }
             }
         }
-        if !estimate.is_finite() || !covariance.iter().all(|x| x.is_finite()) {
+        if !covariance.iter().all(|x| x.is_finite()) {
             return Err(Refusal::NonFinite);
         }
-        if !estimate.is_plausible() {
-            return Err(Refusal::OutOfRange);
-        }
+        estimate.check()?;
         if !adopted.is_positive_definite() {
             return Err(Refusal::Noise);
         }

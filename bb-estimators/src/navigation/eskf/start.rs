@@ -1,6 +1,6 @@
 //! Initial state of a filter.
 
-use nalgebra::{Matrix3, SVector, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::params::EskfParams;
 use crate::navigation::covariance::Covariance;
@@ -96,18 +96,9 @@ impl Start {
             world_from_body,
             accelerometer_bias: self.accelerometer_bias,
             gyroscope_bias: self.gyroscope_bias,
-            angular_velocity: Vector3::zeros(),
-            specific_force: Vector3::zeros(),
-            acceleration: Vector3::zeros(),
-            keyframe: None,
-            optional: SVector::zeros(),
+            ..Estimate::unknown()
         };
-        if !estimate.is_finite() {
-            return Err(Refusal::NonFinite);
-        }
-        if !estimate.is_plausible() {
-            return Err(Refusal::OutOfRange);
-        }
+        estimate.check()?;
         if !covariance.is_positive_definite() {
             return Err(Refusal::Noise);
         }

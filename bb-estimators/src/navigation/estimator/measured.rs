@@ -9,9 +9,6 @@ use nalgebra::{Isometry3, Matrix3, SMatrix, Vector3};
 /// Standard deviation of the height where a fix has none, m.
 const UNKNOWN_HEIGHT: f64 = 1e4;
 
-/// Heights possible on or above the Earth, m.
-const HEIGHTS: core::ops::RangeInclusive<f64> = -1e4..=1e6;
-
 /// A covariance, if it carries information: in ROS all zeros mean unknown, and no noise has a variance of zero or less.
 pub(in crate::navigation) fn told<const D: usize>(
     covariance: Option<SMatrix<f64, D, D>>,
@@ -26,10 +23,7 @@ impl Geodetic {
         let position = fix.position.filter(|_| fix.status != GnssStatus::NoFix)?;
         let height = position.altitude.unwrap_or(height);
         let (latitude, longitude) = (position.latitude_rad, position.longitude_rad);
-        let is_there = latitude.abs() <= core::f64::consts::FRAC_PI_2
-            && longitude.abs() <= core::f64::consts::TAU
-            && HEIGHTS.contains(&height);
-        is_there.then_some(Self { latitude, longitude, height })
+        Some(Self { latitude, longitude, height }).filter(Self::is_possible)
     }
 }
 

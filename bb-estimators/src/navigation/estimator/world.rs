@@ -2,14 +2,10 @@
 
 use super::input::Mounting;
 use super::options::NavigationOptions;
-use crate::navigation::geodesy::{Geodetic, LocalFrame};
+use crate::navigation::geodesy::LocalFrame;
 use crate::navigation::measurement::{AbsolutePose, GnssPosition};
 use bb_core::payload::{GnssFix, Pose};
 use nalgebra::{Isometry3, Vector3};
-
-/// Largest distance of a filter from the origin of its world, m. At that distance, down differs by 0.8 mrad, as much as a good
-/// accelerometer's bias.
-const FARTHEST: f64 = 5000.0;
 
 /// The world of the outputs has its origin where the filter started. The filter's own world is the same until it is far from that
 /// origin.
@@ -62,8 +58,8 @@ impl World {
 
     /// Moves the world to the filter if that, at `position`, is far from the origin, and returns the transform of coordinates to it.
     pub(super) fn moves_on(&mut self, position: &Vector3<f64>) -> Option<Isometry3<f64>> {
-        let frame = self.frame.as_mut().filter(|_| position.xy().norm() > FARTHEST)?;
-        let next = LocalFrame::new(Geodetic { height: frame.origin().height, ..frame.geodetic(position) });
+        let frame = self.frame.as_mut()?;
+        let next = frame.moved_on(position)?;
         let next_from_frame = frame.other_from_self(&next);
         self.first_from_frame *= next.other_from_self(frame);
         *frame = next;

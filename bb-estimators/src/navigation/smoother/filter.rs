@@ -15,9 +15,7 @@ use super::params::SmootherParams;
 use super::preintegration::Preintegration;
 use super::scratch::Scratch;
 use crate::attitude::ParamsError;
-use crate::navigation::eskf::{
-    Doubt, EskfParams, GaussMarkov, ImuDensities, ImuMean, LONGEST_GAP_S, Start, seconds_between,
-};
+use crate::navigation::eskf::{Doubt, GaussMarkov, ImuDensities, ImuMean, LONGEST_GAP_S, Start, seconds_between};
 use crate::navigation::math::unit;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{Estimate, NAVIGATION, Navigation, Optional, States, distinct, offset};
@@ -133,17 +131,6 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         &self.params
     }
 
-    /// Changes the noise of the sensors from now on. Motion that is already integrated keeps its noise.
-    ///
-    /// # Errors
-    ///
-    /// Returns the first parameter outside its accepted range, by name.
-    pub fn set_sensors(&mut self, sensors: EskfParams) -> Result<(), ParamsError> {
-        SmootherParams { sensors, ..self.params }.check()?;
-        self.params.sensors = sensors;
-        Ok(())
-    }
-
     /// Sets the multiple of the white noise of the IMU, as a deviation, from the next sample on.
     pub(in crate::navigation) fn set_noise(&mut self, multiple: f64) {
         self.noise = multiple;
@@ -210,12 +197,10 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
             (None, _) if i == j => variances[i].max(LEAST_VARIANCE),
             _ => 0.0,
         });
-        if !adopted.is_finite() || !covariance.iter().all(|x| x.is_finite()) {
+        if !covariance.iter().all(|x| x.is_finite()) {
             return Err(Refusal::NonFinite);
         }
-        if !adopted.is_plausible() {
-            return Err(Refusal::OutOfRange);
-        }
+        adopted.check()?;
         let last = ImuMean {
             time_ns: estimate.time_ns,
             angular_velocity: estimate.angular_velocity + estimate.gyroscope_bias,

@@ -9,6 +9,7 @@ use super::states::{
 use crate::attitude::{MAX_ANGULAR_VELOCITY, MAX_SPECIFIC_FORCE};
 use crate::navigation::bounds::{is_on_earth, is_within};
 use crate::navigation::math::{Integrals, renormalised, rotation, rotation_vector};
+use crate::navigation::refusal::Refusal;
 
 /// The largest delay of fixes, s, in either direction: a longer one is no delay but a fault, and the position then is no longer nearly
 /// a parabola.
@@ -156,7 +157,6 @@ impl<const N: usize> Estimate<N> {
     }
 
     /// An estimate at rest at the origin, as a placeholder to be filled later.
-    #[cfg(feature = "smoother")]
     pub(in crate::navigation) fn unknown() -> Self {
         let zero = Vector3::zeros();
         Self {
@@ -174,11 +174,15 @@ impl<const N: usize> Estimate<N> {
         }
     }
 
-    /// Returns whether a filter may start here: no component is absurdly large or NaN.
-    pub(in crate::navigation) fn is_plausible(&self) -> bool {
-        is_on_earth(self.position.iter().chain(&self.velocity))
+    /// Checks that a filter may start here: every component is finite, and none absurdly large.
+    pub(in crate::navigation) fn check(&self) -> Result<(), Refusal> {
+        if !self.is_finite() {
+            return Err(Refusal::NonFinite);
+        }
+        let is_plausible = is_on_earth(self.position.iter().chain(&self.velocity))
             && is_within(&self.accelerometer_bias, MAX_SPECIFIC_FORCE)
-            && is_within(&self.gyroscope_bias, MAX_ANGULAR_VELOCITY)
+            && is_within(&self.gyroscope_bias, MAX_ANGULAR_VELOCITY);
+        if is_plausible { Ok(()) } else { Err(Refusal::OutOfRange) }
     }
 
     /// Returns whether no component is NaN.

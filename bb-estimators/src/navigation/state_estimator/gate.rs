@@ -79,11 +79,6 @@ impl Rejection {
     pub(super) fn is_alike(&self, other: &Self) -> bool {
         core::mem::discriminant(self) == core::mem::discriminant(other)
     }
-
-    /// Returns whether it restarts the dwell.
-    pub fn restarts_dwell(&self) -> bool {
-        matches!(self, Self::TooFar { .. } | Self::Disagrees { .. })
-    }
 }
 
 impl fmt::Display for Rejection {

@@ -197,14 +197,9 @@ pub(super) fn check_position(position: &Geodetic) -> Result<(), Refusal> {
     if !(latitude.is_finite() && longitude.is_finite() && height.is_finite()) {
         return Err(Refusal::NonFinite);
     }
-    let is_there = latitude.abs() <= 0.5 * core::f64::consts::PI
-        && longitude.abs() <= 2.0 * core::f64::consts::PI
-        && HEIGHTS.contains(&height);
-    if is_there { Ok(()) } else { Err(Refusal::OutOfRange) }
+    if position.is_possible() { Ok(()) } else { Err(Refusal::OutOfRange) }
 }
 
-/// Possible heights of aircraft, m above the ellipsoid.
-pub(super) const HEIGHTS: core::ops::RangeInclusive<f64> = -1e4..=1e6;
 /// A speed above that of any aircraft, m/s.
 pub(super) const MOST_VELOCITY: f64 = 1e4;
 /// Longest distance between two frames, m.

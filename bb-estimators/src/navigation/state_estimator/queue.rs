@@ -53,7 +53,6 @@ pub struct QueueCounts {
     pub set_back: u64,
 }
 
-#[expect(clippy::large_enum_variant, reason = "its room is taken once")]
 /// Reports of the queue.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Told {

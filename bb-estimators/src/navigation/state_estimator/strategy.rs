@@ -277,20 +277,9 @@ impl<F: ProvidedFactor> Strategy<F> {
         each!(self, strategy => strategy.keyframes())
     }
 
-    /// Number of relative poses that the gate has refused since it last accepted one.
-    pub(super) fn refused_relative(&self) -> u64 {
-        each!(self, strategy => strategy.streams()).relative.counts().gate_in_a_row
-    }
-
-    /// Number of anchors, or factors of providers, that the gate has refused since it last accepted one.
-    pub(super) fn refused_positions(&self) -> u64 {
-        let Streams { anchors, provided, .. } = each!(self, strategy => strategy.streams());
-        anchors.counts().gate_in_a_row.max(provided.counts().gate_in_a_row)
-    }
-
-    /// Number of fixes that the gate has refused since it last accepted one.
-    pub(super) fn refused_fixes(&self) -> u64 {
-        each!(self, strategy => strategy.streams()).positions.counts().gate_in_a_row
+    /// The gates, with what each has refused.
+    pub(super) fn streams(&self) -> &Streams {
+        each!(self, strategy => strategy.streams())
     }
 
     /// Returns how often it started, or went on in another place.

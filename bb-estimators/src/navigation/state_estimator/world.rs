@@ -3,11 +3,8 @@
 use nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3};
 
 use super::input::{GnssReading, PoseAnchor, blocks};
-use crate::navigation::geodesy::{Geodetic, LocalFrame};
+use crate::navigation::geodesy::{FARTHEST, Geodetic, LocalFrame};
 use crate::navigation::measurement::{AbsolutePose, GnssPosition, GnssVelocity};
-
-/// Largest distance of the strategy from its origin, m. At that distance, down differs by 0.8 mrad.
-const FARTHEST: f64 = 5000.0;
 
 /// The tangent frame of the strategy.
 #[derive(Clone, Copy, Debug)]
@@ -77,13 +74,10 @@ impl World {
 
     /// Moves to a nearer frame if a position is far from the origin. Returns the transform of coordinates to it.
     pub(super) fn moves_on(&mut self, position: &Vector3<f64>) -> Option<Isometry3<f64>> {
-        if position.xy().norm() <= FARTHEST {
-            return None;
-        }
-        let old = self.frame;
-        let height = old.origin().height;
-        self.frame = LocalFrame::new(Geodetic { height, ..old.geodetic(position) });
-        Some(old.other_from_self(&self.frame))
+        let next = self.frame.moved_on(position)?;
+        let next_from_old = self.frame.other_from_self(&next);
+        self.frame = next;
+        Some(next_from_old)
     }
 }
 

@@ -4,17 +4,19 @@ use nalgebra::Vector3;
 
 use super::{CONFIRMATIONS, Engine, Phase};
 use crate::navigation::fused::Fused;
+use crate::navigation::geodesy::HEIGHTS;
 use crate::navigation::measurement::RelativePose;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state_estimator::error::{EstimatorError, Reason};
 use crate::navigation::state_estimator::event::StartedFrom;
 use crate::navigation::state_estimator::factor::ProvidedFactor;
 use crate::navigation::state_estimator::gate::Rejection;
-use crate::navigation::state_estimator::input::{GnssReading, HEIGHTS, PoseAnchor, VioOutput, blocks};
+use crate::navigation::state_estimator::input::{GnssReading, PoseAnchor, VioOutput, blocks};
 use crate::navigation::state_estimator::params::StateEstimatorConfig;
 use crate::navigation::state_estimator::start::at_anchor;
-use crate::navigation::state_estimator::strategy::{Measured, Trust, id_of};
+use crate::navigation::state_estimator::strategy::{Measured, Streams, Trust, id_of};
 use crate::navigation::state_estimator::world::World;
+use crate::navigation::stream::Stream;
 
 /// Normalised innovation squared over the dimension up to which a position fits.
 const FITS: f64 = 3.0;
@@ -43,14 +45,16 @@ impl<F: ProvidedFactor> Engine<F> {
         if self.strategy.resets() != resets {
             return self.moved(&result, matches!(measured, Measured::Gnss(..)));
         }
+        let refused = |stream: &Stream| stream.counts().gate_in_a_row;
+        let Streams { relative, anchors, positions, provided, .. } = self.strategy.streams();
+        let is_storm = is_relative && refused(relative) >= STORM;
+        let refused_positions = match measured {
+            Measured::Gnss(..) => refused(positions),
+            _ => refused(anchors).max(refused(provided)),
+        };
         if !is_relative {
-            let refused = match measured {
-                Measured::Gnss(..) => self.strategy.refused_fixes(),
-                _ => self.strategy.refused_positions(),
-            };
-            self.weigh_position(&result, refused >= DOUBT);
+            self.weigh_position(&result, refused_positions >= DOUBT);
         }
-        let is_storm = is_relative && self.strategy.refused_relative() >= STORM;
         if let (true, Some(now_ns)) = (is_storm || self.unconfirmed > 0, self.now_ns) {
             self.distrust(now_ns);
         }

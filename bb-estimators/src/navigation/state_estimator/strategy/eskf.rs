@@ -10,12 +10,8 @@ use nalgebra::{Isometry3, SMatrix, UnitQuaternion, Vector3};
 use super::{Cadence, Measured, Pose, Predictor, Streams, Trust, id_of};
 use crate::attitude::ParamsError;
 use crate::navigation::copies::{Copies, UNKNOWN, Ways};
-#[cfg(feature = "smoother")]
-use crate::navigation::eskf::{Doubt, GaussMarkov};
 use crate::navigation::eskf::{Eskf, ImuMean, Start};
 use crate::navigation::fused::Fused;
-#[cfg(feature = "smoother")]
-use crate::navigation::measurement::GnssPosition;
 use crate::navigation::propagate::Propagate as _;
 use crate::navigation::refusal::Refusal;
 #[cfg(feature = "smoother")]
@@ -152,39 +148,10 @@ impl EskfStrategy {
         best.estimate().map(|estimate| Pose::of(estimate, best.covariance()))
     }
 
-    /// See [`Copies::held`].
+    /// The copies of the filter.
     #[cfg(feature = "smoother")]
-    pub(super) fn held(
-        &self,
-        until_ns: i64,
-        sample: &ImuMean,
-        since_ns: i64,
-    ) -> Result<Option<(ImuMean, Doubt)>, Refusal> {
-        self.copies.held(until_ns, sample, since_ns)
-    }
-
-    /// Number of times that another copy of the filter became the best.
-    #[cfg(feature = "smoother")]
-    pub(super) fn changes(&self) -> u32 {
-        self.copies.changes()
-    }
-
-    /// The multiple of the IMU's white noise that fits.
-    #[cfg(feature = "smoother")]
-    pub(super) fn noise(&self) -> f64 {
-        self.copies.noise()
-    }
-
-    /// The drift of the scale of relative poses that fits.
-    #[cfg(feature = "smoother")]
-    pub(super) fn relative_scale(&self) -> GaussMarkov {
-        self.copies.best().params().relative_scale
-    }
-
-    /// The last fix with the noise that it was fused with.
-    #[cfg(feature = "smoother")]
-    pub(super) fn shown(&self, fix: &GnssPosition) -> GnssPosition {
-        self.copies.as_shown(fix)
+    pub(super) fn copies(&self) -> &Copies<Eskf<Navigated, NAVIGATED>> {
+        &self.copies
     }
 
     /// Returns whether the velocity of the last fix that had one was fused.

@@ -101,7 +101,7 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
     pub(super) fn start(&mut self, start: &Start) -> Result<(), Refusal> {
         self.filter.start(start)?;
         self.tune();
-        self.changes = self.filter.changes();
+        self.changes = self.filter.copies().changes();
         self.smoother.start(id_of(start.time_ns), start)?;
         self.is_converged = true;
         Ok(())
@@ -109,8 +109,8 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
 
     /// Gives the window what the filter has found: the noise of the IMU, and whether the scale of relative poses drifts.
     fn tune(&mut self) {
-        self.smoother.set_noise(self.filter.noise());
-        self.smoother.set_relative_scale(self.filter.relative_scale());
+        self.smoother.set_noise(self.filter.copies().noise());
+        self.smoother.set_relative_scale(self.filter.copies().best().params().relative_scale);
     }
 
     /// Returns how often it started, or went on in another place.
@@ -124,7 +124,7 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
         sample: &ImuMean,
         since_ns: i64,
     ) -> Result<(), EstimatorError> {
-        match self.filter.held(until_ns, sample, since_ns)? {
+        match self.filter.copies().held(until_ns, sample, since_ns)? {
             Some((held, doubt)) => self.smoother.hold(&held, &doubt)?,
             None => self.smoother.propagate(&ImuMean { time_ns: until_ns, ..*sample })?,
         }
@@ -188,7 +188,7 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
         let fused = self.filter.measure(measured);
         // A relative pose ends where the next one begins: in between, the window would lose one.
         let is_between = self.filter.has_camera() && !matches!(measured, Measured::Relative(_));
-        let is_other = self.filter.changes() != self.changes && !is_between;
+        let is_other = self.filter.copies().changes() != self.changes && !is_between;
         if (is_other || self.filter.resets() != resets) && !matches!(fused, Err(EstimatorError::Fatal(_))) {
             self.adopt()?;
             return fused;
@@ -211,7 +211,7 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
             }
             Measured::Gnss(position, velocity, _) => {
                 let way = self.way()?;
-                let shown = self.filter.shown(position);
+                let shown = self.filter.copies().as_shown(position);
                 self.add(
                     id,
                     GnssPosition {
@@ -246,7 +246,7 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
         let past = self.smoother.keyframes().take_while(|id| *id < id_of(now_ns)).count();
         self.leave(past);
         self.tune();
-        self.changes = self.filter.changes();
+        self.changes = self.filter.copies().changes();
         let (estimate, covariance) = self.filter.state().ok_or(Refusal::NotStarted)?;
         self.smoother.adopt::<Navigated, NAVIGATED>(id_of(estimate.time_ns), estimate, covariance)?;
         self.is_converged = true;
@@ -289,7 +289,7 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
 
     pub(super) fn predictor(&self) -> Option<Predictor> {
         let (estimate, covariance) = (self.smoother.estimate()?, self.smoother.covariance()?);
-        let (sensors, noise) = (&self.smoother.params().sensors, self.filter.noise());
+        let (sensors, noise) = (&self.smoother.params().sensors, self.filter.copies().noise());
         Predictor::from_keyframe::<Smoothed, SMOOTHED>(sensors, noise, &estimate, &covariance)
     }
 

@@ -200,9 +200,9 @@ fn a_start_forgets_which_anchors_were_refused() {
         let Err(EstimatorError::Degraded(Reason::Refused(Refusal::Gate { .. }))) = refused else {
             panic!("{refused:?}")
         };
-        assert_eq!(strategy.refused_positions(), 1);
+        assert_eq!(strategy.streams().anchors.counts().gate_in_a_row, 1);
         strategy.start(&Start { time_ns: 2 * SECOND, ..start }).unwrap();
-        assert_eq!(strategy.refused_positions(), 0);
+        assert_eq!(strategy.streams().anchors.counts().gate_in_a_row, 0);
     }
 }
 
