@@ -26,13 +26,13 @@ fn motion() -> impl Iterator<Item = (i64, Vector3<f64>, UnitQuaternion<f64>)> {
     })
 }
 
-/// What an accelerometer of a body with this orientation reads, which moves east and west.
+/// The specific force of a body with this orientation, which moves east and west.
 fn specific_force(time_ns: i64, world_from_body: &UnitQuaternion<f64>) -> Vector3<f64> {
     let acceleration = Vector3::x() * (0.5 * (1.3e-9 * time_ns as f64).sin());
     world_from_body.inverse() * (acceleration + Vector3::z() * GRAVITY)
 }
 
-/// Where the body of [`specific_force`] is, to about a decimetre.
+/// The position of the body of [`specific_force`], to about a decimetre.
 fn position(time_ns: i64) -> Vector3<f64> {
     Vector3::x() * (-0.5 / (1.3 * 1.3) * (1.3e-9 * time_ns as f64).sin())
 }
@@ -133,7 +133,7 @@ fn figures_are_those_of_either_library() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// With the standard library's functions.
+/// Figures with the standard library's functions.
 const STORED: &[(&str, [f64; 3])] = &[
     ("mekf", [0.24839979800728795, -1.901998250804728, 0.38903759630921664]),
     ("madgwick", [0.22394602459538238, -1.9383856155900634, 0.38113392679998526]),

@@ -119,7 +119,7 @@ impl fmt::Display for EstimatorError {
 
 impl Error for EstimatorError {}
 
-/// What became of an input: its normalised innovation squared over its dimension, if it was measured, or why it is not in the estimate
+/// The outcome of an input: its normalised innovation squared over its dimension, if it was measured, or why it is not in the estimate
 /// or has moved it. After a fatal error, the estimate continues without the input.
 pub(super) type Outcome = Result<Option<f64>, EstimatorError>;
 
