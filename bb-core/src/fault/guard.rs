@@ -34,20 +34,11 @@ pub(crate) fn caught<T>(call: impl FnOnce() -> Result<T, Fault>) -> Result<T, Fa
 
 /// Calls code that returns no fault, and turns a panic into a fault.
 pub(crate) fn guarded(call: impl FnOnce()) -> Result<(), Fault> {
-    let mut call = Some(call);
-    guarded_once(&mut || {
-        if let Some(call) = call.take() {
-            call();
-        }
-    })
-}
-
-/// The body of [`guarded`], which is compiled once.
-fn guarded_once(call: &mut dyn FnMut()) -> Result<(), Fault> {
     catch_unwind(AssertUnwindSafe(call)).map_err(of_panic)
 }
 
 /// Locks a mutex, also after a panic of code that held it.
+#[inline]
 pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -61,15 +52,9 @@ pub(crate) fn log_panic(what: &'static str, fault: &Fault) {
 /// Drops a user's value and catches a panic of its `Drop`.
 #[inline]
 pub(crate) fn discard<T>(value: T) {
-    if needs_drop::<T>() {
-        let mut value = Some(value);
-        discard_once(&mut || drop(value.take()));
-    }
-}
-
-/// The body of [`discard`], which is compiled once.
-fn discard_once(release: &mut dyn FnMut()) {
-    if let Err(fault) = guarded_once(release) {
+    if needs_drop::<T>()
+        && let Err(fault) = guarded(|| drop(value))
+    {
         log_panic("a value panicked when it was dropped", &fault);
     }
 }

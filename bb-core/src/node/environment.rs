@@ -393,6 +393,7 @@ impl Environment {
     }
 
     /// The stamp of a message that the robot publishes, measured at that time.
+    #[inline]
     pub(crate) fn stamp(&self, monotonic_time: MonotonicTime, frame: Frame) -> Stamp {
         Stamp { monotonic_time, wall_time: self.0.clock.wall_at(monotonic_time), frame, origin: self.0.origin }
     }
