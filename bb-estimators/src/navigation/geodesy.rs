@@ -117,7 +117,6 @@ impl LocalFrame {
         Isometry3::from_parts(Translation3::from(translation), UnitQuaternion::from_rotation_matrix(&rotation))
     }
 
-    /// The rotation from this frame to the Earth-fixed frame.
     /// The frame at a position that is too far from the origin of this one, at the height of that origin; `None` at any other.
     #[cfg(any(feature = "runtime", feature = "smoother", feature = "eskf"))]
     pub(super) fn moved_on(&self, position: &Vector3<f64>) -> Option<Self> {
@@ -125,6 +124,7 @@ impl LocalFrame {
         is_far.then(|| Self::new(Geodetic { height: self.origin.height, ..self.geodetic(position) }))
     }
 
+    /// The rotation from this frame to the Earth-fixed frame.
     fn earth_from_self(&self) -> Rotation3<f64> {
         let (sin_latitude, cos_latitude) = (sin(self.origin.latitude), cos(self.origin.latitude));
         let (sin_longitude, cos_longitude) = (sin(self.origin.longitude), cos(self.origin.longitude));

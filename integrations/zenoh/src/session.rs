@@ -17,9 +17,10 @@ use zenoh::Wait;
 const LEASE_MS: u32 = 1000;
 /// Signs of life within that time.
 const SIGNS_OF_LIFE: u32 = 4;
-/// Time that a machine has to introduce itself, in milliseconds, and the number of those that have it at the same time: as many say nothing keep
-/// all others out until then, and for as long as they come again. zenoh's are 10 s and 100; it has as many sessions, at most, and each is an open file.
+/// Time that a machine has to introduce itself, in milliseconds; zenoh's is 10 s.
 const ACCEPT_MS: u32 = 2000;
+/// Number of machines that may be about to introduce themselves; as many that say nothing keep all others out. zenoh's is 100, and it has as
+/// many sessions as this at most, each an open file.
 const ACCEPTED: usize = 1000;
 /// Bytes of a message in parts, at most: zenoh keeps up to 1 GiB of each that has begun. Longer ones are dropped.
 const MOST_BYTES: usize = 64 * 1024 * 1024;

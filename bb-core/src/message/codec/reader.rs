@@ -50,7 +50,7 @@ impl<'a> Reader<'a> {
     ///
     /// # Errors
     /// More is left.
-    pub(crate) fn end_message(&self) -> Result<(), DecodeError> {
+    pub(super) fn end_message(&self) -> Result<(), DecodeError> {
         match self.left() {
             0..=PADDING => Ok(()),
             left => Err(self.error("the end", format!("{left} more bytes"))),

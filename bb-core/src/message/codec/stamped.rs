@@ -183,7 +183,7 @@ impl Stamp {
         writer.text(self.origin.node);
     }
 
-    pub(crate) fn read(reader: &mut Reader<'_>) -> Result<Self, DecodeError> {
+    fn read(reader: &mut Reader<'_>) -> Result<Self, DecodeError> {
         let frame = Header::read_frame(reader).map_err(|error| error.within("header"))?;
         Ok(Self {
             frame: Frame::new(frame),

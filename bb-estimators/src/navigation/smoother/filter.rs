@@ -238,8 +238,8 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
 
     /// Integrates one IMU sample.
     ///
-    /// A sample that covers more than [`longest_sample`](crate::navigation::EskfParams::longest_sample) is a gap: velocity and attitude are assumed
-    /// constant, up to the noise that the parameters give a gap.
+    /// A sample that covers more than [`longest_sample`](crate::navigation::EskfParams::longest_sample) is a gap: velocity and
+    /// attitude are assumed constant, up to the noise that the parameters give a gap.
     ///
     /// # Errors
     ///

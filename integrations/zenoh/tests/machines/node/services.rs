@@ -121,7 +121,7 @@ fn requests_that_are_too_long_are_refused_by_name() {
             let asked = session.get(&selector).payload(vec![0; payload]).attachment(vec![0; attachment]);
             asked.timeout(PATIENCE).wait().expect("it is asked").recv().ok()
         };
-        // On a busy machine a link may be closed that stands still for a second.
+        // On a busy machine, a link that gives no sign of life for a second may be closed.
         let reply = (0..3).find_map(|_| once()).expect("it is answered");
         let told =
             reply.result().map_err(|error| error.payload().try_to_string().expect("it is text").into_owned());
