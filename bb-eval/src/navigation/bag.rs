@@ -9,6 +9,7 @@ mod truth;
 
 pub use options::{BagOptions, Origin, RelativeDeviation, StartFrom};
 
+use super::data::TruthMessage;
 use super::drive::RecordedTruth;
 pub(crate) use topics::FIX;
 pub(crate) use truth::TrueTrack;
@@ -126,6 +127,8 @@ impl NavigationBag {
             Ok(topic) => self.frames.base_from(topic)?,
             Err(_) => Isometry3::identity(),
         };
-        Ok(RecordedTruth { messages: self.messages.truth.clone(), base_from_part, topic })
+        let messages = self.messages.truth.clone();
+        let is_of_fixes = messages.iter().any(|(_, message)| matches!(message, TruthMessage::OnEarth(_)));
+        Ok(RecordedTruth { messages, base_from_part, topic, is_of_fixes })
     }
 }

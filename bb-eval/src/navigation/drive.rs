@@ -38,6 +38,8 @@ pub(crate) struct RecordedTruth {
     pub(crate) base_from_part: Isometry3<f64>,
     /// The topic, or why there is none.
     pub(crate) topic: Result<String, String>,
+    /// `true` if it is fixes: it has their clock.
+    pub(crate) is_of_fixes: bool,
 }
 
 impl RecordedTruth {
@@ -48,12 +50,8 @@ impl RecordedTruth {
             messages: messages.collect(),
             base_from_part: base_from_antenna,
             topic: Ok("the fixes withheld".to_owned()),
+            is_of_fixes: true,
         }
-    }
-
-    /// Returns whether it is positions on the Earth.
-    pub(crate) fn is_on_earth(&self) -> bool {
-        self.messages.iter().any(|(_, message)| matches!(message, TruthMessage::OnEarth(_)))
     }
 }
 
@@ -150,6 +148,7 @@ impl DataSet {
             messages: true_states.collect(),
             base_from_part: Isometry3::identity(),
             topic: Ok(format!("{}_truth.csv", self.prefix.display())),
+            is_of_fixes: self.has_fixes_in_truth(),
         };
         let (notes, doubts) = (Vec::new(), Vec::new());
         Drive {
@@ -163,6 +162,12 @@ impl DataSet {
             noise: self.noise,
             declination: None,
         }
+    }
+
+    /// Returns whether each fix is the truth at its time: the rest of the truth is then fixes that were withheld.
+    fn has_fixes_in_truth(&self) -> bool {
+        let truth = |k: &u64| self.keyframes.get(usize::try_from(*k).ok()?)?.truth.map(|truth| truth.position);
+        !self.fixes.is_empty() && self.fixes.iter().all(|(k, fix)| truth(k) == Some(fix.position))
     }
 
     fn given_start(&self) -> Odometry {

@@ -129,7 +129,7 @@ impl<'a> Scoring<'a> {
         } else {
             points.iter().filter(|(time, _)| (begin..=end).contains(&time)).copied().collect()
         };
-        let is_late = self.truth.is_on_earth();
+        let is_of_fixes = self.truth.is_of_fixes;
         let mut last = i64::MIN;
         let mut instants: Vec<Instant> = Vec::new();
         for (time_ns, truth) in truths {
@@ -137,7 +137,7 @@ impl<'a> Scoring<'a> {
                 continue;
             }
             last = time_ns;
-            let estimate = self.at(time_ns).map(|estimate| match is_late {
+            let estimate = self.at(time_ns).map(|estimate| match is_of_fixes {
                 // In the clock of the fixes: where the robot was when they were measured.
                 true => estimate.at(time_ns - (estimate.delay_s * 1e9) as Time),
                 false => estimate,
@@ -153,7 +153,7 @@ impl<'a> Scoring<'a> {
             ));
         }
         let delay_s = self.record.estimates.last().map_or(0.0, |estimate| estimate.delay_s);
-        if is_late && delay_s != 0.0 {
+        if is_of_fixes && delay_s != 0.0 {
             notes.push(format!(
                 "scored in the clock of the fixes: where the robot was {:.0} ms before the stamp of a fix, as the filter has \
                  found in the end",
@@ -211,7 +211,7 @@ impl<'a> Scoring<'a> {
     /// A place of the truth's world that is not that of the filter's, if it was found to explain the error.
     pub(super) fn displaced(&self, instants: &[Instant], align: Align, has_origin: bool) -> Option<String> {
         // A world that does not begin at a fix is given.
-        if align != Align::None || has_origin || self.world.is_none() || self.truth.is_on_earth() {
+        if align != Align::None || has_origin || self.world.is_none() || self.truth.is_of_fixes {
             return None;
         }
         let scored = || instants.iter().filter(|instant| instant.is_scored);
