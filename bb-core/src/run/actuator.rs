@@ -16,7 +16,7 @@ use self::reports::publish_reports;
 use self::telling::Change;
 use self::updating::Due;
 use super::occupied::Occupied;
-use super::source::Assembly;
+use super::source::{Assembly, Order};
 use crate::component::{Accepts, Actuator, ActuatorContext, ActuatorError, Binding, Caller, OptionsList};
 use crate::control::{ComponentOrder, Control};
 use crate::declaration::ActuatorDeclaration;
@@ -41,11 +41,11 @@ struct Inner<A: Actuator> {
     context: ActuatorContext,
     environment: Environment,
     control: Control,
-    /// Topic of its commands; it is one of the robot's topics.
+    /// Topic of its commands.
     topic: Arc<Topic<A::Command>>,
     /// Orders from its supervisor and parameter changes.
     orders: Mutex<Vec<Order>>,
-    /// The time at which its code was entered.
+    /// Time at which its code was entered.
     occupied: Occupied,
     counts: Counts,
     /// Held while its code runs. Anything that must not wait for user code must not take this lock.
@@ -60,18 +60,11 @@ struct State<A: Actuator> {
     may_move: bool,
     /// The command execution that sent the last command to be carried out.
     moved_by: Caller,
-    /// The update time that is currently set as an alarm.
+    /// Time of the next update for which a wake-up is set.
     alarm: Option<MonotonicTime>,
     /// Changes to report to the control state once the lock is released, on virtual time. Loggers, telemetry handlers and subscribers
     /// receive them on this thread and may disarm the robot, which takes the lock.
     pending: Vec<Change>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Order {
-    Options,
-    Restart,
-    GiveUp,
 }
 
 impl<A: Actuator> ActuatorNode<A> {
@@ -129,27 +122,14 @@ impl<A: Actuator> ActuatorNode<A> {
         if inner.environment.mode() != Mode::Replay {
             inner.alone(|_| ());
         }
-        // Weak, since the actuator owns the control state, which stores these callbacks.
         let weak = Arc::downgrade(&inner);
         let target = BindTarget::Other(Box::new(move || Inner::tell(&weak, Order::Options)));
-        assembly.environment.bind(declaration.path, options, binding, target);
-        let weak = Arc::downgrade(&inner);
-        assembly.control.supervise(declaration.path, declaration.supervisor, move |order| {
-            Inner::tell(
-                &weak,
-                match order {
-                    ComponentOrder::Restart => Order::Restart,
-                    ComponentOrder::GiveUp => Order::GiveUp,
-                },
-            );
-        });
-        let disarmed = Arc::downgrade(&inner);
-        let disarm = move || disarmed.upgrade().map_or(Ok(()), |inner| inner.disarm());
-        assembly.control.on_disarm_always(declaration.path, Arc::new(disarm));
+        inner.environment.bind(declaration.path, options, binding, target);
+        inner.register();
         Self(inner)
     }
 
-    /// The topic of its commands at `path`, which exists before the actuator does.
+    /// Creates the topic of its commands at `path`, before the actuator exists.
     pub fn new_topic(path: &'static str) -> Arc<dyn AnyTopic> {
         Arc::new(Topic::<A::Command>::new(path))
     }
@@ -164,8 +144,18 @@ impl<A: Actuator> ActuatorNode<A> {
 }
 
 impl<A: Actuator> Inner<A> {
-    /// Calls `run` while no other code of the actuator runs. Returns `None` if the caller is code of this actuator, or of another
-    /// one that it waits for: the call would wait for itself.
+    /// Registers the callbacks of the control state. They hold weak references, since the actuator owns that state, which stores them.
+    fn register(&self) {
+        let ActuatorDeclaration { path, supervisor, .. } = *self.declaration;
+        let weak = Weak::clone(&self.this);
+        self.control.supervise(path, supervisor, move |order| Inner::tell(&weak, Order::Supervisor(order)));
+        let weak = Weak::clone(&self.this);
+        let disarm = move || weak.upgrade().map_or(Ok(()), |inner| inner.disarm());
+        self.control.on_disarm_always(path, Arc::new(disarm));
+    }
+
+    /// Calls `run` while no other code of the actuator runs. Returns `None` if that would deadlock: the caller is code of this actuator,
+    /// or of another one that this actuator waits for.
     fn alone<T>(&self, run: impl FnOnce(&mut State<A>) -> T) -> Option<T> {
         let mut state = self.state.enter()?;
         let result = run(&mut state);
@@ -173,7 +163,7 @@ impl<A: Actuator> Inner<A> {
         Some(result)
     }
 
-    /// Leaves its code: schedules its next update, and publishes and tells what has happened.
+    /// Leaves the actuator's code: schedules its next update, publishes its reports, and reports pending changes.
     fn leave(&self, mut state: Held<'_, State<A>>) {
         self.schedule_update(&mut state);
         let mut wakers = Wakers::default();
@@ -186,12 +176,12 @@ impl<A: Actuator> Inner<A> {
         pending.into_iter().for_each(|change| self.tell_now(change));
     }
 
-    /// Called by the control state, which must not wait for the actuator's code.
+    /// Queues an order. It does not wait for the actuator's code, as the caller is the control state.
     fn tell(this: &Weak<Self>, order: Order) {
         let Some(inner) = this.upgrade() else { return };
         let mut orders = lock(&inner.orders);
         if orders.contains(&order) {
-            // It already waits for the actuator's code.
+            // The order is already waiting.
             return;
         }
         orders.push(order);
@@ -211,6 +201,7 @@ impl<A: Actuator> Inner<A> {
         }
     }
 
+    /// Carries out the queued orders.
     fn obey(&self, state: &mut State<A>) {
         let orders = std::mem::take(&mut *lock(&self.orders));
         for order in orders {
@@ -230,9 +221,11 @@ impl<A: Actuator> Inner<A> {
                         Err(failed) => self.fail(state, &failed, now),
                     }
                 }
-                Order::Restart if state.slot.is_running() => self.remake(state, Termination::Supervisor, now),
-                Order::Restart => {}
-                Order::GiveUp => state.slot.give_up(),
+                Order::Supervisor(ComponentOrder::Restart) if state.slot.is_running() => {
+                    self.remake(state, Termination::Supervisor, now);
+                }
+                Order::Supervisor(ComponentOrder::Restart) => {}
+                Order::Supervisor(ComponentOrder::GiveUp) => state.slot.give_up(),
             }
         }
     }
@@ -273,7 +266,7 @@ impl<A: Actuator> Inner<A> {
         }
     }
 
-    /// Makes the actuator safe, even after a panic: hardware that may still move is worse than a second panic, which is caught.
+    /// Disarms the actuator, even after a panic: hardware that may still move is worse than a second panic, which is caught.
     pub(super) fn make_safe(&self, state: &mut State<A>) {
         let Some(actuator) = state.slot.running() else { return };
         state.may_move = false;
@@ -312,7 +305,7 @@ impl<A: Actuator> Inner<A> {
                 state.may_move = false;
                 match &disarmed {
                     Err(fault) => self.end_motion(MotionEnd::Failed(fault.to_string())),
-                    // Nothing but another command would have it report an end.
+                    // Without a next update, the actuator does not report the end itself.
                     Ok(()) if self.next_update(state).is_none() => self.end_motion(MotionEnd::Stopped),
                     Ok(()) => {}
                 }

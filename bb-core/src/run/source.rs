@@ -3,9 +3,8 @@
 
 mod shared;
 
-use self::shared::Order;
-pub(super) use self::shared::SharedSource;
 pub use self::shared::SourceStatistics;
+pub(super) use self::shared::{Order, SharedSource};
 use crate::component::{Binding, ExternalSensor, Host, Next, OptionsList, Sensor, SensorContext};
 use crate::control::{ComponentOrder, Control};
 use crate::declaration::SensorDeclaration;
@@ -219,10 +218,7 @@ impl Assembly {
             return None;
         }
         self.control.supervise(declaration.path, declaration.supervisor, move |order| {
-            tell(match order {
-                ComponentOrder::Restart => Order::Restart,
-                ComponentOrder::GiveUp => Order::GiveUp,
-            });
+            tell(Order::Supervisor(order));
         });
         Some(Box::new(Running::<S> {
             slot,
@@ -408,8 +404,8 @@ impl<S: Sensor> Source for Running<S> {
         for order in self.shared.take_orders() {
             match order {
                 Order::Options => self.change_options(),
-                Order::Restart => self.restart_from_above(Termination::Supervisor),
-                Order::GiveUp => {
+                Order::Supervisor(ComponentOrder::Restart) => self.restart_from_above(Termination::Supervisor),
+                Order::Supervisor(ComponentOrder::GiveUp) => {
                     self.slot.give_up();
                     self.due = None;
                 }

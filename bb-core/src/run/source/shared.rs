@@ -1,6 +1,7 @@
-//! The part of a source that other threads reach.
+//! The state of a source that other threads share: orders, counts and failures.
 
 use crate::component::Counts;
+use crate::control::ComponentOrder;
 use crate::fault::lock;
 use crate::run::occupied::{Entered, Occupied};
 use crate::time::{Clock, MonotonicTime};
@@ -8,7 +9,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::Thread;
 
-/// The part of a source that other threads reach. Clones share it.
+/// A handle to the shared state of a source.
 #[derive(Clone, Debug)]
 pub(crate) struct SharedSource(Arc<Shared>);
 
@@ -31,7 +32,7 @@ struct Shared {
 #[derive(Clone, Copy, Debug)]
 struct Failing {
     since: MonotonicTime,
-    /// The readings at the last of them.
+    /// Number of readings at the last failure.
     readings: u64,
 }
 
@@ -43,10 +44,9 @@ struct Inbox {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Order {
+pub(in crate::run) enum Order {
     Options,
-    Restart,
-    GiveUp,
+    Supervisor(ComponentOrder),
 }
 
 /// Counts of a sensor or a service since the start.
@@ -57,7 +57,7 @@ pub struct SourceStatistics {
     pub path: &'static str,
     /// Number of readings.
     pub readings: u64,
-    /// Readings at its rate that it missed because it, or a component downstream, took too long.
+    /// Number of readings missed because the component, or one downstream, took longer than its period.
     pub skipped: u64,
     /// Number of restarts.
     pub restarts: u64,
@@ -70,7 +70,7 @@ pub struct SourceStatistics {
 }
 
 impl SourceStatistics {
-    /// A count of its own; 0 if it has none of that name.
+    /// The component's count of this name; 0 if it has none.
     pub fn count(&self, name: &str) -> u64 {
         self.counts.iter().find(|(known, _)| *known == name).map_or(0, |(_, count)| *count)
     }
@@ -106,7 +106,7 @@ impl SharedSource {
         std::mem::take(&mut lock(&self.0.inbox).orders)
     }
 
-    /// The calling thread reads it from now on.
+    /// Makes the calling thread the one that reads the source, so that orders wake it.
     pub(in crate::run) fn adopt(&self) {
         lock(&self.0.inbox).thread = Some(std::thread::current());
     }
@@ -130,7 +130,7 @@ impl SharedSource {
 
     pub(in crate::run) fn statistics(&self) -> SourceStatistics {
         let readings = self.0.readings.load(Ordering::Relaxed);
-        // After a restart, the next one shows that it has recovered.
+        // After a restart, the next reading shows that the component has recovered.
         let failing = lock(&self.0.failing).filter(|failing| readings == failing.readings);
         SourceStatistics {
             path: self.0.path,
@@ -160,7 +160,7 @@ impl SharedSource {
         *lock(&self.0.stopped) = Some(reason);
     }
 
-    /// Notes a failure that is not the end of a part that the robot does without.
+    /// Records the time since which the component has been failing.
     pub(super) fn note_failure(&self, now: MonotonicTime) {
         let readings = self.0.readings.load(Ordering::Relaxed);
         let mut failing = lock(&self.0.failing);
