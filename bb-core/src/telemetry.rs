@@ -1,4 +1,4 @@
-//! Events for handlers that a user attaches: every input, output, callback, drop, change of health and fault.
+//! Telemetry events for handlers of the user: inputs, outputs, callbacks, drops, changes of health and faults.
 
 use crate::declaration::EstimatorDeclaration;
 use crate::event::{ComponentFault, HealthTransition};
@@ -11,7 +11,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-/// Something that happened while a robot runs.
+/// An event of a running robot.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum TelemetryEvent {
@@ -68,7 +68,7 @@ pub type Handler = Arc<dyn Fn(&'static str, &TelemetryEvent) + Send + Sync>;
 #[derive(Clone)]
 pub(crate) struct Telemetry {
     handlers: Vec<Handler>,
-    /// Number of their panics.
+    /// Number of panics of the handlers.
     panics: Arc<AtomicU64>,
     /// The estimator and the output that publish at a path.
     outputs: Sorted<&'static str, (&'static str, &'static str)>,

@@ -12,11 +12,11 @@ use crate::stub::UNKNOWN_INDEX;
 enum InputFault {
     /// The algorithm takes one input, but several are declared.
     Single,
-    /// A required one is not declared.
+    /// A required input is not declared.
     Missing(&'static str),
-    /// A nested estimator whose algorithm needs several inputs.
+    /// The estimator is nested, but its algorithm needs several inputs.
     NeedsSeveral,
-    /// A nested estimator whose algorithm requires none of its several inputs.
+    /// The estimator is nested, but its algorithm requires none of its several inputs.
     NeedsNone,
 }
 
@@ -93,7 +93,7 @@ const fn missing_input<I: Inputs>(declared: &[&str]) -> Option<InputFault> {
     None
 }
 
-/// Returns the reason for which the sensor of a nested estimator is not its input: the algorithm must have exactly one required
+/// The fault of a nested estimator that cannot take its sensor as its input: the algorithm must have exactly one required
 /// input, or only one.
 const fn no_nested_input<I: Inputs>() -> Option<InputFault> {
     if !I::KNOWN || <I::Nested as TakenAt<I>>::INDEX != UNKNOWN_INDEX {
@@ -124,7 +124,7 @@ const fn describe_input(text: Text, estimator: &str, fault: InputFault) -> Text 
     }
 }
 
-/// An algorithm with several outputs has none declared.
+/// The error text for an algorithm with several outputs, none of which is declared.
 const fn describe_outputs(text: Text, estimator: &str, fields: &[&str]) -> Text {
     let text = text.name(estimator).push(" has several outputs; declare the ones to publish, `output ");
     list(text.push(fields[0]).push(";`, of "), fields)

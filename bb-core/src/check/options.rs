@@ -6,7 +6,7 @@ use crate::declaration::Dimension;
 use crate::message::Payload;
 use crate::message::codec::{FieldUnit, Shape};
 
-/// Checks the range of an option given as a number without a unit, and that it has none. Unknown names are left to rustc.
+/// Checks an option given as a number without a unit: its range, and that it needs no unit. Unknown names are left to rustc.
 ///
 /// The arguments of the checks are passed by value: rustc makes a constant of its own of each reference in a constant.
 #[track_caller]
@@ -48,7 +48,7 @@ const fn check_given(
     }
 }
 
-/// Checks that an option, if it is to be compared with the messages' field that the option `of` names, has the unit of that field.
+/// Checks that an option has the unit of the field that the option `of` names, if it is compared with that field.
 #[track_caller]
 pub const fn check_compared<O: Options, P: Payload, const N: usize>(
     component: &str,

@@ -7,11 +7,11 @@ use std::marker::PhantomData;
 
 /// A sensor whose messages come from elsewhere: a driver's callback, a network, a test.
 ///
-/// Declare `sensor imu: External<Imu>();` and hand in its readings with
+/// Declare `sensor imu: External<Imu>();` and publish its readings with
 /// [`Live::publish`](crate::Live::publish) or [`Simulation::publish`](crate::Simulation::publish). Code that knows only its path gets a
 /// publisher from [`Bus::publisher`](crate::Bus::publisher).
 ///
-/// An `external` input of an estimator is one without a declaration, at a path of your own.
+/// An `external` input of an estimator needs no such declaration: it takes any path.
 #[derive(Debug)]
 pub struct External<T>(PhantomData<fn() -> T>);
 

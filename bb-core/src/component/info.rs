@@ -17,9 +17,8 @@ pub enum Request {
     Timer(u32, Duration),
     /// [`Info::Tick`] at a fixed rate from now on; a period of zero ends it.
     Tick(Duration),
-    /// A restart with fresh state, for this reason, once the outputs of the reply are published and, in reply to a call,
-    /// with the answer on its way to the caller. It comes before a [`Continue`](Self::Continue) of the same reply. Otherwise as if the
-    /// callback had returned the reason as a [`Fault`](super::Fault).
+    /// A restart with fresh state, as if the callback had returned this reason as a [`Fault`](super::Fault). It happens once the outputs
+    /// of the reply are published and the answer to a call is sent, and before a [`Continue`](Self::Continue) of the same reply.
     Restart(&'static str),
 }
 
@@ -31,6 +30,6 @@ pub enum Info {
     Timeout,
     /// The timer of that number.
     Timer(u32),
-    /// The next period of its tick has begun. Periods missed while it is busy are skipped; the phase is kept.
+    /// The next period of the estimator's tick has begun. Periods missed while it is busy are skipped; the phase is kept.
     Tick,
 }

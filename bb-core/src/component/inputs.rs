@@ -20,8 +20,8 @@ use crate::message::Stamped;
 ///
 /// An estimator with one input names the payload: `type Input = Imu;`, and its `handle_input` gets `&Stamped<Imu>`.
 /// One with several inputs derives a struct whose fields are the inputs by name. [`Input`] is the latest message; in
-/// an `Option`, the estimator can run without that input. [`Every`] is all messages since the last run, none or several,
-/// for events and measurements each of which counts.
+/// an `Option`, the estimator can run without that input. [`Every`] is all messages since the last run, none or several:
+/// for events, and for measurements that must not be skipped.
 ///
 /// ```
 /// use bb_core::prelude::*;

@@ -1,10 +1,10 @@
-//! The contract of a store that keeps parameters over restarts.
+//! The contract of a store that keeps parameters across restarts.
 
 use super::Fault;
 use crate::event::ParameterValue;
 use std::collections::BTreeMap;
 
-/// Keeps the values of parameters over restarts of the program: see
+/// Keeps the values of parameters across restarts of the program, see
 /// [`Builder::keep_parameters`](crate::Builder::keep_parameters).
 ///
 /// Its methods are called by one thread at a time and may block. An implementation must be crash-safe: a store that is killed
@@ -57,13 +57,13 @@ pub trait ParameterStore: Send + 'static {
     /// The set of values stored last, by path; empty if none was stored.
     ///
     /// # Errors
-    /// Why it cannot be read.
+    /// The reason for which it cannot be read.
     fn load(&mut self) -> Result<BTreeMap<String, ParameterValue>, Fault>;
 
     /// Stores a set of values in place of the last one, as a whole. When it returns, the set is durable.
     ///
     /// # Errors
-    /// Why it was not stored; the last set remains. It is reported as a fault at `param`, and tried again with the next
-    /// change and when the robot stops. A simulation stores once it stops, and tries again once.
+    /// The reason for which it was not stored; the last set remains. It is reported as a fault at `param`, and storing is tried again
+    /// with the next change and when the robot stops. A simulation stores when it stops, and tries again once.
     fn store(&mut self, values: &BTreeMap<String, ParameterValue>) -> Result<(), Fault>;
 }

@@ -1,4 +1,4 @@
-//! Options that name something the robot declares: `sensor::battery.voltage`, `command::land`.
+//! Types of options that name a declaration of the robot: `sensor::battery.voltage`, `command::land`.
 
 use crate::message::Payload;
 use crate::pubsub::DynamicMessage;
@@ -71,7 +71,7 @@ impl CommandPath {
         Self(path)
     }
 
-    /// `command/land`
+    /// The path: `command/land`.
     pub fn path(self) -> &'static str {
         self.0
     }

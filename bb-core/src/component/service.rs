@@ -6,10 +6,10 @@ use crate::time::MonotonicTime;
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Time for which an update without a rate waits.
+/// Time for which [`StateReport::update`] waits without a rate.
 const WAIT: Duration = Duration::from_millis(100);
-/// Time between two states of a service without a rate.
-const STATE: Duration = Duration::from_secs(1);
+/// Shortest time between two reports of a service without a rate.
+const REPORT_PERIOD: Duration = Duration::from_secs(1);
 
 /// A controller or a bridge: it runs beside the dataflow and reaches everything by path, through [`ServiceContext::bus`].
 ///
@@ -29,18 +29,18 @@ pub trait Service: Sized + Send + 'static {
     /// Creates it, at the start and at every restart.
     ///
     /// # Errors
-    /// Why it cannot start. At the start of the robot, the robot then does not start.
+    /// The reason for which it cannot start. At its start, the robot then does not start either.
     fn init(options: Self::Options, context: &ServiceContext) -> Result<Self, Fault>;
 
     /// Performs its work once: at the declared `rate`, or repeatedly without one, so it may wait for its device or peer. It must then
     /// return from time to time, so that the robot can stop.
     ///
     /// # Errors
-    /// Why it cannot go on; the fault is reported, and the service is restarted with fresh state.
+    /// The reason for which it cannot go on; the fault is reported, and the service is restarted with fresh state.
     fn update(&mut self, now: MonotonicTime) -> Result<Reading<Self::Output>, Fault>;
 
-    /// Takes new options, validated, after a parameter that they are bound to has changed. The default restarts the service
-    /// with them: it is terminated and dropped before the new one is made.
+    /// Applies new, validated options after a parameter that they are bound to has changed. The default restarts the service
+    /// with them: it is terminated and dropped before the new one is created.
     ///
     /// # Errors
     /// As for `update`.
@@ -49,13 +49,13 @@ pub trait Service: Sized + Send + 'static {
         Err(Fault::remake())
     }
 
-    /// Cleans up before it stops or is restarted; not called after a panic.
+    /// Cleans up before the service stops or is restarted; not called after a panic.
     fn terminate(&mut self, reason: Termination<'_>) {
         let _ = reason;
     }
 }
 
-/// The state of a bridge that does its work on threads of its own: published when it has changed, at most once a second without a `rate`.
+/// Reports the state of a bridge that works on its own threads: when it has changed, and at most once a second without a `rate`.
 ///
 /// ```
 /// use bb_core::component::StateReport;
@@ -69,7 +69,7 @@ pub trait Service: Sized + Send + 'static {
 pub struct StateReport<T> {
     last: Option<T>,
     next: Option<Instant>,
-    /// `true` if it has a rate, and so must not wait.
+    /// `true` if the service has a rate or runs on virtual time, and so must not wait.
     is_paced: bool,
 }
 
@@ -80,16 +80,16 @@ impl<T> Default for StateReport<T> {
 }
 
 impl<T: Clone + PartialEq> StateReport<T> {
-    /// Creates it for the service of that context.
+    /// Creates the report of a service.
     pub fn new(context: &ServiceContext) -> Self {
         Self { is_paced: context.period_s().is_some() || context.clock().is_virtual(), ..Self::default() }
     }
 
-    /// The reading of an update with this state; without a rate, waits for a tenth of a second if there is none.
+    /// The reading of an update with this state: `state` if it has changed. Otherwise, without a rate, it waits for a tenth of a second.
     pub fn update(&mut self, state: T) -> Reading<T> {
         let is_due = self.is_paced || self.next.is_none_or(|next| Instant::now() >= next);
         if is_due && self.last.as_ref() != Some(&state) {
-            self.next = Some(Instant::now() + STATE);
+            self.next = Some(Instant::now() + REPORT_PERIOD);
             self.last = Some(state.clone());
             return Reading::now(state);
         }

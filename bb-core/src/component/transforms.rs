@@ -26,13 +26,13 @@ enum Placed {
     At(Isometry3<f64>),
     /// No transform: the payload is the same in every frame.
     Nowhere,
-    /// No message of it takes part in this dispatch.
+    /// No message of the input takes part in this dispatch.
     Absent,
     Missing(LookupError),
 }
 
 impl InputTransform {
-    /// Creates the transform of an input that takes part: it transforms points from its frame to the output's. For tests of an estimator.
+    /// Creates the transform of an input from its frame to the output's, for tests of an estimator.
     ///
     /// ```
     /// use bb_core::component::{InputTransform, InputTransforms};
@@ -48,7 +48,7 @@ impl InputTransform {
         Self { name, is_driver: true, placed: Placed::At(frame_from_input) }
     }
 
-    /// Creates the initial transform: that of an input without a moving joint between.
+    /// Creates the transform of an input before its first message: the fixed one if no moving joint is in between.
     pub(crate) fn declared(name: &'static str, is_driver: bool, fixed: Option<Isometry3<f64>>) -> Self {
         Self { name, is_driver, placed: fixed.map_or(Placed::Nowhere, Placed::At) }
     }
@@ -76,7 +76,7 @@ impl InputTransform {
 }
 
 impl<'a> InputTransforms<'a> {
-    /// Creates the transforms of these inputs; the first one is the driver. For tests of an estimator.
+    /// Creates the transforms of these inputs, of which the first is the driver, for tests of an estimator.
     pub fn new(inputs: &'a [InputTransform]) -> Self {
         Self { inputs, driver_time: MonotonicTime::ZERO }
     }

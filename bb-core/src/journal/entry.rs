@@ -22,8 +22,8 @@ pub struct JournalLine {
 }
 
 impl JournalLine {
-    /// Wall time minus monotonic time from this line on, in nanoseconds, if the line says so: the first one does, which gives the date
-    /// at which the run began, and each at which the machine's date was set.
+    /// Wall time minus monotonic time from this line on, in nanoseconds, if the line states it: the first line does, and each one at
+    /// which the machine's date was set.
     pub fn wall_offset_nanos(&self) -> Option<i64> {
         match self.event {
             Event::Begin { wall_offset_nanos, .. } => Some(wall_offset_nanos),
@@ -36,7 +36,7 @@ impl JournalLine {
 /// Another name of [`JournalLine`], for code that handles many of them.
 pub type Entry = JournalLine;
 
-/// Event of a line, see [`Entry`]. Islands, estimators, publishers, actuators, commands and parameters are named by their numbers.
+/// Event of a line. Islands, estimators, publishers, actuators, commands and parameters are named by their numbers.
 #[derive(Clone, Debug, Payload)]
 #[non_exhaustive]
 pub enum Event {
@@ -254,7 +254,7 @@ pub enum Event {
     },
     /// The disarm callbacks have returned, or their time limit has passed.
     Disarmed {
-        /// Errors of what could not be made safe.
+        /// Errors of the hardware that could not be made safe.
         errors: Vec<SafetyError>,
     },
     /// Arming gave up waiting for cancelled commands.

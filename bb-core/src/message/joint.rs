@@ -7,11 +7,11 @@ pub struct JointReading<'a> {
     /// The joint, by its name or its path; `None` for the joint at which it is measured, which the message's frame
     /// names.
     pub joint: Option<&'a str>,
-    /// Angles in rad, lengths in m.
+    /// Angles in rad or lengths in m.
     pub position: &'a [f64],
-    /// rad/s, m/s; empty if it is not measured.
+    /// Velocities in rad/s or m/s; empty if it is not measured.
     pub velocity: &'a [f64],
-    /// Torques in N·m, forces in N; empty if it is not measured.
+    /// Torques in N·m or forces in N; empty if it is not measured.
     pub effort: &'a [f64],
     /// Side of the joint's transmission.
     pub side: JointSide,
@@ -81,7 +81,7 @@ impl<'a> JointReading<'a> {
         Self { joint: None, position, velocity: &[], effort: &[], side: JointSide::Joint }
     }
 
-    /// Returns the same reading, of the joint of that name.
+    /// Returns this reading for the joint `joint`.
     pub fn of(self, joint: &'a str) -> Self {
         Self { joint: Some(joint), ..self }
     }
@@ -114,7 +114,7 @@ impl<'a> JointReading<'a> {
     note = "`#[payload(joint_position)]` promises it; implement `bb_core::JointPositions` for it"
 )]
 pub trait JointPositions {
-    /// Calls `listener` with each joint it knows.
+    /// Calls `listener` with the reading of each joint.
     fn tell(&self, listener: &mut dyn FnMut(JointReading<'_>));
 }
 

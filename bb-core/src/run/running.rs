@@ -1,4 +1,4 @@
-//! A run in real time: each sensor on a thread of its own.
+//! A run in real time, with a thread for each sensor.
 
 use super::machine::Machine;
 use super::source::OpenSources;
@@ -31,24 +31,23 @@ struct Threads {
     machine: Arc<Machine>,
     /// Threads of sensors and services.
     sources: Vec<Thread>,
-    /// [`Running::wait`] has waited for the limit of a stop in vain: what is left has had its time.
+    /// `true` if [`Running::wait`] has left threads running at its limit, so that a stop need not wait as long again.
     has_waited: bool,
-    /// Thread that is kept for disarm callbacks of commands.
+    /// Thread reserved for disarm callbacks of commands.
     kept: Option<Reserved>,
 }
 
-/// Time that user code may take to return after the robot was asked to stop.
+/// Time within which user code must return after the robot was asked to stop.
 pub(super) const STOP_WITHIN: Duration = Duration::from_secs(5);
 
-/// Least time that it may take, once disarm callbacks have used up their time.
+/// Least time left to user code once disarm callbacks have used up the time of the stop.
 const GRACE: Duration = Duration::from_millis(400);
 
-/// The robot has stopped within this time after the call, even if code hangs. Includes all of the above and the last
-/// lines of the journal.
+/// Time within which a stop returns, even if code hangs. Includes all of the above and the last lines of the journal.
 const BACK_WITHIN: Duration = Duration::from_millis(5800);
 
-/// Time that loggers may take for the last lines. Without this wait, a program that ends after `stop` would not log what could not
-/// be made safe.
+/// Time within which loggers must write the last lines. Without this wait, a program that ends after `stop` would not log the hardware
+/// that could not be made safe.
 const LINES_WITHIN: Duration = Duration::from_millis(150);
 
 impl<R: Robot> Running<R> {
@@ -104,7 +103,7 @@ impl Threads {
     /// Returns the time by which user code that was told to stop at `start` should have returned.
     fn deadline(&self, start: Instant) -> Instant {
         let machine = &self.machine;
-        // The caller may be a command, or woken by an estimator's message: then that cannot end before this call returns.
+        // If the caller is code of the robot itself, that code cannot end before this call returns.
         let is_inside = is_in_command(machine.control.id()) || machine.islands().any(|island| island.is_inside());
         if self.has_waited || is_inside {
             return Instant::now() + GRACE;
@@ -112,7 +111,7 @@ impl Threads {
         (start + STOP_WITHIN).max(Instant::now() + GRACE)
     }
 
-    /// Joins the threads of sensors and services. Those that run at `deadline` are left running and reported.
+    /// Joins the threads of sensors and services. Those still running at `deadline` are left and reported.
     fn join(&mut self, deadline: Instant) {
         let machine = &self.machine;
         for (path, thread) in std::mem::take(&mut self.sources) {

@@ -1,4 +1,4 @@
-//! Threads for user code without a thread of its own: turns of islands, commands, wakers.
+//! A pool of threads for user code without its own thread: turns of islands, commands, wakers.
 //!
 //! A job may block forever. When jobs wait and no thread has taken one for some milliseconds, another thread is
 //! started, so a blocked job delays others by no more than that. Each [`Lane`] has its own queue, and each lane but
@@ -35,7 +35,7 @@ pub(crate) enum Lane {
 impl Lane {
     const ALL: [Self; 4] = [Self::Safety, Self::Robot, Self::Commands, Self::User];
 
-    /// Returns the number of the lane's jobs that may run at once; others wait until one returns.
+    /// The largest number of the lane's jobs that run at once; others wait until one returns.
     const fn most(self) -> usize {
         match self {
             // The model checker has room for few threads.
@@ -45,7 +45,7 @@ impl Lane {
         }
     }
 
-    /// Returns the name of the lane's jobs, for a report.
+    /// The name of the lane's jobs, for a report.
     const fn jobs(self) -> &'static str {
         match self {
             Self::Safety => "commands that disarm or that health has started",
@@ -56,7 +56,7 @@ impl Lane {
     }
 }
 
-/// Threads that are always there.
+/// Number of permanent threads.
 const READY: usize = if cfg!(loom) { 1 } else { 2 };
 
 /// Time for which a lane must be full, with jobs waiting, before that is reported.
@@ -70,7 +70,7 @@ struct Shared {
     state: Mutex<Crew>,
     /// Time for which a thread beyond [`READY`] stays without work.
     idle_for: Duration,
-    /// Tells the thread that keeps time that a job waits.
+    /// Notifies the timekeeper's thread that a job waits.
     alarm: Box<dyn Fn() + Send + Sync>,
     spawn: Box<Spawn>,
 }
@@ -104,7 +104,7 @@ impl Pool {
         self.call(crew);
     }
 
-    /// Starts a thread if jobs wait and the existing ones take none. Returns when to look again, if jobs wait.
+    /// Starts a thread if jobs wait and no existing thread takes one. Returns the time until the next call, if jobs wait.
     pub(crate) fn relieve(&self) -> Option<Duration> {
         self.relieve_at(Instant::now())
     }
@@ -123,7 +123,7 @@ impl Pool {
         Some(wait)
     }
 
-    /// The next lane that has become full, or a failure to start threads, in words; each reported once.
+    /// Describes the next lane that has become full, or a failure to start threads; each is reported once.
     pub(crate) fn report(&self) -> Option<String> {
         let mut crew = self.0.lock();
         if let Some(error) = crew.newly_without_thread() {
@@ -148,7 +148,7 @@ impl Pool {
         }
     }
 
-    /// Runs the waiting jobs, on threads that end once none is left. Nobody keeps time any more.
+    /// Runs the waiting jobs, on threads that end once none is left. There is no timekeeper any more.
     pub(crate) fn close(&self) {
         let mut crew = self.0.lock();
         let idle = crew.close();
@@ -156,7 +156,7 @@ impl Pool {
         idle.iter().for_each(threads::Thread::unpark);
     }
 
-    /// Tells a thread about the jobs that may be taken.
+    /// Wakes or starts a thread for the jobs that may be taken.
     fn call(&self, mut crew: MutexGuard<'_, Crew>) {
         match crew.call() {
             Call::Nobody => {}
@@ -172,8 +172,7 @@ impl Pool {
         }
     }
 
-    /// Jobs may be submitted under a lock of the robot, and the timekeeper calls this as well, so nothing is logged
-    /// here.
+    /// Starts a thread. Nothing is logged here: jobs may be submitted under a lock of the robot, and the timekeeper must not block.
     fn start_thread(&self, mut crew: MutexGuard<'_, Crew>) {
         let number = crew.start();
         drop(crew);

@@ -96,7 +96,7 @@ fn joined_part(input: ParseStream<'_>) -> Option<TokenTree> {
     input.parse().ok()
 }
 
-/// The words of a name with spaces in it, `left wheel`, if the tokens after them could follow a name.
+/// The words of a name with spaces, `left wheel`, if the tokens after them could follow a name.
 fn spaced(input: ParseStream<'_>, name: &Ident, word: &Ident) -> Option<Vec<TokenTree>> {
     let ahead = input.fork();
     let mut words = vec![TokenTree::from(name.clone())];

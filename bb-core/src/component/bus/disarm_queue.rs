@@ -1,17 +1,15 @@
-//! Requests to disarm from a network, apart from all others.
+//! A queue of requests to disarm from a network, with its own thread.
 
 use crate::schedule::start_thread;
 use std::io;
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::JoinHandle;
 
-/// Requests that wait, at most.
-const MOST: usize = 256;
+/// The capacity of the queue.
+const CAPACITY: usize = 256;
 
-/// Requests to disarm from a network, in a queue of their own, with a thread of their own: whatever else is asked, the robot is disarmed, and no number of
-/// requests takes more threads.
-///
-/// A request for which there is no room comes back; those that wait are carried out after it came.
+/// A queue of requests to disarm from a network, with its own thread: other requests cannot delay disarming, and any number of requests
+/// to disarm takes a single thread.
 ///
 /// ```
 /// use bb_core::component::DisarmQueue;
@@ -34,28 +32,28 @@ const MOST: usize = 256;
 pub struct DisarmQueue<R>(SyncSender<R>);
 
 impl<R: Send + 'static> DisarmQueue<R> {
-    /// Starts a thread of that name, to which all requests are given that wait, as one attempt to disarm answers them all. It ends once the
-    /// queue is dropped, after what waits.
+    /// Starts the thread `name`. It passes all waiting requests to `carry_out` at once, as one attempt to disarm answers them all, and
+    /// ends once the queue is dropped and empty.
     ///
     /// # Errors
-    /// The system has no thread.
+    /// The system cannot start a thread.
     pub fn start(
         name: &str,
         mut carry_out: impl FnMut(Vec<R>) + Send + 'static,
     ) -> io::Result<(Self, JoinHandle<()>)> {
-        let (sender, waiting) = sync_channel(MOST);
+        let (sender, waiting) = sync_channel(CAPACITY);
         let run = move || {
             while let Ok(first) = waiting.recv() {
-                carry_out(std::iter::once(first).chain(waiting.try_iter().take(MOST)).collect());
+                carry_out(std::iter::once(first).chain(waiting.try_iter().take(CAPACITY)).collect());
             }
         };
         Ok((Self(sender), start_thread(name, Box::new(run))?))
     }
 
-    /// Adds a request, and does not wait.
+    /// Adds a request without waiting.
     ///
     /// # Errors
-    /// The request, if there is no room.
+    /// The queue is full: returns the request.
     pub fn put(&self, request: R) -> Result<(), R> {
         use std::sync::mpsc::TrySendError::{Disconnected, Full};
         self.0.try_send(request).map_err(|(Full(request) | Disconnected(request))| request)

@@ -1,14 +1,14 @@
-//! A caller with an end, such as the user of a connection.
+//! A bus for a caller whose rights end, such as the user of a connection.
 
 use super::Bus;
 use std::ops::Deref;
 use std::time::Duration;
 
-/// A [`Bus`] until it is dropped. From then on, whatever was obtained through it refuses to act, on any thread, and a joint that one of its
-/// links has moved stops when the link is dropped. Commands that it has started run on.
+/// A [`Bus`] that acts until the session is dropped. From then on, everything obtained through it refuses to act, on any thread. A joint
+/// that one of its links has moved stops when the link is dropped. Commands that it has started run on.
 ///
-/// A call that another thread has begun either passes its last check before the end, and is then completed, or is refused. The end does not
-/// wait for those calls, since code of a component may hang in one; [`Self::end_within`] does, with a time limit.
+/// A call that another thread has begun is completed if it has passed its last check, and refused otherwise. The end does not
+/// wait for such calls, since code of a component may hang in one; [`Self::end_within`] does, with a time limit.
 ///
 /// ```
 /// use bb_core::prelude::*;
@@ -32,19 +32,19 @@ impl Session {
         Self(bus)
     }
 
-    /// Returns the bus that acts in its name, while it lasts.
+    /// Returns a bus that acts for this session until it ends.
     pub fn bus(&self) -> Bus {
         self.0.clone()
     }
 
-    /// Ends it, as dropping it does: where other threads still hold it.
+    /// Ends the session as dropping it does, even if other threads still hold it.
     pub fn end(&self) {
         self.0.caller.revoke();
     }
 
-    /// Ends it, and waits until the calls that other threads have begun in its name are completed, at most `timeout`. Returns whether they
-    /// are: after `true`, no actuator carries out a command of it, and nothing is published, set, armed, started or cancelled in its name. A
-    /// call that contains this one, on the same thread, is not waited for.
+    /// Ends the session, and waits until the calls that other threads have begun through it are completed, at most `timeout`. Returns
+    /// whether they are: after `true`, nothing more is done for the session. A call that contains this one, on the same thread, is not
+    /// waited for.
     pub fn end_within(&self, timeout: Duration) -> bool {
         self.end();
         self.0.caller.wait_for_calls(timeout)

@@ -37,7 +37,7 @@ impl<E: Estimator> Node<E> {
         self.schedule();
     }
 
-    /// Code of the estimator, or of a message that it emitted or kept, has panicked in its turn.
+    /// Handles a panic of the estimator's code, or of a message that it emitted or kept.
     #[cold]
     pub fn panicked(&mut self, panic: Panic, turn: &Turn<'_>) {
         let failed = Failed { fault: of_panic(panic), panicked: true };
@@ -103,7 +103,7 @@ impl<E: Estimator> Node<E> {
 }
 
 impl Common {
-    /// Makes the estimator by `make`; returns `false` if it does not run.
+    /// Calls `make`; returns `false` if the estimator does not run.
     fn make_first(&self, now: MonotonicTime, make: &mut dyn FnMut() -> Result<(), Failed>) -> bool {
         self.shared.set_last_run(now);
         let made = self
@@ -119,7 +119,7 @@ impl Common {
         made.is_ok()
     }
 
-    /// Begins when the robot has started.
+    /// Applies the requests of `init` when the robot has started.
     pub(super) fn begin_life(&mut self, turn: &Turn<'_>) {
         self.shared.set_last_run(turn.now());
         let requested = std::mem::take(&mut self.requested);

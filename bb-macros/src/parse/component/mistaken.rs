@@ -10,7 +10,7 @@ use syn::ext::IdentExt;
 use syn::parse::ParseStream;
 use syn::{LitStr, Token};
 
-/// Reports an associated function, `Encoder::new`, and leaves the type.
+/// Reports an associated function, `Encoder::new`, and removes it from the path.
 pub(super) fn constructor(kind: &mut syn::Path, notes: &mut Notes<'_>) -> bool {
     let starts = |segment: &syn::PathSegment, is: fn(char) -> bool| segment.ident.to_string().starts_with(is);
     let mut last = kind.segments.iter().rev();
@@ -89,7 +89,7 @@ pub(super) fn ros_types(word: &str, kind: &mut syn::Path, notes: &mut Notes<'_>)
     }
 }
 
-/// The error for tokens that are not a type where one is expected: `"Bmi270"`, `dyn Sensor`, `&Bmi270`.
+/// The error for other tokens in place of a type: `"Bmi270"`, `dyn Sensor`, `&Bmi270`.
 pub(super) fn type_of(name: &Ident, input: ParseStream<'_>) -> Option<syn::Error> {
     let place = input.span();
     let message = if let Ok(text) = input.fork().parse::<LitStr>()

@@ -27,7 +27,7 @@ pub(super) fn mismatch(shape: Shape, value: &RawValue) -> JsonError {
     JsonError::mismatch(expected(shape), found(value))
 }
 
-/// Names the values of a shape in the words of JSON.
+/// Describes the values of a shape in the words of JSON.
 pub(super) fn expected(shape: Shape) -> String {
     if let Some(range) = range(shape) {
         return format!("an integer from {} to {}", range.start(), range.end());
