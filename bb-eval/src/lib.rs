@@ -1,7 +1,7 @@
 //! Filters by name, run on recordings and scored against the truth.
 //!
 //! Without features this is [`Chosen`], a filter of `bb-estimators` by its name and settings, and [`Score`] and [`Averages`],
-//! which define the errors. With the feature `recordings`, `evaluate` runs attitude filters on a
+//! which define the errors. With the feature `recordings`, `evaluate_variant` runs attitude filters on a
 //! `Recording`, and `play_navigation` navigation filters, each declared in a robot, on a `Drive`, of CSV files or of a
 //! `NavigationBag`; with `plot`, `plot_errors` and `plot_navigation` draw the errors. `bb eval` is this library on the command line; its
 //! guide is `book/src/how-to/evaluate.md`.
@@ -73,7 +73,7 @@ pub use disturb::{Delay, Disturbances, Dropped, Spell};
 #[cfg(feature = "plot")]
 pub use error_plot::plot_errors;
 #[cfg(feature = "recordings")]
-pub use evaluate::{Detail, Estimate, Evaluation, Evaluator, Run, evaluate, evaluate_all, evaluate_variant};
+pub use evaluate::{Detail, Estimate, Evaluation, Evaluator, Run, evaluate_all, evaluate_variant};
 #[cfg(feature = "plot")]
 pub use export::{export_attitude, export_navigation, exportable};
 #[cfg(feature = "recordings")]

@@ -1,7 +1,7 @@
 //! Orientation on the trials of BROAD: the mean over them of the RMS errors, one parameter set for all.
 
 use super::known::{self, Errors, Row};
-use bb_eval::{Averages, Axes, Degrees, Evaluator, Progress, evaluate};
+use bb_eval::{Averages, Axes, Degrees, Evaluator, Progress, evaluate_variant};
 use bb_tests::recordings::broad;
 use std::error::Error;
 use std::path::Path;
@@ -26,7 +26,7 @@ const PUBLISHED: [Published; 7] = [
 /// The errors of each row on one recording, as `bb eval attitude` has them.
 pub(crate) fn errors(file: &Path, rows: &[Row]) -> Result<Vec<Degrees>, Box<dyn Error>> {
     let evaluator = Evaluator::new(rows.iter().map(Row::chosen).collect::<Result<_, _>>()?, Axes::Nine);
-    let evaluation = evaluate(file, &evaluator, &Progress::new("", 0));
+    let evaluation = evaluate_variant(file, 0, &evaluator, &Progress::new("", 0));
     let scores = evaluation.runs?.into_iter().map(|run| run.score.rms().ok_or("no sample moves and has truth"));
     Ok(scores.collect::<Result<_, _>>()?)
 }

@@ -3,7 +3,7 @@
 use super::list::{Family, Measure};
 use super::trial::Trial;
 use crate::averages::Averages;
-use crate::evaluate::ASKED;
+use crate::evaluate::CHECK_INTERVAL;
 use crate::filters::{Axes, Running};
 use crate::score::{Degrees, Score};
 use bb_core::nalgebra::{UnitQuaternion, Vector3};
@@ -126,7 +126,7 @@ pub(super) fn score(filter: &mut dyn Running, trial: &Trial, axes: Axes) -> Tria
     let mut estimates = Vec::with_capacity(trial.samples.len());
     let mut reported = Vec::new();
     let mut time = Duration::ZERO;
-    for samples in trial.samples.chunks(ASKED) {
+    for samples in trial.samples.chunks(CHECK_INTERVAL) {
         let started = Instant::now();
         filter.run(samples, &mut estimates);
         time += started.elapsed();
