@@ -8,7 +8,7 @@ use bb_core::nalgebra::UnitQuaternion;
 use bb_plot::{Band, Colour, Line, PALETTE, Panel, Picture, Point};
 use std::path::Path;
 
-/// Most viewers cannot open larger pictures.
+/// Largest number of panels; most viewers cannot open larger pictures.
 const MOST_PANELS: usize = 50;
 
 /// The truth is thick and light, so that it is seen under the estimates.

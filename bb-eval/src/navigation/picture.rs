@@ -5,12 +5,12 @@ use bb_estimators::navigation::chi_square::limit;
 use bb_plot::{Band, Colour, Line, PALETTE, Panel, Part, Plane, Point, Scale, Sheet};
 use std::path::Path;
 
-/// Most viewers cannot open a picture with more panels.
+/// Largest number of panels; most viewers cannot open larger pictures.
 const MOST_PANELS: usize = 120;
 
 /// Colour of expected bounds, and of what was refused.
 const BOUND: Colour = (150, 150, 150);
-/// The truth is thick and light, so that it is seen under the estimate.
+/// Colour and width of the truth: light and thick, so that it shows under the estimate.
 const TRUTH: Colour = (190, 190, 190);
 const TRUTH_WIDTH: u32 = 7;
 const REFUSED: Colour = (213, 0, 0);
@@ -24,7 +24,7 @@ const STATES: [(&str, Colour); 3] =
 /// The fraction of good innovations within their bound.
 const WITHIN: f64 = 0.95;
 
-/// A longer time without truth interrupts lines, s.
+/// Time without truth beyond which lines are interrupted, s.
 const INTERRUPTED_S: f64 = 5.0;
 
 /// The number of bins for errors by the age of the anchor.
@@ -100,7 +100,7 @@ fn parts(run: &Drawn) -> Vec<Part> {
     parts
 }
 
-/// Two columns of parts; what has no other beside it takes the width.
+/// Arranges parts in two columns; a part without a neighbour takes the whole width.
 fn in_columns(left: Vec<Part>, right: Vec<Part>) -> Vec<Part> {
     let mut right = right.into_iter();
     left.into_iter()
@@ -157,7 +157,7 @@ fn bounded(
     let line = |value: &dyn Fn(&Row) -> Option<f64>| -> Vec<Point> {
         let mut points: Vec<Point> = Vec::with_capacity(known.len());
         for row in &known {
-            // The line is interrupted where the truth is, and not between its samples.
+            // The line is interrupted where the truth is missing, but not between its samples.
             if let Some((last_s, _)) = points.last().copied()
                 && row.time_s - last_s > INTERRUPTED_S
             {

@@ -10,43 +10,43 @@ use bb_core::nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// A function of time in s.
-type Of<T> = Box<dyn Fn(f64) -> T>;
+type OverTime<T> = Box<dyn Fn(f64) -> T>;
 
-/// A field by place.
+/// A magnetic field as a function of the position.
 type Disturbance = Box<dyn Fn(&Vector3<f64>) -> Vector3<f64>>;
 
-/// The motion of a body, and what shakes and disturbs its sensors.
+/// The motion of a body, and the disturbances of its sensors.
 pub(super) struct Motion {
-    /// Samples a second.
+    /// Samples per second.
     pub(super) rate: f64,
     pub(super) length_s: f64,
-    /// Time of rest at first; errors count from then on.
+    /// Initial time of rest, after which errors count.
     pub(super) rest_s: f64,
-    /// `world_from_body`.
-    pub(super) rotation: Of<UnitQuaternion<f64>>,
-    /// m/s², without gravity.
-    pub(super) acceleration: Of<Vector3<f64>>,
-    /// m/s; `None` of a body that stays near its place.
-    pub(super) velocity: Option<Of<Vector3<f64>>>,
+    /// The orientation, `world_from_body`.
+    pub(super) rotation: OverTime<UnitQuaternion<f64>>,
+    /// The acceleration in the world without gravity, m/s².
+    pub(super) acceleration: OverTime<Vector3<f64>>,
+    /// The velocity in the world, m/s; `None` if the body stays near its place.
+    pub(super) velocity: Option<OverTime<Vector3<f64>>>,
     /// The standard deviation of the vibration on each axis of the accelerometer, m/s².
     pub(super) vibration: f64,
     /// The field of iron at a place of the world, T.
     pub(super) disturbance: Disturbance,
     /// The drift of the gyroscope's bias, rad/s.
-    pub(super) bias: Of<f64>,
+    pub(super) bias: OverTime<f64>,
 }
 
-/// Time for which every body but the walker rests at first, s.
+/// Initial time of rest of every body but the walker, s.
 const REST_S: f64 = 10.0;
 
 /// A course over ground.
 #[derive(Clone, Default)]
 struct Course {
-    /// m/s.
+    /// Speed, m/s.
     speed: Profile,
-    /// rad/s, to the left.
+    /// Angular velocity to the left, rad/s.
     turn: Profile,
-    /// Heading at first, rad from east to north.
+    /// Initial heading, rad from east to north.
     start: f64,
 }
 
@@ -60,7 +60,7 @@ impl Course {
         Vector3::new(cos, sin, 0.0) * self.speed.value(time_s)
     }
 
-    /// Forward and to the left, m/s².
+    /// The accelerations forward and to the left, m/s².
     fn accelerations(&self, time_s: f64) -> (f64, f64) {
         (self.speed.slope(time_s), self.speed.value(time_s) * self.turn.value(time_s))
     }
@@ -71,7 +71,7 @@ impl Course {
         Vector3::new(forward * cos - left * sin, forward * sin + left * cos, 0.0)
     }
 
-    /// A motion along it. Roll and pitch are given for a time and the accelerations forward and to the left.
+    /// Creates a motion along the course. `tilt` returns roll and pitch for a time and the accelerations forward and to the left.
     fn motion(self, rate: f64, length_s: f64, tilt: impl Fn(f64, (f64, f64)) -> (f64, f64) + 'static) -> Motion {
         let (other, third) = (self.clone(), self.clone());
         Motion {
@@ -91,7 +91,7 @@ impl Course {
     }
 }
 
-/// Sines: amplitude, frequency in Hz, phase.
+/// A sum of sines: amplitude, frequency in Hz, phase.
 #[derive(Clone)]
 struct Sines(Vec<(f64, f64, f64)>);
 
@@ -105,15 +105,15 @@ impl Sines {
     }
 }
 
-/// The part of the motion that has set in, from 0 at the end of the rest to 1.
-fn begun(rest_s: f64, within_s: f64) -> Profile {
-    let mut begun = Profile::default();
-    begun.step(rest_s, within_s, 1.0);
-    begun
+/// A ramp from 0 at the end of the rest to 1, by which motions begin smoothly.
+fn ramp(rest_s: f64, within_s: f64) -> Profile {
+    let mut ramp = Profile::default();
+    ramp.step(rest_s, within_s, 1.0);
+    ramp
 }
 
-/// Six minutes: it accelerates to 25 m/s on the runway, and flies circles of 120 m to the left, then to the right, in
-/// coordinated turns.
+/// Six minutes of a plane that accelerates to 25 m/s on the runway, and flies circles of 120 m to the left, then to the right,
+/// in coordinated turns.
 pub(super) fn plane(rate: f64, random: &mut Random) -> Motion {
     const SPEED: f64 = 25.0;
     const RADIUS: f64 = 120.0;
@@ -124,7 +124,7 @@ pub(super) fn plane(rate: f64, random: &mut Random) -> Motion {
         course.turn.step(ends_s, 4.0, -side * SPEED / RADIUS);
     }
     let (flies, roll, pitch) = (
-        begun(REST_S + 12.0, 5.0),
+        ramp(REST_S + 12.0, 5.0),
         Sines::new(random, &[(0.03, 0.31), (0.02, 0.87)]),
         Sines::new(random, &[(0.02, 0.23), (0.015, 0.71)]),
     );
@@ -136,11 +136,11 @@ pub(super) fn plane(rate: f64, random: &mut Random) -> Motion {
     Motion { vibration: 0.5, ..course.motion(rate, 360.0, tilt) }
 }
 
-/// Ten minutes in a town: roundabouts of 20 m at 8 m/s, and stops at 0.35 g.
+/// Ten minutes of a car in a town: roundabouts of 20 m at 8 m/s, and stops at 0.35 g.
 pub(super) fn car(random: &mut Random) -> Motion {
     const BRAKE: f64 = 0.35 * GRAVITY;
     const RADIUS: f64 = 20.0;
-    /// The greatest slope of a step, of its mean.
+    /// Ratio of the largest slope of a step to its mean slope.
     const STEEPEST: f64 = 1.875;
     let mut course = Course { start: random.uniform((0.0, TAU)), ..Course::default() };
     let mut time_s = REST_S;
@@ -168,7 +168,7 @@ pub(super) fn car(random: &mut Random) -> Motion {
         Sines::new(random, &[(0.006, 0.9), (0.004, 2.3)]),
         Sines::new(random, &[(0.006, 1.1), (0.004, 2.7)]),
     );
-    // The springs give way: outwards in a turn, and nose down when it brakes.
+    // The springs yield: outwards in a turn, and nose down under braking.
     let tilt = move |time_s: f64, (forward, left): (f64, f64)| {
         let rough = moves.value(time_s) / 14.0;
         (0.012 * left + rough * roll.at(time_s), -0.008 * forward + rough * pitch.at(time_s))
@@ -176,11 +176,11 @@ pub(super) fn car(random: &mut Random) -> Motion {
     Motion { vibration: 0.2, ..course.motion(100.0, 600.0, tilt) }
 }
 
-/// Ten minutes in swell.
+/// Ten minutes of a boat in swell.
 pub(super) fn boat(random: &mut Random) -> Motion {
     const SWELL: f64 = 0.15;
     let direction = random.uniform((0.0, TAU));
-    let begun = begun(REST_S, 10.0);
+    let ramp = ramp(REST_S, 10.0);
     // Swell comes in groups: the frequencies beside the main one make its height vary.
     let swell = |random: &mut Random, size: f64| {
         Sines::new(random, &[(0.75 * size, SWELL), (0.25 * size, 0.9 * SWELL), (0.1 * size, 2.1 * SWELL)])
@@ -188,13 +188,13 @@ pub(super) fn boat(random: &mut Random) -> Motion {
     let (roll, pitch) = (swell(random, 15_f64.to_radians()), swell(random, 5_f64.to_radians()));
     let (surge, sway, heave) = (swell(random, 1.0), swell(random, 0.4), swell(random, 0.5));
     let yaw = Sines::new(random, &[(0.6, 0.004), (0.12, 0.07), (0.03, SWELL)]);
-    let (also_begun, first, also_yaw) = (begun.clone(), yaw.at(0.0), yaw.clone());
+    let (also_ramp, first, also_yaw) = (ramp.clone(), yaw.at(0.0), yaw.clone());
     Motion {
         rate: 100.0,
         length_s: 600.0,
         rest_s: REST_S,
         rotation: Box::new(move |time_s| {
-            let begun = begun.value(time_s);
+            let begun = ramp.value(time_s);
             UnitQuaternion::from_euler_angles(
                 begun * roll.at(time_s),
                 begun * pitch.at(time_s),
@@ -202,7 +202,7 @@ pub(super) fn boat(random: &mut Random) -> Motion {
             )
         }),
         acceleration: Box::new(move |time_s| {
-            let begun = also_begun.value(time_s);
+            let begun = also_ramp.value(time_s);
             let heading = direction + begun * (also_yaw.at(time_s) - first);
             let along = Vector3::new(surge.at(time_s), sway.at(time_s), heave.at(time_s));
             UnitQuaternion::from_axis_angle(&Vector3::z_axis(), heading) * along * begun
@@ -217,15 +217,15 @@ pub(super) fn boat(random: &mut Random) -> Motion {
 /// Five minutes of a multirotor, whose thrust is along its vertical axis, so that its accelerometer always shows it
 /// level.
 pub(super) fn drone(random: &mut Random) -> Motion {
-    let begun = begun(REST_S, 5.0);
+    let start = ramp(REST_S, 5.0);
     let east = Sines::new(random, &[(1.5, 1.0 / 23.0), (0.8, 1.0 / 7.0)]);
     let north = Sines::new(random, &[(1.9, 1.0 / 40.0), (2.4, 1.0 / 11.0)]);
     let up = Sines::new(random, &[(0.4, 1.0 / 31.0), (1.4, 1.0 / 9.0)]);
     let yaw = Sines::new(random, &[(1.5, 1.0 / 47.0), (0.4, 1.0 / 13.0)]);
     let wobble = [Sines::new(random, &[(0.035, 1.3)]), Sines::new(random, &[(0.035, 0.7)])];
     let acceleration =
-        move |time_s: f64| Vector3::new(east.at(time_s), north.at(time_s), up.at(time_s)) * begun.value(time_s);
-    let (thrust, start) = (acceleration.clone(), self::begun(REST_S, 5.0));
+        move |time_s: f64| Vector3::new(east.at(time_s), north.at(time_s), up.at(time_s)) * start.value(time_s);
+    let (thrust, start) = (acceleration.clone(), ramp(REST_S, 5.0));
     Motion {
         rate: 200.0,
         length_s: 300.0,
@@ -247,7 +247,7 @@ pub(super) fn drone(random: &mut Random) -> Motion {
     }
 }
 
-/// Five minutes of a phone in the swinging hand of a walker, who turns corners. He walks from the first sample on.
+/// Five minutes of a phone in the swinging hand of a walker, who turns corners and walks from the first sample on.
 pub(super) fn walker(random: &mut Random) -> Motion {
     const STEPS: f64 = 1.8;
     let mut turn = Profile::default();
@@ -310,7 +310,7 @@ pub(super) fn steel(random: &mut Random) -> Motion {
     let columns: Vec<_> = (0..4)
         .flat_map(|side| (0..3).map(move |column| (side, 4.0 + 8.0 * f64::from(column))))
         .map(|(side, along)| {
-            // A metre outside of the way, at the height of the sensor.
+            // A metre outside the path, at the height of the sensor.
             let place = Rotation3::from_axis_angle(&Vector3::z_axis(), f64::from(side) * FRAC_PI_2)
                 * Vector3::new(along - 0.5 * SIDE, -0.5 * SIDE - 1.0, 0.0);
             (place + Vector3::new(0.5 * SIDE, 0.5 * SIDE, 0.0), random.direction() * 40e-6)
@@ -319,7 +319,7 @@ pub(super) fn steel(random: &mut Random) -> Motion {
     let disturbance = move |position: &Vector3<f64>| -> Vector3<f64> {
         let dipole = |(place, moment): &(Vector3<f64>, Vector3<f64>)| {
             let from = position - place;
-            // Closer than half a metre it is inside of the column.
+            // At less than half a metre, the position is inside the column.
             let distance = from.norm().max(0.5);
             (from * (3.0 * from.dot(moment) / (distance * distance)) - moment) / (2.0 * distance.powi(3))
         };

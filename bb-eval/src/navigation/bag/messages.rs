@@ -1,4 +1,4 @@
-//! The messages of the chosen topics.
+//! Reads the messages of the chosen topics from a bag.
 
 use super::notes::Notes;
 use super::topics::Topics;
@@ -6,9 +6,10 @@ use crate::frames::{TF_STATIC, TRANSFORM, frame};
 use crate::navigation::data::TruthMessage;
 use crate::navigation::feed::{Message, Time, What};
 use crate::progress::Progress;
+use bb_core::Payload;
 use bb_core::message::codec::ros::{TransformStamped, TransformsMessage};
 use bb_core::nalgebra::Isometry3;
-use bb_core::payload::{Imu, Odometry, Pose, PoseWithCovariance, Twist};
+use bb_core::payload::{Odometry, Pose, PoseWithCovariance, Twist};
 use bb_estimators::navigation::Geodetic;
 use bb_mcap::{Bag, BagMessage, ODOMETRY, POSE, RecordingError};
 use std::collections::HashMap;
@@ -18,7 +19,7 @@ use std::collections::HashMap;
 pub(super) struct Messages {
     /// Messages to the inputs of a filter, in the order of the file.
     pub(super) inputs: Vec<Message>,
-    /// A drifting odometry, by stamp; each with its arrival first.
+    /// Arrival, stamp and message of a drifting odometry, in the order of stamps.
     pub(super) relative: Vec<(Time, Time, Odometry)>,
     pub(super) truth: Vec<(Time, TruthMessage)>,
     /// First message of the topic to start from, with the velocity if it contains one.
@@ -64,27 +65,27 @@ impl Messages {
         let arrival_ns = i64::try_from(message.log_time_ns).unwrap_or(i64::MAX);
         let mut input = |stamp_ns: Time, what: What| self.inputs.push(Message { arrival_ns, stamp_ns, what });
         if topic == topics.imu {
-            let (imu, time) = message.payload::<Imu>()?;
-            input(time.as_unix_nanos(), What::Imu(imu));
+            let (time_ns, imu) = stamped(message)?;
+            input(time_ns, What::Imu(imu));
         }
         if is(&topics.gnss) {
-            let (fix, time) = message.payload()?;
-            input(time.as_unix_nanos(), What::Gnss(fix));
+            let (time_ns, fix) = stamped(message)?;
+            input(time_ns, What::Gnss(fix));
         }
         if is(&topics.odometry) {
-            let (time_ns, odometry) = odometry(message)?;
+            let (time_ns, odometry) = stamped(message)?;
             input(time_ns, What::Odometry(odometry));
         }
         if is(&topics.magnetic_field) {
-            let (field, time) = message.payload()?;
-            input(time.as_unix_nanos(), What::MagneticField(field));
+            let (time_ns, field) = stamped(message)?;
+            input(time_ns, What::MagneticField(field));
         }
         if is(&topics.pose) {
-            let (pose, time) = message.payload::<PoseWithCovariance>()?;
-            input(time.as_unix_nanos(), What::Pose(pose_of(pose)));
+            let (time_ns, pose) = stamped(message)?;
+            input(time_ns, What::Pose(pose_of(pose)));
         }
         if is(&topics.relative) {
-            let (time_ns, odometry) = odometry(message)?;
+            let (time_ns, odometry) = stamped(message)?;
             self.relative.push((arrival_ns, time_ns, odometry));
         }
         if is(&topics.truth) {
@@ -93,12 +94,12 @@ impl Messages {
         if is(&topics.start) && self.start.is_none() {
             self.start = Some(match &*message.schema {
                 ODOMETRY => {
-                    let (time, odometry) = odometry(message)?;
-                    (time, odometry.pose, Some(odometry.twist))
+                    let (time_ns, Odometry { pose, twist }) = stamped(message)?;
+                    (time_ns, pose, Some(twist))
                 }
                 _ => {
-                    let (pose, time) = message.payload::<PoseWithCovariance>()?;
-                    (time.as_unix_nanos(), pose_of(pose), None)
+                    let (time_ns, pose) = stamped(message)?;
+                    (time_ns, pose_of(pose), None)
                 }
             });
         }
@@ -110,13 +111,13 @@ impl Messages {
         self.inputs.iter().filter(move |message| message.what.input() == input).map(|message| message.stamp_ns)
     }
 
-    /// Makes the messages arrive at their stamps if the recorder's clock is not that of the stamps, and adds a note of it.
+    /// Makes the messages arrive at their stamps if the recorder's clock is not that of the stamps, and notes that.
     pub(super) fn settle_arrivals(&mut self, notes: &mut Notes) {
-        let lateness = |message: &Message| message.arrival_ns.saturating_sub(message.stamp_ns);
-        let mut late: Vec<Time> = self.inputs.iter().map(lateness).collect();
-        late.sort_unstable();
-        let Some(middle) = late.get(late.len() / 2) else { return };
-        if middle.abs() > FARTHEST_NS {
+        let delay_ns = |message: &Message| message.arrival_ns.saturating_sub(message.stamp_ns);
+        let mut delays_ns: Vec<Time> = self.inputs.iter().map(delay_ns).collect();
+        delays_ns.sort_unstable();
+        let Some(median_ns) = delays_ns.get(delays_ns.len() / 2) else { return };
+        if median_ns.abs() > LARGEST_DELAY_NS {
             notes.push(
                 "the recorder's clock is another than that of the stamps: messages arrive at their stamps, so delays are not \
                  played"
@@ -127,7 +128,7 @@ impl Messages {
         }
     }
 
-    /// Checks that there is an IMU to play, and says if its stamps go back.
+    /// Checks that there are samples of an IMU to play, and notes those whose stamps go back.
     pub(super) fn check_imu(&self, topic: &str, notes: &mut Notes) -> Result<(), String> {
         let stamps: Vec<Time> = self.stamps(0).collect();
         let mut newest = i64::MIN;
@@ -154,39 +155,40 @@ impl Messages {
     }
 }
 
-/// A recorder that is farther than this from the stamps, ns, has another clock.
-const FARTHEST_NS: Time = 5_000_000_000;
+/// Median delay beyond which the recorder's clock is taken to be another than that of the stamps, ns.
+const LARGEST_DELAY_NS: Time = 5_000_000_000;
 
-/// ROS writes zero for unknown.
+/// Converts a pose; a covariance of zeros is unknown, by the convention of ROS.
 fn pose_of(pose: PoseWithCovariance) -> Pose {
     let is_known = pose.covariance != bb_core::nalgebra::Matrix6::zeros();
     let covariance = is_known.then_some(pose.covariance);
     Pose { covariance, ..pose.into() }
 }
 
-fn odometry(message: &BagMessage) -> Result<(Time, Odometry), RecordingError> {
-    let (odometry, time) = message.payload()?;
-    Ok((time.as_unix_nanos(), odometry))
+/// The time in a message's header, and its payload.
+fn stamped<T: Payload>(message: &BagMessage) -> Result<(Time, T), RecordingError> {
+    let (payload, time) = message.payload()?;
+    Ok((time.as_unix_nanos(), payload))
 }
 
 fn truth_message(message: &BagMessage) -> Result<(Time, TruthMessage), RecordingError> {
     let isometry = |pose: &Pose| Isometry3::from_parts(pose.position.into(), pose.world_from_body);
     let (time_ns, content) = match &*message.schema {
         ODOMETRY => {
-            let (time_ns, Odometry { pose, twist }) = odometry(message)?;
+            let (time_ns, Odometry { pose, twist }) = stamped(message)?;
             (time_ns, TruthMessage::Moving(isometry(&pose), [twist.linear, twist.angular]))
         }
         POSE => {
-            let (pose, time) = message.payload()?;
-            (time.as_unix_nanos(), TruthMessage::Pose(isometry(&pose)))
+            let (time_ns, pose) = stamped(message)?;
+            (time_ns, TruthMessage::Pose(isometry(&pose)))
         }
         TRANSFORM => {
             let TransformStamped { header, transform, .. } = message.decode()?;
             (header.stamp.wall_time().as_unix_nanos(), TruthMessage::Pose(transform))
         }
         _ => {
-            let (fix, time) = message.payload()?;
-            (time.as_unix_nanos(), TruthMessage::OnEarth(Geodetic::of_fix(&fix, 0.0)))
+            let (time_ns, fix) = stamped(message)?;
+            (time_ns, TruthMessage::OnEarth(Geodetic::of_fix(&fix, 0.0)))
         }
     };
     Ok((time_ns, content))

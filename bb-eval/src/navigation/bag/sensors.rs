@@ -1,4 +1,4 @@
-//! Messages about the robot: relative poses from a drifting odometry, a state to start from.
+//! The feed of a filter from a bag: its messages, relative poses from a drifting odometry, and a state to start from.
 
 use super::NavigationBag;
 use super::notes::Notes;
@@ -12,23 +12,23 @@ use bb_core::payload::{GeodeticPosition, GnssFix, GnssStatus, Odometry, Pose, Re
 use bb_core::time::MonotonicTime;
 use bb_estimators::navigation::{Geodetic, LocalFrame};
 
-/// The assumed deviation of a true pose for a filter that starts there: m, rad.
+/// Standard deviations of a pose to start from that has no covariance: m, rad.
 const POSITION: f64 = 0.1;
 const ROTATION: f64 = 0.02;
 
-/// Deviation of a velocity from the truth, from its positions, and of an unknown one, m/s.
-const GIVEN: f64 = 0.1;
-const FROM_POSITIONS: f64 = 0.5;
-const UNKNOWN: f64 = 5.0;
+/// Standard deviations of a true velocity, of one from true positions, and of an unknown one, m/s.
+const TRUE_VELOCITY: f64 = 0.1;
+const VELOCITY_FROM_POSITIONS: f64 = 0.5;
+const UNKNOWN_VELOCITY: f64 = 5.0;
 
 /// The time over which true positions give a velocity, ns.
 const BASELINE_NS: i64 = 100_000_000;
 
-/// A pose, with the variances of translation and rotation if available.
-type Drifting = (Time, Time, Isometry3<f64>, Option<(f64, f64)>);
+/// Arrival, stamp and pose of a drifting odometry, with the variances of translation and rotation if available.
+type DriftingPose = (Time, Time, Isometry3<f64>, Option<(f64, f64)>);
 
 impl NavigationBag {
-    /// The messages for the inputs of a filter.
+    /// Creates the feed of a filter.
     pub(super) fn feed(&self) -> Result<Feed, String> {
         let topics = &self.topics;
         let mut mounts = [None; INPUTS.len()];
@@ -54,7 +54,7 @@ impl NavigationBag {
         Ok(feed)
     }
 
-    /// Says which fixes a filter cannot use.
+    /// Notes fixes that a filter cannot use.
     pub(super) fn doubt_fixes(&self, notes: &mut Notes) {
         let fixes: Vec<&GnssFix> = self.fixes().map(|(_, fix)| fix).collect();
         let is_nowhere = |fix: &&&GnssFix| fix.status != GnssStatus::NoFix && Geodetic::of_fix(fix, 0.0).is_none();
@@ -77,7 +77,7 @@ impl NavigationBag {
         }
     }
 
-    /// Says if fixes scatter more than their covariances state, as `bb info` does.
+    /// Notes that fixes scatter more than their covariances state, as `bb info` does.
     pub(super) fn doubt_covariances(&self, notes: &mut Notes) {
         let sample = |message: &Message| match &message.what {
             What::Imu(imu) => Some((message.stamp_ns, imu.angular_velocity, imu.linear_acceleration)),
@@ -106,7 +106,7 @@ impl NavigationBag {
         })
     }
 
-    /// The world of poses on the Earth: as given, or at the first fix.
+    /// The local frame of the world on the Earth: at the given origin, or at the first fix.
     fn world(&self) -> Option<LocalFrame> {
         let given = self.options.origin.map(|origin| origin.0);
         let first = || self.fixes().find_map(|(_, fix)| Geodetic::of_fix(fix, 0.0));
@@ -124,11 +124,11 @@ impl NavigationBag {
                     None => Isometry3::identity(),
                 };
                 let track = TrueTrack::new(&self.messages.truth, &base_from_truth, world);
-                at_truth(&track, first_ns)
+                start_from_truth(&track, first_ns)
                     .ok_or("the truth tells no orientation to start with; choose --start own, or a topic")?
             }
             (_, Some(topic)) => {
-                self.of_topic(topic)?.ok_or_else(|| format!("{topic} holds no pose to start from"))?
+                self.start_from_topic(topic)?.ok_or_else(|| format!("{topic} holds no pose to start from"))?
             }
             (Some(StartFrom::Topic(name)), None) => return Err(format!("{name}: no such topic")),
         };
@@ -137,7 +137,8 @@ impl NavigationBag {
         Ok(Some(Message { arrival_ns: stamp_ns, stamp_ns, what: What::Start(odometry) }))
     }
 
-    fn of_topic(&self, topic: &str) -> Result<Option<(Time, Odometry)>, String> {
+    /// The first state of the topic, for the base instead of the topic's frame.
+    fn start_from_topic(&self, topic: &str) -> Result<Option<(Time, Odometry)>, String> {
         let Some((time_ns, pose, twist)) = self.messages.start else { return Ok(None) };
         let base_from_part = self.frames.base_from(topic)?;
         let part = Isometry3::from_parts(pose.position.into(), pose.world_from_body);
@@ -149,14 +150,37 @@ impl NavigationBag {
             (turn * twist.linear - angular.cross(&base_from_part.translation.vector), angular, twist.covariance)
         });
         let (linear, angular, covariance) = state.unwrap_or((Vector3::zeros(), Vector3::zeros(), None));
-        let unknown = if twist.is_some() { None } else { Some(diagonal(UNKNOWN, 1.0)) };
+        let unknown = if twist.is_some() { None } else { Some(diagonal(UNKNOWN_VELOCITY, 1.0)) };
         let twist = Twist { linear, angular, covariance: covariance.or(unknown) };
-        Ok(Some((time_ns, Odometry { pose: state_of(&world_from_base, pose.covariance), twist })))
+        Ok(Some((time_ns, Odometry { pose: pose_of(&world_from_base, pose.covariance), twist })))
     }
 
     /// The motions between the poses of the drifting odometry.
     fn relative(&self) -> Result<Vec<Message>, String> {
-        let mut poses: Vec<Drifting> = Vec::new();
+        let poses = self.drifting_poses();
+        let usual = self.usual_deviations(&poses)?;
+        let motion = |pair: &[DriftingPose]| {
+            let [before @ (_, start_ns, from, _), after @ (arrival_ns, end_ns, to, _)] = pair else { return None };
+            let start_from_end = from.inverse() * to;
+            let (translation, rotation) = match self.options.relative_deviation {
+                Some(_) => usual,
+                None => added_deviations(before, after).unwrap_or(usual),
+            };
+            let relative = RelativePose {
+                start: MonotonicTime::from_nanos(*start_ns),
+                end: MonotonicTime::from_nanos(*end_ns),
+                position: start_from_end.translation.vector,
+                start_from_end: start_from_end.rotation,
+                covariance: Some(diagonal(translation, rotation)),
+            };
+            Some(Message { arrival_ns: *arrival_ns, stamp_ns: *end_ns, what: What::Relative(relative) })
+        };
+        Ok(poses.windows(2).filter_map(motion).collect())
+    }
+
+    /// The poses of the drifting odometry, without repeated stamps.
+    fn drifting_poses(&self) -> Vec<DriftingPose> {
+        let mut poses: Vec<DriftingPose> = Vec::new();
         for (arrival, time, odometry) in &self.messages.relative {
             let pose = &odometry.pose;
             let part = Isometry3::from_parts(pose.position.into(), pose.world_from_body);
@@ -170,46 +194,32 @@ impl NavigationBag {
             };
             poses.push((*arrival, *time, world_from_camera, mean(0).zip(mean(3))));
         }
-        let grown = |index: usize| -> Option<(f64, f64)> {
-            let (before, after) = (poses.get(index.checked_sub(1)?)?.3?, poses.get(index)?.3?);
-            let (translation, rotation) = (after.0 - before.0, after.1 - before.1);
-            (translation > 0.0 && rotation > 0.0).then(|| (translation.sqrt(), rotation.sqrt()))
-        };
-        let usual = match self.options.relative_deviation {
-            Some(of) => (of.translation, of.rotation),
-            None => {
-                let mut all: Vec<_> = (0..poses.len()).filter_map(grown).collect();
-                all.sort_by(|a, b| a.0.total_cmp(&b.0));
-                match (all.get(all.len() / 2), &self.topics.relative) {
-                    (Some(median), _) => *median,
-                    (None, Some(topic)) if poses.len() > 1 => {
-                        return Err(format!(
-                            "the covariance of {topic} does not grow, so it does not tell how well its poses are known \
-                             relative to each other; say so with --relative-deviation"
-                        ));
-                    }
-                    _ => (1.0, 1.0),
-                }
-            }
-        };
-        let motion = |(index, pair): (usize, &[Drifting])| {
-            let [(_, start_ns, from, _), (arrival_ns, end_ns, to, _)] = pair else { return None };
-            let way = from.inverse() * to;
-            let (translation, rotation) = match self.options.relative_deviation {
-                Some(_) => usual,
-                None => grown(index + 1).unwrap_or(usual),
-            };
-            let relative = RelativePose {
-                start: MonotonicTime::from_nanos(*start_ns),
-                end: MonotonicTime::from_nanos(*end_ns),
-                position: way.translation.vector,
-                start_from_end: way.rotation,
-                covariance: Some(diagonal(translation, rotation)),
-            };
-            Some(Message { arrival_ns: *arrival_ns, stamp_ns: *end_ns, what: What::Relative(relative) })
-        };
-        Ok(poses.windows(2).enumerate().filter_map(motion).collect())
+        poses
     }
+
+    /// The deviations of a motion whose own are unknown: as given, or the median of those known.
+    fn usual_deviations(&self, poses: &[DriftingPose]) -> Result<(f64, f64), String> {
+        if let Some(given) = self.options.relative_deviation {
+            return Ok((given.translation, given.rotation));
+        }
+        let mut all: Vec<_> = poses.windows(2).filter_map(|pair| added_deviations(&pair[0], &pair[1])).collect();
+        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        match (all.get(all.len() / 2), &self.topics.relative) {
+            (Some(median), _) => Ok(*median),
+            (None, Some(topic)) if poses.len() > 1 => Err(format!(
+                "the covariance of {topic} does not grow, so it does not tell how well its poses are known \
+                 relative to each other; say so with --relative-deviation"
+            )),
+            _ => Ok((1.0, 1.0)),
+        }
+    }
+}
+
+/// The deviations of translation and rotation that a motion adds; `None` if the variances do not grow.
+fn added_deviations(before: &DriftingPose, after: &DriftingPose) -> Option<(f64, f64)> {
+    let (before, after) = (before.3?, after.3?);
+    let (translation, rotation) = (after.0 - before.0, after.1 - before.1);
+    (translation > 0.0 && rotation > 0.0).then(|| (translation.sqrt(), rotation.sqrt()))
 }
 
 /// The covariance with these deviations of the first and of the last three.
@@ -218,7 +228,8 @@ fn diagonal(first: f64, last: f64) -> Matrix6<f64> {
     Matrix6::from_diagonal(&variances.into())
 }
 
-fn state_of(world_from_base: &Isometry3<f64>, covariance: Option<Matrix6<f64>>) -> Pose {
+/// A pose with its covariance, or an assumed one.
+fn pose_of(world_from_base: &Isometry3<f64>, covariance: Option<Matrix6<f64>>) -> Pose {
     Pose {
         position: world_from_base.translation.vector,
         world_from_body: world_from_base.rotation,
@@ -226,18 +237,18 @@ fn state_of(world_from_base: &Isometry3<f64>, covariance: Option<Matrix6<f64>>) 
     }
 }
 
-fn at_truth(track: &TrueTrack, first_ns: Time) -> Option<(Time, Odometry)> {
+fn start_from_truth(track: &TrueTrack, first_ns: Time) -> Option<(Time, Odometry)> {
     let points = track.points();
     let from = points.iter().position(|(time, truth)| *time >= first_ns && truth.world_from_body.is_some())?;
     let (time_ns, Truth { position, world_from_body, velocity }) = points.get(from)?;
     let later = points.iter().skip(from).find(|(time, _)| time - time_ns >= BASELINE_NS);
-    let velocity = velocity.map(|velocity| (velocity, GIVEN)).or_else(|| {
+    let velocity = velocity.map(|velocity| (velocity, TRUE_VELOCITY)).or_else(|| {
         let (later_ns, later) = later?;
         let seconds = (later_ns - time_ns) as f64 * 1e-9;
-        Some(((later.position - position) / seconds, FROM_POSITIONS))
+        Some(((later.position - position) / seconds, VELOCITY_FROM_POSITIONS))
     });
-    let (velocity, deviation) = velocity.unwrap_or((Vector3::zeros(), UNKNOWN));
-    let pose = state_of(&Isometry3::from_parts((*position).into(), (*world_from_body)?), None);
+    let (velocity, deviation) = velocity.unwrap_or((Vector3::zeros(), UNKNOWN_VELOCITY));
+    let pose = pose_of(&Isometry3::from_parts((*position).into(), (*world_from_body)?), None);
     let linear = pose.world_from_body.inverse() * velocity;
     let twist = Twist { linear, angular: Vector3::zeros(), covariance: Some(diagonal(deviation, 1.0)) };
     Some((*time_ns, Odometry { pose, twist }))
