@@ -2,6 +2,7 @@
 
 use crate::values::FromJson;
 use bb_core::message::codec::ros::Header;
+use bb_eval::Progress;
 use bb_eval::filters::near;
 use bb_mcap::{Bag, BagMessage, MessageDefinition, Topic, Value};
 use std::path::Path;
@@ -28,6 +29,29 @@ pub(crate) fn find<'a>(bag: &'a Bag, name: &str) -> Result<&'a Topic, String> {
             false => format!("{file}: no topic {full}; {}", near(&full, &names)),
         }
     })
+}
+
+/// Reads the messages of topics with a progress bar, and returns the damage that cuts the file off, if any.
+pub(crate) fn read_all(
+    bag: &Bag,
+    topics: &[&Topic],
+    mut take: impl FnMut(&BagMessage) -> Result<(), String>,
+) -> Result<Option<String>, String> {
+    let names: Vec<_> = topics.iter().map(|topic| &topic.name).collect();
+    let progress = Progress::new("reading", topics.iter().filter_map(|topic| topic.messages).sum());
+    let mut broken = None;
+    for message in bag.messages_in_any_encoding(&names).map_err(|error| error.to_string())? {
+        match message {
+            Ok(message) => take(&message)?,
+            Err(error) => {
+                broken = Some(error.to_string());
+                break;
+            }
+        }
+        progress.add(1);
+    }
+    progress.finish();
+    Ok(broken)
 }
 
 /// Returns whether a topic has this name, with or without a leading slash.

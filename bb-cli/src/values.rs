@@ -5,10 +5,10 @@ use serde::de::{self, Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
 use serde::ser::{Serialize, SerializeMap, Serializer};
 use std::fmt;
 
-/// Longer lists are not printed as text.
+/// Number of elements after which a list printed as text is cut off.
 const MOST_ELEMENTS: usize = 16;
 
-/// A value as JSON: fields in order, and values that JSON has no number for as strings.
+/// A value as JSON: fields in order, and numbers that JSON cannot express as strings.
 pub(crate) struct Json<'a>(pub(crate) &'a Value);
 
 impl Serialize for Json<'_> {
@@ -44,7 +44,7 @@ fn not_finite(value: f64) -> &'static str {
     }
 }
 
-/// A value read from JSON: objects are messages, and `null` is a missing value, NaN.
+/// A value read from JSON: objects are messages, and `null` is NaN.
 pub(crate) struct FromJson(pub(crate) Value);
 
 impl<'de> Deserialize<'de> for FromJson {
@@ -103,8 +103,8 @@ impl<'de> Visitor<'de> for AnyValue {
     }
 }
 
-/// A message as lines of text, each with its line end. Payloads have an empty list for each field that is not there and
-/// for each variant that it is not: with `leaves_out_empty` those are left out.
+/// Formats a message as lines of text. In payloads, absent fields and the variants not in use are empty lists; `leaves_out_empty` omits
+/// them.
 pub(crate) fn text(value: &Value, leaves_out_empty: bool) -> String {
     let mut text = String::new();
     write_fields(value, leaves_out_empty, 0, &mut text);

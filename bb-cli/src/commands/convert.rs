@@ -84,26 +84,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
     let first = Input { file: input.clone(), columns: columns.clone(), rate: *rate, topic: None };
     let mut inputs = Vec::new();
     for input in std::iter::once(&first).chain(with) {
-        match input.format().map_err(|fault| in_file(&input.file, fault))? {
-            Format::Description => {
-                input.check(Format::Description).map_err(|fault| in_file(&input.file, fault))?;
-                let files = input::described(&input.file).map_err(|fault| in_file(&input.file, fault))?;
-                for file in files {
-                    let format = file.format().map_err(|fault| in_file(&file.file, fault))?;
-                    if format == Format::Description {
-                        return Err(in_file(
-                            &input.file,
-                            format!(
-                                "it names {}, another description; list that one's files here, or name both with --with",
-                                file.file.display()
-                            ),
-                        ));
-                    }
-                    inputs.push((file, format));
-                }
-            }
-            format => inputs.push((input.clone(), format)),
-        }
+        inputs.extend(files(input)?);
     }
     for (input, format) in &inputs {
         input.check(*format).map_err(|fault| in_file(&input.file, fault))?;
@@ -114,7 +95,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
     if let Some((bag, _)) = inputs.iter().find(|(_, format)| *format == Format::Ros1) {
         return Err(in_file(&bag.file, "a bag of ROS 1 is converted alone, since it has topics of its own".into()));
     }
-    complete(&inputs)?;
+    check_columns(&inputs)?;
     let mut sources = Vec::new();
     for (input, format) in &inputs {
         sources.push(Source::open(input, *format).map_err(|fault| in_file(&input.file, fault))?);
@@ -122,12 +103,34 @@ pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
     write(out, |each| merge(sources, each))
 }
 
+/// The input with its format, or the files of a description with theirs.
+fn files(input: &Input) -> Result<Vec<(Input, Format)>, String> {
+    let in_input = |fault| in_file(&input.file, fault);
+    let format = input.format().map_err(in_input)?;
+    if format != Format::Description {
+        return Ok(vec![(input.clone(), format)]);
+    }
+    input.check(format).map_err(in_input)?;
+    let mut files = Vec::new();
+    for file in input::described(&input.file).map_err(in_input)? {
+        let format = file.format().map_err(|fault| in_file(&file.file, fault))?;
+        if format == Format::Description {
+            return Err(in_input(format!(
+                "it names {}, another description; list that one's files here, or name both with --with",
+                file.file.display()
+            )));
+        }
+        files.push((file, format));
+    }
+    Ok(files)
+}
+
 fn in_file(file: &Path, fault: String) -> String {
     format!("{}: {fault}", file.display())
 }
 
-/// Checks that an angular velocity has a specific force, if need be in another file.
-fn complete(inputs: &[(Input, Format)]) -> Result<(), String> {
+/// Checks that a specific force comes with the angular velocity, perhaps in another file.
+fn check_columns(inputs: &[(Input, Format)]) -> Result<(), String> {
     let has = |what: What| inputs.iter().any(|(input, _)| has(&input.columns, what));
     let is_table_alone = inputs.iter().all(|(_, format)| *format == Format::Csv);
     let columns = inputs.iter().any(|(input, _)| !input.columns.is_empty());
@@ -142,7 +145,7 @@ fn complete(inputs: &[(Input, Format)]) -> Result<(), String> {
     Ok(())
 }
 
-/// Writes the entries that `read` passes on, and says how many there are. Removes a bag that is incomplete.
+/// Writes the entries that `read` passes on, and prints their counts and its notes. Removes an incomplete bag.
 fn write(
     out: &Path,
     read: impl FnOnce(&mut dyn FnMut(Entry) -> Result<(), String>) -> Result<Vec<String>, String>,
@@ -156,14 +159,13 @@ fn write(
             Ok(true)
         }
         Err(fault) => {
-            // This run created it, and it is incomplete.
             let _ = std::fs::remove_file(out);
             Err(fault)
         }
     }
 }
 
-/// Passes on the entries of all files by time. Returns what is to be said of them.
+/// Passes on the entries of all files in the order of their times, and returns notes on them.
 fn merge(
     mut sources: Vec<Source>,
     each: &mut dyn FnMut(Entry) -> Result<(), String>,

@@ -1,6 +1,6 @@
 //! `bb hz`: the rates of topics.
 
-use crate::topics::{TopicReader, find, is_of_events, log_ns, open};
+use crate::topics::{TopicReader, find, is_of_events, log_ns, open, read_all};
 use bb_eval::Periods;
 use bb_eval::table::aligned;
 use clap::Args;
@@ -44,28 +44,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
     if topics.is_empty() {
         topics = bag.topics().iter().collect();
     }
-    let names: Vec<_> = topics.iter().map(|topic| &topic.name).collect();
     let readers: HashMap<_, _> =
         topics.iter().filter_map(|topic| Some((topic.name.clone(), TopicReader::new(topic).ok()?))).collect();
-
-    let expected = topics.iter().filter_map(|topic| topic.messages).sum();
-    let progress = bb_eval::Progress::new("reading", expected);
     let mut times: HashMap<_, Vec<i64>> = HashMap::new();
-    let mut broken = None;
-    for message in bag.messages_in_any_encoding(&names).map_err(|error| error.to_string())? {
-        let message = match message {
-            Ok(message) => message,
-            Err(error) => {
-                broken = Some(error.to_string());
-                break;
-            }
-        };
-        let stamp = readers.get(&message.topic).and_then(|reader| reader.stamp_ns(&message));
-        times.entry(message.topic.clone()).or_default().push(stamp.unwrap_or_else(|| log_ns(&message)));
-        progress.add(1);
-    }
-    progress.finish();
-
+    let broken = read_all(&bag, &topics, |message| {
+        let stamp = readers.get(&message.topic).and_then(|reader| reader.stamp_ns(message));
+        times.entry(message.topic.clone()).or_default().push(stamp.unwrap_or_else(|| log_ns(message)));
+        Ok(())
+    })?;
     let periods: Vec<_> = topics
         .iter()
         .map(|topic| {
@@ -76,10 +62,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
         })
         .collect();
     crate::say(&if arguments.json { json(&periods)? } else { table(&periods) })?;
-    match broken {
-        Some(fault) => Err(fault),
-        None => Ok(true),
-    }
+    broken.map_or(Ok(true), Err)
 }
 
 fn json(topics: &[(&str, usize, Option<Periods>)]) -> Result<String, String> {

@@ -4,13 +4,12 @@ mod select;
 mod series;
 mod units;
 
-use crate::topics::{TopicReader, find, is_named, log_ns, open};
+use crate::topics::{TopicReader, find, is_named, log_ns, open, read_all};
 use bb_mcap::{Bag, Topic};
 use bb_plot::Picture;
 use clap::Args;
 pub(crate) use series::{Series, write};
 use std::path::PathBuf;
-use std::sync::Arc;
 
 /// Plots fields of messages over time, by the stamps in the headers, or by the log times if there are none.
 #[derive(Debug, Args)]
@@ -56,10 +55,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
     let series: Vec<&Series> = chosen.iter().map(|chosen| &chosen.series).collect();
     write(title, &series, &arguments.out)?;
     eprintln!("plotted {}", arguments.out.display());
-    match broken {
-        Some(fault) => Err(fault),
-        None => Ok(true),
-    }
+    broken.map_or(Ok(true), Err)
 }
 
 /// The topic and the path of a field in it. The name of a topic may contain dots: the longest match is used.
@@ -88,30 +84,14 @@ fn choose<'a>(bag: &'a Bag, field: &str) -> Result<Chosen<'a>, String> {
 
 /// Reads the values; returns the damage that cut the file off, if any.
 fn read(bag: &Bag, chosen: &mut [Chosen<'_>]) -> Result<Option<String>, String> {
-    let mut names: Vec<Arc<str>> = chosen.iter().map(|chosen| Arc::clone(&chosen.topic.name)).collect();
-    names.sort_unstable();
-    names.dedup();
-    let is_read = |topic: &&Topic| names.contains(&topic.name);
-    let progress = bb_eval::Progress::new(
-        "reading",
-        bag.topics().iter().filter(is_read).filter_map(|topic| topic.messages).sum(),
-    );
-    let mut broken = None;
-    for message in bag.messages_in_any_encoding(&names).map_err(|error| error.to_string())? {
-        let message = match message {
-            Ok(message) => message,
-            Err(error) => {
-                broken = Some(error.to_string());
-                break;
-            }
-        };
-        progress.add(1);
+    let is_chosen = |topic: &&Topic| chosen.iter().any(|chosen| chosen.topic.name == topic.name);
+    let topics: Vec<&Topic> = bag.topics().iter().filter(is_chosen).collect();
+    read_all(bag, &topics, |message| {
         for chosen in chosen.iter_mut().filter(|chosen| chosen.topic.name == message.topic) {
-            let value = chosen.reader.read(&message)?;
-            let time_ns = chosen.reader.stamp_ns(&message).unwrap_or_else(|| log_ns(&message));
+            let value = chosen.reader.read(message)?;
+            let time_ns = chosen.reader.stamp_ns(message).unwrap_or_else(|| log_ns(message));
             chosen.series.add(time_ns, &value);
         }
-    }
-    progress.finish();
-    Ok(broken)
+        Ok(())
+    })
 }

@@ -5,21 +5,23 @@ use serde_json::{Value, json};
 use std::collections::VecDeque;
 use std::net::TcpStream;
 use std::time::Duration;
+use strsim::levenshtein;
 use tungstenite::{Message, WebSocket};
 
 /// The version of the protocol.
 const VERSION: u64 = 1;
-/// A robot that says nothing for so long is gone; it sends reports all the time.
+/// Time without a message after which the robot is gone, since it sends reports all the time.
 const SILENCE: Duration = Duration::from_secs(10);
 
 /// A running robot.
 pub(super) struct Robot {
     socket: WebSocket<TcpStream>,
     host: String,
-    next: u64,
-    /// Messages that came while an answer was awaited.
+    /// The id of the next request.
+    next_id: u64,
+    /// Messages that arrived while an answer was awaited.
     kept: VecDeque<Value>,
-    /// `true` once a report has come. The first is the last one that was made, perhaps before this connection.
+    /// `true` once a report has arrived. The first may have been made before the connection.
     has_report: bool,
     /// Name and parts of the robot, and the rights of this connection.
     pub(super) welcome: Value,
@@ -46,7 +48,7 @@ impl Robot {
         let mut robot = Self {
             socket,
             host: host.clone(),
-            next: 1,
+            next_id: 1,
             kept: VecDeque::new(),
             has_report: false,
             welcome: Value::Null,
@@ -60,7 +62,7 @@ impl Robot {
         Ok(robot)
     }
 
-    /// Parts of the robot.
+    /// The description of the robot's parts.
     pub(super) fn description(&self) -> &Value {
         &self.welcome["description"]
     }
@@ -70,14 +72,14 @@ impl Robot {
         self.description()[list].as_array().map_or(&[], Vec::as_slice)
     }
 
-    /// The element of a list with that path, which may lack its `prefix`; the error names the nearest one.
+    /// The element of a list with this path, which may lack its `prefix`; the error names the nearest one.
     pub(super) fn element(&self, list: &str, prefix: &str, path: &str) -> Result<&Value, String> {
         let long = format!("{prefix}{path}");
         let elements = self.listed(list);
         let found = elements.iter().find(|one| one["path"] == path || one["path"] == long.as_str());
         found.ok_or_else(|| {
             let mut paths: Vec<&str> = elements.iter().filter_map(|one| one["path"].as_str()).collect();
-            paths.sort_by_key(|known| distance(known, path).min(distance(known, &long)));
+            paths.sort_by_key(|known| levenshtein(known, path).min(levenshtein(known, &long)));
             match paths.first() {
                 Some(near) => format!("the robot has no `{path}`; did you mean `{near}`?"),
                 None => format!("the robot has no `{path}`"),
@@ -93,7 +95,7 @@ impl Robot {
         }
     }
 
-    /// The next report that was made since the connection.
+    /// The next report made since the connection.
     pub(super) fn report(&mut self) -> Result<Value, String> {
         loop {
             if let Some(report) = self.next()?.get_mut("report")
@@ -106,8 +108,8 @@ impl Robot {
 
     /// Makes a request, and returns its answer.
     pub(super) fn ask(&mut self, op: &str, mut more: Value) -> Result<Value, String> {
-        let id = self.next;
-        self.next += 1;
+        let id = self.next_id;
+        self.next_id += 1;
         more["op"] = op.into();
         more["id"] = id.into();
         self.socket.send(Message::text(more.to_string())).map_err(|_| self.gone())?;
@@ -144,20 +146,4 @@ impl Robot {
     fn gone(&self) -> String {
         format!("the robot at {} is gone", self.host)
     }
-}
-
-/// The number of changes between two words.
-fn distance(one: &str, other: &str) -> usize {
-    let other: Vec<char> = other.chars().collect();
-    let mut row: Vec<usize> = (0..=other.len()).collect();
-    for (index, letter) in one.chars().enumerate() {
-        let mut before = index;
-        row[0] = index + 1;
-        for (column, wanted) in other.iter().enumerate() {
-            let change = before + usize::from(letter != *wanted);
-            before = row[column + 1];
-            row[column + 1] = change.min(before + 1).min(row[column] + 1);
-        }
-    }
-    row[other.len()]
 }

@@ -1,8 +1,8 @@
-//! A JSON value as lines, like those of `bb echo`.
+//! JSON values as indented lines, like those of `bb echo`.
 
 use serde_json::Value;
 
-/// The lines of a value, indented by `depth` steps.
+/// Appends the lines of a value, indented by `depth` steps.
 pub(super) fn lines(value: &Value, depth: usize, text: &mut String) {
     let indent = "  ".repeat(depth);
     let Value::Object(members) = value else {

@@ -4,43 +4,44 @@ use super::{AXES, Sample};
 use bb_eval::table::counted;
 use std::ops::Range;
 
-/// After a longer time between two samples, in periods, samples are missing.
-const MISSING: f64 = 1.5;
+/// Time between two samples beyond which samples are missing, in periods.
+const LONGEST_PERIOD: f64 = 1.5;
 
-/// Motion is detected in windows of this length, s.
+/// Length of the windows in which motion is detected, s.
 const WINDOW_S: f64 = 1.0;
 
-/// A window is motion if its samples vary this many times as much as usual, or if its mean differs from the previous
-/// one by this many times the usual variation of a sample: no bias drifts so fast.
-const MORE: f64 = 4.0;
+/// Variation beyond which a window is motion, in multiples of the usual variation of a sample. Its mean may differ from the
+/// previous one by as much: no bias drifts so fast.
+const LARGEST_VARIATION: f64 = 4.0;
 
-/// A gyroscope at rest reads less, rad/s.
-const TURNING: f64 = 0.2;
+/// Mean angular velocity beyond which a gyroscope is not at rest, rad/s.
+const LARGEST_RATE: f64 = 0.2;
 
 /// The shortest usable part, s.
 const LEAST_S: f64 = 10.0;
 
-/// Least number of levels: with fewer, a sensor cannot be distinguished from a saturated one.
+/// Number of different values up to which a sensor cannot be distinguished from a saturated one.
 const LEVELS: usize = 20;
 
-/// A larger fraction of samples at one end of the range means saturation.
-const AT_THE_END: f64 = 0.1;
+/// Fraction of samples at one end of the range beyond which an axis is saturated.
+const LARGEST_SHARE: f64 = 0.1;
 
 /// The longest part in which the IMU is at rest.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Still {
     pub(super) samples: Range<usize>,
     pub(super) period_s: f64,
-    /// Begin of the part, after the first sample of the recording, s.
+    /// Start of the part after the first sample of the recording, s.
     pub(super) from_s: f64,
     pub(super) seconds: f64,
     /// Remarks on the recording.
     pub(super) warnings: Vec<String>,
 }
 
-/// # Errors
+/// Finds the longest part at rest without a gap.
 ///
-/// There is no long enough part at rest; in words.
+/// # Errors
+/// A message that no part is long enough.
 pub(super) fn still(samples: &[Sample]) -> Result<Still, String> {
     let (Some(first), true) = (samples.first(), samples.len() >= 2) else {
         return Err(format!("{} samples are too few", samples.len()));
@@ -55,9 +56,9 @@ pub(super) fn still(samples: &[Sample]) -> Result<Still, String> {
         return Err("the stamps of the samples do not grow".into());
     }
     let mut warnings = Vec::new();
-    let mut breaks = missing(samples, usual, &at, &mut warnings);
+    let mut breaks = gaps(samples, usual, &at, &mut warnings);
     let window = ((WINDOW_S * 1e9 / usual as f64) as usize).max(8);
-    moved(samples, window, &at, &mut breaks, &mut warnings);
+    add_motion(samples, window, &at, &mut breaks, &mut warnings);
     breaks.sort_by_key(|part| part.start);
     let longest = longest(samples.len(), &breaks);
     let (from_s, to_s) = (at(longest.start), at(longest.end.saturating_sub(1)));
@@ -73,56 +74,54 @@ pub(super) fn still(samples: &[Sample]) -> Result<Still, String> {
         warnings.push(format!("taken from {from_s:.1} to {to_s:.1} s, the longest part at rest without a gap"));
     }
     let part = samples.get(longest.clone()).unwrap_or_default();
-    turning(part)?;
+    check_rate(part)?;
     warnings.extend((0..AXES.len()).filter_map(|axis| saturated(part, axis)));
     let period_s = seconds / (part.len().saturating_sub(1).max(1)) as f64;
     Ok(Still { samples: longest, period_s, from_s, seconds, warnings })
 }
 
-/// The boundaries between parts, as ranges of samples that belong to neither.
-fn missing(
+/// The breaks between parts without gaps, as ranges of samples that belong to no part.
+fn gaps(
     samples: &[Sample],
     usual: i64,
     at: &dyn Fn(usize) -> f64,
     warnings: &mut Vec<String>,
 ) -> Vec<Range<usize>> {
     let mut breaks = Vec::new();
-    let (mut missing, mut back, mut numbers) = ((0, 0.0, 0.0), (0, 0.0), (0, 0.0));
+    let mut missing = Vec::new();
+    let mut back = Vec::new();
+    let mut not_finite = Vec::new();
     for (index, pair) in samples.windows(2).enumerate() {
         let period = pair[1].time_ns - pair[0].time_ns;
         if period <= 0 {
-            back = (back.0 + 1, if back.0 == 0 { at(index + 1) } else { back.1 });
+            back.push(index + 1);
             breaks.push(index + 1..index + 1);
-        } else if period as f64 > MISSING * usual as f64 {
-            if missing.0 == 0 {
-                missing = (0, period as f64 * 1e-9, at(index));
-            }
-            missing.0 += 1;
+        } else if period as f64 > LONGEST_PERIOD * usual as f64 {
+            missing.push((index, period as f64 * 1e-9));
             breaks.push(index + 1..index + 1);
         }
     }
     for (index, sample) in samples.iter().enumerate() {
         if !sample.axes.iter().all(|value| value.is_finite()) {
-            numbers = (numbers.0 + 1, if numbers.0 == 0 { at(index) } else { numbers.1 });
+            not_finite.push(index);
             breaks.push(index..index + 1);
         }
     }
-    if missing.0 > 0 {
-        let (count, first_s, at_s) = missing;
-        let times = counted(count, "time", "times");
-        warnings.push(format!("samples are missing {times}, first for {first_s:.3} s after {at_s:.2} s"));
+    if let Some((first, period_s)) = missing.first() {
+        let times = counted(missing.len(), "time", "times");
+        warnings.push(format!("samples are missing {times}, first for {period_s:.3} s after {:.2} s", at(*first)));
     }
-    if back.0 > 0 {
-        warnings.push(format!("the time runs back {} times, first at {:.2} s", back.0, back.1));
+    if let Some(first) = back.first() {
+        warnings.push(format!("the time runs back {} times, first at {:.2} s", back.len(), at(*first)));
     }
-    if numbers.0 > 0 {
-        warnings.push(format!("{} samples are no numbers, the first at {:.2} s", numbers.0, numbers.1));
+    if let Some(first) = not_finite.first() {
+        warnings.push(format!("{} samples are no numbers, the first at {:.2} s", not_finite.len(), at(*first)));
     }
     breaks
 }
 
-/// Adds the windows in which an axis moves.
-fn moved(
+/// Adds the windows in which an axis moves to `breaks`.
+fn add_motion(
     samples: &[Sample],
     window: usize,
     at: &dyn Fn(usize) -> f64,
@@ -146,7 +145,7 @@ fn moved(
             let before =
                 index.checked_sub(1).and_then(|before| moments.get(before)).map_or(*mean, |(mean, _)| *mean);
             let more = deviation.max((mean - before).abs()) / usual;
-            if more > MORE {
+            if more > LARGEST_VARIATION {
                 breaks.push(index * window..((index + 1) * window).min(samples.len()));
                 count += 1;
                 if worst.is_none_or(|(_, most)| most < more) {
@@ -185,10 +184,10 @@ fn longest(count: usize, breaks: &[Range<usize>]) -> Range<usize> {
     longest
 }
 
-fn turning(samples: &[Sample]) -> Result<(), String> {
+fn check_rate(samples: &[Sample]) -> Result<(), String> {
     for (axis, name) in AXES.iter().enumerate().take(3) {
         let (mean, _) = moments(samples, axis);
-        if mean.abs() > TURNING {
+        if mean.abs() > LARGEST_RATE {
             return Err(format!("{name} reads {mean:.2} rad/s on average: the IMU turns, or is not in rad/s"));
         }
     }
@@ -202,7 +201,7 @@ fn saturated(samples: &[Sample], axis: usize) -> Option<String> {
     let count = values.len();
     let mut levels = 1 + values.windows(2).filter(|pair| pair[0] != pair[1]).count();
     if levels < 2 {
-        return None; // Constant, which is an error of the axis.
+        return None; // A constant axis is reported as an error of that axis.
     }
     levels = levels.min(LEVELS + 1);
     let name = AXES[axis];
@@ -214,7 +213,7 @@ fn saturated(samples: &[Sample], axis: usize) -> Option<String> {
     }
     for (end, value) in [("largest", values.last()?), ("smallest", values.first()?)] {
         let share = values.iter().filter(|other| *other == value).count() as f64 / count as f64;
-        if share > AT_THE_END {
+        if share > LARGEST_SHARE {
             let percent = share * 100.0;
             return Some(format!("{name} is saturated: {percent:.0} % of its samples are the {end}, {value}"));
         }

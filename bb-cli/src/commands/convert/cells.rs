@@ -10,14 +10,14 @@ use csv::StringRecord;
 use std::path::Path;
 use std::sync::Arc;
 
-/// The last time of a ROS stamp, whose seconds have 32 bits, nanoseconds.
+/// The last time of a ROS stamp, whose seconds have 32 bits, ns.
 pub(super) const LAST_NS: i64 = i32::MAX as i64 * 1_000_000_000 + 999_999_999;
 
 /// The source of the rows' times.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Times {
     Column,
-    /// Hz; the first row is at zero.
+    /// Rate in Hz; the first row is at zero.
     Rate(f64),
 }
 
@@ -25,20 +25,20 @@ pub(super) enum Times {
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Row {
     time_ns: i64,
-    /// rad/s
+    /// Angular velocity, rad/s.
     angular_velocity: Option<[f64; 3]>,
-    /// m/s²
+    /// Specific force, m/s².
     specific_force: Option<[f64; 3]>,
-    /// T
+    /// Magnetic field, T.
     magnetic_field: Option<[f64; 3]>,
-    /// w, x, y, z; NaN if unknown.
+    /// Components w, x, y, z; NaN if unknown.
     orientation: Option<[f64; 4]>,
-    /// m; NaN if unknown.
+    /// Position, m; NaN if unknown.
     position: Option<[f64; 3]>,
     moving: Option<bool>,
     /// Latitude and longitude, rad, and height, m; NaN if unknown.
     fix: Option<[f64; 3]>,
-    /// Horizontal and vertical, m; NaN if unknown.
+    /// Standard deviations of the fix, horizontal and vertical, m; NaN if unknown.
     deviations: Option<[f64; 2]>,
 }
 
@@ -87,8 +87,9 @@ pub(super) struct Table {
     source: Source,
     times: Times,
     quantities: Vec<(Quantity, Vec<usize>)>,
-    /// Lines before the first row, and that row with its line.
+    /// Number of lines before the first row.
     head: usize,
+    /// The first row with its line, until it is returned.
     first: Option<(u64, StringRecord)>,
     /// The number of rows returned.
     rows: u64,
@@ -159,7 +160,7 @@ impl Table {
     }
 }
 
-/// A column's index; found by its name in any line of the header, which may end with a unit in brackets.
+/// Finds a column's index by its name in any line of the header. A name in the header may end with a unit in brackets.
 fn find(column: &Column, head: &[StringRecord]) -> Result<usize, String> {
     let name = match column {
         Column::Number(index) => return Ok(*index),

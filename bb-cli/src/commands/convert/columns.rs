@@ -1,4 +1,4 @@
-//! The contents of the columns.
+//! Descriptions of a CSV's columns: `gyr=gyr_*:deg/s`.
 
 use super::source::exact_ns;
 use super::units::{self, Units};
@@ -176,19 +176,15 @@ impl Columns {
                 return Err(format!("{} is given twice", quantity.what));
             }
         }
-        match (columns.has(What::Time), rate) {
+        match (has(quantities, What::Time), rate) {
             (false, None) => Err("time is needed, as time=1:us, or --rate".into()),
             (true, Some(_)) => Err("time and --rate are both given; leave one out".into()),
             _ => Ok(columns),
         }
     }
-
-    fn has(&self, what: What) -> bool {
-        self.quantities.iter().any(|quantity| quantity.what == what)
-    }
 }
 
-/// Returns whether one of these quantities is among the columns.
+/// Returns whether `what` is among the quantities.
 pub(super) fn has(quantities: &[Quantity], what: What) -> bool {
     quantities.iter().any(|quantity| quantity.what == what)
 }

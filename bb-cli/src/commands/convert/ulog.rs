@@ -1,5 +1,5 @@
-//! Logs of PX4, ULog: the IMU, the magnetometer and the fixes. PX4's body is forward, right, down, and ROS's forward,
-//! left, up.
+//! PX4 logs (ULog): the IMU, the magnetometer and the fixes. The body axes of PX4 are forward, right, down, those of ROS forward, left,
+//! up.
 
 use super::entry::{Entry, FIX, What};
 use bb_core::nalgebra::{Matrix3, Vector3};
@@ -18,13 +18,13 @@ pub(super) fn read(file: &Path, topic: Option<&str>) -> Result<(Vec<Entry>, Opti
         other => Some(format!("{other:?}")),
     };
     let utc_us = utc(&log);
-    // Whole numbers below 2⁵³; times 1000 they are not.
+    // `f64` holds microseconds since 1970 exactly, but not nanoseconds.
     let time = |us: f64| ((us + utc_us) as i64).saturating_mul(1000);
     let mut entries = Vec::new();
     if let Some(imu) = Columns::of(&log, &["sensor_combined"]) {
         let us = imu.all(&["timestamp"])?;
-        let rates = imu.vectors(&["gyro_rad"])?;
-        let forces = imu.vectors(&["accelerometer_m_s2"])?;
+        let rates = imu.vectors("gyro_rad")?;
+        let forces = imu.vectors("accelerometer_m_s2")?;
         for ((us, rate), force) in us.iter().zip(rates).zip(forces) {
             let what = What::Imu { angular_velocity: body(rate), specific_force: body(force) };
             entries.push(Entry { time_ns: time(*us), what });
@@ -32,7 +32,7 @@ pub(super) fn read(file: &Path, topic: Option<&str>) -> Result<(Vec<Entry>, Opti
     }
     if let Some(field) = Columns::of(&log, &["vehicle_magnetometer"]) {
         let us = field.all(&["timestamp_sample", "timestamp"])?;
-        for (us, gauss) in us.iter().zip(field.vectors(&["magnetometer_ga"])?) {
+        for (us, gauss) in us.iter().zip(field.vectors("magnetometer_ga")?) {
             let what = What::MagneticField(body(gauss).map(|gauss| gauss * 1e-4));
             entries.push(Entry { time_ns: time(*us), what });
         }
@@ -54,7 +54,7 @@ pub(super) fn read(file: &Path, topic: Option<&str>) -> Result<(Vec<Entry>, Opti
     Ok((entries, broken))
 }
 
-/// Returns the lead of UTC over the time since boot, µs; 0 if the receiver never reports the time.
+/// UTC minus the time since boot, µs; 0 if the receiver never reports the time.
 fn utc(log: &ParsedData) -> f64 {
     let Some(gnss) = Columns::of(log, &["vehicle_gps_position", "sensor_gps"]) else { return 0.0 };
     let (Ok(us), Ok(utc)) = (gnss.all(&["timestamp"]), gnss.all(&["time_utc_usec"])) else { return 0.0 };
@@ -63,7 +63,7 @@ fn utc(log: &ParsedData) -> f64 {
 }
 
 fn fixes(gnss: &Columns<'_>) -> Result<Vec<GnssFix>, String> {
-    // Since 1.15 in degrees and metres, before in 1e-7 degrees and mm.
+    // Since PX4 1.15 in degrees and metres, before in 1e-7 degrees and mm.
     let (latitudes, longitudes, heights) = match gnss.all(&["latitude_deg"]) {
         Ok(latitudes) => (latitudes, gnss.all(&["longitude_deg"])?, gnss.all(&["altitude_ellipsoid_m"])?),
         Err(_) => {
@@ -103,14 +103,14 @@ fn body([forward, right, down]: [f64; 3]) -> [f64; 3] {
     [forward, -right, -down]
 }
 
-/// The columns of the first instance of a topic; all have one length.
+/// The columns of the first instance of a topic, all of the same length.
 struct Columns<'a> {
     topic: &'a str,
     fields: &'a HashMap<String, SomeVec>,
 }
 
 impl<'a> Columns<'a> {
-    /// Returns the first of these topics that the log has.
+    /// The columns of the first of these topics that is in the log.
     fn of(log: &'a ParsedData, topics: &[&'a str]) -> Option<Self> {
         topics.iter().find_map(|topic| {
             let fields = log.messages.get(*topic)?.get(&MultiId::new(0))?;
@@ -124,11 +124,8 @@ impl<'a> Columns<'a> {
         found.map(numbers).ok_or_else(|| format!("{} has no field {}", self.topic, names.join(" or ")))
     }
 
-    fn vectors(&self, names: &[&str]) -> Result<Vec<[f64; 3]>, String> {
-        let axis = |axis: usize| {
-            let names: Vec<String> = names.iter().map(|name| format!("{name}[{axis}]")).collect();
-            self.all(&names.iter().map(String::as_str).collect::<Vec<_>>())
-        };
+    fn vectors(&self, name: &str) -> Result<Vec<[f64; 3]>, String> {
+        let axis = |axis: usize| self.all(&[&format!("{name}[{axis}]")]);
         let (x, y, z) = (axis(0)?, axis(1)?, axis(2)?);
         Ok(x.iter().zip(&y).zip(&z).map(|((x, y), z)| [*x, *y, *z]).collect())
     }

@@ -7,16 +7,16 @@ use bb_eval::Periods;
 use bb_eval::table::aligned;
 use serde::Serialize;
 
-/// An object of `--json`.
+/// A file as an object of `--json`.
 #[derive(Serialize)]
-struct Row<'a> {
+struct FileRow<'a> {
     file: String,
     bytes: u64,
     /// First log time, and the time from the first to the last.
     start_ns: Option<i64>,
     duration_s: Option<f64>,
     messages: usize,
-    /// Place and cause of the damage at which the file is cut off; `messages` is the number before that, which `bb recover` saves.
+    /// Place and cause of the damage that cuts the file off; `messages` counts those before it, which `bb recover` saves.
     damage: Option<&'a str>,
     topics: Vec<TopicRow<'a>>,
 }
@@ -38,7 +38,7 @@ struct TopicRow<'a> {
 pub(super) fn json(contents: &[Content]) -> Result<String, String> {
     let rows: Vec<_> = contents
         .iter()
-        .map(|content| Row {
+        .map(|content| FileRow {
             file: content.file.display().to_string(),
             bytes: content.bytes,
             start_ns: content.span_ns.map(|(start, _)| start),
@@ -66,10 +66,10 @@ fn topic_row(topic: &TopicContent) -> TopicRow<'_> {
 }
 
 pub(super) fn text(contents: &[Content]) -> String {
-    contents.iter().map(one).collect::<Vec<_>>().join("\n")
+    contents.iter().map(file_text).collect::<Vec<_>>().join("\n")
 }
 
-fn one(content: &Content) -> String {
+fn file_text(content: &Content) -> String {
     let file = content.file.display();
     let mut text = format!("{file}: {}, ", size(content.bytes));
     text += &match content.span_ns {
@@ -84,7 +84,7 @@ fn one(content: &Content) -> String {
     };
     let mut rows = vec![["topic", "type", "frame", "messages", "rate", "longest period"].map(String::from)];
     for topic in &content.topics {
-        // Two messages give no rate.
+        // A single period gives no rate.
         let periods = topic.periods.as_ref().filter(|_| topic.messages > 2);
         rows.push([
             topic.name.clone(),

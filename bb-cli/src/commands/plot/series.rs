@@ -8,7 +8,7 @@ use bb_mcap::Value;
 use bb_plot::{Line, PALETTE, Panel, Picture, Point};
 use std::collections::HashSet;
 
-/// Most viewers cannot open larger pictures.
+/// Largest number of panels; most viewers cannot open larger pictures.
 const MOST_PANELS: usize = 40;
 
 /// The selected fields of a topic.
