@@ -5,7 +5,7 @@ use nalgebra::{ComplexField, Matrix3, Vector3};
 use super::ellipsoid::{self, Point, Shape};
 use super::{CalibrationError, Linear, Rest};
 
-/// The gyroscope's offset.
+/// A fitted offset of the gyroscope.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GyroscopeFit {
     /// The reading at rest, rad/s, body frame.
@@ -25,14 +25,14 @@ pub enum Model {
     ScaleAndMisalignment,
 }
 
-/// The accelerometer's calibration.
+/// A fitted calibration of the accelerometer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AccelerometerFit {
     /// Offset, m/s², and scale with misalignment, upper triangular.
     pub calibration: Linear,
     /// The fitted parameters.
     pub model: Model,
-    /// The number of directions at rest, counting those within 15° as one.
+    /// Number of directions at rest; those within 15° count as one.
     pub directions: usize,
     /// Standard deviations of the offset, m/s².
     pub offset_deviation: Vector3<f64>,
@@ -45,19 +45,19 @@ pub struct AccelerometerFit {
 }
 
 /// Cosine of the angle within which two directions count as one.
-const ONE_DIRECTION: f64 = 0.966;
+const SAME_DIRECTION: f64 = 0.966;
 
 /// Error of the mean of a rest beyond its noise, m/s²: a bias that drifts, a table that trembles. 0.2 mg.
 const INSTABILITY: f64 = 2e-3;
 
-/// The smallest numbers of directions: for offset and scale, and with misalignment.
-const SIX: usize = 6;
-const NINE: usize = 9;
+/// The smallest numbers of directions that determine offset and scale, and misalignment too.
+const FOR_SCALE: usize = 6;
+const FOR_MISALIGNMENT: usize = 9;
 
 /// The largest accepted standard deviation of scale and of offset, as a fraction of gravity.
-const LIMIT: f64 = 0.01;
+const LARGEST_DEVIATION: f64 = 0.01;
 
-/// The gyroscope's offset: the mean over the rests, weighted by their length.
+/// Fits the gyroscope's offset: the mean over the rests, weighted by their length.
 ///
 /// # Errors
 ///
@@ -70,19 +70,19 @@ pub fn gyroscope(rests: &[Rest]) -> Result<GyroscopeFit, CalibrationError> {
     let offset = rests.iter().map(|rest| rest.rate * rest.samples as f64).sum::<Vector3<f64>>() / samples;
     let noise =
         rests.iter().map(|rest| rest.rate_deviation * rest.rate_deviation * rest.samples as f64).sum::<f64>();
-    let squares = |rest: &Rest| (rest.rate - offset).component_mul(&(rest.rate - offset));
-    let spread = rests.iter().map(squares).sum::<Vector3<f64>>() / rests.len() as f64;
+    let square = |rest: &Rest| (rest.rate - offset).component_mul(&(rest.rate - offset));
+    let spread = rests.iter().map(square).sum::<Vector3<f64>>() / rests.len() as f64;
     if !offset.iter().chain(spread.iter()).all(|value| value.is_finite()) {
         return Err(CalibrationError::NonFinite);
     }
     // The deviation of the mean over all samples, or over the rests if they differ by more.
-    let of_noise = noise / (samples * samples);
+    let from_noise = noise / (samples * samples);
     let others = rests.len().saturating_sub(1).max(1) as f64;
-    let deviation = spread.map(|variance| ComplexField::sqrt((variance / others).max(of_noise)));
+    let deviation = spread.map(|variance| ComplexField::sqrt((variance / others).max(from_noise)));
     Ok(GyroscopeFit { offset, deviation, residual: ComplexField::sqrt(spread.mean()) })
 }
 
-/// The accelerometer's offset and scale from rests in six directions, and its misalignment from nine. At rest it
+/// Fits the accelerometer's offset and scale to rests in six directions, and its misalignment to nine. At rest it
 /// measures `gravity`, m/s², in any direction. Poses need not be exact.
 ///
 /// # Errors
@@ -97,14 +97,14 @@ pub fn accelerometer(rests: &[Rest], gravity: f64) -> Result<AccelerometerFit, C
     }
     let directions = directions(rests);
     let (shape, model) = match directions {
-        ..SIX => {
+        ..FOR_SCALE => {
             return Err(CalibrationError::TooFew {
                 what: "directions in which it rested",
                 found: directions,
-                needed: SIX,
+                needed: FOR_SCALE,
             });
         }
-        SIX..NINE => (Shape::Diagonal, Model::Scale),
+        FOR_SCALE..FOR_MISALIGNMENT => (Shape::Diagonal, Model::Scale),
         _ => (Shape::Triangular, Model::ScaleAndMisalignment),
     };
     // Readings in g are as good a start as readings in m/s².
@@ -122,12 +122,12 @@ pub fn accelerometer(rests: &[Rest], gravity: f64) -> Result<AccelerometerFit, C
         ("scale", fit.matrix_deviation.diagonal().max() / scale),
     ];
     for (parameter, deviation) in checks {
-        if deviation.is_nan() || deviation > LIMIT {
-            return Err(CalibrationError::NotObservable { parameter, deviation, limit: LIMIT });
+        if deviation.is_nan() || deviation > LARGEST_DEVIATION {
+            return Err(CalibrationError::NotObservable { parameter, deviation, limit: LARGEST_DEVIATION });
         }
     }
-    let squares = |rest: &Rest| (rest.force.norm() - gravity) * (rest.force.norm() - gravity);
-    let before = rests.iter().map(squares).sum::<f64>() / rests.len() as f64;
+    let square = |rest: &Rest| (rest.force.norm() - gravity) * (rest.force.norm() - gravity);
+    let before = rests.iter().map(square).sum::<f64>() / rests.len() as f64;
     Ok(AccelerometerFit {
         calibration: fit.linear,
         model,
@@ -139,9 +139,9 @@ pub fn accelerometer(rests: &[Rest], gravity: f64) -> Result<AccelerometerFit, C
     })
 }
 
-/// The number of directions of the rests: those not near an earlier one.
+/// Counts the directions of the rests that are not near an earlier one.
 fn directions(rests: &[Rest]) -> usize {
-    let near = |a: &Rest, b: &Rest| a.force.dot(&b.force) > ONE_DIRECTION * a.force.norm() * b.force.norm();
+    let near = |a: &Rest, b: &Rest| a.force.dot(&b.force) > SAME_DIRECTION * a.force.norm() * b.force.norm();
     let is_new = |index: &usize| !rests[..*index].iter().any(|before| near(before, &rests[*index]));
     (0..rests.len()).filter(is_new).count()
 }

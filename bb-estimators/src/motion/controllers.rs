@@ -62,13 +62,13 @@ pub struct PidControllerOptions {
     /// Time constant of the filter of the derivative. Unit: s. Default: 20 ms.
     #[option(default = 0.02, range = 0.0..=1e3, unit = "s")]
     pub derivative_filter: f64,
-    /// The output is at most that, in both directions. Default: no limit but that of the joint.
+    /// Largest output in either direction. Default: no limit but that of the joint.
     #[option(default = f64::INFINITY, range = 0.0..=f64::INFINITY)]
     pub output_limit: f64,
-    /// Time constant with which the integral gives way while the output is at its limit. Unit: s. Default: at once.
+    /// Time constant with which the integral follows the output while that is at its limit. Unit: s. Default: at once.
     #[option(default = 0.0, range = 0.0..=1e3, unit = "s")]
     pub tracking_time: f64,
-    /// A measurement that is older is not used. Unit: s. Default: 100 ms.
+    /// Age beyond which a measurement is not used. Unit: s. Default: 100 ms.
     #[option(default = Duration::from_millis(100))]
     pub stale_after: Duration,
 }
@@ -182,7 +182,7 @@ impl PidController {
         Ok(Reading::nothing())
     }
 
-    /// Ends its own commands. An actuator that refuses this has been made safe already.
+    /// Ends its own command. An actuator that refuses this has been made safe already.
     fn hold(&mut self) -> Result<(), Fault> {
         if std::mem::take(&mut self.is_driving) {
             sent(self.actuator.send(ActuatorCommand::Hold))?;

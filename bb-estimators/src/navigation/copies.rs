@@ -354,7 +354,7 @@ impl<F: CopiedFilter> Copies<F> {
             });
         }
         if let Some(now_ns) = self.time_ns() {
-            let has_moved = self.search.go_on(&mut self.starts, now_ns);
+            let has_moved = self.search.step(&mut self.starts, now_ns);
             self.changes = self.changes.wrapping_add(u32::from(has_moved));
         }
     }
@@ -374,7 +374,7 @@ impl<F: CopiedFilter> Copies<F> {
         if !forked.is_empty() {
             self.starts = forked;
             self.changes = self.changes.wrapping_add(1);
-            self.search.orphan();
+            self.search.drop_neighbours();
             self.newcomer = None;
         }
     }

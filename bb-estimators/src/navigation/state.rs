@@ -8,4 +8,4 @@ pub use states::{
     ACCELEROMETER_BIAS, Aided, Complete, GYROSCOPE_BIAS, NAVIGATED, NAVIGATION, Navigated, Navigation, Optional,
     POSITION, ROTATION, States, VELOCITY, Vehicle, offset,
 };
-pub(super) use states::{Led, MOST_ERRORS, distinct, led};
+pub(super) use states::{MOST_ERRORS, PoseErrors, distinct, pose_errors};

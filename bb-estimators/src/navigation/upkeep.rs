@@ -1,4 +1,4 @@
-//! Records of a filter's past, and the queries common to all filters.
+//! Counts of a filter's starts and gaps, and the queries common to all filters.
 
 /// Counts of a filter's starts and bridged gaps, and the time at which its position was last corrected.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

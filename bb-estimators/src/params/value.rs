@@ -14,7 +14,7 @@ pub enum Kind {
     Count,
     /// A real number, in SI.
     Number,
-    /// A state that wanders: standard deviation and correlation time.
+    /// A state that drifts randomly: standard deviation and correlation time.
     Process,
 }
 
@@ -59,7 +59,7 @@ impl fmt::Display for Value {
     }
 }
 
-/// Writes a number in the shorter notation; both are read back as the same number.
+/// Writes a number in plain or in scientific notation, whichever is shorter.
 fn fmt_number(number: f64, f: &mut fmt::Formatter<'_>) -> fmt::Result {
     let is_plain = number == 0.0 || !number.is_finite() || (1e-3..1e6).contains(&number.abs());
     if is_plain { write!(f, "{number}") } else { write!(f, "{number:e}") }
@@ -75,10 +75,10 @@ pub struct Range {
 }
 
 impl Range {
-    /// All there are.
+    /// All numbers.
     pub const ALL: Self = Self { min: f64::NEG_INFINITY, max: f64::INFINITY };
 
-    /// The stated range; all numbers, if none is stated.
+    /// The first of `ranges`; all numbers if there is none.
     pub(crate) const fn stated(ranges: &[RangeInclusive<f64>]) -> Self {
         match ranges {
             [range, ..] => Self { min: *range.start(), max: *range.end() },
@@ -86,14 +86,14 @@ impl Range {
         }
     }
 
-    /// Returns whether a number is within; NaN never is.
+    /// Returns whether a number is in the range; NaN never is.
     pub(crate) const fn has(&self, value: f64) -> bool {
         self.min <= value && value <= self.max
     }
 }
 
 impl fmt::Display for Range {
-    /// `from 0 to 1000`, `from 1`; nothing for [`Range::ALL`].
+    /// Writes `from 0 to 1000` or `from 1`; nothing for [`Range::ALL`].
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { min, max } = *self;
         match (min.is_finite(), max.is_finite()) {
@@ -117,7 +117,7 @@ pub trait Field: Copy {
     fn from_value(value: Value) -> Option<Self>;
 }
 
-/// Writes the implementation for a type that is one variant of [`Value`].
+/// Implements [`Field`] for a type that is one variant of [`Value`].
 macro_rules! field {
     ($type:ty, $variant:ident) => {
         impl Field for $type {

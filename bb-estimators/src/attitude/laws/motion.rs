@@ -1,4 +1,4 @@
-//! Rotation is followed by the gyroscope.
+//! Laws of motion: a filter follows the gyroscope, also in free fall.
 
 use nalgebra::{UnitQuaternion, Vector3};
 

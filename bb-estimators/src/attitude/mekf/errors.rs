@@ -1,4 +1,4 @@
-//! The state of the filter: what it estimates, with its covariance.
+//! The state of the filter and its covariance.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -26,17 +26,17 @@ pub(super) const NORTH: usize = 8;
 
 const STATES: usize = 9;
 
-/// Length of a row in memory: even, so that a processor that takes two numbers at once takes whole rows.
+/// Length of a row in memory: even, so that vector instructions on two numbers cover whole rows.
 const WIDTH: usize = 10;
 
-/// A smaller variance is rounding.
+/// Variance below which only rounding errors are left.
 const LEAST_VARIANCE: f64 = 1e-16;
 
 /// Values and their covariance.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Errors<T: Real> {
     pub(super) value: [T; STATES],
-    /// The upper triangle; what is below it is zero.
+    /// The upper triangle; the elements below it are zero.
     covariance: [[T; WIDTH]; STATES],
 }
 
@@ -74,7 +74,7 @@ impl<T: Real> Errors<T> {
         Matrix3::from_fn(|row, column| self.at(states[row], states[column]))
     }
 
-    /// Standard deviation of the bias along an axis, in the mean.
+    /// Root mean square of the standard deviations of the bias along the axes.
     pub(super) fn deviation_of_bias(&self) -> T {
         (BIAS.iter().map(|state| self.variance(*state)).sum::<T>() / T::of(3.0)).sqrt()
     }
@@ -151,17 +151,17 @@ impl<T: Real> Errors<T> {
         }
     }
 
-    /// Covariances of all states with one.
+    /// Covariances of all states with `state`.
     #[inline(always)]
     fn shared(&self, state: usize) -> Shared<T> {
         core::array::from_fn(|other| if other < STATES { self.at(state, other) } else { T::ZERO })
     }
 
-    /// Corrects the state by one of it: by how much it is more than expected, with which variance.
+    /// Corrects the state by a measurement of state `STATE` with this residual and variance.
     ///
-    /// If the vertical is given, in the body frame, the heading and the bias about it are left alone, as in a Schmidt–Kalman
-    /// filter: accelerations tell nothing of them but by their errors, which are not white, and without a magnetometer
-    /// nothing would mend that.
+    /// If the vertical `up` is given, in the body frame, the heading and the bias about it are not corrected, as in a Schmidt–Kalman
+    /// filter: accelerations carry no information on them, and their errors, which are not white, would corrupt both, which nothing
+    /// corrects without a magnetometer.
     #[inline(always)]
     pub(super) fn correct_one<const STATE: usize>(&mut self, residual: T, variance: T, up: Option<&Vector3<T>>) {
         let shared = self.shared(STATE);
@@ -177,8 +177,8 @@ impl<T: Real> Errors<T> {
         }
     }
 
-    /// Corrects the state by a field, an angle that depends on it by `slopes`: by how much it is more than expected, with
-    /// which variance. Tilt and velocity are left alone, which gravity knows better.
+    /// Corrects the state by the field's angle, with this residual and variance. `slopes` are its derivatives with respect to the
+    /// states. Tilt and velocity, which gravity determines better, are not corrected.
     #[inline(always)]
     pub(super) fn correct_by_field<const N: usize>(&mut self, slopes: [(usize, T); N], residual: T, variance: T) {
         let mut shared = [T::ZERO; WIDTH];
@@ -191,7 +191,7 @@ impl<T: Real> Errors<T> {
         self.correct::<BY_FIELD>(&shared, expected + variance, residual);
     }
 
-    /// Corrects the first states by a number of this total variance. Returns the inverse of that.
+    /// Corrects the first states by a residual of this total variance, and returns the inverse of the variance.
     fn correct<const FIRST: usize>(&mut self, shared: &Shared<T>, total: T, residual: T) -> Option<T> {
         // Rounding, or absurd samples.
         if total <= T::ZERO || !total.is_finite() {
@@ -203,24 +203,24 @@ impl<T: Real> Errors<T> {
             *value += gain * residual;
         }
         let p = &mut self.covariance;
-        less::<0, T>(p, &gain, shared);
-        less::<1, T>(p, &gain, shared);
-        less::<2, T>(p, &gain, shared);
-        less::<3, T>(p, &gain, shared);
-        less::<4, T>(p, &gain, shared);
+        subtract_row::<0, T>(p, &gain, shared);
+        subtract_row::<1, T>(p, &gain, shared);
+        subtract_row::<2, T>(p, &gain, shared);
+        subtract_row::<3, T>(p, &gain, shared);
+        subtract_row::<4, T>(p, &gain, shared);
         if FIRST > BY_FIELD {
-            less::<5, T>(p, &gain, shared);
-            less::<6, T>(p, &gain, shared);
-            less::<7, T>(p, &gain, shared);
-            less::<8, T>(p, &gain, shared);
+            subtract_row::<5, T>(p, &gain, shared);
+            subtract_row::<6, T>(p, &gain, shared);
+            subtract_row::<7, T>(p, &gain, shared);
+            subtract_row::<8, T>(p, &gain, shared);
         }
         Some(inverse)
     }
 }
 
-/// Subtracts from a row of a covariance, a function for each row so that no loop is left.
+/// Subtracts a correction from row `ROW` of a covariance; a constant, so that the loops are unrolled.
 #[inline(always)]
-fn less<const ROW: usize, T: Real>(covariance: &mut [[T; WIDTH]; STATES], gain: &Shared<T>, shared: &Shared<T>) {
+fn subtract_row<const ROW: usize, T: Real>(covariance: &mut [[T; WIDTH]; STATES], gain: &Shared<T>, shared: &Shared<T>) {
     for column in ROW..WIDTH {
         covariance[ROW][column] -= gain[ROW] * shared[column];
     }

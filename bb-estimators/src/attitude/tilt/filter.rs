@@ -11,14 +11,14 @@ use crate::attitude::state::AttitudeState;
 use crate::attitude::{AttitudeFilter, ImuSample, MAX_GAP_S, ParamsError, Real, SampleError};
 use crate::params::Params as _;
 
-/// Inclination from gravity, heading from the magnetic field.
+/// A filter that takes the inclination from gravity and the heading from the magnetic field.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TiltFilter<T: Real = f64> {
     params: TiltParams,
     state: AttitudeState<T>,
-    /// Low-passed, m/s², body frame.
+    /// Low-passed specific force, m/s², body frame.
     force: Option<Vector3<T>>,
-    /// Low-passed, in the field's own unit, body frame.
+    /// Low-passed magnetic field, in its own unit, body frame.
     field: Option<Vector3<T>>,
     /// Time since the last specific force that was not free fall, and since the last field, at most [`MAX_GAP_S`].
     since_force_s: T,

@@ -50,7 +50,7 @@ impl<S: States, const N: usize> Copies<Eskf<S, N>> {
         self.started_ns = self.started_ns.saturating_add(time_ns.saturating_sub(before_ns));
         self.starts.iter_mut().for_each(|begun| begun.filter.set_clock(time_ns, deviation_s));
         self.newcomer = None;
-        self.search.orphan();
+        self.search.drop_neighbours();
         self.holding.interrupt();
         self.scatter.interrupt();
     }

@@ -108,7 +108,7 @@ impl<F: CopiedFilter> Copies<F> {
         self.starts[0].filter.begin_again();
         self.starts[0].log_likelihood = 0.0;
         self.changes = self.changes.wrapping_add(1);
-        self.search.orphan();
+        self.search.drop_neighbours();
         stream.forgive();
     }
 }

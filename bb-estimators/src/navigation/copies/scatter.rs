@@ -1,39 +1,38 @@
-//! The scatter of fixes: how much they jump about beside the motion that the accelerometer shows.
+//! The scatter of fixes about the motion that the accelerometer shows.
 //!
-//! The mean velocities between three fixes differ by what the body accelerated, which no correction of the filter touches. What is left
+//! The mean velocities between three fixes differ by the acceleration of the body, which does not depend on corrections of the filter. The rest
 //! is the noise of the fixes, `σ² (1/t₁² + (1/t₁ + 1/t₂)² + 1/t₂²)` per axis. A receiver whose fixes scatter more than they state gets
 //! the noise of its scatter; otherwise the filter would blame the IMU, and follow every fix. While the heading is unknown, the fixes decide
-//! between headings: they are then compared with the motion in the heading that suits them best.
+//! between headings: they are then compared with the motion in the heading that fits them best.
 
 use nalgebra::Vector3;
 
 use super::Fix;
 
-/// Error of the acceleration by a wrong attitude, a lever arm and a bias, m/s². Scatter counts beyond that.
+/// Error of the acceleration due to a wrong attitude, a lever arm and a bias, m/s². Only scatter beyond it counts.
 const ALLOWED: f64 = 1.0;
 
-/// The number of differences that count, of which an outlier spoils three, and a jump two.
+/// Number of differences that are kept. An outlier spoils three of them, and a jump two.
 const DIFFERENCES: usize = 9;
 
-/// The place among them, from the smallest, of the one that is the variance: the largest that an outlier leaves, and for three axes as
-/// often above the variance as below.
+/// Rank, from the smallest, of the difference that is taken as the variance: the largest that an outlier leaves intact, and for three axes
+/// as often above the variance as below.
 const PLACE: usize = 5;
 
-/// The factor to which nine differences, each of which shares two fixes with the next, tell the variance: a receiver that states no less
-/// than that is believed.
+/// Factor within which nine differences, each of which shares two fixes with the next, determine the variance: a receiver whose stated
+/// variance is not smaller by more is believed.
 const KNOWN: f64 = 2.0;
 
 /// The variance of a fix that has not yet shown its own, m²: a receiver may state centimetres and scatter by metres.
 pub(in crate::navigation) const UNSEEN: f64 = 9.0;
 
-/// A fix whose difference shows this many times the usual variance gets the whole difference as its noise: nine are three
-/// deviations.
+/// Ratio to the usual variance beyond which a fix gets its whole difference as its noise: three standard deviations.
 const CLEAR: f64 = 9.0;
 
-/// The longest time between two fixes that are compared, s: in a longer one, noise of [`UNSEEN`] does not show beside [`ALLOWED`].
+/// The longest time between two fixes that are compared, s: over a longer one, [`ALLOWED`] hides noise of [`UNSEEN`].
 const LONGEST_S: f64 = 3.5;
 
-/// The way between two fixes.
+/// The motion between two fixes.
 #[derive(Clone, Copy, Debug, Default)]
 struct Leg {
     seconds: f64,
@@ -47,22 +46,22 @@ struct Leg {
 /// Differences of the last fixes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scatter {
-    /// The fix before, and the leg since.
+    /// The previous fix, and the leg since.
     last: Option<Vector3<f64>>,
     leg: Leg,
-    /// The leg before, with its mean velocity.
+    /// The previous leg, with its mean velocity.
     before: Option<(Leg, Vector3<f64>)>,
-    /// Variances that differences show, m², the newest first.
+    /// Variances computed from the differences, m², the newest first.
     variances: [f64; DIFFERENCES],
     count: usize,
-    /// The variance that the last fix got beside its own, m².
-    more: f64,
+    /// The variance added to that of the last fix, m².
+    added: f64,
 }
 
 impl Default for Scatter {
     fn default() -> Self {
         let variances = [UNSEEN; DIFFERENCES];
-        Self { last: None, leg: Leg::default(), before: None, variances, count: 0, more: 0.0 }
+        Self { last: None, leg: Leg::default(), before: None, variances, count: 0, added: 0.0 }
     }
 }
 
@@ -77,12 +76,12 @@ impl Scatter {
         leg.is_turned |= is_turned;
     }
 
-    /// Forgets the fixes, whose differences would not show noise: after a gap, or while the tilt is unknown.
+    /// Forgets the fixes after a gap or while the tilt is unknown, when differences do not show noise.
     pub(super) fn interrupt(&mut self) {
         (self.last, self.before, self.leg) = (None, None, Leg::default());
     }
 
-    /// Adds a fix. Returns it with the noise that fixes have shown, if they have stated less.
+    /// Adds a fix, and returns it with the noise that the fixes have shown, if they have stated less.
     pub(super) fn fix<M: Fix>(&mut self, fix: &M) -> M {
         let leg = core::mem::take(&mut self.leg);
         let last = self.last.replace(fix.position());
@@ -99,7 +98,7 @@ impl Scatter {
             let change = mean - mean_before;
             let mut beside = change - expected;
             if earlier.is_turned || leg.is_turned {
-                // In the heading that suits them best.
+                // In the heading that fits them best.
                 beside = Vector3::new(change.xy().norm() - expected.xy().norm(), 0.0, beside.z);
             }
             let excess = (beside.norm_squared() - allowed * allowed).max(0.0);
@@ -114,16 +113,16 @@ impl Scatter {
         // Fixes that are far from each other never show their noise.
         let shown = if is_near || self.count == DIFFERENCES { self.shown() } else { 0.0 };
         let shown = shown.max(alone);
-        self.more = if shown > KNOWN * stated { shown - stated } else { 0.0 };
+        self.added = if shown > KNOWN * stated { shown - stated } else { 0.0 };
         self.as_shown(fix)
     }
 
-    /// The last fix with the noise that it got.
+    /// A fix with the noise added to the last one.
     pub(super) fn as_shown<M: Fix>(&self, fix: &M) -> M {
-        fix.with_noise(self.more)
+        fix.with_noise(self.added)
     }
 
-    /// The variance of an axis that the last fixes show, m².
+    /// The variance per axis that the last fixes show, m².
     fn shown(&self) -> f64 {
         let mut sorted = self.variances;
         sorted.sort_by(f64::total_cmp);

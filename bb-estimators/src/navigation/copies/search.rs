@@ -4,7 +4,7 @@ use super::{Begun, CopiedFilter, Update};
 use crate::navigation::math::exp;
 use crate::navigation::stream::Stream;
 
-/// The ratio of two neighbouring multiples. Twice as much noise is hard to tell from the same.
+/// The ratio of two neighbouring multiples. A factor of two would be hard to detect.
 const STEP: f64 = 4.0;
 
 /// The multiples that are searched, as powers of [`STEP`]: no vehicle is quieter than the data sheet of its IMU.
@@ -13,8 +13,8 @@ const EXPONENTS: core::ops::RangeInclusive<i32> = 0..=4;
 /// The power at which the search begins.
 const FIRST: i32 = 2;
 
-/// The time over which likelihoods are compared, s: two minutes of a drive.
-const PAST_S: f64 = 120.0;
+/// Time constant with which leads are forgotten, s: two minutes of a drive.
+const MEMORY_S: f64 = 120.0;
 
 /// The log likelihood by which a neighbour leads when the search moves to it.
 const LEAD: f64 = 3.0;
@@ -22,10 +22,10 @@ const LEAD: f64 = 3.0;
 /// The shortest time between two moves, s.
 const PAUSE_S: f64 = 3.0;
 
-/// The most starts between which the search compares: with more, they say more about each other than about the noise.
+/// The largest number of starts with which the search compares: with more, they say more about each other than about the noise.
 pub(super) const MOST_STARTS: usize = 2;
 
-/// The multiple of the white noise.
+/// The multiple of the white noise at a power of [`STEP`].
 fn multiple(exponent: i32) -> f64 {
     (0..exponent).fold(1.0, |multiple, _| multiple * STEP)
 }
@@ -34,16 +34,17 @@ fn multiple(exponent: i32) -> f64 {
 #[derive(Clone, Debug)]
 pub(super) struct Search<F: CopiedFilter> {
     is_on: bool,
+    /// The power of [`STEP`] of the noise of all starts.
     exponent: i32,
     moved_ns: i64,
     compared_ns: i64,
-    /// The start that the neighbours are copies of.
+    /// The start of which the neighbours are copies.
     parent: Option<u32>,
     /// The copies with more and with less noise.
     neighbours: [Option<Neighbour<F>>; 2],
 }
 
-/// A copy with another noise.
+/// A copy of the parent with more or less noise.
 #[derive(Clone, Debug)]
 struct Neighbour<F: CopiedFilter> {
     filter: F,
@@ -75,26 +76,26 @@ impl<F: CopiedFilter> Search<F> {
         self.parent == Some(id)
     }
 
-    /// Forgets the neighbours: their parent is another filter now.
-    pub(super) fn orphan(&mut self) {
+    /// Drops the neighbours, as their parent has been replaced.
+    pub(super) fn drop_neighbours(&mut self) {
         self.parent = None;
         self.neighbours = [None, None];
     }
 
-    /// Fuses a measurement in the neighbours. `of_parent` is its log likelihood for their parent.
-    pub(super) fn fuse<M, const D: usize>(&mut self, stream: &Stream, measurement: &M, of_parent: f64)
+    /// Fuses a measurement in the neighbours. `parent_likelihood` is its log likelihood for their parent.
+    pub(super) fn fuse<M, const D: usize>(&mut self, stream: &Stream, measurement: &M, parent_likelihood: f64)
     where
         F: Update<M, D>,
     {
         for neighbour in self.neighbours.iter_mut().flatten() {
             if let Ok(fused) = neighbour.filter.update_ungated(&mut { *stream }, measurement) {
-                neighbour.lead += fused.log_likelihood - of_parent;
+                neighbour.lead += fused.log_likelihood - parent_likelihood;
             }
         }
     }
 
-    /// Moves to a neighbour that leads, and makes new neighbours where there are none. Returns whether it has moved.
-    pub(super) fn go_on(&mut self, starts: &mut [Begun<F>], now_ns: i64) -> bool {
+    /// Moves to a neighbour that leads, or creates neighbours if there are none. Returns whether it has moved.
+    pub(super) fn step(&mut self, starts: &mut [Begun<F>], now_ns: i64) -> bool {
         if !self.is_on || starts.len() > MOST_STARTS {
             return false;
         }
@@ -104,7 +105,7 @@ impl<F: CopiedFilter> Search<F> {
             (self.moved_ns, self.compared_ns) = (now_ns, now_ns);
             return false;
         };
-        let kept = exp(-since(self.compared_ns) / PAST_S);
+        let kept = exp(-since(self.compared_ns) / MEMORY_S);
         self.compared_ns = now_ns;
         self.neighbours.iter_mut().flatten().for_each(|neighbour| neighbour.lead *= kept);
         if since(self.moved_ns) < PAUSE_S {

@@ -11,7 +11,7 @@ use nalgebra::{Matrix3, SVector};
 
 use crate::navigation::covariance::Covariance;
 use crate::navigation::math::Integrals;
-use crate::navigation::state::{Led, States, led};
+use crate::navigation::state::{PoseErrors, States, pose_errors};
 
 /// T, by blocks: that of the body, and that of the keyframe.
 #[derive(Clone, Copy, Debug)]
@@ -28,11 +28,12 @@ struct Part {
 impl Transport {
     pub(super) fn new<S: States, const N: usize>(error: &SVector<f64, N>) -> Self {
         let part = |first: usize| error.fixed_rows::<3>(first).into_owned();
-        Self(led::<S>().map(|block| {
-            let Led { rotation, led } = block?;
+        Self(pose_errors::<S>().map(|errors| {
+            let PoseErrors { rotation, turned } = errors?;
             let turn = part(rotation);
             let integrals = Integrals::new(&turn);
-            let led = led.map(|first| first.map(|first| (first, integrals.first_derivative(&turn, &part(first)))));
+            let led =
+                turned.map(|first| first.map(|first| (first, integrals.first_derivative(&turn, &part(first)))));
             Some(Part { rotation, integral: integrals.first_matrix(&turn), led })
         }))
     }

@@ -24,22 +24,22 @@ pub(super) struct Judged {
     pub(super) whitened: f64,
 }
 
-/// The covariances with which the observations at one keyframe are gated, as of before its first.
+/// The covariances for gating the observations at one keyframe, as they were before the first.
 #[derive(Clone, Debug)]
 pub(super) struct Judging<const N: usize> {
     /// The keyframe; `None` if the window has changed since.
     keyframe: Option<(u64, usize)>,
     covariance: SMatrix<f64, N, N>,
-    /// The covariance of the motion between that keyframe and each of the window, once it is asked for.
-    ways: Vec<Option<SMatrix<f64, POSE, POSE>>>,
+    /// The covariances of the motions between that keyframe and each of the window, computed on demand.
+    motions: Vec<Option<SMatrix<f64, POSE, POSE>>>,
 }
 
 impl<const N: usize> Judging<N> {
     pub(super) fn new(slots: usize) -> Self {
-        Self { keyframe: None, covariance: SMatrix::zeros(), ways: vec![None; slots] }
+        Self { keyframe: None, covariance: SMatrix::zeros(), motions: vec![None; slots] }
     }
 
-    /// The window has changed.
+    /// Forgets the keyframe, since the window has changed.
     pub(super) fn forget(&mut self) {
         self.keyframe = None;
     }
@@ -51,7 +51,7 @@ impl<const N: usize> Judging<N> {
     pub(super) fn begin(&mut self, id: u64, at: usize, covariance: &Square<N>) {
         self.keyframe = Some((id, at));
         self.covariance = SMatrix::from_fn(|i, j| covariance[i][j]);
-        self.ways.fill(None);
+        self.motions.fill(None);
     }
 
     /// Compares an observation with a landmark whose nearest other observation is that of the keyframe `nearest`. Returns
@@ -76,7 +76,7 @@ impl<const N: usize> Judging<N> {
         let mut covariance = Matrix2::identity() + landmark.seen_covariance(&jacobian);
         covariance += projected(along(jacobian * landmark.held()), &pose);
         if let Some(nearest) = nearest {
-            covariance += projected(along(jacobian), &self.way(nearest, window)?);
+            covariance += projected(along(jacobian), &self.motion(nearest, window)?);
         }
         let root = covariance.cholesky()?.l();
         let whitened = root.solve_lower_triangular(innovation)?;
@@ -87,22 +87,22 @@ impl<const N: usize> Judging<N> {
     }
 
     /// The covariance of the motion between the judged keyframe and another.
-    fn way<F>(&mut self, other: usize, window: &Window<F, N>) -> Option<SMatrix<f64, POSE, POSE>> {
+    fn motion<F>(&mut self, other: usize, window: &Window<F, N>) -> Option<SMatrix<f64, POSE, POSE>> {
         let (_, at) = self.keyframe?;
-        if let Some(known) = self.ways.get(other).copied().flatten() {
+        if let Some(known) = self.motions.get(other).copied().flatten() {
             return Some(known);
         }
         if other < at {
-            self.ways_back(at, other, window)
+            self.motions_back(at, other, window)
         } else {
             // A late observation: the biases and the velocity there are hardly known better.
-            self.ways_back(other, at, window)
+            self.motions_back(other, at, window)
         }?;
-        self.ways.get(other).copied().flatten()
+        self.motions.get(other).copied().flatten()
     }
 
-    /// Finds the motions from a keyframe back to an earlier one; one of them is that of the judged keyframe.
-    fn ways_back<F>(&mut self, from: usize, to: usize, window: &Window<F, N>) -> Option<()> {
+    /// Computes the motions between keyframe `from` and an earlier one, `to`, one of which is the judged keyframe.
+    fn motions_back<F>(&mut self, from: usize, to: usize, window: &Window<F, N>) -> Option<()> {
         let (_, at) = self.keyframe?;
         let later = &window.get(from)?.point;
         let mut transition = SMatrix::<f64, N, N>::identity();
@@ -124,7 +124,7 @@ impl<const N: usize> Judging<N> {
                 relative[(i, place(3 + j))] -= turned[(i, j)];
             }
             let of_noise = SMatrix::<f64, POSE, POSE>::from_fn(|i, j| noise[(place(i), place(j))]);
-            let way = relative * self.covariance * relative.transpose() + of_noise;
+            let motion = relative * self.covariance * relative.transpose() + of_noise;
             // An error of the rotation at the earlier keyframe, as one of the position at the later.
             let mut moved = SMatrix::<f64, POSE, POSE>::identity();
             let by_rotation: Matrix3<f64> = -turned;
@@ -132,14 +132,14 @@ impl<const N: usize> Judging<N> {
                 moved.fixed_view_mut::<3, 3>(0, 3).copy_from(&by_rotation);
             }
             let target = if from == at { index } else { from };
-            *self.ways.get_mut(target)? = Some(moved * way * moved.transpose());
+            *self.motions.get_mut(target)? = Some(moved * motion * moved.transpose());
         }
         Some(())
     }
 }
 
 impl Landmark {
-    /// The keyframe nearest to this one that saw it; the earlier one if two are as near.
+    /// The nearest keyframe that saw the landmark; the earlier one of two equally near.
     pub(super) fn nearest(&self, serial: u64) -> Option<u64> {
         self.sights.iter().map(|sight| sight.serial).min_by_key(|other| other.abs_diff(serial))
     }

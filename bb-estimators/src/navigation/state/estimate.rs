@@ -3,8 +3,8 @@
 use nalgebra::{Matrix3, SVector, UnitQuaternion, Vector3};
 
 use super::states::{
-    ACCELEROMETER_BIAS, GYROSCOPE_BIAS, Led, NAVIGATION, Optional, POSITION, ROTATION, States, VELOCITY, led,
-    offset,
+    ACCELEROMETER_BIAS, GYROSCOPE_BIAS, NAVIGATION, Optional, POSITION, PoseErrors, ROTATION, States, VELOCITY,
+    offset, pose_errors,
 };
 use crate::attitude::{MAX_ANGULAR_VELOCITY, MAX_SPECIFIC_FORCE};
 use crate::navigation::bounds::{is_on_earth, is_within};
@@ -104,10 +104,10 @@ impl<const N: usize> Estimate<N> {
     pub(in crate::navigation) fn composed<S: States>(&self, error: &SVector<f64, N>) -> Self {
         let mut additive = *error;
         let part = |first: usize| error.fixed_rows::<3>(first).into_owned();
-        for Led { rotation, led } in led::<S>().into_iter().flatten() {
+        for PoseErrors { rotation, turned } in pose_errors::<S>().into_iter().flatten() {
             let turn = part(rotation);
             let integral = Integrals::new(&turn).first_matrix(&turn);
-            for first in led.into_iter().flatten() {
+            for first in turned.into_iter().flatten() {
                 additive.fixed_rows_mut::<3>(first).copy_from(&(integral * part(first)));
             }
         }

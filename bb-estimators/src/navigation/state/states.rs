@@ -159,17 +159,17 @@ pub const fn offset<S: States>(state: Optional) -> Option<usize> {
     None
 }
 
-/// A rotation error, and the errors of positions and velocities that turn with it.
-pub(in crate::navigation) struct Led {
+/// The indices of a pose's errors: the rotation, and the positions and velocities that turn with it.
+pub(in crate::navigation) struct PoseErrors {
     pub(in crate::navigation) rotation: usize,
-    pub(in crate::navigation) led: [Option<usize>; 2],
+    pub(in crate::navigation) turned: [Option<usize>; 2],
 }
 
-/// The poses among the errors: that of the body, and that of the keyframe.
-pub(in crate::navigation) fn led<S: States>() -> [Option<Led>; 2] {
-    let body = Led { rotation: ROTATION, led: [Some(POSITION), Some(VELOCITY)] };
-    let keyframe =
-        offset::<S>(Optional::Keyframe).map(|first| Led { rotation: first + 3, led: [Some(first), None] });
+/// The errors of the poses of the body and of the keyframe.
+pub(in crate::navigation) fn pose_errors<S: States>() -> [Option<PoseErrors>; 2] {
+    let body = PoseErrors { rotation: ROTATION, turned: [Some(POSITION), Some(VELOCITY)] };
+    let keyframe = offset::<S>(Optional::Keyframe)
+        .map(|first| PoseErrors { rotation: first + 3, turned: [Some(first), None] });
     [Some(body), keyframe]
 }
 

@@ -1,4 +1,4 @@
-//! Reasons why an input is not in the estimate, or why there is no estimate.
+//! Errors of inputs, with the reasons why an input is not in the estimate or why there is no estimate.
 
 use core::error::Error;
 use core::fmt;
@@ -7,21 +7,20 @@ use core::mem::discriminant;
 use super::gate::Rejection;
 use crate::navigation::refusal::Refusal;
 
-/// Reason for which an input was refused, or the side effect that it had.
+/// Reason for which an input was refused, or the side effect it had.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reason {
     /// The filter or smoother refused it.
     Refused(Refusal),
     /// There already is an input of the same kind, provider and time stamp.
     Duplicate,
-    /// The GNSS receiver is not let in.
+    /// The gate has rejected the GNSS receiver.
     Gate(Rejection),
     /// The window has no room for more inputs.
     Overflow,
-    /// Positions that did not fit have agreed on another place for long enough: the estimate is there now, as uncertain as they
-    /// leave it.
+    /// Positions that did not fit have agreed on another place for long enough, and the estimate was reset to them.
     Overruled {
-        /// The normalised innovation squared of the last of them, by the estimate before.
+        /// The normalised innovation squared of the last of them, before the reset.
         nis: f64,
     },
     /// Samples of the IMU were missing, and the gap was bridged.
@@ -32,7 +31,7 @@ pub enum Reason {
 }
 
 impl Reason {
-    /// Returns whether it is the same reason, with the same or other numbers.
+    /// Returns whether both are the same reason, whatever their numbers.
     pub(super) fn is_alike(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Refused(refusal), Self::Refused(other)) => discriminant(refusal) == discriminant(other),
@@ -85,12 +84,12 @@ impl EstimatorError {
         matches!(self, Self::Fatal(_))
     }
 
-    /// The error of numbers that are no longer usable.
+    /// Creates the error of an estimate whose numbers are no longer usable.
     pub(super) fn fatal(refusal: Refusal) -> Self {
         Self::Fatal(refusal.into())
     }
 
-    /// Returns whether it is the same error for the same reason, with the same or other numbers.
+    /// Returns whether both are the same error for the same reason, whatever their numbers.
     pub(super) fn is_alike(&self, other: &Self) -> bool {
         self.is_fatal() == other.is_fatal() && self.reason().is_alike(&other.reason())
     }
@@ -119,8 +118,8 @@ impl fmt::Display for EstimatorError {
 
 impl Error for EstimatorError {}
 
-/// The outcome of an input: its normalised innovation squared over its dimension, if it was measured, or why it is not in the estimate
-/// or has moved it. After a fatal error, the estimate continues without the input.
+/// The outcome of an input: its normalised innovation squared over its dimension, if it was measured, or its error. After a fatal error,
+/// the estimate continues without the input.
 pub(super) type Outcome = Result<Option<f64>, EstimatorError>;
 
 /// Reason for which the take-off origin was refused.

@@ -32,7 +32,7 @@ pub enum InputKind {
 }
 
 impl InputKind {
-    /// Returns whether it adds to the window of the estimator. All else comes from the flight controller.
+    /// Returns whether the input adds to the window of the estimator. All others come from the flight controller.
     pub(super) const fn is_of_window(self) -> bool {
         match self {
             Self::Vio | Self::Frame | Self::Anchor | Self::Factor => true,
@@ -82,16 +82,16 @@ impl Level {
     }
 }
 
-/// Source of a start.
+/// Source of the state with which the estimator started.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum StartedFrom {
-    /// Start from the take-off origin.
+    /// The take-off origin.
     Origin,
-    /// Warm, from the last known state of the flight controller, with its covariance inflated.
+    /// The last known state of the flight controller, with its covariance inflated: a warm start.
     FlightController,
-    /// Start from an anchor.
+    /// An anchor.
     Anchor,
-    /// A restart from fixes that agree and are far from the estimate.
+    /// Fixes that agree and are far from the estimate: a restart.
     Receiver,
 }
 
@@ -120,18 +120,18 @@ pub struct Event {
     pub kind: EventKind,
 }
 
-#[expect(clippy::large_enum_variant, reason = "events are passed by reference, and allocate nothing")]
 /// Kind of an event.
+#[expect(clippy::large_enum_variant, reason = "events are passed by reference, and allocate nothing")]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EventKind {
-    /// Estimator that is ready for inputs.
+    /// The estimator is ready for inputs.
     Ready {
         /// The strategy in use.
         strategy: StrategyKind,
         /// Number of keyframes held.
         window: u32,
     },
-    /// Start of the estimator.
+    /// The estimator has started.
     Started {
         /// Source of the start.
         from: StartedFrom,
@@ -159,8 +159,8 @@ pub enum EventKind {
         /// The reason.
         reason: Reason,
     },
-    /// Earlier input that a late one has brought into the estimate, though it was reported otherwise. The opposite is reported as it would
-    /// have been at once: as [`Degraded`](Self::Degraded), [`Fatal`](Self::Fatal) or [`Rejected`](Self::Rejected).
+    /// A late input has brought an earlier one, which was reported as refused, into the estimate. The opposite is reported as
+    /// [`Degraded`](Self::Degraded), [`Fatal`](Self::Fatal) or [`Rejected`](Self::Rejected).
     Revised {
         /// The earlier input.
         input: InputKind,
@@ -186,7 +186,7 @@ pub enum EventKind {
     },
     /// The clock of the IMU was set back. The estimator continues on the new clock, degraded until positions confirm it.
     ClockSetBack {
-        /// Time by which it was set back, s.
+        /// Difference between the old and the new time, s.
         seconds: f64,
     },
     /// Samples of the IMU were dropped early because there was no room for more. Late inputs may then be refused even within the
@@ -225,7 +225,7 @@ pub enum EventKind {
 }
 
 impl EventKind {
-    /// The report of what became of an input.
+    /// Creates the event of an input with this outcome.
     pub(super) fn of(input: InputKind, outcome: Outcome) -> Self {
         match outcome {
             Ok(nis) => Self::Added { input, nis, waits: false },
@@ -273,14 +273,14 @@ impl Event {
             | EventKind::Started { .. }
             | EventKind::Label { .. }
             | EventKind::Gate { .. }
-            // It takes a warning back, and belongs wherever the warning went.
+            // It withdraws a warning, so it must reach the same readers.
             | EventKind::Revised { .. }
             | EventKind::FallbackRecovered => Level::Info,
             EventKind::Added { .. } | EventKind::Emitted { .. } | EventKind::Keyframe { .. } => Level::Debug,
         }
     }
 
-    /// A text for the ground station. `None` for events of no use there.
+    /// A text for the ground station; `None` for events of no use there.
     pub fn status_text(&self) -> Option<StatusText> {
         let text = StatusText::new;
         Some(match self.kind {

@@ -30,10 +30,11 @@ pub(in crate::navigation::state_estimator) struct EskfStrategy {
     /// Estimates at the last keyframes, the newest last. They are never corrected.
     past: VecDeque<Pose>,
     window: usize,
+    /// `true` to keep each keyframe that leaves the window for [`Self::take_left`].
     records: bool,
     left: Option<Pose>,
     /// `true` if the present becomes the reference of the next relative pose, once all measurements at this time are fused.
-    is_next: bool,
+    is_reference_due: bool,
 }
 
 #[cfg_attr(not(feature = "eskf"), expect(dead_code, reason = "beside the smoother, that is the estimate"))]
@@ -48,7 +49,7 @@ impl EskfStrategy {
             window,
             records: config.params.record_keyframes,
             left: None,
-            is_next: false,
+            is_reference_due: false,
         })
     }
 
@@ -60,11 +61,11 @@ impl EskfStrategy {
         Ok(())
     }
 
-    /// The present state is the first keyframe.
+    /// Makes the present state the first keyframe.
     fn begin(&mut self, time_ns: i64) {
         self.copies.set_keyframe(id_of(time_ns));
         self.cadence.begin(time_ns);
-        self.is_next = false;
+        self.is_reference_due = false;
         self.past.clear();
         self.past.extend(self.pose());
     }
@@ -75,8 +76,7 @@ impl EskfStrategy {
         sample: &ImuMean,
         since_ns: i64,
     ) -> Result<(), EstimatorError> {
-        if self.is_next {
-            self.is_next = false;
+        if core::mem::take(&mut self.is_reference_due) {
             self.copies.set_keyframe(id_of(self.cadence.camera_ns));
         }
         self.copies.propagate_until(until_ns, sample, since_ns)?;
@@ -86,7 +86,7 @@ impl EskfStrategy {
     pub(super) fn camera_frame(&mut self) -> Result<(), EstimatorError> {
         self.keyframe()?;
         self.cadence.camera_frame();
-        self.is_next = true;
+        self.is_reference_due = true;
         Ok(())
     }
 
@@ -127,16 +127,15 @@ impl EskfStrategy {
                 result
             }
             Measured::Provided(factor) => {
-                return factor::update(copies, &mut streams.provided, *factor).and_then(|fused| self.kept(fused));
+                return factor::update(copies, &mut streams.provided, *factor).and_then(|fused| self.keep(fused));
             }
         };
-        self.kept(result.map_err(absurd)?)
+        self.keep(result.map_err(escalate)?)
     }
 
-    /// Keeps what was fused, in the newest keyframe if it belongs to that.
-    fn kept(&mut self, fused: Fused) -> Result<Fused, EstimatorError> {
+    /// Checks the estimate after a fusion, and updates the newest keyframe if the measurement was at its time.
+    fn keep(&mut self, fused: Fused) -> Result<Fused, EstimatorError> {
         let pose = self.pose().filter(Pose::is_finite).ok_or(EstimatorError::fatal(Refusal::NonFinite))?;
-        // A measurement at a keyframe belongs to that keyframe.
         if let Some(newest) = self.past.back_mut().filter(|newest| newest.time_ns == pose.time_ns) {
             *newest = pose;
         }
@@ -214,7 +213,7 @@ impl EskfStrategy {
         self.past.len()
     }
 
-    /// Returns how often it started, or a newcomer took over.
+    /// Number of starts and of newcomers that took over.
     pub(super) fn resets(&self) -> u32 {
         self.copies.best().resets()
     }
@@ -245,8 +244,8 @@ impl EskfStrategy {
     }
 }
 
-/// A correction that would move the filter farther than any distance on the Earth is fatal, as it is for the smoother.
-fn absurd(refusal: Refusal) -> EstimatorError {
+/// Makes a correction that would move the filter farther than any distance on the Earth fatal, as it is for the smoother.
+fn escalate(refusal: Refusal) -> EstimatorError {
     match refusal {
         Refusal::OutOfRange => EstimatorError::fatal(refusal),
         _ => refusal.into(),

@@ -1,6 +1,6 @@
 //! Factors of outside providers.
 
-use super::absurd;
+use super::escalate;
 use crate::navigation::copies::Copies;
 use crate::navigation::eskf::Eskf;
 use crate::navigation::fused::Fused;
@@ -26,7 +26,7 @@ pub(super) fn update<F: ProvidedFactor>(
     macro_rules! of_dimension {
         ($($dimension:literal)*) => {
             match dimension {
-                $($dimension => copies.update(stream, &Alone::<F, $dimension>(factor)).map_err(absurd),)*
+                $($dimension => copies.update(stream, &Alone::<F, $dimension>(factor)).map_err(escalate),)*
                 _ => Err(Refusal::NotObservable.into()),
             }
         };
