@@ -1,6 +1,6 @@
-//! Events that must happen, in their order.
+//! Events that must happen, in their order, and the figures of a run.
 
-use crate::timeline::{Kind, Line};
+use crate::timeline::{self, Kind, Line};
 use std::fmt;
 
 /// Events of the story, without their times.
@@ -23,17 +23,17 @@ const EXPECTED: &[(Kind, &str)] = &[
     (Kind::Command, "disarm finished"),
 ];
 
-/// The arm moves, rad/s.
-const MOVES: f64 = 0.05;
+/// Speed above which the arm moves, rad/s.
+const MOVING_SPEED: f64 = 0.05;
 
-/// Slower than this, the arm rests, rad/s.
-const RESTS: f64 = 1e-3;
+/// Speed below which the arm rests, rad/s.
+const RESTING_SPEED: f64 = 1e-3;
 
-/// The arm is at the end of its path, rad.
-const NEAR: f64 = 1e-6;
+/// Distance below which the arm is at the end of its path, rad.
+const END_DISTANCE: f64 = 1e-6;
 
-/// An estimate is right, rad/s: three axes of two gyroscopes with biases of 3 mrad/s each.
-const RIGHT: f64 = 0.03;
+/// Error below which an estimate is right, rad/s: three axes of two gyroscopes with biases of 3 mrad/s each.
+const LARGEST_ERROR: f64 = 0.03;
 
 /// Events and figures of a run.
 #[derive(Debug, Default)]
@@ -41,39 +41,31 @@ pub(crate) struct Outcome {
     pub(crate) lines: Vec<Line>,
     /// Positions of the joints over time, s and rad.
     pub(crate) joints: Vec<(f64, Vec<f64>)>,
-    /// The largest speed of a joint when the IMU was unplugged, rad/s.
+    /// Largest speed of a joint when the IMU was unplugged, rad/s.
     pub(crate) speed_when_unplugged: f64,
     /// Largest speed of a joint while the arm was held, rad/s.
     pub(crate) speed_while_held: f64,
-    /// The largest distance of a joint from the end of the path, rad.
+    /// Largest distance of a joint from the end of the path, rad.
     pub(crate) distance_from_end: f64,
-    /// The largest error of the tip's angular velocity, rad/s.
+    /// Largest error of the tip's angular velocity, rad/s.
     pub(crate) worst_error: f64,
     /// Number of estimates that were compared.
     pub(crate) compared: u32,
-    /// `true` in real time, where no estimate is of just now, so that none need be compared.
+    /// `true` in real time, where estimates cannot be compared: each is older than the simulated world.
     pub(crate) is_real_time: bool,
 }
 
 impl Outcome {
-    /// Returns the events of the story that have not happened, or not after what comes before them.
+    /// Describes the events of the story that have not happened in their order, and the figures that are wrong.
     pub(crate) fn missing(&self) -> Vec<String> {
-        let mut rest = self.lines.as_slice();
-        let mut is_missing = |(kind, event): &&(Kind, &str)| {
-            let position = rest.iter().position(|line| line.kind == *kind && line.event == *event);
-            if let Some(position) = position {
-                rest = &rest[position + 1..];
-            }
-            position.is_none()
-        };
-        let events = EXPECTED.iter().filter(|expected| is_missing(expected));
+        let events = timeline::missing(EXPECTED, &self.lines).into_iter();
         let mut missing: Vec<String> = events.map(|(kind, event)| format!("{} {event}", kind.name())).collect();
         let facts = [
-            (self.speed_when_unplugged > MOVES, "an arm that moves when its IMU is unplugged"),
-            (self.speed_while_held < RESTS, "an arm that rests while it is held"),
-            (self.distance_from_end < NEAR, "an arm at the end of its path"),
+            (self.speed_when_unplugged > MOVING_SPEED, "an arm that moves when its IMU is unplugged"),
+            (self.speed_while_held < RESTING_SPEED, "an arm that rests while it is held"),
+            (self.distance_from_end < END_DISTANCE, "an arm at the end of its path"),
             (self.is_real_time || self.compared > 0, "estimates of the tip that were compared"),
-            (self.worst_error < RIGHT, "estimates of the tip that are right"),
+            (self.worst_error < LARGEST_ERROR, "estimates of the tip that are right"),
         ];
         missing.extend(facts.iter().filter(|(is_so, _)| !is_so).map(|(_, fact)| (*fact).to_owned()));
         missing

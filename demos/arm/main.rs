@@ -2,9 +2,9 @@
 //!
 //! It follows a path; an estimator across its six joints estimates the acceleration of the tip. The tip's IMU is unplugged in the
 //! middle of a leg: the estimator is lost, and the command that this starts stops the arm. When the IMU is back and the
-//! estimator has recovered, the arm goes on to the end of its path. On virtual time, which takes a moment and gives the
-//! same output every time; with `--real-time` live. With `--record` it writes a recording that Foxglove and RViz can show. It
-//! fails if anything that belongs to the story did not happen, or not in its order.
+//! estimator has recovered, the arm goes on to the end of its path. It runs on virtual time, which takes a moment and gives the
+//! same output every time, or in real time with `--real-time`. With `--record` it writes a recording that Foxglove and RViz can
+//! show. It fails if an event of the story did not happen in its order.
 
 mod commands;
 mod expected;
@@ -52,13 +52,13 @@ fn main() -> ExitCode {
     }
 }
 
-/// Story, printed before it begins.
+/// The story, printed before it begins.
 const STORY: &str = "\
 An arm of six axes follows a path. At 4 s, in the middle of a leg, the IMU at its tip is unplugged: the estimate of the tip is lost, which
 stops the arm. At 6 s the IMU is plugged in; as soon as the estimator is healthy, the arm goes on to the end of its path. Times are in
 seconds.";
 
-/// Runs the story; whether all of it happened.
+/// Runs the story, and returns whether all of it happened.
 fn tell(arguments: &Arguments, out: &mut dyn Write) -> Result<bool, Box<dyn Error>> {
     if let Some(file) = &arguments.plot {
         Picture::check(file, "--plot")?;

@@ -2,7 +2,7 @@
 
 use crate::expected::Outcome;
 use crate::path;
-use crate::script::{self, Deed};
+use crate::script::{self, Action};
 use bb_core::prelude::*;
 use bb_plot::{Band, Line, PALETTE, Panel, Picture};
 
@@ -17,10 +17,10 @@ pub(crate) fn picture(outcome: &Outcome) -> Picture {
         .iter()
         .enumerate()
         .map(|(joint, path)| Line::new(name(path), PALETTE[joint % PALETTE.len()], 1, &positions(joint)));
-    let at = |deed: Deed| {
-        script::STEPS.iter().find(|(_, of)| *of == deed).map(|(time, _)| time.seconds_since(MonotonicTime::ZERO))
+    let at = |action: Action| {
+        script::STEPS.iter().find(|(_, of)| *of == action).map(|(time, _)| time.seconds_since(MonotonicTime::ZERO))
     };
-    let unplugged = at(Deed::Unplug).zip(at(Deed::Plug));
+    let unplugged = at(Action::Unplug).zip(at(Action::Plug));
     let unplugged =
         unplugged.map(|times| Band { label: "no IMU at the tip".into(), colour: (245, 190, 190), times });
     let panel = Panel::new("position (deg)", lines.collect()).shade(unplugged.as_slice());

@@ -1,8 +1,8 @@
-//! Runs the script on virtual time or in real time, and writes down what happens.
+//! Runs the script on virtual time or in real time, and prints its events.
 
 use crate::expected::Outcome;
 use crate::robot::{Ur5, ur5};
-use crate::script::{self, Deed};
+use crate::script::{self, Action};
 use crate::timeline::{Line, TOPICS};
 use crate::tip::Tip;
 use crate::{Arguments, path};
@@ -41,7 +41,7 @@ impl Run {
     }
 }
 
-/// Run of the robot, with the record of its events.
+/// A run of the robot, with the record of its events.
 struct Story<'a> {
     robot: Run,
     events: DynamicSubscription,
@@ -71,17 +71,17 @@ pub(crate) fn run(arguments: &Arguments, out: &mut dyn Write) -> Result<Outcome,
     writeln!(out, "{}", Line::header())?;
     let outcome = Outcome { is_real_time: arguments.real_time, ..Outcome::default() };
     let mut story = Story { robot, events, tips, recorder, truth, outcome, out };
-    for (time, deed) in script::STEPS {
-        story.go_on(time)?;
-        story.take_place(time, deed)?;
+    for (time, action) in script::STEPS {
+        story.run_until(time)?;
+        story.perform(time, action)?;
     }
-    story.go_on(script::END)?;
-    story.end()
+    story.run_until(script::END)?;
+    story.finish()
 }
 
 impl Story<'_> {
-    /// Lets time pass, and writes down what happens.
-    fn go_on(&mut self, time: MonotonicTime) -> Result<(), Box<dyn Error>> {
+    /// Runs the robot until `time`, and prints its events.
+    fn run_until(&mut self, time: MonotonicTime) -> Result<(), Box<dyn Error>> {
         loop {
             let now = self.robot.clock().now();
             if now >= time {
@@ -110,18 +110,18 @@ impl Story<'_> {
         }
     }
 
-    fn take_place(&mut self, time: MonotonicTime, deed: Deed) -> Result<(), Box<dyn Error>> {
-        self.write(deed.line(time))?;
+    fn perform(&mut self, time: MonotonicTime, action: Action) -> Result<(), Box<dyn Error>> {
+        self.write(action.line(time))?;
         let imu = ur5::sensor::base::shoulder_pan::shoulder::shoulder_lift::upper_arm::elbow::forearm::wrist_1::wrist::wrist_2::hand::wrist_3::tool::imu;
-        match deed {
-            Deed::Arm => drop(self.robot.command(ur5::command::arm, NoArguments)),
-            Deed::Follow => drop(self.robot.command(ur5::command::follow, NoArguments)),
-            Deed::Unplug => {
+        match action {
+            Action::Arm => drop(self.robot.command(ur5::command::arm, NoArguments)),
+            Action::Follow => drop(self.robot.command(ur5::command::follow, NoArguments)),
+            Action::Unplug => {
                 self.outcome.speed_when_unplugged = self.truth.speed(&self.robot)?;
                 self.truth.world.set_unplugged(imu.path(), true);
             }
-            Deed::Plug => self.truth.world.set_unplugged(imu.path(), false),
-            Deed::Disarm => {
+            Action::Plug => self.truth.world.set_unplugged(imu.path(), false),
+            Action::Disarm => {
                 self.outcome.distance_from_end = self.truth.distance_from_end(&self.robot)?;
                 drop(self.robot.command(ur5::command::disarm, NoArguments));
             }
@@ -135,7 +135,7 @@ impl Story<'_> {
         Ok(())
     }
 
-    fn end(self) -> Result<Outcome, Box<dyn Error>> {
+    fn finish(self) -> Result<Outcome, Box<dyn Error>> {
         if let Some(mut recorder) = self.recorder {
             recorder.drain()?;
             recorder.finish()?;

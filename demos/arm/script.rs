@@ -1,11 +1,11 @@
-//! Events from outside: the arm's operator, and a cable that is unplugged.
+//! Actions from outside: commands of the arm's operator, and a cable that is unplugged.
 
 use crate::timeline::{Kind, Line};
 use bb_core::prelude::*;
 
-/// Something that is done from outside.
+/// An action from outside.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Deed {
+pub(crate) enum Action {
     Arm,
     Follow,
     Unplug,
@@ -13,22 +13,22 @@ pub(crate) enum Deed {
     Disarm,
 }
 
-/// Deeds and their times.
-pub(crate) const STEPS: [(MonotonicTime, Deed); 5] = [
-    (at(500), Deed::Arm),
-    (at(1000), Deed::Follow),
-    (at(4000), Deed::Unplug),
-    (at(6000), Deed::Plug),
-    (at(15_000), Deed::Disarm),
+/// Actions and their times.
+pub(crate) const STEPS: [(MonotonicTime, Action); 5] = [
+    (at(500), Action::Arm),
+    (at(1000), Action::Follow),
+    (at(4000), Action::Unplug),
+    (at(6000), Action::Plug),
+    (at(15_000), Action::Disarm),
 ];
 
 /// Time at which the story ends.
 pub(crate) const END: MonotonicTime = at(15_500);
 
-/// Period at which events are written down.
+/// Period at which events are printed.
 pub(crate) const PERIOD: Duration = Duration::from_millis(100);
 
-impl Deed {
+impl Action {
     pub(crate) fn line(self, time: MonotonicTime) -> Line {
         let (kind, event, detail) = match self {
             Self::Arm => (Kind::Operator, "arm!", ""),

@@ -88,7 +88,7 @@ impl Flying {
     }
 }
 
-/// Flies, and records it where a file is named.
+/// Flies the simulated flight, and records it if a file is named.
 pub(crate) fn fly(strategy: &str, record: Option<&Path>) -> Result<Outcome, Box<dyn Error>> {
     let mut builder = Drone::builder();
     let options = builder.options(drone::estimator::base::navigation);
@@ -120,8 +120,8 @@ pub(crate) fn fly(strategy: &str, record: Option<&Path>) -> Result<Outcome, Box<
     flying.end()
 }
 
-/// Flies again what was recorded.
-pub(crate) fn fly_again(
+/// Flies a recorded flight again.
+pub(crate) fn fly_recorded(
     strategy: &str,
     recorded: &Arc<Recorded>,
     record: Option<&Path>,

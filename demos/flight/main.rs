@@ -1,10 +1,10 @@
 //! A flight whose receiver of satellite navigation is spoofed and whose camera goes blind, as a timeline on a terminal.
 //!
 //! A drone takes off with satellite navigation, which is then spoofed and refused; it goes on by its camera from one
-//! satellite image to the next, loses both in fog, finds itself again, and lets the receiver in once that is healthy for ten
-//! seconds and the next image agrees with it. On virtual time, so that it takes seconds and is the same every time. It
-//! fails if anything of this did not happen. With `--data` it flies a recorded flight again, whose labels must be those that follow
-//! from when something was measured.
+//! satellite image to the next, loses both in fog, recovers, and lets the receiver in once that is healthy for ten
+//! seconds and the next image agrees with it. It runs on virtual time, so that it takes seconds and is the same every time. It
+//! fails if any of this did not happen. With `--data` it flies a recorded flight again, whose labels must follow from the times of its
+//! measurements.
 
 mod drone;
 mod expected;
@@ -56,22 +56,22 @@ fn main() -> ExitCode {
     }
 }
 
-/// Flies; whether all happened that should.
+/// Flies, and returns whether all that was expected happened.
 fn run(arguments: &Arguments) -> Result<bool, Box<dyn Error>> {
     let (outcome, missing) = match &arguments.data {
         None => {
             let outcome = drone::fly(&arguments.strategy, arguments.record.as_deref())?;
-            let missing = simulated(&outcome);
+            let missing = missing_simulated(&outcome);
             (outcome, missing)
         }
         Some(prefix) => {
             let recorded = Arc::new(Recorded::read(prefix)?);
-            let outcome = drone::fly_again(&arguments.strategy, &recorded, arguments.record.as_deref())?;
-            let missing = again(&outcome, &recorded);
+            let outcome = drone::fly_recorded(&arguments.strategy, &recorded, arguments.record.as_deref())?;
+            let missing = missing_recorded(&outcome, &recorded);
             (outcome, missing)
         }
     };
-    // Errors are values, also where the reader of a pipe is gone.
+    // `print!` would panic if the reader of a pipe is gone.
     let mut out = std::io::stdout().lock();
     if arguments.data.is_none() {
         writeln!(out, "{STORY}\n")?;
@@ -101,11 +101,11 @@ its camera, with an image of the ground from a satellite to compare with every f
 and sees nothing. At 60 s the receiver is healthy again, and is let in when it has been so for ten seconds and the next image
 agrees with it. Times are in seconds.";
 
-/// Time from which on fixes tell where the drone is again, s.
-const LET_IN: f64 = 73.0;
+/// Time after which fixes are used again, s.
+const FIXED_AFTER_S: f64 = 73.0;
 
-/// Returns what has not happened on the simulated flight.
-fn simulated(outcome: &Outcome) -> Option<String> {
+/// Describes the first event of the simulated flight that is missing.
+fn missing_simulated(outcome: &Outcome) -> Option<String> {
     let fault = |is_fault: bool, text: &str| is_fault.then(|| text.to_owned());
     timeline::missing(&outcome.happened)
         .or_else(|| timeline::unexpected(&outcome.happened))
@@ -114,17 +114,17 @@ fn simulated(outcome: &Outcome) -> Option<String> {
             fault(!outcome.grows_while_dead_reckoning(), text)
         })
         .or_else(|| fault(!outcome.is_gate_open(), "a receiver that is let in at the end"))
-        .or_else(|| fault(!outcome.is_fixed_after(LET_IN), "fixes that are used again"))
+        .or_else(|| fault(!outcome.is_fixed_after(FIXED_AFTER_S), "fixes that are used again"))
 }
 
-/// Returns what has not happened on a recorded flight: its labels follow from the times of the measurements.
-fn again(outcome: &Outcome, recorded: &Recorded) -> Option<String> {
+/// Describes the first fault of a recorded flight, whose labels follow from the times of the measurements.
+fn missing_recorded(outcome: &Outcome, recorded: &Recorded) -> Option<String> {
     let start = "started from flight_controller";
     if outcome.happened.iter().filter(|one| one.what.starts_with("started")).any(|one| one.what != start) {
         return Some("one start, from the flight controller".into());
     }
     let length_s = recorded.sent.last().map_or(0.0, |(time, _)| time.as_nanos() as f64 * 1e-9);
-    // Five a second.
+    // There are five estimates per second.
     let least = (4.9 * length_s) as usize;
     if outcome.labels().count() < least {
         return Some(format!("{least} estimates"));

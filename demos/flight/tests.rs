@@ -1,8 +1,8 @@
 //! The flight has the events of its description, with both strategies, and so has its recording.
 
-use crate::again;
-use crate::drone::{fly, fly_again};
+use crate::drone::{fly, fly_recorded};
 use crate::expected::Expected;
+use crate::missing_recorded;
 use crate::recorded::Recorded;
 use crate::timeline::{Happened, missing, unexpected};
 use bb_estimators::navigation::state_estimator::{FlightEvents, Level};
@@ -67,8 +67,8 @@ fn recorded(name: &str) -> Result<Arc<Recorded>, Box<dyn Error>> {
 #[ignore = "needs recordings: .ci/run runs it"]
 fn a_recorded_flight_has_the_labels_that_follow_from_it() -> Result<(), Box<dyn Error>> {
     let flight = recorded("simflight_stress")?;
-    let outcome = fly_again("eskf", &flight, None)?;
-    assert_eq!(again(&outcome, &flight), None, "{:#?}", outcome.timeline());
+    let outcome = fly_recorded("eskf", &flight, None)?;
+    assert_eq!(missing_recorded(&outcome, &flight), None, "{:#?}", outcome.timeline());
     assert!(outcome.worst_m() < 15.0, "{} m", outcome.worst_m());
     for label in ["dead_reckoned", "visual_propagated", "satellite_anchored"] {
         let happened = outcome.happened.iter().any(|one| one.what == format!("label {label}"));
@@ -87,8 +87,8 @@ fn every_recorded_flight_has_the_labels_that_follow_from_it() -> Result<(), Box<
     for name in ["simflight", "simflight_stress", "euroc_mh01"] {
         let flight = recorded(name)?;
         for strategy in ["smoother", "eskf"] {
-            let outcome = fly_again(strategy, &flight, None)?;
-            assert_eq!(again(&outcome, &flight), None, "{name}, {strategy}: {:#?}", outcome.timeline());
+            let outcome = fly_recorded(strategy, &flight, None)?;
+            assert_eq!(missing_recorded(&outcome, &flight), None, "{name}, {strategy}: {:#?}", outcome.timeline());
             assert!(outcome.worst_m() < 15.0, "{name}, {strategy}: {} m", outcome.worst_m());
         }
     }

@@ -1,4 +1,4 @@
-//! The estimator: where the rover is.
+//! The estimator of the rover's pose.
 
 use bb_core::nalgebra::{UnitQuaternion, Vector3};
 use bb_core::prelude::*;
@@ -13,13 +13,13 @@ pub(crate) struct DeadReckoningInputs<'a> {
 /// Options of [`DeadReckoning`].
 #[derive(Clone, Debug, Options)]
 pub(crate) struct DeadReckoningOptions {
-    /// Nothing is integrated over a longer gap between two dispatches. Unit: s.
+    /// Longest gap between two dispatches that is integrated over. Unit: s.
     #[option(default = Duration::from_millis(50))]
     pub(crate) longest_step: Duration,
 }
 
-/// Turns by the gyroscope's rate and moves by the wheels' velocity, on a plane. Its error grows without bound, and what
-/// happens while it gets no input it does not know.
+/// Integrates the gyroscope's rate and the wheels' velocity on a plane. Its error grows without bound, and motion during a gap
+/// of the input is lost.
 #[derive(Debug)]
 pub(crate) struct DeadReckoning {
     longest_step: Duration,
@@ -43,7 +43,7 @@ impl Estimator for DeadReckoning {
         let step = self.last.replace(now).map_or(Duration::ZERO, |last| now.duration_since(last));
         if step <= self.longest_step {
             let turn = inputs.imu.angular_velocity.z * step.as_secs_f64();
-            // The heading in the middle of the step.
+            // The velocity is turned by the heading in the middle of the step.
             let world_from_body = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.yaw + turn / 2.0);
             self.position += world_from_body * inputs.wheels.linear * step.as_secs_f64();
             self.yaw += turn;

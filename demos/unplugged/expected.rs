@@ -1,9 +1,9 @@
 //! Events that must happen, in their order.
 
-use crate::timeline::{Kind, Line};
+use crate::timeline::Kind;
 
 /// Events of the story, without their times.
-const EXPECTED: &[(Kind, &str)] = &[
+pub(crate) const EXPECTED: &[(Kind, &str)] = &[
     (Kind::State, "disarmed -> idle"),
     (Kind::Command, "drive started"),
     (Kind::State, "executing -> driving"),
@@ -29,16 +29,3 @@ const EXPECTED: &[(Kind, &str)] = &[
     (Kind::State, "stopped -> driving"),
     (Kind::Command, "disarm finished"),
 ];
-
-/// Returns the events of the story that have not happened, or not after what comes before them.
-pub(crate) fn missing(lines: &[Line]) -> Vec<(Kind, &'static str)> {
-    let mut rest = lines;
-    let mut is_missing = |(kind, event): &&(Kind, &str)| {
-        let position = rest.iter().position(|line| line.kind == *kind && line.event == *event);
-        if let Some(position) = position {
-            rest = &rest[position + 1..];
-        }
-        position.is_none()
-    };
-    EXPECTED.iter().filter(|expected| is_missing(expected)).copied().collect()
-}

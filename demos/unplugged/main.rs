@@ -2,8 +2,8 @@
 //!
 //! A rover drives in a circle and estimates its pose from an IMU and its wheels. The wheels stall, the IMU is unplugged,
 //! both come back; the health of the estimator starts the commands that slow the rover down, stop it and let it drive on.
-//! On virtual time, which takes a moment and gives the same output every time; with `--real-time` live. It fails if
-//! anything that belongs to the story did not happen, or not in its order.
+//! It runs on virtual time, which takes a moment and gives the same output every time, or in real time with `--real-time`. It fails
+//! if an event of the story did not happen in its order.
 
 mod commands;
 mod dead_reckoning;
@@ -39,7 +39,7 @@ fn main() -> ExitCode {
     match start(&mut std::io::stdout().lock()) {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::FAILURE,
-        // A reader that has read enough (`| head`) knows that it has not read the end.
+        // The reader has closed the pipe (`| head`), which needs no message.
         Err(error) if error.downcast_ref::<std::io::Error>().is_some_and(is_broken_pipe) => ExitCode::FAILURE,
         Err(error) => {
             eprintln!("error: {error}");
@@ -62,18 +62,18 @@ fn start(out: &mut dyn Write) -> Result<bool, Box<dyn Error>> {
     tell(builder, &arguments, out)
 }
 
-/// Story, printed before it begins.
+/// The story, printed before it begins.
 const STORY: &str = "\
 A rover drives in a circle and estimates its pose from an IMU and its wheels. At 2 s the wheels stall: the estimate is degraded, and the
 rover slows down until they turn again. At 3 s the IMU is unplugged: the estimate is lost, and the rover stops and refuses to drive.
 At 4.5 s the IMU is plugged in, and the rover drives on. Times are in seconds.";
 
-/// Runs the story; whether all of it happened.
+/// Runs the story, and returns whether all of it happened.
 fn tell(builder: Builder<Rover>, arguments: &Arguments, out: &mut dyn Write) -> Result<bool, Box<dyn Error>> {
     writeln!(out, "{STORY}\n")?;
     let lines =
         if arguments.real_time { run::in_real_time(builder, out)? } else { run::on_virtual_time(builder, out)? };
-    let missing = expected::missing(&lines);
+    let missing = timeline::missing(expected::EXPECTED, &lines);
     if missing.is_empty() {
         writeln!(out, "\nAll that was expected happened, in its order.")?;
     }

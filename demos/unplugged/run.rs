@@ -1,18 +1,18 @@
-//! Runs the script on virtual time or in real time, and writes down what happens.
+//! Runs the script on virtual time or in real time, and prints its events.
 
 use crate::rover::{Rover, rover};
-use crate::script::{self, Deed};
+use crate::script::{self, Action};
 use crate::timeline::{Kind, Line, TOPICS};
 use bb_core::prelude::*;
 use bb_core::{Builder, DynamicSubscription};
 use std::error::Error;
 use std::io::Write;
 
-/// Run of the robot, with the events so far.
+/// A run of the robot, with the events so far.
 struct Story<'a> {
     events: DynamicSubscription,
     poses: Subscription<Pose>,
-    /// The next line to write.
+    /// The next line, if it was received but is not written yet.
     next: Option<Line>,
     lines: Vec<Line>,
     out: &'a mut dyn Write,
@@ -21,24 +21,24 @@ struct Story<'a> {
 pub(crate) fn on_virtual_time(builder: Builder<Rover>, out: &mut dyn Write) -> Result<Vec<Line>, Box<dyn Error>> {
     let mut story = Story::new(&builder, out)?;
     let mut simulation = builder.simulate()?;
-    for (time, deed) in script::steps() {
+    for (time, action) in script::steps() {
         simulation.run_until(time);
         story.write_until(time)?;
-        story.take_place(&simulation, time, deed)?;
+        story.perform(&simulation, time, action)?;
     }
     simulation.run_until(script::END);
-    story.end()
+    story.finish()
 }
 
 pub(crate) fn in_real_time(builder: Builder<Rover>, out: &mut dyn Write) -> Result<Vec<Line>, Box<dyn Error>> {
     let mut story = Story::new(&builder, out)?;
     let running = builder.start()?;
-    for (time, deed) in script::steps() {
+    for (time, action) in script::steps() {
         story.wait_until(&running, time)?;
-        story.take_place(&running, time, deed)?;
+        story.perform(&running, time, action)?;
     }
     story.wait_until(&running, script::END)?;
-    story.end()
+    story.finish()
 }
 
 impl<'a> Story<'a> {
@@ -49,20 +49,20 @@ impl<'a> Story<'a> {
         Ok(Self { events, poses, next: None, lines: Vec::new(), out })
     }
 
-    /// Carries out one step of the script. The result of a command is seen on its topic.
-    fn take_place(&mut self, robot: &Live<Rover>, time: MonotonicTime, deed: Deed) -> std::io::Result<()> {
-        let (kind, event, detail) = match deed {
-            Deed::Hardware(event, detail) => (Kind::Hardware, event, detail),
-            Deed::Arm => (Kind::Operator, "arm!", ""),
-            Deed::Drive => (Kind::Operator, "drive!", ""),
-            Deed::Disarm => (Kind::Operator, "disarm!", ""),
+    /// Performs an action of the script. The result of a command is read from its topic.
+    fn perform(&mut self, robot: &Live<Rover>, time: MonotonicTime, action: Action) -> std::io::Result<()> {
+        let (kind, event, detail) = match action {
+            Action::Hardware(event, detail) => (Kind::Hardware, event, detail),
+            Action::Arm => (Kind::Operator, "arm!", ""),
+            Action::Drive => (Kind::Operator, "drive!", ""),
+            Action::Disarm => (Kind::Operator, "disarm!", ""),
         };
         self.write(Line::new(time, kind, event, detail))?;
-        match deed {
-            Deed::Hardware(..) => {}
-            Deed::Arm => drop(robot.command(rover::command::arm, NoArguments)),
-            Deed::Drive => drop(robot.command(rover::command::drive, NoArguments)),
-            Deed::Disarm => drop(robot.command(rover::command::disarm, NoArguments)),
+        match action {
+            Action::Hardware(..) => {}
+            Action::Arm => drop(robot.command(rover::command::arm, NoArguments)),
+            Action::Drive => drop(robot.command(rover::command::drive, NoArguments)),
+            Action::Disarm => drop(robot.command(rover::command::disarm, NoArguments)),
         }
         Ok(())
     }
@@ -95,7 +95,7 @@ impl<'a> Story<'a> {
         }
     }
 
-    fn end(mut self) -> Result<Vec<Line>, Box<dyn Error>> {
+    fn finish(mut self) -> Result<Vec<Line>, Box<dyn Error>> {
         self.write_until(MonotonicTime::MAX)?;
         if let Some(pose) = self.poses.try_recv() {
             let (x, y) = (pose.position.x, pose.position.y);

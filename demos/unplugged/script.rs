@@ -2,7 +2,7 @@
 
 use bb_core::prelude::*;
 
-/// A while in which a sensor says nothing.
+/// An interval in which a sensor sends nothing.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Silence {
     from_millis: u64,
@@ -12,7 +12,7 @@ pub(crate) struct Silence {
 }
 
 impl Silence {
-    /// Returns whether it lasts at `time`.
+    /// Returns whether `time` is in the interval.
     pub(crate) fn includes(self, time: MonotonicTime) -> bool {
         (at(self.from_millis)..at(self.until_millis)).contains(&time)
     }
@@ -32,10 +32,10 @@ pub(crate) const IMU_UNPLUGGED: Silence = Silence {
     ends: ("the IMU is plugged in", ""),
 };
 
-/// Something that is done.
+/// An action from outside.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Deed {
-    /// Event of the hardware, by itself: the sensors know of it.
+pub(crate) enum Action {
+    /// Event of the hardware with its detail; the sensors simulate it themselves.
     Hardware(&'static str, &'static str),
     /// Arming by the operator.
     Arm,
@@ -45,16 +45,16 @@ pub(crate) enum Deed {
     Disarm,
 }
 
-/// All of it, in order.
-pub(crate) fn steps() -> Vec<(MonotonicTime, Deed)> {
-    let operator = [(500, Deed::Arm), (1000, Deed::Drive), (3900, Deed::Drive), (6500, Deed::Disarm)];
+/// All actions with their times, in order.
+pub(crate) fn steps() -> Vec<(MonotonicTime, Action)> {
+    let operator = [(500, Action::Arm), (1000, Action::Drive), (3900, Action::Drive), (6500, Action::Disarm)];
     let hardware = [WHEELS_STALLED, IMU_UNPLUGGED].into_iter().flat_map(|silence| {
         let Silence { from_millis, until_millis, begins, ends } = silence;
-        [(from_millis, Deed::Hardware(begins.0, begins.1)), (until_millis, Deed::Hardware(ends.0, ends.1))]
+        [(from_millis, Action::Hardware(begins.0, begins.1)), (until_millis, Action::Hardware(ends.0, ends.1))]
     });
     let mut steps: Vec<_> = operator.into_iter().chain(hardware).collect();
     steps.sort_by_key(|(millis, _)| *millis);
-    steps.into_iter().map(|(millis, deed)| (at(millis), deed)).collect()
+    steps.into_iter().map(|(millis, action)| (at(millis), action)).collect()
 }
 
 /// Time at which the story ends.

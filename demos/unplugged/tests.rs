@@ -1,8 +1,9 @@
 //! The output is the stored one, and what is missing is named.
 
+use crate::expected::EXPECTED;
 use crate::rover::Rover;
-use crate::timeline::{Kind, Line};
-use crate::{Arguments, expected, run, tell};
+use crate::timeline::{self, Kind, Line};
+use crate::{Arguments, run, tell};
 use std::error::Error;
 
 #[test]
@@ -40,14 +41,14 @@ fn the_tutorial_shows_a_part_of_it() {
 #[test]
 fn what_has_not_happened_in_its_order_is_missing() -> Result<(), Box<dyn Error>> {
     let lines = run::on_virtual_time(Rover::builder(), &mut std::io::sink())?;
-    assert_eq!(expected::missing(&lines), []);
+    assert_eq!(timeline::missing(EXPECTED, &lines), []);
     let without: Vec<Line> = lines.iter().filter(|line| line.event != "drive refused").cloned().collect();
-    assert_eq!(expected::missing(&without), [(Kind::Command, "drive refused")]);
+    assert_eq!(timeline::missing(EXPECTED, &without), [(Kind::Command, "drive refused")]);
     let mut late = lines.clone();
     if let Some(first) = late.iter().position(|line| line.event == "disarmed -> idle") {
         let line = late.remove(first);
         late.push(line);
     }
-    assert!(!expected::missing(&late).is_empty());
+    assert!(!timeline::missing(EXPECTED, &late).is_empty());
     Ok(())
 }

@@ -5,7 +5,7 @@ use bb_core::prelude::*;
 use bb_core::{DynamicMessage, HealthTransition};
 use std::fmt;
 
-/// One thing that happened.
+/// An event as a line of the table.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Line {
     pub(crate) time: MonotonicTime,
@@ -37,7 +37,7 @@ impl Kind {
     }
 }
 
-/// The topics that the table is made of: their order across topics is kept only in one subscription.
+/// The topics in the table, in one subscription, which keeps the order across topics.
 pub(crate) const TOPICS: Select<'static> = Select::AnyOf(&[
     Select::Path("health"),
     Select::Path("state_machine"),
@@ -86,7 +86,7 @@ impl Line {
     }
 }
 
-/// A path that fits into a line: of a long one, the first two parts and the last two.
+/// Shortens a long path to its first two parts and its last two.
 fn short(path: &str) -> String {
     let parts: Vec<&str> = path.split('/').collect();
     match parts.as_slice() {
@@ -111,6 +111,18 @@ fn description(event: &CommandEvent) -> (String, String) {
         CommandPhase::Cancelled => (format!("{name} cancelled"), String::new()),
         other => (name.into(), format!("{other:?}")),
     }
+}
+
+/// Returns the expected events that have not happened in their order.
+pub(crate) fn missing(expected: &[(Kind, &'static str)], mut lines: &[Line]) -> Vec<(Kind, &'static str)> {
+    let mut is_missing = |(kind, event): &&(Kind, &str)| {
+        let position = lines.iter().position(|line| line.kind == *kind && line.event == *event);
+        if let Some(position) = position {
+            lines = &lines[position + 1..];
+        }
+        position.is_none()
+    };
+    expected.iter().filter(|expected| is_missing(expected)).copied().collect()
 }
 
 impl fmt::Display for Line {
