@@ -1,4 +1,4 @@
-//! One connection: what a viewer asks for, and the frames that it gets.
+//! A connection of a viewer: its requests, and the frames sent to it.
 
 use crate::guests::Seat;
 use crate::hub::{Hub, Position};
@@ -13,15 +13,15 @@ use std::time::Duration;
 use tokio::sync::mpsc;
 use tokio::time::timeout;
 
-/// Time within which the first message must come.
+/// Time within which the first message must arrive.
 const FIRST_WITHIN: Duration = Duration::from_secs(5);
-/// Time within which a message to a viewer must have gone.
+/// Time within which a message to a viewer must be sent.
 const SENT_WITHIN: Duration = Duration::from_secs(5);
-/// Wrong tokens in a connection.
+/// Number of wrong tokens that end a connection.
 const MOST_GUESSES: u32 = 3;
-/// Requests of one viewer that may wait for the robot.
+/// Largest number of requests of one viewer that wait for the robot.
 const MOST_WAITING: usize = 4;
-/// Executions of one viewer whose results it waits for.
+/// Largest number of executions of one viewer that run.
 const MOST_EXECUTIONS: usize = 64;
 
 /// A viewer that has introduced itself.
@@ -47,13 +47,13 @@ enum Answer {
 
 pub(crate) async fn serve(mut socket: WebSocket, shared: &Shared, seat: Seat) {
     if let Err(Some(error)) = talk(&mut socket, shared, &seat).await {
-        // It may be gone.
+        // The viewer may be gone.
         let _ = send(&mut socket, protocol::error(&error)).await;
     }
     let _ = timeout(SENT_WITHIN, socket.send(Message::Close(None))).await;
 }
 
-/// Ends with an error to report, or without one if the connection has ended.
+/// Serves the connection until it ends, with an error to report, or `None` if the viewer has left.
 async fn talk(socket: &mut WebSocket, shared: &Shared, seat: &Seat) -> Result<(), Option<String>> {
     let first = tokio::select! {
         first = timeout(FIRST_WITHIN, received(socket)) => first,
@@ -95,7 +95,7 @@ async fn talk(socket: &mut WebSocket, shared: &Shared, seat: &Seat) -> Result<()
 }
 
 impl Viewer<'_> {
-    /// Gives it its rights: with the right token those of the options. The right to read is not given without it, if reading needs it.
+    /// Starts a session with the rights of the options if the token is right, otherwise with the right to read, if that needs no token.
     fn introduce(&mut self, token: Option<&str>) -> Result<(), String> {
         let is_known = match token {
             Some(token) if self.shared.token.is(token) => true,
@@ -135,10 +135,10 @@ impl Viewer<'_> {
         Right::ALL.into_iter().filter(|right| rights.contains(*right)).map(|right| quoted(right.name())).collect()
     }
 
-    /// Answers a request, at once or once the robot has answered.
+    /// Answers a request; `None` if the answer has to wait for the robot.
     ///
     /// # Errors
-    /// The connection ends for this reason.
+    /// The reason for which the connection ends.
     fn ask(&mut self, text: &str) -> Result<Option<String>, String> {
         let Request { id, ask } = match Request::parse(text) {
             Ok(request) => request,
@@ -169,7 +169,7 @@ impl Viewer<'_> {
                 self.position.again();
                 return Ok(Some(protocol::done(id, "")));
             }
-            // Whatever else waits. More of those would do no more.
+            // Other requests must not keep a viewer from disarming the robot.
             Ask::Disarm if self.waiting < 2 * MOST_WAITING => {}
             _ if self.waiting >= MOST_WAITING => {
                 return Ok(Some(protocol::refused(id, "too many requests of this viewer wait for the robot")));
@@ -201,7 +201,7 @@ impl Viewer<'_> {
         }
     }
 
-    /// The results of executions that have ended.
+    /// Removes the executions that have ended, and returns their results.
     fn results(&mut self) -> Vec<String> {
         let mut results = Vec::new();
         self.executions.retain(|execution| match execution.try_result() {
@@ -218,13 +218,13 @@ impl Viewer<'_> {
 
 impl Drop for Viewer<'_> {
     fn drop(&mut self) {
-        // Also for what still waits for the robot.
+        // Requests that still wait for the robot hold the session, and lose its rights.
         self.session.end();
         self.hub.watch(&self.watched, &[]);
     }
 }
 
-/// Does what is asked for; it may wait for the robot.
+/// Performs a request, which may wait for the robot.
 fn perform(session: &Session, id: u64, ask: Ask) -> Answer {
     let done: Result<String, String> = match ask {
         Ask::Arm => session.arm().map(|()| String::new()).map_err(|error| error.to_string()),
@@ -244,7 +244,7 @@ fn perform(session: &Session, id: u64, ask: Ask) -> Answer {
             text(session.send_json(&path, &command).map(|carried_out| format!(r#","command":{carried_out}"#)))
         }
         Ask::Publish { path, payload } => text(session.publish_json(&path, &payload).map(|()| String::new())),
-        // Those are answered without the robot.
+        // The viewer has answered these itself.
         Ask::Ping | Ask::Token(_) | Ask::Describe | Ask::Watch(_) => Ok(String::new()),
     };
     Answer::Text(match done {
@@ -263,7 +263,7 @@ async fn received(socket: &mut WebSocket) -> Option<String> {
         match socket.recv().await? {
             Ok(Message::Text(text)) => return Some(text.as_str().to_owned()),
             Ok(Message::Ping(_) | Message::Pong(_)) => {}
-            // Nobody of ours sends those; an error ends the connection as well.
+            // Viewers send no binary messages.
             Ok(Message::Binary(_) | Message::Close(_)) | Err(_) => return None,
         }
     }

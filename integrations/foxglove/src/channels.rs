@@ -1,4 +1,5 @@
-//! The topics of the robot as channels, with what viewers expect beside them. Each is subscribed to in the robot while a client is subscribed to it.
+//! The robot's topics as channels, and the additional channels that viewers expect. The robot's topic is subscribed to while a client
+//! is subscribed to the channel.
 
 use bb_core::joints::{ViewerChannel, ViewerMessage, ViewerMessages};
 use bb_core::message::Schema;
@@ -10,18 +11,18 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tokio::task::AbortHandle;
 
-/// Messages of a topic that wait to be encoded.
+/// Largest number of messages of a topic that wait to be encoded.
 const WAITING: usize = 16_384;
 
-/// The messages of a channel.
+/// Origin of the messages of a channel.
 #[derive(Clone, Copy, Debug)]
 enum Source {
-    /// Messages of a path, as recordings have them.
+    /// Messages of a path, encoded as in recordings.
     Path {
         path: &'static str,
         is_ros: bool,
     },
-    /// Second messages of a path.
+    /// Companion messages of a path.
     Companion(&'static str),
     Viewer(ViewerChannel),
 }
@@ -31,18 +32,18 @@ struct Entry {
     channel: Arc<RawChannel>,
     source: Source,
     clients: usize,
-    /// The task that encodes.
+    /// The task that encodes messages while a client is subscribed.
     task: Option<AbortHandle>,
 }
 
-/// The channels.
+/// All channels of a robot.
 pub(crate) struct Channels {
     bus: Bus,
     pub(crate) context: Arc<Context>,
     entries: Mutex<HashMap<ChannelId, Entry>>,
-    /// Messages that were encoded.
+    /// Number of encoded messages.
     pub(crate) encoded: AtomicU64,
-    /// Messages that slow clients have lost, or that came faster than they were encoded.
+    /// Number of messages that came faster than they were encoded, or that slow clients have lost.
     pub(crate) lost: AtomicU64,
 }
 
@@ -84,7 +85,7 @@ impl Channels {
     }
 
     fn add(&self, topic: &str, schema: Schema, source: Source) -> Result<(), FoxgloveError> {
-        // Before it is announced.
+        // Clients may subscribe as soon as the channel is built: they find it once the lock is released.
         let mut entries = lock(&self.entries);
         let schema = foxglove::Schema::new(schema.name, Schema::ENCODING, schema.text.into_bytes());
         let channel = self.context.channel_builder(topic).message_encoding(Schema::MESSAGE_ENCODING).schema(schema);
@@ -93,7 +94,7 @@ impl Channels {
         Ok(())
     }
 
-    /// Encodes the messages of a path until it is aborted.
+    /// Encodes and logs the messages of a channel until the task is aborted.
     async fn encode(self: Arc<Self>, channel: Arc<RawChannel>, source: Source) {
         let path = match source {
             Source::Path { path, .. } | Source::Companion(path) => Some(path),
@@ -105,7 +106,7 @@ impl Channels {
         let mut lost = 0;
         while let Some(message) = messages.recv_async().await {
             let mut bytes = Vec::new();
-            let is_there = match source {
+            let is_encoded = match source {
                 Source::Path { is_ros: true, .. } => message.encode_as_ros(&mut bytes),
                 Source::Path { is_ros: false, .. } => {
                     message.encode(&mut bytes);
@@ -114,7 +115,7 @@ impl Channels {
                 Source::Companion(_) => message.encode_companion(&mut bytes),
                 Source::Viewer(_) => viewers.following(&message).map(|message| bytes = message.bytes).is_some(),
             };
-            if is_there {
+            if is_encoded {
                 self.log(&channel, &bytes, message.stamp().wall_time, None);
             }
             let lagged = messages.lagged();
@@ -127,17 +128,17 @@ impl Channels {
                 );
                 lost = lagged;
             }
-            // A fast path leaves the thread to the clients.
+            // The clients share this thread, which a fast path would otherwise keep busy.
             tokio::task::yield_now().await;
         }
     }
 
-    /// Sends a client the messages that it needs of a channel before others.
-    fn greet(&self, client: &Client, channel: &RawChannel, of: ViewerChannel) {
+    /// Sends a client the initial messages of a channel.
+    fn send_first(&self, client: &Client, channel: &RawChannel, viewer: ViewerChannel) {
         let clock = self.bus.clock();
         let now = clock.wall_at(clock.now());
-        for ViewerMessage { channel: which, bytes } in self.viewers().first(now) {
-            if which == of {
+        for ViewerMessage { channel: other, bytes } in self.viewers().first(now) {
+            if other == viewer {
                 self.log(channel, &bytes, now, Some(client));
             }
         }
@@ -156,7 +157,7 @@ impl Channels {
     }
 }
 
-/// Tells the channels of subscriptions, on the server's thread.
+/// Notifies the channels of subscriptions, on the server's thread.
 pub(crate) struct Watch(pub(crate) Arc<Channels>);
 
 impl ServerListener for Watch {
@@ -165,9 +166,9 @@ impl ServerListener for Watch {
         let mut entries = lock(&channels.entries);
         let Some(entry) = entries.get_mut(&view.id()) else { return };
         entry.clients += 1;
-        if let Source::Viewer(of) = entry.source {
-            channels.greet(&client, &entry.channel, of);
-            if of.is_latched() {
+        if let Source::Viewer(viewer) = entry.source {
+            channels.send_first(&client, &entry.channel, viewer);
+            if viewer.is_latched() {
                 return;
             }
         }

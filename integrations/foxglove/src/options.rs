@@ -6,14 +6,14 @@ use bb_core::{Fault, Options};
 /// Options of [`Foxglove`](crate::Foxglove). Lists are separated by spaces.
 #[derive(Clone, Debug, Options)]
 pub struct FoxgloveOptions {
-    /// Port on the loopback device, where it listens alone; 0 lets the system choose one.
+    /// Port on the loopback device, the only one it listens on; 0 lets the system choose.
     #[option(default = 8765)]
     pub port: u16,
-    /// Origins of the pages that may connect, such as `http://localhost:8080` for a viewer served there; programs have none. By default Foxglove in
-    /// the browser.
+    /// Origins of the pages that may connect, such as `http://localhost:8080` for a viewer served there. Programs, which have no origin,
+    /// always may. Default: Foxglove in the browser.
     #[option(default = "https://app.foxglove.dev")]
     pub origins: String,
-    /// Rights of all clients, of `parameters`, `commands` and `arm`. By default they only read topics. All may disarm.
+    /// Rights of all clients besides reading topics and disarming: `parameters`, `commands`, `arm`. Default: none.
     #[option(default = "")]
     pub rights: String,
 }

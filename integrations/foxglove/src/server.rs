@@ -1,4 +1,4 @@
-//! The handle for users, and the thread of the servers.
+//! The bridge's handle, and the thread that serves it.
 
 use crate::channels::Channels;
 use crate::clients::Clients;
@@ -18,11 +18,11 @@ use std::time::Duration;
 use tokio::net::TcpListener;
 use tokio::sync::watch;
 
-/// Time between two looks for new paths.
-const LOOK: Duration = Duration::from_secs(1);
-/// Time after a connection that could not be taken.
-const REST: Duration = Duration::from_millis(100);
-/// Requests that wait for the robot, those to disarm apart.
+/// Time between two searches for new paths.
+const REFRESH_PERIOD: Duration = Duration::from_secs(1);
+/// Pause after a connection could not be accepted.
+const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
+/// Largest number of requests, other than to disarm, that wait for the robot.
 const MOST_WAITING: usize = 64;
 
 /// Reason for which no bridge runs.
@@ -52,9 +52,9 @@ pub struct FoxgloveState {
     pub port: u16,
     /// Number of connected clients.
     pub clients: u32,
-    /// Number of messages that have been encoded, for any number of clients each.
+    /// Number of encoded messages, each counted once for all clients.
     pub encoded: u64,
-    /// Number of messages that slow clients have lost, those of each client added, or that came faster than they could be encoded.
+    /// Number of messages that came faster than they could be encoded, or that slow clients have lost, summed over the clients.
     pub lost: u64,
 }
 
@@ -62,7 +62,7 @@ pub struct FoxgloveState {
 pub struct Foxglove {
     address: SocketAddr,
     door: Arc<Door>,
-    /// Ends what was begun in the name of clients.
+    /// Session of all clients; ending it revokes their rights.
     session: Session,
     stop: watch::Sender<bool>,
     thread: Option<JoinHandle<()>>,
@@ -98,7 +98,7 @@ impl Foxglove {
         let served = Arc::clone(&door);
         let run = move || {
             runtime.block_on(serve(listener, served, stopped));
-            // Calls of the robot that still wait end by themselves.
+            // Calls of the robot that still wait end on their own.
             runtime.shutdown_background();
         };
         let thread = thread::Builder::new().name("foxglove".into()).spawn(run).map_err(at)?;
@@ -141,19 +141,19 @@ impl fmt::Debug for Foxglove {
 }
 
 async fn serve(listener: TcpListener, door: Arc<Door>, mut stopped: watch::Receiver<bool>) {
-    let mut look = tokio::time::interval(LOOK);
+    let mut refresh = tokio::time::interval(REFRESH_PERIOD);
     while !*stopped.borrow() {
         tokio::select! {
             _ = stopped.changed() => break,
             accepted = listener.accept() => match accepted {
                 Ok((client, _)) => _ = tokio::spawn(Arc::clone(&door).admit(client)),
-                // Such as too many open files.
+                // For example, too many files are open.
                 Err(error) => {
                     tracing::warn!(%error, "a connection was not taken");
-                    tokio::time::sleep(REST).await;
+                    tokio::time::sleep(ACCEPT_PAUSE).await;
                 }
             },
-            _ = look.tick() => if let Err(error) = door.clients.channels.refresh() {
+            _ = refresh.tick() => if let Err(error) = door.clients.channels.refresh() {
                 tracing::warn!(%error, "a path is no channel");
             },
         }

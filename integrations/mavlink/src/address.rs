@@ -15,8 +15,8 @@ use std::str::FromStr;
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Address {
-    /// `udpin:HOST:PORT`: waits there, and answers the sender of the newest frame of a system and component that a driver listens
-    /// to; without drivers, of any.
+    /// `udpin:HOST:PORT`: listens there, and answers the sender of the newest frame from a system and component that a driver listens
+    /// to, or from any if there are no drivers.
     UdpIn {
         /// Address of this machine, and port.
         local: String,
@@ -68,7 +68,7 @@ impl FromStr for Address {
     }
 }
 
-/// `HOST:PORT`, where the host may be an IPv6 address in brackets.
+/// Checks a `HOST:PORT`, whose host may be an IPv6 address in brackets.
 fn socket(text: &str) -> Result<String, &'static str> {
     let (host, port) = text.rsplit_once(':').ok_or("has no port")?;
     if host.is_empty() {

@@ -1,4 +1,4 @@
-//! Topics of the robot, for other nodes.
+//! Publishes the topics of the robot to other nodes.
 
 use crate::counts::{Counts, Repetitions};
 use crate::diagnostics::diagnostics;
@@ -18,29 +18,29 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Messages of the robot that wait for the network.
+/// Largest number of messages that wait for the network.
 const WAITING: usize = 16_384;
-/// Time after which the thread looks whether it is to end.
-const PATIENCE: Duration = Duration::from_millis(20);
+/// Time after which the thread checks whether it should end.
+const POLL_PERIOD: Duration = Duration::from_millis(20);
 /// Time between two diagnoses.
-const DIAGNOSIS: Duration = Duration::from_secs(1);
-/// Time after the end for which messages that were published before it are put.
-const LAST: Duration = Duration::from_secs(1);
-/// Least time between two messages of the clock, on it.
-const TICK_NS: i64 = 10_000_000;
-/// The depth of topics, as ROS has it by default.
+const DIAGNOSIS_PERIOD: Duration = Duration::from_secs(1);
+/// Time for which messages that wait at the end are still put.
+const DRAIN_WITHIN: Duration = Duration::from_secs(1);
+/// Shortest time between two messages of the clock, by that clock.
+const CLOCK_PERIOD_NS: i64 = 10_000_000;
+/// The depth of topics: the default of ROS.
 const DEPTH: u64 = 10;
-/// The depth of `/parameter_events`, as ROS has it.
+/// The depth of `/parameter_events`: that of ROS.
 const EVENTS_DEPTH: u64 = 1000;
 
-/// The publishers of the robot's topics, and what they publish.
+/// The publishers of the robot's topics, and the subscriptions that feed them.
 pub(crate) struct Outputs {
     bus: Bus,
     node: Arc<RosNode>,
     counts: Arc<Counts>,
-    /// Paths that are published even if ROS has no message for their payload; all that it has one for, if there are none.
+    /// Paths to publish, even if ROS has no message for their payload. If there are none, all paths with a ROS message are published.
     named: Vec<String>,
-    /// Paths that other nodes publish, and so are not published.
+    /// Paths that other nodes publish, which are left out.
     taken: Vec<String>,
     topics: HashMap<&'static str, Option<Topic>>,
     viewers: ViewerMessages,
@@ -48,7 +48,7 @@ pub(crate) struct Outputs {
     events: RosPublisher,
     diagnostics: RosPublisher,
     robot: String,
-    /// The publisher of the clock, in a simulation, with the time that was published last.
+    /// The publisher of a simulation's clock, and the time that was published last.
     clock: Option<(RosPublisher, WallTime)>,
     messages: DynamicSubscription,
     changes: DynamicSubscription,
@@ -57,7 +57,7 @@ pub(crate) struct Outputs {
 /// The publishers of a path.
 struct Topic {
     main: RosPublisher,
-    /// ROS has no message for the payload.
+    /// `true` if ROS has no message for the payload.
     is_exact: bool,
     companion: Option<RosPublisher>,
 }
@@ -122,7 +122,7 @@ impl Outputs {
         Ok(outputs)
     }
 
-    /// The publishers of a path; `None` if it is not published.
+    /// Declares the publishers of a path; `None` if it is not published.
     fn declare_topic(&self, path: &str, layouts: Layouts) -> Result<Option<Topic>, Ros2Error> {
         if self.taken.iter().any(|taken| taken == path) {
             return Ok(None);
@@ -151,36 +151,36 @@ impl Outputs {
         Ok(Some(Topic { main: publisher(name, &schema.name, &hash)?, is_exact, companion }))
     }
 
-    /// Publishes until it is to end, and the messages that wait then; changes of parameters that wait then may be left out.
+    /// Publishes until `is_over`, and then the messages that still wait; changes of parameters may be left out then.
     pub(crate) fn run(mut self, is_over: &AtomicBool) {
         let now = self.now();
         for message in self.viewers.first(now) {
-            self.view(message);
+            self.publish_for_viewers(message);
         }
         let (mut lost, mut next_diagnosis, mut end) = (0, Instant::now(), None);
         let overrun = Repetitions::default();
         loop {
-            // Before the last look into the queue, so that what was published before the end is put.
+            // Read before the queue, so that every message published before the end is put.
             let is_last = is_over.load(Ordering::Acquire);
-            // A robot that publishes on, or a network that does not take it, does not put the end off.
-            if is_last && Instant::now() > *end.get_or_insert_with(|| Instant::now() + LAST) {
+            // Neither a robot that goes on publishing nor a blocked network may delay the end.
+            if is_last && Instant::now() > *end.get_or_insert_with(|| Instant::now() + DRAIN_WITHIN) {
                 tracing::warn!("messages were left at the end of the bridge");
                 break;
             }
             let waited = Instant::now();
-            match self.messages.recv_timeout(if is_last { Duration::ZERO } else { PATIENCE }) {
+            match self.messages.recv_timeout(if is_last { Duration::ZERO } else { POLL_PERIOD }) {
                 Some(message) => self.publish(&message),
                 None if is_last => break,
-                // Of a robot that has stopped, nothing comes, and at once.
-                None => std::thread::sleep(PATIENCE.saturating_sub(waited.elapsed())),
+                // The subscription of a robot that has stopped does not wait.
+                None => std::thread::sleep(POLL_PERIOD.saturating_sub(waited.elapsed())),
             }
             while let Some(change) = self.changes.try_recv() {
-                self.tell_change(&change);
+                self.publish_change(&change);
             }
-            self.tick();
+            self.publish_clock();
             if Instant::now() >= next_diagnosis {
-                next_diagnosis = Instant::now() + DIAGNOSIS;
-                self.diagnose();
+                next_diagnosis = Instant::now() + DIAGNOSIS_PERIOD;
+                self.publish_diagnosis();
             }
             let lagged = self.messages.lagged() + self.changes.lagged();
             if lagged != lost {
@@ -217,17 +217,17 @@ impl Outputs {
             }
         }
         if let Some(transforms) = self.viewers.following(message) {
-            self.view(transforms);
+            self.publish_for_viewers(transforms);
         }
     }
 
-    fn view(&mut self, message: ViewerMessage) {
+    fn publish_for_viewers(&mut self, message: ViewerMessage) {
         if let Some(publisher) = self.viewed.get_mut(&message.channel) {
             put(publisher, message.bytes, &self.counts);
         }
     }
 
-    fn tell_change(&mut self, change: &DynamicMessage) {
+    fn publish_change(&mut self, change: &DynamicMessage) {
         let Some(change) = change.downcast::<ParameterChange>() else { return };
         let Some(name) = parameter_name(change.path) else { return };
         let event = ParameterEvent {
@@ -240,18 +240,18 @@ impl Outputs {
         put(&mut self.events, bytes_of(&event), &self.counts);
     }
 
-    fn tick(&mut self) {
+    fn publish_clock(&mut self) {
         let now = self.now();
         let Some((clock, last)) = &mut self.clock else { return };
-        if now.as_unix_nanos().saturating_sub(last.as_unix_nanos()) >= TICK_NS {
+        if now.as_unix_nanos().saturating_sub(last.as_unix_nanos()) >= CLOCK_PERIOD_NS {
             *last = now;
             put(clock, bytes_of(&Clock { clock: Time::of(now) }), &self.counts);
         }
     }
 
-    fn diagnose(&mut self) {
+    fn publish_diagnosis(&mut self) {
         let now = self.now();
-        // Not before the robot has started.
+        // There is no report before the robot has started.
         let Ok(report) = self.bus.report_json() else { return };
         match diagnostics(&self.robot, &report, Time::of(now)) {
             Ok(diagnosis) => put(&mut self.diagnostics, bytes_of(&diagnosis), &self.counts),
@@ -277,7 +277,7 @@ fn put(publisher: &mut RosPublisher, message: Vec<u8>, counts: &Counts) {
     }
 }
 
-/// The address of a message of ROS's own at a topic.
+/// The address of a message that ROS defines, at a topic.
 fn message_of<T: Field>(topic: &str) -> Result<Address, Ros2Error> {
     let name = if let Shape::Struct(shape) = T::SHAPE { shape.name } else { "" };
     Ok(address(topic.to_owned(), &name.replacen('/', "/msg/", 1), &type_hash(name, T::SHAPE))?)
