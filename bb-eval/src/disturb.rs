@@ -7,17 +7,24 @@ use std::str::FromStr;
 pub(crate) type Time = i64;
 
 /// The inputs of filters by name, as filters declare them.
-pub(crate) const INPUTS: [&str; 7] = ["imu", "gnss", "odometry", "pose", "relative", "magnetic_field", "start"];
+pub(crate) const INPUTS: [&str; 9] =
+    ["imu", "gnss", "odometry", "pose", "relative", "magnetic_field", "gnss_velocity", "gnss_heading", "start"];
 /// Places among [`INPUTS`].
 pub(crate) const IMU: usize = 0;
 pub(crate) const GNSS: usize = 1;
 pub(crate) const MAGNETIC_FIELD: usize = 5;
+pub(crate) const GNSS_VELOCITY: usize = 6;
+pub(crate) const GNSS_HEADING: usize = 7;
+pub(crate) const START: usize = 8;
+
+/// The option of [`Disturbances::outage`].
+const OUTAGE: &str = "--outage";
 
 /// Changes to the messages of a recording before a filter gets them.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "clap", derive(clap::Args), command(next_help_heading = "Made harder"))]
 pub struct Disturbances {
-    /// Withholds the fixes, or of an attitude filter the magnetic field, for LENGTH at the end of each PERIOD, as 30s/90s. The
+    /// Withholds the fixes with the receiver's velocities and headings, or of an attitude filter the magnetic field, for LENGTH at the end of each PERIOD, as 30s/90s. The
     /// errors without them are shown.
     #[cfg_attr(feature = "clap", arg(long, value_name = "LENGTH/PERIOD"))]
     pub outage: Option<Spell>,
@@ -149,7 +156,7 @@ impl Disturber<'_> {
     /// The spells, each with its input and its option.
     fn spells(&self) -> impl Iterator<Item = (usize, Spell, &'static str)> {
         let drops = self.disturbances.drop.iter().map(|drop| (drop.input, drop.spell, "--drop"));
-        drops.chain(self.disturbances.outage.map(|spell| (self.aiding, spell, "--outage")))
+        drops.chain(self.disturbances.outage.map(|spell| (self.aiding, spell, OUTAGE)))
     }
 
     /// Returns whether the aiding input is withheld at a time by the outage.
@@ -162,8 +169,9 @@ impl Disturber<'_> {
         let since_ns = stamp_ns - self.first_ns;
         let mut dropped = std::mem::take(&mut self.dropped);
         let mut is_kept = true;
-        for ((of, spell, _), count) in self.spells().zip(&mut dropped) {
-            if of == input && spell.contains(since_ns) {
+        for ((of, spell, option), count) in self.spells().zip(&mut dropped) {
+            let is_of_receiver = of == GNSS && option == OUTAGE && [GNSS_VELOCITY, GNSS_HEADING].contains(&input);
+            if (of == input || is_of_receiver) && spell.contains(since_ns) {
                 is_kept = false;
                 *count += 1;
             }

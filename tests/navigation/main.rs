@@ -3,6 +3,7 @@
 mod false_covariances;
 mod optional_states;
 mod planar;
+mod receiver;
 mod rover;
 mod sensor_failures;
 mod small_stacks;

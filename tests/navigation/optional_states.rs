@@ -51,15 +51,15 @@ const FIX: f64 = 0.1;
 
 /// Motion of the robot: at rest for three seconds, then curves to both sides at changing speed.
 #[derive(Clone, Copy, Debug)]
-struct State {
-    position: Vector3<f64>,
-    heading: f64,
-    speed: f64,
-    rate: f64,
+pub(crate) struct State {
+    pub(crate) position: Vector3<f64>,
+    pub(crate) heading: f64,
+    pub(crate) speed: f64,
+    pub(crate) rate: f64,
 }
 
 /// Each millisecond.
-fn way(seconds: usize) -> Vec<State> {
+pub(crate) fn way(seconds: usize) -> Vec<State> {
     let mut state = State { position: Vector3::zeros(), heading: 0.0, speed: 0.0, rate: 0.0 };
     let mut way = vec![state];
     for millis in 1..=seconds * 1000 {
@@ -77,7 +77,35 @@ fn way(seconds: usize) -> Vec<State> {
     way
 }
 
-fn turned(heading: f64) -> UnitQuaternion<f64> {
+/// The velocity in the world.
+pub(crate) fn velocity(state: &State) -> Vector3<f64> {
+    turned(state.heading) * Vector3::x() * state.speed
+}
+
+/// The sample of an IMU over the last 10 ms.
+pub(crate) fn imu(way: &[State], millis: usize, noise: &mut Noise) -> Imu {
+    let (before, now) = (way[millis.saturating_sub(10)], way[millis]);
+    let acceleration = (velocity(&now) - velocity(&before)) * 100.0;
+    let middle = turned(0.5 * (now.heading + before.heading));
+    let force = middle.inverse() * acceleration + Vector3::new(0.0, 0.0, 9.80665) + 0.02 * noise.vector();
+    let turning = Vector3::z() * ((now.heading - before.heading) * 100.0) + 0.0017 * noise.vector();
+    Imu::new(turning, force)
+}
+
+/// A fix of a place in the world, with a deviation of each axis in m.
+pub(crate) fn fix(frame: &LocalFrame, place: &Vector3<f64>, deviation: f64) -> GnssFix {
+    let at = frame.geodetic(place);
+    let position =
+        GeodeticPosition { latitude_rad: at.latitude, longitude_rad: at.longitude, altitude: Some(at.height) };
+    GnssFix {
+        status: GnssStatus::Fix,
+        services: GnssServices::default(),
+        position: Some(position),
+        position_covariance: Some(Matrix3::identity() * (deviation * deviation)),
+    }
+}
+
+pub(crate) fn turned(heading: f64) -> UnitQuaternion<f64> {
     UnitQuaternion::from_euler_angles(0.0, 0.0, heading)
 }
 
@@ -99,15 +127,7 @@ fn a_lever_arm_a_delay_and_a_hard_iron_are_found() -> Result<(), StartError> {
             let then = way[millis.saturating_sub(DELAY_MILLIS)];
             let antenna = then.position + turned(then.heading) * (DECLARED + LEVER_ARM) + FIX * noise.vector();
             first.get_or_insert(antenna);
-            let at = frame.geodetic(&antenna);
-            let position = GeodeticPosition {
-                latitude_rad: at.latitude,
-                longitude_rad: at.longitude,
-                altitude: Some(at.height),
-            };
-            let (status, services) = (GnssStatus::Fix, GnssServices::default());
-            let position_covariance = Some(Matrix3::identity() * (FIX * FIX));
-            let fix = GnssFix { status, services, position: Some(position), position_covariance };
+            let fix = fix(&frame, &antenna, FIX);
             simulation.publish(flawed::sensor::base::mast::antenna::gnss, time, fix);
         }
         if millis % 50 == 0 {
@@ -118,13 +138,7 @@ fn a_lever_arm_a_delay_and_a_hard_iron_are_found() -> Result<(), StartError> {
             let field = turned(now.heading).inverse() * FIELD + HARD_IRON + 3e-7 * noise.vector();
             simulation.publish(flawed::sensor::base::compass, time, MagneticField::new(field));
         }
-        let before = way[millis.saturating_sub(10)];
-        let velocity = |state: &State| turned(state.heading) * Vector3::x() * state.speed;
-        let acceleration = (velocity(&now) - velocity(&before)) * 100.0;
-        let middle = turned(0.5 * (now.heading + before.heading));
-        let force = middle.inverse() * acceleration + Vector3::new(0.0, 0.0, 9.80665) + 0.02 * noise.vector();
-        let turning = Vector3::z() * ((now.heading - before.heading) * 100.0) + 0.0017 * noise.vector();
-        simulation.publish(flawed::sensor::base::imu, time, Imu::new(turning, force));
+        simulation.publish(flawed::sensor::base::imu, time, imu(&way, millis, &mut noise));
     }
     let status = status.drain().last().expect("it has started").payload;
     let arm = (status.gnss_lever_arm - LEVER_ARM).xy().norm();

@@ -1,7 +1,7 @@
 //! A recording as a filter and its score take it: of a bag, or of CSV files.
 
 use super::data::{DataSet, Keyframe, Noise, TruthMessage, nanoseconds};
-use super::feed::{Feed, Message, Time, What};
+use super::feed::{Feed, Message, START, Time, What};
 use bb_core::nalgebra::{Isometry3, Matrix3, Matrix6};
 use bb_core::payload::{
     GeodeticPosition, GnssFix, GnssServices, GnssStatus, Imu, Odometry, Pose, RelativePose, Twist,
@@ -64,7 +64,7 @@ impl Drive {
     /// Removes the state that a filter would be given to start from.
     pub fn without_start(mut self) -> Self {
         self.feed.messages.retain(|message| !matches!(message.what, What::Start(_)));
-        self.feed.mounts[6] = None;
+        self.feed.mounts[START] = None;
         self
     }
 }
@@ -136,6 +136,8 @@ impl DataSet {
             None,
             has(!self.anchors.is_empty()),
             has(!self.relative.is_empty()),
+            None,
+            None,
             None,
             has(true),
         ];

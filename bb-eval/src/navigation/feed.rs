@@ -1,11 +1,11 @@
 //! A recording as the messages that a robot gets, in the order of their arrival.
 
 use bb_core::nalgebra::Isometry3;
-use bb_core::payload::{GnssFix, Imu, MagneticField, Odometry, Pose, RelativePose};
+use bb_core::payload::{GnssFix, Imu, MagneticField, Odometry, Orientation, Pose, RelativePose, Twist};
 use bb_estimators::navigation::LocalFrame;
 
-use crate::disturb::{Disturbances, GNSS, IMU, MAGNETIC_FIELD};
-pub(crate) use crate::disturb::{INPUTS, Time};
+use crate::disturb::{Disturbances, GNSS, GNSS_HEADING, GNSS_VELOCITY, IMU, MAGNETIC_FIELD};
+pub(crate) use crate::disturb::{INPUTS, START, Time};
 
 /// A message to an input of a filter.
 #[derive(Clone, Debug)]
@@ -16,6 +16,8 @@ pub(crate) enum What {
     Pose(Pose),
     Relative(RelativePose),
     MagneticField(MagneticField),
+    GnssVelocity(Twist),
+    GnssHeading(Orientation),
     Start(Odometry),
 }
 
@@ -29,7 +31,9 @@ impl What {
             Self::Pose(_) => 3,
             Self::Relative(_) => 4,
             Self::MagneticField(_) => MAGNETIC_FIELD,
-            Self::Start(_) => 6,
+            Self::GnssVelocity(_) => GNSS_VELOCITY,
+            Self::GnssHeading(_) => GNSS_HEADING,
+            Self::Start(_) => START,
         }
     }
 }

@@ -11,7 +11,7 @@ use super::record::{Estimate, Record, Verdict};
 use bb_core::event::HealthTransition;
 use bb_core::nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use bb_core::payload::{
-    GeodeticPosition, GnssFix, GnssStatus, Imu, MagneticField, Odometry, Orientation, Pose, RelativePose,
+    GeodeticPosition, GnssFix, GnssStatus, Imu, MagneticField, Odometry, Orientation, Pose, RelativePose, Twist,
 };
 use bb_core::prelude::*;
 use bb_core::{Builder, Robot, Simulation, system};
@@ -40,6 +40,8 @@ robot! {
         sensor pose: External<Pose>();
         sensor relative: External<RelativePose>();
         sensor magnetic_field: External<MagneticField>();
+        sensor gnss_velocity: External<Twist>();
+        sensor gnss_heading: External<Orientation>();
         sensor start: External<Odometry>();
         estimator navigation: Eskf<NavigationOutputs>() {
             input imu: sensor::base::imu, driver;
@@ -48,6 +50,8 @@ robot! {
             input pose: sensor::base::pose, optional;
             input relative: sensor::base::relative, optional;
             input magnetic_field: sensor::base::magnetic_field, optional;
+            input gnss_velocity: sensor::base::gnss_velocity, optional;
+            input gnss_heading: sensor::base::gnss_heading, optional;
             input start: sensor::base::start, optional;
             output odometry;
             output status;
@@ -202,6 +206,8 @@ fn spatial(
             What::Pose(pose) => simulation.live().publish(base::pose, time, pose),
             What::Relative(relative) => simulation.live().publish(base::relative, time, relative),
             What::MagneticField(field) => simulation.live().publish(base::magnetic_field, time, field),
+            What::GnssVelocity(twist) => simulation.live().publish(base::gnss_velocity, time, twist),
+            What::GnssHeading(heading) => simulation.live().publish(base::gnss_heading, time, heading),
             What::Start(start) => simulation.live().publish(base::start, time, start),
         }
     };
@@ -216,10 +222,11 @@ fn spatial(
     });
     simulation.stop();
     finish(&mut record, health.drain(), &reasons);
-    if let Some(NavigationStatus { gnss, odometry, pose, relative, magnetic_field, resets, .. }) = last {
-        let verdicts = [gnss, odometry, pose, relative, magnetic_field];
+    if let Some(status) = last {
+        let NavigationStatus { gnss, odometry, pose, relative, magnetic_field, .. } = status;
+        let verdicts = [gnss, odometry, pose, relative, magnetic_field, status.gnss_velocity, status.gnss_heading];
         record.verdicts = INPUTS.into_iter().skip(1).zip(verdicts).map(|(input, of)| verdict(input, &of)).collect();
-        record.resets = resets;
+        record.resets = status.resets;
     }
     Ok(record)
 }
@@ -266,7 +273,7 @@ fn planar(
                 let orientation = Orientation { world_from_body: pose.world_from_body, covariance };
                 simulation.live().publish(base::orientation, time, orientation);
             }
-            What::Relative(_) | What::MagneticField(_) => {}
+            What::Relative(_) | What::MagneticField(_) | What::GnssVelocity(_) | What::GnssHeading(_) => {}
         }
     };
     play(&mut simulation, feed, &mut record, progress, publish, |record| {
@@ -330,7 +337,7 @@ fn flight(
             What::Pose(pose) => simulation.live().publish(base::anchor, time, earth.anchor(&pose)),
             What::Relative(relative) => simulation.live().publish(base::vio, time, earth.vio(&relative)),
             What::Start(start) => simulation.live().publish(base::warm_start, time, earth.warm_start(&start)),
-            What::Odometry(_) | What::MagneticField(_) => {}
+            What::Odometry(_) | What::MagneticField(_) | What::GnssVelocity(_) | What::GnssHeading(_) => {}
         }
     };
     let mut refused = 0;

@@ -9,7 +9,8 @@ use crate::navigation::eskf::{Eskf, Start};
 use crate::navigation::fused::Fused;
 use crate::navigation::history::Replayed;
 use crate::navigation::measurement::{
-    AbsolutePose, BarometricHeight, BodyVelocity, GnssPosition, MagneticHeading, RelativePose,
+    AbsolutePose, BarometricHeight, BodyVelocity, GnssHeading, GnssPosition, GnssVelocity, MagneticHeading,
+    RelativePose,
 };
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{Estimate, POSITION, States};
@@ -30,6 +31,8 @@ pub(super) struct Filter<S: States, const N: usize> {
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Measured {
     Gnss(GnssPosition),
+    GnssVelocity(GnssVelocity),
+    GnssHeading(GnssHeading),
     Odometry(BodyVelocity),
     Pose(AbsolutePose),
     /// Relative pose, with the start of the next one, ns.
@@ -39,8 +42,9 @@ pub(super) enum Measured {
 }
 
 /// The number of sensors, each with a stream.
-const SENSORS: usize = 6;
-const NAMES: [&str; SENSORS] = ["gnss", "odometry", "pose", "relative", "magnetic_field", "pressure"];
+const SENSORS: usize = 8;
+const NAMES: [&str; SENSORS] =
+    ["gnss", "odometry", "pose", "relative", "magnetic_field", "pressure", "gnss_velocity", "gnss_heading"];
 
 impl Measured {
     fn sensor(&self) -> usize {
@@ -51,6 +55,8 @@ impl Measured {
             Self::Relative(..) => 3,
             Self::MagneticField(_) => 4,
             Self::Pressure(_) => 5,
+            Self::GnssVelocity(_) => 6,
+            Self::GnssHeading(_) => 7,
         }
     }
 
@@ -91,7 +97,7 @@ impl<S: States, const N: usize> Filter<S, N> {
         largest_deviation(of(0, 0), of(0, 1), of(1, 1))
     }
 
-    /// Counts of the measurements by result: satellites, odometry, poses, relative poses, magnetic field, pressure.
+    /// Counts of the measurements by result, in the order of [`NAMES`].
     pub(super) fn counts(&self) -> [&Counts; SENSORS] {
         self.streams.each_ref().map(Stream::counts)
     }
@@ -139,6 +145,8 @@ impl<S: States, const N: usize> Replayed for Filter<S, N> {
         let stream = &mut streams[measured.sensor()];
         match measured {
             Measured::Gnss(fix) => copies.update_fix(stream, fix),
+            Measured::GnssVelocity(velocity) => copies.update(stream, velocity),
+            Measured::GnssHeading(heading) => copies.update(stream, heading),
             Measured::Odometry(velocity) => copies.update(stream, velocity),
             Measured::Pose(pose) => copies.update_position(stream, pose),
             Measured::Relative(relative, end_ns) => {

@@ -1,12 +1,16 @@
 //! Inputs of the declared filter, and the mounting of its sensors.
 
+use super::measured::told;
 use super::options::NavigationOptions;
 use crate::navigation::eskf::ImuMean;
-use crate::navigation::measurement::{BodyVelocity, MagneticHeading, RelativePose};
+use crate::navigation::math::atan2;
+use crate::navigation::measurement::{
+    BodyVelocity, GnssHeading, GnssVelocity, MagneticHeading, RelativePose, isotropic,
+};
 use bb_core::message::Stamped;
-use bb_core::payload::{self, FluidPressure, GnssFix, Imu, MagneticField, Odometry, Pose};
+use bb_core::payload::{self, FluidPressure, GnssFix, Imu, MagneticField, Odometry, Orientation, Pose, Twist};
 use bb_core::{Context, Fault, Input, Inputs};
-use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 /// The inputs of [`EskfEstimator`](super::EskfEstimator).
 #[derive(Clone, Copy, Debug, Inputs)]
@@ -15,6 +19,11 @@ pub struct NavigationInputs<'a> {
     pub imu: Input<'a, Imu>,
     /// Satellite navigation.
     pub gnss: Option<Input<'a, GnssFix>>,
+    /// The velocity of the receiver's antenna: the linear part of a twist, east, north and up, as drivers of receivers publish it.
+    pub gnss_velocity: Option<Input<'a, Twist>>,
+    /// The orientation of a pair of antennas, of which the heading is used: that of the x axis of the link where the receiver is
+    /// declared, from the first antenna to the second.
+    pub gnss_heading: Option<Input<'a, Orientation>>,
     /// Wheels, or any other source of odometry. Only the velocity is used, along the x axis and across it.
     pub odometry: Option<Input<'a, Odometry>>,
     /// Poses in the world, from a map or a tracking system.
@@ -37,6 +46,8 @@ pub struct NavigationInputs<'a> {
 pub(super) struct Mounting {
     link_from_imu: Isometry3<f64>,
     pub(super) gnss: Option<Isometry3<f64>>,
+    pub(super) gnss_velocity: Option<Isometry3<f64>>,
+    pub(super) gnss_heading: Option<Isometry3<f64>>,
     pub(super) odometry: Option<Isometry3<f64>>,
     pub(super) pose: Option<Isometry3<f64>>,
     pub(super) relative: Option<Isometry3<f64>>,
@@ -57,6 +68,8 @@ impl Mounting {
         Ok(Self {
             link_from_imu,
             gnss: optional("gnss"),
+            gnss_velocity: optional("gnss_velocity"),
+            gnss_heading: optional("gnss_heading"),
             odometry: optional("odometry"),
             pose: optional("pose"),
             relative: optional("relative"),
@@ -101,6 +114,27 @@ impl Mounting {
         -self.link_from_imu.translation.vector
     }
 
+    /// The velocity of a receiver's antenna.
+    pub(super) fn gnss_velocity(&self, twist: &Twist, options: &NavigationOptions) -> GnssVelocity {
+        let stated = twist.covariance.map(|covariance| covariance.fixed_view::<3, 3>(0, 0).into_owned());
+        GnssVelocity {
+            velocity: twist.linear,
+            covariance: told(stated).unwrap_or_else(|| isotropic(options.gnss_velocity_deviation)),
+            lever_arm: place(self.gnss_velocity.as_ref()),
+        }
+    }
+
+    /// The heading of a pair of antennas.
+    pub(super) fn gnss_heading(&self, orientation: &Orientation, options: &NavigationOptions) -> GnssHeading {
+        let ahead = orientation.world_from_body * Vector3::x();
+        let stated = told(orientation.covariance).map(|covariance| covariance[(2, 2)]);
+        GnssHeading {
+            heading: atan2(ahead.y, ahead.x),
+            deviation: deviation(stated, options.gnss_heading_deviation),
+            baseline: rotation(self.gnss_heading.as_ref()) * Vector3::x(),
+        }
+    }
+
     /// The velocity in an odometry.
     pub(super) fn velocity(&self, odometry: &Odometry, options: &NavigationOptions) -> BodyVelocity {
         let sideways = options.sideways_deviation;
@@ -136,7 +170,6 @@ impl Mounting {
         let lever_arm = place(self.relative.as_ref());
         let start_from_end = body_from_sensor * relative.start_from_end * body_from_sensor.inverse();
         let way = body_from_sensor * relative.position + lever_arm - start_from_end * lever_arm;
-        let isotropic = |deviation: f64| Matrix3::identity() * (deviation * deviation);
         let (translation_covariance, rotation_covariance) = match relative.covariance {
             Some(covariance) => {
                 let turned = |rotation: UnitQuaternion<f64>, first: usize| {

@@ -12,6 +12,10 @@ imu_params! {
         heading_deviation: f64 = 4.0, in 1e-6..=4.0, unit "rad";
         /// Horizontal standard deviation of a fix without a covariance; the vertical one is twice as large.
         gnss_deviation: f64 = 5.0, in 1e-3..=1e4, unit "m";
+        /// Standard deviation of a component of a receiver's velocity without a covariance.
+        gnss_velocity_deviation: f64 = 0.2, in 1e-3..=1e3, unit "m/s";
+        /// Standard deviation of a receiver's heading without a covariance.
+        gnss_heading_deviation: f64 = 0.02, in 1e-4..=4.0, unit "rad";
         /// Standard deviation of the velocity of an odometry along its x axis. A larger one in its covariance counts instead: that of
         /// an encoder knows nothing of slip.
         odometry_deviation: f64 = 0.1, in 1e-4..=1e3, unit "m/s";

@@ -30,6 +30,10 @@ pub struct NavigationStatus {
     pub imu_noise: f64,
     /// Fixes by result.
     pub gnss: Verdicts,
+    /// Velocities of the receiver by result.
+    pub gnss_velocity: Verdicts,
+    /// Headings of the receiver by result.
+    pub gnss_heading: Verdicts,
     /// Velocities from odometry by result.
     pub odometry: Verdicts,
     /// Poses by result.
@@ -170,7 +174,8 @@ pub(super) fn status_of<S: States, const N: usize>(
     let estimate = filter.estimate()?;
     let mounting =
         |i: usize| offset::<S>(Optional::WheelMounting).map_or(0.0, |first| estimate.optional[first + i]);
-    let [gnss, odometry, pose, relative, magnetic_field, pressure] = filter.counts().map(Verdicts::from);
+    let [gnss, odometry, pose, relative, magnetic_field, pressure, gnss_velocity, gnss_heading] =
+        filter.counts().map(Verdicts::from);
     Some(NavigationStatus {
         accelerometer_bias: estimate.accelerometer_bias,
         gyroscope_bias: estimate.gyroscope_bias,
@@ -179,6 +184,8 @@ pub(super) fn status_of<S: States, const N: usize>(
         heading_deviation: filter.copies().heading_deviation(),
         imu_noise: filter.copies().noise(),
         gnss,
+        gnss_velocity,
+        gnss_heading,
         odometry,
         pose,
         relative,

@@ -153,6 +153,14 @@ impl<S: States + Send, const N: usize> Core for Running<S, N> {
         {
             self.fuse(fix.monotonic_time.as_nanos(), Measured::Gnss(measured));
         }
+        if let Some(twist) = inputs.gnss_velocity.filter(|twist| twist.is_new()) {
+            let measured = mounting.gnss_velocity(&twist.payload, options);
+            self.fuse(twist.monotonic_time.as_nanos(), Measured::GnssVelocity(measured));
+        }
+        if let Some(orientation) = inputs.gnss_heading.filter(|orientation| orientation.is_new()) {
+            let measured = mounting.gnss_heading(&orientation.payload, options);
+            self.fuse(orientation.monotonic_time.as_nanos(), Measured::GnssHeading(measured));
+        }
         if let Some(odometry) = inputs.odometry.filter(|odometry| odometry.is_new()) {
             let measured = mounting.velocity(&odometry.payload, options);
             self.fuse(odometry.monotonic_time.as_nanos(), Measured::Odometry(measured));

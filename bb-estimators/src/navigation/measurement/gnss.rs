@@ -63,7 +63,8 @@ impl Measurement<3> for GnssPosition {
     }
 }
 
-/// Velocity of an antenna in the world: `v + R (ω × l)`.
+/// Velocity of an antenna in the world: `v + R (ω × l)`, less the change `(a + R (ω × (ω × l))) d` during its delay d, with
+/// the [acceleration](Estimate::acceleration) a.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GnssVelocity {
     /// Velocity of the antenna in the world, m/s.
@@ -91,19 +92,28 @@ impl Measurement<3> for GnssVelocity {
         let rotation = at.rotation();
         let in_body = self.lever_arm + at.vector::<S>(Optional::GnssLeverArm);
         let swing = rotation * at.angular_velocity.cross(&in_body);
-        model.set_residual(0, &(self.velocity - at.velocity - swing));
+        let delay = at.scalar::<S>(Optional::GnssDelay);
+        let turning = skew(&at.angular_velocity);
+        let pull = rotation * (turning * (turning * in_body));
+        let acceleration = at.acceleration + pull;
+        model.set_residual(0, &(self.velocity - at.velocity - swing + acceleration * delay));
         model.set_noise(0, &self.covariance);
         model.set_block(0, VELOCITY, &Matrix3::identity());
-        model.set_block(0, ROTATION, &-skew(&swing));
-        model.set_block(0, GYROSCOPE_BIAS, &(rotation * skew(&in_body)));
+        model.set_block(0, ROTATION, &-skew(&(swing - pull * delay)));
+        let arm = skew(&in_body);
+        let of_pull = skew(&at.angular_velocity.cross(&in_body)) + turning * arm;
+        model.set_block(0, GYROSCOPE_BIAS, &(rotation * (arm - of_pull * delay)));
         if let Some(index) = offset::<S>(Optional::GnssLeverArm) {
-            model.set_block(0, index, &(rotation * skew(&at.angular_velocity)));
+            model.set_block(0, index, &(rotation * (turning - turning * turning * delay)));
+        }
+        if let Some(index) = offset::<S>(Optional::GnssDelay) {
+            model.set_column(0, index, &-acceleration);
         }
         Ok(())
     }
 }
 
-/// Heading of the line from one antenna to another.
+/// Heading of the line from one antenna to another: that of `R (b - (ω × b) d)`, with the baseline b and the delay d.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GnssHeading {
     /// Heading from the world's x axis, east, counter-clockwise, rad; any number of turns.
@@ -120,13 +130,20 @@ impl Measurement<1> for GnssHeading {
         at: &Estimate<N>,
         model: &mut Linearised<1, N>,
     ) -> Result<(), Refusal> {
-        let direction = self.baseline.try_normalize(1e-12).ok_or(Refusal::NonFinite)?;
-        let direction = at.world_from_body * direction;
+        let baseline = self.baseline.try_normalize(1e-12).ok_or(Refusal::NonFinite)?;
+        let delay = at.scalar::<S>(Optional::GnssDelay);
+        let turning = at.world_from_body * at.angular_velocity.cross(&baseline);
+        let direction = at.world_from_body * baseline - turning * delay;
         let (heading, gradient) = heading_of(&direction).ok_or(Refusal::NotObservable)?;
         model.residual[0] = wrapped(self.heading - heading);
         model.noise[(0, 0)] = self.deviation * self.deviation;
         // The rotation error θ changes the world vector w by θ × w.
         model.set_row(0, ROTATION, &direction.cross(&gradient));
+        if let Some(index) = offset::<S>(Optional::GnssDelay) {
+            let in_body = at.world_from_body.inverse() * gradient;
+            model.set_row(0, GYROSCOPE_BIAS, &(baseline.cross(&in_body) * delay));
+            model.jacobian[0][index] = -turning.dot(&gradient);
+        }
         Ok(())
     }
 }

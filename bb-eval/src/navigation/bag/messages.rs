@@ -80,6 +80,14 @@ impl Messages {
             let (time_ns, field) = stamped(message)?;
             input(time_ns, What::MagneticField(field));
         }
+        if is(&topics.gnss_velocity) {
+            let (time_ns, twist) = stamped(message)?;
+            input(time_ns, What::GnssVelocity(twist));
+        }
+        if is(&topics.gnss_heading) {
+            let (time_ns, orientation) = stamped(message)?;
+            input(time_ns, What::GnssHeading(orientation));
+        }
         if is(&topics.pose) {
             let (time_ns, pose) = stamped(message)?;
             input(time_ns, What::Pose(pose_of(pose)));

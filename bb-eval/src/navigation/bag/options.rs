@@ -16,6 +16,14 @@ pub struct BagOptions {
     /// The topic of the fixes, if there are several (sensor_msgs/NavSatFix), or `none`.
     #[cfg_attr(feature = "clap", arg(long, value_name = "TOPIC"))]
     pub gnss_topic: Option<String>,
+    /// The topic of the receiver's velocity, east, north and up, which `eskf` uses (geometry_msgs/TwistWithCovarianceStamped).
+    /// Default: none.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "TOPIC"))]
+    pub gnss_velocity_topic: Option<String>,
+    /// The topic of the orientation of the receiver's pair of antennas, whose heading `eskf` uses
+    /// (geometry_msgs/QuaternionStamped). Default: none.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "TOPIC"))]
+    pub gnss_heading_topic: Option<String>,
     /// The topic of the wheel odometry, of which the velocity is used, if there are several (nav_msgs/Odometry), or `none`.
     #[cfg_attr(feature = "clap", arg(long, value_name = "TOPIC"))]
     pub odometry_topic: Option<String>,

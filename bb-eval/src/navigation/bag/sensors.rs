@@ -6,7 +6,7 @@ use super::options::StartFrom;
 use super::truth::{TrueTrack, isometry};
 use crate::motion::{self, Motion, scatter};
 use crate::navigation::data::Truth;
-use crate::navigation::feed::{Feed, INPUTS, Message, Time, What};
+use crate::navigation::feed::{Feed, INPUTS, Message, START, Time, What};
 use bb_core::nalgebra::{Isometry3, Matrix6, Vector3};
 use bb_core::payload::{GeodeticPosition, GnssFix, GnssStatus, Odometry, Pose, RelativePose, Twist};
 use bb_core::time::MonotonicTime;
@@ -39,6 +39,8 @@ impl NavigationBag {
             &topics.pose,
             &topics.relative,
             &topics.magnetic_field,
+            &topics.gnss_velocity,
+            &topics.gnss_heading,
         ];
         for (mount, topic) in mounts.iter_mut().zip(of_inputs) {
             *mount = topic.as_ref().map(|topic| self.frames.base_from(topic)).transpose()?;
@@ -47,7 +49,7 @@ impl NavigationBag {
         messages.extend(self.relative()?);
         let world = self.world();
         let start = self.start(world.as_ref())?;
-        mounts[6] = start.is_some().then(Isometry3::identity);
+        mounts[START] = start.is_some().then(Isometry3::identity);
         messages.extend(start);
         let mut feed = Feed { messages, mounts, world };
         feed.sort();

@@ -6,6 +6,8 @@ use crate::frames::{POSE_WITH_COVARIANCE, TF_STATIC, TRANSFORM};
 use bb_mcap::{Bag, IMU, MAGNETIC_FIELD, ODOMETRY, POSE, RecordingErrorKind, Topic};
 
 pub(crate) const FIX: &str = "sensor_msgs/msg/NavSatFix";
+const TWIST: &str = "geometry_msgs/msg/TwistWithCovarianceStamped";
+const ORIENTATION: &str = "geometry_msgs/msg/QuaternionStamped";
 const TRANSFORMS: &str = "tf2_msgs/msg/TFMessage";
 
 /// The topic on which ROS tools publish a robot's initial pose.
@@ -23,6 +25,8 @@ pub(super) struct Topics {
     pub(super) relative: Option<String>,
     pub(super) pose: Option<String>,
     pub(super) magnetic_field: Option<String>,
+    pub(super) gnss_velocity: Option<String>,
+    pub(super) gnss_heading: Option<String>,
     pub(super) truth: Option<String>,
     /// Reason for which there is no truth.
     pub(super) no_truth: Option<String>,
@@ -51,20 +55,38 @@ impl Topics {
         let gnss = choose(FIX, &options.gnss_topic, "--gnss-topic")?;
         let odometry = choose(ODOMETRY, &options.odometry_topic, "--odometry-topic")?;
         let pose = choose(POSE_WITH_COVARIANCE, &options.pose_topic, "--pose-topic")?;
-        // An uncalibrated magnetometer makes a filter worse: only a named one is used.
-        let magnetic_field = match options.mag_topic.as_deref() {
-            Some(name) => only(bag, MAGNETIC_FIELD, Some(name), "--mag-topic", &[])?,
-            None => None,
+        // An uncalibrated magnetometer makes a filter worse, and a twist or an orientation may be of anything: only a named one is used.
+        let named = |schema: &str, name: &Option<String>, option: &str| match name.as_deref() {
+            Some(name) => only(bag, schema, Some(name), option, &[]),
+            None => Ok(None),
         };
+        let magnetic_field = named(MAGNETIC_FIELD, &options.mag_topic, "--mag-topic")?;
+        let gnss_velocity = named(TWIST, &options.gnss_velocity_topic, "--gnss-velocity-topic")?;
+        let gnss_heading = named(ORIENTATION, &options.gnss_heading_topic, "--gnss-heading-topic")?;
         let frames = bag.choose(TRANSFORMS, Some(TF_STATIC)).ok().map(|topic| topic.name.to_string());
-        Ok(Self { imu, gnss, odometry, relative, pose, magnetic_field, truth, no_truth, start, frames })
+        Ok(Self {
+            imu,
+            gnss,
+            odometry,
+            relative,
+            pose,
+            magnetic_field,
+            gnss_velocity,
+            gnss_heading,
+            truth,
+            no_truth,
+            start,
+            frames,
+        })
     }
 
     pub(super) fn all(&self) -> Vec<&str> {
         let Self { gnss, odometry, relative, pose, magnetic_field, truth, start, frames, .. } = self;
+        let of_receiver = [&self.gnss_velocity, &self.gnss_heading];
         let optional = [gnss, odometry, relative, pose, magnetic_field, truth, start, frames];
+        let optional = optional.into_iter().chain(of_receiver);
         let mut all = vec![&*self.imu];
-        for name in optional.into_iter().flatten() {
+        for name in optional.flatten() {
             if !all.contains(&&**name) {
                 all.push(name);
             }

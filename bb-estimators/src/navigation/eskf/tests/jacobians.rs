@@ -43,18 +43,22 @@ fn antenna_velocity(at: &Estimate<ALL>, lever_arm: Vector3<f64>) -> Vector3<f64>
 
 proptest! {
     #[test]
-    fn gnss(at in estimate(), lever_arm in vector(3.0)) {
+    fn gnss(mut at in estimate(), acceleration in vector(5.0), lever_arm in vector(3.0)) {
+        at.acceleration = acceleration;
         let arm = lever_arm + at.vector::<All>(Optional::GnssLeverArm);
         let velocity = antenna_velocity(&at, arm);
         let delay = at.scalar::<All>(Optional::GnssDelay);
-        let position = at.position + at.world_from_body * arm - velocity * delay;
+        let position = at.position + at.world_from_body * arm - (velocity - acceleration * 0.5 * delay) * delay;
         check(&GnssPosition { lever_arm, ..GnssPosition::new(position, 1.0, 2.0) }, &at)?;
+        let pull = at.world_from_body * at.angular_velocity.cross(&at.angular_velocity.cross(&arm));
+        let velocity = velocity - (acceleration + pull) * delay;
         check(&GnssVelocity { lever_arm, ..GnssVelocity::new(velocity, 0.1, 0.2) }, &at)?;
     }
 
     #[test]
     fn headings(at in estimate(), baseline in vector(2.0), field in vector(50e-6)) {
-        let direction = at.world_from_body * baseline;
+        let turned = at.angular_velocity.cross(&baseline) * at.scalar::<All>(Optional::GnssDelay);
+        let direction = at.world_from_body * (baseline - turned);
         prop_assume!(direction.xy().norm() > 0.2);
         let heading = direction.y.atan2(direction.x) + 4.0 * core::f64::consts::PI;
         check(&GnssHeading { heading, deviation: 0.02, baseline }, &at)?;
