@@ -148,69 +148,16 @@ fn what_filters_reach_on_families() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Documentation of code as a page: links to items become their names, and headings go below the title.
-fn page(documentation: &str) -> String {
-    let mut text = String::new();
-    let (mut is_code, mut is_blank) = (false, true);
-    for line in documentation.lines() {
-        if line.starts_with("```") {
-            is_code = !is_code;
-            text += if line == "```" && is_code { "```rust,ignore" } else { line };
-            text.push('\n');
-            continue;
-        }
-        if is_code {
-            // Lines that the documentation hides.
-            if line != "#" && !line.starts_with("# ") {
-                text += &format!("{line}\n");
-            }
-            continue;
-        }
-        let is_generated = line.starts_with("<!-- ");
-        if is_generated || line.is_empty() && is_blank {
-            continue;
-        }
-        is_blank = line.is_empty();
-        let line = if line.starts_with('#') { format!("#{line}") } else { without_items(line) };
-        text += &format!("{line}\n");
-    }
-    text
-}
-
-/// A line without the links whose targets are items of code.
-fn without_items(line: &str) -> String {
-    let mut parts = line.split("[`");
-    let mut text = parts.next().unwrap_or_default().to_owned();
-    for part in parts {
-        match part.split_once("`]") {
-            Some((name, rest)) => {
-                let target = rest.strip_prefix('(').and_then(|rest| rest.split_once(')'));
-                text += &match target {
-                    Some((target, _)) if target.starts_with('#') => format!("[`{name}`]{rest}"),
-                    Some((_, rest)) => format!("`{name}`{rest}"),
-                    None => format!("`{name}`{rest}"),
-                };
-            }
-            None => text += &format!("[`{part}"),
-        }
-    }
-    text
-}
-
+/// Payloads that have a message of ROS, as the documentation of the conversion lists them.
 #[test]
-fn the_language_and_the_payloads() {
-    let read = |file: &str| {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(file);
-        std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{file}: {error}"))
-    };
-    hold("book/src/reference/language.md", "language", &page(&read("bb-core/src/robot.md")));
-    for (file, name) in [("bb-core/src/payload.rs", "payloads"), ("bb-core/src/message/codec/ros.rs", "ros")] {
-        let text = read(file);
-        let rows: Vec<&str> = text.lines().filter_map(|line| line.strip_prefix("//! ")).collect();
-        let table: Vec<&str> = rows.into_iter().filter(|row| row.starts_with('|')).collect();
-        assert!(table.len() > 10, "{file} has no table");
-        hold("book/src/reference/payloads.md", name, &page(&table.join("\n")));
-    }
+fn messages_of_ros() {
+    let file = "bb-core/src/message/codec/ros.rs";
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(file);
+    let text = std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{file}: {error}"));
+    let rows = text.lines().filter_map(|line| line.strip_prefix("//! ")).filter(|row| row.starts_with('|'));
+    let table: String = rows.map(|row| format!("{row}\n")).collect();
+    assert!(table.lines().count() > 10, "{file} has no table");
+    hold("book/src/reference/recordings.md", "ros", &table);
 }
 
 /// The front page has no figure that no page with its command has.

@@ -21,12 +21,12 @@ fn another_filter_is_four_other_lines() {
     let differ: Vec<_> = one.lines().zip(other.lines()).filter(|(one, other)| one != other).collect();
     assert_eq!((one.lines().count(), differ.len()), (other.lines().count(), 4), "{differ:#?}");
     // Which are these, as the guide shows them.
-    let guide = include_str!("../../book/src/how-to/planar.md");
+    let guide = include_str!("../../book/src/how-to/navigation.md");
     for (one, other) in differ {
-        assert!(guide.contains(&format!("-{}\n", one.trim())), "book/src/how-to/planar.md lacks -{}", one.trim());
+        assert!(guide.contains(&format!("-{}\n", one.trim())), "book/src/how-to/navigation.md lacks -{}", one.trim());
         assert!(
             guide.contains(&format!("+{}\n", other.trim())),
-            "book/src/how-to/planar.md lacks +{}",
+            "book/src/how-to/navigation.md lacks +{}",
             other.trim()
         );
     }

@@ -130,6 +130,42 @@ fn code_of_the_book_is_compiled() {
     }
 }
 
+/// A line of code without its indentation, and without marks of doc comments.
+fn quoted(line: &str) -> &str {
+    let line = line.trim();
+    ["///", "//!"].iter().find_map(|mark| line.strip_prefix(mark)).map_or(line, quoted)
+}
+
+/// A fragment after a line that ends with a link to a file, `[robot.rs](../robot.rs):`, is quoted from it; a line `// …` leaves some out.
+#[test]
+fn fragments_are_quoted_from_the_files_before_them() {
+    let mut checked = 0;
+    for page in pages() {
+        let text = std::fs::read_to_string(&page).expect("it is there");
+        let lines: Vec<&str> = text.lines().collect();
+        for start in (2..lines.len()).filter(|line| lines[*line].starts_with("```rust,ignore")) {
+            let link = lines[start - 2].strip_suffix("):").and_then(|line| line.rsplit_once("]("));
+            let Some((_, link)) = link.filter(|(_, link)| link.ends_with(".rs")) else { continue };
+            let file = plain(&page.parent().expect("it is in a folder").join(link));
+            let source =
+                std::fs::read_to_string(&file).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
+            let source: String = source.lines().map(|line| format!("{}\n", quoted(line))).collect();
+            let mut rest = &*source;
+            let block: Vec<&str> =
+                lines[start + 1..].iter().map_while(|line| (*line != "```").then(|| quoted(line))).collect();
+            for part in block.split(|line| *line == "// …") {
+                let part: String = part.iter().map(|line| format!("{line}\n")).collect();
+                let Some(at) = rest.find(&part) else {
+                    panic!("{} quotes what {link} has not:\n{part}", page.display())
+                };
+                rest = &rest[at + part.len()..];
+            }
+            checked += 1;
+        }
+    }
+    assert!(checked > 5, "{checked}");
+}
+
 /// Recordings come through `BB_DATA`, and nothing else is looked for outside the checkout.
 #[test]
 fn nothing_beside_the_project_is_named() {

@@ -108,13 +108,3 @@ fn a_serial_device_is_unplugged_and_comes_back() {
     assert!(report.sources[0].restarts >= 1 && report.sources[0].stopped.is_none());
     let _ = std::fs::remove_file(link);
 }
-
-#[test]
-fn the_guide_shows_this_driver() {
-    let guide = include_str!("../../book/src/how-to/drivers.md");
-    let file = include_str!("drivers.rs");
-    let start =
-        guide.find("#[derive(Clone, Debug, Options)]\npub struct AccelerometerOptions").expect("the driver");
-    let end = guide[start..].find("fn main()").expect("it ends") + start;
-    assert!(file.contains(&guide[start..end]), "tests/behaviour/drivers.rs and book/src/how-to/drivers.md differ");
-}

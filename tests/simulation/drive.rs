@@ -193,7 +193,7 @@ fn they_survive_lost_and_wrong_satellites_and_spinning_wheels() -> Result<(), Fa
     Ok(())
 }
 
-/// Wheels that spin, as `book/src/how-to/planar.md` says. With an accelerometer no spin is believed. On a plane, wheels are refused for as long as the
+/// Wheels that spin, as `book/src/how-to/navigation.md` says. With an accelerometer no spin is believed. On a plane, wheels are refused for as long as the
 /// rover cannot have sped up like that by its settings.
 #[test]
 fn a_spin_is_believed_if_the_rover_can_speed_up_like_that() -> Result<(), Failure> {

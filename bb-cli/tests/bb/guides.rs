@@ -1,6 +1,5 @@
 //! Commands in the README and in the book: each is run, and prints what the page shows below it. `UPDATE_GUIDES=1` rewrites that. Those on
-//! recordings that are no part of the checkout are run by a test that needs them, and of cargo's the targets exist. A script is the file that is
-//! linked before it.
+//! recordings that are no part of the checkout are run by a test that needs them, and of cargo's the targets exist.
 
 use crate::common::poses;
 use crate::{cart, noise};
@@ -270,21 +269,6 @@ fn check(guide: &str) -> usize {
         if language == "csv" {
             let name = lines[start - 3].trim_matches(['`', ':']);
             std::fs::write(folder.join(name), block.join("\n") + "\n").expect("writes");
-        }
-        // A script is the whole of the file that is linked before it.
-        let link = lines[..start].iter().rev().nth(2).and_then(|line| line.split(['(', ')']).nth(1));
-        if let Some(link) = link.filter(|link| language == "python" && link.ends_with(".py")) {
-            let file = std::fs::read_to_string(path.with_file_name(link)).expect("is there");
-            if block != file.lines().collect::<Vec<_>>() {
-                assert!(is_update, "{guide} shows another `{link}` than there is");
-                new.extend(
-                    lines[copied..start]
-                        .iter()
-                        .chain(&file.lines().collect::<Vec<_>>())
-                        .map(|line| (*line).to_owned()),
-                );
-                copied = end;
-            }
         }
         if language != "sh" || is_marked(block) {
             continue;

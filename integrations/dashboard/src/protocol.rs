@@ -1,4 +1,4 @@
-//! The messages of the WebSocket: JSON objects whose member `op` says what they are. `book/src/how-to/live.md` lists them.
+//! The messages of the WebSocket: JSON objects whose member `op` says what they are. The documentation of the crate lists them.
 
 use serde_json::{Map, Value};
 
