@@ -15,13 +15,8 @@ macro_rules! compiled {
 // A test of the architecture checks that each page of the book with code is here.
 compiled! {
     Readme: "README.md",
-    Calibrate: "book/src/how-to/calibrate.md",
     Components: "book/src/how-to/components.md",
-    Joints: "book/src/how-to/joints.md",
     Mavlink: "book/src/how-to/mavlink.md",
-    Motion: "book/src/how-to/motion.md",
     Programs: "book/src/how-to/programs.md",
-    Recording: "book/src/how-to/recording.md",
     TutorialAttitude: "book/src/tutorial/1-attitude.md",
-    Navigation: "book/src/how-to/navigation.md",
 }
