@@ -17,6 +17,5 @@ compiled! {
     Readme: "README.md",
     Components: "book/src/how-to/components.md",
     Mavlink: "book/src/how-to/mavlink.md",
-    Programs: "book/src/how-to/programs.md",
     TutorialAttitude: "book/src/tutorial/1-attitude.md",
 }

@@ -7,17 +7,18 @@ use std::fmt;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Right {
-    /// Subscribe to messages, and read parameters.
+    /// Subscribe to messages, and read parameters. Without it, `subscribe_any` selects nothing, and a description has no parameters. States, paths,
+    /// commands, the graph and where the joints are need no right.
     Read,
     /// Set parameters.
     Parameters,
-    /// Start commands.
+    /// Start commands. A command that arms needs [`Right::Arm`] too. A command that was started acts with all rights, like any component.
     Commands,
     /// Arm the robot, and force it out of the safety state `error`.
     Arm,
     /// Send commands to actuators.
     Actuators,
-    /// Publish at paths of its own.
+    /// Publish at paths of its own, and messages for external sensors and inputs: measurements that an estimator believes.
     Publish,
 }
 
