@@ -239,10 +239,6 @@ mod tests {
             }
             let expected = std::fs::read_to_string(&stored).expect("it is stored");
             assert_eq!(screen, expected, "read it, then store it with UPDATE_TOP=1");
-            // The guide leaves out most topics.
-            let shown = screen.split("sensor/base/battery").next().expect("there is one part");
-            let guide = include_str!("../../../book/src/how-to/live.md");
-            assert!(width != 80 || guide.contains(shown), "the guide shows another");
         }
     }
 

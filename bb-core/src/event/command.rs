@@ -70,7 +70,7 @@ pub enum RefusalReason {
     Safety,
     /// The robot is stopping.
     Stopping,
-    /// Too many cancelled executions have not returned from their code.
+    /// Too many cancelled executions have not returned from their code: 256, or 512 for commands that health starts. Commands that disarm always start.
     Hanging,
 }
 
