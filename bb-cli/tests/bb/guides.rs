@@ -261,15 +261,6 @@ fn check(guide: &str) -> usize {
     let is_update = std::env::var_os("UPDATE_GUIDES").is_some();
     for (index, &(start, end, language)) in blocks.iter().enumerate() {
         let block = &lines[start..end];
-        // A file is named on the line before it.
-        if language == "toml" && lines[start] == "[[file]]" {
-            std::fs::write(folder.join("phone.toml"), block.join("\n") + "\n").expect("writes");
-            run("bb convert phone.toml described.mcap", &folder, true);
-        }
-        if language == "csv" {
-            let name = lines[start - 3].trim_matches(['`', ':']);
-            std::fs::write(folder.join(name), block.join("\n") + "\n").expect("writes");
-        }
         if language != "sh" || is_marked(block) {
             continue;
         }
