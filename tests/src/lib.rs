@@ -15,7 +15,6 @@ macro_rules! compiled {
 // A test of the architecture checks that each page of the book with code is here.
 compiled! {
     Readme: "README.md",
-    Components: "book/src/how-to/components.md",
     Mavlink: "book/src/how-to/mavlink.md",
     TutorialAttitude: "book/src/tutorial/1-attitude.md",
 }
