@@ -4,6 +4,7 @@ mod false_covariances;
 mod optional_states;
 mod planar;
 mod receiver;
+mod rest;
 mod rover;
 mod sensor_failures;
 mod small_stacks;

@@ -60,13 +60,19 @@ pub(crate) struct State {
 
 /// Each millisecond.
 pub(crate) fn way(seconds: usize) -> Vec<State> {
+    driven(seconds, |since| {
+        let begun = ((since - 3.0) / 2.0).clamp(0.0, 1.0);
+        let since = since - 3.0;
+        (begun * (3.0 + 2.0 * (0.7 * since).sin()), begun * (0.25 + 0.5 * (0.31 * since).sin()))
+    })
+}
+
+/// Each millisecond, by the speed and the turn rate at a time.
+pub(crate) fn driven(seconds: usize, motion: impl Fn(f64) -> (f64, f64)) -> Vec<State> {
     let mut state = State { position: Vector3::zeros(), heading: 0.0, speed: 0.0, rate: 0.0 };
     let mut way = vec![state];
     for millis in 1..=seconds * 1000 {
-        let since = millis as f64 * 1e-3 - 3.0;
-        let begun = (since / 2.0).clamp(0.0, 1.0);
-        let (speed, rate) =
-            (begun * (3.0 + 2.0 * (0.7 * since).sin()), begun * (0.25 + 0.5 * (0.31 * since).sin()));
+        let (speed, rate) = motion(millis as f64 * 1e-3);
         let middle = state.heading + 0.25e-3 * (rate + state.rate);
         let along = 0.5e-3 * (speed + state.speed);
         state.position += Vector3::new(middle.cos(), middle.sin(), 0.0) * along;

@@ -23,6 +23,7 @@ mod filter;
 mod flight;
 mod holding;
 mod newcomer;
+mod rest;
 mod scatter;
 mod search;
 #[cfg(test)]
@@ -36,6 +37,7 @@ use nalgebra::{Isometry3, Vector3};
 pub(super) use self::filter::{CopiedFilter, Fix, Update, is_same};
 use self::holding::Holding;
 use self::newcomer::Newcomer;
+use self::rest::Rest;
 use self::scatter::Scatter;
 #[cfg(feature = "runtime")]
 pub(super) use self::scatter::UNSEEN;
@@ -70,6 +72,11 @@ const IMPOSSIBLE: f64 = 10.0;
 /// The largest normalised innovation squared of a position, to each of whose variances [`SLACK`] is added: ten deviations and metres.
 pub(super) const FAR: f64 = 100.0;
 
+/// A body that is faster than this, m/s, and than `CLEARLY` deviations, moves; one that is slower by `PROBABLY` deviations does not.
+const MOVES: f64 = 0.5;
+const CLEARLY: f64 = 5.0;
+const PROBABLY: f64 = 2.0;
+
 /// Variance that is added to those of a position before [`FAR`] is applied, m².
 pub(super) const SLACK: f64 = 1.0;
 
@@ -95,6 +102,7 @@ pub struct Copies<F: CopiedFilter> {
     started_ns: i64,
     changes: u32,
     holding: Holding,
+    rest: Rest,
     scatter: Scatter,
     /// The last whole sample.
     last: Option<ImuMean>,
@@ -128,6 +136,7 @@ impl<F: CopiedFilter> Copies<F> {
             started_ns: 0,
             changes: 0,
             holding: Holding::default(),
+            rest: Rest::default(),
             scatter: Scatter::default(),
             last: None,
             elsewhere: None,
@@ -275,6 +284,21 @@ impl<F: CopiedFilter> Copies<F> {
         match self.best().acceleration() {
             Some(acceleration) => self.scatter.propagate(&acceleration, dt, self.heading_deviation() > UNKNOWN),
             None => self.scatter.interrupt(),
+        }
+    }
+
+    /// Learns from a window how quiet motion is, or stops the filters that may be at rest.
+    fn rest(&mut self, window: &rest::Window) {
+        let Some((speed, deviation)) = self.best().speed() else { return };
+        let has_moved = speed > MOVES.max(CLEARLY * deviation);
+        if has_moved || speed + PROBABLY * deviation < MOVES {
+            self.rest.remember(window, has_moved);
+        }
+        if self.rest.is_rest(window) && !has_moved {
+            let _ = self.each(|filter| {
+                filter.stop(&window.bias);
+                Ok(())
+            });
         }
     }
 
@@ -458,11 +482,15 @@ impl<F: CopiedFilter> Propagate for Copies<F> {
             let part = ImuMean { time_ns, ..*sample };
             self.each(|filter| filter.propagate(&part))?;
             self.holding.add(&part, part_s);
+            if let Some(window) = self.rest.add(&part, part_s) {
+                self.rest(&window);
+            }
             self.scatter(part_s);
             self.last = Some(part);
             return Ok(());
         };
         self.scatter.interrupt();
+        self.rest.interrupt();
         self.each(|filter| filter.hold(&held, &doubt))?;
         if time_ns == sample.time_ns {
             self.holding.interrupt();

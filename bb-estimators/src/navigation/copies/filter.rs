@@ -7,15 +7,16 @@ use core::fmt::Debug;
 
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 
+use super::rest::GyroscopeAtRest;
 use super::{TURN_DEVIATION, TURNS, UNKNOWN, Ways};
 use crate::attitude::ParamsError;
 use crate::navigation::eskf::{Doubt, Eskf, EskfParams, GaussMarkov, ImuMean, Start};
 use crate::navigation::fused::Fused;
 use crate::navigation::math::{rotation, rotation_vector, sqrt};
-use crate::navigation::measurement::{GnssPosition, Measurement};
+use crate::navigation::measurement::{GnssPosition, Measurement, ZeroVelocity};
 use crate::navigation::propagate::Propagate;
 use crate::navigation::refusal::Refusal;
-use crate::navigation::state::{Estimate, Optional, ROTATION, States, offset};
+use crate::navigation::state::{Estimate, Optional, ROTATION, States, VELOCITY, offset};
 use crate::navigation::stream::Stream;
 use crate::navigation::update::Judged;
 
@@ -24,6 +25,10 @@ const ATTITUDE_DEVIATION: f64 = FRAC_PI_4;
 
 /// The deviation of an attitude of which nothing is known, rad: uniform over a turn.
 const UNKNOWABLE: f64 = 1.81;
+
+/// The deviation of the velocity of a body at rest, m/s, and the largest normalised innovation squared of one that may be.
+const STILL: f64 = 0.05;
+const MOST_STILL: f64 = 16.0;
 
 /// A copy whose state is nearer to that of the best than this part of a deviation is the same.
 const SAME: f64 = 0.5;
@@ -52,6 +57,14 @@ pub trait CopiedFilter: Propagate + Copy + Debug {
 
     /// The acceleration in the world that the last sample shows, m/s², in a heading that may be wrong; `None` if the tilt is not known.
     fn acceleration(&self) -> Option<Vector3<f64>>;
+
+    /// The speed, m/s, and its deviation in the least certain direction; `None` if rest tells nothing.
+    fn speed(&self) -> Option<(f64, f64)> {
+        None
+    }
+
+    /// Stops where the velocity allows it: the body is at rest.
+    fn stop(&mut self, _bias: &GyroscopeAtRest) {}
 
     /// The angle about the vertical to the attitude of another, rad.
     fn turn_to(&self, other: &Self) -> f64;
@@ -218,6 +231,20 @@ impl<S: States, const N: usize> CopiedFilter for Eskf<S, N> {
         let tilts = [ROTATION, ROTATION + 1].map(|i| self.covariance()[(i, i)]);
         let known = self.estimate().filter(|_| tilts.iter().all(|variance| *variance < UNKNOWN * UNKNOWN));
         known.map(|estimate| estimate.world_from_body * estimate.specific_force - fall)
+    }
+
+    fn speed(&self) -> Option<(f64, f64)> {
+        let variances = (VELOCITY..VELOCITY + 3).map(|i| self.covariance()[(i, i)]);
+        Some((self.estimate()?.velocity.norm(), sqrt(variances.fold(0.0, f64::max))))
+    }
+
+    fn stop(&mut self, bias: &GyroscopeAtRest) {
+        let still = ZeroVelocity { deviation: STILL };
+        let is_likely = |judged: Result<Judged, Refusal>| judged.is_ok_and(|judged| judged.nis <= MOST_STILL);
+        if is_likely(self.judge(&still, 0.0)) && is_likely(self.judge(bias, 0.0)) {
+            let _ = self.update_ungated(&mut Stream::default(), &still);
+            let _ = self.update_ungated(&mut Stream::default(), bias);
+        }
     }
 
     fn turn_to(&self, other: &Self) -> f64 {
