@@ -9,6 +9,7 @@ use std::sync::mpsc::{SyncSender, TrySendError};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use zenoh::Wait;
 use zenoh::bytes::ZBytes;
+use zenoh::key_expr::keyexpr;
 use zenoh::liveliness::LivelinessToken;
 use zenoh::pubsub::{Publisher, Subscriber};
 use zenoh::qos::CongestionControl;
@@ -131,7 +132,7 @@ impl RosNode {
         let hash = address.type_hash.to_string();
         let subscriber = self.session.declare_subscriber(address.key_of_any_hash(self.domain));
         let subscriber = subscriber.allowed_origin(Locality::Remote).callback(move |sample| {
-            match other_hash(sample.key_expr().as_str(), &hash) {
+            match other_hash(sample.key_expr(), &hash) {
                 None => receive(sample.payload().to_bytes().into_owned()),
                 Some(other) => refuse(other),
             }
@@ -159,7 +160,7 @@ impl RosNode {
         let queryable = queryable.callback(move |query| {
             let (request, size) = Request::take(query, &unanswered, &refusals);
             // A client that waits learns why it does in vain.
-            match other_hash(request.query.key_expr().as_str(), &hash).map(str::to_owned) {
+            match other_hash(request.query.key_expr(), &hash).map(str::to_owned) {
                 _ if size > MOST_BYTES => {
                     request.refuse(format!("a request to {name} has {size} bytes: send at most {MOST_BYTES}"));
                 }
@@ -184,9 +185,10 @@ fn declare_token(session: &Session, token: &str) -> Result<LivelinessToken, Sess
     declared.map_err(SessionError::of(format!("declaring the token {token}")))
 }
 
-/// The hash at the end of a key, if it is another than ours. Humble has none.
-fn other_hash<'a>(key: &'a str, ours: &str) -> Option<&'a str> {
-    let (_, theirs) = key.rsplit_once('/')?;
+/// The hash at the end of a key, if it is another than ours; the key if it has wildcards, as of one who asks for all that there is: each service
+/// would take that for a request. Humble has none.
+fn other_hash<'a>(key: &'a keyexpr, ours: &str) -> Option<&'a str> {
+    let (_, theirs) = key.as_str().rsplit_once('/').filter(|_| !key.is_wild()).unwrap_or(("", key));
     (theirs != ours && theirs != TypeHash::Unsupported.to_string()).then_some(theirs)
 }
 

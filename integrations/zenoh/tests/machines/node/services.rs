@@ -1,8 +1,9 @@
 //! Commands and parameters: in whose name they are carried out, and what of them is refused.
 
-use super::{SmallCart, announced, ask, bridged, client_of, endpoint, options, other, tokens, trigger};
+use super::{SmallCart, announced, ask, bridged, client_of, endpoint, imu, options, other, tokens, trigger};
 use crate::kit::{PATIENCE, until};
 use bb_core::event::CommandEvent;
+use bb_core::message::codec::encode;
 use bb_core::prelude::*;
 use bb_ros2::{Attachment, EndpointKind, Gid};
 use bb_zenoh::{Mode, Ros2Options, Session, SessionSettings};
@@ -106,6 +107,42 @@ fn what_a_client_has_asked_for_is_not_done_once_it_has_left() {
         std::thread::sleep(Duration::from_millis(2));
     }
     assert_eq!(trigger(&session, "/left/arm", Gid([1; 16])), (true, "armed".to_owned()));
+}
+
+/// A tool that asks for all there is, or puts something everywhere.
+#[test]
+fn keys_with_wildcards_are_neither_requests_nor_messages() {
+    let robot = SmallCart::builder().start().expect("it starts");
+    let with_rights =
+        Ros2Options { rights: "arm commands".into(), subscribe: "sensor/base/imu".into(), ..options() };
+    let bridge = bridged(&robot, with_rights);
+    let session = other(&bridge);
+    let hash = announced(&session, EndpointKind::Service, "/small_cart/arm").address.type_hash;
+    let selectors = [
+        "**".to_owned(),
+        "0/small_cart/arm/**/TypeHashNotSupported".to_owned(),
+        format!("0/small_cart/arm/*/{hash}"),
+        format!("0/small_cart/a$*/*/{hash}"),
+    ];
+    for selector in selectors {
+        let replies = session.get(&selector).payload([0, 1, 0, 0, 0]).timeout(PATIENCE).wait();
+        let replies: Vec<_> = replies.expect("it is asked").iter().collect();
+        assert!(
+            !replies.is_empty() && replies.iter().all(|reply| reply.result().is_err()),
+            "{selector}: {replies:?}"
+        );
+        assert_eq!(robot.safety(), Safety::Disarmed, "{selector}");
+    }
+    let imu_hash = announced(&session, EndpointKind::Subscription, "/sensor/base/imu").address.type_hash;
+    let mut bytes = Vec::new();
+    encode(&Imu::to_ros(&Stamped::new(MonotonicTime::default(), imu(3.0))), &mut bytes);
+    let keys =
+        ["**".to_owned(), "0/sensor/**/TypeHashNotSupported".to_owned(), format!("0/sensor/base/*/*/{imu_hash}")];
+    for key in &keys {
+        session.put(key, bytes.clone()).wait().expect("it is put");
+    }
+    assert!(until(|| bridge.state().refused == keys.len() as u64), "{:?}", bridge.state());
+    assert_eq!(bridge.state().received, 0);
 }
 
 #[test]
