@@ -10,8 +10,10 @@ use tokio::net::TcpStream;
 use tokio::sync::Semaphore;
 use tokio::time::timeout;
 
-/// Connections at the same time, those that have not been admitted yet included.
-const MOST_CONNECTIONS: usize = 16;
+/// Clients at the same time.
+const MOST_CLIENTS: usize = 16;
+/// Connections that have not said yet what they want, at the same time. Pages of all sites can make a browser open some.
+const MOST_UNKNOWN: usize = 256;
 /// The longest head of a request.
 const LONGEST_HEAD: usize = 16 * 1024;
 /// Time within which a client sends its request.
@@ -23,6 +25,7 @@ pub(crate) struct Door {
     origins: Vec<String>,
     pub(crate) clients: Clients,
     room: Semaphore,
+    unknown: Semaphore,
 }
 
 /// A refused request: its status, and the reason.
@@ -30,14 +33,12 @@ type Refused = (u16, String);
 
 impl Door {
     pub(crate) fn new(origins: Vec<String>, clients: Clients) -> Self {
-        Self { origins, clients, room: Semaphore::new(MOST_CONNECTIONS) }
+        Self { origins, clients, room: Semaphore::new(MOST_CLIENTS), unknown: Semaphore::new(MOST_UNKNOWN) }
     }
 
     /// Serves a connection until one of both sides ends it.
     pub(crate) async fn admit(self: Arc<Self>, mut client: TcpStream) {
-        let Ok(_place) = self.room.try_acquire() else {
-            return refuse(client, (503, "too many clients are connected".to_owned())).await;
-        };
+        let Ok(unknown) = self.unknown.try_acquire() else { return };
         // Frames are whole messages.
         let _ = client.set_nodelay(true);
         let head = match timeout(PATIENCE, head(&mut client)).await {
@@ -48,6 +49,10 @@ impl Door {
             tracing::warn!(why = refused.1, "a client of Foxglove's bridge is refused");
             return refuse(client, refused).await;
         }
+        let Ok(_place) = self.room.try_acquire() else {
+            return refuse(client, (503, "too many clients are connected".to_owned())).await;
+        };
+        drop(unknown);
         if let Err(error) = self.clients.serve(client, &head).await {
             tracing::debug!(%error, "a client of Foxglove's bridge is gone");
         }

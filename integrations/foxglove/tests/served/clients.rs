@@ -259,6 +259,23 @@ fn a_flood_of_requests_does_not_keep_the_robot_from_being_disarmed() {
     MAY_END[0].store(true, Ordering::Relaxed);
 }
 
+/// Whom a page can make a browser connect with, which then says nothing.
+#[test]
+fn a_client_is_let_in_beside_those_that_do_not_say_what_they_want() {
+    let robot = Rover::builder().simulate().expect("it starts");
+    let foxglove = served(&robot, "");
+    let half = || {
+        let mut half = TcpStream::connect(foxglove.address()).expect("it listens");
+        half.write_all(b"GET / HTTP/1.1\r\n").expect("it listens");
+        half
+    };
+    let _halves: Vec<TcpStream> = (0..100).map(|_| half()).collect();
+    let begun = Instant::now();
+    Client::connect(&foxglove);
+    let took = begun.elapsed();
+    assert!(took < Duration::from_secs(2), "{took:?}");
+}
+
 #[test]
 fn a_client_that_shows_no_sign_of_life_is_ended() {
     let robot = Rover::builder().simulate().expect("it starts");
