@@ -40,8 +40,8 @@
 //! A client has a name, such as `foxglove 3`, in the events of commands and in the journal. A command that runs goes on when its client has left. A
 //! client that is frozen, or whose cable is cut, has left after 3 s: it is pinged each second, which a browser answers by itself.
 //!
-//! There are at most 16 connections; an HTTP head has at most 16 KiB and 5 s, and a message at most 64 KiB. A client may have 24 calls and 32 requests
-//! for parameters at once. Requests to disarm have a queue of their own.
+//! There are at most 16 clients, and 256 connections that have not said yet what they want. An HTTP head has at most 16 KiB and 5 s, and a message at
+//! most 64 KiB. A client may have 24 calls and 32 requests for parameters at once. Requests to disarm have a queue of their own.
 
 // A robot must not stop because of what a client sends.
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
