@@ -72,7 +72,7 @@ impl Clients {
             let outbox = Outbox::new(&self.channels.lost);
             let pulse = Notify::new();
             tokio::select! {
-                ended = inbound::relay(from_client, to_server, &pulse) => ended,
+                ended = inbound::relay(from_client, to_server, &pulse, &outbox.calls) => ended,
                 ended = outbox.relay(from_server, to_client, &pulse) => ended,
                 () = until_silent(&pulse) => Err(Error::new(ErrorKind::TimedOut, "it does not answer")),
             }

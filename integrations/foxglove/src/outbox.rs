@@ -1,7 +1,7 @@
 //! The queue of one client. The server's own queue drops messages without saying so; it is read without delay, so that messages wait, and
 //! are counted, here.
 
-use crate::inbound::head;
+use crate::inbound::{Calls, head};
 use std::collections::VecDeque;
 use std::io::{Error, ErrorKind, Result};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -32,6 +32,9 @@ const TEXT: u8 = 0x81;
 const PING_FRAME: [u8; 2] = [0x89, 0];
 /// The first byte of the message of a topic.
 const MESSAGE_DATA: u8 = 1;
+/// The first byte of the answer to a call, and the first bytes of a refusal.
+const CALL_ANSWER: u8 = 3;
+const CALL_FAILURE: &[u8] = br#"{"op":"serviceCallFailure""#;
 
 /// The queue of a client.
 #[derive(Debug)]
@@ -39,6 +42,7 @@ pub(crate) struct Outbox<'a> {
     waiting: Mutex<Waiting>,
     has_changed: Notify,
     lost: &'a AtomicU64,
+    pub(crate) calls: Calls,
 }
 
 #[derive(Debug, Default)]
@@ -61,7 +65,7 @@ struct Frame {
 impl<'a> Outbox<'a> {
     /// Creates a queue that adds to the number of `lost` messages.
     pub(crate) fn new(lost: &'a AtomicU64) -> Self {
-        Self { waiting: Mutex::default(), has_changed: Notify::new(), lost }
+        Self { waiting: Mutex::default(), has_changed: Notify::new(), lost, calls: Calls::default() }
     }
 
     /// Carries what the server sends to the client, until the server ends, and pings. That the client reads is a sign of life: `pulse`.
@@ -89,7 +93,10 @@ impl<'a> Outbox<'a> {
             }
         }
         self.push(Frame { bytes: answer, is_message: false })?;
-        while let Some(frame) = frame(&mut server).await? {
+        while let Some((frame, is_of_call)) = frame(&mut server).await? {
+            if is_of_call {
+                self.calls.end();
+            }
             self.push(frame)?;
         }
         Ok(())
@@ -174,8 +181,8 @@ impl<'a> Outbox<'a> {
     }
 }
 
-/// The next frame of a server; `None` at the end.
-async fn frame(server: &mut (impl AsyncRead + AsyncBufReadExt + Unpin)) -> Result<Option<Frame>> {
+/// The next frame of a server, and whether it ends a call; `None` at the end.
+async fn frame(server: &mut (impl AsyncRead + AsyncBufReadExt + Unpin)) -> Result<Option<(Frame, bool)>> {
     if server.fill_buf().await?.is_empty() {
         return Ok(None);
     }
@@ -185,8 +192,11 @@ async fn frame(server: &mut (impl AsyncRead + AsyncBufReadExt + Unpin)) -> Resul
     if server.take(length).read_to_end(&mut bytes).await? as u64 != length {
         return Err(Error::from(ErrorKind::UnexpectedEof));
     }
-    let is_message = bytes[0] == BINARY && bytes.get(head) == Some(&MESSAGE_DATA);
-    Ok(Some(Frame { bytes, is_message }))
+    let (kind, payload) = (bytes[0], &bytes[head..]);
+    let is_message = kind == BINARY && payload.first() == Some(&MESSAGE_DATA);
+    let is_of_call = (kind == BINARY && payload.first() == Some(&CALL_ANSWER))
+        || (kind == TEXT && payload.starts_with(CALL_FAILURE));
+    Ok(Some((Frame { bytes, is_message }, is_of_call)))
 }
 
 /// The frame of a warning, in the place of the one before.

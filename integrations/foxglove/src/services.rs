@@ -13,7 +13,7 @@ const JSON: &str = "json";
 /// The schema of what has no arguments, or no result.
 const NOTHING: &str = r#"{"type":"object","properties":{}}"#;
 /// Calls of a client at once, those to disarm apart: less than the 32 that Foxglove's server lets through.
-const MOST_CALLS: usize = 24;
+pub(crate) const MOST_CALLS: usize = 24;
 
 /// Effect of a service.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -183,6 +183,12 @@ impl Client {
 
     /// Calls a service, and does not wait for its answer.
     fn ask(&mut self, service: &str, arguments: &str) {
+        self.write(service, arguments);
+        self.socket.flush().expect("it is connected");
+    }
+
+    /// Calls a service with the next call that is sent.
+    fn write(&mut self, service: &str, arguments: &str) {
         let id = u32::try_from(self.services[service]).expect("it is small");
         let mut request = vec![2];
         for number in [id, 7, 4] {
@@ -190,7 +196,7 @@ impl Client {
         }
         request.extend(b"json");
         request.extend(arguments.as_bytes());
-        self.socket.send(Message::binary(request)).expect("it is connected");
+        self.socket.write(Message::binary(request)).expect("it is connected");
     }
 }
 
