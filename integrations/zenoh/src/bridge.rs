@@ -30,11 +30,13 @@ const OUT: &str = "ros2 out";
 /// robot! { robot Rover; link base { sensor imu: External<Imu>(); } }
 ///
 /// fn main() -> Result<(), Box<dyn std::error::Error>> {
-///     let mut running = Rover::builder().start()?;
+///     let running = Rover::builder().start()?;
 ///     let node = Ros2Bridge::serve(&running, Ros2Options::defaults())?;
 ///     println!("{} at {}", node.node(), node.endpoints().join(" "));
-///     running.wait();
-///     Ok(())
+///     // `Running::wait` waits for sensors and bridges of the robot, of which this one has none that run.
+///     loop {
+///         std::thread::park();
+///     }
 /// }
 /// ```
 ///
