@@ -13,11 +13,13 @@
 //! }
 //!
 //! fn main() -> Result<(), Box<dyn std::error::Error>> {
-//!     let mut running = Rover::builder().start()?;
+//!     let running = Rover::builder().start()?;
 //!     let dashboard = Dashboard::serve(&running, DashboardOptions::defaults())?;
 //!     println!("{}", dashboard.url());
-//!     running.wait();
-//!     Ok(())
+//!     // `Running::wait` waits for sensors and bridges of the robot, of which this one has none.
+//!     loop {
+//!         std::thread::park();
+//!     }
 //! }
 //! ```
 //!

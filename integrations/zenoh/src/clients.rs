@@ -38,12 +38,20 @@ impl Clients {
         let known = Arc::<Mutex<HashMap<Gid, Client>>>::default();
         let clients = Arc::clone(&known);
         let begin = bus.clone();
+        let (own, zid) = (node.node().clone(), node.session().zid().to_string());
         let tokens = node.session().liveliness().declare_subscriber(tokens_of(domain)).history(true);
         let tokens = tokens.callback(move |sample| {
             let key = sample.key_expr().as_str();
             // Another program's token is not our fault: what cannot be read has no name.
             let Ok(token) = key.parse::<Token>() else { return };
-            if token.endpoint.is_none_or(|endpoint| endpoint.kind != EndpointKind::Client) {
+            let Some(endpoint) = token.endpoint else {
+                if sample.kind() == SampleKind::Put && token.node == own && token.session != zid {
+                    let name = own.full_name();
+                    tracing::warn!(name, "another node has this name: a request, as to arm, reaches both; give each a name of its own");
+                }
+                return;
+            };
+            if endpoint.kind != EndpointKind::Client {
                 return;
             }
             let gid = Gid::of(key);
