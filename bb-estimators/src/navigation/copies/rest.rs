@@ -69,7 +69,7 @@ impl Default for Rest {
 /// A window that has ended.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Window {
-    /// Of the vibration, (m/s²)².
+    /// The variance of the vibration, (m/s²)².
     variance: f64,
     pub(super) bias: GyroscopeAtRest,
 }
