@@ -51,7 +51,7 @@ use std::marker::PhantomData;
 ///             origin: { xyz: [0 m, 0 m, 1.2 m] };
 ///             link antenna { sensor gnss: External<GnssFix>(); }
 ///         }
-///         estimator navigation: Eskf(heading = 90 deg) {
+///         estimator navigation: Eskf() {
 ///             input imu: sensor::base::imu, driver;
 ///             input gnss: sensor::base::mast::antenna::gnss, optional;
 ///             input odometry: sensor::base::wheels, optional;
