@@ -482,7 +482,10 @@ impl<F: CopiedFilter> Propagate for Copies<F> {
             let part = ImuMean { time_ns, ..*sample };
             self.each(|filter| filter.propagate(&part))?;
             self.holding.add(&part, part_s);
-            if let Some(window) = self.rest.add(&part, part_s) {
+            // A measurement divides a sample into parts that are alike, which say nothing of how much the body vibrates.
+            if time_ns == sample.time_ns
+                && let Some(window) = self.rest.add(sample, seconds_between(since_ns, time_ns)?)
+            {
                 self.rest(&window);
             }
             self.scatter(part_s);
