@@ -168,12 +168,17 @@ fn fly<S: States, const N: usize>(seed: u64) -> Flown {
         if i % 50 == 0 {
             let lever_arm = truth.vector::<S>(Optional::GnssLeverArm);
             let swing = truth.world_from_body * angular_velocity.cross(&lever_arm);
-            let late = (truth.velocity + swing) * truth.scalar::<S>(Optional::GnssDelay);
-            let antenna = truth.position + truth.world_from_body * lever_arm - late;
+            let delay = truth.scalar::<S>(Optional::GnssDelay);
+            let gravity = Vector3::new(0.0, 0.0, params.gravity);
+            let acceleration = truth.world_from_body * specific_force - gravity
+                + truth.world_from_body * angular_velocity.cross(&angular_velocity.cross(&lever_arm));
+            let moving = truth.velocity + swing - acceleration * (0.5 * delay);
+            let antenna = truth.position + truth.world_from_body * lever_arm - moving * delay;
             fuse(&mut filter, positions, &GnssPosition::new(antenna + noise.vector(0.8), 0.8, 0.8));
-            fuse(&mut filter, velocities, &GnssVelocity::new(truth.velocity + swing + noise.vector(0.1), 0.1, 0.1));
+            let moving = truth.velocity + swing - acceleration * delay;
+            fuse(&mut filter, velocities, &GnssVelocity::new(moving + noise.vector(0.1), 0.1, 0.1));
             let baseline = Vector3::x();
-            let ahead = truth.world_from_body * baseline;
+            let ahead = truth.world_from_body * rotation(&(angular_velocity * -delay)) * baseline;
             let heading = ahead.y.atan2(ahead.x) + 0.02 * noise.next();
             fuse(&mut filter, headings, &GnssHeading { heading, deviation: 0.02, baseline });
         }
