@@ -27,6 +27,8 @@ pub(crate) struct Estimate {
     pub(crate) origin: Option<Geodetic>,
     /// Delay of the fixes behind their stamps, according to the filter, s.
     pub(crate) delay_s: f64,
+    /// Standard deviation of that delay, s.
+    pub(crate) delay_deviation_s: f64,
 }
 
 impl Estimate {
@@ -35,7 +37,7 @@ impl Estimate {
         time_ns: Time,
         odometry: &Odometry,
         origin: Option<GeodeticPosition>,
-        delay_s: f64,
+        (delay_s, delay_deviation_s): (f64, f64),
     ) -> Option<Self> {
         let Odometry { pose, twist } = odometry;
         let place = |place: GeodeticPosition| Geodetic {
@@ -52,6 +54,7 @@ impl Estimate {
             covariance: pose.covariance?,
             origin: origin.map(place),
             delay_s,
+            delay_deviation_s,
         })
     }
 

@@ -213,10 +213,16 @@ fn spatial(
     };
     play(&mut simulation, feed, &mut record, progress, publish, |record| {
         for (odometry, status) in odometry.drain().zip(status.drain()) {
-            let NavigationStatus { world_origin: origin, gnss_delay, gnss, .. } = status.payload;
+            let NavigationStatus { world_origin: origin, gnss_delay, gnss_delay_deviation, gnss, .. } =
+                status.payload;
             let time_ns = record.time_ns(odometry.monotonic_time);
             record.note_refusals(time_ns, &gnss);
-            record.estimates.extend(Estimate::of(time_ns, &odometry.payload, origin, gnss_delay));
+            record.estimates.extend(Estimate::of(
+                time_ns,
+                &odometry.payload,
+                origin,
+                (gnss_delay, gnss_delay_deviation),
+            ));
             last = Some(status.payload);
         }
     });
@@ -280,7 +286,7 @@ fn planar(
         for (odometry, status) in odometry.drain().zip(status.drain()) {
             let time_ns = record.time_ns(odometry.monotonic_time);
             record.note_refusals(time_ns, &status.gnss);
-            record.estimates.extend(Estimate::of(time_ns, &odometry.payload, status.world_origin, 0.0));
+            record.estimates.extend(Estimate::of(time_ns, &odometry.payload, status.world_origin, (0.0, 0.0)));
             last = Some(status.payload);
         }
     });
@@ -446,6 +452,7 @@ impl OnEarth<'_> {
             covariance: estimate.covariance,
             origin: self.feed.world.map(|world| *world.origin()),
             delay_s: 0.0,
+            delay_deviation_s: 0.0,
         }
     }
 }

@@ -152,12 +152,14 @@ impl<'a> Scoring<'a> {
                 "no errors: {topic} has no message while the IMU has; are both stamped by one clock?"
             ));
         }
-        let delay_s = self.record.estimates.last().map_or(0.0, |estimate| estimate.delay_s);
-        if is_of_fixes && delay_s != 0.0 {
+        let last = self.record.estimates.last();
+        let (delay_s, deviation_s) = last.map_or((0.0, 0.0), |of| (of.delay_s, of.delay_deviation_s));
+        if is_of_fixes && delay_s.abs() > deviation_s {
             notes.push(format!(
-                "scored in the clock of the fixes: where the robot was {:.0} ms before the stamp of a fix, as the filter has \
+                "scored in the clock of the fixes: where the robot was {:.0} ± {:.0} ms before the stamp of a fix, as the filter has \
                  found in the end",
-                1e3 * delay_s
+                1e3 * delay_s,
+                1e3 * deviation_s
             ));
         }
         // Before the first estimate there is nothing to score.

@@ -8,12 +8,13 @@ use crate::navigation::copies::{Copies, Ways};
 use crate::navigation::eskf::{Eskf, Start};
 use crate::navigation::fused::Fused;
 use crate::navigation::history::Replayed;
+use crate::navigation::math::sqrt;
 use crate::navigation::measurement::{
     AbsolutePose, BarometricHeight, BodyVelocity, GnssHeading, GnssPosition, GnssVelocity, MagneticHeading,
     RelativePose,
 };
 use crate::navigation::refusal::Refusal;
-use crate::navigation::state::{Estimate, POSITION, States};
+use crate::navigation::state::{Estimate, Optional, POSITION, States, offset};
 use crate::navigation::stream::{Counts, Stream};
 use bb_core::Fault;
 use nalgebra::{Isometry3, Vector3};
@@ -95,6 +96,11 @@ impl<S: States, const N: usize> Filter<S, N> {
         let covariance = self.eskf().covariance();
         let of = |i: usize, j: usize| covariance[(POSITION + i, POSITION + j)];
         largest_deviation(of(0, 0), of(0, 1), of(1, 1))
+    }
+
+    /// Standard deviation of an optional scalar state; 0 if it is not a state.
+    pub(super) fn deviation(&self, state: Optional) -> f64 {
+        offset::<S>(state).map_or(0.0, |index| sqrt(self.eskf().covariance()[(index, index)]))
     }
 
     /// Counts of the measurements by result, in the order of [`NAMES`].

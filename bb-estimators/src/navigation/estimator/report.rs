@@ -56,6 +56,8 @@ pub struct NavigationStatus {
     pub gnss_lever_arm: Vector3<f64>,
     /// Delay of fixes beyond their stamps, s. 0 if it is not a state.
     pub gnss_delay: f64,
+    /// Standard deviation of that delay, s. 0 if it is not a state.
+    pub gnss_delay_deviation: f64,
     /// Magnetic field of the robot itself, axes of the link, T. 0 if it is not a state.
     pub hard_iron: Vector3<f64>,
     /// Barometric height minus the height, m. 0 if it is not a state.
@@ -197,6 +199,7 @@ pub(super) fn status_of<S: States, const N: usize>(
         relative_scale: estimate.scalar::<S>(Optional::RelativeScale),
         gnss_lever_arm: estimate.vector::<S>(Optional::GnssLeverArm),
         gnss_delay: estimate.scalar::<S>(Optional::GnssDelay),
+        gnss_delay_deviation: filter.deviation(Optional::GnssDelay),
         hard_iron: estimate.vector::<S>(Optional::HardIron),
         barometer_bias: estimate.scalar::<S>(Optional::BarometerBias),
         world_origin: world.first().map(|frame| place_of(frame.origin())),
