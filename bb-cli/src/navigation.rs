@@ -49,7 +49,7 @@ pub(crate) struct NavigationArguments {
     /// Prints an array of objects instead of the table.
     #[arg(long)]
     json: bool,
-    /// Plots the track, errors, innovations, and errors by the age of poses to this file, an SVG or a PNG.
+    /// Plots the track, errors, innovations, and errors by the age of positions to this file, an SVG or a PNG.
     #[arg(long, value_name = "FILE", value_parser = picture)]
     plot: Option<PathBuf>,
     /// Writes the estimates with their covariances beside the truth to this file, a CSV or an MCAP.

@@ -5,7 +5,7 @@ use serde_json::Value;
 use std::fmt::Write;
 use std::path::PathBuf;
 
-/// Ten seconds of straight motion at 2 m/s to the east, with a fix a second. Gives the prefix of its files.
+/// Ten seconds of straight motion at 2 m/s to the east, 7 m above the origin, with a fix a second. Gives the prefix of its files.
 fn drive(name: &str) -> PathBuf {
     let (mut imu, mut keyframes) =
         (String::from("t,gx,gy,gz,ax,ay,az,dt\n"), String::from("k,t,imu_start,truth_row,eval\n"));
@@ -17,12 +17,12 @@ fn drive(name: &str) -> PathBuf {
     for k in 0..=100 {
         let t = f64::from(k) * 0.1;
         let _ = writeln!(keyframes, "{k},{t},{},{k},1", k * 10);
-        let _ = writeln!(truth, "{t},{},0,0,1,0,0,0,2,0,0,nan,nan,nan,nan,nan,nan", 2.0 * t);
+        let _ = writeln!(truth, "{t},{},0,7,1,0,0,0,2,0,0,nan,nan,nan,nan,nan,nan", 2.0 * t);
         if k % 10 == 0 {
-            let _ = writeln!(gps, "{k},{t},{},0,0,0.5,1", 2.0 * t);
+            let _ = writeln!(gps, "{k},{t},{},0,7,0.5,1", 2.0 * t);
         }
     }
-    let init = "px,…\n0.2,0,0,1,0,0,0,2,0,0,0,0,0,0,0,0,0.01,0.5,0.1,0.001,0.01\n";
+    let init = "px,…\n0.2,0,7,1,0,0,0,2,0,0,0,0,0,0,0,0,0.01,0.5,0.1,0.001,0.01\n";
     let noise = "gyro_nd,gyro_rw,accel_nd,accel_rw,gravity\n1e-4,1e-6,1e-3,1e-5,9.81\n";
     let files = [("truth", &*truth), ("keyframes", &keyframes), ("gps", &gps), ("init", init), ("noise", noise)];
     for (what, text) in files {
@@ -49,6 +49,9 @@ fn a_drive_is_scored() {
         // It starts at the second fix, on a plane once it has moved for a second; a tenth is not scored.
         assert!((70..92).contains(&row["scored"].as_u64().expect("is counted")), "{row}");
         assert_eq!((&row["refused"], &row["file"]), (&0.into(), &prefix.into()));
+        for state in row["states"].as_array().expect("a list") {
+            assert!(state["position_m"]["rms"].as_f64().is_none_or(|rms| rms < 0.4), "{state}");
+        }
     }
     // What a plane tells is not scored.
     assert_eq!(

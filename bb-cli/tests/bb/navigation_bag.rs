@@ -185,7 +185,7 @@ fn a_plot_has_the_track_the_errors_and_the_innovations() {
         "+3σ",
         "heading (deg)",
         "innovations of fixes",
-        "error by the age of the last pose",
+        "error by the age of the last position",
     ];
     for what in said {
         assert!(svg.contains(what), "{what}");
@@ -195,6 +195,13 @@ fn a_plot_has_the_track_the_errors_and_the_innovations() {
     assert!(height.parse::<u32>().expect("a number") < 1600, "{height}");
     let [truth, estimate] = ["stroke-width=\"7\"", "#0072B2"].map(|line| svg.find(line).expect("is drawn"));
     assert!(truth < estimate);
+    // What is not estimated is not drawn, nor states before the first estimate.
+    let planar = &["--filter", "planar", "--relative-topic", "none", "--start", "own"];
+    let output = bb(&[&["eval", "navigation", text(&bag), "--plot", text(&plot)], &options[2..6], planar].concat());
+    let svg = std::fs::read_to_string(&plot).expect("is there");
+    for not in ["up (m)", "about east", "starting", "keyframes"] {
+        assert!(svg.contains("heading (deg)") && !svg.contains(not), "{not}: {}", output.err);
+    }
     let output = bb(&["eval", "navigation", text(&bag), "--plot", "drawn.jpg"]);
     assert!(output.code == Some(2) && output.err.contains("an SVG or a PNG"), "{}", output.err);
 }

@@ -1,6 +1,6 @@
 //! `--plot` of `bb eval navigation`: the track, errors within their bounds, innovations, errors by the age of the anchor.
 
-use super::trace::{Row, Sensor, Trace};
+use super::trace::{Row, Trace};
 use bb_estimators::navigation::chi_square::limit;
 use bb_plot::{Band, Colour, Line, PALETTE, Panel, Part, Plane, Point, Scale, Sheet};
 use std::path::Path;
@@ -65,7 +65,7 @@ fn parts(run: &Drawn) -> Vec<Part> {
     let mut parts = vec![Part::Plane(track(run), 3)];
     let mut positions = Vec::new();
     if rows.iter().any(|row| row.errors.is_some()) {
-        for (index, axis) in ["east", "north", "up"].into_iter().enumerate() {
+        for (index, axis) in ["east", "north", "up"].into_iter().enumerate().take(dimension(&run.trace)) {
             let title = if index == 0 { "error, and three standard deviations" } else { "" };
             let error = |row: &Row| row.errors.map(|errors| errors.position[index]);
             let deviation = |row: &Row| row.errors.map(|errors| errors.covariance[(index, index)].sqrt());
@@ -74,8 +74,9 @@ fn parts(run: &Drawn) -> Vec<Part> {
     }
     let mut rotations = Vec::new();
     if rows.iter().any(|row| row.errors.is_some_and(|errors| errors.rotation.is_some())) {
-        for (index, axis) in ["about east", "about north", "heading"].into_iter().enumerate() {
-            let title = if index == 0 { "error, and three standard deviations" } else { "" };
+        let first = if run.trace.is_planar { 2 } else { 0 };
+        for (index, axis) in ["about east", "about north", "heading"].into_iter().enumerate().skip(first) {
+            let title = if index == first { "error, and three standard deviations" } else { "" };
             let error = |row: &Row| Some(row.errors?.rotation?[index].to_degrees());
             let deviation =
                 |row: &Row| row.errors.map(|errors| errors.covariance[(3 + index, 3 + index)].sqrt().to_degrees());
@@ -83,12 +84,9 @@ fn parts(run: &Drawn) -> Vec<Part> {
         }
     }
     let mut others = Vec::new();
-    for sensor in Sensor::ALL {
-        if run.trace.innovations.iter().any(|innovation| innovation.sensor == sensor) {
-            let title = format!("innovations of {}", sensor.name());
-            let axis = "in standard deviations".into();
-            others.push(Part::Panel(panel(&title, axis, innovations(&run.trace, sensor))));
-        }
+    if !run.trace.innovations.is_empty() {
+        let axis = "in standard deviations".into();
+        others.push(Part::Panel(panel("innovations of fixes", axis, innovations(&run.trace))));
     }
     let has_ages = rows.iter().any(|row| row.anchor_age_s.is_some() && row.errors.is_some());
     if has_ages {
@@ -98,6 +96,11 @@ fn parts(run: &Drawn) -> Vec<Part> {
     let second = others.split_off(others.len().div_ceil(2));
     parts.extend(in_columns(others, second));
     parts
+}
+
+/// Axes of the position that the filter estimates.
+fn dimension(trace: &Trace) -> usize {
+    if trace.is_planar { 2 } else { 3 }
 }
 
 /// Arranges parts in two columns; a part without a neighbour takes the whole width.
@@ -111,12 +114,17 @@ fn in_columns(left: Vec<Part>, right: Vec<Part>) -> Vec<Part> {
         .collect()
 }
 
-/// Outages, gaps and states of health.
+/// Outages, gaps and states of health, as far as they are while something is drawn.
 fn bands(run: &Drawn) -> Vec<Band> {
     let Trace { rows, health, outages, gaps, .. } = &run.trace;
     let mut bands = Vec::new();
-    let mut shade = |label: &str, colour, times| bands.push(Band { label: label.to_owned(), colour, times });
-    let end_s = rows.last().map_or(0.0, |row| row.time_s);
+    let (begin_s, end_s) = rows.first().zip(rows.last()).map_or((0.0, 0.0), |(a, b)| (a.time_s, b.time_s));
+    let mut shade = |label: &str, colour, (from_s, to_s): (f64, f64)| {
+        let times = (from_s.max(begin_s), to_s.min(end_s));
+        if times.0 < times.1 {
+            bands.push(Band { label: label.to_owned(), colour, times });
+        }
+    };
     for (index, (from_s, state)) in health.iter().enumerate() {
         let to_s = health.get(index + 1).map_or(end_s, |(to_s, _)| *to_s);
         if let Some((label, colour)) = STATES.into_iter().find(|(name, _)| name == state) {
@@ -175,16 +183,15 @@ fn bounded(
 }
 
 /// Innovations in standard deviations: the root of their normalised square over their dimension, 1 on average.
-fn innovations(trace: &Trace, sensor: Sensor) -> Vec<Line> {
-    let dimension = sensor.dimension();
+fn innovations(trace: &Trace) -> Vec<Line> {
+    let dimension = dimension(trace);
     let of = |is_fused: bool| -> Vec<Point> {
-        let chosen = trace.innovations.iter().filter(|one| one.sensor == sensor && one.is_fused == is_fused);
+        let chosen = trace.innovations.iter().filter(|one| one.is_fused == is_fused);
         chosen.map(|one| (one.time_s, Some((one.nis / dimension as f64).sqrt()))).collect()
     };
     let bound = (limit(dimension, 1.0 - WITHIN) / dimension as f64).sqrt();
-    let times: Vec<_> = trace.innovations.iter().filter(|one| one.sensor == sensor).map(|one| one.time_s).collect();
-    let ends = [times.first(), times.last()];
-    let line: Vec<Point> = ends.into_iter().flatten().map(|time_s| (*time_s, Some(bound))).collect();
+    let ends = [trace.innovations.first(), trace.innovations.last()];
+    let line: Vec<Point> = ends.into_iter().flatten().map(|one| (one.time_s, Some(bound))).collect();
     vec![
         Line::new("fused", PALETTE[0], 2, &of(true)),
         Line::new("refused", REFUSED, 3, &of(false)),
@@ -207,12 +214,12 @@ fn by_age(rows: &[Row]) -> Plane {
     let means: Vec<_> =
         filled.map(|(step, (sum, count))| (middle(step), (sum / f64::from(*count)).sqrt())).collect();
     Plane {
-        title: "error by the age of the last pose".into(),
+        title: "error by the age of the last position".into(),
         x_axis: "age (s)".into(),
         y_axis: "position (m)".into(),
         scale: Scale::Linear,
         lines: vec![
-            Line::path("keyframes", PALETTE[5], 2, &points),
+            Line::path("instants with truth", PALETTE[5], 2, &points),
             Line::path("root mean square", PALETTE[1], 1, &means),
         ],
     }

@@ -193,9 +193,7 @@ impl Scores<'_> {
             scored: self.scored.len(),
             silent: self.silent,
             started_s: self.started_s,
-            position_m: of(&|scored| {
-                Some(if is_planar { horizontal(scored) } else { scored.errors.position.norm() })
-            }),
+            position_m: of(&|scored| Some(scored.errors.position.norm())),
             horizontal_m: of(&|scored| Some(horizontal(scored))),
             vertical_m: of(&|scored| (!is_planar).then(|| scored.errors.position.z.abs())),
             orientation_deg: of(&|scored| Some(scored.errors.rotation.filter(|_| !is_planar)?.norm().to_degrees())),

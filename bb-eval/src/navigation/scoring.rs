@@ -7,7 +7,7 @@ use super::errors::{Errors, Known};
 use super::feed::{Feed, Time, What};
 use super::record::{Estimate, Record};
 use super::score::{NavigationScore, Scored, Scores};
-use super::trace::{Innovation, Row, Sensor, State, Trace};
+use super::trace::{Innovation, Row, State, Trace};
 use crate::periods::{Gap, Periods};
 use crate::turns::{Align, LEFT, Turn, Turns, angles, cause};
 use bb_core::nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector3};
@@ -101,6 +101,17 @@ impl<'a> Scoring<'a> {
         }
     }
 
+    /// The error of an estimate, as far as the filter estimates it.
+    fn errors(&self, truth: &Truth, known: &Known) -> Errors {
+        let errors = Errors::between(truth, &self.antenna, known);
+        Errors { position: self.estimated(errors.position), ..errors }
+    }
+
+    /// An error of the position without that of a height that the filter does not estimate.
+    fn estimated(&self, error: Vector3<f64>) -> Vector3<f64> {
+        if self.record.is_planar { Vector3::new(error.x, error.y, 0.0) } else { error }
+    }
+
     /// The estimate for a time: the last one before it, moved on.
     fn at(&self, time_ns: Time) -> Option<Estimate> {
         let estimates = &self.record.estimates;
@@ -143,7 +154,7 @@ impl<'a> Scoring<'a> {
                 false => estimate,
             });
             let known = estimate.map(|estimate| self.known(&estimate));
-            let errors = known.map(|known| Errors::between(&truth, &self.antenna, &known));
+            let errors = known.map(|known| self.errors(&truth, &known));
             instants.push(Instant { time_ns, truth, known, errors, is_scored: false });
         }
         if !points.is_empty() && instants.is_empty() {
@@ -190,8 +201,7 @@ impl<'a> Scoring<'a> {
                 world_from_body: world_from_body.map(|truth| turn.rotation * truth),
                 velocity: velocity.map(|velocity| turn.rotation * velocity),
             };
-            let errors = instant.known.map(|known| Errors::between(&instant.truth, &self.antenna, &known));
-            instant.errors = errors;
+            instant.errors = instant.known.map(|known| self.errors(&instant.truth, &known));
         }
         Some(format!(
             "the truth is turned by roll, pitch, yaw {} deg (spread {:.2} deg, by its {how}) and moved by {:.2}, {:.2}, {:.2} m",
@@ -207,7 +217,7 @@ impl<'a> Scoring<'a> {
     fn moved(&self, instant: &Instant, turn: &UnitQuaternion<f64>) -> Option<Vector3<f64>> {
         let arm = if instant.truth.world_from_body.is_some() { Vector3::zeros() } else { self.antenna };
         let known = instant.known?;
-        Some(known.position + known.world_from_body * arm - turn * instant.truth.position)
+        Some(self.estimated(known.position + known.world_from_body * arm - turn * instant.truth.position))
     }
 
     /// A place of the truth's world that is not that of the filter's, if it was found to explain the error.
@@ -361,6 +371,7 @@ impl<'a> Scoring<'a> {
         };
         Trace {
             first_ns: self.first_ns,
+            is_planar: self.record.is_planar,
             rows,
             innovations: self.innovations(),
             fixes: self.fixes().map(|(_, fix)| fix.position).collect(),
@@ -402,12 +413,8 @@ impl<'a> Scoring<'a> {
             let refusals = &self.record.refusals;
             let from = refusals.partition_point(|time| *time < time_ns);
             let is_fused = refusals.get(from).is_none_or(|time| time - time_ns > OLDEST_NS);
-            Some(Innovation {
-                time_s: self.seconds(time_ns),
-                sensor: Sensor::Fix,
-                nis: errors.normalised(&[0, 1, 2])?,
-                is_fused,
-            })
+            let axes: &[usize] = if self.record.is_planar { &[0, 1] } else { &[0, 1, 2] };
+            Some(Innovation { time_s: self.seconds(time_ns), nis: errors.normalised(axes)?, is_fused })
         };
         self.fixes().filter_map(innovation).collect()
     }

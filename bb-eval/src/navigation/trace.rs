@@ -5,31 +5,14 @@ use super::errors::{Errors, Known};
 use bb_core::event::HealthState;
 use bb_core::nalgebra::Vector3;
 
-/// A kind of measurement of positions.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Sensor {
-    Fix,
-}
-
-#[cfg_attr(not(feature = "plot"), expect(dead_code, reason = "for pictures"))]
-impl Sensor {
-    pub(crate) const ALL: [Self; 1] = [Self::Fix];
-
-    pub(crate) fn name(self) -> &'static str {
-        "fixes"
-    }
-
-    pub(crate) fn dimension(self) -> usize {
-        3
-    }
-}
-
 /// A run over time. Times are seconds since the first message.
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(not(feature = "plot"), allow(dead_code, reason = "for pictures and files"))]
 pub struct Trace {
     /// The time of the first message, ns.
     pub(crate) first_ns: i64,
+    /// `true` if the filter estimates no height, roll and pitch.
+    pub(crate) is_planar: bool,
     pub(crate) rows: Vec<Row>,
     pub(crate) innovations: Vec<Innovation>,
     /// The positions of the fixes that the filter got.
@@ -75,12 +58,11 @@ pub(crate) struct Row {
     pub(crate) anchor_age_s: Option<f64>,
 }
 
-/// A measurement compared with its prediction.
+/// A fix compared with its prediction.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(not(feature = "plot"), expect(dead_code, reason = "for pictures"))]
 pub(crate) struct Innovation {
     pub(crate) time_s: f64,
-    pub(crate) sensor: Sensor,
     /// Normalised innovation squared.
     pub(crate) nis: f64,
     /// `true` if it passed the gate.
