@@ -292,6 +292,8 @@ fn what_is_wrong_with_a_bag_is_said() {
     let known = Bagged { no_truth: true, start: true, ..fixes };
     let from = ["--truth", "/truth", "--origin", drive::ORIGIN, "--start", "/start"];
     fault(&known, "empty_start.mcap", &from, 0, "no errors: /truth holds no position that is a number");
+    let fixed = ["--truth", "/fix", "--start", "/start", "--odometry-topic", "none"];
+    fault(&known, "empty_start.mcap", &fixed, 0, "no errors: /fix is fixes, and without a fix the filter's world");
     let apart = Bagged { mounted: true, transforms: true, apart: true, ..fixes };
     fault(
         &apart,
@@ -348,9 +350,15 @@ fn figures_of_less_than_half_of_a_bag_are_an_error() {
         }
         let rows: Vec<Value> = serde_json::from_str(&output.out).expect("an array");
         assert_eq!(rows.len(), 1);
+        rows[0].clone()
     };
     let stuck = Bagged { stuck: true, ..fixes };
     distrusted(&stuck, "stuck.mcap", &["700 of 1001 messages of /imu are not stamped after the one before"]);
+    let early = Bagged { early_ns: 18_000_000_000, ..fixes };
+    let said = "measurements of `gnss` were not used, being stamped 18.0 s before the samples of the IMU";
+    let row = distrusted(&early, "early.mcap", &[said]);
+    assert_eq!((&row["fates"][0]["fused"], &row["ages"]), (&0.into(), &Value::Array(Vec::new())));
+    assert!(row["fates"][0]["unused"].as_u64() > Some(0), "{row}");
 }
 
 /// Wrong fixes at the beginning set neither the origin of the world nor the start of the filter.

@@ -2,6 +2,7 @@
 
 use super::doubt::{distrusted, is_most};
 use super::drive::{Drive, RecordedTruth};
+use super::feed::{Feed, Time};
 use super::record::{Estimate, Record};
 use super::robot::{self, NavigationFilter, RobotSettings};
 use super::score::NavigationScore;
@@ -72,7 +73,7 @@ pub fn play_navigation(
             doubts.push(format!("{setting} changes nothing on this recording{why}"));
         }
     }
-    doubts.extend(refused(&record));
+    doubts.extend(left_out(&feed, &record));
     let scoring = Scoring::new(origin, &feed, &record, &truth);
     let mut scored = scoring.all(&mut notes);
     notes.extend(scoring.aligned(&mut scored, run.align));
@@ -106,12 +107,35 @@ fn never_started(record: &Record) -> String {
     )
 }
 
-/// The inputs of which most measurements were refused.
-fn refused(record: &Record) -> Vec<String> {
-    let all = record.verdicts.iter().map(|of| (of, of.fused + of.refused));
-    let most = all.filter(|(of, all)| is_most(of.refused, *all));
+/// The inputs of which most measurements were refused or not used.
+fn left_out(feed: &Feed, record: &Record) -> Vec<String> {
+    let all = record.verdicts.iter().map(|of| (of, of.fused + of.refused + of.unused));
+    let most = all.filter(|(of, all)| is_most(of.refused + of.unused, *all));
     most.map(|(of, all)| {
-        distrusted(&format!("{} of {all} measurements of `{}` were refused", of.refused, of.input))
+        let (count, verb) = if of.refused > of.unused { (of.refused, "refused") } else { (of.unused, "not used") };
+        let why = if verb == "refused" { None } else { misstamped(feed, of.input) };
+        let why = why.unwrap_or_default();
+        distrusted(&format!("{count} of {all} measurements of `{}` were {verb}{why}", of.input))
     })
     .collect()
+}
+
+/// Difference of the stamps of messages that arrive at one time above which they are not of one clock, ns.
+const ONE_CLOCK_NS: Time = 1_000_000_000;
+
+/// Says how the stamps of an input differ from those of the IMU at arrival, if they do.
+fn misstamped(feed: &Feed, input: &str) -> Option<String> {
+    let age_ns = |input: &str| {
+        let mut ages: Vec<Time> = feed.usable(input).map(|message| message.arrival_ns - message.stamp_ns).collect();
+        ages.sort_unstable();
+        ages.get(ages.len() / 2).copied()
+    };
+    let older_ns = age_ns(input)?.saturating_sub(age_ns("imu")?);
+    let sense = if older_ns > 0 { "before" } else { "after" };
+    (older_ns.abs() > ONE_CLOCK_NS).then(|| {
+        format!(
+            ", being stamped {:.1} s {sense} the samples of the IMU that arrive with them; correct their stamps",
+            older_ns.abs() as f64 * 1e-9
+        )
+    })
 }

@@ -2,7 +2,7 @@
 
 use bb_core::nalgebra::Isometry3;
 use bb_core::payload::{GnssFix, Imu, MagneticField, Odometry, Orientation, Pose, RelativePose, Twist};
-use bb_estimators::navigation::LocalFrame;
+use bb_estimators::navigation::{Geodetic, LocalFrame};
 
 use crate::disturb::{Disturbances, GNSS, GNSS_HEADING, GNSS_VELOCITY, IMU, MAGNETIC_FIELD};
 pub(crate) use crate::disturb::{INPUTS, START, Time};
@@ -63,6 +63,16 @@ impl Feed {
     /// sample of the IMU, which makes a filter run, comes last.
     pub(crate) fn sort(&mut self) {
         self.messages.sort_by_key(|message| (message.arrival_ns, message.what.input() == 0));
+    }
+
+    /// Returns the messages to an input, without fixes that have no position.
+    pub(crate) fn usable(&self, input: &str) -> impl Iterator<Item = &Message> {
+        let is_usable = |message: &&Message| match &message.what {
+            What::Gnss(fix) => Geodetic::of_fix(fix, 0.0).is_some(),
+            _ => true,
+        };
+        let input = INPUTS.iter().position(|known| *known == input);
+        self.messages.iter().filter(move |message| Some(message.what.input()) == input).filter(is_usable)
     }
 
     /// Returns the first of all times, ns.

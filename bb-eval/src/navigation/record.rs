@@ -77,6 +77,8 @@ pub(crate) struct Verdict {
     pub(crate) input: &'static str,
     pub(crate) fused: u64,
     pub(crate) refused: u64,
+    /// Those since its start that a filter neither fused nor refused: stamped too early or too late.
+    pub(crate) unused: u64,
 }
 
 /// Record of one run: estimates, health and counts.
@@ -92,6 +94,9 @@ pub(crate) struct Record {
     /// Times at which fixes were refused.
     pub(crate) refusals: Vec<Time>,
     last_refused: u64,
+    /// Times at which positions in the world were fused.
+    pub(crate) positions: Vec<Time>,
+    last_fused: u64,
     /// Measurements refused, of a filter that does not count them by input.
     pub(crate) refused: u64,
     pub(crate) resets: u32,
@@ -111,12 +116,17 @@ impl Record {
         Self { base_ns, ..Self::default() }
     }
 
-    /// Notes when the filter has refused another fix.
-    pub(crate) fn note_refusals(&mut self, time_ns: Time, gnss: &Verdicts) {
+    /// Notes when the filter has refused another fix, or fused another position.
+    pub(crate) fn note_positions(&mut self, time_ns: Time, gnss: &Verdicts, pose: &Verdicts) {
         if gnss.refused > self.last_refused {
             self.refusals.push(time_ns);
         }
         self.last_refused = gnss.refused;
+        let fused = gnss.fused + pose.fused;
+        if fused > self.last_fused {
+            self.positions.push(time_ns);
+        }
+        self.last_fused = fused;
     }
 
     /// A message whose payload has times, on the robot's clock.

@@ -127,7 +127,8 @@ fn fared(score: &NavigationScore) -> String {
         );
     }
     for fate in &score.fates {
-        let _ = writeln!(text, "  {}: {} fused, {} refused", fate.input, fate.fused, fate.refused);
+        let _ = write!(text, "  {}: {} fused, {} refused", fate.input, fate.fused, fate.refused);
+        text += &if fate.unused > 0 { format!(", {} not used\n", fate.unused) } else { "\n".to_owned() };
     }
     if score.resets > 0 {
         let _ = writeln!(text, "  begun again elsewhere {} times", score.resets);

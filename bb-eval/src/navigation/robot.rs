@@ -124,11 +124,17 @@ pub(crate) fn run(
     settings: &RobotSettings,
     progress: &mut dyn FnMut(),
 ) -> Result<Record, String> {
-    match filter.kind {
+    let mut record = match filter.kind {
         Kind::Spatial => spatial(filter, feed, settings, progress),
         Kind::Planar => planar(filter, feed, settings, progress),
         Kind::Flight(strategy) => flight(filter, strategy, feed, settings, progress),
+    }?;
+    let started_ns = record.estimates.first().map_or(i64::MAX, |estimate| estimate.time_ns);
+    for of in &mut record.verdicts {
+        let since = feed.usable(of.input).filter(|message| message.arrival_ns > started_ns);
+        of.unused = (since.count() as u64).saturating_sub(of.fused + of.refused);
     }
+    Ok(record)
 }
 
 /// The mountings of the inputs that a recording has, under the names that a filter gives them.
@@ -213,10 +219,10 @@ fn spatial(
     };
     play(&mut simulation, feed, &mut record, progress, publish, |record| {
         for (odometry, status) in odometry.drain().zip(status.drain()) {
-            let NavigationStatus { world_origin: origin, gnss_delay, gnss_delay_deviation, gnss, .. } =
+            let NavigationStatus { world_origin: origin, gnss_delay, gnss_delay_deviation, gnss, pose, .. } =
                 status.payload;
             let time_ns = record.time_ns(odometry.monotonic_time);
-            record.note_refusals(time_ns, &gnss);
+            record.note_positions(time_ns, &gnss, &pose);
             record.estimates.extend(Estimate::of(
                 time_ns,
                 &odometry.payload,
@@ -238,7 +244,7 @@ fn spatial(
 }
 
 fn verdict(input: &'static str, of: &Verdicts) -> Verdict {
-    Verdict { input, fused: of.fused, refused: of.refused + of.invalid }
+    Verdict { input, fused: of.fused, refused: of.refused + of.invalid, unused: 0 }
 }
 
 fn planar(
@@ -285,7 +291,7 @@ fn planar(
     play(&mut simulation, feed, &mut record, progress, publish, |record| {
         for (odometry, status) in odometry.drain().zip(status.drain()) {
             let time_ns = record.time_ns(odometry.monotonic_time);
-            record.note_refusals(time_ns, &status.gnss);
+            record.note_positions(time_ns, &status.gnss, &status.pose);
             record.estimates.extend(Estimate::of(time_ns, &odometry.payload, status.world_origin, (0.0, 0.0)));
             last = Some(status.payload);
         }
@@ -358,6 +364,10 @@ fn flight(
     simulation.stop();
     finish(&mut record, health.drain(), &reasons);
     record.refused = refused;
+    // It does not count them.
+    let positions = ["gnss", "pose"].into_iter().flat_map(|input| feed.usable(input));
+    record.positions = positions.map(|message| message.stamp_ns).collect();
+    record.positions.sort_unstable();
     Ok(record)
 }
 

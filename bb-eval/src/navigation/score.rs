@@ -90,6 +90,8 @@ pub struct Fate {
     pub fused: u64,
     /// Number of those that were refused.
     pub refused: u64,
+    /// Number of those since the start that were neither: stamped too early or too late.
+    pub unused: u64,
 }
 
 /// The errors of a filter in its robot on a bag, over the instants with truth. What the truth does not tell, or the filter does
@@ -186,8 +188,8 @@ impl Scores<'_> {
         let fates: Vec<Fate> = record
             .verdicts
             .iter()
-            .filter(|of| of.fused + of.refused > 0)
-            .map(|of| Fate { input: of.input, fused: of.fused, refused: of.refused })
+            .filter(|of| of.fused + of.refused + of.unused > 0)
+            .map(|of| Fate { input: of.input, fused: of.fused, refused: of.refused, unused: of.unused })
             .collect();
         NavigationScore {
             scored: self.scored.len(),

@@ -1,7 +1,7 @@
 //! The comparison of a filter's record with the truth: instants, errors, states and the run over time.
 
 use super::bag::TrueTrack;
-use super::data::Truth;
+use super::data::{Truth, TruthMessage};
 use super::drive::RecordedTruth;
 use super::errors::{Errors, Known};
 use super::feed::{Feed, Time, What};
@@ -46,8 +46,8 @@ pub(super) struct Scoring<'a> {
     antenna: Vector3<f64>,
     first_ns: Time,
     imu_stamps: Vec<Time>,
-    /// Stamps of positions in the world, by time.
-    anchors: Vec<Time>,
+    /// Median period of the positions in the world, ns.
+    fix_period_ns: Time,
     /// States, each from its time on.
     states: Vec<(Time, State)>,
 }
@@ -61,18 +61,18 @@ impl<'a> Scoring<'a> {
     ) -> Self {
         let of_filter = record.estimates.iter().find_map(|estimate| estimate.origin);
         let world = origin.or(of_filter).map(LocalFrame::new);
-        let stamps = |is: fn(&What) -> bool| -> Vec<Time> {
+        let stamps = |inputs: &[&str]| -> Vec<Time> {
             let mut stamps: Vec<Time> =
-                feed.messages.iter().filter(|message| is(&message.what)).map(|message| message.stamp_ns).collect();
+                inputs.iter().flat_map(|input| feed.usable(input)).map(|message| message.stamp_ns).collect();
             stamps.sort_unstable();
             stamps
         };
-        let imu_stamps = stamps(|what| matches!(what, What::Imu(_)));
-        let anchors = stamps(|what| matches!(what, What::Gnss(_) | What::Pose(_)));
+        let imu_stamps = stamps(&["imu"]);
+        let fix_period_ns = period(stamps(&["gnss", "pose"]).into_iter());
         let first_ns = feed.first_ns().unwrap_or(0);
         let states = states(record, first_ns, &imu_stamps);
         let antenna = truth.base_from_part.translation.vector;
-        Self { feed, record, truth, world, antenna, first_ns, imu_stamps, anchors, states }
+        Self { feed, record, truth, world, antenna, first_ns, imu_stamps, fix_period_ns, states }
     }
 
     fn seconds(&self, time_ns: Time) -> f64 {
@@ -128,7 +128,16 @@ impl<'a> Scoring<'a> {
             notes.push(format!("no truth, so no errors: {why}"));
         } else if points.is_empty() {
             let topic = self.truth.topic.as_deref().unwrap_or_default();
-            notes.push(format!("no truth, so no errors: {topic} holds no position that is a number"));
+            let is_on_earth =
+                |(_, message): &(Time, TruthMessage)| matches!(message, TruthMessage::OnEarth(Some(_)));
+            notes.push(match self.truth.messages.iter().any(is_on_earth) {
+                true => format!(
+                    "no truth, so no errors: {topic} is fixes, and without a fix the filter's world has no place on the Earth; \
+                     give it fixes as well (--gnss-topic), withhold some of them (--every, --outage), or say where its world \
+                     begins (--origin)"
+                ),
+                false => format!("no truth, so no errors: {topic} holds no position that is a number"),
+            });
         }
         let estimates = &self.record.estimates;
         let (Some(begin), Some(end)) = (self.imu_stamps.first(), self.imu_stamps.last()) else { return Vec::new() };
@@ -284,10 +293,11 @@ impl<'a> Scoring<'a> {
         next.checked_sub(1).and_then(|last| self.states.get(last)).map_or(State::Starting, |(_, state)| *state)
     }
 
-    /// Time since the last position in the world, s.
+    /// Time since the filter last fused a position in the world, s.
     fn age_s(&self, time_ns: Time) -> Option<f64> {
-        let next = self.anchors.partition_point(|time| *time <= time_ns);
-        let last = self.anchors.get(next.checked_sub(1)?)?;
+        let positions = &self.record.positions;
+        let next = positions.partition_point(|time| *time <= time_ns);
+        let last = positions.get(next.checked_sub(1)?)?;
         Some((time_ns - last) as f64 * 1e-9)
     }
 
@@ -308,7 +318,7 @@ impl<'a> Scoring<'a> {
             silent: instants.iter().filter(|instant| instant.known.is_none()).count(),
             started_s,
             states: self.durations(),
-            fix_period_s: period(self.anchors.iter().copied()) as f64 * 1e-9,
+            fix_period_s: self.fix_period_ns as f64 * 1e-9,
             sample_s: period(self.imu_stamps.iter().copied()) as f64 * 1e-9,
             gaps: self.gaps().len(),
             record: self.record,
@@ -376,7 +386,7 @@ impl<'a> Scoring<'a> {
             innovations: self.innovations(),
             fixes: self.fixes().map(|(_, fix)| fix.position).collect(),
             health: self.states.iter().map(|(time, state)| (self.seconds(*time), state.name())).collect(),
-            outages: spans(&self.anchors, 3 * period(self.anchors.iter().copied())),
+            outages: spans(&self.record.positions, 3 * self.fix_period_ns),
             gaps: self.gaps(),
         }
     }

@@ -50,6 +50,8 @@ pub(crate) struct Bagged {
     pub(crate) precise: bool,
     /// Delay with which all messages but the samples of the IMU arrive, ns.
     pub(crate) late_ns: i64,
+    /// Time by which the stamps of fixes are too early, ns.
+    pub(crate) early_ns: i64,
     pub(crate) no_imu: bool,
     pub(crate) two_imus: bool,
     /// Range of the samples whose values are NaN.
@@ -334,7 +336,7 @@ impl Drive {
                 let at = frame.geodetic(&position);
                 let variance = deviation * deviation;
                 NavSatFix {
-                    header: header(time, "gps"),
+                    header: header(time - bagged.early_ns, "gps"),
                     latitude: at.latitude.to_degrees() + if bagged.beyond_the_pole { 43.0 } else { 0.0 },
                     longitude: at.longitude.to_degrees(),
                     altitude: at.height,
