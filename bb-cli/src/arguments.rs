@@ -232,6 +232,10 @@ impl AttitudeArguments {
                 self.settings = settings;
             }
         }
+        let twice = self.settings.iter().find(|setting| setting.name() == "declination");
+        if let Some(setting) = twice.filter(|_| self.declination.is_some()) {
+            return Err(invalid(format!("{setting}, and --declination: give it once")));
+        }
         let variants = Variants {
             starts: self.start,
             offset: self.offset,

@@ -353,7 +353,7 @@ fn play(file: &Path, index: u32, evaluator: &Evaluator, show: &mut dyn FnMut(u64
         Align::None => Vec::new(),
         align => {
             let first = Playback::open(file, index, evaluator, &[])?.run(&mut |_| {})?;
-            first.players.iter().map(|player| player.of_world.of(align)).collect()
+            first.players.iter().map(|player| player.compared.of_world.of(align)).collect()
         }
     };
     let playback = Playback::open(file, index, evaluator, &turns)?.run(show)?;

@@ -62,6 +62,8 @@ pub struct Recording {
     pub(crate) imu_topic: String,
     pub(crate) magnetometer_topic: Option<String>,
     pub(crate) truth_topic: Option<String>,
+    /// Rotations on the left and right of the truth as it was written.
+    pub(crate) truth_turns: [UnitQuaternion<f64>; 2],
     /// The frame of the IMU, as `--mount` takes it.
     pub(crate) imu_name: String,
     /// Takes what the IMU, and what the magnetometer measures to the axes of the robot; `None` if they are those.
@@ -143,10 +145,10 @@ impl Recording {
                 topics.declination.at(place, time_ns, &mut notes)?
             }
         };
-        let is_declined = declination != 0.0;
         let declination = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), declination);
-        if base_from_truth.angle() > 0.0 || is_declined {
-            truth.turn(&declination, &base_from_truth.inverse());
+        let truth_turns = [declination, base_from_truth.inverse()];
+        if truth_turns.iter().any(|turn| turn.angle() > 0.0) {
+            truth.turn(&truth_turns[0], &truth_turns[1]);
         }
         let imu_name = match frames.of_topic(&imu.name) {
             "" => imu.name.to_string(),
@@ -163,6 +165,7 @@ impl Recording {
             imu_topic: imu.name.to_string(),
             magnetometer_topic: magnetometer.map(|topic| topic.name.to_string()),
             truth_topic: poses.ok(),
+            truth_turns,
             samples,
             start_ns,
             expected: imu.messages.unwrap_or(0),
@@ -189,6 +192,7 @@ impl Recording {
             imu_topic: imu.name.to_string(),
             magnetometer_topic: None,
             truth_topic: None,
+            truth_turns: Default::default(),
             samples,
             start_ns: i64::MIN,
             expected: imu.messages.unwrap_or(0),

@@ -5,13 +5,14 @@ use bb_estimators::attitude::{ErrorStatistics, OrientationError};
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, PI};
 
 use crate::filters::Axes;
+use crate::turns::Turns;
 
 /// Error, rad, above which the convention of the truth is in doubt. Another one has to be below it to be named.
 const DOUBTFUL: f64 = 20.0 * PI / 180.0;
 /// Factor by which the error in another convention must be smaller for that to be named.
 const CLEARER: f64 = 3.0;
 /// Difference of errors, rad, below which two conventions cannot be distinguished.
-pub(crate) const ALIKE: f64 = 0.5 * PI / 180.0;
+const ALIKE: f64 = 0.5 * PI / 180.0;
 /// Least number of samples for a verdict.
 const FEWEST: u64 = 3;
 
@@ -69,24 +70,91 @@ fn frd_from_flu() -> UnitQuaternion<f64> {
 
 /// The errors of one filter against the truth as read, and in each other convention.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Truths {
+struct Truths {
     as_read: ErrorStatistics,
     others: [ErrorStatistics; CONVENTIONS.len()],
 }
 
 /// A convention that fits much better than the one assumed for the truth.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Verdict {
-    pub(crate) name: &'static str,
+struct Verdict {
+    name: &'static str,
     /// The root mean square error against the truth as read, rad.
-    pub(crate) as_read: f64,
+    as_read: f64,
     /// The error in the other convention, rad.
-    pub(crate) otherwise: f64,
+    otherwise: f64,
+}
+
+/// The estimates of one filter beside the truth.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Compared {
+    truths: Truths,
+    /// Estimates against the truth, in the world and in the body.
+    pub(crate) of_world: Turns,
+    pub(crate) of_body: Turns,
+}
+
+impl Compared {
+    /// Adds an estimate and the truth, which is the one that was written with these rotations on its left and right.
+    pub(crate) fn add(
+        &mut self,
+        estimate: &UnitQuaternion<f64>,
+        truth: &UnitQuaternion<f64>,
+        [left, right]: &[UnitQuaternion<f64>; 2],
+    ) {
+        // A convention is one of what was written.
+        let written = |turned: &UnitQuaternion<f64>| left.inverse() * turned * right.inverse();
+        self.truths.add(&written(estimate), &written(truth));
+        self.of_world.add(&(estimate * truth.inverse()));
+        self.of_body.add(&(truth.inverse() * estimate));
+    }
+
+    /// The root mean square error, rad.
+    pub(crate) fn rms(&self) -> Option<f64> {
+        self.truths.as_read.rms().map(|rms| rms.total)
+    }
+}
+
+/// Explains why no filter agrees with the truth: by a rotation of the IMU or of the truth's world, as `cause` says it, or by
+/// another convention of the truth on its topic, judged by the filter that fits it best. Of what fits, the closest is named.
+pub(crate) fn doubt(
+    axes: Axes,
+    filters: &[(&str, &Compared)],
+    topic: &str,
+    cause: impl Fn(f64, &Compared) -> Option<String>,
+) -> Option<String> {
+    let verdicts = filters.iter().filter_map(|(name, of)| Some((name, of.truths.verdict(axes)?)));
+    let best = verdicts.reduce(|best, other| if other.1.otherwise < best.1.otherwise { other } else { best });
+    // With six axes the heading is any.
+    let is_whole = axes == Axes::Nine;
+    let spread = |of: &Compared| of.of_body.mean().map_or(f64::INFINITY, |turn| turn.spread);
+    let closest = filters.iter().filter(|_| is_whole).min_by(|a, b| spread(a.1).total_cmp(&spread(b.1)));
+    let explained = closest.and_then(|(_, of)| {
+        let least = spread(of).min(of.of_world.mean().map_or(f64::INFINITY, |turn| turn.spread));
+        let said = cause(of.rms()?, of)?;
+        // A convention that fits alike is the more telling one, but for an inverse: on a plane, that of a turned body looks like
+        // another turned body.
+        let is_closer = |verdict: &Verdict| match verdict.name.starts_with("inverse") {
+            true => least <= verdict.otherwise + ALIKE,
+            false => least + ALIKE < verdict.otherwise,
+        };
+        best.as_ref().is_none_or(|(_, verdict)| is_closer(verdict)).then_some(said)
+    });
+    explained.or_else(|| {
+        let (name, verdict) = best?;
+        Some(format!(
+            "{topic}: the truth looks to be {}: with it read so, {name} is off by {:.1} deg, and as it is by {:.1} deg; it \
+             should be `world_from_body` in east, north, up",
+            verdict.name,
+            verdict.otherwise.to_degrees(),
+            verdict.as_read.to_degrees()
+        ))
+    })
 }
 
 impl Truths {
     /// Adds an estimate and the truth as read.
-    pub(crate) fn add(&mut self, estimate: &UnitQuaternion<f64>, truth: &UnitQuaternion<f64>) {
+    fn add(&mut self, estimate: &UnitQuaternion<f64>, truth: &UnitQuaternion<f64>) {
         self.as_read.add(OrientationError::between(estimate, truth));
         for (errors, convention) in self.others.iter_mut().zip(&CONVENTIONS) {
             errors.add(OrientationError::between(estimate, &(convention.enu_from_body)(truth)));
@@ -94,7 +162,7 @@ impl Truths {
     }
 
     /// The convention that fits best, if the truth as read does not fit; with six axes, only by the inclination.
-    pub(crate) fn verdict(&self, axes: Axes) -> Option<Verdict> {
+    fn verdict(&self, axes: Axes) -> Option<Verdict> {
         let rms = |errors: &ErrorStatistics| {
             errors.rms().map(|rms| if axes == Axes::Six { rms.inclination } else { rms.total })
         };
@@ -147,6 +215,23 @@ mod tests {
         }
         assert_eq!(said(|truth| truth.inverse(), Axes::Six), Some(CONVENTIONS[0].name));
         assert_eq!(said(|truth| ned * truth, Axes::Six), Some(CONVENTIONS[1].name));
+    }
+
+    /// Of a compass with a declination, whose truth is turned by it, and of a body that is mounted on another.
+    #[test]
+    fn a_convention_is_one_of_the_truth_as_it_was_written() {
+        let turns =
+            [UnitQuaternion::from_euler_angles(0.0, 0.0, 0.1), UnitQuaternion::from_euler_angles(0.0, 0.4, 1.5)];
+        let mut compared = Compared::default();
+        for index in 0..200 {
+            let angle = f64::from(index) * 0.05;
+            let truth = UnitQuaternion::from_euler_angles(0.8 * angle.sin(), 0.5 * (1.7 * angle).cos(), angle);
+            let written = enu_from_ned().inverse() * truth;
+            compared.add(&(turns[0] * truth * turns[1]), &(turns[0] * written * turns[1]), &turns);
+        }
+        let said = doubt(Axes::Nine, &[("filter", &compared)], "/truth", |_, _| None).expect("is in doubt");
+        assert!(said.starts_with("/truth: the truth looks to be in north, east, down: "), "{said}");
+        assert!(said.contains("filter is off by 0.0 deg"), "{said}");
     }
 
     /// About one level axis, the inverse and others have the same inclination but for the noise.

@@ -38,6 +38,27 @@ pub struct Turn {
     pub spread: f64,
 }
 
+impl Turn {
+    /// Returns whether it is more about the vertical than its spread may be.
+    pub(crate) fn is_turned(&self) -> bool {
+        let angle = heading(&self.rotation).abs();
+        angle.to_degrees() > TURNED && self.spread * LEFT < angle
+    }
+
+    /// Says that the truth's world is turned by it about the vertical, and what to do.
+    pub(crate) fn of_world(&self) -> String {
+        format!(
+            "the truth's world is turned {} to the filter's, but for {:.1} deg: --align heading, or --declination for a compass",
+            about_up(&self.rotation),
+            self.spread.to_degrees()
+        )
+    }
+}
+
+fn about_up(rotation: &UnitQuaternion<f64>) -> String {
+    format!("about the vertical by {:.1} deg", heading(rotation).to_degrees())
+}
+
 /// Rotations, gathered one by one.
 ///
 /// F. L. Markley, Y. Cheng, J. L. Crassidis, Y. Oshman, "Averaging quaternions", Journal of Guidance, Control, and Dynamics
@@ -87,9 +108,9 @@ impl Turns {
     }
 }
 
-/// The angle of a rotation's part about the vertical, rad.
+/// The angle of a rotation's part about the vertical, rad, from -π to π.
 pub(crate) fn heading(rotation: &UnitQuaternion<f64>) -> f64 {
-    2.0 * rotation.k.atan2(rotation.w)
+    2.0 * (rotation.k * rotation.w.signum()).atan2(rotation.w.abs())
 }
 
 /// Roll, pitch and yaw, in whole hundredths of a degree: as `--mount` takes them.
@@ -103,8 +124,15 @@ pub(crate) fn angles(rotation: &UnitQuaternion<f64>) -> String {
 /// Factor by which an error must shrink without a constant for that constant to explain it.
 pub(crate) const LEFT: f64 = 3.0;
 
-/// Returns the constant rotation that explains a large error of the orientation: one that leaves less than a third of it. `is_world` says
-/// whether what else is known of the world allows that it is turned.
+/// Error of an orientation, degrees, above which any constant rotation is sought.
+const LARGE: f64 = 15.0;
+
+/// Angle about the vertical, degrees, above which a constant one counts as a turn of the world.
+const TURNED: f64 = 2.0;
+
+/// Returns the constant rotation that explains the error of the orientation: a turn about the vertical of several times its spread, or
+/// any that leaves less than a third of a large error. `is_world` says whether what else is known of the world allows that it is
+/// turned.
 pub(crate) fn cause(
     rms: f64,
     of_body: &Turns,
@@ -114,57 +142,65 @@ pub(crate) fn cause(
     align: Align,
     is_world: impl Fn(&UnitQuaternion<f64>) -> bool,
 ) -> Option<String> {
-    const LARGE: f64 = 15.0;
-    if rms.to_degrees() < LARGE {
-        return None;
-    }
-    let explains = |turn: &Turn| turn.spread * LEFT < rms;
+    let explains = |turn: &Turn| rms.to_degrees() > LARGE && turn.spread * LEFT < rms;
     let body = of_body.mean().filter(explains);
-    let heading = of_world.heading().zip(of_world.mean()).filter(|(heading, mean)| {
-        explains(mean) && mean.rotation.angle_to(&heading.rotation) < mean.spread.max(0.1)
+    let world = of_world.mean();
+    let upright = of_world.heading().filter(Turn::is_turned).zip(world).filter(|(upright, world)| {
+        world.rotation.angle_to(&upright.rotation) < world.spread.max(0.1)
+            && body.is_none_or(|body| world.spread <= body.spread)
     });
-    let world = of_world.mean().filter(explains);
     let said = |turn: &Turn| format!("{:.1} deg", turn.rotation.angle().to_degrees());
-    match (body, heading, world) {
-        (_, Some((heading, mean)), _)
-            if align == Align::None && body.is_none_or(|body| mean.spread <= body.spread) =>
-        {
-            if !is_world(&heading.rotation) {
-                return Some(format!(
-                    "the filter's heading is off by {:.1} deg throughout while its positions agree with the truth: the filter is wrong, \
-                     not the truth's world",
-                    self::heading(&heading.rotation).to_degrees()
-                ));
-            }
-            Some(format!(
-                "the truth's world is turned about the vertical by {:.1} deg to the filter's, which leaves {:.1} of {:.1} deg: \
-                 --align heading, or --declination for a compass",
-                self::heading(&heading.rotation).to_degrees(),
-                mean.spread.to_degrees(),
-                rms.to_degrees()
-            ))
-        }
-        (Some(body), ..) => {
-            let mount = base_from_imu.translation.vector;
-            Some(format!(
-                "the IMU is mounted at {} to the truth, which leaves {:.1} of {:.1} deg: --mount {imu}={},{},{},{}",
-                said(&body),
-                body.spread.to_degrees(),
-                rms.to_degrees(),
-                mount.x,
-                mount.y,
-                mount.z,
-                angles(&(body.rotation * base_from_imu.rotation))
-            ))
-        }
-        (None, _, Some(world)) if align == Align::None && is_world(&world.rotation) => Some(format!(
-            "the truth's world is turned by {} to the filter's, which leaves {:.1} of {:.1} deg: --align full",
-            said(&world),
-            world.spread.to_degrees(),
-            rms.to_degrees()
-        )),
-        _ => None,
+    if let Some((upright, _)) = upright.filter(|_| align == Align::None) {
+        return Some(match is_world(&upright.rotation) {
+            true => upright.of_world(),
+            false => format!(
+                "the filter's heading is turned {} throughout while its positions agree with the truth: the filter is wrong, \
+                 not the truth's world; see --mount for its IMU, and --declination for a compass",
+                about_up(&upright.rotation)
+            ),
+        });
     }
+    if let Some(body) = body {
+        let place = base_from_imu.translation.vector;
+        let mount = |rotation: &UnitQuaternion<f64>| {
+            format!("--mount {imu}={},{},{},{}", place.x, place.y, place.z, angles(rotation))
+        };
+        let whole = body.rotation * base_from_imu.rotation;
+        let (square, rest) = near_square(&whole);
+        let least = body.spread.max(TURNED.to_radians());
+        let is_upright = rest.axis().is_some_and(|axis| axis.z.abs() > 0.95) && rest.angle() > least;
+        let split = (align == Align::None && is_upright && is_world(&rest)).then(|| {
+            format!(
+                "; or it is mounted at right angles in a world that is turned {} ({}, then --align heading, or --declination for a \
+                 compass)",
+                about_up(&rest),
+                mount(&square)
+            )
+        });
+        return Some(format!(
+            "the IMU is mounted at {} to the truth, which leaves {:.1} of {:.1} deg: {}{}",
+            said(&body),
+            body.spread.to_degrees(),
+            rms.to_degrees(),
+            mount(&whole),
+            split.unwrap_or_default()
+        ));
+    }
+    let world = world.filter(|world| explains(world) && align == Align::None && is_world(&world.rotation))?;
+    Some(format!(
+        "the truth's world is turned by {} to the filter's, which leaves {:.1} of {:.1} deg: --align full",
+        said(&world),
+        world.spread.to_degrees(),
+        rms.to_degrees()
+    ))
+}
+
+/// The nearest rotation by right angles, and the one that is left of it.
+fn near_square(rotation: &UnitQuaternion<f64>) -> (UnitQuaternion<f64>, UnitQuaternion<f64>) {
+    let right = |count: u32| f64::from(count) * std::f64::consts::FRAC_PI_2;
+    let all = (0..64).map(|i| UnitQuaternion::from_euler_angles(right(i / 16), right(i / 4 % 4), right(i % 4)));
+    let nearest = all.min_by(|a, b| a.angle_to(rotation).total_cmp(&b.angle_to(rotation))).unwrap_or_default();
+    (nearest, rotation * nearest.inverse())
 }
 
 #[cfg(test)]
@@ -186,7 +222,50 @@ mod tests {
                 .expect("it is large")
         };
         assert!(said(true).contains("--align heading"), "{}", said(true));
-        assert!(said(false).starts_with("the filter's heading is off by 149.0 deg"), "{}", said(false));
+        assert!(
+            said(false).starts_with("the filter's heading is turned about the vertical by 149.0 deg"),
+            "{}",
+            said(false)
+        );
+    }
+
+    /// The error of a cart on level ground whose estimates err at random by half a degree.
+    fn of_cart(world: f64, mount: f64) -> Option<String> {
+        let (mut of_body, mut of_world) = (Turns::default(), Turns::default());
+        let about_up = |degrees: f64| UnitQuaternion::from_euler_angles(0.0, 0.0, degrees.to_radians());
+        for index in 0..100 {
+            let truth = UnitQuaternion::from_euler_angles(0.0, 0.02 * f64::from(index % 3), 0.1 * f64::from(index));
+            let error = if index % 2 == 0 { 0.5 } else { -0.5 };
+            let estimate = about_up(world + error) * truth * about_up(mount);
+            of_body.add(&(truth.inverse() * estimate));
+            of_world.add(&(estimate * truth.inverse()));
+        }
+        let rms = (world + mount).to_radians().abs();
+        cause(rms, &of_body, &of_world, &Isometry3::identity(), "imu", Align::None, |_| true)
+    }
+
+    #[test]
+    fn a_world_turned_by_a_few_degrees_is_named() {
+        for world in [4.0, -4.0] {
+            let said = of_cart(world, 0.0).expect("it is constant");
+            let lead = format!("the truth's world is turned about the vertical by {world:.1} deg");
+            assert!(said.starts_with(&lead) && said.contains("--align heading, or --declination"), "{said}");
+        }
+        assert_eq!(of_cart(0.0, 0.0), None);
+        assert_eq!(of_cart(1.4, 0.0), None, "compasses err by as much");
+    }
+
+    #[test]
+    fn of_a_mounting_near_right_angles_the_rest_may_be_the_world() {
+        for (world, mount, whole) in [(4.4, 90.0, "94.40"), (-4.4, -90.0, "-94.40"), (4.4, 180.0, "-175.60")] {
+            let said = of_cart(world, mount).expect("it is large");
+            let square = if mount == 180.0 { 180.0 } else { mount };
+            assert!(said.contains(&format!("--mount imu=0,0,0,0.00,0.00,{whole}; or")), "{said}");
+            assert!(said.contains(&format!("turned about the vertical by {world:.1} deg")), "{said}");
+            assert!(said.contains(&format!("0.00,{square:.2}, then --align heading")), "{said}");
+        }
+        let said = of_cart(1.4, 90.0).expect("it is large");
+        assert!(!said.contains("; or"), "{said}");
     }
 
     #[test]

@@ -167,6 +167,42 @@ fn fixes_can_be_the_truth() {
     assert_eq!((&row["orientation_deg"], &row["velocity_mps"]), (&Value::Null, &Value::Null));
 }
 
+/// Of the truth's world, where that explains the error, and not of a good recording.
+#[test]
+fn a_turned_world_and_another_convention_are_named() {
+    let drive = Drive::new(5, 600);
+    let fixes = Bagged { fixes: true, wheels: true, rest: true, ..Bagged::default() };
+    let options = ["--origin", drive::ORIGIN, "--truth", "/truth", "--odometry-topic", "/wheels"];
+    let said = |bagged: &Bagged, name: &str, more: &[&str]| {
+        let bag = drive.bag(name, bagged);
+        let output = bb(&[&["eval", "navigation", text(&bag)], &options[..], more].concat());
+        let notes = output.err.lines().filter(|line| line.contains("truth"));
+        notes.map(|line| line.split(".mcap: ").nth(1).expect("names it").to_owned()).collect::<Vec<_>>()
+    };
+    for more in [&[][..], &["--filter", "planar"], &["--start", "truth"]] {
+        assert_eq!(said(&fixes, "unturned.mcap", more), [""; 0]);
+    }
+    for turned_deg in [4.0, -4.0] {
+        let notes = said(&Bagged { turned_deg, ..fixes }, "turned.mcap", &[]);
+        let angle = notes[0].strip_prefix("the truth's world is turned about the vertical by ");
+        let angle = angle.and_then(|rest| rest.split(' ').next()?.parse::<f64>().ok()).expect("says it first");
+        assert!(notes.len() == 1 && (angle + turned_deg).abs() < 0.5, "{notes:?}");
+        assert!(notes[0].ends_with("--align heading, or --declination for a compass"), "{notes:?}");
+    }
+    let notes = said(&Bagged { ned: true, ..fixes }, "ned.mcap", &[]);
+    let lead =
+        "/truth: the truth looks to be in north, east, down, of a body whose axes are forward, right, down: ";
+    assert!(notes.len() == 1 && notes[0].starts_with(lead), "{notes:?}");
+    // By the track, which an unknown heading at the start leaves alone.
+    let bag = drive.bag("turned.mcap", &Bagged { turned_deg: -4.0, ..fixes });
+    let position = |align: &str| {
+        let row = &rows(&[&[text(&bag)], &options[..], &["--align", align]].concat())[0];
+        number(row, "position_m")
+    };
+    let (none, heading, full) = (position("none"), position("heading"), position("full"));
+    assert!(heading < 0.5 && full < 0.5 && none > 1.5, "{none} {heading} {full}");
+}
+
 #[test]
 fn a_plot_has_the_track_the_errors_and_the_innovations() {
     let drive = Drive::new(7, 200);

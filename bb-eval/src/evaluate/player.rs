@@ -4,8 +4,7 @@ use super::{BLOCK, CHECK_INTERVAL, Detail, Estimate, Run};
 use crate::filters::{Axes, Chosen, Deviations, Refused, Running};
 use crate::recording::Recording;
 use crate::score::Score;
-use crate::truths::Truths;
-use crate::turns::Turns;
+use crate::truths::Compared;
 use bb_core::nalgebra::UnitQuaternion;
 use bb_estimators::attitude::ImuSample;
 use std::time::{Duration, Instant};
@@ -16,13 +15,10 @@ pub(super) struct Player {
     filter: Box<dyn Running>,
     pub(super) score: Score,
     refused: Refused,
-    pub(super) truths: Truths,
     detail: Detail,
     /// Takes estimates to the world of the truth.
     pub(super) world_from_aligned: Option<UnitQuaternion<f64>>,
-    /// Estimates against the truth, in the world and in the body.
-    pub(super) of_world: Turns,
-    pub(super) of_body: Turns,
+    pub(super) compared: Compared,
     time: Duration,
     estimates: Vec<Option<UnitQuaternion<f64>>>,
     errors: Vec<(f64, Option<f64>)>,
@@ -41,11 +37,9 @@ impl Player {
             filter: chosen.start()?,
             score: Score::default(),
             refused: Refused::default(),
-            truths: Truths::default(),
             detail: Detail::default(),
             world_from_aligned: None,
-            of_world: Turns::default(),
-            of_body: Turns::default(),
+            compared: Compared::default(),
             time: Duration::ZERO,
             estimates: Vec::with_capacity(BLOCK),
             errors: Vec::new(),
@@ -137,9 +131,7 @@ impl Player {
         let Some(sample) = samples.last() else { return };
         let Some(estimate) = self.estimates.last().copied().flatten() else { return };
         let (Some(truth), true) = recording.truth.at(sample.time_ns) else { return };
-        self.truths.add(&estimate, &truth);
-        self.of_world.add(&(estimate * truth.inverse()));
-        self.of_body.add(&(truth.inverse() * estimate));
+        self.compared.add(&estimate, &truth, &recording.truth_turns);
         let deviations = self.deviations();
         self.detail.add(sample.time_ns, &estimate, &truth, deviations.as_ref(), self.filter.trusts_heading());
     }

@@ -54,6 +54,13 @@ impl FromStr for Setting {
     }
 }
 
+impl Setting {
+    /// Name of the parameter.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+}
+
 #[cfg(feature = "recordings")]
 impl Setting {
     /// Reads the options of a filter from the settings file of a robot.

@@ -54,6 +54,9 @@ pub fn play_navigation(
 ) -> Result<Played, String> {
     let Drive { mut feed, mut truth, mut notes, mut doubts, origin, imu, gnss, noise, declination } = drive.clone();
     let settings = run.settings.over(noise.as_ref(), declination);
+    if let Some(setting) = declination.and(run.settings.setting("declination")) {
+        return Err(format!("{setting}, and --declination: give it once"));
+    }
     if declination.is_some() && !filter.has("declination") {
         doubts.push(format!("--declination changes nothing: {} uses no magnetometer", filter.name));
     }
@@ -77,7 +80,7 @@ pub fn play_navigation(
     let scoring = Scoring::new(origin, &feed, &record, &truth);
     let mut scored = scoring.all(&mut notes);
     notes.extend(scoring.aligned(&mut scored, run.align));
-    notes.extend(scoring.explained(&imu, &scored, run.align));
+    notes.extend(scoring.explained(filter.name, &imu, &scored, run.align));
     notes.extend(scoring.displaced(&scored, run.align, origin.is_some()));
     let score = scoring.score(&scored);
     let trace = run.keep_trace.then(|| scoring.trace(&scored));

@@ -8,9 +8,11 @@ use super::feed::{Feed, Time, What};
 use super::record::{Estimate, Record};
 use super::score::{NavigationScore, Scored, Scores};
 use super::trace::{Innovation, Row, State, Trace};
+use crate::filters::Axes;
 use crate::periods::{Gap, Periods};
+use crate::truths::{Compared, doubt};
 use crate::turns::{Align, LEFT, Turn, Turns, angles, cause};
-use bb_core::nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector3};
+use bb_core::nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3};
 use bb_estimators::navigation::{Geodetic, GnssPosition, LocalFrame};
 
 /// Less than a tenth of a second, so that a truth at 10 Hz is scored at each message even if its clock jitters.
@@ -256,28 +258,31 @@ impl<'a> Scoring<'a> {
         })
     }
 
-    /// A cause of a large error, if it was found to explain it.
-    pub(super) fn explained(&self, imu: &str, instants: &[Instant], align: Align) -> Option<String> {
-        let mut of_body = Turns::default();
-        let mut of_world = Turns::default();
-        let mut square = 0.0;
-        let mut count = 0.0;
-        let both = instants.iter().filter(|instant| instant.is_scored);
-        for (estimate, truth) in both.filter_map(|instant| {
-            instant.known.map(|known| known.world_from_body).zip(instant.truth.world_from_body)
-        }) {
-            of_body.add(&(truth.inverse() * estimate));
-            of_world.add(&(estimate * truth.inverse()));
-            square += truth.angle_to(&estimate).powi(2);
-            count += 1.0;
+    /// A cause of the error, if it was found to explain it.
+    pub(super) fn explained(&self, filter: &str, imu: &str, instants: &[Instant], align: Align) -> Option<String> {
+        let mut compared = Compared::default();
+        let right = self.truth.base_from_part.rotation.inverse();
+        for instant in instants.iter().filter(|instant| instant.is_scored) {
+            if let Some((known, truth)) = instant.known.zip(instant.truth.world_from_body) {
+                compared.add(&known.world_from_body, &truth, &[UnitQuaternion::identity(), right]);
+            }
         }
-        let rms = (square / f64::max(count, 1.0)).sqrt();
         let base_from_imu = self.feed.mounts[0].unwrap_or_else(Isometry3::identity);
-        let is_world = |turn: &UnitQuaternion<f64>| !self.contradicts(instants, turn);
-        cause(rms, &of_body, &of_world, &base_from_imu, imu, align, is_world)
+        let topic = self.truth.topic.as_deref().unwrap_or_default();
+        doubt(Axes::Nine, &[(filter, &compared)], topic, |rms, of| {
+            let is_world = |turn: &UnitQuaternion<f64>| !self.contradicts(instants, turn);
+            cause(rms, &of.of_body, &of.of_world, &base_from_imu, imu, align, is_world)
+        })
+        .or_else(|| {
+            // An unknown heading at the start hides a turn that the track shows.
+            let (turn, _) = turn_of(instants, Align::Heading).filter(|_| align == Align::None)?;
+            let of_orientations = turn_of_orientations(instants).heading();
+            let agrees = |of: Turn| turn.rotation.angle_to(&of.rotation) <= of.spread;
+            (turn.is_turned() && of_orientations.is_none_or(agrees)).then(|| turn.of_world())
+        })
     }
 
-    /// Returns whether the positions speak against a turn of the truth's world: with it, the tracks differ by far more than without.
+    /// Returns whether the positions speak against a turn of the truth's world: with it, the tracks differ by more than without.
     fn contradicts(&self, instants: &[Instant], turn: &UnitQuaternion<f64>) -> bool {
         let apart = |turn: &UnitQuaternion<f64>| {
             let scored = instants.iter().filter(|instant| instant.is_scored);
@@ -285,7 +290,7 @@ impl<'a> Scoring<'a> {
             let mean = moved.iter().sum::<Vector3<f64>>() / moved.len().max(1) as f64;
             moved.iter().map(|moved| (moved - mean).norm_squared()).sum::<f64>()
         };
-        apart(turn) > LEFT * LEFT * apart(&UnitQuaternion::identity())
+        apart(turn) > 1.01 * apart(&UnitQuaternion::identity())
     }
 
     fn state(&self, time_ns: Time) -> State {
@@ -472,20 +477,38 @@ fn states(record: &Record, first_ns: Time, imu: &[Time]) -> Vec<(Time, State)> {
     states
 }
 
-/// The rotation of the truth's world to that of the estimates, by orientations or, where the truth has none, by the track.
+/// The rotation that an alignment takes from the truth: by the orientations or by the track, whichever leaves less beside it. Of any
+/// rotation, the track tells the part about the vertical best, for most tracks are level.
 fn turn_of(instants: &[Instant], align: Align) -> Option<(Turn, &'static str)> {
-    let scored = || instants.iter().filter(|instant| instant.is_scored);
+    let identity = UnitQuaternion::identity();
+    let by = [
+        (turn_of_orientations(instants).of(align), "orientations"),
+        (turn_of_track(instants, align, &identity), "track"),
+    ];
+    let by = by.into_iter().filter_map(|(turn, how)| Some((turn?, how)));
+    let (turn, how) = by.min_by(|(a, _), (b, _)| a.spread.total_cmp(&b.spread))?;
+    let rest = turn_of_track(instants, Align::Heading, &turn.rotation).filter(|rest| rest.spread < turn.spread);
+    Some(match rest {
+        Some(rest) => (Turn { rotation: rest.rotation * turn.rotation, ..rest }, "track"),
+        None => (turn, how),
+    })
+}
+
+fn turn_of_orientations(instants: &[Instant]) -> Turns {
     let mut turns = Turns::default();
-    for instant in scored() {
+    for instant in instants.iter().filter(|instant| instant.is_scored) {
         if let (Some(known), Some(truth)) = (instant.known, instant.truth.world_from_body) {
             turns.add(&(known.world_from_body * truth.inverse()));
         }
     }
-    if let Some(turn) = turns.of(align) {
-        return Some((turn, "orientations"));
-    }
+    turns
+}
+
+/// The rotation of the track of the truth, after another one.
+fn turn_of_track(instants: &[Instant], align: Align, before: &UnitQuaternion<f64>) -> Option<Turn> {
+    let scored = instants.iter().filter(|instant| instant.is_scored);
     let pairs: Vec<(Vector3<f64>, Vector3<f64>)> =
-        scored().filter_map(|instant| Some((instant.known?.position, instant.truth.position))).collect();
+        scored.filter_map(|instant| Some((instant.known?.position, before * instant.truth.position))).collect();
     let count = pairs.len().max(1) as f64;
     let estimates = pairs.iter().map(|(estimate, _)| estimate).sum::<Vector3<f64>>() / count;
     let truths = pairs.iter().map(|(_, truth)| truth).sum::<Vector3<f64>>() / count;
@@ -493,7 +516,7 @@ fn turn_of(instants: &[Instant], align: Align) -> Option<(Turn, &'static str)> {
     let centred = |(estimate, truth): &(Vector3<f64>, Vector3<f64>)| {
         ((estimate - estimates).component_mul(&flat), (truth - truths).component_mul(&flat))
     };
-    let mut between = bb_core::nalgebra::Matrix3::zeros();
+    let mut between = Matrix3::zeros();
     for (estimate, truth) in pairs.iter().map(centred) {
         between += estimate * truth.transpose();
     }
@@ -513,8 +536,10 @@ fn turn_of(instants: &[Instant], align: Align) -> Option<(Turn, &'static str)> {
     let rotation = UnitQuaternion::from_matrix(&rotation);
     let residual: f64 =
         pairs.iter().map(centred).map(|(estimate, truth)| (estimate - rotation * truth).norm_squared()).sum();
-    let extent: f64 = pairs.iter().map(centred).map(|(_, truth)| truth.norm_squared()).sum();
+    let extents: Matrix3<f64> = pairs.iter().map(centred).map(|(_, truth)| truth * truth.transpose()).sum();
+    // About the axis along which the track is longest, what is beside it tells the rotation.
+    let along = if align == Align::Heading { 0.0 } else { extents.symmetric_eigenvalues().max() };
     // As an angle over the size of the track.
-    let spread = (residual / extent.max(f64::MIN_POSITIVE)).sqrt();
-    (pairs.len() > 2).then_some((Turn { rotation, spread }, "track"))
+    let spread = (residual / (extents.trace() - along).max(f64::MIN_POSITIVE)).sqrt();
+    (pairs.len() > 2).then_some(Turn { rotation, spread })
 }

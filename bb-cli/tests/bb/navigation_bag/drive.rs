@@ -67,6 +67,10 @@ pub(crate) struct Bagged {
     /// Fixes that state a centimetre.
     pub(crate) sure: bool,
     pub(crate) no_truth: bool,
+    /// Angle about the vertical by which the world of the truth is turned, degrees.
+    pub(crate) turned_deg: f64,
+    /// The truth is in north, east, down, of a body whose axes are forward, right, down.
+    pub(crate) ned: bool,
     /// The frame of the receiver is not connected.
     pub(crate) apart: bool,
     /// No sample for half a second.
@@ -313,7 +317,13 @@ impl Drive {
                 odometry
             };
             // Truth and start are the IMU's.
-            let mut truth = odometry(&world_from_imu, (0.1, 0.02), "imu");
+            let world_from_east = Isometry3::rotation(V::z() * bagged.turned_deg.to_radians());
+            let mut true_pose = world_from_east * world_from_imu;
+            if bagged.ned {
+                let ned_from_enu = Isometry3::rotation(V::new(1.0, 1.0, 0.0).normalize() * std::f64::consts::PI);
+                true_pose = ned_from_enu * true_pose * Isometry3::rotation(V::x() * std::f64::consts::PI);
+            }
+            let mut truth = odometry(&true_pose, (0.1, 0.02), "imu");
             let in_imu = base_from_imu.rotation.inverse();
             let swing = V::new(0.0, 0.0, rate).cross(&base_from_imu.translation.vector);
             truth.twist.twist.linear = vector(&(in_imu * (V::new(speed, 0.0, 0.0) + swing)));

@@ -201,6 +201,11 @@ impl RobotSettings {
         Ok(())
     }
 
+    /// Returns the last setting of an option.
+    pub(crate) fn setting(&self, name: &str) -> Option<&NavigationSetting> {
+        self.settings.iter().rev().find(|setting| setting.name == name)
+    }
+
     /// Returns these options, with the noise of a recording's IMU and its declination (rad) where they give none.
     pub(crate) fn over(&self, noise: Option<&Noise>, declination: Option<f64>) -> Self {
         let of_imu = |noise: &Noise| {
