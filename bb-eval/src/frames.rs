@@ -230,7 +230,7 @@ impl Frames {
         if frame.is_empty() || frame == self.base {
             return Ok(Some(Isometry3::identity()));
         }
-        let path = self.path(&self.base, &frame);
+        let path = self.path(&self.base, &frame).or_else(|| self.mounted_beside(&frame));
         if path.is_some() || self.edges.is_empty() {
             return Ok(path);
         }
@@ -241,6 +241,15 @@ impl Frames {
             if self.base.is_empty() { "the frame without a name" } else { &self.base },
             known.join(", ")
         ))
+    }
+
+    /// The place of another topic in this frame that is mounted by its name.
+    fn mounted_beside(&self, frame: &str) -> Option<Isometry3<f64>> {
+        let beside = self.of_topics.iter().filter(|(_, other)| *other == frame);
+        beside.into_iter().find_map(|(topic, _)| match self.mount(topic) {
+            Some(Place::Pose(pose)) => Some(*pose),
+            _ => None,
+        })
     }
 
     fn mount(&self, name: &str) -> Option<&Place> {
@@ -298,6 +307,19 @@ pub(crate) fn frame(message: &BagMessage) -> Result<String, RecordingError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_mount_of_a_topic_is_one_of_its_frame() {
+        let frames =
+            [("/imu/data", "imu_link"), ("/imu/mag", "imu_link"), ("/fix", "gps"), ("/wheels", "base_link")];
+        let frames: HashMap<_, _> = frames.map(|(topic, frame)| (topic.to_owned(), frame.to_owned())).into();
+        let mounts = ["/imu/data=0,0,0,0,0,90"].map(|text| text.parse().expect("is one"));
+        let frames = Frames::new(&[], &frames, "/imu/data", &mounts).expect("are frames");
+        let yaw = |topic: &str| frames.base_from(topic).expect("is placed").rotation.euler_angles().2.to_degrees();
+        assert!((yaw("/imu/mag") - 90.0).abs() < 1e-9 && (yaw("/imu/data") - 90.0).abs() < 1e-9);
+        let said = frames.unplaced(&["/imu/data", "/imu/mag", "/fix", "/wheels"]).expect("one is not placed");
+        assert!(said.contains("where gps of /fix is"), "{said}");
+    }
 
     #[test]
     fn a_mount_is_a_pose_or_a_frame() {
