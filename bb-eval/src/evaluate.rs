@@ -17,7 +17,7 @@ use crate::units::Units;
 use crate::variants::{Variant, Variants, moving_times};
 use bb_core::nalgebra::{Matrix3, UnitQuaternion};
 use bb_estimators::attitude::ImuSample;
-use doubts::{take_units, truth_doubt, unit_doubts};
+use doubts::{take_units, truth_doubt};
 use player::{Player, seconds};
 use rejoined::Rejoined;
 use std::path::{Path, PathBuf};
@@ -328,7 +328,8 @@ impl<'a> Playback<'a> {
         }
         // For a recording, not for each of its variants.
         if index == 0 {
-            let doubts = unit_doubts(recording, &self.units);
+            let magnetometer = recording.magnetometer_topic.as_deref();
+            let doubts = self.units.of_topics(&recording.imu_topic, magnetometer);
             // If filters were disturbed on purpose, their errors say nothing about the truth.
             let is_disturbed = evaluator.variants.changes_field() || !evaluator.disturbances.is_none();
             let is_misled = !doubts.is_empty() || is_disturbed;

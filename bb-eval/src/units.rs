@@ -88,6 +88,14 @@ impl Units {
         self.not_finite
     }
 
+    /// Remarks on the IMU and the magnetometer, each with its topic.
+    #[cfg(feature = "recordings")]
+    pub(crate) fn of_topics(&self, imu: &str, magnetometer: Option<&str>) -> Vec<String> {
+        let of_imu = self.of_imu().into_iter().map(|fault| format!("{imu}: {fault}"));
+        let magnetometer = magnetometer.unwrap_or_default();
+        of_imu.chain(self.of_field().map(|fault| format!("{magnetometer}: {fault}"))).collect()
+    }
+
     /// Remarks on the specific force and the angular velocity.
     pub fn of_imu(&self) -> Vec<String> {
         let forces: Vec<f64> = self.imu.iter().map(|(_, _, force)| force.norm()).collect();

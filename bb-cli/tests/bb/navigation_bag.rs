@@ -347,8 +347,17 @@ fn what_is_wrong_with_a_bag_is_said() {
     let remark = &of_fixes["remarks"][0];
     assert_eq!(remark["subject"], "covariance", "{of_fixes}");
     let output = bb(&[&["eval", "navigation", text(&bag)], &truth[..]].concat());
-    let said = format!("note: {}: /fix: {}\n", bag.display(), remark["text"].as_str().expect("is text"));
+    let said = format!(
+        "note: {}: /fix: {}; the filter takes their scatter for their noise",
+        bag.display(),
+        remark["text"].as_str().expect("is text")
+    );
     assert!(output.err.contains(&said), "{said}: {}", output.err);
+    let swapped = ["--truth", "/truth", "--origin", "11.5,48.1,520"];
+    fault(&fixes, "typed.mcap", &swapped, 1, "--origin is 5142 km from the nearest fix");
+    // In those of `bb info` too.
+    let force = "/imu: the specific force has a median of 1.005: it looks to be in g; ROS has m/s²";
+    fault(&Bagged { rest: true, in_g: true, ..fixes }, "in_g.mcap", &["--truth", "none"], 1, force);
     let misspelt = [&["--mount", "gpps=0,0,1"], &truth[..]].concat();
     let used = "--mount gpps names no topic of the recording and no frame of one: ";
     fault(&fixes, "misspelt.mcap", &misspelt, 1, used);

@@ -21,13 +21,6 @@ pub(super) fn take_units(units: &mut Units, samples: &[ImuSample]) {
     }
 }
 
-/// Units that look wrong: the errors are then those of the recording, and not of the filters.
-pub(super) fn unit_doubts(recording: &Recording, units: &Units) -> Vec<String> {
-    let imu = units.of_imu().into_iter().map(|fault| format!("{}: {fault}", recording.imu_topic));
-    let magnetometer = recording.magnetometer_topic.as_deref().unwrap_or_default();
-    imu.chain(units.of_field().map(|fault| format!("{magnetometer}: {fault}"))).collect()
-}
-
 /// Explains why no filter agrees with the truth, see [`doubt`].
 pub(super) fn truth_doubt(recording: &Recording, players: &[Player], align: Align) -> Option<String> {
     let filters: Vec<_> = players.iter().map(|player| (player.name, &player.compared)).collect();

@@ -59,6 +59,7 @@ impl NavigationBag {
         let frames = Frames::new(&messages.transforms, &messages.frames, &topics.imu, &options.mount)?;
         frames.check_mounts(&bag)?;
         let mut bag = Self { topics, messages, frames, options: options.clone(), notes: Notes::default() };
+        bag.doubt_units(&mut notes);
         bag.doubt_fixes(&mut notes);
         bag.doubt_covariances(&mut notes);
         bag.notes = notes;
@@ -80,6 +81,7 @@ impl NavigationBag {
     /// # Errors
     /// A frame that is not connected, or no state to start from; in words.
     pub fn drive(&self) -> Result<Drive, String> {
+        self.check_origin()?;
         let mut notes = self.notes.clone();
         let feed = self.feed()?;
         let truth = self.truth()?;

@@ -53,6 +53,8 @@ pub(crate) struct Bagged {
     /// Time by which the stamps of fixes are too early, ns.
     pub(crate) early_ns: i64,
     pub(crate) no_imu: bool,
+    /// The accelerometer is in g.
+    pub(crate) in_g: bool,
     pub(crate) two_imus: bool,
     /// Range of the samples whose values are NaN.
     pub(crate) nan: (i64, i64),
@@ -283,6 +285,7 @@ impl Drive {
                 continue;
             }
             let force = self.force(accelerometer, &base_from_imu, i, bagged.rest);
+            let force = if bagged.in_g { force / GRAVITY } else { force };
             let imu = Imu {
                 header: header(time - back, "imu"),
                 angular_velocity,

@@ -7,6 +7,7 @@ use super::truth::{TrueTrack, isometry};
 use crate::motion::{self, Motion, scatter};
 use crate::navigation::data::Truth;
 use crate::navigation::feed::{Feed, INPUTS, Message, START, Time, What};
+use crate::units::Units;
 use bb_core::nalgebra::{Isometry3, Matrix6, Vector3};
 use bb_core::payload::{GeodeticPosition, GnssFix, GnssStatus, Odometry, Pose, RelativePose, Twist};
 use bb_core::time::MonotonicTime;
@@ -20,6 +21,9 @@ const ROTATION: f64 = 0.02;
 const TRUE_VELOCITY: f64 = 0.1;
 const VELOCITY_FROM_POSITIONS: f64 = 0.5;
 const UNKNOWN_VELOCITY: f64 = 5.0;
+
+/// The farthest that the origin of a local frame may be from all fixes, m: the Earth is round.
+const FARTHEST_ORIGIN: f64 = 1e5;
 
 /// The time over which true positions give a velocity, ns.
 const BASELINE_NS: i64 = 100_000_000;
@@ -54,6 +58,36 @@ impl NavigationBag {
         let mut feed = Feed { messages, mounts, world };
         feed.sort();
         Ok(feed)
+    }
+
+    /// Notes units that look wrong.
+    pub(super) fn doubt_units(&self, notes: &mut Notes) {
+        let mut units = Units::default();
+        for message in &self.messages.inputs {
+            match &message.what {
+                What::Imu(imu) => units.take_imu(message.stamp_ns, imu.angular_velocity, imu.linear_acceleration),
+                What::MagneticField(field) => units.take_field(&field.magnetic_field),
+                _ => {}
+            }
+        }
+        notes.notes.extend(units.of_topics(&self.topics.imu, self.topics.magnetic_field.as_deref()));
+    }
+
+    /// Checks that the given origin is near one of the fixes.
+    ///
+    /// # Errors
+    /// It is not, as if its numbers were swapped.
+    pub(super) fn check_origin(&self) -> Result<(), String> {
+        let Some(origin) = self.options.origin.map(|origin| LocalFrame::new(origin.0)) else { return Ok(()) };
+        let places = self.fixes().filter_map(|(_, fix)| Geodetic::of_fix(fix, 0.0));
+        let nearest = places.map(|place| origin.position(&place).norm()).reduce(f64::min);
+        match nearest.filter(|metres| *metres > FARTHEST_ORIGIN) {
+            Some(metres) => Err(format!(
+                "--origin is {:.0} km from the nearest fix; it is LATITUDE,LONGITUDE,HEIGHT of the place where the recording was made",
+                metres / 1e3
+            )),
+            None => Ok(()),
+        }
     }
 
     /// Notes fixes that a filter cannot use.
@@ -97,7 +131,10 @@ impl NavigationBag {
         if let Some(found) = scatter::oddities(&track, Some(&Motion::new(&samples, zero_ns))).scatter {
             let topic = self.topics.gnss.as_deref().unwrap_or_default();
             let since_s = zero_ns.saturating_sub(start_ns) as f64 * 1e-9;
-            notes.push(format!("{topic}: {}", found.in_words(since_s, Some(&self.topics.imu))));
+            let said = found.in_words(since_s, Some(&self.topics.imu));
+            notes.push(format!(
+                "{topic}: {said}; the filter takes their scatter for their noise, so nothing is to be done"
+            ));
         }
     }
 
