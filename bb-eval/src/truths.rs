@@ -217,7 +217,7 @@ mod tests {
         assert_eq!(said(|truth| ned * truth, Axes::Six), Some(CONVENTIONS[1].name));
     }
 
-    /// Of a compass with a declination, whose truth is turned by it, and of a body that is mounted on another.
+    /// A compass has a declination, by which its truth is turned, and a body may be mounted on another.
     #[test]
     fn a_convention_is_one_of_the_truth_as_it_was_written() {
         let turns =

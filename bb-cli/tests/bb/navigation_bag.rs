@@ -170,7 +170,7 @@ fn fixes_can_be_the_truth() {
     assert_eq!((&row["orientation_deg"], &row["velocity_mps"]), (&Value::Null, &Value::Null));
 }
 
-/// Of the truth's world, where that explains the error, and not of a good recording.
+/// Causes that explain the error; a good recording has none.
 #[test]
 fn a_turned_world_and_another_convention_are_named() {
     let drive = Drive::new(5, 600);

@@ -77,7 +77,7 @@ pub(crate) struct Verdict {
     pub(crate) input: &'static str,
     pub(crate) fused: u64,
     pub(crate) refused: u64,
-    /// Those since its start that a filter neither fused nor refused: stamped too early or too late.
+    /// Number of those since its start that a filter neither fused nor refused: stamped too early or too late.
     pub(crate) unused: u64,
 }
 
