@@ -52,8 +52,8 @@ pub(crate) struct NavigationArguments {
     /// Plots the track, errors, innovations, and errors by the age of positions to this file, an SVG or a PNG.
     #[arg(long, value_name = "FILE", value_parser = picture)]
     plot: Option<PathBuf>,
-    /// Writes the estimates with their covariances to this file, a CSV or an MCAP: at each instant at which the truth is compared,
-    /// beside it, and without it at ten a second where there is none.
+    /// Writes all estimates with their covariances beside the truth to this file, a CSV or an MCAP, and the instants of the truth
+    /// that are compared between them.
     #[arg(long, value_name = "FILE", value_parser = exportable)]
     export: Option<PathBuf>,
     #[command(flatten)]

@@ -11,8 +11,8 @@ use bb_mcap::{BagWriter, RecorderOptions, RecordingError};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-/// Writes the estimates of navigation filters with their covariances beside the truth, as a CSV, or else as an MCAP: at each
-/// instant with truth, and between these at ten a second. Returns how many.
+/// Writes the estimates of navigation filters with their covariances beside the truth, as a CSV, or else as an MCAP: all of them,
+/// and the instants that are compared between them. Returns how many.
 ///
 /// # Errors
 /// The file cannot be written.

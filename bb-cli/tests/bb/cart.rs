@@ -386,7 +386,7 @@ fn the_command_scores_what_robots_publish() {
         ("state-smoother", &flown, flight(&file, "smoother")),
     ] {
         let rows = exported(&file, filter, arguments);
-        assert!(rows.len() > 500, "{filter}: {} rows", rows.len());
+        assert!(rows.len() >= robot.len() && robot.len() > 500, "{filter}: {} rows", rows.len());
         let mut published = robot.iter();
         // In the gap, the last estimate is moved on to the truth.
         for row in rows.iter().filter(|row| !GAP.contains(&row.0)) {

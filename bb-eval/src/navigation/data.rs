@@ -1,6 +1,6 @@
 //! A drive or a flight: measurements and truth.
 
-use bb_core::nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use bb_core::nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use bb_estimators::navigation::{AbsolutePose, Camera, Geodetic, GnssPosition, Observation, RelativePose, Start};
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -66,6 +66,18 @@ pub struct Truth {
     pub world_from_body: Option<UnitQuaternion<f64>>,
     /// Velocity in the world, m/s.
     pub velocity: Option<Vector3<f64>>,
+}
+
+impl Truth {
+    /// The truth in another world.
+    pub(crate) fn moved(&self, new_from_old: &Isometry3<f64>) -> Self {
+        let turn = new_from_old.rotation;
+        Self {
+            position: new_from_old * Point3::from(self.position) - Point3::origin(),
+            world_from_body: self.world_from_body.map(|truth| turn * truth),
+            velocity: self.velocity.map(|velocity| turn * velocity),
+        }
+    }
 }
 
 /// Densities of a data sheet, and gravity.

@@ -79,11 +79,12 @@ pub fn play_navigation(
     doubts.extend(left_out(&feed, &record));
     let scoring = Scoring::new(origin, &feed, &record, &truth);
     let mut scored = scoring.all(&mut notes);
-    notes.extend(scoring.aligned(&mut scored, run.align));
+    let (aligned, said) = scoring.aligned(&mut scored, run.align).unzip();
+    notes.extend(said);
     notes.extend(scoring.explained(filter.name, &imu, &scored, run.align));
     notes.extend(scoring.displaced(&scored, run.align, origin.is_some()));
     let score = scoring.score(&scored);
-    let trace = run.keep_trace.then(|| scoring.trace(&scored));
+    let trace = run.keep_trace.then(|| scoring.trace(&scored, &aligned.unwrap_or_default()));
     Ok(Played { score, notes, doubts, trace })
 }
 

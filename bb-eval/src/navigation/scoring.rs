@@ -122,9 +122,13 @@ impl<'a> Scoring<'a> {
         (time_ns - estimate.time_ns <= OLDEST_NS).then(|| estimate.at(time_ns))
     }
 
+    fn track(&self) -> TrueTrack {
+        TrueTrack::new(&self.truth.messages, &self.truth.base_from_part, self.world.as_ref())
+    }
+
     /// All instants with truth: those of the truth, or of the estimates where these are the rarer ones.
     pub(super) fn all(&self, notes: &mut Vec<String>) -> Vec<Instant> {
-        let track = TrueTrack::new(&self.truth.messages, &self.truth.base_from_part, self.world.as_ref());
+        let track = self.track();
         let points = track.points();
         if let Err(why) = &self.truth.topic {
             notes.push(format!("no truth, so no errors: {why}"));
@@ -195,8 +199,8 @@ impl<'a> Scoring<'a> {
         instants
     }
 
-    /// Turns the truth to the world of the estimates, and says by how much.
-    pub(super) fn aligned(&self, instants: &mut [Instant], align: Align) -> Option<String> {
+    /// Turns the truth to the world of the estimates. Returns by how much, in words too.
+    pub(super) fn aligned(&self, instants: &mut [Instant], align: Align) -> Option<(Isometry3<f64>, String)> {
         if align == Align::None {
             return None;
         }
@@ -205,23 +209,20 @@ impl<'a> Scoring<'a> {
         let count = scored().count().max(1) as f64;
         let shift =
             scored().filter_map(|instant| self.moved(instant, &turn.rotation)).sum::<Vector3<f64>>() / count;
+        let aligned = Isometry3::from_parts(shift.into(), turn.rotation);
         for instant in instants.iter_mut() {
-            let Truth { position, world_from_body, velocity } = instant.truth;
-            instant.truth = Truth {
-                position: turn.rotation * position + shift,
-                world_from_body: world_from_body.map(|truth| turn.rotation * truth),
-                velocity: velocity.map(|velocity| turn.rotation * velocity),
-            };
+            instant.truth = instant.truth.moved(&aligned);
             instant.errors = instant.known.map(|known| self.errors(&instant.truth, &known));
         }
-        Some(format!(
+        let said = format!(
             "the truth is turned by roll, pitch, yaw {} deg (spread {:.2} deg, by its {how}) and moved by {:.2}, {:.2}, {:.2} m",
             angles(&turn.rotation),
             turn.spread.to_degrees(),
             shift.x,
             shift.y,
             shift.z
-        ))
+        );
+        Some((aligned, said))
     }
 
     /// Way from the true position, turned, to the estimate, m.
@@ -347,12 +348,16 @@ impl<'a> Scoring<'a> {
         durations
     }
 
-    pub(super) fn trace(&self, instants: &[Instant]) -> Trace {
+    /// The run over time, with the truth as it was aligned.
+    pub(super) fn trace(&self, instants: &[Instant], aligned: &Isometry3<f64>) -> Trace {
+        let track = self.track();
+        // Fixes have a clock of their own.
+        let truth_at = |time_ns: Time| if self.truth.is_of_fixes { None } else { track.at(time_ns) };
         let mut rows: Vec<Row> = Vec::new();
         let mut last = i64::MIN;
         let mut next = 0;
         for estimate in &self.record.estimates {
-            // The instants with truth, and the estimates between them at ten a second.
+            // The estimates, and the instants that are compared between them.
             while let Some(instant) = instants.get(next).filter(|instant| instant.time_ns <= estimate.time_ns) {
                 if let (Some(known), Some(errors)) = (instant.known, instant.errors) {
                     rows.push(Row {
@@ -367,14 +372,14 @@ impl<'a> Scoring<'a> {
                 }
                 next += 1;
             }
-            if estimate.time_ns >= last.saturating_add(SCORED_PERIOD_NS) {
+            if estimate.time_ns > last {
                 last = estimate.time_ns;
                 let known = self.known(estimate);
                 rows.push(Row {
                     time_s: self.seconds(estimate.time_ns),
                     position: known.position,
                     known,
-                    truth: None,
+                    truth: truth_at(estimate.time_ns).map(|truth| truth.moved(aligned)),
                     errors: None,
                     anchor_age_s: self.age_s(estimate.time_ns),
                 });
