@@ -455,6 +455,12 @@ fn an_imu_at_90_degrees_is_found_and_mounted() {
     // Without the declination the compass is off by it; and the transforms tell the same.
     let undeclined = [&mounted[..], &["--declination", "0"]].concat();
     assert!(bb(&undeclined).code == Some(2), "it is given twice");
+    let navigation = ["eval", "navigation", file, "--mag-topic", "/imu/magnetic_field", "--declination", "4"];
+    for (arguments, code) in [(&mounted[..], 2), (&navigation, 1)] {
+        let output = bb(&[arguments, &["--set", "declination=4 deg"]].concat());
+        let said = "--set declination=4 deg, and --declination: give it once";
+        assert!(output.code == Some(code) && output.err.contains(said), "{}", output.err);
+    }
     let undeclined: Vec<&str> =
         mounted.iter().copied().filter(|word| !["--declination", "4"].contains(word)).collect();
     assert!((heading(&undeclined) - DECLINATION_DEG).abs() < 1.0);
