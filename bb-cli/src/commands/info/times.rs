@@ -182,7 +182,7 @@ mod tests {
     fn stamps_that_jitter_are_reported_and_missing_messages_are_not() {
         let jitter = |index| EVEN(index) + (index * 7 % 11 - 5) * MS / 2;
         let said = remarks(EVEN, jitter);
-        assert_eq!(said, ["the stamps jitter: of the periods of 8.0 ms, one in ten is off by 2.5 ms or more"]);
+        assert_eq!(said, ["the stamps jitter: of the periods of 10.0 ms, one in ten is off by 3.5 ms or more"]);
         let rounded = |index| EVEN(index) + (index * 7 % 11 - 5) * MS / 10;
         assert_eq!(remarks(EVEN, rounded), [""; 0]);
         // Every fourth message is elsewhere.
