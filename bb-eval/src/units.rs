@@ -15,8 +15,6 @@ pub struct Units {
     /// Norms of magnetic fields.
     fields: Vec<f64>,
     pressures: Vec<f64>,
-    /// The number of messages with values that are not finite.
-    not_finite: usize,
 }
 
 /// The range of a quantity in a unit that is not SI: from, to, and the unit it looks like.
@@ -58,9 +56,7 @@ impl Units {
 
     /// Adds a sample of an IMU: its time in nanoseconds, its angular velocity and its specific force.
     pub fn take_imu(&mut self, time_ns: i64, rate: Vector3<f64>, force: Vector3<f64>) {
-        if !rate.iter().chain(&force).all(|value| value.is_finite()) {
-            self.not_finite += 1;
-        } else if self.imu.len() < MOST {
+        if rate.iter().chain(&force).all(|value| value.is_finite()) && self.imu.len() < MOST {
             self.imu.push((time_ns as f64 * 1e-9, rate, force));
         }
     }
@@ -76,16 +72,9 @@ impl Units {
     }
 
     fn keep(&mut self, value: f64, list: fn(&mut Self) -> &mut Vec<f64>) {
-        if !value.is_finite() {
-            self.not_finite += 1;
-        } else if list(self).len() < MOST {
+        if value.is_finite() && list(self).len() < MOST {
             list(self).push(value);
         }
-    }
-
-    /// The number of messages with values that are not finite.
-    pub fn not_finite(&self) -> usize {
-        self.not_finite
     }
 
     /// Remarks on the IMU and the magnetometer, each with its topic.

@@ -3,7 +3,7 @@
 use super::remark::{Remark, Subject};
 use bb_core::payload::{FluidPressure, Imu, MagneticField};
 use bb_eval::units::Units;
-use bb_mcap::{BagMessage, IMU, MAGNETIC_FIELD, RecordingError};
+use bb_mcap::{BagMessage, IMU, MAGNETIC_FIELD, ODOMETRY, RecordingError, Value};
 
 const PRESSURE: &str = "sensor_msgs/msg/FluidPressure";
 
@@ -24,15 +24,26 @@ pub(super) fn take(units: &mut Units, message: &BagMessage) -> Result<(), Record
     Ok(())
 }
 
+/// Returns whether the numbers of a type must be finite. In others, as of a truth without positions, NaN or infinity says that there
+/// is no measurement.
+pub(super) fn must_be_finite(schema: &str) -> bool {
+    [IMU, MAGNETIC_FIELD, ODOMETRY, PRESSURE].contains(&schema) || schema.starts_with("geometry_msgs/msg/Twist")
+}
+
+/// Returns whether all numbers of a message are finite, but for covariances, which may be unknown.
+pub(super) fn is_finite(value: &Value) -> bool {
+    match value {
+        Value::F32(value) => value.is_finite(),
+        Value::F64(value) => value.is_finite(),
+        Value::List(values) => values.iter().all(is_finite),
+        Value::Message(fields) => fields.iter().all(|(name, of)| name.ends_with("covariance") || is_finite(of)),
+        _ => true,
+    }
+}
+
 /// Remarks on units that look wrong; not on a field whose offset is known.
 pub(super) fn remarks(units: &Units, has_offset: bool) -> Vec<Remark> {
-    let mut remarks = Vec::new();
-    if units.not_finite() > 0 {
-        let text = format!("{} messages hold NaN or infinity", units.not_finite());
-        remarks.push(Remark::new(Subject::Values, text));
-    }
     let units =
         units.of_imu().into_iter().chain(units.of_field().filter(|_| !has_offset)).chain(units.of_pressure());
-    remarks.extend(units.map(|text| Remark::new(Subject::Unit, text)));
-    remarks
+    units.map(|text| Remark::new(Subject::Unit, text)).collect()
 }

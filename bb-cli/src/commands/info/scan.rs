@@ -1,11 +1,12 @@
 //! Reads a file once, from beginning to end.
 
-use super::quantities;
+use super::quantities::{self, is_finite, must_be_finite};
 use super::remark::{Remark, Subject};
 use super::signals::{self, Reference, Signal};
 use super::times::Times;
 use crate::topics::{TopicReader, is_of_events, log_ns};
 use bb_eval::Periods;
+use bb_eval::table::counted;
 use bb_eval::units::Units;
 use bb_mcap::Bag;
 use std::collections::HashMap;
@@ -44,6 +45,8 @@ struct Open {
     units: Units,
     signal: Signal,
     frames: Vec<String>,
+    /// Messages with a number that is not finite, and may not be so.
+    not_finite: usize,
     /// The first message that cannot be read.
     fault: Option<String>,
 }
@@ -93,8 +96,13 @@ pub(super) fn scan(file: &Path) -> Result<Content, String> {
         let read = quantities::take(&mut topic.units, &message).and_then(|()| topic.signal.take(&message));
         let read = read.map_err(|error| error.to_string());
         let read = read.and_then(|()| match &topic.reader {
-            // One message is enough for topics without units to judge.
-            Some(reader) if topic.times.count() == 1 => reader.read(&message).map(drop),
+            // One message is enough for topics without numbers to judge.
+            Some(reader) if topic.times.count() == 1 || must_be_finite(&message.schema) => {
+                let value = reader.read(&message);
+                value.map(|value| {
+                    topic.not_finite += usize::from(must_be_finite(&message.schema) && !is_finite(&value))
+                })
+            }
             _ => Ok(()),
         });
         if let (None, Err(fault)) = (&topic.fault, read) {
@@ -114,6 +122,10 @@ pub(super) fn scan(file: &Path) -> Result<Content, String> {
         let signal = if is_estimate { &Signal::None } else { &open.signal };
         let together = signals::remarks(signal, reference.as_ref(), start_ns);
         let has_offset = together.iter().any(|remark| remark.subject == Subject::Calibration);
+        if open.not_finite > 0 {
+            let count = counted(open.not_finite, "message holds", "messages hold");
+            remarks.push(Remark::new(Subject::Values, format!("{count} NaN or infinity")));
+        }
         remarks.extend(quantities::remarks(&open.units, has_offset));
         remarks.extend(together);
         remarks.extend(open.fault.clone().map(|fault| Remark::new(Subject::Messages, fault)));
