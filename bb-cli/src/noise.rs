@@ -1,5 +1,6 @@
 //! `bb eval noise BAG`: the noise of an IMU at rest, by its Allan deviation.
 
+mod moving;
 mod report;
 mod still;
 
@@ -103,8 +104,14 @@ impl NoiseArguments {
     }
 
     fn noise(&self, file: &Path, is_whole: &mut bool) -> Result<Noise, String> {
-        let samples = if is_csv(file) { of_csv(file)? } else { self.of_bag(file, is_whole)? };
-        let still = still(&samples)?;
+        let (samples, moving) = match is_csv(file) {
+            true => (of_csv(file)?, Vec::new()),
+            false => {
+                let samples = self.of_bag(file, is_whole)?;
+                (samples, moving::moving(file).map_err(|error| error.kind().to_string())?)
+            }
+        };
+        let still = still(&samples, &moving)?;
         let progress = Progress::new("averaging", AXES.len() as u64);
         let part = samples.get(still.samples.clone()).unwrap_or_default();
         let axes = std::array::from_fn(|axis| {

@@ -2,6 +2,7 @@
 
 use super::{AXES, Noise};
 use bb_estimators::calibration::{Known, SensorNoise};
+use bb_estimators::navigation::EskfParams;
 use bb_plot::{Line, PALETTE, Part, Plane, Scale, Sheet};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
@@ -51,7 +52,7 @@ impl Axis {
 struct Options {
     gyroscope_noise: Option<f64>,
     accelerometer_noise: Option<f64>,
-    /// Random walk of the gyroscope if one is seen; otherwise its upper limit.
+    /// Random walk of the gyroscope if one is seen; otherwise its upper limit, if that says more than the default.
     gyroscope_walk: Option<f64>,
     accelerometer_walk: Option<f64>,
 }
@@ -63,16 +64,21 @@ impl Options {
             let values: Option<Vec<_>> = axes.iter().map(|axis| axis.as_ref().ok().map(of)).collect();
             values.and_then(|values| values.into_iter().reduce(f64::max))
         };
-        let walk = |axes: std::ops::Range<usize>| {
+        let walk = |axes: std::ops::Range<usize>, default: f64| {
             let seen =
                 worst(axes.clone(), &|axis| if is_seen(&axis.random_walk) { axis.random_walk.value } else { 0.0 })?;
-            if seen > 0.0 { Some(seen) } else { worst(axes, &|axis| axis.random_walk.at_most) }
+            if seen > 0.0 {
+                Some(seen)
+            } else {
+                worst(axes, &|axis| axis.random_walk.at_most).filter(|most| *most < default)
+            }
         };
+        let EskfParams { gyroscope_bias_walk, accelerometer_bias_walk, .. } = EskfParams::default();
         Self {
             gyroscope_noise: worst(0..3, &|axis| axis.density.value),
             accelerometer_noise: worst(3..6, &|axis| axis.density.value),
-            gyroscope_walk: walk(0..3),
-            accelerometer_walk: walk(3..6),
+            gyroscope_walk: walk(0..3, gyroscope_bias_walk),
+            accelerometer_walk: walk(3..6, accelerometer_bias_walk),
         }
     }
 
@@ -107,6 +113,7 @@ pub(super) fn json(found: &[Noise]) -> Result<String, String> {
             "file": noise.file.display().to_string(),
             "from_s": noise.still.from_s,
             "seconds": noise.still.seconds,
+            "at_rest_by": noise.still.by,
             "rate_hz": 1.0 / noise.still.period_s,
             "gyroscope": axes(0..3),
             "accelerometer": axes(3..6),
@@ -123,7 +130,12 @@ pub(super) fn text(found: &[Noise]) -> String {
     for noise in found {
         let still = &noise.still;
         let (file, rate) = (noise.file.display(), 1.0 / still.period_s);
-        let _ = writeln!(text, "# {file}: {:.1} s at rest, {rate:.1} Hz", still.seconds);
+        let by = if still.by.is_empty() {
+            "the IMU alone".to_owned()
+        } else {
+            format!("the IMU and {}", still.by.join(", "))
+        };
+        let _ = writeln!(text, "# {file}: {:.1} s at rest by {by}, {rate:.1} Hz", still.seconds);
         for (name, axis) in AXES.iter().zip(&noise.axes) {
             let Ok(axis) = axis else {
                 let _ = writeln!(text, "# {name}: none");

@@ -1,4 +1,7 @@
 //! The part of a recording in which the IMU is at rest and no samples are missing.
+//!
+//! To an IMU, rest is what is as quiet as the quietest ten seconds. What drives steadily all the time is quiet too, so wheels and
+//! fixes that show motion are believed.
 
 use super::{AXES, Sample};
 use bb_eval::table::counted;
@@ -10,7 +13,7 @@ const LONGEST_PERIOD: f64 = 1.5;
 /// Length of the windows in which motion is detected, s.
 const WINDOW_S: f64 = 1.0;
 
-/// Variation beyond which a window is motion, in multiples of the usual variation of a sample. Its mean may differ from the
+/// Variation beyond which a window is motion, in multiples of that in the quietest windows. Its mean may differ from the
 /// previous one by as much: no bias drifts so fast.
 const LARGEST_VARIATION: f64 = 4.0;
 
@@ -26,6 +29,13 @@ const LEVELS: usize = 20;
 /// Fraction of samples at one end of the range beyond which an axis is saturated.
 const LARGEST_SHARE: f64 = 0.1;
 
+/// The times in which a sensor of the robot's motion shows some, ns.
+#[derive(Clone, Debug)]
+pub(super) struct Moving {
+    pub(super) topic: String,
+    pub(super) spans_ns: Vec<Range<i64>>,
+}
+
 /// The longest part in which the IMU is at rest.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Still {
@@ -34,15 +44,17 @@ pub(super) struct Still {
     /// Start of the part after the first sample of the recording, s.
     pub(super) from_s: f64,
     pub(super) seconds: f64,
+    /// The topics that show that, beside the IMU.
+    pub(super) by: Vec<String>,
     /// Remarks on the recording.
     pub(super) warnings: Vec<String>,
 }
 
-/// Finds the longest part at rest without a gap.
+/// Finds the longest part at rest without a gap. `moving` are times in which other sensors show motion, each with its sensor.
 ///
 /// # Errors
 /// A message that no part is long enough.
-pub(super) fn still(samples: &[Sample]) -> Result<Still, String> {
+pub(super) fn still(samples: &[Sample], moving: &[Moving]) -> Result<Still, String> {
     let (Some(first), true) = (samples.first(), samples.len() >= 2) else {
         return Err(format!("{} samples are too few", samples.len()));
     };
@@ -59,11 +71,20 @@ pub(super) fn still(samples: &[Sample]) -> Result<Still, String> {
     let mut breaks = gaps(samples, usual, &at, &mut warnings);
     let window = ((WINDOW_S * 1e9 / usual as f64) as usize).max(8);
     add_motion(samples, window, &at, &mut breaks, &mut warnings);
+    for Moving { topic, spans_ns } in moving {
+        let of = |time_ns: i64| samples.partition_point(|sample| sample.time_ns < time_ns);
+        breaks.extend(spans_ns.iter().map(|span| of(span.start)..of(span.end)));
+        if spans_ns.is_empty() {
+            continue;
+        }
+        let seconds = spans_ns.iter().map(|span| (span.end - span.start) as f64 * 1e-9).sum::<f64>();
+        warnings.push(format!("{topic} moves for {seconds:.1} s"));
+    }
     breaks.sort_by_key(|part| part.start);
     let longest = longest(samples.len(), &breaks);
     let (from_s, to_s) = (at(longest.start), at(longest.end.saturating_sub(1)));
     let seconds = to_s - from_s;
-    let why = warnings.first().map(|warning| format!(" ({warning})")).unwrap_or_default();
+    let why = warnings.last().map(|warning| format!(" ({warning})")).unwrap_or_default();
     if seconds < LEAST_S {
         return Err(format!(
             "at most {seconds:.1} s are at rest without a gap, and {LEAST_S:.0} s are the least{why}; record ten minutes for \
@@ -77,7 +98,14 @@ pub(super) fn still(samples: &[Sample]) -> Result<Still, String> {
     check_rate(part)?;
     warnings.extend((0..AXES.len()).filter_map(|axis| saturated(part, axis)));
     let period_s = seconds / (part.len().saturating_sub(1).max(1)) as f64;
-    Ok(Still { samples: longest, period_s, from_s, seconds, warnings })
+    Ok(Still {
+        samples: longest,
+        period_s,
+        from_s,
+        seconds,
+        by: moving.iter().map(|of| of.topic.clone()).collect(),
+        warnings,
+    })
 }
 
 /// The breaks between parts without gaps, as ranges of samples that belong to no part.
@@ -130,13 +158,16 @@ fn add_motion(
 ) {
     for (axis, name) in AXES.iter().enumerate() {
         let moments: Vec<_> = samples.chunks(window).map(|chunk| moments(chunk, axis)).collect();
-        let median = |values: &mut Vec<f64>| {
-            values.retain(|value| value.is_finite());
-            values.sort_by(f64::total_cmp);
-            values.get(values.len() / 2).copied().unwrap_or(0.0)
+        let median = |windows: &[(f64, f64)]| {
+            let mut deviations: Vec<f64> = windows.iter().map(|(_, deviation)| *deviation).collect();
+            deviations.sort_by(f64::total_cmp);
+            deviations.get(deviations.len() / 2).copied()
         };
-        let usual = median(&mut moments.iter().map(|(_, deviation)| *deviation).collect());
-        if usual <= 0.0 {
+        let windows = ((LEAST_S / WINDOW_S) as usize).min(moments.len());
+        let quietest = moments.windows(windows.max(1)).filter_map(median).fold(f64::INFINITY, f64::min);
+        // What varies by less than its resolution may seem to vary by none.
+        let quietest = quietest.max(0.5 * resolution(samples, axis));
+        if median(&moments).is_none_or(|usual| usual <= 0.0) {
             continue;
         }
         let mut worst: Option<(usize, f64)> = None;
@@ -144,7 +175,7 @@ fn add_motion(
         for (index, (mean, deviation)) in moments.iter().enumerate() {
             let before =
                 index.checked_sub(1).and_then(|before| moments.get(before)).map_or(*mean, |(mean, _)| *mean);
-            let more = deviation.max((mean - before).abs()) / usual;
+            let more = deviation.max((mean - before).abs()) / quietest;
             if more > LARGEST_VARIATION {
                 breaks.push(index * window..((index + 1) * window).min(samples.len()));
                 count += 1;
@@ -156,12 +187,23 @@ fn add_motion(
         if let Some((index, more)) = worst {
             warnings.push(format!(
                 "{name} moves in {count} of {} windows of a second, most at {:.1} s, where it varies {more:.0} times as much \
-                 as usual",
+                 as in its quietest ten seconds",
                 moments.len(),
                 at(index * window)
             ));
         }
     }
+}
+
+/// The smallest step between the values of an axis, but for those of rounding; 0 if it has one value.
+fn resolution(samples: &[Sample], axis: usize) -> f64 {
+    /// The part of the range that is rounding.
+    const ROUNDING: f64 = 1e-9;
+    let mut values: Vec<f64> = samples.iter().map(|sample| sample.axes[axis]).filter(|of| of.is_finite()).collect();
+    values.sort_by(f64::total_cmp);
+    let range = values.last().zip(values.first()).map_or(0.0, |(last, first)| last - first);
+    let steps = values.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > ROUNDING * range);
+    steps.reduce(f64::min).unwrap_or(0.0)
 }
 
 fn moments(samples: &[Sample], axis: usize) -> (f64, f64) {
