@@ -30,11 +30,11 @@ impl RobotFile {
         &self.file
     }
 
-    /// Reads the options of an estimator in it and their values: of the path that is named, or of the only estimator whose
-    /// options are all known.
+    /// Reads the options of an estimator in it and their values: of the path that is named, or of the only component that has the
+    /// most of its options among those known.
     ///
     /// # Errors
-    /// The file cannot be read, has no such estimator or several, or the estimator has an unknown option.
+    /// The file cannot be read, has no such estimator or several, or the estimator has unknown options; all of these.
     pub(crate) fn read(&self, known: &[&str]) -> Result<Vec<(String, String)>, String> {
         let name = self.file.display();
         let text = std::fs::read_to_string(&self.file).map_err(|error| format!("{name}: {error}"))?;
@@ -48,13 +48,16 @@ impl RobotFile {
                 format!("{name}: there is no [{}] in it; {}", path.replace('/', "."), near(path, &paths))
             })?,
             None => {
-                let of_estimators = || tables.iter().filter(|(path, _)| path.starts_with("estimator/"));
-                let whole =
-                    |(_, options): &&(String, toml::Table)| !options.is_empty() && options.keys().all(is_option);
-                let partly = |(_, options): &&(String, toml::Table)| options.keys().any(is_option);
-                let mut fitting: Vec<_> = of_estimators().filter(whole).collect();
-                if fitting.is_empty() {
-                    fitting = of_estimators().filter(partly).collect();
+                let share = |(_, options): &(String, toml::Table)| {
+                    let fitting = options.keys().filter(|option| is_option(option)).count();
+                    fitting as f64 / options.len().max(1) as f64
+                };
+                let most = tables.iter().map(share).fold(0.0, f64::max);
+                let mut fitting: Vec<_> =
+                    tables.iter().filter(|table| most > 0.0 && share(table) == most).collect();
+                // A listing has all options of each; one may have some of those of another.
+                if let Some(whole) = fitting.iter().copied().find(|(_, options)| 2 * options.len() > known.len()) {
+                    fitting = vec![whole];
                 }
                 let paths = || fitting.iter().map(|(path, _)| format!("{name}:{path}")).collect::<Vec<_>>();
                 match *fitting {
@@ -70,14 +73,18 @@ impl RobotFile {
             }
         };
         let (path, options) = of;
+        let unknown: Vec<_> = options
+            .keys()
+            .filter(|option| !is_option(option))
+            .map(|option| {
+                format!("{name}: {path}/{option}: this filter has no such option; {}", near(option, known))
+            })
+            .collect();
+        if !unknown.is_empty() {
+            return Err(unknown.join("\n"));
+        }
         let mut settings = Vec::new();
         for (option, value) in options {
-            if !is_option(option) {
-                return Err(format!(
-                    "{name}: {path}/{option}: this filter has no such option; {}",
-                    near(option, known)
-                ));
-            }
             let value = match value {
                 toml::Value::String(text) => text.clone(),
                 // As JSON, which settings are.

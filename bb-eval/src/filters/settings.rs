@@ -93,8 +93,11 @@ impl Chosen {
             }
             let mut params = *filter;
             let fault = |error: SetError<'_>| format!("{}: {error}", filter.name());
-            for setting in settings.iter().filter(|setting| setting.is_of(filter)) {
-                params.set(&setting.name, &setting.value).map_err(fault)?;
+            let of_filter = settings.iter().filter(|setting| setting.is_of(filter));
+            let set = of_filter.map(|setting| params.set(&setting.name, &setting.value).map_err(fault));
+            let faults: Vec<_> = set.filter_map(Result::err).collect();
+            if !faults.is_empty() {
+                return Err(faults.join("\n"));
             }
             Self { params }.on(axes)
         });
