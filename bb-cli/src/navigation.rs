@@ -65,8 +65,8 @@ pub(crate) struct NavigationArguments {
 fn factor(text: &str) -> Result<f64, String> {
     let factor: Option<f64> = text.parse().ok();
     factor
-        .filter(|factor| (1e-6..=1e6).contains(factor))
-        .ok_or_else(|| "write a factor from 1e-6 to 1e6".to_owned())
+        .filter(|factor| (1e-6..=1e6).contains(factor) && *factor != 1.0)
+        .ok_or_else(|| "write a factor from 1e-6 to 1e6 other than 1".to_owned())
 }
 
 fn filters_in_words() -> String {

@@ -29,7 +29,7 @@ pub struct Disturbances {
     #[cfg_attr(feature = "clap", arg(long, value_name = "LENGTH/PERIOD"))]
     pub outage: Option<Spell>,
     /// Gives every N-th fix, or reading of the magnetic field, to the filter, and withholds the others.
-    #[cfg_attr(feature = "clap", arg(long, value_name = "N"))]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "N", value_parser = every))]
     pub every: Option<u32>,
     /// Stamps and delivers the messages of an input later, as gnss=125ms, or earlier, as magnetic_field=-12ms. Several.
     #[cfg_attr(feature = "clap", arg(long, value_name = "INPUT=TIME"))]
@@ -90,6 +90,11 @@ impl FromStr for Dropped {
         let (input, value) = named(text, "imu=300ms/10s")?;
         Ok(Self { input, spell: value.parse()? })
     }
+}
+
+#[cfg(feature = "clap")]
+fn every(text: &str) -> Result<u32, String> {
+    text.parse().ok().filter(|every| *every >= 2).ok_or_else(|| "write a whole number, at least 2".to_owned())
 }
 
 fn named<'a>(text: &'a str, example: &str) -> Result<(usize, &'a str), String> {
