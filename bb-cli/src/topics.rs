@@ -19,7 +19,7 @@ pub(crate) fn open(file: &Path) -> Result<Bag, String> {
 
 /// The topic of this name, with or without a leading slash.
 pub(crate) fn find<'a>(bag: &'a Bag, name: &str) -> Result<&'a Topic, String> {
-    let found = bag.topics().iter().find(|topic| is_named(topic, name));
+    let found = bag.topics().iter().find(|topic| topic.is_named(name));
     found.ok_or_else(|| {
         let full = format!("/{}", name.trim_start_matches('/'));
         let names: Vec<&str> = bag.topics().iter().map(|topic| &*topic.name).collect();
@@ -52,11 +52,6 @@ pub(crate) fn read_all(
     }
     progress.finish();
     Ok(broken)
-}
-
-/// Returns whether a topic has this name, with or without a leading slash.
-pub(crate) fn is_named(topic: &Topic, name: &str) -> bool {
-    *topic.name == *name || topic.name.strip_prefix('/') == Some(name.trim_start_matches('/'))
 }
 
 /// Returns whether a topic reports events of a robot: no rate is expected of it.

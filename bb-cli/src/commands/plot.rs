@@ -4,7 +4,7 @@ mod select;
 mod series;
 mod units;
 
-use crate::topics::{TopicReader, find, is_named, log_ns, open, read_all};
+use crate::topics::{TopicReader, find, log_ns, open, read_all};
 use bb_mcap::{Bag, Topic};
 use bb_plot::Picture;
 use clap::Args;
@@ -61,7 +61,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<bool, String> {
 /// The topic and the path of a field in it. The name of a topic may contain dots: the longest match is used.
 fn topic_and_field<'a, 'b>(bag: &'a Bag, field: &'b str) -> Result<(&'a Topic, &'b str), String> {
     let dots = field.match_indices('.').map(|(at, _)| at).chain([field.len()]);
-    let is_topic = |end: &usize| bag.topics().iter().any(|topic| is_named(topic, &field[..*end]));
+    let is_topic = |end: &usize| bag.topics().iter().any(|topic| topic.is_named(&field[..*end]));
     let known = dots.rev().find(is_topic);
     let (name, path) = match known {
         Some(end) => (&field[..end], field[end..].trim_start_matches('.')),

@@ -49,6 +49,11 @@ pub struct Topic {
 }
 
 impl Topic {
+    /// Returns whether it has this name, with or without a leading slash.
+    pub fn is_named(&self, name: &str) -> bool {
+        *self.name == *name || self.name.strip_prefix('/') == Some(name.trim_start_matches('/'))
+    }
+
     /// The fields of the messages.
     ///
     /// # Errors
@@ -110,7 +115,8 @@ impl Bag {
         Err(RecordingError::new(&self.path, kind))
     }
 
-    /// The topic of this name, if one is given; it must be of the type. Otherwise the only one of the type.
+    /// The topic of this name, if one is given, with or without its leading slash; it must be of the type. Otherwise the only one
+    /// of the type.
     ///
     /// # Errors
     ///
@@ -118,7 +124,7 @@ impl Bag {
     pub fn choose(&self, schema: &str, name: Option<&str>) -> Result<&Topic, RecordingError> {
         let Some(name) = name else { return self.topic_of(schema) };
         let wanted = full_name(schema);
-        let mut named = self.topics.iter().filter(|topic| *topic.name == *name).peekable();
+        let mut named = self.topics.iter().filter(|topic| topic.is_named(name)).peekable();
         let kind = match named.peek() {
             None => RecordingErrorKind::NoTopic { topic: name.to_owned(), topics: self.topics_in_words() },
             Some(first) => {
