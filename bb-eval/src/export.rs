@@ -96,10 +96,10 @@ fn csv<T: Exported>(runs: &[(String, Vec<(i64, T)>)]) -> String {
     text.push('\n');
     for (name, rows) in runs {
         for (_, estimate) in rows {
-            let _ = write!(text, "\"{}\",{}", name.replace('"', "'"), estimate.time_s());
+            let _ = write!(text, "\"{}\",{:?}", name.replace('"', "'"), estimate.time_s());
             estimate.cells(&mut text);
             for (row, column) in upper() {
-                let _ = write!(text, ",{}", estimate.covariance(row, column));
+                let _ = write!(text, ",{:?}", estimate.covariance(row, column));
             }
             text.push('\n');
         }
@@ -124,12 +124,12 @@ fn mcap<T: Exported>(file: &Path, runs: &[(String, Vec<(i64, T)>)]) -> Result<()
 
 fn vector(text: &mut String, vector: Option<Vector3<f64>>) {
     let vector = vector.unwrap_or_else(|| Vector3::repeat(f64::NAN));
-    let _ = write!(text, ",{},{},{}", vector.x, vector.y, vector.z);
+    let _ = write!(text, ",{:?},{:?},{:?}", vector.x, vector.y, vector.z);
 }
 
 fn rotation(text: &mut String, rotation: Option<UnitQuaternion<f64>>) {
     let [w, i, j, k] = rotation.map_or([f64::NAN; 4], |of| [of.w, of.i, of.j, of.k]);
-    let _ = write!(text, ",{w},{i},{j},{k}");
+    let _ = write!(text, ",{w:?},{i:?},{j:?},{k:?}");
 }
 
 /// Position, then rotation about the axes of the world. `nav_msgs/Odometry`, and `geometry_msgs/PoseStamped`.
