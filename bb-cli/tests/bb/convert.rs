@@ -335,6 +335,10 @@ fn sentences_of_a_receiver_are_fixes() {
     assert_eq!((output.code, &*output.err), (Some(0), ""));
     let said = "3 on /fix, 1 line is no sentence with the right checksum";
     assert_eq!(output.out, format!("{}: {said}\n", out.display()));
+    let wrong: String = text.iter().map(|line| line.replace('*', "*1")).collect();
+    let output = convert(&csv("wrong.nmea", &wrong), &bag("wrong_nmea.mcap"), &[]);
+    let said = "6 lines are no sentences with the right checksum, and none of the others is an RMC or ZDA that says the date";
+    assert!(output.code == Some(1) && output.err.contains(said), "{}", output.err);
     let fixes = fixes(&out, "/fix");
     // 2024-06-24T00:00:00Z
     let midnight = 1_719_187_200_000_000_000;

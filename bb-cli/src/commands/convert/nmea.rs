@@ -4,6 +4,7 @@ use super::cells::LAST_NS;
 use super::entry::{Entry, FIX, What};
 use bb_core::nalgebra::{Matrix3, Vector3};
 use bb_core::payload::{GeodeticPosition, GnssFix, GnssServices, GnssStatus};
+use bb_eval::table::counted;
 use nmea::ParseResult;
 use nmea::sentences::FixType;
 use nmea::sentences::rmc::RmcStatusOfFix;
@@ -30,7 +31,13 @@ pub(super) fn read(file: &Path, topic: Option<&str>) -> Result<(Vec<Entry>, u64)
         }
     }
     if !fixes.dated {
-        return Err("no RMC or ZDA sentence says the date".into());
+        return Err(match bad {
+            0 => "no RMC or ZDA sentence says the date".into(),
+            _ => format!(
+                "{} the right checksum, and none of the others is an RMC or ZDA that says the date",
+                counted(bad as usize, "line is no sentence with", "lines are no sentences with")
+            ),
+        });
     }
     let entries = fixes.all.into_iter().map(|(time_ns, fix)| {
         let topic = Arc::clone(&topic);
