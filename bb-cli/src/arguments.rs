@@ -144,7 +144,8 @@ struct AttitudeArguments {
     /// Plots the errors over time to this file, an SVG or a PNG.
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
-    /// Writes the estimates with their covariances beside the truth to this file, a CSV or an MCAP.
+    /// Writes the estimates with their covariances beside the truth to this file, a CSV or an MCAP; with --declination, both to true
+    /// north.
     #[arg(long, value_name = "FILE", value_parser = bb_eval::exportable)]
     export: Option<PathBuf>,
     #[command(flatten)]
@@ -218,6 +219,13 @@ impl AttitudeArguments {
         }
         if self.origin.is_some() && self.declination != Some(Declination::Auto) {
             return Err(invalid("--origin changes nothing without --declination auto".to_owned()));
+        }
+        for (option, is_given) in
+            [("--mag-topic", self.mag_topic.is_some()), ("--declination", self.declination.is_some())]
+        {
+            if is_given && self.axes == Axes::Six {
+                return Err(invalid(format!("{option} changes nothing with --axes 6")));
+            }
         }
         if let Some(plot) = &self.plot {
             Picture::check(plot, "--plot").map_err(invalid)?;

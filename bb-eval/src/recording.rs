@@ -69,6 +69,8 @@ pub struct Recording {
     /// Takes what the IMU, and what the magnetometer measures to the axes of the robot; `None` if they are those.
     base_from_imu: Option<Rotation3<f64>>,
     base_from_magnetometer: Option<Rotation3<f64>>,
+    /// Takes the world of the filters and of the turned truth to that of the truth.
+    pub(crate) true_from_magnetic: UnitQuaternion<f64>,
     /// Statements on what was assumed of the mountings.
     pub(crate) notes: Vec<String>,
     samples: MargSamples,
@@ -156,6 +158,7 @@ impl Recording {
         };
         Ok(Self {
             imu_name,
+            true_from_magnetic: declination.inverse(),
             base_from_imu: turned(base_from_imu),
             base_from_magnetometer: turned(base_from_magnetometer),
             notes,
@@ -183,6 +186,7 @@ impl Recording {
         let samples = MargSamples::read(&bag, &imu.name, None).map_err(|error| error.kind().to_string())?;
         Ok(Self {
             imu_name: imu.name.to_string(),
+            true_from_magnetic: UnitQuaternion::identity(),
             base_from_imu: None,
             base_from_magnetometer: None,
             notes: Vec::new(),

@@ -175,6 +175,9 @@ fn topics_are_named_where_several_fit() {
     assert_eq!(output.code, Some(0), "{}", output.err);
     assert_eq!(rows(&output.out)[0]["samples"], 199);
 
+    // The slashes may be left out.
+    let bare: Vec<_> = arguments.iter().map(|word| word.strip_prefix('/').unwrap_or(word)).collect();
+    assert_eq!(eval(&[&file], &[&bare[..], &["--json"]].concat()).code, Some(0));
     let output = eval(&[&file], &["--imu-topic", "/mag"]);
     assert!(output.err.contains(
         "twice.mcap: the messages of /mag are sensor_msgs/msg/MagneticField, and sensor_msgs/msg/Imu is needed"
@@ -274,14 +277,34 @@ fn a_robot_lends_its_settings() {
     let text = "[sensor.base.imu]\nrate = 3\n[estimator.base.orientation]\nbeta = \"2 rad/s\"\n";
     let set = eval(&[&walk], &["--json", "--filter", "madgwick", "--set", "beta=2"]);
     assert_eq!(heading(&lent(text, &["--filter", "madgwick"])), heading(&set));
+    let times = "[estimator.o]\nheading_time_constant = -1\ntilt_time_constant = \"soon\"\n";
+    // Of an estimator below a sensor, beside others that have some of the options, as `--list` writes it.
+    let listed = "[estimator.base.navigation]\nbeta = 1\ngyroscope_noise = 1\n[sensor.base.imu.tilt]\nbeta = 2\n";
+    assert_eq!(heading(&lent(listed, &["--filter", "madgwick"])), heading(&set));
+    // A listing has all options of each estimator, which may be some of those of another.
+    let all = "[estimator.base.navigation]\nbeta = 1\n[sensor.base.imu.tilt]\nbeta = 2\nmagnetometer = true\n";
+    assert_eq!(heading(&lent(all, &["--filter", "madgwick"])), heading(&set));
     for (text, arguments, fault) in [
         (text, &[][..], "--robot gives the options of one filter; name it with --filter"),
+        ("[estimator.a]\nbeta = 1\n[sensor.b]\nbeta = 2\n", &["--filter", "madgwick"], "estimator/a or "),
         (text, &["--filter", "mahony"], "no estimator in it has an option of this filter"),
         (
             "[estimator.o]\nbeta = 2\ngamma = 1\n",
             &["--filter", "madgwick"],
             "estimator/o/gamma: this filter has no such option",
         ),
+        (
+            "[estimator.o]\nbeta = 2\ngamma = 1\nalfa = 1\n",
+            &["--filter", "madgwick"],
+            "estimator/o/alfa: this filter has no such option",
+        ),
+        (
+            "[estimator.o]\nbeta = 2\ngamma = 1\nalfa = 1\n",
+            &["--filter", "madgwick"],
+            "estimator/o/gamma: this filter has no such option",
+        ),
+        (times, &["--filter", "complementary"], "`heading_time_constant` is -1 s"),
+        (times, &["--filter", "complementary"], "`tilt_time_constant` is `soon`"),
     ] {
         let output = lent(text, arguments);
         assert!(output.code == Some(2) && output.err.contains(fault), "{}", output.err);
@@ -335,15 +358,16 @@ fn outages_gaps_and_delays_are_options() {
 fn estimates_are_exported() {
     let walk = Walk { error: 0.1, lost: 150..200, ..Walk::default() }.file("exported.mcap");
     let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR"));
-    let export = |name: &str, filter: &str| {
+    let export_as = |name: &str, filter: &str, more: &[&str]| {
         let to = folder.join(name);
         // Of an earlier run: recordings are not overwritten.
         let _ = std::fs::remove_file(&to);
         let arguments = ["--json", "--filter", filter, "--export", to.to_str().expect("is text")];
-        let output = eval(&[&walk], &arguments);
+        let output = eval(&[&walk], &[&arguments[..], more].concat());
         assert_eq!(output.code, Some(0), "{}", output.err);
         (to, rows(&output.out))
     };
+    let export = |name: &str, filter: &str| export_as(name, filter, &[]);
     let (csv, scored) = export("attitude.csv", "mekf,madgwick");
     let text = std::fs::read_to_string(csv).expect("was written");
     let mut lines = text.lines();
@@ -365,6 +389,22 @@ fn estimates_are_exported() {
     let rms = (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt().to_degrees();
     assert!((rms - scored[0]["total_deg"].as_f64().expect("is scored")).abs() < 1e-6, "{rms}");
     assert!(cells.iter().all(|cells| cells[9] > 0.0 && cells[12] > 0.0 && cells[14] > 0.0), "variances");
+
+    assert!(text.split(['\n', ',']).all(|cell| cell.len() < 26), "digits that say nothing");
+    // In true north the truth is what was recorded, and the estimates are turned with it.
+    let turned = |name: &str, more: &[&str]| {
+        let text = std::fs::read_to_string(export_as(name, "mekf", more).0).expect("was written");
+        let row = text.lines().nth(250).expect("has rows").rsplit("\",").next().expect("has cells").to_owned();
+        let cells: Vec<f64> = row.split(',').map(|cell| cell.parse().expect("is a number")).collect();
+        // The angle about the vertical.
+        [cells[1..5].to_vec(), cells[5..9].to_vec()].map(|of| 2.0 * of[3].atan2(of[0]).to_degrees())
+    };
+    let ([plain, truth], [declined, same]) =
+        (turned("plain.csv", &[]), turned("declined.csv", &["--declination", "4"]));
+    assert!(
+        (truth - same).abs() < 1e-9 && (plain - 4.0 - declined).abs() < 1e-9,
+        "{plain} {declined} {truth} {same}"
+    );
 
     let (bag, _) = export("attitude_export.mcap", "mekf");
     let info = bb(&["info", bag.to_str().expect("is text")]);
@@ -389,6 +429,9 @@ fn a_wrong_use_has_exit_code_2_and_a_way_out() {
         (&["--export", "walk.txt"], "write to a file that ends in .csv or .mcap"),
         (&["--declination", "east"], "write degrees in -180..=180, or auto"),
         (&["--declination", "4", "--origin", "48,11,500"], "--origin changes nothing without --declination auto"),
+        (&["--axes", "6", "--declination", "4"], "--declination changes nothing with --axes 6"),
+        (&["--axes", "6", "--mag-topic", "/mag"], "--mag-topic changes nothing with --axes 6"),
+        (&["--every", "1"], "write a whole number, at least 2"),
         (&["--jsom"], "--json"),
     ] {
         let output = eval(&[&file], arguments);

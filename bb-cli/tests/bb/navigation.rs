@@ -143,6 +143,13 @@ fn outages_gaps_delays_and_noise_are_options() {
         "{}",
         output.err
     );
+    for (arguments, fault) in [
+        (["--every", "0"], "write a whole number, at least 2"),
+        (["--noise-times", "1"], "write a factor from 1e-6 to 1e6 other than 1"),
+    ] {
+        let output = bb(&[&["eval", "navigation", prefix], &arguments[..]].concat());
+        assert!(output.code == Some(2) && output.err.contains(fault), "{}", output.err);
+    }
     let output = bb(&["eval", "navigation", prefix, "--delay", "gps=1s"]);
     assert!(output.code == Some(2) && output.err.contains("did you mean `gnss`?"), "{}", output.err);
 }

@@ -56,12 +56,14 @@ impl Player {
             self.run(samples);
             if keep_trace && let Some((sample, Some(estimate))) = samples.last().zip(self.estimates.last().copied())
             {
+                let turn = recording.true_from_magnetic;
+                let axes = turn.to_rotation_matrix().into_inner();
                 self.kept.push(Estimate {
                     time_ns: sample.time_ns,
                     time_s: seconds(sample.time_ns, start_ns),
-                    world_from_body: estimate,
-                    covariance: self.deviations().map(|deviations| deviations.covariance),
-                    truth: recording.truth.at(sample.time_ns).0,
+                    world_from_body: turn * estimate,
+                    covariance: self.deviations().map(|of| axes * of.covariance * axes.transpose()),
+                    truth: recording.truth.at(sample.time_ns).0.map(|truth| turn * truth),
                 });
             }
         }
