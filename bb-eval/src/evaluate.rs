@@ -9,6 +9,8 @@ pub use detail::Detail;
 
 use crate::disturb::Disturbances;
 use crate::filters::{Axes, Chosen, Without};
+use crate::motion::Sample;
+use crate::motion::latency::Oddity;
 use crate::progress::Progress;
 use crate::recording::{End, Recording, Topics};
 use crate::score::Score;
@@ -17,7 +19,7 @@ use crate::units::Units;
 use crate::variants::{Variant, Variants, moving_times};
 use bb_core::nalgebra::{Matrix3, UnitQuaternion};
 use bb_estimators::attitude::ImuSample;
-use doubts::{take_units, truth_doubt};
+use doubts::{take_units, truth_doubt, turn_doubt};
 use player::{Player, seconds};
 use rejoined::Rejoined;
 use std::path::{Path, PathBuf};
@@ -30,6 +32,9 @@ const BLOCK: usize = 1024;
 
 /// Number of samples after which headings are checked against two sigma, and truths for other conventions.
 pub(crate) const CHECK_INTERVAL: usize = 64;
+
+/// Samples whose turns are compared with those of the truth; what comes later is not looked at.
+const MOST_SAMPLES: usize = 200_000;
 
 /// The length of the progress bar for one recording.
 const BAR: u64 = 1000;
@@ -115,7 +120,7 @@ pub struct Run {
     pub outage: Score,
 }
 
-/// An estimate beside the truth.
+/// An estimate beside the truth, both in a world of true north.
 #[derive(Clone, Copy, Debug)]
 pub struct Estimate {
     /// Stamp of the sample, ns since the Unix epoch.
@@ -198,6 +203,8 @@ struct Playback<'a> {
     variant: Variant,
     rejoined: Option<Rejoined<'a>>,
     units: Units,
+    /// Samples as they were recorded.
+    samples: Vec<Sample>,
     players: Vec<Player>,
     /// The filters of [`Evaluator::without`].
     others: Vec<Player>,
@@ -239,6 +246,7 @@ impl<'a> Playback<'a> {
             variant,
             rejoined: None,
             units: Units::default(),
+            samples: Vec::new(),
             players,
             proven: vec![false; others.len()],
             others,
@@ -257,6 +265,10 @@ impl<'a> Playback<'a> {
             samples.clear();
             let end = self.recording.read(&mut samples, BLOCK)?;
             take_units(&mut self.units, &samples);
+            let room = MOST_SAMPLES.saturating_sub(self.samples.len());
+            let taken = samples.iter().take(room);
+            self.samples
+                .extend(taken.map(|sample| (sample.time_ns, sample.angular_velocity, sample.specific_force)));
             self.variant.apply(&mut samples, &self.recording.truth);
             if let Some(first) = samples.first() {
                 let start_ns = *start_ns.get_or_insert(first.time_ns);
@@ -330,10 +342,13 @@ impl<'a> Playback<'a> {
         if index == 0 {
             let magnetometer = recording.magnetometer_topic.as_deref();
             let doubts = self.units.of_topics(&recording.imu_topic, magnetometer);
+            let turns = turn_doubt(recording, &self.samples);
             // If filters were disturbed on purpose, their errors say nothing about the truth.
             let is_disturbed = evaluator.variants.changes_field() || !evaluator.disturbances.is_none();
-            let is_misled = !doubts.is_empty() || is_disturbed;
+            let is_scaled = matches!(turns, Some((Oddity::Scaled(_), _)));
+            let is_misled = !doubts.is_empty() || is_scaled || is_disturbed;
             notes.extend(doubts);
+            notes.extend(turns.map(|(_, said)| said));
             notes.extend(truth_doubt(recording, players, evaluator.align).filter(|_| !is_misled));
         }
         notes.extend(players.iter().filter_map(|player| player.refusals(self.played)));

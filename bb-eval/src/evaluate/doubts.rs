@@ -1,6 +1,8 @@
 //! Signs that a recording is wrong, so that the errors are not those of the filters.
 
 use super::Player;
+use crate::motion::latency::{self, Oddity};
+use crate::motion::{Motion, Sample};
 use crate::recording::Recording;
 use crate::truths::doubt;
 use crate::turns::{Align, cause};
@@ -19,6 +21,20 @@ pub(super) fn take_units(units: &mut Units, samples: &[ImuSample]) {
             units.take_field(field);
         }
     }
+}
+
+/// Stamps of the truth, or a unit of the gyroscope, that the turns of both contradict; in words too.
+pub(super) fn turn_doubt(recording: &Recording, samples: &[Sample]) -> Option<(Oddity, String)> {
+    let zero_ns = samples.first()?.0;
+    let truth = samples
+        .iter()
+        .filter_map(|(time_ns, ..)| Some(((time_ns - zero_ns) as f64 * 1e-9, recording.truth.at(*time_ns).0?)));
+    let found = latency::of_orientations(&truth.collect::<Vec<_>>(), &Motion::new(samples, zero_ns))?;
+    let said = match found {
+        Oddity::Late(latency_s) => latency::remark(latency_s, &recording.imu_topic, "the turns"),
+        Oddity::Scaled(times) => latency::scaled(times, &recording.imu_topic),
+    };
+    Some((found, format!("{}: {said}", recording.truth_topic.as_deref().unwrap_or_default())))
 }
 
 /// Explains why no filter agrees with the truth, see [`doubt`].

@@ -30,27 +30,28 @@ type Sample = (f64, Vector3<f64>, Vector3<f64>);
 pub(super) fn verdict(samples: &[Sample], calm: Option<f64>) -> Option<String> {
     let gravity = calm.filter(|calm| GRAVITIES.iter().any(|known| (calm / known - 1.0).abs() < WITHIN));
     let is_steady = |span: &&[Sample]| gravity.is_some_and(|gravity| is_steady(span, gravity));
-    let mut errors: Vec<(f64, f64)> = spans(samples)
-        .filter(is_steady)
-        .map(|span| (error(span, 1.0), error(span, std::f64::consts::PI / 180.0)))
+    let steady: Vec<&[Sample]> = spans(samples).filter(is_steady).collect();
+    let degree = std::f64::consts::PI / 180.0;
+    for (scale, looks) in [(degree, "in deg/s"), (1.0 / degree, "converted from deg/s to rad/s twice")] {
+        let errors = steady.iter().map(|span| [error(span, 1.0), error(span, scale)]);
         // Spans at rest are uninformative: both units give no turn.
-        .filter(|(as_radians, as_degrees)| as_radians.max(*as_degrees) > WRONG)
-        .collect();
-    if errors.len() >= FEWEST {
-        let mut median = |of: fn(&(f64, f64)) -> f64| {
-            errors.sort_by(|a, b| of(a).total_cmp(&of(b)));
-            of(&errors[errors.len() / 2])
-        };
-        let (as_radians, as_degrees) = (median(|error| error.0), median(|error| error.1));
-        if as_radians > WRONG && as_radians > CLEARER * as_degrees {
+        let mut errors: Vec<_> = errors.filter(|[as_read, otherwise]| as_read.max(*otherwise) > WRONG).collect();
+        if errors.len() < FEWEST {
+            continue;
+        }
+        let [as_read, otherwise] = [0, 1].map(|unit| {
+            errors.sort_by(|a, b| a[unit].total_cmp(&b[unit]));
+            errors[errors.len() / 2][unit]
+        });
+        if as_read > WRONG && as_read > CLEARER * otherwise {
             return Some(format!(
-                "the angular velocity looks to be in deg/s: where the body does not accelerate, gravity turns over a \
+                "the angular velocity looks to be {looks}: where the body does not accelerate, gravity turns over a \
                  second as it says within {:.1} deg, and read as rad/s within {:.1} deg; ROS has rad/s",
-                as_degrees.to_degrees(),
-                as_radians.to_degrees()
+                otherwise.to_degrees(),
+                as_read.to_degrees()
             ));
         }
-        if as_degrees > CLEARER * as_radians {
+        if scale < 1.0 && otherwise > CLEARER * as_read {
             return None;
         }
     }
@@ -152,6 +153,8 @@ mod tests {
         // Slowly too: 6 deg/s.
         assert!(verdict(&walk(57.3, 0.1)).expect("it is wrong").contains("in deg/s"));
         assert_eq!(verdict(&walk(1.0, 0.1)), None);
+        let said = verdict(&walk(1.0 / 57.3, 1.0)).expect("it is wrong");
+        assert!(said.contains("converted from deg/s to rad/s twice"), "{said}");
     }
 
     #[test]

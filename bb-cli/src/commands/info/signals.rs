@@ -5,6 +5,7 @@ use super::remark::{Remark, Subject};
 use bb_core::nalgebra::{UnitQuaternion, Vector3};
 use bb_core::payload::{GnssFix, Imu, MagneticField, Odometry, Pose};
 use bb_estimators::navigation::Geodetic;
+use bb_eval::motion::latency::Oddity;
 use bb_eval::motion::scatter::{Oddities, oddities, position, track};
 use bb_eval::motion::{Motion, Sample, latency};
 use bb_mcap::{BagMessage, IMU, MAGNETIC_FIELD, ODOMETRY, POSE, RecordingError};
@@ -111,6 +112,9 @@ pub(super) fn remarks(signal: &Signal, reference: Option<&Reference<'_>>, start_
         let imu = reference.map_or("", |reference| reference.imu);
         Remark::new(Subject::Latency, latency::remark(latency_s, imu, what))
     };
+    let scaled = |times: f64| {
+        Remark::new(Subject::Unit, latency::scaled(times, reference.map_or("", |reference| reference.imu)))
+    };
     let mut remarks = Vec::new();
     match signal {
         Signal::None | Signal::Imu(_) => {}
@@ -119,13 +123,19 @@ pub(super) fn remarks(signal: &Signal, reference: Option<&Reference<'_>>, start_
             let found = offset::offset(&fields);
             remarks.extend(found.map(|(at, norm)| Remark::new(Subject::Calibration, offset::remark(&at, norm))));
             let at = found.map_or(Vector3::zeros(), |(at, _)| at);
-            let latency = reference.and_then(|reference| latency::of_field(&fields, &at, &reference.motion));
-            remarks.extend(latency.map(|latency_s| late(latency_s, "the turns")));
+            let found = reference.and_then(|reference| latency::of_field(&fields, &at, &reference.motion));
+            remarks.extend(found.map(|found| match found {
+                Oddity::Late(latency_s) => late(latency_s, "the turns"),
+                Oddity::Scaled(times) => scaled(times),
+            }));
         }
         Signal::Orientations(poses) => {
-            let poses: Vec<_> = poses.iter().map(|(time_ns, turned)| (seconds(*time_ns), *turned)).collect();
-            let latency = reference.and_then(|reference| latency::of_orientations(&poses, &reference.motion));
-            remarks.extend(latency.map(|latency_s| late(latency_s, "the turns")));
+            let turned: Vec<_> = poses.iter().map(|(time_ns, turned)| (seconds(*time_ns), *turned)).collect();
+            let found = reference.and_then(|reference| latency::of_orientations(&turned, &reference.motion));
+            remarks.extend(found.map(|found| match found {
+                Oddity::Late(latency_s) => late(latency_s, "the turns"),
+                Oddity::Scaled(times) => scaled(times),
+            }));
         }
         Signal::Fixes(fixes) => {
             let track = track(fixes, zero_ns);
