@@ -1,7 +1,7 @@
 //! `bb info`, `echo`, `hz`, `plot` and `recover`, on small recordings made here.
 
 use crate::common::bags::ros::{
-    Header, Imu, MagneticField, NavSatFix, Pose, PoseStamped, Quaternion, Stamp, Vector3,
+    Header, Imu, MagneticField, NavSatFix, Odometry, Pose, PoseStamped, Quaternion, Stamp, Vector3,
 };
 use crate::common::bags::{Maker, little};
 use crate::common::{bb, file};
@@ -117,6 +117,10 @@ fn units_that_look_wrong_are_named() {
         ),
         "{said}"
     );
+    let said = unit(Walk { gyroscope: 1.0 / 57.29578, ..Walk::default() }, "info_twice.mcap");
+    let lead =
+        "unit: the angular velocity looks to be converted from deg/s to rad/s twice: where the body does not";
+    assert!(said.starts_with(lead), "{said}");
     let said = unit(Walk { field: 0.48, ..Walk::default() }, "info_gauss.mcap");
     assert_eq!(said, "unit: the magnetic field has a median of 0.480: it looks to be in gauss; ROS has T");
     let said = unit(Walk { field: 48.0, ..Walk::default() }, "info_ut.mcap");
@@ -147,10 +151,18 @@ struct Turns {
     offset: f64,
     /// Jitter of the IMU's stamps, half milliseconds.
     jitter: u64,
+    /// The gyroscope's unit, rad/s.
+    unit: f64,
+    /// Steps of an odometry that its pose is ahead of its twist, and one without a number.
+    ahead: Option<(u64, u64)>,
 }
 
 impl Turns {
     fn remarks(self, name: &str) -> Vec<String> {
+        remarks_of(&self.file(name))
+    }
+
+    fn file(self, name: &str) -> PathBuf {
         let mut maker = Maker::new(WriteOptions::new().chunk_size(Some(50_000)));
         let topics = [
             ("/imu", IMU),
@@ -159,6 +171,7 @@ impl Turns {
             ("/fix", "sensor_msgs/msg/NavSatFix"),
         ]
         .map(|(topic, schema)| maker.topic(topic, schema));
+        let wheels = self.ahead.map(|_| maker.topic("/wheels", "nav_msgs/msg/Odometry"));
         let header = |time_ns: u64, frame: &str| {
             let stamp = Stamp { sec: (time_ns / 1_000_000_000) as i32, nanosec: (time_ns % 1_000_000_000) as u32 };
             Header { stamp, frame_id: frame.into() }
@@ -179,7 +192,7 @@ impl Turns {
             let force = nalgebra::Vector3::new(-6.0 * 0.64 * (0.8 * time).sin(), 0.0, 9.81);
             let sample = Imu {
                 header: header(log + index * 7 % 11 * self.jitter * 500_000, "imu_link"),
-                angular_velocity: vector(rate),
+                angular_velocity: vector(rate / self.unit),
                 linear_acceleration: vector(rotation.inverse() * force),
                 ..Imu::default()
             };
@@ -194,6 +207,14 @@ impl Turns {
                 let pose = Pose { orientation, ..Pose::default() };
                 let stamped = header(late(self.late_s[1]), "world");
                 maker.bytes_at(topics[2], log, &little(&PoseStamped { header: stamped, pose }));
+            }
+            if let (Some(wheels), Some((ahead, lost)), 0) = (wheels, self.ahead, index % 5) {
+                let turned = turned(time + ahead as f64 * 0.05);
+                let mut odometry = Odometry { header: header(log, "odom"), ..Odometry::default() };
+                odometry.pose.pose.orientation = Quaternion { x: turned.i, y: turned.j, z: turned.k, w: turned.w };
+                odometry.twist.twist.angular = vector(rate);
+                odometry.twist.twist.linear.x = if index == lost { f64::NAN } else { 0.0 };
+                maker.bytes_at(wheels, log, &little(&odometry));
             }
             if index % 20 == 0 {
                 let deviation = if index < 3000 { 0.01 } else { self.scatter };
@@ -214,14 +235,14 @@ impl Turns {
                 maker.bytes_at(topics[3], log, &little(&fix));
             }
         }
-        remarks_of(&file(name, &maker.finish()))
+        file(name, &maker.finish())
     }
 }
 
 /// Faults between sensors are reported, each by itself.
 #[test]
 fn latencies_scatter_offsets_and_jitter_are_reported() {
-    let good = Turns { late_s: [0.0; 3], scatter: 0.01, offset: 0.0, jitter: 0 };
+    let good = Turns { late_s: [0.0; 3], scatter: 0.01, offset: 0.0, jitter: 0, unit: 1.0, ahead: None };
     assert_eq!(good.remarks("info_turns.mcap"), [""; 0]);
     let late = |late_s| Turns { late_s, ..good }.remarks("info_late.mcap");
     let said = |ms: u32, order: &str, what: &str| {
@@ -242,6 +263,34 @@ fn latencies_scatter_offsets_and_jitter_are_reported() {
             "calibration: the magnetometer is not calibrated: its readings lie on a sphere of 45 µT about (30, 30, 30) µT"
         ]
     );
+    // To filters too the truth is late, and the gyroscope too small; its motion has no rest that shows gravity.
+    let doubts = |file: &Path| {
+        let output = bb(&["eval", "attitude", file.to_str().expect("is text"), "--filter", "mekf"]);
+        output
+            .err
+            .lines()
+            .filter(|line| !line.contains("refused"))
+            .map(str::to_owned)
+            .collect::<Vec<_>>()
+            .join("\n")
+    };
+    let late = doubts(&Turns { late_s: [0.0, 0.06, 0.0], ..good }.file("eval_late.mcap"));
+    assert!(
+        late.ends_with(
+            "/truth: its stamps are 60 ms after those of /imu for the same motion, as the turns of both show"
+        ),
+        "{late}"
+    );
+    let small = Turns { unit: 57.29578, ..good };
+    let said = "it turns 57.296 times as much as /imu says, whose angular velocity looks to be converted from deg/s to rad/s twice; ROS has rad/s";
+    let remarks = small.remarks("info_small.mcap");
+    for topic in ["/mag", "/truth"] {
+        assert!(remarks.iter().any(|remark| *remark == format!("unit: {said}")), "{topic}: {remarks:?}");
+    }
+    assert!(doubts(&small.file("eval_small.mcap")).contains(&format!("/truth: {said}")));
+    // A pose that holds the step after its stamp, and a velocity that does not; and one message without a number.
+    let wheels = Turns { ahead: Some((1, 500)), ..good }.remarks("info_wheels.mcap");
+    assert_eq!(wheels, ["values: 1 message holds NaN or infinity"]);
     let jitter = Turns { jitter: 1, ..good }.remarks("info_jitter.mcap");
     assert!(jitter[0].starts_with("clock: the stamps jitter: of the periods of "), "{jitter:?}");
 }

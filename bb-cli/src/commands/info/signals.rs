@@ -24,7 +24,8 @@ pub(super) enum Signal {
     Field(Vec<(i64, Vector3<f64>)>),
     /// Positions with the sum of their variances.
     Fixes(Vec<(i64, Geodetic, Option<f64>)>),
-    Orientations(Vec<(i64, UnitQuaternion<f64>)>),
+    /// Orientations with the angular velocity that an odometry says beside.
+    Orientations(Vec<(i64, UnitQuaternion<f64>, Vector3<f64>)>),
 }
 
 impl Signal {
@@ -65,15 +66,16 @@ impl Signal {
                 all.extend(position(&fix).map(|(position, variance)| (time.as_unix_nanos(), position, variance)));
             }
             Self::Orientations(all) => {
-                let (pose, time) = match &*message.schema {
-                    POSE => message.payload::<Pose>()?,
-                    _ => message.payload::<Odometry>().map(|(odometry, time)| (odometry.pose, time))?,
+                let (pose, rate, time) = match &*message.schema {
+                    POSE => message.payload::<Pose>().map(|(pose, time)| (pose, Vector3::zeros(), time))?,
+                    _ => message
+                        .payload::<Odometry>()
+                        .map(|(odometry, time)| (odometry.pose, odometry.twist.angular, time))?,
                 };
                 let turned = pose.world_from_body;
                 let is_rotation = (turned.norm() - 1.0).abs() < 0.1;
-                all.extend(
-                    is_rotation.then(|| (time.as_unix_nanos(), UnitQuaternion::new_normalize(turned.into_inner()))),
-                );
+                let turned = || UnitQuaternion::new_normalize(turned.into_inner());
+                all.extend(is_rotation.then(|| (time.as_unix_nanos(), turned(), rate)));
             }
         }
         Ok(())
@@ -130,11 +132,22 @@ pub(super) fn remarks(signal: &Signal, reference: Option<&Reference<'_>>, start_
             }));
         }
         Signal::Orientations(poses) => {
-            let turned: Vec<_> = poses.iter().map(|(time_ns, turned)| (seconds(*time_ns), *turned)).collect();
+            let mut turned: Vec<_> =
+                poses.iter().map(|(time_ns, turned, _)| (seconds(*time_ns), *turned)).collect();
+            // Filters take the velocities of an odometry, and its pose may hold the step after its stamp.
+            let has_rates = poses.iter().any(|(_, _, rate)| *rate != Vector3::zeros());
+            if has_rates {
+                let rates: Vec<_> =
+                    poses.iter().map(|(time_ns, _, rate)| (*time_ns, *rate, Vector3::zeros())).collect();
+                let motion = Motion::new(&rates, zero_ns);
+                turned = turned.iter().filter_map(|(time_s, _)| Some((*time_s, motion.turned(*time_s)?))).collect();
+            }
             let found = reference.and_then(|reference| latency::of_orientations(&turned, &reference.motion));
-            remarks.extend(found.map(|found| match found {
-                Oddity::Late(latency_s) => late(latency_s, "the turns"),
-                Oddity::Scaled(times) => scaled(times),
+            remarks.extend(found.and_then(|found| match found {
+                Oddity::Late(latency_s) => Some(late(latency_s, "the turns")),
+                // A twist may be in another unit itself.
+                Oddity::Scaled(_) if has_rates => None,
+                Oddity::Scaled(times) => Some(scaled(times)),
             }));
         }
         Signal::Fixes(fixes) => {
