@@ -4,6 +4,7 @@ mod imu;
 mod message;
 mod messages;
 mod samples;
+mod sensor;
 #[cfg(feature = "sqlite")]
 mod sqlite;
 mod summary;
@@ -13,6 +14,7 @@ pub use imu::{BagImu, BagImuOptions};
 pub use message::BagMessage;
 pub use messages::BagMessages;
 pub use samples::{IMU, MAGNETIC_FIELD, MargSamples};
+pub use sensor::{BagSensor, BagSensorOptions};
 pub use truth::{Bool, MOVING, ODOMETRY, POSE, Truth};
 
 use crate::definition::MessageDefinition;

@@ -6,7 +6,8 @@
 //! | read it back, bit for bit | [`Recording`] |
 //! | read ROS messages from any bag, including those of a [`Recorder`] | [`Bag`] |
 //! | play back what was recorded in the place of a sensor or an estimator | [`PlayedSensor`], [`PlayedEstimator`] |
-//! | play back a recorded IMU as the sensor of a robot, or read its samples | [`BagImu`], [`MargSamples`] |
+//! | play back any topic of a bag as the sensor of a robot | [`BagSensor`] |
+//! | play back a recorded IMU with its magnetometer, or read its samples | [`BagImu`], [`MargSamples`] |
 //! | read messages of any type, by the definition in the file | [`MessageDefinition`], [`Value`] |
 //! | write payloads as ROS messages | [`BagWriter`] |
 //! | messages of ROS 1 as those of ROS 2 | [`Ros1Definition`] |
@@ -83,8 +84,8 @@ mod recover;
 mod writer;
 
 pub use bag::{
-    Bag, BagImu, BagImuOptions, BagMessage, BagMessages, Bool, IMU, MAGNETIC_FIELD, MOVING, MargSamples, ODOMETRY,
-    POSE, Topic, Truth,
+    Bag, BagImu, BagImuOptions, BagMessage, BagMessages, BagSensor, BagSensorOptions, Bool, IMU, MAGNETIC_FIELD,
+    MOVING, MargSamples, ODOMETRY, POSE, Topic, Truth,
 };
 pub use definition::{MessageDefinition, Ros1Definition, Value};
 pub use error::{RecordingError, RecordingErrorKind};

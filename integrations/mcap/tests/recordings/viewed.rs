@@ -7,7 +7,7 @@ use bb_core::prelude::*;
 use bb_core::pubsub::{AnyTopic, Topic};
 use bb_core::{DynamicSubscription, Frame};
 use bb_estimators::{Madgwick, SimulatedImu};
-use bb_mcap::{Bag, BagImu, MargSamples, Recorder, RecorderOptions, Recording, RecordingErrorKind};
+use bb_mcap::{Bag, BagImu, BagSensor, MargSamples, Recorder, RecorderOptions, Recording, RecordingErrorKind};
 
 robot! {
     robot Walker;
@@ -91,6 +91,30 @@ fn a_recording_is_played_as_a_sensor() {
     while simulation.step() {}
     simulation.stop().ok().expect("it is whole");
     assert!(played.drain().map(|message| message.payload).eq(published.iter().map(|message| message.payload)));
+}
+
+robot! {
+    robot Parts;
+    link body {
+        sensor imu: BagSensor<Imu>(topic = "sensor/base/imu");
+        sensor magnetometer: BagSensor<MagneticField>();
+    }
+}
+
+#[test]
+fn topics_are_played_as_sensors() {
+    let (file, published) = recorded("parts");
+    let mut builder = Parts::builder();
+    builder.options(parts::sensor::body::imu).file = file.to_path_buf();
+    builder.options(parts::sensor::body::magnetometer).file = file.to_path_buf();
+    let (imu, field) =
+        (builder.subscribe(parts::sensor::body::imu), builder.subscribe(parts::sensor::body::magnetometer));
+    let mut simulation = builder.simulate().expect("it starts");
+    simulation.run_to_end();
+    simulation.stop().ok().expect("it is whole");
+    assert!(imu.drain().map(|message| message.payload).eq(published.iter().map(|message| message.imu)));
+    let fields: Vec<_> = published.iter().filter_map(|message| message.magnetic_field).collect();
+    assert!(!fields.is_empty() && field.drain().map(|message| message.payload).eq(fields));
 }
 
 /// The transforms of a topic by child, each with its parents.
