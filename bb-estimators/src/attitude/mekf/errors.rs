@@ -220,7 +220,11 @@ impl<T: Real> Errors<T> {
 
 /// Subtracts a correction from row `ROW` of a covariance; a constant, so that the loops are unrolled.
 #[inline(always)]
-fn subtract_row<const ROW: usize, T: Real>(covariance: &mut [[T; WIDTH]; STATES], gain: &Shared<T>, shared: &Shared<T>) {
+fn subtract_row<const ROW: usize, T: Real>(
+    covariance: &mut [[T; WIDTH]; STATES],
+    gain: &Shared<T>,
+    shared: &Shared<T>,
+) {
     for column in ROW..WIDTH {
         covariance[ROW][column] -= gain[ROW] * shared[column];
     }
