@@ -39,10 +39,10 @@ pub struct Turn {
 }
 
 impl Turn {
-    /// Returns whether it is more about the vertical than its spread may be.
-    pub(crate) fn is_turned(&self) -> bool {
+    /// Returns whether it is more about the vertical than `least` degrees, and than its spread may be.
+    pub(crate) fn is_turned(&self, least: f64) -> bool {
         let angle = heading(&self.rotation).abs();
-        angle.to_degrees() > TURNED && self.spread * LEFT < angle
+        angle.to_degrees() > least && self.spread * LEFT < angle
     }
 
     /// Says that the truth's world is turned by it about the vertical, and what to do.
@@ -127,25 +127,27 @@ pub(crate) const LEFT: f64 = 3.0;
 /// Error of an orientation, degrees, above which any constant rotation is sought.
 const LARGE: f64 = 15.0;
 
-/// Angle about the vertical, degrees, above which a constant one counts as a turn of the world.
-const TURNED: f64 = 2.0;
+/// Angles about the vertical, degrees, above which a constant one counts as a turn of the world: where the motion shows the heading, and where
+/// a compass alone does, which may be off by as much.
+pub(crate) const TURNED: f64 = 2.0;
+pub(crate) const TURNED_BY_COMPASS: f64 = 5.0;
 
 /// Returns the constant rotation that explains the error of the orientation: a turn about the vertical of several times its spread, or
-/// any that leaves less than a third of a large error. `is_world` says whether what else is known of the world allows that it is
+/// any that leaves less than a third of a large error. `imu` is its name and place, `least` the angle of a turn in degrees. `is_world` says whether what else is known of the world allows that it is
 /// turned.
 pub(crate) fn cause(
     rms: f64,
     of_body: &Turns,
     of_world: &Turns,
-    base_from_imu: &Isometry3<f64>,
-    imu: &str,
+    (imu, base_from_imu): (&str, &Isometry3<f64>),
     align: Align,
+    least: f64,
     is_world: impl Fn(&UnitQuaternion<f64>) -> bool,
 ) -> Option<String> {
     let explains = |turn: &Turn| rms.to_degrees() > LARGE && turn.spread * LEFT < rms;
     let body = of_body.mean().filter(explains);
     let world = of_world.mean();
-    let upright = of_world.heading().filter(Turn::is_turned).zip(world).filter(|(upright, world)| {
+    let upright = of_world.heading().filter(|turn| turn.is_turned(least)).zip(world).filter(|(upright, world)| {
         world.rotation.angle_to(&upright.rotation) < world.spread.max(0.1)
             && body.is_none_or(|body| world.spread <= body.spread)
     });
@@ -167,7 +169,7 @@ pub(crate) fn cause(
         };
         let whole = body.rotation * base_from_imu.rotation;
         let (square, rest) = near_square(&whole);
-        let least = body.spread.max(TURNED.to_radians());
+        let least = body.spread.max(least.to_radians());
         let is_upright = rest.axis().is_some_and(|axis| axis.z.abs() > 0.95) && rest.angle() > least;
         let split = (align == Align::None && is_upright && is_world(&rest)).then(|| {
             format!(
@@ -218,7 +220,7 @@ mod tests {
             of_world.add(&(estimate * truth.inverse()));
         }
         let said = |allows: bool| {
-            cause(2.6, &of_body, &of_world, &Isometry3::identity(), "imu", Align::None, |_| allows)
+            cause(2.6, &of_body, &of_world, ("imu", &Isometry3::identity()), Align::None, TURNED, |_| allows)
                 .expect("it is large")
         };
         assert!(said(true).contains("--align heading"), "{}", said(true));
@@ -241,7 +243,7 @@ mod tests {
             of_world.add(&(estimate * truth.inverse()));
         }
         let rms = (world + mount).to_radians().abs();
-        cause(rms, &of_body, &of_world, &Isometry3::identity(), "imu", Align::None, |_| true)
+        cause(rms, &of_body, &of_world, ("imu", &Isometry3::identity()), Align::None, TURNED, |_| true)
     }
 
     #[test]

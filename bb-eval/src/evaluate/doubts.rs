@@ -5,7 +5,7 @@ use crate::motion::latency::{self, Oddity};
 use crate::motion::{Motion, Sample};
 use crate::recording::Recording;
 use crate::truths::doubt;
-use crate::turns::{Align, cause};
+use crate::turns::{Align, TURNED_BY_COMPASS, cause};
 use crate::units::Units;
 use bb_core::nalgebra::Isometry3;
 use bb_estimators::attitude::ImuSample;
@@ -42,6 +42,7 @@ pub(super) fn truth_doubt(recording: &Recording, players: &[Player], align: Alig
     let filters: Vec<_> = players.iter().map(|player| (player.name, &player.compared)).collect();
     let base_from_imu = Isometry3::from_parts(Default::default(), recording.base_from_imu());
     doubt(recording.axes, &filters, recording.truth_topic.as_deref().unwrap_or_default(), |rms, of| {
-        cause(rms, &of.of_body, &of.of_world, &base_from_imu, &recording.imu_name, align, |_| true)
+        let imu = (&*recording.imu_name, &base_from_imu);
+        cause(rms, &of.of_body, &of.of_world, imu, align, TURNED_BY_COMPASS, |_| true)
     })
 }

@@ -11,7 +11,7 @@ use super::trace::{Innovation, Row, State, Trace};
 use crate::filters::Axes;
 use crate::periods::{Gap, Periods};
 use crate::truths::{Compared, doubt};
-use crate::turns::{Align, LEFT, Turn, Turns, angles, cause};
+use crate::turns::{Align, LEFT, TURNED, Turn, Turns, angles, cause};
 use bb_core::nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3};
 use bb_estimators::navigation::{Geodetic, GnssPosition, LocalFrame};
 
@@ -272,14 +272,14 @@ impl<'a> Scoring<'a> {
         let topic = self.truth.topic.as_deref().unwrap_or_default();
         doubt(Axes::Nine, &[(filter, &compared)], topic, |rms, of| {
             let is_world = |turn: &UnitQuaternion<f64>| !self.contradicts(instants, turn);
-            cause(rms, &of.of_body, &of.of_world, &base_from_imu, imu, align, is_world)
+            cause(rms, &of.of_body, &of.of_world, (imu, &base_from_imu), align, TURNED, is_world)
         })
         .or_else(|| {
             // An unknown heading at the start hides a turn that the track shows.
             let (turn, _) = turn_of(instants, Align::Heading).filter(|_| align == Align::None)?;
             let of_orientations = turn_of_orientations(instants).heading();
             let agrees = |of: Turn| turn.rotation.angle_to(&of.rotation) <= of.spread;
-            (turn.is_turned() && of_orientations.is_none_or(agrees)).then(|| turn.of_world())
+            (turn.is_turned(TURNED) && of_orientations.is_none_or(agrees)).then(|| turn.of_world())
         })
     }
 
