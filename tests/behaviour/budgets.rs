@@ -1,6 +1,7 @@
 //! Latency budgets in real time: what they charge an estimator with, and what is measured without one.
 
-use crate::components::{Failure, Number, Scale, at};
+use crate::components::{Failure, Number, at};
+use crate::plain::{NUMBER, Plain};
 use bb_core::prelude::*;
 
 /// Time that a copy for a subscriber takes.
@@ -80,19 +81,14 @@ fn copies_and_drops_of_messages_are_charged_to_no_estimator() -> Result<(), Fail
     Ok(())
 }
 
-robot! {
-    robot Sampled;
-    link base { sensor number: External<Number>() { estimator scale: Scale(); } }
-}
-
 #[test]
 fn without_a_budget_one_of_64_callbacks_is_measured() -> Result<(), Failure> {
-    let mut simulation = Sampled::builder().simulate()?;
+    let mut simulation = Plain::builder().simulate()?;
     for number in 1..=640 {
-        simulation.publish(sampled::sensor::base::number, at(number), Number(1.0));
+        simulation.publish(NUMBER, at(number), Number(1.0));
     }
     let report = simulation.stop();
-    let scale = report.estimator("sensor/base/number/scale").ok_or("it is declared")?;
-    assert_eq!((scale.emitted, scale.latency.count), (640, 10));
+    let echo = report.estimator("sensor/base/number/echo").ok_or("it is declared")?;
+    assert_eq!((echo.emitted, echo.latency.count), (640, 10));
     Ok(())
 }

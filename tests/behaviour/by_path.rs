@@ -1,7 +1,8 @@
 //! A robot as tools see it: by path, with arguments as JSON; and what they are told of it.
 
-use crate::components::{Counter, Echo, Failure, Number, Read, Replied, Source, at, lock, within};
+use crate::components::{Counter, Echo, Failure, Number, Read, Replied, at, lock, within};
 use crate::gate::Gate;
+use crate::plain::{Plain, SOURCE};
 use bb_core::prelude::*;
 use bb_core::telemetry::TelemetryEvent;
 use std::sync::{Arc, Mutex};
@@ -59,17 +60,17 @@ fn slow(_: u32, _: MonotonicTime) -> Read {
     Ok(Reading::now(Number(1.0)))
 }
 
-robot! {
-    robot Tardy;
-    link base { sensor slow: Source(read = slow) { rate: 100 Hz; } sensor beside: Counter(count = 3) { rate: 1 Hz; } }
-}
-
 #[test]
 fn readings_that_a_sensor_skips_are_counted() {
     within(60, || {
         HERE.close("a reading");
-        let builder = Tardy::builder();
-        let slow = builder.subscribe(tardy::sensor::base::slow);
+        let tardy = || {
+            let mut builder = Plain::builder();
+            builder.options(SOURCE).read = slow;
+            builder
+        };
+        let builder = tardy();
+        let slow = builder.subscribe(SOURCE);
         let running = builder.start().expect("it starts");
         HERE.wait_for(1);
         // It lasts at least so long, during which it should have been read ten times.
@@ -80,10 +81,10 @@ fn readings_that_a_sensor_skips_are_counted() {
         }
         let report = running.stop();
         let of = |path: &str| report.sources.iter().find(|source| source.path == path).expect("it is declared");
-        let slow = of("sensor/base/slow");
+        let slow = of("sensor/base/source");
         assert!(slow.skipped >= 8 && slow.readings >= 3, "{slow:?}");
-        assert!(report.to_string().contains("sensor/base/slow: "), "{report}");
-        let mut simulation = Tardy::builder().simulate().expect("it starts");
+        assert!(report.to_string().contains("sensor/base/source: "), "{report}");
+        let mut simulation = tardy().simulate().expect("it starts");
         simulation.run_until(at(1000));
         assert!(simulation.report().sources.iter().all(|source| source.skipped == 0), "virtual time misses none");
     });

@@ -1,9 +1,9 @@
 //! Commands that misbehave: that never sleep, that block, that start others while they start.
 
-use crate::components::{Number, at, within};
+use crate::components::{Doing, Number, Task, at, lock, within};
+use crate::gate::wait_until;
 use bb_core::prelude::*;
 use bb_core::run::CommandError;
-use std::future::Future;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::task::Poll;
@@ -58,45 +58,24 @@ impl Command for Misbehave {
 type Starts = Box<dyn FnOnce() + Send>;
 static STARTS: Mutex<Option<Starts>> = Mutex::new(None);
 
-/// Command that does something before it gives its future.
-#[derive(Debug)]
-pub(crate) struct Nested;
-
-impl Command for Nested {
-    type Options = NoOptions;
-    type Arguments = NoArguments;
-    type Output = ();
-
-    fn run(
-        _: NoOptions,
-        _: NoArguments,
-        _: CommandContext,
-    ) -> impl Future<Output = Result<Outcome<()>, Fault>> + Send {
-        let starts = STARTS.lock().expect("nobody panics with it").take();
-        if let Some(starts) = starts {
-            starts();
-        }
-        std::future::ready(Ok(Outcome::done(())))
+/// Does something before it gives its future.
+fn nested(_: CommandContext) -> Doing {
+    let starts = lock(&STARTS).take();
+    if let Some(starts) = starts {
+        starts();
     }
+    Box::pin(std::future::ready(Ok(Outcome::done(()))))
 }
 
-/// Command that arms once the test releases it.
-#[derive(Debug)]
-pub(crate) struct SlowArm;
-
-impl Command for SlowArm {
-    type Options = NoOptions;
-    type Arguments = NoArguments;
-    type Output = ();
-    const ROLE: Role = Role::Arming;
-
-    async fn run(_: NoOptions, _: NoArguments, _: CommandContext) -> Result<Outcome<()>, Fault> {
+/// Is done, and so arms, once the test releases it.
+fn slow_arm(_: CommandContext) -> Doing {
+    Box::pin(async {
         ARMING.store(true, Ordering::SeqCst);
         while ARMING.load(Ordering::SeqCst) {
             std::thread::sleep(Duration::from_millis(1));
         }
         Ok(Outcome::done(()))
-    }
+    })
 }
 
 static ARMING: AtomicBool = AtomicBool::new(false);
@@ -109,8 +88,8 @@ robot! {
         category others { concurrency: 2; }
         misbehave: Misbehave { category: many; timeout: 200 ms; allowed_states: [disarmed, idle, executing]; }
         patient: Misbehave { category: many; allowed_states: [disarmed, idle, executing]; }
-        nested: Nested { category: others; allowed_states: [disarmed, idle, executing]; }
-        slow_arm: SlowArm { category: others; allowed_states: [disarmed]; }
+        nested: Task(run = nested) { category: others; allowed_states: [disarmed, idle, executing]; }
+        slow_arm: Task<true>(run = slow_arm) { category: others; allowed_states: [disarmed]; }
     }
 
     link base { sensor number: External<Number>(); }
@@ -149,9 +128,7 @@ fn a_command_that_does_not_come_back_does_not_keep_the_robot_from_stopping() {
     within(60, || {
         let running = Unruly::builder().start().expect("it starts");
         let blocked = running.command(unruly::command::patient, Kind::Block).expect("it is allowed");
-        while !BLOCKS.load(Ordering::SeqCst) {
-            std::thread::sleep(Duration::from_millis(1));
-        }
+        wait_until("it blocks", || BLOCKS.load(Ordering::SeqCst));
         let report = running.stop();
         assert_eq!(blocked.wait(), Err(CommandError::Cancelled));
         let faults: Vec<_> = report.faults.iter().map(ToString::to_string).collect();
@@ -169,7 +146,7 @@ fn a_command_may_start_another_while_it_starts() {
         let mut simulation = Unruly::builder().simulate().expect("it starts");
         let live = (*simulation).clone();
         let starts = move || drop(live.command(unruly::command::nested, NoArguments).expect("there is room"));
-        *STARTS.lock().expect("nobody panics with it") = Some(Box::new(starts));
+        *lock(&STARTS) = Some(Box::new(starts));
         let nested = simulation.command(unruly::command::nested, NoArguments).expect("it is allowed");
         simulation.run_until(at(1));
         assert_eq!(nested.try_result(), Some(Ok(())));
@@ -207,9 +184,7 @@ fn one_that_arms_does_not_arm_a_robot_that_was_disarmed_meanwhile() {
     within(60, || {
         let running = Unruly::builder().start().expect("it starts");
         let arming = running.command(unruly::command::slow_arm, NoArguments).expect("it is disarmed");
-        while !ARMING.load(Ordering::SeqCst) {
-            std::thread::sleep(Duration::from_millis(1));
-        }
+        wait_until("it runs", || ARMING.load(Ordering::SeqCst));
         // Somebody else arms and disarms it meanwhile.
         assert_eq!((running.arm(), running.disarm()), (Ok(()), Ok(())));
         ARMING.store(false, Ordering::SeqCst);
@@ -239,9 +214,7 @@ fn events_of_a_command_come_in_their_order_from_many_threads() {
                 });
             }
         });
-        while running.state() != "idle" {
-            std::thread::sleep(Duration::from_millis(1));
-        }
+        wait_until("all have ended", || running.state() == "idle");
         let live = (*running).clone();
         running.stop();
         let mut started = std::collections::HashSet::new();

@@ -50,7 +50,7 @@ pub(crate) struct SourceOptions {
     #[option(default = || ())]
     pub(crate) dropped: fn(),
     /// Another one is made when it changes.
-    #[option(default = 1.0)]
+    #[option(default = 1.0, range = 0.0..=1e6)]
     pub(crate) gain: f64,
 }
 
@@ -262,14 +262,15 @@ pub(crate) struct TaskOptions {
     pub(crate) run: fn(CommandContext) -> Doing,
 }
 
-/// A command; it does nothing, unless it is told to.
+/// A command; it does nothing, unless it is told to. It may arm the robot when it is done.
 #[derive(Debug)]
-pub(crate) struct Task;
+pub(crate) struct Task<const ARMS: bool = false>;
 
-impl Command for Task {
+impl<const ARMS: bool> Command for Task<ARMS> {
     type Options = TaskOptions;
     type Arguments = NoArguments;
     type Output = ();
+    const ROLE: Role = if ARMS { Role::Arming } else { Role::Plain };
 
     fn run(
         options: TaskOptions,

@@ -1,17 +1,17 @@
 //! Whatever hangs, hardware is made safe first; and what is not safe, or was cancelled, moves nothing any more.
 
-use crate::components::{Doing, Done, Number, Pulse, Read, Servo, Source, Task, Update, at, at_once, lock, within};
-use crate::gate::{Gate, PATIENCE, Place, Stuck};
+use crate::components::{
+    Doing, Done, Echo, Number, Pulse, Read, Replied, Servo, Source, Task, Update, at, at_once, lock, when_woken,
+    within,
+};
+use crate::gate::{Gate, PATIENCE};
 use bb_core::event::CommandPhase;
 use bb_core::prelude::*;
 use bb_core::run::ActuatorError;
 use bb_core::run::CommandError;
 use bb_core::{ArmError, DisarmError};
-use std::future::Future;
-use std::pin::pin;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, mpsc};
-use std::task::{Context as Polled, Wake, Waker};
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError, mpsc};
 
 /// Time within which a motor is stopped, whatever hangs: shorter than any time that the robot gives code that hangs.
 const AT_ONCE: Duration = Duration::from_secs(2);
@@ -38,38 +38,19 @@ fn read(_: u32, _: MonotonicTime) -> Read {
     Ok(Reading::now(Number(1.0)))
 }
 
-/// Hangs at a message, or at a tick.
-#[derive(Debug)]
-pub(crate) struct Thinker;
-
-impl Estimator for Thinker {
-    type Options = NoOptions;
-    type Input = Number;
-    type Output = Number;
-
-    fn init(_: NoOptions, context: &Context) -> Result<Self, Fault> {
-        context.request(Request::Tick(Duration::from_millis(5)));
-        Ok(Self)
-    }
-
-    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
-        HERE.pass("an estimator's callback");
-        Ok(Reply::emit(number.payload))
-    }
-
-    fn handle_info(&mut self, _: Info) -> Result<Reply<Number>, Fault> {
-        HERE.pass("an estimator's tick");
-        Ok(Reply::none())
-    }
+fn tick(context: &Context) -> Done {
+    context.request(Request::Tick(Duration::from_millis(5)));
+    Ok(())
 }
 
-/// Place at which commands hang.
-#[derive(Debug)]
-pub(crate) struct InCommands;
+fn think(_: &mut f64, number: f64) -> Replied {
+    HERE.pass("an estimator's callback");
+    Ok(Reply::emit(Number(number)))
+}
 
-impl Place for InCommands {
-    const GATE: &'static Gate = &HERE;
-    const NAME: &'static str = "a command";
+fn ticks(_: &mut f64, _: Info) -> Replied {
+    HERE.pass("an estimator's tick");
+    Ok(Reply::none())
 }
 
 /// Hangs in `update`.
@@ -102,8 +83,8 @@ robot! {
 
     commands {
         category many { concurrency: 8; }
-        errand: Stuck<InCommands> { category: many; allowed_states: [idle, executing]; }
-        hurried: Stuck<InCommands> { category: many; timeout: 20 ms; allowed_states: [idle, executing]; }
+        errand: Task(run = |_| HERE.stuck("a command")) { category: many; allowed_states: [idle, executing]; }
+        hurried: Task(run = |_| HERE.stuck("a command")) { category: many; timeout: 20 ms; allowed_states: [idle, executing]; }
         alarm: Task(run = at_once) { allowed_states: [disarmed, idle, executing]; }
     }
 
@@ -117,9 +98,9 @@ robot! {
             link lens { }
         }
         joint pan: continuous { axis: z; sensor encoder: External<Number>(); actuator motor: Servo(disarm = stop); link head { } }
-        sensor device: Source(read = read) { rate: 100 Hz; estimator thinker: Thinker(); }
+        sensor device: Source(read = read) { rate: 100 Hz; estimator thinker: Echo(init = tick, input = think, info = ticks); }
         sensor silent: External<Number>() {
-            estimator waiting: Thinker() { lost_after: 1 s; on_lost: alarm; }
+            estimator waiting: Echo(init = tick, input = think, info = ticks) { lost_after: 1 s; on_lost: alarm; }
         }
     }
 }
@@ -131,22 +112,6 @@ fn alone() -> MutexGuard<'static, ()> {
     let guard = lock(&ALONE);
     HERE.open();
     guard
-}
-
-/// Hangs at the place of its name.
-struct Hangs(&'static str);
-
-impl Wake for Hangs {
-    fn wake(self: Arc<Self>) {
-        HERE.pass(self.0);
-    }
-}
-
-/// Polls a subscriber with a waker that hangs at the next message.
-fn wait<T: Payload>(subscription: &mut Subscription<T>, place: &'static str) {
-    let waker = Waker::from(Arc::new(Hangs(place)));
-    let awaited = pin!(subscription.recv_async());
-    assert!(awaited.poll(&mut Polled::from_waker(&waker)).is_pending());
 }
 
 /// Ends the robot while something hangs at `place`: the motor is told to stop at once.
@@ -177,9 +142,9 @@ fn motor_stops_first(place: &'static str, way: &'static str) {
         "a subscriber of a sensor" => {
             while running.subscribe(hanging::sensor::base::device).recv_timeout(PATIENCE).is_none() {}
             numbers.drain().for_each(drop);
-            wait(&mut numbers, place);
+            when_woken(&mut numbers, move || HERE.pass(place));
         }
-        "a subscriber of the safety state" => wait(&mut safety, place),
+        "a subscriber of the safety state" => when_woken(&mut safety, move || HERE.pass(place)),
         _ => {}
     }
     if comes_before {
@@ -316,26 +281,20 @@ fn hold(last: f64) -> Done {
     Ok(())
 }
 
-/// Watches a temperature.
-#[derive(Debug)]
-pub(crate) struct Thermometer(SensorContext);
-
+static THERMOMETER: Mutex<Option<SensorContext>> = Mutex::new(None);
 static IS_HOT: AtomicBool = AtomicBool::new(false);
 
-impl Sensor for Thermometer {
-    type Options = NoOptions;
-    type Output = Number;
-
-    fn init(_: NoOptions, context: &SensorContext) -> Result<Self, Fault> {
-        Ok(Self(context.clone()))
+/// Watches a temperature.
+fn watch(_: u32, _: MonotonicTime) -> Read {
+    if IS_HOT.swap(false, Ordering::SeqCst) {
+        lock(&THERMOMETER).as_ref().ok_or("it was not made")?.hardware_error("it burns");
     }
+    Ok(Reading::nothing())
+}
 
-    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        if IS_HOT.swap(false, Ordering::SeqCst) {
-            self.0.hardware_error("it burns");
-        }
-        Ok(Reading::nothing())
-    }
+fn install(context: &SensorContext) -> Done {
+    *lock(&THERMOMETER) = Some(context.clone());
+    Ok(())
 }
 
 /// Context that a command was given.
@@ -382,7 +341,7 @@ robot! {
             actuator winch: Servo(command = wind, disarm = hold);
             link load { }
         }
-        sensor thermometer: Thermometer() { rate: 10 Hz; }
+        sensor thermometer: Source(init = install, read = watch) { rate: 10 Hz; }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Descriptions for tools of a running robot: its declaration as JSON, by path, and its picture.
 
 use crate::components::{CanEncoder, Counter, Failure, Scale, Task};
-use bb_core::component::{ComponentKind, JointPublisher};
+use bb_core::component::{ComponentKind, JointPublisher, RunKind};
 use bb_core::prelude::*;
 use bb_core::topology::GraphFormat;
 use bb_estimators::motion::{Drive, MoveJoints, PidController};
@@ -27,6 +27,7 @@ robot! {
         category motion { concurrency: 1; }
         go: MoveJoints(speed = 1.0) { category: motion; timeout: 2500 ms; allowed_states: [idle, lifting]; }
         stop: Task { cancel: [motion]; allowed_states: [idle, executing]; }
+        arm: Arm;
     }
 
     controllers {
@@ -88,7 +89,9 @@ fn check_stored(name: &str, is: &str) -> Result<(), Failure> {
 fn a_robot_describes_itself_as_json() -> Result<(), Failure> {
     let simulation = simulated()?;
     simulation.set_parameter(hoist::param::top, 0.7)?;
-    let json: Value = serde_json::from_str(&simulation.bus().description().to_json())?;
+    let description = simulation.bus().description();
+    assert_eq!((description.run, simulation.run_kind()), (RunKind::Simulation, RunKind::Simulation));
+    let json: Value = serde_json::from_str(&description.to_json())?;
     check_stored("description.json", &(serde_json::to_string_pretty(&json)? + "\n"))
 }
 

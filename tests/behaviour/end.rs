@@ -1,20 +1,9 @@
 //! The end of a run: what comes later changes nothing, and nobody waits for it.
 
 use crate::components::{Done, Echo, Number, Source, Task, within};
+use crate::plain::{ECHO, NUMBER, Plain, SOURCE, TASK, plain};
 use crate::replay::same_again;
 use bb_core::prelude::*;
-
-robot! {
-    robot Ending;
-    parameters { gain: f64 = 1.0; }
-    commands { idle: Task; }
-    link base {
-        sensor number: External<Number>() { estimator echo: Echo(); }
-        // Fails when it is closed.
-        sensor port: Source(terminate = |_| panic!("the port does not close")) { rate: 100 Hz; }
-        estimator apart: Echo() { input number: sensor::base::number; runs_on: worker; }
-    }
-}
 
 /// Needs a while to be made safe.
 fn brake(context: &SensorContext) -> Done {
@@ -49,23 +38,29 @@ fn an_estimator_is_not_lost_because_the_robot_stops() -> Result<(), StartError> 
     Ok(())
 }
 
+fn ending() -> bb_core::Builder<Plain> {
+    let mut builder = Plain::builder();
+    builder.options(SOURCE).terminate = |_| panic!("the port does not close");
+    builder
+}
+
 /// The fault of a journal that ended before what a publisher did.
 const UNFINISHED: &str =
     "journal failed: a publisher did not come back: what followed from its message may be missing";
 
 /// All that may be asked of a robot, over and over, until it says that it has stopped; and ten times more.
-fn ask_for_everything(live: &bb_core::Live<Ending>, own: &bb_core::pubsub::Publisher<Number>) {
+fn ask_for_everything(live: &bb_core::Live<Plain>, own: &bb_core::pubsub::Publisher<Number>) {
     let mut left = 10;
     for round in 0.. {
         let number = Number(f64::from(round));
-        live.publish(ending::sensor::base::number, live.clock().now(), number);
+        live.publish(NUMBER, live.clock().now(), number);
         own.publish(number);
-        let _ = live.command(ending::command::idle, NoArguments);
-        let _ = live.set_parameter(ending::param::gain, f64::from(round));
+        let _ = live.command(TASK, NoArguments);
+        let _ = live.set_parameter(plain::param::gain, f64::from(round));
         let _ = live.bus().set_parameter("param/gain", f64::from(round));
         let _ = live.arm();
         let _ = live.disarm();
-        if live.cast(ending::sensor::base::number::echo, number).is_err() {
+        if live.cast(ECHO, number).is_err() {
             left -= 1;
         }
         if left == 0 {
@@ -79,7 +74,7 @@ fn what_comes_after_the_end_is_neither_published_nor_counted() {
     within(120, || {
         let mut round = 0;
         while round < 8 {
-            let run = same_again(Ending::builder, |builder| {
+            let run = same_again(ending, |builder| {
                 let running = builder.start()?;
                 let live = running.live();
                 let callers: Vec<_> = (0..3)
@@ -102,7 +97,7 @@ fn what_comes_after_the_end_is_neither_published_nor_counted() {
                 Err(error) if error.to_string() == UNFINISHED => continue,
                 Err(error) => panic!("{error}"),
             };
-            let closed = "sensor/base/port failed: panicked: the port does not close";
+            let closed = "sensor/base/source failed: panicked: the port does not close";
             assert!(report.faults.iter().any(|fault| fault.to_string() == closed), "{:?}", report.faults);
             for topic in report.topics.iter().filter(|topic| topic.path != "journal") {
                 assert_eq!(topic.published, heard.get(topic.path).map_or(0, Vec::len) as u64, "{}", topic.path);

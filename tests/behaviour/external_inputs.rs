@@ -50,6 +50,7 @@ fn mapper(context: &ServiceContext) -> Result<Update, Fault> {
 robot! {
     robot Mapped;
     sensors { sensor radio: External<Number>(); }
+    controllers { controller mapper: Pulse() { rate: 200 Hz; } }
     link base {
         sensor ticks: Source(read = |number, _| Ok(Reading::now(Number(f64::from(number))))) { rate: 100 Hz; }
         estimator fused: Snapshot() {
@@ -67,20 +68,6 @@ robot! {
                     runs_on: worker;
                 }
             }
-        }
-    }
-}
-
-robot! {
-    robot Mapping;
-    controllers { controller mapper: Pulse(init = mapper) { rate: 200 Hz; } }
-    link base {
-        sensor ticks: Source(read = |number, _| Ok(Reading::now(Number(f64::from(number))))) { rate: 100 Hz; }
-        estimator echo: Echo() { input number: slam::scale, external; }
-        estimator sum: Sum() {
-            input driver: sensor::base::ticks, driver;
-            input marks: slam::scale, external;
-            runs_on: worker;
         }
     }
 }
@@ -210,26 +197,27 @@ fn a_replay_takes_what_was_published_bit_for_bit() -> Result<(), Failure> {
         Ok(simulation.stop())
     })?;
     // On many threads, and from a file, which a replay reads without a publisher.
-    let mut builder = Mapping::builder();
+    let mut builder = Mapped::builder();
+    builder.options(mapped::controller::mapper).init = mapper;
     let lines = journal(&mut builder);
-    let echoes = builder.subscribe_with(mapping::estimator::base::echo, overflow());
-    let sums = builder.subscribe_with(mapping::estimator::base::sum, overflow());
+    let echoes = builder.subscribe_with(mapped::estimator::base::echo, overflow());
+    let sums = builder.subscribe_with(mapped::estimator::base::mast::top::sum, overflow());
     let running = builder.start()?;
     let outside = running.bus().publisher::<Number>("slam/scale")?;
     for number in 0..50 {
         outside.publish(Number(-f64::from(number)));
     }
     wait_until("twenty sums", || {
-        running.report().topic("estimator/base/sum").is_some_and(|topic| topic.published > 20)
+        running.report().topic("estimator/base/mast/top/sum").is_some_and(|topic| topic.published > 20)
     });
     running.stop().ok()?;
-    let lines = read_back::<Mapping>(&entries(&lines))?;
+    let lines = read_back::<Mapped>(&entries(&lines))?;
     assert!(!lines.iter().any(|line| matches!(line.event, Event::Own { .. })), "they are messages of a publisher");
-    let (heard, report) = play(Mapping::builder(), &lines)?;
+    let (heard, report) = play(Mapped::builder(), &lines)?;
     report.ok()?;
     let count = |path| heard.get(path).map_or(0, |texts: &Vec<_>| texts.len());
     assert_eq!(count("estimator/base/echo"), echoes.drain().count());
-    assert_eq!(count("estimator/base/sum"), sums.drain().count());
+    assert_eq!(count("estimator/base/mast/top/sum"), sums.drain().count());
     Ok(())
 }
 

@@ -1,7 +1,8 @@
 //! Starts that fail: how what an `init` has started is made safe, and what becomes of callbacks that fail or hang.
 
-use crate::components::{Number, side_by_side, within};
+use crate::components::{Done, Number, side_by_side, within};
 use crate::gate::Gate;
+use crate::plain::{Plain, SERVO, SOURCE};
 use bb_core::prelude::*;
 use bb_core::{Builder, DisarmError, Running};
 use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
@@ -51,80 +52,30 @@ impl Rig {
     }
 }
 
-/// Options of [`Device`] and [`Servo`].
-#[derive(Clone, Debug, Options)]
-pub(crate) struct DeviceOptions {
-    /// Index of its rig.
-    #[option(default = 0)]
-    pub(crate) rig: usize,
-}
-
 /// Works once, until it is read; never again.
-#[derive(Debug)]
-pub(crate) struct Device;
-
-impl Device {
-    fn make(options: &DeviceOptions, register: impl Fn(&'static Rig)) -> Result<Self, Fault> {
-        let rig = RIGS.get(options.rig).ok_or_else(|| Fault::new("there is no such rig"))?;
-        if rig.made.fetch_add(1, Ordering::SeqCst) == 0 {
-            return Ok(Self);
-        }
-        register(rig);
-        register(rig);
-        Err(Fault::new("no handshake"))
+fn make(rig: usize, register: impl Fn(&'static Rig)) -> Done {
+    let rig = &RIGS[rig];
+    if rig.made.fetch_add(1, Ordering::SeqCst) == 0 {
+        return Ok(());
     }
+    register(rig);
+    register(rig);
+    Err(Fault::new("no handshake"))
 }
 
-impl Sensor for Device {
-    type Options = DeviceOptions;
-    type Output = Number;
-
-    fn init(options: DeviceOptions, context: &SensorContext) -> Result<Self, Fault> {
-        Self::make(&options, |rig| context.on_disarm(move || rig.stop()))
-    }
-
-    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        Err(Fault::new("unplugged"))
-    }
+fn device<const RIG: usize>(context: &SensorContext) -> Done {
+    make(RIG, |rig| context.on_disarm(move || rig.stop()))
 }
 
-/// Device as an actuator.
-#[derive(Debug)]
-pub(crate) struct Servo;
-
-impl Actuator for Servo {
-    type Options = DeviceOptions;
-    type Command = Number;
-
-    fn init(options: DeviceOptions, context: &ActuatorContext) -> Result<Self, Fault> {
-        Device::make(&options, |rig| context.on_disarm(move || rig.stop())).map(|_| Self)
-    }
-
-    fn handle_command(&mut self, _: &Stamped<Number>) -> Result<(), Fault> {
-        Err(Fault::new("unplugged"))
-    }
-
-    fn disarm(&mut self) -> Result<(), Fault> {
-        Ok(())
-    }
-}
-
-robot! {
-    robot Sensing;
-    link base { sensor device: Device() { rate: 100 Hz; } }
-}
-
-robot! {
-    robot Moving;
-    link base {
-        joint pan: continuous { axis: z; actuator servo: Servo(); sensor encoder: External<Number>(); link head {} }
-    }
+fn servo(context: &ActuatorContext) -> Done {
+    make(LOCKS, |rig| context.on_disarm(move || rig.stop()))
 }
 
 /// A robot whose backoff is so long that a second attempt of `attempts` is not followed by another.
-fn sensing(rig: usize, backoff: Duration) -> Builder<Sensing> {
-    let mut builder = Sensing::builder();
-    builder.options(sensing::sensor::base::device).rig = rig;
+fn sensing<const RIG: usize>(backoff: Duration) -> Builder<Plain> {
+    let mut builder = Plain::builder();
+    let source = builder.options(SOURCE);
+    (source.init, source.read) = (device::<RIG>, |_, _| Err(Fault::new("unplugged")));
     builder.supervision().first_backoff = backoff;
     builder.supervision().longest_backoff = backoff;
     builder
@@ -137,7 +88,7 @@ fn arm<R: bb_core::Robot>(robot: &Running<R>) {
 #[test]
 fn a_callback_that_fails_is_a_fault_and_stays_for_the_next_disarming() {
     within(60, || {
-        let builder = sensing(FAILS, Duration::from_millis(100));
+        let builder = sensing::<FAILS>(Duration::from_millis(100));
         let faults = builder.subscribe(system::Faults);
         let robot = builder.start().expect("it starts");
         arm(&robot);
@@ -145,7 +96,7 @@ fn a_callback_that_fails_is_a_fault_and_stays_for_the_next_disarming() {
         while failed < 2 {
             let fault = faults.recv_timeout(Duration::from_secs(20)).expect("it is reported");
             if fault.message == "disarming failed: no answer" {
-                assert_eq!(fault.path, "sensor/base/device");
+                assert_eq!(fault.path, "sensor/base/source");
                 failed += 1;
             }
         }
@@ -167,7 +118,7 @@ fn a_robot_that_is_disarmed_while_such_callbacks_run_waits_for_them() {
     let rig = &RIGS[DISARMS];
     within(60, move || {
         rig.gate.close("here");
-        let robot = sensing(DISARMS, Duration::from_secs(10)).start().expect("it starts");
+        let robot = sensing::<DISARMS>(Duration::from_secs(10)).start().expect("it starts");
         arm(&robot);
         // Both are run at once, each on a thread of its own, though each hangs.
         rig.gate.wait_for(2);
@@ -187,17 +138,17 @@ fn an_actuator_whose_failed_init_hangs_in_its_callbacks_keeps_no_disarming_waiti
     let rig = &RIGS[LOCKS];
     within(60, move || {
         rig.gate.close("here");
-        let mut builder = Moving::builder();
-        builder.options(moving::actuator::base::pan::servo).rig = LOCKS;
+        let mut builder = Plain::builder();
+        let actuator = builder.options(SERVO);
+        (actuator.init, actuator.command) = (servo, |_| Err(Fault::new("unplugged")));
         builder.supervision().first_backoff = Duration::from_millis(1);
         let robot = builder.start().expect("it starts");
         arm(&robot);
-        let servo = moving::actuator::base::pan::servo;
-        while robot.actuate(servo, Number(1.0)).is_ok() {}
+        while robot.actuate(SERVO, Number(1.0)).is_ok() {}
         let live = robot.live();
         let sends = std::thread::spawn(move || {
             while rig.inside.load(Ordering::SeqCst) < 2 {
-                let _ = live.actuate(servo, Number(1.0));
+                let _ = live.actuate(SERVO, Number(1.0));
             }
         });
         rig.gate.wait_for(2);
@@ -213,7 +164,7 @@ fn a_dead_device_whose_callbacks_hang_is_not_started_again_before_they_return() 
     let rig = &RIGS[DIES];
     within(120, move || {
         rig.gate.close("here");
-        let builder = sensing(DIES, Duration::from_millis(1));
+        let builder = sensing::<DIES>(Duration::from_millis(1));
         let faults = builder.subscribe(system::Faults);
         let robot = builder.start().expect("it starts");
         arm(&robot);
@@ -225,7 +176,7 @@ fn a_dead_device_whose_callbacks_hang_is_not_started_again_before_they_return() 
         ];
         while !expected.is_empty() {
             let fault = faults.recv_timeout(Duration::from_secs(20)).expect("it is reported");
-            assert_eq!(fault.path, "sensor/base/device");
+            assert_eq!(fault.path, "sensor/base/source");
             expected.retain(|message| *message != fault.message);
         }
         assert_eq!((robot.safety(), rig.entered()), (Safety::Armed, 2));

@@ -1,6 +1,7 @@
 //! Driver, last known inputs, tolerance, and what is dropped why; sensors that other code feeds, from several threads.
 
-use crate::components::{Echo, Number, Read, Seen, Snapshot, Source, at, lock, numbers};
+use crate::components::{Counter, Number, Read, Scale, Seen, Snapshot, at, lock, numbers};
+use crate::plain::{BEHIND, Plain, SOURCE};
 use bb_core::prelude::*;
 use bb_core::run::DropReason;
 use bb_core::telemetry::TelemetryEvent;
@@ -166,20 +167,16 @@ fn skewed(reading: u32, now: MonotonicTime) -> Read {
     Ok(Reading::at(if reading == 2 { MonotonicTime::MAX } else { now }, Number(f64::from(reading))))
 }
 
-robot! {
-    robot Skew;
-    link base { sensor skewed: Source(read = skewed) { rate: 10 Hz; estimator scaled: Echo(); } }
-}
-
 #[test]
 fn a_stamp_from_the_future_is_dropped_and_does_not_disable_the_input() -> Result<(), StartError> {
-    let builder = Skew::builder();
-    let scaled = builder.subscribe(skew::sensor::base::skewed::scaled);
+    let mut builder = Plain::builder();
+    builder.options(SOURCE).read = skewed;
+    let behind = builder.subscribe(BEHIND);
     let mut simulation = builder.simulate()?;
-    simulation.run_until(at(350));
-    assert_eq!(numbers(&scaled), [1.0, 3.0, 4.0]);
+    simulation.run_until(at(35));
+    assert_eq!(numbers(&behind), [1.0, 3.0, 4.0]);
     let report = simulation.report();
-    let input = &report.estimator("sensor/base/skewed/scaled").expect("it is declared").inputs[0];
+    let input = &report.estimator("sensor/base/source/behind").expect("it is declared").inputs[0];
     assert_eq!(input.dropped(DropReason::ClockSkew), 1);
     Ok(())
 }
@@ -187,7 +184,7 @@ fn a_stamp_from_the_future_is_dropped_and_does_not_disable_the_input() -> Result
 robot! {
     robot Diamond;
     link base {
-        sensor a: crate::components::Counter() { rate: 100 Hz; }
+        sensor a: Counter() { rate: 100 Hz; }
         // Declared before what it depends on, which hangs on a child link.
         estimator both: Snapshot() {
             input driver: sensor::base::a, driver;
@@ -197,7 +194,7 @@ robot! {
         }
         joint mount: fixed {
             link mast {
-                estimator derived: crate::components::Scale(factor = 10.0) { input number: sensor::base::a; }
+                estimator derived: Scale(factor = 10.0) { input number: sensor::base::a; }
             }
         }
     }

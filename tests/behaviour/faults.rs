@@ -1,7 +1,7 @@
 //! Components that fail: at the start, in a callback, by a panic. The others go on.
 
 use crate::components::{Counter, Echo, Number, OnNumber, Read, Replied, Scale, Source, at, numbers};
-use crate::gate::{Gate, wait_until};
+use crate::gate::wait_until;
 use bb_core::message::DecodeError;
 use bb_core::message::codec::{Reader, Shape, Writer};
 use bb_core::prelude::*;
@@ -9,7 +9,6 @@ use bb_core::run::DropReason;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 static TERMINATED: AtomicUsize = AtomicUsize::new(0);
-static HERE: Gate = Gate::new();
 
 /// Breaks at its second reading.
 fn break_down(reading: u32, _: MonotonicTime) -> Read {
@@ -102,23 +101,6 @@ fn a_component_that_fails_is_restarted_alone_with_fresh_state() -> Result<(), St
         assert_eq!((report.faults[1].first_time, report.faults[1].last_time), (at(100), at(210)));
         assert!(report.ok().is_err());
     }
-    Ok(())
-}
-
-#[test]
-fn a_report_does_not_wait_for_a_busy_estimator() -> Result<(), StartError> {
-    let mut builder = Patient::builder();
-    builder.options(patient::sensor::base::numbers::first).input = |_, _| {
-        HERE.pass("a message");
-        Ok(Reply::none())
-    };
-    HERE.close("a message");
-    let running = builder.start()?;
-    HERE.wait_for(1);
-    // Would never come back if it waited: the estimator goes on only after it.
-    let report = running.report();
-    assert_eq!(report.estimator("sensor/base/numbers/first").map(|busy| busy.dispatched), Some(1));
-    HERE.open();
     Ok(())
 }
 

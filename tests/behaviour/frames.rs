@@ -63,10 +63,10 @@ impl<const MOVING: bool> Estimator for Surveyor<MOVING> {
 robot! {
     robot Mast;
 
-    sensors { sensor clock: Counter() { rate: 1 Hz; } }
+    sensors { sensor clock: Counter() { rate: 1 Hz; estimator of_the_robot: Echo(init = note); } }
 
     link base {
-        sensor imu: Counter() { rate: 1 Hz; }
+        sensor imu: Counter() { rate: 1 Hz; estimator at_a_link: Echo(init = note); }
         estimator here: Surveyor() {
             input near: sensor::base::imu, driver;
             input far: sensor::base::mount::mast::tip::top::imu;
@@ -77,12 +77,12 @@ robot! {
         }
         joint mount: fixed {
             origin: { xyz: [1 m, 0 m, 0 m], rpy: [0 deg, 0 deg, 90 deg] };
-            sensor weight: Counter() { rate: 1 Hz; }
+            sensor weight: Counter() { rate: 1 Hz; estimator at_a_joint: Echo(init = note); }
             link mast {
                 joint tip: fixed {
                     origin: { xyz: [2 m, 0 m, 3 m] };
                     link top {
-                        sensor imu: Counter() { rate: 1 Hz; estimator scaled: crate::components::Scale(); }
+                        sensor imu: Counter() { rate: 1 Hz; estimator scaled: Echo(); }
                         estimator back: Surveyor() {
                             input near: sensor::base::mount::mast::tip::top::imu, driver;
                             input far: sensor::base::imu;
@@ -99,13 +99,17 @@ robot! {
             origin: { xyz: [0 m, 0 m, 5 m] };
             axis: [0, 3, 4];
             limit: { velocity: 60 deg/s, effort: 5 N*m };
-            link head { sensor imu: Counter() { rate: 1 Hz; } }
+            link head {
+                sensor imu: Counter() { rate: 1 Hz; }
+                estimator of_a_link: Echo(init = note) { input number: sensor::clock; }
+            }
         }
     }
 }
 
 #[test]
 fn transforms_are_the_products_of_the_fixed_joints() -> Result<(), StartError> {
+    let _alone = lock(&ALONE);
     let builder = Mast::builder();
     let here = builder.subscribe(mast::estimator::base::here);
     let back = builder.subscribe(mast::estimator::base::mount::mast::tip::top::back);
@@ -155,34 +159,25 @@ fn the_topology_is_data() {
 
 /// Contexts of estimators, in the order in which they are made.
 static CONTEXTS: Mutex<Vec<[&str; 3]>> = Mutex::new(Vec::new());
+static ALONE: Mutex<()> = Mutex::new(());
 
 fn note(context: &Context) -> Done {
     lock(&CONTEXTS).push([context.robot(), context.path(), context.frame().name()]);
     Ok(())
 }
 
-robot! {
-    robot Placed;
-    sensors { sensor clock: External<Number>() { estimator of_the_robot: Echo(init = note); } }
-    link base {
-        sensor imu: External<Number>() { estimator at_a_link: Echo(init = note); }
-        joint pan: fixed {
-            sensor encoder: External<Number>() { estimator at_a_joint: Echo(init = note); }
-            link head { estimator of_a_link: Echo(init = note) { input number: sensor::clock; } }
-        }
-    }
-}
-
 #[test]
 fn an_estimator_gets_its_robot_its_path_and_its_frame() -> Result<(), StartError> {
-    Placed::builder().simulate()?;
+    let _alone = lock(&ALONE);
+    lock(&CONTEXTS).clear();
+    Mast::builder().simulate()?;
     let mut contexts = std::mem::take(&mut *lock(&CONTEXTS));
     contexts.sort_unstable();
     let expected = [
-        ["Placed", "estimator/base/pan/head/of_a_link", "head"],
-        ["Placed", "sensor/base/imu/at_a_link", "base"],
-        ["Placed", "sensor/base/pan/encoder/at_a_joint", "pan"],
-        ["Placed", "sensor/clock/of_the_robot", ""],
+        ["Mast", "estimator/base/pan/head/of_a_link", "head"],
+        ["Mast", "sensor/base/imu/at_a_link", "base"],
+        ["Mast", "sensor/base/mount/weight/at_a_joint", "mount"],
+        ["Mast", "sensor/clock/of_the_robot", ""],
     ];
     assert_eq!(contexts, expected);
     Ok(())

@@ -1,8 +1,8 @@
-//! Code that hangs until a test lets it go on, and components that are made of it.
+//! Code that hangs until a test lets it go on, and what is waited for meanwhile.
 
-use crate::components::Number;
+use crate::components::Doing;
+use bb_core::ComponentFault;
 use bb_core::prelude::*;
-use std::marker::PhantomData;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
 /// Longer than anything takes that does not hang, however busy the machine.
@@ -15,6 +15,13 @@ pub(crate) fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
         assert!(start.elapsed() < PATIENCE, "not reached: {what}");
         std::thread::sleep(Duration::from_millis(1));
     }
+}
+
+/// Waits for a fault at `path`, and returns its message.
+pub(crate) fn fault_of(faults: &Subscription<ComponentFault>, path: &str) -> String {
+    let mut faults = std::iter::from_fn(|| faults.recv_timeout(PATIENCE));
+    let fault = faults.find(|fault| fault.path == path);
+    fault.unwrap_or_else(|| panic!("no fault of {path}")).payload.message
 }
 
 /// A place at which code waits until the test lets it go on.
@@ -56,55 +63,19 @@ impl Gate {
         }
     }
 
+    /// Code of a task that blocks its thread at a place.
+    pub(crate) fn stuck(&'static self, place: &'static str) -> Doing {
+        Box::pin(async move {
+            self.pass(place);
+            Ok(Outcome::done(()))
+        })
+    }
+
     /// Waits until so many wait there.
     pub(crate) fn wait_for(&self, many: u32) {
         let state = self.lock();
         let waited = self.changed.wait_timeout_while(state, PATIENCE, |state| state.1 < many);
         let (state, timeout) = waited.unwrap_or_else(PoisonError::into_inner);
         assert!(!timeout.timed_out(), "nobody came to {:?}", state.0);
-    }
-}
-
-/// A place at a gate, as a type.
-pub(crate) trait Place: 'static {
-    const GATE: &'static Gate;
-    const NAME: &'static str;
-}
-
-/// A command that blocks the thread that runs it.
-#[derive(Debug)]
-pub(crate) struct Stuck<P>(PhantomData<P>);
-
-impl<P: Place + Send + Sync> Command for Stuck<P> {
-    type Options = NoOptions;
-    type Arguments = NoArguments;
-    type Output = ();
-
-    async fn run(_: NoOptions, _: NoArguments, _: CommandContext) -> Result<Outcome<()>, Fault> {
-        P::GATE.pass(P::NAME);
-        Ok(Outcome::done(()))
-    }
-}
-
-/// Code of a [`Brake`].
-pub(crate) trait Brakes: Send + 'static {
-    fn brake() -> Result<(), Fault>;
-}
-
-/// Measures nothing; its disarm callback takes its time.
-#[derive(Debug)]
-pub(crate) struct Brake<B>(PhantomData<B>);
-
-impl<B: Brakes> Sensor for Brake<B> {
-    type Options = NoOptions;
-    type Output = Number;
-
-    fn init(_: NoOptions, context: &SensorContext) -> Result<Self, Fault> {
-        context.on_disarm(B::brake);
-        Ok(Self(PhantomData))
-    }
-
-    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        Ok(Reading::nothing())
     }
 }

@@ -77,14 +77,6 @@ fn lift(context: CommandContext) -> Doing {
 
 static HERE: Gate = Gate::new();
 
-/// Blocks its thread while the gate is closed, whether it was cancelled or not.
-fn block(_: CommandContext) -> Doing {
-    Box::pin(async {
-        HERE.pass("a command");
-        Ok(Outcome::done(()))
-    })
-}
-
 /// Arms the robot on another thread.
 fn arm_later(context: CommandContext) -> Doing {
     Box::pin(async move {
@@ -105,7 +97,7 @@ robot! {
         arm: Arm;
         disarm: Disarm;
         lift: Task(run = lift) { category: many; allowed_states: [disarmed, idle, executing]; }
-        block: Task(run = block) { category: many; allowed_states: [disarmed]; }
+        block: Task(run = |_| HERE.stuck("a command")) { category: many; allowed_states: [disarmed]; }
         later: Task(run = arm_later) { category: many; allowed_states: [disarmed]; }
     }
 

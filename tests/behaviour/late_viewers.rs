@@ -1,11 +1,10 @@
 //! A caller that knows nothing of the robot and comes late: what is wrong, what runs, and what it may change until it leaves.
 
-use crate::components::{Done, Echo, Number, Read, Servo, Source, at};
-use bb_core::component::RunKind;
+use crate::components::{Doing, Done, Echo, Failure, Number, Read, Servo, Task, at};
+use crate::plain::{Plain, SERVO, SOURCE};
 use bb_core::message::codec::from_json;
 use bb_core::prelude::*;
 use serde_json::Value;
-use std::error::Error;
 use std::sync::Barrier;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
@@ -30,40 +29,12 @@ fn count(number: f64) -> Done {
     Ok(())
 }
 
-robot! {
-    robot Steered;
-    parameters { speed: f64 = 1.0; }
-    commands { go: Arm { allowed_states: [disarmed]; } }
-    link base { joint pan: continuous { axis: z; actuator motor: Servo(command = count); sensor encoder: External<Number>(); link head {} } }
-}
-
-/// Arguments of [`Travel`].
-#[derive(Clone, Debug, Payload)]
-pub(crate) struct Distance {
-    /// Distance to travel.
-    #[payload(unit = "m")]
-    pub(crate) distance: f64,
-}
-
-impl Default for Distance {
-    fn default() -> Self {
-        Self { distance: 2.5 }
-    }
-}
-
 /// Takes an hour.
-#[derive(Debug)]
-pub(crate) struct Travel;
-
-impl Command for Travel {
-    type Options = NoOptions;
-    type Arguments = Distance;
-    type Output = ();
-
-    async fn run(_: NoOptions, _: Distance, context: CommandContext) -> Result<Outcome<()>, Fault> {
+fn travel(context: CommandContext) -> Doing {
+    Box::pin(async move {
         context.sleep(Duration::from_secs(3600)).await;
         Ok(Outcome::done(()))
-    }
+    })
 }
 
 robot! {
@@ -76,8 +47,7 @@ robot! {
         is_on: bool = true;
     }
     commands {
-        travel: Travel { allowed_states: [idle]; }
-        once: Travel { allowed_states: [disarmed]; }
+        travel: Task(run = travel) { allowed_states: [idle]; }
         arm: Arm;
     }
     link base {
@@ -88,7 +58,7 @@ robot! {
     }
 }
 
-fn report(bus: &bb_core::Bus) -> Result<Value, Box<dyn Error>> {
+fn report(bus: &bb_core::Bus) -> Result<Value, Failure> {
     Ok(serde_json::from_str(&bus.report_json()?)?)
 }
 
@@ -104,7 +74,7 @@ fn problems(report: &Value) -> Vec<String> {
 }
 
 #[test]
-fn a_late_bus_names_all_that_is_wrong_since_when_and_why() -> Result<(), Box<dyn Error>> {
+fn a_late_bus_names_all_that_is_wrong_since_when_and_why() -> Result<(), Failure> {
     let mut simulation = Watched::builder().simulate()?;
     simulation.run_until(at(1000));
     // Refused in this state.
@@ -141,29 +111,26 @@ fn loose(_: u32, now: MonotonicTime) -> Read {
     if is_loose { Err(Fault::new("the cable is loose")) } else { Ok(Reading::now(Number(1.0))) }
 }
 
-robot! {
-    robot Loose;
-    link base { sensor flaky: Source(read = loose) { rate: 100 Hz; } }
-}
-
 /// Restarts without a reading do not begin it again, and the same fault of before has another beginning.
 #[test]
-fn a_sensor_that_is_restarted_in_vain_has_failed_since_its_last_reading() -> Result<(), Box<dyn Error>> {
-    let mut simulation = Loose::builder().simulate()?;
+fn a_sensor_that_is_restarted_in_vain_has_failed_since_its_last_reading() -> Result<(), Failure> {
+    let mut builder = Plain::builder();
+    builder.options(SOURCE).read = loose;
+    let mut simulation = builder.simulate()?;
     let bus = simulation.bus();
     let mut seen = Vec::new();
     for millis in [90, 150, 590, 4990, 5300, 9000] {
         simulation.run_until(at(millis));
         seen.push(problems(&report(&bus)?));
     }
-    let loose = |since: &str| vec![format!("stopped sensor/base/flaky since {since}: the cable is loose")];
+    let loose = |since: &str| vec![format!("stopped sensor/base/source since {since}: the cable is loose")];
     assert_eq!(seen, [vec![], loose("0.1"), loose("0.1"), vec![], loose("5.0"), vec![]]);
     assert!(simulation.report().sources[0].restarts > 2, "it was restarted in vain");
     Ok(())
 }
 
 #[test]
-fn another_caller_lists_and_cancels_what_runs() -> Result<(), Box<dyn Error>> {
+fn another_caller_lists_and_cancels_what_runs() -> Result<(), Failure> {
     let simulation = Watched::builder().simulate()?;
     simulation.arm()?;
     let first = simulation.bus().for_caller("first page", [Right::Read, Right::Commands]);
@@ -186,7 +153,7 @@ fn another_caller_lists_and_cancels_what_runs() -> Result<(), Box<dyn Error>> {
 
 /// Objects obtained through a session, by whatever thread, refuse to act once it has ended; to disarm is everybody's.
 #[test]
-fn nothing_acts_in_the_name_of_a_session_that_has_ended() -> Result<(), Box<dyn Error>> {
+fn nothing_acts_in_the_name_of_a_session_that_has_ended() -> Result<(), Failure> {
     let simulation = Watched::builder().simulate()?;
     simulation.arm()?;
     let session = simulation.session("page 7", Rights::ALL);
@@ -222,8 +189,10 @@ fn nothing_acts_in_the_name_of_a_session_that_has_ended() -> Result<(), Box<dyn 
 /// Eight threads act in the name of a session until they are refused, 40 times: once its end was waited for, nothing moves, is published or
 /// is set any more. Ending it within one of its own calls, or while an actuator hangs in one, returns.
 #[test]
-fn no_call_of_other_threads_outlives_a_session() -> Result<(), Box<dyn Error>> {
-    let running = Steered::builder().start()?;
+fn no_call_of_other_threads_outlives_a_session() -> Result<(), Failure> {
+    let mut builder = Plain::builder();
+    builder.options(SERVO).command = count;
+    let running = builder.start()?;
     running.arm()?;
     let heard = running.bus().subscribe::<Number>("page/number", Overflow::DropOldest { capacity: 1 << 16 })?;
     let calls = AtomicU64::new(0);
@@ -232,11 +201,11 @@ fn no_call_of_other_threads_outlives_a_session() -> Result<(), Box<dyn Error>> {
         rounds += 1;
         let session = running.session(format!("page {rounds}"), Rights::ALL);
         let (begin, first) = (Barrier::new(9), calls.load(Ordering::Relaxed));
-        std::thread::scope(|scope| -> Result<(), Box<dyn Error>> {
+        std::thread::scope(|scope| -> Result<(), Failure> {
             for thread in 0..8_u32 {
                 let (bus, begin, calls) = (session.bus(), &begin, &calls);
                 scope.spawn(move || {
-                    let link = bus.actuator::<Number>("actuator/base/pan/motor").expect("it is there");
+                    let link = bus.actuator::<Number>("actuator/base/pan/servo").expect("it is there");
                     let publisher = bus.publisher::<Number>("page/number").expect("it may");
                     begin.wait();
                     let mut number = 0.0;
@@ -244,7 +213,7 @@ fn no_call_of_other_threads_outlives_a_session() -> Result<(), Box<dyn Error>> {
                         number += 1.0;
                         match thread % 3 {
                             0 => link.send(Number(number)).is_ok(),
-                            1 => bus.set_parameter("param/speed", number).is_ok(),
+                            1 => bus.set_parameter("param/gain", number).is_ok(),
                             _ => {
                                 publisher.publish(Number(number));
                                 bus.publish_json("page/number", "0.5").is_ok()
@@ -261,7 +230,7 @@ fn no_call_of_other_threads_outlives_a_session() -> Result<(), Box<dyn Error>> {
                 std::thread::yield_now();
             }
             assert!(session.end_within(Duration::from_secs(60)));
-            let state = || (CARRIED_OUT.load(Ordering::SeqCst), running.bus().parameter("param/speed"));
+            let state = || (CARRIED_OUT.load(Ordering::SeqCst), running.bus().parameter("param/gain"));
             let (at_end, _) = (state(), heard.drain().count());
             std::thread::sleep(Duration::from_millis(1));
             assert_eq!((state(), heard.drain().count()), (at_end, 0));
@@ -270,14 +239,14 @@ fn no_call_of_other_threads_outlives_a_session() -> Result<(), Box<dyn Error>> {
         assert_eq!(heard.drain().count(), 0, "nor while its threads returned");
     }
     let session = running.session("page", Rights::ALL);
-    let link = session.actuator::<Number>("actuator/base/pan/motor")?;
+    let link = session.actuator::<Number>("actuator/base/pan/servo")?;
     std::thread::scope(|scope| {
         let hangs = scope.spawn(|| link.send(Number(-1.0)));
         while !HANGS.load(Ordering::SeqCst) {
             std::thread::yield_now();
         }
         session.end();
-        assert!(session.set_parameter("param/speed", 0.0).is_err(), "the end does not wait");
+        assert!(session.set_parameter("param/gain", 0.0).is_err(), "the end does not wait");
         assert!(!session.end_within(Duration::from_millis(20)), "the motor hangs");
         IS_FREED.store(true, Ordering::SeqCst);
         assert!(session.end_within(Duration::from_secs(60)));
@@ -287,7 +256,7 @@ fn no_call_of_other_threads_outlives_a_session() -> Result<(), Box<dyn Error>> {
 }
 
 #[test]
-fn parameters_and_actuators_take_json() -> Result<(), Box<dyn Error>> {
+fn parameters_and_actuators_take_json() -> Result<(), Failure> {
     let simulation = Watched::builder().simulate()?;
     let set = |path, json| simulation.set_parameters_json([(path, json)]).map_err(|error| error.to_string());
     assert_eq!(set("param/turn", "1"), Ok(()));
@@ -321,30 +290,5 @@ fn parameters_and_actuators_take_json() -> Result<(), Box<dyn Error>> {
         near.to_string(),
         "no actuator is at `actuator/base/pan/server`; did you mean `actuator/base/pan/servo`?"
     );
-    Ok(())
-}
-
-/// Forms and sliders are built from this alone.
-#[test]
-fn a_description_has_what_forms_need() -> Result<(), Box<dyn Error>> {
-    let simulation = Watched::builder().simulate()?;
-    let description = simulation.description();
-    assert_eq!((description.run, simulation.run_kind()), (RunKind::Simulation, RunKind::Simulation));
-    let turn = description.parameter("param/turn").ok_or("it is declared")?;
-    assert_eq!(turn.unit, "rad");
-    assert_eq!(turn.range, Some(0.0..=std::f64::consts::PI));
-    let json: Value = serde_json::from_str(&description.to_json())?;
-    let of = |list: &str, path: &str| {
-        let list = json[list].as_array().into_iter().flatten();
-        list.clone().find(|element| element["path"] == path).cloned().unwrap_or_default()
-    };
-    let travel = of("commands", "command/travel");
-    let distance = &travel["arguments"]["properties"]["distance"];
-    assert_eq!((&distance["description"], &distance["unit"]), (&"Distance to travel.".into(), &"m".into()));
-    assert_eq!((&travel["defaults"]["distance"], &travel["role"]), (&2.5.into(), &"plain".into()));
-    assert_eq!(of("commands", "command/arm")["role"], "arming");
-    assert_eq!(of("parameters", "param/turn")["maximum"], std::f64::consts::PI);
-    assert!(of("components", "actuator/base/pan/servo")["command"].is_object());
-    assert!(of("components", "sensor/base/number")["command"].is_null());
     Ok(())
 }

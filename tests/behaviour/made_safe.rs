@@ -1,7 +1,9 @@
 //! Hardware that is started, and commands that arm, while the robot is being disarmed or was.
 
-use crate::components::{Doing, Done, Number, Source, Task, lock, within};
-use crate::gate::{Brake, Brakes, Gate, Place, Stuck, wait_until};
+use crate::components::{Doing, Done, Failure, Number, Source, Task, lock, within};
+use crate::gate::{Gate, wait_until};
+use crate::plain::{Plain, SOURCE};
+use crate::replay::{entries, journal};
 use bb_core::prelude::*;
 use bb_core::{ArmError, DisarmError, Live};
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, Ordering};
@@ -120,12 +122,9 @@ impl Sensor for Lidar {
     }
 }
 
-/// Takes its time.
-#[derive(Debug)]
-pub(crate) struct Slowly;
-
-impl Brakes for Slowly {
-    fn brake() -> Result<(), Fault> {
+/// Takes its time to be made safe.
+fn brake(context: &SensorContext) -> Done {
+    context.on_disarm(|| {
         match BRAKES.load(Ordering::SeqCst) {
             UNTIL_SAFE => {
                 wait_until("it is restarted and made safe", || MADE.load(Ordering::SeqCst) > 1 && turning() == 0)
@@ -134,30 +133,23 @@ impl Brakes for Slowly {
             _ => std::thread::sleep(Duration::from_millis(300)),
         }
         if HOLDS.load(Ordering::SeqCst) { Ok(()) } else { Err(Fault::new("it slips")) }
-    }
+    });
+    Ok(())
 }
 
 /// Gate at which a command blocks its thread.
 static BLOCK: Gate = Gate::new();
-
-#[derive(Debug)]
-pub(crate) struct Held;
-
-impl Place for Held {
-    const GATE: &'static Gate = &BLOCK;
-    const NAME: &'static str = "block";
-}
 
 robot! {
     robot Scanner;
     commands {
         category other { concurrency: 3; }
         arm: Arm;
-        block: Stuck<Held> { allowed_states: [idle]; category: other; }
+        block: Task(run = |_| BLOCK.stuck("block")) { allowed_states: [idle]; category: other; }
     }
     link base {
         sensor lidar: Lidar() { rate: 100 Hz; }
-        sensor brake: Brake<Slowly>() { rate: 10 Hz; }
+        sensor brake: Source(init = brake) { rate: 10 Hz; }
     }
 }
 
@@ -297,20 +289,12 @@ fn what_an_init_has_started_that_fails_is_made_safe() {
     });
 }
 
-/// Arms after 200 ms.
-#[derive(Debug)]
-pub(crate) struct Check;
-
-impl Command for Check {
-    type Options = NoOptions;
-    type Arguments = NoArguments;
-    type Output = ();
-    const ROLE: Role = Role::Arming;
-
-    async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
+/// Takes 200 ms.
+fn check(context: CommandContext) -> Doing {
+    Box::pin(async move {
         context.sleep(Duration::from_millis(200)).await;
         Ok(Outcome::done(()))
-    }
+    })
 }
 
 /// Distance to go. Its default takes long to find out.
@@ -356,16 +340,16 @@ robot! {
     robot Commanded;
     commands {
         category other { concurrency: 3; }
-        check: Check;
-        block: Stuck<Held> { allowed_states: [idle]; category: other; }
+        check: Task<true>(run = check);
+        block: Task(run = |_| BLOCK.stuck("block")) { allowed_states: [idle]; category: other; }
         go: Go { allowed_states: [idle, executing]; category: other; }
         mission: Task(run = mission) { allowed_states: [idle]; category: other; }
     }
-    link base { sensor brake: Brake<Slowly>() { rate: 10 Hz; } }
+    link base { sensor brake: Source(init = brake) { rate: 10 Hz; } }
 }
 
 #[test]
-fn a_robot_that_was_disarmed_is_not_armed_by_what_began_before() -> Result<(), Box<dyn std::error::Error>> {
+fn a_robot_that_was_disarmed_is_not_armed_by_what_began_before() -> Result<(), Failure> {
     let _alone = alone();
     let mut simulation = Commanded::builder().simulate()?;
     let check = simulation.command(commanded::command::check, NoArguments)?;
@@ -402,7 +386,7 @@ fn a_robot_that_was_disarmed_is_not_armed_by_what_began_before() -> Result<(), B
 }
 
 #[test]
-fn a_command_that_was_cancelled_while_it_made_arguments_starts_nothing() -> Result<(), Box<dyn std::error::Error>> {
+fn a_command_that_was_cancelled_while_it_made_arguments_starts_nothing() -> Result<(), Failure> {
     let _alone = alone();
     let robot = Commanded::builder().start()?;
     assert_eq!(robot.arm(), Ok(()));
@@ -463,7 +447,7 @@ type Said = (Result<(), DisarmError>, Result<(), ArmError>);
 static SAID: Mutex<Vec<Said>> = Mutex::new(Vec::new());
 
 /// The robot that is called.
-static ROBOT: Mutex<Option<Live<Calling>>> = Mutex::new(None);
+static ROBOT: Mutex<Option<Live<Plain>>> = Mutex::new(None);
 
 /// Calls the robot from its callback.
 fn calls(context: &SensorContext) -> Done {
@@ -477,19 +461,16 @@ fn calls(context: &SensorContext) -> Done {
     Ok(())
 }
 
-robot! {
-    robot Calling;
-    link base { sensor calls: Source(init = calls) { rate: 10 Hz; } }
-}
-
 #[test]
-fn a_callback_cannot_wait_for_itself_and_a_replay_obeys_its_journal_alone() -> Result<(), Box<dyn std::error::Error>>
-{
+fn a_callback_cannot_wait_for_itself_and_a_replay_obeys_its_journal_alone() -> Result<(), Failure> {
     let _alone = alone();
-    let lines = Arc::new(Mutex::new(Vec::new()));
-    let sink = Arc::clone(&lines);
-    let mut builder = Calling::builder();
-    builder.journal(move |line| lock(&sink).push(line));
+    let calling = || {
+        let mut builder = Plain::builder();
+        builder.options(SOURCE).init = calls;
+        builder
+    };
+    let mut builder = calling();
+    let lines = journal(&mut builder);
     let called = |robot| *lock(&ROBOT) = robot;
     let mut simulation = builder.simulate()?;
     called(Some(simulation.live()));
@@ -497,7 +478,7 @@ fn a_callback_cannot_wait_for_itself_and_a_replay_obeys_its_journal_alone() -> R
     assert_eq!(simulation.disarm(), Ok(()));
     simulation.run_for(Duration::from_millis(100));
     assert_eq!(simulation.stop().safety, Safety::Disarmed);
-    let robot = Calling::builder().start()?;
+    let robot = calling().start()?;
     called(Some(robot.live()));
     assert_eq!((robot.arm(), robot.disarm()), (Ok(()), Ok(())));
     robot.stop();
@@ -508,9 +489,9 @@ fn a_callback_cannot_wait_for_itself_and_a_replay_obeys_its_journal_alone() -> R
     let stopping = (Err(DisarmError::Callback), Err(ArmError::Stopping));
     assert_eq!(said, [during.clone(), stopping.clone(), during, stopping]);
 
-    let mut replay = Calling::builder().replay()?;
+    let mut replay = calling().replay()?;
     assert_eq!((replay.arm(), replay.disarm()), (Err(ArmError::Replay), Err(DisarmError::Replay)));
-    replay.play(std::mem::take(&mut *lock(&lines)))?;
+    replay.play(entries(&lines))?;
     assert_eq!(replay.stop().safety, Safety::Disarmed);
     Ok(())
 }

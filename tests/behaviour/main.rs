@@ -47,6 +47,7 @@ mod panicking_code;
 mod parameter_sets;
 mod parameter_store;
 mod parameters;
+mod plain;
 mod reactions;
 mod real_time;
 mod replaced;

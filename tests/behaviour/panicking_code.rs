@@ -1,7 +1,8 @@
 //! A panic in a user's code is charged to whom it belongs, at the start too; and what would keep virtual time from going on is
 //! ended.
 
-use crate::components::{Number, Source};
+use crate::components::{Failure, Number, Source};
+use crate::plain::{Plain, SOURCE};
 use bb_core::message::codec::{Reader, Shape, Writer};
 use bb_core::message::{DecodeError, Field, Finite};
 use bb_core::prelude::*;
@@ -90,7 +91,7 @@ mod outputs {
     }
 
     /// One panic of that code, and what the robot does after it.
-    fn charged(code: u32) -> Result<(), Box<dyn std::error::Error>> {
+    fn charged(code: u32) -> Result<(), Failure> {
         let _turn = TURN.lock();
         let mut builder = Making::builder();
         builder.journal(|_| ());
@@ -127,12 +128,12 @@ mod outputs {
 
     #[test]
     fn a_panic_in_the_code_of_an_estimators_output_is_charged_to_the_estimator_which_is_restarted()
-    -> Result<(), Box<dyn std::error::Error>> {
+    -> Result<(), Failure> {
         (1..=4).try_for_each(charged)
     }
 
     #[test]
-    fn outputs_that_panic_too_often_have_the_robot_made_safe() -> Result<(), Box<dyn std::error::Error>> {
+    fn outputs_that_panic_too_often_have_the_robot_made_safe() -> Result<(), Failure> {
         let _turn = TURN.lock();
         let builder = Making::builder();
         let _outputs = builder.subscribe(making::sensor::base::source::maker);
@@ -149,46 +150,30 @@ mod outputs {
     }
 }
 
-mod instants {
-    use super::*;
-
-    robot! {
-        robot Failing;
-        link base { sensor number: Source(read = |_, _| Err(Fault::new("unplugged"))) { rate: 10 Hz; } }
-    }
-
-    #[test]
-    fn a_backoff_of_zero_does_not_keep_virtual_time_from_going_on() -> Result<(), Box<dyn std::error::Error>> {
-        let mut builder = Failing::builder();
-        builder.supervision().first_backoff = Duration::ZERO;
-        builder.supervision().longest_backoff = Duration::ZERO;
-        let mut simulation = builder.simulate()?;
-        simulation.run_for(Duration::from_millis(10));
-        assert_eq!(simulation.clock().now(), MonotonicTime::from_nanos(10_000_000));
-        let restarts = simulation.report().sources[0].restarts;
-        assert!((99..=101).contains(&restarts), "100 µs apart: {restarts}");
-        Ok(())
-    }
+#[test]
+fn a_backoff_of_zero_does_not_keep_virtual_time_from_going_on() -> Result<(), Failure> {
+    let mut builder = Plain::builder();
+    builder.options(SOURCE).read = |_, _| Err(Fault::new("unplugged"));
+    builder.supervision().first_backoff = Duration::ZERO;
+    builder.supervision().longest_backoff = Duration::ZERO;
+    let mut simulation = builder.simulate()?;
+    simulation.run_for(Duration::from_millis(10));
+    assert_eq!(simulation.clock().now(), MonotonicTime::from_nanos(10_000_000));
+    let restarts = simulation.report().sources[0].restarts;
+    assert!((99..=101).contains(&restarts), "100 µs apart: {restarts}");
+    Ok(())
 }
 
-mod stops {
-    use super::*;
-    use crate::components::Counter;
-
-    robot! {
-        robot Counting;
-        link base { sensor counter: Counter(count = 1000) { rate: 100 Hz; } }
-    }
-
-    #[test]
-    fn a_stop_that_is_requested_stops_sensors_on_virtual_time_too() -> Result<(), Box<dyn std::error::Error>> {
-        let mut simulation = Counting::builder().simulate()?;
-        simulation.run_for(Duration::from_millis(95));
-        assert_eq!(simulation.report().sources[0].readings, 10);
-        simulation.request_stop();
-        simulation.run_for(Duration::from_secs(1));
-        assert_eq!((simulation.report().sources[0].readings, simulation.next_due()), (10, None));
-        simulation.stop().ok()?;
-        Ok(())
-    }
+#[test]
+fn a_stop_that_is_requested_stops_sensors_on_virtual_time_too() -> Result<(), Failure> {
+    let mut builder = Plain::builder();
+    builder.options(SOURCE).read = |_, _| Ok(Reading::now(Number(1.0)));
+    let mut simulation = builder.simulate()?;
+    simulation.run_for(Duration::from_millis(95));
+    assert_eq!(simulation.report().sources[0].readings, 10);
+    simulation.request_stop();
+    simulation.run_for(Duration::from_secs(1));
+    assert_eq!((simulation.report().sources[0].readings, simulation.next_due()), (10, None));
+    simulation.stop().ok()?;
+    Ok(())
 }

@@ -1,38 +1,33 @@
 //! Real time: a thread per sensor. Nothing here asserts how late a thread was.
 
-use crate::components::{Counter, Number, Scale, within};
+use crate::components::{Counter, Done, Number, Read, Scale, Source, lock, within};
 use crate::gate::PATIENCE;
 use bb_core::prelude::*;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-/// A driver that waits for its device.
-#[derive(Debug)]
-pub(crate) struct Waiting {
-    context: SensorContext,
+static WAITING: Mutex<Option<SensorContext>> = Mutex::new(None);
+
+/// Waits for its device.
+fn wait(_: u32, _: MonotonicTime) -> Read {
+    let context = lock(&WAITING).clone().ok_or("it was not made")?;
+    while !context.is_stopping() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    Ok(Reading::nothing())
 }
 
-impl Sensor for Waiting {
-    type Options = NoOptions;
-    type Output = Number;
-
-    fn init(_: NoOptions, context: &SensorContext) -> Result<Self, Fault> {
-        Ok(Self { context: context.clone() })
-    }
-
-    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        while !self.context.is_stopping() {
-            std::thread::sleep(Duration::from_millis(1));
-        }
-        Ok(Reading::nothing())
-    }
+fn install(context: &SensorContext) -> Done {
+    *lock(&WAITING) = Some(context.clone());
+    Ok(())
 }
 
 robot! {
     robot Live;
     link base {
         sensor numbers: Counter(count = 20) { rate: 200 Hz; estimator scaled: Scale(); }
-        sensor waiting: Waiting();
+        sensor waiting: Source(init = install, read = wait);
         sensor rare: Counter(count = 2) { rate: 0.001 Hz; }
     }
 }

@@ -4,6 +4,7 @@ use crate::components::{
     Ask, Counter, CounterOptions, Echo, Failure, Number, Pulse, Scale, ScaleOptions, at, numbers,
 };
 use crate::joints::{Pixel, Spot, Spotter};
+use crate::plain::{Plain, SOURCE};
 use crate::replay::{entries, journal, overflow};
 use bb_core::Builder;
 use bb_core::component::InputTransforms;
@@ -213,51 +214,17 @@ fn a_replacement_that_does_not_fit_keeps_the_robot_from_starting() -> Result<(),
     Ok(())
 }
 
-/// Options that are always refused, as those of a driver whose device file is not on the desk.
-#[derive(Clone, Debug)]
-struct Absent;
-
-impl Options for Absent {
-    const FIELDS: &'static [bb_core::component::OptionField] = &[];
-
-    fn defaults() -> Self {
-        Self
-    }
-
-    fn validate(&self) -> Result<(), String> {
-        Err("there is no such device".to_owned())
-    }
-}
-
-/// Cannot be made.
-#[derive(Debug)]
-struct Driver;
-
-impl Sensor for Driver {
-    type Options = Absent;
-    type Output = Number;
-
-    fn init(_: Absent, _: &SensorContext) -> Result<Self, Fault> {
-        Err(Fault::permanent("it is never made"))
-    }
-
-    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        Ok(Reading::nothing())
-    }
-}
-
-robot! {
-    robot Desk;
-    link base { sensor device: Driver() { rate: 100 Hz; } }
-}
-
 #[test]
 fn options_of_replaced_components_are_ignored() -> Result<(), Failure> {
-    let error = Desk::builder().simulate().expect_err("its options are refused").to_string();
-    assert_eq!(error, "sensor/base/device cannot start: there is no such device");
-
-    let mut builder = Desk::builder();
-    builder.replace_sensor::<Counter>("sensor/base/device", CounterOptions::defaults())?;
+    let desk = || {
+        let mut builder = Plain::builder();
+        builder.options(SOURCE).gain = -1.0;
+        builder
+    };
+    let error = desk().simulate().expect_err("its options are refused").to_string();
+    assert_eq!(error, "sensor/base/source cannot start: option `gain` is -1, but must be in 0.0..=1e6");
+    let mut builder = desk();
+    builder.replace_sensor::<Counter>("sensor/base/source", CounterOptions::defaults())?;
     builder.simulate()?.stop().ok()?;
 
     // A parameter that is out of range for them only: as the declared one's gain it is refused.

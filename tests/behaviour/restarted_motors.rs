@@ -1,7 +1,8 @@
 //! Hardware that a restart, or a change of options, starts while the robot is being disarmed.
 
-use crate::components::{Done, Number, Servo, Source, lock, within};
+use crate::components::{Done, Number, Source, lock, within};
 use crate::gate::{Gate, wait_until};
+use crate::plain::{Plain, SERVO, SOURCE};
 use bb_core::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard};
@@ -79,19 +80,6 @@ fn torque_off(_: f64) -> Done {
 }
 
 robot! {
-    robot Stiff;
-    link base {
-        sensor brake: Source(init = brake) { rate: 10 Hz; }
-        joint pan: continuous {
-            axis: z;
-            actuator servo: Servo(init = torque_on, command = |_| Err(Fault::new("the cable is loose")), disarm = torque_off);
-            sensor encoder: External<Number>();
-            link head {}
-        }
-    }
-}
-
-robot! {
     robot Windy;
     parameters { speed: f64 = 1.0, range: 0.0..=10.0; }
     link base {
@@ -104,10 +92,15 @@ robot! {
 fn an_actuator_that_restarts_while_the_robot_is_disarmed_is_disarmed_once_more() {
     let _alone = alone();
     within(60, || {
-        let robot = Stiff::builder().start().expect("it starts");
+        let mut builder = Plain::builder();
+        builder.options(SOURCE).init = brake;
+        let servo = builder.options(SERVO);
+        (servo.init, servo.disarm) = (torque_on, torque_off);
+        servo.command = |_| Err(Fault::new("the cable is loose"));
+        let robot = builder.start().expect("it starts");
         assert_eq!(robot.arm(), Ok(()));
         GATE.close("brake");
-        assert!(robot.actuate(stiff::actuator::base::pan::servo, Number(1.0)).is_err());
+        assert!(robot.actuate(SERVO, Number(1.0)).is_err());
         let live = robot.live();
         let disarms = std::thread::spawn(move || live.disarm());
         GATE.wait_for(1);

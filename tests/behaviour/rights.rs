@@ -1,33 +1,23 @@
 //! Rights of a caller: each verb of the bus needs its right, and everybody may disarm.
 
-use crate::components::{Number, Servo};
+use crate::components::{Failure, Number};
+use crate::plain::{Plain, plain};
+use crate::replay::{entries, journal, play, read_back};
 use bb_core::journal::Event;
 use bb_core::prelude::*;
 use bb_core::run::Bus;
 use bb_core::{ArmError, DisarmError};
 
-robot! {
-    robot Guarded;
-    parameters { speed: f64 = 1.0; }
-    commands {
-        stop: Disarm { allowed_states: [disarmed, idle]; }
-        go: Arm { allowed_states: [disarmed]; }
-    }
-    link base {
-        joint pan: continuous { axis: z; actuator servo: Servo(); sensor encoder: External<Number>(); link head {} }
-    }
-}
-
 /// Request to a bus that needs a right; its error says why the bus refuses.
-type Verb = fn(&Bus) -> Result<(), Box<dyn std::error::Error>>;
+type Verb = fn(&Bus) -> Result<(), Failure>;
 
 const VERBS: [(Right, &str, Verb); 11] = [
     (Right::Read, "subscribe", |bus| {
         Ok(bus.subscribe::<Number>("sensor/base/pan/encoder", Overflow::default()).map(drop)?)
     }),
-    (Right::Parameters, "set_parameter", |bus| Ok(bus.set_parameter("param/speed", 2.0)?)),
-    (Right::Parameters, "set_parameters", |bus| Ok(bus.set_parameters([("param/speed", 3.0.into())])?)),
-    (Right::Commands, "start_command", |bus| Ok(bus.start_command("command/stop", "").map(drop)?)),
+    (Right::Parameters, "set_parameter", |bus| Ok(bus.set_parameter("param/gain", 2.0)?)),
+    (Right::Parameters, "set_parameters", |bus| Ok(bus.set_parameters([("param/gain", 3.0.into())])?)),
+    (Right::Commands, "start_command", |bus| Ok(bus.start_command("command/disarm", "").map(drop)?)),
     (Right::Arm, "arm", |bus| Ok(bus.arm()?)),
     (Right::Actuators, "actuator", |bus| {
         Ok(bus.actuator::<Number>("actuator/base/pan/servo")?.send(Number(1.0))?)
@@ -51,11 +41,11 @@ fn encoded() -> Vec<u8> {
 }
 
 #[test]
-fn each_verb_needs_its_right_and_names_it_and_the_caller() -> Result<(), Box<dyn std::error::Error>> {
+fn each_verb_needs_its_right_and_names_it_and_the_caller() -> Result<(), Failure> {
     for bits in 0..1_u32 << Right::ALL.len() {
         let of_bits = Right::ALL.into_iter().filter(|right| bits & 1 << *right as u32 != 0);
         let rights: Rights = of_bits.collect();
-        let robot = Guarded::builder().simulate()?;
+        let robot = Plain::builder().simulate()?;
         let page = robot.bus().for_caller("page", rights);
         assert_eq!((page.caller(), page.rights()), ("page", rights));
         for (right, verb, ask) in VERBS {
@@ -79,23 +69,23 @@ fn each_verb_needs_its_right_and_names_it_and_the_caller() -> Result<(), Box<dyn
 }
 
 #[test]
-fn callers_that_may_not_read_see_no_values_and_no_messages() -> Result<(), Box<dyn std::error::Error>> {
-    let robot = Guarded::builder().simulate()?;
+fn callers_that_may_not_read_see_no_values_and_no_messages() -> Result<(), Failure> {
+    let robot = Plain::builder().simulate()?;
     for (rights, may_read) in [(Rights::NONE, false), ([Right::Read].into(), true)] {
         let page = robot.bus().for_caller("page", rights);
         let all = page.subscribe_any(Select::All, None, Overflow::default());
         robot.arm()?;
         robot.disarm()?;
         assert_eq!(all.drain().count() > 0, may_read);
-        assert_eq!(page.parameter("param/speed").is_some(), may_read);
+        assert_eq!(page.parameter("param/gain").is_some(), may_read);
         assert_eq!(page.description().parameters.len(), usize::from(may_read));
     }
     Ok(())
 }
 
 #[test]
-fn a_caller_gives_no_rights_that_it_does_not_have() -> Result<(), Box<dyn std::error::Error>> {
-    let robot = Guarded::builder().simulate()?;
+fn a_caller_gives_no_rights_that_it_does_not_have() -> Result<(), Failure> {
+    let robot = Plain::builder().simulate()?;
     assert_eq!((robot.caller(), robot.rights()), ("program", Rights::ALL));
     let page = robot.for_caller("page", [Right::Read, Right::Arm]);
     let user = page.for_caller("user", [Right::Arm, Right::Commands]);
@@ -112,15 +102,15 @@ fn a_caller_gives_no_rights_that_it_does_not_have() -> Result<(), Box<dyn std::e
 }
 
 #[test]
-fn a_command_that_arms_needs_the_right_to_arm_too() -> Result<(), Box<dyn std::error::Error>> {
+fn a_command_that_arms_needs_the_right_to_arm_too() -> Result<(), Failure> {
     for (rights, missing) in [
         (vec![Right::Commands], Some(Right::Arm)),
         (vec![Right::Arm], Some(Right::Commands)),
         (vec![Right::Arm, Right::Commands], None),
     ] {
-        let mut robot = Guarded::builder().simulate()?;
+        let mut robot = Plain::builder().simulate()?;
         let page = robot.for_caller("page", rights.into_iter().collect::<Rights>());
-        let started = page.start_command("command/go", "").map(drop).map_err(|fault| fault.to_string());
+        let started = page.start_command("command/arm", "").map(drop).map_err(|fault| fault.to_string());
         robot.run_for(Duration::from_millis(1));
         match missing {
             None => assert_eq!((started, robot.safety()), (Ok(()), Safety::Armed)),
@@ -136,25 +126,25 @@ fn a_command_that_arms_needs_the_right_to_arm_too() -> Result<(), Box<dyn std::e
 
 /// Events, lines of the journal and a replay name the same callers.
 #[test]
-fn changes_of_parameters_and_safety_name_their_caller() -> Result<(), Box<dyn std::error::Error>> {
-    let mut builder = Guarded::builder();
-    let lines = crate::replay::journal(&mut builder);
+fn changes_of_parameters_and_safety_name_their_caller() -> Result<(), Failure> {
+    let mut builder = Plain::builder();
+    let lines = journal(&mut builder);
     let safety = builder.subscribe(system::SafetyState);
-    let speed = builder.subscribe(guarded::param::speed);
+    let gain = builder.subscribe(plain::param::gain);
     let mut robot = builder.simulate()?;
     let page = robot.for_caller("page 1", Rights::ALL);
-    page.set_parameter("param/speed", 2.0)?;
-    robot.set_parameter(guarded::param::speed, 3.0)?;
+    page.set_parameter("param/gain", 2.0)?;
+    robot.set_parameter(plain::param::gain, 3.0)?;
     page.arm()?;
     robot.for_caller("stop button", Rights::NONE).disarm()?;
-    page.start_command("command/go", "")?;
+    page.start_command("command/arm", "")?;
     robot.run_for(Duration::from_millis(1));
-    page.start_command("command/stop", "")?;
+    page.start_command("command/disarm", "")?;
     robot.run_for(Duration::from_millis(1));
     page.arm()?;
     robot.for_caller("service", Rights::ALL).request_stop()?;
     robot.stop();
-    let callers: Vec<_> = speed.drain().map(|change| change.payload.caller).collect();
+    let callers: Vec<_> = gain.drain().map(|change| change.payload.caller).collect();
     assert_eq!(callers, ["page 1", "program"]);
     let changes: Vec<_> =
         safety.drain().map(|change| (change.to, change.payload.caller.unwrap_or_default())).collect();
@@ -171,7 +161,7 @@ fn changes_of_parameters_and_safety_name_their_caller() -> Result<(), Box<dyn st
         (disarmed, "service"),
     ];
     assert_eq!(changes, expected.map(|(to, caller)| (to, caller.to_owned())));
-    let lines = crate::replay::entries(&lines);
+    let lines = entries(&lines);
     let written: Vec<_> = lines
         .iter()
         .cloned()
@@ -193,9 +183,9 @@ fn changes_of_parameters_and_safety_name_their_caller() -> Result<(), Box<dyn st
     ];
     assert_eq!(written, expected.map(|(what, caller)| (what, caller.to_owned())));
     // A replay publishes the same.
-    let builder = Guarded::builder();
+    let builder = Plain::builder();
     let again = builder.subscribe(system::SafetyState);
-    crate::replay::play(builder, &crate::replay::read_back::<Guarded>(&lines)?)?;
+    play(builder, &read_back::<Plain>(&lines)?)?;
     let again: Vec<_> =
         again.drain().map(|change| (change.to, change.payload.caller.unwrap_or_default())).collect();
     assert_eq!(again, changes);

@@ -1,14 +1,26 @@
 //! Virtual time.
 
-use crate::components::{Counter, Number, Read, Scale, Source, at};
+use crate::components::{Counter, Number, Read, Snapshot, Source, at};
 use bb_core::prelude::*;
 
 robot! {
     robot Clockwork;
 
     link base {
-        sensor fast: Counter(count = 1000) { rate: 100 Hz; estimator scaled: Scale(factor = 3.0); }
+        sensor rated: Counter(count = 100) { rate: 100 Hz; }
         sensor slow: Counter(start = 100.0, count = 2) { rate: 4 Hz; }
+        sensor fed: External<Number>();
+        // The driver is declared first; what it needs beside it is read before it all the same.
+        sensor driver: Counter(count = 10) { rate: 10 Hz; }
+        sensor other: Counter(count = 10) { rate: 10 Hz; }
+        estimator both: Snapshot() {
+            input driver: sensor::base::driver, driver;
+            input second: sensor::base::other;
+            sync_tolerance: 1 ms;
+        }
+        // Both have finished, unless their options say otherwise.
+        sensor odd: Source(read = |_, _| Ok(Reading::finished()));
+        sensor no_rate: Counter(count = 0);
     }
 }
 
@@ -16,11 +28,11 @@ robot! {
 fn sensors_are_read_at_their_rates_and_stamped_with_virtual_time() -> Result<(), StartError> {
     let builder = Clockwork::builder();
     let slow = builder.subscribe(clockwork::sensor::base::slow);
-    let fast = builder.subscribe(clockwork::sensor::base::fast);
+    let rated = builder.subscribe(clockwork::sensor::base::rated);
     let mut simulation = builder.simulate()?;
     simulation.run_for(Duration::from_millis(495));
     assert_eq!(simulation.clock().now(), at(495));
-    assert_eq!(fast.drain().count(), 50);
+    assert_eq!(rated.drain().count(), 50);
     let slow: Vec<_> = slow.drain().map(|number| (number.monotonic_time, number.0)).collect();
     assert_eq!(slow, [(at(0), 100.0), (at(250), 101.0)]);
     Ok(())
@@ -31,48 +43,27 @@ fn restless(_: u32, now: MonotonicTime) -> Read {
     Ok(Reading::now(Number(0.0)).next_at(now))
 }
 
-robot! {
-    robot Stuck;
-    link base {
-        sensor restless: Source(read = restless);
-        sensor no_rate: Counter();
-    }
-}
-
 #[test]
 fn a_sensor_that_stops_virtual_time_is_stopped_and_named() -> Result<(), StartError> {
-    let mut simulation = Stuck::builder().simulate()?;
+    let mut builder = Clockwork::builder();
+    builder.options(clockwork::sensor::base::odd).read = restless;
+    builder.options(clockwork::sensor::base::no_rate).count = 5;
+    let mut simulation = builder.simulate()?;
     simulation.run_to_end();
     let faults = simulation.stop().faults;
     let paths: Vec<_> = faults.iter().map(|fault| fault.path).collect();
-    assert_eq!(paths, ["sensor/base/restless", "sensor/base/no_rate"]);
+    assert_eq!(paths, ["sensor/base/odd", "sensor/base/no_rate"]);
     assert!(faults[1].message.contains("declare `rate`"), "{}", faults[1]);
     Ok(())
 }
 
-robot! {
-    robot Ahead;
-    link base {
-        sensor rated: Counter(count = 100) { rate: 100 Hz; }
-        sensor fed: External<Number>();
-        // The driver is declared first; what it needs beside it is read before it all the same.
-        sensor driver: Counter(count = 10) { rate: 10 Hz; }
-        sensor other: Counter(count = 10) { rate: 10 Hz; }
-        estimator both: crate::components::Snapshot() {
-            input driver: sensor::base::driver, driver;
-            input second: sensor::base::other;
-            sync_tolerance: 1 ms;
-        }
-    }
-}
-
 #[test]
 fn publishing_ahead_of_time_loses_no_reading_and_doubles_none() -> Result<(), StartError> {
-    let builder = Ahead::builder();
-    let rated = builder.subscribe(ahead::sensor::base::rated);
+    let builder = Clockwork::builder();
+    let rated = builder.subscribe(clockwork::sensor::base::rated);
     let mut simulation = builder.simulate()?;
     simulation.run_for(Duration::from_millis(5));
-    simulation.publish(ahead::sensor::base::fed, at(35), Number(0.0));
+    simulation.publish(clockwork::sensor::base::fed, at(35), Number(0.0));
     simulation.run_until(at(60));
     let times: Vec<_> = rated.drain().map(|number| number.monotonic_time).collect();
     assert_eq!(times, [0, 10, 20, 30, 40, 50, 60].map(at));
@@ -81,8 +72,8 @@ fn publishing_ahead_of_time_loses_no_reading_and_doubles_none() -> Result<(), St
 
 #[test]
 fn of_sensors_due_at_once_the_driver_is_read_last() -> Result<(), StartError> {
-    let builder = Ahead::builder();
-    let both = builder.subscribe(ahead::estimator::base::both);
+    let builder = Clockwork::builder();
+    let both = builder.subscribe(clockwork::estimator::base::both);
     let mut simulation = builder.simulate()?;
     simulation.run_to_end();
     assert_eq!(both.drain().filter(|seen| seen.driver == seen.second).count(), 10);
@@ -97,26 +88,22 @@ fn recording(number: u32, now: MonotonicTime) -> Read {
     Ok(if number > 2 { Reading::finished() } else { reading })
 }
 
-robot! {
-    robot Replay;
-    link base {
-        sensor rated: Counter(count = 3) { rate: 100 Hz; }
-        sensor recording: Source(read = recording, starts_at = || Some(MADE_AT)) { estimator scaled: Scale(factor = 1.0); }
-    }
-}
-
 #[test]
 fn virtual_time_starts_with_a_recording_and_real_time_refuses_one() -> Result<(), StartError> {
-    let builder = Replay::builder();
-    let (rated, scaled) = (
-        builder.subscribe(replay::sensor::base::rated),
-        builder.subscribe(replay::sensor::base::recording::scaled),
-    );
-    let mut simulation = builder.simulate()?;
+    let builder = || {
+        let mut builder = Clockwork::builder();
+        let odd = builder.options(clockwork::sensor::base::odd);
+        (odd.read, odd.starts_at) = (recording, || Some(MADE_AT));
+        builder
+    };
+    let first = builder();
+    let (rated, played) =
+        (first.subscribe(clockwork::sensor::base::rated), first.subscribe(clockwork::sensor::base::odd));
+    let mut simulation = first.simulate()?;
     simulation.run_to_end();
     assert_eq!(rated.try_recv().map(|number| number.monotonic_time), Some(MADE_AT));
-    assert_eq!(scaled.drain().count(), 2);
-    let mut running = Replay::builder().start()?;
+    assert_eq!(played.drain().count(), 2);
+    let mut running = builder().start()?;
     running.wait();
     let faults = running.stop().faults;
     assert!(faults.len() == 1 && faults[0].message.contains("needs virtual time"), "{faults:?}");

@@ -1,6 +1,7 @@
 //! Supervision: who is restarted when something fails too often, and who is not.
 
 use crate::components::{Done, Echo, Number, Read, Replied, Source, at, lock, within};
+use crate::plain::{Plain, SOURCE};
 use bb_core::prelude::*;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -173,23 +174,19 @@ fn read(_: u32, _: MonotonicTime) -> Read {
     Ok(Reading::now(Number(1.0)))
 }
 
-robot! {
-    robot Unplugged;
-    link base {
-        sensor flaky: Source(init = plug_in, read = read, terminate = |_| panic!("cannot be closed")) { rate: 10 Hz; }
-    }
-}
-
 #[test]
 fn a_sensor_that_panics_when_it_is_restarted_backs_off() {
     within(60, || {
-        let builder = Unplugged::builder();
-        let numbers = builder.subscribe(unplugged::sensor::base::flaky);
+        let mut builder = Plain::builder();
+        let source = builder.options(SOURCE);
+        (source.init, source.read) = (plug_in, read);
+        source.terminate = |_| panic!("cannot be closed");
+        let numbers = builder.subscribe(SOURCE);
         let mut simulation = builder.simulate().expect("it starts");
         simulation.run_until(at(1000));
         // 10 ms, 20 ms, and 40 ms after the one before.
         assert_eq!(*lock(&FLAKY), [0, 10, 30, 70]);
-        assert_eq!(numbers.drain().count(), 10);
+        assert_eq!(numbers.drain().count(), 94);
         let report = simulation.stop();
         let messages: Vec<_> = report.faults.iter().map(|fault| (fault.message.as_str(), fault.count)).collect();
         let expected = [("panicked: unplugged", 1), ("panicked: no device", 2), ("panicked: cannot be closed", 1)];

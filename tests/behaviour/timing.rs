@@ -1,17 +1,8 @@
 //! Timers, ticks, continues and readings with times that never come.
 
-use crate::components::{Echo, EchoOptions, Number, Source, at, within};
+use crate::components::{EchoOptions, Number, at, within};
+use crate::plain::{ECHO, ENCODER, Plain, SOURCE};
 use bb_core::prelude::*;
-
-robot! {
-    robot Impatient;
-    link base {
-        sensor number: External<Number>() { estimator asking: Echo(); }
-        sensor other: External<Number>() { estimator beside: Echo(); }
-        // The next reading is due at a time that never comes.
-        sensor never: Source(read = |_, _| Ok(Reading::now(Number(1.0)).next_at(MonotonicTime::MAX)));
-    }
-}
 
 /// Asks as it is made, and again at every callback; a tick comes again by itself.
 macro_rules! asking {
@@ -33,14 +24,16 @@ macro_rules! asking {
 
 const NANOSECOND: Duration = Duration::from_nanos(1);
 
-fn start(asks: EchoOptions) -> Simulation<Impatient> {
-    let mut builder = Impatient::builder();
-    *builder.options(impatient::sensor::base::number::asking) = asks;
+fn start(asks: EchoOptions) -> Simulation<Plain> {
+    let mut builder = Plain::builder();
+    *builder.options(ECHO) = asks;
+    // The next reading is due at a time that never comes.
+    builder.options(SOURCE).read = |_, _| Ok(Reading::now(Number(1.0)).next_at(MonotonicTime::MAX));
     builder.simulate().expect("it starts")
 }
 
-fn emitted(simulation: &Simulation<Impatient>) -> u64 {
-    simulation.report().estimator("sensor/base/number/asking").map_or(0, |asking| asking.emitted)
+fn emitted(simulation: &Simulation<Plain>) -> u64 {
+    simulation.report().estimator("sensor/base/number/echo").map_or(0, |asking| asking.emitted)
 }
 
 #[test]
@@ -63,12 +56,12 @@ fn nothing_is_due_sooner_than_a_microsecond_after_it_was_asked_for() {
 fn an_estimator_that_never_ends_its_work_is_stopped() {
     within(60, || {
         let mut simulation = start(asking!(Request::Continue(1)));
-        simulation.publish(impatient::sensor::base::other, at(1), Number(1.0));
+        simulation.publish(ENCODER, at(1), Number(1.0));
         let report = simulation.stop();
-        let asking = report.estimator("sensor/base/number/asking").expect("it is declared");
+        let asking = report.estimator("sensor/base/number/echo").expect("it is declared");
         let reason = "it asked 1000000 times in a row to go on at 0.000000000 s, and nothing else could happen";
         assert_eq!((asking.stopped.as_deref(), asking.restarts), (Some(reason), 0));
-        assert_eq!(report.estimator("sensor/base/other/beside").map(|beside| beside.emitted), Some(1));
+        assert_eq!(report.estimator("sensor/base/pan/encoder/position").map(|beside| beside.emitted), Some(1));
     });
 }
 
