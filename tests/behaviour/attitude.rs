@@ -1,6 +1,6 @@
 //! Outputs of attitude estimators: the orientation alone, or beside what else they know.
 
-use bb_core::prelude::*;
+use crate::kit::*;
 use bb_estimators::attitude::AttitudeOutputs;
 use bb_estimators::{Madgwick, Mekf, SimulatedImu};
 

@@ -1,14 +1,11 @@
 //! Journals that cannot be replayed, or not to their end.
 
-use crate::components::{Echo, Failure, Number, Replied, at};
 use crate::journals::{Again, Way, again};
-use crate::replay::{entries, is_again, journal, once_more, overflow};
-use bb_core::journal::{Entry, Event, JournalLine, JournalReader};
-use bb_core::prelude::*;
+use crate::kit::*;
+use bb_core::journal::{JournalLine, JournalReader};
 use bb_mcap::{Recorder, RecorderOptions, Recording};
 use std::io::{BufRead, BufReader};
 use std::process::Stdio;
-use std::sync::atomic::{AtomicU32, Ordering};
 
 macro_rules! rig {
     ($module:ident: $($sensor:ident)*) => {
@@ -76,8 +73,7 @@ fn an_estimator_that_gives_something_else_is_named_at_its_first_difference() -> 
     assert_eq!(replay.play(lines), Err(error.clone()));
     let report = replay.stop();
     assert_eq!(numbers.drain().count(), 0, "after {heard}");
-    let faults: Vec<_> = report.faults.iter().map(ToString::to_string).collect();
-    assert_eq!(faults, [format!("journal failed: {error}")]);
+    assert_eq!(told(&report), [format!("journal failed: {error}")]);
     assert_eq!(
         error.message,
         "`sensor/base/left/dice` emits another message than it did: the algorithm is not deterministic"
@@ -97,8 +93,7 @@ fn child() {
     let mut options = RecorderOptions::of::<Again>();
     options.flush_messages = 50;
     let recorder = Recorder::new(file, journal, options).expect("it can be created").spawn().expect("a thread");
-    let running = builder.start().expect("it starts");
-    running.arm().expect("it may be armed");
+    let running = armed(builder);
     for round in 0_u32.. {
         running.publish(again::sensor::base::number, running.clock().now(), Number(f64::from(round % 100)));
         running.publish(again::sensor::base::pan::encoder, running.clock().now(), Number(1.0));

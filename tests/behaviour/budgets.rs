@@ -1,8 +1,6 @@
 //! Latency budgets in real time: what they charge an estimator with, and what is measured without one.
 
-use crate::components::{Failure, Number, at};
-use crate::plain::{NUMBER, Plain};
-use bb_core::prelude::*;
+use crate::kit::*;
 
 /// Time that a copy for a subscriber takes.
 const COPYING: Duration = Duration::from_millis(60);

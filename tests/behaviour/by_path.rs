@@ -1,11 +1,6 @@
 //! A robot as tools see it: by path, with arguments as JSON; and what they are told of it.
 
-use crate::components::{Counter, Echo, Failure, Number, Read, Replied, at, lock, within};
-use crate::gate::Gate;
-use crate::plain::{Plain, SOURCE};
-use bb_core::prelude::*;
-use bb_core::telemetry::TelemetryEvent;
-use std::sync::{Arc, Mutex};
+use crate::kit::*;
 
 /// Destination of a trip, and its pace.
 #[derive(Clone, Debug, Default, PartialEq, Payload)]

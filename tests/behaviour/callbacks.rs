@@ -1,11 +1,6 @@
 //! Every callback of an estimator, what it may emit and ask for.
 
-use crate::components::{Break, Echo, Failure, Number, Replied, Snapshot, Task, at};
-use crate::replay::same_again;
-use bb_core::RequestCodec;
-use bb_core::event::ParameterValue;
-use bb_core::prelude::*;
-use bb_core::run::DropReason;
+use crate::kit::*;
 
 /// Cast that adds a number.
 pub(crate) struct Add(f64);
@@ -312,8 +307,7 @@ robot! {
 fn an_estimator_may_be_left_out() -> Result<(), StartError> {
     let builder = Partial::builder();
     let health = builder.subscribe(system::Health);
-    let mut simulation = builder.simulate()?;
-    simulation.arm().expect("it may be armed");
+    let mut simulation = armed_simulation(builder);
     simulation.publish(partial::sensor::base::number, at(5), Number(1.0));
     simulation.run_until(at(500));
     assert_eq!(simulation.state(), "idle", "no command has run");

@@ -1,11 +1,6 @@
 //! Commands that misbehave: that never sleep, that block, that start others while they start.
 
-use crate::components::{Doing, Number, Task, at, lock, within};
-use crate::gate::wait_until;
-use bb_core::prelude::*;
-use bb_core::run::CommandError;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, Ordering};
+use crate::kit::*;
 use std::task::Poll;
 
 /// Behaviour of a [`Misbehave`].
@@ -201,8 +196,7 @@ fn events_of_a_command_come_in_their_order_from_many_threads() {
         let roomy = Overflow::DropOldest { capacity: 1 << 15 };
         let events = builder.subscribe_with(unruly::command::patient, roomy);
         let states = builder.subscribe_with(system::StateMachine, roomy);
-        let running = builder.start().expect("it starts");
-        running.arm().expect("it may be armed");
+        let running = armed(builder);
         std::thread::scope(|scope| {
             for _ in 0..4 {
                 scope.spawn(|| {

@@ -2,7 +2,7 @@
 //! about, and what many of them share.
 
 use bb_core::prelude::*;
-use bb_core::{JointPositions, JointReading, RequestCodec};
+use bb_core::{Builder, JointPositions, JointReading, Report, RequestCodec, Robot, Running};
 use std::pin::{Pin, pin};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context as Polled, Wake, Waker};
@@ -469,6 +469,25 @@ pub(crate) fn when_woken<T: Payload>(subscription: &mut Subscription<T>, run: im
 /// The time `millis` after zero.
 pub(crate) fn at(millis: i64) -> MonotonicTime {
     MonotonicTime::from_nanos(millis * 1_000_000)
+}
+
+/// Starts a robot on virtual time and arms it.
+pub(crate) fn armed_simulation<R: Robot>(builder: Builder<R>) -> Simulation<R> {
+    let simulation = builder.simulate().expect("it starts");
+    simulation.arm().expect("it may be armed");
+    simulation
+}
+
+/// Starts a robot and arms it.
+pub(crate) fn armed<R: Robot>(builder: Builder<R>) -> Running<R> {
+    let running = builder.start().expect("it starts");
+    running.arm().expect("it may be armed");
+    running
+}
+
+/// The faults of a report, as it writes them.
+pub(crate) fn told(report: &Report) -> Vec<String> {
+    report.faults.iter().map(ToString::to_string).collect()
 }
 
 /// Runs tests that wait most of their time on a thread each.

@@ -1,13 +1,6 @@
 //! Several threads at once: nothing is lost uncounted, orders are kept, nobody waits for ever.
 
-use crate::components::{Ask, Echo, Number, lock, when_woken, within};
-use crate::gate::{Gate, wait_until};
-use bb_core::ArmError;
-use bb_core::DynamicSubscription;
-use bb_core::prelude::*;
-use bb_core::run::DropReason;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex};
+use crate::kit::*;
 
 /// Numbers of two publishers, which must never go back.
 #[derive(Clone, Copy, Debug, Inputs)]

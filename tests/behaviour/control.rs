@@ -1,14 +1,6 @@
 //! States, commands, safety, actuators, controllers and bridges.
 
-use crate::components::{
-    Counter, Doing, Done, Failure, MakeUpdate, Move, Number, Pulse, Servo, Target, Task, Update, at, lock, numbers,
-};
-use bb_core::event::{CommandPhase, RefusalReason};
-use bb_core::prelude::*;
-use bb_core::run::CommandError;
-use bb_core::{ArmError, DisarmError};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, MutexGuard};
+use crate::kit::*;
 
 static HAS_TORQUE: AtomicBool = AtomicBool::new(false);
 static REFUSES: AtomicBool = AtomicBool::new(false);
@@ -133,8 +125,7 @@ fn a_robot_is_armed_by_its_command_and_executes_until_its_last_one_ends() -> Res
 #[test]
 fn a_command_that_begins_where_it_is_started_has_the_time_of_its_start() -> Result<(), Failure> {
     let _alone = alone();
-    let mut simulation = Commanded::builder().simulate()?;
-    simulation.arm().expect("it may be armed");
+    let mut simulation = armed_simulation(Commanded::builder());
     simulation.run_until(at(200));
     let eager = simulation.command(commanded::command::eager, NoArguments)?;
     simulation.run_until(at(300));
@@ -145,8 +136,7 @@ fn a_command_that_begins_where_it_is_started_has_the_time_of_its_start() -> Resu
 #[test]
 fn a_command_may_name_the_next_state_if_it_is_declared() -> Result<(), Failure> {
     let _alone = alone();
-    let mut simulation = Commanded::builder().simulate()?;
-    simulation.arm().expect("it may be armed");
+    let mut simulation = armed_simulation(Commanded::builder());
     let parking = Target { millis: 1, does: Some(commanded::state::parked) };
     simulation.command(commanded::command::go, parking)?;
     simulation.run_until(at(10));
@@ -165,8 +155,7 @@ fn a_command_that_fails_times_out_or_is_cancelled_is_reported() -> Result<(), Fa
     let _alone = alone();
     let builder = Commanded::builder();
     let events = builder.subscribe(commanded::command::go);
-    let mut simulation = builder.simulate()?;
-    simulation.arm().expect("it may be armed");
+    let mut simulation = armed_simulation(builder);
     let mut outcome = |target, cancelled_at: Option<i64>| -> Result<_, Failure> {
         let start = simulation.clock().now();
         let execution = simulation.command(commanded::command::go, target)?;
@@ -195,8 +184,7 @@ fn a_command_that_fails_times_out_or_is_cancelled_is_reported() -> Result<(), Fa
 #[test]
 fn a_category_has_its_limit_and_its_pre_emption() -> Result<(), Failure> {
     let _alone = alone();
-    let mut simulation = Commanded::builder().simulate()?;
-    simulation.arm().expect("it may be armed");
+    let mut simulation = armed_simulation(Commanded::builder());
     let first = simulation.command(commanded::command::turn, millis(500))?;
     let second = simulation.command(commanded::command::turn, millis(500))?;
     let refusal = simulation.command(commanded::command::turn, millis(500)).expect_err("two are the limit");
@@ -252,8 +240,7 @@ fn what_cannot_be_made_safe_is_an_error_until_it_is_forced() -> Result<(), Failu
     let _alone = alone();
     let builder = Commanded::builder();
     let errors = builder.subscribe(system::SafetyErrors);
-    let mut simulation = builder.simulate()?;
-    simulation.arm().expect("it may be armed");
+    let mut simulation = armed_simulation(builder);
     REFUSES.store(true, Ordering::SeqCst);
     let disarming = simulation.command(commanded::command::disarm, NoArguments)?;
     simulation.run_until(at(10));

@@ -1,10 +1,6 @@
 //! Commands that hang, however many, do not keep others from running and from making the robot safe.
 
-use crate::components::{Done, Echo, Failure, Number, Replied, Task, at_once, within};
-use crate::gate::{Gate, PATIENCE, fault_of, wait_until};
-use bb_core::ArmError;
-use bb_core::event::RefusalReason;
-use bb_core::prelude::*;
+use crate::kit::*;
 
 fn tick(context: &Context) -> Done {
     context.request(Request::Tick(Duration::from_millis(10)));
@@ -42,8 +38,7 @@ fn health_commands_that_hang_keep_none_that_disarms_from_running() {
         HERE.close("here");
         let mut builder = Ill::builder();
         builder.options(ill::command::react).run = |_| HERE.stuck("here");
-        let running = builder.start().expect("it starts");
-        running.arm().expect("it may be armed");
+        let running = armed(builder);
         for _ in 0..80 {
             for number in [1.0, 0.0] {
                 running.publish(ill::sensor::base::number, running.clock().now(), Number(number));
@@ -65,8 +60,7 @@ fn a_cancelled_command_that_never_began_is_gone_though_others_hang_in_every_thre
         HERE.close("here");
         let mut builder = Ill::builder();
         builder.options(ill::command::stuck).run = |_| HERE.stuck("here");
-        let running = builder.start().expect("it starts");
-        running.arm().expect("it may be armed");
+        let running = armed(builder);
         (0..560).for_each(|_| drop(running.command(ill::command::stuck, NoArguments).expect("it starts")));
         HERE.wait_for(512);
         assert_eq!(running.disarm(), Ok(()));
@@ -84,8 +78,7 @@ fn a_command_that_hangs_is_not_started_for_ever_however_often_it_is_cancelled() 
         HERE.close("here");
         let mut builder = Ill::builder();
         builder.options(ill::command::stuck).run = |_| HERE.stuck("here");
-        let running = builder.start().expect("it starts");
-        running.arm().expect("it may be armed");
+        let running = armed(builder);
         let start = || running.command(ill::command::stuck, NoArguments);
         let mut started = 0;
         let refusal = loop {
@@ -117,8 +110,7 @@ fn commands_that_hang_keep_neither_ticks_nor_health_commands_from_running_and_ar
     let mut builder = Ill::builder();
     builder.options(ill::command::stuck).run = |_| HERE.stuck("here");
     let faults = builder.subscribe(system::Faults);
-    let running = builder.start()?;
-    running.arm()?;
+    let running = armed(builder);
     for _ in 0..520 {
         drop(running.command(ill::command::stuck, NoArguments)?);
     }

@@ -1,17 +1,7 @@
 //! Whatever hangs, hardware is made safe first; and what is not safe, or was cancelled, moves nothing any more.
 
-use crate::components::{
-    Doing, Done, Echo, Number, Pulse, Read, Replied, Servo, Source, Task, Update, at, at_once, lock, when_woken,
-    within,
-};
-use crate::gate::{Gate, PATIENCE};
-use bb_core::event::CommandPhase;
-use bb_core::prelude::*;
-use bb_core::run::ActuatorError;
-use bb_core::run::CommandError;
-use bb_core::{ArmError, DisarmError};
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError, mpsc};
+use crate::kit::*;
+use std::sync::Condvar;
 
 /// Time within which a motor is stopped, whatever hangs: shorter than any time that the robot gives code that hangs.
 const AT_ONCE: Duration = Duration::from_secs(2);
@@ -127,8 +117,7 @@ fn motor_stops_first(place: &'static str, way: &'static str) {
     if place == "a handler of telemetry" {
         builder.telemetry(move |_, _| HERE.pass(place));
     }
-    let running = builder.start().expect("it starts");
-    assert_eq!(running.arm(), Ok(()));
+    let running = armed(builder);
     safety.drain().for_each(drop);
     HERE.close(place);
     set_stopped(false);
@@ -221,8 +210,7 @@ fn a_silent_estimator_is_lost_and_its_command_runs_while_the_code_of_others_hang
             HERE.open();
             let builder = Hanging::builder();
             let (health, alarms) = (builder.subscribe(system::Health), builder.subscribe(hanging::command::alarm));
-            let running = builder.start().expect("it starts");
-            assert_eq!(running.arm(), Ok(()));
+            let running = armed(builder);
             HERE.close(place);
             if place == "a command" {
                 // As many as there are cores, and more.
@@ -251,8 +239,7 @@ fn a_command_that_blocks_times_out() {
     within(60, || {
         let builder = Hanging::builder();
         let events = builder.subscribe(hanging::command::hurried);
-        let running = builder.start().expect("it starts");
-        assert_eq!(running.arm(), Ok(()));
+        let running = armed(builder);
         HERE.close("a command");
         let hurried = running.command(hanging::command::hurried, NoArguments).expect("it is allowed");
         HERE.wait_for(1);
@@ -350,8 +337,7 @@ fn an_actuator_that_fails_and_cannot_be_made_safe_leads_to_error() -> Result<(),
     let _alone = alone();
     let builder = Crane::builder();
     let errors = builder.subscribe(system::SafetyErrors);
-    let mut simulation = builder.simulate()?;
-    assert_eq!(simulation.arm(), Ok(()));
+    let mut simulation = armed_simulation(builder);
     simulation.actuate(crane::actuator::base::hook::winch, Number(1.0)).expect("it moves");
     assert!(simulation.actuate(crane::actuator::base::hook::winch, Number(-1.0)).is_err());
     simulation.run_until(at(5));
@@ -378,8 +364,7 @@ fn an_actuator_that_cannot_be_made_safe_is_an_error_in_real_time_too() {
     within(60, || {
         let builder = Crane::builder();
         let safety = builder.subscribe(system::SafetyState);
-        let running = builder.start().expect("it starts");
-        assert_eq!(running.arm(), Ok(()));
+        let running = armed(builder);
         assert!(running.actuate(crane::actuator::base::hook::winch, Number(-1.0)).is_err());
         let mut changes = std::iter::from_fn(|| safety.recv_timeout(PATIENCE)).map(|change| change.to);
         assert!(changes.any(|safety| safety == Safety::Error));
@@ -391,8 +376,7 @@ fn an_actuator_that_cannot_be_made_safe_is_an_error_in_real_time_too() {
 #[test]
 fn what_a_cancelled_command_holds_moves_nothing_even_when_the_robot_is_armed_again() -> Result<(), StartError> {
     let _alone = alone();
-    let mut simulation = Crane::builder().simulate()?;
-    assert_eq!(simulation.arm(), Ok(()));
+    let mut simulation = armed_simulation(Crane::builder());
     let lending = simulation.command(crane::command::lend, NoArguments).expect("it is idle");
     simulation.run_until(at(10));
     let context = lock(&LENT).take().expect("it runs");
@@ -423,8 +407,7 @@ fn what_a_cancelled_command_holds_moves_nothing_even_when_the_robot_is_armed_aga
 fn arming_waits_until_the_code_of_a_cancelled_command_has_returned() {
     let _alone = alone();
     within(60, || {
-        let running = Crane::builder().start().expect("it starts");
-        assert_eq!(running.arm(), Ok(()));
+        let running = armed(Crane::builder());
         HERE.close("a command on its way");
         let late = running.command(crane::command::late, NoArguments).expect("it is idle");
         HERE.wait_for(1);
@@ -452,8 +435,7 @@ fn a_component_that_reports_a_hardware_error_has_the_robot_disarmed() -> Result<
     let _alone = alone();
     let builder = Crane::builder();
     let errors = builder.subscribe(system::SafetyErrors);
-    let mut simulation = builder.simulate()?;
-    assert_eq!(simulation.arm(), Ok(()));
+    let mut simulation = armed_simulation(builder);
     simulation.run_until(at(50));
     let made_safe = MADE_SAFE.load(Ordering::SeqCst);
     IS_HOT.store(true, Ordering::SeqCst);

@@ -1,13 +1,11 @@
 //! Descriptions for tools of a running robot: its declaration as JSON, by path, and its picture.
 
-use crate::components::{CanEncoder, Counter, Failure, Scale, Task};
+use crate::kit::*;
 use bb_core::component::{ComponentKind, JointPublisher, RunKind};
-use bb_core::prelude::*;
 use bb_core::topology::GraphFormat;
 use bb_estimators::motion::{Drive, MoveJoints, PidController};
 use bb_estimators::simulation::{SimulatedActuatorOptions, SimulatedEncoderOptions};
 use bb_estimators::{SimulatedActuator, SimulatedEncoder};
-use serde_json::Value;
 use std::path::Path;
 
 robot! {

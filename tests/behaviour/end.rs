@@ -1,9 +1,6 @@
 //! The end of a run: what comes later changes nothing, and nobody waits for it.
 
-use crate::components::{Done, Echo, Number, Source, Task, within};
-use crate::plain::{ECHO, NUMBER, Plain, SOURCE, TASK, plain};
-use crate::replay::same_again;
-use bb_core::prelude::*;
+use crate::kit::*;
 
 /// Needs a while to be made safe.
 fn brake(context: &SensorContext) -> Done {
@@ -38,7 +35,7 @@ fn an_estimator_is_not_lost_because_the_robot_stops() -> Result<(), StartError> 
     Ok(())
 }
 
-fn ending() -> bb_core::Builder<Plain> {
+fn ending() -> Builder<Plain> {
     let mut builder = Plain::builder();
     builder.options(SOURCE).terminate = |_| panic!("the port does not close");
     builder
@@ -49,7 +46,7 @@ const UNFINISHED: &str =
     "journal failed: a publisher did not come back: what followed from its message may be missing";
 
 /// All that may be asked of a robot, over and over, until it says that it has stopped; and ten times more.
-fn ask_for_everything(live: &bb_core::Live<Plain>, own: &bb_core::pubsub::Publisher<Number>) {
+fn ask_for_everything(live: &Live<Plain>, own: &bb_core::pubsub::Publisher<Number>) {
     let mut left = 10;
     for round in 0.. {
         let number = Number(f64::from(round));

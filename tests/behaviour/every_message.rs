@@ -1,10 +1,6 @@
 //! An input of all messages since the last run: each is in one run, whatever the driver does.
 
-use crate::components::{Failure, Number, at, within};
-use crate::gate::{Gate, wait_until};
-use crate::replay::{Random, overflow, same_again};
-use bb_core::prelude::*;
-use bb_core::run::DropReason;
+use crate::kit::*;
 
 /// A driver, and events.
 #[derive(Clone, Copy, Debug, Inputs)]

@@ -1,15 +1,10 @@
 //! Inputs at paths at which other code publishes.
 
-use crate::components::{Echo, Failure, Number, Pulse, Seen, Snapshot, Source, SourceOptions, Update, at, numbers};
-use crate::gate::wait_until;
-use crate::replay::{Random, entries, journal, overflow, play, read_back, same_again};
+use crate::kit::*;
 use bb_core::event::{HealthState, Right};
-use bb_core::journal::Event;
 use bb_core::message::codec::{Layouts, Shape, encode, encode_as_ros, from_json, to_json};
 use bb_core::payload::*;
-use bb_core::prelude::*;
-use bb_core::run::{Bus, DropReason};
-use serde_json::{Value, json};
+use serde_json::json;
 
 /// All numbers since the last run.
 #[derive(Clone, Copy, Debug, Inputs)]
@@ -331,7 +326,7 @@ const CASES: usize = 10;
 fn typed_and_by_path<T: Payload>(bus: &Bus, path: &str, random: &mut Random) -> Result<(), Failure> {
     let publisher = bus.publisher::<T>(path)?;
     let arrived = bus.subscribe_any(Select::Path(path), None, overflow());
-    let bytes = |arrived: &bb_core::DynamicSubscription| -> Result<Vec<u8>, Failure> {
+    let bytes = |arrived: &DynamicSubscription| -> Result<Vec<u8>, Failure> {
         let mut bytes = Vec::new();
         arrived.try_recv().ok_or("nothing has arrived")?.encode(&mut bytes);
         Ok(bytes)

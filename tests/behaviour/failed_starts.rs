@@ -1,11 +1,6 @@
 //! Starts that fail: how what an `init` has started is made safe, and what becomes of callbacks that fail or hang.
 
-use crate::components::{Done, Number, side_by_side, within};
-use crate::gate::Gate;
-use crate::plain::{Plain, SERVO, SOURCE};
-use bb_core::prelude::*;
-use bb_core::{Builder, DisarmError, Running};
-use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
+use crate::kit::*;
 
 /// The devices of one test.
 struct Rig {

@@ -1,11 +1,6 @@
 //! Driver, last known inputs, tolerance, and what is dropped why; sensors that other code feeds, from several threads.
 
-use crate::components::{Counter, Number, Read, Scale, Seen, Snapshot, at, lock, numbers};
-use crate::plain::{BEHIND, Plain, SOURCE};
-use bb_core::prelude::*;
-use bb_core::run::DropReason;
-use bb_core::telemetry::TelemetryEvent;
-use std::sync::{Arc, Mutex};
+use crate::kit::*;
 
 robot! {
     robot FanIn;

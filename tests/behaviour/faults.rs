@@ -1,12 +1,8 @@
 //! Components that fail: at the start, in a callback, by a panic. The others go on.
 
-use crate::components::{Counter, Echo, Number, OnNumber, Read, Replied, Scale, Source, at, numbers};
-use crate::gate::wait_until;
+use crate::kit::*;
 use bb_core::message::DecodeError;
 use bb_core::message::codec::{Reader, Shape, Writer};
-use bb_core::prelude::*;
-use bb_core::run::DropReason;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 static TERMINATED: AtomicUsize = AtomicUsize::new(0);
 
@@ -42,7 +38,7 @@ robot! {
 #[test]
 fn a_component_that_cannot_start_is_named_and_those_before_it_are_stopped() {
     let before = TERMINATED.load(Ordering::SeqCst);
-    let refused = |change: fn(&mut bb_core::Builder<Patient>)| {
+    let refused = |change: fn(&mut Builder<Patient>)| {
         let mut builder = Patient::builder();
         change(&mut builder);
         builder.simulate().expect_err("it cannot start").to_string()

@@ -1,10 +1,8 @@
 //! Frames of outputs, transforms of inputs, and the topology as data.
 
-use crate::components::{Counter, Done, Echo, Number, lock};
+use crate::kit::*;
 use bb_core::nalgebra::Vector3;
-use bb_core::prelude::*;
 use bb_core::topology::JointKind;
-use std::sync::Mutex;
 
 /// Origins of the inputs in the frame of the output, m.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]

@@ -1,11 +1,7 @@
 //! Disarm callbacks and hardware errors of estimators and commands, in a run and in its replay.
 
-use crate::components::{Doing, Done, Failure, Number, Source, Task, at, lock};
-use crate::replay::same_again;
+use crate::kit::*;
 use bb_core::event::Quantity;
-use bb_core::prelude::*;
-use std::sync::atomic::{AtomicU32, Ordering};
-use std::sync::{Mutex, MutexGuard};
 
 /// Number of times that brakes were applied: by the estimator, and by the command.
 static BRAKED: [AtomicU32; 2] = [AtomicU32::new(0), AtomicU32::new(0)];

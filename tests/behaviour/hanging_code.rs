@@ -1,12 +1,7 @@
 //! Code that hangs, or that calls where it would wait for itself: it is reported while the robot runs, and stops nothing else.
 
-use crate::components::{Ask, Doing, Done, Failure, Number, lock};
-use crate::gate::{Gate, PATIENCE, fault_of, wait_until};
-use crate::plain::{ECHO, NUMBER, Plain, SERVO, TASK, plain};
-use bb_core::prelude::*;
-use bb_core::run::{ActuatorError, Report};
-use bb_core::{DisarmError, Live, Running, TelemetryEvent};
-use std::sync::{Arc, Mutex, OnceLock, mpsc};
+use crate::kit::*;
+use bb_core::TelemetryEvent;
 
 #[test]
 fn an_actuator_and_a_command_that_hang_are_reported_while_the_robot_runs() -> Result<(), Failure> {
@@ -19,8 +14,7 @@ fn an_actuator_and_a_command_that_hang_are_reported_while_the_robot_runs() -> Re
     };
     builder.options(TASK).run = |_| HERE.stuck("here");
     let faults = builder.subscribe(system::Faults);
-    let running = builder.start()?;
-    running.arm()?;
+    let running = armed(builder);
     let live = running.live();
     let sender = std::thread::spawn(move || live.actuate(SERVO, Number(1.0)));
     let waiting = running.command(TASK, NoArguments)?;
@@ -131,7 +125,7 @@ fn stop_it(_: CommandContext) -> Doing {
 
 static STOPPED: OnceLock<(Duration, Report)> = OnceLock::new();
 
-fn own() -> bb_core::Builder<Plain> {
+fn own() -> Builder<Plain> {
     let mut builder = Plain::builder();
     builder.options(SERVO).command = turn;
     builder.options(TASK).run = stop_it;

@@ -1,12 +1,6 @@
 //! Hardware is made safe whatever state the robot is in, and what guards it is neither lost nor kept for ever.
 
-use crate::components::{Doing, Done, Failure, Pulse, Source, Task, Update, at, lock, within};
-use crate::gate::Gate;
-use crate::replay::{entries, journal, same_again};
-use bb_core::prelude::*;
-use bb_core::run::CommandError;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard};
+use crate::kit::*;
 
 static IS_ON: AtomicBool = AtomicBool::new(false);
 static FAILS: AtomicBool = AtomicBool::new(false);
@@ -171,8 +165,7 @@ fn a_robot_that_has_ended_keeps_nothing_open() -> Result<(), Failure> {
 #[test]
 fn a_commands_callbacks_end_with_it_whatever_they_hold() -> Result<(), Failure> {
     let _alone = alone();
-    let mut simulation = Guarded::builder().simulate()?;
-    assert_eq!(simulation.arm(), Ok(()));
+    let mut simulation = armed_simulation(Guarded::builder());
     for millis in 1..=20 {
         simulation.command(guarded::command::lift, NoArguments)?;
         simulation.run_until(at(millis));
@@ -243,8 +236,7 @@ fn a_forced_disarm_does_not_reopen_a_stop() {
     let _alone = alone();
     within(60, || {
         for _ in 0..20 {
-            let running = Guarded::builder().start().expect("it starts");
-            running.arm().expect("it may be armed");
+            let running = armed(Guarded::builder());
             let live = running.live();
             let forcing = std::thread::spawn(move || {
                 for _ in 0..200 {

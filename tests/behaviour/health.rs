@@ -1,11 +1,7 @@
 //! Every row of the health table, on virtual time: the new state, the command that starts, and what is published; and which runs of an
 //! estimator count as good.
 
-use crate::components::{Ask, Doing, Done, Echo, Number, Replied, Snapshot, Task, at};
-use bb_core::HealthTransition;
-use bb_core::event::{CommandPhase, RefusalReason};
-use bb_core::prelude::*;
-use bb_core::run::DropReason;
+use crate::kit::*;
 
 /// Passes numbers on; a negative one is a divergence.
 fn watch(_: &mut f64, number: f64) -> Replied {
@@ -66,8 +62,7 @@ impl Run {
     fn start() -> Result<Self, StartError> {
         let builder = Watched::builder();
         let transitions = builder.subscribe(system::Health);
-        let simulation = builder.simulate()?;
-        simulation.arm().expect("it may be armed");
+        let simulation = armed_simulation(builder);
         Ok(Self { simulation, transitions, now: 0 })
     }
 
@@ -257,7 +252,7 @@ robot! {
 const BUSY: &str = "sensor/base/number/busy";
 
 /// The changes of health, with their times in milliseconds.
-fn changes(health: &Subscription<bb_core::HealthTransition>) -> Vec<(i64, HealthState, HealthReason)> {
+fn changes(health: &Subscription<HealthTransition>) -> Vec<(i64, HealthState, HealthReason)> {
     health.drain().map(|change| (change.time.as_nanos() / 1_000_000, change.to, change.reason)).collect()
 }
 

@@ -1,9 +1,8 @@
 //! Transforms of messages that are older than the history of a joint, or ahead of the clock.
 
-use crate::components::at;
 use crate::joints::{Pixel, joint};
+use crate::kit::*;
 use bb_core::component::InputTransforms;
-use bb_core::prelude::*;
 
 /// Inputs from the base, and from beyond the joint: the newest of both, however old.
 #[derive(Clone, Copy, Debug, Inputs)]
@@ -83,7 +82,7 @@ fn a_message_that_is_older_than_the_history_of_a_joint_stays_where_it_was_seen()
     simulation.publish(lookout::sensor::base::imu, at(1001), Pixel(0.0));
     assert_eq!(keeper.drain().count(), 0);
     let report = simulation.report();
-    let drops = report.estimators[0].inputs[1].dropped(bb_core::run::DropReason::NoTransform);
+    let drops = report.estimators[0].inputs[1].dropped(DropReason::NoTransform);
     assert_eq!(drops, 1);
     Ok(())
 }
@@ -92,7 +91,7 @@ fn a_message_that_is_older_than_the_history_of_a_joint_stays_where_it_was_seen()
 /// for a second at most, since one that is further ahead is refused.
 #[test]
 fn an_input_ahead_of_the_clock_costs_a_second_at_most() -> Result<(), StartError> {
-    use bb_core::run::DropReason::{ClockSkew, NoTransform, OutOfOrder};
+    use DropReason::{ClockSkew, NoTransform, OutOfOrder};
     for (ahead, resumes) in [(900, 1_000), (1_000, 1_100), (1_001, 200)] {
         let builder = Lookout::builder();
         let seen = builder.subscribe(lookout::estimator::base::keeper);

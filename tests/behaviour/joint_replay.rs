@@ -1,12 +1,7 @@
 //! A replay gives estimators the transforms that they had, whatever raced.
 
-use crate::components::{Failure, at};
-use crate::gate::wait_until;
 use crate::joints::{Fusion, Pixel, Spotter};
-use crate::replay::{Published, Random, collect, counts, entries, journal, overflow, play, same};
-use bb_core::Report;
-use bb_core::journal::{Entry, Event};
-use bb_core::prelude::*;
+use crate::kit::*;
 use std::collections::BTreeSet;
 
 /// An encoder of a bad day: it pauses, repeats itself, stamps late, and now and then gives a NaN.
@@ -111,7 +106,7 @@ robot! {
     }
 }
 
-fn builder(seed: u64, reads: u32) -> bb_core::Builder<Swing> {
+fn builder(seed: u64, reads: u32) -> Builder<Swing> {
     let mut builder = Swing::builder();
     builder.joints().stale_after = Duration::from_millis(3);
     *builder.options(swing::sensor::base::imu) = DayOptions { seed, reads };
@@ -124,8 +119,8 @@ fn builder(seed: u64, reads: u32) -> bb_core::Builder<Swing> {
 
 /// Runs a day; what it gives, and its journal.
 fn day(
-    mut builder: bb_core::Builder<Swing>,
-    run: impl FnOnce(bb_core::Builder<Swing>) -> Result<Report, Failure>,
+    mut builder: Builder<Swing>,
+    run: impl FnOnce(Builder<Swing>) -> Result<Report, Failure>,
 ) -> Result<(Published, Report, Vec<Entry>), Failure> {
     let lines = journal(&mut builder);
     let all = builder.subscribe_any(Select::All, None, overflow());
@@ -142,10 +137,7 @@ fn replayed(lines: &[Entry]) -> Result<(Published, Report), Failure> {
     play(builder, lines)
 }
 
-fn on_virtual_time(
-    builder: bb_core::Builder<Swing>,
-    millis: i64,
-) -> Result<(Published, Report, Vec<Entry>), Failure> {
+fn on_virtual_time(builder: Builder<Swing>, millis: i64) -> Result<(Published, Report, Vec<Entry>), Failure> {
     day(builder, |builder| {
         let mut simulation = builder.simulate()?;
         simulation.run_until(at(millis));
@@ -157,7 +149,7 @@ fn on_virtual_time(
 fn is_a_bad_day(report: &Report) -> bool {
     ["estimator/base/spot", "estimator/base/busy"].iter().all(|path| {
         let estimator = report.estimator(path).expect("it is declared");
-        estimator.emitted > 20 && estimator.inputs[0].dropped(bb_core::run::DropReason::NoTransform) > 3
+        estimator.emitted > 20 && estimator.inputs[0].dropped(DropReason::NoTransform) > 3
     })
 }
 

@@ -1,14 +1,10 @@
 //! States of joints, and the transforms across them.
 
-use crate::components::{Failure, at};
-use crate::replay::same_again;
-use bb_core::SensorHandle;
+use crate::kit::*;
 use bb_core::component::{InputTransforms, JointPublisher};
 use bb_core::joints::{JointRefusal, LookupError};
 use bb_core::nalgebra::{Isometry3, UnitQuaternion, Vector3};
-use bb_core::prelude::*;
 use std::f64::consts::FRAC_PI_2;
-use std::sync::Arc;
 
 /// Measurement of a camera.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
@@ -203,7 +199,7 @@ fn what_is_unknown_or_too_old_drops_the_dispatch_and_is_never_zero() -> Result<(
     let gap = |simulation: &Simulation<Reach>| {
         let report = simulation.report();
         let spot = report.estimator("estimator/base/spot").expect("it is declared");
-        let dropped = spot.inputs[0].dropped(bb_core::run::DropReason::NoTransform);
+        let dropped = spot.inputs[0].dropped(DropReason::NoTransform);
         (dropped, spot.last_gap.as_ref().map(ToString::to_string).unwrap_or_default())
     };
     assert_eq!(gap(&simulation), (1, "nothing is known yet of the joint `shoulder`".into()));

@@ -1,10 +1,6 @@
 //! Order of what happens at one instant, or in the middle of something else: it is the same again from the journal.
 
-use crate::components::{Doing, Echo, Failure, Number, Replied, Task, at};
-use crate::gate::wait_until;
-use crate::replay::{is_again, same_again};
-use bb_core::Builder;
-use bb_core::prelude::*;
+use crate::kit::*;
 
 const PANICS: f64 = -2.0;
 const DIVERGES: f64 = -1.0;
@@ -84,8 +80,7 @@ fn cascade(max_restarts: u32) -> impl Fn() -> Builder<Cascade> {
 #[test]
 fn an_estimator_that_is_given_up_as_its_command_starts() -> Result<(), Failure> {
     let (heard, report) = same_again(cascade(0), |builder| {
-        let mut simulation = builder.simulate()?;
-        simulation.arm()?;
+        let mut simulation = armed_simulation(builder);
         simulation.publish(cascade::sensor::base::shoulder::arm::number, at(10), Number(PANICS));
         simulation.run_for(Duration::from_millis(100));
         Ok(simulation.stop())
@@ -98,8 +93,7 @@ fn an_estimator_that_is_given_up_as_its_command_starts() -> Result<(), Failure> 
 #[test]
 fn changes_of_health_at_one_instant_start_their_commands_in_order() -> Result<(), Failure> {
     let (heard, report) = same_again(cascade(3), |builder| {
-        let mut simulation = builder.simulate()?;
-        simulation.arm()?;
+        let mut simulation = armed_simulation(builder);
         simulation.run_until(at(10));
         let live = simulation.live();
         for number in [DIVERGES, 1.0, DIVERGES] {

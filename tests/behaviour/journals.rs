@@ -1,13 +1,6 @@
 //! Replays of messages, faults, requests, commands and restarts of a robot, from its journal.
 
-use crate::components::{Done, Failure, Number, Replied, Servo, at, within};
-use crate::gate::Gate;
-use crate::replay::{Published, is_again, same_again};
-use bb_core::prelude::*;
-use bb_core::run::CommandError;
-use bb_core::run::DropReason;
-use bb_core::{Report, RequestCodec};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use crate::kit::*;
 
 static HERE: Gate = Gate::new();
 
@@ -192,8 +185,7 @@ fn again(
     script: impl FnOnce(&mut Simulation<Again>) -> Result<(), Failure>,
 ) -> Result<(Published, Report), Failure> {
     same_again(Again::builder, |builder| {
-        let mut simulation = builder.simulate()?;
-        assert_eq!(simulation.arm(), Ok(()));
+        let mut simulation = armed_simulation(builder);
         script(&mut simulation)?;
         Ok(simulation.stop())
     })
@@ -202,8 +194,7 @@ fn again(
 /// Runs `script` in real time, and then its replay.
 fn again_in_real_time(script: impl FnOnce(&Running<Again>)) -> Result<(Published, Report), Failure> {
     same_again(Again::builder, |builder| {
-        let running = builder.start()?;
-        assert_eq!(running.arm(), Ok(()));
+        let running = armed(builder);
         script(&running);
         Ok(running.stop())
     })

@@ -1,12 +1,8 @@
 //! A caller that knows nothing of the robot and comes late: what is wrong, what runs, and what it may change until it leaves.
 
-use crate::components::{Doing, Done, Echo, Failure, Number, Read, Servo, Task, at};
-use crate::plain::{Plain, SERVO, SOURCE};
+use crate::kit::*;
 use bb_core::message::codec::from_json;
-use bb_core::prelude::*;
-use serde_json::Value;
 use std::sync::Barrier;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// Fails at each command.
 fn jam(_: f64) -> Done {
@@ -58,7 +54,7 @@ robot! {
     }
 }
 
-fn report(bus: &bb_core::Bus) -> Result<Value, Failure> {
+fn report(bus: &Bus) -> Result<Value, Failure> {
     Ok(serde_json::from_str(&bus.report_json()?)?)
 }
 
@@ -131,8 +127,7 @@ fn a_sensor_that_is_restarted_in_vain_has_failed_since_its_last_reading() -> Res
 
 #[test]
 fn another_caller_lists_and_cancels_what_runs() -> Result<(), Failure> {
-    let simulation = Watched::builder().simulate()?;
-    simulation.arm()?;
+    let simulation = armed_simulation(Watched::builder());
     let first = simulation.bus().for_caller("first page", [Right::Read, Right::Commands]);
     let second = simulation.bus().for_caller("second page", [Right::Read, Right::Commands]);
     let visitor = simulation.bus().for_caller("visitor", [Right::Read]);
@@ -154,8 +149,7 @@ fn another_caller_lists_and_cancels_what_runs() -> Result<(), Failure> {
 /// Objects obtained through a session, by whatever thread, refuse to act once it has ended; to disarm is everybody's.
 #[test]
 fn nothing_acts_in_the_name_of_a_session_that_has_ended() -> Result<(), Failure> {
-    let simulation = Watched::builder().simulate()?;
-    simulation.arm()?;
+    let simulation = armed_simulation(Watched::builder());
     let session = simulation.session("page 7", Rights::ALL);
     let bus = session.bus();
     let inner = bus.session("frame", Rights::ALL);
@@ -192,8 +186,7 @@ fn nothing_acts_in_the_name_of_a_session_that_has_ended() -> Result<(), Failure>
 fn no_call_of_other_threads_outlives_a_session() -> Result<(), Failure> {
     let mut builder = Plain::builder();
     builder.options(SERVO).command = count;
-    let running = builder.start()?;
-    running.arm()?;
+    let running = armed(builder);
     let heard = running.bus().subscribe::<Number>("page/number", Overflow::DropOldest { capacity: 1 << 16 })?;
     let calls = AtomicU64::new(0);
     let mut rounds = 0;

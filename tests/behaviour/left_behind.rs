@@ -1,12 +1,7 @@
 //! Code that hangs when the robot stops is left behind and reported; nobody waits for it for longer than the robot says.
 
-use crate::components::{Done, Number, Servo, Source, within};
-use crate::gate::Gate;
-use bb_core::journal::Event;
-use bb_core::prelude::*;
+use crate::kit::*;
 use std::future::Future;
-use std::sync::atomic::{AtomicU32, Ordering};
-use std::sync::{Arc, mpsc};
 use std::task::{Context as Polled, Wake, Waker};
 
 /// Gate at which all of it hangs.
@@ -85,8 +80,7 @@ fn a_robot_of_which_everything_hangs_as_it_closes_is_back_and_says_what_it_left(
                 HERE.pass("here");
             }
         });
-        let running = builder.start().expect("it starts");
-        running.arm().expect("it may be armed");
+        let running = armed(builder);
         // Both are woken by the end.
         let (tell, told) = mpsc::channel();
         let wakers = [Waker::from(Arc::new(Hanging)), Waker::from(Arc::new(Tell(tell)))];

@@ -1,9 +1,8 @@
 //! A simulated IMU on a moving link.
 
-use crate::components::{Failure, at};
+use crate::kit::*;
 use bb_core::kinematics::Kinematics;
 use bb_core::nalgebra::{Isometry3, Vector3};
-use bb_core::prelude::*;
 use bb_estimators::simulation::{GRAVITY, SimulatedWorld};
 use bb_estimators::{SimulatedActuator, SimulatedEncoder, SimulatedLinkImu};
 
@@ -40,8 +39,7 @@ robot! {
 /// a millisecond of the world, so the three poses are taken within one.
 #[test]
 fn an_imu_on_a_moving_link_measures_how_that_moves() -> Result<(), Failure> {
-    let mut simulation = Swing::builder().simulate()?;
-    assert_eq!(simulation.arm(), Ok(()));
+    let mut simulation = armed_simulation(Swing::builder());
     // The world's steps begin with a command; the sensor is read in the middle of them.
     simulation.run_until(MonotonicTime::from_nanos(500_000));
     simulation

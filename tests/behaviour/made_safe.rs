@@ -1,14 +1,7 @@
 //! Hardware that is started, and commands that arm, while the robot is being disarmed or was.
 
-use crate::components::{Doing, Done, Failure, Number, Source, Task, lock, within};
-use crate::gate::{Gate, wait_until};
-use crate::plain::{Plain, SOURCE};
-use crate::replay::{entries, journal};
-use bb_core::prelude::*;
-use bb_core::{ArmError, DisarmError, Live};
-use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, Ordering};
+use crate::kit::*;
 use std::sync::mpsc::channel;
-use std::sync::{Arc, Mutex, MutexGuard};
 
 /// The devices of these tests are there once.
 static ALONE: Mutex<()> = Mutex::new(());
@@ -163,8 +156,7 @@ fn what_is_started_while_the_robot_is_disarmed_is_made_safe_as_well() {
             MADE.store(0, Ordering::SeqCst);
             REGISTERS_FIRST.store(registers_first, Ordering::SeqCst);
             // The lidar's own callback stops it at once, it fails and is restarted once. The brake waits for the second one.
-            let robot = Scanner::builder().start().expect("it starts");
-            assert_eq!(robot.arm(), Ok(()));
+            let robot = armed(Scanner::builder());
             assert_eq!((robot.disarm(), turning()), (Ok(()), 0), "{registers_first}");
             assert_eq!(MADE.load(Ordering::SeqCst), 2, "it was restarted meanwhile");
             let report = robot.stop();
@@ -196,8 +188,7 @@ fn what_is_started_after_a_disarming_by_an_init_from_before_is_made_safe_before_
                 LATER.store(later, Ordering::SeqCst);
                 REGISTERS_FIRST.store(registers_first, Ordering::SeqCst);
                 GATE.close("init");
-                let robot = Scanner::builder().start().expect("it starts");
-                assert_eq!(robot.arm(), Ok(()));
+                let robot = armed(Scanner::builder());
                 if by == Arms::AfterAnother {
                     BLOCK.close("block");
                     robot.command(scanner::command::block, NoArguments).expect("it is allowed");
@@ -257,7 +248,7 @@ fn what_makes_hardware_safe_cannot_arm_the_robot_meanwhile() {
 }
 
 /// A scanner whose first backoff is short.
-fn start() -> Result<bb_core::Running<Scanner>, StartError> {
+fn start() -> Result<Running<Scanner>, StartError> {
     let mut builder = Scanner::builder();
     builder.supervision().first_backoff = Duration::from_millis(20);
     builder.start()
@@ -360,8 +351,7 @@ fn a_robot_that_was_disarmed_is_not_armed_by_what_began_before() -> Result<(), F
     assert!(check.try_result().is_some_and(|result| result.is_err()), "it was cancelled");
     drop(simulation);
 
-    let robot = Commanded::builder().start()?;
-    assert_eq!(robot.arm(), Ok(()));
+    let robot = armed(Commanded::builder());
     BLOCK.close("block");
     let _block = robot.command(commanded::command::block, NoArguments)?;
     BLOCK.wait_for(1);
@@ -388,8 +378,7 @@ fn a_robot_that_was_disarmed_is_not_armed_by_what_began_before() -> Result<(), F
 #[test]
 fn a_command_that_was_cancelled_while_it_made_arguments_starts_nothing() -> Result<(), Failure> {
     let _alone = alone();
-    let robot = Commanded::builder().start()?;
-    assert_eq!(robot.arm(), Ok(()));
+    let robot = armed(Commanded::builder());
     let mission = robot.command(commanded::command::mission, NoArguments)?;
     std::thread::sleep(Duration::from_millis(60));
     mission.cancel();
@@ -408,8 +397,7 @@ fn force_forgives_nothing_once_the_robot_stops() {
     HOLDS.store(false, Ordering::SeqCst);
     within(60, || {
         for first in [true, false] {
-            let robot = Commanded::builder().start().expect("it starts");
-            assert_eq!(robot.arm(), Ok(()));
+            let robot = armed(Commanded::builder());
             let live = robot.live();
             let forces = std::thread::spawn(move || {
                 std::thread::sleep(Duration::from_millis(if first { 0 } else { 100 }));
@@ -427,8 +415,7 @@ fn each_disarm_reports_its_own_callbacks() {
     let _alone = alone();
     HOLDS.store(false, Ordering::SeqCst);
     within(60, || {
-        let robot = Commanded::builder().start().expect("it starts");
-        assert_eq!(robot.arm(), Ok(()));
+        let robot = armed(Commanded::builder());
         let live: Live<Commanded> = robot.live();
         let disarms = std::thread::spawn(move || live.disarm());
         // Its callback has read that the brake slips by the time the next one begins.

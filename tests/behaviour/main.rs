@@ -34,6 +34,7 @@ mod joint_replay;
 mod joints;
 mod journal_order;
 mod journals;
+mod kit;
 mod late_viewers;
 mod left_behind;
 mod link_imu;

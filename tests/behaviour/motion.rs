@@ -7,19 +7,17 @@ mod replay;
 mod reports;
 mod transmissions;
 
-use crate::components::{CanEncoder, Failure, at};
+use crate::kit::*;
+use bb_core::LimitedQuantity;
 use bb_core::component::ActuatorError;
 use bb_core::payload::{ActuatorCommand, EndMotion, MotionEnd};
-use bb_core::prelude::*;
-use bb_core::run::{Bus, Execution};
-use bb_core::{DynamicMessage, DynamicSubscription, LimitedQuantity};
+use bb_core::run::Execution;
 use bb_estimators::motion::{
     Drive, Easing, JointTarget, JointTargets, MotionProgress, MoveJoints, OpenLoopPosition, PidController,
     ThresholdController,
 };
 use bb_estimators::simulation::{SimulatedActuatorOptions, SimulatedEncoderOptions, SimulatedWorld};
 use bb_estimators::{SimulatedActuator, SimulatedEncoder};
-use std::sync::{Arc, Mutex};
 
 /// A driver of hardware that is not there.
 #[derive(Debug)]
@@ -141,7 +139,7 @@ robot! {
 }
 
 /// The crane with simulated components in the place of its drivers.
-fn simulated() -> Result<bb_core::Builder<Crane>, Failure> {
+fn simulated() -> Result<Builder<Crane>, Failure> {
     let mut builder = Crane::builder();
     let motor = SimulatedActuatorOptions { acceleration: 4.0, ..SimulatedActuatorOptions::defaults() };
     builder.replace_actuator::<SimulatedActuator>("actuator/base/slew/boom/reach/motor", motor)?;

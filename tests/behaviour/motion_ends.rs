@@ -1,12 +1,8 @@
 //! Motions that end because their actuator fails, and code of actuators and commands that panics or hangs.
 
-use crate::components::{Failure, at, lock};
-use crate::gate::Gate;
+use crate::kit::*;
 use bb_core::payload::{EndMotion, MotionEnd};
-use bb_core::prelude::*;
-use bb_core::run::{ActuatorError, ActuatorHandle};
-use bb_core::{DynamicSubscription, Exceeded, JointBounds, JointCommand, OutOfBounds};
-use std::sync::{Arc, Mutex};
+use bb_core::{Exceeded, JointBounds, JointCommand, OutOfBounds};
 
 /// Fault of the driver, and whether it reports the end of its motion when it is disarmed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -151,8 +147,7 @@ fn moving(script: &Script) -> Result<(Simulation<Press>, DynamicSubscription), F
     script.set(Fails::Never, script.get().1);
     let mut builder = Press::builder();
     builder.options(DRIVE).script = script.clone();
-    let mut simulation = builder.simulate()?;
-    assert_eq!(simulation.arm(), Ok(()));
+    let mut simulation = armed_simulation(builder);
     let ends = simulation.subscribe_any(Select::Below("actuator"), "EndMotion", Overflow::default());
     simulation.actuate(DRIVE, Push { position: 1.0 })?;
     simulation.run_until(at(10));
@@ -264,8 +259,7 @@ fn code_that_hangs_beside_a_command_is_reported() -> Result<(), Failure> {
         let script = Script::default();
         let mut builder = Press::builder();
         builder.options(DRIVE).script = script.clone();
-        let running = builder.start()?;
-        assert_eq!(running.arm(), Ok(()));
+        let running = armed(builder);
         if place == "next update" {
             script.set(Fails::NextUpdateHangs, false);
         }
@@ -274,7 +268,7 @@ fn code_that_hangs_beside_a_command_is_reported() -> Result<(), Failure> {
         let live = running.live();
         let sender = std::thread::spawn(move || live.actuate(DRIVE, Push { position }));
         HANG.wait_for(1);
-        let fault = faults.recv_timeout(crate::gate::PATIENCE).ok_or("it is reported while it hangs")?;
+        let fault = faults.recv_timeout(PATIENCE).ok_or("it is reported while it hangs")?;
         HANG.open();
         assert_eq!(fault.path, DRIVE.path());
         assert!(sender.join().is_ok_and(|sent| sent.is_ok()), "{place}");

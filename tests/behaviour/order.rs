@@ -1,9 +1,6 @@
 //! Order of callbacks on many threads; and code that the robot calls, which may call it back.
 
-use crate::components::{Ask, Done, Echo, Number, Replied, Servo, Source, lock, when_woken, within};
-use crate::gate::PATIENCE;
-use bb_core::prelude::*;
-use std::sync::{Arc, Mutex, OnceLock, mpsc};
+use crate::kit::*;
 
 static DONE: Mutex<Vec<f64>> = Mutex::new(Vec::new());
 
@@ -56,8 +53,7 @@ fn what_is_asked_for_in_init_comes_before_the_first_message() {
 #[test]
 fn commands_to_an_actuator_are_published_in_the_order_in_which_it_carried_them_out() {
     within(60, || {
-        let running = Orderly::builder().start().expect("it starts");
-        assert_eq!(running.arm(), Ok(()));
+        let running = armed(Orderly::builder());
         let motor = orderly::actuator::base::pan::motor;
         let room = Overflow::DropOldest { capacity: 10_000 };
         let told = running.subscribe_any(Select::Path(motor.path()), None, room);
@@ -119,7 +115,7 @@ fn a_subscriber_of_a_system_topic_may_call_the_robot() {
 #[test]
 fn the_sink_of_a_journal_may_ask_the_robot() {
     within(120, || {
-        let live: Arc<OnceLock<bb_core::Live<Orderly>>> = Arc::default();
+        let live: Arc<OnceLock<Live<Orderly>>> = Arc::default();
         let (asked, is_asked) = mpsc::channel();
         let (seen, asked) = (Arc::clone(&live), Mutex::new(asked));
         let mut builder = Orderly::builder();

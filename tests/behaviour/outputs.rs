@@ -1,9 +1,6 @@
 //! Several outputs, their paths, and what is emitted when.
 
-use crate::components::{Counter, Echo, Failure, Number, Scale, at};
-use crate::replay::same_again;
-use bb_core::prelude::*;
-use bb_core::run::DropReason;
+use crate::kit::*;
 
 /// Outputs of [`Split`].
 #[derive(Clone, Debug, Default, Outputs)]
@@ -55,7 +52,7 @@ robot! {
             input number: parts::even;
             output whole;
         }
-        estimator single: crate::components::Scale(factor = 10.0) {
+        estimator single: Scale(factor = 10.0) {
             input number: sensor::numbers::split::whole;
             output out: [tens];
         }

@@ -1,10 +1,6 @@
 //! Paths of their own at which commands, controllers and outside code publish.
 
-use crate::components::{Counter, Doing, Failure, Number, Pulse, Task, Update};
-use crate::replay::{entries, journal, same_again};
-use bb_core::DynamicSubscription;
-use bb_core::journal::Event;
-use bb_core::prelude::*;
+use crate::kit::*;
 
 /// Progress of a mission.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
@@ -57,7 +53,7 @@ robot! {
 }
 
 fn received(subscription: &DynamicSubscription) -> Vec<(&'static str, i64, f64)> {
-    let row = |message: bb_core::DynamicMessage| {
+    let row = |message: DynamicMessage| {
         let done = message.downcast::<Progress>().map_or(f64::NAN, |progress| progress.done);
         (message.path(), message.stamp().monotonic_time.as_nanos() / 1_000_000, done)
     };
@@ -88,8 +84,7 @@ fn a_subtree_is_received_without_naming_its_publishers() -> Result<(), Failure> 
 fn a_command_publishes_its_progress_below_its_path_which_a_replay_publishes_again() -> Result<(), Failure> {
     let (heard, _) = same_again(Missionary::builder, |builder| {
         let commands = builder.subscribe_any(Select::Below("command/climb"), "Progress", Overflow::default());
-        let mut simulation = builder.simulate()?;
-        simulation.arm()?;
+        let mut simulation = armed_simulation(builder);
         simulation.command(missionary::command::climb, NoArguments)?;
         simulation.run_for(Duration::from_millis(50));
         let path = "command/climb/progress";
@@ -170,7 +165,7 @@ fn a_path_of_the_robot_is_refused() -> Result<(), StartError> {
 }
 
 /// Topics of a report, and how much was published there.
-fn rows(report: &bb_core::Report) -> Vec<(&'static str, &'static str, u64)> {
+fn rows(report: &Report) -> Vec<(&'static str, &'static str, u64)> {
     report.topics.iter().map(|topic| (topic.path, topic.payload, topic.published)).collect()
 }
 
@@ -205,9 +200,8 @@ fn a_replay_reports_the_paths_that_made_room_no_more() -> Result<(), Failure> {
     assert!(first.contains(&("many/7", "Number", 1)) && first.contains(&("many/2999", "Progress", 0)));
     assert!(!first.iter().any(|(path, ..)| *path == "many/0"));
     let lines = entries(&lines);
-    let silent = |line: &&bb_core::journal::Entry| {
-        matches!(line.event, Event::OwnPublisher { path: "own/silent", payload: "Progress" })
-    };
+    let silent =
+        |line: &&Entry| matches!(line.event, Event::OwnPublisher { path: "own/silent", payload: "Progress" });
     assert_eq!(lines.iter().filter(silent).count(), 1, "once");
     for is_used in [false, true] {
         let mut replay = Missionary::builder().replay()?;

@@ -1,13 +1,9 @@
 //! A panic in a user's code is charged to whom it belongs, at the start too; and what would keep virtual time from going on is
 //! ended.
 
-use crate::components::{Failure, Number, Source};
-use crate::plain::{Plain, SOURCE};
+use crate::kit::*;
 use bb_core::message::codec::{Reader, Shape, Writer};
 use bb_core::message::{DecodeError, Field, Finite};
-use bb_core::prelude::*;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicU32, Ordering};
 
 mod outputs {
     use super::*;
@@ -97,8 +93,7 @@ mod outputs {
         builder.journal(|_| ());
         let outputs = builder.subscribe(making::sensor::base::source::maker);
         let health = builder.subscribe(system::Health);
-        let mut simulation = builder.simulate()?;
-        simulation.arm()?;
+        let mut simulation = armed_simulation(builder);
         simulation.run_for(Duration::from_millis(15));
         PANICS.store(code, Ordering::SeqCst);
         simulation.run_for(Duration::from_millis(10));
@@ -137,8 +132,7 @@ mod outputs {
         let _turn = TURN.lock();
         let builder = Making::builder();
         let _outputs = builder.subscribe(making::sensor::base::source::maker);
-        let mut simulation = builder.simulate()?;
-        simulation.arm()?;
+        let mut simulation = armed_simulation(builder);
         PANICS.store(1, Ordering::SeqCst);
         simulation.run_for(Duration::from_secs(5));
         PANICS.store(0, Ordering::SeqCst);

@@ -1,14 +1,8 @@
 //! Parameters that are set at once: all of them, or none.
 
-use crate::components::{Doing, Failure, Number, Task, lock, within};
+use crate::kit::*;
 use crate::parameters::{Bound, Which};
-use crate::replay::{entries, journal, read_back};
-use bb_core::EstimatorHandle;
-use bb_core::event::{ParameterChange, ParameterValue};
-use bb_core::journal::Event;
-use bb_core::prelude::*;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, Ordering};
+use bb_core::event::ParameterChange;
 
 /// Sets two parameters of which the second may be refused.
 fn set_both(context: CommandContext) -> Doing {
@@ -40,7 +34,7 @@ fn values(live: &Live<Mixer>) -> (f64, i64, String) {
     (live.parameter(mixer::param::gain), live.parameter(mixer::param::count), live.parameter(mixer::param::name))
 }
 
-fn changes(all: &bb_core::DynamicSubscription) -> Vec<(&'static str, ParameterValue, ParameterValue)> {
+fn changes(all: &DynamicSubscription) -> Vec<(&'static str, ParameterValue, ParameterValue)> {
     let changes = all.drain().filter_map(|change| {
         change.downcast::<ParameterChange>().map(|change| (change.path, change.from.clone(), change.to.clone()))
     });

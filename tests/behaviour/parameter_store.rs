@@ -1,12 +1,7 @@
 //! Parameters that are kept over restarts, and start-up values from the environment.
 
-use crate::components::{Failure, Source, lock, within};
-use crate::gate::{Gate, PATIENCE};
+use crate::kit::*;
 use bb_core::component::ParameterStore;
-use bb_core::event::ParameterValue;
-use bb_core::prelude::*;
-use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, MutexGuard};
 
 type Values = BTreeMap<String, ParameterValue>;
 
@@ -74,7 +69,7 @@ robot! {
     link base { sensor device: Source() { rate: 100 Hz; } }
 }
 
-fn kept(store: &Memory) -> Result<(bb_core::Builder<Rig>, Vec<String>), Failure> {
+fn kept(store: &Memory) -> Result<(Builder<Rig>, Vec<String>), Failure> {
     let mut builder = Rig::builder();
     let unused = builder.keep_parameters(store.clone())?;
     Ok((builder, unused.iter().map(ToString::to_string).collect()))
@@ -265,7 +260,7 @@ fn the_environment_sets_what_it_names() -> Result<(), Failure> {
     assert_eq!(simulation.parameter(rig::param::name), "12");
 
     let mut builder = Rig::builder();
-    let refused = |builder: &mut bb_core::Builder<Rig>, name: &str, value: &str| {
+    let refused = |builder: &mut Builder<Rig>, name: &str, value: &str| {
         let variables = [("BB_SET_param__gains__ki", "9.5"), (name, value)];
         builder.load_environment(variables).expect_err("it is refused").to_string()
     };

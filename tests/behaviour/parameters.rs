@@ -1,8 +1,6 @@
 //! Parameters that are set from everywhere at once.
 
-use crate::components::{Doing, Failure, Number, Pulse, Task, Update, within};
-use bb_core::event::ParameterValue;
-use bb_core::prelude::*;
+use crate::kit::*;
 
 /// Options that a parameter can be bound to in every way.
 #[derive(Clone, Debug, Options)]
@@ -79,7 +77,7 @@ robot! {
     }
 }
 
-const BOUND: bb_core::EstimatorHandle<Tuned, Bound, Number> = tuned::sensor::base::number::bound;
+const BOUND: EstimatorHandle<Tuned, Bound, Number> = tuned::sensor::base::number::bound;
 
 #[test]
 fn changes_are_published_in_their_order_and_the_last_one_holds() {

@@ -1,12 +1,9 @@
 //! Reactions: a condition on a field of a topic starts a command.
 
-use crate::components::{Doing, Failure, Move, Target, Task, at};
-use crate::replay::{entries, journal, read_back};
+use crate::kit::*;
+use bb_core::Stamped;
 use bb_core::component::{ReactionEvent, ReactionState};
-use bb_core::event::{CommandEvent, CommandPhase};
-use bb_core::prelude::*;
-use bb_core::run::Report;
-use bb_core::{DynamicMessage, Stamped};
+use bb_core::event::CommandEvent;
 
 /// Takes half a second.
 fn land(context: CommandContext) -> Doing {
@@ -279,7 +276,7 @@ fn the_command_cancels_what_runs_and_a_bound_follows_its_parameter() -> Result<(
     flight.simulation.set_parameter(drone::param::battery::low, 10.5)?;
     each_half_second(45, 65, 10.0).into_iter().for_each(|(time, voltage)| flight.voltage(time, voltage));
     assert_eq!(flight.states(), [(45, "fulfilled".into()), (65, "started".into())]);
-    assert_eq!(going.try_result(), Some(Err(bb_core::run::CommandError::Cancelled)));
+    assert_eq!(going.try_result(), Some(Err(CommandError::Cancelled)));
     Ok(())
 }
 
@@ -317,8 +314,7 @@ fn a_replay_gives_the_same_events_with_the_same_caller() -> Result<(), Failure> 
 
 #[test]
 fn events_of_a_command_name_its_caller() -> Result<(), Failure> {
-    let mut simulation = Drone::builder().simulate()?;
-    simulation.arm()?;
+    let mut simulation = armed_simulation(Drone::builder());
     let events = simulation.subscribe(drone::command::land);
     simulation.command(drone::command::land, NoArguments)?;
     simulation.run_for(Duration::from_secs(1));
@@ -336,8 +332,7 @@ fn events_of_a_command_name_its_caller() -> Result<(), Failure> {
 fn in_real_time_it_reacts_to_a_message_at_once() -> Result<(), Failure> {
     let builder = Drone::builder();
     let states = builder.subscribe(drone::controller::low);
-    let running = builder.start()?;
-    running.arm()?;
+    let running = armed(builder);
     let voltage = |voltage: f64| {
         let battery = BatteryState { voltage, ..Default::default() };
         running.publish(drone::sensor::battery, running.clock().now(), battery);

@@ -1,10 +1,6 @@
 //! Real time: a thread per sensor. Nothing here asserts how late a thread was.
 
-use crate::components::{Counter, Done, Number, Read, Scale, Source, lock, within};
-use crate::gate::PATIENCE;
-use bb_core::prelude::*;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering};
+use crate::kit::*;
 use std::time::Instant;
 
 static WAITING: Mutex<Option<SensorContext>> = Mutex::new(None);
@@ -109,8 +105,7 @@ robot! {
 #[test]
 fn a_stream_of_commands_does_not_starve_the_updates_of_an_actuator() {
     within(60, || {
-        let running = Streamed::builder().start().expect("it starts");
-        running.arm().expect("it may be armed");
+        let running = armed(Streamed::builder());
         let servo = streamed::actuator::base::pan::servo;
         let mut commands = 0_u64;
         for _ in 0..50 {

@@ -1,14 +1,8 @@
 //! Estimators that others take the place of: what stays, what is refused, and what a replay says to it.
 
-use crate::components::{
-    Ask, Counter, CounterOptions, Echo, Failure, Number, Pulse, Scale, ScaleOptions, at, numbers,
-};
 use crate::joints::{Pixel, Spot, Spotter};
-use crate::plain::{Plain, SOURCE};
-use crate::replay::{entries, journal, overflow};
-use bb_core::Builder;
+use crate::kit::*;
 use bb_core::component::InputTransforms;
-use bb_core::prelude::*;
 
 /// Options of [`Ramp`].
 #[derive(Clone, Debug, Options)]
@@ -284,8 +278,8 @@ fn a_journal_is_replayed_with_the_same_replacements_only() -> Result<(), Failure
     simulation.run_until(at(100));
     simulation.stop();
     let entries = entries(&lines);
-    let numbers = |all: &bb_core::DynamicSubscription| -> Vec<_> {
-        let number = |message: bb_core::DynamicMessage| message.downcast::<Number>().map(|number| number.0);
+    let numbers = |all: &DynamicSubscription| -> Vec<_> {
+        let number = |message: DynamicMessage| message.downcast::<Number>().map(|number| number.0);
         all.drain().map(|message| (message.path(), message.stamp(), number(message))).collect()
     };
 

@@ -1,11 +1,6 @@
 //! Hardware that a restart, or a change of options, starts while the robot is being disarmed.
 
-use crate::components::{Done, Number, Source, lock, within};
-use crate::gate::{Gate, wait_until};
-use crate::plain::{Plain, SERVO, SOURCE};
-use bb_core::prelude::*;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use std::sync::{Mutex, MutexGuard};
+use crate::kit::*;
 
 /// The devices of these tests are there once.
 static ALONE: Mutex<()> = Mutex::new(());
@@ -97,8 +92,7 @@ fn an_actuator_that_restarts_while_the_robot_is_disarmed_is_disarmed_once_more()
         let servo = builder.options(SERVO);
         (servo.init, servo.disarm) = (torque_on, torque_off);
         servo.command = |_| Err(Fault::new("the cable is loose"));
-        let robot = builder.start().expect("it starts");
-        assert_eq!(robot.arm(), Ok(()));
+        let robot = armed(builder);
         GATE.close("brake");
         assert!(robot.actuate(SERVO, Number(1.0)).is_err());
         let live = robot.live();
@@ -116,8 +110,7 @@ fn an_actuator_that_restarts_while_the_robot_is_disarmed_is_disarmed_once_more()
 fn what_a_change_of_options_starts_while_the_robot_is_disarmed_is_stopped() {
     let _alone = alone();
     within(60, || {
-        let robot = Windy::builder().start().expect("it starts");
-        assert_eq!(robot.arm(), Ok(()));
+        let robot = armed(Windy::builder());
         GATE.close("options");
         robot.set_parameter(windy::param::speed, 2.0).expect("it may be set");
         GATE.wait_for(1);

@@ -1,14 +1,6 @@
 //! Restarts: what they leave alone, what they reset, and what becomes of those who fail in an unusual way.
 
-use crate::components::{
-    Break, Counter, Done, Echo, Number, Read, Replied, Servo, Source, Task, at, lock, numbers, within,
-};
-use crate::gate::{Gate, PATIENCE};
-use bb_core::HealthTransition;
-use bb_core::prelude::*;
-use bb_core::run::DropReason;
-use std::sync::atomic::{AtomicU32, Ordering};
-use std::sync::{Mutex, MutexGuard};
+use crate::kit::*;
 
 /// The devices of these tests are there once.
 fn alone() -> MutexGuard<'static, ()> {
@@ -67,8 +59,7 @@ fn a_device_that_is_unplugged_is_lost_once_and_found_again_and_nobody_else_notic
         builder.subscribe(workshop::sensor::base::plugged::pose),
         builder.subscribe(workshop::sensor::base::beside::tally),
     );
-    let mut simulation = builder.simulate()?;
-    assert_eq!(simulation.arm(), Ok(()));
+    let mut simulation = armed_simulation(builder);
     simulation.run_until(at(5005));
     let changes: Vec<_> = health
         .drain()
@@ -94,8 +85,7 @@ fn a_device_that_is_unplugged_is_lost_once_and_found_again_and_nobody_else_notic
     let started = |name| report.commands.iter().find(|command| command.name == name).map(|command| command.started);
     assert_eq!((started("alarm"), started("calm")), (Some(1), Some(1)));
     assert!(report.estimators.iter().all(|estimator| estimator.restarts == 0));
-    let faults: Vec<_> = report.faults.iter().map(ToString::to_string).collect();
-    assert_eq!(faults, ["sensor/base/plugged failed: unplugged (8 times in 1.270 s)"]);
+    assert_eq!(told(&report), ["sensor/base/plugged failed: unplugged (8 times in 1.270 s)"]);
     Ok(())
 }
 
@@ -120,16 +110,14 @@ fn a_sensor_that_panics_in_starts_at_is_restarted() -> Result<(), StartError> {
     assert_eq!(beside.drain().count(), 20, "the other one is read from the start");
     // After backoffs of 10 ms and 20 ms.
     assert_eq!(startled.try_recv().map(|number| number.monotonic_time), Some(at(30)));
-    let faults: Vec<_> = simulation.stop().faults.iter().map(ToString::to_string).collect();
-    assert_eq!(faults, ["sensor/base/startled failed: panicked: no index (2 times in 0.010 s)"]);
+    assert_eq!(told(&simulation.stop()), ["sensor/base/startled failed: panicked: no index (2 times in 0.010 s)"]);
 
     STARTLES.store(1, Ordering::SeqCst);
     let builder = Workshop::builder();
     let startled = builder.subscribe(workshop::sensor::base::startled);
     let running = builder.start()?;
     assert!(startled.recv_timeout(PATIENCE).is_some(), "in real time its thread goes on");
-    let faults: Vec<_> = running.stop().faults.iter().map(ToString::to_string).collect();
-    assert_eq!(faults, ["sensor/base/startled failed: panicked: no index"]);
+    assert_eq!(told(&running.stop()), ["sensor/base/startled failed: panicked: no index"]);
     Ok(())
 }
 
@@ -217,8 +205,7 @@ fn new_options_close_and_drop_the_old_instance_before_the_new_one_is_made() -> R
     let _alone = alone();
     NUMBER.store(0, Ordering::SeqCst);
     lock(&LOG).clear();
-    let mut simulation = Single::builder().simulate()?;
-    assert_eq!(simulation.arm(), Ok(()));
+    let mut simulation = armed_simulation(Single::builder());
     simulation.run_until(at(55));
     simulation.set_parameter(single::param::gain, 2.0).expect("it is finite");
     simulation.run_until(at(154));
@@ -263,8 +250,7 @@ fn each_component_gets_the_reason_for_its_end() -> Result<(), StartError> {
 #[test]
 fn parameters_that_change_often_are_no_failures() -> Result<(), StartError> {
     let _alone = alone();
-    let mut simulation = Single::builder().simulate()?;
-    assert_eq!(simulation.arm(), Ok(()));
+    let mut simulation = armed_simulation(Single::builder());
     for change in 1..=50_u32 {
         simulation.run_until(at(20 * i64::from(change)));
         simulation.set_parameter(single::param::gain, f64::from(change)).expect("it is finite");
@@ -378,8 +364,7 @@ fn panics_that_use_up_the_budget_of_the_robot_have_it_made_safe() -> Result<(), 
     let _alone = alone();
     let mut builder = Workshop::builder();
     builder.supervision().max_restarts = 1;
-    let mut simulation = builder.simulate()?;
-    assert_eq!(simulation.arm(), Ok(()));
+    let mut simulation = armed_simulation(builder);
     let before = MADE_SAFE.load(Ordering::SeqCst);
     let mut failures = 0;
     while simulation.safety() == Safety::Armed && failures < 10 {

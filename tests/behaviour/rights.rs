@@ -1,12 +1,6 @@
 //! Rights of a caller: each verb of the bus needs its right, and everybody may disarm.
 
-use crate::components::{Failure, Number};
-use crate::plain::{Plain, plain};
-use crate::replay::{entries, journal, play, read_back};
-use bb_core::journal::Event;
-use bb_core::prelude::*;
-use bb_core::run::Bus;
-use bb_core::{ArmError, DisarmError};
+use crate::kit::*;
 
 /// Request to a bus that needs a right; its error says why the bus refuses.
 type Verb = fn(&Bus) -> Result<(), Failure>;

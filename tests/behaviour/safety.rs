@@ -1,12 +1,6 @@
 //! Code that makes hardware safe, and what happens when it goes wrong itself.
 
-use crate::components::{Done, Number, at, lock, within};
-use crate::gate::Gate;
-use crate::plain::{Plain, SERVO, SOURCE};
-use bb_core::Builder;
-use bb_core::prelude::*;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use crate::kit::*;
 
 static MADE: AtomicU32 = AtomicU32::new(0);
 static STOPPED: Mutex<Vec<u32>> = Mutex::new(Vec::new());
@@ -112,8 +106,7 @@ fn a_disarm_that_panics_leads_to_error_and_the_next_one_may_succeed() -> Result<
     let _alone = ALONE.lock();
     let builder = powered();
     let errors = builder.subscribe(system::SafetyErrors);
-    let running = builder.start()?;
-    running.arm().expect("it may be armed");
+    let running = armed(builder);
     running.actuate(SERVO, Number(PANICS_AT_DISARM)).expect("it does as told");
     let why = running.disarm().expect_err("it panics").to_string();
     assert_eq!(
@@ -133,8 +126,7 @@ fn a_disarm_that_hangs_is_an_error_and_does_not_keep_the_robot_from_stopping() {
     let _alone = ALONE.lock();
     within(60, || {
         HERE.close("a brake");
-        let running = powered().start().expect("it starts");
-        running.arm().expect("it may be armed");
+        let running = armed(powered());
         running.actuate(SERVO, Number(HANGS_AT_DISARM)).expect("it does as told");
         let start = std::time::Instant::now();
         let why = running.disarm().expect_err("it hangs").to_string();

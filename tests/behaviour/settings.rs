@@ -1,8 +1,7 @@
 //! Options and parameters from files, from the command line and by path.
 
-use crate::components::Number;
-use bb_core::prelude::*;
-use bb_core::{Builder, HandleCall};
+use crate::kit::*;
+use bb_core::HandleCall;
 use proptest::prelude::*;
 use std::path::PathBuf;
 

@@ -1,7 +1,6 @@
 //! Virtual time.
 
-use crate::components::{Counter, Number, Read, Snapshot, Source, at};
-use bb_core::prelude::*;
+use crate::kit::*;
 
 robot! {
     robot Clockwork;

@@ -4,9 +4,8 @@ mod rates;
 mod same;
 mod seeds;
 
-use crate::components::{Counter, Failure, Number, Scale};
-use bb_core::prelude::*;
-use bb_core::{DynamicSubscription, Unmatched};
+use crate::kit::*;
+use bb_core::Unmatched;
 
 robot! {
     robot Talker;

@@ -1,10 +1,6 @@
 //! Supervision: who is restarted when something fails too often, and who is not.
 
-use crate::components::{Done, Echo, Number, Read, Replied, Source, at, lock, within};
-use crate::plain::{Plain, SOURCE};
-use bb_core::prelude::*;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicU32, Ordering};
+use crate::kit::*;
 
 static MADE: [AtomicU32; 8] = [const { AtomicU32::new(0) }; 8];
 
@@ -64,8 +60,7 @@ fn panics_go_up_link_joint_robot_and_restart_exactly_what_is_below() -> Result<(
     builder.supervision().longest_backoff = Duration::from_millis(250);
     let errors = builder.subscribe(system::SafetyErrors);
     let brother = builder.subscribe(family::sensor::base::neck::head::head_pulse::brother);
-    let mut simulation = builder.simulate()?;
-    simulation.arm().expect("it may be armed");
+    let mut simulation = armed_simulation(builder);
     let start: Vec<_> = (0..4).map(made).collect();
     let since = |number: usize| made(number) - start[number];
     for failure in 1_u32..=13 {
@@ -94,8 +89,7 @@ fn an_estimator_is_restarted_by_the_supervisor_of_its_sensor() -> Result<(), Sta
     let _alone = ALONE.lock();
     let mut builder = Family::builder();
     builder.supervision().longest_backoff = Duration::from_millis(250);
-    let mut simulation = builder.simulate()?;
-    simulation.arm().expect("it may be armed");
+    let mut simulation = armed_simulation(builder);
     let start: Vec<_> = (0..6).map(made).collect();
     let since = || (0..6).map(|number| made(number) - start[number]).collect::<Vec<_>>();
     for failure in 1..=4 {
@@ -124,8 +118,7 @@ fn an_estimator_is_restarted_by_the_supervisor_of_its_sensor() -> Result<(), Sta
 #[test]
 fn a_fault_never_touches_another_component_however_often_it_comes() -> Result<(), StartError> {
     let _alone = ALONE.lock();
-    let mut simulation = Family::builder().simulate()?;
-    simulation.arm().expect("it may be armed");
+    let mut simulation = armed_simulation(Family::builder());
     let start: Vec<_> = (0..4).map(made).collect();
     for round in 1..=200 {
         simulation.publish(family::sensor::base::neck::head::number, at(20 * round), Number(4.0));

@@ -1,8 +1,6 @@
 //! Timers, ticks, continues and readings with times that never come.
 
-use crate::components::{EchoOptions, Number, at, within};
-use crate::plain::{ECHO, ENCODER, Plain, SOURCE};
-use bb_core::prelude::*;
+use crate::kit::*;
 
 /// Asks as it is made, and again at every callback; a tick comes again by itself.
 macro_rules! asking {

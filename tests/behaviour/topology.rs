@@ -1,7 +1,6 @@
 //! Masses, shapes and resistance of links and joints; URDF in and out.
 
-use crate::components::{Counter, Scale, Snapshot};
-use bb_core::prelude::*;
+use crate::kit::*;
 use bb_core::topology::{Dynamics, Geometry, Mimic, Origin, Transmission};
 
 /// A reduction of 50, and nothing else.

@@ -1,11 +1,7 @@
 //! Commands that change the operational state while they run.
 
-use crate::components::{Doing, Failure, Task, at, lock};
-use crate::replay::{entries, journal, read_back};
-use bb_core::event::{RefusalReason, StateTransition};
-use bb_core::prelude::*;
-use bb_core::run::CommandError;
-use std::sync::Mutex;
+use crate::kit::*;
+use bb_core::event::StateTransition;
 
 /// Answers to those who asked for a transition.
 static ANSWERS: Mutex<Vec<String>> = Mutex::new(Vec::new());
@@ -102,8 +98,7 @@ fn changes(states: &Subscription<StateTransition>) -> Vec<(i64, &'static str, &'
 #[test]
 fn other_commands_follow_a_transition_at_once() -> Result<(), Failure> {
     let _alone = alone();
-    let mut simulation = Harbour::builder().simulate()?;
-    simulation.arm()?;
+    let mut simulation = armed_simulation(Harbour::builder());
     let states = simulation.subscribe(system::StateMachine);
     let docking = simulation.command(harbour::command::dock, NoArguments)?;
     simulation.run_until(at(99));
@@ -132,8 +127,7 @@ fn other_commands_follow_a_transition_at_once() -> Result<(), Failure> {
 #[test]
 fn the_state_stays_when_the_command_is_cancelled_or_fails_and_goes_when_it_is_disarmed() -> Result<(), Failure> {
     let _alone = alone();
-    let mut simulation = Harbour::builder().simulate()?;
-    simulation.arm()?;
+    let mut simulation = armed_simulation(Harbour::builder());
     let docking = simulation.command(harbour::command::dock, NoArguments)?;
     simulation.run_until(at(150));
     simulation.command(harbour::command::stop, NoArguments)?;
@@ -175,8 +169,7 @@ fn a_replay_goes_through_the_same_states() -> Result<(), Failure> {
     let mut builder = Harbour::builder();
     let lines = journal(&mut builder);
     let first = builder.subscribe(system::StateMachine);
-    let mut simulation = builder.simulate()?;
-    simulation.arm()?;
+    let mut simulation = armed_simulation(builder);
     simulation.command(harbour::command::dock, NoArguments)?;
     simulation.run_until(at(150));
     // Allowed by the transition alone.

@@ -1,11 +1,6 @@
 //! Estimators with a thread of their own: they hang, fail, tick, are lost and stopped as any other, and hold nobody up.
 
-use crate::components::{Ask, Done, Echo, Number, Replied, within};
-use crate::gate::{Gate, PATIENCE, wait_until};
-use bb_core::prelude::*;
-use bb_core::run::DropReason;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use crate::kit::*;
 
 static TERMINATED: AtomicUsize = AtomicUsize::new(0);
 static TICKS: AtomicUsize = AtomicUsize::new(0);

@@ -82,7 +82,7 @@ fn a_command_may_be_cancelled_in_each_phase_of_its_motion() -> Result<(), Failur
         if has_arrived {
             assert!((slew - 0.8).abs() < 1e-6 && (reach - 0.5).abs() < 1e-6, "{millis}: {slew} {reach}");
         } else {
-            assert_eq!(result, Some(Err(bb_core::run::CommandError::Cancelled)), "{millis}");
+            assert_eq!(result, Some(Err(CommandError::Cancelled)), "{millis}");
         }
         // They rest, and hold.
         simulation.run_for(Duration::from_secs(1));
@@ -230,7 +230,7 @@ robot! {
 }
 
 /// Armed, 10 ms after its start.
-fn shop(mut change: impl FnMut(&mut bb_core::Builder<Shop>)) -> Result<Simulation<Shop>, Failure> {
+fn shop(mut change: impl FnMut(&mut Builder<Shop>)) -> Result<Simulation<Shop>, Failure> {
     let mut builder = Shop::builder();
     change(&mut builder);
     let mut simulation = builder.simulate()?;

@@ -65,8 +65,7 @@ robot! {
 /// A message that was kept back on its way, or arrives twice, is not the newest measurement.
 #[test]
 fn a_controller_does_not_go_back_to_an_older_measurement() -> Result<(), Failure> {
-    let mut simulation = Servo::builder().simulate()?;
-    assert_eq!(simulation.arm(), Ok(()));
+    let mut simulation = armed_simulation(Servo::builder());
     let terms = simulation.subscribe(servo::controller::hold);
     let mut measured = |now: i64, stamp: i64, position: f64| -> Result<f64, Failure> {
         simulation.run_until(at(now - 1));
@@ -171,8 +170,7 @@ fn another_controller_takes_the_place_of_a_declared_one() -> Result<(), Failure>
         "no controller or bridge is at `controller/hod`; did you mean `controller/hold`?"
     );
     builder.replace_service::<Steady>("controller/hold", options)?;
-    let mut simulation = builder.simulate()?;
-    assert_eq!(simulation.arm(), Ok(()));
+    let mut simulation = armed_simulation(builder);
     simulation.run_for(Duration::from_secs(1));
     // The gain belongs to the replaced one.
     simulation.set_parameter(crane::param::gains::kp, 9.0)?;

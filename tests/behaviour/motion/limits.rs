@@ -7,8 +7,7 @@ fn commands_beyond_a_limit_are_brought_back_and_counted() -> Result<(), Failure>
     let commanded = Arc::new(Mutex::new(Vec::new()));
     let mut builder = simulated()?;
     builder.options(crane::actuator::base::flap::servo).commanded = Arc::clone(&commanded);
-    let simulation = builder.simulate()?;
-    assert_eq!(simulation.arm(), Ok(()));
+    let simulation = armed_simulation(builder);
     let servo = crane::actuator::base::flap::servo;
     let carried_out = simulation.subscribe_any(Select::Path(servo.path()), None, Overflow::default());
     let limit = 10_f64.to_radians();
@@ -38,8 +37,7 @@ fn each_bound_belongs_to_what_is_allowed() -> Result<(), Failure> {
     let commanded = Arc::new(Mutex::new(Vec::new()));
     let mut builder = simulated()?;
     builder.options(crane::actuator::base::flap::servo).commanded = commanded;
-    let simulation = builder.simulate()?;
-    assert_eq!(simulation.arm(), Ok(()));
+    let simulation = armed_simulation(builder);
     let servo = crane::actuator::base::flap::servo;
     let carried_out = simulation.subscribe_any(Select::Path(servo.path()), None, Overflow::default());
     let limited = || -> Vec<u64> {

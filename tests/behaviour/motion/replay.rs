@@ -1,8 +1,7 @@
 //! Motions in a replay.
 
 use super::*;
-use crate::replay::{entries, journal, read_back};
-use std::collections::BTreeMap;
+use crate::kit::*;
 
 /// Collects the messages published at each path below `actuator` and `command`.
 fn published(all: &DynamicSubscription) -> BTreeMap<&'static str, Vec<String>> {

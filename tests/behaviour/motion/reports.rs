@@ -102,8 +102,7 @@ fn a_velocity_of_zero_is_no_motion_to_the_end_of_the_range() -> Result<(), Failu
 fn a_joint_that_nothing_holds_is_not_stalled_however_short_it_may_be_held() -> Result<(), Failure> {
     let mut builder = simulated()?;
     builder.options(crane::actuator::base::slew::motor).stall_after = Duration::ZERO;
-    let mut simulation = builder.simulate()?;
-    assert_eq!(simulation.arm(), Ok(()));
+    let mut simulation = armed_simulation(builder);
     let ends = ends(&simulation.bus());
     let motor = crane::actuator::base::slew::motor;
     simulation.actuate(motor, PositionCommand { position: 0.2, ..Default::default() }.into())?;
@@ -114,8 +113,7 @@ fn a_joint_that_nothing_holds_is_not_stalled_however_short_it_may_be_held() -> R
 
 #[test]
 fn a_simulated_motor_moves_in_real_time() -> Result<(), Failure> {
-    let running = simulated()?.start()?;
-    assert_eq!(running.arm(), Ok(()));
+    let running = armed(simulated()?);
     let ends = ends(&running.bus());
     let servo = crane::actuator::base::slew::boom::reach::trolley::jaw::servo;
     let begin = running.clock().now();
@@ -131,8 +129,7 @@ fn a_simulated_motor_moves_in_real_time() -> Result<(), Failure> {
 
 #[test]
 fn a_motion_without_a_target_is_reported_too() -> Result<(), Failure> {
-    let mut simulation = Swing::builder().simulate()?;
-    assert_eq!(simulation.arm(), Ok(()));
+    let mut simulation = armed_simulation(Swing::builder());
     let motor = swing::actuator::base::turn::motor;
     let begins = simulation.subscribe_any(Select::Below(motor.path()), "BeginMotion", Overflow::default());
     let ends = ends(&simulation.bus());

@@ -148,8 +148,7 @@ fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
 }
 
 fn armed() -> Result<(Simulation<Geared>, Arc<Shafts>), Failure> {
-    let simulation = Geared::builder().simulate()?;
-    simulation.arm()?;
+    let simulation = armed_simulation(Geared::builder());
     let shafts = simulation.shared(Shafts::default);
     Ok((simulation, shafts))
 }
@@ -273,8 +272,7 @@ fn without_a_transmission_the_motor_is_the_joint_to_the_bit() -> Result<(), Fail
 fn a_simulated_joint_takes_the_place_of_a_motor() -> Result<(), Failure> {
     let mut builder = Geared::builder();
     builder.replace_actuator::<SimulatedActuator>(ARM, SimulatedActuatorOptions::defaults())?;
-    let mut simulation = builder.simulate()?;
-    simulation.arm()?;
+    let mut simulation = armed_simulation(builder);
     simulation.actuate(
         geared::actuator::base::arm::motor,
         PositionCommand { position: 1.25, ..Default::default() }.into(),

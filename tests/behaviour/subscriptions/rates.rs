@@ -1,9 +1,7 @@
 //! Subscriptions with a highest rate: on virtual time, in real time and in a replay.
 
-use crate::components::{Counter, Doing, Failure, Number, Task, numbers};
-use crate::replay::{entries, journal};
-use bb_core::prelude::*;
-use bb_core::{Builder, Delivery, DynamicMessage};
+use crate::kit::*;
+use bb_core::Delivery;
 
 /// Delivers at most ten messages a second of each path.
 fn slowly(overflow: Overflow) -> Delivery {

@@ -1,11 +1,7 @@
 //! A selection is the same on the builder and on the running robot.
 
-use crate::components::{Doing, Echo, Failure, Number, Task};
-use bb_core::DynamicSubscription;
-use bb_core::prelude::*;
-use bb_core::run::Live;
+use crate::kit::*;
 use bb_estimators::SimulatedActuator;
-use std::collections::BTreeMap;
 
 /// Publishes at a path of its own, then reports an error of the hardware.
 fn work(context: CommandContext) -> Doing {

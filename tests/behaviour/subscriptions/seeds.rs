@@ -1,8 +1,7 @@
 //! Expectations of users of Beam Bots of publish and subscribe.
 
-use crate::components::{Counter, Doing, Failure, Number, Task, at};
+use crate::kit::*;
 use bb_core::event::{Safety, SafetyTransition};
-use bb_core::prelude::*;
 
 /// Ends once a sensor has reached the target.
 fn reach(context: CommandContext) -> Doing {
@@ -63,7 +62,7 @@ fn a_log_of_safety_hears_that_alone() -> Result<(), Failure> {
     assert_eq!(simulation.arm(), Ok(()));
     simulation.run_for(Duration::from_millis(50));
     assert_eq!(simulation.disarm(), Ok(()));
-    let to = |message: bb_core::DynamicMessage| message.downcast::<SafetyTransition>().map(|change| change.to);
+    let to = |message: DynamicMessage| message.downcast::<SafetyTransition>().map(|change| change.to);
     let heard: Vec<_> = safety.drain().map(to).collect();
     assert_eq!(heard, [Some(Safety::Armed), Some(Safety::Disarming), Some(Safety::Disarmed)]);
     Ok(())
@@ -95,8 +94,7 @@ fn an_empty_list_of_payloads_is_no_filter() -> Result<(), Failure> {
     let (all, one, none) = (listen(&[]), listen(&["Number"]), listen(&["Imu"]));
     assert_eq!([&all, &one, &none].map(|heard| heard.unmatched().len()), [0, 0, 1]);
     let everything = builder.subscribe_any(Select::AnyOf(&[]), [], Overflow::default());
-    let mut simulation = builder.simulate()?;
-    assert_eq!(simulation.arm(), Ok(()));
+    let mut simulation = armed_simulation(builder);
     simulation.run_to_end();
     assert_eq!([&all, &one, &none].map(|heard| heard.drain().count()), [20, 20, 0]);
     assert!(everything.drain().any(|message| message.path() == "safety"));
