@@ -28,22 +28,9 @@ impl Drop for Large {
     }
 }
 
-/// Emits a message of its own for each.
-#[derive(Debug)]
-pub(crate) struct Forward;
-
-impl Estimator for Forward {
-    type Options = NoOptions;
-    type Input = Large;
-    type Output = Large;
-
-    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-
-    fn handle_input(&mut self, large: &Stamped<Large>) -> Result<Reply<Large>, Fault> {
-        Ok(Reply::emit(Large { x: large.x }))
-    }
+stateless! {
+    /// Emits a message of its own for each.
+    Forward: Large => Large, |large: &Stamped<Large>| Ok(Reply::emit(Large { x: large.x }));
 }
 
 robot! {

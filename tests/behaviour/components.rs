@@ -374,28 +374,39 @@ pub(crate) struct Numbers<'a> {
     pub(crate) third: Option<Input<'a, Number>>,
 }
 
-/// Emits what it is given.
-#[derive(Debug)]
-pub(crate) struct Snapshot;
+/// Declares estimators without options and state by the code of their inputs.
+macro_rules! stateless {
+    ($($(#[$doc:meta])* $name:ident: $Input:ty => $Output:ty, |$input:ident: $View:ty| $code:expr;)*) => { $(
+        $(#[$doc])*
+        #[derive(Debug)]
+        pub(crate) struct $name;
 
-impl Estimator for Snapshot {
-    type Options = NoOptions;
-    type Input = Numbers<'static>;
-    type Output = Seen;
+        impl Estimator for $name {
+            type Options = NoOptions;
+            type Input = $Input;
+            type Output = $Output;
 
-    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
-        Ok(Self)
-    }
+            fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
+                Ok(Self)
+            }
 
-    fn handle_input(&mut self, numbers: Numbers<'_>) -> Result<Reply<Seen>, Fault> {
-        Ok(Reply::emit(Seen {
-            driver: numbers.driver.0,
-            second: numbers.second.0,
-            second_is_new: numbers.second.is_new(),
-            third: numbers.third.map_or(-1.0, |third| third.0),
-            third_is_new: numbers.third.is_some_and(|third| third.is_new()),
-        }))
-    }
+            fn handle_input(&mut self, $input: $View) -> Result<Reply<$Output>, Fault> {
+                $code
+            }
+        }
+    )* };
+}
+pub(crate) use stateless;
+
+stateless! {
+    /// Emits what it is given.
+    Snapshot: Numbers<'static> => Seen, |numbers: Numbers<'_>| Ok(Reply::emit(Seen {
+        driver: numbers.driver.0,
+        second: numbers.second.0,
+        second_is_new: numbers.second.is_new(),
+        third: numbers.third.map_or(-1.0, |third| third.0),
+        third_is_new: numbers.third.is_some_and(|third| third.is_new()),
+    }));
 }
 
 /// The driver of an encoder on a bus that is not there.

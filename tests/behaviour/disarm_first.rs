@@ -252,7 +252,6 @@ fn a_command_that_blocks_times_out() {
 }
 
 static MOVED: AtomicU32 = AtomicU32::new(0);
-static MADE_SAFE: AtomicU32 = AtomicU32::new(0);
 
 /// Moves; at -1 it fails, and from then on it cannot be made safe.
 fn wind(number: f64) -> Done {
@@ -264,23 +263,6 @@ fn hold(last: f64) -> Done {
     if last == -1.0 {
         return Err(Fault::new("the brake does not answer"));
     }
-    MADE_SAFE.fetch_add(1, Ordering::SeqCst);
-    Ok(())
-}
-
-static THERMOMETER: Mutex<Option<SensorContext>> = Mutex::new(None);
-static IS_HOT: AtomicBool = AtomicBool::new(false);
-
-/// Watches a temperature.
-fn watch(_: u32, _: MonotonicTime) -> Read {
-    if IS_HOT.swap(false, Ordering::SeqCst) {
-        lock(&THERMOMETER).as_ref().ok_or("it was not made")?.hardware_error("it burns");
-    }
-    Ok(Reading::nothing())
-}
-
-fn install(context: &SensorContext) -> Done {
-    *lock(&THERMOMETER) = Some(context.clone());
     Ok(())
 }
 
@@ -328,7 +310,6 @@ robot! {
             actuator winch: Servo(command = wind, disarm = hold);
             link load { }
         }
-        sensor thermometer: Source(init = install, read = watch) { rate: 10 Hz; }
     }
 }
 
@@ -428,31 +409,6 @@ fn arming_waits_until_the_code_of_a_cancelled_command_has_returned() {
         assert!(matches!(tried, Some(Err(ActuatorError::Cancelled | ActuatorError::NotArmed(_)))), "{tried:?}");
         assert_eq!(MOVED.load(Ordering::SeqCst), moved);
     });
-}
-
-#[test]
-fn a_component_that_reports_a_hardware_error_has_the_robot_disarmed() -> Result<(), StartError> {
-    let _alone = alone();
-    let builder = Crane::builder();
-    let errors = builder.subscribe(system::SafetyErrors);
-    let mut simulation = armed_simulation(builder);
-    simulation.run_until(at(50));
-    let made_safe = MADE_SAFE.load(Ordering::SeqCst);
-    IS_HOT.store(true, Ordering::SeqCst);
-    simulation.run_until(at(99));
-    assert_eq!(simulation.safety(), Safety::Armed);
-    simulation.run_until(at(100));
-    assert_eq!(simulation.safety(), Safety::Error);
-    assert_eq!(MADE_SAFE.load(Ordering::SeqCst), made_safe + 1);
-    let error = errors.try_recv().map(|error| (error.path, error.payload.error.message));
-    assert_eq!(error, Some(("sensor/base/thermometer", "it burns".to_owned())));
-    assert!(simulation.arm().is_err());
-    // A robot that is disarmed is in `error` as well.
-    simulation.force_disarm().expect("all can be made safe");
-    IS_HOT.store(true, Ordering::SeqCst);
-    simulation.run_until(at(200));
-    assert_eq!(simulation.safety(), Safety::Error);
-    Ok(())
 }
 
 /// A sensor that hangs is reported while the robot runs, and once each time.

@@ -143,26 +143,6 @@ fn what_a_run_sees() -> Result<(), StartError> {
     Ok(())
 }
 
-#[test]
-fn messages_that_wait_too_long_for_the_driver_are_counted_and_reported() -> Result<(), StartError> {
-    let builder = Witnessed::builder();
-    let here = builder.subscribe(witnessed::estimator::base::here);
-    let mut run = builder.simulate()?;
-    let most = Every::<Number>::MOST as i64;
-    for millis in 0..most + 3 {
-        run.publish(witnessed::sensor::base::first, at(millis), Number(millis as f64));
-    }
-    run.publish(witnessed::sensor::base::clock, at(most + 3), Number(0.0));
-    run.publish(witnessed::sensor::base::clock, at(most + 4), Number(0.0));
-    let expected: Vec<f64> = (3..most + 3).map(|number| number as f64).collect();
-    assert_eq!(saw(&here), [(expected, 3), (vec![], 0)]);
-    let report = run.report();
-    let counts = report.estimator("estimator/base/here").expect("it is declared");
-    let displaced: Vec<u64> = counts.inputs.iter().map(|input| input.dropped(DropReason::Displaced)).collect();
-    assert_eq!(displaced, [0, 3, 0]);
-    Ok(())
-}
-
 /// While the worker is in a run, messages wait in its inbox, in order.
 #[test]
 fn a_worker_that_is_held_up_sees_each_message_in_the_run_that_it_came_before() {

@@ -1,8 +1,6 @@
 //! Components that fail: at the start, in a callback, by a panic. The others go on.
 
 use crate::kit::*;
-use bb_core::message::DecodeError;
-use bb_core::message::codec::{Reader, Shape, Writer};
 
 static TERMINATED: AtomicUsize = AtomicUsize::new(0);
 
@@ -97,73 +95,5 @@ fn a_component_that_fails_is_restarted_alone_with_fresh_state() -> Result<(), St
         assert_eq!((report.faults[1].first_time, report.faults[1].last_time), (at(100), at(210)));
         assert!(report.ok().is_err());
     }
-    Ok(())
-}
-
-/// A payload whose own code panics.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Cursed(u32);
-
-impl bb_core::Finite for Cursed {
-    fn is_finite(&self) -> bool {
-        assert!(self.0 < 3, "cursed");
-        true
-    }
-}
-
-impl bb_core::Field for Cursed {
-    const SHAPE: Shape = <u32 as bb_core::Field>::SHAPE;
-
-    fn write(&self, writer: &mut Writer<'_>) {
-        self.0.write(writer);
-    }
-
-    fn read(reader: &mut Reader<'_>) -> Result<Self, DecodeError> {
-        bb_core::Field::read(reader).map(Self)
-    }
-}
-
-impl Payload for Cursed {
-    const NAME: &'static str = "Cursed";
-}
-
-/// Takes it.
-#[derive(Debug)]
-pub(crate) struct Taker;
-
-impl Estimator for Taker {
-    type Options = NoOptions;
-    type Input = Cursed;
-    type Output = Number;
-
-    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-
-    fn handle_input(&mut self, cursed: &Stamped<Cursed>) -> Replied {
-        Ok(Reply::emit(Number(f64::from(cursed.0))))
-    }
-}
-
-robot! {
-    robot Haunted;
-    link base { sensor curse: External<Cursed>() { estimator taker: Taker(); } }
-}
-
-#[test]
-fn a_payload_that_panics_fails_the_estimator_that_takes_it_and_not_its_publisher() -> Result<(), StartError> {
-    let running = Haunted::builder().start()?;
-    for number in 1..=5 {
-        running.publish(haunted::sensor::base::curse, running.clock().now(), Cursed(number));
-    }
-    wait_until("all that is published is taken", || {
-        let report = running.report();
-        report.estimator("sensor/base/curse/taker").is_some_and(|taker| taker.inputs[0].received == 5)
-    });
-    let report = running.stop();
-    let taker = report.estimator("sensor/base/curse/taker").expect("it is declared");
-    let faults: Vec<_> = report.faults.iter().map(|fault| (fault.path, fault.message.as_str())).collect();
-    assert_eq!(faults, [(taker.path, "panicked: cursed")]);
-    assert_eq!((taker.emitted, taker.inputs[0].received), (2, 5));
     Ok(())
 }

@@ -13,33 +13,28 @@ fn braked() -> [u32; 2] {
 const TOO_MUCH: f64 = 100.0;
 const WRONG: f64 = -1.0;
 
-/// Estimator with a brake, which reports a load that is too heavy as a hardware error.
-#[derive(Debug)]
-pub(crate) struct LoadGuard(SafetyLink);
+static LINK: Mutex<Option<SafetyLink>> = Mutex::new(None);
 
-impl Estimator for LoadGuard {
-    type Options = NoOptions;
-    type Input = Number;
-    type Output = Number;
+/// Gives an estimator a brake.
+fn guard(context: &Context) -> Done {
+    context.on_disarm(|| {
+        BRAKED[0].fetch_add(1, Ordering::SeqCst);
+        Ok(())
+    });
+    *lock(&LINK) = Some(context.safety());
+    Ok(())
+}
 
-    fn init(_: NoOptions, context: &Context) -> Result<Self, Fault> {
-        context.on_disarm(|| {
-            BRAKED[0].fetch_add(1, Ordering::SeqCst);
-            Ok(())
-        });
-        Ok(Self(context.safety()))
+/// Reports a load that is too heavy as a hardware error.
+fn check(_: &mut f64, load: f64) -> Replied {
+    if load == WRONG {
+        return Err(Fault::new("no such load"));
     }
-
-    fn handle_input(&mut self, load: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
-        if load.0 == WRONG {
-            return Err(Fault::new("no such load"));
-        }
-        if load.0 > TOO_MUCH {
-            let error = HardwareError::new(HardwareErrorKind::Overload, "the load");
-            self.0.hardware_error(error.with_quantity(load.0, "kg"));
-        }
-        Ok(Reply::emit(load.payload))
+    if load > TOO_MUCH {
+        let error = HardwareError::new(HardwareErrorKind::Overload, "the load");
+        lock(&LINK).as_ref().ok_or("it was not made")?.hardware_error(error.with_quantity(load, "kg"));
     }
+    Ok(Reply::emit(Number(load)))
 }
 
 /// Command that takes 10 ms and has a brake of its own.
@@ -64,7 +59,7 @@ robot! {
     robot Hoist;
     commands { lift: Task(run = lift); }
     link base {
-        sensor load: External<Number>() { estimator guard: LoadGuard(); }
+        sensor load: External<Number>() { estimator guard: Echo(init = guard, input = check); }
         sensor burnt: Source(init = burn, read = |_, _| Ok(Reading::finished())) { rate: 1 Hz; }
     }
 }

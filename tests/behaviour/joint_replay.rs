@@ -2,69 +2,30 @@
 
 use crate::joints::{Fusion, Pixel, Spotter};
 use crate::kit::*;
+use crate::replay::{BadDay, BadDayOptions, OnBadDay};
 use std::collections::BTreeSet;
 
-/// An encoder of a bad day: it pauses, repeats itself, stamps late, and now and then gives a NaN.
-#[derive(Debug)]
-struct Encoder {
-    random: Random,
-    reads: u32,
-    angle: f64,
-}
-
-/// Options of [`Encoder`] and [`Camera`].
-#[derive(Clone, Debug, Options)]
-pub(crate) struct DayOptions {
-    #[option(default = 1)]
-    pub(crate) seed: u64,
-    #[option(default = 0)]
-    pub(crate) reads: u32,
-}
-
-impl Sensor for Encoder {
-    type Options = DayOptions;
-    type Output = JointState;
-
-    fn init(DayOptions { seed, reads }: DayOptions, _: &SensorContext) -> Result<Self, Fault> {
-        Ok(Self { random: Random::new(seed), reads, angle: 0.0 })
-    }
-
-    fn read(&mut self, now: MonotonicTime) -> Result<Reading<JointState>, Fault> {
-        let Some(reads) = self.reads.checked_sub(1) else { return Ok(Reading::finished()) };
-        self.reads = reads;
-        self.angle += self.random.below(1000) as f64 * 1e-3 - 0.5;
-        let velocity = (self.random.below(2) == 0).then_some(self.angle * 0.7);
-        let state = JointState { position: self.angle.clamp(0.0, 1.0), velocity, effort: None };
-        Ok(match self.random.below(40) {
+/// States of a joint: they pause, repeat themselves, are stamped late, and now and then give a NaN.
+impl OnBadDay for JointState {
+    fn on_bad_day(random: &mut Random, angle: &mut f64, now: MonotonicTime) -> Reading<Self> {
+        *angle += random.below(1000) as f64 * 1e-3 - 0.5;
+        let velocity = (random.below(2) == 0).then_some(*angle * 0.7);
+        let state = JointState { position: angle.clamp(0.0, 1.0), velocity, effort: None };
+        match random.below(40) {
             0 => Reading::at(now - Duration::from_millis(30), state),
             1 => Reading::now(JointState { position: f64::NAN, ..state }),
             2 => Reading::nothing().next_at(now + Duration::from_millis(50)),
             3 => Reading::at(now + Duration::from_secs(3), state),
             _ => Reading::now(state),
-        })
+        }
     }
 }
 
-/// Gives numbers, stamped a little ago.
-#[derive(Debug)]
-struct Camera {
-    random: Random,
-    reads: u32,
-}
-
-impl Sensor for Camera {
-    type Options = DayOptions;
-    type Output = Pixel;
-
-    fn init(DayOptions { seed, reads }: DayOptions, _: &SensorContext) -> Result<Self, Fault> {
-        Ok(Self { random: Random::new(seed), reads })
-    }
-
-    fn read(&mut self, now: MonotonicTime) -> Result<Reading<Pixel>, Fault> {
-        let Some(reads) = self.reads.checked_sub(1) else { return Ok(Reading::finished()) };
-        self.reads = reads;
-        let ago = Duration::from_micros(self.random.below(8000));
-        Ok(Reading::at(now - ago, Pixel(self.random.below(100) as f64)))
+/// Numbers that are stamped a little ago.
+impl OnBadDay for Pixel {
+    fn on_bad_day(random: &mut Random, _: &mut f64, now: MonotonicTime) -> Reading<Self> {
+        let ago = Duration::from_micros(random.below(8000));
+        Reading::at(now - ago, Pixel(random.below(100) as f64))
     }
 }
 
@@ -74,7 +35,7 @@ robot! {
     bridges { bridge joint_states: bb_core::component::JointPublisher() { rate: 100 Hz; } }
 
     link base {
-        sensor imu: Camera(seed = 4) { rate: 300 Hz; }
+        sensor imu: BadDay<Pixel>(seed = 4) { rate: 300 Hz; }
         estimator spot: Spotter() {
             input camera: sensor::base::shoulder::arm::lift::carriage::camera;
             lost_after: 40 ms;
@@ -93,13 +54,13 @@ robot! {
         }
         joint shoulder: continuous {
             axis: z;
-            sensor encoder: Encoder() { rate: 1 kHz; }
+            sensor encoder: BadDay<JointState>() { rate: 1 kHz; }
             link arm {
                 joint lift: prismatic {
                     axis: x;
                     limit: { lower: 0 m, upper: 2 m, velocity: 1 m/s, effort: 10 N };
-                    sensor encoder: Encoder(seed = 2) { rate: 700 Hz; }
-                    link carriage { sensor camera: Camera(seed = 3) { rate: 500 Hz; } }
+                    sensor encoder: BadDay<JointState>(seed = 2) { rate: 700 Hz; }
+                    link carriage { sensor camera: BadDay<Pixel>(seed = 3) { rate: 500 Hz; } }
                 }
             }
         }
@@ -109,11 +70,11 @@ robot! {
 fn builder(seed: u64, reads: u32) -> Builder<Swing> {
     let mut builder = Swing::builder();
     builder.joints().stale_after = Duration::from_millis(3);
-    *builder.options(swing::sensor::base::imu) = DayOptions { seed, reads };
-    *builder.options(swing::sensor::base::shoulder::encoder) = DayOptions { seed: seed + 1, reads };
-    *builder.options(swing::sensor::base::shoulder::arm::lift::encoder) = DayOptions { seed: seed + 2, reads };
+    *builder.options(swing::sensor::base::imu) = BadDayOptions { seed, reads };
+    *builder.options(swing::sensor::base::shoulder::encoder) = BadDayOptions { seed: seed + 1, reads };
+    *builder.options(swing::sensor::base::shoulder::arm::lift::encoder) = BadDayOptions { seed: seed + 2, reads };
     let camera = builder.options(swing::sensor::base::shoulder::arm::lift::carriage::camera);
-    *camera = DayOptions { seed: seed + 3, reads };
+    *camera = BadDayOptions { seed: seed + 3, reads };
     builder
 }
 

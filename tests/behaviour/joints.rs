@@ -93,22 +93,9 @@ impl Estimator for Fusion {
     }
 }
 
-/// Passes on the position of a joint across another that moves, although it handles fixed transforms only.
-#[derive(Debug)]
-struct Watch;
-
-impl Estimator for Watch {
-    type Options = NoOptions;
-    type Input = JointState;
-    type Output = Pixel;
-
-    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-
-    fn handle_input(&mut self, joint: &Stamped<JointState>) -> Result<Reply<Pixel>, Fault> {
-        Ok(Reply::emit(Pixel(joint.position)))
-    }
+stateless! {
+    /// Passes on the position of a joint across another that moves, although it handles fixed transforms only.
+    Watch: JointState => Pixel, |joint: &Stamped<JointState>| Ok(Reply::emit(Pixel(joint.position)));
 }
 
 robot! {

@@ -5,12 +5,12 @@ pub(crate) use crate::gate::*;
 pub(crate) use crate::plain::*;
 pub(crate) use crate::replay::{
     Published, Random, collect, counts, entries, is_again, journal, once_more, overflow, play, read_back, same,
-    same_again,
+    same_again, same_from_file,
 };
 pub(crate) use bb_core::event::{CommandPhase, ParameterValue, RefusalReason};
 pub(crate) use bb_core::journal::{Entry, Event};
 pub(crate) use bb_core::prelude::*;
-pub(crate) use bb_core::run::{ActuatorError, ActuatorHandle, Bus, CommandError, CommandHandle, DropReason};
+pub(crate) use bb_core::run::{ActuatorError, ActuatorHandle, Bus, CommandError, DropReason};
 pub(crate) use bb_core::telemetry::TelemetryEvent;
 pub(crate) use bb_core::{
     ArmError, Builder, DisarmError, DynamicMessage, DynamicSubscription, EstimatorHandle, HealthTransition, Live,

@@ -1,8 +1,6 @@
 //! Code that hangs when the robot stops is left behind and reported; nobody waits for it for longer than the robot says.
 
 use crate::kit::*;
-use std::future::Future;
-use std::task::{Context as Polled, Wake, Waker};
 
 /// Gate at which all of it hangs.
 static HERE: Gate = Gate::new();
@@ -33,23 +31,6 @@ fn own(context: &SensorContext) -> Done {
         disarm(0.0)
     });
     Ok(())
-}
-
-/// Hangs, unlike what it is woken with.
-struct Hanging;
-
-impl Wake for Hanging {
-    fn wake(self: Arc<Self>) {
-        HERE.pass("here");
-    }
-}
-
-struct Tell(mpsc::Sender<()>);
-
-impl Wake for Tell {
-    fn wake(self: Arc<Self>) {
-        let _ = self.0.send(());
-    }
 }
 
 robot! {
@@ -83,13 +64,12 @@ fn a_robot_of_which_everything_hangs_as_it_closes_is_back_and_says_what_it_left(
         let running = armed(builder);
         // Both are woken by the end.
         let (tell, told) = mpsc::channel();
-        let wakers = [Waker::from(Arc::new(Hanging)), Waker::from(Arc::new(Tell(tell)))];
         let mut first = running.subscribe(sticky::sensor::base::pan::a);
         let mut second = running.subscribe(sticky::sensor::base::tilt::b);
-        let mut first = Box::pin(async move { first.recv_async().await.is_none() });
-        let mut second = Box::pin(async move { second.recv_async().await.is_none() });
-        assert!(first.as_mut().poll(&mut Polled::from_waker(&wakers[0])).is_pending());
-        assert!(second.as_mut().poll(&mut Polled::from_waker(&wakers[1])).is_pending());
+        when_woken(&mut first, || HERE.pass("here"));
+        when_woken(&mut second, move || {
+            let _ = tell.send(());
+        });
         HERE.close("here");
         let start = std::time::Instant::now();
         let report = running.stop();

@@ -13,26 +13,13 @@ pub(crate) struct Parts {
     pub(crate) spare: Option<Number>,
 }
 
-/// Estimator that emits each number, and even ones at a second output too.
-#[derive(Debug)]
-pub(crate) struct Split;
-
-impl Estimator for Split {
-    type Options = NoOptions;
-    type Input = Number;
-    type Output = Parts;
-
-    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-
-    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Parts>, Fault> {
-        if number.0 == 3.0 {
-            return Ok(Reply::none());
-        }
+stateless! {
+    /// Estimator that emits each number but 3, and even ones at a second output too.
+    Split: Number => Parts, |number: &Stamped<Number>| {
         let even = (number.0 % 2.0 == 0.0).then_some(number.payload);
-        Ok(Reply::emit(Parts { whole: Some(number.payload), even, spare: Some(Number(0.0)) }))
-    }
+        let parts = Parts { whole: Some(number.payload), even, spare: Some(Number(0.0)) };
+        Ok(if number.0 == 3.0 { Reply::none() } else { Reply::emit(parts) })
+    };
 }
 
 robot! {
@@ -80,22 +67,20 @@ fn outputs_go_to_their_paths_and_only_when_emitted() -> Result<(), StartError> {
     Ok(())
 }
 
-/// Estimator that emits as many numbers, counted from 0, as its input says.
-#[derive(Debug)]
-pub(crate) struct Unroll;
-
-impl Estimator for Unroll {
-    type Options = NoOptions;
-    type Input = Number;
-    type Output = Vec<Number>;
-
-    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-
-    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Vec<Number>>, Fault> {
+stateless! {
+    /// Estimator that emits as many numbers, counted from 0, as its input says.
+    Unroll: Number => Vec<Number>, |number: &Stamped<Number>| {
         Ok(Reply::emit((0..number.0 as u32).map(|count| Number(f64::from(count))).collect()))
-    }
+    };
+    /// Estimator that emits the samples of a batch one by one: 10 ms apart, the last at the time of the message.
+    Sampler: Number => Samples, |number: &Stamped<Number>| {
+        let count = number.0 as i64;
+        let sample = |index| {
+            let time = number.monotonic_time.plus_nanos(-10_000_000 * (count - 1 - index));
+            Timed::new(time, Number(index as f64))
+        };
+        Ok(Reply::emit(Samples { samples: (0..count).map(sample).collect(), count: Some(number.payload) }))
+    };
 }
 
 impl HandleCast<Number> for Unroll {
@@ -111,29 +96,6 @@ pub(crate) struct Samples {
     pub(crate) samples: Vec<Timed<Number>>,
     /// Number at the time of the driver's message.
     pub(crate) count: Option<Number>,
-}
-
-/// Estimator that emits the samples of a batch one by one: 10 ms apart, the last at the time of the message.
-#[derive(Debug)]
-pub(crate) struct Sampler;
-
-impl Estimator for Sampler {
-    type Options = NoOptions;
-    type Input = Number;
-    type Output = Samples;
-
-    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-
-    fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Samples>, Fault> {
-        let count = number.0 as i64;
-        let sample = |index| {
-            let time = number.monotonic_time.plus_nanos(-10_000_000 * (count - 1 - index));
-            Timed::new(time, Number(index as f64))
-        };
-        Ok(Reply::emit(Samples { samples: (0..count).map(sample).collect(), count: Some(number.payload) }))
-    }
 }
 
 /// Estimator that emits each number at the middle of the time since the previous one.

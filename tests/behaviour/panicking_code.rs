@@ -5,143 +5,152 @@ use crate::kit::*;
 use bb_core::message::codec::{Reader, Shape, Writer};
 use bb_core::message::{DecodeError, Field, Finite};
 
-mod outputs {
-    use super::*;
+static PANICS: AtomicU32 = AtomicU32::new(0);
+static TURN: Mutex<()> = Mutex::new(());
 
-    static PANICS: AtomicU32 = AtomicU32::new(0);
-    static TURN: Mutex<()> = Mutex::new(());
+fn may_panic(code: u32) {
+    assert!(PANICS.load(Ordering::SeqCst) != code || std::thread::panicking(), "code {code}");
+}
 
-    fn may_panic(code: u32) {
-        assert!(PANICS.load(Ordering::SeqCst) != code || std::thread::panicking(), "code {code}");
+/// A number with code that panics.
+#[derive(Debug)]
+pub(crate) struct Evil(f64);
+
+impl Clone for Evil {
+    fn clone(&self) -> Self {
+        may_panic(1);
+        Self(self.0)
+    }
+}
+
+impl Drop for Evil {
+    fn drop(&mut self) {
+        may_panic(2);
+    }
+}
+
+impl Finite for Evil {
+    fn is_finite(&self) -> bool {
+        assert!(self.0 < 3.0, "cursed");
+        true
+    }
+}
+
+impl Field for Evil {
+    const SHAPE: Shape = <f64 as Field>::SHAPE;
+
+    fn heap_bytes(&self) -> usize {
+        may_panic(3);
+        0
     }
 
-    /// A number with code that panics.
-    #[derive(Debug)]
-    pub(crate) struct Evil(f64);
-
-    impl Clone for Evil {
-        fn clone(&self) -> Self {
-            may_panic(1);
-            Self(self.0)
-        }
+    fn write(&self, writer: &mut Writer<'_>) {
+        may_panic(4);
+        self.0.write(writer);
     }
 
-    impl Drop for Evil {
-        fn drop(&mut self) {
-            may_panic(2);
-        }
+    fn read(reader: &mut Reader<'_>) -> Result<Self, DecodeError> {
+        Ok(Self(f64::read(reader)?))
     }
+}
 
-    impl Finite for Evil {
-        fn is_finite(&self) -> bool {
-            true
-        }
-    }
+/// An output.
+#[derive(Clone, Debug, Payload)]
+pub(crate) struct Output {
+    /// A number.
+    evil: Evil,
+}
 
-    impl Field for Evil {
-        const SHAPE: Shape = <f64 as Field>::SHAPE;
-
-        fn heap_bytes(&self) -> usize {
-            may_panic(3);
-            0
-        }
-
-        fn write(&self, writer: &mut Writer<'_>) {
-            may_panic(4);
-            self.0.write(writer);
-        }
-
-        fn read(reader: &mut Reader<'_>) -> Result<Self, DecodeError> {
-            Ok(Self(f64::read(reader)?))
-        }
-    }
-
-    /// An output.
-    #[derive(Clone, Debug, Payload)]
-    pub(crate) struct Output {
-        /// A number.
-        evil: Evil,
-    }
-
+stateless! {
     /// Emits it.
-    #[derive(Debug)]
-    pub(crate) struct Maker;
+    Maker: Number => Output, |number: &Stamped<Number>| Ok(Reply::emit(Output { evil: Evil(number.0) }));
+    /// Takes it.
+    Taker: Output => Number, |output: &Stamped<Output>| Ok(Reply::emit(Number(output.evil.0)));
+}
 
-    impl Estimator for Maker {
-        type Options = NoOptions;
-        type Input = Number;
-        type Output = Output;
-
-        fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
-            Ok(Self)
-        }
-
-        fn handle_input(&mut self, number: &Stamped<Number>) -> Result<Reply<Output>, Fault> {
-            Ok(Reply::emit(Output { evil: Evil(number.0) }))
-        }
+robot! {
+    robot Making;
+    link base {
+        sensor source: Source(read = |_, _| Ok(Reading::now(Number(1.0)))) { rate: 100 Hz; estimator maker: Maker(); }
+        sensor curse: External<Output>() { estimator taker: Taker(); }
     }
+}
 
-    robot! {
-        robot Making;
-        link base { sensor source: Source(read = |_, _| Ok(Reading::now(Number(1.0)))) { rate: 100 Hz; estimator maker: Maker(); } }
-    }
+/// One panic of that code, and what the robot does after it.
+fn charged(code: u32) -> Result<(), Failure> {
+    let _turn = TURN.lock();
+    let mut builder = Making::builder();
+    builder.journal(|_| ());
+    let outputs = builder.subscribe(making::sensor::base::source::maker);
+    let health = builder.subscribe(system::Health);
+    let mut simulation = armed_simulation(builder);
+    simulation.run_for(Duration::from_millis(15));
+    PANICS.store(code, Ordering::SeqCst);
+    simulation.run_for(Duration::from_millis(10));
+    PANICS.store(0, Ordering::SeqCst);
+    simulation.run_for(Duration::from_millis(50));
+    let report = simulation.report();
+    let faults: Vec<_> = report.faults.iter().map(ToString::to_string).collect();
+    let expected = format!("sensor/base/source/maker failed: panicked: code {code}");
+    assert_eq!(faults, [expected], "code {code}");
+    assert_eq!(report.sources[0].restarts, 0, "the sensor has done nothing");
+    assert_eq!(report.sources[0].readings, 8, "and is read at its rate");
+    assert_eq!(report.estimators[0].restarts, 1, "code {code}");
+    assert!(outputs.drain().count() >= 7);
+    let transitions = |health: &Subscription<HealthTransition>| {
+        let transitions = health.drain().map(|change| (change.from, change.to, change.reason, change.time));
+        transitions.collect::<Vec<_>>()
+    };
+    let transitions_of_run = transitions(&health);
+    assert_eq!(
+        transitions_of_run.iter().map(|(_, to, reason, _)| (*to, *reason)).collect::<Vec<_>>(),
+        [(HealthState::Degraded, HealthReason::Restarted), (HealthState::Healthy, HealthReason::Recovered)]
+    );
+    assert_eq!(simulation.safety(), Safety::Armed);
+    simulation.stop();
+    Ok(())
+}
 
-    /// One panic of that code, and what the robot does after it.
-    fn charged(code: u32) -> Result<(), Failure> {
-        let _turn = TURN.lock();
-        let mut builder = Making::builder();
-        builder.journal(|_| ());
-        let outputs = builder.subscribe(making::sensor::base::source::maker);
-        let health = builder.subscribe(system::Health);
-        let mut simulation = armed_simulation(builder);
-        simulation.run_for(Duration::from_millis(15));
-        PANICS.store(code, Ordering::SeqCst);
-        simulation.run_for(Duration::from_millis(10));
-        PANICS.store(0, Ordering::SeqCst);
-        simulation.run_for(Duration::from_millis(50));
-        let report = simulation.report();
-        let faults: Vec<_> = report.faults.iter().map(ToString::to_string).collect();
-        let expected = format!("sensor/base/source/maker failed: panicked: code {code}");
-        assert_eq!(faults, [expected], "code {code}");
-        assert_eq!(report.sources[0].restarts, 0, "the sensor has done nothing");
-        assert_eq!(report.sources[0].readings, 8, "and is read at its rate");
-        assert_eq!(report.estimators[0].restarts, 1, "code {code}");
-        assert!(outputs.drain().count() >= 7);
-        let transitions = |health: &Subscription<HealthTransition>| {
-            let transitions = health.drain().map(|change| (change.from, change.to, change.reason, change.time));
-            transitions.collect::<Vec<_>>()
-        };
-        let transitions_of_run = transitions(&health);
-        assert_eq!(
-            transitions_of_run.iter().map(|(_, to, reason, _)| (*to, *reason)).collect::<Vec<_>>(),
-            [(HealthState::Degraded, HealthReason::Restarted), (HealthState::Healthy, HealthReason::Recovered)]
-        );
-        assert_eq!(simulation.safety(), Safety::Armed);
-        simulation.stop();
-        Ok(())
-    }
+#[test]
+fn a_panic_in_the_code_of_an_estimators_output_is_charged_to_the_estimator_which_is_restarted()
+-> Result<(), Failure> {
+    (1..=4).try_for_each(charged)
+}
 
-    #[test]
-    fn a_panic_in_the_code_of_an_estimators_output_is_charged_to_the_estimator_which_is_restarted()
-    -> Result<(), Failure> {
-        (1..=4).try_for_each(charged)
+#[test]
+fn a_payload_that_panics_fails_the_estimator_that_takes_it_and_not_its_publisher() -> Result<(), StartError> {
+    let _turn = TURN.lock();
+    let running = Making::builder().start()?;
+    for number in 1..=5 {
+        let output = Output { evil: Evil(f64::from(number)) };
+        running.publish(making::sensor::base::curse, running.clock().now(), output);
     }
+    wait_until("all that is published is taken", || {
+        let report = running.report();
+        report.estimator("sensor/base/curse/taker").is_some_and(|taker| taker.inputs[0].received == 5)
+    });
+    let report = running.stop();
+    let taker = report.estimator("sensor/base/curse/taker").expect("it is declared");
+    let faults: Vec<_> = report.faults.iter().map(|fault| (fault.path, fault.message.as_str())).collect();
+    assert_eq!(faults, [(taker.path, "panicked: cursed")]);
+    assert_eq!((taker.emitted, taker.inputs[0].received), (2, 5));
+    Ok(())
+}
 
-    #[test]
-    fn outputs_that_panic_too_often_have_the_robot_made_safe() -> Result<(), Failure> {
-        let _turn = TURN.lock();
-        let builder = Making::builder();
-        let _outputs = builder.subscribe(making::sensor::base::source::maker);
-        let mut simulation = armed_simulation(builder);
-        PANICS.store(1, Ordering::SeqCst);
-        simulation.run_for(Duration::from_secs(5));
-        PANICS.store(0, Ordering::SeqCst);
-        assert_eq!(simulation.safety(), Safety::Error);
-        let report = simulation.report();
-        let stopped = report.estimators[0].stopped.as_deref();
-        assert!(stopped.is_some_and(|why| why.contains("code 1")), "{stopped:?}");
-        Ok(())
-    }
+#[test]
+fn outputs_that_panic_too_often_have_the_robot_made_safe() -> Result<(), Failure> {
+    let _turn = TURN.lock();
+    let builder = Making::builder();
+    let _outputs = builder.subscribe(making::sensor::base::source::maker);
+    let mut simulation = armed_simulation(builder);
+    PANICS.store(1, Ordering::SeqCst);
+    simulation.run_for(Duration::from_secs(5));
+    PANICS.store(0, Ordering::SeqCst);
+    assert_eq!(simulation.safety(), Safety::Error);
+    let report = simulation.report();
+    let stopped = report.estimators[0].stopped.as_deref();
+    assert!(stopped.is_some_and(|why| why.contains("code 1")), "{stopped:?}");
+    Ok(())
 }
 
 #[test]

@@ -45,33 +45,20 @@ fn changes(all: &DynamicSubscription) -> Vec<(&'static str, ParameterValue, Para
 fn a_set_that_is_refused_in_the_middle_changes_nothing() -> Result<(), Failure> {
     let simulation = Mixer::builder().simulate()?;
     let all = simulation.subscribe_any(Select::Below("param"), None, Overflow::default());
-    let gain = || ("param/gain", ParameterValue::from(2.0));
+    let gain = |gain: f64| ("param/gain", gain.into());
+    let (name, count) = (("param/name", "two".to_owned().into()), ("param/count", 2.into()));
+    let refuses = "param/gain is not set: sensor/base/number/bound would refuse it: ";
+    let wrong_type = "param/count is not set: expected a value of type `i64`, found `2.5`";
+    let unknown = "param/cuont is not set: no such parameter is declared; did you mean `param/count`?";
+    let out_of_range = "param/gain is not set: expected a number in 0.0..=1000000000.0, found `-1.0`";
     // The option `gain` of the estimator is at most 1e6.
     let refused: [(Vec<(&str, ParameterValue)>, &str); 6] = [
-        (
-            vec![gain(), ("param/count", 2.5.into())],
-            "param/count is not set: expected a value of type `i64`, found `2.5`",
-        ),
-        (
-            vec![gain(), ("param/cuont", 2.into())],
-            "param/cuont is not set: no such parameter is declared; did you mean `param/count`?",
-        ),
-        (
-            vec![gain(), ("param/name", "two".to_owned().into()), ("param/gain", 3.0.into())],
-            "param/gain is not set: it is set twice at once",
-        ),
-        (
-            vec![("param/name", "two".to_owned().into()), ("param/gain", (-1.0).into())],
-            "param/gain is not set: expected a number in 0.0..=1000000000.0, found `-1.0`",
-        ),
-        (
-            vec![("param/count", 2.into()), ("param/gain", 1e8.into())],
-            "param/gain is not set: sensor/base/number/bound would refuse it: ",
-        ),
-        (
-            vec![("param/name", "two".to_owned().into()), ("param/gain", 1e8.into())],
-            "param/gain is not set: sensor/base/number/bound would refuse it: ",
-        ),
+        (vec![gain(2.0), ("param/count", 2.5.into())], wrong_type),
+        (vec![gain(2.0), ("param/cuont", 2.into())], unknown),
+        (vec![gain(2.0), name.clone(), gain(3.0)], "param/gain is not set: it is set twice at once"),
+        (vec![name.clone(), gain(-1.0)], out_of_range),
+        (vec![count, gain(1e8)], refuses),
+        (vec![name, gain(1e8)], refuses),
     ];
     for (set, message) in refused {
         let error = simulation.set_parameters(set).expect_err("one of them is wrong").to_string();

@@ -35,6 +35,5 @@ pub(crate) const BEHIND: EstimatorHandle<Plain, Echo, Number> = plain::sensor::b
 pub(crate) const NUMBER: SensorHandle<Plain, External<Number>> = plain::sensor::base::number;
 pub(crate) const ECHO: EstimatorHandle<Plain, Echo, Number> = plain::sensor::base::number::echo;
 pub(crate) const ENCODER: SensorHandle<Plain, External<Number>> = plain::sensor::base::pan::encoder;
-pub(crate) const POSITION: EstimatorHandle<Plain, Echo, Number> = plain::sensor::base::pan::encoder::position;
 pub(crate) const SERVO: ActuatorHandle<Plain, Servo> = plain::actuator::base::pan::servo;
 pub(crate) const TASK: CommandHandle<Plain, Task> = plain::command::task;

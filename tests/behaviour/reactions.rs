@@ -104,67 +104,40 @@ const REFUSED: &str = "`land` is refused: it is not allowed in the state `disarm
 
 #[test]
 fn a_command_starts_when_the_condition_has_held_by_the_stamps() -> Result<(), Failure> {
-    type Case = (&'static str, bool, Vec<Vec<(i64, f64)>>, &'static [(i64, &'static str)], [u64; 2]);
-    let low = each_half_second;
-    let (nan, ok) = (f64::NAN, 12.0);
-    let cases: [Case; 10] = [
-        ("never low", true, vec![low(10, 60, ok)], &[], [0, 0]),
-        ("at the bound", true, vec![low(10, 60, 11.0)], &[], [0, 0]),
-        ("once after `for`", true, vec![low(10, 35, 10.0)], &[(10, "fulfilled"), (30, "started")], [0, 0]),
-        (
-            "again after the end, 0.5 s later, and the cooldown of 3 s",
-            true,
-            vec![low(10, 70, 10.0)],
-            &[(10, "fulfilled"), (30, "started"), (70, "started")],
-            [0, 0],
-        ),
-        (
-            "chatter",
-            true,
-            vec![low(10, 25, 10.0), vec![(28, ok)], low(30, 50, 10.0)],
-            &[(10, "fulfilled"), (28, "not fulfilled"), (30, "fulfilled"), (50, "started")],
-            [0, 0],
-        ),
-        (
-            "NaN",
-            true,
-            vec![low(10, 25, 10.0), vec![(28, nan), (29, nan)], low(30, 50, 10.0)],
-            &[(10, "fulfilled"), (28, "not fulfilled"), (30, "fulfilled"), (50, "started")],
-            [2, 0],
-        ),
-        (
-            "silence",
-            true,
-            vec![low(10, 20, 10.0), low(41, 61, 10.0)],
-            &[(10, "fulfilled"), (40, "not fulfilled"), (41, "fulfilled"), (61, "started")],
-            [0, 1],
-        ),
-        ("silence from the start", true, vec![low(45, 50, ok)], &[], [0, 1]),
-        (
-            "disarmed: refused, and tried again after the cooldown",
-            false,
-            vec![low(10, 65, 10.0)],
-            &[(10, "fulfilled"), (30, REFUSED), (60, REFUSED)],
-            [0, 0],
-        ),
-        (
-            "recovered before the cooldown is over",
-            true,
-            vec![low(10, 35, 10.0), low(40, 65, ok), low(70, 90, 10.0)],
-            &[(10, "fulfilled"), (30, "started"), (40, "not fulfilled"), (70, "fulfilled"), (90, "started")],
-            [0, 0],
-        ),
+    type Case<'a> = (&'a str, bool, &'a [(i64, i64, f64)], &'a str, [u64; 2]);
+    let disarmed = format!("fulfilled at 10; {REFUSED} at 30; {REFUSED} at 60");
+    // Messages from a decisecond to another, each half second, and what happens at which.
+    const NAN: f64 = f64::NAN;
+    const LOW: f64 = 10.0;
+    const OK: f64 = 12.0;
+    const CHATTER: &str = "fulfilled at 10; not fulfilled at 28; fulfilled at 30; started at 50";
+    const SILENCE: &str = "fulfilled at 10; not fulfilled at 40; fulfilled at 41; started at 61";
+    const RECOVERED: &str = "fulfilled at 10; started at 30; not fulfilled at 40; fulfilled at 70; started at 90";
+    const AGAIN: &str = "fulfilled at 10; started at 30; started at 70";
+    let cases: [Case<'_>; 10] = [
+        ("never low", true, &[(10, 60, OK)], "", [0, 0]),
+        ("at the bound", true, &[(10, 60, 11.0)], "", [0, 0]),
+        ("once after `for`", true, &[(10, 35, LOW)], "fulfilled at 10; started at 30", [0, 0]),
+        ("again after the end, 0.5 s later, and the cooldown of 3 s", true, &[(10, 70, LOW)], AGAIN, [0, 0]),
+        ("chatter", true, &[(10, 25, LOW), (28, 28, OK), (30, 50, LOW)], CHATTER, [0, 0]),
+        ("NaN", true, &[(10, 25, LOW), (28, 28, NAN), (29, 29, NAN), (30, 50, LOW)], CHATTER, [2, 0]),
+        ("silence", true, &[(10, 20, LOW), (41, 61, LOW)], SILENCE, [0, 1]),
+        ("silence from the start", true, &[(45, 50, OK)], "", [0, 1]),
+        ("disarmed: refused, and tried again after the cooldown", false, &[(10, 65, LOW)], &disarmed, [0, 0]),
+        ("recovered within the cooldown", true, &[(10, 35, LOW), (40, 65, OK), (70, 90, LOW)], RECOVERED, [0, 0]),
     ];
     for (name, is_armed, messages, expected, [not_numbers, silences]) in cases {
         let mut flight = Flight::new(is_armed)?;
-        for (time, voltage) in messages.concat() {
-            flight.voltage(time, voltage);
+        for (from, to, voltage) in messages {
+            each_half_second(*from, *to, *voltage)
+                .into_iter()
+                .for_each(|(time, voltage)| flight.voltage(time, voltage));
         }
-        let expected: Happened = expected.iter().map(|(time, event)| (*time, (*event).to_owned())).collect();
-        assert_eq!(flight.states(), expected, "{name}");
+        let states: Vec<_> =
+            flight.states().into_iter().map(|(time, event)| format!("{event} at {time}")).collect();
+        assert_eq!(states.join("; "), expected, "{name}");
         assert_eq!([flight.count("not a number"), flight.count("silent")], [not_numbers, silences], "{name}");
-        let started = expected.iter().filter(|(_, event)| event == "started").count();
-        let refused = expected.iter().filter(|(_, event)| event == REFUSED).count();
+        let (started, refused) = (expected.matches("started").count(), expected.matches(REFUSED).count());
         let report = flight.simulation.report();
         let counts = &report.commands[0];
         assert_eq!((counts.started, counts.refused), (started as u64, refused as u64), "{name}");
@@ -283,32 +256,19 @@ fn the_command_cancels_what_runs_and_a_bound_follows_its_parameter() -> Result<(
 /// A run with a start, a refusal and a recovery.
 #[test]
 fn a_replay_gives_the_same_events_with_the_same_caller() -> Result<(), Failure> {
-    fn seen(message: DynamicMessage) -> String {
-        let what = message.downcast::<CommandEvent>().map(|event| format!("{event:?}"));
-        let state = || message.downcast::<ReactionState>().map(|state| format!("{state:?}"));
-        what.or_else(state).unwrap_or_else(|| message.to_json())
-    }
-    let select =
-        Select::AnyOf(&[Select::Below("command"), Select::Below("controller"), Select::Path("state_machine")]);
-    let mut builder = Drone::builder();
-    let lines = journal(&mut builder);
-    let first = builder.subscribe_any(select, None, Overflow::default());
-    let mut flight = Flight::of(builder.simulate()?, false)?;
-    each_half_second(10, 40, 10.0).into_iter().for_each(|(time, voltage)| flight.voltage(time, voltage));
-    flight.simulation.arm()?;
-    each_half_second(45, 80, 10.0).into_iter().for_each(|(time, voltage)| flight.voltage(time, voltage));
-    flight.simulation.stop().ok()?;
-    let first: Vec<_> = first.drain().map(seen).collect();
-    let callers = first.iter().filter(|event| event.contains("caller: \"controller/low\"")).count();
-    assert_eq!(callers, 3, "refused, started, succeeded: {first:#?}");
-    assert!(first.iter().any(|event| event.contains("phase: Refused")), "{first:#?}");
-
-    let builder = Drone::builder();
-    let again = builder.subscribe_any(select, None, Overflow::default());
-    let mut replay = builder.replay()?;
-    replay.play(read_back::<Drone>(&entries(&lines))?)?;
-    replay.stop().ok()?;
-    assert_eq!(again.drain().map(seen).collect::<Vec<_>>(), first);
+    let (heard, report) = same_from_file(Drone::builder, |builder| {
+        let mut flight = Flight::of(builder.simulate()?, false)?;
+        each_half_second(10, 40, 10.0).into_iter().for_each(|(time, voltage)| flight.voltage(time, voltage));
+        flight.simulation.arm()?;
+        each_half_second(45, 80, 10.0).into_iter().for_each(|(time, voltage)| flight.voltage(time, voltage));
+        Ok(flight.simulation.stop())
+    })?;
+    report.ok()?;
+    let events = &heard["command/land"];
+    let callers = events.iter().filter(|event| event.contains("caller: \"controller/low\"")).count();
+    assert_eq!(callers, 3, "refused, started, succeeded: {events:#?}");
+    assert!(events.iter().any(|event| event.contains("phase: Refused")), "{events:#?}");
+    assert!(!heard["controller/low"].is_empty() && !heard["state_machine"].is_empty());
     Ok(())
 }
 

@@ -76,22 +76,9 @@ impl Estimator for Above {
     }
 }
 
-/// Estimator that knows of fixed transforms only.
-#[derive(Debug)]
-struct Fixed;
-
-impl Estimator for Fixed {
-    type Options = NoOptions;
-    type Input = Pixel;
-    type Output = Spot;
-
-    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-
-    fn handle_input(&mut self, _: &Stamped<Pixel>) -> Result<Reply<Spot>, Fault> {
-        Ok(Reply::none())
-    }
+stateless! {
+    /// Estimator that knows of fixed transforms only.
+    Fixed: Pixel => Spot, |_pixel: &Stamped<Pixel>| Ok(Reply::none());
 }
 
 robot! {

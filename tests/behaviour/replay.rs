@@ -1,6 +1,6 @@
 //! A run from a journal gives what the first run gave, bit for bit: outputs, transitions, drops.
 
-use crate::components::{Failure, Number, Read, Replied, Seen, Snapshot, at, lock};
+use crate::components::{Failure, Number, Replied, Seen, Snapshot, at, lock};
 use bb_core::journal::{Entry, Event, JournalReader};
 use bb_core::message::codec::{decode, encode};
 use bb_core::prelude::*;
@@ -8,14 +8,18 @@ use bb_core::{Builder, DynamicMessage, DynamicSubscription, HealthTransition, Re
 pub(crate) use bb_tests::random::Random;
 use std::cell::Cell;
 use std::collections::BTreeMap;
+use std::marker::PhantomData;
 use std::sync::{Arc, Mutex};
 
-/// Sensor on a bad day: numbers that come late, twice, with a NaN, or not at all, and now and then it fails.
-#[derive(Debug)]
-pub(crate) struct BadDay {
-    random: Random,
-    reads: u32,
+/// Readings on a bad day: they come late, twice, with a NaN, or not at all.
+pub(crate) trait OnBadDay: Payload {
+    /// Reads, with a number that the sensor keeps.
+    fn on_bad_day(random: &mut Random, kept: &mut f64, now: MonotonicTime) -> Reading<Self>;
 }
+
+/// Sensor on a bad day.
+#[derive(Debug)]
+pub(crate) struct BadDay<T = Number>(Random, u32, f64, PhantomData<fn() -> T>);
 
 /// Options of [`BadDay`].
 #[derive(Clone, Debug, Options)]
@@ -26,28 +30,32 @@ pub(crate) struct BadDayOptions {
     pub(crate) reads: u32,
 }
 
-impl Sensor for BadDay {
+impl<T: OnBadDay> Sensor for BadDay<T> {
     type Options = BadDayOptions;
-    type Output = Number;
+    type Output = T;
 
     fn init(options: BadDayOptions, _: &SensorContext) -> Result<Self, Fault> {
         // One that restarts must not give the same again.
-        Ok(Self { random: Random::new(options.seed), reads: options.reads })
+        Ok(Self(Random::new(options.seed), options.reads, 0.0, PhantomData))
     }
 
-    fn read(&mut self, now: MonotonicTime) -> Read {
-        if self.reads == 0 {
-            return Ok(Reading::finished());
-        }
-        self.reads -= 1;
-        let number = Number(self.random.below(1000) as f64 - 20.0);
-        Ok(match self.random.below(200) {
+    fn read(&mut self, now: MonotonicTime) -> Result<Reading<T>, Fault> {
+        let Some(reads) = self.1.checked_sub(1) else { return Ok(Reading::finished()) };
+        self.1 = reads;
+        Ok(T::on_bad_day(&mut self.0, &mut self.2, now))
+    }
+}
+
+impl OnBadDay for Number {
+    fn on_bad_day(random: &mut Random, _: &mut f64, now: MonotonicTime) -> Reading<Self> {
+        let number = Number(random.below(1000) as f64 - 20.0);
+        match random.below(200) {
             0 => Reading::now(Number(f64::NAN)),
             1 => Reading::at(now - Duration::from_millis(50), number),
             2 => Reading::at(now + Duration::from_secs(5), number),
             3..8 => Reading::nothing(),
             _ => Reading::now(number),
-        })
+        }
     }
 }
 
@@ -268,13 +276,29 @@ pub(crate) fn same_again<R: Robot>(
     builder: impl Fn() -> Builder<R>,
     run: impl FnOnce(Builder<R>) -> Result<Report, Failure>,
 ) -> Result<(Published, Report), Failure> {
+    run_again(builder, run, |entries| Ok(entries))
+}
+
+/// Runs a robot, and once more from what a file would hold of its journal: all that is published and counted is the same.
+pub(crate) fn same_from_file<R: Robot>(
+    builder: impl Fn() -> Builder<R>,
+    run: impl FnOnce(Builder<R>) -> Result<Report, Failure>,
+) -> Result<(Published, Report), Failure> {
+    run_again(builder, run, |entries| read_back::<R>(&entries))
+}
+
+fn run_again<R: Robot>(
+    builder: impl Fn() -> Builder<R>,
+    run: impl FnOnce(Builder<R>) -> Result<Report, Failure>,
+    keep: impl FnOnce(Vec<Entry>) -> Result<Vec<Entry>, Failure>,
+) -> Result<(Published, Report), Failure> {
     let mut first_builder = builder();
     let lines = journal(&mut first_builder);
     let all = first_builder.subscribe_any(Select::All, None, overflow());
     let report = run(first_builder)?;
     let mut first = Published::new();
     collect(&all, &mut first);
-    let (again, report_again) = play(builder(), &entries(&lines))?;
+    let (again, report_again) = play(builder(), &keep(entries(&lines))?)?;
     same(&first, &again);
     assert_eq!(counts(&report), counts(&report_again));
     assert_eq!((&report.faults, report.all_faults), (&report_again.faults, report_again.all_faults));

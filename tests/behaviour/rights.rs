@@ -131,10 +131,10 @@ fn changes_of_parameters_and_safety_name_their_caller() -> Result<(), Failure> {
     robot.set_parameter(plain::param::gain, 3.0)?;
     page.arm()?;
     robot.for_caller("stop button", Rights::NONE).disarm()?;
-    page.start_command("command/arm", "")?;
-    robot.run_for(Duration::from_millis(1));
-    page.start_command("command/disarm", "")?;
-    robot.run_for(Duration::from_millis(1));
+    for command in ["command/arm", "command/disarm"] {
+        page.start_command(command, "")?;
+        robot.run_for(Duration::from_millis(1));
+    }
     page.arm()?;
     robot.for_caller("service", Rights::ALL).request_stop()?;
     robot.stop();

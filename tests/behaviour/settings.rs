@@ -233,44 +233,24 @@ fn a_parameter_is_held_against_the_options_that_are_bound_to_it() {
     let error = builder.set("param/gain", "1.5").expect_err("the option takes less").to_string();
     assert_eq!(
         error,
-        "param/gain: sensor/base/source/every/gain is bound to it, and must be in 0.0..=1.0, found `1.5`"
+        "param/gain: sensor/base/source/start/gain is bound to it, and must be in 0.0..=1.0, found `1.5`"
     );
     let error =
         builder.set_parameter(crowd::param::gain, 1.5).expect_err("it takes as much as in a file").to_string();
     assert_eq!(
         error,
-        "param/gain is not set: sensor/base/source/every/gain is bound to it, and must be in 0.0..=1.0, found `1.5`"
+        "param/gain is not set: sensor/base/source/start/gain is bound to it, and must be in 0.0..=1.0, found `1.5`"
     );
     builder.set_parameter(crowd::param::gain, 0.75).expect("the option takes it");
     assert!(builder.settings().to_string().contains("gain = 0.75"));
-}
-
-/// An option of its sensor has the name of the estimator that is nested there.
-#[derive(Clone, Debug, Options)]
-pub(crate) struct CrowdedOptions {
-    #[option(default = Filtering::None)]
-    pub(crate) every: Filtering,
-}
-
-#[derive(Debug)]
-pub(crate) struct Crowded;
-
-impl Sensor for Crowded {
-    type Options = CrowdedOptions;
-    type Output = Number;
-    fn init(_: CrowdedOptions, _: &SensorContext) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        Ok(Reading::finished())
-    }
 }
 
 robot! {
     robot Crowd;
     parameters { gain: f64 = 0.5, range: 0.0..=2.0; }
     link base {
-        sensor source: Crowded() { rate: 1 Hz; estimator every: Every(port = "/dev/null", gain = param::gain); }
+        // An option of the sensor has the name of the estimator that is nested there.
+        sensor source: Counter() { rate: 1 Hz; estimator start: Every(port = "/dev/null", gain = param::gain); }
     }
 }
 
@@ -278,19 +258,17 @@ robot! {
 fn options_below_a_setting_of_the_same_name_are_listed_and_in_the_schema() {
     let mut builder = Crowd::builder();
     let listed = builder.settings().to_string();
-    assert!(listed.contains("[sensor.base.source]\nevery = \"None\"\n"), "{listed}");
-    assert!(listed.contains("[\"sensor/base/source/every\"]\n# Device file.\n"), "{listed}");
-    let file = listed
-        .replace("retries = 3", "retries = 4")
-        .replace("every = \"None\"", "every = { LowPass = { cutoff = 2.0 } }");
+    assert!(listed.contains("[sensor.base.source]\n# First number.\nstart = 0.0\n"), "{listed}");
+    assert!(listed.contains("[\"sensor/base/source/start\"]\n# Device file.\n"), "{listed}");
+    let file = listed.replace("retries = 3", "retries = 4").replace("start = 0.0", "start = 2.0");
     builder.set_from_toml("list", &file).expect("what is listed is read");
-    assert_eq!(builder.options(crowd::sensor::base::source).every, Filtering::LowPass { cutoff: 2.0 });
-    assert_eq!(builder.options(crowd::sensor::base::source::every).retries, 4);
+    assert_eq!(builder.options(crowd::sensor::base::source).start, 2.0);
+    assert_eq!(builder.options(crowd::sensor::base::source::start).retries, 4);
     let schema: serde_json::Value = serde_json::from_str(&Crowd::settings_schema()).expect("it is JSON");
     let sensor = &schema["properties"]["sensor"]["properties"]["base"]["properties"]["source"]["properties"];
-    assert!(sensor["every"]["$ref"].is_string(), "{schema:#}");
+    assert_eq!(sensor["start"]["type"], "number", "{schema:#}");
     assert_eq!(
-        schema["properties"]["sensor/base/source/every"]["properties"]["retries"]["maximum"], 8.0,
+        schema["properties"]["sensor/base/source/start"]["properties"]["retries"]["maximum"], 8.0,
         "{schema:#}"
     );
 }

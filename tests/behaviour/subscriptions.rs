@@ -2,31 +2,30 @@
 
 mod rates;
 mod same;
-mod seeds;
 
 use crate::kit::*;
 use bb_core::Unmatched;
 
 robot! {
     robot Talker;
-    link base;
-    sensors { sensor numbers: Counter(count = 10) { rate: 1 kHz; estimator scaled: Scale(); } }
+    commands { arm: Arm; watch: Task; }
+    link base { sensor numbers: Counter(count = 10) { rate: 1 kHz; estimator scaled: Scale(); } }
 }
 
 #[test]
 fn the_subscribers_of_a_path_are_listed() -> Result<(), StartError> {
     let mut simulation = Talker::builder().simulate()?;
     let bus = simulation.bus();
-    let slow = simulation.subscribe_with(talker::sensor::numbers, Overflow::DropOldest { capacity: 3 });
+    let slow = simulation.subscribe_with(talker::sensor::base::numbers, Overflow::DropOldest { capacity: 3 });
     // An absurd capacity is bounded.
     let all = Overflow::DropOldest { capacity: usize::MAX };
     let any = simulation.subscribe_any(Select::Below("sensor"), None, all);
     simulation.run_to_end();
-    let subscribers: Vec<_> = bus.subscribers("sensor/numbers");
+    let subscribers: Vec<_> = bus.subscribers("sensor/base/numbers");
     let told: Vec<_> = subscribers.iter().map(|one| (one.is_typed, one.waiting, one.capacity, one.lost)).collect();
     assert_eq!(told, [(true, 3, 3, 7), (false, 20, Overflow::MAX_CAPACITY, 0)]);
     drop((slow, any));
-    assert_eq!(bus.subscribers("sensor/numbers"), []);
+    assert_eq!(bus.subscribers("sensor/base/numbers"), []);
     assert_eq!(bus.subscribers("sensor/nobody"), []);
     Ok(())
 }
@@ -34,7 +33,7 @@ fn the_subscribers_of_a_path_are_listed() -> Result<(), StartError> {
 #[tokio::test]
 async fn a_subscription_can_be_awaited() -> Result<(), StartError> {
     let builder = Talker::builder();
-    let mut numbers = builder.subscribe(talker::sensor::numbers);
+    let mut numbers = builder.subscribe(talker::sensor::base::numbers);
     let mut running = builder.start()?;
     let mut sum = 0.0;
     for _ in 0..10 {
@@ -51,13 +50,13 @@ async fn a_subscription_can_be_awaited() -> Result<(), StartError> {
 fn waiting_ends_when_the_robot_does_not_start_and_when_it_stops_for_every_waiting_thread() -> Result<(), StartError>
 {
     let mut builder = Talker::builder();
-    builder.options(talker::sensor::numbers::scaled).factor = f64::NAN;
-    let never = builder.subscribe(talker::sensor::numbers);
+    builder.options(talker::sensor::base::numbers::scaled).factor = f64::NAN;
+    let never = builder.subscribe(talker::sensor::base::numbers);
     assert!(builder.start().is_err());
     assert!(never.recv().is_none());
 
     let builder = Talker::builder();
-    let waited = builder.subscribe_with(talker::sensor::numbers::scaled, Overflow::KeepLatest);
+    let waited = builder.subscribe_with(talker::sensor::base::numbers::scaled, Overflow::KeepLatest);
     let mut running = builder.start()?;
     running.wait();
     waited.drain().for_each(drop);
@@ -66,6 +65,53 @@ fn waiting_ends_when_the_robot_does_not_start_and_when_it_stops_for_every_waitin
         running.stop();
         assert!(waiting.into_iter().all(|thread| thread.join().is_ok_and(|ended| ended)));
     });
+    Ok(())
+}
+
+#[test]
+fn those_who_hear_a_subtree_hear_a_publisher_that_comes_later() -> Result<(), Failure> {
+    let builder = Talker::builder();
+    let early = builder.subscribe_any(Select::Below("sensor"), [], Overflow::default());
+    let typed = builder.subscribe_any(Select::Path("sensor/*"), "Number", Overflow::default());
+    let mut simulation = builder.simulate()?;
+    simulation.run_for(Duration::from_micros(500));
+    simulation.bus().publisher("sensor/wrist")?.publish(Number(0.5));
+    let paths = early.drain().map(|message| message.path()).collect::<Vec<_>>();
+    assert_eq!(paths, ["sensor/base/numbers", "sensor/base/numbers/scaled", "sensor/wrist"]);
+    assert_eq!(typed.drain().map(|message| message.path()).collect::<Vec<_>>(), ["sensor/wrist"]);
+    Ok(())
+}
+
+#[test]
+fn two_robots_of_a_process_do_not_hear_each_other() -> Result<(), Failure> {
+    let (mut one, mut two) = (Talker::builder().simulate()?, Talker::builder().simulate()?);
+    let heard = [&one, &two].map(|robot| robot.subscribe_any(Select::All, None, Overflow::default()));
+    let typed = two.bus().subscribe::<Number>("mission/progress", Overflow::default())?;
+    one.bus().publisher("mission/progress")?.publish(Number(0.5));
+    assert_eq!(one.arm(), Ok(()));
+    one.run_to_end();
+    let counts = heard.each_ref().map(|heard| heard.drain().count());
+    assert!(counts[0] > 20 && counts[1] == 0, "{counts:?}");
+    // The same path may have another payload there, once nobody waits for this one.
+    assert_eq!(typed.drain().count(), 0);
+    drop(typed);
+    two.bus().publisher("mission/progress")?.publish(Imu::new([0.0; 3].into(), [0.0; 3].into()));
+    two.run_to_end();
+    assert_eq!((heard[0].drain().count(), heard[1].drain().count()), (0, 21));
+    Ok(())
+}
+
+#[test]
+fn an_empty_list_of_payloads_is_no_filter() -> Result<(), Failure> {
+    let builder = Talker::builder();
+    let listen = |payloads: &[&str]| builder.subscribe_any(Select::Below("sensor"), payloads, Overflow::default());
+    let (all, one, none) = (listen(&[]), listen(&["Number"]), listen(&["Imu"]));
+    assert_eq!([&all, &one, &none].map(|heard| heard.unmatched().len()), [0, 0, 1]);
+    let everything = builder.subscribe_any(Select::AnyOf(&[]), [], Overflow::default());
+    let mut simulation = armed_simulation(builder);
+    simulation.run_to_end();
+    assert_eq!([&all, &one, &none].map(|heard| heard.drain().count()), [20, 20, 0]);
+    assert!(everything.drain().any(|message| message.path() == "safety"));
     Ok(())
 }
 

@@ -166,25 +166,20 @@ fn a_state_that_is_not_declared_is_refused_and_so_is_any_of_a_robot_that_is_not_
 #[test]
 fn a_replay_goes_through_the_same_states() -> Result<(), Failure> {
     let _alone = alone();
-    let mut builder = Harbour::builder();
-    let lines = journal(&mut builder);
-    let first = builder.subscribe(system::StateMachine);
-    let mut simulation = armed_simulation(builder);
-    simulation.command(harbour::command::dock, NoArguments)?;
-    simulation.run_until(at(150));
-    // Allowed by the transition alone.
-    simulation.command(harbour::command::horn, NoArguments)?;
-    simulation.command(harbour::command::stop, NoArguments)?;
-    simulation.run_until(at(400));
-    simulation.stop().ok()?;
-    let first = changes(&first);
-    assert!(first.contains(&(100, "executing", "docking", Some("dock"))), "{first:?}");
-
-    let builder = Harbour::builder();
-    let again = builder.subscribe(system::StateMachine);
-    let mut replay = builder.replay()?;
-    replay.play(read_back::<Harbour>(&entries(&lines))?)?;
-    replay.stop().ok()?;
-    assert_eq!(changes(&again), first);
+    same_from_file(Harbour::builder, |builder| {
+        let states = builder.subscribe(system::StateMachine);
+        let mut simulation = armed_simulation(builder);
+        simulation.command(harbour::command::dock, NoArguments)?;
+        simulation.run_until(at(150));
+        // Allowed by the transition alone.
+        simulation.command(harbour::command::horn, NoArguments)?;
+        simulation.command(harbour::command::stop, NoArguments)?;
+        simulation.run_until(at(400));
+        let changes = changes(&states);
+        assert!(changes.contains(&(100, "executing", "docking", Some("dock"))), "{changes:?}");
+        Ok(simulation.stop())
+    })?
+    .1
+    .ok()?;
     Ok(())
 }

@@ -152,63 +152,37 @@ fn a_robot_is_stopped_with_a_full_inbox_and_with_one_that_hangs() {
 
 /// An image of 1920 × 1080.
 #[derive(Clone, Debug, Payload)]
-struct Frame {
+pub(crate) struct Frame {
     pixels: Vec<u8>,
-}
-
-/// Estimator that does not return from its first frame, or fails at it.
-#[derive(Debug)]
-struct Eye<const HANGS: bool>;
-
-impl<const HANGS: bool> Estimator for Eye<HANGS> {
-    type Options = NoOptions;
-    type Input = Frame;
-    type Output = Number;
-
-    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-
-    fn handle_input(&mut self, _: &Stamped<Frame>) -> Result<Reply<Number>, Fault> {
-        if HANGS {
-            HERE.pass("an eye");
-            return Ok(Reply::none());
-        }
-        Err(Fault::new("it is blind"))
-    }
 }
 
 /// All frames since the last page.
 #[derive(Clone, Copy, Debug, Inputs)]
-struct Pages<'a> {
+pub(crate) struct Pages<'a> {
     page: Input<'a, Number>,
     frames: Every<'a, Frame>,
 }
 
-/// Says how many there were.
-#[derive(Debug)]
-struct Album;
-
-impl Estimator for Album {
-    type Options = NoOptions;
-    type Input = Pages<'static>;
-    type Output = Number;
-
-    fn init(_: NoOptions, _: &Context) -> Result<Self, Fault> {
-        Ok(Self)
-    }
-
-    fn handle_input(&mut self, pages: Pages<'_>) -> Result<Reply<Number>, Fault> {
+stateless! {
+    /// Estimator that does not return from its first frame.
+    Hung: Frame => Number, |_frame: &Stamped<Frame>| {
+        HERE.pass("an eye");
+        Ok(Reply::none())
+    };
+    /// Estimator that fails at its first frame.
+    Blind: Frame => Number, |_frame: &Stamped<Frame>| Err(Fault::new("it is blind"));
+    /// Says how many there were.
+    Album: Pages<'static> => Number, |pages: Pages<'_>| {
         Ok(Reply::emit(Number(pages.page.0 + pages.frames.len() as f64)))
-    }
+    };
 }
 
 robot! {
     robot Watching;
     link base {
-        sensor camera: External<Frame>() { estimator blind: Eye<false>(); }
+        sensor camera: External<Frame>() { estimator blind: Blind(); }
         sensor page: External<Number>();
-        estimator hung: Eye<true>() { input frame: sensor::base::camera; runs_on: worker; }
+        estimator hung: Hung() { input frame: sensor::base::camera; runs_on: worker; }
         estimator album: Album() {
             input page: sensor::base::page, driver;
             input frames: sensor::base::camera, optional;

@@ -1,16 +1,6 @@
 //! Motions in a replay.
 
 use super::*;
-use crate::kit::*;
-
-/// Collects the messages published at each path below `actuator` and `command`.
-fn published(all: &DynamicSubscription) -> BTreeMap<&'static str, Vec<String>> {
-    let mut heard: BTreeMap<&'static str, Vec<String>> = BTreeMap::new();
-    for message in all.drain() {
-        heard.entry(message.path()).or_default().push(format!("{} {message:?}", message.stamp().monotonic_time));
-    }
-    heard
-}
 
 #[test]
 fn motions_and_their_reports_are_the_same_in_a_replay() -> Result<(), Failure> {
@@ -18,7 +8,7 @@ fn motions_and_their_reports_are_the_same_in_a_replay() -> Result<(), Failure> {
     let lines = journal(&mut builder);
     let mut simulation = builder.simulate()?;
     let selected = Select::AnyOf(&[Select::Below("actuator"), Select::Below("command")]);
-    let all = simulation.subscribe_any(selected, None, Overflow::DropOldest { capacity: 1 << 16 });
+    let all = simulation.subscribe_any(selected, None, overflow());
     simulation.run_until(at(10));
     assert_eq!(simulation.arm(), Ok(()));
     let execution = simulation.command(crane::command::go, targets(&[[1.2, 1.9]]))?;
@@ -29,24 +19,21 @@ fn motions_and_their_reports_are_the_same_in_a_replay() -> Result<(), Failure> {
     simulation.actuate(servo, PositionCommand { position: 9.0, ..Default::default() }.into())?;
     simulation.run_until(at(2000));
     simulation.stop();
-    let first = published(&all);
+    let (mut first, lines) = (Published::new(), entries(&lines));
+    collect(&all, &mut first);
     for path in ["actuator/base/slew/motor", "actuator/base/slew/motor/end_motion", "command/go/progress"] {
         assert!(first.contains_key(path), "nothing at {path}");
     }
-
-    let lines = entries(&lines);
     for lines in [read_back::<Crane>(&lines)?, lines] {
         let mut replay = Crane::builder().replay()?;
         let progress = replay.bus().publisher::<MotionProgress>("command/go/progress")?;
-        let all = replay.subscribe_any(selected, None, Overflow::DropOldest { capacity: 1 << 16 });
+        let all = replay.subscribe_any(selected, None, overflow());
         replay.play(lines)?;
         replay.stop();
         drop(progress);
-        let again = published(&all);
-        for (path, messages) in &first {
-            assert_eq!(Some(messages), again.get(path), "{path}");
-        }
-        assert_eq!(first.len(), again.len(), "nothing else is heard");
+        let mut again = Published::new();
+        collect(&all, &mut again);
+        same(&first, &again);
     }
     Ok(())
 }

@@ -1,5 +1,6 @@
 //! Subscriptions with a highest rate: on virtual time, in real time and in a replay.
 
+use super::{Talker, talker};
 use crate::kit::*;
 use bb_core::Delivery;
 
@@ -24,34 +25,36 @@ fn watch(context: CommandContext) -> Doing {
     })
 }
 
-robot! {
-    robot Sampled;
-    commands { arm: Arm; watch: Task(run = watch); }
-    link base { sensor numbers: Counter(count = 450) { rate: 1 kHz; } }
+/// A robot that counts to 449, and repeats it at its command.
+fn sampled() -> Builder<Talker> {
+    let mut builder = Talker::builder();
+    builder.options(talker::sensor::base::numbers).count = 450;
+    builder.options(talker::command::watch).run = watch;
+    builder
 }
 
 const SLOW: [f64; 6] = [0.0, 99.0, 199.0, 299.0, 399.0, 449.0];
 
 #[test]
 fn a_slow_display_gets_the_newest_at_its_rate_and_so_it_does_in_a_replay() -> Result<(), Failure> {
-    let subscribe = |builder: &Builder<Sampled>| {
-        let typed = builder.subscribe_with(sampled::sensor::base::numbers, slowly(Overflow::default()));
+    let subscribe = |builder: &Builder<Talker>| {
+        let typed = builder.subscribe_with(talker::sensor::base::numbers, slowly(Overflow::default()));
         let all = builder.subscribe_any(Select::Below("sensor"), None, slowly(Overflow::LatestPerPath));
         (typed, all)
     };
-    let mut builder = Sampled::builder();
+    let mut builder = sampled();
     let lines = journal(&mut builder);
     let (typed, all) = subscribe(&builder);
     let mut simulation = builder.simulate()?;
     simulation.run_for(Duration::from_millis(449));
     // The newest is held until its time has come.
-    assert_eq!(all.drain().map(|message| number(&message)).collect::<Vec<_>>(), [399.0]);
+    assert_eq!(all.drain().map(|message| number(&message)).collect::<Vec<_>>(), [399.0, 798.0]);
     simulation.run_for(Duration::from_millis(51));
     assert_eq!(numbers(&typed), SLOW);
     assert_eq!(all.try_recv().map(|message| number(&message)), Some(449.0));
     simulation.stop();
 
-    let builder = Sampled::builder();
+    let builder = sampled();
     let (typed, all) = subscribe(&builder);
     let mut replay = builder.replay()?;
     replay.play(entries(&lines))?;
@@ -67,14 +70,14 @@ fn number(message: &DynamicMessage) -> f64 {
 
 #[test]
 fn a_command_is_woken_at_the_rate_on_virtual_time() -> Result<(), Failure> {
-    let builder = Sampled::builder();
+    let builder = sampled();
     let seen = builder.subscribe_any(Select::Path("watch/seen"), None, Overflow::default());
     let mut simulation = builder.simulate()?;
-    simulation.command(sampled::command::arm, NoArguments)?;
-    let watch = simulation.command(sampled::command::watch, NoArguments);
+    simulation.command(talker::command::arm, NoArguments)?;
+    let watch = simulation.command(talker::command::watch, NoArguments);
     assert!(watch.is_err(), "it is armed when the simulation runs");
     simulation.run_for(Duration::ZERO);
-    let watch = simulation.command(sampled::command::watch, NoArguments)?;
+    let watch = simulation.command(talker::command::watch, NoArguments)?;
     simulation.run_for(Duration::from_secs(1));
     let millis = |message: &DynamicMessage| message.stamp().monotonic_time.as_nanos() / 1_000_000;
     let seen: Vec<_> = seen.drain().map(|message| (millis(&message), number(&message))).collect();
@@ -86,8 +89,8 @@ fn a_command_is_woken_at_the_rate_on_virtual_time() -> Result<(), Failure> {
 
 #[test]
 fn a_display_is_delivered_no_more_than_its_rate_in_real_time_and_the_last_at_the_end() -> Result<(), Failure> {
-    let builder = Sampled::builder();
-    let display = builder.subscribe_with(sampled::sensor::base::numbers, slowly(Overflow::default()));
+    let builder = sampled();
+    let display = builder.subscribe_with(talker::sensor::base::numbers, slowly(Overflow::default()));
     let mut running = builder.start()?;
     let begin = running.clock().now();
     // A thread that waits is woken when the time of a message comes: the last number is delivered while the robot runs.
