@@ -74,10 +74,8 @@ fn an_estimator_that_gives_something_else_is_named_at_its_first_difference() -> 
     let report = replay.stop();
     assert_eq!(numbers.drain().count(), 0, "after {heard}");
     assert_eq!(told(&report), [format!("journal failed: {error}")]);
-    assert_eq!(
-        error.message,
-        "`sensor/base/left/dice` emits another message than it did: the algorithm is not deterministic"
-    );
+    let says = "`sensor/base/left/dice` emits another message than it did: the algorithm is not deterministic";
+    assert_eq!(error.message, says);
     Ok(())
 }
 

@@ -281,12 +281,25 @@ impl<const ARMS: bool> Command for Task<ARMS> {
     }
 }
 
-/// The code of a [`Task`] that is done after a millisecond.
-pub(crate) fn at_once(context: CommandContext) -> Doing {
+/// The code of a [`Task`] that is done after so long.
+pub(crate) fn after(context: CommandContext, millis: u64) -> Doing {
     Box::pin(async move {
-        context.sleep(Duration::from_millis(1)).await;
+        context.sleep(Duration::from_millis(millis)).await;
         Ok(Outcome::done(()))
     })
+}
+
+/// The code of an [`Echo`] that ticks from its start on.
+pub(crate) fn tick<const MILLIS: u64>(context: &Context) -> Done {
+    context.request(Request::Tick(Duration::from_millis(MILLIS)));
+    Ok(())
+}
+
+/// Options of an estimator with a gain.
+#[derive(Clone, Debug, Options)]
+pub(crate) struct GainOptions {
+    #[option(default = 1.0)]
+    pub(crate) gain: f64,
 }
 
 /// Options of [`Counter`].

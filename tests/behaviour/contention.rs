@@ -9,13 +9,6 @@ pub(crate) struct Two<'a> {
     pub(crate) second: Option<Input<'a, Number>>,
 }
 
-/// Options of [`Ordered`].
-#[derive(Clone, Debug, Options)]
-pub(crate) struct OrderedOptions {
-    #[option(default = 1.0)]
-    pub(crate) gain: f64,
-}
-
 /// Fails if something is out of order; half a number is a fault, [`HANG`] hangs it.
 #[derive(Debug, Default)]
 pub(crate) struct Ordered([f64; 2]);
@@ -24,11 +17,11 @@ const HANG: f64 = 1e9;
 static HERE: Gate = Gate::new();
 
 impl Estimator for Ordered {
-    type Options = OrderedOptions;
+    type Options = GainOptions;
     type Input = Two<'static>;
     type Output = Number;
 
-    fn init(_: OrderedOptions, _: &Context) -> Result<Self, Fault> {
+    fn init(_: GainOptions, _: &Context) -> Result<Self, Fault> {
         Ok(Self::default())
     }
 
@@ -45,7 +38,7 @@ impl Estimator for Ordered {
         Ok(Reply::emit(Number(two.first.0)))
     }
 
-    fn handle_options(&mut self, _: OrderedOptions, _: &Context) -> Result<(), Fault> {
+    fn handle_options(&mut self, _: GainOptions, _: &Context) -> Result<(), Fault> {
         Ok(())
     }
 }

@@ -2,11 +2,6 @@
 
 use crate::kit::*;
 
-fn tick(context: &Context) -> Done {
-    context.request(Request::Tick(Duration::from_millis(10)));
-    Ok(())
-}
-
 /// Reports a divergence at each 1 that it gets.
 fn fickle(_: &mut f64, number: f64) -> Replied {
     let reply = Reply::none();
@@ -19,11 +14,11 @@ robot! {
         category many { concurrency: 1000; }
         disarm: Disarm;
         stuck: Task { category: many; allowed_states: [idle, executing]; }
-        react: Task(run = at_once) { category: many; allowed_states: [idle, executing]; }
+        react: Task(run = |context| after(context, 1)) { category: many; allowed_states: [idle, executing]; }
     }
     link base {
         sensor number: External<Number>() {
-            estimator fickle: Echo(init = tick, input = fickle, info = |_, _| Ok(Reply::emit(Number(0.0)))) {
+            estimator fickle: Echo(init = tick::<10>, input = fickle, info = |_, _| Ok(Reply::emit(Number(0.0)))) {
                 recover_after: 1;
                 on_degraded: react;
             }

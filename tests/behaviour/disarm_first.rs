@@ -28,11 +28,6 @@ fn read(_: u32, _: MonotonicTime) -> Read {
     Ok(Reading::now(Number(1.0)))
 }
 
-fn tick(context: &Context) -> Done {
-    context.request(Request::Tick(Duration::from_millis(5)));
-    Ok(())
-}
-
 fn think(_: &mut f64, number: f64) -> Replied {
     HERE.pass("an estimator's callback");
     Ok(Reply::emit(Number(number)))
@@ -75,7 +70,7 @@ robot! {
         category many { concurrency: 8; }
         errand: Task(run = |_| HERE.stuck("a command")) { category: many; allowed_states: [idle, executing]; }
         hurried: Task(run = |_| HERE.stuck("a command")) { category: many; timeout: 20 ms; allowed_states: [idle, executing]; }
-        alarm: Task(run = at_once) { allowed_states: [disarmed, idle, executing]; }
+        alarm: Task(run = |context| after(context, 1)) { allowed_states: [disarmed, idle, executing]; }
     }
 
     controllers { controller steer: Pulse(init = steer) { rate: 100 Hz; } }
@@ -88,9 +83,9 @@ robot! {
             link lens { }
         }
         joint pan: continuous { axis: z; sensor encoder: External<Number>(); actuator motor: Servo(disarm = stop); link head { } }
-        sensor device: Source(read = read) { rate: 100 Hz; estimator thinker: Echo(init = tick, input = think, info = ticks); }
+        sensor device: Source(read = read) { rate: 100 Hz; estimator thinker: Echo(init = tick::<5>, input = think, info = ticks); }
         sensor silent: External<Number>() {
-            estimator waiting: Echo(init = tick, input = think, info = ticks) { lost_after: 1 s; on_lost: alarm; }
+            estimator waiting: Echo(init = tick::<5>, input = think, info = ticks) { lost_after: 1 s; on_lost: alarm; }
         }
     }
 }

@@ -37,10 +37,12 @@ fn check(_: &mut f64, load: f64) -> Replied {
     Ok(Reply::emit(Number(load)))
 }
 
-/// Command that takes 10 ms and has a brake of its own.
+/// Command that takes 10 ms and has a brake of its own, whose code holds the context of the command.
 fn lift(context: CommandContext) -> Doing {
     Box::pin(async move {
-        context.on_disarm(|| {
+        let kept = context.clone();
+        context.on_disarm(move || {
+            let _ = kept.state();
             BRAKED[1].fetch_add(1, Ordering::SeqCst);
             Ok(())
         });

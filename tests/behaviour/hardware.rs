@@ -5,14 +5,12 @@ use crate::kit::*;
 static IS_ON: AtomicBool = AtomicBool::new(false);
 static FAILS: AtomicBool = AtomicBool::new(false);
 static IS_SKIPPED: AtomicBool = AtomicBool::new(false);
-static BRAKED: AtomicU32 = AtomicU32::new(0);
 static PORTS: AtomicU32 = AtomicU32::new(0);
 static ALONE: Mutex<()> = Mutex::new(());
 
 fn alone() -> MutexGuard<'static, ()> {
     let guard = lock(&ALONE);
     [&IS_ON, &FAILS, &IS_SKIPPED].into_iter().for_each(|flag| flag.store(false, Ordering::SeqCst));
-    BRAKED.store(0, Ordering::SeqCst);
     guard
 }
 
@@ -56,19 +54,6 @@ fn spare(context: &SensorContext) -> Done {
     Err(Fault::skip("it is not plugged in"))
 }
 
-/// Registers a callback that holds the command's own context.
-fn lift(context: CommandContext) -> Doing {
-    Box::pin(async move {
-        let kept = context.clone();
-        context.on_disarm(move || {
-            let _ = kept.state();
-            BRAKED.fetch_add(1, Ordering::SeqCst);
-            Ok(())
-        });
-        Ok(Outcome::done(()))
-    })
-}
-
 static HERE: Gate = Gate::new();
 
 /// Arms the robot on another thread.
@@ -90,7 +75,6 @@ robot! {
         category many { concurrency: 4; }
         arm: Arm;
         disarm: Disarm;
-        lift: Task(run = lift) { category: many; allowed_states: [disarmed, idle, executing]; }
         block: Task(run = |_| HERE.stuck("a command")) { category: many; allowed_states: [disarmed]; }
         later: Task(run = arm_later) { category: many; allowed_states: [disarmed]; }
     }
@@ -159,19 +143,6 @@ fn a_robot_that_has_ended_keeps_nothing_open() -> Result<(), Failure> {
             std::thread::sleep(Duration::from_millis(1));
         }
     });
-    Ok(())
-}
-
-#[test]
-fn a_commands_callbacks_end_with_it_whatever_they_hold() -> Result<(), Failure> {
-    let _alone = alone();
-    let mut simulation = armed_simulation(Guarded::builder());
-    for millis in 1..=20 {
-        simulation.command(guarded::command::lift, NoArguments)?;
-        simulation.run_until(at(millis));
-    }
-    assert_eq!(simulation.disarm(), Ok(()));
-    assert_eq!(BRAKED.load(Ordering::SeqCst), 0);
     Ok(())
 }
 

@@ -221,12 +221,6 @@ fn a_command_gets_the_change_and_a_refused_one_is_counted_and_changes_nothing() 
     Ok(())
 }
 
-/// Ticks.
-fn tick(context: &Context) -> Done {
-    context.request(Request::Tick(Duration::from_millis(5)));
-    Ok(())
-}
-
 fn tick_again(_: &mut f64, _: Info) -> Replied {
     Ok(Reply::emit(Number(0.0)).and(Request::Timer(1, Duration::from_millis(1))))
 }
@@ -244,7 +238,7 @@ robot! {
     robot Industrious;
     link base {
         sensor number: External<Number>() {
-            estimator busy: Echo(init = tick, input = work, info = tick_again) { lost_after: 100 ms; recover_after: 2; }
+            estimator busy: Echo(init = tick::<5>, input = work, info = tick_again) { lost_after: 100 ms; recover_after: 2; }
         }
     }
 }

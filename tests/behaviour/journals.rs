@@ -8,13 +8,6 @@ const PANICS: f64 = -2.0;
 const HANGS: f64 = -1000.0;
 const IS_SLOW: f64 = 1000.0;
 
-/// Options of [`Adder`].
-#[derive(Clone, Debug, Options)]
-pub(crate) struct AdderOptions {
-    #[option(default = 1.0)]
-    pub(crate) gain: f64,
-}
-
 /// Estimator that adds up its input, from the second of its creation on; some inputs make it fail.
 #[derive(Debug)]
 pub(crate) struct Adder {
@@ -23,11 +16,11 @@ pub(crate) struct Adder {
 }
 
 impl Estimator for Adder {
-    type Options = AdderOptions;
+    type Options = GainOptions;
     type Input = Number;
     type Output = Number;
 
-    fn init(options: AdderOptions, context: &Context) -> Result<Self, Fault> {
+    fn init(options: GainOptions, context: &Context) -> Result<Self, Fault> {
         context.request(Request::Tick(Duration::from_millis(7)));
         Ok(Self { sum: context.now().as_nanos() as f64, gain: options.gain })
     }
@@ -49,7 +42,7 @@ impl Estimator for Adder {
         Ok(Reply::emit(Number(self.sum * self.gain)))
     }
 
-    fn handle_options(&mut self, options: AdderOptions, _: &Context) -> Result<(), Fault> {
+    fn handle_options(&mut self, options: GainOptions, _: &Context) -> Result<(), Fault> {
         self.gain = options.gain;
         Ok(())
     }

@@ -25,14 +25,6 @@ fn count(number: f64) -> Done {
     Ok(())
 }
 
-/// Takes an hour.
-fn travel(context: CommandContext) -> Doing {
-    Box::pin(async move {
-        context.sleep(Duration::from_secs(3600)).await;
-        Ok(Outcome::done(()))
-    })
-}
-
 robot! {
     robot Watched;
     parameters {
@@ -43,7 +35,7 @@ robot! {
         is_on: bool = true;
     }
     commands {
-        travel: Task(run = travel) { allowed_states: [idle]; }
+        travel: Task(run = |context| after(context, 3_600_000)) { allowed_states: [idle]; }
         arm: Arm;
     }
     link base {
@@ -279,9 +271,7 @@ fn parameters_and_actuators_take_json() -> Result<(), Failure> {
     simulation.arm()?;
     assert_eq!(from_json::<Number>(&simulation.send_json("actuator/base/pan/servo", "1.5")?)?, Number(1.5));
     let near = simulation.send_json("actuator/base/pan/server", "1").expect_err("it is unknown");
-    assert_eq!(
-        near.to_string(),
-        "no actuator is at `actuator/base/pan/server`; did you mean `actuator/base/pan/servo`?"
-    );
+    let says = "no actuator is at `actuator/base/pan/server`; did you mean `actuator/base/pan/servo`?";
+    assert_eq!(near.to_string(), says);
     Ok(())
 }

@@ -280,14 +280,6 @@ fn what_an_init_has_started_that_fails_is_made_safe() {
     });
 }
 
-/// Takes 200 ms.
-fn check(context: CommandContext) -> Doing {
-    Box::pin(async move {
-        context.sleep(Duration::from_millis(200)).await;
-        Ok(Outcome::done(()))
-    })
-}
-
 /// Distance to go. Its default takes long to find out.
 #[derive(Clone, Debug, Payload)]
 pub(crate) struct Far {
@@ -331,7 +323,7 @@ robot! {
     robot Commanded;
     commands {
         category other { concurrency: 3; }
-        check: Task<true>(run = check);
+        check: Task<true>(run = |context| after(context, 200));
         block: Task(run = |_| BLOCK.stuck("block")) { allowed_states: [idle]; category: other; }
         go: Go { allowed_states: [idle, executing]; category: other; }
         mission: Task(run = mission) { allowed_states: [idle]; category: other; }

@@ -19,19 +19,47 @@ use bb_estimators::motion::{
 use bb_estimators::simulation::{SimulatedActuatorOptions, SimulatedEncoderOptions, SimulatedWorld};
 use bb_estimators::{SimulatedActuator, SimulatedEncoder};
 
-/// A driver of hardware that is not there.
+/// A motor that is not there, that says at once that it is stuck, or that reports the end of a motion more often than it has any.
 #[derive(Debug)]
-struct CanMotor;
+struct Odd {
+    context: ActuatorContext,
+    chats: bool,
+    now: MonotonicTime,
+}
 
-impl Actuator for CanMotor {
-    type Options = NoOptions;
+#[derive(Clone, Debug, Options)]
+struct OddOptions {
+    #[option(default = false)]
+    is_absent: bool,
+    #[option(default = false)]
+    chats: bool,
+}
+
+impl Actuator for Odd {
+    type Options = OddOptions;
     type Command = ActuatorCommand;
 
-    fn init(_: NoOptions, _: &ActuatorContext) -> Result<Self, Fault> {
-        Err(Fault::new("no such bus: can0"))
+    fn init(OddOptions { is_absent, chats }: OddOptions, context: &ActuatorContext) -> Result<Self, Fault> {
+        if is_absent {
+            return Err(Fault::new("no such bus: can0"));
+        }
+        Ok(Self { context: context.clone(), chats, now: MonotonicTime::ZERO })
     }
 
-    fn handle_command(&mut self, _: &Stamped<ActuatorCommand>) -> Result<(), Fault> {
+    fn handle_command(&mut self, command: &Stamped<ActuatorCommand>) -> Result<(), Fault> {
+        if matches!(command.payload, ActuatorCommand::Trajectory(_)) {
+            self.context.end_motion(EndMotion { position: 0.0, end: MotionEnd::Stalled });
+        }
+        Ok(())
+    }
+
+    fn next_update(&self) -> Option<MonotonicTime> {
+        self.chats.then(|| self.now + Duration::from_millis(1))
+    }
+
+    fn update(&mut self, now: MonotonicTime) -> Result<(), Fault> {
+        self.now = now;
+        self.context.end_motion(EndMotion { position: 0.0, end: MotionEnd::Stopped });
         Ok(())
     }
 
@@ -107,7 +135,7 @@ robot! {
                 joint reach: prismatic {
                     axis: x;
                     limit: { lower: 0 m, upper: 2 m, velocity: 0.5 m/s, effort: 20 N };
-                    actuator motor: CanMotor();
+                    actuator motor: Odd(is_absent = true);
                     sensor encoder: CanEncoder() { rate: 200 Hz; }
                     link trolley {
                         joint jaw: revolute {

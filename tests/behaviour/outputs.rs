@@ -23,38 +23,34 @@ stateless! {
 }
 
 robot! {
-    robot Splitter;
-
+    robot Batches;
     sensors {
-        sensor numbers: Counter(count = 5) {
-            rate: 10 Hz;
-            estimator split: Split() {
-                output even: [parts, even];
-                output whole;
-            }
-        }
+        sensor numbers: Counter(count = 5) { rate: 10 Hz; estimator split: Split() { output even: [parts, even]; output whole; } }
     }
     link base {
-        estimator again: Split() {
-            input number: parts::even;
-            output whole;
+        estimator again: Split() { input number: parts::even; output whole; }
+        estimator single: Scale(factor = 10.0) { input number: sensor::numbers::split::whole; output out: [tens]; }
+        sensor batch: External<Number>() {
+            estimator unroll: Unroll();
+            estimator sampler: Sampler() { output samples; output count: [counted]; }
+            estimator middle: Middle();
         }
-        estimator single: Scale(factor = 10.0) {
-            input number: sensor::numbers::split::whole;
-            output out: [tens];
-        }
+        // Those that take what is unrolled: in its island, and in one of its own with another sensor.
+        estimator tenfold: Scale(factor = 10.0) { input number: sensor::base::batch::unroll; }
+        estimator apart: Echo() { input number: sensor::base::batch::unroll; runs_on: worker; }
+        estimator delayed: Echo() { input number: sensor::base::batch::sampler::samples; }
     }
 }
 
 #[test]
 fn outputs_go_to_their_paths_and_only_when_emitted() -> Result<(), StartError> {
-    let mut builder = Splitter::builder();
+    let mut builder = Batches::builder();
     // An estimator of several outputs has options like any other.
-    let NoOptions = builder.options(splitter::sensor::numbers::split);
-    let whole = builder.subscribe(splitter::sensor::numbers::split::whole);
-    let even = builder.subscribe(splitter::parts::even);
-    let again = builder.subscribe(splitter::estimator::base::again::whole);
-    let tens = builder.subscribe(splitter::tens);
+    let NoOptions = builder.options(batches::sensor::numbers::split);
+    let whole = builder.subscribe(batches::sensor::numbers::split::whole);
+    let even = builder.subscribe(batches::parts::even);
+    let again = builder.subscribe(batches::estimator::base::again::whole);
+    let tens = builder.subscribe(batches::tens);
     let mut simulation = builder.simulate()?;
     simulation.run_to_end();
     let numbers = |messages: Subscription<Number>| messages.drain().map(|number| number.0).collect::<Vec<_>>();
@@ -115,22 +111,6 @@ impl Estimator for Middle {
         let time = number.monotonic_time;
         let middle = |before: MonotonicTime| before.plus_nanos(time.nanos_since(before) / 2);
         Ok(self.0.replace(time).map(|before| Timed::new(middle(before), number.payload)).into())
-    }
-}
-
-robot! {
-    robot Batches;
-    link base {
-        sensor batch: External<Number>() {
-            estimator unroll: Unroll();
-            estimator sampler: Sampler() { output samples; output count: [counted]; }
-            estimator middle: Middle();
-        }
-        sensor other: External<Number>();
-        // Those that take what is unrolled: in its island, and in one of its own with another sensor.
-        estimator tenfold: Scale(factor = 10.0) { input number: sensor::base::batch::unroll; }
-        estimator apart: Echo() { input number: sensor::base::batch::unroll; runs_on: worker; }
-        estimator delayed: Echo() { input number: sensor::base::batch::sampler::samples; }
     }
 }
 

@@ -54,6 +54,16 @@ impl Field for Evil {
     }
 }
 
+static MADE_SAFE: AtomicBool = AtomicBool::new(false);
+
+fn guard(context: &SensorContext) -> Done {
+    context.on_disarm(|| {
+        MADE_SAFE.store(true, Ordering::SeqCst);
+        Ok(())
+    });
+    Ok(())
+}
+
 /// An output.
 #[derive(Clone, Debug, Payload)]
 pub(crate) struct Output {
@@ -71,7 +81,7 @@ stateless! {
 robot! {
     robot Making;
     link base {
-        sensor source: Source(read = |_, _| Ok(Reading::now(Number(1.0)))) { rate: 100 Hz; estimator maker: Maker(); }
+        sensor source: Source(init = guard, read = |_, _| Ok(Reading::now(Number(1.0)))) { rate: 100 Hz; estimator maker: Maker(); }
         sensor curse: External<Output>() { estimator taker: Taker(); }
     }
 }
@@ -144,9 +154,11 @@ fn outputs_that_panic_too_often_have_the_robot_made_safe() -> Result<(), Failure
     let _outputs = builder.subscribe(making::sensor::base::source::maker);
     let mut simulation = armed_simulation(builder);
     PANICS.store(1, Ordering::SeqCst);
+    MADE_SAFE.store(false, Ordering::SeqCst);
     simulation.run_for(Duration::from_secs(5));
     PANICS.store(0, Ordering::SeqCst);
     assert_eq!(simulation.safety(), Safety::Error);
+    assert!(MADE_SAFE.swap(false, Ordering::SeqCst) && simulation.arm().is_err());
     let report = simulation.report();
     let stopped = report.estimators[0].stopped.as_deref();
     assert!(stopped.is_some_and(|why| why.contains("code 1")), "{stopped:?}");

@@ -5,19 +5,11 @@ use bb_core::Stamped;
 use bb_core::component::{ReactionEvent, ReactionState};
 use bb_core::event::CommandEvent;
 
-/// Takes half a second.
-fn land(context: CommandContext) -> Doing {
-    Box::pin(async move {
-        context.sleep(Duration::from_millis(500)).await;
-        Ok(Outcome::done(()))
-    })
-}
-
 robot! {
     robot Drone;
     parameters { battery { low: f64 = 11 V, range: 5 V..=15 V; hot: f64 = 330 K; } }
     commands {
-        land: Task(run = land) { allowed_states: [idle, executing]; cancel: all; }
+        land: Task(run = |context| after(context, 500)) { allowed_states: [idle, executing]; cancel: all; }
         go: Move { allowed_states: [idle, executing]; }
     }
     sensors { sensor battery: External<BatteryState>(); }

@@ -1,6 +1,6 @@
 //! A run from a journal gives what the first run gave, bit for bit: outputs, transitions, drops.
 
-use crate::components::{Failure, Number, Replied, Seen, Snapshot, at, lock};
+use crate::components::{Failure, GainOptions, Number, Replied, Seen, Snapshot, at, lock};
 use bb_core::journal::{Entry, Event, JournalReader};
 use bb_core::message::codec::{decode, encode};
 use bb_core::prelude::*;
@@ -66,19 +66,12 @@ pub(crate) struct Moody {
     gain: f64,
 }
 
-/// Options of [`Moody`].
-#[derive(Clone, Debug, Options)]
-pub(crate) struct MoodyOptions {
-    #[option(default = 1.0)]
-    pub(crate) gain: f64,
-}
-
 impl Estimator for Moody {
-    type Options = MoodyOptions;
+    type Options = GainOptions;
     type Input = Number;
     type Output = Number;
 
-    fn init(options: MoodyOptions, context: &Context) -> Result<Self, Fault> {
+    fn init(options: GainOptions, context: &Context) -> Result<Self, Fault> {
         context.request(Request::Tick(Duration::from_millis(70)));
         Ok(Self { sum: 0.0, gain: options.gain })
     }
@@ -104,7 +97,7 @@ impl Estimator for Moody {
         Ok(Reply::emit(Number(self.sum)))
     }
 
-    fn handle_options(&mut self, options: MoodyOptions, _: &Context) -> Result<(), Fault> {
+    fn handle_options(&mut self, options: GainOptions, _: &Context) -> Result<(), Fault> {
         self.gain = options.gain;
         Ok(())
     }

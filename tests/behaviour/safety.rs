@@ -109,10 +109,8 @@ fn a_disarm_that_panics_leads_to_error_and_the_next_one_may_succeed() -> Result<
     let running = armed(builder);
     running.actuate(SERVO, Number(PANICS_AT_DISARM)).expect("it does as told");
     let why = running.disarm().expect_err("it panics").to_string();
-    assert_eq!(
-        why,
-        "not everything could be made safe: `actuator/base/pan/servo`: disarming failed: panicked: no brake"
-    );
+    let says = "not everything could be made safe: `actuator/base/pan/servo`: disarming failed: panicked: no brake";
+    assert_eq!(why, says);
     assert_eq!(running.safety(), Safety::Error);
     let message = errors.try_recv().map(|error| error.payload.error.message);
     assert_eq!(message.as_deref(), Some("disarming failed: panicked: no brake"));

@@ -10,11 +10,6 @@ static HERE: Gate = Gate::new();
 const HANGS: f64 = -1.0;
 const PANICS: f64 = -2.0;
 
-fn tick(context: &Context) -> Done {
-    context.request(Request::Tick(Duration::from_millis(5)));
-    Ok(())
-}
-
 fn ticks(_: &mut f64, _: Info) -> Replied {
     TICKS.fetch_add(1, Ordering::SeqCst);
     Ok(Reply::emit(Number(-10.0)))
@@ -36,7 +31,7 @@ robot! {
     robot Laden;
     link base {
         sensor number: External<Number>();
-        estimator heavy: Echo(init = tick, input = work, info = ticks, terminate = end) {
+        estimator heavy: Echo(init = tick::<5>, input = work, info = ticks, terminate = end) {
             input number: sensor::base::number;
             runs_on: worker;
             lost_after: 100 ms;

@@ -157,50 +157,6 @@ fn a_joint_that_is_held_fails_the_command_and_stops_the_others() -> Result<(), F
     Ok(())
 }
 
-/// A motor that says at once that it is stuck, or that reports the end of a motion more often than it has any.
-#[derive(Debug)]
-struct Odd {
-    context: ActuatorContext,
-    chats: bool,
-    now: MonotonicTime,
-}
-
-#[derive(Clone, Debug, Options)]
-struct OddOptions {
-    #[option(default = false)]
-    chats: bool,
-}
-
-impl Actuator for Odd {
-    type Options = OddOptions;
-    type Command = ActuatorCommand;
-
-    fn init(options: OddOptions, context: &ActuatorContext) -> Result<Self, Fault> {
-        Ok(Self { context: context.clone(), chats: options.chats, now: MonotonicTime::ZERO })
-    }
-
-    fn handle_command(&mut self, command: &Stamped<ActuatorCommand>) -> Result<(), Fault> {
-        if matches!(command.payload, ActuatorCommand::Trajectory(_)) {
-            self.context.end_motion(EndMotion { position: 0.0, end: MotionEnd::Stalled });
-        }
-        Ok(())
-    }
-
-    fn next_update(&self) -> Option<MonotonicTime> {
-        self.chats.then(|| self.now + Duration::from_millis(1))
-    }
-
-    fn update(&mut self, now: MonotonicTime) -> Result<(), Fault> {
-        self.now = now;
-        self.context.end_motion(EndMotion { position: 0.0, end: MotionEnd::Stopped });
-        Ok(())
-    }
-
-    fn disarm(&mut self) -> Result<(), Fault> {
-        Ok(())
-    }
-}
-
 robot! {
     robot Shop;
     commands { go: MoveJoints(); wind: MoveJoints(speed = 1.0, acceleration = 2.0, jerk = 20.0); }

@@ -45,47 +45,11 @@ fn a_controller_that_is_blind_holds_its_joint() -> Result<(), Failure> {
 }
 
 robot! {
-    robot Servo;
-    controllers {
-        controller hold: PidController(
-            measurement = "sensor/base/arm/encoder", actuator = "actuator/base/arm/motor", stale_after = 1 s,
-        ) { rate: 100 Hz; }
-    }
-    link base {
-        joint arm: continuous {
-            axis: z;
-            limit: { velocity: 3 rad/s, effort: 2 N*m };
-            actuator motor: SimulatedActuator();
-            sensor encoder: External<JointState>();
-            link hand;
-        }
-    }
-}
-
-/// A message that was kept back on its way, or arrives twice, is not the newest measurement.
-#[test]
-fn a_controller_does_not_go_back_to_an_older_measurement() -> Result<(), Failure> {
-    let mut simulation = armed_simulation(Servo::builder());
-    let terms = simulation.subscribe(servo::controller::hold);
-    let mut measured = |now: i64, stamp: i64, position: f64| -> Result<f64, Failure> {
-        simulation.run_until(at(now - 1));
-        let _ = terms.drain().count();
-        let state = JointState { position, velocity: None, effort: None };
-        simulation.publish(servo::sensor::base::arm::encoder, at(stamp), state);
-        simulation.run_until(at(now));
-        Ok(terms.drain().last().ok_or("it commands")?.measurement)
-    };
-    assert_eq!(measured(100, 99, 0.5)?, 0.5);
-    assert_eq!(measured(200, 199, 0.4)?, 0.4);
-    assert_eq!(measured(300, 150, 0.9)?, 0.4, "it is older");
-    assert_eq!(measured(400, 199, 0.8)?, 0.4, "it is as old");
-    assert_eq!(measured(500, 200, 0.3)?, 0.3);
-    Ok(())
-}
-
-robot! {
     robot Sump;
     controllers {
+        controller hold: PidController(
+            measurement = "sensor/base/float/level", actuator = "actuator/base/valve/motor", stale_after = 1 s,
+        ) { rate: 100 Hz; }
         controller level: ThresholdController(
             measurement = "sensor/base/float/level",
             actuator = "actuator/base/pump/motor",
@@ -108,7 +72,35 @@ robot! {
             sensor encoder: SimulatedEncoder() { rate: 100 Hz; }
             link rotor;
         }
+        joint valve: continuous {
+            axis: z;
+            limit: { velocity: 3 rad/s, effort: 2 N*m };
+            actuator motor: SimulatedActuator();
+            sensor encoder: External<JointState>();
+            link flap;
+        }
     }
+}
+
+/// A message that was kept back on its way, or arrives twice, is not the newest measurement.
+#[test]
+fn a_controller_does_not_go_back_to_an_older_measurement() -> Result<(), Failure> {
+    let mut simulation = armed_simulation(Sump::builder());
+    let terms = simulation.subscribe(sump::controller::hold);
+    let mut measured = |now: i64, stamp: i64, position: f64| -> Result<f64, Failure> {
+        simulation.run_until(at(now - 1));
+        let _ = terms.drain().count();
+        let state = JointState { position, velocity: None, effort: None };
+        simulation.publish(sump::sensor::base::float::level, at(stamp), state);
+        simulation.run_until(at(now));
+        Ok(terms.drain().last().ok_or("it commands")?.measurement)
+    };
+    assert_eq!(measured(100, 99, 0.5)?, 0.5);
+    assert_eq!(measured(200, 199, 0.4)?, 0.4);
+    assert_eq!(measured(300, 150, 0.9)?, 0.4, "it is older");
+    assert_eq!(measured(400, 199, 0.8)?, 0.4, "it is as old");
+    assert_eq!(measured(500, 200, 0.3)?, 0.3);
+    Ok(())
 }
 
 #[test]
@@ -165,10 +157,8 @@ fn another_controller_takes_the_place_of_a_declared_one() -> Result<(), Failure>
     let mut builder = simulated()?;
     let options = SteadyOptions { velocity: -0.5 };
     let error = builder.replace_service::<Steady>("controller/hod", options.clone()).expect_err("a typo");
-    assert_eq!(
-        error.to_string(),
-        "no controller or bridge is at `controller/hod`; did you mean `controller/hold`?"
-    );
+    let says = "no controller or bridge is at `controller/hod`; did you mean `controller/hold`?";
+    assert_eq!(error.to_string(), says);
     builder.replace_service::<Steady>("controller/hold", options)?;
     let mut simulation = armed_simulation(builder);
     simulation.run_for(Duration::from_secs(1));

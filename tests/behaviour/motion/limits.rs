@@ -2,41 +2,12 @@
 
 use super::*;
 
+/// A value at a bound is carried out as it is; the next number beyond it is clamped, and counted.
 #[test]
-fn commands_beyond_a_limit_are_brought_back_and_counted() -> Result<(), Failure> {
+fn commands_beyond_a_limit_are_brought_back_and_counted_and_each_bound_is_allowed() -> Result<(), Failure> {
     let commanded = Arc::new(Mutex::new(Vec::new()));
     let mut builder = simulated()?;
     builder.options(crane::actuator::base::flap::servo).commanded = Arc::clone(&commanded);
-    let simulation = armed_simulation(builder);
-    let servo = crane::actuator::base::flap::servo;
-    let carried_out = simulation.subscribe_any(Select::Path(servo.path()), None, Overflow::default());
-    let limit = 10_f64.to_radians();
-    for (position, velocity) in [(0.1, None), (0.2, Some(0.5)), (-9.0, Some(-7.0)), (limit, None)] {
-        simulation.actuate(servo, PositionCommand { position, velocity, effort: None })?;
-    }
-    assert_eq!(*commanded.lock().map_err(|_| "poisoned")?, [0.1, limit, -limit, limit]);
-    let velocities: Vec<_> = carried_out
-        .drain()
-        .filter_map(|message| message.downcast::<PositionCommand>().map(|command| command.velocity))
-        .collect();
-    assert_eq!(velocities, [None, Some(0.5), Some(-1.0), None]);
-    let report = simulation.report();
-    let counts = report.actuator(servo.path()).ok_or("it is declared")?;
-    assert_eq!(counts.commands, 4);
-    let limited = LimitedQuantity::ALL.iter().map(|quantity| counts.limited(*quantity));
-    assert_eq!(limited.collect::<Vec<_>>(), [2, 1, 0]);
-    let line = "actuator/base/flap/servo: 4 commands, 2 clamped to the limit of position, 1 clamped to the limit of \
-                velocity";
-    assert!(report.to_string().contains(line), "{report}");
-    Ok(())
-}
-
-/// A value at a bound is carried out as it is; the next number beyond it is clamped, and counted.
-#[test]
-fn each_bound_belongs_to_what_is_allowed() -> Result<(), Failure> {
-    let commanded = Arc::new(Mutex::new(Vec::new()));
-    let mut builder = simulated()?;
-    builder.options(crane::actuator::base::flap::servo).commanded = commanded;
     let simulation = armed_simulation(builder);
     let servo = crane::actuator::base::flap::servo;
     let carried_out = simulation.subscribe_any(Select::Path(servo.path()), None, Overflow::default());
@@ -56,18 +27,23 @@ fn each_bound_belongs_to_what_is_allowed() -> Result<(), Failure> {
     for (quantity, limit) in [10_f64.to_radians(), 1.0, 1.0].into_iter().enumerate() {
         for bound in [limit, -limit] {
             let beyond = bound.signum() * bound.abs().next_up();
-            for (value, is_beyond) in [(bound, false), (beyond, true), (bound / 2.0, false)] {
+            for (value, is_beyond) in [(bound, false), (beyond, true), (9.0 * bound, true), (bound / 2.0, false)] {
                 simulation.actuate(servo, command(quantity, value))?;
                 expected[quantity] += u64::from(is_beyond);
                 assert_eq!(limited(), expected, "{value}");
                 let carried_out = carried_out.try_recv().ok_or("it was carried out")?;
                 let carried_out = carried_out.downcast::<PositionCommand>().ok_or("a position")?.payload;
                 assert_eq!(carried_out, command(quantity, if is_beyond { bound } else { value }));
+                assert_eq!(lock(&commanded).last(), Some(&carried_out.position), "what the driver gets");
             }
         }
     }
     simulation.actuate(servo, plain)?;
-    assert_eq!(limited(), [2, 2, 2]);
+    assert_eq!(limited(), [4, 4, 4]);
+    let report = simulation.report().to_string();
+    let line = "actuator/base/flap/servo: 25 commands, 4 clamped to the limit of position, 4 clamped to the limit of \
+                velocity, 4 clamped to the limit of effort";
+    assert!(report.contains(line), "{report}");
     for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         let error = simulation.actuate(servo, PositionCommand { position: value, ..plain });
         assert_eq!(error, Err(ActuatorError::NonFinite));
