@@ -20,7 +20,6 @@ pub(crate) struct Arrival {
 }
 
 /// Goes there, at 10 ms a stop.
-#[derive(Debug)]
 pub(crate) struct Go;
 
 impl Command for Go {

@@ -22,7 +22,6 @@ pub(crate) struct SumOptions {
 }
 
 /// Sums up what it gets.
-#[derive(Debug)]
 pub(crate) struct Sum {
     options: SumOptions,
     sum: f64,

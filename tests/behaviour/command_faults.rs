@@ -20,7 +20,6 @@ static MAY_GO_ON: AtomicBool = AtomicBool::new(false);
 static BLOCKS: AtomicBool = AtomicBool::new(false);
 
 /// Command that behaves as its arguments say.
-#[derive(Debug)]
 pub(crate) struct Misbehave;
 
 impl Command for Misbehave {

@@ -55,7 +55,6 @@ pub(crate) struct SourceOptions {
 }
 
 /// A sensor; it measures nothing, unless it is told to.
-#[derive(Debug)]
 pub(crate) struct Source(SourceOptions, u32);
 
 impl Sensor for Source {
@@ -109,7 +108,6 @@ pub(crate) struct EchoOptions {
 }
 
 /// An estimator; it emits what it gets, unless it is told to do something else.
-#[derive(Debug)]
 pub(crate) struct Echo(EchoOptions, f64);
 
 impl Estimator for Echo {
@@ -193,7 +191,6 @@ pub(crate) struct ServoOptions {
 }
 
 /// An actuator; it does nothing, unless it is told to.
-#[derive(Debug)]
 pub(crate) struct Servo(ServoOptions, f64);
 
 impl Actuator for Servo {
@@ -263,7 +260,6 @@ pub(crate) struct TaskOptions {
 }
 
 /// A command; it does nothing, unless it is told to. It may arm the robot when it is done.
-#[derive(Debug)]
 pub(crate) struct Task<const ARMS: bool = false>;
 
 impl<const ARMS: bool> Command for Task<ARMS> {
@@ -314,7 +310,6 @@ pub(crate) struct CounterOptions {
 }
 
 /// Counts up by one.
-#[derive(Debug)]
 pub(crate) struct Counter(CounterOptions);
 
 impl Sensor for Counter {
@@ -344,7 +339,6 @@ pub(crate) struct ScaleOptions {
 }
 
 /// Multiplies.
-#[derive(Debug)]
 pub(crate) struct Scale(f64);
 
 impl Estimator for Scale {
@@ -391,7 +385,6 @@ pub(crate) struct Numbers<'a> {
 macro_rules! stateless {
     ($($(#[$doc:meta])* $name:ident: $Input:ty => $Output:ty, |$input:ident: $View:ty| $code:expr;)*) => { $(
         $(#[$doc])*
-        #[derive(Debug)]
         pub(crate) struct $name;
 
         impl Estimator for $name {
@@ -423,7 +416,6 @@ stateless! {
 }
 
 /// The driver of an encoder on a bus that is not there.
-#[derive(Debug)]
 pub(crate) struct CanEncoder;
 
 impl Sensor for CanEncoder {
@@ -447,7 +439,6 @@ pub(crate) struct Target {
 }
 
 /// Takes its time.
-#[derive(Debug)]
 pub(crate) struct Move;
 
 impl Command for Move {

@@ -10,7 +10,7 @@ pub(crate) struct Two<'a> {
 }
 
 /// Fails if something is out of order; half a number is a fault, [`HANG`] hangs it.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub(crate) struct Ordered([f64; 2]);
 
 const HANG: f64 = 1e9;

@@ -32,7 +32,6 @@ struct WitnessOptions {
 }
 
 /// Emits what it is given.
-#[derive(Debug)]
 struct Witness(WitnessOptions);
 
 impl Estimator for Witness {

@@ -25,7 +25,6 @@ pub(crate) struct Places<'a> {
 }
 
 /// Tells what it was given at the start.
-#[derive(Debug)]
 pub(crate) struct Surveyor<const MOVING: bool = false>(Origins);
 
 impl<const MOVING: bool> Estimator for Surveyor<MOVING> {

@@ -14,7 +14,7 @@ pub(crate) struct Kept<'a> {
 }
 
 /// Says where its camera was when that saw something last.
-#[derive(Debug, Default)]
+#[derive(Default)]
 struct Keeper {
     camera_x: f64,
 }

@@ -18,7 +18,7 @@ pub(crate) struct Spot {
 }
 
 /// Publishes the position of its input.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub(crate) struct Spotter {
     frame_from_camera: Isometry3<f64>,
 }
@@ -61,7 +61,7 @@ pub(crate) struct Received {
     pub(crate) lift: Option<f64>,
 }
 
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub(crate) struct Fusion {
     camera: String,
 }

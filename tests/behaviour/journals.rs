@@ -9,7 +9,6 @@ const HANGS: f64 = -1000.0;
 const IS_SLOW: f64 = 1000.0;
 
 /// Estimator that adds up its input, from the second of its creation on; some inputs make it fail.
-#[derive(Debug)]
 pub(crate) struct Adder {
     sum: f64,
     gain: f64,
@@ -109,7 +108,6 @@ pub(crate) struct Way {
 }
 
 /// Command that drives the actuator step by step, publishes its progress, and sets a parameter at each step.
-#[derive(Debug)]
 pub(crate) struct Drive;
 
 impl Command for Drive {

@@ -60,7 +60,6 @@ fn turning() -> i32 {
 }
 
 /// Turns from `init` on, until it is made safe; fails once it does not turn.
-#[derive(Debug)]
 pub(crate) struct Lidar {
     turns: Arc<AtomicBool>,
     fails: bool,
@@ -297,7 +296,6 @@ impl Default for Far {
 static WENT: AtomicU32 = AtomicU32::new(0);
 
 /// Goes there.
-#[derive(Debug)]
 pub(crate) struct Go;
 
 impl Command for Go {

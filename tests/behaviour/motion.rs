@@ -20,7 +20,6 @@ use bb_estimators::simulation::{SimulatedActuatorOptions, SimulatedEncoderOption
 use bb_estimators::{SimulatedActuator, SimulatedEncoder};
 
 /// A motor that is not there, that says at once that it is stuck, or that reports the end of a motion more often than it has any.
-#[derive(Debug)]
 struct Odd {
     context: ActuatorContext,
     chats: bool,
@@ -69,7 +68,6 @@ impl Actuator for Odd {
 }
 
 /// A servo that takes positions alone and keeps what it was told.
-#[derive(Debug)]
 struct Hobby(Arc<Mutex<Vec<f64>>>);
 
 #[derive(Clone, Debug, Default, Options)]

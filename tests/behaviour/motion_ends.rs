@@ -42,7 +42,6 @@ struct DriveOptions {
 }
 
 /// Reports the beginning of a motion with each command, and follows a script.
-#[derive(Debug)]
 struct Drive {
     script: Script,
     context: ActuatorContext,

@@ -95,7 +95,6 @@ pub(crate) struct Samples {
 }
 
 /// Estimator that emits each number at the middle of the time since the previous one.
-#[derive(Debug)]
 pub(crate) struct Middle(Option<MonotonicTime>);
 
 impl Estimator for Middle {

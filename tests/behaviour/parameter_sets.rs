@@ -1,7 +1,7 @@
 //! Parameters that are set at once: all of them, or none.
 
 use crate::kit::*;
-use crate::parameters::{Bound, Which};
+use crate::parameters::{BOUND, Tuned, Which, tuned};
 use bb_core::event::ParameterChange;
 
 /// Sets two parameters of which the second may be refused.
@@ -13,25 +13,8 @@ fn set_both(context: CommandContext) -> Doing {
     })
 }
 
-robot! {
-    robot Mixer;
-    parameters {
-        gain: f64 = 1.0, range: 0.0..=1000000000.0;
-        count: i64 = 1;
-        name: String = "one";
-        share: f64 = 0.25, range: -0.5..=0.75;
-        level: i64 = 1, range: -3..=4;
-    }
-    commands { set_both: Task(run = set_both) { allowed_states: [disarmed]; } }
-    link base {
-        sensor number: External<Number>() { estimator bound: Bound(gain = param::gain, count = param::count); }
-    }
-}
-
-const BOUND: EstimatorHandle<Mixer, Bound, Number> = mixer::sensor::base::number::bound;
-
-fn values(live: &Live<Mixer>) -> (f64, i64, String) {
-    (live.parameter(mixer::param::gain), live.parameter(mixer::param::count), live.parameter(mixer::param::name))
+fn values(live: &Live<Tuned>) -> (f64, i64, String) {
+    (live.parameter(tuned::param::gain), live.parameter(tuned::param::count), live.parameter(tuned::param::name))
 }
 
 fn changes(all: &DynamicSubscription) -> Vec<(&'static str, ParameterValue, ParameterValue)> {
@@ -43,7 +26,7 @@ fn changes(all: &DynamicSubscription) -> Vec<(&'static str, ParameterValue, Para
 
 #[test]
 fn a_set_that_is_refused_in_the_middle_changes_nothing() -> Result<(), Failure> {
-    let simulation = Mixer::builder().simulate()?;
+    let simulation = Tuned::builder().simulate()?;
     let all = simulation.subscribe_any(Select::Below("param"), None, Overflow::default());
     let gain = |gain: f64| ("param/gain", gain.into());
     let (name, count) = (("param/name", "two".to_owned().into()), ("param/count", 2.into()));
@@ -66,16 +49,16 @@ fn a_set_that_is_refused_in_the_middle_changes_nothing() -> Result<(), Failure> 
         assert_eq!(values(&simulation), (1.0, 1, "one".to_owned()));
     }
     assert_eq!(changes(&all), []);
-    assert_eq!(simulation.call(BOUND, Which)?, (1.0, None, 1));
+    assert_eq!(simulation.call(BOUND, Which)?, (1.0, Some(Duration::from_millis(500)), 1));
     assert_eq!(simulation.set_parameters::<&str>([]), Ok(()));
 
     simulation.set_parameters([
-        mixer::param::count.to(2),
-        mixer::param::name.to("two"),
-        mixer::param::gain.to(2.0),
+        tuned::param::count.to(2),
+        tuned::param::name.to("two"),
+        tuned::param::gain.to(2.0),
     ])?;
     assert_eq!(values(&simulation), (2.0, 2, "two".to_owned()));
-    assert_eq!(simulation.call(BOUND, Which)?, (2.0, None, 2));
+    assert_eq!(simulation.call(BOUND, Which)?, (2.0, Some(Duration::from_millis(500)), 2));
     let told = changes(&all);
     let paths: Vec<_> = told.iter().map(|(path, ..)| *path).collect();
     assert_eq!(
@@ -87,8 +70,10 @@ fn a_set_that_is_refused_in_the_middle_changes_nothing() -> Result<(), Failure> 
 
 #[test]
 fn a_command_sets_all_or_none() -> Result<(), Failure> {
-    let mut simulation = Mixer::builder().simulate()?;
-    let execution = simulation.command(mixer::command::set_both, NoArguments)?;
+    let mut builder = Tuned::builder();
+    builder.options(tuned::command::tune).run = set_both;
+    let mut simulation = builder.simulate()?;
+    let execution = simulation.command(tuned::command::tune, NoArguments)?;
     simulation.run_for(Duration::from_millis(10));
     assert!(execution.try_result().is_some_and(|result| result.is_err()));
     assert_eq!(values(&simulation), (7.0, 7, "one".to_owned()));
@@ -99,7 +84,7 @@ fn a_command_sets_all_or_none() -> Result<(), Failure> {
 #[test]
 fn a_set_is_seen_as_a_whole() {
     within(60, || {
-        let running = Mixer::builder().start().expect("it starts");
+        let running = Tuned::builder().start().expect("it starts");
         let is_over = AtomicBool::new(false);
         std::thread::scope(|scope| {
             let setters: Vec<_> = (0..3)
@@ -108,7 +93,7 @@ fn a_set_is_seen_as_a_whole() {
                     scope.spawn(move || {
                         for round in 0..500 {
                             let value = (thread * 80 + round % 80) as i64;
-                            let set = [mixer::param::count.to(value), mixer::param::gain.to(value as f64)];
+                            let set = [tuned::param::count.to(value), tuned::param::gain.to(value as f64)];
                             running.set_parameters(set).expect("they are in range");
                         }
                     })
@@ -137,14 +122,14 @@ fn a_set_is_seen_as_a_whole() {
 
 #[test]
 fn a_set_is_one_entry_of_the_journal_and_the_same_in_a_replay() -> Result<(), Failure> {
-    let mut builder = Mixer::builder();
+    let mut builder = Tuned::builder();
     let lines = journal(&mut builder);
     let mut simulation = builder.simulate()?;
     let all = simulation.subscribe_any(Select::Below("param"), None, Overflow::default());
     simulation.run_for(Duration::from_millis(10));
-    simulation.set_parameters([mixer::param::count.to(2), mixer::param::gain.to(2.0)])?;
-    assert!(simulation.set_parameters([mixer::param::count.to(3), mixer::param::gain.to(1e8)]).is_err());
-    simulation.set_parameter(mixer::param::gain, 4.0)?;
+    simulation.set_parameters([tuned::param::count.to(2), tuned::param::gain.to(2.0)])?;
+    assert!(simulation.set_parameters([tuned::param::count.to(3), tuned::param::gain.to(1e8)]).is_err());
+    simulation.set_parameter(tuned::param::gain, 4.0)?;
     simulation.run_for(Duration::from_millis(10));
     simulation.stop();
     let first = changes(&all);
@@ -156,9 +141,9 @@ fn a_set_is_one_entry_of_the_journal_and_the_same_in_a_replay() -> Result<(), Fa
         _ => None,
     });
     assert_eq!(sizes.collect::<Vec<_>>(), [2, 1]);
-    let mut replay = Mixer::builder().replay()?;
+    let mut replay = Tuned::builder().replay()?;
     let all = replay.subscribe_any(Select::Below("param"), None, Overflow::default());
-    replay.play(read_back::<Mixer>(&lines)?)?;
+    replay.play(read_back::<Tuned>(&lines)?)?;
     assert_eq!(values(&replay), (4.0, 2, "one".to_owned()));
     assert_eq!(changes(&all), first);
     replay.stop();
@@ -168,19 +153,19 @@ fn a_set_is_one_entry_of_the_journal_and_the_same_in_a_replay() -> Result<(), Fa
 /// A parameter may have each end of its range and not the next number beyond it, alone or among others.
 #[test]
 fn the_ends_of_a_range_belong_to_it() -> Result<(), Failure> {
-    let simulation = Mixer::builder().simulate()?;
-    let values = || (simulation.parameter(mixer::param::share), simulation.parameter(mixer::param::level));
+    let simulation = Tuned::builder().simulate()?;
+    let values = || (simulation.parameter(tuned::param::share), simulation.parameter(tuned::param::level));
     for (share, level) in [(-0.5, -3), (0.75, 4)] {
         simulation.set_parameters([("param/share", share.into()), ("param/level", level.into())])?;
         assert_eq!(values(), (share, level));
         let beyond: f64 = share.signum() * share.abs().next_up();
         for wrong in [beyond, f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-            assert!(simulation.set_parameter(mixer::param::share, wrong).is_err(), "{wrong}");
+            assert!(simulation.set_parameter(tuned::param::share, wrong).is_err(), "{wrong}");
             let set = [("param/level", 0.into()), ("param/share", wrong.into())];
             assert!(simulation.set_parameters(set).is_err(), "{wrong}");
         }
         for wrong in [level + level.signum(), i64::MIN, i64::MAX] {
-            assert!(simulation.set_parameter(mixer::param::level, wrong).is_err(), "{wrong}");
+            assert!(simulation.set_parameter(tuned::param::level, wrong).is_err(), "{wrong}");
             let set = [("param/share", 0.0.into()), ("param/level", wrong.into())];
             assert!(simulation.set_parameters(set).is_err(), "{wrong}");
         }
@@ -208,7 +193,6 @@ impl Clone for SlowOptions {
 static TUNED: Mutex<(Vec<f64>, Option<bool>)> = Mutex::new((Vec::new(), None));
 
 /// Tunes itself as it starts.
-#[derive(Debug)]
 pub(crate) struct Tuning;
 
 impl Sensor for Tuning {

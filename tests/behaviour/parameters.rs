@@ -14,7 +14,6 @@ pub(crate) struct BoundOptions {
 }
 
 /// Says what its options are.
-#[derive(Debug)]
 pub(crate) struct Bound(BoundOptions);
 
 impl Estimator for Bound {
@@ -66,10 +65,17 @@ fn knob(context: &ServiceContext) -> Result<Update, Fault> {
 }
 
 robot! {
-    robot Tuned;
-    parameters { gain: f64 = 1.0; timeout: f64 = 0.5 s; count: i64 = 7; }
-    commands { tune: Task(run = tune) { allowed_states: [disarmed]; } }
-    bridges { bridge knob: Pulse(init = knob) { rate: 1 kHz; } }
+    pub(crate) robot Tuned;
+    parameters {
+        gain: f64 = 1.0, range: 0.0..=1000000000.0;
+        timeout: f64 = 0.5 s;
+        count: i64 = 1;
+        name: String = "one";
+        share: f64 = 0.25, range: -0.5..=0.75;
+        level: i64 = 1, range: -3..=4;
+    }
+    commands { tune: Task { allowed_states: [disarmed]; } }
+    bridges { bridge knob: Pulse() { rate: 1 kHz; } }
     link base {
         sensor number: External<Number>() {
             estimator bound: Bound(gain = param::gain, timeout = param::timeout, count = param::count);
@@ -77,12 +83,14 @@ robot! {
     }
 }
 
-const BOUND: EstimatorHandle<Tuned, Bound, Number> = tuned::sensor::base::number::bound;
+pub(crate) const BOUND: EstimatorHandle<Tuned, Bound, Number> = tuned::sensor::base::number::bound;
 
 #[test]
 fn changes_are_published_in_their_order_and_the_last_one_holds() {
     within(60, || {
-        let builder = Tuned::builder();
+        let mut builder = Tuned::builder();
+        builder.options(tuned::command::tune).run = tune;
+        builder.options(tuned::bridge::knob).init = knob;
         let roomy = Overflow::DropOldest { capacity: 1 << 16 };
         let changes = builder.subscribe_with(tuned::param::gain, roomy);
         let running = builder.start().expect("it starts");
@@ -115,7 +123,7 @@ fn changes_are_published_in_their_order_and_the_last_one_holds() {
 fn what_an_option_cannot_hold_becomes_the_nearest_it_can() -> Result<(), Failure> {
     let simulation = Tuned::builder().simulate()?;
     let ask = |simulation: &Simulation<Tuned>| simulation.call(BOUND, Which).map_err(|fault| fault.to_string());
-    assert_eq!(ask(&simulation)?, (1.0, Some(Duration::from_millis(500)), 7));
+    assert_eq!(ask(&simulation)?, (1.0, Some(Duration::from_millis(500)), 1));
     simulation.set_parameter(tuned::param::timeout, -1.0)?;
     simulation.set_parameter(tuned::param::count, i64::MAX)?;
     for wrong in [f64::NAN, f64::INFINITY, -1.0] {

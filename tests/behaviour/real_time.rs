@@ -47,7 +47,6 @@ fn sensors_run_on_threads_of_their_own_and_stop_on_request() -> Result<(), Start
 }
 
 /// Wants to be called every two milliseconds, and counts its calls.
-#[derive(Debug)]
 pub(crate) struct Checking {
     context: ActuatorContext,
     next: MonotonicTime,

@@ -16,7 +16,6 @@ struct RampOptions {
 }
 
 /// Counts its messages by its step, and fails once in a life.
-#[derive(Debug)]
 struct Ramp {
     options: RampOptions,
     messages: u32,
@@ -51,7 +50,7 @@ impl Estimator for Ramp {
 }
 
 /// Emits where the driver was, as [`Spotter`] does, one metre higher.
-#[derive(Debug, Default)]
+#[derive(Default)]
 struct Above(Spotter, MonotonicTime);
 
 impl Estimator for Above {

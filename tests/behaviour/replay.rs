@@ -18,7 +18,6 @@ pub(crate) trait OnBadDay: Payload {
 }
 
 /// Sensor on a bad day.
-#[derive(Debug)]
 pub(crate) struct BadDay<T = Number>(Random, u32, f64, PhantomData<fn() -> T>);
 
 /// Options of [`BadDay`].
@@ -60,7 +59,6 @@ impl OnBadDay for Number {
 }
 
 /// Passes on; negative numbers diverge, −20 panics, −19 is an error; beyond 970 it works for a while.
-#[derive(Debug)]
 pub(crate) struct Moody {
     sum: f64,
     gain: f64,
@@ -104,7 +102,6 @@ impl Estimator for Moody {
 }
 
 /// Takes a while, and names where it leads.
-#[derive(Debug)]
 pub(crate) struct Settle;
 
 impl Command for Settle {

@@ -25,7 +25,6 @@ pub(crate) struct FanOptions {
 }
 
 /// Motor that is set to its speed whenever that changes, and registers what stops it once.
-#[derive(Debug)]
 pub(crate) struct Fan;
 
 impl Sensor for Fan {

@@ -56,7 +56,6 @@ pub(crate) struct EveryOptions {
     pub(crate) nick: Option<String>,
 }
 
-#[derive(Debug)]
 pub(crate) struct Every(EveryOptions);
 
 impl Estimator for Every {

@@ -128,7 +128,6 @@ fn a_threshold_switches_its_actuator_on_again_after_a_disarming() -> Result<(), 
 }
 
 /// Always commands the same velocity.
-#[derive(Debug)]
 struct Steady(bb_core::run::ActuatorLink<ActuatorCommand>, f64);
 
 #[derive(Clone, Debug, Options)]

@@ -20,7 +20,6 @@ struct Shaft {
 }
 
 /// A motor that is at once where it is told to be.
-#[derive(Debug)]
 struct GearMotor {
     context: ActuatorContext,
     shafts: Arc<Shafts>,
@@ -62,7 +61,6 @@ impl Actuator for GearMotor {
 }
 
 /// An encoder on the shaft of the motor.
-#[derive(Debug)]
 struct ShaftEncoder(&'static str, Arc<Shafts>);
 
 impl Sensor for ShaftEncoder {
@@ -90,7 +88,6 @@ impl JointCommand for Grip {
     }
 }
 
-#[derive(Debug)]
 struct Gripper;
 
 impl Actuator for Gripper {
@@ -142,10 +139,6 @@ robot! {
 }
 
 const ARM: &str = "actuator/base/arm/motor";
-
-fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
-    crate::components::lock(mutex)
-}
 
 fn armed() -> Result<(Simulation<Geared>, Arc<Shafts>), Failure> {
     let simulation = armed_simulation(Geared::builder());
