@@ -104,10 +104,6 @@ fn result(execution: &bb_core::component::DynamicExecution) -> Option<Result<Str
     execution.try_result().map(|result| result.map_err(|error| error.to_string()))
 }
 
-fn refused<T>(result: Result<T, Fault>) -> String {
-    result.map(drop).expect_err("it is refused").to_string()
-}
-
 #[test]
 fn commands_are_listed_with_what_they_take_and_give() -> Result<(), StartError> {
     let simulation = Open::builder().simulate()?;
@@ -140,12 +136,12 @@ fn a_command_is_started_followed_and_cancelled_by_path() -> Result<(), Failure> 
     let mut simulation = Open::builder().simulate()?;
     let bus = simulation.bus();
     let goal = r#"{"name": "dock", "speed": 0.5, "stops": [1, 2, 3]}"#;
-    assert_eq!(
-        refused(bus.start_command("command/go", goal)),
-        "`go` is refused: it is not allowed in the state `disarmed`"
+    assert_refused(
+        bus.start_command("command/go", goal),
+        "`go` is refused: it is not allowed in the state `disarmed`",
     );
     let fast = r#"{"name": "dock", "speed": 2.5, "stops": []}"#;
-    assert_eq!(refused(bus.start_command("command/go", fast)), "speed: expected a number from -1 to 2, found 2.5");
+    assert_refused(bus.start_command("command/go", fast), "speed: expected a number from -1 to 2, found 2.5");
     assert_eq!(bus.arm(), Ok(()));
     assert_eq!((bus.safety(), bus.state()), (Safety::Armed, "idle"));
     let events = simulation.subscribe(open::command::go);
@@ -186,12 +182,14 @@ fn arguments_that_do_not_fit_are_refused_with_the_field() -> Result<(), StartErr
         (r#"{"name": "dock", "stops": []}"#, "speed"),
         (r#"{"name": "dock", "speed": 1, "stops": [1, 300]}"#, "stops[1]"),
     ] {
-        let error = refused(bus.start_command("command/go", arguments));
+        let error = bus.start_command("command/go", arguments).expect_err("it does not fit").to_string();
         assert!(error.contains(field), "{arguments}: {error}");
     }
     assert!(bus.start_command("command/go", "{").is_err());
-    let near = refused(bus.start_command("command/og", ""));
-    assert_eq!(near, "no command is at `command/og`; did you mean `command/go`?");
+    assert_refused(
+        bus.start_command("command/og", ""),
+        "no command is at `command/og`; did you mean `command/go`?",
+    );
     let go = simulation.report().commands.into_iter().find(|command| command.name == "go").map(|go| go.started);
     assert_eq!(go, Some(0), "none was started");
     Ok(())
@@ -271,8 +269,7 @@ fn an_execution_by_path_may_be_awaited() -> Result<(), Failure> {
     });
     assert_eq!(ended?, r#"{"name":"dock","stops":2}"#);
     let failing = bus.start_command("command/go", &goal.replace("0.5", "-0.5"))?;
-    let failed = runtime.block_on(failing).expect_err("it cannot go back").to_string();
-    assert_eq!(failed, "the command failed: it cannot go back");
+    assert_refused(runtime.block_on(failing), "the command failed: it cannot go back");
     running.stop().ok()?;
     Ok(())
 }

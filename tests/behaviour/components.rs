@@ -402,6 +402,7 @@ macro_rules! stateless {
         }
     )* };
 }
+#[allow(unused_imports, reason = "other binaries of tests take a part of this file")]
 pub(crate) use stateless;
 
 stateless! {
@@ -503,6 +504,17 @@ pub(crate) fn armed<R: Robot>(builder: Builder<R>) -> Running<R> {
 /// The faults of a report, as it writes them.
 pub(crate) fn told(report: &Report) -> Vec<String> {
     report.faults.iter().map(ToString::to_string).collect()
+}
+
+/// Asserts that something is refused, and that the error says so.
+#[track_caller]
+pub(crate) fn assert_refused<T, E: std::fmt::Display>(result: Result<T, E>, says: &str) {
+    assert_eq!(result.map(drop).map_err(|error| error.to_string()), Err(says.to_owned()));
+}
+
+/// Times in milliseconds and numbers of the messages that wait in a subscription.
+pub(crate) fn timed(numbers: &Subscription<Number>) -> Vec<(i64, f64)> {
+    numbers.drain().map(|number| (number.monotonic_time.as_nanos() / 1_000_000, number.0)).collect()
 }
 
 /// Runs tests that wait most of their time on a thread each.

@@ -215,8 +215,7 @@ fn an_actuator_moves_only_while_armed_and_is_made_safe() -> Result<(), Failure> 
     let builder = Commanded::builder();
     let mut simulation = builder.simulate()?;
     let servo = commanded::actuator::base::pan::servo;
-    let error = simulation.actuate(servo, Number(1.0)).expect_err("it is disarmed").to_string();
-    assert_eq!(error, "the robot is not armed (disarmed)");
+    assert_refused(simulation.actuate(servo, Number(1.0)), "the robot is not armed (disarmed)");
     let seen = simulation.subscribe_any(Select::Path(servo.path()), None, Overflow::default());
     simulation.arm().expect("it may be armed");
     simulation.actuate(servo, Number(1.0))?;

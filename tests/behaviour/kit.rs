@@ -1,4 +1,4 @@
-//! What the tests of this binary are written with: the kit of components and its robot, what hangs and what watches them, and journals.
+//! Imports of the tests of this binary: the kit of components and its robot, gates, and what records and replays.
 
 pub(crate) use crate::components::*;
 pub(crate) use crate::gate::*;

@@ -113,11 +113,6 @@ impl Estimator for Middle {
     }
 }
 
-/// Times in ms and numbers of all waiting messages.
-fn timed(subscription: &Subscription<Number>) -> Vec<(i64, f64)> {
-    subscription.drain().map(|number| (number.monotonic_time.as_nanos() / 1_000_000, number.0)).collect()
-}
-
 /// A reply with several messages of one output: each is published, taken and recorded by itself, in their order.
 #[test]
 fn one_reply_may_emit_any_number_at_an_output() -> Result<(), Failure> {

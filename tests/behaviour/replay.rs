@@ -266,7 +266,7 @@ pub(crate) fn same_again<R: Robot>(
     builder: impl Fn() -> Builder<R>,
     run: impl FnOnce(Builder<R>) -> Result<Report, Failure>,
 ) -> Result<(Published, Report), Failure> {
-    run_again(builder, run, |entries| Ok(entries))
+    run_again(builder, run, Ok)
 }
 
 /// Runs a robot, and once more from what a file would hold of its journal: all that is published and counted is the same.

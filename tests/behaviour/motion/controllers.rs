@@ -177,15 +177,14 @@ fn another_controller_takes_the_place_of_a_declared_one() -> Result<(), Failure>
         off_velocity: 0.0,
     };
     builder.replace_service::<ThresholdController>("controller/hold", threshold)?;
-    let error = builder.simulate().expect_err("another payload").to_string();
-    assert_eq!(
-        error,
-        "controller/hold cannot start: its replacement publishes `ThresholdState`, and what is declared publishes `PidState`"
-    );
+    let says = "controller/hold cannot start: its replacement publishes `ThresholdState`, and what is declared publishes `PidState`";
+    assert_refused(builder.simulate(), says);
     let refused = SteadyOptions { velocity: 3.0 };
     let mut builder = simulated()?;
     builder.replace_service::<Steady>("controller/hold", refused)?;
-    let error = builder.simulate().expect_err("its options are wrong").to_string();
-    assert_eq!(error, "controller/hold cannot start: option `velocity` is 3, but must be in -1.0..=1.0");
+    assert_refused(
+        builder.simulate(),
+        "controller/hold cannot start: option `velocity` is 3, but must be in -1.0..=1.0",
+    );
     Ok(())
 }

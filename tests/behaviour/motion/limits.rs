@@ -68,12 +68,10 @@ fn a_trajectory_beyond_a_limit_is_refused() -> Result<(), Failure> {
     let expected = format!("the position 2 is beyond the limit {} of the joint", 90_f64.to_radians());
     assert_eq!(error, ActuatorError::OutOfBounds(expected));
     let fast = trajectory(vec![point(0.0, 0.0, 0), point(0.5, -1.5, 500), point(1.0, 0.0, 5000)]);
-    let error = simulation.actuate(motor, fast.into()).expect_err("it is too fast").to_string();
-    assert_eq!(error, "the velocity -1.5 is beyond the limit -1 of the joint");
+    assert_refused(simulation.actuate(motor, fast.into()), "the velocity -1.5 is beyond the limit -1 of the joint");
     // Nor is there a way around the limits.
     let jump = trajectory(vec![point(0.0, 0.0, 0), point(1.0, 0.0, 500)]);
-    let error = simulation.actuate(motor, jump.into()).expect_err("it is too fast between its points").to_string();
-    assert_eq!(error, "the velocity 2 is beyond the limit 1 of the joint");
+    assert_refused(simulation.actuate(motor, jump.into()), "the velocity 2 is beyond the limit 1 of the joint");
     let mut twice = trajectory(vec![point(0.0, 0.0, 0), point(0.5, 0.0, 5000)]);
     twice.joint_names = ["slew".to_owned(), "slew".to_owned()].into();
     twice.points = twice

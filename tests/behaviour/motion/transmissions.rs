@@ -281,11 +281,8 @@ fn a_simulated_joint_takes_the_place_of_a_motor() -> Result<(), Failure> {
 fn a_command_that_says_nothing_of_motors_is_refused_at_a_transmission() -> Result<(), Failure> {
     let (simulation, _) = armed()?;
     let grip = geared::actuator::base::arm::hand::wrist::palm::finger::grip;
-    let error = simulation.actuate(grip, Grip(1.0)).expect_err("it has no `at_motor`").to_string();
-    assert_eq!(
-        error,
-        "the command could not be converted to the motor of the joint: `Grip` does not define `JointCommand::at_motor`"
-    );
+    let says = "the command could not be converted to the motor of the joint: `Grip` does not define `JointCommand::at_motor`";
+    assert_refused(simulation.actuate(grip, Grip(1.0)), says);
     Ok(())
 }
 
