@@ -133,11 +133,8 @@ fn the_journal_of_a_robot_that_was_killed_is_replayed_up_to_where_it_breaks_off(
             .skip_while(|round| *round < rounds);
         assert!(reached.next().is_some(), "it runs until it is killed");
         // The recorder may lag behind.
-        let start = std::time::Instant::now();
-        while std::fs::metadata(&file).map_or(0, |file| file.len()) < 30_000 + 20 * u64::from(rounds) {
-            assert!(start.elapsed() < Duration::from_secs(20), "nothing is recorded");
-            std::thread::sleep(Duration::from_millis(1));
-        }
+        let size = || std::fs::metadata(&file).map_or(0, |file| file.len());
+        wait_until("much is recorded", || size() >= 30_000 + 20 * u64::from(rounds));
         // At any moment, in the middle of a line too.
         std::thread::sleep(Duration::from_micros(u64::from(rounds) * 37 % 5000));
         child.kill()?;

@@ -16,8 +16,8 @@ pub(crate) enum Kind {
     Endless,
 }
 
-static MAY_GO_ON: AtomicBool = AtomicBool::new(false);
-static BLOCKS: AtomicBool = AtomicBool::new(false);
+static HERE: Gate = Gate::new();
+static ARMING: Gate = Gate::new();
 
 /// Command that behaves as its arguments say.
 pub(crate) struct Misbehave;
@@ -37,12 +37,7 @@ impl Command for Misbehave {
                 })
                 .await;
             }
-            Kind::Block => {
-                BLOCKS.store(true, Ordering::SeqCst);
-                while !MAY_GO_ON.load(Ordering::SeqCst) {
-                    std::thread::sleep(Duration::from_millis(1));
-                }
-            }
+            Kind::Block => HERE.pass("a command that blocks"),
             Kind::Endless => context.sleep(Duration::from_secs(3_600_000)).await,
         }
         Ok(Outcome::done(()))
@@ -61,19 +56,6 @@ fn nested(_: CommandContext) -> Doing {
     Box::pin(std::future::ready(Ok(Outcome::done(()))))
 }
 
-/// Is done, and so arms, once the test releases it.
-fn slow_arm(_: CommandContext) -> Doing {
-    Box::pin(async {
-        ARMING.store(true, Ordering::SeqCst);
-        while ARMING.load(Ordering::SeqCst) {
-            std::thread::sleep(Duration::from_millis(1));
-        }
-        Ok(Outcome::done(()))
-    })
-}
-
-static ARMING: AtomicBool = AtomicBool::new(false);
-
 robot! {
     robot Unruly;
 
@@ -83,7 +65,7 @@ robot! {
         misbehave: Misbehave { category: many; timeout: 200 ms; allowed_states: [disarmed, idle, executing]; }
         patient: Misbehave { category: many; allowed_states: [disarmed, idle, executing]; }
         nested: Task(run = nested) { category: others; allowed_states: [disarmed, idle, executing]; }
-        slow_arm: Task<true>(run = slow_arm) { category: others; allowed_states: [disarmed]; }
+        slow_arm: Task<true>(run = |_| ARMING.stuck("a command that arms")) { category: others; allowed_states: [disarmed]; }
     }
 
     link base { sensor number: External<Number>(); }
@@ -118,8 +100,9 @@ fn a_command_that_wakes_itself_for_ever_does_not_hold_up_time() {
 fn a_command_that_does_not_come_back_does_not_keep_the_robot_from_stopping() {
     within(60, || {
         let running = Unruly::builder().start().expect("it starts");
+        HERE.close("a command that blocks");
         let blocked = running.command(unruly::command::patient, Kind::Block).expect("it is allowed");
-        wait_until("it blocks", || BLOCKS.load(Ordering::SeqCst));
+        HERE.wait_for(1);
         let report = running.stop();
         assert_eq!(blocked.wait(), Err(CommandError::Cancelled));
         let faults: Vec<_> = report.faults.iter().map(ToString::to_string).collect();
@@ -127,7 +110,7 @@ fn a_command_that_does_not_come_back_does_not_keep_the_robot_from_stopping() {
             faults.iter().any(|fault| fault == "command/patient failed: did not come back when the robot stopped"),
             "{faults:?}"
         );
-        MAY_GO_ON.store(true, Ordering::SeqCst);
+        HERE.open();
     });
 }
 
@@ -174,11 +157,12 @@ fn ten_thousand_commands_end_at_their_time() {
 fn one_that_arms_does_not_arm_a_robot_that_was_disarmed_meanwhile() {
     within(60, || {
         let running = Unruly::builder().start().expect("it starts");
+        ARMING.close("a command that arms");
         let arming = running.command(unruly::command::slow_arm, NoArguments).expect("it is disarmed");
-        wait_until("it runs", || ARMING.load(Ordering::SeqCst));
+        ARMING.wait_for(1);
         // Somebody else arms and disarms it meanwhile.
         assert_eq!((running.arm(), running.disarm()), (Ok(()), Ok(())));
-        ARMING.store(false, Ordering::SeqCst);
+        ARMING.open();
         assert_eq!(arming.wait(), Err(CommandError::Cancelled));
         assert_eq!(running.safety(), Safety::Disarmed);
     });

@@ -26,6 +26,13 @@ robot! {
     }
 }
 
+/// A robot whose commands hang.
+fn stuck(at: fn(CommandContext) -> Doing) -> Running<Ill> {
+    let mut builder = Ill::builder();
+    builder.options(ill::command::stuck).run = at;
+    armed(builder)
+}
+
 #[test]
 fn health_commands_that_hang_keep_none_that_disarms_from_running() {
     static HERE: Gate = Gate::new();
@@ -53,9 +60,7 @@ fn a_cancelled_command_that_never_began_is_gone_though_others_hang_in_every_thre
     static HERE: Gate = Gate::new();
     within(120, || {
         HERE.close("here");
-        let mut builder = Ill::builder();
-        builder.options(ill::command::stuck).run = |_| HERE.stuck("here");
-        let running = armed(builder);
+        let running = stuck(|_| HERE.stuck("here"));
         (0..560).for_each(|_| drop(running.command(ill::command::stuck, NoArguments).expect("it starts")));
         HERE.wait_for(512);
         assert_eq!(running.disarm(), Ok(()));
@@ -71,9 +76,7 @@ fn a_command_that_hangs_is_not_started_for_ever_however_often_it_is_cancelled() 
     static HERE: Gate = Gate::new();
     within(60, || {
         HERE.close("here");
-        let mut builder = Ill::builder();
-        builder.options(ill::command::stuck).run = |_| HERE.stuck("here");
-        let running = armed(builder);
+        let running = stuck(|_| HERE.stuck("here"));
         let start = || running.command(ill::command::stuck, NoArguments);
         let mut started = 0;
         let refusal = loop {
@@ -102,10 +105,8 @@ fn commands_that_hang_keep_neither_ticks_nor_health_commands_from_running_and_ar
 {
     static HERE: Gate = Gate::new();
     HERE.close("here");
-    let mut builder = Ill::builder();
-    builder.options(ill::command::stuck).run = |_| HERE.stuck("here");
-    let faults = builder.subscribe(system::Faults);
-    let running = armed(builder);
+    let running = stuck(|_| HERE.stuck("here"));
+    let faults = running.subscribe(system::Faults);
     for _ in 0..520 {
         drop(running.command(ill::command::stuck, NoArguments)?);
     }

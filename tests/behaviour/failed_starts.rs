@@ -76,17 +76,12 @@ fn sensing<const RIG: usize>(backoff: Duration) -> Builder<Plain> {
     builder
 }
 
-fn arm<R: bb_core::Robot>(robot: &Running<R>) {
-    assert_eq!(robot.arm(), Ok(()));
-}
-
 #[test]
 fn a_callback_that_fails_is_a_fault_and_stays_for_the_next_disarming() {
     within(60, || {
         let builder = sensing::<FAILS>(Duration::from_millis(100));
         let faults = builder.subscribe(system::Faults);
-        let robot = builder.start().expect("it starts");
-        arm(&robot);
+        let robot = armed(builder);
         let mut failed = 0;
         while failed < 2 {
             let fault = faults.recv_timeout(Duration::from_secs(20)).expect("it is reported");
@@ -113,8 +108,7 @@ fn a_robot_that_is_disarmed_while_such_callbacks_run_waits_for_them() {
     let rig = &RIGS[DISARMS];
     within(60, move || {
         rig.gate.close("here");
-        let robot = sensing::<DISARMS>(Duration::from_secs(10)).start().expect("it starts");
-        arm(&robot);
+        let robot = armed(sensing::<DISARMS>(Duration::from_secs(10)));
         // Both are run at once, each on a thread of its own, though each hangs.
         rig.gate.wait_for(2);
         let live = robot.live();
@@ -137,8 +131,7 @@ fn an_actuator_whose_failed_init_hangs_in_its_callbacks_keeps_no_disarming_waiti
         let actuator = builder.options(SERVO);
         (actuator.init, actuator.command) = (servo, |_| Err(Fault::new("unplugged")));
         builder.supervision().first_backoff = Duration::from_millis(1);
-        let robot = builder.start().expect("it starts");
-        arm(&robot);
+        let robot = armed(builder);
         while robot.actuate(SERVO, Number(1.0)).is_ok() {}
         let live = robot.live();
         let sends = std::thread::spawn(move || {
@@ -161,8 +154,7 @@ fn a_dead_device_whose_callbacks_hang_is_not_started_again_before_they_return() 
         rig.gate.close("here");
         let builder = sensing::<DIES>(Duration::from_millis(1));
         let faults = builder.subscribe(system::Faults);
-        let robot = builder.start().expect("it starts");
-        arm(&robot);
+        let robot = armed(builder);
         let mut expected = vec![
             "a disarm callback of its last attempt to start has not returned",
             "did not come back from disarming in time",
@@ -178,11 +170,9 @@ fn a_dead_device_whose_callbacks_hang_is_not_started_again_before_they_return() 
         assert!(robot.disarm().is_err() && robot.force_disarm().is_err());
         assert_eq!((robot.safety(), rig.entered()), (Safety::Disarmed, 2), "no thread for each time");
         assert_eq!(rig.made.load(Ordering::SeqCst), 2);
-        arm(&robot);
+        assert_eq!(robot.arm(), Ok(()));
         rig.gate.open();
-        while rig.made.load(Ordering::SeqCst) < 3 {
-            std::thread::sleep(Duration::from_millis(1));
-        }
+        wait_until("it is made again", || rig.made.load(Ordering::SeqCst) == 3);
         assert_eq!(robot.safety(), Safety::Armed);
     });
 }

@@ -137,12 +137,9 @@ fn a_robot_that_has_ended_keeps_nothing_open() -> Result<(), Failure> {
         simulation.stop();
         Guarded::builder().start()?.stop();
     }
-    within(10, move || {
-        // Threads of a real run may still be on their way out.
-        while PORTS.load(Ordering::SeqCst) != before || Arc::strong_count(&kept) != 1 {
-            std::thread::sleep(Duration::from_millis(1));
-        }
-    });
+    // Threads of a real run may still be on their way out.
+    let is_closed = || PORTS.load(Ordering::SeqCst) == before && Arc::strong_count(&kept) == 1;
+    wait_until("nothing is open", is_closed);
     Ok(())
 }
 

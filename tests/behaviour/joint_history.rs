@@ -1,6 +1,6 @@
 //! Transforms of messages that are older than the history of a joint, or ahead of the clock.
 
-use crate::joints::{Pixel, joint};
+use crate::joints::{CAMERA, LIFT, Pixel, Reach, SHOULDER, joint, reach};
 use crate::kit::*;
 use bb_core::component::InputTransforms;
 
@@ -15,7 +15,7 @@ pub(crate) struct Kept<'a> {
 
 /// Says where its camera was when that saw something last.
 #[derive(Default)]
-struct Keeper {
+pub(crate) struct Keeper {
     camera_x: f64,
 }
 
@@ -39,50 +39,32 @@ impl Estimator for Keeper {
     }
 }
 
-robot! {
-    robot Lookout;
-
-    link base {
-        sensor imu: External<Pixel>();
-        estimator keeper: Keeper() {
-            input imu: sensor::base::imu, driver;
-            input camera: sensor::base::lift::carriage::camera;
-        }
-        joint lift: prismatic {
-            axis: x;
-            limit: { lower: 0 m, upper: 2 m, velocity: 1 m/s, effort: 10 N };
-            sensor encoder: External<JointState>();
-            link carriage { sensor camera: External<Pixel>(); }
-        }
-    }
-}
-
 #[test]
 fn a_message_that_is_older_than_the_history_of_a_joint_stays_where_it_was_seen() -> Result<(), StartError> {
-    let mut builder = Lookout::builder();
+    let mut builder = Reach::builder();
     builder.joints().history = Duration::from_millis(100);
-    let keeper = builder.subscribe(lookout::estimator::base::keeper);
+    let keeper = builder.subscribe(reach::estimator::base::keeper);
     let mut simulation = builder.simulate()?;
     for millis in 1..=1000 {
         let position = 0.3 + millis as f64 * 1e-3;
-        let state = JointState { position, velocity: None, effort: None };
-        simulation.publish(lookout::sensor::base::lift::encoder, at(millis), state);
+        simulation.publish(SHOULDER, at(millis), joint(0.0));
+        simulation.publish(LIFT, at(millis), joint(position));
         if millis == 1 {
-            simulation.publish(lookout::sensor::base::lift::carriage::camera, at(1), Pixel(1.0));
+            simulation.publish(CAMERA, at(1), Pixel(1.0));
         }
         if millis % 50 == 2 {
-            simulation.publish(lookout::sensor::base::imu, at(millis), Pixel(0.0));
+            simulation.publish(reach::sensor::base::imu, at(millis), Pixel(0.0));
         }
     }
     let heard: Vec<_> = keeper.drain().map(|pixel| pixel.0).collect();
     assert_eq!(heard, [0.301; 20]);
     // One that was never placed while the joints were known is not placed later.
-    let camera = lookout::sensor::base::lift::carriage::camera;
-    simulation.publish(camera, at(800), Pixel(1.0));
-    simulation.publish(lookout::sensor::base::imu, at(1001), Pixel(0.0));
+    simulation.publish(CAMERA, at(800), Pixel(1.0));
+    simulation.publish(reach::sensor::base::imu, at(1001), Pixel(0.0));
     assert_eq!(keeper.drain().count(), 0);
     let report = simulation.report();
-    let drops = report.estimators[0].inputs[1].dropped(DropReason::NoTransform);
+    let keeper = report.estimator("estimator/base/keeper").expect("it is declared");
+    let drops = keeper.inputs[1].dropped(DropReason::NoTransform);
     assert_eq!(drops, 1);
     Ok(())
 }
@@ -93,20 +75,22 @@ fn a_message_that_is_older_than_the_history_of_a_joint_stays_where_it_was_seen()
 fn an_input_ahead_of_the_clock_costs_a_second_at_most() -> Result<(), StartError> {
     use DropReason::{ClockSkew, NoTransform, OutOfOrder};
     for (ahead, resumes) in [(900, 1_000), (1_000, 1_100), (1_001, 200)] {
-        let builder = Lookout::builder();
-        let seen = builder.subscribe(lookout::estimator::base::keeper);
+        let builder = Reach::builder();
+        let seen = builder.subscribe(reach::estimator::base::keeper);
         let health = builder.subscribe(system::Health);
         let mut simulation = builder.simulate()?;
         for millis in (0..1500).step_by(10) {
-            simulation.publish(lookout::sensor::base::lift::encoder, at(millis), joint(0.1));
+            simulation.publish(SHOULDER, at(millis), joint(0.0));
+            simulation.publish(LIFT, at(millis), joint(0.1));
             let stamp = if millis == 200 { millis + ahead } else { millis };
-            simulation.live().publish(lookout::sensor::base::lift::carriage::camera, at(stamp), Pixel(1.0));
-            simulation.publish(lookout::sensor::base::imu, at(millis), Pixel(0.0));
+            simulation.live().publish(CAMERA, at(stamp), Pixel(1.0));
+            simulation.publish(reach::sensor::base::imu, at(millis), Pixel(0.0));
         }
         let times: Vec<_> = seen.drain().map(|seen| seen.monotonic_time).collect();
         let expected = (0..200).chain(resumes..1500).step_by(10).map(at);
         assert!(times.iter().copied().eq(expected), "{ahead} ms ahead: {times:?}");
-        let changes: Vec<_> = health.drain().map(|change| (change.time, change.to)).collect();
+        let of_keeper = health.drain().filter(|change| change.estimator == "estimator/base/keeper");
+        let changes: Vec<_> = of_keeper.map(|change| (change.time, change.to)).collect();
         let report = simulation.stop();
         let keeper = report.estimator("estimator/base/keeper").expect("it is declared");
         let camera = &keeper.inputs[1];

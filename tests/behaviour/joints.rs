@@ -1,5 +1,6 @@
 //! States of joints, and the transforms across them.
 
+use crate::joint_history::Keeper;
 use crate::kit::*;
 use bb_core::component::{InputTransforms, JointPublisher};
 use bb_core::joints::{JointRefusal, LookupError};
@@ -112,6 +113,10 @@ robot! {
             input camera: sensor::base::shoulder::arm::lift::carriage::camera, optional;
             input lift: sensor::base::shoulder::arm::lift::encoder, optional;
             sync_tolerance: 20 ms;
+        }
+        estimator keeper: Keeper() {
+            input imu: sensor::base::imu, driver;
+            input camera: sensor::base::shoulder::arm::lift::carriage::camera;
         }
         estimator watch: Watch() { input lift: sensor::base::shoulder::arm::lift::encoder; }
         joint shoulder: continuous {

@@ -10,14 +10,12 @@ fn jam(_: f64) -> Done {
 }
 
 static CARRIED_OUT: AtomicU64 = AtomicU64::new(0);
-static HANGS: AtomicBool = AtomicBool::new(false);
-static IS_FREED: AtomicBool = AtomicBool::new(false);
+static HERE: Gate = Gate::new();
 
 /// Counts its commands, and hangs in a negative one until it is freed.
 fn count(number: f64) -> Done {
-    while number < 0.0 && !IS_FREED.load(Ordering::SeqCst) {
-        HANGS.store(true, Ordering::SeqCst);
-        std::thread::sleep(Duration::from_millis(1));
+    if number < 0.0 {
+        HERE.pass("a motor");
     }
     // Long enough for another thread to be between.
     std::thread::yield_now();
@@ -225,15 +223,14 @@ fn no_call_of_other_threads_outlives_a_session() -> Result<(), Failure> {
     }
     let session = running.session("page", Rights::ALL);
     let link = session.actuator::<Number>("actuator/base/pan/servo")?;
+    HERE.close("a motor");
     std::thread::scope(|scope| {
         let hangs = scope.spawn(|| link.send(Number(-1.0)));
-        while !HANGS.load(Ordering::SeqCst) {
-            std::thread::yield_now();
-        }
+        HERE.wait_for(1);
         session.end();
         assert!(session.set_parameter("param/gain", 0.0).is_err(), "the end does not wait");
         assert!(!session.end_within(Duration::from_millis(20)), "the motor hangs");
-        IS_FREED.store(true, Ordering::SeqCst);
+        HERE.open();
         assert!(session.end_within(Duration::from_secs(60)));
         assert!(hangs.join().expect("it does not panic").is_ok(), "what was begun before is completed");
     });

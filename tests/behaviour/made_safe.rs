@@ -268,9 +268,7 @@ fn what_an_init_has_started_that_fails_is_made_safe() {
             LATER.store(way, Ordering::SeqCst);
             let robot = start().expect("it starts");
             assert_eq!(robot.arm(), Ok(()));
-            while MADE.load(Ordering::SeqCst) < 2 {
-                std::thread::sleep(Duration::from_millis(1));
-            }
+            wait_until("it is made again", || MADE.load(Ordering::SeqCst) >= 2);
             std::thread::sleep(Duration::from_millis(50));
             assert_eq!(robot.safety(), Safety::Armed, "{way}: the fault of one component is no danger");
             assert_eq!((robot.disarm(), turning()), (Ok(()), 0), "{way}");

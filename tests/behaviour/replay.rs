@@ -1,6 +1,6 @@
 //! A run from a journal gives what the first run gave, bit for bit: outputs, transitions, drops.
 
-use crate::components::{Failure, GainOptions, Number, Replied, Seen, Snapshot, at, lock};
+use crate::components::{Doing, Failure, GainOptions, Number, Replied, Seen, Snapshot, Task, at, lock};
 use bb_core::journal::{Entry, Event, JournalReader};
 use bb_core::message::codec::{decode, encode};
 use bb_core::prelude::*;
@@ -102,22 +102,15 @@ impl Estimator for Moody {
 }
 
 /// Takes a while, and names where it leads.
-pub(crate) struct Settle;
-
-impl Command for Settle {
-    type Options = NoOptions;
-    type Arguments = NoArguments;
-    type Output = ();
-
-    async fn run(_: NoOptions, _: NoArguments, context: CommandContext) -> Result<Outcome<()>, Fault> {
+fn settle(context: CommandContext) -> Doing {
+    Box::pin(async move {
         context.sleep(Duration::from_millis(15)).await;
-        if let Some(gain) = context.health().map(|health| if health.to == HealthState::Healthy { 1.0 } else { 0.5 })
-        {
+        if let Some(health) = context.health() {
             // What a command sets follows from what came in, and is not in the journal.
-            context.set_parameter("param/gain", gain)?;
+            context.set_parameter("param/gain", if health.to == HealthState::Healthy { 1.0 } else { 0.5 })?;
         }
         Ok(Outcome::done(()).next_state(if context.now() > at(200) { "settled" } else { "idle" }))
-    }
+    })
 }
 
 robot! {
@@ -127,7 +120,7 @@ robot! {
     states { settled; }
     commands {
         arm: Arm;
-        settle: Settle { allowed_states: [idle, executing, settled]; cancel: all; }
+        settle: Task(run = settle) { allowed_states: [idle, executing, settled]; cancel: all; }
     }
 
     link base {
