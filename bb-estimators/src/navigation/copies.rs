@@ -15,8 +15,8 @@
 //!   most 20 s, takes over; one that loses a position is gone. "My place was wrong" and "these fixes have an offset" explain the data
 //!   equally well, so that time decides and not likelihood.
 //!
-//! Copies are never mixed: the estimate is that of one filter. A gap in the samples is bridged as `holding.rs` says, and fixes that
-//! scatter more than they state get the noise of their scatter (`scatter.rs`).
+//! Copies are never mixed: the estimate is that of one filter. A gap in the samples is bridged as `holding.rs` says, rest is found as
+//! `rest.rs` says, and fixes that scatter more than they state get the noise of their scatter (`scatter.rs`).
 
 mod filter;
 #[cfg(any(feature = "smoother", feature = "eskf"))]

@@ -52,6 +52,7 @@ impl<S: States, const N: usize> Copies<Eskf<S, N>> {
         self.newcomer = None;
         self.search.drop_neighbours();
         self.holding.interrupt();
+        self.rest.interrupt();
         self.scatter.interrupt();
     }
 
