@@ -9,10 +9,11 @@ use std::ops::Range;
 use std::path::Path;
 
 const FIX: &str = "sensor_msgs/msg/NavSatFix";
-/// An odometry beyond this moves, m/s or rad/s;
+/// Velocity beyond which an odometry moves, m/s or rad/s.
 const FASTEST: f64 = 0.05;
-/// and a fix this far, m, from those this time, s, before and after: at rest they scatter by less.
+/// Distance in m from the fixes that were [`SPAN_S`] before and after, beyond which a fix shows motion: at rest they scatter by less.
 const FARTHEST_M: f64 = 10.0;
+/// Time between two fixes that are compared, s.
 const SPAN_S: f64 = 8.0;
 /// Time before and after a message that moves, in which it counts as moving, ns.
 const MARGIN_NS: i64 = 1_000_000_000;

@@ -72,7 +72,8 @@ const IMPOSSIBLE: f64 = 10.0;
 /// The largest normalised innovation squared of a position, to each of whose variances [`SLACK`] is added: ten deviations and metres.
 pub(super) const FAR: f64 = 100.0;
 
-/// A body that is faster than this, m/s, and than `CLEARLY` deviations, moves; one that is slower by `PROBABLY` deviations does not.
+/// Speed in m/s beyond which a body moves, if it is also more than `CLEARLY` deviations; one that is below it by `PROBABLY` deviations is at
+/// rest.
 const MOVES: f64 = 0.5;
 const CLEARLY: f64 = 5.0;
 const PROBABLY: f64 = 2.0;

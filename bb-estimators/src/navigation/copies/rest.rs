@@ -2,8 +2,8 @@
 //!
 //! How much a body vibrates depends on the vehicle and its road, and an engine may idle. So the vibration is remembered of the last seconds
 //! in which the filter knew that the body moved, and of those in which it knew that it did not. A body that vibrates like these for three
-//! seconds, and not like those, is at rest, unless the filter's velocity or the gyroscope contradicts. A vehicle that moves as quietly as it
-//! rests, on rails or in the air, is never taken to be at rest, once it was seen to.
+//! seconds, and not like those, is at rest, unless the filter's velocity or the gyroscope contradicts. A vehicle that was seen to move as
+//! quietly as it rests, on rails or in the air, is not taken to be at rest.
 
 use nalgebra::{Matrix3, Vector3};
 
