@@ -17,8 +17,6 @@
 
 mod alignment;
 mod bounds;
-#[cfg(feature = "smoother")]
-mod camera;
 pub mod chi_square;
 mod consistency;
 #[cfg(feature = "alloc")]
@@ -27,6 +25,7 @@ mod covariance;
 pub mod eskf;
 #[cfg(feature = "runtime")]
 mod estimator;
+mod factor;
 mod fused;
 mod fusion;
 mod geodesy;
@@ -39,7 +38,7 @@ mod noise;
 pub mod planar;
 mod propagate;
 mod refusal;
-#[cfg(any(feature = "smoother", feature = "eskf"))]
+#[cfg(feature = "smoother")]
 pub mod smoother;
 mod state;
 #[cfg(any(feature = "smoother", feature = "eskf"))]
@@ -50,8 +49,6 @@ mod update;
 mod upkeep;
 
 pub use alignment::{Alignment, AlignmentParams};
-#[cfg(feature = "smoother")]
-pub use camera::{Camera, Seen, Undistorted};
 pub use consistency::{Consistency, nees};
 #[cfg(feature = "alloc")]
 pub use copies::{Copies, Ways};
@@ -61,6 +58,7 @@ pub use estimator::{
     Course, EskfEstimator, NavigationInputs, NavigationOptions, NavigationOutput, NavigationOutputs,
     NavigationStatus, Verdicts,
 };
+pub use factor::{Factor, NavigationFactor, Rows};
 pub use fused::Fused;
 pub use geodesy::{Geodetic, LocalFrame};
 pub use history::{Arrivals, History, Placed, Replayed};
@@ -73,10 +71,11 @@ pub use propagate::Propagate;
 pub use refusal::Refusal;
 #[cfg(feature = "autodiff")]
 pub use smoother::{Automatic, Differentiable, Expectation};
-#[cfg(any(feature = "smoother", feature = "eskf"))]
-pub use smoother::{Factor, Kernel, NavigationFactor, Preintegration, Rows};
 #[cfg(feature = "smoother")]
-pub use smoother::{FixedLagSmoother, LandmarkParams, Observation, Sighted, SmootherParams, Updated};
+pub use smoother::{
+    Camera, FixedLagSmoother, Kernel, LandmarkParams, Observation, Preintegration, Seen, Sighted, SmootherParams,
+    Undistorted, Updated,
+};
 pub use state::{
     ACCELEROMETER_BIAS, Aided, Complete, Estimate, GYROSCOPE_BIAS, Keyframe, NAVIGATED, NAVIGATION, Navigated,
     Navigation, Optional, POSITION, ROTATION, States, VELOCITY, Vehicle, offset,

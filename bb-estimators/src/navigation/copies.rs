@@ -19,7 +19,6 @@
 //! `rest.rs` says, and fixes that scatter more than they state get the noise of their scatter (`scatter.rs`).
 
 mod filter;
-#[cfg(any(feature = "smoother", feature = "eskf"))]
 mod flight;
 mod holding;
 mod newcomer;
@@ -175,7 +174,6 @@ impl<F: CopiedFilter> Copies<F> {
     }
 
     /// Number of times that another filter became the best.
-    #[cfg(feature = "smoother")]
     pub(in crate::navigation) fn changes(&self) -> u32 {
         self.changes
     }

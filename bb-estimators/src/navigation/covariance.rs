@@ -123,13 +123,11 @@ impl<const N: usize> Covariance<N> {
     }
 
     /// Multiplies the matrix.
-    #[cfg(feature = "alloc")]
     pub(in crate::navigation) fn multiply(&mut self, factor: f64) {
         self.matrix *= factor;
     }
 
     /// Adds a block between three states and three others or the same; its transpose is added too.
-    #[cfg(feature = "alloc")]
     pub(in crate::navigation) fn add(&mut self, row: usize, column: usize, block: &Matrix3<f64>) {
         let p = self.rows_mut();
         for i in 0..3 {

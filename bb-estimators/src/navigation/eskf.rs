@@ -32,15 +32,12 @@ mod start;
 mod tests;
 mod transport;
 
-#[cfg(feature = "alloc")]
 pub(super) use elsewhere::{UNMOORED, UNMOORED_HEADING, UNMOORED_SPEED};
-#[cfg(feature = "alloc")]
 pub(super) use filter::Doubt;
 pub use filter::Eskf;
 #[cfg(feature = "runtime")]
 pub(crate) use params::imu_params;
 pub use params::{EskfParams, GaussMarkov, ImuDensities};
-#[cfg(feature = "smoother")]
 pub(super) use propagation::{Transition, rows};
 pub use sample::ImuMean;
 pub(super) use sample::{LONGEST_GAP_S, seconds_between};

@@ -9,12 +9,10 @@ use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vect
 use super::math::{cos, sin};
 
 /// Heights possible on or above the Earth, m.
-#[cfg(any(feature = "runtime", feature = "smoother", feature = "eskf"))]
 pub(super) const HEIGHTS: core::ops::RangeInclusive<f64> = -1e4..=1e6;
 
 /// Largest distance of a filter from the origin of its frame, m. At that distance, down differs by 0.8 mrad, as much as a good
 /// accelerometer's bias.
-#[cfg(any(feature = "runtime", feature = "smoother", feature = "eskf"))]
 pub(super) const FARTHEST: f64 = 5000.0;
 
 /// A position on the Earth, WGS 84.
@@ -47,7 +45,6 @@ impl Geodetic {
     }
 
     /// Returns whether it is on or above the Earth. NaN is not.
-    #[cfg(any(feature = "runtime", feature = "smoother", feature = "eskf"))]
     pub(super) fn is_possible(&self) -> bool {
         self.latitude.abs() <= core::f64::consts::FRAC_PI_2
             && self.longitude.abs() <= core::f64::consts::TAU
@@ -118,7 +115,6 @@ impl LocalFrame {
     }
 
     /// The frame at a position that is too far from the origin of this one, at the height of that origin; `None` at any other.
-    #[cfg(any(feature = "runtime", feature = "smoother", feature = "eskf"))]
     pub(super) fn moved_on(&self, position: &Vector3<f64>) -> Option<Self> {
         let is_far = position.xy().norm() > FARTHEST;
         is_far.then(|| Self::new(Geodetic { height: self.origin.height, ..self.geodetic(position) }))

@@ -19,7 +19,6 @@ impl Noise {
     }
 
     /// A uniform sample.
-    #[cfg_attr(not(feature = "alloc"), expect(dead_code, reason = "tests of copies alone use it"))]
     pub(super) fn between(&mut self, low: f64, high: f64) -> f64 {
         let share: f64 = StandardUniform.sample(&mut self.0);
         low + (high - low) * share

@@ -33,55 +33,33 @@
 
 #[cfg(feature = "autodiff")]
 mod automatic;
-#[cfg(feature = "smoother")]
+mod camera;
 mod coupling;
-#[cfg(feature = "smoother")]
 mod elimination;
-#[cfg(feature = "smoother")]
 mod estimates;
-mod factor;
-#[cfg(feature = "smoother")]
 mod filter;
-#[cfg(feature = "smoother")]
 mod fusion;
-#[cfg(feature = "smoother")]
 mod judging;
 mod kernel;
-#[cfg(feature = "smoother")]
 mod keyframe;
-#[cfg(feature = "smoother")]
 mod landmark;
-#[cfg(feature = "smoother")]
 mod landmarks;
-#[cfg(feature = "smoother")]
 mod link;
-#[cfg_attr(not(feature = "smoother"), expect(dead_code, reason = "a filter needs none of it but the check"))]
 mod matrix;
-#[cfg(feature = "smoother")]
 mod params;
 mod preintegration;
-mod relative;
-mod rows;
-#[cfg(feature = "smoother")]
 mod scratch;
-#[cfg(feature = "smoother")]
 mod sight;
-#[cfg(feature = "smoother")]
 mod solution;
-#[cfg(all(test, feature = "smoother"))]
+#[cfg(test)]
 mod tests;
 
 #[cfg(feature = "autodiff")]
 pub use automatic::{Automatic, Differentiable, Expectation};
-pub use factor::{Factor, NavigationFactor};
-#[cfg(feature = "smoother")]
+pub use camera::{Camera, Seen, Undistorted};
 pub use filter::FixedLagSmoother;
 pub use kernel::Kernel;
-#[cfg(feature = "smoother")]
 pub use params::{LandmarkParams, SmootherParams};
 pub use preintegration::Preintegration;
-pub use rows::{MOST_ROWS, Rows};
-#[cfg(feature = "smoother")]
 pub use sight::{Observation, Sighted};
-#[cfg(feature = "smoother")]
 pub use solution::Updated;

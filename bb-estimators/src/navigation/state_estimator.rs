@@ -90,7 +90,6 @@ pub use error::{EstimatorError, OriginError, Reason};
 pub use estimator::{Added, StateEstimator};
 pub use event::{Both, Event, EventKind, EventSink, InputKind, Level, StartedFrom};
 pub use factor::ProvidedFactor;
-#[cfg(feature = "smoother")]
 pub use factor::{SMOOTHED, Smoothed};
 pub use gate::{GateState, Rejection};
 pub use input::{

@@ -55,7 +55,6 @@ pub(crate) enum Gate {
     /// Measurements that are too far off are rejected.
     Closed,
     /// All measurements pass.
-    #[cfg(feature = "alloc")]
     Open,
 }
 
@@ -111,7 +110,6 @@ impl Stream {
     }
 
     /// Resets the count of successive rejections, because the filter was relocated.
-    #[cfg(any(feature = "std", feature = "smoother", feature = "eskf"))]
     pub(crate) fn forgive(&mut self) {
         self.counts.gate_in_a_row = 0;
     }

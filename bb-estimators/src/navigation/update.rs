@@ -136,7 +136,6 @@ fn corrected<E: Composed<N>, const N: usize>(
 }
 
 /// A measurement compared with a filter.
-#[cfg(feature = "alloc")]
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Judged {
     /// Normalised innovation squared.
@@ -149,7 +148,6 @@ pub(super) struct Judged {
 /// # Errors
 ///
 /// Returns the reason why it cannot be compared.
-#[cfg(feature = "alloc")]
 #[inline(never)]
 pub(super) fn judged<E, const D: usize, const N: usize>(
     estimate: &E,

@@ -57,7 +57,6 @@ impl<S: States, const N: usize> Copies<Eskf<S, N>> {
     }
 
     /// The last fix with the noise that it was fused with.
-    #[cfg(feature = "smoother")]
     pub(in crate::navigation) fn as_shown(&self, fix: &GnssPosition) -> GnssPosition {
         self.scatter.as_shown(fix)
     }

@@ -1,7 +1,6 @@
 //! Changes of the filter's position or frame of reference without a measurement.
 
 use nalgebra::{Isometry3, SMatrix, SVector};
-#[cfg(feature = "alloc")]
 use nalgebra::{Matrix3, UnitQuaternion};
 
 use super::filter::Eskf;
@@ -18,13 +17,9 @@ use crate::navigation::update::Composed as _;
 const COPY: f64 = 1e-11;
 
 /// Errors of a filter in the wrong place, as deviations: anywhere within 10 km, 5 m/s, 3° of tilt and 30° of heading.
-#[cfg(feature = "alloc")]
 pub(in crate::navigation) const UNMOORED: f64 = 1e4;
-#[cfg(feature = "alloc")]
 pub(in crate::navigation) const UNMOORED_SPEED: f64 = 5.0;
-#[cfg(feature = "alloc")]
 const UNMOORED_TILT: f64 = 0.05;
-#[cfg(feature = "alloc")]
 pub(in crate::navigation) const UNMOORED_HEADING: f64 = 0.52;
 
 impl<S: States, const N: usize> Eskf<S, N> {
@@ -91,7 +86,6 @@ impl<S: States, const N: usize> Eskf<S, N> {
     }
 
     /// Forgets the position, and doubts the motion and the attitude by as much as a filter in the wrong place may have been wrong.
-    #[cfg(feature = "alloc")]
     pub(in crate::navigation) fn unmoor(&mut self) {
         let Some(estimate) = &mut self.estimate else { return };
         estimate.keyframe = None;
@@ -113,7 +107,6 @@ impl<S: States, const N: usize> Eskf<S, N> {
     }
 
     /// Sets the time, which is known to a standard deviation: the motion is as uncertain as what the body does in that.
-    #[cfg(any(feature = "smoother", feature = "eskf"))]
     pub(in crate::navigation) fn set_clock(&mut self, time_ns: i64, deviation_s: f64) {
         let Some(estimate) = &mut self.estimate else { return };
         self.upkeep.fixed_ns = self.upkeep.fixed_ns.saturating_add(time_ns.saturating_sub(estimate.time_ns));
@@ -130,7 +123,6 @@ impl<S: States, const N: usize> Eskf<S, N> {
     }
 
     /// Turns the body in the world, to an attitude with this covariance that is uncorrelated with all other states.
-    #[cfg(feature = "alloc")]
     pub(in crate::navigation) fn turn(&mut self, turn: &UnitQuaternion<f64>, covariance: &Matrix3<f64>) {
         let Some(estimate) = &mut self.estimate else { return };
         estimate.world_from_body = turn * estimate.world_from_body;
@@ -138,7 +130,6 @@ impl<S: States, const N: usize> Eskf<S, N> {
     }
 
     /// Counts a new beginning.
-    #[cfg(feature = "alloc")]
     pub(in crate::navigation) fn begin_again(&mut self) {
         if let Some(estimate) = &self.estimate {
             self.upkeep.started(estimate.time_ns);
@@ -146,7 +137,6 @@ impl<S: States, const N: usize> Eskf<S, N> {
     }
 
     /// Sets an optional state, and leaves its covariance.
-    #[cfg(feature = "alloc")]
     pub(in crate::navigation) fn set_optional(&mut self, error: usize, value: f64) {
         if let Some(estimate) = &mut self.estimate {
             estimate.optional[error] = value;

@@ -1,6 +1,5 @@
 //! The filter: IMU samples propagate it, and measurements correct it.
 
-#[cfg(feature = "alloc")]
 use nalgebra::Matrix3;
 use nalgebra::{Matrix6, SMatrix, SVector, Vector3};
 
@@ -14,18 +13,15 @@ use crate::navigation::covariance::{Covariance, Innovation};
 use crate::navigation::fused::Fused;
 use crate::navigation::layout::Layout;
 use crate::navigation::math::exp;
-#[cfg(feature = "alloc")]
 use crate::navigation::math::skew;
 use crate::navigation::measurement::Measurement;
 use crate::navigation::refusal::Refusal;
-#[cfg(feature = "alloc")]
 use crate::navigation::state::VELOCITY;
 use crate::navigation::state::{
     Estimate, NAVIGATION, Navigation, Optional, POSITION, ROTATION, States, distinct, offset,
 };
 use crate::navigation::stream::{Gate, Stream};
 use crate::navigation::update::{Composed, updated};
-#[cfg(feature = "alloc")]
 use crate::navigation::update::{Judged, judged};
 use crate::navigation::upkeep::{Upkeep, upkeep_methods};
 use crate::params::Params as _;
@@ -60,7 +56,6 @@ pub struct Eskf<S: States = Navigation, const N: usize = NAVIGATION> {
 }
 
 /// Variances of what holding a reading over a gap may have done wrong, per axis of the body.
-#[cfg(feature = "alloc")]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::navigation) struct Doubt {
     /// Rotation, rad².
@@ -159,7 +154,6 @@ impl<S: States, const N: usize> Eskf<S, N> {
 
     /// Propagates over a part, `dt` seconds, of a gap in the samples, during which the reading is assumed to be that of `sample`, but
     /// may have been wrong by `doubt`.
-    #[cfg(feature = "alloc")]
     #[cold]
     pub(in crate::navigation) fn hold(&mut self, sample: &ImuMean, doubt: &Doubt) -> Result<(), Refusal> {
         let estimate = self.estimate.as_mut().ok_or(Refusal::NotStarted)?;
@@ -237,13 +231,11 @@ impl<S: States, const N: usize> Eskf<S, N> {
     }
 
     /// Multiplies the white noise of the IMU, as a deviation.
-    #[cfg(feature = "alloc")]
     pub(in crate::navigation) fn multiply_noise(&mut self, multiple: f64) {
         self.densities = self.params.densities().times(multiple);
     }
 
     /// Multiplies the covariance.
-    #[cfg(feature = "alloc")]
     pub(in crate::navigation) fn doubt_all(&mut self, factor: f64) {
         self.covariance.multiply(factor);
         self.covariance.bound(&Self::LAYOUT);
@@ -254,7 +246,6 @@ impl<S: States, const N: usize> Eskf<S, N> {
     /// # Errors
     ///
     /// Returns the reason why it cannot be compared.
-    #[cfg(feature = "alloc")]
     #[inline(never)]
     pub(in crate::navigation) fn judge<M: Measurement<D>, const D: usize>(
         &self,
@@ -283,7 +274,6 @@ impl<S: States, const N: usize> Eskf<S, N> {
     }
 
     /// Like [`update`](Self::update), but bypasses the gate.
-    #[cfg(feature = "alloc")]
     pub(crate) fn update_ungated<M: Measurement<D>, const D: usize>(
         &mut self,
         stream: &mut Stream,

@@ -131,7 +131,6 @@ pub struct ImuDensities {
 impl ImuDensities {
     /// The densities with the white noise of the IMU, as a deviation, multiplied. The walks of its biases stay: a multiple of them, found on
     /// noise, made the biases follow every error of the model.
-    #[cfg(feature = "alloc")]
     pub(in crate::navigation) fn times(self, multiple: f64) -> Self {
         let factor = multiple * multiple;
         Self { accelerometer: self.accelerometer * factor, gyroscope: self.gyroscope * factor, ..self }

@@ -106,7 +106,6 @@ impl Start {
     }
 
     /// The corresponding state and information matrix, the inverse of the covariance.
-    #[cfg(feature = "smoother")]
     pub(in crate::navigation) fn information<S: States, const N: usize>(
         &self,
         params: &EskfParams,

@@ -5,8 +5,8 @@ use core::fmt;
 use nalgebra::{SMatrix, Vector3};
 use num_dual::{Dual64, DualNum};
 
-use super::factor::Factor;
-use super::rows::Rows;
+use crate::navigation::factor::Factor;
+use crate::navigation::factor::Rows;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{
     ACCELEROMETER_BIAS, Estimate, GYROSCOPE_BIAS, NAVIGATION, POSITION, ROTATION, States, VELOCITY,

@@ -14,7 +14,7 @@ use super::link::{Information, Link};
 use super::matrix::{
     Root, Square, add_gram, axpy, dot, lower_root, mirror, times, transpose_times, transposed, zeros,
 };
-use super::rows::{MOST_ROWS, Rows};
+use crate::navigation::factor::{MOST_ROWS, Rows};
 use crate::navigation::math::ln;
 
 /// Transformation of a keyframe's ties to later poses by its elimination.

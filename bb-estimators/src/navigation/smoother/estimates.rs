@@ -3,12 +3,12 @@
 use nalgebra::{Matrix6, SMatrix};
 
 use super::coupling::{Coupling, POSE, place};
-use super::factor::Factor;
 use super::filter::FixedLagSmoother;
 use super::link::predicted;
 use super::matrix::{Square, axpy, dot, mirror};
-use super::rows::{MOST_ROWS, Rows};
 use super::scratch::Scratch;
+use crate::navigation::factor::Factor;
+use crate::navigation::factor::{MOST_ROWS, Rows};
 use crate::navigation::state::{Estimate, POSITION, ROTATION, States};
 
 impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {

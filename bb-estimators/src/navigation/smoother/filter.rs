@@ -7,7 +7,6 @@ use core::marker::PhantomData;
 
 use nalgebra::{SMatrix, Vector3};
 
-use super::factor::{Factor, NavigationFactor};
 use super::keyframe::{Keyframe, Prior, Window, after};
 use super::landmarks::Landmarks;
 use super::link::Information;
@@ -16,6 +15,7 @@ use super::preintegration::Preintegration;
 use super::scratch::Scratch;
 use crate::attitude::ParamsError;
 use crate::navigation::eskf::{Doubt, GaussMarkov, ImuDensities, ImuMean, LONGEST_GAP_S, Start, seconds_between};
+use crate::navigation::factor::{Factor, NavigationFactor};
 use crate::navigation::math::unit;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{Estimate, NAVIGATION, Navigation, Optional, States, distinct, offset};

@@ -1,11 +1,11 @@
 //! Gates and adds measurements at any keyframe of the window.
 
 use super::elimination::{Judged, Known, judge, judge_pair, judge_with};
-use super::factor::Factor;
 use super::filter::FixedLagSmoother;
 use super::kernel::Kernel;
 use super::keyframe::{Held, Prior};
-use super::rows::Rows;
+use crate::navigation::factor::Factor;
+use crate::navigation::factor::Rows;
 use crate::navigation::fused::Fused;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::States;

@@ -7,13 +7,13 @@ use alloc::vec::Vec;
 use nalgebra::SVector;
 
 use super::elimination::Pivot;
-use super::factor::Factor;
 use super::kernel::Kernel;
 use super::link::{Information, Link, predicted};
 use super::matrix::{axpy, dot, mirror, times};
 use super::params::SmootherParams;
 use super::preintegration::Preintegration;
-use super::rows::Rows;
+use crate::navigation::factor::Factor;
+use crate::navigation::factor::Rows;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{Estimate, POSITION, ROTATION, States};
 

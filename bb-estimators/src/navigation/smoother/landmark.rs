@@ -20,8 +20,8 @@ use nalgebra::{Matrix2x3, Matrix3, SMatrix, Vector2, Vector3};
 use super::coupling::{Coupling, POSE, PoseInformation, Seen};
 use super::kernel::Kernel;
 use super::keyframe::{Keyframe, Window};
-use crate::navigation::camera::{Camera, Undistorted, normalised};
 use crate::navigation::math::sqrt;
+use crate::navigation::smoother::camera::{Camera, Undistorted, normalised};
 use crate::navigation::state::{POSITION, ROTATION, States};
 
 /// An observation of a landmark from one keyframe.

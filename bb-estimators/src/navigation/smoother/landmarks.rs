@@ -16,8 +16,8 @@ use super::kernel::Kernel;
 use super::keyframe::Window;
 use super::landmark::{Landmark, Sight};
 use super::params::LandmarkParams;
-use crate::navigation::camera::Camera;
 use crate::navigation::chi_square::limit;
+use crate::navigation::smoother::camera::Camera;
 use crate::navigation::state::States;
 use triangulation::located;
 

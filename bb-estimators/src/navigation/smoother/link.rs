@@ -12,8 +12,8 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::matrix::{Square, add_gram, axpy, dot, times, zeros};
 use super::preintegration::Preintegration;
-use super::rows::{MOST_ROWS, Rows};
 use crate::navigation::eskf::{EskfParams, ImuDensities, Transition, rows};
+use crate::navigation::factor::{MOST_ROWS, Rows};
 use crate::navigation::math::{Integrals, exp, renormalised, rotation, skew, sqrt};
 use crate::navigation::state::{
     ACCELEROMETER_BIAS, Estimate, GYROSCOPE_BIAS, POSITION, ROTATION, States, VELOCITY, offset,

@@ -204,12 +204,6 @@ pub(super) fn mirror<const N: usize>(matrix: &mut Square<N>) {
     }
 }
 
-/// Returns whether every component is finite and not absurd; larger whitened numbers cannot be measurements.
-pub(super) fn is_sound(row: &[f64]) -> bool {
-    // A NaN is outside the range.
-    row.iter().all(|x| (-1e15..=1e15).contains(x))
-}
-
 pub(super) fn transposed<const N: usize>(matrix: &Square<N>) -> Square<N> {
     core::array::from_fn(|i| core::array::from_fn(|j| matrix[j][i]))
 }

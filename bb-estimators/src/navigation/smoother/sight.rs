@@ -2,16 +2,16 @@
 
 use nalgebra::{Matrix2x3, Vector2, Vector3};
 
-use super::factor::Factor;
 use super::filter::FixedLagSmoother;
 use super::landmark::Sight;
 use super::landmarks::Landmarks;
 use super::params::LandmarkParams;
 use crate::navigation::bounds::is_on_earth;
-use crate::navigation::camera::Camera;
+use crate::navigation::factor::Factor;
 use crate::navigation::fused::Fused;
 use crate::navigation::math::sqrt;
 use crate::navigation::refusal::Refusal;
+use crate::navigation::smoother::camera::Camera;
 use crate::navigation::state::States;
 use crate::navigation::stream::{Gate, Stream};
 use crate::params::ParamsError;

@@ -1,8 +1,8 @@
 //! Solving the window: eliminates what has changed and relinearises what has moved.
 
-use super::factor::Factor;
 use super::filter::FixedLagSmoother;
 use super::params::SmootherParams;
+use crate::navigation::factor::Factor;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{ROTATION, States};
 

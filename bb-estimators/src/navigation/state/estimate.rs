@@ -139,7 +139,6 @@ impl<const N: usize> Estimate<N> {
     }
 
     /// Returns this estimate as one of a filter with `M` errors. States that it lacks are dropped, and further ones are zero.
-    #[cfg(any(feature = "smoother", feature = "eskf"))]
     pub(in crate::navigation) fn resized<const M: usize>(&self) -> Estimate<M> {
         Estimate {
             time_ns: self.time_ns,

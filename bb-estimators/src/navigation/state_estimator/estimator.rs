@@ -20,9 +20,9 @@ use super::queue::{Queue, QueueCounts, Told};
 use super::strategy::Pose;
 use crate::attitude::ParamsError;
 use crate::navigation::eskf::ImuMean;
+use crate::navigation::factor::NavigationFactor;
 use crate::navigation::geodesy::LocalFrame;
 use crate::navigation::refusal::Refusal;
-use crate::navigation::smoother::NavigationFactor;
 
 /// Largest lag of the caller's clock behind the IMU's, ns.
 const LONGEST_LAG_NS: i64 = 200_000_000;

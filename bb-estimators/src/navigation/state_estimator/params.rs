@@ -3,46 +3,45 @@
 use crate::navigation::eskf::EskfParams;
 use crate::params::{Params as _, ParamsError, params};
 
-/// The estimator in use. Each is available if the crate was built with the feature of its name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum StrategyKind {
+macro_rules! strategies {
+    ($($(#[doc = $about:literal])+ #[$built:meta] $kind:ident = $name:literal, smoothing: $is_smoothing:literal;)+) => {
+        /// The estimator in use. Each is available if the crate was built with the feature of its name.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        pub enum StrategyKind {
+            $($(#[doc = $about])+ #[$built] $kind,)+
+        }
+
+        impl StrategyKind {
+            /// The strategies that were built.
+            pub const ALL: &'static [Self] = &[$(#[$built] Self::$kind,)+];
+
+            /// Returns the name of the strategy: `smoother` or `eskf`.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(#[$built] Self::$kind => $name,)+
+                }
+            }
+
+            /// Returns whether later measurements correct its keyframes.
+            pub(super) const fn is_smoothing(self) -> bool {
+                match self {
+                    $(#[$built] Self::$kind => $is_smoothing,)+
+                }
+            }
+        }
+    };
+}
+
+strategies! {
     /// [`FixedLagSmoother`](crate::navigation::FixedLagSmoother), with the feature `smoother`: the default.
     #[cfg(feature = "smoother")]
-    FixedLagSmoother,
+    FixedLagSmoother = "smoother", smoothing: true;
     /// [`Eskf`](crate::navigation::Eskf), with the feature `eskf`: the simple baseline.
     #[cfg(feature = "eskf")]
-    Eskf,
+    Eskf = "eskf", smoothing: false;
 }
 
 impl StrategyKind {
-    /// The strategies that were built.
-    pub const ALL: &'static [Self] = &[
-        #[cfg(feature = "smoother")]
-        Self::FixedLagSmoother,
-        #[cfg(feature = "eskf")]
-        Self::Eskf,
-    ];
-
-    /// Returns the name of the strategy: `smoother` or `eskf`.
-    pub const fn name(self) -> &'static str {
-        match self {
-            #[cfg(feature = "smoother")]
-            Self::FixedLagSmoother => "smoother",
-            #[cfg(feature = "eskf")]
-            Self::Eskf => "eskf",
-        }
-    }
-
-    /// Returns whether later measurements correct its keyframes.
-    pub(super) const fn is_smoothing(self) -> bool {
-        match self {
-            #[cfg(feature = "smoother")]
-            Self::FixedLagSmoother => true,
-            #[cfg(feature = "eskf")]
-            Self::Eskf => false,
-        }
-    }
-
     /// The strategy with that name, if it was built.
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.iter().copied().find(|strategy| strategy.name() == name)

@@ -135,14 +135,12 @@ impl Cadence {
     }
 
     /// Returns whether the camera determines the times of keyframes.
-    #[cfg(feature = "smoother")]
     fn has_camera(&self, now_ns: i64) -> bool {
         self.awaits_camera(now_ns, self.interval_ns / 2)
     }
 }
 
 /// Raises the covariance of the position by what a body moves in a time with this standard deviation, s.
-#[cfg(feature = "smoother")]
 fn add_time<const N: usize>(covariance: &mut SMatrix<f64, N, N>, velocity: &Vector3<f64>, deviation_s: f64) {
     let way = velocity * deviation_s;
     let mut of_position = covariance.fixed_view_mut::<3, 3>(POSITION, POSITION);
@@ -159,7 +157,6 @@ pub(super) fn id_of(time_ns: i64) -> u64 {
 pub(super) enum Strategy<F: ProvidedFactor> {
     #[cfg(feature = "smoother")]
     Smoother(Box<smoother::SmootherStrategy<F>>),
-    #[cfg(feature = "eskf")]
     Eskf(Box<eskf::EskfStrategy>, core::marker::PhantomData<fn() -> F>),
 }
 
@@ -168,7 +165,6 @@ macro_rules! each {
         match $self {
             #[cfg(feature = "smoother")]
             Strategy::Smoother($strategy) => $do,
-            #[cfg(feature = "eskf")]
             Strategy::Eskf($strategy, _) => $do,
         }
     };
@@ -212,24 +208,12 @@ impl<F: ProvidedFactor> Strategy<F> {
 
     /// Returns whether the last correction has converged. If not, the covariance is not to be trusted.
     pub(super) fn is_converged(&self) -> bool {
-        match self {
-            #[cfg(feature = "smoother")]
-            Self::Smoother(strategy) => strategy.is_converged(),
-            // It corrects in a fixed number of steps.
-            #[cfg(feature = "eskf")]
-            Self::Eskf(..) => true,
-        }
+        each!(self, strategy => strategy.is_converged())
     }
 
     /// Returns whether the heading is known. After an outage of the IMU it is not, until it has been determined again.
     pub(super) fn is_attitude_known(&self) -> bool {
-        match self {
-            // It linearises again until it converges.
-            #[cfg(feature = "smoother")]
-            Self::Smoother(_) => true,
-            #[cfg(feature = "eskf")]
-            Self::Eskf(strategy, _) => strategy.is_attitude_known(),
-        }
+        each!(self, strategy => strategy.is_attitude_known())
     }
 
     /// Present position and velocity.

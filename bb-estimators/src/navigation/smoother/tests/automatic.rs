@@ -5,9 +5,9 @@ use num_dual::DualNum;
 use proptest::prelude::*;
 
 use super::super::automatic::{Automatic, Differentiable, Expectation};
-use super::super::factor::{Factor, NavigationFactor};
-use super::super::rows::Rows;
 use super::flight::{Drone, N, open};
+use crate::navigation::factor::Rows;
+use crate::navigation::factor::{Factor, NavigationFactor};
 use crate::navigation::{
     Estimate, FixedLagSmoother, GnssPosition, ImuMean, NAVIGATION, Navigation, Optional, Refusal, SmootherParams,
     Start, offset,

@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use super::super::elimination::Pivot;
 use super::super::link::{Information, Link};
 use super::super::matrix::{Root, Square, mirror};
-use super::super::rows::Rows;
+use crate::navigation::factor::Rows;
 use crate::navigation::noise::Noise;
 
 const N: usize = 5;

@@ -5,10 +5,10 @@
 use nalgebra::{SMatrix, SVector, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
-use super::super::factor::Factor;
 use super::super::link::{Link, predicted};
-use super::super::rows::Rows;
 use super::flight::{Drone, N, sensors};
+use crate::navigation::factor::Factor;
+use crate::navigation::factor::Rows;
 use crate::navigation::{
     Estimate, NAVIGATION, NavigationFactor, POSITION, Preintegration, ROTATION, RelativePose, VELOCITY,
 };

@@ -7,10 +7,10 @@ use super::super::coupling::POSE;
 use super::super::landmark::Sight;
 use super::super::link::{Information, Link};
 use super::super::matrix::Square;
-use super::super::rows::Rows;
 use super::flight::open;
-use crate::navigation::camera::Undistorted;
+use crate::navigation::factor::Rows;
 use crate::navigation::noise::Noise;
+use crate::navigation::smoother::camera::Undistorted;
 use crate::navigation::{
     Camera, FixedLagSmoother, Kernel, LandmarkParams, NAVIGATION, Navigation, POSITION, ROTATION, RelativePose,
     SmootherParams, Start,

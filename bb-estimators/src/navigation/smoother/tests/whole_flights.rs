@@ -8,10 +8,10 @@ use nalgebra::{DMatrix, DVector, Matrix2x3, SMatrix, SVector, Vector3};
 use super::super::landmark::{Landmark, Sight};
 use super::super::link::{Information, Link};
 use super::super::matrix::mirror;
-use super::super::rows::Rows;
 use super::flight::{Drone, Flight, N, Smoother, linear, open, sensors};
 use super::scenery::{Scenery, camera, exact};
-use crate::navigation::smoother::Factor;
+use crate::navigation::factor::Factor;
+use crate::navigation::factor::Rows;
 use crate::navigation::{Estimate, LandmarkParams, POSITION, ROTATION, SmootherParams};
 
 /// A keyframe as it was linearised last.

@@ -14,7 +14,6 @@ use crate::navigation::eskf::{Eskf, ImuMean, Start};
 use crate::navigation::fused::Fused;
 use crate::navigation::propagate::Propagate as _;
 use crate::navigation::refusal::Refusal;
-#[cfg(feature = "smoother")]
 use crate::navigation::state::Estimate;
 use crate::navigation::state::{NAVIGATED, Navigated};
 use crate::navigation::state_estimator::error::EstimatorError;
@@ -37,7 +36,6 @@ pub(in crate::navigation::state_estimator) struct EskfStrategy {
     is_reference_due: bool,
 }
 
-#[cfg_attr(not(feature = "eskf"), expect(dead_code, reason = "beside the smoother, that is the estimate"))]
 impl EskfStrategy {
     pub(super) fn new(config: &StateEstimatorConfig) -> Result<Self, ParamsError> {
         let window = config.params.window as usize;
@@ -148,25 +146,21 @@ impl EskfStrategy {
     }
 
     /// The copies of the filter.
-    #[cfg(feature = "smoother")]
     pub(super) fn copies(&self) -> &Copies<Eskf<Navigated, NAVIGATED>> {
         &self.copies
     }
 
     /// Returns whether the velocity of the last fix that had one was fused.
-    #[cfg(feature = "smoother")]
     pub(super) fn has_fused_velocity(&self) -> bool {
         self.streams.velocities.counts().gate_in_a_row == 0
     }
 
     /// Returns whether the camera determines the times of keyframes.
-    #[cfg(feature = "smoother")]
     pub(super) fn has_camera(&self) -> bool {
         self.copies.estimate().is_some_and(|now| self.cadence.has_camera(now.time_ns))
     }
 
     /// The present state and its covariance.
-    #[cfg(feature = "smoother")]
     pub(super) fn state(&self) -> Option<(&Estimate<NAVIGATED>, &SMatrix<f64, NAVIGATED, NAVIGATED>)> {
         let best = self.copies.best();
         best.estimate().map(|estimate| (estimate, best.covariance()))
@@ -216,6 +210,11 @@ impl EskfStrategy {
     /// Number of starts and of newcomers that took over.
     pub(super) fn resets(&self) -> u32 {
         self.copies.best().resets()
+    }
+
+    /// The filter corrects in a fixed number of steps.
+    pub(super) fn is_converged(&self) -> bool {
+        true
     }
 
     /// Returns whether the attitude is known well enough to be corrected linearly.

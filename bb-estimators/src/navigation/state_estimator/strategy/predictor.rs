@@ -1,15 +1,9 @@
 //! Prediction from the newest estimate with each sample of the IMU, for outputs between keyframes.
 
 use super::Pose;
-#[cfg(feature = "smoother")]
-use crate::navigation::eskf::EskfParams;
 use crate::navigation::eskf::{Eskf, ImuMean};
 use crate::navigation::refusal::Refusal;
-#[cfg(feature = "smoother")]
-use crate::navigation::state::{Estimate, States};
 use crate::navigation::state::{NAVIGATED, Navigated};
-#[cfg(feature = "smoother")]
-use nalgebra::SMatrix;
 
 /// A filter that is never corrected.
 #[derive(Clone, Copy, Debug)]
@@ -19,20 +13,6 @@ impl Predictor {
     /// A copy of the filter.
     pub(super) fn of(filter: &Eskf<Navigated, NAVIGATED>) -> Self {
         Self(*filter)
-    }
-
-    /// A filter that starts at a keyframe of the smoother.
-    #[cfg(feature = "smoother")]
-    pub(super) fn from_keyframe<S: States, const N: usize>(
-        params: &EskfParams,
-        noise: f64,
-        estimate: &Estimate<N>,
-        covariance: &SMatrix<f64, N, N>,
-    ) -> Option<Self> {
-        let mut filter = Eskf::new(*params).ok()?;
-        filter.multiply_noise(noise);
-        filter.adopt::<S, N>(estimate, covariance).ok()?;
-        Some(Self(filter))
     }
 
     pub(in crate::navigation::state_estimator) fn time_ns(&self) -> i64 {

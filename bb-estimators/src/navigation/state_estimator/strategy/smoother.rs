@@ -15,11 +15,12 @@ use nalgebra::{Isometry3, Matrix3, SMatrix, UnitQuaternion, Vector3};
 use super::eskf::EskfStrategy;
 use super::{Measured, Pose, Predictor, Streams, add_time, id_of};
 use crate::attitude::ParamsError;
-use crate::navigation::eskf::{ImuMean, Start, seconds_between};
+use crate::navigation::eskf::{Eskf, ImuMean, Start, seconds_between};
+use crate::navigation::factor::{Factor, NavigationFactor, Rows};
 use crate::navigation::fused::Fused;
 use crate::navigation::measurement::{AbsolutePose, GnssPosition, GnssVelocity};
 use crate::navigation::refusal::Refusal;
-use crate::navigation::smoother::{Factor, FixedLagSmoother, NavigationFactor, Rows, SmootherParams};
+use crate::navigation::smoother::{FixedLagSmoother, SmootherParams};
 use crate::navigation::state::{Estimate, NAVIGATED, Navigated, Optional, POSITION, ROTATION, States, VELOCITY};
 use crate::navigation::state_estimator::error::EstimatorError;
 use crate::navigation::state_estimator::factor::{ProvidedFactor, SMOOTHED, Smoothed};
@@ -96,6 +97,11 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
 
     pub(super) fn is_converged(&self) -> bool {
         self.is_converged
+    }
+
+    /// The window is linearised again until it converges.
+    pub(super) fn is_attitude_known(&self) -> bool {
+        true
     }
 
     pub(super) fn start(&mut self, start: &Start) -> Result<(), Refusal> {
@@ -290,7 +296,10 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
     pub(super) fn predictor(&self) -> Option<Predictor> {
         let (estimate, covariance) = (self.smoother.estimate()?, self.smoother.covariance()?);
         let (sensors, noise) = (&self.smoother.params().sensors, self.filter.copies().noise());
-        Predictor::from_keyframe::<Smoothed, SMOOTHED>(sensors, noise, &estimate, &covariance)
+        let mut filter = Eskf::new(*sensors).ok()?;
+        filter.multiply_noise(noise);
+        filter.adopt::<Smoothed, SMOOTHED>(&estimate, &covariance).ok()?;
+        Some(Predictor::of(&filter))
     }
 
     pub(super) fn newest(&self) -> Option<Pose> {

@@ -1,6 +1,6 @@
 //! Factors of outside providers. One type: each costs the compilation of both strategies.
 
-use crate::navigation::smoother::{Factor, NavigationFactor, Rows};
+use crate::navigation::factor::{Factor, NavigationFactor, Rows};
 use crate::navigation::{Estimate, POSITION, Refusal, States};
 use nalgebra::Matrix1;
 

@@ -3,10 +3,10 @@
 use super::escalate;
 use crate::navigation::copies::Copies;
 use crate::navigation::eskf::Eskf;
+use crate::navigation::factor::{Factor, Rows};
 use crate::navigation::fused::Fused;
 use crate::navigation::measurement::{Linearised, Measurement};
 use crate::navigation::refusal::Refusal;
-use crate::navigation::smoother::{Factor, Rows};
 use crate::navigation::state::{Estimate, NAVIGATED, Navigated, States};
 use crate::navigation::state_estimator::error::EstimatorError;
 use crate::navigation::state_estimator::factor::ProvidedFactor;

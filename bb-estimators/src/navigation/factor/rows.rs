@@ -2,28 +2,27 @@
 
 use nalgebra::SMatrix;
 
-use super::matrix::is_sound;
 use crate::navigation::math::{ln, sqrt};
 use crate::navigation::measurement::{Linearised, Measurement};
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{Estimate, States};
 
 /// The maximum number of values in one factor.
-pub const MOST_ROWS: usize = 9;
+pub(in crate::navigation) const MOST_ROWS: usize = 9;
 
 /// A linearised factor, whitened by its noise: `residual = H_previous error_previous + H error + noise` with noise of
 /// variance 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rows<const N: usize> {
     /// Number of rows. Zero unless [`set`](Self::set) has succeeded.
-    pub(super) count: usize,
+    pub(in crate::navigation) count: usize,
     /// `true` if the rows involve the previous keyframe.
     is_pair: bool,
-    pub(super) residual: [f64; MOST_ROWS],
-    pub(super) previous: [[f64; N]; MOST_ROWS],
-    pub(super) at: [[f64; N]; MOST_ROWS],
+    pub(in crate::navigation) residual: [f64; MOST_ROWS],
+    pub(in crate::navigation) previous: [[f64; N]; MOST_ROWS],
+    pub(in crate::navigation) at: [[f64; N]; MOST_ROWS],
     /// `-½ ln det R` of the noise R.
-    pub(super) log_density: f64,
+    pub(in crate::navigation) log_density: f64,
 }
 
 impl<const N: usize> Rows<N> {
@@ -129,8 +128,7 @@ impl<const N: usize> Rows<N> {
     }
 
     /// Multiplies the weight. The rows are multiplied by its square root.
-    #[cfg(feature = "smoother")]
-    pub(super) fn weigh(&mut self, weight: f64) {
+    pub(in crate::navigation) fn weigh(&mut self, weight: f64) {
         let factor = sqrt(weight);
         (0..self.count).for_each(|row| self.scale(row, factor));
     }
@@ -158,4 +156,10 @@ impl<const N: usize> Default for Rows<N> {
     fn default() -> Self {
         Self::new()
     }
+}
+
+/// Returns whether every component is finite and not absurd; larger whitened numbers cannot be measurements.
+fn is_sound(row: &[f64]) -> bool {
+    // A NaN is outside the range.
+    row.iter().all(|x| (-1e15..=1e15).contains(x))
 }

@@ -1,7 +1,11 @@
 //! The factors of a window, besides those of the IMU, and the trait for custom ones.
 
-use super::relative::compare;
-use super::rows::Rows;
+mod relative;
+mod rows;
+
+use self::relative::compare;
+pub(in crate::navigation) use self::rows::MOST_ROWS;
+pub use self::rows::Rows;
 use crate::navigation::measurement::{
     AbsolutePose, BarometricHeight, BodyVelocity, GnssHeading, GnssPosition, GnssVelocity, Height, MagneticField,
     MagneticHeading, NonHolonomic, RelativePose, WheelSpeed, ZeroRotation, ZeroVelocity,
