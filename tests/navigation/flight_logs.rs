@@ -1,13 +1,14 @@
 //! Logs of the state estimator in a subscriber that writes JSON: one object a line, by level, each with its fields.
 
-use crate::kit::*;
 use bb_core::nalgebra::{UnitQuaternion, Vector3};
 use bb_estimators::navigation::state_estimator::{
     AttitudeReading, Both, Event, EventSink, FlightControllerState, GpsHealth, GpsHealthReading, Level, PoseAnchor,
     StateEstimator, StateEstimatorConfig, StrategyKind, TracingSink,
 };
 use bb_estimators::navigation::{Geodetic, ImuMean};
+use serde_json::Value;
 use std::io::Write;
+use std::sync::{Arc, Mutex, PoisonError};
 use tracing_subscriber::filter::LevelFilter;
 use tracing_subscriber::fmt::MakeWriter;
 

@@ -1,8 +1,10 @@
 //! The state estimator in a robot: where it starts, where its antenna is, and what its recorder holds.
 
-use crate::kit::*;
 use bb_core::nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use bb_core::payload::{GeodeticPosition, GnssFix, GnssServices, GnssStatus};
+use bb_core::prelude::*;
+use bb_core::run::DropReason;
+use bb_core::Builder;
 use bb_estimators::StateEstimator;
 use bb_estimators::navigation::state_estimator::{
     AttitudeReport, FlightEstimate, FlightEvent, FlightEvents, FlightHealth, FlightOptions, GpsHealth, GpsReport,
@@ -51,6 +53,11 @@ fn geodetic(position: Vector3<f64>) -> GeodeticPosition {
 fn local(position: &GeodeticPosition) -> Vector3<f64> {
     let height = position.altitude.unwrap_or(f64::NAN);
     frame().position(&Geodetic { latitude: position.latitude_rad, longitude: position.longitude_rad, height })
+}
+
+/// The time `millis` after zero.
+fn at(millis: i64) -> MonotonicTime {
+    MonotonicTime::from_nanos(millis * 1_000_000)
 }
 
 fn at_rest() -> Imu {
@@ -214,7 +221,7 @@ fn an_imu_that_stops_engages_the_fallback_and_its_return_recovers_it() -> Result
 
 /// Events for the recorder are in the file, though nothing is logged: no subscriber of `tracing` is set.
 #[test]
-fn the_recorder_holds_labels_the_gate_rejections_and_faults() -> Result<(), Failure> {
+fn the_recorder_holds_labels_the_gate_rejections_and_faults() -> Result<(), Box<dyn std::error::Error>> {
     for strategy in STRATEGIES {
         let file = std::env::temp_dir().join(format!("bb-flights-{strategy}-{}.mcap", std::process::id()));
         let builder = Flight::builder(strategy, true);
