@@ -92,10 +92,11 @@ impl<K: Ord, V> Sorted<K, V> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bb_tests::laws;
     use proptest::prelude::*;
     use std::collections::BTreeMap;
 
-    proptest! {
+    laws! {
         #[test]
         fn it_is_a_map_in_the_order_of_its_keys(steps in proptest::collection::vec((0..4, 0..20u8, any::<u16>()), 0..200)) {
             let (mut sorted, mut map) = (Sorted::default(), BTreeMap::new());

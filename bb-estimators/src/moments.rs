@@ -35,6 +35,7 @@ impl Moments {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bb_tests::laws;
     use proptest::prelude::*;
 
     fn moments(values: &[[f64; 3]]) -> Moments {
@@ -45,7 +46,7 @@ mod tests {
         moments
     }
 
-    proptest! {
+    laws! {
         #[test]
         fn merged_parts_are_the_whole(
             one in proptest::collection::vec(proptest::array::uniform3(-1e3..1e3_f64), 1..20),

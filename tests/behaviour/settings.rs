@@ -2,6 +2,7 @@
 
 use crate::kit::*;
 use bb_core::HandleCall;
+use bb_tests::laws;
 use proptest::prelude::*;
 use std::path::PathBuf;
 
@@ -423,7 +424,7 @@ fn the_schema_says_what_can_be_set() {
     );
 }
 
-proptest! {
+laws! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
     /// Whatever is set can be listed, and read back to the same.
@@ -436,12 +437,10 @@ proptest! {
         rate in proptest::num::f32::NORMAL,
         retries in 1..=8_u8,
         axis in [proptest::num::f64::NORMAL, proptest::num::f64::NORMAL, proptest::num::f64::NORMAL],
-        name in ".{0,12}",
-        cutoff in proptest::option::of(proptest::num::f64::NORMAL),
+        (name, label) in (".{0,12}", ".{0,12}"),
+        (cutoff, reach) in (proptest::option::of(proptest::num::f64::NORMAL), proptest::option::of(proptest::num::f64::NORMAL)),
         limit in proptest::num::f64::NORMAL,
         count in any::<i64>(),
-        label in ".{0,12}",
-        reach in proptest::option::of(proptest::num::f64::NORMAL),
         tries in any::<Option<u8>>(),
     ) {
         let mut builder = Set::builder();

@@ -5,7 +5,8 @@ use bb_core::kinematics::{Frames, InverseKinematics, InverseParams, Kinematics, 
 use bb_core::nalgebra::{Isometry3, Matrix6xX, Vector3};
 use bb_core::prelude::*;
 use bb_core::topology::{Joint, JointKind, Limit, Link, Mimic, Origin, Topology};
-use proptest::prelude::{Strategy, any, prop_assert, proptest};
+use bb_tests::laws;
+use proptest::prelude::{Strategy, any, prop_assert};
 
 robot! {
     robot Every;
@@ -48,7 +49,7 @@ fn states() -> impl Strategy<Value = (Vec<f64>, Vec<f64>, usize, usize)> {
     (positions, velocities, 0..Every::TOPOLOGY.links.len(), 0..Every::TOPOLOGY.links.len())
 }
 
-proptest! {
+laws! {
     /// The Jacobian is the derivative of the transform along `integrate`.
     #[test]
     fn jacobians_are_derivatives((mut positions, velocity, base, tip) in states()) {

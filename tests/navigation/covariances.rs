@@ -2,9 +2,9 @@
 //! fixed axes), in what is read and in what is emitted, however the robot and the sensor are turned. Fixes that tell nothing of their noise, or are nowhere on Earth,
 //! are not taken for exact, and lead to nothing that is no number.
 
-use bb_core::prelude::*;
 use bb_core::nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 use bb_core::payload::{GeodeticPosition, GnssServices, GnssStatus};
+use bb_core::prelude::*;
 use bb_estimators::{Eskf, PlanarEkf};
 use std::f64::consts::FRAC_PI_2;
 

@@ -1,10 +1,10 @@
 //! The state estimator in a robot: where it starts, where its antenna is, and what its recorder holds.
 
+use bb_core::Builder;
 use bb_core::nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use bb_core::payload::{GeodeticPosition, GnssFix, GnssServices, GnssStatus};
 use bb_core::prelude::*;
 use bb_core::run::DropReason;
-use bb_core::Builder;
 use bb_estimators::StateEstimator;
 use bb_estimators::navigation::state_estimator::{
     AttitudeReport, FlightEstimate, FlightEvent, FlightEvents, FlightHealth, FlightOptions, GpsHealth, GpsReport,

@@ -1,5 +1,6 @@
 //! Tests of whole robots; see the test targets of this crate. The code in the documents is compiled here.
 
+pub mod law;
 pub mod random;
 pub mod recordings;
 

@@ -123,6 +123,7 @@ impl Faults {
 #[cfg(all(test, not(loom)))]
 mod tests {
     use super::*;
+    use bb_tests::laws;
     use proptest::prelude::*;
 
     const PATHS: [&str; 3] = ["sensor/a", "sensor/b", "sensor/c"];
@@ -153,7 +154,7 @@ mod tests {
         assert_eq!(seen, [("sensor/a", "1", 1), ("sensor/a", "2", 1), ("sensor/b", "1", 1), ("sensor/a", "1", 1)]);
     }
 
-    proptest! {
+    laws! {
         /// No fault is uncounted; of each component, no two neighbours are equal, and its last line is its last fault.
         #[test]
         fn groups_hold_all_faults_in_order(all in prop::collection::vec((0..3_usize, 0..3_u64), 0..200)) {

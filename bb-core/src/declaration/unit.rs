@@ -106,6 +106,7 @@ fn symbol(exponents: [i8; 6]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bb_tests::laws;
     use proptest::prelude::*;
 
     fn si(text: &str) -> Result<(f64, String), String> {
@@ -130,7 +131,7 @@ mod tests {
         assert!(si("3 m*").is_err() && si("3 /s").is_err() && si("").is_err());
     }
 
-    proptest! {
+    laws! {
         #[test]
         fn no_text_panics(text in ".{0,24}") {
             let _ = Quantity::parse(&text);

@@ -7,6 +7,7 @@ use crate::message::{Payload, Stamped};
 use crate::sorted::Sorted;
 use crate::time::{Clock, MonotonicTime};
 use crate::topology::{Joint, JointKind, Link, Mimic, Origin, Topology};
+use bb_tests::laws;
 use nalgebra::{Isometry3, Vector3};
 use proptest::prelude::*;
 
@@ -80,13 +81,13 @@ fn drawn() -> impl Strategy<Value = Vec<Drawn>> {
     proptest::collection::vec(joint, 1..10)
 }
 
-proptest! {
+laws! {
     #[test]
     fn a_handle_finds_what_the_whole_robot_gives(
         drawn in drawn(),
         values in proptest::collection::vec(0.1..1.0_f64, 80),
-        target: prop::sample::Index,
-        source: prop::sample::Index,
+        target in any::<prop::sample::Index>(),
+        source in any::<prop::sample::Index>(),
     ) {
         let topology: &'static Topology = Box::leak(Box::new(topology(&drawn)));
         let kinematics = Kinematics::new(topology).expect("it is a tree");

@@ -171,13 +171,14 @@ impl DeviceClock {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bb_tests::laws;
     use proptest::prelude::*;
 
     fn at(nanos: i64) -> MonotonicTime {
         MonotonicTime::from_nanos(nanos)
     }
 
-    proptest! {
+    laws! {
         /// The time is between the measurement with the smallest delay and the arrival, for any delays; the counter
         /// wraps often.
         #[test]

@@ -79,6 +79,7 @@ macro_rules! laws_in {
         mod $module {
             use super::*;
             use crate::attitude::laws;
+            use bb_tests::laws;
             use proptest::prelude::*;
 
             /// A filter that has seen no sample.
@@ -94,7 +95,7 @@ macro_rules! laws_in {
                 };
             }
 
-            proptest! {
+            laws! {
                 #![proptest_config(laws::cases::<$scalar>())]
 
                 #[test]

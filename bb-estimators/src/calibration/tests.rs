@@ -1,5 +1,6 @@
 //! Calibrations of simulated sensors, whose errors are known.
 
+use bb_tests::laws;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use rand_chacha::ChaCha8Rng;
@@ -180,7 +181,7 @@ fn magnetometer_fit_reports_its_deviations() {
     assert!((0.8..1.2).contains(&mean), "mean square {mean}");
 }
 
-proptest! {
+laws! {
     #[test]
     fn iron_is_exact_without_noise_in_any_unit(seed in any::<u64>(), exponent in -9..6) {
         let mut random = Random::new(seed);

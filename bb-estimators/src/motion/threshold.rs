@@ -42,6 +42,7 @@ impl Threshold {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bb_tests::laws;
     use proptest::prelude::*;
 
     #[test]
@@ -54,7 +55,7 @@ mod tests {
         assert_eq!(Threshold::new(f64::NAN, 60.0), None);
     }
 
-    proptest! {
+    laws! {
         /// A measurement that stays within the hysteresis switches it at most once.
         #[test]
         fn noise_within_the_hysteresis_does_not_make_it_chatter(noise in proptest::collection::vec(-0.99..0.99, 1..200)) {

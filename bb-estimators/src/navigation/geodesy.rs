@@ -133,6 +133,7 @@ impl LocalFrame {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bb_tests::laws;
     use proptest::prelude::*;
 
     fn positions() -> impl Strategy<Value = Geodetic> {
@@ -140,7 +141,7 @@ mod tests {
             .prop_map(|(latitude, longitude, height)| Geodetic::from_degrees(latitude, longitude, height))
     }
 
-    proptest! {
+    laws! {
         #[test]
         fn there_and_back_is_the_same_place(position in positions(), origin in positions()) {
             let frame = LocalFrame::new(origin);

@@ -1,5 +1,6 @@
 //! Laws of the parameters of every algorithm.
 
+use bb_tests::laws;
 use proptest::prelude::*;
 
 use super::{Kind, Params, SetError, Value};
@@ -78,7 +79,7 @@ fn a_value_of_another_kind_is_refused() {
     });
 }
 
-proptest! {
+laws! {
     #[test]
     fn a_name_with_a_letter_too_many_is_answered_with_the_right_one(letter in "[a-z]", at in 0_usize..100) {
         each(|params| {

@@ -93,6 +93,7 @@ impl fmt::Display for Address {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bb_tests::laws;
     use proptest::prelude::*;
 
     #[test]
@@ -123,7 +124,7 @@ mod tests {
         }
     }
 
-    proptest! {
+    laws! {
         #[test]
         fn what_is_written_is_read_alike(text in "(udpin|udpout|serial)?:?[a-z/.:0-9]{0,20}") {
             if let Ok(address) = text.parse::<Address>() {

@@ -60,6 +60,7 @@ pub(crate) fn turned(covariance: &Matrix6<f64>, first: &Matrix3<f64>, second: &M
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bb_tests::laws;
     use proptest::prelude::*;
 
     fn vectors() -> impl Strategy<Value = Vector3<f64>> {
@@ -71,7 +72,7 @@ mod tests {
             .prop_map(|(x, y, z)| UnitQuaternion::from_scaled_axis(Vector3::new(x, y, z)))
     }
 
-    proptest! {
+    laws! {
         #[test]
         fn vectors_come_back(vector in vectors()) {
             prop_assert_eq!(swap_world(&swap_world(&vector)), vector);

@@ -188,6 +188,7 @@ impl Layout {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bb_tests::laws;
     use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, SYSTEM_TIME_DATA};
     use mavlink::write_versioned_msg;
     use proptest::prelude::*;
@@ -262,7 +263,7 @@ mod tests {
         assert_eq!((framer.next_at_end(), framer.is_waiting(), framer.skipped()), (None, false, 10));
     }
 
-    proptest! {
+    laws! {
         /// Bytes known not to be a frame are not examined again, which changes nothing.
         #[test]
         fn a_frame_within_noise_is_found_where_it_is(pieces in proptest::collection::vec(pieces(), 1..12), cut in 1..200_usize) {

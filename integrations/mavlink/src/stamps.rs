@@ -128,6 +128,7 @@ impl Stamps {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bb_tests::laws;
     use proptest::prelude::*;
 
     fn at(millis: i64) -> MonotonicTime {
@@ -195,7 +196,7 @@ mod tests {
         (400..500).for_each(|n| assert!(matches!(read(n * 10, n * 10), Ok(Some(_))), "{n}"));
     }
 
-    proptest! {
+    laws! {
         #[test]
         fn no_stamp_panics(readings in proptest::collection::vec((any::<u64>(), any::<i64>()), 0..50), millis in any::<bool>()) {
             let mut stamps = stamps(if millis { Unit::Millis } else { Unit::Micros });

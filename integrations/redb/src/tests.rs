@@ -1,6 +1,7 @@
 mod killed;
 
 use super::*;
+use bb_tests::laws;
 use proptest::prelude::*;
 use redb::StorageBackend;
 use redb::backends::InMemoryBackend;
@@ -124,7 +125,7 @@ fn values() -> impl Strategy<Value = ParameterValue> {
     ]
 }
 
-proptest! {
+laws! {
     /// Each set replaces the last one, and comes back bit for bit.
     #[test]
     fn what_is_stored_comes_back(

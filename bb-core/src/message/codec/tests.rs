@@ -7,6 +7,7 @@ use crate::message::Payload;
 use crate::message::{Frame, Origin, Stamp, Stamped};
 use crate::payload::{Imu, JointState, Marg, Odometry, Orientation, Pose};
 use crate::time::{MonotonicTime, WallTime};
+use bb_tests::laws;
 use nalgebra::{
     DMatrix, DVector, Isometry3, Matrix2x3, Matrix6, Quaternion, Translation3, Unit, UnitQuaternion, Vector3,
 };
@@ -177,7 +178,7 @@ pub(super) fn ros_round_trip<T: Payload>(payload: T, stamp: Stamp) {
     assert_eq!(is_same, is_exact_as_ros(&message));
 }
 
-proptest! {
+laws! {
     #[test]
     fn everything_is_read_back_bit_for_bit(value in everything(), stamp in stamp()) {
         round_trip(&value);

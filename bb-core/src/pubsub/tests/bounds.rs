@@ -6,6 +6,7 @@ use super::super::{AnyTopic, DynamicSubscription, Overflow, Select, Topic};
 use crate::message::{Field, Stamped};
 use crate::message::{Finite, Payload};
 use crate::time::MonotonicTime;
+use bb_tests::laws;
 use nalgebra::{DMatrix, DVector, Matrix3, UnitQuaternion};
 use proptest::prelude::*;
 use std::collections::VecDeque;
@@ -143,7 +144,7 @@ fn step() -> impl Strategy<Value = Step> {
     prop_oneof![3 => (0usize..40).prop_map(Step::Push), 1 => Just(Step::Pop)]
 }
 
-proptest! {
+laws! {
     #[test]
     fn a_queue_is_a_list_that_loses_its_oldest(
         capacity in 1usize..9,

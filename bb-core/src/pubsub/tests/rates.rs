@@ -5,6 +5,7 @@ use super::super::{Delivery, DynamicSubscription, Overflow, Payloads, Registry, 
 use crate::message::Stamped;
 use crate::payload::JointState;
 use crate::time::MonotonicTime;
+use bb_tests::laws;
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 use std::pin::pin;
@@ -72,7 +73,7 @@ fn every(millis: u64) -> Delivery {
 
 const PATHS: [&str; 3] = ["a", "b", "c"];
 
-proptest! {
+laws! {
     #[test]
     fn each_path_gives_its_newest_at_the_rate_and_the_last_in_the_end(
         period in 1i64..12,

@@ -1,5 +1,6 @@
 //! Laws and known answers of averages.
 
+use bb_tests::laws;
 use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
@@ -29,7 +30,7 @@ fn closed_form(q1: &UnitQuaternion<f64>, w1: f64, q2: &UnitQuaternion<f64>, w2: 
     Unit::new_normalize(q1.into_inner() * first + q2.into_inner() * (second * product.signum()))
 }
 
-proptest! {
+laws! {
     #[test]
     fn agrees_with_the_papers_closed_form(
         q1 in orientation(), q2 in orientation(), w1 in 0.01..10.0_f64, w2 in 0.01..10.0,

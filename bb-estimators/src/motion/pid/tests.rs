@@ -1,4 +1,5 @@
 use super::*;
+use bb_tests::laws;
 use proptest::prelude::*;
 
 const PARAMS: PidParams = PidParams {
@@ -73,7 +74,7 @@ fn it_holds_a_mass_against_a_load() {
     assert!((position - 1.0_f64).abs() < 1e-3 && velocity.abs() < 1e-3, "{position} {velocity}");
 }
 
-proptest! {
+laws! {
     #[test]
     fn the_output_and_the_integral_stay_within_the_limits(
         steps in proptest::collection::vec((-100.0..100.0, -100.0..100.0, 0.0..2.0), 1..100),

@@ -1,5 +1,6 @@
 use super::super::JointPath;
 use super::*;
+use bb_tests::laws;
 use proptest::prelude::*;
 
 fn names(count: usize) -> Arc<[String]> {
@@ -23,7 +24,7 @@ fn shortest_s(way: f64, limits: &JointMotionLimits) -> f64 {
     if way * a < v * v { 2.0 * (way / a).sqrt() } else { way / v + v / a }
 }
 
-proptest! {
+laws! {
     #[test]
     fn it_keeps_the_limits_and_takes_the_shortest_time(
         joints in proptest::collection::vec((-3.0..3.0, -3.0..3.0, limits()), 1..7),

@@ -1,4 +1,5 @@
 use super::*;
+use bb_tests::laws;
 use proptest::prelude::*;
 
 fn easings() -> impl Strategy<Value = Easing> {
@@ -13,7 +14,7 @@ fn accelerations() -> impl Strategy<Value = Option<f64>> {
     proptest::option::of(0.1..50.0)
 }
 
-proptest! {
+laws! {
     /// The velocity integrates to the target, and the acceleration to the velocity, by Simpson's rule, which is exact for
     /// polynomials of third degree between the ends of the ramps.
     #[test]

@@ -1,5 +1,6 @@
 //! Tests of initialisation from rest and in motion.
 
+use bb_tests::laws;
 use nalgebra::{UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
@@ -18,7 +19,7 @@ fn at_rest(i: i64, world_from_body: &UnitQuaternion<f64>, bias: Vector3<f64>) ->
     }
 }
 
-proptest! {
+laws! {
     #[test]
     fn rest_shows_tilt_and_bias(
         roll in -3.1..3.1, pitch in -1.4..1.4, heading in -3.1..3.1,

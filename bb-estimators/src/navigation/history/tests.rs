@@ -1,5 +1,6 @@
 //! The result is that of the order of the stamps, regardless of the order of arrival.
 
+use bb_tests::laws;
 use nalgebra::{UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
@@ -88,7 +89,7 @@ fn fly(mut arrivals: Vec<(i64, i64, Sensed)>) -> Long {
     history
 }
 
-proptest! {
+laws! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]

@@ -110,6 +110,7 @@ pub(super) fn follows(time_ns: i64, previous_ns: i64) -> bool {
 mod tests {
     use super::*;
     use alloc::collections::BTreeSet;
+    use bb_tests::laws;
     use proptest::prelude::*;
 
     const MS: i64 = 1_000_000;
@@ -202,7 +203,7 @@ mod tests {
         }
     }
 
-    proptest! {
+    laws! {
         /// A jump needs its evidence: enough stamps since the last one near the clock, which rise for half a second.
         #[test]
         fn a_jump_needs_its_evidence(

@@ -1,11 +1,12 @@
 use super::*;
+use bb_tests::laws;
 use proptest::prelude::*;
 
 fn point(time_s: f64, position: Vector3<f64>) -> TrackPoint {
     TrackPoint { time_ns: (time_s * 1e9) as i64, position, covariance: Matrix3::identity() * 0.25, yaw: 0.0 }
 }
 
-proptest! {
+laws! {
     /// The track of a robot that accelerates, brakes and turns by up to half a g, with the stated noise.
     #[test]
     fn what_a_robot_measures_on_its_way_agrees(

@@ -3,6 +3,7 @@ use super::super::{GRAVITY, SimulatedWorld};
 use super::*;
 use bb_core::kinematics::Frames;
 use bb_core::topology::{Dynamics as Friction, Inertial, Joint, JointKind, Limit, Link, Origin};
+use bb_tests::laws;
 use nalgebra::{DVector, Isometry3, UnitQuaternion};
 use proptest::prelude::*;
 
@@ -205,7 +206,7 @@ fn a_root_that_is_nowhere_does_not_take_the_joints_along() {
     assert!(after[0].position > during[0].position, "it goes on falling: {during:?} {after:?}");
 }
 
-proptest! {
+laws! {
     /// Accelerations that the sweeps find solve the equations of motion.
     #[test]
     fn accelerations_are_those_of_the_equations_of_motion(

@@ -1,5 +1,6 @@
 use super::*;
 use crate::motion::{Easing, Pace, Profile};
+use bb_tests::laws;
 use proptest::prelude::*;
 
 fn drivetrains() -> impl Strategy<Value = Drivetrain> {
@@ -43,7 +44,7 @@ const PLAIN: Drivetrain = Drivetrain {
     friction: 0.3,
 };
 
-proptest! {
+laws! {
     /// Random commands at random times.
     #[test]
     fn limits_hold_under_random_commands(

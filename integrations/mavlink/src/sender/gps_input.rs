@@ -108,6 +108,7 @@ pub(super) mod tests {
     use bb_core::nalgebra::{Matrix6, UnitQuaternion, Vector6};
     use bb_core::payload::GeodeticPosition;
     use bb_estimators::navigation::state_estimator::SourceLabel;
+    use bb_tests::laws;
     use proptest::prelude::*;
 
     /// Returns an estimate in Munich, to the north-west, 5 m and 2 m to east and north, 3 m up.
@@ -204,7 +205,7 @@ pub(super) mod tests {
         assert_eq!(accuracies(&estimate), Some((5.0, 3.0)));
     }
 
-    proptest! {
+    laws! {
         #[test]
         fn what_is_sent_is_finite(
             values in proptest::collection::vec(proptest::num::f64::ANY, 12),

@@ -45,6 +45,7 @@ pub(super) fn chunks(severity: MavSeverity, text: &str, last_id: &mut u16) -> Ve
 mod tests {
     use super::*;
     use bb_core::MonotonicTime;
+    use bb_tests::laws;
     use proptest::prelude::*;
 
     /// Assembles the text as a ground station does.
@@ -93,7 +94,7 @@ mod tests {
         assert_eq!((of(Level::Error, "fallback_engaged"), severities), (2, [3, 4, 6, 7]));
     }
 
-    proptest! {
+    laws! {
         #[test]
         fn long_texts_arrive_whole(length in 51..CHUNK * CHUNKS - 1, letter in "[a-z]") {
             let text = letter.repeat(length);

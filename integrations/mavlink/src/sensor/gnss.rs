@@ -120,6 +120,7 @@ fn degrees(tenths_of_microdegrees: i32) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bb_tests::laws;
     use proptest::prelude::*;
 
     fn data(fix_type: GpsFixType) -> GPS_RAW_INT_DATA {
@@ -176,7 +177,7 @@ mod tests {
         }
     }
 
-    proptest! {
+    laws! {
         #[test]
         fn every_value_is_finite_or_unknown(
             (lat, lon, alt, alt_ellipsoid) in any::<(i32, i32, i32, i32)>(),

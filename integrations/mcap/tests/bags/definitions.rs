@@ -8,6 +8,7 @@ use bb_core::payload::{Imu, MagneticField};
 use bb_core::time::{MonotonicTime, WallTime};
 use bb_core::{Payload, Stamped};
 use bb_mcap::{Bag, BagWriter, MessageDefinition, RecorderOptions, RecordingErrorKind, Value};
+use bb_tests::laws;
 use mcap::WriteOptions;
 use proptest::prelude::*;
 use std::path::PathBuf;
@@ -99,7 +100,7 @@ prop_compose! {
     }
 }
 
-proptest! {
+laws! {
     /// A definition reads what the project writes of any type.
     #[test]
     fn a_definition_reads_what_was_written(value in everything()) {
@@ -111,7 +112,7 @@ proptest! {
 
     /// Bytes that end early are an error, and no bytes are a panic or a value of more than there are.
     #[test]
-    fn damage_is_an_error(value in everything(), at: prop::sample::Index, byte: u8) {
+    fn damage_is_an_error(value in everything(), at in any::<prop::sample::Index>(), byte in any::<u8>()) {
         let mut bytes = Vec::new();
         encode(&value, &mut bytes);
         let definition = definition::<Everything>();
@@ -124,7 +125,7 @@ proptest! {
     }
 
     #[test]
-    fn no_definition_is_a_panic(text in "[a-c/ \\[\\]<=0-9#\n]{0,60}|(float64|string|uint8|A)(\\[[0-9]{0,20}\\])? x", bytes: Vec<u8>) {
+    fn no_definition_is_a_panic(text in "[a-c/ \\[\\]<=0-9#\n]{0,60}|(float64|string|uint8|A)(\\[[0-9]{0,20}\\])? x", bytes in any::<Vec<u8>>()) {
         if let Ok(definition) = MessageDefinition::parse("a/msg/A", &text) {
             let _ = definition.read(&bytes);
         }

@@ -1,6 +1,7 @@
 //! Texts and bytes for zenoh, compared with those of `rmw_zenoh_cpp`.
 
 use bb_ros2::*;
+use bb_tests::laws;
 use proptest::prelude::*;
 use serde_json::Value;
 use std::time::Duration;
@@ -254,7 +255,7 @@ fn changed(token: &str, (place, with, how): (prop::sample::Index, String, u8)) -
     letters.concat()
 }
 
-proptest! {
+laws! {
     #[test]
     fn quality_of_service_is_read_back(qos in qos()) {
         prop_assert_eq!(qos.to_string().parse(), Ok(qos));

@@ -3,6 +3,7 @@ use crate::declaration::InputDeclaration;
 use crate::message::Payload as DerivePayload;
 use crate::message::Stamp;
 use crate::time::MonotonicTime;
+use bb_tests::laws;
 use proptest::prelude::*;
 use std::collections::VecDeque;
 
@@ -19,7 +20,7 @@ fn message(number: u64, millis: i64) -> Stamped<Number> {
     Stamp { monotonic_time: at(millis), ..Stamp::default() }.message(Number(number))
 }
 
-proptest! {
+laws! {
     /// Comparison with a plain list of what waits. A step is a number of messages before a run.
     #[test]
     fn each_message_is_seen_once_or_counted_as_lost(steps in prop::collection::vec(0..1500_u64, 0..12)) {

@@ -7,6 +7,7 @@ use crate::message::codec::tests::{Choice, Everything, Nothing, bytes_of, choice
 use crate::message::{Finite, Stamped};
 use crate::payload::{Imu, JointState, Pose};
 use crate::time::MonotonicTime;
+use bb_tests::laws;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use proptest::prelude::*;
 use serde_json::{Value, json};
@@ -417,7 +418,7 @@ fn read_or_refuse<T: Field>(text: &str) {
     }
 }
 
-proptest! {
+laws! {
     #[test]
     fn the_schema_takes_what_the_reader_takes(
         value in everything(), changes in proptest::collection::vec((any::<usize>(), anything()), 1..4),

@@ -8,6 +8,7 @@ use super::super::{decode, decode_as_ros, decode_companion, encode_as_ros, encod
 use crate::message::{Finite, Frame, Payload, RosMessage, Stamp, Stamped};
 use crate::payload::*;
 use crate::time::{MonotonicTime, WallTime};
+use bb_tests::laws;
 use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use random::Random;
@@ -47,7 +48,7 @@ macro_rules! of_each_ros_payload {
 }
 use of_each_ros_payload;
 
-proptest! {
+laws! {
     // One of every payload.
     #![proptest_config(ProptestConfig::with_cases(64))]
 

@@ -1,5 +1,6 @@
 //! Bad and extreme input. Each case once broke the covariance, or moved a state that the input carries no information about.
 
+use bb_tests::laws;
 use nalgebra::{Isometry3, Matrix3, SMatrix, Translation3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
@@ -181,7 +182,7 @@ fn number() -> impl Strategy<Value = f64> {
     ]
 }
 
-proptest! {
+laws! {
     #![proptest_config(ProptestConfig::with_cases(16))]
 
     /// No gate, both exact and extremely noisy sensors, and samples of any length.

@@ -1,5 +1,6 @@
 //! Jacobians of every measurement: the residual of an exact measurement is zero, and the Jacobian matches numeric differentiation.
 
+use bb_tests::laws;
 use nalgebra::{SVector, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
@@ -41,7 +42,7 @@ fn antenna_velocity(at: &Estimate<ALL>, lever_arm: Vector3<f64>) -> Vector3<f64>
     at.velocity + at.world_from_body * at.angular_velocity.cross(&lever_arm)
 }
 
-proptest! {
+laws! {
     #[test]
     fn gnss(mut at in estimate(), acceleration in vector(5.0), lever_arm in vector(3.0)) {
         at.acceleration = acceleration;

@@ -1,5 +1,6 @@
 //! Laws that hold for a filter of every configuration and any input.
 
+use bb_tests::laws;
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
@@ -199,13 +200,13 @@ fn late_and_out_of_order_is_as_in_order<S: States, const N: usize>(fixes: &[(i64
 }
 
 /// The laws of one configuration.
-macro_rules! laws {
+macro_rules! laws_of {
     ($($name:ident: $states:ty;)*) => { $(
         mod $name {
             use super::*;
             const N: usize = <$states>::DIMENSION;
 
-            proptest! {
+            laws! {
                 #![proptest_config(ProptestConfig::with_cases(16))]
 
                 #[test]
@@ -244,9 +245,9 @@ macro_rules! laws {
     )* };
 }
 
-configurations!(laws);
+configurations!(laws_of);
 
-proptest! {
+laws! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
     #[test]

@@ -1,5 +1,6 @@
 //! Tests of the transition over one IMU sample.
 
+use bb_tests::laws;
 use nalgebra::{SMatrix, SVector};
 use proptest::prelude::*;
 
@@ -25,7 +26,7 @@ fn error(from: &Estimate<ALL>, to: &Estimate<ALL>) -> SVector<f64, 15> {
     error
 }
 
-proptest! {
+laws! {
     #[test]
     fn is_the_derivative_of_the_mean(start in estimate(), dt in 1e-3..0.05) {
         let mut mean = start;

@@ -1,5 +1,6 @@
 //! Analytic derivatives compared with finite differences.
 
+use bb_tests::laws;
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector};
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
@@ -52,7 +53,7 @@ fn check<const D: usize>(
     Ok(())
 }
 
-proptest! {
+laws! {
     #[test]
     fn of_the_transition(at in estimate(), dt in 1e-4..0.5) {
         let mut moved = at;

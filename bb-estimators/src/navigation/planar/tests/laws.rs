@@ -2,6 +2,7 @@
 
 use core::f64::consts::{PI, TAU};
 
+use bb_tests::laws;
 use nalgebra::{Matrix2, Rotation2, Vector2, Vector3};
 use proptest::prelude::*;
 
@@ -46,7 +47,7 @@ fn drive(turn: f64, shift: Vector2<f64>) -> PlanarEkf {
     filter
 }
 
-proptest! {
+laws! {
     #![proptest_config(ProptestConfig::with_cases(32))]
 
     #[test]

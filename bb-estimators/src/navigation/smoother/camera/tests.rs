@@ -1,5 +1,6 @@
 //! The camera against numeric derivatives, its inverse, and hand-computed values of OpenCV's model.
 
+use bb_tests::laws;
 use nalgebra::{Vector2, Vector3};
 use proptest::prelude::*;
 
@@ -14,7 +15,7 @@ fn lens() -> Camera {
     }
 }
 
-proptest! {
+laws! {
     #[test]
     fn derivatives_are_the_numeric_ones(
         x in -3.0..3.0_f64, y in -2.0..2.0_f64, z in 4.0..50.0_f64,

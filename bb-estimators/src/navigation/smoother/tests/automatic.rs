@@ -1,5 +1,6 @@
 //! Automatic differentiation against hand-written Jacobians, and in a window.
 
+use bb_tests::laws;
 use nalgebra::{Matrix1, Matrix3, SMatrix, UnitQuaternion, Vector3};
 use num_dual::DualNum;
 use proptest::prelude::*;
@@ -94,7 +95,7 @@ fn rows(factor: &impl Factor<Drone, N>, previous: Option<&Estimate<N>>, at: &Est
     rows
 }
 
-proptest! {
+laws! {
     #[test]
     fn it_is_the_jacobian_by_hand(at in estimate(), position in vector(100.0), lever_arm in vector(2.0)) {
         let hand = NavigationFactor::from(GnssPosition { lever_arm, ..GnssPosition::new(position, 1.0, 2.0) });

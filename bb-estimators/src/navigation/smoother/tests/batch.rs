@@ -2,6 +2,7 @@
 
 #![allow(clippy::needless_range_loop, reason = "the indices are those of the equations")]
 
+use bb_tests::laws;
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 use proptest::prelude::*;
 
@@ -136,7 +137,7 @@ fn agrees(numbers: impl Iterator<Item = (f64, f64)>, what: &str) -> Result<(), T
     Ok(())
 }
 
-proptest! {
+laws! {
     #[test]
     fn it_is_the_batch(seed in any::<u64>(), keyframes in 1_usize..9, stiffness in -4.0..4.0_f64) {
         let problem = Problem::new(seed | 1, keyframes, 10_f64.powf(stiffness));

@@ -1,5 +1,6 @@
 //! An elimination that resumes after the keyframes before all current tracks, against one of the whole window.
 
+use bb_tests::laws;
 use proptest::prelude::*;
 
 use super::flight::{Flight, N, Smoother, linear, open, sensors};
@@ -194,7 +195,7 @@ fn landmarks_that_outlive_the_window_cost_no_longer_than_they_last() {
     assert!(coupled > 20 && (CUT..KEYFRAMES - window).contains(&last_coupled), "{coupled} {last_coupled}");
 }
 
-proptest! {
+laws! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
     /// Whatever changes in the window: observations, positions and relative poses that come late, at any keyframe, before or

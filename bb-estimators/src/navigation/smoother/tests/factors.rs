@@ -2,6 +2,7 @@
 
 #![allow(clippy::needless_range_loop, reason = "the indices are those of the equations")]
 
+use bb_tests::laws;
 use nalgebra::{SMatrix, SVector, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
@@ -69,7 +70,7 @@ fn turned(at: &Estimate<N>) -> Error {
     error
 }
 
-proptest! {
+laws! {
     /// The gradient of the cost matches numeric differentiation even if the measurement does not fit.
     #[test]
     fn gradients_of_relative_poses(previous in estimate(), at in estimate(), off in vector(1.0)) {

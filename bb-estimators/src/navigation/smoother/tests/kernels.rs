@@ -1,5 +1,6 @@
 //! Robust kernels: the weight is half the derivative of the cost, divided by the distance.
 
+use bb_tests::laws;
 use proptest::prelude::*;
 
 use super::super::kernel::Kernel;
@@ -15,7 +16,7 @@ fn cost(kernel: Kernel, x: f64) -> f64 {
     }
 }
 
-proptest! {
+laws! {
     #[test]
     fn weights_are_those_of_the_cost(x in 0.01..50.0_f64, parameter in 0.5..5.0_f64) {
         let all = [Kernel::Huber(parameter), Kernel::Cauchy(parameter), Kernel::GemanMcClure(parameter)];

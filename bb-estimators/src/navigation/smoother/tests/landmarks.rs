@@ -1,5 +1,6 @@
 //! Landmarks against a dense batch solution that has them as unknowns of their own, on random problems.
 
+use bb_tests::laws;
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix2x3, SMatrix, SVector, UnitQuaternion, Vector2, Vector3};
 use proptest::prelude::*;
 
@@ -229,7 +230,7 @@ fn compare(
     Ok(())
 }
 
-proptest! {
+laws! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]

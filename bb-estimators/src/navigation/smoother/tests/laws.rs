@@ -1,5 +1,6 @@
 //! Invariants of every flight.
 
+use bb_tests::laws;
 use nalgebra::{SMatrix, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
@@ -17,7 +18,7 @@ fn differ(a: &SMatrix<f64, N, N>, b: &SMatrix<f64, N, N>) -> f64 {
     largest
 }
 
-proptest! {
+laws! {
     #![proptest_config(ProptestConfig::with_cases(16))]
 
     /// Information that leaves the window is not lost: with linear factors, the result matches the one with all keyframes.

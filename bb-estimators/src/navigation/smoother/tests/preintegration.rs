@@ -1,5 +1,6 @@
 //! Preintegration against the sample-by-sample filter, numeric differentiation and reintegration.
 
+use bb_tests::laws;
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
@@ -42,7 +43,7 @@ fn densities() -> ImuDensities {
     params().densities()
 }
 
-proptest! {
+laws! {
     /// Mean and covariance match those of the filter without gravity, from a known state.
     #[test]
     fn it_is_the_filter_in_one_step(seed in 0.0..100.0, samples in 1_usize..200) {

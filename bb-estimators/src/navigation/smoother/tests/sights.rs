@@ -1,5 +1,6 @@
 //! Invariants of every flight with a camera.
 
+use bb_tests::laws;
 use nalgebra::{SVector, UnitQuaternion, Vector2, Vector3};
 use proptest::prelude::*;
 
@@ -9,7 +10,7 @@ use super::flight::{Drone, Flight, N, Smoother, apart, converged, linear, open, 
 use super::scenery::{Scenery, camera, exact};
 use crate::navigation::{LandmarkParams, NavigationFactor, Observation, SmootherParams, Stream};
 
-proptest! {
+laws! {
     #![proptest_config(ProptestConfig::with_cases(12))]
 
     /// The Jacobians by pose and landmark match the numeric ones.

@@ -1,5 +1,6 @@
 //! Tracks of landmarks, and what is left of them when their keyframes leave the window.
 
+use bb_tests::laws;
 use proptest::prelude::*;
 
 use super::flight::{Flight, N, Smoother, apart, linear, sensors};
@@ -16,7 +17,7 @@ fn carrying(window: usize) -> Smoother {
     smoother
 }
 
-proptest! {
+laws! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
     /// Information that leaves the window is not lost, however long the tracks are.

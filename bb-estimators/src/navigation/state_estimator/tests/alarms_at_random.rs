@@ -5,6 +5,7 @@ use super::flight::{SECOND, STEP};
 use super::*;
 use crate::navigation::ImuMean;
 use alloc::collections::BTreeMap;
+use bb_tests::laws;
 use proptest::prelude::*;
 
 const DWELL_NS: i64 = SECOND / 2;
@@ -193,7 +194,7 @@ fn arriving(flight: &Flight, extra: &[Report], shares: &[f64], jump: Option<(i64
     all.into_iter().map(|(_, sent)| sent).collect()
 }
 
-proptest! {
+laws! {
     #![proptest_config(ProptestConfig::with_cases(16))]
 
     #[test]

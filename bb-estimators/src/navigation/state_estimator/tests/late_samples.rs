@@ -4,6 +4,7 @@ use super::flight::{SECOND, STEP};
 use super::order::answers;
 use super::*;
 use crate::navigation::{GnssPosition, ImuMean};
+use bb_tests::laws;
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
@@ -348,7 +349,7 @@ fn add(estimator: &mut Estimator, step: &Step, now_ns: i64) -> Vec<Result<(), Es
     }
 }
 
-proptest! {
+laws! {
     #![proptest_config(ProptestConfig::with_cases(12))]
 
     /// Late samples may be run at any time: each at once, since somebody reads after each input, or many together when somebody reads at

@@ -3,6 +3,7 @@
 use super::flight::{SECOND, STEP};
 use super::*;
 use crate::navigation::Refusal;
+use bb_tests::laws;
 use proptest::prelude::*;
 
 /// All query results.
@@ -27,7 +28,7 @@ fn spoofed(sent: &Sent) -> Sent {
     }
 }
 
-proptest! {
+laws! {
     #![proptest_config(ProptestConfig::with_cases(4))]
 
     #[test]

@@ -3,6 +3,7 @@
 use super::flight::{SECOND, STEP};
 use super::*;
 use crate::navigation::ImuMean;
+use bb_tests::laws;
 use proptest::prelude::*;
 
 #[test]
@@ -228,7 +229,7 @@ fn a_clock_that_is_set_back_does_not_let_a_spoofed_receiver_in() {
     }
 }
 
-proptest! {
+laws! {
     #![proptest_config(ProptestConfig::with_cases(8))]
 
     /// A clock that jumps and keeps its new time. There is an estimate again within a second, or with the next anchor if the gap is

@@ -3,6 +3,7 @@
 use super::flight::{SECOND, STEP};
 use super::*;
 use crate::navigation::{ImuMean, Refusal};
+use bb_tests::laws;
 use proptest::prelude::*;
 
 /// An isolated absurd stamp, before the first sample, as the first, or among others. Other inputs are processed as if it were
@@ -62,7 +63,7 @@ fn burst() -> impl Strategy<Value = Burst> {
     )
 }
 
-proptest! {
+laws! {
     #![proptest_config(ProptestConfig::with_cases(8))]
 
     /// The estimate is the same as without the burst, except for any missing samples.

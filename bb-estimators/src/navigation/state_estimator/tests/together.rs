@@ -3,6 +3,7 @@
 use super::flight::{SECOND, STEP};
 use super::order::answers;
 use super::*;
+use bb_tests::laws;
 use proptest::prelude::*;
 
 /// Stamps that are far in the future begin here.
@@ -92,7 +93,7 @@ fn a_refused_alarm_shuts_out_what_comes_after_it_alone() {
     }
 }
 
-proptest! {
+laws! {
     #![proptest_config(ProptestConfig::with_cases(6))]
 
     #[test]

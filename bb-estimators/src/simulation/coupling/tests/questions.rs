@@ -6,6 +6,7 @@ use crate::simulation::plant::{Drivetrain, Goal};
 use crate::simulation::world::{SimulatedJoint, SimulatedWorld};
 use bb_core::payload::{JointTrajectory, TrajectoryPoint};
 use bb_core::topology::{Link, Topology};
+use bb_tests::laws;
 use nalgebra::{Isometry3, Vector3};
 use proptest::prelude::*;
 use std::sync::Arc;
@@ -120,13 +121,13 @@ fn run(
     NAMES.map(|name| world.joint(name, at(now)).expect("it is declared"))
 }
 
-proptest! {
+laws! {
     #![proptest_config(ProptestConfig::with_cases(40))]
 
     /// One that is asked every millisecond takes each step; one that is asked once, at the end, skips those at rest.
     #[test]
     fn a_world_that_is_asked_all_the_time_agrees_with_one_that_is_asked_at_the_end(
-        has_masses: bool,
+        has_masses in any::<bool>(),
         has_motor in proptest::array::uniform3(proptest::bool::weighted(0.8)),
         happenings in proptest::collection::vec((happenings(), 1_i64..300_000), 1..8),
         (effort, friction, damping) in (0.5..60.0, 0.0..3.0, 0.0..2.0),
