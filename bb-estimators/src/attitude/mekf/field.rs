@@ -2,7 +2,7 @@
 
 use nalgebra::{Vector2, Vector3};
 
-use super::numbers::{BRIEF_S, CALIBRATED, DISTURBANCE, HEADING_NOISE, LONG_S, NEW_FIELD_S, SAME_FIELD, SHORT_S};
+use super::numbers::{BRIEF_S, DISTURBANCE, HEADING_NOISE, LONG_S, NEW_FIELD_S, SAME_FIELD, SHORT_S};
 use crate::attitude::Real;
 
 /// The reference, as horizontal and vertical part.
@@ -16,11 +16,6 @@ pub(super) struct Field<T: Real> {
     lasted_s: T,
     /// Squared distance from the reference, as a fraction of its norm: the largest of late.
     disturbance: T,
-    /// Present distance from the reference, as a fraction of its norm; how far the filter has followed such distances, with the
-    /// gain of its heading; and the mean square of that.
-    off: Vector2<T>,
-    followed: Vector2<T>,
-    scatter: T,
 }
 
 /// Evidence of a window on the heading.
@@ -34,44 +29,11 @@ pub(super) struct Verdict<T> {
 impl<T: Real> Field<T> {
     pub(super) fn new(field: &Vector3<T>) -> Self {
         let plane = in_plane(field);
-        Self {
-            reference: plane,
-            seen_s: T::ZERO,
-            candidate: plane,
-            lasted_s: T::ZERO,
-            disturbance: T::ZERO,
-            off: Vector2::zeros(),
-            followed: Vector2::zeros(),
-            scatter: T::of(CALIBRATED * CALIBRATED),
-        }
+        Self { reference: plane, seen_s: T::ZERO, candidate: plane, lasted_s: T::ZERO, disturbance: T::ZERO }
     }
 
     pub(super) fn horizontal(&self) -> T {
         self.reference.x
-    }
-
-    /// The vertical part over the horizontal one.
-    pub(super) fn dip(&self) -> T {
-        self.reference.y / self.effective_horizontal()
-    }
-
-    fn effective_horizontal(&self) -> T {
-        self.reference.x.max(T::of(LEAST_HORIZONTAL) * self.reference.norm())
-    }
-
-    /// Variance of the heading by what is wrong in the field for long, rad², with the expected square of an offset's part.
-    /// The part across the field, which turns the heading, is not seen, but as large as each of the two that are.
-    pub(super) fn variance(&self, offset: T) -> T {
-        (T::HALF * self.scatter + offset) * self.reference.norm_squared() / self.effective_horizontal().powi(2)
-    }
-
-    /// Adds that the heading was corrected towards the field by this part of what was missing.
-    pub(super) fn follow(&mut self, gain: T, dt: T, moved_s: T) {
-        self.followed += (self.off - self.followed) * gain;
-        let squared = self.followed.norm_squared();
-        // A body at rest sees one place, which tells that fields are wrong here, but not that they are right.
-        let seen_s = if squared > self.scatter { dt } else { moved_s };
-        self.scatter += (squared - self.scatter) * (seen_s / (self.seen_s.min(T::of(LONG_S)) + T::of(SHORT_S)));
     }
 
     pub(super) fn is_disturbed(&self) -> bool {
@@ -105,8 +67,6 @@ impl<T: Real> Field<T> {
         }
         // A field that is off by its norm tells nothing more.
         squared = squared.min(T::ONE);
-        let off = (plane - self.reference) / self.reference.norm();
-        self.off = off / off.norm().max(T::ONE);
         let faded = self.disturbance + (squared - self.disturbance) * (dt / T::of(BRIEF_S)).min(T::ONE);
         self.disturbance = squared.max(faded);
         let known_s = self.seen_s + T::of(0.1);
@@ -121,11 +81,16 @@ impl<T: Real> Field<T> {
 /// The least part of a field that counts as horizontal.
 const LEAST_HORIZONTAL: f64 = 0.05;
 
-/// The horizontal part of a field, but at least a twentieth of it.
-pub(super) fn effective_horizontal<T: Real>(field: &Vector3<T>) -> T {
-    field.xy().norm().max(T::of(LEAST_HORIZONTAL) * field.norm())
+/// The horizontal part of a field, but at least a twentieth of its norm.
+pub(super) fn horizontal<T: Real>(horizontal: T, norm: T) -> T {
+    horizontal.max(T::of(LEAST_HORIZONTAL) * norm)
 }
 
-fn in_plane<T: Real>(field: &Vector3<T>) -> Vector2<T> {
+pub(super) fn effective_horizontal<T: Real>(field: &Vector3<T>) -> T {
+    horizontal(field.xy().norm(), field.norm())
+}
+
+/// The horizontal and the vertical part of a field.
+pub(super) fn in_plane<T: Real>(field: &Vector3<T>) -> Vector2<T> {
     Vector2::new(field.xy().norm(), field.z)
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-use super::doubt::Doubt;
+use super::doubt::{Correction, Doubt};
 use super::errors::{BIAS, EAST, Errors, HEADING, LAG, NORTH, ProcessNoise, ROTATION, VELOCITY};
 use super::field::{Field, effective_horizontal};
 use super::numbers::*;
@@ -191,7 +191,10 @@ impl<T: Real> MekfFilter<T> {
 
     /// Covariance of the rotation error in the world, rad².
     fn uncertainty(&self) -> Matrix3<T> {
-        self.doubt.covariance(self.errors.block(ROTATION), &self.force, self.field.as_ref(), &self.iron)
+        let (sin, cos) = T::of(self.params.declination).sin_cos();
+        let across = self.rotation.tr_mul(&Vector3::new(cos, -sin, T::ZERO));
+        let offset = self.iron.doubt(&across);
+        self.doubt.covariance(self.errors.block(ROTATION), &self.force, self.missed, offset)
     }
 
     /// Starts the estimation of errors after a start from a sample, the first one or the one after a gap.
@@ -267,6 +270,7 @@ impl<T: Real> MekfFilter<T> {
             let ratio = error / horizontal;
             self.errors.doubt(HEADING, (ratio * ratio).min(square(UNKNOWN)));
             self.forget_field();
+            self.doubt.forget_fields();
         }
         let field = field - self.iron.offset();
         let in_world = self.rotation * field;
@@ -401,8 +405,7 @@ impl<T: Real> MekfFilter<T> {
             return;
         }
         let variance = self.errors.variance(HEADING);
-        self.doubt.miss_heading(dt, self.missed, variance, noise);
-        reference.follow(variance / (variance + noise / dt), dt, moved_s);
+        self.doubt.correct_heading(&Correction { dt, field, moved_s, missed: self.missed, variance, noise });
         self.errors.correct_by_field(slopes, residual, noise / dt);
     }
 }

@@ -92,18 +92,15 @@ impl<T: Real> Hypothesis<T> {
         self.of_offset.trace() / T::of(3.0)
     }
 
-    /// Variance of the offset along an axis, with what the field's changes from place to place look like.
-    fn doubt(&self) -> T {
-        self.variance() + T::of(PLACES * PLACES)
-    }
-
     /// The offset, as far as it is larger than its deviation.
     ///
     /// An estimate of variance `σ²` along each axis, of an offset of unknown variance `τ²`, has the mean square `3 (τ² + σ²)`;
     /// the part `τ² / (τ² + σ²)` of it is the offset. B. Efron, C. Morris, "Stein's estimation rule and its competitors: an
     /// empirical Bayes approach", Journal of the American Statistical Association 68, 1973.
     fn believed(&self) -> Vector3<T> {
-        let (squared, unknown) = (self.offset.norm_squared(), T::of(3.0) * self.doubt());
+        // With what the field's changes from place to place look like.
+        let unknown = self.of_offset.trace() + T::of(3.0 * PLACES * PLACES);
+        let squared = self.offset.norm_squared();
         if squared > unknown { self.offset * (T::ONE - unknown / squared) } else { Vector3::zeros() }
     }
 }
@@ -142,6 +139,8 @@ pub(super) struct HardIron<T: Real> {
     seen: T,
     /// `true` if the user has stated that the magnetometer is calibrated, so that there is no newcomer.
     is_calibrated: bool,
+    /// `true` once a newcomer has won or lost, or the user has stated whether there is an offset.
+    is_settled: bool,
     /// Deviation of the offset when the heading was last doubted for it, zero while it is what calibration leaves.
     doubted: T,
     /// The last pose, and sums of how much the field changed and the body turned from pose to pose, squared.
@@ -166,6 +165,7 @@ impl<T: Real> HardIron<T> {
             odds: -T::of(ODDS),
             seen: T::ZERO,
             is_calibrated: magnetometer == Magnetometer::Calibrated,
+            is_settled: magnetometer != Magnetometer::Auto,
             doubted: T::of(doubted),
             pose: None,
             changed: T::ZERO,
@@ -184,16 +184,27 @@ impl<T: Real> HardIron<T> {
         self.incumbent.variance() * self.scale() * self.scale()
     }
 
-    /// Expected square of the error of the offset along an axis, as a fraction of the field's norm. The newcomer's offset is the true
-    /// one with the odds so far, which are even at first.
-    pub(super) fn doubt(&self) -> T {
-        let known = self.incumbent.doubt();
+    /// Expected square of the error of the offset along a direction of the body, as a fraction of the field's norm.
+    ///
+    /// An offset of the newcomer's variance `σ²` and distance `d` from the incumbent's has the expected square `d² + σ²`, with
+    /// the odds so far. They say little for long: fields that a small offset explains as well as none speak against one of
+    /// any size, and so against the small one. Before the first newcomer has won or lost, the logarithm of the offset's size is
+    /// uniform instead, down to what a calibration leaves, `c`: the part `1 / (1 + ln (σ / c))` of the expected square is left.
+    pub(super) fn doubt(&self, along: &Vector3<T>) -> T {
+        let of = |hypothesis: &Hypothesis<T>| along.dot(&(hypothesis.of_offset * along));
+        let known = of(&self.incumbent);
         if self.is_calibrated {
             return known;
         }
-        let moved = (self.newcomer.offset - self.incumbent.believed()).norm_squared() / T::of(3.0);
+        let variance = of(&self.newcomer);
+        let moved = along.dot(&(self.newcomer.offset - self.incumbent.believed()));
         let odds = (self.odds + T::of(ODDS)).min(T::ZERO).exp();
-        known + (moved + self.newcomer.variance()) * odds / (T::ONE + odds)
+        let mut part = odds / (T::ONE + odds);
+        if !self.is_settled {
+            let ratio = (variance / T::of(CALIBRATED * CALIBRATED)).max(T::ONE);
+            part = part.max(T::ONE / (T::ONE + T::HALF * ratio.ln()));
+        }
+        known + (moved * moved + variance) * part
     }
 
     /// The norm of the world's field, zero before it is known.
@@ -280,6 +291,7 @@ impl<T: Real> HardIron<T> {
     /// A newcomer that begins with this pose.
     fn another(&mut self, measured: &Vector3<T>) -> Hypothesis<T> {
         self.odds = -T::of(LATER_ODDS);
+        self.is_settled = true;
         self.seen = T::ZERO;
         let mut newcomer = Hypothesis::new(ANY_OFFSET);
         newcomer.step = self.incumbent.step;
