@@ -24,19 +24,6 @@ pub(super) struct Doubt<T: Real> {
     scatter: T,
 }
 
-/// A correction of the heading by the field of a window.
-pub(super) struct Correction<'a, T: Real> {
-    pub(super) dt: T,
-    pub(super) field: &'a Vector3<T>,
-    /// Time in which the body was leaving its place, s.
-    pub(super) moved_s: T,
-    /// Mean of `SHORT_S` of what the field says the heading is off by, rad.
-    pub(super) missed: T,
-    /// Variance of the heading before, and of the measured heading over a second.
-    pub(super) variance: T,
-    pub(super) noise: T,
-}
-
 impl<T: Real> Doubt<T> {
     pub(super) fn new() -> Self {
         Self {
@@ -67,23 +54,34 @@ impl<T: Real> Doubt<T> {
         self.corrected += corrected - self.corrected * (dt / T::of(LONG_S)).min(T::ONE);
     }
 
-    pub(super) fn correct_heading(&mut self, of: &Correction<T>) {
-        let surprise = of.missed * of.missed / (of.variance + of.noise / T::of(2.0 * SHORT_S));
-        self.seen_s = (self.seen_s + of.dt).min(T::of(SHORT_S * LONG_S));
-        self.surprise += (surprise - self.surprise) * (of.dt / (self.seen_s + T::of(LONG_S)));
-        let plane = in_plane(of.field);
+    /// Adds a correction of the heading by the field of a window of `dt` seconds, in `moved_s` of which the body was leaving its
+    /// place. In the mean of `SHORT_S` the field says that the heading is off by `missed`. `variance` is that of the heading
+    /// before, `noise` that of the measured heading over a second.
+    pub(super) fn correct_heading(
+        &mut self,
+        dt: T,
+        field: &Vector3<T>,
+        moved_s: T,
+        missed: T,
+        variance: T,
+        noise: T,
+    ) {
+        let surprise = missed * missed / (variance + noise / T::of(2.0 * SHORT_S));
+        self.seen_s = (self.seen_s + dt).min(T::of(SHORT_S * LONG_S));
+        self.surprise += (surprise - self.surprise) * (dt / (self.seen_s + T::of(LONG_S)));
+        let plane = in_plane(field);
         let mean = self.mean.get_or_insert(plane);
-        self.moved_s = (self.moved_s + of.moved_s).min(T::of(SHORT_S * LONG_S));
+        self.moved_s = (self.moved_s + moved_s).min(T::of(SHORT_S * LONG_S));
         let off = (plane - *mean) / mean.norm();
         // A field that differs by more than an outlier counts less than half.
         let weight = T::ONE / (T::ONE + off.norm_squared() / T::of(OUTLIER * OUTLIER * SAME_FIELD * SAME_FIELD));
-        *mean += (plane - *mean) * (weight * of.moved_s / self.moved_s.max(T::ONE));
-        let gain = of.variance / (of.variance + of.noise / of.dt);
+        *mean += (plane - *mean) * (weight * moved_s / self.moved_s.max(T::ONE));
+        let gain = variance / (variance + noise / dt);
         // A field that is off by its norm tells nothing more.
         self.followed += (off / off.norm().max(T::ONE) - self.followed) * gain;
         let squared = self.followed.norm_squared();
         // A body at rest sees one place, which tells that fields are wrong here, but not that they are right.
-        let seen_s = if squared > self.scatter { of.dt } else { of.moved_s };
+        let seen_s = if squared > self.scatter { dt } else { moved_s };
         self.scatter += (squared - self.scatter) * (seen_s / (self.moved_s.min(T::of(LONG_S)) + T::of(SHORT_S)));
     }
 

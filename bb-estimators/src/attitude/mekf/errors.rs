@@ -40,14 +40,6 @@ pub(super) struct Errors<T: Real> {
     covariance: [[T; WIDTH]; STATES],
 }
 
-/// Variances that a window adds.
-pub(super) struct ProcessNoise<T> {
-    /// About each axis, rad².
-    pub(super) rotation: T,
-    /// (rad/s)².
-    pub(super) bias: T,
-}
-
 /// Covariances of all states with one quantity.
 type Shared<T> = [T; WIDTH];
 
@@ -103,18 +95,18 @@ impl<T: Real> Errors<T> {
     /// Propagates over a window: `θ -= ∫R dt b`, `v += ∫R f dt + g_z θ × z`.
     ///
     /// Heading does not enter the velocity: it would let accelerations correct the heading, and through it the bias about
-    /// the vertical.
-    pub(super) fn propagate(&mut self, window: &Window<T>, noise: &ProcessNoise<T>) {
+    /// the vertical. `rotation`, rad², and `bias`, (rad/s)², are the variances that are added about each axis.
+    pub(super) fn propagate(&mut self, window: &Window<T>, rotation: T, bias: T) {
         self.value[EAST] += window.force.x;
         self.value[NORTH] += window.force.y;
         let (turn, lift) = (&window.rotation, window.force.z);
         // Covariances of the new rotation with the old states.
         let turned: [Shared<T>; 3] = core::array::from_fn(|axis| {
             let mut row = self.shared(ROTATION[axis]);
-            for bias in BIAS {
-                let (of_bias, part) = (self.shared(bias), turn[(axis, bias)]);
-                for state in 0..WIDTH {
-                    row[state] -= part * of_bias[state];
+            for state in BIAS {
+                let (of_bias, part) = (self.shared(state), turn[(axis, state)]);
+                for (one, other) in row.iter_mut().zip(of_bias) {
+                    *one -= part * other;
                 }
             }
             row
@@ -141,8 +133,8 @@ impl<T: Real> Errors<T> {
                     p[row][column] = turned[axis][column] - of_bias;
                 }
             }
-            p[row][row] += noise.rotation;
-            p[axis][axis] += noise.bias;
+            p[row][row] += rotation;
+            p[axis][axis] += bias;
         }
         for (state, row) in p.iter_mut().enumerate() {
             if row[state] < T::of(LEAST_VARIANCE) {

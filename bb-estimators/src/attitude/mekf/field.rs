@@ -2,7 +2,7 @@
 
 use nalgebra::{Vector2, Vector3};
 
-use super::numbers::{BRIEF_S, DISTURBANCE, HEADING_NOISE, LONG_S, NEW_FIELD_S, SAME_FIELD, SHORT_S};
+use super::numbers::{BRIEF_S, DISTURBANCE, HEADING_NOISE, LONG_S, SAME_FIELD, SHORT_S};
 use crate::attitude::Real;
 
 /// The reference, as horizontal and vertical part.
@@ -11,25 +11,14 @@ pub(super) struct Field<T: Real> {
     reference: Vector2<T>,
     /// Time for which the body has moved in it, s.
     seen_s: T,
-    /// Another field, and how long the body has moved in that.
-    candidate: Vector2<T>,
-    lasted_s: T,
     /// Squared distance from the reference, as a fraction of its norm: the largest of late.
     disturbance: T,
-}
-
-/// Evidence of a window on the heading.
-pub(super) struct Verdict<T> {
-    /// Variance of the measured heading over a second, rad² s.
-    pub(super) noise: T,
-    /// True if the reference is another one than before.
-    pub(super) is_new: bool,
 }
 
 impl<T: Real> Field<T> {
     pub(super) fn new(field: &Vector3<T>) -> Self {
         let plane = in_plane(field);
-        Self { reference: plane, seen_s: T::ZERO, candidate: plane, lasted_s: T::ZERO, disturbance: T::ZERO }
+        Self { reference: plane, seen_s: T::ZERO, disturbance: T::ZERO }
     }
 
     pub(super) fn horizontal(&self) -> T {
@@ -40,41 +29,24 @@ impl<T: Real> Field<T> {
         self.disturbance > T::of(SAME_FIELD * SAME_FIELD)
     }
 
-    /// Adds the mean field of a window of `dt` seconds, in `moved_s` of which the body was leaving its place.
-    pub(super) fn observe(&mut self, dt: T, field: &Vector3<T>, moved_s: T) -> Verdict<T> {
+    /// Adds the mean field of a window of `dt` seconds, in `moved_s` of which the body was leaving its place. Returns the variance
+    /// of the heading that it shows over a second, rad² s.
+    pub(super) fn observe(&mut self, dt: T, field: &Vector3<T>, moved_s: T) -> T {
         let plane = in_plane(field);
-        let same = T::of(SAME_FIELD * SAME_FIELD);
-        let mut squared = (plane - self.reference).norm_squared() / self.reference.norm_squared();
-        let mut is_calm = squared < same;
-        if (plane - self.candidate).norm_squared() < same * self.candidate.norm_squared() {
-            self.lasted_s += moved_s;
-        } else {
-            self.lasted_s = T::ZERO;
-            self.candidate = plane;
-        }
-        self.candidate += (plane - self.candidate) * (dt / T::of(NEW_FIELD_S)).min(T::ONE);
-        let is_new = !is_calm && self.lasted_s > (T::of(SHORT_S) + T::TWO * self.seen_s).min(T::of(LONG_S));
-        if is_new {
-            self.reference = self.candidate;
-            self.seen_s = self.lasted_s;
-            self.disturbance = T::ZERO;
-            is_calm = true;
-        }
-        if is_calm {
-            self.seen_s += moved_s;
-            let memory = self.seen_s.max(T::ONE).min(T::of(LONG_S)).max(dt);
-            self.reference += (plane - self.reference) * (dt / memory);
-        }
         // A field that is off by its norm tells nothing more.
-        squared = squared.min(T::ONE);
+        let squared = ((plane - self.reference).norm_squared() / self.reference.norm_squared()).min(T::ONE);
+        // Another field hardly counts, but becomes the reference in the end if it lasts.
+        let ratio = squared / T::of(SAME_FIELD * SAME_FIELD);
+        let weight = T::ONE / (T::ONE + ratio * ratio);
+        self.seen_s += moved_s * weight;
+        let memory = self.seen_s.max(T::ONE).min(T::of(LONG_S)).max(dt);
+        self.reference += (plane - self.reference) * (dt * weight / memory);
         let faded = self.disturbance + (squared - self.disturbance) * (dt / T::of(BRIEF_S)).min(T::ONE);
         self.disturbance = squared.max(faded);
         let known_s = self.seen_s + T::of(0.1);
-        let squared_norm = field.norm_squared();
-        let slope = squared_norm / effective_horizontal(field).powi(2);
-        let noise = T::of(HEADING_NOISE * HEADING_NOISE)
-            + T::of(DISTURBANCE * DISTURBANCE) * self.disturbance * slope * known_s / (known_s + T::of(SHORT_S));
-        Verdict { noise, is_new }
+        let slope = field.norm_squared() / effective_horizontal(field).powi(2);
+        T::of(HEADING_NOISE * HEADING_NOISE)
+            + T::of(DISTURBANCE * DISTURBANCE) * self.disturbance * slope * known_s / (known_s + T::of(SHORT_S))
     }
 }
 

@@ -1,15 +1,15 @@
 //! One step of the filter: strapdown integration with every sample, errors once per window.
 
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector2, Vector3};
 
-use super::doubt::{Correction, Doubt};
-use super::errors::{BIAS, EAST, Errors, HEADING, LAG, NORTH, ProcessNoise, ROTATION, VELOCITY};
+use super::doubt::Doubt;
+use super::errors::{BIAS, EAST, Errors, HEADING, LAG, NORTH, ROTATION, VELOCITY};
 use super::field::{Field, effective_horizontal};
 use super::numbers::*;
 use super::offset::HardIron;
 use super::params::MekfParams;
 use super::rest::Rest;
-use super::window::{MeanField, Window};
+use super::window::Window;
 use crate::attitude::initial::heading_error;
 use crate::attitude::rotation::{matrix, renormalised, turn, turn_heading, turn_upright};
 use crate::attitude::state::AttitudeState;
@@ -298,11 +298,8 @@ impl<T: Real> MekfFilter<T> {
     fn close_window(&mut self, orientation: UnitQuaternion<T>) -> UnitQuaternion<T> {
         self.window.rotation += self.rotation * self.window.half;
         let dt = self.window.duration;
-        let noise = ProcessNoise {
-            rotation: square::<T>(GYROSCOPE_NOISE) * dt + square::<T>(TURN_NOISE) * self.window.squared_rate,
-            bias: square::<T>(BIAS_DRIFT) * dt,
-        };
-        self.errors.propagate(&self.window, &noise);
+        let turned = square::<T>(GYROSCOPE_NOISE) * dt + square::<T>(TURN_NOISE) * self.window.squared_rate;
+        self.errors.propagate(&self.window, turned, square::<T>(BIAS_DRIFT) * dt);
         let force = self.window.force / dt;
         if self.is_overturned(dt, &force) {
             return self.level(orientation);
@@ -326,9 +323,9 @@ impl<T: Real> MekfFilter<T> {
             self.fuse_rest(dt, &(self.window.measured_turn / dt));
         }
         if self.is_north_known
-            && let Some(mean) = self.window.mean_field()
+            && let Some((field, rate)) = self.window.mean_field()
         {
-            self.fuse_field(dt, &mean, self.window.squared_rate / dt);
+            self.fuse_field(dt, &field, &rate);
         }
         self.window = Window::new();
         self.rest.expect(self.errors.deviation_of_bias());
@@ -370,15 +367,10 @@ impl<T: Real> MekfFilter<T> {
     }
 
     /// The angle of the field to north.
-    fn fuse_field(&mut self, dt: T, mean: &MeanField<T>, squared_rate: T) {
-        let MeanField { field, rate } = mean;
+    fn fuse_field(&mut self, dt: T, field: &Vector3<T>, rate: &Vector2<T>) {
         let reference = self.field.get_or_insert_with(|| Field::new(field));
-        let moved_s = if squared_rate > square(FAST) { dt } else { T::ZERO };
-        let verdict = reference.observe(dt, field, moved_s);
-        if verdict.is_new {
-            self.errors.doubt(HEADING, square(UNKNOWN));
-            self.doubt.begin();
-        }
+        let moved_s = if self.window.squared_rate > square::<T>(FAST) * dt { dt } else { T::ZERO };
+        let noise = reference.observe(dt, field, moved_s);
         let horizontal = effective_horizontal(field);
         let (east, north) = (field.x / horizontal, field.y / horizontal);
         let dip = field.z / horizontal;
@@ -394,7 +386,7 @@ impl<T: Real> MekfFilter<T> {
             residual -= T::two_pi() * (residual / T::two_pi()).round();
         }
         let offset = square::<T>(DISTURBANCE) * self.iron.variance() / (horizontal * horizontal);
-        let noise = verdict.noise + offset;
+        let noise = noise + offset;
         // A heading that the field has contradicted for long is not known.
         self.missed += (residual - self.missed) * (dt / T::of(SHORT_S)).min(T::ONE);
         let squared = self.missed * self.missed;
@@ -405,7 +397,7 @@ impl<T: Real> MekfFilter<T> {
             return;
         }
         let variance = self.errors.variance(HEADING);
-        self.doubt.correct_heading(&Correction { dt, field, moved_s, missed: self.missed, variance, noise });
+        self.doubt.correct_heading(dt, field, moved_s, self.missed, variance, noise);
         self.errors.correct_by_field(slopes, residual, noise / dt);
     }
 }

@@ -79,8 +79,6 @@ pub(super) const DISTURBANCE: f64 = 2.45;
 pub(super) const MAGNETOMETER_LAG: f64 = 0.015;
 /// Fields whose norm and dip differ by less than this fraction are the same.
 pub(super) const SAME_FIELD: f64 = 0.1;
-/// Time constant of the mean of another field, s.
-pub(super) const NEW_FIELD_S: f64 = 2.0;
 /// The angular velocity of a body that leaves its place, rad/s.
 pub(super) const FAST: f64 = 20.0 * DEGREE;
 /// Smallest error that contradicts the heading, if the field shows it for seconds, rad.

@@ -63,8 +63,8 @@ impl<T: Real> Hypothesis<T> {
         self.of_both += moved;
         let residual = measured - self.expected;
         // A step and an error of the magnetometer have one scale.
-        let (walk, white) = (self.step, self.step);
-        of_expected += Matrix3::from_diagonal_element(walk);
+        let white = self.step;
+        of_expected += Matrix3::from_diagonal_element(white);
         let (mut inverse, determinant) = inverse_of_symmetric(&of_expected, white)?;
         let squared = residual.dot(&(inverse * residual));
         let (tails, freedom) = (T::of(TAILS), T::of(TAILS + 3.0));
@@ -75,7 +75,7 @@ impl<T: Real> Hypothesis<T> {
         self.step = self.step.max(T::of(LEAST_WALK * LEAST_WALK));
         // A step that is too large for the scale is one, rather than an error of the sensor.
         if weight < T::ONE {
-            of_expected += Matrix3::from_diagonal_element(walk / weight - walk);
+            of_expected += Matrix3::from_diagonal_element(white / weight - white);
             (inverse, _) = inverse_of_symmetric(&of_expected, white)?;
         }
         let gain = self.of_both * inverse;
@@ -135,8 +135,6 @@ pub(super) struct HardIron<T: Real> {
     offset: Vector3<T>,
     /// Logarithm of the odds of the newcomer.
     odds: T,
-    /// Poses that the newcomer has seen.
-    seen: T,
     /// `true` if the user has stated that the magnetometer is calibrated, so that there is no newcomer.
     is_calibrated: bool,
     /// `true` once a newcomer has won or lost, or the user has stated whether there is an offset.
@@ -163,7 +161,6 @@ impl<T: Real> HardIron<T> {
             newcomer: Hypothesis::new(ANY_OFFSET),
             offset: Vector3::zeros(),
             odds: -T::of(ODDS),
-            seen: T::ZERO,
             is_calibrated: magnetometer == Magnetometer::Calibrated,
             is_settled: magnetometer != Magnetometer::Auto,
             doubted: T::of(doubted),
@@ -267,17 +264,16 @@ impl<T: Real> HardIron<T> {
                 self.odds += T::HALF * (other.determinant / one.determinant).ln()
                     + T::HALF * T::of(TAILS + 3.0) * nearer.ln();
             }
-            self.seen += T::ONE;
             let moved = (self.newcomer.offset - self.incumbent.believed()).norm_squared();
             let variance = self.newcomer.variance();
-            if self.odds > T::ZERO && variance < moved {
+            if self.odds > T::ZERO {
                 let newcomer = self.another(&measured);
                 self.incumbent = core::mem::replace(&mut self.newcomer, newcomer);
                 self.offset = self.incumbent.believed() * scale;
                 self.doubted = variance.sqrt();
                 return Some((moved + variance).sqrt() * scale);
             }
-            if self.seen > T::of(NEWCOMER_POSES) && self.odds < -T::of(ODDS) {
+            if self.newcomer.poses > T::of(NEWCOMER_POSES) && self.odds < -T::of(ODDS) {
                 self.newcomer = self.another(&measured);
             }
         }
@@ -292,7 +288,6 @@ impl<T: Real> HardIron<T> {
     fn another(&mut self, measured: &Vector3<T>) -> Hypothesis<T> {
         self.odds = -T::of(LATER_ODDS);
         self.is_settled = true;
-        self.seen = T::ZERO;
         let mut newcomer = Hypothesis::new(ANY_OFFSET);
         newcomer.step = self.incumbent.step;
         newcomer.begin(measured);

@@ -26,13 +26,6 @@ pub(super) struct Window<T: Real> {
     fields: T,
 }
 
-/// The mean field of a window, in the world frame, and how its horizontal part changes by a second of lag.
-#[derive(Clone, Copy)]
-pub(super) struct MeanField<T: Real> {
-    pub(super) field: Vector3<T>,
-    pub(super) rate: Vector2<T>,
-}
-
 impl<T: Real> Window<T> {
     pub(super) fn new() -> Self {
         Self {
@@ -67,8 +60,8 @@ impl<T: Real> Window<T> {
         self.fields = T::ZERO;
     }
 
-    pub(super) fn mean_field(&self) -> Option<MeanField<T>> {
-        (self.fields > T::ZERO)
-            .then(|| MeanField { field: self.field / self.fields, rate: self.field_rate / self.fields })
+    /// The mean field, and how its horizontal part changes by a second of lag.
+    pub(super) fn mean_field(&self) -> Option<(Vector3<T>, Vector2<T>)> {
+        (self.fields > T::ZERO).then(|| (self.field / self.fields, self.field_rate / self.fields))
     }
 }
