@@ -92,7 +92,7 @@ pub(crate) const STEPS: &[Step] = &[
             })
         },
     },
-    Step { name: "mekf/nine", on: None, steps: USUAL, stored: 1439.0, run: attitude::<MekfFilter> },
+    Step { name: "mekf/nine", on: None, steps: USUAL, stored: 1436.0, run: attitude::<MekfFilter> },
     Step {
         name: "smoother/30_landmarks",
         on: None,
