@@ -470,16 +470,11 @@ impl<F: CopiedFilter> Propagate for Copies<F> {
         self.best().admits(sample)
     }
 
-    fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
-        let since_ns = self.time_ns().ok_or(Refusal::NotStarted)?;
-        self.propagate_until(sample.time_ns, sample, since_ns)
-    }
-
     fn propagate_until(&mut self, time_ns: i64, sample: &ImuMean, since_ns: i64) -> Result<(), Refusal> {
         let Some((held, doubt)) = self.held(time_ns, sample, since_ns)? else {
             let part_s = seconds_between(self.time_ns().ok_or(Refusal::NotStarted)?, time_ns)?;
             let part = ImuMean { time_ns, ..*sample };
-            self.each(|filter| filter.propagate(&part))?;
+            self.each(|filter| filter.propagate_until(time_ns, sample, since_ns))?;
             self.holding.add(&part, part_s);
             // A measurement divides a sample into parts that are alike, which say nothing of how much the body vibrates.
             if time_ns == sample.time_ns

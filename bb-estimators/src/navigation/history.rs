@@ -10,11 +10,12 @@ use super::fused::Fused;
 use super::propagate::Propagate;
 use super::refusal::Refusal;
 
+pub(super) mod past;
 mod ring;
 #[cfg(test)]
 mod tests;
 
-use ring::Ring;
+use past::{Key, Past, Run};
 
 /// A filter with its streams, as one value that can be stored and replayed.
 ///
@@ -73,20 +74,16 @@ pub enum Placed {
 
 /// A filter with its last `SAMPLES` samples, `MEASUREMENTS` measurements, and `STATES` states, spread evenly between the samples.
 ///
-/// With the feature `std`, these are on the heap, allocated when the history is created; without it, they are stored inline.
+/// With the feature `alloc`, these are on the heap, allocated when the history is created; without it, they are stored inline.
 ///
-/// The history covers about `SAMPLES` samples. A measurement that is less late than the one before it costs the time since that one;
-/// else it costs its own delay plus half the time between two states, of which more take memory.
+/// The history covers about `SAMPLES` samples. A measurement at the time of the last sample costs nothing more, and one that is less
+/// late than the late one before it costs the time since that one; else it costs its own delay plus half the time between two states, of
+/// which more take memory.
 #[derive(Clone, Debug)]
 pub struct History<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES: usize> {
-    now: F,
-    samples: Ring<ImuMean, SAMPLES>,
-    measurements: Ring<(i64, F::Measurement), MEASUREMENTS>,
-    /// Each with the number of samples since the previous one.
-    states: Ring<F, STATES>,
-    since_state: usize,
-    /// State before the last late measurement, with the number of samples since the last of `states`: the next one is seldom older.
-    recent: Option<(F, usize)>,
+    past: Past<F, F::Measurement, SAMPLES, MEASUREMENTS, STATES>,
+    /// Number of measurements so far: those of one stamp are fused in the order of their arrival.
+    arrived: u32,
     longest_lead_ns: i64,
     counts: Arrivals,
 }
@@ -117,21 +114,10 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
             assert!(STATES >= 1 && SAMPLES >= STATES, "a history needs a state, and a sample for each");
             assert!(MEASUREMENTS >= 1, "a history needs room for a measurement");
         }
-        if time_of(&started).is_none() {
-            return Err(Refusal::NotStarted);
-        }
-        let mut states = Ring::new();
-        states.push(started.clone());
-        Ok(Self {
-            now: started,
-            samples: Ring::new(),
-            measurements: Ring::new(),
-            states,
-            since_state: 0,
-            recent: None,
-            longest_lead_ns,
-            counts: Arrivals::default(),
-        })
+        let time_ns = started.filter().time_ns().ok_or(Refusal::NotStarted)?;
+        let rooms = [SAMPLES, MEASUREMENTS, STATES];
+        let past = Past::new(started, Key::of_sample(time_ns), Some(time_ns), rooms);
+        Ok(Self { past, arrived: 0, longest_lead_ns, counts: Arrivals::default() })
     }
 
     /// Continues with a filter that was started elsewhere. Earlier measurements are discarded. Does not allocate.
@@ -140,22 +126,15 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
     ///
     /// Returns [`Refusal::NotStarted`]. The history is then unchanged.
     pub fn restart(&mut self, started: F) -> Result<(), Refusal> {
-        if time_of(&started).is_none() {
-            return Err(Refusal::NotStarted);
-        }
-        self.samples.clear();
-        self.measurements.clear();
-        self.states.clear();
-        self.states.push(started.clone());
-        self.since_state = 0;
-        self.recent = None;
-        self.now = started;
+        let time_ns = started.filter().time_ns().ok_or(Refusal::NotStarted)?;
+        self.past.now.state = started;
+        self.past.restart(Key::of_sample(time_ns), Some(time_ns));
         Ok(())
     }
 
     /// The filter at the time of the last sample.
     pub fn now(&self) -> &F {
-        &self.now
+        &self.past.now.state
     }
 
     /// Counts of late and rejected measurements.
@@ -169,15 +148,10 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
     ///
     /// The same as [`Propagate::propagate`]. The history is then unchanged.
     pub fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
-        if self.has_measurements_until(sample.time_ns) {
-            // A rejected sample must not have fused any measurement.
-            self.now.filter().admits(sample)?;
-            self.advance(sample, None);
-        } else {
-            self.now.filter_mut().propagate(sample)?;
-        }
-        self.samples.push(*sample);
-        self.keep_state();
+        // A rejected sample must not have fused any measurement.
+        self.now().filter().admits(sample)?;
+        self.past.push(*sample);
+        let _ = self.run(sample.time_ns, None);
         Ok(())
     }
 
@@ -187,130 +161,80 @@ impl<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES:
     ///
     /// Returns [`Refusal::TooOld`], [`Refusal::InTheFuture`], or an error of [`Replayed::update`].
     pub fn update(&mut self, time_ns: i64, measurement: &F::Measurement) -> Result<Placed, Refusal> {
-        let now_ns = time_of(&self.now).ok_or(Refusal::NotStarted)?;
+        let now_ns = self.past.now.key.time_ns;
         let is_ahead = time_ns > now_ns;
         let too_far = is_ahead && time_ns.saturating_sub(now_ns) > self.longest_lead_ns;
         if too_far || !self.make_room(now_ns) {
             self.counts.in_the_future += 1;
             return Err(Refusal::InTheFuture { time_ns });
         }
-        if is_ahead {
-            self.insert(time_ns, measurement);
-            return Ok(Placed::Waits);
-        }
-        // The last state that is not after the measurement: the measurements in that state are not newer.
-        let is_before = |state: &F| time_of(state).is_some_and(|state_ns| state_ns <= time_ns);
-        let found = self.states.count_while(is_before).checked_sub(1);
-        let Some((index, state)) = found.and_then(|index| Some((index, self.states.get(index)?))) else {
+        self.arrived = self.arrived.wrapping_add(1);
+        let key = Key { time_ns, rank: MEASURED, order: self.arrived };
+        if !self.past.reaches(key) {
             self.counts.too_old += 1;
             return Err(Refusal::TooOld { time_ns });
-        };
-        let recent = self.recent.take().filter(|(recent, _)| is_before(recent) && time_of(recent) > time_of(state));
-        let is_recent = recent.is_some();
-        (self.now, self.since_state) = recent.unwrap_or_else(|| (state.clone(), 0));
-        let place = self.insert(time_ns, measurement);
+        }
+        self.past.insert(key, *measurement);
+        if is_ahead {
+            return Ok(Placed::Waits);
+        }
         self.counts.late += 1;
         self.counts.longest_delay_ns = self.counts.longest_delay_ns.max(now_ns.saturating_sub(time_ns));
-        self.states.truncate(index + 1);
-        let from = time_of(&self.now).ok_or(Refusal::NotStarted)?;
-        let first = self.samples.count_while(|sample| sample.time_ns <= from);
-        let mut result = Err(Refusal::NotStarted);
-        if from == time_ns {
-            result = self.now.update(measurement);
-            if !is_recent {
-                self.states.truncate(index);
-                self.states.push(self.now.clone());
-            }
-        }
-        for i in first..self.samples.len() {
-            let Some(sample) = self.samples.get(i).copied() else { break };
-            if self.recent.is_none() && sample.time_ns >= time_ns {
-                self.recent = Some((self.now.clone(), self.since_state));
-            }
-            if let Some(of_it) = self.advance(&sample, Some(place)) {
-                result = of_it;
-            }
-            self.keep_state();
-        }
-        result.map(Placed::Fused)
+        self.run(now_ns, Some(key)).map(Placed::Fused)
     }
 
-    fn has_measurements_until(&self, time_ns: i64) -> bool {
-        let now_ns = time_of(&self.now).unwrap_or(i64::MAX);
-        let first = self.measurements.count_while(|(at, _)| *at <= now_ns);
-        self.measurements.get(first).is_some_and(|(at, _)| *at <= time_ns)
+    /// Runs up to a time, and returns the result of a measurement.
+    fn run(&mut self, until_ns: i64, asked: Option<Key>) -> Result<Fused, Refusal> {
+        let mut replay = Replay { asked, answer: Err(Refusal::NotStarted), apart: SAMPLES / STATES };
+        self.past.run(Key::end_of(until_ns), &mut replay);
+        self.past.trim();
+        replay.answer
     }
 
     /// Makes room for a measurement: removes the oldest, and with it the states that do not include it yet. Returns `false` if
     /// all still wait for a sample.
     fn make_room(&mut self, now_ns: i64) -> bool {
-        if self.measurements.len() < MEASUREMENTS {
+        let past = &mut self.past;
+        if !past.inputs.is_full() {
             return true;
         }
-        let Some((left_ns, _)) = self.measurements.get(0).copied() else { return true };
-        if left_ns > now_ns {
-            return false;
+        let Some((left, _)) = past.inputs.pop_front_if(|(key, _)| key.time_ns <= now_ns) else { return false };
+        while past.copies.pop_front_if(|copy| copy.key < left).is_some() {}
+        past.recent.take_if(|recent| recent.key < left);
+        if past.copies.len() == 0 {
+            past.copy_now();
         }
-        self.measurements.pop_front();
-        while self.states.get(0).and_then(time_of).is_some_and(|state_ns| state_ns < left_ns) {
-            self.states.pop_front();
-        }
-        self.recent.take_if(|(state, _)| time_of(state).is_some_and(|state_ns| state_ns < left_ns));
-        if self.states.len() == 0 {
-            self.states.push(self.now.clone());
-            self.since_state = 0;
+        true
+    }
+}
+
+/// The rank of measurements among what has one stamp: they follow the sample.
+const MEASURED: u8 = 1;
+
+/// A run of the filter.
+struct Replay {
+    /// The measurement whose result is wanted.
+    asked: Option<Key>,
+    answer: Result<Fused, Refusal>,
+    /// Number of samples from a state to the next.
+    apart: usize,
+}
+
+impl<F: Replayed> Run<F, F::Measurement> for Replay {
+    fn advance(&mut self, filter: &mut F, until_ns: i64, sample: &ImuMean, since_ns: Option<i64>) {
+        let since_ns = since_ns.unwrap_or(sample.time_ns);
+        let _ = filter.filter_mut().propagate_until(until_ns, sample, since_ns);
+    }
+
+    fn apply(&mut self, filter: &mut F, key: Key, measurement: &mut F::Measurement) -> bool {
+        let result = filter.update(measurement);
+        if self.asked == Some(key) {
+            self.answer = result;
         }
         true
     }
 
-    /// Inserts a measurement after those that are not newer, and returns its index.
-    fn insert(&mut self, time_ns: i64, measurement: &F::Measurement) -> usize {
-        let place = self.measurements.count_while(|(at, _)| *at <= time_ns);
-        self.measurements.insert(place, (time_ns, *measurement));
-        place
+    fn is_due(&self, _: &F, _: &F, samples: usize) -> bool {
+        samples >= self.apart
     }
-
-    /// Advances `now` over one sample with the measurements in it, and returns the result of the one at `place`.
-    fn advance(&mut self, sample: &ImuMean, place: Option<usize>) -> Option<Result<Fused, Refusal>> {
-        let mut result = None;
-        let from = time_of(&self.now).unwrap_or(i64::MAX);
-        for index in self.measurements.count_while(|(at, _)| *at <= from)..self.measurements.len() {
-            let Some((time_ns, measurement)) = self.measurements.get(index) else { break };
-            if *time_ns > sample.time_ns {
-                break;
-            }
-            if time_of(&self.now) != Some(*time_ns) {
-                let _ = self.now.filter_mut().propagate_until(*time_ns, sample, from);
-            }
-            let of_it = self.now.update(measurement);
-            if place == Some(index) {
-                result = Some(of_it);
-            }
-        }
-        let reached = time_of(&self.now);
-        if reached == Some(from) {
-            let _ = self.now.filter_mut().propagate(sample);
-        } else if reached != Some(sample.time_ns) {
-            let _ = self.now.filter_mut().propagate_until(sample.time_ns, sample, from);
-        }
-        result
-    }
-
-    /// Stores the state if one is due, and discards data older than the oldest state.
-    fn keep_state(&mut self) {
-        self.since_state += 1;
-        if self.since_state < SAMPLES / STATES {
-            return;
-        }
-        self.since_state = 0;
-        self.states.push(self.now.clone());
-        let oldest_ns = self.states.get(0).and_then(time_of).unwrap_or(i64::MIN);
-        while self.measurements.get(0).is_some_and(|(time_ns, _)| *time_ns <= oldest_ns) {
-            self.measurements.pop_front();
-        }
-    }
-}
-
-fn time_of<F: Replayed>(state: &F) -> Option<i64> {
-    state.filter().time_ns()
 }

@@ -14,40 +14,31 @@ pub trait Propagate: Clone {
     /// # Errors
     ///
     /// Returns the reason why the sample is rejected. The filter is then unchanged.
-    fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal>;
+    fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
+        let since_ns = self.time_ns().ok_or(Refusal::NotStarted)?;
+        self.propagate_until(sample.time_ns, sample, since_ns)
+    }
 
     /// Checks that a sample can be propagated.
     ///
     /// # Errors
     ///
     /// The same as [`propagate`](Self::propagate).
-    fn admits(&self, sample: &ImuMean) -> Result<(), Refusal> {
-        self.clone().propagate(sample)
-    }
+    fn admits(&self, sample: &ImuMean) -> Result<(), Refusal>;
 
     /// Propagates the filter over the part of a sample that ends at `time_ns`, where a measurement divides it. The sample began at
     /// `since_ns`, which tells a filter that treats gaps differently whether the whole sample is one: every part of a gap is a gap,
     /// however short it is.
     ///
-    /// By default, the part is propagated like a sample of its own.
-    ///
     /// # Errors
     ///
     /// The same as [`propagate`](Self::propagate).
-    fn propagate_until(&mut self, time_ns: i64, sample: &ImuMean, since_ns: i64) -> Result<(), Refusal> {
-        let _ = since_ns;
-        // The sample is a mean, so each part of it is the same.
-        self.propagate(&ImuMean { time_ns, ..*sample })
-    }
+    fn propagate_until(&mut self, time_ns: i64, sample: &ImuMean, since_ns: i64) -> Result<(), Refusal>;
 }
 
 impl<S: States, const N: usize> Propagate for Eskf<S, N> {
     fn time_ns(&self) -> Option<i64> {
         self.estimate().map(|estimate| estimate.time_ns)
-    }
-
-    fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
-        self.propagate(sample)
     }
 
     fn admits(&self, sample: &ImuMean) -> Result<(), Refusal> {
@@ -57,6 +48,7 @@ impl<S: States, const N: usize> Propagate for Eskf<S, N> {
     }
 
     fn propagate_until(&mut self, time_ns: i64, sample: &ImuMean, since_ns: i64) -> Result<(), Refusal> {
+        // The sample is a mean, so each part of it is the same.
         let is_gap = seconds_between(since_ns, sample.time_ns)? > self.params().longest_sample;
         self.propagate_part(&ImuMean { time_ns, ..*sample }, is_gap)
     }

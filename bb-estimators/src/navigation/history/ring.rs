@@ -1,91 +1,125 @@
 //! A bounded queue that allocates only when it is created.
 
-#[cfg(feature = "std")]
-use std::boxed::Box;
+#[cfg(feature = "alloc")]
+use alloc::boxed::Box;
 
 /// Storage of the values: with a heap, they are allocated there from the beginning. Hundreds of kilobytes are too much for a thread's
 /// stack, which in a build without optimisation holds a copy for each function they pass through.
-#[cfg(feature = "std")]
+#[cfg(feature = "alloc")]
 type Slots<T, const N: usize> = Box<[Option<T>]>;
-#[cfg(not(feature = "std"))]
+#[cfg(not(feature = "alloc"))]
 type Slots<T, const N: usize> = [Option<T>; N];
 
-/// Up to `N` values, oldest first.
+/// Values up to the number that it was made for, oldest first; inline, up to `N`.
 #[derive(Clone, Debug)]
-pub(super) struct Ring<T, const N: usize> {
+pub(in crate::navigation) struct Ring<T, const N: usize> {
     slots: Slots<T, N>,
     first: usize,
     len: usize,
 }
 
 impl<T, const N: usize> Ring<T, N> {
-    pub(super) fn new() -> Self {
-        #[cfg(feature = "std")]
-        let slots = core::iter::repeat_with(|| None).take(N).collect();
-        #[cfg(not(feature = "std"))]
-        let slots = core::array::from_fn(|_| None);
+    pub(super) fn new(room: usize) -> Self {
+        #[cfg(feature = "alloc")]
+        let slots = core::iter::repeat_with(|| None).take(room).collect();
+        #[cfg(not(feature = "alloc"))]
+        let (slots, _) = (core::array::from_fn(|_| None), room);
         Self { slots, first: 0, len: 0 }
     }
 
     pub(super) fn clear(&mut self) {
-        self.truncate(0);
-        self.first = 0;
+        while self.pop().is_some() {}
     }
 
-    pub(super) fn len(&self) -> usize {
+    pub(in crate::navigation) fn len(&self) -> usize {
         self.len
     }
 
-    pub(super) fn get(&self, index: usize) -> Option<&T> {
-        if index >= self.len {
-            return None;
-        }
-        self.slots[(self.first + index) % N].as_ref()
+    pub(in crate::navigation) fn is_full(&self) -> bool {
+        self.len == self.slots.len()
+    }
+
+    fn slot(&self, index: usize) -> usize {
+        let slot = self.first + index;
+        if slot < self.slots.len() { slot } else { slot - self.slots.len() }
+    }
+
+    pub(in crate::navigation) fn get(&self, index: usize) -> Option<&T> {
+        if index < self.len { self.slots[self.slot(index)].as_ref() } else { None }
+    }
+
+    pub(in crate::navigation) fn get_mut(&mut self, index: usize) -> Option<&mut T> {
+        if index < self.len { self.slots[self.slot(index)].as_mut() } else { None }
+    }
+
+    pub(in crate::navigation) fn last(&self) -> Option<&T> {
+        self.len.checked_sub(1).and_then(|last| self.get(last))
     }
 
     /// The number of values at the front for which a condition holds, which holds for none after them. The search begins at the back.
-    pub(super) fn count_while(&self, holds: impl Fn(&T) -> bool) -> usize {
+    pub(in crate::navigation) fn count_while(&self, holds: impl Fn(&T) -> bool) -> usize {
         let last = (0..self.len).rev().find(|index| self.get(*index).is_some_and(&holds));
         last.map_or(0, |index| index + 1)
     }
 
     /// Appends a value; the oldest is removed if there is no room.
-    pub(super) fn push(&mut self, value: T) {
-        if self.len == N {
+    pub(in crate::navigation) fn push(&mut self, value: T) {
+        if self.is_full() {
             self.pop_front();
         }
-        self.slots[(self.first + self.len) % N] = Some(value);
+        let slot = self.slot(self.len);
+        self.slots[slot] = Some(value);
         self.len += 1;
     }
 
-    pub(super) fn pop_front(&mut self) -> Option<T> {
-        if self.len == 0 {
-            return None;
-        }
-        let value = self.slots[self.first].take();
-        self.first = (self.first + 1) % N;
+    pub(super) fn pop(&mut self) -> Option<T> {
+        self.len = self.len.checked_sub(1)?;
+        let slot = self.slot(self.len);
+        self.slots[slot].take()
+    }
+
+    pub(in crate::navigation) fn pop_front(&mut self) -> Option<T> {
+        let value = self.slots.get_mut(self.first)?.take()?;
+        self.first = self.slot(1);
         self.len -= 1;
-        value
+        Some(value)
+    }
+
+    /// Removes the oldest value if a condition holds for it.
+    pub(in crate::navigation) fn pop_front_if(&mut self, holds: impl Fn(&T) -> bool) -> Option<T> {
+        if self.get(0).is_some_and(holds) { self.pop_front() } else { None }
     }
 
     /// Inserts a value before the one at `index`. If there is no room, the newest is removed.
-    pub(super) fn insert(&mut self, index: usize, value: T) {
-        if index >= N {
+    pub(in crate::navigation) fn insert(&mut self, index: usize, value: T) {
+        if index >= self.slots.len() {
             return;
         }
-        self.truncate(N - 1);
+        if self.is_full() {
+            self.pop();
+        }
         self.push(value);
         for i in (index..self.len - 1).rev() {
-            self.slots.swap((self.first + i) % N, (self.first + i + 1) % N);
+            let (this, next) = (self.slot(i), self.slot(i + 1));
+            self.slots.swap(this, next);
         }
     }
+}
 
-    /// Keeps only the oldest `len` values.
-    pub(super) fn truncate(&mut self, len: usize) {
-        while self.len > len {
-            self.len -= 1;
-            self.slots[(self.first + self.len) % N] = None;
-        }
+#[cfg(any(feature = "smoother", feature = "eskf"))]
+impl<T, const N: usize> Ring<T, N> {
+    /// The number of values for which there is room.
+    pub(in crate::navigation) fn room(&self) -> usize {
+        self.slots.len()
+    }
+
+    /// The values, in any order.
+    pub(in crate::navigation) fn iter_mut(&mut self) -> impl Iterator<Item = &mut T> {
+        self.slots.iter_mut().flatten()
+    }
+
+    pub(in crate::navigation) fn iter(&self) -> impl DoubleEndedIterator<Item = &T> {
+        (0..self.len).filter_map(|index| self.get(index))
     }
 }
 
@@ -99,7 +133,7 @@ mod tests {
 
     #[test]
     fn there_is_never_more_than_there_is_room_for() {
-        let mut ring = Ring::<i32, 4>::new();
+        let mut ring = Ring::<i32, 4>::new(4);
         for value in [1, 2, 4, 5] {
             ring.push(value);
         }
@@ -108,7 +142,8 @@ mod tests {
         ring.insert(1, 3);
         assert_eq!(all(&ring), [2, 3, 4, 5]);
         assert_eq!((ring.count_while(|x| *x < 5), ring.count_while(|x| *x < 0)), (3, 0));
-        ring.truncate(2);
+        ring.pop();
+        ring.pop();
         assert_eq!((all(&ring), ring.len()), (vec![2, 3], 2));
         ring.insert(2, 7);
         ring.insert(0, 1);

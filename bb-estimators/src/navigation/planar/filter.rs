@@ -288,8 +288,8 @@ impl Propagate for PlanarEkf {
         self.estimate().map(|estimate| estimate.time_ns)
     }
 
-    fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
-        self.propagate(sample)
+    fn admits(&self, sample: &ImuMean) -> Result<(), Refusal> {
+        self.seconds_to(sample).map(drop)
     }
 
     fn propagate_until(&mut self, time_ns: i64, sample: &ImuMean, since_ns: i64) -> Result<(), Refusal> {

@@ -3,7 +3,7 @@
 
 use alloc::collections::VecDeque;
 
-use super::entry::{Entry, Key, Payload};
+use super::entry::{Entry, Payload};
 use super::error::{EstimatorError, Outcome, Reason};
 use super::event::StartedFrom;
 use super::factor::ProvidedFactor;
@@ -32,8 +32,6 @@ const FARTHEST: f64 = 1.4e7;
 /// The deterministic part of the estimator.
 #[derive(Clone, Debug)]
 pub(super) struct Engine<F: ProvidedFactor> {
-    /// The key of the last input that was applied.
-    key: Key,
     /// The IMU time up to which it has run.
     now_ns: Option<i64>,
     /// The time from which the first sample continues.
@@ -81,7 +79,6 @@ pub(super) enum Condition {
 impl<F: ProvidedFactor> Engine<F> {
     pub(super) fn new(config: &StateEstimatorConfig) -> Result<Self, ParamsError> {
         Ok(Self {
-            key: Key::FIRST,
             now_ns: None,
             begun_ns: None,
             world: None,
@@ -106,10 +103,6 @@ impl<F: ProvidedFactor> Engine<F> {
     pub(super) fn set_origin(&mut self, origin: &TakeoffOrigin) {
         self.origin = Some(*origin);
         self.world = Some(World::new(origin.position));
-    }
-
-    pub(super) fn key(&self) -> Key {
-        self.key
     }
 
     pub(super) fn now_ns(&self) -> Option<i64> {
@@ -199,7 +192,7 @@ impl<F: ProvidedFactor> Engine<F> {
     /// The clock of the IMU was set back. The estimate is kept, but the times of its measurements are dropped. A receiver that was
     /// not let in stays out. The new clock has been seen for `for_ns`, and the same time again may have passed before.
     pub(super) fn set_clock_back(&mut self, sample_ns: i64, for_ns: i64, config: &StateEstimatorConfig) {
-        (self.key, self.now_ns, self.begun_ns) = (Key::FIRST, None, None);
+        (self.now_ns, self.begun_ns) = (None, None);
         self.sources = Sources::default();
         self.gate.forget_times();
         self.marks.clear();
@@ -246,7 +239,6 @@ impl<F: ProvidedFactor> Engine<F> {
         since_ns: i64,
         config: &StateEstimatorConfig,
     ) -> Result<(), Reason> {
-        self.key = Key::of_sample(until_ns);
         let is_first = self.now_ns.is_none();
         self.now_ns = Some(until_ns);
         match &mut self.phase {
@@ -289,22 +281,22 @@ impl<F: ProvidedFactor> Engine<F> {
         }
     }
 
-    /// Applies an input at the present time. After `Fatal`, this engine must be discarded.
+    /// Applies an input of that stamp at the present time. After `Fatal`, this engine must be discarded.
     pub(super) fn apply(
         &mut self,
+        time_ns: i64,
         entry: &Entry<F>,
         config: &StateEstimatorConfig,
     ) -> (Outcome, Option<Rejection>) {
-        self.key = entry.key;
         if matches!(entry.payload, Payload::Warm(_)) {
             // The first known time. The first sample continues from it.
             if self.now_ns.is_none() {
-                (self.now_ns, self.begun_ns) = (Some(entry.key.time_ns), Some(entry.key.time_ns));
+                (self.now_ns, self.begun_ns) = (Some(time_ns), Some(time_ns));
             }
         }
         // Reports before the first sample count as well.
         let is_told = matches!(entry.payload, Payload::Attitude(_) | Payload::Health(_) | Payload::Frame);
-        let Some(now_ns) = self.now_ns.or(is_told.then_some(entry.key.time_ns)) else {
+        let Some(now_ns) = self.now_ns.or(is_told.then_some(time_ns)) else {
             return (Err(Refusal::NotStarted.into()), None);
         };
         let mut rejection = None;
@@ -327,7 +319,7 @@ impl<F: ProvidedFactor> Engine<F> {
                 Ok(None)
             }
             Payload::Health(health) => {
-                self.gate.health(entry.key.time_ns, *health, &config.params);
+                self.gate.health(time_ns, *health, &config.params);
                 Ok(None)
             }
             Payload::Frame => match self.phase {

@@ -4,30 +4,7 @@ use super::error::{EstimatorError, Outcome, Reason};
 use super::event::{EventKind, InputKind};
 use super::gate::Rejection;
 use super::input::{AttitudeReading, FlightControllerState, GnssReading, GpsHealth, PoseAnchor, VioOutput};
-
-/// The position of an input in the queue: its stamp, then its kind. Keys are unique.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Key {
-    pub(super) time_ns: i64,
-    rank: u8,
-    /// The number of a provider; of reports at one time, the worse comes later, and counts.
-    provider: u32,
-}
-
-impl Key {
-    /// Before all inputs.
-    pub(super) const FIRST: Self = Self { time_ns: i64::MIN, rank: 0, provider: 0 };
-
-    /// A sample of the IMU precedes measurements at its end.
-    pub(super) const fn of_sample(time_ns: i64) -> Self {
-        Self { time_ns, rank: 0, provider: 0 }
-    }
-
-    /// After all inputs of that time.
-    pub(super) const fn end_of(time_ns: i64) -> Self {
-        Self { time_ns, rank: u8::MAX, provider: u32::MAX }
-    }
-}
+use crate::navigation::history::past::Key;
 
 /// An input other than a sample of the IMU.
 #[derive(Clone, Debug)]
@@ -44,8 +21,9 @@ pub(super) enum Payload<F> {
 }
 
 impl<F> Payload<F> {
+    /// Place in the queue. Of one kind, the number of the provider counts; of reports, the worse comes later.
     pub(super) fn key(&self, time_ns: i64) -> Key {
-        let (rank, provider) = match self {
+        let (rank, order) = match self {
             Self::Warm(_) => (1, 0),
             Self::Attitude(_) => (2, 0),
             Self::Health(health) => (3, health.severity()),
@@ -55,7 +33,7 @@ impl<F> Payload<F> {
             Self::Gnss(_) => (7, 0),
             Self::Provided(provider, _) => (8, *provider),
         };
-        Key { time_ns, rank, provider }
+        Key { time_ns, rank, order }
     }
 
     pub(super) fn kind(&self) -> InputKind {
@@ -82,10 +60,9 @@ impl<F> Payload<F> {
     }
 }
 
-/// An input at its position in the queue.
+/// An input in the queue.
 #[derive(Clone, Debug)]
 pub(super) struct Entry<F> {
-    pub(super) key: Key,
     pub(super) payload: Payload<F>,
     /// `None` until it is first applied.
     pub(super) outcome: Option<Outcome>,

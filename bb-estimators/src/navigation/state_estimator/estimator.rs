@@ -4,7 +4,7 @@ use alloc::vec::Vec;
 
 use super::emission::Emission;
 use super::engine::Condition;
-use super::entry::{Key, Payload};
+use super::entry::Payload;
 use super::error::{EstimatorError, OriginError, Reason};
 use super::event::{Event, EventKind, EventSink, InputKind};
 use super::factor::ProvidedFactor;
@@ -22,6 +22,7 @@ use crate::attitude::ParamsError;
 use crate::navigation::eskf::ImuMean;
 use crate::navigation::factor::NavigationFactor;
 use crate::navigation::geodesy::LocalFrame;
+use crate::navigation::history::past::Key;
 use crate::navigation::refusal::Refusal;
 
 /// Largest lag of the caller's clock behind the IMU's, ns.
@@ -294,7 +295,7 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
 
     /// Passes on the reports of the queue.
     fn drain(&mut self) {
-        let mut told = core::mem::take(&mut self.queue.told);
+        let mut told = core::mem::take(&mut self.queue.news.told);
         for told in told.drain(..) {
             match told {
                 Told::Event(time_ns, kind) => self.tell(time_ns, kind),
@@ -306,7 +307,7 @@ impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
                 }
             }
         }
-        self.queue.told = told;
+        self.queue.news.told = told;
         self.look();
     }
 

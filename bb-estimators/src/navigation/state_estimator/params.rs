@@ -144,26 +144,6 @@ impl StateEstimatorConfig {
     }
 }
 
-/// Capacity of the queue.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Rooms {
-    pub(super) samples: usize,
-    pub(super) inputs: usize,
-}
-
-impl Rooms {
-    pub(super) fn of(params: &StateEstimatorParams) -> Self {
-        let [samples, inputs] = params.room();
-        Self { samples, inputs }
-    }
-
-    /// Number of inputs up to which those of the flight controller are accepted: it alone may fill three quarters, which at the
-    /// configured rate it does not.
-    pub(super) fn of_controller(self) -> usize {
-        self.inputs - self.inputs / 4
-    }
-}
-
 impl StateEstimatorParams {
     /// Maximum numbers of IMU samples and of other inputs held: `imu_rate (1.25 lateness + keyframe_interval + 1)` and
     /// `input_rate (1.25 lateness + lead + 1)`. The memory for them is allocated when the estimator is created.

@@ -1,24 +1,23 @@
 //! The single queue of all inputs, ordered by stamp, and the only writer that follows it.
 //!
-//! The engine is run up to the newest input that is not a sample of the IMU. Later IMU samples only feed the predictor. A late
-//! input is inserted at its place, and the engine is run again from its last copy before that input: at once, or for a late sample
-//! of the IMU once the estimate is needed, see [`reruns`]. The result equals that of inputs that arrive in order, to the last bit.
+//! The engine is run up to the newest input that is not a sample of the IMU. Later IMU samples only feed the predictor. After a late
+//! input, [`Past`] runs the engine again: at once, or for a late sample of the IMU once the estimate is needed, see [`reruns`].
 
-use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 
 use super::clock::Clock;
 use super::engine::Engine;
-use super::entry::{Entry, Key, Payload};
-use super::error::{EstimatorError, Outcome, Reason};
-use super::event::{EventKind, InputKind, StartedFrom};
+use super::entry::{Entry, Payload};
+use super::error::{Outcome, Reason};
+use super::event::{EventKind, StartedFrom};
 use super::factor::ProvidedFactor;
 use super::input::TakeoffOrigin;
 use super::label::Sources;
-use super::params::{Rooms, StateEstimatorConfig, ns};
+use super::params::{StateEstimatorConfig, ns};
 use super::strategy::{Pose, Predictor};
 use crate::attitude::ParamsError;
 use crate::navigation::eskf::ImuMean;
+use crate::navigation::history::past::{Key, Past};
 use crate::navigation::refusal::Refusal;
 
 mod reruns;
@@ -65,76 +64,60 @@ pub(super) enum Told {
 /// See the module.
 #[derive(Debug)]
 pub(super) struct Queue<F: ProvidedFactor> {
-    samples: VecDeque<ImuMean>,
-    /// The time of the last sample that was dropped: the first one held begins there.
-    dropped_ns: Option<i64>,
-    inputs: VecDeque<Entry<F>>,
-    engine: Engine<F>,
-    copies: VecDeque<Engine<F>>,
-    /// The first place at which the queue has changed since the engine and the predictor were run. While there is one, neither
-    /// runs on, and no copy is made.
-    changed: Option<Key>,
+    /// While it has changed, the predictor does not run on.
+    past: Past<Engine<F>, Entry<F>, 0, 0, 0>,
     /// While inputs are added together: the time up to which they have to be run.
     held: Option<i64>,
     predictor: Option<Predictor>,
-    newest: Option<ImuMean>,
     /// The first sample, until another stamp agrees with its own.
     first: Option<ImuMean>,
     clock: Clock,
-    rooms: Rooms,
     counts: QueueCounts,
-    /// Starts that were told and may be run again.
+    pub(super) news: News,
+}
+
+/// Reports, and those already made that a repeated run would make again.
+#[derive(Debug)]
+pub(super) struct News {
+    /// Starts that may be run again.
     started: Vec<(i64, StartedFrom)>,
-    /// The last failure by a sample that was told.
+    /// The last failure by a sample.
     broken: Option<(i64, Reason)>,
+    /// Time of the last keyframe that has left the window.
     left_ns: i64,
     pub(super) told: Vec<Told>,
 }
 
 impl<F: ProvidedFactor> Queue<F> {
     pub(super) fn new(config: &StateEstimatorConfig) -> Result<Self, ParamsError> {
-        let engine = Engine::new(config)?;
-        let mut copies = VecDeque::with_capacity(COPIES + 2);
-        copies.push_back(engine.clone());
-        let rooms = Rooms::of(&config.params);
+        let [samples, inputs] = config.params.room();
         Ok(Self {
-            samples: VecDeque::with_capacity(rooms.samples),
-            dropped_ns: None,
-            inputs: VecDeque::with_capacity(rooms.inputs),
-            engine,
-            copies,
-            changed: None,
+            past: Past::new(Engine::new(config)?, Key::FIRST, None, [samples, inputs, COPIES]),
             held: None,
             predictor: None,
-            newest: None,
             first: None,
             clock: Clock::default(),
-            rooms,
             counts: QueueCounts::default(),
-            started: Vec::new(),
-            broken: None,
-            left_ns: i64::MIN,
-            told: Vec::new(),
+            news: News { started: Vec::new(), broken: None, left_ns: i64::MIN, told: Vec::new() },
         })
     }
 
     /// Returns whether there has been no input yet.
     pub(super) fn is_empty(&self) -> bool {
-        self.newest.is_none() && self.first.is_none() && self.inputs.is_empty()
+        self.newest().is_none() && self.first.is_none() && self.past.inputs.len() == 0
     }
 
     pub(super) fn set_origin(&mut self, origin: &TakeoffOrigin) {
-        self.engine.set_origin(origin);
-        self.copies.iter_mut().for_each(|copy| copy.set_origin(origin));
+        self.past.each(|engine| engine.set_origin(origin));
     }
 
     /// The engine as of the last run, see [`catch_up`](Self::catch_up).
     pub(super) fn engine(&self) -> &Engine<F> {
-        &self.engine
+        &self.past.now.state
     }
 
     pub(super) fn engine_mut(&mut self) -> &mut Engine<F> {
-        &mut self.engine
+        &mut self.past.now.state
     }
 
     /// The predictor as of the last run, see [`catch_up`](Self::catch_up).
@@ -144,7 +127,7 @@ impl<F: ProvidedFactor> Queue<F> {
 
     /// The newest sample of the IMU.
     pub(super) fn newest(&self) -> Option<&ImuMean> {
-        self.newest.as_ref()
+        self.past.samples.last()
     }
 
     pub(super) fn counts(&self) -> &QueueCounts {
@@ -153,18 +136,13 @@ impl<F: ProvidedFactor> Queue<F> {
 
     /// Result of an input. `None` while it waits.
     pub(super) fn outcome(&self, key: Key) -> Option<Outcome> {
-        let index = self.inputs.binary_search_by(|entry| entry.key.cmp(&key)).ok()?;
-        self.inputs.get(index)?.outcome
+        self.past.input(key)?.outcome
     }
 
     /// Numbers of samples, inputs and copies held.
     #[cfg(test)]
     pub(super) fn held(&self) -> [usize; 3] {
-        [self.samples.len(), self.inputs.len(), self.copies.len()]
-    }
-
-    fn tell(&mut self, time_ns: i64, kind: EventKind) {
-        self.told.push(Told::Event(time_ns, kind));
+        [self.past.samples.len(), self.past.inputs.len(), self.past.copies.len()]
     }
 
     fn count(&mut self, reason: Reason) -> Reason {
@@ -190,14 +168,6 @@ impl<F: ProvidedFactor> Queue<F> {
     pub(super) fn add_sample(&mut self, sample: &ImuMean, config: &StateEstimatorConfig) -> Result<bool, Reason> {
         let result = self.place_sample(sample, config);
         result.map_err(|reason| self.count(reason))
-    }
-
-    /// Returns whether there is a copy from before an input. Within the lateness there always is, unless samples were dropped or the clock
-    /// was set back.
-    fn reaches(&self, key: Key) -> bool {
-        let is_before =
-            |copy: &Engine<F>| copy.key() < key && copy.now_ns().is_none_or(|now_ns| now_ns <= key.time_ns);
-        self.copies.front().is_some_and(is_before)
     }
 
     /// Returns whether an input may belong to the time of a sample.
@@ -231,9 +201,8 @@ impl<F: ProvidedFactor> Queue<F> {
     fn block(&mut self, config: &StateEstimatorConfig) {
         // Fixes that came before the report remain in the estimate: a run from a blocked engine drops them.
         self.catch_up_with_held(config);
-        let until_ns = self.newest.map(|newest| newest.time_ns);
-        self.engine.block(until_ns);
-        self.copies.iter_mut().for_each(|copy| copy.block(until_ns));
+        let until_ns = self.newest().map(|newest| newest.time_ns);
+        self.past.each(|engine| engine.block(until_ns));
     }
 
     fn place(
@@ -243,40 +212,39 @@ impl<F: ProvidedFactor> Queue<F> {
         frames: &[i64],
         config: &StateEstimatorConfig,
     ) -> Result<Key, Reason> {
-        let newest_ns = self.newest.map(|newest| newest.time_ns);
+        let newest_ns = self.newest().map(|newest| newest.time_ns);
         let oldest_ns =
             newest_ns.map_or(i64::MIN, |newest_ns| newest_ns.saturating_sub(ns(config.params.lateness)));
         let key = payload.key(time_ns);
-        if time_ns < oldest_ns || !self.reaches(key) {
+        // Within the lateness there is a copy, unless samples were dropped or the clock was set back.
+        if time_ns < oldest_ns || !self.past.reaches(key) {
             return Err(Refusal::TooOld { time_ns }.into());
         }
         if newest_ns.is_some_and(|newest_ns| time_ns > newest_ns.saturating_add(ns(config.params.lead))) {
             return Err(Refusal::InTheFuture { time_ns }.into());
         }
-        if self.inputs.binary_search_by(|entry| entry.key.cmp(&key)).is_ok() {
+        if self.past.input(key).is_some() {
             return Err(Reason::Duplicate);
         }
-        let room = if payload.kind().is_of_window() { self.rooms.inputs } else { self.rooms.of_controller() };
-        if self.inputs.len() + 1 + frames.len() > room {
+        let room = self.past.inputs.room();
+        // The flight controller alone may fill three quarters, which at the configured rate it does not.
+        let room = if payload.kind().is_of_window() { room } else { room - room / 4 };
+        if self.past.inputs.len() + 1 + frames.len() > room {
             return Err(Reason::Overflow);
         }
         let is_past = |at_ns: i64| newest_ns.is_some_and(|newest_ns| at_ns <= newest_ns);
-        let mut first = key;
+        let entry = |payload| Entry { payload, outcome: None, rejection: None };
         let mut until_ns = Some(time_ns).filter(|time_ns| is_past(*time_ns));
-        self.insert(key, payload);
+        let mut is_late = self.past.insert(key, entry(payload));
         for frame_ns in frames.iter().filter(|frame_ns| **frame_ns >= oldest_ns) {
             let frame = Payload::<F>::Frame.key(*frame_ns);
-            if self.reaches(frame) && self.inputs.binary_search_by(|entry| entry.key.cmp(&frame)).is_err() {
-                self.insert(frame, Payload::Frame);
-                first = first.min(frame);
+            if self.past.reaches(frame) && self.past.input(frame).is_none() {
+                is_late |= self.past.insert(frame, entry(Payload::Frame));
                 // The relative pose may have to wait for the IMU, but it begins where this is.
                 until_ns = until_ns.max(Some(*frame_ns).filter(|frame_ns| is_past(*frame_ns)));
             }
         }
-        if first < self.engine.key() {
-            self.counts.late += 1;
-            self.change(first);
-        }
+        self.counts.late += u64::from(is_late);
         match (&mut self.held, until_ns) {
             (Some(held_ns), Some(until_ns)) => *held_ns = until_ns.max(*held_ns),
             (None, Some(until_ns)) => self.settle(until_ns, config),
@@ -285,162 +253,77 @@ impl<F: ProvidedFactor> Queue<F> {
         Ok(key)
     }
 
-    fn insert(&mut self, key: Key, payload: Payload<F>) {
-        let index = self.inputs.partition_point(|entry| entry.key < key);
-        self.inputs.insert(index, Entry { key, payload, outcome: None, rejection: None });
-    }
-
-    /// Runs the engine on. An input that breaks it is marked, and the engine must be restored from a copy.
-    fn run_until(&mut self, until: Key, config: &StateEstimatorConfig) -> Result<(), Key> {
-        let key = self.engine.key();
-        let mut sample_index = self.samples.partition_point(|sample| Key::of_sample(sample.time_ns) <= key);
-        let mut input_index = self.inputs.partition_point(|entry| entry.key <= key);
-        loop {
-            // Also on the way of a run that is repeated: it has dropped those after the late input, and the next one may be as late.
-            self.keep_copy(config);
-            let sample = self.samples.get(sample_index).copied();
-            let sample_key = sample.map(|sample| Key::of_sample(sample.time_ns));
-            let input_key = self.inputs.get(input_index).map(|entry| entry.key);
-            let is_input = match (sample_key, input_key) {
-                (Some(sample), Some(input)) => input < sample,
-                // Nothing is known after the newest sample.
-                (None, Some(input)) => self.newest.is_some_and(|newest| input.time_ns <= newest.time_ns),
-                _ => false,
-            };
-            let Some(next) = (if is_input { input_key } else { sample_key }) else { break };
-            if next > until {
-                break;
-            }
-            let since_ns = self.since_ns(sample_index);
-            if !is_input {
-                if let Some(sample) = sample {
-                    self.advance(sample.time_ns, &sample, since_ns, config);
-                }
-                sample_index += 1;
-                continue;
-            }
-            if self.engine.now_ns().is_some_and(|now_ns| now_ns < next.time_ns)
-                && let Some(sample) = sample
-            {
-                // The sample is a mean, so its parts have the same values.
-                self.advance(next.time_ns, &sample, since_ns, config);
-            }
-            self.apply(input_index, config)?;
-            input_index += 1;
-        }
-        Ok(())
-    }
-
-    /// The time at which a sample begins. Inputs may divide it into parts of any length.
+    /// The time at which a sample begins.
     fn since_ns(&self, index: usize) -> Option<i64> {
-        let before = index.checked_sub(1).and_then(|before| self.samples.get(before));
-        // The first sample held follows one that was dropped, or continues from where the engine began.
-        before.map(|before| before.time_ns).or(self.dropped_ns).or(self.engine.begun_ns())
+        self.past.since_ns(index).or(self.engine().begun_ns())
     }
 
     /// Returns whether a sample is the first after a gap.
     fn follows_gap(&self, index: usize, config: &StateEstimatorConfig) -> bool {
-        let (Some(since_ns), Some(sample)) = (self.since_ns(index), self.samples.get(index)) else { return false };
+        let (Some(since_ns), Some(sample)) = (self.since_ns(index), self.past.samples.get(index)) else {
+            return false;
+        };
         sample.time_ns.saturating_sub(since_ns) > ns(config.sensors.longest_sample)
-    }
-
-    fn advance(&mut self, until_ns: i64, sample: &ImuMean, since_ns: Option<i64>, config: &StateEstimatorConfig) {
-        let was = self.engine.condition();
-        let since_ns = since_ns.or(self.engine.now_ns()).unwrap_or(sample.time_ns);
-        if let Err(reason) = self.engine.advance(until_ns, sample, since_ns, config)
-            && self.engine.condition() != was
-        {
-            let time_ns = until_ns;
-            if self.broken.is_none_or(|(at_ns, before)| at_ns != time_ns || !before.is_alike(&reason)) {
-                self.tell(time_ns, EventKind::Fatal { input: InputKind::Imu, reason });
-            }
-            self.broken = Some((time_ns, reason));
-        }
-        self.look();
-    }
-
-    fn apply(&mut self, index: usize, config: &StateEstimatorConfig) -> Result<(), Key> {
-        let Some(entry) = self.inputs.get_mut(index) else { return Ok(()) };
-        if matches!(entry.outcome, Some(Err(EstimatorError::Fatal(_)))) {
-            return Ok(());
-        }
-        let (outcome, rejection) = self.engine.apply(entry, config);
-        let key = entry.key;
-        let news = entry.became(outcome, rejection);
-        self.told.extend(news.into_iter().flatten().map(|kind| Told::Event(key.time_ns, kind)));
-        if matches!(outcome, Err(EstimatorError::Fatal(_))) {
-            return Err(key);
-        }
-        self.look();
-        Ok(())
-    }
-
-    /// Collects the reports of the engine. Those already made in an earlier run are skipped.
-    fn look(&mut self) {
-        while let Some((pose, sources)) = self.engine.take_left() {
-            if pose.time_ns > self.left_ns {
-                self.left_ns = pose.time_ns;
-                self.told.push(Told::Left(pose, sources));
-            }
-        }
-        if let Some(started) = self.engine.started()
-            && !self.started.contains(&started)
-        {
-            self.started.push(started);
-            let (time_ns, from) = started;
-            self.tell(time_ns, EventKind::Started { from });
-        }
-    }
-
-    /// Copies the engine if the last copy is old enough.
-    fn keep_copy(&mut self, config: &StateEstimatorConfig) {
-        let apart_ns = (ns(config.params.lateness) / (COPIES as i64 - 2)).max(SHORTEST_NS);
-        let Some(now_ns) = self.engine.now_ns() else { return };
-        let last_ns = self.copies.back().and_then(Engine::now_ns);
-        if last_ns.is_none_or(|last_ns| now_ns.saturating_sub(last_ns) >= apart_ns) {
-            self.copies.push_back(self.engine.clone());
-        }
     }
 
     /// Drops the copies that no late input needs.
     fn forget(&mut self, config: &StateEstimatorConfig) {
-        let Some(newest) = self.newest else { return };
+        let Some(newest) = self.newest() else { return };
         let oldest_ns = newest.time_ns.saturating_sub(ns(config.params.lateness));
-        let is_old = |copy: &Engine<F>| copy.key().time_ns < oldest_ns;
-        while self.copies.len() > COPIES || self.copies.get(1).is_some_and(is_old) {
-            self.copies.pop_front();
+        while self.past.copies.get(1).is_some_and(|copy| copy.key.time_ns < oldest_ns) {
+            self.past.copies.pop_front();
         }
         self.trim();
     }
 
     /// Drops entries that no copy needs to run on or to predict.
     fn trim(&mut self) {
-        let Some(oldest) = self.copies.front() else { return };
-        let key = oldest.key();
-        let kept_ns = oldest.needed_ns().min(self.engine.needed_ns());
-        // The sample before the first needed one shows whether that one follows a gap.
-        while self.samples.get(1).is_some_and(|sample| sample.time_ns <= kept_ns) {
-            self.dropped_ns = self.samples.pop_front().map(|sample| sample.time_ns);
-        }
-        while self.inputs.front().is_some_and(|entry| entry.key <= key) {
-            self.inputs.pop_front();
-        }
+        self.past.trim();
+        let Some(oldest) = self.past.copies.get(0) else { return };
+        let kept_ns = oldest.state.needed_ns().min(self.past.now.state.needed_ns());
         // The start of the oldest copy is that of any run.
-        let last = oldest.started();
-        self.started.retain(|started| started.0 >= key.time_ns || Some(*started) == last);
+        let (from_ns, last) = (oldest.key.time_ns, oldest.state.started());
+        self.news.started.retain(|started| started.0 >= from_ns || Some(*started) == last);
+        // The sample before the first needed one shows whether that one follows a gap.
+        while self.past.samples.get(1).is_some_and(|sample| sample.time_ns <= kept_ns) {
+            self.past.drop_sample();
+        }
     }
 
     /// Restarts the prediction at the newest estimate.
     fn predict(&mut self, config: &StateEstimatorConfig) {
         self.predictor = None;
-        let Some(mut predictor) = self.engine.predictor() else { return };
-        let first = self.samples.partition_point(|sample| sample.time_ns <= predictor.time_ns());
-        for (index, sample) in self.samples.iter().enumerate().skip(first) {
+        let Some(mut predictor) = self.engine().predictor() else { return };
+        let first = self.past.samples.count_while(|sample| sample.time_ns <= predictor.time_ns());
+        for (index, sample) in self.past.samples.iter().enumerate().skip(first) {
             // An input may have divided a gap.
             if predictor.propagate(sample, self.follows_gap(index, config)).is_err() {
                 return;
             }
         }
         self.predictor = Some(predictor);
+    }
+}
+
+impl News {
+    fn tell(&mut self, time_ns: i64, kind: EventKind) {
+        self.told.push(Told::Event(time_ns, kind));
+    }
+
+    /// Collects the reports of the engine. Those already made in an earlier run are skipped.
+    fn look<F: ProvidedFactor>(&mut self, engine: &mut Engine<F>) {
+        while let Some((pose, sources)) = engine.take_left() {
+            if pose.time_ns > self.left_ns {
+                self.left_ns = pose.time_ns;
+                self.told.push(Told::Left(pose, sources));
+            }
+        }
+        if let Some(started) = engine.started()
+            && !self.started.contains(&started)
+        {
+            self.started.push(started);
+            let (time_ns, from) = started;
+            self.tell(time_ns, EventKind::Started { from });
+        }
     }
 }

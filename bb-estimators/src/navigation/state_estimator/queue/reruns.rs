@@ -1,28 +1,26 @@
 //! Runs of the engine, and repeated runs.
 //!
-//! Samples of the IMU are many, and each that is late changes all that came since. They are inserted, and the first place at which
-//! one was is remembered. The run is repeated from there when its result is needed: when the estimate is read, when the engine is
-//! to run on, and before anything else that depends on it. So the number of runs depends on how often that is, and not on the
-//! number of late samples.
+//! Samples of the IMU are many, and each that is late changes all that came since. They are inserted, and the run is repeated from the
+//! first place at which one was, when its result is needed: when the estimate is read, when the engine is to run on, and before
+//! anything else that depends on it. So the number of runs depends on how often that is, and not on the number of late samples.
 
-use super::Queue;
-use crate::navigation::state_estimator::engine::Condition;
-use crate::navigation::state_estimator::entry::Key;
+use super::{COPIES, News, Queue, SHORTEST_NS};
+use crate::navigation::eskf::ImuMean;
+use crate::navigation::history::past::{Key, Run};
+use crate::navigation::state_estimator::engine::{Condition, Engine};
+use crate::navigation::state_estimator::entry::Entry;
+use crate::navigation::state_estimator::error::EstimatorError;
+use crate::navigation::state_estimator::event::{EventKind, InputKind};
 use crate::navigation::state_estimator::factor::ProvidedFactor;
-use crate::navigation::state_estimator::params::StateEstimatorConfig;
+use crate::navigation::state_estimator::params::{StateEstimatorConfig, ns};
 
 impl<F: ProvidedFactor> Queue<F> {
-    /// Notes that the queue has changed at a place that may have been run already.
-    pub(super) fn change(&mut self, at: Key) {
-        self.changed = Some(self.changed.map_or(at, |before| before.min(at)));
-    }
-
     /// Runs what has changed since the last run, up to where that was. Must be called before the engine or the predictor is read.
     /// Returns whether anything was run.
     pub(in crate::navigation::state_estimator) fn catch_up(&mut self, config: &StateEstimatorConfig) -> bool {
-        let has_changed = self.changed.is_some();
+        let has_changed = self.past.changed.is_some();
         if has_changed {
-            self.settle(self.engine.now_ns().unwrap_or(i64::MIN), config);
+            self.settle(self.engine().now_ns().unwrap_or(i64::MIN), config);
         }
         has_changed
     }
@@ -58,8 +56,8 @@ impl<F: ProvidedFactor> Queue<F> {
     /// Runs the engine on, through all inputs stamped up to a time, and the predictor from there.
     pub(super) fn settle(&mut self, until_ns: i64, config: &StateEstimatorConfig) {
         self.run(until_ns, config);
-        if let Some(newest) = self.newest
-            && self.engine.condition() != Condition::Running
+        if let Some(newest) = self.newest().copied()
+            && self.engine().condition() != Condition::Running
         {
             // Nothing predicts, and a start must not be missed.
             self.run(newest.time_ns, config);
@@ -70,27 +68,53 @@ impl<F: ProvidedFactor> Queue<F> {
 
     /// Runs the engine on, through all inputs stamped up to a time. What it has passed is run again if it has changed.
     pub(super) fn run(&mut self, until_ns: i64, config: &StateEstimatorConfig) {
-        let mut until_ns = until_ns;
-        if let Some(from) = self.changed.take()
-            && from < self.engine.key()
+        let mut flight = Flight { config, news: &mut self.news };
+        self.counts.reruns += self.past.run(Key::end_of(until_ns), &mut flight);
+    }
+}
+
+/// A run of the engine, and what it tells.
+struct Flight<'a> {
+    config: &'a StateEstimatorConfig,
+    news: &'a mut News,
+}
+
+impl<F: ProvidedFactor> Run<Engine<F>, Entry<F>> for Flight<'_> {
+    fn advance(&mut self, engine: &mut Engine<F>, until_ns: i64, sample: &ImuMean, since_ns: Option<i64>) {
+        if engine.now_ns().is_none() && until_ns < sample.time_ns {
+            // The first sample has no part before its end.
+            return;
+        }
+        let was = engine.condition();
+        let since_ns = since_ns.or(engine.begun_ns()).or(engine.now_ns()).unwrap_or(sample.time_ns);
+        if let Err(reason) = engine.advance(until_ns, sample, since_ns, self.config)
+            && engine.condition() != was
         {
-            until_ns = self.engine.now_ns().map_or(until_ns, |now_ns| now_ns.max(until_ns));
-            self.take_back(from);
+            if self.news.broken.is_none_or(|(at_ns, before)| at_ns != until_ns || !before.is_alike(&reason)) {
+                self.news.tell(until_ns, EventKind::Fatal { input: InputKind::Imu, reason });
+            }
+            self.news.broken = Some((until_ns, reason));
         }
-        // Every input breaks the engine at most once.
-        while let Err(broken) = self.run_until(Key::end_of(until_ns), config) {
-            self.take_back(broken);
-        }
+        self.news.look(engine);
     }
 
-    /// Restores the last copy before an input.
-    fn take_back(&mut self, from: Key) {
-        while self.copies.len() > 1 && self.copies.back().is_some_and(|copy| copy.key() >= from) {
-            self.copies.pop_back();
+    fn apply(&mut self, engine: &mut Engine<F>, Key { time_ns, .. }: Key, entry: &mut Entry<F>) -> bool {
+        if matches!(entry.outcome, Some(Err(EstimatorError::Fatal(_)))) {
+            return true;
         }
-        if let Some(copy) = self.copies.back() {
-            self.engine = copy.clone();
-            self.counts.reruns += 1;
+        let (outcome, rejection) = engine.apply(time_ns, entry, self.config);
+        let news = entry.became(outcome, rejection);
+        news.into_iter().flatten().for_each(|kind| self.news.tell(time_ns, kind));
+        if matches!(outcome, Err(EstimatorError::Fatal(_))) {
+            return false;
         }
+        self.news.look(engine);
+        true
+    }
+
+    fn is_due(&self, last: &Engine<F>, engine: &Engine<F>, _: usize) -> bool {
+        let apart_ns = (ns(self.config.params.lateness) / (COPIES as i64 - 2)).max(SHORTEST_NS);
+        let is_apart = |now_ns: i64| last.now_ns().is_none_or(|last_ns| now_ns.saturating_sub(last_ns) >= apart_ns);
+        engine.now_ns().is_some_and(is_apart)
     }
 }

@@ -1,11 +1,11 @@
 //! Samples of the IMU: which are taken, where they are put, and which leave when there is no room.
 
-use super::{Queue, Told};
+use super::Queue;
 use crate::navigation::eskf::ImuMean;
+use crate::navigation::history::past::Key;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state_estimator::clock::{Stamped, follows};
 use crate::navigation::state_estimator::engine::Condition;
-use crate::navigation::state_estimator::entry::{Entry, Key};
 use crate::navigation::state_estimator::error::Reason;
 use crate::navigation::state_estimator::event::{EventKind, InputKind};
 use crate::navigation::state_estimator::factor::ProvidedFactor;
@@ -21,9 +21,8 @@ impl<F: ProvidedFactor> Queue<F> {
     pub(super) fn place_sample(&mut self, sample: &ImuMean, config: &StateEstimatorConfig) -> Result<bool, Reason> {
         sample.check()?;
         let time_ns = sample.time_ns;
-        let Some(newest) = self.newest else { return self.place_first(sample, config) };
-        let held = self.samples.binary_search_by_key(&time_ns, |other| other.time_ns);
-        if held.is_ok_and(|index| self.samples.get(index) == Some(sample)) {
+        let Some(newest) = self.newest().copied() else { return self.place_first(sample, config) };
+        if self.past.samples.get(self.index_of(time_ns)) == Some(sample) {
             // Sent twice: it says nothing about the clock.
             return Err(Reason::Duplicate);
         }
@@ -39,38 +38,41 @@ impl<F: ProvidedFactor> Queue<F> {
             }
         }
         self.make_room(config);
-        self.newest = Some(*sample);
-        self.samples.push_back(*sample);
+        self.past.push(*sample);
         let is_gap = time_ns.saturating_sub(newest.time_ns) > ns(config.sensors.longest_sample);
         // After a change it is rebuilt before it is read.
-        let is_current = self.changed.is_none();
+        let is_current = self.past.changed.is_none();
         if is_current
             && self.predictor.as_mut().is_some_and(|predictor| predictor.propagate(sample, is_gap).is_err())
         {
             self.predictor = None;
         }
-        let waits = |entry: &Entry<F>| entry.key > self.engine.key() && entry.key.time_ns <= time_ns;
-        let behind_ns = self.engine.now_ns().map_or(i64::MAX, |now_ns| time_ns.saturating_sub(now_ns));
-        let is_starting = is_current && self.engine.condition() != Condition::Running;
+        let due = self.past.inputs.iter().rev().map(|(key, _)| *key).find(|key| key.time_ns <= time_ns);
+        let behind_ns = self.engine().now_ns().map_or(i64::MAX, |now_ns| time_ns.saturating_sub(now_ns));
+        let is_starting = is_current && self.engine().condition() != Condition::Running;
         if is_starting || behind_ns > LONGEST_TAIL_NS {
             self.settle(time_ns, config);
-        } else if let Some(last) = self.inputs.iter().rev().find(|entry| waits(entry)).map(|entry| entry.key) {
+        } else if let Some(last) = due.filter(|last| *last > self.past.now.key) {
             self.settle(last.time_ns, config);
         }
         if is_gap { Err(Reason::Bridged) } else { Ok(false) }
     }
 
+    /// The place of a sample of that time.
+    fn index_of(&self, time_ns: i64) -> usize {
+        self.past.samples.count_while(|other| other.time_ns < time_ns)
+    }
+
     /// Returns whether no sample is missing at a time: those before and after it are no farther apart than others.
     fn is_surplus(&self, time_ns: i64, config: &StateEstimatorConfig) -> bool {
-        let index = self.samples.partition_point(|other| other.time_ns < time_ns);
-        if self.samples.get(index).is_some_and(|other| other.time_ns == time_ns) {
+        let index = self.index_of(time_ns);
+        let Some(after) = self.past.samples.get(index) else { return false };
+        if after.time_ns == time_ns {
             return true;
         }
-        let before = index.checked_sub(1).and_then(|before| self.samples.get(before));
-        let before_ns = before.map(|before| before.time_ns).or(self.dropped_ns);
-        let (Some(before_ns), Some(after)) = (before_ns, self.samples.get(index)) else { return false };
+        let Some(before_ns) = self.past.since_ns(index) else { return false };
         // An outage says nothing of how far apart they are.
-        let following = self.samples.iter().zip(self.samples.iter().skip(1));
+        let following = self.past.samples.iter().zip(self.past.samples.iter().skip(1));
         let apart = following.map(|(before, after)| after.time_ns.saturating_sub(before.time_ns));
         let usual = apart.filter(|apart_ns| *apart_ns <= ns(config.sensors.longest_sample));
         let (sum_ns, count) =
@@ -85,7 +87,7 @@ impl<F: ProvidedFactor> Queue<F> {
     fn place_first(&mut self, sample: &ImuMean, config: &StateEstimatorConfig) -> Result<bool, Reason> {
         let time_ns = sample.time_ns;
         let before = self.first.take();
-        let is_believed = self.clock.doubt(time_ns).is_some() || self.inputs.is_empty();
+        let is_believed = self.clock.doubt(time_ns).is_some() || self.past.inputs.len() == 0;
         if let Some(first) = before.filter(|first| is_believed && follows(time_ns, first.time_ns)) {
             self.begin(&first, config);
             return self.place_sample(sample, config);
@@ -93,9 +95,9 @@ impl<F: ProvidedFactor> Queue<F> {
         if let Some(first) = before {
             // Neither is known to be wrong, but the later one may still be confirmed.
             let reason = self.count(stranger(first.time_ns, time_ns).into());
-            self.tell(first.time_ns, EventKind::Degraded { input: InputKind::Imu, reason });
+            self.news.tell(first.time_ns, EventKind::Degraded { input: InputKind::Imu, reason });
         }
-        if self.inputs.iter().any(|entry| self.is_near(entry.key.time_ns, time_ns, config)) {
+        if self.past.inputs.iter().any(|(key, _)| self.is_near(key.time_ns, time_ns, config)) {
             self.begin(sample, config);
             return Ok(false);
         }
@@ -104,8 +106,7 @@ impl<F: ProvidedFactor> Queue<F> {
     }
 
     fn begin(&mut self, sample: &ImuMean, config: &StateEstimatorConfig) {
-        self.newest = Some(*sample);
-        self.samples.push_back(*sample);
+        self.past.push(*sample);
         self.drop_strangers(sample.time_ns, config);
         self.settle(sample.time_ns, config);
     }
@@ -114,27 +115,23 @@ impl<F: ProvidedFactor> Queue<F> {
     fn set_back(&mut self, sample: &ImuMean, for_ns: i64, newest_ns: i64, config: &StateEstimatorConfig) {
         self.settle(newest_ns, config);
         let mut is_alarmed = false;
-        for entry in self.inputs.drain(..) {
+        while let Some((key, entry)) = self.past.inputs.pop_front() {
             if entry.outcome.is_none() && entry.payload.is_added() {
                 is_alarmed |= entry.payload.is_alarm();
                 self.counts.too_old += 1;
-                let reason = Refusal::TooOld { time_ns: entry.key.time_ns }.into();
-                let kind = EventKind::Degraded { input: entry.payload.kind(), reason };
-                self.told.push(Told::Event(entry.key.time_ns, kind));
+                let reason = Refusal::TooOld { time_ns: key.time_ns }.into();
+                self.news.tell(key.time_ns, EventKind::Degraded { input: entry.payload.kind(), reason });
             }
         }
-        self.engine.set_clock_back(sample.time_ns, for_ns, config);
-        self.samples.clear();
-        self.dropped_ns = None;
-        self.copies.clear();
-        self.copies.push_back(self.engine.clone());
-        self.left_ns = i64::MIN;
-        (self.started, self.broken) = (self.engine.started().into_iter().collect(), None);
+        let engine = self.engine_mut();
+        engine.set_clock_back(sample.time_ns, for_ns, config);
+        let (now_ns, started) = (engine.now_ns(), engine.started().into_iter().collect());
+        self.past.restart(now_ns.map_or(Key::FIRST, Key::of_sample), None);
+        (self.news.left_ns, self.news.started, self.news.broken) = (i64::MIN, started, None);
         self.counts.set_back += 1;
         let seconds = newest_ns.saturating_sub(sample.time_ns) as f64 * 1e-9;
-        self.tell(sample.time_ns, EventKind::ClockSetBack { seconds });
-        self.newest = Some(*sample);
-        self.samples.push_back(*sample);
+        self.news.tell(sample.time_ns, EventKind::ClockSetBack { seconds });
+        self.past.push(*sample);
         if is_alarmed {
             self.block(config);
         }
@@ -144,70 +141,67 @@ impl<F: ProvidedFactor> Queue<F> {
     /// Inserts a sample at its place. The engine is not run: more such samples may follow.
     fn place_late_sample(&mut self, sample: &ImuMean, config: &StateEstimatorConfig) -> Result<bool, Reason> {
         let time_ns = sample.time_ns;
-        if self.samples.binary_search_by_key(&time_ns, |other| other.time_ns).is_ok() {
+        if self.past.samples.get(self.index_of(time_ns)).is_some_and(|other| other.time_ns == time_ns) {
             return Err(Reason::Duplicate);
         }
         self.make_room(config);
-        let index = self.samples.partition_point(|other| other.time_ns < time_ns);
-        let before = index.checked_sub(1).and_then(|before| self.samples.get(before));
-        let before_ns = before.map(|before| before.time_ns).or(self.dropped_ns).or(self.engine.begun_ns());
+        let index = self.index_of(time_ns);
+        let before_ns = self.since_ns(index);
         // Inputs since the sample before have been reached with a part of the sample after.
         let from = before_ns.filter(|at_ns| *at_ns < time_ns).map_or(Key::of_sample(time_ns), Key::end_of);
-        if !self.reaches(from) {
+        if !self.past.reaches(from) {
             return Err(Refusal::TooOld { time_ns }.into());
         }
-        self.samples.insert(index, *sample);
+        self.past.samples.insert(index, *sample);
         self.counts.late += 1;
-        self.change(from);
+        self.past.change(from);
         Ok(false)
     }
 
     /// Drops the oldest sample if there is no room for another one. Those needed only for late inputs are dropped first, and such inputs
     /// are then refused as too old.
     fn make_room(&mut self, config: &StateEstimatorConfig) {
-        let most = self.rooms.samples;
-        if self.samples.len() < most {
+        if !self.past.samples.is_full() {
             return;
         }
-        let newest_ns = self.newest.map_or(i64::MIN, |newest| newest.time_ns);
+        let newest_ns = self.newest().map_or(i64::MIN, |newest| newest.time_ns);
         self.run(newest_ns, config);
-        let held = self.samples.len();
-        while self.samples.len() >= most && self.copies.len() > 1 {
-            self.copies.pop_front();
+        let held = self.past.samples.len();
+        while self.past.samples.is_full() && self.past.copies.len() > 1 {
+            self.past.copies.pop_front();
             self.trim();
         }
-        if self.samples.len() >= most {
-            self.copies.clear();
-            self.copies.push_back(self.engine.clone());
+        if self.past.samples.is_full() {
+            self.past.copy_now();
             self.trim();
         }
-        if self.samples.len() >= most {
+        if self.past.samples.is_full() {
             // All remaining samples are later than the newest keyframe. The prediction has to bridge the dropped ones.
-            let last = self.samples.drain(..(most / LEAVING).max(1)).next_back();
-            self.dropped_ns = last.map(|sample| sample.time_ns).or(self.dropped_ns);
+            (0..(held / LEAVING).max(1)).for_each(|_| self.past.drop_sample());
         }
         self.predict(config);
-        let count = held.saturating_sub(self.samples.len()) as u64;
+        let count = held.saturating_sub(self.past.samples.len()) as u64;
         self.counts.dropped += count;
-        self.tell(newest_ns, EventKind::SamplesDropped { count });
+        self.news.tell(newest_ns, EventKind::SamplesDropped { count });
     }
 
     /// Drops inputs that came before the IMU and do not match its time.
     fn drop_strangers(&mut self, time_ns: i64, config: &StateEstimatorConfig) {
-        let mut index = 0;
-        while let Some(entry) = self.inputs.get(index) {
-            let (at_ns, input, is_added) = (entry.key.time_ns, entry.payload.kind(), entry.payload.is_added());
-            if self.is_near(at_ns, time_ns, config) {
-                index += 1;
+        let mut is_alarmed = false;
+        for _ in 0..self.past.inputs.len() {
+            let Some((key, entry)) = self.past.inputs.pop_front() else { break };
+            if self.is_near(key.time_ns, time_ns, config) {
+                self.past.inputs.push((key, entry));
                 continue;
             }
-            if self.inputs.remove(index).is_some_and(|entry| entry.payload.is_alarm()) {
-                self.block(config);
+            is_alarmed |= entry.payload.is_alarm();
+            if entry.payload.is_added() {
+                let reason = self.count(stranger(key.time_ns, time_ns).into());
+                self.news.tell(key.time_ns, EventKind::Degraded { input: entry.payload.kind(), reason });
             }
-            if is_added {
-                let reason = self.count(stranger(at_ns, time_ns).into());
-                self.tell(at_ns, EventKind::Degraded { input, reason });
-            }
+        }
+        if is_alarmed {
+            self.block(config);
         }
     }
 }

@@ -138,7 +138,7 @@ fn an_input_that_breaks_the_estimate_after_all_is_fatal() {
 #[test]
 fn a_frame_is_told_if_it_fails() {
     let payload = Payload::<Provided>::Frame;
-    let mut frame = Entry { key: payload.key(SECOND), payload, outcome: None, rejection: None };
+    let mut frame = Entry { payload, outcome: None, rejection: None };
     assert_eq!(frame.payload.kind(), InputKind::Frame);
     let (added, reason) = (Ok(None), Reason::Refused(Refusal::NonFinite));
     let (fatal, degraded) = (Err(EstimatorError::Fatal(reason)), Err(EstimatorError::Degraded(reason)));
