@@ -3,6 +3,7 @@
 pub(super) mod correlation;
 pub(super) mod course;
 mod filter;
+pub(super) mod fusing;
 pub(super) mod health;
 mod height;
 mod input;
@@ -21,11 +22,10 @@ pub use options::NavigationOptions;
 pub use output::{NavigationOutput, NavigationOutputs};
 pub use report::{NavigationStatus, Verdicts};
 
-use self::health::Limits;
+use self::fusing::{Taken, doubted};
 use self::input::Mounting;
 use self::running::Core;
 use self::starting::Starting;
-use super::refusal::Refusal;
 use super::state::{NAVIGATION, Navigation, States};
 use crate::params::Params as _;
 use bb_core::payload::Odometry;
@@ -167,13 +167,8 @@ pub struct EskfEstimator<O = Odometry, S: States = Navigation, const N: usize = 
     options: NavigationOptions,
     mounting: Mounting,
     phase: Phase,
-    /// IMU samples.
-    refused_in_a_row: u32,
     types: PhantomData<fn(S) -> O>,
 }
-
-/// After this many rejected IMU samples in a row, there is no estimate.
-pub(super) const MOST_REFUSED: u32 = 50;
 
 #[derive(Debug)]
 enum Phase {
@@ -197,76 +192,32 @@ impl<O: NavigationOutput, S: States + Send + 'static, const N: usize> Estimator 
         let mounting = Mounting::of(context)?;
         states::check::<S>(&mounting)?;
         let phase = Phase::Starting(Box::new(Starting::new(&options, None)));
-        Ok(Self { options, mounting, phase, refused_in_a_row: 0, types: PhantomData })
+        Ok(Self { options, mounting, phase, types: PhantomData })
     }
 
     fn handle_input(&mut self, inputs: NavigationInputs<'_>) -> Result<Reply<O>, Fault> {
         let sample = self.mounting.sample(inputs.imu.message());
-        match &mut self.phase {
+        let Self { options, mounting, phase, .. } = self;
+        match phase {
             Phase::Starting(starting) => {
-                let start = starting.take(&sample, &inputs, &self.options, &self.mounting);
-                let reply = if starting.takes_too_long() {
-                    Reply::none().diverged("it has neither lain still nor seen a course, and cannot start")
-                } else {
-                    Reply::none()
-                };
+                let start = starting.take(&sample, &inputs, options, mounting);
+                let reason = starting
+                    .takes_too_long()
+                    .then_some("it has neither lain still nor seen a course, and cannot start");
                 if let Some((start, world)) = start {
-                    let limits = self.limits();
-                    self.phase = Phase::Running(running::started::<S, N>(
-                        &self.options,
-                        &self.mounting,
-                        &start,
-                        world,
-                        limits,
-                    )?);
+                    *phase = Phase::Running(running::started::<S, N>(options, mounting, &start, world)?);
+                }
+                Ok(doubted(Reply::none(), reason))
+            }
+            Phase::Running(running) => {
+                let taken = running.take(&sample, &inputs, options, mounting);
+                let taken = running.judge(taken)?;
+                let reply = taken.reply(|| O::of(running.as_ref(), mounting));
+                if let Taken::Lost = taken {
+                    *phase = Phase::Starting(Box::new(Starting::new(options, running.frame())));
                 }
                 Ok(reply)
             }
-            Phase::Running(running) => match running.take(&sample, &inputs, &self.options, &self.mounting) {
-                Ok(()) => {
-                    self.refused_in_a_row = 0;
-                    if !running.is_sound() {
-                        return Err(Fault::new("its estimate is no number"));
-                    }
-                    if let Some(distance) = running.elsewhere() {
-                        let km = distance * 1e-3;
-                        return Err(Fault::new(format!(
-                            "fixes agree on a place {km:.0} km away: its world is elsewhere"
-                        )));
-                    }
-                    let reply: Reply<O> = O::of(running.as_ref(), &self.mounting).into();
-                    Ok(match running.divergence() {
-                        Some(reason) => reply.diverged(reason),
-                        None => reply,
-                    })
-                }
-                Err(Refusal::Gap { .. }) => {
-                    tracing::info!("no sample for too long: it starts again");
-                    let frame = running.frame();
-                    self.phase = Phase::Starting(Box::new(Starting::new(&self.options, frame)));
-                    Ok(Reply::none().diverged("no sample of the IMU for too long"))
-                }
-                Err(refusal) => {
-                    tracing::debug!(%refusal, "sample refused");
-                    self.refused_in_a_row += 1;
-                    let is_deaf = self.refused_in_a_row >= MOST_REFUSED;
-                    Ok(if is_deaf {
-                        Reply::none().diverged("it refuses every sample of the IMU")
-                    } else {
-                        Reply::none()
-                    })
-                }
-            },
-        }
-    }
-}
-
-impl<O, S: States, const N: usize> EskfEstimator<O, S, N> {
-    fn limits(&self) -> Limits {
-        let longest_s = self.options.longest_dead_reckoning;
-        Limits {
-            dead_reckoning_s: self.mounting.has_positions().then_some(longest_s),
-            deviation: self.options.largest_deviation,
         }
     }
 }

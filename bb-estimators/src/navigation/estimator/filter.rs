@@ -1,7 +1,8 @@
 //! The filter with a stream per sensor.
 
 use super::correlation::Correlation;
-use super::health::{Sight, largest_deviation};
+use super::fusing::Sensing;
+use super::health::{Sight, Watch, largest_deviation};
 use super::input::keyframe_at;
 use super::options::NavigationOptions;
 use crate::navigation::copies::{Copies, Ways};
@@ -14,10 +15,10 @@ use crate::navigation::measurement::{
     RelativePose,
 };
 use crate::navigation::refusal::Refusal;
-use crate::navigation::state::{Estimate, Optional, POSITION, States, offset};
+use crate::navigation::state::{Estimate, NAVIGATION, Optional, POSITION, States, offset};
 use crate::navigation::stream::{Counts, Stream};
 use bb_core::Fault;
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::Isometry3;
 
 /// Copies of the filter, and a stream for each sensor.
 #[derive(Clone, Debug)]
@@ -60,10 +61,6 @@ impl Measured {
             Self::GnssHeading(_) => 7,
         }
     }
-
-    pub(super) fn name(&self) -> &'static str {
-        NAMES[self.sensor()]
-    }
 }
 
 impl<S: States, const N: usize> Filter<S, N> {
@@ -87,10 +84,6 @@ impl<S: States, const N: usize> Filter<S, N> {
         self.copies.estimate()
     }
 
-    pub(super) fn position(&self) -> Option<Vector3<f64>> {
-        self.estimate().map(|estimate| estimate.position)
-    }
-
     /// Standard deviation of the horizontal position in its least certain direction, m.
     pub(super) fn horizontal_deviation(&self) -> f64 {
         let covariance = self.eskf().covariance();
@@ -106,18 +99,6 @@ impl<S: States, const N: usize> Filter<S, N> {
     /// Counts of the measurements by result, in the order of [`NAMES`].
     pub(super) fn counts(&self) -> [&Counts; SENSORS] {
         self.streams.each_ref().map(Stream::counts)
-    }
-
-    /// The data from which its health is judged.
-    pub(super) fn sight<'a>(&self, counts: &'a [&'a Counts]) -> Option<Sight<'a>> {
-        Some(Sight {
-            now_ns: self.estimate()?.time_ns,
-            counts,
-            resets: self.eskf().resets(),
-            dead_reckoning_s: self.eskf().dead_reckoning_s(),
-            deviation: self.horizontal_deviation(),
-            heading_deviation: self.copies.heading_deviation(),
-        })
     }
 
     pub(super) fn move_world(&mut self, new_from_old: &Isometry3<f64>) -> Result<(), Refusal> {
@@ -167,13 +148,48 @@ impl<S: States, const N: usize> Replayed for Filter<S, N> {
     }
 }
 
+impl<S: States, const N: usize> Sensing for Filter<S, N> {
+    fn sensor(measured: &Measured) -> &'static str {
+        NAMES[measured.sensor()]
+    }
+
+    fn is_sound(&self) -> bool {
+        let variances = self.eskf().covariance().diagonal();
+        self.estimate().is_none_or(|estimate| {
+            let numbers =
+                estimate.position.iter().chain(&estimate.velocity).chain(estimate.world_from_body.coords.iter());
+            numbers.copied().all(f64::is_finite)
+                && variances.iter().take(NAVIGATION).all(|variance| variance.is_finite() && *variance >= 0.0)
+        })
+    }
+
+    fn elsewhere(&self) -> Option<f64> {
+        self.copies.elsewhere()
+    }
+
+    fn resets(&self) -> u32 {
+        self.eskf().resets()
+    }
+
+    fn watched(&self, watch: &mut Watch) -> Option<&'static str> {
+        watch.look(&Sight {
+            now_ns: self.estimate()?.time_ns,
+            counts: &self.counts(),
+            resets: self.resets(),
+            dead_reckoning_s: self.eskf().dead_reckoning_s(),
+            deviation: self.horizontal_deviation(),
+            heading_deviation: self.copies.heading_deviation(),
+        })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::navigation::History;
     use crate::navigation::eskf::ImuMean;
-    use crate::navigation::state::{NAVIGATION, Navigation};
-    use nalgebra::UnitQuaternion;
+    use crate::navigation::state::Navigation;
+    use nalgebra::{UnitQuaternion, Vector3};
 
     /// The parts of a gap that a measurement divides are gaps.
     #[test]

@@ -14,9 +14,7 @@ pub use output::{PlanarOutput, PlanarOutputs, PlanarStatus};
 use self::input::Mounting;
 use self::running::Running;
 use self::starting::Starting;
-use crate::navigation::estimator::MOST_REFUSED;
-use crate::navigation::estimator::health::Limits;
-use crate::navigation::refusal::Refusal;
+use crate::navigation::estimator::fusing::{Taken, doubted};
 use crate::params::Params as _;
 use bb_core::payload::Odometry;
 use bb_core::{Context, Estimator, Fault, Reply};
@@ -65,8 +63,6 @@ pub struct PlanarEstimator<O = Odometry> {
     options: PlanarOptions,
     mounting: Mounting,
     phase: Phase,
-    /// IMU samples.
-    refused_in_a_row: u32,
     output: PhantomData<fn() -> O>,
 }
 
@@ -84,63 +80,30 @@ impl<O: PlanarOutput> Estimator for PlanarEstimator<O> {
     fn init(options: PlanarOptions, context: &Context) -> Result<Self, Fault> {
         options.params().check()?;
         let mounting = Mounting::of(context)?;
-        Ok(Self {
-            options,
-            mounting,
-            phase: Phase::Starting(Box::new(Starting::new(None))),
-            refused_in_a_row: 0,
-            output: PhantomData,
-        })
+        Ok(Self { options, mounting, phase: Phase::Starting(Box::new(Starting::new(None))), output: PhantomData })
     }
 
     fn handle_input(&mut self, inputs: PlanarInputs<'_>) -> Result<Reply<O>, Fault> {
         let sample = self.mounting.sample(inputs.imu.message());
-        match &mut self.phase {
+        let Self { options, mounting, phase, .. } = self;
+        match phase {
             Phase::Starting(starting) => {
-                let start = starting.take(&sample, &inputs, &self.options, &self.mounting);
-                let Some((start, frame)) = start else {
-                    let reply = Reply::none();
-                    let is_late = starting.takes_too_long();
-                    return Ok(if is_late { reply.diverged("it cannot start without fixes") } else { reply });
-                };
-                let longest_s = self.options.longest_dead_reckoning;
-                let limits = Limits {
-                    dead_reckoning_s: self.mounting.has_positions().then_some(longest_s),
-                    deviation: self.options.largest_deviation,
-                };
-                self.phase = Phase::Running(Running::new(&self.options, &start, frame, limits)?);
-                Ok(Reply::none())
+                if let Some((start, frame)) = starting.take(&sample, &inputs, options, mounting) {
+                    *phase = Phase::Running(Running::new(options, mounting, &start, frame)?);
+                    return Ok(Reply::none());
+                }
+                let reason = starting.takes_too_long().then_some("it cannot start without fixes");
+                Ok(doubted(Reply::none(), reason))
             }
-            Phase::Running(running) => match running.take(&sample, &inputs, &self.options, &self.mounting) {
-                Ok(()) => {
-                    self.refused_in_a_row = 0;
-                    if !running.is_sound() {
-                        return Err(Fault::new("its estimate is no number"));
-                    }
-                    if let Some(distance) = running.elsewhere() {
-                        let km = distance * 1e-3;
-                        return Err(Fault::new(format!(
-                            "fixes agree on a place {km:.0} km away: its world is elsewhere"
-                        )));
-                    }
-                    Ok(running.reply(&self.mounting))
+            Phase::Running(running) => {
+                let taken = running.take(&sample, &inputs, options, mounting);
+                let taken = running.fusing.judge(taken)?;
+                let reply = taken.reply(|| O::of(running.fusing.now(), mounting, running.frame.as_ref()));
+                if let Taken::Lost = taken {
+                    *phase = Phase::Starting(Box::new(Starting::new(running.frame)));
                 }
-                Err(Refusal::Gap { .. }) => {
-                    tracing::info!("no sample for too long: it starts again");
-                    self.phase = Phase::Starting(Box::new(Starting::new(running.frame())));
-                    Ok(Reply::none().diverged("no sample of the IMU for too long"))
-                }
-                Err(refusal) => {
-                    tracing::debug!(%refusal, "sample refused");
-                    self.refused_in_a_row += 1;
-                    let is_deaf = self.refused_in_a_row >= MOST_REFUSED;
-                    Ok(if is_deaf {
-                        Reply::none().diverged("it refuses every sample of the IMU")
-                    } else {
-                        Reply::none()
-                    })
-                }
-            },
+                Ok(reply)
+            }
         }
     }
 }

@@ -3,7 +3,8 @@
 use super::options::PlanarOptions;
 use crate::navigation::copies::{Copies, Ways};
 use crate::navigation::estimator::correlation::Correlation;
-use crate::navigation::estimator::health::{Sight, largest_deviation};
+use crate::navigation::estimator::fusing::Sensing;
+use crate::navigation::estimator::health::{Sight, Watch, largest_deviation};
 use crate::navigation::fused::Fused;
 use crate::navigation::history::Replayed;
 use crate::navigation::planar::estimate::{POSITION, PlanarEstimate};
@@ -34,17 +35,6 @@ pub(super) enum Measured {
     Orientation(PlanarHeading),
 }
 
-impl Measured {
-    pub(super) fn name(&self) -> &'static str {
-        match self {
-            Self::Gnss(_) => "gnss",
-            Self::Odometry(..) => "odometry",
-            Self::Pose(_) => "pose",
-            Self::Orientation(_) => "orientation",
-        }
-    }
-}
-
 impl Filter {
     pub(super) fn new(options: &PlanarOptions, start: &PlanarStart) -> Result<Self, Fault> {
         let mut copies = Copies::new(options.params(), Ways { noise: true, scale: false })?;
@@ -70,33 +60,9 @@ impl Filter {
         largest_deviation(of(0, 0), of(0, 1), of(1, 1))
     }
 
-    /// Returns whether no emitted value is NaN and no variance is negative.
-    pub(super) fn is_sound(&self) -> bool {
-        let covariance = self.ekf().covariance();
-        let variances =
-            (0..covariance.nrows()).all(|i| covariance[(i, i)].is_finite() && covariance[(i, i)] >= 0.0);
-        let is_number = |estimate: &PlanarEstimate| {
-            estimate.position.iter().chain(&estimate.velocity).all(|x| x.is_finite())
-                && estimate.heading.is_finite()
-        };
-        variances && self.ekf().estimate().is_none_or(is_number)
-    }
-
     /// Counts of the measurements: satellite fixes, odometry velocities and yaw rates, poses, orientations.
     pub(super) fn counts(&self) -> [&Counts; 5] {
         [&self.gnss, &self.odometry, &self.yaw_rate, &self.pose, &self.orientation].map(Stream::counts)
-    }
-
-    /// The inputs to the health assessment.
-    pub(super) fn sight<'a>(&self, counts: &'a [&'a Counts]) -> Option<Sight<'a>> {
-        Some(Sight {
-            now_ns: self.ekf().estimate()?.time_ns,
-            counts,
-            resets: self.ekf().resets(),
-            dead_reckoning_s: self.ekf().dead_reckoning_s(),
-            deviation: self.deviation(),
-            heading_deviation: self.copies.heading_deviation(),
-        })
     }
 }
 
@@ -127,6 +93,46 @@ impl Replayed for Filter {
             Measured::Pose(pose) => copies.update_position(&mut self.pose, pose),
             Measured::Orientation(heading) => copies.update(&mut self.orientation, heading),
         }
+    }
+}
+
+impl Sensing for Filter {
+    fn sensor(measured: &Measured) -> &'static str {
+        match measured {
+            Measured::Gnss(_) => "gnss",
+            Measured::Odometry(..) => "odometry",
+            Measured::Pose(_) => "pose",
+            Measured::Orientation(_) => "orientation",
+        }
+    }
+
+    fn is_sound(&self) -> bool {
+        let variances = self.ekf().covariance().diagonal();
+        let is_number = |estimate: &PlanarEstimate| {
+            estimate.position.iter().chain(&estimate.velocity).all(|x| x.is_finite())
+                && estimate.heading.is_finite()
+        };
+        variances.iter().all(|variance| variance.is_finite() && *variance >= 0.0)
+            && self.ekf().estimate().is_none_or(is_number)
+    }
+
+    fn elsewhere(&self) -> Option<f64> {
+        self.copies.elsewhere()
+    }
+
+    fn resets(&self) -> u32 {
+        self.ekf().resets()
+    }
+
+    fn watched(&self, watch: &mut Watch) -> Option<&'static str> {
+        watch.look(&Sight {
+            now_ns: self.ekf().estimate()?.time_ns,
+            counts: &self.counts(),
+            resets: self.resets(),
+            dead_reckoning_s: self.ekf().dead_reckoning_s(),
+            deviation: self.deviation(),
+            heading_deviation: self.copies.heading_deviation(),
+        })
     }
 }
 
