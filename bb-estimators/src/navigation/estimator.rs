@@ -196,7 +196,7 @@ impl<O: NavigationOutput, S: States + Send + 'static, const N: usize> Estimator 
     }
 
     fn handle_input(&mut self, inputs: NavigationInputs<'_>) -> Result<Reply<O>, Fault> {
-        let sample = self.mounting.sample(inputs.imu.message());
+        let sample = measured::sample(inputs.imu.message(), &self.mounting.link_from_imu.rotation);
         let Self { options, mounting, phase, .. } = self;
         match phase {
             Phase::Starting(starting) => {

@@ -2,12 +2,10 @@
 
 use super::measured::told;
 use super::options::NavigationOptions;
-use crate::navigation::eskf::ImuMean;
 use crate::navigation::math::atan2;
 use crate::navigation::measurement::{
     BodyVelocity, GnssHeading, GnssVelocity, MagneticHeading, RelativePose, isotropic,
 };
-use bb_core::message::Stamped;
 use bb_core::payload::{self, FluidPressure, GnssFix, Imu, MagneticField, Odometry, Orientation, Pose, Twist};
 use bb_core::{Context, Fault, Input, Inputs};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
@@ -44,7 +42,7 @@ pub struct NavigationInputs<'a> {
 /// The filter's body frame has the axes of the link and its origin at the IMU.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mounting {
-    link_from_imu: Isometry3<f64>,
+    pub(super) link_from_imu: Isometry3<f64>,
     pub(super) gnss: Option<Isometry3<f64>>,
     pub(super) gnss_velocity: Option<Isometry3<f64>>,
     pub(super) gnss_heading: Option<Isometry3<f64>>,
@@ -85,16 +83,6 @@ impl Mounting {
 
     pub(super) fn has_gnss(&self) -> bool {
         self.gnss.is_some()
-    }
-
-    /// The sample in the axes of the link.
-    pub(super) fn sample(&self, imu: &Stamped<Imu>) -> ImuMean {
-        let rotation = self.link_from_imu.rotation;
-        ImuMean {
-            time_ns: imu.monotonic_time.as_nanos(),
-            angular_velocity: rotation * imu.angular_velocity,
-            specific_force: rotation * imu.linear_acceleration,
-        }
     }
 
     /// Pose and velocity of the body, from those of the link.

@@ -1,10 +1,21 @@
 //! Payloads as measurements, with the lever arm of their sensor in the body.
 
+use crate::navigation::eskf::ImuMean;
 use crate::navigation::geodesy::{Geodetic, LocalFrame};
 use crate::navigation::math::skew;
 use crate::navigation::measurement::{AbsolutePose, GnssPosition, isotropic};
-use bb_core::payload::{GnssFix, GnssStatus, Pose};
-use nalgebra::{Isometry3, Matrix3, SMatrix, Vector3};
+use bb_core::message::Stamped;
+use bb_core::payload::{GnssFix, GnssStatus, Imu, Pose};
+use nalgebra::{Isometry3, Matrix3, SMatrix, UnitQuaternion, Vector3};
+
+/// A sample of an IMU in the axes of the body.
+pub(in crate::navigation) fn sample(imu: &Stamped<Imu>, body_from_imu: &UnitQuaternion<f64>) -> ImuMean {
+    ImuMean {
+        time_ns: imu.monotonic_time.as_nanos(),
+        angular_velocity: body_from_imu * imu.angular_velocity,
+        specific_force: body_from_imu * imu.linear_acceleration,
+    }
+}
 
 /// Standard deviation of the height where a fix has none, m.
 const UNKNOWN_HEIGHT: f64 = 1e4;

@@ -15,6 +15,7 @@ use self::input::Mounting;
 use self::running::Running;
 use self::starting::Starting;
 use crate::navigation::estimator::fusing::{Taken, doubted};
+use crate::navigation::estimator::measured::sample;
 use crate::params::Params as _;
 use bb_core::payload::Odometry;
 use bb_core::{Context, Estimator, Fault, Reply};
@@ -84,7 +85,7 @@ impl<O: PlanarOutput> Estimator for PlanarEstimator<O> {
     }
 
     fn handle_input(&mut self, inputs: PlanarInputs<'_>) -> Result<Reply<O>, Fault> {
-        let sample = self.mounting.sample(inputs.imu.message());
+        let sample = sample(inputs.imu.message(), &self.mounting.body_from_imu);
         let Self { options, mounting, phase, .. } = self;
         match phase {
             Phase::Starting(starting) => {

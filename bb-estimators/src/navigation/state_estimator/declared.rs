@@ -11,6 +11,7 @@ pub use options::FlightOptions;
 pub use output::{FlightEstimate, FlightEvent, FlightEvents, FlightHealth, FlightOutputs};
 
 use super::{EstimatorOutput, Event, EventKind, EventSink, HealthState, Level, StateEstimator};
+use crate::navigation::estimator::measured::sample;
 use bb_core::component::{HandleCall, Info, Request, RequestCodec};
 use bb_core::{Context, Estimator, Fault, Payload, Reply, Termination};
 use input::Mounting;
@@ -216,7 +217,7 @@ impl Estimator for FlightEstimator {
 
     /// Refusals are reported by events.
     fn handle_input(&mut self, inputs: FlightInputs<'_>) -> Result<Reply<FlightOutputs>, Fault> {
-        let sample = input::sample(inputs.imu.message(), &self.mounting);
+        let sample = sample(inputs.imu.message(), &self.mounting.link_from_imu.rotation);
         (self.last_ns, self.ticks) = (sample.time_ns, 0);
         self.start(&inputs);
         let _ = self.estimator.add_imu(&sample);

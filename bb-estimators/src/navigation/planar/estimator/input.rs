@@ -1,12 +1,10 @@
 //! Inputs of the declared filter, and the mounting of their sensors.
 
 use super::options::PlanarOptions;
-use crate::navigation::eskf::ImuMean;
 use crate::navigation::estimator::measured::told;
 use crate::navigation::geodesy::LocalFrame;
 use crate::navigation::measurement::GnssPosition;
 use crate::navigation::planar::measurement::{PlanarHeading, PlanarPose, PlanarPosition, WheelVelocity, YawRate};
-use bb_core::message::Stamped;
 use bb_core::payload::{GnssFix, Imu, Odometry, Orientation, Pose};
 use bb_core::{Context, Fault, Input, Inputs};
 use nalgebra::{Isometry3, Matrix2, Matrix3, UnitQuaternion, Vector2, Vector3};
@@ -35,11 +33,11 @@ pub struct PlanarInputs<'a> {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mounting {
     pub(super) body_from_link: Isometry3<f64>,
-    body_from_imu: UnitQuaternion<f64>,
+    pub(super) body_from_imu: UnitQuaternion<f64>,
     antenna: Option<Vector2<f64>>,
-    body_from_pose: Option<Isometry3<f64>>,
-    body_from_orientation: Option<UnitQuaternion<f64>>,
-    has_wheels: bool,
+    pub(super) body_from_pose: Option<Isometry3<f64>>,
+    pub(super) body_from_orientation: Option<UnitQuaternion<f64>>,
+    pub(super) has_wheels: bool,
 }
 
 impl Mounting {
@@ -74,15 +72,6 @@ impl Mounting {
         self.has_gnss() || self.body_from_pose.is_some()
     }
 
-    /// The sample in body axes.
-    pub(super) fn sample(&self, imu: &Stamped<Imu>) -> ImuMean {
-        ImuMean {
-            time_ns: imu.monotonic_time.as_nanos(),
-            angular_velocity: self.body_from_imu * imu.angular_velocity,
-            specific_force: self.body_from_imu * imu.linear_acceleration,
-        }
-    }
-
     /// The antenna's position in the body, m.
     pub(super) fn antenna(&self) -> Vector2<f64> {
         self.antenna.unwrap_or_else(Vector2::zeros)
@@ -93,21 +82,6 @@ impl Mounting {
         let fix = GnssPosition::of_fix(fix, frame, Vector3::zeros(), options.gnss_deviation)?;
         let covariance = fix.covariance.fixed_view::<2, 2>(0, 0).into_owned();
         Some(PlanarPosition { position: fix.position.xy(), covariance, lever_arm: self.antenna() })
-    }
-
-    /// Returns whether the robot has wheels.
-    pub(super) fn has_wheels(&self) -> bool {
-        self.has_wheels
-    }
-
-    /// Returns whether something measures the heading in the world alone.
-    pub(super) fn has_orientation(&self) -> bool {
-        self.body_from_orientation.is_some()
-    }
-
-    /// Returns whether something measures poses in the world.
-    pub(super) fn has_poses(&self) -> bool {
-        self.body_from_pose.is_some()
     }
 
     /// The velocity and yaw rate from wheel odometry.

@@ -111,7 +111,7 @@ fn pose_covariance(covariance: &SMatrix<f64, STATES, STATES>, arm: &Vector2<f64>
         by_errors[(i, HEADING)] = by_heading[i];
     }
     by_errors[(5, HEADING)] = 1.0;
-    on_the_plane(&by_errors, covariance, [2, 3, 4])
+    on_the_plane(&by_errors, covariance)
 }
 
 /// Covariance of the twist, with the link's origin at `link` in the body.
@@ -130,18 +130,14 @@ fn twist_covariance(
         }
     }
     by_errors[(5, GYROSCOPE_BIAS)] = -1.0;
-    on_the_plane(&by_errors, covariance, [2, 3, 4])
+    on_the_plane(&by_errors, covariance)
 }
 
 /// `J P Jᵀ`, exactly symmetric, with the components that the plane determines.
-fn on_the_plane(
-    by_errors: &SMatrix<f64, 6, STATES>,
-    covariance: &SMatrix<f64, STATES, STATES>,
-    known: [usize; 3],
-) -> Matrix6<f64> {
+fn on_the_plane(by_errors: &SMatrix<f64, 6, STATES>, covariance: &SMatrix<f64, STATES, STATES>) -> Matrix6<f64> {
     let product = by_errors * covariance * by_errors.transpose();
     let mut matrix = 0.5 * (product + product.transpose());
-    for i in known {
+    for i in [2, 3, 4] {
         matrix[(i, i)] = PLANE;
     }
     matrix

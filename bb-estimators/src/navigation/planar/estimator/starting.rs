@@ -83,7 +83,7 @@ impl Starting {
                 let at_pose = start((pose.position, ORIGIN), velocity);
                 return Some((PlanarStart { position_covariance, ..at_pose }, None));
             }
-            if mounting.has_poses() && !self.takes_too_long() {
+            if mounting.body_from_pose.is_some() && !self.takes_too_long() {
                 return None;
             }
             // The link starts at the origin.
@@ -116,7 +116,7 @@ impl Starting {
     /// The velocity in the body at the last fix, m/s, with its standard deviation: that of the wheels or, without wheels, of the last
     /// fixes. Nothing but their course tells forwards from backwards then, so that an unknown heading waits for one.
     fn in_motion(&self, heading: (f64, f64), mounting: &Mounting) -> Option<(Vector2<f64>, f64)> {
-        if mounting.has_wheels()
+        if mounting.has_wheels
             && let Some(of_wheels) = self.speed_of_wheels()
         {
             return Some(of_wheels);
@@ -140,7 +140,7 @@ impl Starting {
         if let Some(measured) = of_pose.or(of_orientation).filter(|(_, deviation)| *deviation <= UNKNOWN) {
             return measured;
         }
-        let is_measured = mounting.has_positions() || mounting.has_orientation();
+        let is_measured = mounting.has_positions() || mounting.body_from_orientation.is_some();
         let deviation = options.heading_deviation;
         let deviation = if is_measured || deviation <= UNKNOWN { deviation } else { BY_DEFINITION };
         // The heading of the options is that of the link.

@@ -1,6 +1,5 @@
 //! Inputs of the declared state estimator.
 
-use crate::navigation::eskf::ImuMean;
 use crate::navigation::geodesy::Geodetic;
 use crate::navigation::state_estimator::{
     AttitudeReading, FlightControllerState, GnssReading, GpsHealth, GpsHealthReading, ImuBias, PoseAnchor,
@@ -99,7 +98,7 @@ pub struct WarmStartReport {
 /// Poses of the sensors. The body has the axes of the link and its origin at the IMU.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mounting {
-    link_from_imu: Isometry3<f64>,
+    pub(super) link_from_imu: Isometry3<f64>,
     /// Position of the antenna in the body, m.
     lever_arm: Vector3<f64>,
 }
@@ -132,15 +131,6 @@ pub(super) fn warm_start(report: &Stamped<WarmStartReport>) -> Option<FlightCont
         velocity: report.velocity,
         velocity_covariance: report.velocity_covariance,
     })
-}
-
-pub(super) fn sample(imu: &Stamped<Imu>, mounting: &Mounting) -> ImuMean {
-    let turn = mounting.link_from_imu.rotation;
-    ImuMean {
-        time_ns: imu.monotonic_time.as_nanos(),
-        angular_velocity: turn * imu.angular_velocity,
-        specific_force: turn * imu.linear_acceleration,
-    }
 }
 
 pub(super) fn vio(reading: &Stamped<RelativePoseReading>) -> VioOutput {
