@@ -35,6 +35,7 @@ mod math;
 pub mod measurement;
 #[cfg(test)]
 mod noise;
+mod numbers;
 pub mod planar;
 mod propagate;
 mod refusal;

@@ -80,7 +80,6 @@ macro_rules! laws_in {
             use super::*;
             use crate::attitude::laws;
             use bb_tests::laws;
-            use proptest::prelude::*;
 
             /// A filter that has seen no sample.
             macro_rules! nine {

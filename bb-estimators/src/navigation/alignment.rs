@@ -9,6 +9,7 @@ use super::math::{atan2, sqrt};
 use super::refusal::Refusal;
 use crate::attitude::initial::initial_orientation;
 use crate::moments::Moments;
+use crate::navigation::numbers::RECENT_FORCE_S;
 use crate::params::params;
 
 #[cfg(test)]
@@ -54,12 +55,9 @@ pub struct Alignment {
     last_ns: i64,
     rotation: Moments,
     force: Moments,
-    /// Mean of the specific force over [`RECENT_S`], whatever the motion.
+    /// Mean of the specific force over [`RECENT_FORCE_S`], whatever the motion.
     recent: Vector3<f64>,
 }
-
-/// Time over which the force is averaged for [`Alignment::in_motion`], s.
-const RECENT_S: f64 = 0.5;
 
 impl Alignment {
     /// Creates an alignment without samples.
@@ -88,7 +86,7 @@ impl Alignment {
         longer.rotation.add(longer.count, angular_velocity);
         longer.force.add(longer.count, specific_force);
         let dt = self.first_ns.map_or(f64::INFINITY, |_| time_ns.saturating_sub(self.last_ns) as f64 * 1e-9);
-        let share = if dt.is_finite() { dt / (dt + RECENT_S) } else { 1.0 };
+        let share = if dt.is_finite() { dt / (dt + RECENT_FORCE_S) } else { 1.0 };
         longer.recent += (specific_force - longer.recent) * share;
         let recent = longer.recent;
         *self = if longer.is_still() { longer } else { Self::new(self.params).beginning_with(sample) };

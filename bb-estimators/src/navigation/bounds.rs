@@ -1,17 +1,10 @@
 //! Upper bounds on meaningful values.
 
-/// The largest meaningful variance of a position or velocity: the square of 10,000 km, or of 10,000 km/s.
-pub(in crate::navigation) const MOST_VARIANCE: f64 = 1e14;
-
-/// The largest meaningful variance of a rotation error, rad²: beyond a hundred turns the rotation is unknown anyway.
-pub(in crate::navigation) const MOST_ROTATION: f64 = 4e5;
-
-/// The largest component of a position or velocity of anything on the Earth, m or m/s.
-const FARTHEST: f64 = 1e9;
+use crate::navigation::numbers::FARTHEST_ON_EARTH;
 
 /// Returns whether a position (m) or velocity (m/s) is possible for something on the Earth. `false` for NaN.
 pub(in crate::navigation) fn is_on_earth<'a>(components: impl IntoIterator<Item = &'a f64>) -> bool {
-    is_within(components, FARTHEST)
+    is_within(components, FARTHEST_ON_EARTH)
 }
 
 /// Returns whether no component exceeds the bound in magnitude. `false` if one is NaN.

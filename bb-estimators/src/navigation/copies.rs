@@ -39,46 +39,19 @@ use self::newcomer::Newcomer;
 use self::rest::Rest;
 use self::scatter::Scatter;
 #[cfg(feature = "runtime")]
-pub(super) use self::scatter::UNSEEN;
 use self::search::Search;
 use super::bounds::is_within;
-use super::eskf::{Doubt, Eskf, ImuMean, LONGEST_GAP_S, seconds_between};
+use super::eskf::{Doubt, Eskf, ImuMean, seconds_between};
 use super::fused::Fused;
 use super::propagate::Propagate;
 use super::refusal::Refusal;
 use super::state::States;
 use super::stream::Stream;
 use crate::attitude::ParamsError;
-
-/// The number of headings, and of mountings, that cover a turn.
-pub(super) const TURNS: u32 = 6;
-
-/// The deviation of each of them, rad: half of the angle between two.
-pub(super) const TURN_DEVIATION: f64 = core::f64::consts::PI / 6.0;
-
-/// A larger deviation, rad, is an unknown heading: a filter cannot be corrected linearly from so far.
-pub(super) const UNKNOWN: f64 = 0.5;
-
-/// The log likelihood by which a copy leads before it becomes the best.
-const BETTER: f64 = 1.0;
-
-/// A copy this much less likely than the best is dropped.
-const IMPLAUSIBLE: f64 = 12.0;
-
-/// The log likelihood that a copy loses with a measurement that it cannot take.
-const IMPOSSIBLE: f64 = 10.0;
-
-/// The largest normalised innovation squared of a position, to each of whose variances [`SLACK`] is added: ten deviations and metres.
-pub(super) const FAR: f64 = 100.0;
-
-/// Speed in m/s beyond which a body moves, if it is also more than `CLEARLY` deviations; one that is below it by `PROBABLY` deviations is at
-/// rest.
-const MOVES: f64 = 0.5;
-const CLEARLY: f64 = 5.0;
-const PROBABLY: f64 = 2.0;
-
-/// Variance that is added to those of a position before [`FAR`] is applied, m².
-pub(super) const SLACK: f64 = 1.0;
+use crate::navigation::numbers::{
+    BETTER, CLEARLY, FAR_POSITION, FARTHEST_JUMP, IMPLAUSIBLE, IMPOSSIBLE, LONGEST_GAP_S, MOST_STARTS, MOVES,
+    POSITION_SLACK, PROBABLY, UNKNOWN_HEADING,
+};
 
 /// Further differences between the copies.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -197,7 +170,7 @@ impl<F: CopiedFilter> Copies<F> {
     /// The standard deviation of the heading, rad: of the best copy, or of a whole turn while the headings of others that are
     /// plausible are far from it.
     pub fn heading_deviation(&self) -> f64 {
-        let is_far = |begun: &Begun<F>| self.best().turn_to(&begun.filter).abs() > UNKNOWN;
+        let is_far = |begun: &Begun<F>| self.best().turn_to(&begun.filter).abs() > UNKNOWN_HEADING;
         if self.starts.iter().any(is_far) {
             return core::f64::consts::PI / 1.732_050_807_568_877_2;
         }
@@ -252,7 +225,7 @@ impl<F: CopiedFilter> Copies<F> {
     where
         F: Update<M, D>,
     {
-        let result = self.is_admitted(measurement, SLACK, FAR);
+        let result = self.is_admitted(measurement, POSITION_SLACK, FAR_POSITION);
         let result = self.settle(stream, measurement, result);
         self.fuse(stream, measurement, result)
     }
@@ -267,7 +240,7 @@ impl<F: CopiedFilter> Copies<F> {
     where
         F: Update<M, D>,
     {
-        let result = self.is_admitted(fix, SLACK, FAR);
+        let result = self.is_admitted(fix, POSITION_SLACK, FAR_POSITION);
         let result = self.settle(stream, fix, result);
         let shown = self.shown(fix);
         self.fuse(stream, &shown, result)
@@ -281,7 +254,9 @@ impl<F: CopiedFilter> Copies<F> {
     /// Adds what a sample of `dt` seconds shows of the acceleration to the scatter of fixes.
     fn scatter(&mut self, dt: f64) {
         match self.best().acceleration() {
-            Some(acceleration) => self.scatter.propagate(&acceleration, dt, self.heading_deviation() > UNKNOWN),
+            Some(acceleration) => {
+                self.scatter.propagate(&acceleration, dt, self.heading_deviation() > UNKNOWN_HEADING)
+            }
             None => self.scatter.interrupt(),
         }
     }
@@ -384,7 +359,7 @@ impl<F: CopiedFilter> Copies<F> {
 
     /// Begins again in several attitudes if a gap has left it unknown.
     fn fork(&mut self) {
-        if self.starts.len() > search::MOST_STARTS {
+        if self.starts.len() > MOST_STARTS {
             self.starts.truncate(1);
         }
         let mut forked = Vec::new();
@@ -500,5 +475,5 @@ impl<F: CopiedFilter> Propagate for Copies<F> {
 
 /// Returns whether a distance is one on this part of the Earth.
 fn is_near(distance: &Vector3<f64>) -> bool {
-    is_within(distance, newcomer::FARTHEST)
+    is_within(distance, FARTHEST_JUMP)
 }

@@ -32,7 +32,6 @@ mod start;
 mod tests;
 mod transport;
 
-pub(super) use elsewhere::{UNMOORED, UNMOORED_HEADING, UNMOORED_SPEED};
 pub(super) use filter::Doubt;
 pub use filter::Eskf;
 #[cfg(feature = "runtime")]
@@ -40,5 +39,5 @@ pub(crate) use params::imu_params;
 pub use params::{EskfParams, GaussMarkov, ImuDensities};
 pub(super) use propagation::{Transition, rows};
 pub use sample::ImuMean;
-pub(super) use sample::{LONGEST_GAP_S, seconds_between};
+pub(super) use sample::seconds_between;
 pub use start::Start;

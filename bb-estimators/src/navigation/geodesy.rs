@@ -7,13 +7,7 @@ use geoconv::{CoordinateSystem, Enu, Lle, Meters, Radians, Wgs84, Xyz};
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 use super::math::{cos, sin};
-
-/// Heights possible on or above the Earth, m.
-pub(super) const HEIGHTS: core::ops::RangeInclusive<f64> = -1e4..=1e6;
-
-/// Largest distance of a filter from the origin of its frame, m. At that distance, down differs by 0.8 mrad, as much as a good
-/// accelerometer's bias.
-pub(super) const FARTHEST: f64 = 5000.0;
+use crate::navigation::numbers::{FARTHEST_FROM_ORIGIN, HEIGHTS};
 
 /// A position on the Earth, WGS 84.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -116,7 +110,7 @@ impl LocalFrame {
 
     /// The frame at a position that is too far from the origin of this one, at the height of that origin; `None` at any other.
     pub(super) fn moved_on(&self, position: &Vector3<f64>) -> Option<Self> {
-        let is_far = position.xy().norm() > FARTHEST;
+        let is_far = position.xy().norm() > FARTHEST_FROM_ORIGIN;
         is_far.then(|| Self::new(Geodetic { height: self.origin.height, ..self.geodetic(position) }))
     }
 

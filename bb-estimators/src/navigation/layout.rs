@@ -1,6 +1,6 @@
 //! Properties of a filter's errors besides their order.
 
-use super::bounds::{MOST_ROTATION, MOST_VARIANCE};
+use super::numbers::{MOST_ROTATION, MOST_VARIANCE};
 use super::state::{
     ACCELEROMETER_BIAS, GYROSCOPE_BIAS, NAVIGATION, Optional, POSITION, ROTATION, States, VELOCITY,
 };

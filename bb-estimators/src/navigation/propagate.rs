@@ -1,8 +1,9 @@
 //! Interface of a filter that a `History` replays.
 
-use super::eskf::{Eskf, ImuMean, LONGEST_GAP_S, seconds_between};
+use super::eskf::{Eskf, ImuMean, seconds_between};
 use super::refusal::Refusal;
 use super::state::States;
+use crate::navigation::numbers::LONGEST_GAP_S;
 
 /// A filter that IMU samples carry forward in time.
 pub trait Propagate: Clone {

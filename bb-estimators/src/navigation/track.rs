@@ -3,28 +3,15 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::math::{cos, sin, sqrt};
+use crate::navigation::numbers::{
+    CLEARLY, FASTEST, LONGEST_TRACK_NS, STRONGEST, TRACK_BASELINE_NS, TRACK_DEVIATIONS,
+};
 
 #[cfg(test)]
 mod tests;
 
 /// The number of agreeing positions that rules out coincidence: two define a straight line, and the third is on it.
 pub const CONFIRMED: u32 = 3;
-
-/// The largest difference between two positions, in standard deviations.
-const SIGMAS: f64 = 5.0;
-
-/// A speed that few robots exceed, m/s, and an acceleration that none exceeds, m/s².
-const FASTEST: f64 = 150.0;
-const STRONGEST: f64 = 10.0;
-
-/// Default for the longest time between two positions that can be compared, ns.
-const LONGEST_NS: i64 = 60_000_000_000;
-
-/// The time between two positions that determine a velocity, ns. In a longer time, a car may turn into the next street.
-const BASELINE_NS: core::ops::RangeInclusive<i64> = 500_000_000..=5_000_000_000;
-
-/// A velocity determines a course if it exceeds this many of its standard deviations.
-pub(in crate::navigation) const CLEARLY: f64 = 5.0;
 
 /// A measured position.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,7 +66,7 @@ pub struct Track {
 impl Default for Track {
     /// Creates a track for a robot slower than 150 m/s; positions more than a minute apart do not agree.
     fn default() -> Self {
-        Self::with(FASTEST, LONGEST_NS)
+        Self::with(FASTEST, LONGEST_TRACK_NS)
     }
 }
 
@@ -104,7 +91,7 @@ impl Track {
             return false;
         }
         self.count = self.count.saturating_add(1);
-        let longest_ns = *BASELINE_NS.end();
+        let longest_ns = *TRACK_BASELINE_NS.end();
         if self.older.is_none_or(|older| point.time_ns.saturating_sub(older.time_ns) > longest_ns) {
             self.older = Some(newest);
         }
@@ -138,7 +125,7 @@ impl Track {
             }
         };
         let horizontal = (covariance[(0, 0)] + covariance[(1, 1)]) / 2.0;
-        let is_near = |distance: f64, variance: f64| distance <= SIGMAS * sqrt(variance.max(0.0)) + slack;
+        let is_near = |distance: f64, variance: f64| distance <= TRACK_DEVIATIONS * sqrt(variance.max(0.0)) + slack;
         // Also rejects NaN.
         is_near(off.xy().norm(), horizontal) && is_near(off.z.abs(), covariance[(2, 2)])
     }
@@ -164,7 +151,7 @@ impl Track {
     fn since(&self, older: Option<TrackPoint>) -> Option<(Vector3<f64>, f64)> {
         let (newest, older) = (self.newest?, older?);
         let between_ns = newest.time_ns.saturating_sub(older.time_ns);
-        if !BASELINE_NS.contains(&between_ns) {
+        if !TRACK_BASELINE_NS.contains(&between_ns) {
             return None;
         }
         let seconds = between_ns as f64 * 1e-9;

@@ -12,14 +12,7 @@ use super::layout::Layout;
 use super::measurement::Linearised;
 use super::refusal::Refusal;
 use super::stream::{Gate, Stream};
-
-/// Steps of an iterated correction. Three are as good as five, and two are not. What a single one gives is in
-/// `book/src/explanation/navigation-filter.md`.
-const STEPS: usize = 3;
-
-/// A linear correction is exact to two percent below this product of the normalised innovation squared and the variance of
-/// the attitude, rad².
-const LINEAR: f64 = 1e-3;
+use crate::navigation::numbers::{LINEAR, UPDATE_STEPS};
 
 /// States on a group, corrected by the exponential of an error.
 pub(super) trait Composed<const N: usize> {
@@ -85,7 +78,7 @@ pub(super) fn updated<E: Composed<N>, const D: usize, const N: usize>(
         |led: &SVector<f64, N>, room: &mut Room<D, N>| linearised_at::<E, D, N>(estimate, led, room, &linearise);
     let factor = stream.params().variance_factor / fused.weight;
     let mut led = error;
-    for _ in 2..STEPS {
+    for _ in 2..UPDATE_STEPS {
         let next = step(&led, &mut room).and_then(|()| Ok(covariance.innovation(&mut room, factor)?.mean()));
         led = next.unwrap_or_else(|_| SVector::zeros());
     }

@@ -1,7 +1,6 @@
 //! Laws of the parameters of every algorithm.
 
 use bb_tests::laws;
-use proptest::prelude::*;
 
 use super::{Kind, Params, SetError, Value};
 use crate::attitude::{FilterParams, MadgwickParams, VqfParams};

@@ -1,14 +1,16 @@
 //! Requirements of copies on their filter.
 
+use crate::navigation::numbers::{ATTITUDE_DEVIATION, MOST_STILL, SAME_COPY, STILL_SPEED, UNKNOWABLE};
+use crate::navigation::numbers::{TURN_DEVIATION, TURNS, UNKNOWN_HEADING};
 use alloc::vec;
 use alloc::vec::Vec;
-use core::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
+use core::f64::consts::{FRAC_PI_2, PI, TAU};
 use core::fmt::Debug;
 
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 
+use super::Ways;
 use super::rest::GyroscopeAtRest;
-use super::{TURN_DEVIATION, TURNS, UNKNOWN, Ways};
 use crate::attitude::ParamsError;
 use crate::navigation::eskf::{Doubt, Eskf, EskfParams, GaussMarkov, ImuMean, Start};
 use crate::navigation::fused::Fused;
@@ -19,19 +21,6 @@ use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{Estimate, Optional, ROTATION, States, VELOCITY, offset};
 use crate::navigation::stream::Stream;
 use crate::navigation::update::Judged;
-
-/// The deviation of each of the attitudes that cover all, rad: half of the angle between two.
-const ATTITUDE_DEVIATION: f64 = FRAC_PI_4;
-
-/// The deviation of an attitude of which nothing is known, rad: uniform over a turn.
-const UNKNOWABLE: f64 = 1.81;
-
-/// The deviation of the velocity of a body at rest, m/s, and the largest normalised innovation squared of one that may be.
-const STILL: f64 = 0.05;
-const MOST_STILL: f64 = 16.0;
-
-/// A copy whose state is nearer to that of the best than this part of a deviation is the same.
-const SAME: f64 = 0.5;
 
 /// A filter of which there can be [`Copies`](super::Copies).
 #[expect(private_interfaces, reason = "implemented here alone")]
@@ -138,7 +127,7 @@ pub(in crate::navigation) fn is_same<const N: usize>(
     (0..N).all(|i| {
         let (own, other) = (own[(i, i)], other[(i, i)]);
         let is_known_alike = own == other || (0.25..4.0).contains(&(own / other));
-        is_known_alike && error[i] * error[i] <= SAME * SAME * own
+        is_known_alike && error[i] * error[i] <= SAME_COPY * SAME_COPY * own
     })
 }
 
@@ -185,8 +174,8 @@ impl<S: States, const N: usize> CopiedFilter for Eskf<S, N> {
         let turns = |is_unknown: bool| if is_unknown { TURNS } else { 1 };
         let angle = |i: u32| TAU * f64::from(i) / f64::from(TURNS);
         let mounting = offset::<S>(Optional::WheelMounting);
-        let is_mounted = mounting.is_none() || params.wheel_mounting.deviation <= UNKNOWN;
-        let is_pointed = start.rotation_covariance[(2, 2)] <= UNKNOWN * UNKNOWN;
+        let is_mounted = mounting.is_none() || params.wheel_mounting.deviation <= UNKNOWN_HEADING;
+        let is_pointed = start.rotation_covariance[(2, 2)] <= UNKNOWN_HEADING * UNKNOWN_HEADING;
         let mut scales = vec![*params];
         if offset::<S>(Optional::RelativeScale).is_some() && ways.scale {
             scales.push(EskfParams { relative_scale: GaussMarkov::constant(0.0), ..*params });
@@ -229,7 +218,8 @@ impl<S: States, const N: usize> CopiedFilter for Eskf<S, N> {
     fn acceleration(&self) -> Option<Vector3<f64>> {
         let fall = Vector3::new(0.0, 0.0, self.params().gravity);
         let tilts = [ROTATION, ROTATION + 1].map(|i| self.covariance()[(i, i)]);
-        let known = self.estimate().filter(|_| tilts.iter().all(|variance| *variance < UNKNOWN * UNKNOWN));
+        let known =
+            self.estimate().filter(|_| tilts.iter().all(|variance| *variance < UNKNOWN_HEADING * UNKNOWN_HEADING));
         known.map(|estimate| estimate.world_from_body * estimate.specific_force - fall)
     }
 
@@ -239,7 +229,7 @@ impl<S: States, const N: usize> CopiedFilter for Eskf<S, N> {
     }
 
     fn stop(&mut self, bias: &GyroscopeAtRest) {
-        let still = ZeroVelocity { deviation: STILL };
+        let still = ZeroVelocity { deviation: STILL_SPEED };
         let is_likely = |judged: Result<Judged, Refusal>| judged.is_ok_and(|judged| judged.nis <= MOST_STILL);
         if is_likely(self.judge(&still, 0.0)) && is_likely(self.judge(bias, 0.0)) {
             let _ = self.update_ungated(&mut Stream::default(), &still);
@@ -289,9 +279,9 @@ impl<S: States, const N: usize> CopiedFilter for Eskf<S, N> {
     fn forks(&self) -> Vec<(Self, f64)> {
         let covariance = self.covariance().fixed_view::<3, 3>(ROTATION, ROTATION).into_owned();
         let variances = covariance.diagonal();
-        let (turns, deviation) = if variances.x.max(variances.y) > UNKNOWN * UNKNOWN {
+        let (turns, deviation) = if variances.x.max(variances.y) > UNKNOWN_HEADING * UNKNOWN_HEADING {
             (attitudes(), ATTITUDE_DEVIATION)
-        } else if variances.z > UNKNOWN * UNKNOWN {
+        } else if variances.z > UNKNOWN_HEADING * UNKNOWN_HEADING {
             ((0..TURNS).map(|turn| turned(2, TAU * f64::from(turn) / f64::from(TURNS))).collect(), TURN_DEVIATION)
         } else {
             return Vec::new();

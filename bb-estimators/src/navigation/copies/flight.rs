@@ -1,10 +1,11 @@
 //! Operations that only flights need: fixes of a receiver that may be spoofed, a clock that is set back, the certainty of the attitude.
 
-use super::{Begun, Copies, FAR, SLACK, UNKNOWN};
+use super::{Begun, Copies};
 use crate::navigation::eskf::Eskf;
 use crate::navigation::fused::Fused;
 use crate::navigation::math::sqrt;
 use crate::navigation::measurement::GnssPosition;
+use crate::navigation::numbers::{FAR_POSITION, POSITION_SLACK, UNKNOWN_HEADING};
 use crate::navigation::propagate::Propagate as _;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{ROTATION, States};
@@ -21,10 +22,10 @@ impl<S: States, const N: usize> Copies<Eskf<S, N>> {
         stream: &mut Stream,
         fix: &GnssPosition,
     ) -> Result<Fused, Refusal> {
-        let result = self.is_admitted(fix, SLACK, FAR);
+        let result = self.is_admitted(fix, POSITION_SLACK, FAR_POSITION);
         let shown = self.shown(fix);
         if let Some(newcomer) = &mut self.newcomer {
-            newcomer.aid(fix, &shown, FAR);
+            newcomer.aid(fix, &shown, FAR_POSITION);
         }
         self.fuse(stream, &shown, result)
     }
@@ -35,7 +36,7 @@ impl<S: States, const N: usize> Copies<Eskf<S, N>> {
         let attitude = |begun: &Begun<Eskf<S, N>>| begun.filter.estimate().map(|at| at.world_from_body);
         let best = attitude(&self.starts[0]);
         let is_far = |begun: &Begun<Eskf<S, N>>| {
-            best.zip(attitude(begun)).is_some_and(|(best, other)| best.angle_to(&other) > UNKNOWN)
+            best.zip(attitude(begun)).is_some_and(|(best, other)| best.angle_to(&other) > UNKNOWN_HEADING)
         };
         if self.starts.iter().any(is_far) {
             return core::f64::consts::PI;

@@ -9,24 +9,9 @@ use nalgebra::Vector3;
 
 use crate::navigation::eskf::{Doubt, ImuMean};
 use crate::navigation::math::{exp, ln};
-
-/// The shortest length, s; each other one is twice as long as the one before.
-const SHORTEST_S: f64 = 0.1;
-
-/// The number of lengths: the longest is 12.8 s.
-const LENGTHS: usize = 8;
-
-/// The time over which squares are averaged, s.
-const PAST_S: f64 = 60.0;
-
-/// The number of windows that make a mean.
-const ENOUGH: f64 = 3.0;
-
-/// Factor on the mean square: over curves alone, the mean square is three times that of a whole minute of a car.
-const RAISED: f64 = 3.0;
-
-/// Motion that a gap may hide before anything is known of it, as white noise: 1 rad/s and 3 m/s² for about a second.
-const UNKNOWN: [f64; 2] = [1.0, 9.0];
+use crate::navigation::numbers::{
+    HOLD_LENGTHS, HOLD_MEMORY_S, HOLD_RAISED, HOLD_WINDOWS, SHORTEST_HOLD_S, UNKNOWN_MOTION,
+};
 
 /// Statistics of the readings.
 #[derive(Clone, Copy, Debug, Default)]
@@ -34,7 +19,7 @@ pub(super) struct Holding {
     /// Integrals of the angular velocity and of the specific force.
     integral: [Vector3<f64>; 2],
     elapsed_s: f64,
-    windows: [Window; LENGTHS],
+    windows: [Window; HOLD_LENGTHS],
 }
 
 /// The time, s, the reading and the integrals at the begin of a window.
@@ -50,7 +35,7 @@ struct Window {
 }
 
 fn length(index: usize) -> f64 {
-    SHORTEST_S * f64::from(1_u32 << index.min(LENGTHS))
+    SHORTEST_HOLD_S * f64::from(1_u32 << index.min(HOLD_LENGTHS))
 }
 
 impl Holding {
@@ -79,12 +64,12 @@ impl Holding {
     pub(super) fn doubt(&self, whole_s: f64, part_s: f64) -> Doubt {
         let square = |x: f64| x * x;
         let [rotation, velocity] = [0, 1].map(|quantity| {
-            let known = |index: usize| self.windows.get(index).filter(|window| window.count >= ENOUGH);
-            let Some(first) = known(0) else { return Vector3::repeat(UNKNOWN[quantity] * part_s) };
-            let last = (0..LENGTHS).take_while(|index| known(*index).is_some()).last().unwrap_or(0);
+            let known = |index: usize| self.windows.get(index).filter(|window| window.count >= HOLD_WINDOWS);
+            let Some(first) = known(0) else { return Vector3::repeat(UNKNOWN_MOTION[quantity] * part_s) };
+            let last = (0..HOLD_LENGTHS).take_while(|index| known(*index).is_some()).last().unwrap_or(0);
             let above = (0..=last).find(|index| length(*index) >= whole_s);
             let squares = match above {
-                Some(0) => first.squares[quantity] * square(whole_s / SHORTEST_S),
+                Some(0) => first.squares[quantity] * square(whole_s / SHORTEST_HOLD_S),
                 Some(above) => {
                     let (low, high) =
                         (self.windows[above - 1].squares[quantity], self.windows[above].squares[quantity]);
@@ -93,7 +78,7 @@ impl Holding {
                 }
                 None => self.windows[last].squares[quantity] * square(whole_s / length(last)),
             };
-            squares * (RAISED * part_s / whole_s)
+            squares * (HOLD_RAISED * part_s / whole_s)
         });
         Doubt { rotation, velocity }
     }
@@ -109,7 +94,7 @@ impl Window {
     fn end(&mut self, now_s: f64, reading: &[Vector3<f64>; 2], integral: &[Vector3<f64>; 2], wanted: f64) {
         if let Some((since_s, first, from)) = &self.begun {
             let lasted = now_s - since_s;
-            self.count = (self.count + 1.0).min(PAST_S / wanted);
+            self.count = (self.count + 1.0).min(HOLD_MEMORY_S / wanted);
             for quantity in 0..2 {
                 let held = (first[quantity] + reading[quantity]) * (0.5 * lasted);
                 let wrong = (integral[quantity] - from[quantity] - held) * (wanted / lasted);
@@ -148,7 +133,7 @@ mod tests {
                 sum += (integral - length * 0.5 * (rate(t).z + rate(t + length).z)).powi(2) / 1000.0;
             }
             let doubt = holding.doubt(length, length);
-            let ratio = doubt.rotation.z / RAISED / sum;
+            let ratio = doubt.rotation.z / HOLD_RAISED / sum;
             assert!((0.3..8.0).contains(&ratio), "{length} s: {ratio}");
             assert!(doubt.rotation.x < 1e-20 && doubt.velocity.norm() < 1e-20);
         }

@@ -1,15 +1,11 @@
 //! The newcomer: the filter as if it had been where positions are that it refuses.
 
-use super::{CopiedFilter, Copies, FAR, SLACK, Update, is_near};
+use super::{CopiedFilter, Copies, Update, is_near};
 use crate::navigation::fused::Fused;
+use crate::navigation::numbers::LONGEST_PROBATION_S;
+use crate::navigation::numbers::{FAR_POSITION, POSITION_SLACK};
 use crate::navigation::refusal::Refusal;
 use crate::navigation::stream::Stream;
-
-/// The longest time after which a newcomer that fits takes over, s.
-const LONGEST_S: f64 = 20.0;
-
-/// No robot that was right is so far, m, from where it is along any axis.
-pub(super) const FARTHEST: f64 = 100_000.0;
 
 /// A filter that waits to take over.
 #[derive(Clone, Debug)]
@@ -34,12 +30,14 @@ impl<F: CopiedFilter> Newcomer<F> {
                 there.forget_attitude();
             }
             let _: Fused = there.update_ungated(&mut Stream::default(), measurement).ok()?;
-            Some(there).filter(|there| there.judge(measurement, SLACK).is_ok_and(|judged| judged.nis <= FAR))
+            Some(there).filter(|there| {
+                there.judge(measurement, POSITION_SLACK).is_ok_and(|judged| judged.nis <= FAR_POSITION)
+            })
         };
         // A pose may show that the attitude was wrong as well.
         let filter = there(false).or_else(|| there(true))?;
         let age_s = born_ns.saturating_sub(right_since_ns) as f64 * 1e-9;
-        Some(Self { filter, born_ns, probation_s: age_s.min(LONGEST_S) })
+        Some(Self { filter, born_ns, probation_s: age_s.min(LONGEST_PROBATION_S) })
     }
 
     /// Fuses a measurement of another sensor, if it fits.
@@ -70,12 +68,13 @@ impl<F: CopiedFilter> Copies<F> {
         F: Update<M, D>,
     {
         let refusal = match admitted {
-            Ok(_) => Refusal::Gate { nis: FAR, limit: FAR },
+            Ok(_) => Refusal::Gate { nis: FAR_POSITION, limit: FAR_POSITION },
             Err(refusal @ Refusal::Gate { .. }) => refusal,
             Err(_) => return admitted,
         };
         if let Some(newcomer) = &mut self.newcomer {
-            let judged = newcomer.filter.judge(measurement, SLACK).ok().filter(|judged| judged.nis <= FAR);
+            let judged =
+                newcomer.filter.judge(measurement, POSITION_SLACK).ok().filter(|judged| judged.nis <= FAR_POSITION);
             if judged
                 .is_some_and(|judged| admitted.is_ok_and(|ours| judged.log_likelihood > ours) || admitted.is_err())
             {

@@ -11,29 +11,11 @@ use crate::moments::Moments;
 use crate::navigation::eskf::ImuMean;
 use crate::navigation::math::sqrt;
 use crate::navigation::measurement::{Linearised, Measurement, isotropic};
+use crate::navigation::numbers::{
+    LEAST_RATE_VARIANCE, LOUDER, QUIETER, REST_PLACE, REST_WINDOW_S, REST_WINDOWS, SUCCESSIVE,
+};
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{Estimate, GYROSCOPE_BIAS, States};
-
-/// The length of a window, s.
-const WINDOW_S: f64 = 1.0;
-
-/// The number of windows that are remembered, in motion and at rest.
-const REMEMBERED: usize = 40;
-
-/// The place among them, from the quietest, of the one that rest is compared with: a vehicle that coasts may be quiet for two windows.
-const PLACE: usize = 2;
-
-/// A window in motion has at least this many times the variance of one at rest: an engine that idles has a third of it.
-const QUIETER: f64 = 2.25;
-
-/// A window at rest has at most this many times the variance of the loudest known one: as far as that of a second is off.
-const LOUDER: f64 = 1.5;
-
-/// The number of successive quiet windows that are rest.
-const SUCCESSIVE: u32 = 3;
-
-/// The least variance of the mean of a gyroscope, (rad/s)²: its noise is not white.
-const LEAST: f64 = 1e-8;
 
 /// The window that is gathered, and those before.
 #[derive(Clone, Copy, Debug)]
@@ -45,8 +27,8 @@ pub(super) struct Rest {
     changes: Vector3<f64>,
     rate: Moments,
     /// The variances of the vibration, (m/s²)², the newest first.
-    moving: [f64; REMEMBERED],
-    resting: [f64; REMEMBERED],
+    moving: [f64; REST_WINDOWS],
+    resting: [f64; REST_WINDOWS],
     quiet: u32,
 }
 
@@ -59,8 +41,8 @@ impl Default for Rest {
             changes: Vector3::zeros(),
             rate: Moments::default(),
             // Nothing is quieter than that.
-            moving: [0.0; REMEMBERED],
-            resting: [0.0; REMEMBERED],
+            moving: [0.0; REST_WINDOWS],
+            resting: [0.0; REST_WINDOWS],
             quiet: 0,
         }
     }
@@ -85,12 +67,12 @@ impl Rest {
             self.changes += change.component_mul(&change);
         }
         self.rate.add(self.count, &sample.angular_velocity);
-        (self.seconds >= WINDOW_S).then(|| self.end())
+        (self.seconds >= REST_WINDOW_S).then(|| self.end())
     }
 
     fn end(&mut self) -> Window {
         let variance = self.rate.largest_variance(self.count) / self.count;
-        let bias = GyroscopeAtRest { reading: self.rate.mean, deviation: sqrt(variance.max(LEAST)) };
+        let bias = GyroscopeAtRest { reading: self.rate.mean, deviation: sqrt(variance.max(LEAST_RATE_VARIANCE)) };
         // The changes of white noise have twice its variance.
         let window = Window { variance: self.changes.max() / (2.0 * self.count), bias };
         *self = Self { last: self.last, quiet: self.quiet, ..self.remembered() };
@@ -122,7 +104,7 @@ impl Rest {
         let mut moving = self.moving;
         moving.sort_by(f64::total_cmp);
         let loudest = self.resting.iter().copied().fold(0.0, f64::max);
-        let is_quiet = window.variance <= LOUDER * loudest && window.variance * QUIETER < moving[PLACE];
+        let is_quiet = window.variance <= LOUDER * loudest && window.variance * QUIETER < moving[REST_PLACE];
         self.quiet = if is_quiet { self.quiet.saturating_add(1) } else { 0 };
         self.quiet >= SUCCESSIVE
     }

@@ -8,29 +8,10 @@
 use nalgebra::Vector3;
 
 use super::Fix;
-
-/// Error of the acceleration due to a wrong attitude, a lever arm and a bias, m/s². Only scatter beyond it counts.
-const ALLOWED: f64 = 1.0;
-
-/// Number of differences that are kept. An outlier spoils three of them, and a jump two.
-const DIFFERENCES: usize = 9;
-
-/// Rank, from the smallest, of the difference that is taken as the variance: the largest that an outlier leaves intact, and for three axes
-/// as often above the variance as below.
-const PLACE: usize = 5;
-
-/// Factor within which nine differences, each of which shares two fixes with the next, determine the variance: a receiver whose stated
-/// variance is not smaller by more is believed.
-const KNOWN: f64 = 2.0;
-
-/// The variance of a fix that has not yet shown its own, m²: a receiver may state centimetres and scatter by metres.
-pub(in crate::navigation) const UNSEEN: f64 = 9.0;
-
-/// Ratio to the usual variance beyond which a fix gets its whole difference as its noise: three standard deviations.
-const CLEAR: f64 = 9.0;
-
-/// The longest time between two fixes that are compared, s: over a longer one, [`ALLOWED`] hides noise of [`UNSEEN`].
-const LONGEST_S: f64 = 3.5;
+use crate::navigation::numbers::{
+    CLEAR_SCATTER, DIFFERENCES, LONGEST_DIFFERENCE_S, SCATTER_KNOWN, SCATTER_PLACE, UNMODELLED_ACCELERATION,
+    UNSEEN_SCATTER,
+};
 
 /// The motion between two fixes.
 #[derive(Clone, Copy, Debug, Default)]
@@ -60,7 +41,7 @@ pub(super) struct Scatter {
 
 impl Default for Scatter {
     fn default() -> Self {
-        let variances = [UNSEEN; DIFFERENCES];
+        let variances = [UNSEEN_SCATTER; DIFFERENCES];
         Self { last: None, leg: Leg::default(), before: None, variances, count: 0, added: 0.0 }
     }
 }
@@ -85,7 +66,7 @@ impl Scatter {
     pub(super) fn fix<M: Fix>(&mut self, fix: &M) -> M {
         let leg = core::mem::take(&mut self.leg);
         let last = self.last.replace(fix.position());
-        let is_near = (1e-3..LONGEST_S).contains(&leg.seconds);
+        let is_near = (1e-3..LONGEST_DIFFERENCE_S).contains(&leg.seconds);
         let mean = last.filter(|_| is_near).map(|last| (fix.position() - last) / leg.seconds);
         let before = core::mem::replace(&mut self.before, mean.map(|mean| (leg, mean)));
         let stated = fix.variance();
@@ -94,7 +75,7 @@ impl Scatter {
             let expected = earlier.velocity + leg.position / leg.seconds - earlier.position / earlier.seconds;
             let (one, other) = (1.0 / earlier.seconds, 1.0 / leg.seconds);
             let by_noise = one * one + (one + other) * (one + other) + other * other;
-            let allowed = ALLOWED * 0.5 * (earlier.seconds + leg.seconds);
+            let allowed = UNMODELLED_ACCELERATION * 0.5 * (earlier.seconds + leg.seconds);
             let change = mean - mean_before;
             let mut beside = change - expected;
             if earlier.is_turned || leg.is_turned {
@@ -105,7 +86,7 @@ impl Scatter {
             self.variances.rotate_right(1);
             self.variances[0] = excess / (M::AXES * by_noise);
             self.count = (self.count + 1).min(DIFFERENCES);
-            if self.variances[0] > CLEAR * stated.max(self.shown()) {
+            if self.variances[0] > CLEAR_SCATTER * stated.max(self.shown()) {
                 // As if this fix alone made the difference.
                 alone = excess * leg.seconds * leg.seconds / M::AXES;
             }
@@ -113,7 +94,7 @@ impl Scatter {
         // Fixes that are far from each other never show their noise.
         let shown = if is_near || self.count == DIFFERENCES { self.shown() } else { 0.0 };
         let shown = shown.max(alone);
-        self.added = if shown > KNOWN * stated { shown - stated } else { 0.0 };
+        self.added = if shown > SCATTER_KNOWN * stated { shown - stated } else { 0.0 };
         self.as_shown(fix)
     }
 
@@ -126,7 +107,7 @@ impl Scatter {
     fn shown(&self) -> f64 {
         let mut sorted = self.variances;
         sorted.sort_by(f64::total_cmp);
-        sorted[PLACE]
+        sorted[SCATTER_PLACE]
     }
 }
 

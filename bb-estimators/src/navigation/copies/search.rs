@@ -2,39 +2,21 @@
 
 use super::{Begun, CopiedFilter, Update};
 use crate::navigation::math::exp;
+use crate::navigation::numbers::{
+    MOST_STARTS, SEARCH_EXPONENTS, SEARCH_FIRST, SEARCH_LEAD, SEARCH_MEMORY_S, SEARCH_PAUSE_S, SEARCH_STEP,
+};
 use crate::navigation::stream::Stream;
 
-/// The ratio of two neighbouring multiples. A factor of two would be hard to detect.
-const STEP: f64 = 4.0;
-
-/// The multiples that are searched, as powers of [`STEP`]: no vehicle is quieter than the data sheet of its IMU.
-const EXPONENTS: core::ops::RangeInclusive<i32> = 0..=4;
-
-/// The power at which the search begins.
-const FIRST: i32 = 2;
-
-/// Time constant with which leads are forgotten, s: two minutes of a drive.
-const MEMORY_S: f64 = 120.0;
-
-/// The log likelihood by which a neighbour leads when the search moves to it.
-const LEAD: f64 = 3.0;
-
-/// The shortest time between two moves, s.
-const PAUSE_S: f64 = 3.0;
-
-/// The largest number of starts with which the search compares: with more, they say more about each other than about the noise.
-pub(super) const MOST_STARTS: usize = 2;
-
-/// The multiple of the white noise at a power of [`STEP`].
+/// The multiple of the white noise at a power of [`SEARCH_STEP`].
 fn multiple(exponent: i32) -> f64 {
-    (0..exponent).fold(1.0, |multiple, _| multiple * STEP)
+    (0..exponent).fold(1.0, |multiple, _| multiple * SEARCH_STEP)
 }
 
 /// The state of the search.
 #[derive(Clone, Debug)]
 pub(super) struct Search<F: CopiedFilter> {
     is_on: bool,
-    /// The power of [`STEP`] of the noise of all starts.
+    /// The power of [`SEARCH_STEP`] of the noise of all starts.
     exponent: i32,
     moved_ns: i64,
     compared_ns: i64,
@@ -54,13 +36,13 @@ struct Neighbour<F: CopiedFilter> {
 
 impl<F: CopiedFilter> Search<F> {
     pub(super) fn new(is_on: bool) -> Self {
-        let exponent = if is_on { FIRST } else { 0 };
+        let exponent = if is_on { SEARCH_FIRST } else { 0 };
         Self { is_on, exponent, moved_ns: i64::MIN, compared_ns: i64::MIN, parent: None, neighbours: [None, None] }
     }
 
     /// The multiple at which the search begins.
     pub(super) fn first_multiple(&self) -> f64 {
-        if self.is_on { multiple(FIRST) } else { 1.0 }
+        if self.is_on { multiple(SEARCH_FIRST) } else { 1.0 }
     }
 
     /// The multiple of the noise of all starts.
@@ -105,14 +87,14 @@ impl<F: CopiedFilter> Search<F> {
             (self.moved_ns, self.compared_ns) = (now_ns, now_ns);
             return false;
         };
-        let kept = exp(-since(self.compared_ns) / MEMORY_S);
+        let kept = exp(-since(self.compared_ns) / SEARCH_MEMORY_S);
         self.compared_ns = now_ns;
         self.neighbours.iter_mut().flatten().for_each(|neighbour| neighbour.lead *= kept);
-        if since(self.moved_ns) < PAUSE_S {
+        if since(self.moved_ns) < SEARCH_PAUSE_S {
             return false;
         }
         for (index, up) in [(0, 1), (1, -1)] {
-            let Some(neighbour) = self.neighbours[index].take_if(|neighbour| neighbour.lead > LEAD) else {
+            let Some(neighbour) = self.neighbours[index].take_if(|neighbour| neighbour.lead > SEARCH_LEAD) else {
                 continue;
             };
             self.exponent += up;
@@ -121,7 +103,7 @@ impl<F: CopiedFilter> Search<F> {
             for begun in starts.iter_mut() {
                 begun.filter.multiply_noise(self.multiple());
                 if up > 0 {
-                    begun.filter.doubt_all(STEP * STEP);
+                    begun.filter.doubt_all(SEARCH_STEP * SEARCH_STEP);
                 }
             }
             self.fork(&starts[parent]);
@@ -134,7 +116,7 @@ impl<F: CopiedFilter> Search<F> {
         self.parent = Some(parent.id);
         self.neighbours = [1, -1].map(|step| {
             let exponent = self.exponent + step;
-            EXPONENTS.contains(&exponent).then(|| {
+            SEARCH_EXPONENTS.contains(&exponent).then(|| {
                 let mut filter = parent.filter;
                 filter.multiply_noise(multiple(exponent));
                 Neighbour { filter, lead: 0.0 }

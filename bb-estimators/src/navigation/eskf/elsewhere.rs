@@ -7,6 +7,7 @@ use super::filter::Eskf;
 use crate::navigation::bounds::is_on_earth;
 use crate::navigation::covariance::Covariance;
 use crate::navigation::math::unit;
+use crate::navigation::numbers::{UNMOORED, UNMOORED_HEADING, UNMOORED_SPEED, UNMOORED_TILT};
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{
     Estimate, Keyframe, NAVIGATION, Optional, POSITION, ROTATION, States, VELOCITY, offset,
@@ -15,12 +16,6 @@ use crate::navigation::update::Composed as _;
 
 /// Relative difference in variance between a keyframe and the pose that it copies: 3 µm where a pose is known to a metre.
 const COPY: f64 = 1e-11;
-
-/// Errors of a filter in the wrong place, as deviations: anywhere within 10 km, 5 m/s, 3° of tilt and 30° of heading.
-pub(in crate::navigation) const UNMOORED: f64 = 1e4;
-pub(in crate::navigation) const UNMOORED_SPEED: f64 = 5.0;
-const UNMOORED_TILT: f64 = 0.05;
-pub(in crate::navigation) const UNMOORED_HEADING: f64 = 0.52;
 
 impl<S: States, const N: usize> Eskf<S, N> {
     /// Restarts from the estimate of another estimator of the same robot, with the correlations of all states that both estimate.

@@ -5,7 +5,7 @@ use nalgebra::{Matrix6, SMatrix, SVector, Vector3};
 
 use super::params::{EskfParams, ImuDensities};
 use super::propagation::Transition;
-use super::sample::{ImuMean, LONGEST_GAP_S, seconds_between};
+use super::sample::{ImuMean, seconds_between};
 use super::start::Start;
 use super::transport::Transport;
 use crate::attitude::ParamsError;
@@ -15,6 +15,7 @@ use crate::navigation::layout::Layout;
 use crate::navigation::math::exp;
 use crate::navigation::math::skew;
 use crate::navigation::measurement::Measurement;
+use crate::navigation::numbers::{AVERAGED_FORCE_S, LONGEST_GAP_S};
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::VELOCITY;
 use crate::navigation::state::{
@@ -64,14 +65,11 @@ pub(in crate::navigation) struct Doubt {
     pub(in crate::navigation) velocity: Vector3<f64>,
 }
 
-/// Time over which the acceleration is averaged, s.
-const AVERAGED_S: f64 = 0.1;
-
 /// Adds a sample of `dt` seconds to the average of the acceleration.
 #[inline]
 fn average<const N: usize>(estimate: &mut Estimate<N>, dt: f64, gravity: f64) {
     let now = estimate.world_from_body * estimate.specific_force - Vector3::new(0.0, 0.0, gravity);
-    estimate.acceleration += (now - estimate.acceleration) * (dt / (dt + AVERAGED_S));
+    estimate.acceleration += (now - estimate.acceleration) * (dt / (dt + AVERAGED_FORCE_S));
 }
 
 impl<S: States, const N: usize> Eskf<S, N> {

@@ -5,9 +5,6 @@ use nalgebra::Vector3;
 use crate::attitude::{MAX_ANGULAR_VELOCITY, MAX_SPECIFIC_FORCE};
 use crate::navigation::refusal::Refusal;
 
-/// The longest gap that is bridged at all, s: the position is unknown after a longer one.
-pub(in crate::navigation) const LONGEST_GAP_S: f64 = 60.0;
-
 /// One IMU sample, body axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImuMean {

@@ -5,13 +5,11 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use super::params::EskfParams;
 use crate::navigation::covariance::Covariance;
 use crate::navigation::math::unit;
+use crate::navigation::numbers::MOST_PITCH;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{
     ACCELEROMETER_BIAS, Estimate, GYROSCOPE_BIAS, Optional, POSITION, ROTATION, States, VELOCITY, offset,
 };
-
-/// The largest deviation of the pitch of an IMU in its vehicle, rad: 5°.
-const MOST_PITCH: f64 = 0.09;
 
 /// The state and uncertainty that a filter starts with.
 #[derive(Clone, Copy, Debug, PartialEq)]

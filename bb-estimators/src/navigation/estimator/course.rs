@@ -3,16 +3,11 @@
 use crate::navigation::eskf::ImuMean;
 use crate::navigation::geodesy::{Geodetic, LocalFrame};
 use crate::navigation::measurement::GnssPosition;
+use crate::navigation::numbers::{COURSES_AGREED, LONGEST_COURSE_WAIT_NS};
 use crate::navigation::track::{CONFIRMED, Track, TrackPoint};
 use bb_core::Input;
 use bb_core::payload::GnssFix;
 use nalgebra::Vector3;
-
-/// Number of agreeing fixes that may define a world. With a receiver at 1 Hz, a robot often cannot wait for more.
-const AGREED: u32 = 2;
-
-/// After this time, ns, fewer fixes suffice if none disagreed: the receiver may be slow or may have stopped.
-const LONGEST_WAIT_NS: i64 = 10_000_000_000;
 
 /// The fixes of a receiver. No single fix is trusted: a receiver may first report the position where it was switched off, or zeros.
 ///
@@ -96,7 +91,7 @@ impl Course {
 
     /// The newest fix, as the antenna's position in the frame, if it counts at that time.
     pub fn newest(&self, now_ns: i64) -> Option<&TrackPoint> {
-        self.track.newest().filter(|_| self.agree(AGREED, now_ns))
+        self.track.newest().filter(|_| self.agree(COURSES_AGREED, now_ns))
     }
 
     /// The mean velocity over the last seconds, in the frame, with its standard deviation, m/s, if it counts at that time.
@@ -106,7 +101,8 @@ impl Course {
 
     /// Returns whether `count` fixes agree, or, after a while, all of them.
     fn agree(&self, count: u32, now_ns: i64) -> bool {
-        let has_waited = self.first_ns.is_some_and(|first_ns| now_ns.saturating_sub(first_ns) >= LONGEST_WAIT_NS);
+        let has_waited =
+            self.first_ns.is_some_and(|first_ns| now_ns.saturating_sub(first_ns) >= LONGEST_COURSE_WAIT_NS);
         self.track.count() >= count || (has_waited && !self.is_disputed)
     }
 }

@@ -2,6 +2,7 @@
 
 use super::health::{Limits, Watch};
 use crate::navigation::history::{History, Replayed};
+use crate::navigation::numbers::{LONGEST_LEAD_NS, MOST_REFUSED};
 use crate::navigation::refusal::Refusal;
 use bb_core::{Fault, Input, Reply};
 use std::fmt::Debug;
@@ -9,12 +10,6 @@ use std::fmt::Debug;
 /// Number of IMU samples by which measurements may be late: 1.3 s at 400 Hz.
 const SAMPLES: usize = 512;
 const MEASUREMENTS: usize = 128;
-
-/// Largest lead of a measurement's stamp over the IMU, ns.
-const LONGEST_LEAD_NS: i64 = 500_000_000;
-
-/// After this many rejected IMU samples in a row, there is no estimate.
-const MOST_REFUSED: u32 = 50;
 
 /// A filter with a stream for each of its sensors.
 pub(in crate::navigation) trait Sensing: Replayed<Measurement: Debug> {

@@ -1,15 +1,7 @@
 //! Conditions under which the estimate is not to be trusted.
 
+use crate::navigation::numbers::{DISTRUST_NS, STORM, UNKNOWN_HEADING};
 use crate::navigation::stream::Counts;
-
-/// Time for which the filter is distrusted after it has moved, ns.
-const DISTRUST_NS: i64 = 1_000_000_000;
-
-/// Number of consecutive refusals of one sensor that are more than outliers.
-const STORM: u64 = 3;
-
-/// A heading with a larger deviation, rad, is unknown.
-const UNKNOWN_HEADING: f64 = 0.5;
 
 /// Observations of the filter so far.
 #[derive(Clone, Copy, Debug)]

@@ -4,6 +4,7 @@ use crate::navigation::eskf::ImuMean;
 use crate::navigation::geodesy::{Geodetic, LocalFrame};
 use crate::navigation::math::skew;
 use crate::navigation::measurement::{AbsolutePose, GnssPosition, isotropic};
+use crate::navigation::numbers::UNKNOWN_HEIGHT;
 use bb_core::message::Stamped;
 use bb_core::payload::{GnssFix, GnssStatus, Imu, Pose};
 use nalgebra::{Isometry3, Matrix3, SMatrix, UnitQuaternion, Vector3};
@@ -16,9 +17,6 @@ pub(in crate::navigation) fn sample(imu: &Stamped<Imu>, body_from_imu: &UnitQuat
         specific_force: body_from_imu * imu.linear_acceleration,
     }
 }
-
-/// Standard deviation of the height where a fix has none, m.
-const UNKNOWN_HEIGHT: f64 = 1e4;
 
 /// A covariance, if it carries information: in ROS all zeros mean unknown, and no noise has a variance of zero or less.
 pub(in crate::navigation) fn told<const D: usize>(

@@ -5,33 +5,18 @@ use super::input::{Mounting, NavigationInputs};
 use super::options::NavigationOptions;
 use super::world::World;
 use crate::navigation::alignment::{Alignment, AlignmentParams};
-use crate::navigation::copies::{UNKNOWN, UNSEEN};
 use crate::navigation::eskf::{ImuMean, Start};
 use crate::navigation::geodesy::LocalFrame;
 use crate::navigation::measurement::AbsolutePose;
+use crate::navigation::numbers::{
+    CLEARLY, HEADING_BY_DEFINITION, LONGEST_MOVE_S, LONGEST_START_NS, MOVING, ORIGIN_DEVIATION, RESTLESS_NS,
+    START_ACCELERATION, UNKNOWN_HEADING, UNSEEN_SCATTER,
+};
 use crate::navigation::refusal::Refusal;
-use crate::navigation::track::{CLEARLY, TrackPoint};
+use crate::navigation::track::TrackPoint;
 use bb_core::message::Stamped;
 use bb_core::payload::Odometry;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
-
-/// The time of a start, ns, after which it is reported, and waits no longer for an input that may be missing.
-const LONGEST_NS: i64 = 10_000_000_000;
-
-/// The time for which the filter waits for rest once it knows where it is, ns.
-const RESTLESS_NS: i64 = 3_000_000_000;
-
-/// Standard deviation of the world's origin without satellites, m: it is known by definition.
-const ORIGIN: f64 = 0.01;
-
-/// The largest standard deviation of a heading that nothing measures, rad: the world is turned so that it is right.
-const BY_DEFINITION: f64 = 0.1;
-
-/// Standard deviation of the velocity of a robot in motion, m/s.
-const MOVING: f64 = 5.0;
-
-/// The longest time that a given state is moved on, s: after that it is too uncertain to start from.
-const LONGEST_MOVE_S: f64 = 20.0;
 
 /// Gathers the data that a start needs.
 #[derive(Clone, Copy, Debug)]
@@ -65,7 +50,7 @@ impl Starting {
 
     /// Returns whether the start has lasted long enough to be reported.
     pub(super) fn takes_too_long(&self) -> bool {
-        self.has_waited(self.first_ns, LONGEST_NS)
+        self.has_waited(self.first_ns, LONGEST_START_NS)
     }
 
     fn has_waited(&self, since_ns: Option<i64>, longest_ns: i64) -> bool {
@@ -116,8 +101,8 @@ impl Starting {
         }
         let is_measured = mounting.pose.is_some() || mounting.magnetic_field.is_some();
         let deviation = options.heading_deviation;
-        let deviation = if is_measured || deviation <= UNKNOWN { deviation } else { BY_DEFINITION };
-        self.alignment.at_rest((-mounting.link(), ORIGIN), (options.heading, deviation))
+        let deviation = if is_measured || deviation <= UNKNOWN_HEADING { deviation } else { HEADING_BY_DEFINITION };
+        self.alignment.at_rest((-mounting.link(), ORIGIN_DEVIATION), (options.heading, deviation))
     }
 
     /// Returns a start at the last fix, with the velocity of the last ones.
@@ -138,7 +123,7 @@ impl Starting {
         let age_s = start.time_ns.saturating_sub(fix.time_ns) as f64 * 1e-9;
         let position = fix.position + start.velocity * age_s - antenna;
         // A single fix shows nothing of its noise.
-        let own = fix.covariance + Matrix3::identity() * UNSEEN;
+        let own = fix.covariance + Matrix3::identity() * UNSEEN_SCATTER;
         let position_covariance = own + start.velocity_covariance * (age_s * age_s);
         Ok(Start { position, position_covariance, ..start })
     }
@@ -167,7 +152,7 @@ impl Starting {
     /// Returns a start at the last pose.
     fn at_pose(&self) -> Result<Start, Refusal> {
         let (time_ns, pose) = self.pose.ok_or(Refusal::NotObservable)?;
-        let origin = (Vector3::zeros(), ORIGIN);
+        let origin = (Vector3::zeros(), ORIGIN_DEVIATION);
         let start = match self.alignment.at_rest(origin, (0.0, 0.0)) {
             Ok(start) => start,
             Err(refusal) if !self.has_waited(self.first_ns, RESTLESS_NS) => return Err(refusal),
@@ -228,11 +213,8 @@ fn move_on(start: &mut Start, sample: &ImuMean) {
     let turn = UnitQuaternion::from_scaled_axis(sample.angular_velocity * since_s);
     start.velocity = start.world_from_body * (turn * (start.world_from_body.inverse() * start.velocity));
     start.world_from_body *= turn;
-    let changed = ACCELERATION * ACCELERATION * since_s;
+    let changed = START_ACCELERATION * START_ACCELERATION * since_s;
     start.velocity_covariance += Matrix3::identity() * changed;
     start.position_covariance += start.velocity_covariance * (since_s * since_s);
     start.time_ns = sample.time_ns;
 }
-
-/// The acceleration of a robot whose state is given, as white noise, m/s²/√Hz.
-const ACCELERATION: f64 = 1.0;

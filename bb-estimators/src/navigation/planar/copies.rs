@@ -10,10 +10,13 @@ use super::filter::{LAYOUT, PlanarEkf, PlanarStart};
 use super::measurement::{PlanarMeasurement, PlanarPosition};
 use super::params::PlanarParams;
 use crate::attitude::ParamsError;
-use crate::navigation::copies::{CopiedFilter, Fix, TURN_DEVIATION, TURNS, UNKNOWN, Update, Ways, is_same};
-use crate::navigation::eskf::{Doubt, ImuMean, UNMOORED, UNMOORED_HEADING, UNMOORED_SPEED};
+use crate::navigation::copies::{CopiedFilter, Fix, Update, Ways, is_same};
+use crate::navigation::eskf::{Doubt, ImuMean};
 use crate::navigation::fused::Fused;
 use crate::navigation::math::{sqrt, wrapped};
+use crate::navigation::numbers::{
+    TURN_DEVIATION, TURNS, UNKNOWN_HEADING, UNMOORED, UNMOORED_HEADING, UNMOORED_SPEED,
+};
 use crate::navigation::refusal::Refusal;
 use crate::navigation::stream::{Gate, Stream};
 use crate::navigation::update::Judged;
@@ -59,7 +62,7 @@ impl CopiedFilter for PlanarEkf {
 
     /// A heading whose deviation is more than half a radian counts as unknown.
     fn starts(params: &PlanarParams, _: Ways, start: &PlanarStart) -> Result<Vec<Self>, Refusal> {
-        let (turns, deviation) = match start.heading_deviation <= UNKNOWN {
+        let (turns, deviation) = match start.heading_deviation <= UNKNOWN_HEADING {
             true => (1, start.heading_deviation),
             false => (TURNS, TURN_DEVIATION),
         };

@@ -4,10 +4,10 @@ use nalgebra::{Matrix2, SVector, Vector2};
 
 use super::arc::arc;
 use crate::attitude::MAX_ANGULAR_VELOCITY;
-use crate::navigation::bounds::{MOST_ROTATION, MOST_VARIANCE};
 use crate::navigation::covariance::{Covariance, Innovation};
 use crate::navigation::layout::Layout;
 use crate::navigation::math::{cos, sin, wrapped};
+use crate::navigation::numbers::{MOST_ROTATION, MOST_VARIANCE};
 use crate::navigation::update::Composed;
 
 /// Error of the position in the world, m.

@@ -5,10 +5,8 @@ mod tests;
 
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, UnitQuaternion, Vector2, Vector3};
 
+use crate::navigation::numbers::PIXEL_STEPS;
 use crate::navigation::refusal::Refusal;
-
-/// Newton steps before a pixel is rejected as one that the lens cannot produce.
-const STEPS: usize = 30;
 
 /// A pinhole camera with radial and tangential distortion, and its pose on the body. The optical axis is z; x points to
 /// the right in the image and y points down.
@@ -123,7 +121,7 @@ impl Camera {
             return Err(Refusal::OutOfRange);
         }
         let mut direction = (pixel - self.centre).component_div(&self.focal_length);
-        for _ in 0..STEPS {
+        for _ in 0..PIXEL_STEPS {
             let (expected, jacobian) = self.distorted(&direction);
             // Beyond the fold, where the distortion turns back, two directions share a pixel.
             let determinant = jacobian.determinant();

@@ -14,9 +14,10 @@ use super::params::SmootherParams;
 use super::preintegration::Preintegration;
 use super::scratch::Scratch;
 use crate::attitude::ParamsError;
-use crate::navigation::eskf::{Doubt, GaussMarkov, ImuDensities, ImuMean, LONGEST_GAP_S, Start, seconds_between};
+use crate::navigation::eskf::{Doubt, GaussMarkov, ImuDensities, ImuMean, Start, seconds_between};
 use crate::navigation::factor::{Factor, NavigationFactor};
 use crate::navigation::math::unit;
+use crate::navigation::numbers::LONGEST_GAP_S;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{Estimate, NAVIGATION, Navigation, Optional, States, distinct, offset};
 

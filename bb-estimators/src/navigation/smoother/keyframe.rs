@@ -14,11 +14,9 @@ use super::params::SmootherParams;
 use super::preintegration::Preintegration;
 use crate::navigation::factor::Factor;
 use crate::navigation::factor::Rows;
+use crate::navigation::numbers::REWEIGHED_FACTOR;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{Estimate, POSITION, ROTATION, States};
-
-/// A weight is replaced if the kernel's differs from it by more than this.
-const REWEIGHED: f64 = 0.02;
 
 /// A factor and its weight.
 #[derive(Clone, Copy, Debug)]
@@ -238,7 +236,7 @@ impl<F, const N: usize> Keyframe<F, N> {
             && self.factors.iter().filter(|held| held.kernel != Kernel::Squares).any(|held| {
                 let weight = |rows: &Rows<N>| held.kernel.weight(held.trust * self.distance(rows, before));
                 self.rows::<S>(&held.factor, before, &mut rows).is_ok()
-                    && (weight(&rows) - held.weight).abs() > REWEIGHED
+                    && (weight(&rows) - held.weight).abs() > REWEIGHED_FACTOR
             })
     }
 }

@@ -17,19 +17,10 @@ use super::keyframe::Window;
 use super::landmark::{Landmark, Sight};
 use super::params::LandmarkParams;
 use crate::navigation::chi_square::limit;
+use crate::navigation::numbers::{LANDMARK_KNOWN_WITHIN, PRESSING, REWEIGHED_LANDMARK, UNFIT};
 use crate::navigation::smoother::camera::Camera;
 use crate::navigation::state::States;
 use triangulation::located;
-
-/// A landmark is relinearised if the kernel's weight of an observation differs from the current one by more than this.
-const REWEIGHED: f64 = 0.1;
-
-/// Multiple of its thresholds that a landmark must exceed to be relinearised in an update, which then eliminates the keyframes from its
-/// first on once more. With its next observation, it is relinearised for less, at no such cost.
-const PRESSING: f64 = 3.0;
-
-/// The fraction of good landmarks that are rejected because their directions do not intersect.
-const UNFIT: f64 = 1e-4;
 
 /// The landmarks of a window.
 #[derive(Clone, Debug)]
@@ -63,7 +54,7 @@ impl<const N: usize> Landmarks<N> {
             rows,
             judging: Judging::new(window + 1),
             unfit,
-            known_within: leaving::KNOWN_WITHIN,
+            known_within: LANDMARK_KNOWN_WITHIN,
         }
     }
 
@@ -204,7 +195,7 @@ impl<const N: usize> Landmarks<N> {
                 return false;
             }
             let off = sight.residual - sight.jacobian * (correction + sight.moved(&keyframe.correction));
-            (kernel.weight(off.norm_squared()) - sight.weight).abs() > times * REWEIGHED
+            (kernel.weight(off.norm_squared()) - sight.weight).abs() > times * REWEIGHED_LANDMARK
         })
     }
 

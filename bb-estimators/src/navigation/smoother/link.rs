@@ -15,13 +15,10 @@ use super::preintegration::Preintegration;
 use crate::navigation::eskf::{EskfParams, ImuDensities, Transition, rows};
 use crate::navigation::factor::{MOST_ROWS, Rows};
 use crate::navigation::math::{Integrals, exp, renormalised, rotation, skew, sqrt};
+use crate::navigation::numbers::LEAST_KEPT;
 use crate::navigation::state::{
     ACCELEROMETER_BIAS, Estimate, GYROSCOPE_BIAS, POSITION, ROTATION, States, VELOCITY, offset,
 };
-
-/// An optional state keeps at least this fraction of its value from one keyframe to the next, so that the transition
-/// stays invertible.
-const LEAST_KEPT: f64 = 1e-6;
 
 /// Information on a state in least-squares form: the cost `½ δᵀ M δ - vᵀ δ`.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -10,15 +10,12 @@ use crate::navigation::bounds::is_on_earth;
 use crate::navigation::factor::Factor;
 use crate::navigation::fused::Fused;
 use crate::navigation::math::sqrt;
+use crate::navigation::numbers::LEAST_SIGHT_DEVIATION;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::smoother::camera::Camera;
 use crate::navigation::state::States;
 use crate::navigation::stream::{Gate, Stream};
 use crate::params::ParamsError;
-
-/// The least deviation of an observation, pixels, and of a prior position, m. Below it, the rounding errors of one observation
-/// exceed all that others tell.
-const LEAST_DEVIATION: f64 = 1e-3;
 
 /// A camera's observation of one landmark.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -246,14 +243,14 @@ fn sighted(camera: &Camera, seen: &Observation, serial: u64, factor: f64) -> Res
         if !is_on_earth(&position) {
             return Err(Refusal::OutOfRange);
         }
-        if !(LEAST_DEVIATION..=1e9).contains(&deviation) {
+        if !(LEAST_SIGHT_DEVIATION..=1e9).contains(&deviation) {
             return Err(Refusal::Noise);
         }
     }
     if seen.deviation_px.is_nan() {
         return Err(Refusal::NonFinite);
     }
-    if !(LEAST_DEVIATION..=1e6).contains(&seen.deviation_px) {
+    if !(LEAST_SIGHT_DEVIATION..=1e6).contains(&seen.deviation_px) {
         return Err(Refusal::Noise);
     }
     let precision = 1.0 / (seen.deviation_px * sqrt(factor));

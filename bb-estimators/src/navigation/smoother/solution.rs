@@ -3,12 +3,9 @@
 use super::filter::FixedLagSmoother;
 use super::params::SmootherParams;
 use crate::navigation::factor::Factor;
+use crate::navigation::numbers::SETTLED;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{ROTATION, States};
-
-/// The fraction of a relinearisation threshold below which a change of correction is not propagated to earlier
-/// keyframes until they are requested.
-const SETTLED: f64 = 0.01;
 
 /// The work done by an update.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

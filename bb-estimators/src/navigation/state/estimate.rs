@@ -9,11 +9,8 @@ use super::states::{
 use crate::attitude::{MAX_ANGULAR_VELOCITY, MAX_SPECIFIC_FORCE};
 use crate::navigation::bounds::{is_on_earth, is_within};
 use crate::navigation::math::{Integrals, renormalised, rotation, rotation_vector};
+use crate::navigation::numbers::MOST_DELAY_S;
 use crate::navigation::refusal::Refusal;
-
-/// The largest delay of fixes, s, in either direction: a longer one is no delay but a fault, and the position then is no longer nearly
-/// a parabola.
-const MOST_DELAY_S: f64 = 0.5;
 
 /// Pose at an earlier time, to which relative poses refer.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,13 +1,6 @@
 //! Plausibility of IMU stamps. The IMU's clock is that of the queue, and one corrupt stamp must not make all others too old.
 
-/// Largest difference of two stamps that agree, ns.
-const AGREED_NS: i64 = 1_000_000_000;
-
-/// A clock jump is believed once agreeing stamps have covered this time, ns, and none has come from the former clock.
-const BELIEVED_NS: i64 = 500_000_000;
-
-/// Minimum number of these stamps.
-const BELIEVED_STAMPS: u32 = 5;
+use crate::navigation::numbers::{AGREED_NS, BELIEVED_NS, BELIEVED_STAMPS};
 
 /// Result for a stamp.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

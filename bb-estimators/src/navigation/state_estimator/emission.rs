@@ -11,14 +11,9 @@ use super::params::{StateEstimatorConfig, StateEstimatorParams, ns};
 use super::strategy::Pose;
 use super::world::turned_pose;
 use crate::navigation::math::sqrt;
+use crate::navigation::numbers::{REARMED, STEADY_GAIN};
 use nalgebra::Matrix6;
 use uuid::Uuid;
-
-/// Gain per output of the filter for the steady norm of the covariance.
-const STEADY: f64 = 0.05;
-
-/// A warning is re-armed once the norm is below this fraction of its limit.
-const REARMED: f64 = 0.75;
 
 /// See the module.
 #[derive(Debug)]
@@ -169,7 +164,7 @@ impl Emission {
         self.last = Some(norm);
         if norm.label == SourceLabel::SatelliteAnchored {
             let steady = self.steady.get_or_insert(norm.norm);
-            *steady += STEADY * (norm.norm - *steady);
+            *steady += STEADY_GAIN * (norm.norm - *steady);
         }
         let ratio = self.steady.filter(|steady| *steady > 0.0).map_or(1.0, |steady| norm.norm / steady);
         let is_large = ratio > params.growing_covariance;

@@ -8,7 +8,7 @@ use super::error::{EstimatorError, Outcome, Reason};
 use super::event::StartedFrom;
 use super::factor::ProvidedFactor;
 use super::gate::{Rejection, SpoofGate};
-use super::input::{ImuBias, MOST_VELOCITY, TakeoffOrigin};
+use super::input::{ImuBias, TakeoffOrigin};
 use super::label::Sources;
 use super::params::{StateEstimatorConfig, ns};
 use super::start::{Starter, warm};
@@ -16,18 +16,10 @@ use super::strategy::{Measured, Pose, Predictor, Strategy};
 use super::world::World;
 use crate::attitude::ParamsError;
 use crate::navigation::eskf::{ImuMean, Start};
+use crate::navigation::numbers::{CONFIRMATIONS, FARTHEST_FLIGHT, FLIGHT_DISTRUST_S, MOST_VELOCITY};
 use crate::navigation::refusal::Refusal;
 
 mod measured;
-
-/// Time for which an estimate is distrusted after an input that does not fit, s.
-const DISTRUST: f64 = 1.0;
-
-/// Number of consecutive positions that must fit before an estimate is trusted again after positions overruled it.
-const CONFIRMATIONS: u32 = 5;
-
-/// Largest possible distance from the origin, m: beyond the other side of the Earth.
-const FARTHEST: f64 = 1.4e7;
 
 /// The deterministic part of the estimator.
 #[derive(Clone, Debug)]
@@ -356,7 +348,7 @@ impl<F: ProvidedFactor> Engine<F> {
     }
 
     fn distrust(&mut self, now_ns: i64) {
-        self.distrust_until(now_ns, now_ns.saturating_add(ns(DISTRUST)));
+        self.distrust_until(now_ns, now_ns.saturating_add(ns(FLIGHT_DISTRUST_S)));
     }
 
     fn distrust_until(&mut self, now_ns: i64, until_ns: i64) {
@@ -397,6 +389,6 @@ impl<F: ProvidedFactor> Engine<F> {
     /// Returns whether it is on the Earth and slow enough to be corrected. After corrupt samples, the state may be finite but neither.
     fn is_bounded(&self) -> bool {
         let Some((position, velocity)) = self.strategy.motion() else { return false };
-        position.norm() < FARTHEST && velocity.norm() <= MOST_VELOCITY
+        position.norm() < FARTHEST_FLIGHT && velocity.norm() <= MOST_VELOCITY
     }
 }

@@ -23,10 +23,8 @@ use crate::navigation::eskf::ImuMean;
 use crate::navigation::factor::NavigationFactor;
 use crate::navigation::geodesy::LocalFrame;
 use crate::navigation::history::past::Key;
+use crate::navigation::numbers::LONGEST_LAG_NS;
 use crate::navigation::refusal::Refusal;
-
-/// Largest lag of the caller's clock behind the IMU's, ns.
-const LONGEST_LAG_NS: i64 = 200_000_000;
 
 /// Result of an input that was accepted.
 #[derive(Clone, Copy, Debug, PartialEq)]

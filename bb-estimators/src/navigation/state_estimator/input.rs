@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3};
 
 use crate::navigation::eskf::ImuMean;
 use crate::navigation::geodesy::Geodetic;
+use crate::navigation::numbers::{LEAST_GIVEN_VARIANCE, LONGEST_WAY, MOST_GIVEN_VARIANCE, MOST_VELOCITY};
 use crate::navigation::refusal::Refusal;
 
 /// IMU biases as estimated by a visual-inertial odometry.
@@ -163,15 +164,11 @@ pub struct FlightControllerWindow<'a> {
     pub fixes: &'a [GnssReading],
 }
 
-/// Standard deviations range from a thousandth of a millimetre to a million kilometres, and similarly for rotations.
-const LEAST_VARIANCE: f64 = 1e-18;
-const MOST_VARIANCE: f64 = 1e18;
-
 pub(super) fn check_covariance(covariance: &Matrix3<f64>) -> Result<(), Refusal> {
     if !covariance.iter().all(|x| x.is_finite()) {
         return Err(Refusal::NonFinite);
     }
-    let is_usual = covariance.diagonal().iter().all(|x| (LEAST_VARIANCE..=MOST_VARIANCE).contains(x));
+    let is_usual = covariance.diagonal().iter().all(|x| (LEAST_GIVEN_VARIANCE..=MOST_GIVEN_VARIANCE).contains(x));
     if is_usual && nalgebra::linalg::Cholesky::new(*covariance).is_some() { Ok(()) } else { Err(Refusal::Noise) }
 }
 
@@ -199,11 +196,6 @@ pub(super) fn check_position(position: &Geodetic) -> Result<(), Refusal> {
     }
     if position.is_possible() { Ok(()) } else { Err(Refusal::OutOfRange) }
 }
-
-/// A speed above that of any aircraft, m/s.
-pub(super) const MOST_VELOCITY: f64 = 1e4;
-/// Longest distance between two frames, m.
-const LONGEST_WAY: f64 = 1e5;
 
 impl VioOutput {
     pub(super) fn check(&self) -> Result<(), Refusal> {

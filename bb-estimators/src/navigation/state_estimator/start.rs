@@ -7,15 +7,7 @@ use super::params::{StateEstimatorConfig, ns};
 use super::world::World;
 use crate::navigation::alignment::{Alignment, AlignmentParams};
 use crate::navigation::eskf::{ImuMean, Start};
-
-/// Maximum age of an attitude at the start, s.
-const ATTITUDE_AGE: f64 = 1.0;
-
-/// Standard deviation of each velocity component after a start from an anchor in the air, m/s.
-const UNKNOWN_VELOCITY: f64 = 30.0;
-
-/// A bias is rejected if it exceeds this many of its standard deviations.
-const PLAUSIBLE: f64 = 5.0;
+use crate::navigation::numbers::{ATTITUDE_AGE_S, PLAUSIBLE_BIAS, UNKNOWN_VELOCITY};
 
 /// Gathers the data for a start from the take-off origin.
 #[derive(Clone, Copy, Debug)]
@@ -51,7 +43,7 @@ impl Starter {
         let square = |x: f64| x * x;
         let (horizontal, vertical) = (square(origin.horizontal_deviation), square(origin.vertical_deviation));
         let position_covariance = Matrix3::from_diagonal(&Vector3::new(horizontal, horizontal, vertical));
-        let recent = |attitude: &AttitudeReading| now_ns.saturating_sub(attitude.time_ns) <= ns(ATTITUDE_AGE);
+        let recent = |attitude: &AttitudeReading| now_ns.saturating_sub(attitude.time_ns) <= ns(ATTITUDE_AGE_S);
         let rest = (Vector3::zeros(), params.takeoff_velocity);
         if let Some(attitude) = self.attitude.filter(recent) {
             let start = Start::at(now_ns, (Vector3::zeros(), 1.0), rest, (attitude.world_from_body, 1.0));
@@ -113,7 +105,8 @@ fn with_bias(start: Start, config: &StateEstimatorConfig, bias: Option<&ImuBias>
     let (accelerometer, gyroscope) = (config.params.accelerometer_bias, config.params.gyroscope_bias);
     // An odometry that is lost may report any values.
     let is_plausible = |bias: &&ImuBias| {
-        bias.accelerometer.norm() <= PLAUSIBLE * accelerometer && bias.gyroscope.norm() <= PLAUSIBLE * gyroscope
+        bias.accelerometer.norm() <= PLAUSIBLE_BIAS * accelerometer
+            && bias.gyroscope.norm() <= PLAUSIBLE_BIAS * gyroscope
     };
     let bias = bias.filter(is_plausible);
     let zero = Vector3::zeros();

@@ -18,6 +18,7 @@ use crate::attitude::ParamsError;
 use crate::navigation::eskf::{ImuMean, Start};
 use crate::navigation::fused::Fused;
 use crate::navigation::measurement::{AbsolutePose, GnssPosition, GnssVelocity, RelativePose};
+use crate::navigation::numbers::CAMERA_SLACK_NS;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{Estimate, POSITION, ROTATION};
 use crate::navigation::stream::{Stream, StreamParams};
@@ -87,10 +88,6 @@ impl Streams {
     }
 }
 
-/// Time beyond [`keyframe_interval`](super::params::StateEstimatorParams::keyframe_interval) for which a keyframe may wait for a slow
-/// camera. [`room`](super::params::StateEstimatorParams::room) includes this margin.
-const SLACK_NS: i64 = 1_000_000_000;
-
 /// Timing of keyframes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cadence {
@@ -122,7 +119,7 @@ impl Cadence {
 
     /// Returns the time to wait for the next frame: a keyframe between two frames would separate them.
     fn patience_ns(&self) -> i64 {
-        (self.spacing_ns / 2).saturating_mul(3).min(self.interval_ns.saturating_add(SLACK_NS))
+        (self.spacing_ns / 2).saturating_mul(3).min(self.interval_ns.saturating_add(CAMERA_SLACK_NS))
     }
 
     fn awaits_camera(&self, now_ns: i64, at_least_ns: i64) -> bool {

@@ -3,8 +3,9 @@
 use nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3};
 
 use super::input::{GnssReading, PoseAnchor, blocks};
-use crate::navigation::geodesy::{FARTHEST, Geodetic, LocalFrame};
+use crate::navigation::geodesy::{Geodetic, LocalFrame};
 use crate::navigation::measurement::{AbsolutePose, GnssPosition, GnssVelocity};
+use crate::navigation::numbers::FARTHEST_FROM_ORIGIN;
 
 /// The tangent frame of the strategy.
 #[derive(Clone, Copy, Debug)]
@@ -65,7 +66,7 @@ impl World {
 
     /// Height above the ellipsoid, m.
     pub(super) fn height(&self, position: &Vector3<f64>) -> f64 {
-        if position.xy().norm() > FARTHEST {
+        if position.xy().norm() > FARTHEST_FROM_ORIGIN {
             return self.frame.geodetic(position).height;
         }
         // Within this distance, the ellipsoid falls away from the plane by at most 2 m.

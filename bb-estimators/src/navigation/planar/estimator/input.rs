@@ -4,13 +4,11 @@ use super::options::PlanarOptions;
 use crate::navigation::estimator::measured::told;
 use crate::navigation::geodesy::LocalFrame;
 use crate::navigation::measurement::GnssPosition;
+use crate::navigation::numbers::UPRIGHT;
 use crate::navigation::planar::measurement::{PlanarHeading, PlanarPose, PlanarPosition, WheelVelocity, YawRate};
 use bb_core::payload::{GnssFix, Imu, Odometry, Orientation, Pose};
 use bb_core::{Context, Fault, Input, Inputs};
 use nalgebra::{Isometry3, Matrix2, Matrix3, UnitQuaternion, Vector2, Vector3};
-
-/// The largest angle between the z axes of a planar sensor and the link, as a cosine.
-const UPRIGHT: f64 = 0.999;
 
 /// The inputs of [`PlanarEstimator`](super::PlanarEstimator).
 #[derive(Clone, Copy, Debug, Inputs)]

@@ -5,14 +5,11 @@ use super::input::Mounting;
 use crate::navigation::estimator::Verdicts;
 use crate::navigation::estimator::report::place_of;
 use crate::navigation::geodesy::LocalFrame;
+use crate::navigation::numbers::PLANE_VARIANCE;
 use crate::navigation::planar::estimate::{GYROSCOPE_BIAS, HEADING, POSITION, STATES, VELOCITY, WHEEL_SCALE, left};
 use bb_core::payload::{GeodeticPosition, Odometry, Pose, Twist};
 use bb_core::{Outputs, Payload};
 use nalgebra::{Matrix6, SMatrix, UnitQuaternion, Vector2, Vector3};
-
-/// Variance of the components that the plane determines, m², rad² and their squares per second: height, roll and pitch. Not 0, so
-/// that the covariance can be inverted.
-const PLANE: f64 = 1e-6;
 
 /// An output that can be made from the filter after a sample.
 #[diagnostic::on_unimplemented(
@@ -138,7 +135,7 @@ fn on_the_plane(by_errors: &SMatrix<f64, 6, STATES>, covariance: &SMatrix<f64, S
     let product = by_errors * covariance * by_errors.transpose();
     let mut matrix = 0.5 * (product + product.transpose());
     for i in [2, 3, 4] {
-        matrix[(i, i)] = PLANE;
+        matrix[(i, i)] = PLANE_VARIANCE;
     }
     matrix
 }

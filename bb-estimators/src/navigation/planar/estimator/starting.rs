@@ -2,26 +2,15 @@
 
 use super::input::{Mounting, PlanarInputs, heading};
 use super::options::PlanarOptions;
-use crate::navigation::copies::UNKNOWN;
 use crate::navigation::eskf::ImuMean;
 use crate::navigation::estimator::course::Course;
 use crate::navigation::geodesy::LocalFrame;
+use crate::navigation::numbers::{
+    CLEARLY, HEADING_BY_DEFINITION, LONGEST_START_NS, ORIGIN_DEVIATION, PLANAR_START_SPEED, UNKNOWN_HEADING,
+};
 use crate::navigation::planar::filter::PlanarStart;
 use crate::navigation::planar::measurement::{PlanarHeading, PlanarPose};
-use crate::navigation::track::CLEARLY;
 use nalgebra::{Matrix2, Rotation2, Vector2, Vector3};
-
-/// The time of a start, ns, after which it is reported, and waits no longer for an input that may be missing.
-const LONGEST_NS: i64 = 10_000_000_000;
-
-/// Standard deviation of the start position without satellite navigation, where the origin is known by definition, m.
-const ORIGIN: f64 = 0.01;
-
-/// The largest standard deviation of a heading that nothing measures, rad: the world is turned so that it is right.
-const BY_DEFINITION: f64 = 0.1;
-
-/// Standard deviation of the initial velocity if no sensor reports it, m/s.
-const SPEED: f64 = 1.0;
 
 /// Gathers the data that a start needs.
 #[derive(Clone, Copy, Debug)]
@@ -44,7 +33,7 @@ impl Starting {
 
     /// Returns whether the start has lasted long enough to be reported.
     pub(super) fn takes_too_long(&self) -> bool {
-        self.first_ns.is_some_and(|first_ns| self.last_ns.saturating_sub(first_ns) > LONGEST_NS)
+        self.first_ns.is_some_and(|first_ns| self.last_ns.saturating_sub(first_ns) > LONGEST_START_NS)
     }
 
     /// Adds the new inputs. Returns the start of the filter once it is known, and the frame of its world.
@@ -77,10 +66,10 @@ impl Starting {
         let heading = self.heading(options, mounting);
         let start = |position, velocity| PlanarStart::at(sample.time_ns, position, heading, velocity);
         if !mounting.has_gnss() {
-            let velocity = self.speed_of_wheels().unwrap_or((Vector2::zeros(), SPEED));
+            let velocity = self.speed_of_wheels().unwrap_or((Vector2::zeros(), PLANAR_START_SPEED));
             if let Some(pose) = self.pose {
                 let position_covariance = pose.covariance.fixed_view::<2, 2>(0, 0).into_owned();
-                let at_pose = start((pose.position, ORIGIN), velocity);
+                let at_pose = start((pose.position, ORIGIN_DEVIATION), velocity);
                 return Some((PlanarStart { position_covariance, ..at_pose }, None));
             }
             if mounting.body_from_pose.is_some() && !self.takes_too_long() {
@@ -88,7 +77,7 @@ impl Starting {
             }
             // The link starts at the origin.
             let position = -(Rotation2::new(heading.0) * mounting.body_from_link.translation.vector.xy());
-            return Some((start((position, ORIGIN), velocity), None));
+            return Some((start((position, ORIGIN_DEVIATION), velocity), None));
         }
         let fix = *self.course.newest(self.last_ns)?;
         let (ahead, deviation) = self.in_motion(heading, mounting)?;
@@ -96,7 +85,7 @@ impl Starting {
         let age_s = sample.time_ns.saturating_sub(fix.time_ns) as f64 * 1e-9;
         let turn = Rotation2::new(heading.0);
         let arm = turn * mounting.antenna();
-        let (moved, off) = if heading.1 > UNKNOWN {
+        let (moved, off) = if heading.1 > UNKNOWN_HEADING {
             (-arm, ahead.norm() * age_s + arm.norm())
         } else {
             (turn * ahead * age_s - arm, arm.norm() * heading.1)
@@ -104,13 +93,13 @@ impl Starting {
         let more = off * off + deviation * deviation * age_s * age_s;
         let own: Matrix2<f64> = fix.covariance.fixed_view::<2, 2>(0, 0).into_owned();
         let position_covariance = own + Matrix2::identity() * more;
-        let at_fix = start((fix.position.xy() + moved, ORIGIN), (ahead, deviation));
+        let at_fix = start((fix.position.xy() + moved, ORIGIN_DEVIATION), (ahead, deviation));
         Some((PlanarStart { position_covariance, ..at_fix }, self.course.frame()))
     }
 
     /// The velocity in the body that wheels report, m/s, with its standard deviation.
     fn speed_of_wheels(&self) -> Option<(Vector2<f64>, f64)> {
-        self.wheels.map(|velocity| (velocity, SPEED.min(0.1 + 0.1 * velocity.norm())))
+        self.wheels.map(|velocity| (velocity, PLANAR_START_SPEED.min(0.1 + 0.1 * velocity.norm())))
     }
 
     /// The velocity in the body at the last fix, m/s, with its standard deviation: that of the wheels or, without wheels, of the last
@@ -122,11 +111,11 @@ impl Starting {
             return Some(of_wheels);
         }
         let course = self.course.velocity(self.last_ns);
-        if heading.1 <= UNKNOWN {
+        if heading.1 <= UNKNOWN_HEADING {
             let turned = |(velocity, deviation): (Vector3<f64>, f64)| {
-                (Rotation2::new(-heading.0) * velocity.xy(), deviation + SPEED)
+                (Rotation2::new(-heading.0) * velocity.xy(), deviation + PLANAR_START_SPEED)
             };
-            return course.map(turned).or(self.takes_too_long().then_some((Vector2::zeros(), SPEED)));
+            return course.map(turned).or(self.takes_too_long().then_some((Vector2::zeros(), PLANAR_START_SPEED)));
         }
         let (velocity, deviation) = course?;
         let speed = velocity.xy().norm();
@@ -137,12 +126,12 @@ impl Starting {
     fn heading(&self, options: &PlanarOptions, mounting: &Mounting) -> (f64, f64) {
         let of_pose = self.pose.map(|pose| (pose.heading, pose.covariance[(2, 2)].sqrt()));
         let of_orientation = self.orientation.map(|measured| (measured.heading, measured.deviation));
-        if let Some(measured) = of_pose.or(of_orientation).filter(|(_, deviation)| *deviation <= UNKNOWN) {
+        if let Some(measured) = of_pose.or(of_orientation).filter(|(_, deviation)| *deviation <= UNKNOWN_HEADING) {
             return measured;
         }
         let is_measured = mounting.has_positions() || mounting.body_from_orientation.is_some();
         let deviation = options.heading_deviation;
-        let deviation = if is_measured || deviation <= UNKNOWN { deviation } else { BY_DEFINITION };
+        let deviation = if is_measured || deviation <= UNKNOWN_HEADING { deviation } else { HEADING_BY_DEFINITION };
         // The heading of the options is that of the link.
         (options.heading - heading(&mounting.body_from_link.rotation), deviation)
     }

@@ -7,9 +7,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::{Coupling, POSE};
-
-/// Least number of keyframes before a checkpoint.
-const LEAST: usize = 2;
+use crate::navigation::numbers::LEAST_CHECKPOINT;
 
 /// The state of an elimination after the keyframes before all current tracks.
 #[derive(Clone, Debug)]
@@ -74,7 +72,7 @@ impl<const N: usize> Coupling<N> {
     /// The index of the first keyframe that shares a landmark with the newest of `len`, if a checkpoint there is worth it.
     pub(super) fn checkpoint_at(&self, len: usize) -> Option<usize> {
         let index = self.reach[..len].partition_point(|reach| *reach < len);
-        (self.points() == 0 && (LEAST..len).contains(&index)).then_some(index)
+        (self.points() == 0 && (LEAST_CHECKPOINT..len).contains(&index)).then_some(index)
     }
 
     /// Keeps what the keyframes before this one leave, when they are eliminated and it has not arrived.

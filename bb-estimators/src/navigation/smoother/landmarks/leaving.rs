@@ -10,21 +10,9 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::Landmarks;
+use crate::navigation::numbers::{LANDMARK_FAR, LANDMARK_LOST_AFTER, UNKNOWN_LANDMARK};
 use crate::navigation::smoother::keyframe::Window;
 use crate::navigation::smoother::landmark::Landmark;
-
-/// A landmark that continues without a prior is given a standard deviation of this many times its distance: almost no
-/// information, but never singular.
-const UNKNOWN: f64 = 100.0;
-
-/// A landmark that none of this many newest keyframes saw is lost.
-const LOST_AFTER: u64 = 5;
-
-/// The most of its distance to within which a landmark must be known, given the keyframes, to keep its linearisation point.
-pub(super) const KNOWN_WITHIN: f64 = 0.1;
-
-/// A landmark that is off by this many times as much begins again.
-const FAR: f64 = 3.0;
 
 impl<const N: usize> Landmarks<N> {
     /// Called before the oldest keyframe is marginalised.
@@ -35,11 +23,11 @@ impl<const N: usize> Landmarks<N> {
         while index < self.all.len() {
             let Some(landmark) = self.all.get(index) else { break };
             let is_seen = landmark.sights.first().is_some_and(|sight| sight.serial == first);
-            let mut is_lost = !landmark.is_open || landmark.last + LOST_AFTER < newest;
+            let mut is_lost = !landmark.is_open || landmark.last + LANDMARK_LOST_AFTER < newest;
             if landmark.slot.is_some() && !landmark.sights.is_empty() {
                 // Too far from its linearisation point, as seen from where the robot is now.
                 let correction = self.correction(landmark, window).norm();
-                is_lost |= correction > FAR * self.known_within * landmark.distance();
+                is_lost |= correction > LANDMARK_FAR * self.known_within * landmark.distance();
             }
             if let Some(slot) = landmark.slot {
                 if is_lost {
@@ -155,7 +143,7 @@ impl<const N: usize> Landmarks<N> {
 
 /// The weight of an almost uninformative prior.
 fn unknown(distance: f64) -> f64 {
-    let deviation = UNKNOWN * distance;
+    let deviation = UNKNOWN_LANDMARK * distance;
     1.0 / (deviation * deviation)
 }
 

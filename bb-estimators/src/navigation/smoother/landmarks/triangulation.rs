@@ -3,13 +3,11 @@
 use nalgebra::{Matrix2x3, Matrix3, Vector2, Vector3};
 
 use super::Landmarks;
+use crate::navigation::numbers::TRIANGULATION_STEPS;
 use crate::navigation::smoother::camera::Camera;
 use crate::navigation::smoother::keyframe::Window;
 use crate::navigation::smoother::landmark::Landmark;
 use crate::navigation::state::States;
-
-/// Gauss–Newton steps for a single landmark.
-const STEPS: usize = 5;
 
 impl<const N: usize> Landmarks<N> {
     /// Triangulates a landmark and uses it if its directions fit: `Some(true)`. `Some(false)` if they do not intersect,
@@ -83,7 +81,7 @@ pub(super) fn located<F, S: States, const N: usize>(
     let mut point = from;
     let last = window.get((landmark.sights.last()?.serial - first) as usize)?;
     let distance = (from - last.estimate::<S>().position).norm();
-    for _ in 0..STEPS {
+    for _ in 0..TRIANGULATION_STEPS {
         let mut matrix = Matrix3::zeros();
         let mut vector = Vector3::zeros();
         if let Some((mean, weight)) = landmark.prior {

@@ -1,6 +1,7 @@
 //! Inputs of the declared state estimator.
 
 use crate::navigation::geodesy::Geodetic;
+use crate::navigation::numbers::UNSTATED_FIX;
 use crate::navigation::state_estimator::{
     AttitudeReading, FlightControllerState, GnssReading, GpsHealth, GpsHealthReading, ImuBias, PoseAnchor,
     VioOutput,
@@ -161,12 +162,10 @@ pub(super) fn anchor(reading: &Stamped<AnchorReading>) -> Option<PoseAnchor> {
     })
 }
 
-/// Standard deviation of a fix that does not report its own, m. For its height, twice that is used.
-const FIX: f64 = 5.0;
-
 pub(super) fn fix(fix: &Stamped<GnssFix>, mounting: &Mounting) -> Option<GnssReading> {
     let position = fix.position.filter(|_| fix.status != GnssStatus::NoFix)?;
-    let usual = Vector3::new(FIX * FIX, FIX * FIX, 4.0 * FIX * FIX);
+    let usual =
+        Vector3::new(UNSTATED_FIX * UNSTATED_FIX, UNSTATED_FIX * UNSTATED_FIX, 4.0 * UNSTATED_FIX * UNSTATED_FIX);
     Some(GnssReading {
         time_ns: fix.monotonic_time.as_nanos(),
         position: geodetic(&position)?,

@@ -4,8 +4,8 @@ use nalgebra::Vector3;
 
 use super::{CONFIRMATIONS, Engine, Phase};
 use crate::navigation::fused::Fused;
-use crate::navigation::geodesy::HEIGHTS;
 use crate::navigation::measurement::RelativePose;
+use crate::navigation::numbers::{ALONE_NS, DOUBTFUL_POSITION, FITS, HEIGHTS, POSITION_STORM, STORM};
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state_estimator::error::{EstimatorError, Reason};
 use crate::navigation::state_estimator::event::StartedFrom;
@@ -17,22 +17,6 @@ use crate::navigation::state_estimator::start::at_anchor;
 use crate::navigation::state_estimator::strategy::{Measured, Streams, Trust, id_of};
 use crate::navigation::state_estimator::world::World;
 use crate::navigation::stream::Stream;
-
-/// Normalised innovation squared over the dimension up to which a position fits.
-const FITS: f64 = 3.0;
-
-/// Number of consecutive refused relative poses that are more than outliers.
-const STORM: u64 = 3;
-
-/// Number of consecutive refused positions that are more than outliers. Positions arrive about once a second.
-const DOUBT: u64 = 2;
-
-/// Normalised innovation squared over the dimension at which a single position makes the estimate doubtful: thirty standard
-/// deviations.
-const FAR: f64 = 1000.0;
-
-/// Time without a camera or an anchor after which a trusted receiver may overrule the estimate, ns: the IMU alone is less certain.
-const ALONE_NS: i64 = 60_000_000_000;
 
 impl<F: ProvidedFactor> Engine<F> {
     pub(super) fn measure(&mut self, measured: &Measured<'_, F>) -> Result<Fused, EstimatorError> {
@@ -53,7 +37,7 @@ impl<F: ProvidedFactor> Engine<F> {
             _ => refused(anchors).max(refused(provided)),
         };
         if !is_relative {
-            self.weigh_position(&result, refused_positions >= DOUBT);
+            self.weigh_position(&result, refused_positions >= POSITION_STORM);
         }
         if let (true, Some(now_ns)) = (is_storm || self.unconfirmed > 0, self.now_ns) {
             self.distrust(now_ns);
@@ -97,7 +81,7 @@ impl<F: ProvidedFactor> Engine<F> {
 
     /// Updates the trust in the estimate from the result of a position.
     fn weigh_position(&mut self, result: &Result<Fused, EstimatorError>, is_repeated: bool) {
-        let is_far = |nis: f64| nis > FAR * 6.0;
+        let is_far = |nis: f64| nis > DOUBTFUL_POSITION * 6.0;
         let is_doubtful = match result {
             Err(EstimatorError::Degraded(Reason::Refused(Refusal::Gate { nis, .. }))) => {
                 is_repeated || is_far(*nis)

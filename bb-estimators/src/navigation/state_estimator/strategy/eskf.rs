@@ -9,9 +9,10 @@ use nalgebra::{Isometry3, SMatrix, UnitQuaternion, Vector3};
 
 use super::{Cadence, Measured, Pose, Predictor, Streams, Trust, id_of};
 use crate::attitude::ParamsError;
-use crate::navigation::copies::{Copies, UNKNOWN, Ways};
+use crate::navigation::copies::{Copies, Ways};
 use crate::navigation::eskf::{Eskf, ImuMean, Start};
 use crate::navigation::fused::Fused;
+use crate::navigation::numbers::UNKNOWN_HEADING;
 use crate::navigation::propagate::Propagate as _;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::Estimate;
@@ -219,7 +220,7 @@ impl EskfStrategy {
 
     /// Returns whether the attitude is known well enough to be corrected linearly.
     pub(super) fn is_attitude_known(&self) -> bool {
-        self.copies.attitude_deviation() <= UNKNOWN
+        self.copies.attitude_deviation() <= UNKNOWN_HEADING
     }
 
     pub(super) fn set_clock(&mut self, time_ns: i64, deviation_s: f64) -> Result<(), EstimatorError> {
