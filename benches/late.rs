@@ -4,26 +4,26 @@
 
 use bb_core::nalgebra::{UnitQuaternion, Vector3};
 use bb_estimators::navigation::{
-    Eskf, EskfParams, Fused, GnssPosition, History, ImuMean, Refusal, Replayed, Start, Stream,
+    EskfFilter, EskfParams, Fused, GnssPosition, History, ImuMean, Refusal, Replayed, Start, Stream,
 };
 use std::error::Error;
 use std::time::Instant;
 
 #[derive(Clone)]
 struct Rover {
-    filter: Eskf,
+    filter: EskfFilter,
     gnss: Stream,
 }
 
 impl Replayed for Rover {
-    type Filter = Eskf;
+    type Filter = EskfFilter;
     type Measurement = GnssPosition;
 
-    fn filter(&self) -> &Eskf {
+    fn filter(&self) -> &EskfFilter {
         &self.filter
     }
 
-    fn filter_mut(&mut self) -> &mut Eskf {
+    fn filter_mut(&mut self) -> &mut EskfFilter {
         &mut self.filter
     }
 
@@ -40,7 +40,7 @@ const SAMPLES: i64 = 80;
 fn main() -> Result<(), Box<dyn Error>> {
     println!("{:>10}  {:>12}  {:>12}", "late, ms", "smallest, µs", "median, µs");
     for late_ms in [0, 100, 500] {
-        let mut filter = Eskf::new(EskfParams::default())?;
+        let mut filter = EskfFilter::new(EskfParams::default())?;
         let (origin, rest, level) = (Vector3::zeros(), Vector3::zeros(), UnitQuaternion::identity());
         filter.start(&Start::at(0, (origin, 5.0), (rest, 0.1), (level, 0.05)))?;
         let mut past = History::<Rover, 320, 64, 16>::new(Rover { filter, gnss: Stream::default() }, 0)?;

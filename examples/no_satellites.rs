@@ -5,7 +5,7 @@
 
 use bb_core::nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3};
 use bb_estimators::navigation::state_estimator::{
-    AttitudeReading, EstimatorError, Event, GnssReading, GpsHealth, GpsHealthReading, PoseAnchor, StateEstimator,
+    AttitudeReading, EstimatorError, Event, FlightNavigator, GnssReading, GpsHealth, GpsHealthReading, PoseAnchor,
     StateEstimatorConfig, StrategyKind, TakeoffOrigin, VioOutput,
 };
 use bb_estimators::navigation::{Geodetic, ImuMean};
@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         Matrix6::from_diagonal(&[position, position, position, angle, angle, angle].map(|one| one * one).into())
     };
     let config = StateEstimatorConfig { strategy: StrategyKind::Eskf, ..StateEstimatorConfig::default() };
-    let mut estimator: StateEstimator<_> = StateEstimator::new(config, log)?;
+    let mut estimator: FlightNavigator<_> = FlightNavigator::new(config, log)?;
     estimator.set_takeoff_origin(TakeoffOrigin::new(position))?;
     estimator.add_attitude(AttitudeReading {
         time_ns: 0,

@@ -5,10 +5,10 @@
 //! | filter | estimates |
 //! |---|---|
 //! | [`MekfFilter`](attitude::MekfFilter), [`VqfFilter`](attitude::VqfFilter), [`MadgwickFilter`](attitude::MadgwickFilter) and others of [`attitude`] | orientation, in `f64` or `f32` |
-//! | [`navigation::Eskf`], with [`navigation::History`] for late measurements | position, velocity, attitude, biases |
-//! | [`navigation::planar::PlanarEkf`] | the same on flat ground |
+//! | [`navigation::EskfFilter`], with [`navigation::History`] for late measurements | position, velocity, attitude, biases |
+//! | [`navigation::planar::PlanarFilter`] | the same on flat ground |
 //! | [`navigation::FixedLagSmoother`] | the last keyframes, with landmarks |
-//! | `navigation::state_estimator::StateEstimator`, with the feature `smoother` or `eskf` | a flight without satellite navigation |
+//! | `navigation::state_estimator::FlightNavigator`, with the feature `smoother` or `eskf` | a flight without satellite navigation |
 //! | [`calibration`] | offsets, scale, misalignment and noise of an IMU |
 //!
 //! ```
@@ -27,7 +27,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Without the feature `runtime` the crate does not depend on `bb-core`, and without `std` it is `no_std`; attitude filters and `Eskf` do
+//! Without the feature `runtime` the crate does not depend on `bb-core`, and without `std` it is `no_std`; attitude filters and `EskfFilter` do
 //! not allocate:
 //!
 //! ```toml

@@ -8,7 +8,7 @@
 //! * An accelerometer measures specific force: at rest it reads one g upwards.
 //! * All quantities are SI; stamps are nanoseconds since any fixed moment.
 //!
-//! [`Eskf`] is the filter, one type parameter for its optional states; [`Alignment`] finds where it starts. Sensors are
+//! [`EskfFilter`] is the filter, one type parameter for its optional states; [`Alignment`] finds where it starts. Sensors are
 //! values that implement [`Measurement`], see [`measurement`] for how to add one, each with a [`Stream`] that holds its gate,
 //! counts and statistics. [`History`] fuses measurements that come late at their own time. [`Copies`] are
 //! several filters of which the likeliest is the estimate. [`planar`] has the filter of a robot that drives on
@@ -53,7 +53,7 @@ pub use alignment::{Alignment, AlignmentParams};
 pub use consistency::{Consistency, nees};
 #[cfg(feature = "alloc")]
 pub use copies::{Copies, Ways};
-pub use eskf::{Eskf, EskfParams, GaussMarkov, ImuDensities, ImuMean, Start};
+pub use eskf::{EskfFilter, EskfParams, GaussMarkov, ImuDensities, ImuMean, Start};
 #[cfg(feature = "runtime")]
 pub use estimator::{
     Course, EskfEstimator, NavigationInputs, NavigationOptions, NavigationOutput, NavigationOutputs,

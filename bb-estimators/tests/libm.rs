@@ -2,10 +2,12 @@
 //! this test with each.
 
 use bb_estimators::attitude::{AnyFilter, AnyParams, AttitudeFilter, FilterParams, ImuSample};
-use bb_estimators::navigation::planar::{PlanarEkf, PlanarParams, PlanarPosition, PlanarStart};
+use bb_estimators::navigation::planar::{PlanarFilter, PlanarParams, PlanarPosition, PlanarStart};
 #[cfg(feature = "smoother")]
 use bb_estimators::navigation::{AbsolutePose, FixedLagSmoother, SmootherParams};
-use bb_estimators::navigation::{Eskf, EskfParams, GnssPosition, ImuMean, NAVIGATION, Navigation, Start, Stream};
+use bb_estimators::navigation::{
+    EskfFilter, EskfParams, GnssPosition, ImuMean, NAVIGATION, Navigation, Start, Stream,
+};
 use nalgebra::{UnitQuaternion, Vector2, Vector3};
 use std::error::Error;
 
@@ -61,7 +63,7 @@ fn start() -> Start {
 }
 
 fn eskf() -> Result<[f64; 3], Box<dyn Error>> {
-    let mut filter = Eskf::<Navigation, NAVIGATION>::new(EskfParams::default())?;
+    let mut filter = EskfFilter::<Navigation, NAVIGATION>::new(EskfParams::default())?;
     let mut fixes = Stream::default();
     filter.start(&start())?;
     for (time_ns, rate, world_from_body) in motion() {
@@ -75,7 +77,7 @@ fn eskf() -> Result<[f64; 3], Box<dyn Error>> {
 }
 
 fn planar() -> Result<[f64; 3], Box<dyn Error>> {
-    let mut filter = PlanarEkf::new(PlanarParams::default())?;
+    let mut filter = PlanarFilter::new(PlanarParams::default())?;
     let mut fixes = Stream::default();
     filter.start(&PlanarStart::at(0, (Vector2::zeros(), 5.0), (0.0, 0.1), (Vector2::x(), 0.1)))?;
     for (time_ns, rate, _) in motion() {

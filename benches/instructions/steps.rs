@@ -6,10 +6,10 @@ use crate::{LONG, SHORT};
 use bb_benches::overflight::{Overflight, Pilot, passed};
 use bb_core::nalgebra::{UnitQuaternion, Vector2, Vector3};
 use bb_estimators::attitude::{AttitudeFilter, ImuSample, MekfFilter, VqfFilter};
-use bb_estimators::navigation::planar::{PlanarEkf, PlanarParams, PlanarPosition, PlanarStart};
+use bb_estimators::navigation::planar::{PlanarFilter, PlanarParams, PlanarPosition, PlanarStart};
 use bb_estimators::navigation::{
-    Eskf, EskfParams, Fused, GnssPosition, Height, History, ImuMean, Navigation, Refusal, Replayed, SmootherParams,
-    Start, Stream,
+    EskfFilter, EskfParams, Fused, GnssPosition, Height, History, ImuMean, Navigation, Refusal, Replayed,
+    SmootherParams, Start, Stream,
 };
 use std::error::Error;
 use std::hint::black_box;
@@ -32,7 +32,7 @@ const USUAL: (usize, usize) = (SHORT, LONG);
 /// Numbers of keyframes, after the window of 20 is full of tracks.
 const KEYFRAMES: (usize, usize) = (60, 160);
 
-/// Steps, in `f64`. Those of `Eskf` have 15 states, those of the attitude filters read the orientation too.
+/// Steps, in `f64`. Those of `EskfFilter` have 15 states, those of the attitude filters read the orientation too.
 pub(crate) const STEPS: &[Step] = &[
     Step { name: "hop/none", on: None, steps: USUAL, stored: 237.0, run: hop::direct },
     // Sixteen hops each.
@@ -113,10 +113,10 @@ pub(crate) const STEPS: &[Step] = &[
 /// The filter takes a sample and is corrected.
 fn eskf(
     steps: usize,
-    correct: impl Fn(&mut Eskf<Navigation>, &mut Stream, &Reading) -> Result<(), Refusal>,
+    correct: impl Fn(&mut EskfFilter<Navigation>, &mut Stream, &Reading) -> Result<(), Refusal>,
 ) -> Result<(), Box<dyn Error>> {
     let readings = readings(LONG);
-    let mut filter = Eskf::<Navigation>::new(EskfParams::default())?;
+    let mut filter = EskfFilter::<Navigation>::new(EskfParams::default())?;
     let mut stream = Stream::default();
     let (origin, level) = (Vector3::zeros(), UnitQuaternion::identity());
     filter.start(&Start::at(0, (origin, 1.0), (origin, 0.1), (level, 0.05)))?;
@@ -130,10 +130,10 @@ fn eskf(
 
 /// A filter with the stream of its heights.
 #[derive(Clone)]
-struct Flying(Eskf<Navigation>, Stream);
+struct Flying(EskfFilter<Navigation>, Stream);
 
 impl Replayed for Flying {
-    type Filter = Eskf<Navigation>;
+    type Filter = EskfFilter<Navigation>;
     type Measurement = Height;
 
     fn filter(&self) -> &Self::Filter {
@@ -153,7 +153,7 @@ impl Replayed for Flying {
 fn late(steps: usize) -> Result<(), Box<dyn Error>> {
     let readings = readings(LONG);
     let (origin, level) = (Vector3::zeros(), UnitQuaternion::identity());
-    let mut filter = Eskf::<Navigation>::new(EskfParams::default())?;
+    let mut filter = EskfFilter::<Navigation>::new(EskfParams::default())?;
     filter.start(&Start::at(0, (origin, 1.0), (origin, 0.1), (level, 0.05)))?;
     let mut history = History::<_, 512, 128, 8>::new(Flying(filter, Stream::default()), 0)?;
     let mut before: Option<&Reading> = None;
@@ -170,10 +170,10 @@ fn late(steps: usize) -> Result<(), Box<dyn Error>> {
 
 fn planar(
     steps: usize,
-    correct: impl Fn(&mut PlanarEkf, &mut Stream, &Reading) -> Result<(), Refusal>,
+    correct: impl Fn(&mut PlanarFilter, &mut Stream, &Reading) -> Result<(), Refusal>,
 ) -> Result<(), Box<dyn Error>> {
     let readings = readings(LONG);
-    let mut filter = PlanarEkf::new(PlanarParams::default())?;
+    let mut filter = PlanarFilter::new(PlanarParams::default())?;
     let mut stream = Stream::default();
     let rest = Vector2::zeros();
     filter.start(&PlanarStart::at(0, (rest, 1.0), (0.0, 0.1), (rest, 0.1)))?;

@@ -2,8 +2,8 @@
 
 use bb_core::nalgebra::{UnitQuaternion, Vector3};
 use bb_estimators::navigation::state_estimator::{
-    AttitudeReading, Both, Event, EventSink, FlightControllerState, GpsHealth, GpsHealthReading, Level, PoseAnchor,
-    StateEstimator, StateEstimatorConfig, StrategyKind, TracingSink,
+    AttitudeReading, Both, Event, EventSink, FlightControllerState, FlightNavigator, GpsHealth, GpsHealthReading,
+    Level, PoseAnchor, StateEstimatorConfig, StrategyKind, TracingSink,
 };
 use bb_estimators::navigation::{Geodetic, ImuMean};
 use serde_json::Value;
@@ -49,8 +49,8 @@ impl EventSink for Kept {
 /// A hover in which something of every level happens; its events.
 fn hover(strategy: StrategyKind) -> Vec<Event> {
     let config = StateEstimatorConfig { strategy, ..StateEstimatorConfig::default() };
-    let mut estimator: StateEstimator<Both<TracingSink, Kept>> =
-        StateEstimator::new(config, Both::default()).expect("the defaults are in range");
+    let mut estimator: FlightNavigator<Both<TracingSink, Kept>> =
+        FlightNavigator::new(config, Both::default()).expect("the defaults are in range");
     let position = Geodetic::from_degrees(48.0, 11.0, 500.0);
     let level = UnitQuaternion::identity();
     let attitude =

@@ -41,7 +41,7 @@ use self::scatter::Scatter;
 #[cfg(feature = "runtime")]
 use self::search::Search;
 use super::bounds::is_within;
-use super::eskf::{Doubt, Eskf, ImuMean, seconds_between};
+use super::eskf::{Doubt, EskfFilter, ImuMean, seconds_between};
 use super::fused::Fused;
 use super::propagate::Propagate;
 use super::refusal::Refusal;
@@ -62,7 +62,7 @@ pub struct Ways {
     pub scale: bool,
 }
 
-/// Copies of one filter, such as [`Eskf`], that differ in where they begin, in the noise of the IMU, and in where they believe to be. The best by
+/// Copies of one filter, such as [`EskfFilter`], that differ in where they begin, in the noise of the IMU, and in where they believe to be. The best by
 /// likelihood is the estimate; they are never mixed.
 #[derive(Clone, Debug)]
 pub struct Copies<F: CopiedFilter> {
@@ -415,8 +415,8 @@ impl<F: CopiedFilter> Copies<F> {
     }
 }
 
-impl<S: States, const N: usize> Copies<Eskf<S, N>> {
-    /// See [`Eskf::set_keyframe`].
+impl<S: States, const N: usize> Copies<EskfFilter<S, N>> {
+    /// See [`EskfFilter::set_keyframe`].
     pub fn set_keyframe(&mut self, id: u64) {
         let _ = self.each(|filter| {
             filter.set_keyframe(id);
@@ -424,11 +424,11 @@ impl<S: States, const N: usize> Copies<Eskf<S, N>> {
         });
     }
 
-    /// See [`Eskf::move_world`].
+    /// See [`EskfFilter::move_world`].
     ///
     /// # Errors
     ///
-    /// The same as [`Eskf::move_world`].
+    /// The same as [`EskfFilter::move_world`].
     pub fn move_world(&mut self, new_from_old: &Isometry3<f64>) -> Result<(), Refusal> {
         self.each(|filter| filter.move_world(new_from_old))?;
         self.scatter.interrupt();

@@ -19,7 +19,7 @@
 //! Two bounds limit the effect of rounding. The noise of a scalar is at least 1e-10 of its predicted variance, and at least 1e-13
 //! of the variances of its individual terms. A Cholesky decomposition checks the covariance every 1024 updates. It also checks
 //! after an update that leaves less than 1e-8 of a variance, after a gap, and while the filter is lost (a position known to 100
-//! km). [`Eskf::repairs`] counts the repairs. Variances are bounded, see `layout.rs`. A correction larger than any possible error
+//! km). [`EskfFilter::repairs`] counts the repairs. Variances are bounded, see `layout.rs`. A correction larger than any possible error
 //! on the Earth is rejected as [`Refusal::OutOfRange`](super::Refusal).
 
 mod elsewhere;
@@ -33,7 +33,7 @@ mod tests;
 mod transport;
 
 pub(super) use filter::Doubt;
-pub use filter::Eskf;
+pub use filter::EskfFilter;
 #[cfg(feature = "runtime")]
 pub(crate) use params::imu_params;
 pub use params::{EskfParams, GaussMarkov, ImuDensities};

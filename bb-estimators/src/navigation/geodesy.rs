@@ -61,7 +61,7 @@ impl Geodetic {
 /// A local tangent frame: x east, y north, z up at its origin.
 ///
 /// Its axes are straight: 10 km away, the ground is 8 m below its xy plane and the vertical is tilted by 1.6 mrad. A filter
-/// should move to a new frame before that; see [`Eskf::move_world`](super::Eskf::move_world).
+/// should move to a new frame before that; see [`EskfFilter::move_world`](super::EskfFilter::move_world).
 ///
 /// ```
 /// use bb_estimators::navigation::{Geodetic, LocalFrame};

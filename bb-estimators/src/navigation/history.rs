@@ -20,22 +20,22 @@ use past::{Key, Past, Run};
 /// A filter with its streams, as one value that can be stored and replayed.
 ///
 /// ```
-/// use bb_estimators::navigation::{Eskf, Fused, GnssPosition, Refusal, Replayed, Stream};
+/// use bb_estimators::navigation::{EskfFilter, Fused, GnssPosition, Refusal, Replayed, Stream};
 ///
 /// #[derive(Clone)]
 /// struct Rover {
-///     filter: Eskf,
+///     filter: EskfFilter,
 ///     gnss: Stream,
 /// }
 ///
 /// impl Replayed for Rover {
-///     type Filter = Eskf;
+///     type Filter = EskfFilter;
 ///     type Measurement = GnssPosition;
 ///
-///     fn filter(&self) -> &Eskf {
+///     fn filter(&self) -> &EskfFilter {
 ///         &self.filter
 ///     }
-///     fn filter_mut(&mut self) -> &mut Eskf {
+///     fn filter_mut(&mut self) -> &mut EskfFilter {
 ///         &mut self.filter
 ///     }
 ///     fn update(&mut self, fix: &GnssPosition) -> Result<Fused, Refusal> {

@@ -25,7 +25,7 @@ impl<const N: usize> Layout<N> {
     /// A layout in which all errors are known.
     pub(in crate::navigation) const EMPTY: Self = Self { largest: [0.0; N], lost: [0.0; N] };
 
-    /// The layout of an [`Eskf`](super::Eskf).
+    /// The layout of an [`EskfFilter`](super::EskfFilter).
     pub(in crate::navigation) const fn of<S: States>() -> Self {
         let mut layout = Self::EMPTY;
         layout.set((POSITION, 3), MOST_VARIANCE);

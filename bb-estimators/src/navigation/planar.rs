@@ -1,7 +1,7 @@
 //! An extended Kalman filter for robots that drive on a plane.
 //!
 //! Estimates position, heading and velocity from a gyroscope and wheels, corrected by satellite navigation, headings and poses.
-//! It also estimates the gyroscope bias and the wheel scale. It needs a quarter of the work of [`Eskf`](super::Eskf) and no
+//! It also estimates the gyroscope bias and the wheel scale. It needs a quarter of the work of [`EskfFilter`](super::EskfFilter) and no
 //! accelerometer, and it starts while the robot moves. It cannot handle slopes: the world is flat, and the body upright.
 //!
 //! S. Thrun, W. Burgard, D. Fox, "Probabilistic Robotics", 2005, section 5.3 (motion on an arc); P. D. Groves, "Principles of GNSS,
@@ -21,11 +21,11 @@
 //! and their scale is known no better than the tyre pressure.
 //!
 //! ```
-//! use bb_estimators::navigation::planar::{PlanarEkf, PlanarParams, PlanarPosition, PlanarStart, WheelVelocity};
+//! use bb_estimators::navigation::planar::{PlanarFilter, PlanarParams, PlanarPosition, PlanarStart, WheelVelocity};
 //! use bb_estimators::navigation::{ImuMean, Stream};
 //! use nalgebra::{Vector2, Vector3};
 //!
-//! let mut filter = PlanarEkf::new(PlanarParams::default())?;
+//! let mut filter = PlanarFilter::new(PlanarParams::default())?;
 //! let (mut wheels, mut gnss) = (Stream::default(), Stream::default());
 //! filter.start(&PlanarStart::at(0, (Vector2::zeros(), 2.0), (0.0, 0.1), (Vector2::new(1.0, 0.0), 0.1)))?;
 //! for i in 1..=500 {
@@ -56,6 +56,6 @@ mod tests;
 pub use estimate::{GYROSCOPE_BIAS, HEADING, POSITION, PlanarEstimate, STATES, VELOCITY, WHEEL_SCALE};
 #[cfg(feature = "runtime")]
 pub use estimator::{PlanarEstimator, PlanarInputs, PlanarOptions, PlanarOutput, PlanarOutputs, PlanarStatus};
-pub use filter::{PlanarEkf, PlanarStart};
+pub use filter::{PlanarFilter, PlanarStart};
 pub use measurement::{PlanarHeading, PlanarMeasurement, PlanarPose, PlanarPosition, WheelVelocity, YawRate};
 pub use params::PlanarParams;

@@ -1,6 +1,6 @@
 //! Interface of a filter that a `History` replays.
 
-use super::eskf::{Eskf, ImuMean, seconds_between};
+use super::eskf::{EskfFilter, ImuMean, seconds_between};
 use super::refusal::Refusal;
 use super::state::States;
 use crate::navigation::numbers::LONGEST_GAP_S;
@@ -37,7 +37,7 @@ pub trait Propagate: Clone {
     fn propagate_until(&mut self, time_ns: i64, sample: &ImuMean, since_ns: i64) -> Result<(), Refusal>;
 }
 
-impl<S: States, const N: usize> Propagate for Eskf<S, N> {
+impl<S: States, const N: usize> Propagate for EskfFilter<S, N> {
     fn time_ns(&self) -> Option<i64> {
         self.estimate().map(|estimate| estimate.time_ns)
     }

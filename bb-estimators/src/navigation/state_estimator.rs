@@ -1,6 +1,6 @@
 //! Position, velocity and attitude of a flight without satellite navigation.
 //!
-//! [`StateEstimator`] takes samples of the flight controller's IMU, relative poses from a camera and poses from satellite images.
+//! [`FlightNavigator`] takes samples of the flight controller's IMU, relative poses from a camera and poses from satellite images.
 //! While it can be trusted, the flight controller's satellite receiver is used too. The configuration selects one of two
 //! strategies: the fixed-lag smoother, with the filter beside it (feature `smoother`, the default), or the error-state Kalman filter
 //! alone (feature `eskf`). Either can be built without the other.
@@ -9,13 +9,13 @@
 //! # #[cfg(feature = "std")]
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! use bb_estimators::navigation::state_estimator::{
-//!     AttitudeReading, Event, StateEstimator, StateEstimatorConfig, TakeoffOrigin,
+//!     AttitudeReading, Event, FlightNavigator, StateEstimatorConfig, TakeoffOrigin,
 //! };
 //! use bb_estimators::navigation::{Geodetic, ImuMean};
 //! use nalgebra::{UnitQuaternion, Vector3};
 //!
 //! let log = |event: &Event| println!("{}: {}", event.level().name(), event.kind.name());
-//! let mut estimator: StateEstimator<_> = StateEstimator::new(StateEstimatorConfig::default(), log)?;
+//! let mut estimator: FlightNavigator<_> = FlightNavigator::new(StateEstimatorConfig::default(), log)?;
 //! estimator.set_takeoff_origin(TakeoffOrigin::new(Geodetic::from_degrees(48.0, 11.0, 500.0)))?;
 //! estimator.add_attitude(AttitudeReading {
 //!     time_ns: 5_000_000,
@@ -87,7 +87,7 @@ pub use declared::{
     TracingSink, WarmStartReport,
 };
 pub use error::{EstimatorError, OriginError, Reason};
-pub use estimator::{Added, StateEstimator};
+pub use estimator::{Added, FlightNavigator};
 pub use event::{Both, Event, EventKind, EventSink, InputKind, Level, StartedFrom};
 pub use factor::ProvidedFactor;
 pub use factor::{SMOOTHED, Smoothed};

@@ -2,7 +2,7 @@
 
 use crate::readings::{GRAVITY, PERIOD_NS, POSITION_NOISE, Reading};
 use bb_estimators::navigation::{
-    Eskf, EskfParams, GnssPosition, Height, ImuMean, Navigation, Refusal, Start, Stream,
+    EskfFilter, EskfParams, GnssPosition, Height, ImuMean, Navigation, Refusal, Start, Stream,
 };
 use multicalc::estimation::{CovarianceUpdate, ErrorStateKalmanFilter, ImuNoise, NominalState, NominalStateFn};
 use multicalc::linear_algebra::{Matrix, Vector};
@@ -45,13 +45,13 @@ pub trait Navigating: Sized {
 
 /// 15 states in `f64`; a gate, counts and statistics of the sensor in each update.
 pub struct Ours {
-    filter: Eskf<Navigation>,
+    filter: EskfFilter<Navigation>,
     stream: Stream,
 }
 
 impl Navigating for Ours {
     fn start() -> Result<Self, Box<dyn Error>> {
-        let mut filter = Eskf::<Navigation>::new(EskfParams {
+        let mut filter = EskfFilter::<Navigation>::new(EskfParams {
             gyroscope_noise: GYROSCOPE_NOISE,
             accelerometer_noise: ACCELEROMETER_NOISE,
             gyroscope_bias_walk: GYROSCOPE_BIAS_WALK,

@@ -8,8 +8,8 @@ use bb_estimators::attitude::initial::initial_orientation;
 use bb_estimators::attitude::{
     AnyFilter, AnyParams, AttitudeFilter, FilterParams, ImuSample, OrientationError, Real,
 };
-use bb_estimators::navigation::{Eskf, EskfParams, GnssPosition, ImuMean, Optional, Start, States, Stream};
-use bb_estimators::navigation::planar::{PlanarEkf, PlanarParams, PlanarPosition, PlanarStart};
+use bb_estimators::navigation::{EskfFilter, EskfParams, GnssPosition, ImuMean, Optional, Start, States, Stream};
+use bb_estimators::navigation::planar::{PlanarFilter, PlanarParams, PlanarPosition, PlanarStart};
 use bb_estimators::params::Params;
 use nalgebra::{UnitQuaternion, Vector2, Vector3};
 
@@ -49,7 +49,7 @@ impl States for Rover {
 
 /// Returns the position after one sample and one fix, east of the origin, m.
 pub fn navigate(sample: &ImuMean) -> Option<f64> {
-    let mut filter = Eskf::<Rover, { Rover::DIMENSION }>::new(EskfParams::default()).ok()?;
+    let mut filter = EskfFilter::<Rover, { Rover::DIMENSION }>::new(EskfParams::default()).ok()?;
     let rest = Vector3::zeros();
     filter.start(&Start::at(0, (rest, 5.0), (rest, 0.1), (UnitQuaternion::identity(), 0.1))).ok()?;
     filter.propagate(sample).ok()?;
@@ -59,7 +59,7 @@ pub fn navigate(sample: &ImuMean) -> Option<f64> {
 
 /// Returns the position of the filter on a plane after one sample and one fix, east of the origin, m.
 pub fn drive(sample: &ImuMean) -> Option<f64> {
-    let mut filter = PlanarEkf::new(PlanarParams::default()).ok()?;
+    let mut filter = PlanarFilter::new(PlanarParams::default()).ok()?;
     let rest = Vector2::zeros();
     filter.start(&PlanarStart::at(0, (rest, 5.0), (0.0, 0.1), (rest, 0.1))).ok()?;
     filter.propagate(sample).ok()?;

@@ -5,7 +5,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
 use super::{Alignment, AlignmentParams};
-use crate::navigation::{Eskf, EskfParams, ImuMean, Refusal};
+use crate::navigation::{EskfFilter, EskfParams, ImuMean, Refusal};
 
 const G: f64 = 9.80665;
 
@@ -34,7 +34,7 @@ laws! {
         let start = alignment.at_rest((Vector3::zeros(), 1.0), (heading, 0.02)).unwrap();
         prop_assert!(start.world_from_body.angle_to(&truth) < 2e-3);
         prop_assert!((start.gyroscope_bias - bias).norm() < 5e-4);
-        prop_assert!(Eskf::<crate::navigation::Navigation>::new(EskfParams::default()).unwrap().start(&start).is_ok());
+        prop_assert!(EskfFilter::<crate::navigation::Navigation>::new(EskfParams::default()).unwrap().start(&start).is_ok());
     }
 }
 

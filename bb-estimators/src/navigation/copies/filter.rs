@@ -12,7 +12,7 @@ use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 use super::Ways;
 use super::rest::GyroscopeAtRest;
 use crate::attitude::ParamsError;
-use crate::navigation::eskf::{Doubt, Eskf, EskfParams, GaussMarkov, ImuMean, Start};
+use crate::navigation::eskf::{Doubt, EskfFilter, EskfParams, GaussMarkov, ImuMean, Start};
 use crate::navigation::fused::Fused;
 use crate::navigation::math::{rotation, rotation_vector, sqrt};
 use crate::navigation::measurement::{GnssPosition, Measurement, ZeroVelocity};
@@ -148,7 +148,7 @@ impl Fix for GnssPosition {
 }
 
 #[expect(private_interfaces, reason = "implemented here alone")]
-impl<S: States, M: Measurement<D>, const N: usize, const D: usize> Update<M, D> for Eskf<S, N> {
+impl<S: States, M: Measurement<D>, const N: usize, const D: usize> Update<M, D> for EskfFilter<S, N> {
     fn judge(&self, measurement: &M, slack: f64) -> Result<Judged, Refusal> {
         self.judge(measurement, slack)
     }
@@ -159,7 +159,7 @@ impl<S: States, M: Measurement<D>, const N: usize, const D: usize> Update<M, D> 
 }
 
 #[expect(private_interfaces, reason = "implemented here alone")]
-impl<S: States, const N: usize> CopiedFilter for Eskf<S, N> {
+impl<S: States, const N: usize> CopiedFilter for EskfFilter<S, N> {
     type Params = EskfParams;
     type Start = Start;
     type Estimate = Estimate<N>;

@@ -1,7 +1,7 @@
 //! Operations that only flights need: fixes of a receiver that may be spoofed, a clock that is set back, the certainty of the attitude.
 
 use super::{Begun, Copies};
-use crate::navigation::eskf::Eskf;
+use crate::navigation::eskf::EskfFilter;
 use crate::navigation::fused::Fused;
 use crate::navigation::math::sqrt;
 use crate::navigation::measurement::GnssPosition;
@@ -11,7 +11,7 @@ use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{ROTATION, States};
 use crate::navigation::stream::Stream;
 
-impl<S: States, const N: usize> Copies<Eskf<S, N>> {
+impl<S: States, const N: usize> Copies<EskfFilter<S, N>> {
     /// Fuses a fix of a receiver that may be spoofed: unlike others, one that the filter refuses founds no newcomer.
     ///
     /// # Errors
@@ -33,9 +33,9 @@ impl<S: States, const N: usize> Copies<Eskf<S, N>> {
     /// The largest standard deviation of the attitude about any axis, rad: of the best copy, or of one that is unknown while others that
     /// are plausible are far from it.
     pub(in crate::navigation) fn attitude_deviation(&self) -> f64 {
-        let attitude = |begun: &Begun<Eskf<S, N>>| begun.filter.estimate().map(|at| at.world_from_body);
+        let attitude = |begun: &Begun<EskfFilter<S, N>>| begun.filter.estimate().map(|at| at.world_from_body);
         let best = attitude(&self.starts[0]);
-        let is_far = |begun: &Begun<Eskf<S, N>>| {
+        let is_far = |begun: &Begun<EskfFilter<S, N>>| {
             best.zip(attitude(begun)).is_some_and(|(best, other)| best.angle_to(&other) > UNKNOWN_HEADING)
         };
         if self.starts.iter().any(is_far) {

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::{Copies, Ways};
-use crate::navigation::eskf::{Eskf, EskfParams, ImuMean, Start};
+use crate::navigation::eskf::{EskfFilter, EskfParams, ImuMean, Start};
 use crate::navigation::measurement::{BodyVelocity, GnssPosition};
 use crate::navigation::noise::Noise;
 use crate::navigation::propagate::Propagate;
@@ -107,7 +107,7 @@ fn stream() -> Stream {
 }
 
 /// Copies that know the noise of the car's own IMU, and those of fixes and wheels.
-fn copies<S: States, const N: usize>(densities: [f64; 2], mounting: f64, noise: bool) -> Copies<Eskf<S, N>> {
+fn copies<S: States, const N: usize>(densities: [f64; 2], mounting: f64, noise: bool) -> Copies<EskfFilter<S, N>> {
     let params = EskfParams {
         gyroscope_noise: densities[0],
         accelerometer_noise: densities[1],
@@ -118,12 +118,12 @@ fn copies<S: States, const N: usize>(densities: [f64; 2], mounting: f64, noise: 
     Copies::new(params, Ways { noise, scale: false }).unwrap()
 }
 
-type Fixed = Copies<Eskf<Aided, { Aided::DIMENSION }>>;
-type Wheels = Copies<Eskf<Vehicle, { Vehicle::DIMENSION }>>;
+type Fixed = Copies<EskfFilter<Aided, { Aided::DIMENSION }>>;
+type Wheels = Copies<EskfFilter<Vehicle, { Vehicle::DIMENSION }>>;
 
 const QUIET: [f64; 2] = [1e-3, 1e-2];
 
-fn heading_error<S: States, const N: usize>(car: &Car, copies: &Copies<Eskf<S, N>>) -> f64 {
+fn heading_error<S: States, const N: usize>(car: &Car, copies: &Copies<EskfFilter<S, N>>) -> f64 {
     (car.world_from_imu() * copies.estimate().unwrap().world_from_body.inverse()).scaled_axis().z
 }
 

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, SMatrix, SVector};
 use nalgebra::{Matrix3, UnitQuaternion};
 
-use super::filter::Eskf;
+use super::filter::EskfFilter;
 use crate::navigation::bounds::is_on_earth;
 use crate::navigation::covariance::Covariance;
 use crate::navigation::math::unit;
@@ -17,7 +17,7 @@ use crate::navigation::update::Composed as _;
 /// Relative difference in variance between a keyframe and the pose that it copies: 3 µm where a pose is known to a metre.
 const COPY: f64 = 1e-11;
 
-impl<S: States, const N: usize> Eskf<S, N> {
+impl<S: States, const N: usize> EskfFilter<S, N> {
     /// Restarts from the estimate of another estimator of the same robot, with the correlations of all states that both estimate.
     /// The other may be a parallel prediction or use different noise. Optional states that the other lacks are set to zero, with
     /// the deviations of the parameters.

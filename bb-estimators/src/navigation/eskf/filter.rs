@@ -30,10 +30,10 @@ use crate::params::Params as _;
 /// An error-state Kalman filter with the optional states `S` and `N` errors in total; see the [module](super).
 ///
 /// ```
-/// use bb_estimators::navigation::{Eskf, EskfParams, GnssPosition, ImuMean, Navigation, Start, Stream};
+/// use bb_estimators::navigation::{EskfFilter, EskfParams, GnssPosition, ImuMean, Navigation, Start, Stream};
 /// use nalgebra::{UnitQuaternion, Vector3};
 ///
-/// let mut filter = Eskf::<Navigation>::new(EskfParams::default())?;
+/// let mut filter = EskfFilter::<Navigation>::new(EskfParams::default())?;
 /// let mut gnss = Stream::default();
 /// let (origin, rest, level) = (Vector3::zeros(), Vector3::zeros(), UnitQuaternion::identity());
 /// filter.start(&Start::at(0, (origin, 5.0), (rest, 0.1), (level, 0.05)))?;
@@ -47,7 +47,7 @@ use crate::params::Params as _;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Eskf<S: States = Navigation, const N: usize = NAVIGATION> {
+pub struct EskfFilter<S: States = Navigation, const N: usize = NAVIGATION> {
     pub(super) params: EskfParams,
     densities: ImuDensities,
     pub(super) estimate: Option<Estimate<N>>,
@@ -72,7 +72,7 @@ fn average<const N: usize>(estimate: &mut Estimate<N>, dt: f64, gravity: f64) {
     estimate.acceleration += (now - estimate.acceleration) * (dt / (dt + AVERAGED_FORCE_S));
 }
 
-impl<S: States, const N: usize> Eskf<S, N> {
+impl<S: States, const N: usize> EskfFilter<S, N> {
     /// Creates a filter that has not started.
     ///
     /// # Errors
@@ -80,7 +80,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
     /// Returns the name of the first parameter outside its accepted range.
     pub fn new(params: EskfParams) -> Result<Self, ParamsError> {
         const {
-            assert!(N == S::DIMENSION, "the second parameter of `Eskf` must be `DIMENSION` of the first");
+            assert!(N == S::DIMENSION, "the second parameter of `EskfFilter` must be `DIMENSION` of the first");
             assert!(distinct(S::OPTIONAL), "an optional state is listed twice");
         }
         params.check()?;
@@ -345,7 +345,7 @@ impl<S: States, const N: usize> Eskf<S, N> {
     upkeep_methods!();
 }
 
-impl<S: States, const N: usize> Composed<N> for Eskf<S, N> {
+impl<S: States, const N: usize> Composed<N> for EskfFilter<S, N> {
     type State = Estimate<N>;
 
     const LAYOUT: Layout<N> = Layout::of::<S>();

@@ -49,7 +49,7 @@ macro_rules! imu_params {
 pub(crate) use imu_params;
 
 imu_params! {
-    /// The tuning of [`Eskf`](super::Eskf).
+    /// The tuning of [`EskfFilter`](super::EskfFilter).
     pub struct EskfParams {
         /// The longest interval that one sample of the IMU covers; a longer one is a gap.
         ///

@@ -13,7 +13,7 @@ use nalgebra::{SVector, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
 use super::params::EskfParams;
-use super::{Eskf, ImuMean, Start};
+use super::{EskfFilter, ImuMean, Start};
 use crate::navigation::state::{Estimate, Optional, States};
 
 /// All optional states.
@@ -115,8 +115,8 @@ fn estimate() -> impl Strategy<Value = Estimate<ALL>> {
 }
 
 /// A level filter at rest at the origin with a moderate uncertainty.
-fn started<S: States, const N: usize>() -> Eskf<S, N> {
-    let mut filter = Eskf::new(EskfParams::default()).unwrap();
+fn started<S: States, const N: usize>() -> EskfFilter<S, N> {
+    let mut filter = EskfFilter::new(EskfParams::default()).unwrap();
     let start = Start::at(0, (Vector3::zeros(), 2.0), (Vector3::zeros(), 0.5), (UnitQuaternion::identity(), 0.1));
     filter.start(&start).unwrap();
     filter

@@ -6,7 +6,7 @@ use super::health::{Sight, Watch, largest_deviation};
 use super::input::keyframe_at;
 use super::options::NavigationOptions;
 use crate::navigation::copies::{Copies, Ways};
-use crate::navigation::eskf::{Eskf, Start};
+use crate::navigation::eskf::{EskfFilter, Start};
 use crate::navigation::fused::Fused;
 use crate::navigation::history::Replayed;
 use crate::navigation::math::sqrt;
@@ -23,7 +23,7 @@ use nalgebra::Isometry3;
 /// Copies of the filter, and a stream for each sensor.
 #[derive(Clone, Debug)]
 pub(super) struct Filter<S: States, const N: usize> {
-    copies: Copies<Eskf<S, N>>,
+    copies: Copies<EskfFilter<S, N>>,
     /// Indexed by [`Measured::sensor`].
     streams: [Stream; SENSORS],
     correlation: Correlation,
@@ -72,11 +72,11 @@ impl<S: States, const N: usize> Filter<S, N> {
         Ok(Self { copies, streams: [stream; SENSORS], correlation })
     }
 
-    pub(super) fn copies(&self) -> &Copies<Eskf<S, N>> {
+    pub(super) fn copies(&self) -> &Copies<EskfFilter<S, N>> {
         &self.copies
     }
 
-    pub(super) fn eskf(&self) -> &Eskf<S, N> {
+    pub(super) fn eskf(&self) -> &EskfFilter<S, N> {
         self.copies.best()
     }
 
@@ -113,14 +113,14 @@ impl<S: States, const N: usize> Filter<S, N> {
 }
 
 impl<S: States, const N: usize> Replayed for Filter<S, N> {
-    type Filter = Copies<Eskf<S, N>>;
+    type Filter = Copies<EskfFilter<S, N>>;
     type Measurement = Measured;
 
-    fn filter(&self) -> &Copies<Eskf<S, N>> {
+    fn filter(&self) -> &Copies<EskfFilter<S, N>> {
         &self.copies
     }
 
-    fn filter_mut(&mut self) -> &mut Copies<Eskf<S, N>> {
+    fn filter_mut(&mut self) -> &mut Copies<EskfFilter<S, N>> {
         &mut self.copies
     }
 

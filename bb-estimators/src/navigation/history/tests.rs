@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 use super::{History, Placed, Replayed};
 use crate::navigation::{
-    Eskf, EskfParams, Fused, GnssPosition, GnssVelocity, ImuMean, Refusal, Start, Stream, StreamParams,
+    EskfFilter, EskfParams, Fused, GnssPosition, GnssVelocity, ImuMean, Refusal, Start, Stream, StreamParams,
 };
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,20 +17,20 @@ enum Sensed {
 
 #[derive(Clone, Debug, PartialEq)]
 struct Drone {
-    filter: Eskf,
+    filter: EskfFilter,
     positions: Stream,
     velocities: Stream,
 }
 
 impl Replayed for Drone {
-    type Filter = Eskf;
+    type Filter = EskfFilter;
     type Measurement = Sensed;
 
-    fn filter(&self) -> &Eskf {
+    fn filter(&self) -> &EskfFilter {
         &self.filter
     }
 
-    fn filter_mut(&mut self) -> &mut Eskf {
+    fn filter_mut(&mut self) -> &mut EskfFilter {
         &mut self.filter
     }
 
@@ -47,7 +47,7 @@ type Long = History<Drone, 100, 60, 10>;
 const SAMPLE_NS: i64 = 10_000_000;
 
 fn drone() -> Drone {
-    let mut filter = Eskf::new(EskfParams::default()).unwrap();
+    let mut filter = EskfFilter::new(EskfParams::default()).unwrap();
     let rest = Vector3::zeros();
     filter.start(&Start::at(0, (rest, 2.0), (rest, 0.5), (UnitQuaternion::identity(), 0.1))).unwrap();
     let robust = StreamParams { robust: 0.05, ..StreamParams::default() };

@@ -14,7 +14,7 @@ use crate::navigation::state::{Estimate, Optional, POSITION, ROTATION, States, o
 /// twice, and the uncertainty of heading and position in the world is preserved.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RelativePose {
-    /// The keyframe, as passed to [`Eskf::set_keyframe`](crate::navigation::Eskf::set_keyframe).
+    /// The keyframe, as passed to [`EskfFilter::set_keyframe`](crate::navigation::EskfFilter::set_keyframe).
     pub keyframe: u64,
     /// Position of the body's origin, in the keyframe's axes, m.
     pub translation: Vector3<f64>,

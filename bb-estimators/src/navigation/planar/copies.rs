@@ -6,7 +6,7 @@ use core::f64::consts::TAU;
 use nalgebra::{Matrix2, Vector3};
 
 use super::estimate::{HEADING, POSITION, PlanarEstimate, VELOCITY, left};
-use super::filter::{LAYOUT, PlanarEkf, PlanarStart};
+use super::filter::{LAYOUT, PlanarFilter, PlanarStart};
 use super::measurement::{PlanarMeasurement, PlanarPosition};
 use super::params::PlanarParams;
 use crate::attitude::ParamsError;
@@ -39,7 +39,7 @@ impl Fix for PlanarPosition {
 }
 
 #[expect(private_interfaces, reason = "implemented here alone")]
-impl<M: PlanarMeasurement<D>, const D: usize> Update<M, D> for PlanarEkf {
+impl<M: PlanarMeasurement<D>, const D: usize> Update<M, D> for PlanarFilter {
     fn judge(&self, measurement: &M, slack: f64) -> Result<Judged, Refusal> {
         let estimate = self.estimate.as_ref().ok_or(Refusal::NotStarted)?;
         judged(estimate, &self.covariance, slack, |at, model| measurement.linearise(at, model))
@@ -51,7 +51,7 @@ impl<M: PlanarMeasurement<D>, const D: usize> Update<M, D> for PlanarEkf {
 }
 
 #[expect(private_interfaces, reason = "implemented here alone")]
-impl CopiedFilter for PlanarEkf {
+impl CopiedFilter for PlanarFilter {
     type Params = PlanarParams;
     type Start = PlanarStart;
     type Estimate = PlanarEstimate;

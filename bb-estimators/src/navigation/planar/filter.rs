@@ -107,7 +107,7 @@ impl PlanarStart {
 
 /// An extended Kalman filter on a plane; the [module](super) has an example.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PlanarEkf {
+pub struct PlanarFilter {
     params: PlanarParams,
     pub(super) densities: Densities,
     pub(super) estimate: Option<PlanarEstimate>,
@@ -115,7 +115,7 @@ pub struct PlanarEkf {
     pub(super) upkeep: Upkeep,
 }
 
-impl PlanarEkf {
+impl PlanarFilter {
     /// Creates a filter that has not started.
     ///
     /// # Errors
@@ -284,7 +284,7 @@ impl PlanarEkf {
     upkeep_methods!();
 }
 
-impl Propagate for PlanarEkf {
+impl Propagate for PlanarFilter {
     fn time_ns(&self) -> Option<i64> {
         self.estimate().map(|estimate| estimate.time_ns)
     }

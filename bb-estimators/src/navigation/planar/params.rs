@@ -4,7 +4,7 @@ use crate::navigation::eskf::GaussMarkov;
 use crate::params::params;
 
 params! {
-    /// The tuning of [`PlanarEkf`](super::PlanarEkf).
+    /// The tuning of [`PlanarFilter`](super::PlanarFilter).
     pub struct PlanarParams {
         /// White noise of the gyroscope.
         ///

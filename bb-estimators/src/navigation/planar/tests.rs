@@ -10,7 +10,7 @@ mod wrong;
 use nalgebra::{Vector2, Vector3};
 use proptest::prelude::*;
 
-use super::{PlanarEkf, PlanarEstimate, PlanarParams, PlanarStart};
+use super::{PlanarEstimate, PlanarFilter, PlanarParams, PlanarStart};
 use crate::navigation::ImuMean;
 
 fn vector(limit: f64) -> impl Strategy<Value = Vector2<f64>> {
@@ -32,8 +32,8 @@ fn estimate() -> impl Strategy<Value = PlanarEstimate> {
 }
 
 /// A filter at rest at the origin with a moderate uncertainty.
-fn started() -> PlanarEkf {
-    let mut filter = PlanarEkf::new(PlanarParams::default()).unwrap();
+fn started() -> PlanarFilter {
+    let mut filter = PlanarFilter::new(PlanarParams::default()).unwrap();
     filter.start(&PlanarStart::at(0, (Vector2::zeros(), 2.0), (0.3, 0.1), (Vector2::zeros(), 0.5))).unwrap();
     filter
 }

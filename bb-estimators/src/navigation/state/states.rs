@@ -73,7 +73,7 @@ impl Optional {
 /// lacks.
 ///
 /// ```
-/// use bb_estimators::navigation::{Eskf, Optional, States};
+/// use bb_estimators::navigation::{EskfFilter, Optional, States};
 ///
 /// /// A rover whose wheels wear, with an antenna on a mast.
 /// #[derive(Clone, Copy, Debug, PartialEq)]
@@ -83,14 +83,14 @@ impl Optional {
 ///     const OPTIONAL: &'static [Optional] = &[Optional::WheelScale, Optional::GnssLeverArm];
 /// }
 ///
-/// type RoverFilter = Eskf<Rover, { Rover::DIMENSION }>;
+/// type RoverFilter = EskfFilter<Rover, { Rover::DIMENSION }>;
 /// assert_eq!(Rover::DIMENSION, 19);
 /// ```
 pub trait States: Copy + Debug + PartialEq {
     /// The optional states in the order of the error vector, each at most once.
     const OPTIONAL: &'static [Optional];
 
-    /// The number of estimated errors: the second parameter of [`Eskf`](crate::navigation::Eskf).
+    /// The number of estimated errors: the second parameter of [`EskfFilter`](crate::navigation::EskfFilter).
     const DIMENSION: usize = NAVIGATION + dimension(Self::OPTIONAL);
 }
 

@@ -10,14 +10,14 @@ pub use log::TracingSink;
 pub use options::FlightOptions;
 pub use output::{FlightEstimate, FlightEvent, FlightEvents, FlightHealth, FlightOutputs};
 
-use super::{EstimatorOutput, Event, EventKind, EventSink, HealthState, Level, StateEstimator};
+use super::{EstimatorOutput, Event, EventKind, EventSink, FlightNavigator, HealthState, Level};
 use crate::navigation::estimator::measured::sample;
 use bb_core::component::{HandleCall, Info, Request, RequestCodec};
 use bb_core::{Context, Estimator, Fault, Payload, Reply, Termination};
 use input::Mounting;
 use std::time::Duration;
 
-/// Position, velocity and attitude of a flight as an estimator of a robot. It is a [`StateEstimator`] with an IMU, relative poses,
+/// Position, velocity and attitude of a flight as an estimator of a robot. It is a [`FlightNavigator`] with an IMU, relative poses,
 /// poses from satellite images, and the flight controller's GNSS receiver.
 ///
 /// ```
@@ -76,7 +76,7 @@ use std::time::Duration;
 /// fields.
 #[derive(Debug)]
 pub struct FlightEstimator {
-    estimator: StateEstimator<Sink>,
+    estimator: FlightNavigator<Sink>,
     mounting: Mounting,
     period_ns: i64,
     /// The last sample of the IMU, and the ticks since then.
@@ -162,14 +162,14 @@ impl FlightEstimator {
 }
 
 /// Request for the last keyframes before the newest, in reverse order of time: see
-/// [`StateEstimator::smoothed_history`]. They are for recorders, and not to be flown with.
+/// [`FlightNavigator::smoothed_history`]. They are for recorders, and not to be flown with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Payload)]
 pub struct SmoothedHistory {
     /// The most keyframes that are wanted.
     pub most: u32,
 }
 
-/// Request for the present health, see [`StateEstimator::health`].
+/// Request for the present health, see [`FlightNavigator::health`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HealthSnapshot;
 
@@ -203,7 +203,7 @@ impl Estimator for FlightEstimator {
 
     fn init(options: FlightOptions, context: &Context) -> Result<Self, Fault> {
         let config = options.config()?;
-        let mut estimator = StateEstimator::new(config, Sink::default())?;
+        let mut estimator = FlightNavigator::new(config, Sink::default())?;
         if let Some(origin) = options.origin() {
             estimator.set_takeoff_origin(origin).map_err(|error| Fault::new(error.to_string()))?;
         }

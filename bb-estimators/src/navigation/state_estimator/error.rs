@@ -67,7 +67,7 @@ pub enum EstimatorError {
     /// There still is an estimate: without the input, or elsewhere and less certain.
     Degraded(Reason),
     /// There is no estimate for this tick: its numbers are no longer usable, or the window overflowed. An overflow by what the flight
-    /// controller sends, [`add_fc_imu`](super::StateEstimator::add_fc_imu), is [`Degraded`](Self::Degraded).
+    /// controller sends, [`add_fc_imu`](super::FlightNavigator::add_fc_imu), is [`Degraded`](Self::Degraded).
     Fatal(Reason),
 }
 

@@ -42,7 +42,7 @@ pub enum Added {
 ///
 /// `K` receives the events. `F` is the type of factors that outside providers add.
 #[derive(Debug)]
-pub struct StateEstimator<K = (), F: ProvidedFactor = NavigationFactor> {
+pub struct FlightNavigator<K = (), F: ProvidedFactor = NavigationFactor> {
     config: StateEstimatorConfig,
     queue: Queue<F>,
     emission: Emission,
@@ -61,7 +61,7 @@ struct Counts {
     poses: u32,
 }
 
-impl<K: EventSink, F: ProvidedFactor> StateEstimator<K, F> {
+impl<K: EventSink, F: ProvidedFactor> FlightNavigator<K, F> {
     /// Creates an estimator that has not started. Most of its memory is allocated here.
     ///
     /// # Errors

@@ -18,7 +18,7 @@ pub const SMOOTHED: usize = Smoothed::DIMENSION;
 /// A factor that an outside provider adds directly: the window is shared. Every type that implements [`Factor`] for any
 /// states, such as [`NavigationFactor`](crate::navigation::NavigationFactor), is one.
 ///
-/// Its world is that of [`StateEstimator::frame`](super::StateEstimator::frame). The filter, which decides in either
+/// Its world is that of [`FlightNavigator::frame`](super::FlightNavigator::frame). The filter, which decides in either
 /// strategy, accepts only factors on one keyframe, of at most nine rows: one that names a previous keyframe is refused as
 /// [`NoKeyframe`](crate::navigation::Refusal::NoKeyframe), one with more rows as
 /// [`NotObservable`](crate::navigation::Refusal::NotObservable).

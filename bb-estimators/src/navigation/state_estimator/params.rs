@@ -36,7 +36,7 @@ strategies! {
     /// [`FixedLagSmoother`](crate::navigation::FixedLagSmoother), with the feature `smoother`: the default.
     #[cfg(feature = "smoother")]
     FixedLagSmoother = "smoother", smoothing: true;
-    /// [`Eskf`](crate::navigation::Eskf), with the feature `eskf`: the simple baseline.
+    /// [`EskfFilter`](crate::navigation::EskfFilter), with the feature `eskf`: the simple baseline.
     #[cfg(feature = "eskf")]
     Eskf = "eskf", smoothing: false;
 }
@@ -55,7 +55,7 @@ impl Default for StrategyKind {
 }
 
 params! {
-    /// Times and limits of [`StateEstimator`](super::StateEstimator).
+    /// Times and limits of [`FlightNavigator`](super::FlightNavigator).
     pub struct StateEstimatorParams {
         /// Number of keyframes that are held, in the smoother's window or in the filter's history: from 2 to 100.
         window: u32 = 15;
@@ -118,7 +118,7 @@ params! {
     }
 }
 
-/// Complete configuration of a [`StateEstimator`](super::StateEstimator).
+/// Complete configuration of a [`FlightNavigator`](super::FlightNavigator).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StateEstimatorConfig {
     /// Estimator that does the work.

@@ -42,17 +42,17 @@ impl EventSink for Events {
     }
 }
 
-type Estimator = StateEstimator<Events>;
+type Estimator = FlightNavigator<Events>;
 
 /// Estimator with factors of outside providers.
-type Providing = StateEstimator<Events, Provided>;
+type Providing = FlightNavigator<Events, Provided>;
 
 fn config(strategy: StrategyKind) -> StateEstimatorConfig {
     StateEstimatorConfig { strategy, flight: 7, ..StateEstimatorConfig::default() }
 }
 
 fn estimator(strategy: StrategyKind) -> Estimator {
-    StateEstimator::new(config(strategy), Events::new()).unwrap()
+    FlightNavigator::new(config(strategy), Events::new()).unwrap()
 }
 
 /// The estimator in flight, after the first sample.

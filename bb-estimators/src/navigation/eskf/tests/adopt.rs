@@ -27,8 +27,8 @@ const MORE: usize = More::DIMENSION;
 const FEWER: usize = Fewer::DIMENSION;
 
 /// A filter that has flown for five seconds, so that all errors are correlated.
-fn flown() -> Eskf<More, MORE> {
-    let mut filter = Eskf::<More, MORE>::new(EskfParams::default()).unwrap();
+fn flown() -> EskfFilter<More, MORE> {
+    let mut filter = EskfFilter::<More, MORE>::new(EskfParams::default()).unwrap();
     let mut noise = Noise::new(5);
     let (origin, speed) = (Vector3::zeros(), Vector3::new(3.0, 1.0, 0.0));
     filter.start(&Start::at(0, (origin, 2.0), (speed, 0.5), (UnitQuaternion::identity(), 0.05))).unwrap();
@@ -68,7 +68,7 @@ fn place<S: States, T: States>(error: usize) -> Option<usize> {
 #[test]
 fn all_that_both_estimate_is_taken_over_with_its_correlations() {
     let from = flown();
-    let mut to = Eskf::<Fewer, FEWER>::new(EskfParams::default()).unwrap();
+    let mut to = EskfFilter::<Fewer, FEWER>::new(EskfParams::default()).unwrap();
     to.adopt::<More, MORE>(from.estimate().unwrap(), from.covariance()).unwrap();
     let (theirs, ours) = (from.estimate().unwrap(), to.estimate().unwrap());
     assert_eq!((ours.time_ns, ours.position, ours.velocity), (theirs.time_ns, theirs.position, theirs.velocity));
@@ -93,9 +93,9 @@ fn all_that_both_estimate_is_taken_over_with_its_correlations() {
 #[test]
 fn what_the_other_has_not_is_zero_with_the_deviation_of_the_parameters() {
     let from = flown();
-    let mut bare = Eskf::<Navigation>::new(EskfParams::default()).unwrap();
+    let mut bare = EskfFilter::<Navigation>::new(EskfParams::default()).unwrap();
     bare.adopt::<More, MORE>(from.estimate().unwrap(), from.covariance()).unwrap();
-    let mut to = Eskf::<More, MORE>::new(EskfParams::default()).unwrap();
+    let mut to = EskfFilter::<More, MORE>::new(EskfParams::default()).unwrap();
     to.adopt::<Navigation, NAVIGATION>(bare.estimate().unwrap(), bare.covariance()).unwrap();
     assert!(to.is_consistent());
     assert_eq!(to.estimate().unwrap().keyframe, None);
@@ -115,7 +115,7 @@ fn what_the_other_has_not_is_zero_with_the_deviation_of_the_parameters() {
 #[test]
 fn both_go_on_alike() {
     let mut from = flown();
-    let mut to = Eskf::<More, MORE>::new(EskfParams::default()).unwrap();
+    let mut to = EskfFilter::<More, MORE>::new(EskfParams::default()).unwrap();
     to.adopt::<More, MORE>(from.estimate().unwrap(), from.covariance()).unwrap();
     let mut streams = [Stream::default(); 2];
     let mut noise = Noise::new(8);
@@ -143,7 +143,7 @@ fn both_go_on_alike() {
 fn what_is_no_estimate_is_refused_and_changes_nothing() {
     let from = flown();
     let (estimate, covariance) = (*from.estimate().unwrap(), *from.covariance());
-    let mut to = Eskf::<Fewer, FEWER>::new(EskfParams::default()).unwrap();
+    let mut to = EskfFilter::<Fewer, FEWER>::new(EskfParams::default()).unwrap();
     to.adopt::<More, MORE>(&estimate, &covariance).unwrap();
     let before = (*to.estimate().unwrap(), *to.covariance(), to.resets());
     let mut broken = estimate;

@@ -14,7 +14,7 @@ use crate::navigation::measurement::{
 use crate::navigation::state::{NAVIGATION, Navigation, ROTATION, States};
 use crate::navigation::stream::{Stream, StreamParams};
 
-type Plain = Eskf<Navigation, NAVIGATION>;
+type Plain = EskfFilter<Navigation, NAVIGATION>;
 
 fn open() -> Stream {
     Stream::new(StreamParams { gate: 0.0, ..StreamParams::default() })
@@ -109,7 +109,7 @@ fn what_is_nowhere_on_the_earth_is_refused() {
 #[test]
 fn a_state_without_deviation_keeps_the_covariance_regular() {
     let params = EskfParams { wheel_scale: GaussMarkov::new(0.0, 1e-3), ..EskfParams::default() };
-    let mut filter = Eskf::<All, ALL>::new(params).unwrap();
+    let mut filter = EskfFilter::<All, ALL>::new(params).unwrap();
     let at_rest = Start::at(0, (Vector3::zeros(), 2.0), (Vector3::zeros(), 0.5), (UnitQuaternion::identity(), 0.1));
     filter.start(&at_rest).unwrap();
     for i in 1..2000 {
@@ -121,7 +121,7 @@ fn a_state_without_deviation_keeps_the_covariance_regular() {
 /// The sum of the height and the barometer's bias, known far better than either.
 #[test]
 fn what_is_measured_exactly_again_and_again_keeps_the_covariance_regular() {
-    let mut filter: Eskf<All, ALL> = started();
+    let mut filter: EskfFilter<All, ALL> = started();
     let mut stream = open();
     for i in 0..20 {
         filter.update(&mut stream, &BarometricHeight { height: 1.0, deviation: 1e-12 }).unwrap();
@@ -134,7 +134,7 @@ fn what_is_measured_exactly_again_and_again_keeps_the_covariance_regular() {
 fn an_unknown_velocity_after_an_exact_fix_keeps_the_covariance_regular() {
     for (exact, unknown) in [(1e-8, 10.0), (1e-8, 1e3), (1e-7, 1e5), (1e-12, 10.0)] {
         let quiet = EskfParams { accelerometer_noise: 1e-7, gyroscope_noise: 1e-8, ..EskfParams::default() };
-        let mut filter = Eskf::<All, ALL>::new(quiet).unwrap();
+        let mut filter = EskfFilter::<All, ALL>::new(quiet).unwrap();
         let (origin, level) = (Vector3::zeros(), UnitQuaternion::identity());
         filter.start(&Start::at(0, (origin, exact), (origin, unknown), (level, 0.1))).unwrap();
         filter.set_keyframe(7);
@@ -151,7 +151,7 @@ fn an_unknown_velocity_after_an_exact_fix_keeps_the_covariance_regular() {
 fn a_world_that_tilts_keeps_the_covariance_regular() {
     for tilt in [0.3, 1.0, 2.5] {
         for height in [1e-2, 1e-3, 1e-4, 1e-5] {
-            let mut filter = Eskf::<All, ALL>::new(EskfParams::default()).unwrap();
+            let mut filter = EskfFilter::<All, ALL>::new(EskfParams::default()).unwrap();
             let (origin, level) = (Vector3::zeros(), UnitQuaternion::identity());
             let position_covariance = Matrix3::from_diagonal(&Vector3::new(4e9, 1e9, 6.0));
             let start = Start::at(0, (origin, 1.0), (origin, 1.0), (level, 0.1));
@@ -191,7 +191,7 @@ laws! {
         steps in proptest::collection::vec((0..12_u8, proptest::collection::vec(number(), 12), 0..8_u8), 30..100),
         is_gated in any::<bool>(),
     ) {
-        let mut filter: Eskf<All, ALL> = started();
+        let mut filter: EskfFilter<All, ALL> = started();
         let gate = if is_gated { 1e-4 } else { 0.0 };
         let mut stream = Stream::new(StreamParams { gate, ..StreamParams::default() });
         let (mut time_ns, mut updates) = (0_i64, 0);

@@ -5,11 +5,11 @@ use nalgebra::{Matrix3, SMatrix, UnitQuaternion, Vector3};
 use super::{ALL, All, sample, started};
 use crate::navigation::state::Navigation;
 use crate::navigation::{
-    AbsolutePose, Eskf, EskfParams, GnssPosition, GnssVelocity, Height, ImuMean, Refusal, RelativePose, Start,
-    Stream, StreamParams, ZeroVelocity,
+    AbsolutePose, EskfFilter, EskfParams, GnssPosition, GnssVelocity, Height, ImuMean, Refusal, RelativePose,
+    Start, Stream, StreamParams, ZeroVelocity,
 };
 
-type Plain = Eskf<Navigation, 15>;
+type Plain = EskfFilter<Navigation, 15>;
 
 #[test]
 fn refusals_are_named_and_counted() {
@@ -44,7 +44,7 @@ fn refusals_are_named_and_counted() {
 
 #[test]
 fn only_a_position_in_the_world_ends_dead_reckoning() {
-    let mut filter: Eskf<All, ALL> = started();
+    let mut filter: EskfFilter<All, ALL> = started();
     let mut stream = Stream::default();
     filter.set_keyframe(0);
     let variance = filter.pose_covariance().fixed_view::<2, 2>(0, 0).trace();
@@ -130,7 +130,7 @@ fn an_outlier_weighs_less_where_it_is_asked_for() {
 /// Repeated updates that remove nearly all variance; a long flight in the release build, see `docs`.
 #[test]
 fn the_covariance_stays_positive_definite() {
-    let mut filter: Eskf<All, ALL> = Eskf::new(EskfParams::default()).unwrap();
+    let mut filter: EskfFilter<All, ALL> = EskfFilter::new(EskfParams::default()).unwrap();
     let start = Start::at(0, (Vector3::zeros(), 1e5), (Vector3::zeros(), 1e3), (UnitQuaternion::identity(), 1.0));
     filter.start(&start).unwrap();
     let mut stream = Stream::new(StreamParams { gate: 0.0, ..StreamParams::default() });

@@ -10,7 +10,7 @@ use crate::navigation::noise::Noise;
 use crate::navigation::state::{Estimate, NAVIGATION, Optional, States};
 use crate::navigation::state::{Navigation, offset};
 use crate::navigation::{
-    BarometricHeight, Eskf, EskfParams, GaussMarkov, GnssHeading, GnssPosition, GnssVelocity, ImuMean,
+    BarometricHeight, EskfFilter, EskfParams, GaussMarkov, GnssHeading, GnssPosition, GnssVelocity, ImuMean,
     MagneticField, Measurement, RelativePose, Start, Stream, StreamParams, WheelSpeed, nees,
 };
 
@@ -99,7 +99,7 @@ impl Hidden {
 fn fly<S: States, const N: usize>(seed: u64) -> Flown {
     let params = params();
     let mut noise = Noise::new(seed);
-    let mut filter = Eskf::<S, N>::new(params).unwrap();
+    let mut filter = EskfFilter::<S, N>::new(params).unwrap();
     let level = UnitQuaternion::from_euler_angles(0.1, -0.1, 1.0);
     let velocity = Vector3::new(8.0, 2.0, 0.0);
     let start = Start {
@@ -200,7 +200,7 @@ fn fly<S: States, const N: usize>(seed: u64) -> Flown {
 }
 
 fn fuse<S: States, const N: usize, X: Measurement<D>, const D: usize>(
-    filter: &mut Eskf<S, N>,
+    filter: &mut EskfFilter<S, N>,
     stream: &mut Stream,
     measurement: &X,
 ) {

@@ -10,7 +10,7 @@ use crate::navigation::state::{
     ACCELEROMETER_BIAS, GYROSCOPE_BIAS, Navigation, Optional, POSITION, States, offset,
 };
 use crate::navigation::{
-    AbsolutePose, BarometricHeight, Eskf, EskfParams, Fused, GnssPosition, GnssVelocity, History, ImuMean,
+    AbsolutePose, BarometricHeight, EskfFilter, EskfParams, Fused, GnssPosition, GnssVelocity, History, ImuMean,
     MagneticField, Refusal, RelativePose, Replayed, Start, Stream, StreamParams, WheelSpeed,
 };
 
@@ -22,8 +22,8 @@ fn flight<S: States, const N: usize>(
     turn: UnitQuaternion<f64>,
     shift: Vector3<f64>,
     mounting: UnitQuaternion<f64>,
-) -> Eskf<S, N> {
-    let mut filter: Eskf<S, N> = Eskf::new(EskfParams::default()).unwrap();
+) -> EskfFilter<S, N> {
+    let mut filter: EskfFilter<S, N> = EskfFilter::new(EskfParams::default()).unwrap();
     let to_world = |point: Vector3<f64>| turn * point + shift;
     let orientation = |q: UnitQuaternion<f64>| turn * q * mounting;
     let level = UnitQuaternion::from_euler_angles(0.1, -0.2, 0.3);
@@ -71,7 +71,7 @@ fn flight<S: States, const N: usize>(
     filter
 }
 
-fn flight_plain<S: States, const N: usize>() -> Eskf<S, N> {
+fn flight_plain<S: States, const N: usize>() -> EskfFilter<S, N> {
     flight(UnitQuaternion::identity(), Vector3::zeros(), UnitQuaternion::identity())
 }
 
@@ -108,7 +108,7 @@ fn the_sensors_mounting_does_not_matter<S: States, const N: usize>(mounting: Uni
     let (plain, turned) =
         (flight_plain::<S, N>(), flight::<S, N>(UnitQuaternion::identity(), Vector3::zeros(), mounting));
     let rotation = mounting.inverse().to_rotation_matrix().into_inner();
-    let block = |filter: &Eskf<S, N>, first: usize| -> Matrix3<f64> {
+    let block = |filter: &EskfFilter<S, N>, first: usize| -> Matrix3<f64> {
         filter.covariance().fixed_view::<3, 3>(first, first).into_owned()
     };
     for first in [ACCELEROMETER_BIAS, GYROSCOPE_BIAS] {
@@ -125,7 +125,7 @@ fn the_sensors_mounting_does_not_matter<S: States, const N: usize>(mounting: Uni
 }
 
 fn what_is_refused_changes_nothing<S: States, const N: usize>(numbers: &[f64], time_ns: i64) -> Law {
-    let mut filter: Eskf<S, N> = started();
+    let mut filter: EskfFilter<S, N> = started();
     for i in 1..20 {
         filter.propagate(&sample(i)).unwrap();
     }
@@ -153,19 +153,19 @@ fn what_is_refused_changes_nothing<S: States, const N: usize>(numbers: &[f64], t
 
 #[derive(Clone, Debug, PartialEq)]
 struct Fixed<S: States, const N: usize> {
-    filter: Eskf<S, N>,
+    filter: EskfFilter<S, N>,
     stream: Stream,
 }
 
 impl<S: States, const N: usize> Replayed for Fixed<S, N> {
-    type Filter = Eskf<S, N>;
+    type Filter = EskfFilter<S, N>;
     type Measurement = GnssPosition;
 
-    fn filter(&self) -> &Eskf<S, N> {
+    fn filter(&self) -> &EskfFilter<S, N> {
         &self.filter
     }
 
-    fn filter_mut(&mut self) -> &mut Eskf<S, N> {
+    fn filter_mut(&mut self) -> &mut EskfFilter<S, N> {
         &mut self.filter
     }
 

@@ -8,7 +8,7 @@ use crate::navigation::estimator::health::{Sight, Watch, largest_deviation};
 use crate::navigation::fused::Fused;
 use crate::navigation::history::Replayed;
 use crate::navigation::planar::estimate::{POSITION, PlanarEstimate};
-use crate::navigation::planar::filter::{PlanarEkf, PlanarStart};
+use crate::navigation::planar::filter::{PlanarFilter, PlanarStart};
 use crate::navigation::planar::measurement::{PlanarHeading, PlanarPose, PlanarPosition, WheelVelocity, YawRate};
 use crate::navigation::refusal::Refusal;
 use crate::navigation::stream::{Counts, Stream};
@@ -17,7 +17,7 @@ use bb_core::Fault;
 /// Copies of the filter, and a stream for each sensor.
 #[derive(Clone, Debug)]
 pub(super) struct Filter {
-    copies: Copies<PlanarEkf>,
+    copies: Copies<PlanarFilter>,
     correlation: Correlation,
     gnss: Stream,
     odometry: Stream,
@@ -45,11 +45,11 @@ impl Filter {
         Ok(Self { copies, correlation, gnss, odometry, yaw_rate, pose, orientation })
     }
 
-    pub(super) fn copies(&self) -> &Copies<PlanarEkf> {
+    pub(super) fn copies(&self) -> &Copies<PlanarFilter> {
         &self.copies
     }
 
-    pub(super) fn ekf(&self) -> &PlanarEkf {
+    pub(super) fn ekf(&self) -> &PlanarFilter {
         self.copies.best()
     }
 
@@ -67,14 +67,14 @@ impl Filter {
 }
 
 impl Replayed for Filter {
-    type Filter = Copies<PlanarEkf>;
+    type Filter = Copies<PlanarFilter>;
     type Measurement = Measured;
 
-    fn filter(&self) -> &Copies<PlanarEkf> {
+    fn filter(&self) -> &Copies<PlanarFilter> {
         &self.copies
     }
 
-    fn filter_mut(&mut self) -> &mut Copies<PlanarEkf> {
+    fn filter_mut(&mut self) -> &mut Copies<PlanarFilter> {
         &mut self.copies
     }
 

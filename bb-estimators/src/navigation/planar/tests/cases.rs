@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::super::{
-    GYROSCOPE_BIAS, PlanarEkf, PlanarParams, PlanarPosition, PlanarStart, WHEEL_SCALE, WheelVelocity, YawRate,
+    GYROSCOPE_BIAS, PlanarFilter, PlanarParams, PlanarPosition, PlanarStart, WHEEL_SCALE, WheelVelocity, YawRate,
 };
 use super::{sample, started};
 use crate::navigation::eskf::GaussMarkov;
@@ -11,7 +11,7 @@ use crate::navigation::{ImuMean, Refusal, Stream};
 
 #[test]
 fn refusals_are_named_and_counted() {
-    let mut filter = PlanarEkf::new(PlanarParams::default()).unwrap();
+    let mut filter = PlanarFilter::new(PlanarParams::default()).unwrap();
     let mut stream = Stream::default();
     let fix = PlanarPosition::new(Vector2::zeros(), 1.0);
     assert_eq!(filter.update(&mut stream, &fix), Err(Refusal::NotStarted));
@@ -61,7 +61,7 @@ fn an_unknown_velocity_after_an_exact_fix_keeps_the_covariance_regular() {
             gyroscope_noise: 1e-8,
             ..PlanarParams::default()
         };
-        let mut filter = PlanarEkf::new(quiet).unwrap();
+        let mut filter = PlanarFilter::new(quiet).unwrap();
         let start = PlanarStart::at(0, (Vector2::zeros(), exact), (0.3, 1e-6), (Vector2::zeros(), unknown));
         filter.start(&start).unwrap();
         for i in 1..300 {
@@ -76,7 +76,7 @@ fn an_unknown_velocity_after_an_exact_fix_keeps_the_covariance_regular() {
 fn the_bias_and_the_wheels_scale_are_found() {
     const BIAS: f64 = 0.01;
     const SCALE: f64 = 0.03;
-    let mut filter = PlanarEkf::new(PlanarParams::default()).unwrap();
+    let mut filter = PlanarFilter::new(PlanarParams::default()).unwrap();
     filter.start(&PlanarStart::at(0, (Vector2::zeros(), 0.5), (0.0, 0.05), (Vector2::zeros(), 0.1))).unwrap();
     let (mut wheels, mut gnss) = (Stream::default(), Stream::default());
     // On a circle of 20 m at 2 m/s.
@@ -105,7 +105,7 @@ fn the_bias_and_the_wheels_scale_are_found() {
 #[test]
 fn a_scale_that_is_known_stays_what_it_is() {
     let params = PlanarParams { wheel_scale: GaussMarkov::new(0.0, 1000.0), ..PlanarParams::default() };
-    let mut filter = PlanarEkf::new(params).unwrap();
+    let mut filter = PlanarFilter::new(params).unwrap();
     filter.start(&PlanarStart::at(0, (Vector2::zeros(), 0.5), (0.0, 0.05), (Vector2::new(1.1, 0.0), 0.1))).unwrap();
     let (mut wheels, mut gnss) = (Stream::default(), Stream::default());
     for i in 1..=2000_i64 {

@@ -4,7 +4,7 @@ use nalgebra::{SVector, Vector2, Vector3};
 
 use super::super::propagation::Transition;
 use super::super::{
-    PlanarEkf, PlanarEstimate, PlanarHeading, PlanarParams, PlanarPosition, PlanarStart, STATES, WheelVelocity,
+    PlanarEstimate, PlanarFilter, PlanarHeading, PlanarParams, PlanarPosition, PlanarStart, STATES, WheelVelocity,
     YawRate,
 };
 use super::sample;
@@ -32,7 +32,7 @@ fn drive(seed: u64) -> Driven {
         ..PlanarParams::default()
     };
     let mut noise = Noise::new(seed);
-    let mut filter = PlanarEkf::new(params).unwrap();
+    let mut filter = PlanarFilter::new(params).unwrap();
     let velocity = Vector2::new(3.0, 0.0);
     filter.start(&PlanarStart::at(0, (Vector2::zeros(), 1.0), (1.0, 0.05), (velocity, 0.3))).unwrap();
     // The truth deviates from the estimate according to the filter's initial covariance.

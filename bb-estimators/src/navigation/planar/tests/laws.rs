@@ -7,7 +7,7 @@ use nalgebra::{Matrix2, Rotation2, Vector2, Vector3};
 use proptest::prelude::*;
 
 use super::super::{
-    GYROSCOPE_BIAS, HEADING, PlanarEkf, PlanarHeading, PlanarParams, PlanarPose, PlanarPosition, PlanarStart,
+    GYROSCOPE_BIAS, HEADING, PlanarFilter, PlanarHeading, PlanarParams, PlanarPose, PlanarPosition, PlanarStart,
     STATES, VELOCITY, WheelVelocity, YawRate,
 };
 use super::{sample, started, vector};
@@ -15,10 +15,10 @@ use crate::navigation::math::wrapped;
 use crate::navigation::{Fused, History, ImuMean, Refusal, Replayed, Stream, StreamParams};
 
 /// Three seconds with wheels, fixes, headings and poses, in a world that is rotated and shifted.
-fn drive(turn: f64, shift: Vector2<f64>) -> PlanarEkf {
+fn drive(turn: f64, shift: Vector2<f64>) -> PlanarFilter {
     let rotation = Rotation2::new(turn);
     let to_world = |point: Vector2<f64>| rotation * point + shift;
-    let mut filter = PlanarEkf::new(PlanarParams::default()).unwrap();
+    let mut filter = PlanarFilter::new(PlanarParams::default()).unwrap();
     let start =
         PlanarStart::at(0, (to_world(Vector2::zeros()), 2.0), (0.3 + turn, 0.2), (Vector2::new(2.0, 0.0), 0.5));
     filter.start(&start).unwrap();
@@ -54,7 +54,7 @@ laws! {
     fn the_worlds_heading_and_origin_do_not_matter(turn in -6.0..6.0, shift in vector(1000.0)) {
         let (plain, moved) = (drive(0.0, Vector2::zeros()), drive(turn, shift));
         let rotation = Rotation2::new(turn);
-        let turned = |filter: &PlanarEkf, rotation: &Rotation2<f64>| -> Matrix2<f64> {
+        let turned = |filter: &PlanarFilter, rotation: &Rotation2<f64>| -> Matrix2<f64> {
             let block = filter.covariance().fixed_view::<2, 2>(0, 0).into_owned();
             rotation * block * rotation.inverse()
         };
@@ -90,7 +90,7 @@ laws! {
             prop_assert_eq!(&filter, &before);
         }
         let mut updates = 0;
-        let mut law = |filter: &mut PlanarEkf, update: &dyn Fn(&mut PlanarEkf, &mut Stream) -> bool| {
+        let mut law = |filter: &mut PlanarFilter, update: &dyn Fn(&mut PlanarFilter, &mut Stream) -> bool| {
             let before = *filter;
             updates += 1;
             update(filter, &mut stream) || *filter == before
@@ -140,7 +140,7 @@ laws! {
     fn the_covariance_stays_positive_definite(
         steps in proptest::collection::vec((0..5_u8, -8.0..3.0), 100..400),
     ) {
-        let mut filter = PlanarEkf::new(PlanarParams::default()).unwrap();
+        let mut filter = PlanarFilter::new(PlanarParams::default()).unwrap();
         filter.start(&PlanarStart::at(0, (Vector2::zeros(), 1e5), (0.0, 3.0), (Vector2::zeros(), 1e3))).unwrap();
         let mut stream = Stream::new(StreamParams { gate: 0.0, ..StreamParams::default() });
         for (i, (kind, exponent)) in (1..).zip(steps) {
@@ -164,19 +164,19 @@ laws! {
 
 #[derive(Clone, Debug, PartialEq)]
 struct Fixed {
-    filter: PlanarEkf,
+    filter: PlanarFilter,
     stream: Stream,
 }
 
 impl Replayed for Fixed {
-    type Filter = PlanarEkf;
+    type Filter = PlanarFilter;
     type Measurement = PlanarPosition;
 
-    fn filter(&self) -> &PlanarEkf {
+    fn filter(&self) -> &PlanarFilter {
         &self.filter
     }
 
-    fn filter_mut(&mut self) -> &mut PlanarEkf {
+    fn filter_mut(&mut self) -> &mut PlanarFilter {
         &mut self.filter
     }
 

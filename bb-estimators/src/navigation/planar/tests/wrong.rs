@@ -2,7 +2,9 @@
 
 use nalgebra::{Vector2, Vector3};
 
-use super::super::{PlanarEkf, PlanarHeading, PlanarParams, PlanarPosition, PlanarStart, WheelVelocity, YawRate};
+use super::super::{
+    PlanarFilter, PlanarHeading, PlanarParams, PlanarPosition, PlanarStart, WheelVelocity, YawRate,
+};
 use crate::navigation::copies::{Copies, Ways};
 use crate::navigation::math::{cos, sin, sqrt, wrapped};
 use crate::navigation::noise::Noise;
@@ -18,7 +20,7 @@ const HEADING: f64 = 0.05;
 /// The factor on deviations of readings at 10 Hz whose errors are alike for a second.
 const ALIKE: f64 = 4.58;
 
-fn copies(start: &PlanarStart) -> Copies<PlanarEkf> {
+fn copies(start: &PlanarStart) -> Copies<PlanarFilter> {
     let mut copies = Copies::new(PlanarParams::default(), Ways { noise: true, scale: false }).unwrap();
     copies.start(start).unwrap();
     copies

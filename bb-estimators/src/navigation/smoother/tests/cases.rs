@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::flight::{DT_NS, Drone, Flight, N, Smoother, linear, open, sample, sensors};
 use crate::navigation::{
-    AbsolutePose, Eskf, Estimate, FixedLagSmoother, GaussMarkov, GnssPosition, ImuMean, Kernel, NAVIGATION,
+    AbsolutePose, EskfFilter, Estimate, FixedLagSmoother, GaussMarkov, GnssPosition, ImuMean, Kernel, NAVIGATION,
     Navigation, NavigationFactor, Refusal, RelativePose, SmootherParams, Start, Stream,
 };
 
@@ -96,7 +96,7 @@ fn the_newest_covariance_is_that_of_the_filter() {
         measured.retain(|factor| !matches!(factor, NavigationFactor::RelativePose(_)));
     }
     let smoother = flight.flown(linear(7));
-    let mut filter = Eskf::<Drone, N>::new(sensors()).unwrap();
+    let mut filter = EskfFilter::<Drone, N>::new(sensors()).unwrap();
     filter.start(&flight.start).unwrap();
     for k in 1..60 {
         for sample in &flight.samples[k] {

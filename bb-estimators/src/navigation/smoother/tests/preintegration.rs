@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 use super::super::preintegration::Preintegration;
 use crate::navigation::math::rotation_vector;
-use crate::navigation::{Eskf, EskfParams, ImuDensities, ImuMean, NAVIGATION, Start};
+use crate::navigation::{EskfFilter, EskfParams, ImuDensities, ImuMean, NAVIGATION, Start};
 
 const DT: f64 = 0.005;
 
@@ -49,7 +49,7 @@ laws! {
     fn it_is_the_filter_in_one_step(seed in 0.0..100.0, samples in 1_usize..200) {
         let biases = SVector::<f64, 6>::new(0.1, -0.2, 0.05, 0.01, -0.02, 0.005);
         let all = integrated(seed, samples, &biases, &densities());
-        let mut filter: Eskf = Eskf::new(EskfParams { gravity: 1.0, ..params() }).unwrap();
+        let mut filter: EskfFilter = EskfFilter::new(EskfParams { gravity: 1.0, ..params() }).unwrap();
         // As small as the filter allows.
         let known = 1e-9;
         let rest = (Vector3::zeros(), known);

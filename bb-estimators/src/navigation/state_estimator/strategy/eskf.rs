@@ -10,7 +10,7 @@ use nalgebra::{Isometry3, SMatrix, UnitQuaternion, Vector3};
 use super::{Cadence, Measured, Pose, Predictor, Streams, Trust, id_of};
 use crate::attitude::ParamsError;
 use crate::navigation::copies::{Copies, Ways};
-use crate::navigation::eskf::{Eskf, ImuMean, Start};
+use crate::navigation::eskf::{EskfFilter, ImuMean, Start};
 use crate::navigation::fused::Fused;
 use crate::navigation::numbers::UNKNOWN_HEADING;
 use crate::navigation::propagate::Propagate as _;
@@ -24,7 +24,7 @@ use crate::navigation::state_estimator::params::StateEstimatorConfig;
 /// The copies of the filter, and the poses of the last keyframes.
 #[derive(Clone, Debug)]
 pub(in crate::navigation::state_estimator) struct EskfStrategy {
-    copies: Copies<Eskf<Navigated, NAVIGATED>>,
+    copies: Copies<EskfFilter<Navigated, NAVIGATED>>,
     streams: Streams,
     cadence: Cadence,
     /// Estimates at the last keyframes, the newest last. They are never corrected.
@@ -147,7 +147,7 @@ impl EskfStrategy {
     }
 
     /// The copies of the filter.
-    pub(super) fn copies(&self) -> &Copies<Eskf<Navigated, NAVIGATED>> {
+    pub(super) fn copies(&self) -> &Copies<EskfFilter<Navigated, NAVIGATED>> {
         &self.copies
     }
 

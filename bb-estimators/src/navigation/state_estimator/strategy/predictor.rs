@@ -1,17 +1,17 @@
 //! Prediction from the newest estimate with each sample of the IMU, for outputs between keyframes.
 
 use super::Pose;
-use crate::navigation::eskf::{Eskf, ImuMean};
+use crate::navigation::eskf::{EskfFilter, ImuMean};
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{NAVIGATED, Navigated};
 
 /// A filter that is never corrected.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::navigation::state_estimator) struct Predictor(Eskf<Navigated, NAVIGATED>);
+pub(in crate::navigation::state_estimator) struct Predictor(EskfFilter<Navigated, NAVIGATED>);
 
 impl Predictor {
     /// A copy of the filter.
-    pub(super) fn of(filter: &Eskf<Navigated, NAVIGATED>) -> Self {
+    pub(super) fn of(filter: &EskfFilter<Navigated, NAVIGATED>) -> Self {
         Self(*filter)
     }
 

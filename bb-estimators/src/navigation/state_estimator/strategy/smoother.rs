@@ -15,7 +15,7 @@ use nalgebra::{Isometry3, Matrix3, SMatrix, UnitQuaternion, Vector3};
 use super::eskf::EskfStrategy;
 use super::{Measured, Pose, Predictor, Streams, add_time, id_of};
 use crate::attitude::ParamsError;
-use crate::navigation::eskf::{Eskf, ImuMean, Start, seconds_between};
+use crate::navigation::eskf::{EskfFilter, ImuMean, Start, seconds_between};
 use crate::navigation::factor::{Factor, NavigationFactor, Rows};
 use crate::navigation::fused::Fused;
 use crate::navigation::measurement::{AbsolutePose, GnssPosition, GnssVelocity};
@@ -296,7 +296,7 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
     pub(super) fn predictor(&self) -> Option<Predictor> {
         let (estimate, covariance) = (self.smoother.estimate()?, self.smoother.covariance()?);
         let (sensors, noise) = (&self.smoother.params().sensors, self.filter.copies().noise());
-        let mut filter = Eskf::new(*sensors).ok()?;
+        let mut filter = EskfFilter::new(*sensors).ok()?;
         filter.multiply_noise(noise);
         filter.adopt::<Smoothed, SMOOTHED>(&estimate, &covariance).ok()?;
         Some(Predictor::of(&filter))

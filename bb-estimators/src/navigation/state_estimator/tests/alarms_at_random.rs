@@ -213,7 +213,7 @@ laws! {
             let [dwell, health_gap, lateness, lead] = [DWELL_NS, GAP_NS, LATENESS_NS, LEAD_NS].map(|ns| ns as f64 * 1e-9);
             let mut config = config(*strategy);
             config.params = StateEstimatorParams { dwell, health_gap, lateness, lead, input_rate: 80.0, ..config.params };
-            let mut estimator: Estimator = StateEstimator::new(config, Events::new()).unwrap();
+            let mut estimator: Estimator = FlightNavigator::new(config, Events::new()).unwrap();
             estimator.warm_start(flight.warm_start(0)).unwrap();
             let mut model = Model::default();
             for sent in core::iter::once(&Sent::Imu(flight.samples[0])).chain(&sent) {

@@ -30,7 +30,7 @@ fn a_slow_camera_is_waited_for() {
             let mut config = config(*strategy);
             config.params.keyframe_interval = keyframe_interval;
             config.params.visual_loss = 3.0;
-            let mut estimator: Estimator = StateEstimator::new(config, Events::new()).unwrap();
+            let mut estimator: Estimator = FlightNavigator::new(config, Events::new()).unwrap();
             estimator.warm_start(flight.warm_start(0)).unwrap();
             estimator.add_imu(&flight.samples[0]).unwrap();
             let mut camera = every(&flight, n).peekable();

@@ -75,7 +75,7 @@ fn degraded_positions_that_agree_on_another_place_move_the_estimate() {
 fn degraded_a_correction_that_does_not_converge_is_told() {
     let flight = Flight::new(3, 2);
     for strategy in StrategyKind::ALL {
-        let mut estimator: Providing = StateEstimator::new(config(*strategy), Events::new()).unwrap();
+        let mut estimator: Providing = FlightNavigator::new(config(*strategy), Events::new()).unwrap();
         estimator.warm_start(flight.warm_start(0)).unwrap();
         flight.samples.iter().for_each(|sample| estimator.add_imu(sample).unwrap());
         let time_ns = 3 * SECOND - STEP;
@@ -98,7 +98,7 @@ fn degraded_a_correction_that_does_not_converge_is_told() {
 fn degraded_a_provider_that_ignores_what_is_refused_does_not_break_the_estimate() {
     let flight = Flight::new(3, 2);
     for strategy in StrategyKind::ALL {
-        let mut estimator: Providing = StateEstimator::new(config(*strategy), Events::new()).unwrap();
+        let mut estimator: Providing = FlightNavigator::new(config(*strategy), Events::new()).unwrap();
         estimator.warm_start(flight.warm_start(0)).unwrap();
         flight.samples.iter().for_each(|sample| estimator.add_imu(sample).unwrap());
         let time_ns = 3 * SECOND - STEP;
@@ -178,7 +178,7 @@ fn degraded_a_flood_of_the_flight_controller_stops_no_estimate() {
 fn degraded_numbers_that_are_no_good_are_refused_however_often() {
     let flight = Flight::new(3, 2);
     for strategy in StrategyKind::ALL {
-        let mut estimator: Providing = StateEstimator::new(config(*strategy), Events::new()).unwrap();
+        let mut estimator: Providing = FlightNavigator::new(config(*strategy), Events::new()).unwrap();
         estimator.warm_start(flight.warm_start(0)).unwrap();
         flight.samples.iter().for_each(|sample| estimator.add_imu(sample).unwrap());
         let before = estimator.predicted(3 * SECOND);

@@ -410,7 +410,7 @@ fn a_receiver_is_let_in_by_where_its_antenna_puts_the_body() {
         for strategy in StrategyKind::ALL {
             let mut config = config(*strategy);
             config.params.dwell = 2.0;
-            let mut estimator: Estimator = StateEstimator::new(config, Events::new()).unwrap();
+            let mut estimator: Estimator = FlightNavigator::new(config, Events::new()).unwrap();
             estimator.warm_start(flight.warm_start(0)).unwrap();
             estimator.add_imu(&flight.samples[0]).unwrap();
             let lever_arm = Vector3::new(0.0, 0.0, arm_m);

@@ -32,7 +32,7 @@ fn strategies_are_chosen_by_configuration() {
     assert_eq!(StrategyKind::default(), StrategyKind::FixedLagSmoother);
     assert_eq!(StrategyKind::named("gtsam"), None);
     let params = StateEstimatorParams { window: 1, ..StateEstimatorParams::default() };
-    let refused = StateEstimator::<()>::new(StateEstimatorConfig { params, ..Default::default() }, ());
+    let refused = FlightNavigator::<()>::new(StateEstimatorConfig { params, ..Default::default() }, ());
     assert_eq!(refused.unwrap_err().to_string(), "`window` is 1: choose a value from 2 to 100");
 }
 

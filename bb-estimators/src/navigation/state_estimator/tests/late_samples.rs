@@ -320,7 +320,7 @@ fn steps(
 
 /// Starts, and takes the first sample.
 fn begun(flight: &Flight, config: StateEstimatorConfig, from: From) -> Estimator {
-    let mut estimator = StateEstimator::new(config, Events::new()).unwrap();
+    let mut estimator = FlightNavigator::new(config, Events::new()).unwrap();
     let state = flight.warm_start(0);
     match from {
         From::Warm => drop(estimator.warm_start(state).unwrap()),

@@ -39,7 +39,7 @@ fn add(estimator: &mut Providing, flight: &Flight, kind: InputKind, time_ns: i64
 }
 
 fn flown(flight: &Flight, strategy: StrategyKind) -> Providing {
-    let mut estimator: Providing = StateEstimator::new(config(strategy), Events::new()).unwrap();
+    let mut estimator: Providing = FlightNavigator::new(config(strategy), Events::new()).unwrap();
     estimator.warm_start(flight.warm_start(0)).unwrap();
     flight.samples.iter().for_each(|sample| estimator.add_imu(sample).unwrap());
     estimator

@@ -12,7 +12,7 @@ fn flown(
     let flight = Flight::new(12, 3);
     let mut config = config(strategy);
     set(&mut config.params);
-    let mut estimator: Estimator = StateEstimator::new(config, Events::new()).unwrap();
+    let mut estimator: Estimator = FlightNavigator::new(config, Events::new()).unwrap();
     estimator.warm_start(flight.warm_start(0)).unwrap();
     estimator.add_imu(&flight.samples[0]).unwrap();
     let mut outputs = Vec::new();

@@ -39,7 +39,7 @@ laws! {
             let mut config = config(*strategy);
             config.params.dwell = 1.0;
             let start = || {
-                let mut estimator = StateEstimator::new(config, Events::new()).unwrap();
+                let mut estimator = FlightNavigator::new(config, Events::new()).unwrap();
                 estimator.warm_start(flight.warm_start(0)).unwrap();
                 estimator.add_imu(&flight.samples[0]).unwrap();
                 estimator

@@ -13,7 +13,7 @@ fn a_fast_imu_and_a_long_lateness_fit() {
         config.params.imu_rate = 4000.0;
         config.params.lateness = 3.0;
         config.params.keyframe_interval = 2.0;
-        let mut estimator: Estimator = StateEstimator::new(config, Events::new()).unwrap();
+        let mut estimator: Estimator = FlightNavigator::new(config, Events::new()).unwrap();
         // Before the start as well: the position is unknown for twenty seconds.
         let fast = |i: i64, from: &ImuMean| ImuMean { time_ns: i * SECOND / 4000, ..*from };
         let most = config.params.room()[0];
@@ -43,7 +43,7 @@ fn an_imu_that_is_too_fast_drops_the_oldest_and_says_so() {
         for (imu_rate, keyframe_interval) in [(50.0, 1.0), (1.0, 10.0)] {
             let mut config = config(*strategy);
             (config.params.imu_rate, config.params.keyframe_interval) = (imu_rate, keyframe_interval);
-            let mut estimator: Estimator = StateEstimator::new(config, Events::new()).unwrap();
+            let mut estimator: Estimator = FlightNavigator::new(config, Events::new()).unwrap();
             estimator.warm_start(flight.warm_start(0)).unwrap();
             for sent in &flight.sent(true, true, false) {
                 ignore(sent.to(&mut estimator));

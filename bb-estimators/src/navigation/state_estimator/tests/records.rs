@@ -205,7 +205,7 @@ fn a_recorder_that_is_not_wanted_costs_nothing() {
     for strategy in StrategyKind::ALL {
         let mut config = config(*strategy);
         config.params.record_keyframes = false;
-        let mut estimator = StateEstimator::new(config, Events::new()).unwrap();
+        let mut estimator = FlightNavigator::new(config, Events::new()).unwrap();
         estimator.warm_start(flight.warm_start(0)).unwrap();
         flight.sent(true, true, false).iter().for_each(|sent| sent.to(&mut estimator).unwrap());
         assert_eq!(count(estimator.sink(), "keyframe"), 0);
@@ -217,8 +217,8 @@ fn a_recorder_that_is_not_wanted_costs_nothing() {
 fn two_sinks_get_the_same_events() {
     let flight = Flight::new(1, 4);
     let sink = Both(Events::new(), Events::new());
-    let mut estimator: StateEstimator<Both<Events, Events>> =
-        StateEstimator::new(config(StrategyKind::default()), sink).unwrap();
+    let mut estimator: FlightNavigator<Both<Events, Events>> =
+        FlightNavigator::new(config(StrategyKind::default()), sink).unwrap();
     estimator.warm_start(flight.warm_start(0)).unwrap();
     estimator.add_imu(&flight.samples[0]).unwrap();
     let _ = estimator.tick(STEP);

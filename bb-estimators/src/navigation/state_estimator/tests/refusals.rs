@@ -10,7 +10,7 @@ use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3};
 
 /// Two seconds of flight, without anchors.
 fn flown(flight: &Flight, strategy: StrategyKind) -> Providing {
-    let mut estimator: Providing = StateEstimator::new(config(strategy), Events::new()).unwrap();
+    let mut estimator: Providing = FlightNavigator::new(config(strategy), Events::new()).unwrap();
     estimator.warm_start(flight.warm_start(0)).unwrap();
     for sample in &flight.samples[..400] {
         estimator.add_imu(sample).unwrap();
@@ -33,7 +33,7 @@ fn every_refusal_that_a_user_can_see() {
     let flight = Flight::new(4, 3);
     let (vio, anchor) = (flight.vio[19], flight.anchors[0]);
     for strategy in StrategyKind::ALL {
-        let mut cold: Providing = StateEstimator::new(config(*strategy), Events::new()).unwrap();
+        let mut cold: Providing = FlightNavigator::new(config(*strategy), Events::new()).unwrap();
         flight.samples[..200].iter().for_each(|sample| cold.add_imu(sample).unwrap());
         assert_eq!(refused(cold.add_vio(flight.vio[4])), Refusal::NotStarted);
 

@@ -9,7 +9,7 @@ use nalgebra::{Matrix6, Vector3};
 
 /// A flight by the IMU alone.
 fn flown(flight: &Flight, strategy: StrategyKind) -> Providing {
-    let mut estimator: Providing = StateEstimator::new(config(strategy), Events::new()).unwrap();
+    let mut estimator: Providing = FlightNavigator::new(config(strategy), Events::new()).unwrap();
     estimator.warm_start(flight.warm_start(0)).unwrap();
     flight.samples.iter().for_each(|sample| estimator.add_imu(sample).unwrap());
     estimator
@@ -74,7 +74,7 @@ fn an_anchor_that_no_longer_fits_is_degraded_and_warned_of() {
 fn an_anchor_that_does_not_overrule_the_estimate_after_all_says_so() {
     let flight = Flight::new(7, 1);
     for strategy in StrategyKind::ALL {
-        let mut estimator: Providing = StateEstimator::new(config(*strategy), Events::new()).unwrap();
+        let mut estimator: Providing = FlightNavigator::new(config(*strategy), Events::new()).unwrap();
         estimator.warm_start(flight.warm_start(0)).unwrap();
         let (mut overruled_ns, mut last_ns) = (None, 0);
         for sample in &flight.samples {
@@ -110,7 +110,7 @@ fn an_input_that_breaks_the_estimate_after_all_is_fatal() {
     let lowered = flight.frame.geodetic(&Flight::truth(early_ns).position).height + 9999.8;
     let low = |position: Geodetic, by: f64| Geodetic { height: position.height - by, ..position };
     for strategy in StrategyKind::ALL {
-        let mut estimator: Providing = StateEstimator::new(config(*strategy), Events::new()).unwrap();
+        let mut estimator: Providing = FlightNavigator::new(config(*strategy), Events::new()).unwrap();
         let start = flight.warm_start(0);
         let position_covariance = nalgebra::Matrix3::identity() * 25.0;
         let position = low(start.position, lowered - 6.0);
@@ -211,7 +211,7 @@ fn an_estimate_that_is_lost_is_told_once() {
 fn each_start_is_told_once() {
     let flight = Flight::new(3, 1);
     for strategy in StrategyKind::ALL {
-        let mut estimator: Providing = StateEstimator::new(config(*strategy), Events::new()).unwrap();
+        let mut estimator: Providing = FlightNavigator::new(config(*strategy), Events::new()).unwrap();
         flight.samples.iter().for_each(|sample| estimator.add_imu(sample).unwrap());
         let at = |i: i64| 2 * SECOND + i * FRAME;
         estimator.add_pose_anchor(anchor(&flight, at(0), 0.0, 1.0)).unwrap();

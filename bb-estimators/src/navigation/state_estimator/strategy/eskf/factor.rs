@@ -2,7 +2,7 @@
 
 use super::escalate;
 use crate::navigation::copies::Copies;
-use crate::navigation::eskf::Eskf;
+use crate::navigation::eskf::EskfFilter;
 use crate::navigation::factor::{Factor, Rows};
 use crate::navigation::fused::Fused;
 use crate::navigation::measurement::{Linearised, Measurement};
@@ -15,7 +15,7 @@ use nalgebra::SMatrix;
 
 /// Fuses a factor that involves only the present state.
 pub(super) fn update<F: ProvidedFactor>(
-    copies: &mut Copies<Eskf<Navigated, NAVIGATED>>,
+    copies: &mut Copies<EskfFilter<Navigated, NAVIGATED>>,
     stream: &mut Stream,
     factor: &F,
 ) -> Result<Fused, EstimatorError> {
