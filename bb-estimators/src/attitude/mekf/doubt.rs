@@ -19,7 +19,7 @@ pub(super) struct Doubt<T: Real> {
     /// Mean of the fields that the body has moved in, as horizontal and vertical part, and for how long, s.
     mean: Option<Vector2<T>>,
     moved_s: T,
-    /// How far the heading has followed fields that differ from the mean, as a fraction of its norm; and the mean square of that.
+    /// Part of the mean that the heading has followed in fields that differ from it; and the mean square of that.
     followed: Vector2<T>,
     scatter: T,
 }

@@ -266,7 +266,7 @@ impl<T: Real> HardIron<T> {
             }
             let moved = (self.newcomer.offset - self.incumbent.believed()).norm_squared();
             let variance = self.newcomer.variance();
-            if self.odds > T::ZERO {
+            if self.odds > T::ZERO && variance < moved {
                 let newcomer = self.another(&measured);
                 self.incumbent = core::mem::replace(&mut self.newcomer, newcomer);
                 self.offset = self.incumbent.believed() * scale;
