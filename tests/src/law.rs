@@ -76,3 +76,32 @@ fn run(config: Config, names: &str, cases: &BoxedStrategy<Case>, law: &dyn Fn(Ca
         panic!("{error}\narguments: {names}\n{runner}");
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Config;
+    use proptest::prelude::*;
+
+    laws! {
+        // What fails here is not to be kept for the next time.
+        #![proptest_config(Config { failure_persistence: None, ..Config::default() })]
+
+        #[test]
+        fn a_true_law_holds(one in 0..100_u32, (other, _) in (0..100_u32, any::<bool>())) {
+            prop_assume!(one != other);
+            prop_assert_ne!(one, other);
+        }
+
+        #[test]
+        #[should_panic(expected = "minimal failing input: (\n    50,\n)")]
+        fn a_law_that_fails_names_the_smallest_case(number in 0..100_u32) {
+            prop_assert!(number < 50);
+        }
+
+        #[test]
+        #[should_panic(expected = "arguments: one, other, ")]
+        fn a_law_that_panics_names_its_arguments(one in 0..100_u32, other in 0..100_u32) {
+            assert!(one + other < 50, "it panics");
+        }
+    }
+}

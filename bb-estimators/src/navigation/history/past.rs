@@ -16,7 +16,6 @@ pub(in crate::navigation) struct Key {
 
 impl Key {
     /// Before all inputs.
-    #[cfg(any(feature = "smoother", feature = "eskf"))]
     pub(in crate::navigation) const FIRST: Self = Self::of_sample(i64::MIN);
 
     /// A sample of the IMU precedes measurements at its end.
@@ -225,7 +224,6 @@ impl<T: Clone, I, const SAMPLES: usize, const INPUTS: usize, const COPIES: usize
     }
 }
 
-#[cfg(any(feature = "smoother", feature = "eskf"))]
 impl<T, I, const SAMPLES: usize, const INPUTS: usize, const COPIES: usize> Past<T, I, SAMPLES, INPUTS, COPIES> {
     /// Calls a function for the state and all copies of it.
     pub(in crate::navigation) fn each(&mut self, with: impl Fn(&mut T)) {
