@@ -38,7 +38,6 @@ use self::holding::Holding;
 use self::newcomer::Newcomer;
 use self::rest::Rest;
 use self::scatter::Scatter;
-#[cfg(feature = "runtime")]
 use self::search::Search;
 use super::bounds::is_within;
 use super::eskf::{Doubt, EskfFilter, ImuMean, seconds_between};

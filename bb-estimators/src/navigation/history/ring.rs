@@ -106,7 +106,6 @@ impl<T, const N: usize> Ring<T, N> {
     }
 }
 
-#[cfg(any(feature = "smoother", feature = "eskf"))]
 impl<T, const N: usize> Ring<T, N> {
     /// The number of values for which there is room.
     pub(in crate::navigation) fn room(&self) -> usize {
