@@ -222,9 +222,7 @@ impl<T: Clone, I, const SAMPLES: usize, const INPUTS: usize, const COPIES: usize
             }
         }
     }
-}
 
-impl<T, I, const SAMPLES: usize, const INPUTS: usize, const COPIES: usize> Past<T, I, SAMPLES, INPUTS, COPIES> {
     /// Calls a function for the state and all copies of it.
     pub(in crate::navigation) fn each(&mut self, with: impl Fn(&mut T)) {
         with(&mut self.now.state);

@@ -104,9 +104,7 @@ impl<T, const N: usize> Ring<T, N> {
             self.slots.swap(this, next);
         }
     }
-}
 
-impl<T, const N: usize> Ring<T, N> {
     /// The number of values for which there is room.
     pub(in crate::navigation) fn room(&self) -> usize {
         self.slots.len()
