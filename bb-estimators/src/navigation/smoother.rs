@@ -5,7 +5,7 @@
 //!
 //! # Window
 //!
-//! Errors and states are those of the [filter](super::eskf), so every [`Measurement`](super::Measurement) is a [`Factor`] here.
+//! Errors and states are those of the [filter](super::eskf), so every [`Measurement`](super::Measurement) is a [`Factor`](super::Factor) here.
 //! Optional states change from one keyframe to the next according to the parameters. The IMU between two keyframes is one factor
 //! ([`Preintegration`]). A factor concerns one keyframe, or a keyframe and the one before it. Your own types can implement the
 //! trait.
