@@ -1,6 +1,6 @@
 //! Tuning constants of navigation, each with its unit and its reason, no name twice.
 //!
-//! Sizes of buffers, indices of states and limits of rounding stand where they are used.
+//! Sizes of buffers, indices of states and limits of rounding are defined where they are used.
 
 // Plausibility: what no robot exceeds.
 
@@ -53,11 +53,11 @@ pub(super) const AVERAGED_FORCE_S: f64 = 0.1;
 pub(super) const LONGEST_GAP_S: f64 = 60.0;
 /// Deviation of the position of a filter in the wrong place, m: it is anywhere within 10 km.
 pub(super) const UNMOORED: f64 = 1e4;
-/// Deviation of its velocity, m/s.
+/// Deviation of the velocity of a filter in the wrong place, m/s.
 pub(super) const UNMOORED_SPEED: f64 = 5.0;
-/// Deviation of its tilt, rad: 3°.
+/// Deviation of the tilt of a filter in the wrong place, rad: 3°.
 pub(super) const UNMOORED_TILT: f64 = 0.05;
-/// Deviation of its heading, rad: 30°.
+/// Deviation of the heading of a filter in the wrong place, rad: 30°.
 pub(super) const UNMOORED_HEADING: f64 = 0.52;
 /// Steps of an iterated correction. Three are as good as five, and two are not. What a single one gives is in
 /// `book/src/explanation/navigation-filter.md`.
@@ -70,7 +70,7 @@ pub(super) const LINEAR: f64 = 1e-3;
 
 /// The number of headings, and of mountings, that cover a turn.
 pub(super) const TURNS: u32 = 6;
-/// The deviation of each of them, rad: half of the angle between two.
+/// The deviation of each of these headings and mountings, rad: half of the angle between two.
 pub(super) const TURN_DEVIATION: f64 = core::f64::consts::PI / 6.0;
 /// A larger deviation, rad, is an unknown heading: a filter cannot be corrected linearly from so far.
 pub(super) const UNKNOWN_HEADING: f64 = 0.5;
@@ -125,11 +125,11 @@ pub(super) const MOST_STARTS: usize = 2;
 
 // Gaps of the IMU, over which motion is held.
 
-/// The shortest length, s; each other one is twice as long as the one before.
+/// The shortest window over which the error of holding is measured, s; each other one is twice as long as the one before.
 pub(super) const SHORTEST_HOLD_S: f64 = 0.1;
-/// The number of lengths: the longest is 12.8 s.
+/// The number of lengths of these windows: the longest is 12.8 s.
 pub(super) const HOLD_LENGTHS: usize = 8;
-/// The time over which squares are averaged, s.
+/// The time over which the squares of these errors are averaged, s.
 pub(super) const HOLD_MEMORY_S: f64 = 60.0;
 /// The number of windows that make a mean.
 pub(super) const HOLD_WINDOWS: f64 = 3.0;
@@ -140,11 +140,11 @@ pub(super) const UNKNOWN_MOTION: [f64; 2] = [1.0, 9.0];
 
 // Rest, found by itself.
 
-/// The length of a window, s.
+/// The length of a window of vibration, s.
 pub(super) const REST_WINDOW_S: f64 = 1.0;
 /// The number of windows that are remembered, in motion and at rest.
 pub(super) const REST_WINDOWS: usize = 40;
-/// The place among them, from the quietest, of the one that rest is compared with: a vehicle that coasts may be quiet for two windows.
+/// The place among the remembered windows, from the quietest, of the one that rest is compared with: a vehicle that coasts may be quiet for two windows.
 pub(super) const REST_PLACE: usize = 2;
 /// A window in motion has at least this many times the variance of one at rest: an engine that idles has a third of it.
 pub(super) const QUIETER: f64 = 2.25;
@@ -216,7 +216,7 @@ pub(super) const LEAST_SIGHT_DEVIATION: f64 = 1e-3;
 pub(super) const AGREED_NS: i64 = 1_000_000_000;
 /// A clock jump is believed once agreeing stamps have covered this time, ns, and none has come from the former clock.
 pub(super) const BELIEVED_NS: i64 = 500_000_000;
-/// Minimum number of these stamps.
+/// Minimum number of agreeing stamps by which a clock jump is believed.
 pub(super) const BELIEVED_STAMPS: u32 = 5;
 /// Largest lag of the caller's clock behind the IMU's, ns.
 pub(super) const LONGEST_LAG_NS: i64 = 200_000_000;
