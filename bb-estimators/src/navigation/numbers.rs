@@ -144,7 +144,8 @@ pub(super) const UNKNOWN_MOTION: [f64; 2] = [1.0, 9.0];
 pub(super) const REST_WINDOW_S: f64 = 1.0;
 /// The number of windows that are remembered, in motion and at rest.
 pub(super) const REST_WINDOWS: usize = 40;
-/// The place among the remembered windows, from the quietest, of the one that rest is compared with: a vehicle that coasts may be quiet for two windows.
+/// The place among the remembered windows, from the quietest, of the one that rest is compared with: a vehicle that coasts may be
+/// quiet for two windows.
 pub(super) const REST_PLACE: usize = 2;
 /// A window in motion has at least this many times the variance of one at rest: an engine that idles has a third of it.
 pub(super) const QUIETER: f64 = 2.25;
