@@ -8,7 +8,7 @@ use super::error::{EstimatorError, Outcome, Reason};
 use super::event::StartedFrom;
 use super::factor::ProvidedFactor;
 use super::gate::{Rejection, SpoofGate};
-use super::input::{ImuBias, TakeoffOrigin};
+use super::input::{GpsHealth, ImuBias, TakeoffOrigin};
 use super::label::Sources;
 use super::params::{StateEstimatorConfig, ns};
 use super::start::{Starter, warm};
@@ -131,9 +131,9 @@ impl<F: ProvidedFactor> Engine<F> {
         &self.gate
     }
 
-    /// A report of spoofing was refused, see [`SpoofGate::block`].
-    pub(super) fn block(&mut self, until_ns: Option<i64>) {
-        self.gate.block(until_ns);
+    /// Handles a report of spoofing for which there is no place in the queue.
+    pub(super) fn alarm(&mut self, time_ns: i64, config: &StateEstimatorConfig) {
+        self.gate.health(time_ns, GpsHealth::Spoofed, &config.params);
     }
 
     pub(super) fn sources(&self) -> &Sources {

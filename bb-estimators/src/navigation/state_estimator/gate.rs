@@ -4,8 +4,7 @@
 //! [`dwell`](super::StateEstimatorParams::dwell) without interruption. The next anchor agrees with it. It is no farther than
 //! [`bounded_distance`](super::StateEstimatorParams::bounded_distance) from the estimate. A rejected fix restarts the dwell.
 //!
-//! A report of spoofing that is refused, because of its stamp or for lack of room, blocks the gate all the same, from the newest sample
-//! of the IMU on.
+//! A report of spoofing that is refused, because of its stamp or for lack of room, counts all the same, at the newest sample of the IMU.
 
 use core::fmt;
 
@@ -108,8 +107,6 @@ pub(super) struct SpoofGate {
     state: GateState,
     health: Option<(i64, GpsHealth)>,
     candidate: Option<Candidate>,
-    /// The time up to which it is blocked by a refused report of spoofing.
-    blocked_ns: Option<i64>,
 }
 
 impl SpoofGate {
@@ -119,8 +116,6 @@ impl SpoofGate {
 
     /// Handles a report of the receiver's health.
     pub(super) fn health(&mut self, time_ns: i64, health: GpsHealth, params: &StateEstimatorParams) {
-        let is_blocked = self.blocked_ns.is_some_and(|blocked_ns| time_ns <= blocked_ns);
-        let health = if is_blocked { GpsHealth::Spoofed } else { health };
         self.look(time_ns, params);
         self.health = Some((time_ns, health));
         self.state = match (self.state, health) {
@@ -208,14 +203,6 @@ impl SpoofGate {
     /// The estimate was moved: how far a fix is from the estimate before says nothing of how far an anchor is from the one after.
     pub(super) fn moved(&mut self) {
         self.candidate = None;
-    }
-
-    /// Handles a report of spoofing that was refused: reports up to `until_ns` count as reports of spoofing, also in a run that is
-    /// repeated. The later of two such times is in force.
-    pub(super) fn block(&mut self, until_ns: Option<i64>) {
-        self.state = GateState::Blocked;
-        self.candidate = None;
-        self.blocked_ns = self.blocked_ns.max(until_ns);
     }
 
     /// The clock was set back: drops the times of reports.

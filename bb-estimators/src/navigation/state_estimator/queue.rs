@@ -11,7 +11,7 @@ use super::entry::{Entry, Payload};
 use super::error::{Outcome, Reason};
 use super::event::{EventKind, StartedFrom};
 use super::factor::ProvidedFactor;
-use super::input::TakeoffOrigin;
+use super::input::{GpsHealth, TakeoffOrigin};
 use super::label::Sources;
 use super::params::{StateEstimatorConfig, ns};
 use super::strategy::{Pose, Predictor};
@@ -191,18 +191,42 @@ impl<F: ProvidedFactor> Queue<F> {
         let result = self.place(time_ns, payload, frames, config);
         result.map_err(|reason| {
             if is_alarm && reason != Reason::Duplicate {
-                self.block(config);
+                self.alarm(config);
             }
             self.count(reason)
         })
     }
 
-    /// Blocks the gate: a report of spoofing was refused.
-    fn block(&mut self, config: &StateEstimatorConfig) {
-        // Fixes that came before the report remain in the estimate: a run from a blocked engine drops them.
-        self.catch_up_with_held(config);
-        let until_ns = self.newest().map(|newest| newest.time_ns);
-        self.past.each(|engine| engine.block(until_ns));
+    /// Adds a report of spoofing at the newest sample: its own stamp was refused, or there was no room.
+    fn alarm(&mut self, config: &StateEstimatorConfig) {
+        let time_ns = self.newest().map_or(i64::MIN, |newest| newest.time_ns);
+        let payload = Payload::Health(GpsHealth::Spoofed);
+        let key = payload.key(time_ns);
+        if self.past.input(key).is_some() {
+            return;
+        }
+        if self.past.inputs.is_full() {
+            // Rather late inputs are lost than an alarm.
+            self.run(time_ns, config);
+            self.past.copy_now();
+            self.trim();
+        }
+        if self.past.inputs.is_full() || !self.past.reaches(key) {
+            // No run begins before it.
+            self.past.each(|engine| engine.alarm(time_ns, config));
+            return;
+        }
+        // Its sender has been told otherwise.
+        self.past.insert(key, Entry { payload, outcome: Some(Ok(None)), rejection: None });
+        self.run_or_hold(time_ns, config);
+    }
+
+    /// Runs the engine through the inputs up to a time, unless they are to be run together with others.
+    fn run_or_hold(&mut self, until_ns: i64, config: &StateEstimatorConfig) {
+        match &mut self.held {
+            Some(held_ns) => *held_ns = until_ns.max(*held_ns),
+            None => self.settle(until_ns, config),
+        }
     }
 
     fn place(
@@ -245,10 +269,8 @@ impl<F: ProvidedFactor> Queue<F> {
             }
         }
         self.counts.late += u64::from(is_late);
-        match (&mut self.held, until_ns) {
-            (Some(held_ns), Some(until_ns)) => *held_ns = until_ns.max(*held_ns),
-            (None, Some(until_ns)) => self.settle(until_ns, config),
-            (_, None) => {}
+        if let Some(until_ns) = until_ns {
+            self.run_or_hold(until_ns, config);
         }
         Ok(key)
     }

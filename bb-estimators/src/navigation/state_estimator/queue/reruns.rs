@@ -34,21 +34,7 @@ impl<F: ProvidedFactor> Queue<F> {
 
     /// Runs the inputs since [`hold`](Self::hold) together.
     pub(in crate::navigation::state_estimator) fn release(&mut self, config: &StateEstimatorConfig) {
-        self.run_held(config);
-        self.held = None;
-    }
-
-    /// Runs what has changed, and the inputs held so far, as if they had not been held.
-    pub(super) fn catch_up_with_held(&mut self, config: &StateEstimatorConfig) {
-        self.run_held(config);
-        self.catch_up(config);
-    }
-
-    fn run_held(&mut self, config: &StateEstimatorConfig) {
-        if let Some(held_ns) = &mut self.held
-            && *held_ns > i64::MIN
-        {
-            let until_ns = core::mem::replace(held_ns, i64::MIN);
+        if let Some(until_ns) = self.held.take().filter(|until_ns| *until_ns > i64::MIN) {
             self.settle(until_ns, config);
         }
     }

@@ -133,7 +133,7 @@ impl<F: ProvidedFactor> Queue<F> {
         self.news.tell(sample.time_ns, EventKind::ClockSetBack { seconds });
         self.past.push(*sample);
         if is_alarmed {
-            self.block(config);
+            self.alarm(config);
         }
         self.settle(sample.time_ns, config);
     }
@@ -201,7 +201,7 @@ impl<F: ProvidedFactor> Queue<F> {
             }
         }
         if is_alarmed {
-            self.block(config);
+            self.alarm(config);
         }
     }
 }
