@@ -27,12 +27,15 @@ laws! {
         let scenery = Scenery::new(&flight, seed, 6, longest, Some(5.0));
         let mut batch = scenery.carried(&flight, carrying(30));
         let mut here = scenery.carried(&flight, carrying(window));
+        // A flight whose first linearisation points do not do, one in a thousand, diverges and amplifies even rounding.
+        let off = |id: u64| (batch.smoothed(id).unwrap().position - flight.truth[id as usize].position).norm();
+        prop_assume!((0..30).map(off).fold(0.0, f64::max) < 5.0);
         for id in here.keyframes().collect::<Vec<_>>() {
             let (all, some) = (batch.smoothed(id).unwrap(), here.smoothed(id).unwrap());
-            prop_assert!(apart(&all, &some) < 1e-6, "{id}: {}", apart(&all, &some));
+            prop_assert!(apart(&all, &some) < 1e-9, "{id}: {}", apart(&all, &some));
             let (all, some) = (batch.smoothed_covariance(id).unwrap(), here.smoothed_covariance(id).unwrap());
             for i in 0..N {
-                prop_assert!((all[(i, i)] / some[(i, i)] - 1.0).abs() < 1e-6, "{id}, {i}");
+                prop_assert!((all[(i, i)] / some[(i, i)] - 1.0).abs() < 1e-9, "{id}, {i}");
             }
         }
     }
