@@ -28,8 +28,6 @@ const WITHIN: f64 = 0.150;
 /// on top of 0.5 s and 2 s.
 const NOTICED_S: f64 = 2.0;
 const JOINED_S: f64 = 6.0;
-/// Largest number of beats that are counted before the first is taken: those of a fifth of a second.
-const EARLY: u64 = 10;
 
 pub(crate) fn main() -> ExitCode {
     let mut arguments = std::env::args().skip_while(|argument| argument != MAST).skip(1);
@@ -252,8 +250,8 @@ fn judge(story: &mut Story, report: &bb_core::Report, taken: &[TakenBeat], outpu
     story.expect(stale > 0, "what was held up was taken");
     story.expect(lost > 0, "no beat was lost, though the link was cut");
     let counted = received + lost + stale + unsure;
-    // A few of each run came before the first reading, while the clock was not known yet.
-    let most = span + 2 * EARLY;
+    // Those of a run before its first reading came while the clock was not known, if at all; what came after its last one was stale.
+    let most = stale + runs.iter().filter_map(|run| Some(run.last()?.beat.number)).sum::<u64>();
     story
         .expect((span..=most).contains(&counted), format_args!("{counted} are accounted for, of {span} to {most}"));
 }
