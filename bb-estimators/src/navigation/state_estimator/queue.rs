@@ -205,13 +205,15 @@ impl<F: ProvidedFactor> Queue<F> {
         if self.past.input(key).is_some() {
             return;
         }
-        if self.past.inputs.is_full() {
+        // Reports without end leave an eighth of the room for relative poses and anchors, which are fatal where they find none.
+        let most = self.past.inputs.room() - self.past.inputs.room() / 8;
+        if self.past.inputs.len() >= most {
             // Rather late inputs are lost than an alarm.
-            self.run(time_ns, config);
+            self.settle(time_ns, config);
             self.past.copy_now();
             self.trim();
         }
-        if self.past.inputs.is_full() || !self.past.reaches(key) {
+        if self.past.inputs.len() >= most || !self.past.reaches(key) {
             // No run begins before it.
             self.past.each(|engine| engine.alarm(time_ns, config));
             return;

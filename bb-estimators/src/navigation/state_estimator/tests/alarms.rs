@@ -90,6 +90,51 @@ fn a_report_for_which_there_is_no_room_blocks_all_the_same() {
     }
 }
 
+/// A refused report with each sample, for longer than the queue has room, costs neither a relative pose nor an anchor.
+#[test]
+fn refused_reports_without_end_leave_room_for_the_window() {
+    let flight = Flight::new(8, 1);
+    for strategy in StrategyKind::ALL {
+        let mut estimator = started(&flight, *strategy);
+        let room = estimator.config().params.room()[1];
+        let mut alarms = 0;
+        for sent in flight.sent(true, true, true) {
+            let result = sent.to(&mut estimator);
+            if matches!(sent, Sent::Vio(_) | Sent::Anchor(_)) {
+                assert!(result.is_ok(), "{strategy:?}: {result:?} after {alarms}");
+            }
+            if matches!(sent, Sent::Imu(_)) {
+                assert!(estimator.add_gps_health(report(i64::MAX, GpsHealth::Spoofed)).is_err());
+                assert_eq!(estimator.health().gate, GateState::Blocked);
+                alarms += 1;
+            }
+            assert!(estimator.held()[1] < room - room / 16, "{}", estimator.held()[1]);
+        }
+        assert!(alarms > 2 * room, "{alarms}");
+        assert_eq!((count(estimator.sink(), "fatal"), estimator.counts().too_old), (0, 0));
+    }
+}
+
+/// Also where the window has taken all the room, and waits for a sample.
+#[test]
+fn a_refused_report_blocks_a_queue_that_is_full() {
+    let flight = Flight::new(6, 1);
+    for strategy in StrategyKind::ALL {
+        let mut estimator = flown(&flight, *strategy);
+        let mut provider = 1;
+        let anchor = |provider| PoseAnchor { provider, time_ns: 4 * SECOND + STEP, ..flight.anchors[3] };
+        while estimator.add_pose_anchor(anchor(provider)).is_ok() {
+            provider += 1;
+        }
+        assert_eq!(estimator.held()[1], estimator.config().params.room()[1]);
+        assert!(estimator.add_gps_health(report(i64::MAX, GpsHealth::Spoofed)).is_err());
+        assert_eq!(estimator.health().gate, GateState::Blocked);
+        let rest = flight.sent(true, true, true).into_iter().filter(|sent| sent.time_ns() > 4 * SECOND);
+        rest.for_each(|sent| ignore(sent.to(&mut estimator)));
+        assert!(!estimator.health().gate.is_open());
+    }
+}
+
 /// A report of another clock blocks the gate all the same. It waits for the IMU, whose clock is then another one:
 /// before the first sample, and after the clock was set back.
 #[test]
