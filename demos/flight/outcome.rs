@@ -25,7 +25,7 @@ const WORDS: [(&str, &str); 12] = [
     ("revised", "a late measurement has changed estimates that were given out before"),
     (
         "the iterations have not converged",
-        "the smoother stopped at its limit; it goes on from there with the next input",
+        "the smoother stopped at its limit; its window restarts in the state of the filter",
     ),
     ("degraded", "an input is not used as it should be, for this reason"),
 ];

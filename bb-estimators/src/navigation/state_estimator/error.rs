@@ -25,8 +25,7 @@ pub enum Reason {
     },
     /// Samples of the IMU were missing, and the gap was bridged.
     Bridged,
-    /// The measurement is in the estimate, but the smoother's iterations have not converged: the covariance does not fit the estimate yet.
-    /// Later updates continue. The filter corrects in one step and cannot tell.
+    /// The measurement is in the estimate, but the smoother's iterations did not converge: its window restarts in the state of the filter.
     NotConverged,
 }
 

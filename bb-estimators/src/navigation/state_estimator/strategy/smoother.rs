@@ -2,7 +2,8 @@
 //!
 //! The [filter](super::eskf) runs with the same inputs. It decides what is fused, finds the noise of the IMU and of fixes and whether the
 //! scale of relative poses drifts, and moves to where positions agree. Whenever another of its copies becomes the best, the window restarts
-//! in that copy's state, with its noise: what it has concluded with another noise is more or less certain than its covariance says.
+//! in that copy's state, with its noise: what it has concluded with another noise is more or less certain than its covariance says. It
+//! restarts there as well when an update does not converge: what leaves it would be linearised in the wrong place for good.
 //!
 //! Keyframes are the frames of the camera. Without a camera, they are made at intervals, and at measurements. A measurement between
 //! two keyframes is carried back to the earlier one by the motion since then.
@@ -67,6 +68,7 @@ pub(in crate::navigation::state_estimator) struct SmootherStrategy<F: ProvidedFa
     open: Stream,
     records: bool,
     left: VecDeque<Pose>,
+    /// `false` if the last update of the window did not converge.
     is_converged: bool,
 }
 
@@ -99,9 +101,9 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
         self.is_converged
     }
 
-    /// The window is linearised again until it converges.
+    /// The window follows the filter.
     pub(super) fn is_attitude_known(&self) -> bool {
-        true
+        self.filter.is_attitude_known()
     }
 
     pub(super) fn start(&mut self, start: &Start) -> Result<(), Refusal> {
@@ -194,9 +196,12 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
         let fused = self.filter.measure(measured);
         // A relative pose ends where the next one begins: in between, the window would lose one.
         let is_between = self.filter.has_camera() && !matches!(measured, Measured::Relative(_));
-        let is_other = self.filter.copies().changes() != self.changes && !is_between;
-        if (is_other || self.filter.resets() != resets) && !matches!(fused, Err(EstimatorError::Fatal(_))) {
+        let is_off = self.filter.copies().changes() != self.changes || !self.is_converged;
+        if (is_off && !is_between || self.filter.resets() != resets)
+            && !matches!(fused, Err(EstimatorError::Fatal(_)))
+        {
             self.adopt()?;
+            self.is_converged = true;
             return fused;
         }
         let fused = fused?;
@@ -234,6 +239,9 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
             Measured::Provided(factor) => self.hold(id, Held::Provided((*factor).clone()))?,
         }
         self.update()?;
+        if !self.is_converged && !is_between {
+            self.adopt()?;
+        }
         Ok(fused)
     }
 
@@ -255,7 +263,6 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
         self.changes = self.filter.copies().changes();
         let (estimate, covariance) = self.filter.state().ok_or(Refusal::NotStarted)?;
         self.smoother.adopt::<Navigated, NAVIGATED>(id_of(estimate.time_ns), estimate, covariance)?;
-        self.is_converged = true;
         self.filter.keyframe()?;
         Ok(())
     }

@@ -273,10 +273,9 @@ laws! {
             let bound_ns = if is_lost { 3 * SECOND / 2 + 5 * STEP } else { SECOND / 2 + 2 * STEP };
             prop_assert!(again_ns <= bound_ns, "{}: again after {again_ns} ns", strategy.name());
             let error_m = last.unwrap();
-            // After a long gap the attitude is unknown, and confirming it may take longer than the flight. One of 25 flights with the smoother,
-            // whose window does not go on from another copy of the filter, takes that long after 4 s.
+            // After a long gap the attitude is unknown, and confirming it may take longer than the flight.
             let is_long = is_ahead && !is_lost && off_ns + silence_ns > 3 * SECOND;
-            let is_told = error_m < 6.0 && is_confirmed || is_long && (error_m < 6.0 || is_degraded);
+            let is_told = error_m < 6.0 && is_confirmed || is_long && is_degraded;
             prop_assert!(is_told, "{}: {error_m} m, confirmed {is_confirmed}", strategy.name());
         }
     }
