@@ -1,7 +1,7 @@
 //! An attack on the headings that `Mekf` trusts: random bodies in random fields, sampled by random clocks.
 //!
 //! A heading that the filter trusts should be within three of its standard deviations but for 2 % of a run, in every run. It is
-//! in 99 of a hundred; `book/src/laboratory/attitude.md` says which are left.
+//! in 99.4 of a hundred; `book/src/laboratory/attitude.md` says which are left.
 
 use bb_core::nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use bb_estimators::attitude::{ImuSample, OrientationError};
@@ -16,7 +16,7 @@ const RUNS: u64 = if cfg!(debug_assertions) { 40 } else { 1000 };
 const MOST: f64 = 0.02;
 
 /// The number of runs of a thousand in which it is for longer; a change that raises it makes the deviations less honest.
-const DISHONEST: u64 = 8;
+const DISHONEST: u64 = 6;
 
 const GRAVITY: f64 = 9.81;
 const DEGREE: f64 = PI / 180.0;
@@ -290,6 +290,11 @@ fn headings_that_are_trusted_are_right() {
     let wrong: Vec<_> = outcomes.iter().filter(|(_, outcome)| outcome.wrong > MOST).collect();
     assert!(wrong.len() as u64 <= RUNS * DISHONEST / 1000, "{} of {RUNS}: {wrong:?}", wrong.len());
     // Who trusts nothing is not wrong either.
-    let trusted = outcomes.iter().map(|(_, outcome)| outcome.trusted).sum::<f64>() / RUNS as f64;
-    assert!(trusted > 0.57, "{trusted}");
+    let mean =
+        |part: fn(&Outcome) -> f64| outcomes.iter().map(|(_, outcome)| part(outcome)).sum::<f64>() / RUNS as f64;
+    let (trusted, wrong) = (mean(|outcome| outcome.trusted), mean(|outcome| outcome.wrong));
+    assert!(trusted > 0.53, "{trusted}");
+    // As many as of a normal distribution are beyond three deviations.
+    let most = if cfg!(debug_assertions) { MOST } else { 0.0027 };
+    assert!(wrong <= most * trusted, "{wrong} of {trusted}");
 }

@@ -43,9 +43,9 @@ impl<T: Real> Doubt<T> {
         self.seen_s = T::ZERO;
     }
 
-    /// Forgets the fields so far, which had another offset.
-    pub(super) fn forget_fields(&mut self) {
-        *self = Self { surprise: self.surprise, corrected: self.corrected, ..Self::new() };
+    /// Forgets the mean of the fields so far, which had another offset. By how much they differ stays.
+    pub(super) fn forget_mean(&mut self) {
+        (self.mean, self.moved_s, self.followed) = (None, T::ZERO, Vector2::zeros());
         self.begin();
     }
 

@@ -159,7 +159,7 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
 
     fn orientation_uncertainty(&self) -> Option<Matrix3<T>> {
         self.state.world_from_body()?;
-        Some(self.rotation.transpose() * self.uncertainty() * self.rotation)
+        Some(self.rotation.transpose() * self.uncertainty(T::ZERO) * self.rotation)
     }
 
     fn is_at_rest(&self) -> Option<bool> {
@@ -171,7 +171,7 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
     }
 
     fn is_heading_trusted(&self) -> Option<bool> {
-        let is_trusted = self.is_north_known && self.uncertainty().m33 < square(TRUSTED);
+        let is_trusted = self.is_north_known && self.uncertainty(T::of(WITH_TURNS)).m33 < square(TRUSTED);
         self.params.magnetometer.is_used().then_some(is_trusted)
     }
 
@@ -189,11 +189,11 @@ impl<T: Real> MekfFilter<T> {
         self.iron.offset()
     }
 
-    /// Covariance of the rotation error in the world, rad².
-    fn uncertainty(&self) -> Matrix3<T> {
+    /// Covariance of the rotation error in the world, rad², if this part of the field goes with the angle from pose to pose, 1/rad.
+    fn uncertainty(&self, with_turns: T) -> Matrix3<T> {
         let (sin, cos) = T::of(self.params.declination).sin_cos();
         let across = self.rotation.tr_mul(&Vector3::new(cos, -sin, T::ZERO));
-        let offset = self.iron.doubt(&across);
+        let offset = self.iron.doubt(&across, with_turns);
         self.doubt.covariance(self.errors.block(ROTATION), &self.force, self.missed, offset)
     }
 
@@ -270,7 +270,7 @@ impl<T: Real> MekfFilter<T> {
             let ratio = error / horizontal;
             self.errors.doubt(HEADING, (ratio * ratio).min(square(UNKNOWN)));
             self.forget_field();
-            self.doubt.forget_fields();
+            self.doubt.forget_mean();
         }
         let field = field - self.iron.offset();
         let in_world = self.rotation * field;

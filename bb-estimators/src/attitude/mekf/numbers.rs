@@ -86,6 +86,10 @@ pub(super) const CONTRADICTION: f64 = 0.9;
 /// Standard deviation up to which a heading is trusted, rad: 10°.
 pub(super) const TRUSTED: f64 = 0.175;
 
+/// The largest error of a field that goes with how the body turns, as a fraction of it, 1/rad: the axes of an uncalibrated magnetometer, and
+/// the scale of a gyroscope.
+pub(super) const WITH_TURNS: f64 = 0.02;
+
 // The offset of the magnetometer, in units of the field.
 
 /// Degrees of freedom of Student's distribution of the field's steps from pose to pose.

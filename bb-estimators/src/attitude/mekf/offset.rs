@@ -25,6 +25,9 @@ struct Hypothesis<T: Real> {
     /// Scale of a step, squared, as learnt.
     step: T,
     poses: T,
+    /// Variance of the offset along each axis before the first pose, and sum of the squares of the angles between poses since.
+    prior: T,
+    turned: T,
 }
 
 /// Determinant of the covariance of a measured field and squared distance from the expected one, over its scale.
@@ -35,14 +38,17 @@ struct Surprise<T> {
 
 impl<T: Real> Hypothesis<T> {
     fn new(deviation: f64) -> Self {
+        let prior = T::of(deviation * deviation);
         Self {
             expected: Vector3::zeros(),
             offset: Vector3::zeros(),
             of_expected: Matrix3::zeros(),
             of_both: Matrix3::zeros(),
-            of_offset: Matrix3::from_diagonal_element(T::of(deviation * deviation)),
+            of_offset: Matrix3::from_diagonal_element(prior),
             step: T::of(FIELD_WALK * FIELD_WALK),
             poses: T::ZERO,
+            prior,
+            turned: T::ZERO,
         }
     }
 
@@ -70,6 +76,7 @@ impl<T: Real> Hypothesis<T> {
         let (tails, freedom) = (T::of(TAILS), T::of(TAILS + 3.0));
         let weight = freedom / (tails + squared);
         self.poses += T::ONE;
+        self.turned += T::HALF * turned.norm_squared();
         let learnt = weight * squared / T::of(3.0) - T::ONE;
         self.step *= T::ONE + learnt / (self.poses + T::of(FIRST_POSES));
         self.step = self.step.max(T::of(LEAST_WALK * LEAST_WALK));
@@ -85,6 +92,21 @@ impl<T: Real> Hypothesis<T> {
         self.of_both = gain * white;
         self.of_expected = (Matrix3::identity() - inverse * white) * white;
         Some(Surprise { determinant, squared })
+    }
+
+    /// Variance of the offset along a direction of the body, with the square of the largest error by what goes with the turns.
+    ///
+    /// From poses `i` with `x_i = x_(i-1) + T_i offset`, an offset of covariance `P` is off by `P Σ T_iᵀ e_i / step` for errors `e_i`. If
+    /// none of them is longer than `part` times the angle of its turn, the square of that along `a` is at most
+    /// `part² Σ angle² · aᵀ P (Σ T_iᵀ T_i / step²) P a`, by Cauchy and Schwarz, where `P⁻¹ = 1 / prior + Σ T_iᵀ T_i / step`.
+    fn along(&self, along: &Vector3<T>, part: T) -> T {
+        let moved = self.of_offset * along;
+        let variance = along.dot(&moved);
+        if self.prior <= T::ZERO {
+            return variance;
+        }
+        let told = (variance - moved.norm_squared() / self.prior).max(T::ZERO);
+        variance + part * part * told * self.turned / self.step
     }
 
     /// Variance of the offset along an axis, as the poses tell it.
@@ -187,8 +209,10 @@ impl<T: Real> HardIron<T> {
     /// the odds so far. They say little for long: fields that a small offset explains as well as none speak against one of
     /// any size, and so against the small one. Before the first newcomer has won or lost, the logarithm of the offset's size is
     /// uniform instead, down to what a calibration leaves, `c`: the part `1 / (1 + ln (σ / c))` of the expected square is left.
-    pub(super) fn doubt(&self, along: &Vector3<T>) -> T {
-        let of = |hypothesis: &Hypothesis<T>| along.dot(&(hypothesis.of_offset * along));
+    ///
+    /// `with_turns` is the largest part of the field that may go with the angle from pose to pose, 1/rad. It does not average out.
+    pub(super) fn doubt(&self, along: &Vector3<T>, with_turns: T) -> T {
+        let of = |hypothesis: &Hypothesis<T>| hypothesis.along(along, with_turns);
         let known = of(&self.incumbent);
         if self.is_calibrated {
             return known;
