@@ -10,7 +10,7 @@ use tracing::{Event, Metadata, Subscriber, span};
 #[derive(Clone, Copy, Debug, Payload)]
 struct Number(f64);
 
-/// Cannot be made safe.
+/// Cannot be made safe, and fails once when the logger panics.
 #[derive(Debug)]
 struct Brake;
 
@@ -24,6 +24,9 @@ impl Sensor for Brake {
     }
 
     fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
+        if PANICS.load(Ordering::SeqCst) && !FAILED.swap(true, Ordering::SeqCst) {
+            return Err(Fault::new("it is worn"));
+        }
         Ok(Reading::nothing())
     }
 }
@@ -58,6 +61,7 @@ robot! {
 struct Slow;
 
 static PANICS: AtomicBool = AtomicBool::new(false);
+static FAILED: AtomicBool = AtomicBool::new(false);
 static ERRORS: AtomicU32 = AtomicU32::new(0);
 
 impl Subscriber for Slow {
@@ -128,9 +132,10 @@ fn the_rest_goes_on() -> Result<(), Box<dyn std::error::Error>> {
     simulation.run_for(Duration::from_millis(20));
     assert_eq!(heard.load(Ordering::SeqCst), 1, "the estimator was lost");
     let report = simulation.report();
-    // Its change of health is one line for loggers.
+    assert_eq!(report.sources[0].restarts, 1, "{report}");
+    // One line for loggers each: its change of health, the brake's fault and its restart.
     let panics = (report.panics.loggers, report.panics.telemetry, report.panics.journal, report.panics.wakers);
-    assert_eq!(panics, (1, 1, 1, 0), "{report}");
+    assert_eq!(panics, (3, 1, 1, 0), "{report}");
     PANICS.store(false, Ordering::SeqCst);
     Ok(())
 }

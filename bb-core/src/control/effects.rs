@@ -6,7 +6,7 @@ use super::execution::{CommandError, Slot};
 use super::task::{EndedCode, Task, Value};
 use super::{Control, Wired};
 use crate::event::{ComponentFault, HealthTransition, Refusal, Safety, SafetyError};
-use crate::fault::{discard, lock};
+use crate::fault::{discard, guarded, lock};
 use crate::node::Mode;
 use crate::pubsub::Wakers;
 use crate::schedule::Lane;
@@ -214,6 +214,13 @@ impl Control {
         }
     }
 
+    /// Calls a logger. A panic in it, which cannot be logged, is counted.
+    pub(crate) fn log(&self, write: impl FnOnce()) {
+        if guarded(write).is_err() {
+            self.0.logger_panics.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
     fn write_logs(&self) {
         loop {
             let mut reports = lock(&self.0.reporter.0);
@@ -223,16 +230,12 @@ impl Control {
             };
             let skipped = std::mem::take(&mut reports.skipped);
             drop(reports);
-            // A panic of the logger itself cannot be logged.
-            let logged = crate::fault::guarded(|| {
+            self.log(|| {
                 if skipped > 0 {
                     tracing::warn!(skipped, "lines of this log were dropped: the logger blocked");
                 }
                 write_log(&log);
             });
-            if logged.is_err() {
-                self.0.logger_panics.fetch_add(1, Ordering::Relaxed);
-            }
             if let Some(telemetry) = &self.0.telemetry {
                 let robot = self.0.origin.robot;
                 match log {

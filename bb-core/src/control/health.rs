@@ -39,7 +39,8 @@ impl Overseer for Control {
         Control::replacing_hooks(self, path, is_made, make)
     }
 
-    fn forget_hooks(&self, path: &'static str) {
+    fn leave_out(&self, path: &'static str, reason: &str) {
+        self.log(|| tracing::info!(component = path, reason, "left out"));
         let gone = self.lock().hooks.take_failed(path);
         gone.into_iter().for_each(crate::fault::discard);
     }

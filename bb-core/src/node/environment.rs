@@ -38,8 +38,8 @@ pub(crate) trait Overseer: Guardian {
         is_made: bool,
         make: &mut dyn FnMut() -> Result<(), Failed>,
     ) -> Result<(), Failed>;
-    /// Records that the component at `path` was left out: it has no disarm callbacks.
-    fn forget_hooks(&self, path: &'static str);
+    /// Logs that the component at `path` was left out, and forgets its disarm callbacks.
+    fn leave_out(&self, path: &'static str, reason: &str);
 }
 
 /// Checks whether options would be valid with these parameters.
@@ -190,8 +190,7 @@ impl Environment {
         make().map_err(|fault| {
             let reason = fault.to_string();
             if fault.then == crate::fault::Then::Skip {
-                tracing::info!(component = path, reason, "left out");
-                self.overseer().forget_hooks(path);
+                self.overseer().leave_out(path, &reason);
                 return Some(reason);
             }
             self.refuse(path, fault);

@@ -21,7 +21,7 @@ use crate::component::{Bus, Caller, Fault, Host, OptionsList};
 use crate::control::{Control, Parts, SystemTopics};
 use crate::declaration::{ParameterError, ParameterValues, RobotDeclaration};
 use crate::event::ParameterValue;
-use crate::fault::{Failed, caught, discard, guarded};
+use crate::fault::{Failed, caught, discard, guarded, log_panic};
 use crate::joints::JointSettings;
 use crate::journal::{Event, Journal, Sink};
 use crate::message::{Origin, Stamp};
@@ -249,7 +249,7 @@ impl Assembling {
             if let Some(island) = wired.as_ref().and_then(|wired| wired.island(island))
                 && let Err(fault) = guarded(|| island.drain())
             {
-                tracing::error!(%fault, "an island was left");
+                log_panic("an island was left", &fault);
             }
         });
         Ok(Self { robot, mode, control, environment, host, place, machine })

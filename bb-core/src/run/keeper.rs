@@ -3,7 +3,7 @@
 use crate::component::{Fault, ParameterStore};
 use crate::control::Control;
 use crate::event::ParameterValue;
-use crate::fault::{caught, discard, guarded, lock};
+use crate::fault::{caught, discard, guarded, lock, log_panic};
 use crate::schedule::start_thread;
 use crate::sorted::Sorted;
 use std::collections::BTreeMap;
@@ -96,7 +96,7 @@ impl Keeper {
         let run = move || {
             // The store is closed with `work`.
             if let Err(fault) = guarded(|| work.run()) {
-                tracing::error!(%fault, "the store of parameters failed as it was closed");
+                log_panic("the store of parameters failed as it was closed", &fault);
             }
             watched.turn(|state| state.has_ended = true);
         };

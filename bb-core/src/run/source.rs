@@ -306,7 +306,7 @@ impl<S: Sensor> Running<S> {
             AfterFault::Stopped => None,
         };
         if failed.fault.then == Then::Skip {
-            tracing::info!(component = path, message, "left out");
+            self.control.log(|| tracing::info!(component = path, message, "left out"));
             return;
         }
         self.shared.note_failure(self.environment.clock().now());
@@ -335,7 +335,7 @@ impl<S: Sensor> Running<S> {
         };
         match made {
             Ok(()) => {
-                tracing::info!(component = path, "restarted");
+                self.control.log(|| tracing::info!(component = path, "restarted"));
                 self.shared.note_restart();
                 self.begin();
             }

@@ -27,7 +27,7 @@ pub(super) fn serve(machine: &Arc<Machine>) -> Result<(), StartError> {
         island.give_to_worker();
         spawn(name, move || {
             if let Err(message) = set_up(worker) {
-                tracing::warn!(estimator = name, message, "its thread runs as any other");
+                served.control.log(|| tracing::warn!(estimator = name, message, "its thread runs as any other"));
                 served.fault(name, format!("its thread runs as any other: {message}"));
             }
             while let Some(island) = served.island(number).filter(|island| !island.has_retired()) {

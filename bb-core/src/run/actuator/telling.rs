@@ -22,7 +22,10 @@ pub(super) enum Change {
 impl<A: Actuator> Inner<A> {
     pub(super) fn log(&self, state: &mut State<A>, write: impl FnOnce() + Send + 'static) {
         match self.environment.mode() {
-            Mode::Real => self.environment.pool().submit(Lane::User, write),
+            Mode::Real => {
+                let control = self.control.clone();
+                self.environment.pool().submit(Lane::User, move || control.log(write));
+            }
             Mode::Virtual | Mode::Replay => state.pending.push(Change::Log(Box::new(write))),
         }
     }
@@ -45,7 +48,7 @@ impl<A: Actuator> Inner<A> {
                 self.control.note_hardware_error(path, error);
             }
             Change::MessageFailed(message) => drop(self.control.note_fault(path, message)),
-            Change::Log(write) => write(),
+            Change::Log(write) => self.control.log(write),
         }
     }
 }

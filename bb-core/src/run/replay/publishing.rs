@@ -1,7 +1,7 @@
 //! Publishing recorded messages of others than estimators.
 
 use super::Replayer;
-use crate::fault::{discard, guarded};
+use crate::fault::{discard, guarded, log_panic};
 use crate::journal::{Recorded, decoded};
 use crate::node::Replayed;
 use crate::pubsub::{AnyTopic, DynamicMessage};
@@ -94,6 +94,6 @@ fn publish(topic: &dyn AnyTopic, message: Recorded, before: impl FnOnce(&Dynamic
 /// consequences are still the same.
 pub(super) fn handed_out(hand_out: impl FnOnce()) {
     if let Err(fault) = guarded(hand_out) {
-        tracing::error!(%fault, "a recorded message failed where it was copied");
+        log_panic("a recorded message failed where it was copied", &fault);
     }
 }
