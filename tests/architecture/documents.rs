@@ -24,6 +24,19 @@ fn paths_in_the_documents_exist() {
     }
 }
 
+/// The pictures name files below one folder, which the text before them names.
+#[test]
+fn paths_in_the_pictures_exist() {
+    let text = read("ARCHITECTURE.md");
+    let labels = text.split("<br/>").skip(1).filter_map(|rest| rest.split(['"', '<']).next());
+    let mut checked = 0;
+    for path in labels.filter(|label| label.ends_with(".rs")) {
+        assert!(root().join("bb-core/src").join(path).exists(), "a picture names {path}, which is not there");
+        checked += 1;
+    }
+    assert!(checked > 15, "{checked}");
+}
+
 /// The pages of the book by path, without the table of contents.
 fn pages() -> Vec<PathBuf> {
     let is_page = |path: &PathBuf| path.extension().is_some_and(|end| end == "md") && !path.ends_with("SUMMARY.md");
