@@ -2,8 +2,9 @@
 //!
 //! It is assembled in stages, each of which makes what the next ones need: [`Assembling::new`] the control state, the
 //! environment of the islands and the robot as components see it; [`Assembling::make`] the components, in whose `init` user
-//! code runs for the first time; then the journal begins, and the store of parameters. An error in any of them ends in
-//! [`Assembling::abandon`], which makes safe what components have started.
+//! code runs for the first time; then the journal begins, and the store of parameters. [`Assembling`] owns all that was made. It
+//! ends in [`Assembling::complete`], or at an error in any stage in [`Assembling::abandon`], which makes safe what components have
+//! started and takes it down.
 
 use super::bound::refused_by_bound;
 use super::describe::describe;
@@ -133,42 +134,20 @@ impl Draft {
         clock: Clock,
         mode: Mode,
     ) -> Result<(Arc<Machine>, OpenSources), StartError> {
-        let assembling = Assembling::new(&mut self, unwired, clock, mode)?;
-        let mut facts = describe(self.robot, &unwired.topics(), &assembling.control);
-        facts.push(format!("supervision: {:?}", self.supervision));
-        let kept = if mode == Mode::Replay { None } else { self.kept.take() };
-        if let Some(kept) = &kept {
-            kept.note(&assembling.control);
+        let mut assembling = Assembling::new(&mut self, unwired, clock, mode)?;
+        match assembling.build(&self) {
+            Ok((wired, keeper)) => Ok(assembling.complete(wired, keeper)),
+            Err((path, fault)) => Err(assembling.abandon(path, fault)),
         }
-        let made = assembling.make(unwired, &self.options);
-        if let Some(refusal) = assembling.environment.take_refusal() {
-            return Err(assembling.abandon(refusal.path, refusal.fault, (made.ok(), unwired.take_wiring(), kept)));
-        }
-        let (wired, sources) = match made {
-            Ok(made) => made,
-            // Each component's code is guarded separately, with its path. This is for anything else.
-            Err(failed) => {
-                return Err(assembling.abandon(self.robot.name, failed.fault, (unwired.take_wiring(), kept)));
-            }
-        };
-        if let Err((path, fault)) = assembling.begin_journal(&facts) {
-            return Err(assembling.abandon(path, fault, (wired, sources, unwired.take_wiring(), kept)));
-        }
-        for fact in facts {
-            assembling.environment.add_declared_fact(fact);
-        }
-        let keeper = match kept.map(|kept| Keeper::start(kept, &assembling.control)) {
-            Some(Err(fault)) => {
-                return Err(assembling.abandon(KEEPER, fault, (wired, sources, unwired.take_wiring())));
-            }
-            keeper => keeper.and_then(Result::ok),
-        };
-        Ok((assembling.complete(wired, &sources, keeper), sources))
     }
 }
 
-/// The state that components are made with.
-struct Assembling {
+/// The path of what prevents the robot from starting, and the reason.
+type Refused = (&'static str, Fault);
+
+/// A robot that is being assembled, with all that was made for it.
+struct Assembling<'a> {
+    unwired: &'a mut dyn Unwired,
     robot: &'static RobotDeclaration,
     mode: Mode,
     control: Control,
@@ -178,10 +157,13 @@ struct Assembling {
     place: Place,
     /// The robot once it is assembled.
     machine: Arc<OnceLock<Weak<Machine>>>,
+    wired: Option<Arc<Wired>>,
+    sources: OpenSources,
+    kept: Option<Kept>,
 }
 
-impl Assembling {
-    fn new(draft: &mut Draft, unwired: &dyn Unwired, clock: Clock, mode: Mode) -> Result<Self, StartError> {
+impl<'a> Assembling<'a> {
+    fn new(draft: &mut Draft, unwired: &'a mut dyn Unwired, clock: Clock, mode: Mode) -> Result<Self, StartError> {
         let (robot, origin, supervision) = (draft.robot, draft.origin(), draft.supervision);
         let sink = if mode == Mode::Replay { None } else { draft.journal.take() };
         let journal = sink.map(|sink| Journal::new(sink, clock.wall_offset_nanos()));
@@ -252,28 +234,52 @@ impl Assembling {
                 log_panic("an island was left", &fault);
             }
         });
-        Ok(Self { robot, mode, control, environment, host, place, machine })
+        let kept = if mode == Mode::Replay { None } else { draft.kept.take() };
+        let (wired, sources) = (None, Vec::new());
+        Ok(Self { unwired, robot, mode, control, environment, host, place, machine, wired, sources, kept })
+    }
+
+    /// The stages in which code of users runs.
+    fn build(&mut self, draft: &Draft) -> Result<(Arc<Wired>, Option<Keeper>), Refused> {
+        let mut facts = describe(self.robot, &self.unwired.topics(), &self.control);
+        facts.push(format!("supervision: {:?}", draft.supervision));
+        if let Some(kept) = &self.kept {
+            kept.note(&self.control);
+        }
+        let made = self.make(&draft.options);
+        if let Some(refusal) = self.environment.take_refusal() {
+            return Err((refusal.path, refusal.fault));
+        }
+        // Each component's code is guarded separately, with its path. This is for anything else.
+        let wired = made.map_err(|failed| (self.robot.name, failed.fault))?;
+        self.begin_journal(&facts)?;
+        for fact in facts {
+            self.environment.add_declared_fact(fact);
+        }
+        let keeper = self.kept.take().map(|kept| Keeper::start(kept, &self.control));
+        Ok((wired, keeper.transpose().map_err(|fault| (KEEPER, fault))?))
     }
 
     /// Makes the components.
-    fn make(&self, unwired: &mut dyn Unwired, options: &OptionsList) -> Result<(Arc<Wired>, OpenSources), Failed> {
+    fn make(&mut self, options: &OptionsList) -> Result<Arc<Wired>, Failed> {
         let assembly = Assembly {
             environment: self.environment.clone(),
             control: self.control.clone(),
             host: Arc::clone(&self.host),
         };
         caught(|| {
-            let wired = Arc::new(unwired.wire(options, &assembly));
+            let wired = self.wired.insert(Arc::new(self.unwired.wire(options, &assembly)));
             // It is set once.
-            let _ = self.place.set(Arc::downgrade(&wired));
-            let is_replay = self.mode == Mode::Replay;
-            let sources = if is_replay { Vec::new() } else { wired.sources().open(options, &assembly) };
-            Ok((wired, sources))
+            let _ = self.place.set(Arc::downgrade(wired));
+            if self.mode != Mode::Replay {
+                self.sources = wired.sources().open(options, &assembly);
+            }
+            Ok(Arc::clone(wired))
         })
     }
 
     /// Writes the first line of the journal, and lets its sink begin.
-    fn begin_journal(&self, facts: &[String]) -> Result<(), (&'static str, Fault)> {
+    fn begin_journal(&self, facts: &[String]) -> Result<(), Refused> {
         let Some(journal) = self.environment.journal() else { return Ok(()) };
         let declaration = [facts, &self.environment.facts()].concat();
         let wall_offset_nanos = self.environment.clock().wall_offset_nanos();
@@ -285,12 +291,12 @@ impl Assembling {
         }
     }
 
-    /// Makes safe what components have started in `init`, and closes and drops them and all else that was `made`; returns why the
-    /// robot does not start.
-    fn abandon(&self, path: &'static str, fault: Fault, made: impl Send + 'static) -> StartError {
+    /// Makes safe what components have started in `init`, and closes and drops all that was made; returns why the robot does not start.
+    fn abandon(self, path: &'static str, fault: Fault) -> StartError {
         self.control.begin_stop(&Caller::PROGRAM);
         self.control.wait_until_disarmed();
         self.control.drop_hooks();
+        let made = (self.wired, self.sources, self.unwired.take_wiring(), self.kept);
         self.control.run_on_pool(Lane::User, move || discard(made));
         if let Some(journal) = self.environment.journal() {
             journal.close();
@@ -301,7 +307,7 @@ impl Assembling {
         StartError::component(path, fault)
     }
 
-    fn complete(self, wired: Arc<Wired>, sources: &OpenSources, keeper: Option<Keeper>) -> Arc<Machine> {
+    fn complete(self, wired: Arc<Wired>, keeper: Option<Keeper>) -> (Arc<Machine>, OpenSources) {
         let machine = Arc::new(Machine {
             robot: self.robot,
             wired,
@@ -309,13 +315,13 @@ impl Assembling {
             control: self.control,
             bus: Bus::new(Arc::clone(&self.host), Caller::PROGRAM),
             host: self.host,
-            sources: Mutex::new(sources.iter().map(|source| source.shared()).collect()),
+            sources: Mutex::new(self.sources.iter().map(|source| source.shared()).collect()),
             has_ended: AtomicBool::new(false),
             last_report: OnceLock::new(),
             keeper: Mutex::new(keeper),
         });
         // It is set once.
         let _ = self.machine.set(Arc::downgrade(&machine));
-        machine
+        (machine, self.sources)
     }
 }
