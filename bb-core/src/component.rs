@@ -58,7 +58,7 @@ pub(crate) use field::FromQuantity;
 pub use field::OptionField;
 pub use guardian::SafetyLink;
 pub(crate) use guardian::{DisarmHook, Guardian};
-pub(crate) use host::{Controls, ExternalSensor, Host};
+pub(crate) use host::{CommandControls, Controls, ExternalSensor, Host, ParameterControls, SafetyControls};
 pub use info::{Info, Request};
 pub(crate) use inputs::{At, FieldIndex, InputAt, SyncMiss, TakenAt};
 pub use inputs::{Every, Input, InputField, Inputs};

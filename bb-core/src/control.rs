@@ -7,11 +7,9 @@
 //! collected as `Effects` and run without the lock, on their own threads or on those of the pool. Each may block
 //! forever without harming anything else.
 
-mod alarms;
 mod arming;
 #[cfg(test)]
 mod bare;
-mod budgets;
 mod callbacks;
 mod command;
 mod commands;
@@ -20,14 +18,12 @@ mod ending;
 mod execution;
 mod faults;
 mod health;
-mod machine;
 #[cfg(all(test, loom))]
 mod model;
 mod parameters;
 mod registering;
 mod step;
 mod system;
-mod task;
 
 pub(crate) use callbacks::{Inside, is_in_actuator, is_in_command};
 pub use command::{CommandStatistics, Prepared};
@@ -48,20 +44,18 @@ use crate::schedule::{Bell, Deadlines, Pool, Reserve, Sleeper, StopSignal};
 use crate::sorted::Sorted;
 use crate::telemetry::Telemetry;
 use crate::time::{Clock, MonotonicTime};
-use budgets::Budgets;
 use callbacks::{Apart, Callback, Hooks};
 use effects::Reporter;
-use execution::Slot;
-use faults::{Faults, SafetyErrors};
+use execution::{EndedCode, Slot, Task, Value};
+use faults::{Budgets, Faults, SafetyErrors};
 #[cfg(loom)]
 use loom::sync::{Condvar, Mutex as StateMutex, MutexGuard, atomic::AtomicU8};
-use machine::Machine;
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicU64};
 use std::sync::{Arc, Mutex, OnceLock, Weak};
 #[cfg(not(loom))]
 use std::sync::{Condvar, Mutex as StateMutex, MutexGuard, atomic::AtomicU8};
-use task::{EndedCode, Task, Value};
+use step::Machine;
 
 /// The arguments of [`Control::new`].
 pub(crate) struct Parts {

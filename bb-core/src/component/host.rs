@@ -16,33 +16,47 @@ use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 
-/// The robot as a whole: its safety, states, parameters and commands. The caller has the rights that it needs.
-pub(crate) trait Controls: Guardian {
+/// The robot as a whole. In all of this, the caller has the rights that it needs.
+pub(crate) trait Controls: Guardian + SafetyControls + ParameterControls + CommandControls {
     fn origin(&self) -> Origin;
     fn clock(&self) -> &Clock;
+    fn kind_of_run(&self) -> RunKind;
     /// Returns whether components are to stop.
     fn is_stopping(&self) -> bool;
     fn state(&self) -> &'static str;
     fn safety(&self) -> Safety;
+}
+
+/// Arming, disarming and stopping.
+pub(crate) trait SafetyControls {
     fn arm(&self, caller: &Caller) -> Result<(), ArmError>;
     /// `force` needs the right to arm, and a caller that has ended only disarms.
     fn disarm(&self, force: bool, caller: &Caller) -> Result<(), DisarmError>;
+    /// Disarms the robot and stops its components, without waiting.
+    fn request_stop(&self, caller: &Caller) -> Result<(), Fault>;
+}
+
+/// Parameters.
+pub(crate) trait ParameterControls {
     fn parameter(&self, path: &str) -> Option<ParameterValue>;
     /// Sets all of them, or none.
     fn set_parameters(&self, changes: Vec<(String, ParameterValue)>, caller: &Caller)
     -> Result<(), ParameterError>;
+}
+
+/// Commands.
+pub(crate) trait CommandControls {
     fn commands(&self) -> Vec<CommandInfo>;
-    /// The executions that have not ended.
+    /// Starts the command at `path` with arguments from JSON, on behalf of the caller.
+    fn start_command(&self, path: &str, arguments: &str, caller: &Caller) -> Result<DynamicExecution, Fault>;
+    /// The executions that have not ended, in the order of their numbers.
     fn executions(&self) -> Vec<ExecutionInfo>;
+    /// Cancels the execution of that number on behalf of the caller.
     fn cancel(&self, execution: u64, caller: &Caller) -> Result<(), Fault>;
-    /// Disarms the robot and stops its components, without waiting.
-    fn request_stop(&self, caller: &Caller) -> Result<(), Fault>;
-    fn kind_of_run(&self) -> RunKind;
     /// The execution of that number has come so far.
     fn keep_progress(&self, execution: u64, progress: DynamicMessage);
     /// The execution of that number, whose caller it is, changes the operational state.
     fn transition(&self, execution: u64, state: &str, caller: &Caller) -> Result<(), Fault>;
-    fn start_command(&self, path: &str, arguments: &str, caller: &Caller) -> Result<DynamicExecution, Fault>;
 }
 
 /// A sensor whose messages other code publishes.

@@ -9,11 +9,11 @@
 //!   safe or the time limit has passed. Nobody waits for longer than the limits, whatever hangs.
 
 use super::callbacks::{Reason, is_awaited};
-use super::machine::IDLE;
-use super::step::Step;
+use super::step::{IDLE, Step};
 use super::{Control, Disarming, Limit, RunningCommand, State};
-use crate::component::Caller;
+use crate::component::{Caller, SafetyControls};
 use crate::event::{ArmError, DisarmError, HardwareError, HardwareErrorKind, Safety, SafetyError};
+use crate::fault::Fault;
 use crate::journal::Event;
 use crate::node::Mode;
 use crate::time::MonotonicTime;
@@ -62,9 +62,9 @@ impl State {
     }
 }
 
-impl Control {
+impl SafetyControls for Control {
     /// Arms the robot, unless it is in `error` or stopping.
-    pub(crate) fn arm(&self, caller: &Caller) -> Result<(), ArmError> {
+    fn arm(&self, caller: &Caller) -> Result<(), ArmError> {
         if self.0.mode == Mode::Replay {
             return Err(ArmError::Replay);
         }
@@ -99,18 +99,10 @@ impl Control {
         step.arm()
     }
 
-    /// Replays a request to arm the robot.
-    pub(crate) fn replay_arm(&self, caller: String) {
-        let mut step = self.step();
-        step.asked_by = Some(caller);
-        // Whether it succeeds follows from the state.
-        let _ = step.arm();
-    }
-
     /// Disarms the robot: commands are cancelled and the disarm callbacks run. If not everything could be made safe,
     /// the safety state is `error`; with `force`, that state is left even if something still fails. If the robot is
     /// disarmed already, commands that would arm it are cancelled. Without a permit, the caller may not force it, but still disarm.
-    pub(crate) fn disarm(&self, force: bool, caller: &Caller) -> Result<(), DisarmError> {
+    fn disarm(&self, force: bool, caller: &Caller) -> Result<(), DisarmError> {
         if self.0.mode == Mode::Replay {
             return Err(DisarmError::Replay);
         }
@@ -145,6 +137,22 @@ impl Control {
             while self.run_pending_hooks() {}
         }
         outcome.get().cloned().unwrap_or(Err(DisarmError::Unfinished))
+    }
+
+    fn request_stop(&self, caller: &Caller) -> Result<(), Fault> {
+        let _permit = caller.permit()?;
+        self.begin_stop(caller);
+        Ok(())
+    }
+}
+
+impl Control {
+    /// Replays a request to arm the robot.
+    pub(crate) fn replay_arm(&self, caller: String) {
+        let mut step = self.step();
+        step.asked_by = Some(caller);
+        // Whether it succeeds follows from the state.
+        let _ = step.arm();
     }
 
     /// Replays a request to disarm the robot.

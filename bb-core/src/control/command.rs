@@ -1,6 +1,7 @@
-//! Commands with their options, whatever their types.
+//! Commands with their options, whatever their types: what differs from command to command is behind one trait, so that the rest of the
+//! control state is compiled once.
 
-use super::task::{RunningFuture, Value};
+use super::execution::{RunningFuture, Value};
 use crate::component::{Binding, Command, CommandContext, OptionsList, Outcome, Template};
 use crate::declaration::{ParameterValues, Role};
 use crate::event::Refusal;

@@ -1,12 +1,16 @@
 //! Commands as callers see them: listing them, starting them, the reasons for refusing them, and those that hang.
+//!
+//! A start is one entry: the command is refused, or the ones that it cancels are settled and it has its number. Its code is called
+//! afterwards, as an effect. What follows is in [`ending`](super::ending).
 
 use super::command::Arguments;
 use super::effects::Log;
-use super::execution::{Execution, Slot, UntypedExecution};
+use super::execution::{Execution, Slot, Task, UntypedExecution, Value};
 use super::step::Step;
-use super::task::{Task, Value};
 use super::{Control, Limit, Phase, RunningCommand};
-use crate::component::{Bus, Caller, CommandContext, CommandInfo, DynamicExecution, ExecutionInfo};
+use crate::component::{
+    Bus, Caller, CommandContext, CommandControls, CommandInfo, DynamicExecution, ExecutionInfo,
+};
 use crate::declaration::{CommandDeclaration, Role};
 use crate::event::{
     CategoryDeclaration, CommandEvent, CommandPhase, HealthTransition, Refusal, RefusalReason, Right, Safety,
@@ -53,37 +57,6 @@ impl Control {
         self.request(self.step(), number, Some(arguments), caller).map(Execution::new)
     }
 
-    /// Starts the command at `path` with arguments from JSON, on behalf of the caller.
-    pub(crate) fn execute_untyped(
-        &self,
-        path: &str,
-        json: &str,
-        caller: &Caller,
-    ) -> Result<DynamicExecution, Fault> {
-        let number = self.0.declared.commands.iter().position(|declared| declared.path == path);
-        let Some((number, command)) = number.and_then(|number| Some((number, self.0.commands.get(number)?))) else {
-            let paths = self.0.declared.commands.iter().map(|declared| declared.path);
-            let hint = did_you_mean(nearest_path(path, paths));
-            return Err(Fault::new(format!("no command is at `{path}`{hint}")));
-        };
-        if command.0.role() == Role::Arming {
-            caller.check(Right::Arm)?;
-        }
-        let arguments = command.0.arguments(json)?;
-        let step = self.step();
-        let _permit = match caller.permit() {
-            Ok(permit) => permit,
-            Err(fault) => {
-                // It was cancelled while the arguments were created.
-                drop(step);
-                crate::fault::discard(arguments);
-                return Err(fault);
-            }
-        };
-        let slot = self.request(step, number, Some(arguments), caller.name().to_owned())?;
-        Ok(DynamicExecution::new(UntypedExecution(slot)))
-    }
-
     /// Replays a request of a command.
     pub(crate) fn replay_command(&self, number: usize, caller: String) {
         // A command that was refused is refused again.
@@ -101,71 +74,6 @@ impl Control {
         let started = step.start(number, arguments, caller, None);
         step.finish();
         started
-    }
-
-    pub(crate) fn infos(&self) -> Vec<CommandInfo> {
-        let mut running = vec![0; self.0.declared.commands.len()];
-        for execution in self.lock().executions.iter().filter(|execution| !execution.is_lingering()) {
-            running[execution.command] += 1;
-        }
-        let mut infos = Vec::new();
-        for ((declared, command), running) in self.0.declared.commands.iter().zip(&self.0.commands).zip(running) {
-            let (arguments, output) = command.0.shapes();
-            infos.push(CommandInfo {
-                path: declared.path,
-                role: command.0.role(),
-                arguments,
-                default_arguments: command.0.default_arguments(),
-                output,
-                allowed_states: declared.allowed_states,
-                category: self.category(declared).name,
-                timeout: declared.timeout_nanos.map(|nanos| Duration::from_nanos(nanos.max(0).unsigned_abs())),
-                running,
-            });
-        }
-        infos
-    }
-
-    /// The executions that have not ended, in the order of their numbers.
-    pub(crate) fn executions(&self) -> Vec<ExecutionInfo> {
-        let state = self.lock();
-        let (mut infos, mut messages) = (Vec::new(), Vec::new());
-        for execution in state.executions.iter().filter(|execution| !execution.is_lingering()) {
-            let Some(declared) = self.0.declared.commands.get(execution.command) else { continue };
-            infos.push(ExecutionInfo {
-                number: execution.id,
-                path: declared.path,
-                caller: execution.asked_by.clone(),
-                started: execution.started,
-                progress: None,
-            });
-            messages.push(execution.progress.clone());
-        }
-        drop(state);
-        // The payload's code runs without the lock.
-        for (info, message) in infos.iter_mut().zip(messages) {
-            info.progress = message.and_then(|message| member_of(&message.to_json(), "payload"));
-        }
-        infos
-    }
-
-    pub(super) fn keep_progress_of(&self, number: u64, progress: DynamicMessage) {
-        let mut state = self.lock();
-        let execution = state.executions.iter_mut().find(|execution| execution.id == number);
-        let previous = execution.and_then(|execution| execution.progress.replace(progress));
-        drop(state);
-        crate::fault::discard(previous);
-    }
-
-    /// Cancels the execution of that number on behalf of the caller.
-    pub(crate) fn cancel_by(&self, number: u64, caller: &Caller) -> Result<(), Fault> {
-        caller.check_valid()?;
-        if !self.executions().iter().any(|execution| execution.number == number) {
-            return Err(Fault::new(format!("no execution with the number {number} runs")));
-        }
-        let _permit = caller.permit()?;
-        self.cancel(number);
-        Ok(())
     }
 
     /// The first execution of each command whose code has been running for `longest` or longer.
@@ -213,6 +121,107 @@ impl Control {
 
     pub(crate) fn has_ready(&self) -> bool {
         !lock(&self.0.ready).is_empty()
+    }
+}
+
+impl CommandControls for Control {
+    fn commands(&self) -> Vec<CommandInfo> {
+        let mut running = vec![0; self.0.declared.commands.len()];
+        for execution in self.lock().executions.iter().filter(|execution| !execution.is_lingering()) {
+            running[execution.command] += 1;
+        }
+        let mut infos = Vec::new();
+        for ((declared, command), running) in self.0.declared.commands.iter().zip(&self.0.commands).zip(running) {
+            let (arguments, output) = command.0.shapes();
+            infos.push(CommandInfo {
+                path: declared.path,
+                role: command.0.role(),
+                arguments,
+                default_arguments: command.0.default_arguments(),
+                output,
+                allowed_states: declared.allowed_states,
+                category: self.category(declared).name,
+                timeout: declared.timeout_nanos.map(|nanos| Duration::from_nanos(nanos.max(0).unsigned_abs())),
+                running,
+            });
+        }
+        infos
+    }
+
+    fn executions(&self) -> Vec<ExecutionInfo> {
+        let state = self.lock();
+        let (mut infos, mut messages) = (Vec::new(), Vec::new());
+        for execution in state.executions.iter().filter(|execution| !execution.is_lingering()) {
+            let Some(declared) = self.0.declared.commands.get(execution.command) else { continue };
+            infos.push(ExecutionInfo {
+                number: execution.id,
+                path: declared.path,
+                caller: execution.asked_by.clone(),
+                started: execution.started,
+                progress: None,
+            });
+            messages.push(execution.progress.clone());
+        }
+        drop(state);
+        // The payload's code runs without the lock.
+        for (info, message) in infos.iter_mut().zip(messages) {
+            info.progress = message.and_then(|message| member_of(&message.to_json(), "payload"));
+        }
+        infos
+    }
+
+    fn keep_progress(&self, number: u64, progress: DynamicMessage) {
+        let mut state = self.lock();
+        let execution = state.executions.iter_mut().find(|execution| execution.id == number);
+        let previous = execution.and_then(|execution| execution.progress.replace(progress));
+        drop(state);
+        crate::fault::discard(previous);
+    }
+
+    fn cancel(&self, number: u64, caller: &Caller) -> Result<(), Fault> {
+        caller.check_valid()?;
+        if !self.executions().iter().any(|execution| execution.number == number) {
+            return Err(Fault::new(format!("no execution with the number {number} runs")));
+        }
+        let _permit = caller.permit()?;
+        self.cancel_execution(number);
+        Ok(())
+    }
+
+    fn start_command(&self, path: &str, json: &str, caller: &Caller) -> Result<DynamicExecution, Fault> {
+        let number = self.0.declared.commands.iter().position(|declared| declared.path == path);
+        let Some((number, command)) = number.and_then(|number| Some((number, self.0.commands.get(number)?))) else {
+            let paths = self.0.declared.commands.iter().map(|declared| declared.path);
+            let hint = did_you_mean(nearest_path(path, paths));
+            return Err(Fault::new(format!("no command is at `{path}`{hint}")));
+        };
+        if command.0.role() == Role::Arming {
+            caller.check(Right::Arm)?;
+        }
+        let arguments = command.0.arguments(json)?;
+        let step = self.step();
+        let _permit = match caller.permit() {
+            Ok(permit) => permit,
+            Err(fault) => {
+                // It was cancelled while the arguments were created.
+                drop(step);
+                crate::fault::discard(arguments);
+                return Err(fault);
+            }
+        };
+        let slot = self.request(step, number, Some(arguments), caller.name().to_owned())?;
+        Ok(DynamicExecution::new(UntypedExecution(slot)))
+    }
+
+    fn transition(&self, id: u64, name: &str, caller: &Caller) -> Result<(), Fault> {
+        let mut step = self.step();
+        let permitted = step.may_become(name).and_then(|state| Ok((state, caller.permit()?)));
+        if let Ok((state, _)) = permitted {
+            step.line(Event::Transition { execution: id, state: state.to_owned() });
+            step.become_by(id, state);
+        }
+        step.finish();
+        permitted.map(drop)
     }
 }
 

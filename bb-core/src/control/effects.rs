@@ -1,20 +1,23 @@
 //! The effects of a control-state entry that are user code. They run without the lock, on threads that nothing else
 //! waits for.
+//!
+//! Disarm callbacks begin first, then the lines for loggers; only then comes what may block on this thread. Lines are queued under the
+//! lock, so they are in the order of the entries, and at most one thread at a time hands them to loggers.
 
 use super::callbacks::{Callback, Reason, is_awaited};
-use super::execution::{CommandError, Slot};
-use super::task::{EndedCode, Task, Value};
+use super::execution::{CommandError, EndedCode, Slot, Task, Value};
 use super::{Control, Wired};
 use crate::event::{ComponentFault, HealthTransition, Refusal, Safety, SafetyError};
 use crate::fault::{discard, guarded, lock};
 use crate::node::Mode;
-use crate::pubsub::Wakers;
-use crate::schedule::Lane;
+use crate::pubsub::{Alarms, Wakers};
+use crate::schedule::{Lane, Sleeper};
 use crate::telemetry::TelemetryEvent;
-use crate::time::MonotonicTime;
+use crate::time::{Clock, MonotonicTime};
 use std::collections::VecDeque;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
+use std::task::Waker;
 use std::time::{Duration, Instant};
 
 /// Effects of an entry, see the [module](self).
@@ -274,5 +277,28 @@ fn write_log(log: &Log) {
         Log::Refused(refusal) => {
             tracing::warn!(command = refusal.command, %refusal, "command refused");
         }
+    }
+}
+
+/// The clock and the alarms of a run, for subscriptions with a highest rate. They do not keep the control state alive, whose topics have them.
+struct RunAlarms {
+    clock: Clock,
+    sleeper: Sleeper,
+}
+
+impl Alarms for RunAlarms {
+    fn now(&self) -> MonotonicTime {
+        self.clock.now()
+    }
+
+    fn wake_at(&self, time: MonotonicTime, waker: Waker) {
+        self.sleeper.wake_at(time, None, waker);
+    }
+}
+
+impl Control {
+    /// Subscribers are woken as other code of users is.
+    pub(crate) fn alarms(&self) -> impl Alarms + 'static {
+        RunAlarms { clock: self.0.clock.clone(), sleeper: self.0.sleeper.in_lane(Lane::User) }
     }
 }

@@ -7,12 +7,10 @@
 //! - [`Step::settle`] gives the caller the result, whichever way it came.
 
 use super::arming::ARM_WITHIN;
-use super::execution::CommandError;
-use super::machine::IDLE;
-use super::step::Step;
-use super::task::{Ended, EndedCode, Value};
+use super::execution::{CommandError, Ended, EndedCode, Value};
+use super::step::{IDLE, Step};
 use super::{Control, Limit, Phase, RunningCommand};
-use crate::component::{Caller, Outcome};
+use crate::component::Outcome;
 use crate::declaration::Role;
 use crate::event::{CommandPhase, Safety};
 use crate::fault::Fault;
@@ -23,20 +21,8 @@ use std::sync::Arc;
 
 impl Control {
     /// Cancels an execution for its caller.
-    pub(crate) fn cancel(&self, id: u64) {
+    pub(crate) fn cancel_execution(&self, id: u64) {
         self.cut_short(id, Event::Cancel { execution: id }, CommandError::Cancelled);
-    }
-
-    /// The execution of that number, whose caller it is, changes the operational state.
-    pub(crate) fn transition_by(&self, id: u64, name: &str, caller: &Caller) -> Result<(), Fault> {
-        let mut step = self.step();
-        let permitted = step.may_become(name).and_then(|state| Ok((state, caller.permit()?)));
-        if let Ok((state, _)) = permitted {
-            step.line(Event::Transition { execution: id, state: state.to_owned() });
-            step.become_by(id, state);
-        }
-        step.finish();
-        permitted.map(drop)
     }
 
     /// Replays a change of the operational state by an execution.
@@ -250,7 +236,7 @@ impl Step<'_> {
     }
 
     /// The state of that name, if the operational state can be it now.
-    fn may_become(&self, name: &str) -> Result<&'static str, Fault> {
+    pub(super) fn may_become(&self, name: &str) -> Result<&'static str, Fault> {
         let Some(state) = self.state_named(name) else {
             let states = self.control.0.declared.states.iter().copied().chain([IDLE]);
             let hint = did_you_mean(nearest(name, states));
@@ -263,7 +249,7 @@ impl Step<'_> {
     }
 
     /// An execution changes the operational state.
-    fn become_by(&mut self, id: u64, state: &'static str) {
+    pub(super) fn become_by(&mut self, id: u64, state: &'static str) {
         self.state.machine.resting = state;
         let name = self.name_of(id);
         self.publish_machine(name);

@@ -1,7 +1,10 @@
 //! Reports of estimators and other components: health, faults and panics; and the watchdog.
+//!
+//! An estimator is declared lost here, whether or not its island is free, and learns it by an entry. Both count the losses: a report
+//! with an earlier count was made before the estimator knew, and is passed over. In a replay, a report waits until its line comes.
 
-use super::budgets::Verdict;
 use super::effects::Log;
+use super::faults::Verdict;
 use super::step::Step;
 use super::{ComponentOrder, Control};
 use crate::declaration::{ParameterValues, Supervisor};

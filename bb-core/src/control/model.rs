@@ -4,7 +4,7 @@
 //! `error`, and an actuator does not move after it was made safe.
 
 use super::{Control, bare};
-use crate::component::{Caller, Controls, Guardian};
+use crate::component::{Caller, Controls, Guardian, SafetyControls};
 use crate::event::Safety;
 use crate::fault::Fault;
 use crate::node::Mode;

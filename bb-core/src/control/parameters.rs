@@ -1,8 +1,12 @@
 //! Parameters: setting and validating them, and notifying components.
+//!
+//! The options of bound components are validated without the lock, since that is user code. If a parameter that one of them is bound to
+//! was set meanwhile, they are validated again; otherwise one entry sets all values and leaves an entry for each estimator. The others
+//! are told to look.
 
 use super::step::Step;
 use super::{Bound, Control};
-use crate::component::Caller;
+use crate::component::{Caller, ParameterControls};
 use crate::declaration::{ParameterError, ParameterValues};
 use crate::event::{ParameterChange, ParameterValue};
 use crate::journal::{Event, ParameterEntry};
@@ -10,18 +14,13 @@ use crate::message::nearest::{did_you_mean, nearest_path};
 use crate::node::{BindTarget, Check, NodeEntry};
 use std::sync::Arc;
 
-impl Control {
-    pub(crate) fn parameters(&self) -> ParameterValues {
-        self.lock().parameters.clone()
-    }
-
-    pub(crate) fn parameter_at(&self, path: &str) -> Option<ParameterValue> {
+impl ParameterControls for Control {
+    fn parameter(&self, path: &str) -> Option<ParameterValue> {
         let number = self.0.declared.parameters.iter().position(|parameter| parameter.path == path)?;
         self.parameters().all().get(number).cloned()
     }
 
-    /// Sets parameters by path: see [`Self::set_parameters`].
-    pub(crate) fn set_parameters_at(
+    fn set_parameters(
         &self,
         changes: Vec<(String, ParameterValue)>,
         caller: &Caller,
@@ -30,7 +29,13 @@ impl Control {
         for (path, value) in changes {
             entries.push(ParameterEntry { parameter: self.parameter_number(&path)?, value });
         }
-        self.set_parameters(entries, caller)
+        self.set_entries(entries, caller)
+    }
+}
+
+impl Control {
+    pub(crate) fn parameters(&self) -> ParameterValues {
+        self.lock().parameters.clone()
     }
 
     /// The path of a parameter.
@@ -48,11 +53,7 @@ impl Control {
 
     /// Sets parameters at once, in one entry: all of them, or none if one of them, or the options of a component bound to them,
     /// would be out of range.
-    pub(crate) fn set_parameters(
-        &self,
-        changes: Vec<ParameterEntry>,
-        caller: &Caller,
-    ) -> Result<(), ParameterError> {
+    pub(crate) fn set_entries(&self, changes: Vec<ParameterEntry>, caller: &Caller) -> Result<(), ParameterError> {
         let Some(first) = changes.first() else { return Ok(()) };
         let path_of = |number: usize| self.0.declared.parameters.get(number).map_or("?", |declared| declared.path);
         let refuse = |path: &str, message: String| ParameterError { path: path.to_owned(), message };

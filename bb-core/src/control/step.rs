@@ -1,9 +1,14 @@
-//! One entry of the control state.
+//! One entry of the control state, and the operational state that it may change.
+//!
+//! An entry takes the lock ([`Control::step`]), reads the clock, writes its line, changes the state, and releases the lock
+//! ([`Step::finish`]), in this order: lines are in the order of their times and of the changes. What it publishes is queued under the
+//! lock; subscribers are woken and user code is called by its [`Effects`], after the lock is released.
+//!
+//! The operational state is `disarmed`, a declared state, or `idle`, which is `executing` while a command runs.
 
 use super::effects::{Effects, Log};
-use super::machine::Machine;
 use super::{Control, State, StateGuard};
-use crate::event::{ComponentFault, SafetyError, SafetyTransition, StateTransition};
+use crate::event::{ComponentFault, Safety, SafetyError, SafetyTransition, StateTransition};
 use crate::journal::Event;
 use crate::message::{Payload, Stamp};
 use crate::node::{Mode, NodeEntry};
@@ -11,6 +16,40 @@ use crate::pubsub::Topic;
 use crate::time::{MonotonicTime, WallTime};
 use std::sync::atomic::Ordering;
 use std::time::Duration;
+
+/// Motion is inhibited.
+pub(super) const DISARMED: &str = "disarmed";
+/// Armed, and no command runs.
+pub(super) const IDLE: &str = "idle";
+/// Armed, and a command runs.
+pub(super) const EXECUTING: &str = "executing";
+
+/// The parts of the operational state.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Machine {
+    pub(super) safety: Safety,
+    /// The state while no command runs.
+    pub(super) resting: &'static str,
+    /// Number of running commands.
+    pub(super) running: usize,
+}
+
+impl Default for Machine {
+    fn default() -> Self {
+        Self { safety: Safety::Disarmed, resting: IDLE, running: 0 }
+    }
+}
+
+impl Machine {
+    /// Returns the name of the state.
+    pub(super) fn state(&self) -> &'static str {
+        match self.safety {
+            Safety::Armed if self.running > 0 && self.resting == IDLE => EXECUTING,
+            Safety::Armed => self.resting,
+            Safety::Disarmed | Safety::Disarming | Safety::Error => DISARMED,
+        }
+    }
+}
 
 /// The processing of one entry: the lock, the entry's time, and the effects once the lock is released. No user code
 /// may be called while it lives.
@@ -122,5 +161,24 @@ impl Step<'_> {
         drop(state);
         control.0.changed.notify_all();
         effects.run(control);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn idle_becomes_executing_while_commands_run_and_a_declared_state_stays() {
+        let mut machine = Machine::default();
+        assert_eq!(machine.state(), "disarmed");
+        machine.running = 1;
+        assert_eq!(machine.state(), "disarmed", "the command that arms runs while it is disarmed");
+        machine.safety = Safety::Armed;
+        assert_eq!(machine.state(), "executing");
+        machine = Machine { running: 0, resting: "degraded", ..machine };
+        assert_eq!(machine.state(), "degraded");
+        machine.running = 1;
+        assert_eq!(machine.state(), "degraded", "a declared state is never hidden");
     }
 }

@@ -1,26 +1,26 @@
 //! Creating and inspecting the control state, and its topics.
 
-use super::budgets::Budgets;
 use super::callbacks::Hooks;
 use super::command::CommandStatistics;
 use super::effects::Reporter;
-use super::machine::Machine;
+use super::faults::Budgets;
+use super::step::Machine;
 use super::{
     ComponentOrder, Control, Health, Inner, Islands, Parts, State, StateGuard, StateMutex, Summary, Supervised,
     WeakControl,
 };
-use crate::component::{Caller, CommandInfo, Controls, DynamicExecution, ExecutionInfo, Host, RunKind};
-use crate::declaration::{ActuatorDeclaration, CommandDeclaration, ParameterError, RobotDeclaration, Supervisor};
+use crate::component::{Controls, Host, RunKind};
+use crate::declaration::{ActuatorDeclaration, CommandDeclaration, RobotDeclaration, Supervisor};
 use crate::event::{
-    ArmError, CommandEvent, ComponentFault, DisarmError, HealthTransition, ParameterChange, ParameterValue, Safety,
-    SafetyError, SafetyTransition, StateTransition,
+    CommandEvent, ComponentFault, HealthTransition, ParameterChange, Safety, SafetyError, SafetyTransition,
+    StateTransition,
 };
 use crate::fault::{Fault, lock, wake};
 use crate::journal::JournalLine;
 use crate::message::{Origin, Payload};
 use crate::node::Mode;
 use crate::payload::{BeginMotion, EndMotion};
-use crate::pubsub::{AnyTopic, DynamicMessage, Registry, Topic};
+use crate::pubsub::{AnyTopic, Registry, Topic};
 use crate::schedule::{Bell, Deadlines, Pool, Reserve, Sleeper, StopSignal};
 use crate::time::Clock;
 #[cfg(loom)]
@@ -278,62 +278,12 @@ impl Controls for Control {
         self.lock().machine.safety
     }
 
-    fn arm(&self, caller: &Caller) -> Result<(), ArmError> {
-        Self::arm(self, caller)
-    }
-
-    fn disarm(&self, force: bool, caller: &Caller) -> Result<(), DisarmError> {
-        Self::disarm(self, force, caller)
-    }
-
-    fn parameter(&self, path: &str) -> Option<ParameterValue> {
-        self.parameter_at(path)
-    }
-
-    fn set_parameters(
-        &self,
-        changes: Vec<(String, ParameterValue)>,
-        caller: &Caller,
-    ) -> Result<(), ParameterError> {
-        self.set_parameters_at(changes, caller)
-    }
-
-    fn commands(&self) -> Vec<CommandInfo> {
-        self.infos()
-    }
-
-    fn executions(&self) -> Vec<ExecutionInfo> {
-        Self::executions(self)
-    }
-
-    fn cancel(&self, execution: u64, caller: &Caller) -> Result<(), Fault> {
-        self.cancel_by(execution, caller)
-    }
-
-    fn request_stop(&self, caller: &Caller) -> Result<(), Fault> {
-        let _permit = caller.permit()?;
-        self.begin_stop(caller);
-        Ok(())
-    }
-
     fn kind_of_run(&self) -> RunKind {
         match self.0.mode {
             Mode::Real => RunKind::Live,
             Mode::Virtual => RunKind::Simulation,
             Mode::Replay => RunKind::Replay,
         }
-    }
-
-    fn keep_progress(&self, execution: u64, progress: DynamicMessage) {
-        self.keep_progress_of(execution, progress);
-    }
-
-    fn transition(&self, execution: u64, state: &str, caller: &Caller) -> Result<(), Fault> {
-        self.transition_by(execution, state, caller)
-    }
-
-    fn start_command(&self, path: &str, arguments: &str, caller: &Caller) -> Result<DynamicExecution, Fault> {
-        self.execute_untyped(path, arguments, caller)
     }
 }
 

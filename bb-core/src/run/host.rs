@@ -196,7 +196,7 @@ impl Host for RobotHost {
             let is_external =
                 |path: &str| externals.contains(&path) || own.iter().any(|topic| topic.path() == path);
             let is_replaced = |path: &str| self.is_replaced(path);
-            let commands = self.control.infos();
+            let commands = self.controls().commands();
             description = Some(discover(self.robot, run, &all, values.all(), commands, &is_replaced, &is_external));
         });
         let empty =
@@ -214,7 +214,7 @@ impl Host for RobotHost {
 
     fn report_json(&self) -> Option<String> {
         let machine = self.machine.get()?.upgrade()?;
-        Some(machine.report().to_json(self.control.clock().now(), &self.control.executions()))
+        Some(machine.report().to_json(self.control.clock().now(), &self.controls().executions()))
     }
 
     fn json_actuator(&self, path: &str) -> Option<Arc<dyn AcceptsJson>> {

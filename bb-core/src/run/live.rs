@@ -160,7 +160,7 @@ impl<R: Robot> Live<R> {
         value: T,
     ) -> Result<(), ParameterError> {
         let entry = ParameterEntry { parameter: parameter.number, value: value.into_value() };
-        self.settled(|machine| machine.control.set_parameters(vec![entry], &Caller::PROGRAM))
+        self.settled(|machine| machine.control.set_entries(vec![entry], &Caller::PROGRAM))
     }
 
     /// A report of the run so far.

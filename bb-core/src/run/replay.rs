@@ -312,7 +312,7 @@ impl Replayer {
             Event::Command { command, caller } => control.replay_command(command, caller),
             Event::Ended { execution, end } => control.replay_end(execution, end),
             Event::Transition { execution, state } => control.replay_transition(execution, &state),
-            Event::Cancel { execution } => control.cancel(execution),
+            Event::Cancel { execution } => control.cancel_execution(execution),
             Event::Timeout { execution } => control.timed_out(execution),
             Event::Gone { execution } => control.future_dropped(execution),
             Event::Arm { caller } => control.replay_arm(caller),
