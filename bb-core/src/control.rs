@@ -25,7 +25,6 @@ mod registering;
 mod step;
 mod system;
 
-pub(crate) use callbacks::{Inside, is_in_actuator, is_in_command};
 pub use command::{CommandStatistics, Prepared};
 pub(crate) use commands::Hanging;
 pub use execution::{CommandError, Execution};

@@ -10,9 +10,9 @@ mod model;
 #[cfg(all(test, not(loom)))]
 mod tests;
 
+use crate::fault::{Place, enter, leave, times_inside};
 #[cfg(loom)]
 use loom::sync::{Condvar, Mutex, atomic::AtomicUsize};
-use std::cell::RefCell;
 use std::marker::PhantomData;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, PoisonError};
@@ -24,24 +24,6 @@ use std::time::{Duration, Instant};
 const OVER: usize = 1;
 /// A permit in [`Tenure::state`].
 const PERMIT: usize = 2;
-
-#[cfg(not(loom))]
-thread_local! {
-    /// The addresses of the tenures in which the calling thread holds permits, one for each permit.
-    static HELD: RefCell<Vec<usize>> = const { RefCell::new(Vec::new()) };
-}
-#[cfg(loom)]
-loom::thread_local! {
-    static HELD: RefCell<Vec<usize>> = RefCell::new(Vec::new());
-}
-
-/// Calls with the permits of the calling thread; `None` in a thread that ends: values that it drops may still call.
-fn with_held<T>(call: impl FnOnce(&mut Vec<usize>) -> T) -> Option<T> {
-    #[cfg(not(loom))]
-    return HELD.try_with(|held| call(&mut held.borrow_mut())).ok();
-    #[cfg(loom)]
-    return Some(HELD.with(|held| call(&mut held.borrow_mut())));
-}
 
 /// An execution of a command, or a session.
 #[derive(Debug, Default)]
@@ -98,7 +80,7 @@ impl Tenure {
             return Err(Over { session: self.session.as_deref() });
         }
         // Before anything that may fail, so that `leave` finds it.
-        with_held(|held| held.push(self.address()));
+        enter(self.place());
         if let Some(outer) = &self.outer
             && let Err(over) = outer.enter()
         {
@@ -116,11 +98,7 @@ impl Tenure {
     }
 
     fn leave_this(&self) {
-        with_held(|held| {
-            if let Some(index) = held.iter().rposition(|address| *address == self.address()) {
-                held.remove(index);
-            }
-        });
+        leave(self.place());
         let before = self.state.fetch_sub(PERMIT, Ordering::SeqCst);
         if before & OVER != 0 {
             // A thread that waits has seen the permit under this lock, or will see that it is gone.
@@ -138,8 +116,8 @@ impl Tenure {
     pub(super) fn wait(&self, timeout: Duration) -> bool {
         // A time that far away is never reached.
         let deadline = Instant::now().checked_add(timeout);
-        let address = self.address();
-        let own = with_held(|held| held.iter().filter(|other| **other == address).count()).unwrap_or(0);
+        let place = self.place();
+        let own = times_inside(|other| other == place);
         let mut idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner);
         while self.state.load(Ordering::SeqCst) / PERMIT > own {
             let left = match deadline {
@@ -157,8 +135,8 @@ impl Tenure {
         true
     }
 
-    fn address(&self) -> usize {
-        std::ptr::from_ref(self).addr()
+    fn place(&self) -> Place {
+        Place::Permit(std::ptr::from_ref(self).addr())
     }
 }
 

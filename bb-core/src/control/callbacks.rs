@@ -5,15 +5,13 @@
 //!   thread.
 //! - A disarming runs all of them: see [`arming`](super::arming). Some also run [`Apart`] from one: see
 //!   [`registering`](super::registering).
-//! - Code that a disarming waits for does not wait for that disarming: [`is_awaited`] tells the thread that runs it. The same list of
-//!   what a thread is inside of tells a command that stops its robot.
+//! - Code that a disarming waits for does not wait for that disarming: [`is_awaited`] tells the thread that runs it.
 
 use super::{Control, Key, State};
 use crate::component::DisarmHook;
 use crate::event::{HardwareError, HardwareErrorKind, SafetyError};
-use crate::fault::{caught, lock};
+use crate::fault::{Inside, Place, caught, lock, times_inside};
 use crate::schedule::Reserved;
-use std::cell::RefCell;
 use std::sync::{Arc, Mutex};
 
 /// One disarm callback.
@@ -75,7 +73,7 @@ impl Callback {
         let mut reasons = vec![reason];
         while !reasons.is_empty() {
             let failed = {
-                let _inside = Inside::callback(control.id());
+                let _inside = Inside::new(Place::Callback(control.id()));
                 caught(|| (self.code)()).err()
             };
             let error = failed.map(|failed| SafetyError {
@@ -272,83 +270,12 @@ impl State {
     }
 }
 
-thread_local! {
-    /// The code of robots that the calling thread is inside of.
-    static INSIDE: RefCell<Vec<Place>> = const { RefCell::new(Vec::new()) };
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Place {
-    /// The address of the robot's state.
-    robot: usize,
-    code: Code,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Code {
-    Callback,
-    /// The code of the actuator at that address.
-    Actuator(usize),
-    Command,
-}
-
 /// Returns whether the calling thread runs code of `robot` that its disarming waits for: a disarm callback, or an actuator's code,
 /// which the actuator's callback waits for.
 pub(crate) fn is_awaited(robot: usize) -> bool {
-    is_inside(|place| place.robot == robot && place.code != Code::Command)
-}
-
-/// Returns whether the calling thread runs a disarm callback of `robot`.
-pub(super) fn is_callback(robot: usize) -> bool {
-    is_inside(|place| place.robot == robot && place.code == Code::Callback)
-}
-
-/// Returns whether the calling thread runs code of a command of `robot`.
-pub(crate) fn is_in_command(robot: usize) -> bool {
-    is_inside(|place| place.robot == robot && place.code == Code::Command)
-}
-
-/// Returns whether the calling thread is inside the actuator.
-pub(crate) fn is_in_actuator(actuator: usize) -> bool {
-    is_inside(|place| place.code == Code::Actuator(actuator))
-}
-
-fn is_inside(fits: impl Fn(&Place) -> bool) -> bool {
-    INSIDE.with_borrow(|inside| inside.iter().any(fits))
-}
-
-/// The calling thread is inside such code until this is dropped.
-#[derive(Debug)]
-pub(crate) struct Inside(Place);
-
-impl Inside {
-    fn callback(robot: usize) -> Self {
-        Self::new(Place { robot, code: Code::Callback })
-    }
-
-    pub(super) fn command(robot: usize) -> Self {
-        Self::new(Place { robot, code: Code::Command })
-    }
-
-    /// `robot` is [`Control::id`].
-    pub(crate) fn actuator(robot: usize, actuator: usize) -> Self {
-        Self::new(Place { robot, code: Code::Actuator(actuator) })
-    }
-
-    fn new(place: Place) -> Self {
-        INSIDE.with_borrow_mut(|inside| inside.push(place));
-        Self(place)
-    }
-}
-
-impl Drop for Inside {
-    fn drop(&mut self) {
-        INSIDE.with_borrow_mut(|inside| {
-            if let Some(index) = inside.iter().rposition(|place| *place == self.0) {
-                inside.remove(index);
-            }
-        });
-    }
+    let is_awaited =
+        |place| matches!(place, Place::Callback(of) | Place::Actuator { robot: of, .. } if of == robot);
+    times_inside(is_awaited) > 0
 }
 
 #[cfg(all(test, not(loom)))]
@@ -358,20 +285,6 @@ mod tests {
     use crate::node::Mode;
     use std::sync::mpsc;
     use std::time::Duration;
-
-    #[test]
-    fn a_thread_knows_whose_code_it_is_inside_of() {
-        const ROBOT: usize = usize::MAX;
-        const ACTUATOR: usize = usize::MAX - 2;
-        assert!(!is_awaited(ROBOT));
-        let callback = Inside::callback(ROBOT);
-        assert!(is_awaited(ROBOT) && !is_in_actuator(ACTUATOR));
-        let actuator = Inside::actuator(ROBOT, ACTUATOR);
-        drop(callback);
-        assert!(is_awaited(ROBOT) && is_in_actuator(ACTUATOR) && !is_awaited(ACTUATOR));
-        drop(actuator);
-        assert!(!is_awaited(ROBOT) && !is_in_actuator(ACTUATOR));
-    }
 
     /// A callback that may hang does not use the thread that is kept for another component's callback.
     #[test]

@@ -6,9 +6,8 @@
 //! - The first result counts; one that comes later is dropped without the lock.
 
 use super::WeakControl;
-use super::callbacks::Inside;
 use crate::component::{AnyExecution, Outcome};
-use crate::fault::{Fault, caught, discard, lock};
+use crate::fault::{Fault, Inside, Place, caught, discard, lock};
 use crate::journal::End;
 use crate::schedule::Lane;
 use crate::time::MonotonicTime;
@@ -129,7 +128,7 @@ impl Task {
             state.entered = Some(control.clock().now());
         }
         drop(state);
-        let inside = Inside::command(control.id());
+        let inside = Inside::new(Place::Command(control.id()));
         let ended = match code {
             // A late wake: another thread is polling it, or it has ended.
             Code::Polled | Code::Done => {

@@ -8,12 +8,12 @@
 //! - They may take [`DISARM_WITHIN`]. Until they have returned, the robot is not armed, and the component is not started again.
 
 use super::arming::{DISARM_WITHIN, late_at};
-use super::callbacks::{Apart, Callback, Forgotten, Owner, Reason, is_awaited, is_callback};
+use super::callbacks::{Apart, Callback, Forgotten, Owner, Reason, is_awaited};
 use super::step::Step;
 use super::{Control, Key, Limit, State};
 use crate::component::{DisarmHook, Guardian};
 use crate::event::{HardwareError, Safety, SafetyError};
-use crate::fault::{Failed, Fault, discard};
+use crate::fault::{Failed, Fault, Place, discard, is_inside};
 use crate::journal::Event;
 use crate::node::Mode;
 use crate::schedule::Reserved;
@@ -36,7 +36,7 @@ impl Control {
             _ => true,
         };
         // A callback that registers another: that one runs at the next disarming.
-        let is_callback = is_callback(self.id());
+        let is_callback = is_inside(Place::Callback(self.id()));
         let is_last = step.state.is_stopped();
         if !is_known || is_callback && is_last {
             step.finish();

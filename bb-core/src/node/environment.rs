@@ -8,7 +8,7 @@ use super::shared::SharedNode;
 use crate::component::replacement::{Replacement, Replacements};
 use crate::component::{Binding, Guardian, Options, Template};
 use crate::declaration::{EstimatorDeclaration, ParameterValues};
-use crate::fault::{Failed, Fault, lock};
+use crate::fault::{Failed, Fault, Place, lock};
 use crate::joints::Joints;
 use crate::journal::{Journal, Waiting};
 use crate::lifecycle::Supervision;
@@ -68,10 +68,6 @@ pub(crate) enum Mode {
     /// A replay of a journal.
     Replay,
 }
-
-/// Identifier of a run, see [`Environment::robot`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct RobotId(pub(super) usize);
 
 /// The first component that could not start.
 #[derive(Debug)]
@@ -361,10 +357,10 @@ impl Environment {
         self.shared().parts.start
     }
 
-    /// Identifies the robot, as long as it lives.
+    /// The place that a thread is inside of while it holds an island of the robot.
     #[inline]
-    pub(super) fn robot(&self) -> RobotId {
-        RobotId(Arc::as_ptr(&self.0) as usize)
+    pub(super) fn place(&self) -> Place {
+        Place::Island(Arc::as_ptr(&self.0).addr())
     }
 
     #[inline]

@@ -17,7 +17,6 @@
 mod alone;
 mod any;
 mod inbox;
-mod inside;
 mod member;
 #[cfg(all(test, loom))]
 mod model;
@@ -29,13 +28,13 @@ pub use self::any::IslandOf;
 use self::any::Placed;
 pub(crate) use self::any::{AnyIsland, Replayed};
 use self::inbox::Inbox;
-use self::inside::{Within, is_inside};
 pub use self::member::{Member, act, alone, emit, enter, hold, island, receive, start};
 use self::processing::{deliver, dropped};
 use super::act::Act;
 use super::environment::Environment;
 use super::{NodeEntry, Turn};
 use crate::declaration::{EstimatorDeclaration, IslandDeclaration};
+use crate::fault::{Within, is_inside};
 use crate::journal::Event;
 use crate::pubsub::DynamicMessage;
 use crate::time::MonotonicTime;
@@ -341,7 +340,7 @@ impl<S: IslandState> Island<S> {
         line: Event,
         call: impl FnOnce(&mut S, &Turn<'_>) -> T,
     ) -> Result<T, CallError> {
-        if is_inside(wiring.environment().robot()) {
+        if is_inside(wiring.environment().place()) {
             return Err(CallError::Inside);
         }
         let Some(mut state) = self.hold(wiring, LONGEST_CALL) else { return Err(CallError::Busy) };
@@ -362,7 +361,7 @@ impl<S: IslandState> Island<S> {
             Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
             Err(TryLockError::WouldBlock) => return None,
         };
-        Some(Within::new(state, wiring.environment().robot()))
+        Some(Within::new(state, wiring.environment().place()))
     }
 
     /// Returns whether a thread holds the island. The caller does not want to enter.

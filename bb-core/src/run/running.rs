@@ -5,8 +5,7 @@ use super::source::OpenSources;
 use super::threads::{self, Thread};
 use super::{Live, Report, Robot, StartError};
 use crate::component::Caller;
-use crate::control::is_in_command;
-use crate::fault::lock;
+use crate::fault::{Place, is_inside, lock};
 use crate::schedule::Reserved;
 use std::fmt;
 use std::ops::Deref;
@@ -104,7 +103,8 @@ impl Threads {
     fn deadline(&self, start: Instant) -> Instant {
         let machine = &self.machine;
         // If the caller is code of the robot itself, that code cannot end before this call returns.
-        let is_inside = is_in_command(machine.control.id()) || machine.islands().any(|island| island.is_inside());
+        let is_inside =
+            is_inside(Place::Command(machine.control.id())) || machine.islands().any(|island| island.is_inside());
         if self.has_waited || is_inside {
             return Instant::now() + GRACE;
         }

@@ -9,7 +9,9 @@ use crate::time::MonotonicTime;
 use std::sync::Arc;
 
 #[cfg(not(loom))]
-use super::{Island, IslandWiring, RELAXED, inbox::Pending, inside::is_inside, processing::for_all};
+use super::{Island, IslandWiring, RELAXED, inbox::Pending, processing::for_all};
+#[cfg(not(loom))]
+use crate::fault::is_inside;
 #[cfg(not(loom))]
 use crate::node::act::Act;
 #[cfg(not(loom))]
@@ -191,7 +193,7 @@ where
 
     fn is_inside(&self) -> bool {
         let wiring = &*self.0;
-        is_inside(wiring.environment().robot())
+        is_inside(wiring.environment().place())
     }
 
     fn has_retired(&self) -> bool {

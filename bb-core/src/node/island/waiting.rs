@@ -1,7 +1,7 @@
 //! Threads that wait for an island: callers, and publishers that wait for room in its inbox.
 
-use super::inside::is_inside;
 use super::{Held, Island, IslandState, IslandWiring as _};
+use crate::fault::is_inside;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
@@ -12,7 +12,7 @@ impl<S: IslandState> Island<S> {
     /// Back-pressure: waits until the holder drains the inbox. Returns `false` at once if the holder hangs or if this thread
     /// is inside an island of this robot. `bytes` are those of the message that is to be added.
     pub(super) fn wait_for_room(&self, wiring: &S::Wiring, bytes: usize) -> bool {
-        if self.hangs.load(Ordering::Relaxed) || is_inside(wiring.environment().robot()) {
+        if self.hangs.load(Ordering::Relaxed) || is_inside(wiring.environment().place()) {
             return false;
         }
         self.waiting.fetch_add(1, Ordering::SeqCst);

@@ -1,8 +1,7 @@
 //! An actuator's state, which only one thread at a time may enter. Its code must not wait for itself: on the thread that runs it, an
 //! attempt to enter once more is refused. Code of several actuators that wait for each other on several threads hangs.
 
-use crate::control::{Inside, is_in_actuator};
-use crate::fault::lock;
+use crate::fault::{Place, Within, is_inside, lock};
 use std::sync::{Mutex, MutexGuard, TryLockError};
 
 /// Lock around an actuator's state, see the [module](self). Its address identifies the actuator, so it must not be moved while it is used.
@@ -12,12 +11,8 @@ pub(super) struct Guarded<S> {
     state: Mutex<S>,
 }
 
-/// Keeps the calling thread inside an actuator until dropped.
-pub(super) struct Held<'a, S> {
-    // Declared before the lock: the thread leaves before the lock is released.
-    _inside: Inside,
-    state: MutexGuard<'a, S>,
-}
+/// The state of an actuator that the calling thread is inside of.
+pub(super) type Held<'a, S> = Within<MutexGuard<'a, S>>;
 
 impl<S> Guarded<S> {
     pub(super) fn new(robot: usize, state: S) -> Self {
@@ -26,7 +21,7 @@ impl<S> Guarded<S> {
 
     /// Waits until no other thread is inside. Returns `None` if the calling thread would wait for its own code.
     pub(super) fn enter(&self) -> Option<Held<'_, S>> {
-        if is_in_actuator(self.address()) {
+        if is_inside(self.place()) {
             return None;
         }
         Some(self.held(lock(&self.state)))
@@ -42,24 +37,11 @@ impl<S> Guarded<S> {
     }
 
     fn held<'a>(&self, state: MutexGuard<'a, S>) -> Held<'a, S> {
-        Held { _inside: Inside::actuator(self.robot, self.address()), state }
+        Within::new(state, self.place())
     }
 
-    fn address(&self) -> usize {
-        std::ptr::from_ref(&self.state).addr()
-    }
-}
-
-impl<S> std::ops::Deref for Held<'_, S> {
-    type Target = S;
-    fn deref(&self) -> &S {
-        &self.state
-    }
-}
-
-impl<S> std::ops::DerefMut for Held<'_, S> {
-    fn deref_mut(&mut self) -> &mut S {
-        &mut self.state
+    fn place(&self) -> Place {
+        Place::Actuator { robot: self.robot, actuator: std::ptr::from_ref(&self.state).addr() }
     }
 }
 
