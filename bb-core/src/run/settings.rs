@@ -75,7 +75,7 @@ impl Draft {
     }
 
     fn set_from_toml(&mut self, name: &str, text: &str) -> Result<(), SettingsError> {
-        let names = assign::names(self);
+        let names = assign::names(self.robot, &mut self.options);
         let known = |path: &str| match (names.get(path).is_some(), assign::is_beginning(&names, path)) {
             (true, true) => file::Known::Both,
             (true, false) => file::Known::Setting,

@@ -43,12 +43,11 @@ impl Assignment {
 }
 
 /// The paths of all settings.
-pub(super) fn names(draft: &mut Draft) -> Sorted<String, ()> {
-    let robot = draft.robot;
+pub(super) fn names(robot: &RobotDeclaration, options: &mut OptionsList) -> Sorted<String, ()> {
     let paths = robot.component_paths().into_iter().enumerate();
     let mut names = Sorted::default();
     for (component, path) in paths {
-        for field in fields(&mut draft.options, component) {
+        for field in fields(options, component) {
             names.insert(format!("{path}/{}", field.name), ());
         }
     }
@@ -56,6 +55,14 @@ pub(super) fn names(draft: &mut Draft) -> Sorted<String, ()> {
         names.insert(declared.path.to_owned(), ());
     }
     names
+}
+
+/// The tables of the settings at `path`, from the outermost: `sensor`, `base` and `imu`. If one of these is itself a setting, such as an
+/// option with the name of a nested estimator, the whole path is one name.
+pub(super) fn tables<'a>(names: &Sorted<String, ()>, path: &'a str) -> Vec<&'a str> {
+    let mut ends = path.match_indices('/').map(|(end, _)| end).chain([path.len()]);
+    let is_in_the_way = ends.any(|end| names.get(&path[..end]).is_some());
+    if is_in_the_way { vec![path] } else { path.split('/').collect() }
 }
 
 /// Returns whether a setting is below this path.
@@ -68,7 +75,7 @@ pub(super) fn is_beginning(names: &Sorted<String, ()>, path: &str) -> bool {
 /// Sets all of `assignments`, or none if one of them is wrong.
 pub(super) fn assign(draft: &mut Draft, assignments: &[Assignment]) -> Result<(), SettingsError> {
     let robot = draft.robot;
-    let names = names(draft);
+    let names = names(robot, &mut draft.options);
     let paths = robot.component_paths();
     let mut problems = Vec::new();
     let mut unknown_names = 0;

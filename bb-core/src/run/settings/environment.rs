@@ -67,7 +67,7 @@ impl Draft {
         }
         // Settings by the names of their variables in capitals.
         let mut known: Sorted<String, Vec<String>> = Sorted::default();
-        for (path, ()) in names(self).into_entries() {
+        for (path, ()) in names(self.robot, &mut self.options).into_entries() {
             known.get_or_insert(variable(&path).to_uppercase(), Vec::new).push(path);
         }
         let mut assignments: Vec<Assignment> = Vec::new();

@@ -1,6 +1,6 @@
 //! All settings of a robot, as a TOML file.
 
-use super::assign::{NULL_TEXT, names};
+use super::assign::{NULL_TEXT, names, tables};
 use crate::component::{OptionField, SettingKind};
 use crate::declaration::{Range, unit};
 use crate::event::ParameterValue;
@@ -35,18 +35,13 @@ struct Line {
 
 pub(super) fn list(draft: &mut Draft) -> SettingsList {
     let robot = draft.robot;
-    let names = names(draft);
-    // A table with the same name as a setting would define that name twice.
+    let names = names(robot, &mut draft.options);
     let header = |path: &str| {
-        let is_in_the_way =
-            path.match_indices('/').any(|(end, _)| names.get(&path[..end]).is_some()) || names.get(path).is_some();
-        if is_in_the_way {
-            format!("[{}]", to_json(&path.to_owned()))
-        } else {
-            format!("[{}]", path.replace('/', "."))
-        }
+        let quoted = |name: &str| if name.contains('/') { to_json(&name.to_owned()) } else { name.to_owned() };
+        let names: Vec<String> = tables(&names, path).into_iter().map(quoted).collect();
+        format!("[{}]", names.join("."))
     };
-    let mut tables = Vec::new();
+    let mut listed = Vec::new();
     let mut declared = (draft.declared_options)();
     let paths = robot.component_paths();
     for (number, path) in paths.into_iter().enumerate() {
@@ -80,7 +75,7 @@ pub(super) fn list(draft: &mut Draft) -> SettingsList {
             })
             .collect();
         if !settings.is_empty() {
-            tables.push(Table { header: header(path), settings });
+            listed.push(Table { header: header(path), settings });
         }
     }
     for (declared, value) in robot.parameters.iter().zip(&draft.parameters) {
@@ -94,12 +89,12 @@ pub(super) fn list(draft: &mut Draft) -> SettingsList {
         let limits = limits(declared.range, "");
         let line = Line { name, doc: declared.doc, value: Ok(value), limits };
         let header = header(group);
-        match tables.iter_mut().find(|table| table.header == header) {
+        match listed.iter_mut().find(|table: &&mut Table| table.header == header) {
             Some(table) => table.settings.push(line),
-            None => tables.push(Table { header, settings: vec![line] }),
+            None => listed.push(Table { header, settings: vec![line] }),
         }
     }
-    SettingsList { tables }
+    SettingsList { tables: listed }
 }
 
 fn limits_of(field: &OptionField) -> String {

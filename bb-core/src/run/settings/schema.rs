@@ -1,5 +1,6 @@
 //! The JSON Schema of a robot's settings: for editors, and for programs that write them.
 
+use super::assign::{names, tables};
 use crate::component::{OptionField, OptionsList, Setting, SettingKind};
 use crate::declaration::RobotDeclaration;
 use crate::declaration::schema::{number, parameter_schema, quantity, with_notes};
@@ -10,7 +11,7 @@ use crate::sorted::Sorted;
 
 pub(crate) fn settings_schema(robot: &RobotDeclaration, mut options: OptionsList) -> String {
     let mut definitions = Definitions::default();
-    let mut root = Sorted::default();
+    let (mut root, names) = (Sorted::default(), names(robot, &mut options));
     for (number, path) in robot.component_paths().into_iter().enumerate() {
         let Some(options) = options.any(number) else { continue };
         for (index, field) in options.fields().iter().enumerate() {
@@ -18,12 +19,12 @@ pub(crate) fn settings_schema(robot: &RobotDeclaration, mut options: OptionsList
             if bound_to(robot, number, field.name).is_none()
                 && let Some(schema) = of_option(field, &*setting, &mut definitions)
             {
-                insert(&mut root, &format!("{path}/{}", field.name), schema);
+                insert(&mut root, &names, &format!("{path}/{}", field.name), schema);
             }
         }
     }
     for declared in robot.parameters {
-        insert(&mut root, declared.path, parameter_schema(declared));
+        insert(&mut root, &names, declared.path, parameter_schema(declared));
     }
     document(&member("title", robot.name), &object(&root), definitions)
 }
@@ -34,32 +35,16 @@ enum Node {
     Table(Sorted<String, Node>),
 }
 
-/// Puts a schema in its place: `sensor/base/imu/rate` in the tables `sensor`, `base` and `imu`. If one of these is
-/// itself a setting, such as an option with the name of a nested estimator, the whole path is one name, as
-/// `SettingsList` writes it.
-fn insert(root: &mut Sorted<String, Node>, path: &str, schema: String) {
+/// Puts a schema in its place, the table that a file has for it.
+fn insert(root: &mut Sorted<String, Node>, names: &Sorted<String, ()>, path: &str, schema: String) {
     let (above, last) = path.rsplit_once('/').unwrap_or(("", path));
-    let above: Vec<&str> = if is_through_setting(root, above) { vec![above] } else { above.split('/').collect() };
     let mut table = root;
-    for name in above {
+    for name in tables(names, above) {
         let node = table.get_or_insert(name.to_owned(), || Node::Table(Sorted::default()));
         let Node::Table(inner) = node else { return };
         table = inner;
     }
     table.insert(last.to_owned(), Node::Setting(schema));
-}
-
-/// Returns whether a table at this path would collide with a setting.
-fn is_through_setting(root: &Sorted<String, Node>, path: &str) -> bool {
-    let mut table = root;
-    for name in path.split('/') {
-        match table.get(name) {
-            Some(Node::Table(inner)) => table = inner,
-            Some(Node::Setting(_)) => return true,
-            None => return false,
-        }
-    }
-    false
 }
 
 fn object(table: &Sorted<String, Node>) -> String {
