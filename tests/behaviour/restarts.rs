@@ -332,6 +332,7 @@ fn panic(_: &mut f64, number: f64) -> Replied {
 
 #[test]
 fn a_sibling_that_is_restarted_from_above_says_so() -> Result<(), StartError> {
+    let _alone = alone();
     let builder = Workshop::builder();
     let (health, tally) =
         (builder.subscribe(system::Health), builder.subscribe(workshop::sensor::base::beside::tally));
