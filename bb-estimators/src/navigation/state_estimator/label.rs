@@ -17,9 +17,9 @@ pub enum SourceLabel {
     /// The IMU alone, or a camera that has had no position since it was last lost. The covariance grows.
     #[default]
     DeadReckoned,
-    /// A recent anchor, or a recent fix of a trusted receiver.
+    /// A recent anchor, or a recent fix of a trusted receiver, which bounds the position as well. The age of the anchor tells which.
     SatelliteAnchored,
-    /// A camera, since the last anchor.
+    /// A camera, since the last of these.
     VisualPropagated,
 }
 
@@ -43,19 +43,27 @@ impl fmt::Display for SourceLabel {
 /// The state machine of the label. It can be queried for any time, and so stores times instead of a label.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Sources {
-    /// Time of the newest pose or position in the world.
+    /// Time of the newest anchor.
     anchored_ns: Option<i64>,
+    /// Time of the newest of these or of the receiver's fixes.
+    located_ns: Option<i64>,
     /// Time of the newest of these or of the relative poses.
     seen_ns: Option<i64>,
-    /// `true` if there was an anchor since the camera was last lost.
+    /// `true` if there was an anchor or a fix since the camera was last lost.
     is_grounded: bool,
 }
 
 impl Sources {
-    /// A pose or a position in the world was fused.
+    /// An anchor was fused.
     pub(super) fn anchored(&mut self, time_ns: i64, params: &StateEstimatorParams) {
-        self.lose(time_ns, params);
         self.anchored_ns = self.anchored_ns.max(Some(time_ns));
+        self.located(time_ns, params);
+    }
+
+    /// An anchor or a fix of the receiver was fused.
+    pub(super) fn located(&mut self, time_ns: i64, params: &StateEstimatorParams) {
+        self.lose(time_ns, params);
+        self.located_ns = self.located_ns.max(Some(time_ns));
         self.seen_ns = self.seen_ns.max(Some(time_ns));
         self.is_grounded = true;
     }
@@ -76,10 +84,10 @@ impl Sources {
 
     /// The label at a time.
     pub(super) fn label(&self, time_ns: i64, params: &StateEstimatorParams) -> SourceLabel {
-        let is_recent = self.age_ns(time_ns).is_some_and(|age_ns| age_ns <= ns(params.anchor_age));
+        let is_recent = |at_ns: i64| time_ns.saturating_sub(at_ns) <= ns(params.anchor_age);
         match self.is_grounded && self.is_seen(time_ns, params) {
             false => SourceLabel::DeadReckoned,
-            true if is_recent => SourceLabel::SatelliteAnchored,
+            true if self.located_ns.is_some_and(is_recent) => SourceLabel::SatelliteAnchored,
             true => SourceLabel::VisualPropagated,
         }
     }
@@ -115,6 +123,9 @@ mod tests {
         assert_eq!(label(&sources, 9), SourceLabel::DeadReckoned, "only an anchor leads out");
         sources.anchored(10 * SECOND, &params);
         assert_eq!(label(&sources, 10), SourceLabel::SatelliteAnchored);
-        assert_eq!(sources.age_ns(12 * SECOND), Some(2 * SECOND));
+        sources.located(11 * SECOND, &params);
+        (12..=14).for_each(|second| sources.seen(second * SECOND, &params));
+        assert_eq!(label(&sources, 14), SourceLabel::SatelliteAnchored, "by a fix that is 3 s old");
+        assert_eq!(sources.age_ns(14 * SECOND), Some(4 * SECOND), "a fix is no anchor");
     }
 }

@@ -28,7 +28,7 @@ pub struct EstimatorOutput {
     pub covariance: Matrix6<f64>,
     /// Source of the estimate.
     pub label: SourceLabel,
-    /// Time since the last anchor, or since the last fix of a trusted receiver. `None` before the first.
+    /// Time since the last anchor. `None` before the first: fixes of the receiver do not count.
     pub anchor_age_ms: Option<u64>,
     /// `true` if later measurements have corrected it.
     pub smoothed: bool,
@@ -48,7 +48,7 @@ pub struct Quality {
     pub label: SourceLabel,
     /// Frobenius norm of the covariance, of m² and rad².
     pub covariance_norm: f64,
-    /// Time since the last anchor, or since the last fix of a trusted receiver. `None` before the first.
+    /// Time since the last anchor. `None` before the first: fixes of the receiver do not count.
     pub anchor_age_ms: Option<u64>,
     /// Normalised innovation squared of the last measurement, over its dimension. It is 1 on average if the estimate is consistent.
     pub nis: Option<f64>,

@@ -87,7 +87,7 @@ params! {
         longest_prediction: f64 = 0.2, in 0.0..=1.0, unit "s";
         /// Time for which estimates may be missing before the flight controller's own IMU takes over.
         fallback_after: f64 = 3.0, in 0.1..=60.0, unit "s";
-        /// An anchor older than this demotes to `visual_propagated`.
+        /// Anchors and fixes of a trusted receiver that are older than this demote to `visual_propagated`.
         anchor_age: f64 = 3.0, in 0.1..=600.0, unit "s";
         /// Without a camera's, or a satellite's, measurement for this time it is dead reckoning.
         visual_loss: f64 = 1.0, in 0.05..=60.0, unit "s";

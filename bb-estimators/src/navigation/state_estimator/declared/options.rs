@@ -29,7 +29,7 @@ pub struct FlightOptions {
     /// Heading of the link's x axis at take-off, from east counter-clockwise.
     #[option(default = 0.0, range = -7.0..=7.0, unit = "rad")]
     pub heading: f64,
-    /// An anchor older than this demotes to `visual_propagated`.
+    /// Anchors and fixes of a trusted receiver that are older than this demote to `visual_propagated`.
     #[option(default = 3.0, range = 0.1..=600.0, unit = "s")]
     pub anchor_age: f64,
     /// Largest delay of an input behind the newest sample of the IMU with which it is still placed where it belongs.

@@ -39,7 +39,7 @@ pub struct FlightEstimate {
     pub covariance: Matrix6<f64>,
     /// Source of the estimate.
     pub label: SourceLabel,
-    /// Time since the last anchor, or since the last fix of a trusted receiver, ms.
+    /// Time since the last anchor, ms. `None` before the first: fixes of the receiver do not count.
     pub anchor_age_ms: Option<u64>,
     /// `true` if later measurements have corrected it.
     pub smoothed: bool,

@@ -189,7 +189,7 @@ impl<F: ProvidedFactor> Engine<F> {
         let trust = if is_alone { Trust::Believed } else { Trust::Doubted };
         let result = self.measure(&Measured::Gnss(measured, velocity, trust));
         if self.is_in(&result) {
-            self.sources.anchored(fix.time_ns, &config.params);
+            self.sources.located(fix.time_ns, &config.params);
         }
         Ok(Some(result?))
     }

@@ -4,21 +4,23 @@ use super::flight::SECOND;
 use super::*;
 use crate::navigation::ImuMean;
 
-/// Labels with their times, s, of a flight with camera and anchors only at some times.
+/// Labels with their times, s, of a flight with camera, anchors and fixes only at some times.
 fn timeline(
     strategy: StrategyKind,
     sees: impl Fn(i64) -> bool,
     anchors: impl Fn(i64) -> bool,
+    fixes: impl Fn(i64) -> bool,
 ) -> (Vec<(i64, SourceLabel)>, Vec<EstimatorOutput>) {
     let flight = Flight::new(40, 3);
     let mut estimator = started(&flight, strategy);
     let mut outputs = Vec::new();
-    for sent in &flight.sent(true, true, false) {
+    for sent in &flight.sent(true, true, true) {
         let time_ns = sent.time_ns();
         let second = time_ns / SECOND;
         match sent {
             Sent::Vio(_) if !sees(second) => continue,
             Sent::Anchor(_) if !anchors(second) => continue,
+            Sent::Fix(_) if !fixes(second) => continue,
             // After a loss, the first relative pose has no keyframe, or fits badly.
             sent => ignore(sent.to(&mut estimator)),
         }
@@ -34,7 +36,7 @@ fn timeline(
 #[test]
 fn the_label_goes_from_dead_reckoned_to_anchored_to_visual_and_back() {
     for strategy in StrategyKind::ALL {
-        let (labels, outputs) = timeline(*strategy, |_| true, |second| !(5..15).contains(&second));
+        let (labels, outputs) = timeline(*strategy, |_| true, |second| !(5..15).contains(&second), |_| false);
         use SourceLabel::{SatelliteAnchored, VisualPropagated};
         assert_eq!(labels, [(1, SatelliteAnchored), (7, VisualPropagated), (15, SatelliteAnchored)]);
         for output in outputs {
@@ -44,11 +46,32 @@ fn the_label_goes_from_dead_reckoned_to_anchored_to_visual_and_back() {
     }
 }
 
+/// A trusted receiver bounds the position as anchors do, but the age tells that there are none.
+#[test]
+fn fixes_keep_the_label_and_not_the_age_of_the_anchor() {
+    for strategy in StrategyKind::ALL {
+        let (labels, outputs) = timeline(*strategy, |_| true, |second| second < 5, |second| second >= 6);
+        assert_eq!(labels, [(1, SourceLabel::SatelliteAnchored)]);
+        let last_ns = 4 * SECOND + 3 * super::flight::STEP;
+        for output in outputs.iter().filter(|output| output.time_ns >= 5 * SECOND) {
+            let age_ns = output.anchor_age_ms.map(|age_ms| age_ms as i64 * 1_000_000);
+            assert_eq!(age_ns, Some(output.time_ns - last_ns), "{output:?}");
+        }
+        let (labels, outputs) = timeline(*strategy, |_| true, |_| false, |_| true);
+        assert_eq!(labels, [(0, SourceLabel::SatelliteAnchored)]);
+        assert!(outputs.iter().all(|output| output.anchor_age_ms.is_none()));
+    }
+}
+
 #[test]
 fn visual_loss_demotes_to_dead_reckoning_until_the_next_anchor() {
     for strategy in StrategyKind::ALL {
-        let (labels, _) =
-            timeline(*strategy, |second| !(10..20).contains(&second), |second| !(10..25).contains(&second));
+        let (labels, _) = timeline(
+            *strategy,
+            |second| !(10..20).contains(&second),
+            |second| !(10..25).contains(&second),
+            |_| false,
+        );
         use SourceLabel::{DeadReckoned, SatelliteAnchored};
         assert_eq!(labels, [(1, SatelliteAnchored), (10, DeadReckoned), (25, SatelliteAnchored)]);
     }
@@ -58,8 +81,12 @@ fn visual_loss_demotes_to_dead_reckoning_until_the_next_anchor() {
 fn while_dead_reckoning_the_covariance_grows_monotonically() {
     for strategy in StrategyKind::ALL {
         // The camera returns at 20 s and improves the velocity. Only the anchor determines the position.
-        let (_, outputs) =
-            timeline(*strategy, |second| !(10..20).contains(&second), |second| !(10..25).contains(&second));
+        let (_, outputs) = timeline(
+            *strategy,
+            |second| !(10..20).contains(&second),
+            |second| !(10..25).contains(&second),
+            |_| false,
+        );
         let lost: Vec<_> = outputs
             .iter()
             .filter(|output| output.label == SourceLabel::DeadReckoned && output.time_ns > SECOND * 5)
