@@ -98,6 +98,8 @@ pub(crate) struct EchoOptions {
     pub(crate) info: fn(&mut f64, Info) -> Replied,
     #[option(default = |_, _| Ok(Reply::none()))]
     pub(crate) go_on: fn(&mut f64, u32) -> Replied,
+    #[option(default = || None)]
+    pub(crate) end: fn() -> Option<Number>,
     #[option(default = |_| ())]
     pub(crate) terminate: fn(Termination<'_>),
     #[option(default = || ())]
@@ -130,6 +132,10 @@ impl Estimator for Echo {
 
     fn handle_continue(&mut self, step: u32) -> Replied {
         (self.0.go_on)(&mut self.1, step)
+    }
+
+    fn handle_end(&mut self) -> Option<Number> {
+        (self.0.end)()
     }
 
     fn terminate(&mut self, reason: Termination<'_>) {

@@ -38,7 +38,20 @@ fn an_estimator_is_not_lost_because_the_robot_stops() -> Result<(), StartError> 
 fn ending() -> Builder<Plain> {
     let mut builder = Plain::builder();
     builder.options(SOURCE).terminate = |_| panic!("the port does not close");
+    builder.options(ECHO).end = || Some(Number(-1.0));
     builder
+}
+
+#[test]
+fn an_estimator_that_panics_at_its_end_is_stopped_all_the_same() -> Result<(), StartError> {
+    let mut builder = Plain::builder();
+    builder.options(ECHO).end = || panic!("it holds nothing");
+    let report = builder.simulate()?.stop();
+    let faults: Vec<_> = report.faults.iter().map(ToString::to_string).collect();
+    let [fault] = &faults[..] else { panic!("{faults:?}") };
+    assert!(fault.ends_with("failed: panicked: it holds nothing"), "{fault}");
+    assert_eq!(report.estimators.iter().map(|estimator| estimator.restarts).sum::<u64>(), 0);
+    Ok(())
 }
 
 /// The fault of a journal that ended before what a publisher did.

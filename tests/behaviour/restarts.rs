@@ -184,6 +184,10 @@ robot! {
                 gain = param::gain,
                 init = make_estimator,
                 info = timer,
+                end = || {
+                    log("estimator", "ends");
+                    Some(Number(-1.0))
+                },
                 terminate = |reason| log("estimator", format!("closed: {reason}")),
                 dropped = || log("estimator", "dropped"),
             );
@@ -196,13 +200,18 @@ fn new_options_close_and_drop_the_old_instance_before_the_new_one_is_made() -> R
     let _alone = alone();
     NUMBER.store(0, Ordering::SeqCst);
     lock(&LOG).clear();
-    let mut simulation = armed_simulation(Single::builder());
+    let builder = Single::builder();
+    let last = builder.subscribe(single::sensor::base::numbers::only);
+    let mut simulation = armed_simulation(builder);
     simulation.run_until(at(55));
     simulation.set_parameter(single::param::gain, 2.0).expect("it is finite");
     simulation.run_until(at(154));
+    let last: Vec<_> = last.drain().map(|number| (number.monotonic_time, number.0)).collect();
+    assert_eq!(last, [(at(55), -1.0)], "what the old one still held");
     let closed = "closed: new options";
     assert_eq!(logged("sensor"), ["made", closed, "dropped", "made"]);
-    assert_eq!(logged("estimator"), ["made", closed, "dropped", "made"], "the timer of the old one is gone");
+    let of_estimator = logged("estimator");
+    assert_eq!(of_estimator, ["made", "ends", closed, "dropped", "made"], "the timer of the old one is gone");
     assert_eq!(logged("actuator"), ["made", "made safe", closed, "dropped", "made"]);
     simulation.run_until(at(160));
     assert_eq!(logged("estimator"), ["timer 1"]);
@@ -212,7 +221,9 @@ fn new_options_close_and_drop_the_old_instance_before_the_new_one_is_made() -> R
 #[test]
 fn each_component_gets_the_reason_for_its_end() -> Result<(), StartError> {
     let _alone = alone();
-    let mut simulation = Single::builder().simulate()?;
+    let builder = Single::builder();
+    let last = builder.subscribe(single::sensor::base::numbers::only);
+    let mut simulation = builder.simulate()?;
     lock(&LOG).clear();
     // A panic ends the instance without a word; too many in its link restart what is there, but for what is below its joint.
     for panic in 1..=4 {
@@ -228,11 +239,13 @@ fn each_component_gets_the_reason_for_its_end() -> Result<(), StartError> {
     simulation.call(single::sensor::base::numbers::only, Break).expect_err("it breaks");
     simulation.run_until(at(1050));
     assert_eq!(logged("estimator"), ["closed: it failed: broken on request", "dropped", "made"]);
+    assert_eq!(last.drain().count(), 1, "its supervisor has restarted it once");
     simulation.stop();
+    assert_eq!(last.drain().count(), 1, "before it stops");
     let closed = "closed: the robot stops";
     assert_eq!(
         [logged("sensor"), logged("estimator"), logged("faulty")].concat(),
-        [closed, "dropped", closed, "dropped", closed, "dropped"]
+        [closed, "dropped", "ends", closed, "dropped", closed, "dropped"]
     );
     assert_eq!(logged("actuator"), ["made safe", closed, "dropped"]);
     Ok(())

@@ -12,9 +12,12 @@ use bb_estimators::navigation::state_estimator::{
 };
 use bb_estimators::navigation::{Geodetic, LocalFrame};
 use bb_mcap::{Recorder, RecorderOptions, Recording};
+use std::path::Path;
 
 robot! {
     robot Surveying;
+
+    parameters { output_rate: f64 = 5 Hz; }
 
     link base {
         joint shelf: fixed {
@@ -28,7 +31,7 @@ robot! {
         sensor gps_report: External<GpsReport>();
         sensor attitude: External<AttitudeReport>();
         sensor state: External<WarmStartReport>();
-        estimator navigation: StateEstimator() {
+        estimator navigation: StateEstimator(output_rate = param::output_rate) {
             input imu: sensor::base::shelf::board::imu, driver;
             input gnss: sensor::base::mast::antenna::gps, optional;
             input gps_health: sensor::base::gps_report, optional;
@@ -219,6 +222,46 @@ fn an_imu_that_stops_engages_the_fallback_and_its_return_recovers_it() -> Result
     Ok(())
 }
 
+fn recorded_events(file: &Path) -> Result<Vec<FlightEvent>, Box<dyn std::error::Error>> {
+    let mut events = Vec::new();
+    for message in Recording::open(file)?.messages::<FlightEvents>("estimator/base/navigation/events")? {
+        let message = message?;
+        assert_eq!(message.lost, 0);
+        events.extend(message.events.iter().cloned());
+    }
+    Ok(events)
+}
+
+/// All keyframes are still in the window when the estimator gets another rate, and again when the robot stops.
+#[test]
+fn every_keyframe_reaches_the_recorder_before_a_restart_and_at_the_stop() -> Result<(), Box<dyn std::error::Error>>
+{
+    for strategy in STRATEGIES {
+        let file = std::env::temp_dir().join(format!("bb-keyframes-{strategy}-{}.mcap", std::process::id()));
+        let builder = Flight::builder(strategy, true);
+        let path = Select::Path("estimator/base/navigation/events");
+        let recorded = builder.subscribe_any(path, None, Overflow::default());
+        let recorder = Recorder::new(&file, recorded, RecorderOptions::of::<Surveying>())?;
+        let mut flight = Flight::start(builder)?;
+        for step in 1..=1700 {
+            if step == 900 {
+                flight.simulation.set_parameter(surveying::param::output_rate, 10.0)?;
+            }
+            flight.imu(at(5 * step), at_rest());
+        }
+        flight.simulation.stop().ok()?;
+        recorder.finish()?;
+        let keyframes = recorded_events(&file)?.into_iter().filter_map(|event| event.keyframe);
+        let times: Vec<i64> = keyframes.map(|keyframe| keyframe.time.as_nanos() / 1_000_000).collect();
+        std::fs::remove_file(&file)?;
+        // Each instance levels for a second at rest, and makes a keyframe each second from there.
+        let of = |span: std::ops::Range<i64>| times.iter().filter(|time| span.contains(time)).count();
+        assert!(of(0..4500) >= 3 && of(4500..8501) >= 3, "{strategy}: {times:?}");
+        assert!(times.is_sorted_by(|a, b| a < b), "{strategy}: {times:?}");
+    }
+    Ok(())
+}
+
 /// Events for the recorder are in the file, though nothing is logged: no subscriber of `tracing` is set.
 #[test]
 fn the_recorder_holds_labels_the_gate_rejections_and_faults() -> Result<(), Box<dyn std::error::Error>> {
@@ -253,13 +296,9 @@ fn the_recorder_holds_labels_the_gate_rejections_and_faults() -> Result<(), Box<
             recorder.drain()?;
         }
         flight.simulation.stop().ok()?;
+        expected.extend(flight.events.drain().flat_map(|events| events.payload.events));
         recorder.finish()?;
-        let mut events = Vec::new();
-        for message in Recording::open(&file)?.messages::<FlightEvents>("estimator/base/navigation/events")? {
-            let message = message?;
-            assert_eq!(message.lost, 0);
-            events.extend(message.events.iter().cloned());
-        }
+        let events = recorded_events(&file)?;
         std::fs::remove_file(&file)?;
         assert_eq!(events, expected, "{strategy}: all that was published, in order");
         let of = |kind: &str| events.iter().filter(|event| event.kind == kind).collect::<Vec<_>>();

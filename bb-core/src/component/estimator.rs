@@ -106,6 +106,13 @@ pub trait Estimator: Sized + Send + 'static {
         Err(Fault::remake())
     }
 
+    /// Emits what it still holds, such as the end of what it records, right before [`terminate`](Self::terminate): when the robot
+    /// stops, and when it is restarted with new options or by its supervisor. Not called after an error or a panic. The output is
+    /// stamped with the current time; whoever has stopped before it does not get it.
+    fn handle_end(&mut self) -> Option<Self::Output> {
+        None
+    }
+
     /// Cleans up before it stops or is restarted, also after an error; not called after a panic, when its state may be
     /// inconsistent.
     fn terminate(&mut self, reason: Termination<'_>) {

@@ -82,6 +82,10 @@ impl<E: Estimator> AsEstimator<E> {
     pub(crate) fn handle_continue(&mut self, step: u32) -> Result<Reply<E::Output>, Fault> {
         whichever!(self, own => own.handle_continue(step), other => other.handle_continue(step))
     }
+
+    pub(crate) fn handle_end(&mut self) -> Option<E::Output> {
+        whichever!(self, own => own.handle_end(), other => other.handle_end())
+    }
 }
 
 /// A sensor, or its replacement.

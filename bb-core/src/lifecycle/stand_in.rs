@@ -19,6 +19,7 @@ pub(crate) trait AnyEstimator<I: Inputs, O>: Send {
     fn handle_transforms(&mut self, transforms: &InputTransforms<'_>) -> Result<(), Fault>;
     fn handle_info(&mut self, info: Info) -> Result<Reply<O>, Fault>;
     fn handle_continue(&mut self, step: u32) -> Result<Reply<O>, Fault>;
+    fn handle_end(&mut self) -> Option<O>;
     fn terminate(&mut self, reason: Termination<'_>);
 }
 
@@ -142,6 +143,10 @@ impl<E: Estimator> AnyEstimator<E::Input, E::Output> for E {
 
     fn handle_continue(&mut self, step: u32) -> Result<Reply<E::Output>, Fault> {
         Estimator::handle_continue(self, step)
+    }
+
+    fn handle_end(&mut self) -> Option<E::Output> {
+        Estimator::handle_end(self)
     }
 
     fn terminate(&mut self, reason: Termination<'_>) {

@@ -1,10 +1,10 @@
 //! Creation, failure and restart of an estimator.
 
-use super::Node;
 use super::common::Common;
+use super::{Next, Node};
 use crate::component::{Context, Estimator};
 use crate::event::HealthReason;
-use crate::fault::{Failed, Panic, Termination, of_panic};
+use crate::fault::{Failed, Panic, Termination, caught, of_panic};
 use crate::lifecycle::AfterFault;
 use crate::node::DropReason;
 use crate::node::admission::Admission;
@@ -66,8 +66,27 @@ impl<E: Estimator> Node<E> {
         }
     }
 
+    /// Lets the estimator emit what it still holds, before it is terminated. After a panic it has failed, and has been dropped.
+    pub(super) fn end(&mut self, turn: &Turn<'_>, emitted: &mut Option<E::Output>) -> Next {
+        let Some(estimator) = self.slot.running() else { return Next::Quiet };
+        turn.enter(self.common.number);
+        match caught(|| Ok(estimator.handle_end())) {
+            Ok(None) => Next::Quiet,
+            Ok(output) => {
+                *emitted = output;
+                let stamp = self.common.complete_other(None, None, turn);
+                self.common.settle(false, true, turn);
+                Next::Emitted(stamp)
+            }
+            Err(failed) => {
+                self.fail(failed, turn);
+                Next::Quiet
+            }
+        }
+    }
+
     /// Applies new parameter values.
-    pub(super) fn change_options(&mut self, turn: &Turn<'_>) {
+    pub(super) fn change_options(&mut self, turn: &Turn<'_>, emitted: &mut Option<E::Output>) -> Next {
         let Self { common, slot, .. } = self;
         let context = common.context(turn.now());
         let mut is_kept = true;
@@ -81,11 +100,14 @@ impl<E: Estimator> Node<E> {
                 self.schedule();
             }
             Ok(()) => {
+                let ended = self.end(turn, emitted);
                 self.restart_from_above(Termination::NewOptions, turn);
                 self.restart(turn);
+                return ended;
             }
             Err(failed) => self.fail(failed, turn),
         }
+        Next::Quiet
     }
 
     /// Resets everything but the backlog and the health.

@@ -42,9 +42,13 @@ impl<E: Estimator> Node<E> {
             NodeEntry::Start => self.common.begin_life(turn),
             NodeEntry::Options(values) => {
                 self.common.parameters = values;
-                self.change_options(turn);
+                return self.change_options(turn, emitted);
             }
-            NodeEntry::Restart => self.restart_from_above(Termination::Supervisor, turn),
+            NodeEntry::Restart => {
+                let ended = self.end(turn, emitted);
+                self.restart_from_above(Termination::Supervisor, turn);
+                return ended;
+            }
             NodeEntry::GiveUp => {
                 self.slot.give_up();
                 if self.slot.restart_at().is_none() && !self.slot.is_running() {
@@ -71,7 +75,11 @@ impl<E: Estimator> Node<E> {
                     estimator.declared().map_or_else(|| Ok(Reply::none()), handle)
                 });
             }
-            NodeEntry::Retire => self.retire(),
+            NodeEntry::Retire => {
+                let ended = self.end(turn, emitted);
+                self.retire();
+                return ended;
+            }
         }
         Next::Quiet
     }

@@ -13,7 +13,7 @@ pub use output::{FlightEstimate, FlightEvent, FlightEvents, FlightHealth, Flight
 use super::{EstimatorOutput, Event, EventKind, EventSink, FlightNavigator, HealthState, Level};
 use crate::navigation::estimator::measured::sample;
 use bb_core::component::{HandleCall, Info, Request, RequestCodec};
-use bb_core::{Context, Estimator, Fault, Payload, Reply, Termination};
+use bb_core::{Context, Estimator, Fault, Payload, Reply};
 use input::Mounting;
 use std::time::Duration;
 
@@ -72,8 +72,8 @@ use std::time::Duration;
 /// other messages, which is counted. If the estimator fails and is restarted, the gate is open as at the start.
 ///
 /// Estimates are emitted at the output's rate, with the health. Events at the levels error, warn and info, and keyframes that leave
-/// the window, are emitted as they occur: record `events` for a flight-data recorder. All events also go to `tracing` as structured
-/// fields.
+/// the window, are emitted as they occur, and those still in it at the end and before a restart: record `events` for a flight-data
+/// recorder. All events also go to `tracing` as structured fields.
 #[derive(Debug)]
 pub struct FlightEstimator {
     estimator: FlightNavigator<Sink>,
@@ -96,12 +96,35 @@ struct Sink {
     events: FlightEvents,
     /// Number of these that may be lost.
     spare: usize,
+    /// One event of each kind that was lost since the last message.
+    lost: Vec<Event>,
 }
 
 impl Sink {
     fn take(&mut self) -> FlightEvents {
         self.spare = 0;
+        for lost in std::mem::take(&mut self.lost) {
+            self.event(&lost);
+        }
         std::mem::take(&mut self.events)
+    }
+
+    /// Counts an event for which there is no room.
+    fn lose(&mut self, event: &Event) {
+        self.events.lost += 1;
+        let name = event.kind.name();
+        for lost in &mut self.lost {
+            if let EventKind::Lost { kind, count, first_ns, last_ns } = &mut lost.kind
+                && *kind == name
+            {
+                *count += 1;
+                (*first_ns, *last_ns) = ((*first_ns).min(event.time_ns), (*last_ns).max(event.time_ns));
+                return;
+            }
+        }
+        let time_ns = event.time_ns;
+        let kind = EventKind::Lost { kind: name, count: 1, first_ns: time_ns, last_ns: time_ns };
+        self.lost.push(Event { kind, ..*event });
     }
 }
 
@@ -114,8 +137,7 @@ impl EventSink for Sink {
         // A recorder must have each error and each warning, and each change of gate and label.
         let is_spare = matches!(event.kind, EventKind::Keyframe { .. } | EventKind::Revised { .. });
         if is_spare && self.spare == EVENTS {
-            self.events.lost += 1;
-            return;
+            return self.lose(event);
         }
         self.spare += usize::from(is_spare);
         self.events.events.push(FlightEvent::of(event));
@@ -241,9 +263,11 @@ impl Estimator for FlightEstimator {
         Ok(self.reply(sample.time_ns))
     }
 
-    /// Passes the last keyframes to `tracing`: nothing can be published any more.
-    fn terminate(&mut self, _: Termination<'_>) {
+    /// Emits the keyframes that are still in the window.
+    fn handle_end(&mut self) -> Option<FlightOutputs> {
         self.estimator.finish();
+        let events = self.estimator.sink_mut().take();
+        (!events.events.is_empty()).then(|| FlightOutputs { events: Some(events), ..FlightOutputs::default() })
     }
 
     fn handle_info(&mut self, _: Info) -> Result<Reply<FlightOutputs>, Fault> {
@@ -304,8 +328,10 @@ mod tests {
         tell(602, EventKind::FallbackEngaged);
         let FlightEvents { events, lost } = sink.take();
         let count = |level: Level| events.iter().filter(|event| event.level == level).count();
-        assert_eq!((lost, count(Level::Error), events.len()), (44, 2, 256 + 300 + 3));
-        assert!(events.is_sorted_by_key(|event| event.time));
+        assert_eq!((lost, count(Level::Error), events.len()), (44, 2, 256 + 300 + 3 + 1));
+        assert!(events[..559].is_sorted_by_key(|event| event.time));
+        assert_eq!((&*events[559].kind, events[559].level), ("lost", Level::Warn));
+        assert_eq!(events[559].reason.as_deref(), Some("44 of kind revised from 256 ns to 299 ns"));
         // The next message has room again.
         sink.event(&event(603, EventKind::Revised { input: InputKind::Gnss }));
         assert_eq!((sink.events.lost, sink.take().events.len()), (0, 1));

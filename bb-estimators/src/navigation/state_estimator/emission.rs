@@ -9,7 +9,7 @@ use super::label::{SourceLabel, Sources};
 use super::output::{EstimatorOutput, FrameIds, Quality};
 use super::params::{StateEstimatorConfig, StateEstimatorParams, ns};
 use super::strategy::Pose;
-use super::world::turned_pose;
+use super::world::{World, turned_pose};
 use crate::navigation::math::sqrt;
 use crate::navigation::numbers::{REARMED, STEADY_GAIN};
 use nalgebra::Matrix6;
@@ -94,16 +94,16 @@ impl Emission {
         true
     }
 
-    /// An estimate in the form for users. Its id is assigned when it is emitted.
+    /// An estimate in the form for users. `world` is that of the pose. Its id is assigned when it is emitted.
     pub(super) fn describe<F: ProvidedFactor>(
         &self,
         pose: &Pose,
         sources: &Sources,
-        smoothed: bool,
+        world: &World,
         engine: &Engine<F>,
         params: &StateEstimatorParams,
     ) -> Option<EstimatorOutput> {
-        let (position, turn) = engine.world()?.local(&pose.position);
+        let (position, turn) = world.local(&pose.position);
         // A position that has diverged off the Earth is no estimate.
         check_position(&position).ok()?;
         let covariance = turned_pose(&turn, &pose.covariance);
@@ -126,7 +126,7 @@ impl Emission {
             covariance,
             label,
             anchor_age_ms,
-            smoothed,
+            smoothed: false,
             degraded: engine.is_degraded(pose.time_ns),
             resets: engine.resets(),
             quality,

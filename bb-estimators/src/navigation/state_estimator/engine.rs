@@ -48,7 +48,17 @@ pub(super) struct Engine<F: ProvidedFactor> {
     independent_ns: Option<i64>,
     /// Number of positions that must still fit.
     unconfirmed: u32,
-    left: VecDeque<(Pose, Sources)>,
+    records: bool,
+    left: VecDeque<Left>,
+}
+
+/// A keyframe that has left the window.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Left {
+    pub(super) pose: Pose,
+    pub(super) sources: Sources,
+    /// The world of the pose, which may have moved on since.
+    pub(super) world: World,
 }
 
 #[expect(clippy::large_enum_variant, reason = "there is one of it in an engine")]
@@ -88,6 +98,7 @@ impl<F: ProvidedFactor> Engine<F> {
             degraded_ns: None,
             independent_ns: None,
             unconfirmed: 0,
+            records: config.params.record_keyframes,
             left: VecDeque::new(),
         })
     }
@@ -189,7 +200,6 @@ impl<F: ProvidedFactor> Engine<F> {
         self.gate.forget_times();
         self.marks.clear();
         self.degraded_ns = None;
-        self.left.clear();
         // The measurement counts as made now: a receiver must not benefit.
         self.independent_ns = self.independent_ns.and(Some(sample_ns));
         match self.phase {
@@ -214,8 +224,25 @@ impl<F: ProvidedFactor> Engine<F> {
         if matches!(self.phase, Phase::Running) { self.strategy.keyframes() } else { 0 }
     }
 
-    pub(super) fn take_left(&mut self) -> Option<(Pose, Sources)> {
+    pub(super) fn take_left(&mut self) -> Option<Left> {
         self.left.pop_front()
+    }
+
+    /// Keeps all keyframes for the recorder, before the window restarts.
+    pub(super) fn leave(&mut self) {
+        if !self.records || self.started.is_none() {
+            return;
+        }
+        let (mut poses, _) = self.strategy.history(usize::MAX);
+        poses.reverse();
+        poses.extend(self.strategy.newest());
+        poses.into_iter().for_each(|pose| self.note(pose));
+    }
+
+    fn note(&mut self, pose: Pose) {
+        if let Some(world) = self.world {
+            self.left.push_back(Left { pose, sources: self.sources_at(pose.time_ns), world });
+        }
     }
 
     fn sources_at(&self, time_ns: i64) -> Sources {
@@ -338,6 +365,7 @@ impl<F: ProvidedFactor> Engine<F> {
     }
 
     fn start(&mut self, start: &Start, from: StartedFrom) -> Result<(), Reason> {
+        self.leave();
         self.strategy.start(start)?;
         self.phase = Phase::Running;
         self.resets = self.resets.wrapping_add(u32::from(self.started.is_some()));
@@ -363,7 +391,7 @@ impl<F: ProvidedFactor> Engine<F> {
             return;
         }
         while let Some(pose) = self.strategy.take_left() {
-            self.left.push_back((pose, self.sources_at(pose.time_ns)));
+            self.note(pose);
         }
         let keyframe_ns = self.strategy.keyframe_ns();
         match self.marks.back_mut() {
@@ -375,13 +403,15 @@ impl<F: ProvidedFactor> Engine<F> {
                 self.marks.push_back((keyframe_ns, self.sources));
             }
         }
-        if let (Some(world), Some((position, _))) = (&mut self.world, self.strategy.motion()) {
-            let mut moved = *world;
-            // If the move fails, the world stays where it is, and the move is tried again later.
-            if let Some(new_from_old) = moved.moves_on(&position)
-                && self.strategy.move_world(&new_from_old).is_ok()
-            {
-                *world = moved;
+        if let (Some(world), Some((position, _))) = (self.world, self.strategy.motion()) {
+            let mut moved = world;
+            if let Some(new_from_old) = moved.moves_on(&position) {
+                // The smoother's window restarts.
+                self.leave();
+                // If the move fails, the world stays where it is, and the move is tried again later.
+                if self.strategy.move_world(&new_from_old).is_ok() {
+                    self.world = Some(moved);
+                }
             }
         }
     }

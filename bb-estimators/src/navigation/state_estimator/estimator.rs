@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 
 use super::emission::Emission;
-use super::engine::Condition;
+use super::engine::{Condition, Left};
 use super::entry::Payload;
 use super::error::{EstimatorError, OriginError, Reason};
 use super::event::{Event, EventKind, EventSink, InputKind};
@@ -18,6 +18,7 @@ use super::output::{EstimatorHealth, EstimatorOutput, HealthState, number_of};
 use super::params::{StateEstimatorConfig, ns};
 use super::queue::{Queue, QueueCounts, Told};
 use super::strategy::Pose;
+use super::world::World;
 use crate::attitude::ParamsError;
 use crate::navigation::eskf::ImuMean;
 use crate::navigation::factor::NavigationFactor;
@@ -297,9 +298,9 @@ impl<K: EventSink, F: ProvidedFactor> FlightNavigator<K, F> {
         for told in told.drain(..) {
             match told {
                 Told::Event(time_ns, kind) => self.tell(time_ns, kind),
-                Told::Left(pose, sources) => {
+                Told::Left(Left { pose, sources, world }) => {
                     let is_smoothed = self.is_smoothing();
-                    if let Some(estimate) = self.describe_past(&pose, &sources, is_smoothed) {
+                    if let Some(estimate) = self.describe_past(&pose, &sources, &world, is_smoothed) {
                         self.tell(pose.time_ns, EventKind::Keyframe { estimate });
                     }
                 }
@@ -338,7 +339,7 @@ impl<K: EventSink, F: ProvidedFactor> FlightNavigator<K, F> {
         let pose = if core::mem::take(&mut self.has_failed) { None } else { self.pose_at(now_ns) };
         let described = pose.and_then(|pose| {
             let sources = *self.queue.engine().sources();
-            self.describe(&pose, &sources, false)
+            self.describe(&pose, &sources)
         });
         let output = described.map(|estimate| {
             let started = self.queue.engine().started();
@@ -370,7 +371,7 @@ impl<K: EventSink, F: ProvidedFactor> FlightNavigator<K, F> {
     pub fn predicted(&mut self, time_ns: i64) -> Option<EstimatorOutput> {
         self.catch_up();
         let pose = self.pose_at(time_ns)?;
-        self.describe(&pose, self.queue.engine().sources(), false)
+        self.describe(&pose, self.queue.engine().sources())
     }
 
     fn pose_at(&self, time_ns: i64) -> Option<Pose> {
@@ -396,7 +397,7 @@ impl<K: EventSink, F: ProvidedFactor> FlightNavigator<K, F> {
     pub fn current_estimate(&mut self) -> Option<EstimatorOutput> {
         self.catch_up();
         let (pose, sources) = self.queue.engine().newest()?;
-        self.describe(&pose, &sources, false)
+        self.describe(&pose, &sources)
     }
 
     /// Up to `n` keyframes before the newest, in reverse order of time. The smoother's are corrected by later measurements. The
@@ -407,7 +408,8 @@ impl<K: EventSink, F: ProvidedFactor> FlightNavigator<K, F> {
         let most = n.min(self.config.params.window as usize);
         let (history, is_smoothed) = self.queue.engine_mut().history(most);
         let poses: Vec<(Pose, Sources)> = history.collect();
-        poses.iter().filter_map(|(pose, sources)| self.describe_past(pose, sources, is_smoothed)).collect()
+        let Some(world) = self.queue.engine().world() else { return Vec::new() };
+        poses.iter().filter_map(|(pose, sources)| self.describe_past(pose, sources, world, is_smoothed)).collect()
     }
 
     /// Reports the keyframes that are still in the window as events, the oldest first: for a recorder, at the end of a flight.
@@ -416,20 +418,31 @@ impl<K: EventSink, F: ProvidedFactor> FlightNavigator<K, F> {
         last.reverse();
         last.extend(self.current_estimate());
         for estimate in last {
-            self.tell(estimate.time_ns, EventKind::Keyframe { estimate });
+            // Others were reported when the world moved on.
+            if estimate.time_ns > self.queue.news.left_ns {
+                self.tell(estimate.time_ns, EventKind::Keyframe { estimate });
+            }
         }
     }
 
     /// The last innovation does not belong to a past keyframe.
-    fn describe_past(&self, pose: &Pose, sources: &Sources, smoothed: bool) -> Option<EstimatorOutput> {
-        let mut estimate = self.describe(pose, sources, smoothed)?;
-        estimate.quality.nis = None;
+    fn describe_past(
+        &self,
+        pose: &Pose,
+        sources: &Sources,
+        world: &World,
+        smoothed: bool,
+    ) -> Option<EstimatorOutput> {
+        let engine = self.queue.engine();
+        let mut estimate = self.emission.describe(pose, sources, world, engine, &self.config.params)?;
+        (estimate.smoothed, estimate.quality.nis) = (smoothed, None);
         Some(estimate)
     }
 
-    fn describe(&self, pose: &Pose, sources: &Sources, smoothed: bool) -> Option<EstimatorOutput> {
+    /// The estimate in the present world, which no later measurement has corrected.
+    fn describe(&self, pose: &Pose, sources: &Sources) -> Option<EstimatorOutput> {
         let engine = self.queue.engine();
-        self.emission.describe(pose, sources, smoothed, engine, &self.config.params)
+        self.emission.describe(pose, sources, engine.world()?, engine, &self.config.params)
     }
 
     /// Health of the estimator, at the last output or later: late samples may not be in it until they are needed, see

@@ -222,6 +222,17 @@ pub enum EventKind {
         /// Present estimate of the keyframe, for recorders only.
         estimate: EstimatorOutput,
     },
+    /// Events were too many for a recorder's message.
+    Lost {
+        /// Name of their kind.
+        kind: &'static str,
+        /// Number of events.
+        count: u32,
+        /// Time of the first, ns.
+        first_ns: i64,
+        /// Time of the last, ns.
+        last_ns: i64,
+    },
 }
 
 impl EventKind {
@@ -254,6 +265,7 @@ impl EventKind {
             Self::FallbackRecovered => "fallback_recovered",
             Self::Emitted { .. } => "emitted",
             Self::Keyframe { .. } => "keyframe",
+            Self::Lost { .. } => "lost",
         }
     }
 }
@@ -267,6 +279,7 @@ impl Event {
             | EventKind::Rejected { .. }
             | EventKind::ClockSetBack { .. }
             | EventKind::SamplesDropped { .. }
+            | EventKind::Lost { .. }
             | EventKind::Gate { to: GateState::Blocked, .. }
             | EventKind::CovarianceGrowing { .. } => Level::Warn,
             EventKind::Ready { .. }
@@ -306,6 +319,7 @@ impl Event {
             EventKind::FallbackImminent => text(format_args!("NAV no estimate: fallback imminent")),
             EventKind::FallbackEngaged => text(format_args!("NAV no estimate: FALL BACK TO FC IMU")),
             EventKind::FallbackRecovered => text(format_args!("NAV estimate recovered")),
+            EventKind::Lost { kind, count, .. } => text(format_args!("NAV recorder: {count} {kind} lost")),
             EventKind::Ready { .. }
             | EventKind::Added { .. }
             | EventKind::Degraded { .. }

@@ -6,15 +6,14 @@
 use alloc::vec::Vec;
 
 use super::clock::Clock;
-use super::engine::Engine;
+use super::engine::{Engine, Left};
 use super::entry::{Entry, Payload};
 use super::error::{Outcome, Reason};
 use super::event::{EventKind, StartedFrom};
 use super::factor::ProvidedFactor;
 use super::input::{GpsHealth, TakeoffOrigin};
-use super::label::Sources;
 use super::params::{StateEstimatorConfig, ns};
-use super::strategy::{Pose, Predictor};
+use super::strategy::Predictor;
 use crate::attitude::ParamsError;
 use crate::navigation::eskf::ImuMean;
 use crate::navigation::history::past::{Key, Past};
@@ -58,7 +57,7 @@ pub(super) enum Told {
     /// An event, with its time.
     Event(i64, EventKind),
     /// A keyframe has left the window.
-    Left(Pose, Sources),
+    Left(Left),
 }
 
 /// See the module.
@@ -84,7 +83,7 @@ pub(super) struct News {
     /// The last failure by a sample.
     broken: Option<(i64, Reason)>,
     /// Time of the last keyframe that has left the window.
-    left_ns: i64,
+    pub(super) left_ns: i64,
     pub(super) told: Vec<Told>,
 }
 
@@ -336,10 +335,10 @@ impl News {
 
     /// Collects the reports of the engine. Those already made in an earlier run are skipped.
     fn look<F: ProvidedFactor>(&mut self, engine: &mut Engine<F>) {
-        while let Some((pose, sources)) = engine.take_left() {
-            if pose.time_ns > self.left_ns {
-                self.left_ns = pose.time_ns;
-                self.told.push(Told::Left(pose, sources));
+        while let Some(left) = engine.take_left() {
+            if left.pose.time_ns > self.left_ns {
+                self.left_ns = left.pose.time_ns;
+                self.told.push(Told::Left(left));
             }
         }
         if let Some(started) = engine.started()

@@ -83,6 +83,10 @@ impl<E: Estimator<Options: Sync>> Estimator for Mounted<E> {
         self.estimator.handle_continue(step)
     }
 
+    fn handle_end(&mut self) -> Option<E::Output> {
+        self.estimator.handle_end()
+    }
+
     fn terminate(&mut self, reason: Termination<'_>) {
         self.estimator.terminate(reason);
     }

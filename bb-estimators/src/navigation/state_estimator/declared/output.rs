@@ -117,8 +117,8 @@ impl FlightHealth {
 pub struct FlightEvents {
     /// The events.
     pub events: Vec<FlightEvent>,
-    /// Number of further reports of the level info, and of further keyframes, that did not fit in the message. Errors and warnings
-    /// always do.
+    /// Number of further reports that late inputs have changed, and of further keyframes, that did not fit in the message. Events of the
+    /// kind `lost` say which. Errors, warnings and changes of state always fit.
     pub lost: u32,
 }
 
@@ -207,6 +207,10 @@ impl Parts {
                 Self { to: Some(strategy.name()), window: Some(*window), ..none }
             }
             EventKind::CovarianceGrowing { ratio } => Self { cov_inflation: Some(*ratio), ..none },
+            EventKind::Lost { kind, count, first_ns, last_ns } => {
+                let reason = format!("{count} of kind {kind} from {first_ns} ns to {last_ns} ns");
+                Self { reason: Some(reason), ..none }
+            }
             EventKind::ClockSetBack { .. }
             | EventKind::SamplesDropped { .. }
             | EventKind::FallbackImminent

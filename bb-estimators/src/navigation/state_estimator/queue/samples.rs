@@ -123,7 +123,10 @@ impl<F: ProvidedFactor> Queue<F> {
                 self.news.tell(key.time_ns, EventKind::Degraded { input: entry.payload.kind(), reason });
             }
         }
-        let engine = self.engine_mut();
+        let engine = &mut self.past.now.state;
+        // The window restarts, on another clock.
+        engine.leave();
+        self.news.look(engine);
         engine.set_clock_back(sample.time_ns, for_ns, config);
         let (now_ns, started) = (engine.now_ns(), engine.started().into_iter().collect());
         self.past.restart(now_ns.map_or(Key::FIRST, Key::of_sample), None);

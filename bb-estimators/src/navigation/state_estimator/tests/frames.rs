@@ -71,5 +71,21 @@ fn the_velocity_is_in_the_axes_of_the_place() {
         }
         let origin = estimator.frame().unwrap().origin();
         assert!((origin.latitude - start.latitude).abs() * radius_m > 15_000.0, "the world has moved on");
+        // Each keyframe is recorded once, in the world that it was estimated in.
+        estimator.finish();
+        let recorded = kinds(estimator.sink(), "keyframe").map(|event| match event.kind {
+            EventKind::Keyframe { estimate } => estimate,
+            _ => unreachable!(),
+        });
+        let recorded: Vec<_> = recorded.collect();
+        let is_next =
+            |[before, after]: &[EstimatorOutput; 2]| (1..=SECOND).contains(&(after.time_ns - before.time_ns));
+        assert!(recorded.array_windows().all(is_next), "{}: {recorded:?}", strategy.name());
+        assert_eq!((recorded[0].time_ns, recorded[recorded.len() - 1].time_ns), (0, 60 * SECOND));
+        for keyframe in recorded {
+            let latitude = start.latitude + 400.0 * keyframe.time_ns as f64 * 1e-9 / radius_m;
+            let off = (keyframe.position.latitude - latitude) * radius_m;
+            assert!(off.abs() < 20.0, "{}: {off} m at {}", strategy.name(), keyframe.time_ns);
+        }
     }
 }

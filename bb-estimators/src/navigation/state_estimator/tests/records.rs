@@ -114,6 +114,7 @@ fn status_texts_have_at_most_fifty_characters() {
         EventKind::Label { from: SourceLabel::DeadReckoned, to: SourceLabel::SatelliteAnchored },
         EventKind::Gate { from: GateState::Open, to: GateState::AwaitsAnchor },
         EventKind::Fatal { input: InputKind::WarmStart, reason: Reason::Overflow },
+        EventKind::Lost { kind: "keyframe", count: u32::MAX, first_ns: 0, last_ns: i64::MAX },
     ]);
     for kind in texts {
         let text = event(kind).status_text().unwrap();
@@ -136,6 +137,35 @@ fn a_recorder_has_every_keyframe_at_the_end() {
         let times: Vec<i64> = kinds(estimator.sink(), "keyframe").map(|event| event.time_ns).collect();
         let expected: Vec<i64> = (0..=newest_ns / FRAME).map(|i| i * FRAME).collect();
         assert_eq!(times, expected, "{}", strategy.name());
+    }
+}
+
+/// The window restarts after a gap that is too long to be bridged, and on a clock that was set back.
+#[test]
+fn a_recorder_has_every_keyframe_before_a_restart() {
+    let flight = Flight::new(10, 3);
+    for (strategy, behind_ns) in
+        StrategyKind::ALL.iter().flat_map(|one| [(one, -100 * SECOND), (one, 100 * SECOND)])
+    {
+        let mut estimator = started(&flight, *strategy);
+        for sent in &flight.sent(true, true, false) {
+            let behind_ns = if sent.time_ns() > 5 * SECOND { behind_ns } else { 0 };
+            ignore(sent.behind(behind_ns).to(&mut estimator));
+        }
+        let newest_ns = estimator.current_estimate().unwrap().time_ns;
+        estimator.finish();
+        let estimates = kinds(estimator.sink(), "keyframe").map(|event| match event.kind {
+            EventKind::Keyframe { estimate } => estimate,
+            _ => unreachable!(),
+        });
+        let estimates: Vec<_> = estimates.collect();
+        let times: Vec<i64> = estimates.iter().map(|estimate| estimate.time_ns).collect();
+        let what = std::format!("{}, {behind_ns}: {times:?}", strategy.name());
+        let (before, after) = times.split_at(51);
+        assert_eq!(before, (0..=50).map(|i| i * FRAME).collect::<Vec<_>>(), "{what}");
+        assert!(after.is_sorted_by(|a, b| a < b) && after.len() > 20, "{what}");
+        assert_eq!(after.last(), Some(&newest_ns), "{what}");
+        assert!(estimates[..51].iter().all(|estimate| flight.error(estimate).0 < 3.0), "{what}");
     }
 }
 
