@@ -165,6 +165,18 @@ impl<const N: usize> Covariance<N> {
         }
     }
 
+    /// Adds a multiple of another state to a state: `x_i ← x_i + f x_j`.
+    #[inline]
+    pub(in crate::navigation) fn shear(&mut self, i: usize, factor: f64, j: usize) {
+        let p = self.rows_mut();
+        let (own, other) = (p[i], p[j]);
+        p[i] = core::array::from_fn(|k| own[k] + factor * other[k]);
+        for k in 0..N {
+            p[k][i] = p[i][k];
+        }
+        p[i][i] = own[i] + factor * (2.0 * other[i] + factor * other[j]);
+    }
+
     /// Transforms three states, and adds others to them: `x ← G x + D y`.
     pub(in crate::navigation) fn transform_with(
         &mut self,

@@ -81,6 +81,11 @@ impl Mounting {
         self.has_gnss() || self.pose.is_some()
     }
 
+    /// Returns whether there is an input whose delay is a state.
+    pub(super) fn has_receiver(&self) -> bool {
+        self.has_gnss() || self.gnss_velocity.is_some() || self.gnss_heading.is_some()
+    }
+
     pub(super) fn has_gnss(&self) -> bool {
         self.gnss.is_some()
     }

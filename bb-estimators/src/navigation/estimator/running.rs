@@ -73,9 +73,10 @@ fn provided(
     start: &Start,
     world: World,
 ) -> Result<Box<dyn Core>, Fault> {
-    // Without wheels, nothing tells how the IMU is mounted on them.
+    // Without wheels, nothing tells how the IMU is mounted on them; and a delay is that of a receiver.
     let wheel_mounting = if mounting.odometry.is_some() { options.wheel_mounting } else { 0.0 };
-    let options = &NavigationOptions { wheel_mounting, ..*options };
+    let gnss_delay = if mounting.has_receiver() { options.gnss_delay } else { 0.0 };
+    let options = &NavigationOptions { wheel_mounting, gnss_delay, ..*options };
     if mounting.relative.is_some() {
         running::<Complete, { Complete::DIMENSION }>(options, mounting, start, world)
     } else if mounting.odometry.is_some() {

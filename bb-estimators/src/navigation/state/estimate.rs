@@ -97,7 +97,8 @@ impl<const N: usize> Estimate<N> {
 
     /// The estimate composed with the exponential of an error: `R⁺ = exp(θ) R`, `v⁺ = v + Γ1(θ) δv`, `p⁺ = p + Γ1(θ) δp`, and the
     /// other states by addition. It is the left error of SE₂(3), its axes turned to those of the world; A. Barrau, S. Bonnabel, "The
-    /// invariant extended Kalman filter as a stable observer", IEEE Transactions on Automatic Control 62(4), 2017.
+    /// invariant extended Kalman filter as a stable observer", IEEE Transactions on Automatic Control 62(4), 2017. With the delay of
+    /// fixes, δp is that of the delayed position `p - v d`.
     pub(in crate::navigation) fn composed<S: States>(&self, error: &SVector<f64, N>) -> Self {
         let mut additive = *error;
         let part = |first: usize| error.fixed_rows::<3>(first).into_owned();
@@ -106,6 +107,12 @@ impl<const N: usize> Estimate<N> {
             let integral = Integrals::new(&turn).first_matrix(&turn);
             for first in turned.into_iter().flatten() {
                 additive.fixed_rows_mut::<3>(first).copy_from(&(integral * part(first)));
+            }
+        }
+        if let Some(delay) = offset::<S>(Optional::GnssDelay) {
+            // What is corrected by addition is the delayed position, see `transport.rs`.
+            for i in 0..3 {
+                additive[POSITION + i] += additive[VELOCITY + i] * error[delay];
             }
         }
         let mut composed = self.corrected::<S>(&additive);
