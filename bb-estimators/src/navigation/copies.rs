@@ -26,7 +26,7 @@ mod rest;
 mod scatter;
 mod search;
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;
 
 use alloc::vec;
 use alloc::vec::Vec;

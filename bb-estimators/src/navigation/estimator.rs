@@ -7,6 +7,8 @@ pub(super) mod fusing;
 pub(super) mod health;
 mod height;
 mod input;
+#[cfg(test)]
+mod laws;
 pub(super) mod measured;
 mod options;
 mod output;

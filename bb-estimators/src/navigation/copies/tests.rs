@@ -1,27 +1,29 @@
 //! Random drives of a car: what is unknown is found, and what is wrong is not believed for long.
 
+use bb_tests::laws;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use proptest::prelude::*;
 
 use super::{Copies, Ways};
 use crate::navigation::eskf::{EskfFilter, EskfParams, ImuMean, Start};
-use crate::navigation::measurement::{BodyVelocity, GnssPosition};
+use crate::navigation::measurement::{BodyVelocity, GnssPosition, GnssVelocity};
 use crate::navigation::noise::Noise;
 use crate::navigation::propagate::Propagate;
 use crate::navigation::state::{Aided, POSITION, States, Vehicle};
 use crate::navigation::stream::Stream;
-use crate::navigation::{GaussMarkov, Refusal, nees};
+use crate::navigation::{GaussMarkov, nees};
 
 const STEP_NS: i64 = 20_000_000;
 const STEP_S: f64 = 0.02;
 const FIX_M: f64 = 0.5;
 
 /// A car on a plane, and its IMU, which is turned in it.
-struct Car {
+pub(in crate::navigation) struct Car {
     noise: Noise,
-    time_ns: i64,
-    position: Vector3<f64>,
-    heading: f64,
-    speed: f64,
+    pub(in crate::navigation) time_ns: i64,
+    pub(in crate::navigation) position: Vector3<f64>,
+    pub(in crate::navigation) heading: f64,
+    pub(in crate::navigation) speed: f64,
     phase: [f64; 4],
     /// The IMU's white noise, rad/s/√Hz and m/s²/√Hz.
     densities: [f64; 2],
@@ -30,11 +32,14 @@ struct Car {
 }
 
 impl Car {
-    fn new(seed: u64, densities: [f64; 2], yaw: f64) -> Self {
+    /// Deviations of the biases of the gyroscope, rad/s, and the accelerometer, m/s².
+    pub(in crate::navigation) const BIASES: [f64; 2] = [0.005, 0.05];
+
+    pub(in crate::navigation) fn new(seed: u64, densities: [f64; 2], yaw: f64) -> Self {
         let mut noise = Noise::new(seed);
         let phase = core::array::from_fn(|_| noise.between(0.0, 6.0));
         let heading = noise.between(-3.0, 3.0);
-        let biases = [noise.vector(0.005), noise.vector(0.05)];
+        let biases = Self::BIASES.map(|deviation| noise.vector(deviation));
         Self {
             noise,
             time_ns: 0,
@@ -48,15 +53,15 @@ impl Car {
         }
     }
 
-    fn world_from_imu(&self) -> UnitQuaternion<f64> {
+    pub(in crate::navigation) fn world_from_imu(&self) -> UnitQuaternion<f64> {
         UnitQuaternion::from_euler_angles(0.0, 0.0, self.heading) * self.vehicle_from_imu
     }
 
-    fn velocity(&self) -> Vector3<f64> {
+    pub(in crate::navigation) fn velocity(&self) -> Vector3<f64> {
         Vector3::new(self.heading.cos(), self.heading.sin(), 0.0) * self.speed
     }
 
-    fn start(&self, heading_deviation: f64) -> Start {
+    pub(in crate::navigation) fn start(&self, heading_deviation: f64) -> Start {
         let attitude = UnitQuaternion::from_euler_angles(0.0, 0.0, 0.3) * self.world_from_imu();
         let start = Start::at(self.time_ns, (self.position, 1.0), (self.velocity(), 1.0), (attitude, 0.03));
         let variances = Vector3::new(1e-3, 1e-3, heading_deviation * heading_deviation);
@@ -64,7 +69,7 @@ impl Car {
     }
 
     /// Drives on, and returns the sample.
-    fn drive(&mut self) -> ImuMean {
+    pub(in crate::navigation) fn drive(&mut self) -> ImuMean {
         let t = self.time_ns as f64 * 1e-9;
         let rate = 0.25 * (0.21 * t + self.phase[0]).sin() + 0.1 * (0.53 * t + self.phase[1]).sin();
         let along = 0.8 * (0.17 * t + self.phase[2]).cos() * 0.7;
@@ -88,13 +93,19 @@ impl Car {
         }
     }
 
-    fn fix(&mut self) -> GnssPosition {
+    pub(in crate::navigation) fn fix(&mut self) -> GnssPosition {
         GnssPosition::new(self.position + self.noise.vector(FIX_M), FIX_M, FIX_M)
     }
 
     fn wheels(&mut self) -> BodyVelocity {
+        let off = self.noise.vector(0.05);
+        self.rolling(&off)
+    }
+
+    /// The wheels with this error.
+    pub(in crate::navigation) fn rolling(&self, off: &Vector3<f64>) -> BodyVelocity {
         BodyVelocity {
-            velocity: Vector3::new(self.speed, 0.0, 0.0) + self.noise.vector(0.05),
+            velocity: Vector3::new(self.speed, 0.0, 0.0) + off,
             deviations: Vector3::new(0.1, 0.1, 0.2),
             body_from_sensor: UnitQuaternion::identity(),
             lever_arm: Vector3::zeros(),
@@ -327,29 +338,49 @@ fn another_world_is_no_scatter_of_fixes() {
     assert!(moved < 2.0 * FIX_M && restarted < 2.0 * FIX_M, "{moved} m, {restarted} m");
 }
 
-/// A refused measurement changes nothing but the counts and a newcomer.
-#[test]
-fn what_is_refused_changes_no_copy() {
-    let mut car = Car::new(6, QUIET, 0.0);
-    let mut copies: Wheels = copies(QUIET, 0.1, true);
-    copies.start(&car.start(0.3)).unwrap();
-    let mut gnss = stream();
-    for step in 1..=30 * 50 {
-        copies.propagate(&car.drive()).unwrap();
-        if step % 50 == 0 {
-            copies.update_position(&mut gnss, &car.fix()).unwrap();
+laws! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    /// A refusal changes no copy: only the counts, the scatter of fixes and a newcomer.
+    #[test]
+    fn what_is_refused_changes_nothing(
+        seed in 0..1000_u64, heading_deviation in prop_oneof![Just(0.3), Just(4.0)],
+        numbers in proptest::collection::vec(prop_oneof![any::<f64>(), -10.0..10.0, -1e5..1e5, Just(f64::NAN)], 12),
+        dt_ns in any::<i64>(),
+    ) {
+        let mut car = Car::new(seed, QUIET, 0.0);
+        let mut copies: Wheels = copies(QUIET, 0.1, true);
+        copies.start(&car.start(heading_deviation)).unwrap();
+        let (mut gnss, mut refused) = (stream(), 0);
+        for step in 1..=10 * 50 {
+            copies.propagate(&car.drive()).unwrap();
+            if step % 50 == 0 {
+                copies.update_fix(&mut gnss, &car.fix()).unwrap();
+            }
         }
+        let states = |copies: &Wheels| format!("{:?} {:?}", copies.starts, copies.search);
+        let vector = |first: usize| Vector3::new(numbers[first], numbers[first + 1], numbers[first + 2]);
+        let fix = GnssPosition::new(vector(0), numbers[3], numbers[4]);
+        let wheels = BodyVelocity { deviations: vector(5), ..car.rolling(&vector(1)) };
+        let velocity = GnssVelocity::new(vector(8), numbers[2], numbers[3]);
+        let time_ns = car.time_ns.wrapping_add(dt_ns);
+        let sample = ImuMean { time_ns, angular_velocity: vector(3), specific_force: vector(9) };
+        type Input<'a> = &'a dyn Fn(&mut Wheels, &mut Stream) -> bool;
+        let inputs: [Input<'_>; 5] = [
+            &|copies, stream| copies.update_fix(stream, &fix).is_err(),
+            &|copies, stream| copies.update_position(stream, &fix).is_err(),
+            &|copies, stream| copies.update(stream, &wheels).is_err(),
+            &|copies, stream| copies.update(stream, &velocity).is_err(),
+            &|copies, _| copies.propagate(&sample).is_err(),
+        ];
+        for input in inputs {
+            let mut after = copies.clone();
+            if input(&mut after, &mut gnss) {
+                prop_assert_eq!(states(&copies), states(&after));
+                refused += 1;
+            }
+        }
+        let counts = gnss.counts();
+        prop_assert!(counts.gate + counts.invalid <= refused && counts.gate + counts.invalid + 1 >= refused);
     }
-    let states = |copies: &Wheels| format!("{:?} {:?}", copies.starts, copies.search);
-    let before = states(&copies);
-    let far = GnssPosition::new(Vector3::repeat(1e4), 1.0, 1.0);
-    assert!(matches!(copies.update_position(&mut gnss, &far), Err(Refusal::Gate { .. })));
-    let absurd = GnssPosition::new(Vector3::repeat(f64::NAN), 1.0, 1.0);
-    assert_eq!(copies.update_position(&mut gnss, &absurd), Err(Refusal::NonFinite));
-    let slip = BodyVelocity { velocity: Vector3::repeat(50.0), ..car.wheels() };
-    assert!(matches!(copies.update(&mut stream(), &slip), Err(Refusal::Gate { .. })));
-    let nan = ImuMean { specific_force: Vector3::repeat(f64::NAN), ..car.drive() };
-    assert_eq!(copies.propagate(&nan), Err(Refusal::NonFinite));
-    assert_eq!(before, states(&copies));
-    assert_eq!((gnss.counts().gate, gnss.counts().invalid), (1, 1));
 }

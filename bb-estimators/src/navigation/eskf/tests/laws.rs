@@ -10,8 +10,8 @@ use crate::navigation::state::{
     ACCELEROMETER_BIAS, GYROSCOPE_BIAS, Navigation, Optional, POSITION, States, offset,
 };
 use crate::navigation::{
-    AbsolutePose, BarometricHeight, EskfFilter, EskfParams, Fused, GnssPosition, GnssVelocity, History, ImuMean,
-    MagneticField, Refusal, RelativePose, Replayed, Start, Stream, StreamParams, WheelSpeed,
+    AbsolutePose, BarometricHeight, EskfFilter, EskfParams, GnssPosition, GnssVelocity, ImuMean, MagneticField,
+    Refusal, RelativePose, Start, Stream, StreamParams, WheelSpeed,
 };
 
 type Law = Result<(), TestCaseError>;
@@ -151,54 +151,6 @@ fn what_is_refused_changes_nothing<S: States, const N: usize>(numbers: &[f64], t
     Ok(())
 }
 
-#[derive(Clone, Debug, PartialEq)]
-struct Fixed<S: States, const N: usize> {
-    filter: EskfFilter<S, N>,
-    stream: Stream,
-}
-
-impl<S: States, const N: usize> Replayed for Fixed<S, N> {
-    type Filter = EskfFilter<S, N>;
-    type Measurement = GnssPosition;
-
-    fn filter(&self) -> &EskfFilter<S, N> {
-        &self.filter
-    }
-
-    fn filter_mut(&mut self) -> &mut EskfFilter<S, N> {
-        &mut self.filter
-    }
-
-    fn update(&mut self, measurement: &GnssPosition) -> Result<Fused, Refusal> {
-        self.filter.update(&mut self.stream, measurement)
-    }
-}
-
-/// Fixes at sample ends that arrive this many samples late: the result equals that of arrival in order, bit for bit.
-fn late_and_out_of_order_is_as_in_order<S: States, const N: usize>(fixes: &[(i64, i64, f64)]) -> Law {
-    const SAMPLES: i64 = 120;
-    let fly = |delayed: i64| {
-        let start = Fixed::<S, N> { filter: started(), stream: Stream::default() };
-        let mut history = History::<_, 150, 50, 6>::new(start, 0).unwrap();
-        for i in 1..=SAMPLES {
-            history.propagate(&sample(i)).unwrap();
-            for (taken, _, value) in fixes.iter().filter(|(taken, delay, _)| {
-                let arrives = (taken + delayed * delay).min(SAMPLES);
-                arrives == i
-            }) {
-                let fix = GnssPosition::new(Vector3::new(*value, -value, 0.5 * value), 1.0, 2.0);
-                match history.update(taken * 10_000_000, &fix) {
-                    Ok(_) | Err(Refusal::Gate { .. }) => {}
-                    Err(error) => panic!("{error}"),
-                }
-            }
-        }
-        history.now().clone()
-    };
-    prop_assert_eq!(fly(0), fly(1));
-    Ok(())
-}
-
 /// The laws of one configuration.
 macro_rules! laws_of {
     ($($name:ident: $states:ty;)*) => { $(
@@ -230,15 +182,6 @@ macro_rules! laws_of {
                     time_ns in any::<i64>(),
                 ) {
                     super::what_is_refused_changes_nothing::<$states, N>(&numbers, time_ns)?;
-                }
-
-                #[test]
-                fn late_and_out_of_order_is_as_in_order(
-                    fixes in proptest::collection::btree_map(1..119_i64, (0..60_i64, -9.0..9.0), 1..30),
-                ) {
-                    let fixes: Vec<_> =
-                        fixes.into_iter().map(|(taken, (delay, value))| (taken, delay, value)).collect();
-                    super::late_and_out_of_order_is_as_in_order::<$states, N>(&fixes)?;
                 }
             }
         }
