@@ -1,16 +1,19 @@
 //! `bb eval navigation` on recorded and simulated drives and flights: what `robot!` runs, with one set of options for all.
 
-use bb_eval::{DataSet, NavigationFilter, NavigationRun, NavigationScore, RobotSettings, play_navigation};
-use bb_tests::recordings::navigation;
+use bb_eval::{
+    BagOptions, DataSet, Drive, NavigationBag, NavigationFilter, NavigationRun, NavigationScore, RobotSettings,
+    play_navigation,
+};
+use bb_tests::recordings::{navigation, vehicles};
 use std::error::Error;
 use std::path::Path;
 
-fn score(prefix: &Path, name: &str, settings: &[&str]) -> Result<NavigationScore, Box<dyn Error>> {
+fn score(drive: &Drive, name: &str, settings: &[&str]) -> Result<NavigationScore, Box<dyn Error>> {
     let filter: NavigationFilter = name.parse()?;
     let settings: Vec<_> = settings.iter().map(|text| text.parse()).collect::<Result<_, _>>()?;
     let settings = RobotSettings::new(&filter, None, &settings, None)?;
     let run = NavigationRun { settings, ..NavigationRun::default() };
-    Ok(play_navigation(&DataSet::read(prefix)?.drive(), &filter, &run, || {})?.score)
+    Ok(play_navigation(drive, &filter, &run, || {})?.score)
 }
 
 /// An estimate with each sample of the IMU of a drive, so that there is one at each instant of its truth.
@@ -46,11 +49,73 @@ const KNOWN: [Known; 16] = [
 fn errors_are_no_greater_than_known() -> Result<(), Box<dyn Error>> {
     let folder = navigation()?;
     for (name, filter, settings, known, range) in KNOWN {
-        let score = score(&folder.join(name), filter, settings)?;
+        let score = score(&DataSet::read(&folder.join(name))?.drive(), filter, settings)?;
         let (position, nees) = (score.position_m.ok_or("no truth")?.rms, score.nees.ok_or("no covariance")?);
         println!("{name}, {filter}: {position:.3} m, NEES {nees:.2}, {} instants", score.scored);
         assert!(position <= 1.02 * known, "{name}, {filter}: {position} m was {known}");
         assert!(range.contains(&nees), "{name}, {filter}: NEES {nees}");
+    }
+    Ok(())
+}
+
+/// The data sheet of the car's IMU, times five, and over five.
+const SHEET: [&[&str]; 3] = [
+    &["gyroscope_noise=6.6e-5", "accelerometer_noise=6.9e-4"],
+    &["gyroscope_noise=3.3e-4", "accelerometer_noise=3.45e-3"],
+    &["gyroscope_noise=1.32e-5", "accelerometer_noise=1.38e-4"],
+];
+
+/// Options of `Eskf` for a bag: the mount of a frame, and the topics that are not those of the bag alone.
+fn vehicle(folder: &Path, name: &str, mounts: &[&str], topics: [Option<&str>; 3]) -> Result<Drive, Box<dyn Error>> {
+    let [gnss, truth, odometry] = topics.map(|topic| topic.map(str::to_owned));
+    let mount = mounts.iter().map(|mount| mount.parse()).collect::<Result<_, _>>()?;
+    let origin = name.starts_with("comma").then(|| "37.721000009,-122.472299089,31.6392".parse()).transpose()?;
+    let options =
+        BagOptions { gnss_topic: gnss, truth, odometry_topic: odometry, mount, origin, ..BagOptions::default() };
+    Ok(NavigationBag::read(&folder.join(name).with_extension("mcap"), &options)?.drive()?)
+}
+
+/// A row of vehicles: the bag, its mounts and topics, the options, the position that was measured, m, and the NEES that is accepted.
+type Vehicle = (
+    &'static str,
+    &'static [&'static str],
+    [Option<&'static str>; 3],
+    &'static [&'static str],
+    f64,
+    std::ops::Range<f64>,
+);
+
+const CAR: &[&str] = &["gps=0,0.05,0"];
+const FIXES: [Option<&str>; 3] = [Some("/gps/fix"), Some("/truth/fix"), None];
+const HUSKY: &[&str] = &["gps=0,0.3,0", "base=0,0.3,-0.52"];
+const WHEELS: [Option<&str>; 3] = [Some("/gps/fix"), Some("/truth/fix"), Some("/odom")];
+const NO_WHEELS: [Option<&str>; 3] = [None, None, Some("none")];
+const OWN: [Option<&str>; 3] = [None; 3];
+
+const VEHICLES: [Vehicle; 12] = [
+    ("drive_s4", CAR, FIXES, SHEET[0], 0.036, 2.0..5.0),
+    ("drive_s4", CAR, FIXES, SHEET[1], 0.034, 1.5..5.0),
+    ("drive_s4", CAR, FIXES, SHEET[2], 0.036, 2.0..5.0),
+    ("drive_s4_rot", CAR, FIXES, SHEET[0], 0.036, 2.0..5.0),
+    ("drive_o30", CAR, FIXES, SHEET[0], 12.27, 0.5..5.0),
+    ("drive_o30", CAR, FIXES, SHEET[1], 7.92, 0.5..5.0),
+    ("drive_o30", CAR, FIXES, SHEET[2], 6.80, 0.5..5.0),
+    ("comma", &["car=0,0,0"], OWN, &[], 0.505, 0.5..4.0),
+    ("comma", &["car=0,0,0"], NO_WHEELS, &[], 0.654, 0.5..4.0),
+    ("comma_late", &["car=0,0,0"], OWN, &[], 1.375, 0.5..5.0),
+    ("husky_flat", HUSKY, WHEELS, &[], 1.310, 1.0..9.0),
+    ("husky_o30_flat", HUSKY, WHEELS, &[], 4.103, 1.0..20.0),
+];
+
+#[test]
+fn vehicles_are_followed_as_well_as_known() -> Result<(), Box<dyn Error>> {
+    let folder = vehicles()?;
+    for (name, mounts, topics, settings, known, range) in VEHICLES {
+        let score = score(&vehicle(&folder, name, mounts, topics)?, "eskf", settings)?;
+        let (position, nees) = (score.position_m.ok_or("no truth")?.rms, score.nees.ok_or("no covariance")?);
+        println!("{name}, {settings:?}: {position:.3} m, NEES {nees:.2}, {} instants", score.scored);
+        assert!(position <= 1.02 * known, "{name}, {settings:?}: {position} m was {known}");
+        assert!(range.contains(&nees), "{name}, {settings:?}: NEES {nees}");
     }
     Ok(())
 }

@@ -9,6 +9,9 @@ pub const TRIALS: usize = 10;
 /// Number of recordings of phones.
 pub const PHONES: usize = 66;
 
+/// Number of bags of vehicles.
+pub const VEHICLES: usize = 7;
+
 /// Number of data sets of navigation; one is left out, as it has the samples of another.
 pub const SETS: usize = 7;
 
@@ -39,6 +42,16 @@ pub fn families() -> Result<PathBuf, String> {
 /// `BB_DATA` is not set, or the folder has not as many data sets as the bounds are for.
 pub fn navigation() -> Result<PathBuf, String> {
     navigation_in(std::env::var_os("BB_DATA").map(PathBuf::from).as_deref())
+}
+
+/// The folder of the bags of vehicles.
+///
+/// # Errors
+/// `BB_DATA` is not set, or the folder has not as many bags as the bounds are for.
+pub fn vehicles() -> Result<PathBuf, String> {
+    let (folder, files) = folder(std::env::var_os("BB_DATA").map(PathBuf::from).as_deref(), "vehicles")?;
+    expect(&folder, VEHICLES, files.len())?;
+    Ok(folder)
 }
 
 fn broad_in(data: Option<&Path>) -> Result<Vec<PathBuf>, String> {
