@@ -1,26 +1,30 @@
-//! The two estimation strategies and their common interface.
+//! The filter, as [copies](crate::navigation::Copies) of which the best is the estimate, with or without a window that follows it.
 
-mod eskf;
 mod predictor;
-#[cfg(feature = "smoother")]
-mod smoother;
+mod provided;
+#[cfg_attr(not(feature = "smoother"), path = "strategy/no_window.rs")]
+mod window;
 
 use alloc::boxed::Box;
+use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 
 use nalgebra::{Isometry3, Matrix6, SMatrix, UnitQuaternion, Vector3};
 
 pub(super) use self::predictor::Predictor;
+use self::window::Window;
 use super::error::EstimatorError;
 use super::factor::ProvidedFactor;
-use super::params::{StateEstimatorConfig, StrategyKind, ns};
+use super::params::{StateEstimatorConfig, ns};
 use crate::attitude::ParamsError;
-use crate::navigation::eskf::{ImuMean, Start};
+use crate::navigation::copies::{Copies, Ways};
+use crate::navigation::eskf::{EskfFilter, ImuMean, Start};
 use crate::navigation::fused::Fused;
 use crate::navigation::measurement::{AbsolutePose, GnssPosition, GnssVelocity, RelativePose};
-use crate::navigation::numbers::CAMERA_SLACK_NS;
+use crate::navigation::numbers::{CAMERA_SLACK_NS, UNKNOWN_HEADING};
+use crate::navigation::propagate::Propagate as _;
 use crate::navigation::refusal::Refusal;
-use crate::navigation::state::{Estimate, POSITION, ROTATION};
+use crate::navigation::state::{Estimate, NAVIGATED, Navigated, POSITION, ROTATION};
 use crate::navigation::stream::{Stream, StreamParams};
 
 /// A pose in the world of the engine, and its covariance.
@@ -137,50 +141,64 @@ impl Cadence {
     }
 }
 
-/// Raises the covariance of the position by what a body moves in a time with this standard deviation, s.
-fn add_time<const N: usize>(covariance: &mut SMatrix<f64, N, N>, velocity: &Vector3<f64>, deviation_s: f64) {
-    let way = velocity * deviation_s;
-    let mut of_position = covariance.fixed_view_mut::<3, 3>(POSITION, POSITION);
-    of_position += way * way.transpose();
-}
-
 /// Converts a stamp to an id that increases with it.
 pub(super) fn id_of(time_ns: i64) -> u64 {
     (time_ns as u64) ^ (1 << 63)
 }
 
-/// The strategy in use.
+/// The copies of the filter, and the poses of the last keyframes: the window's, if there is one.
 #[derive(Clone, Debug)]
-pub(super) enum Strategy<F: ProvidedFactor> {
-    #[cfg(feature = "smoother")]
-    Smoother(Box<smoother::SmootherStrategy<F>>),
-    Eskf(Box<eskf::EskfStrategy>, core::marker::PhantomData<fn() -> F>),
-}
-
-macro_rules! each {
-    ($self:expr, $strategy:ident => $do:expr) => {
-        match $self {
-            #[cfg(feature = "smoother")]
-            Strategy::Smoother($strategy) => $do,
-            Strategy::Eskf($strategy, _) => $do,
-        }
-    };
+pub(super) struct Strategy<F: ProvidedFactor> {
+    copies: Copies<EskfFilter<Navigated, NAVIGATED>>,
+    streams: Streams,
+    cadence: Cadence,
+    /// `None` if the filter is the whole strategy.
+    window: Option<Box<Window<F>>>,
+    /// Estimates of the filter at the last keyframes, the newest last. They are never corrected.
+    past: VecDeque<Pose>,
+    /// The most of them.
+    most: usize,
+    /// `true` to keep each keyframe that leaves for [`Self::take_left`].
+    records: bool,
+    left: Option<Pose>,
+    /// `true` if the present becomes the reference of the next relative pose, once all measurements at this time are fused.
+    is_reference_due: bool,
 }
 
 impl<F: ProvidedFactor> Strategy<F> {
     /// Creates a strategy that has not started.
     pub(super) fn new(config: &StateEstimatorConfig) -> Result<Self, ParamsError> {
-        Ok(match config.strategy {
-            #[cfg(feature = "smoother")]
-            StrategyKind::FixedLagSmoother => Self::Smoother(Box::new(smoother::SmootherStrategy::new(config)?)),
-            #[cfg(feature = "eskf")]
-            StrategyKind::Eskf => Self::Eskf(Box::new(eskf::EskfStrategy::new(config)?), core::marker::PhantomData),
+        let most = config.params.window as usize;
+        let has_window = config.strategy.is_smoothing();
+        Ok(Self {
+            copies: Copies::new(config.sensors, Ways { noise: true, scale: true })?,
+            streams: Streams::new(),
+            cadence: Cadence::new(config),
+            window: has_window.then(|| Window::new(config).map(Box::new)).transpose()?,
+            past: VecDeque::with_capacity(most + 1),
+            most,
+            records: config.params.record_keyframes,
+            left: None,
+            is_reference_due: false,
         })
     }
 
     /// Starts or restarts.
     pub(super) fn start(&mut self, start: &Start) -> Result<(), Refusal> {
-        each!(self, strategy => strategy.start(start))
+        self.copies.start(start)?;
+        self.begin(start.time_ns);
+        // Earlier refusals relate to another estimate.
+        self.streams.anchors.forgive();
+        self.window.as_mut().map_or(Ok(()), |window| window.start(start, &self.copies))
+    }
+
+    /// Makes the present state the first keyframe.
+    fn begin(&mut self, time_ns: i64) {
+        self.copies.set_keyframe(id_of(time_ns));
+        self.cadence.begin(time_ns);
+        self.is_reference_due = false;
+        self.past.clear();
+        self.past.extend(self.pose());
     }
 
     /// Advances to a time within one sample, which began at `since_ns`. Makes a keyframe if one is due.
@@ -190,91 +208,246 @@ impl<F: ProvidedFactor> Strategy<F> {
         sample: &ImuMean,
         since_ns: i64,
     ) -> Result<(), EstimatorError> {
-        each!(self, strategy => strategy.propagate(until_ns, sample, since_ns))
+        if let Some(window) = &mut self.window {
+            let held = self.copies.held(until_ns, sample, since_ns)?;
+            window.propagate(&ImuMean { time_ns: until_ns, ..*sample }, held)?;
+        }
+        if core::mem::take(&mut self.is_reference_due) {
+            self.copies.set_keyframe(id_of(self.cadence.camera_ns));
+        }
+        self.copies.propagate_until(until_ns, sample, since_ns)?;
+        if self.cadence.is_due(until_ns) {
+            self.keep()?;
+        }
+        self.follow()
     }
 
     /// Makes the present state a keyframe: a camera has captured a frame.
     pub(super) fn frame(&mut self) -> Result<(), EstimatorError> {
-        each!(self, strategy => strategy.camera_frame())
+        self.keep()?;
+        self.cadence.camera_frame();
+        self.is_reference_due = true;
+        self.follow()
+    }
+
+    /// Makes the present a keyframe.
+    fn keyframe(&mut self) -> Result<(), EstimatorError> {
+        self.keep()?;
+        self.follow()
+    }
+
+    /// Makes the present a keyframe of the filter.
+    fn keep(&mut self) -> Result<(), EstimatorError> {
+        let pose = self.pose().ok_or(Refusal::NotStarted)?;
+        if pose.time_ns == self.cadence.keyframe_ns {
+            return Ok(());
+        }
+        if !pose.is_finite() {
+            return Err(EstimatorError::fatal(Refusal::NonFinite));
+        }
+        self.cadence.keyframe_ns = pose.time_ns;
+        self.past.push_back(pose);
+        if self.past.len() > self.most {
+            self.left = self.past.pop_front().filter(|_| self.records);
+        }
+        Ok(())
+    }
+
+    /// Makes the newest keyframe of the filter one of the window.
+    fn follow(&mut self) -> Result<(), EstimatorError> {
+        self.window.as_mut().map_or(Ok(()), |window| window.follow(self.cadence.keyframe_ns))
+    }
+
+    /// Restarts the window in the state of the filter.
+    fn restart_window(&mut self, is_converged: bool) -> Result<(), EstimatorError> {
+        self.window.as_mut().map_or(Ok(()), |window| window.restart(&self.copies, is_converged))?;
+        self.keep()
+    }
+
+    /// The window, if there is one, once the present is its newest keyframe: otherwise samples since then would be lost.
+    fn window_at_present(&mut self) -> Result<Option<&mut Window<F>>, EstimatorError> {
+        if self.window.is_some() {
+            self.keyframe()?;
+        }
+        Ok(self.window.as_deref_mut())
     }
 
     /// Fuses a measurement at the present time.
     pub(super) fn measure(&mut self, measured: &Measured<'_, F>) -> Result<Fused, EstimatorError> {
-        each!(self, strategy => strategy.measure(measured))
+        if self.window.is_none() {
+            return self.fuse(measured);
+        }
+        // Without a camera, nothing else determines the times of keyframes. The dependence of a provider's factor on the present state is
+        // unknown, so it cannot be carried back.
+        let has_camera = self.copies.estimate().is_some_and(|now| self.cadence.has_camera(now.time_ns));
+        if !has_camera || matches!(measured, Measured::Provided(_)) {
+            self.keyframe()?;
+        }
+        let resets = self.resets();
+        let fused = self.fuse(measured);
+        // A relative pose ends where the next one begins: in between, the window would lose one.
+        let is_between = has_camera && !matches!(measured, Measured::Relative(_));
+        let has_moved = self.resets() != resets;
+        let is_fatal = matches!(fused, Err(EstimatorError::Fatal(_)));
+        let Some(window) = &mut self.window else { return fused };
+        if (!window.fits(&self.copies) && !is_between || has_moved) && !is_fatal {
+            self.restart_window(true)?;
+            return fused;
+        }
+        let fused = fused?;
+        let has_velocity = self.streams.velocities.counts().gate_in_a_row == 0;
+        window.add(measured, id_of(self.cadence.keyframe_ns), &self.copies, has_velocity)?;
+        if !window.is_converged() && !is_between {
+            self.restart_window(false)?;
+        }
+        Ok(fused)
     }
 
-    /// Returns whether the last correction has converged. If not, the covariance is not to be trusted.
+    /// Fuses a measurement with the filter.
+    fn fuse(&mut self, measured: &Measured<'_, F>) -> Result<Fused, EstimatorError> {
+        let Self { copies, streams, .. } = self;
+        let fused = match measured {
+            Measured::Relative(pose) => copies.update(&mut streams.relative, pose).map_err(escalate)?,
+            Measured::Anchor(pose) => copies.update_position(&mut streams.anchors, pose).map_err(escalate)?,
+            Measured::Gnss(position, velocity, trust) => {
+                let fused = match trust {
+                    Trust::Doubted => copies.update_doubted_fix(&mut streams.positions, position),
+                    Trust::Believed => copies.update_fix(&mut streams.positions, position),
+                }
+                .map_err(escalate)?;
+                // A receiver with a good position is trusted even if its velocity is refused.
+                if let Some(velocity) = velocity {
+                    let _ = copies.update(&mut streams.velocities, velocity);
+                }
+                fused
+            }
+            Measured::Provided(factor) => provided::update(copies, &mut streams.provided, *factor)?,
+        };
+        let pose = self.pose().filter(Pose::is_finite).ok_or(EstimatorError::fatal(Refusal::NonFinite))?;
+        if let Some(newest) = self.past.back_mut().filter(|newest| newest.time_ns == pose.time_ns) {
+            *newest = pose;
+        }
+        Ok(fused)
+    }
+
+    fn pose(&self) -> Option<Pose> {
+        let best = self.copies.best();
+        best.estimate().map(|estimate| Pose::of(estimate, best.covariance()))
+    }
+
+    /// Returns whether the last correction has converged. If not, the covariance is not to be trusted. The filter corrects in a fixed
+    /// number of steps.
     pub(super) fn is_converged(&self) -> bool {
-        each!(self, strategy => strategy.is_converged())
+        self.window.as_ref().is_none_or(|window| window.is_converged())
     }
 
-    /// Returns whether the heading is known. After an outage of the IMU it is not, until it has been determined again.
+    /// Returns whether the attitude is known well enough to be corrected linearly. After an outage of the IMU it is not, until it has
+    /// been determined again.
     pub(super) fn is_attitude_known(&self) -> bool {
-        each!(self, strategy => strategy.is_attitude_known())
+        self.copies.attitude_deviation() <= UNKNOWN_HEADING
     }
 
     /// Present position and velocity.
     pub(super) fn motion(&self) -> Option<(Vector3<f64>, Vector3<f64>)> {
-        each!(self, strategy => strategy.motion())
+        self.present(|position, velocity, _| (*position, *velocity))
     }
 
     /// The attitude at the present time.
     pub(super) fn attitude(&self) -> Option<UnitQuaternion<f64>> {
-        each!(self, strategy => strategy.attitude())
+        self.present(|_, _, attitude| *attitude)
+    }
+
+    fn present<T>(&self, of: impl FnOnce(&Vector3<f64>, &Vector3<f64>, &UnitQuaternion<f64>) -> T) -> Option<T> {
+        match &self.window {
+            Some(window) => window.predicted().map(|now| of(&now.position, &now.velocity, &now.world_from_body)),
+            None => self.copies.estimate().map(|now| of(&now.position, &now.velocity, &now.world_from_body)),
+        }
     }
 
     /// Number of gaps in the IMU samples that were bridged.
     pub(super) fn gaps(&self) -> u32 {
-        each!(self, strategy => strategy.gaps())
+        self.copies.best().gaps()
     }
 
     /// The predictor from the newest estimate, if there is one.
     pub(super) fn predictor(&self) -> Option<Predictor> {
-        each!(self, strategy => strategy.predictor())
+        let Some(window) = &self.window else {
+            return self.copies.estimate().map(|_| Predictor::of(self.copies.best()));
+        };
+        window.filter(self.copies.noise()).map(|filter| Predictor::of(&filter))
     }
 
     /// The newest keyframe.
     pub(super) fn newest(&self) -> Option<Pose> {
-        each!(self, strategy => strategy.newest())
+        self.window.as_ref().map_or_else(|| self.past.back().copied(), |window| window.newest())
     }
 
     /// Keyframes before the newest, in reverse order of time, and whether they are smoothed.
     pub(super) fn history(&mut self, most: usize) -> (Vec<Pose>, bool) {
-        each!(self, strategy => strategy.history(most))
+        match &mut self.window {
+            Some(window) => (window.history(most), true),
+            None => (self.past.iter().rev().skip(1).take(most).copied().collect(), false),
+        }
     }
 
-    /// The next of the keyframes that have left the window, if any.
+    /// The next of the keyframes that have left, if any.
     pub(super) fn take_left(&mut self) -> Option<Pose> {
-        each!(self, strategy => strategy.take_left())
+        self.window.as_mut().map_or_else(|| self.left.take(), |window| window.take_left())
     }
 
     /// Time of the newest keyframe, ns.
     pub(super) fn keyframe_ns(&self) -> i64 {
-        each!(self, strategy => strategy.keyframe_ns())
+        self.cadence.keyframe_ns
     }
 
     /// Number of keyframes held.
     pub(super) fn keyframes(&self) -> usize {
-        each!(self, strategy => strategy.keyframes())
+        self.window.as_ref().map_or(self.past.len(), |window| window.keyframes())
     }
 
     /// The gates, with what each has refused.
     pub(super) fn streams(&self) -> &Streams {
-        each!(self, strategy => strategy.streams())
+        &self.streams
     }
 
-    /// Returns how often it started, or went on in another place.
+    /// Number of starts and of newcomers that took over.
     pub(super) fn resets(&self) -> u32 {
-        each!(self, strategy => strategy.resets())
+        self.copies.best().resets()
     }
 
     /// Assigns a new time to the present state, with the standard deviation of that time, s. Keyframes are dropped.
     pub(super) fn set_clock(&mut self, time_ns: i64, deviation_s: f64) -> Result<(), EstimatorError> {
-        each!(self, strategy => strategy.set_clock(time_ns, deviation_s))
+        if let Some(window) = self.window_at_present()? {
+            window.set_clock(time_ns, deviation_s)?;
+        }
+        self.copies.set_clock(time_ns, deviation_s);
+        self.begin(time_ns);
+        Ok(())
     }
 
     /// Moves to another world.
     pub(super) fn move_world(&mut self, new_from_old: &Isometry3<f64>) -> Result<(), EstimatorError> {
-        each!(self, strategy => strategy.move_world(new_from_old))
+        if let Some(window) = self.window_at_present()? {
+            window.move_world(new_from_old)?;
+        }
+        self.copies.move_world(new_from_old)?;
+        let turn = new_from_old.rotation.to_rotation_matrix().into_inner();
+        for pose in &mut self.past {
+            pose.position = new_from_old.transform_point(&pose.position.into()).coords;
+            pose.velocity = turn * pose.velocity;
+            pose.world_from_body = new_from_old.rotation * pose.world_from_body;
+            let mut block = SMatrix::<f64, 6, 6>::zeros();
+            [0, 3].iter().for_each(|first| block.fixed_view_mut::<3, 3>(*first, *first).copy_from(&turn));
+            pose.covariance = block * pose.covariance * block.transpose();
+        }
+        Ok(())
+    }
+}
+
+/// Makes a correction that would move the filter farther than any distance on the Earth fatal, as it is for the window.
+fn escalate(refusal: Refusal) -> EstimatorError {
+    match refusal {
+        Refusal::OutOfRange => EstimatorError::fatal(refusal),
+        _ => refusal.into(),
     }
 }

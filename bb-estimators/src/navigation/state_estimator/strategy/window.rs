@@ -1,9 +1,9 @@
-//! The fixed-lag smoother, beside the filter.
+//! The window of the fixed-lag smoother, which follows the filter.
 //!
-//! The [filter](super::eskf) runs with the same inputs. It decides what is fused, finds the noise of the IMU and of fixes and whether the
-//! scale of relative poses drifts, and moves to where positions agree. Whenever another of its copies becomes the best, the window restarts
-//! in that copy's state, with its noise: what it has concluded with another noise is more or less certain than its covariance says. It
-//! restarts there as well when an update does not converge: what leaves it would be linearised in the wrong place for good.
+//! Both get the same inputs. The filter decides what is fused, finds the noise of the IMU and of fixes and whether the scale of relative
+//! poses drifts, and moves to where positions agree. Whenever another of its copies becomes the best, the window restarts in that copy's
+//! state, with its noise: what it has concluded with another noise is more or less certain than its covariance says. It restarts there as
+//! well when an update does not converge: what leaves it would be linearised in the wrong place for good.
 //!
 //! Keyframes are the frames of the camera. Without a camera, they are made at intervals, and at measurements. A measurement between
 //! two keyframes is carried back to the earlier one by the motion since then.
@@ -13,12 +13,11 @@ use alloc::vec::Vec;
 
 use nalgebra::{Isometry3, Matrix3, SMatrix, UnitQuaternion, Vector3};
 
-use super::eskf::EskfStrategy;
-use super::{Measured, Pose, Predictor, Streams, add_time, id_of};
+use super::{Measured, Pose, id_of};
 use crate::attitude::ParamsError;
-use crate::navigation::eskf::{EskfFilter, ImuMean, Start, seconds_between};
+use crate::navigation::copies::Copies;
+use crate::navigation::eskf::{Doubt, EskfFilter, ImuMean, Start, seconds_between};
 use crate::navigation::factor::{Factor, NavigationFactor, Rows};
-use crate::navigation::fused::Fused;
 use crate::navigation::measurement::{AbsolutePose, GnssPosition, GnssVelocity};
 use crate::navigation::refusal::Refusal;
 use crate::navigation::smoother::{FixedLagSmoother, SmootherParams};
@@ -57,20 +56,22 @@ impl<S: States, const N: usize, F: Factor<S, N>> Factor<S, N> for Held<F> {
     }
 }
 
-/// The window, and the filter beside it.
+/// The window. Its newest keyframe is that of the filter.
 #[derive(Clone, Debug)]
-pub(in crate::navigation::state_estimator) struct SmootherStrategy<F: ProvidedFactor> {
+pub(super) struct Window<F: ProvidedFactor> {
     smoother: FixedLagSmoother<Smoothed, SMOOTHED, Held<F>>,
-    filter: EskfStrategy,
     /// The changes of the best copy that the window has followed.
     changes: u32,
     /// A stream without a gate, for measurements that the filter has fused.
     open: Stream,
     records: bool,
     left: VecDeque<Pose>,
-    /// `false` if the last update of the window did not converge.
+    /// `false` if the last update did not converge.
     is_converged: bool,
 }
+
+/// The filter that the window follows.
+type Filter = Copies<EskfFilter<Navigated, NAVIGATED>>;
 
 /// Motion from the newest keyframe to the present.
 struct Way {
@@ -82,13 +83,12 @@ struct Way {
     covariance: Matrix3<f64>,
 }
 
-impl<F: ProvidedFactor> SmootherStrategy<F> {
+impl<F: ProvidedFactor> Window<F> {
     pub(super) fn new(config: &StateEstimatorConfig) -> Result<Self, ParamsError> {
         let window = config.params.window as usize;
         let params = SmootherParams { sensors: config.sensors, window, ..SmootherParams::default() };
         Ok(Self {
             smoother: FixedLagSmoother::new(params)?,
-            filter: EskfStrategy::new(config)?,
             changes: 0,
             open: Stream::new(StreamParams { gate: 0.0, ..StreamParams::default() }),
             records: config.params.record_keyframes,
@@ -101,63 +101,40 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
         self.is_converged
     }
 
-    /// The window follows the filter.
-    pub(super) fn is_attitude_known(&self) -> bool {
-        self.filter.is_attitude_known()
+    /// Returns whether it converges, with what the filter has found.
+    pub(super) fn fits(&self, filter: &Filter) -> bool {
+        filter.changes() == self.changes && self.is_converged
     }
 
-    pub(super) fn start(&mut self, start: &Start) -> Result<(), Refusal> {
-        self.filter.start(start)?;
-        self.tune();
-        self.changes = self.filter.copies().changes();
+    pub(super) fn start(&mut self, start: &Start, filter: &Filter) -> Result<(), Refusal> {
+        self.tune(filter);
         self.smoother.start(id_of(start.time_ns), start)?;
         self.is_converged = true;
         Ok(())
     }
 
-    /// Gives the window what the filter has found: the noise of the IMU, and whether the scale of relative poses drifts.
-    fn tune(&mut self) {
-        self.smoother.set_noise(self.filter.copies().noise());
-        self.smoother.set_relative_scale(self.filter.copies().best().params().relative_scale);
+    /// Takes over what the filter has found: the noise of the IMU, and whether the scale of relative poses drifts.
+    fn tune(&mut self, filter: &Filter) {
+        self.smoother.set_noise(filter.noise());
+        self.smoother.set_relative_scale(filter.best().params().relative_scale);
+        self.changes = filter.changes();
     }
 
-    /// Returns how often it started, or went on in another place.
-    pub(super) fn resets(&self) -> u32 {
-        self.filter.resets()
-    }
-
-    pub(super) fn propagate(
-        &mut self,
-        until_ns: i64,
-        sample: &ImuMean,
-        since_ns: i64,
-    ) -> Result<(), EstimatorError> {
-        match self.filter.copies().held(until_ns, sample, since_ns)? {
-            Some((held, doubt)) => self.smoother.hold(&held, &doubt)?,
-            None => self.smoother.propagate(&ImuMean { time_ns: until_ns, ..*sample })?,
+    /// Advances over a part of a sample, or of a gap over which the filter holds a reading.
+    pub(super) fn propagate(&mut self, part: &ImuMean, held: Option<(ImuMean, Doubt)>) -> Result<(), Refusal> {
+        match held {
+            Some((held, doubt)) => self.smoother.hold(&held, &doubt),
+            None => self.smoother.propagate(part),
         }
-        self.filter.propagate(until_ns, sample, since_ns)?;
-        self.follow()
-    }
-
-    pub(super) fn camera_frame(&mut self) -> Result<(), EstimatorError> {
-        self.filter.camera_frame()?;
-        self.follow()
-    }
-
-    fn keyframe(&mut self) -> Result<(), EstimatorError> {
-        self.filter.keyframe()?;
-        self.follow()
     }
 
     /// Makes the present a keyframe if the filter did.
-    fn follow(&mut self) -> Result<(), EstimatorError> {
+    pub(super) fn follow(&mut self, now_ns: i64) -> Result<(), EstimatorError> {
         let newest_ns = self.smoother.estimate().ok_or(Refusal::NotStarted)?.time_ns;
-        let now_ns = self.filter.keyframe_ns();
         if newest_ns == now_ns {
             return Ok(());
         }
-        if self.smoother.keyframes().len() >= self.smoother.params().window {
+        if self.keyframes() >= self.smoother.params().window {
             self.leave(1);
         }
         self.smoother.add_keyframe(id_of(now_ns)).map_err(|refusal| match refusal {
@@ -186,31 +163,19 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
         Ok(())
     }
 
-    pub(super) fn measure(&mut self, measured: &Measured<'_, F>) -> Result<Fused, EstimatorError> {
-        // Without a camera, nothing else determines the times of keyframes. The dependence of a provider's factor on the present state is
-        // unknown, so it cannot be carried back.
-        if !self.filter.has_camera() || matches!(measured, Measured::Provided(_)) {
-            self.keyframe()?;
-        }
-        let resets = self.filter.resets();
-        let fused = self.filter.measure(measured);
-        // A relative pose ends where the next one begins: in between, the window would lose one.
-        let is_between = self.filter.has_camera() && !matches!(measured, Measured::Relative(_));
-        let is_off = self.filter.copies().changes() != self.changes || !self.is_converged;
-        if (is_off && !is_between || self.filter.resets() != resets)
-            && !matches!(fused, Err(EstimatorError::Fatal(_)))
-        {
-            self.adopt()?;
-            self.is_converged = true;
-            return fused;
-        }
-        let fused = fused?;
-        let id = id_of(self.filter.keyframe_ns());
+    /// Adds a measurement that the filter has fused, and its velocity if that was fused too, to the newest keyframe.
+    pub(super) fn add(
+        &mut self,
+        measured: &Measured<'_, F>,
+        id: u64,
+        filter: &Filter,
+        has_velocity: bool,
+    ) -> Result<(), EstimatorError> {
         match measured {
-            Measured::Relative(relative) => self.add(id, *relative)?,
+            Measured::Relative(relative) => self.hold(id, *relative)?,
             Measured::Anchor(anchor) => {
                 let way = self.way()?;
-                self.add(
+                self.hold(
                     id,
                     AbsolutePose {
                         position: anchor.position - way.position,
@@ -222,8 +187,8 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
             }
             Measured::Gnss(position, velocity, _) => {
                 let way = self.way()?;
-                let shown = self.filter.copies().as_shown(position);
-                self.add(
+                let shown = filter.as_shown(position);
+                self.hold(
                     id,
                     GnssPosition {
                         position: shown.position - way.position,
@@ -232,38 +197,32 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
                     },
                 )?;
                 // A receiver with a good position is trusted even if its velocity is refused.
-                if let Some(velocity) = velocity.filter(|_| self.filter.has_fused_velocity()) {
-                    let _ = self.add(id, GnssVelocity { velocity: velocity.velocity - way.velocity, ..velocity });
+                if let Some(velocity) = velocity.filter(|_| has_velocity) {
+                    let _ = self.hold(id, GnssVelocity { velocity: velocity.velocity - way.velocity, ..velocity });
                 }
             }
-            Measured::Provided(factor) => self.hold(id, Held::Provided((*factor).clone()))?,
+            Measured::Provided(factor) => self.hold_factor(id, Held::Provided((*factor).clone()))?,
         }
-        self.update()?;
-        if !self.is_converged && !is_between {
-            self.adopt()?;
-        }
-        Ok(fused)
+        self.update()
     }
 
-    /// Adds what the filter has fused.
-    fn add(&mut self, id: u64, factor: impl Into<NavigationFactor>) -> Result<(), Refusal> {
-        self.hold(id, Held::Navigation(factor.into()))
+    fn hold(&mut self, id: u64, factor: impl Into<NavigationFactor>) -> Result<(), Refusal> {
+        self.hold_factor(id, Held::Navigation(factor.into()))
     }
 
-    fn hold(&mut self, id: u64, factor: Held<F>) -> Result<(), Refusal> {
+    fn hold_factor(&mut self, id: u64, factor: Held<F>) -> Result<(), Refusal> {
         self.smoother.add(&mut self.open, id, factor).map(|_| ())
     }
 
-    /// Restarts the window in the state of the filter, which is another copy than before.
-    fn adopt(&mut self) -> Result<(), EstimatorError> {
-        let now_ns = self.filter.state().ok_or(Refusal::NotStarted)?.0.time_ns;
-        let past = self.smoother.keyframes().take_while(|id| *id < id_of(now_ns)).count();
-        self.leave(past);
-        self.tune();
-        self.changes = self.filter.copies().changes();
-        let (estimate, covariance) = self.filter.state().ok_or(Refusal::NotStarted)?;
-        self.smoother.adopt::<Navigated, NAVIGATED>(id_of(estimate.time_ns), estimate, covariance)?;
-        self.filter.keyframe()?;
+    /// Restarts in the state of the filter.
+    pub(super) fn restart(&mut self, filter: &Filter, is_converged: bool) -> Result<(), EstimatorError> {
+        let best = filter.best();
+        let estimate = best.estimate().ok_or(Refusal::NotStarted)?;
+        let id = id_of(estimate.time_ns);
+        self.leave(self.smoother.keyframes().take_while(|before| *before < id).count());
+        self.tune(filter);
+        self.smoother.adopt::<Navigated, NAVIGATED>(id, estimate, best.covariance())?;
+        self.is_converged = is_converged;
         Ok(())
     }
 
@@ -284,67 +243,50 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
         })
     }
 
-    pub(super) fn motion(&self) -> Option<(Vector3<f64>, Vector3<f64>)> {
-        self.smoother.predicted().map(|estimate| (estimate.position, estimate.velocity))
+    pub(super) fn predicted(&self) -> Option<Estimate<SMOOTHED>> {
+        self.smoother.predicted()
     }
 
-    pub(super) fn attitude(&self) -> Option<UnitQuaternion<f64>> {
-        self.smoother.predicted().map(|estimate| estimate.world_from_body)
-    }
-
-    pub(super) fn streams(&self) -> &Streams {
-        self.filter.streams()
-    }
-
-    pub(super) fn gaps(&self) -> u32 {
-        self.smoother.gaps()
-    }
-
-    pub(super) fn predictor(&self) -> Option<Predictor> {
-        let (estimate, covariance) = (self.smoother.estimate()?, self.smoother.covariance()?);
-        let (sensors, noise) = (&self.smoother.params().sensors, self.filter.copies().noise());
-        let mut filter = EskfFilter::new(*sensors).ok()?;
+    /// A filter in the state of the newest keyframe.
+    pub(super) fn filter(&self, noise: f64) -> Option<EskfFilter<Navigated, NAVIGATED>> {
+        let mut filter = EskfFilter::new(self.smoother.params().sensors).ok()?;
         filter.multiply_noise(noise);
-        filter.adopt::<Smoothed, SMOOTHED>(&estimate, &covariance).ok()?;
-        Some(Predictor::of(&filter))
+        filter.adopt::<Smoothed, SMOOTHED>(&self.smoother.estimate()?, &self.smoother.covariance()?).ok()?;
+        Some(filter)
     }
 
     pub(super) fn newest(&self) -> Option<Pose> {
         Some(Pose::of(&self.smoother.estimate()?, &self.smoother.covariance()?))
     }
 
-    pub(super) fn history(&mut self, most: usize) -> (Vec<Pose>, bool) {
+    pub(super) fn history(&mut self, most: usize) -> Vec<Pose> {
         let ids: Vec<u64> = self.smoother.keyframes().rev().skip(1).take(most).collect();
-        (ids.into_iter().filter_map(|id| self.smoothed(id)).collect(), true)
+        ids.into_iter().filter_map(|id| self.smoothed(id)).collect()
     }
 
     pub(super) fn take_left(&mut self) -> Option<Pose> {
         self.left.pop_front()
     }
 
-    pub(super) fn keyframe_ns(&self) -> i64 {
-        self.filter.keyframe_ns()
-    }
-
     pub(super) fn keyframes(&self) -> usize {
         self.smoother.keyframes().len()
     }
 
-    /// The window restarts with the newest keyframe.
-    pub(super) fn set_clock(&mut self, time_ns: i64, deviation_s: f64) -> Result<(), EstimatorError> {
-        self.keyframe()?;
+    /// Restarts with the newest keyframe.
+    pub(super) fn set_clock(&mut self, time_ns: i64, deviation_s: f64) -> Result<(), Refusal> {
         let mut covariance = self.smoother.covariance().ok_or(Refusal::Noise)?;
         let estimate = Estimate { time_ns, ..self.smoother.estimate().ok_or(Refusal::NotStarted)? };
-        add_time(&mut covariance, &estimate.velocity, deviation_s);
+        // What the body moves in that time.
+        let way = estimate.velocity * deviation_s;
+        let mut of_position = covariance.fixed_view_mut::<3, 3>(POSITION, POSITION);
+        of_position += way * way.transpose();
         self.smoother.adopt::<Smoothed, SMOOTHED>(id_of(time_ns), &estimate, &covariance)?;
         self.is_converged = true;
-        self.filter.set_clock(time_ns, deviation_s)
+        Ok(())
     }
 
-    /// The window restarts with the newest keyframe.
-    pub(super) fn move_world(&mut self, new_from_old: &Isometry3<f64>) -> Result<(), EstimatorError> {
-        // Otherwise samples since the newest keyframe would be lost.
-        self.keyframe()?;
+    /// Restarts with the newest keyframe.
+    pub(super) fn move_world(&mut self, new_from_old: &Isometry3<f64>) -> Result<(), Refusal> {
         let covariance = self.smoother.covariance().ok_or(Refusal::Noise)?;
         let mut estimate = self.smoother.estimate().ok_or(Refusal::NotStarted)?;
         estimate.position = new_from_old.transform_point(&estimate.position.into()).coords;
@@ -360,8 +302,7 @@ impl<F: ProvidedFactor> SmootherStrategy<F> {
             id_of(estimate.time_ns),
             &estimate,
             &(0.5 * (covariance + covariance.transpose())),
-        )?;
-        self.filter.move_world(new_from_old)
+        )
     }
 }
 
