@@ -34,7 +34,7 @@ use alloc::vec::Vec;
 use nalgebra::{Isometry3, Vector3};
 
 pub(super) use self::filter::{CopiedFilter, Fix, Update, is_same};
-use self::holding::Holding;
+pub(in crate::navigation) use self::holding::Holding;
 use self::newcomer::Newcomer;
 use self::rest::Rest;
 use self::scatter::Scatter;
@@ -48,8 +48,8 @@ use super::state::States;
 use super::stream::Stream;
 use crate::attitude::ParamsError;
 use crate::navigation::numbers::{
-    BETTER, CLEARLY, FAR_POSITION, FARTHEST_JUMP, IMPLAUSIBLE, IMPOSSIBLE, LONGEST_GAP_S, MOST_STARTS, MOVES,
-    POSITION_SLACK, PROBABLY, UNKNOWN_HEADING,
+    BETTER, CLEARLY, FAR_POSITION, FARTHEST_JUMP, IMPLAUSIBLE, IMPOSSIBLE, MOST_STARTS, MOVES, POSITION_SLACK,
+    PROBABLY, UNKNOWN_HEADING,
 };
 
 /// Further differences between the copies.
@@ -388,22 +388,13 @@ impl<F: CopiedFilter> Copies<F> {
         sample: &ImuMean,
         since_ns: i64,
     ) -> Result<Option<(ImuMean, Doubt)>, Refusal> {
-        let whole_s = seconds_between(since_ns, sample.time_ns)?;
-        if whole_s <= self.best().longest_sample() {
-            return Ok(None);
-        }
-        let part_s = seconds_between(self.time_ns().ok_or(Refusal::NotStarted)?, time_ns)?;
-        sample.check()?;
-        if whole_s > LONGEST_GAP_S {
-            return Err(Refusal::Gap { seconds: whole_s });
-        }
-        let last = self.last.as_ref().unwrap_or(sample);
-        let held = ImuMean {
-            time_ns,
-            angular_velocity: (last.angular_velocity + sample.angular_velocity) * 0.5,
-            specific_force: (last.specific_force + sample.specific_force) * 0.5,
-        };
-        Ok(Some((held, self.holding.doubt(whole_s, part_s))))
+        let (now_ns, longest_s) = (self.time_ns().ok_or(Refusal::NotStarted)?, self.best().longest_sample());
+        self.holding.held(self.last.as_ref().unwrap_or(sample), sample, since_ns, longest_s, [now_ns, time_ns])
+    }
+
+    /// Statistics of what holding a reading has lately done wrong.
+    pub(in crate::navigation) fn holding(&self) -> &Holding {
+        &self.holding
     }
 
     /// Calls a function for each filter.

@@ -50,7 +50,6 @@ impl<S: States, const N: usize> Propagate for EskfFilter<S, N> {
 
     fn propagate_until(&mut self, time_ns: i64, sample: &ImuMean, since_ns: i64) -> Result<(), Refusal> {
         // The sample is a mean, so each part of it is the same.
-        let is_gap = seconds_between(since_ns, sample.time_ns)? > self.params().longest_sample;
-        self.propagate_part(&ImuMean { time_ns, ..*sample }, is_gap)
+        self.propagate_part(&ImuMean { time_ns, ..*sample }, seconds_between(since_ns, sample.time_ns)?)
     }
 }

@@ -7,15 +7,16 @@
 
 use nalgebra::Vector3;
 
-use crate::navigation::eskf::{Doubt, ImuMean};
+use crate::navigation::eskf::{Doubt, ImuMean, seconds_between};
 use crate::navigation::math::{exp, ln};
 use crate::navigation::numbers::{
-    HOLD_LENGTHS, HOLD_MEMORY_S, HOLD_RAISED, HOLD_WINDOWS, SHORTEST_HOLD_S, UNKNOWN_MOTION,
+    HOLD_LENGTHS, HOLD_MEMORY_S, HOLD_RAISED, HOLD_WINDOWS, LONGEST_GAP_S, SHORTEST_HOLD_S,
 };
+use crate::navigation::refusal::Refusal;
 
 /// Statistics of the readings.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Holding {
+pub(in crate::navigation) struct Holding {
     /// Integrals of the angular velocity and of the specific force.
     integral: [Vector3<f64>; 2],
     elapsed_s: f64,
@@ -60,12 +61,45 @@ impl Holding {
         self.windows.iter_mut().for_each(|window| window.begun = None);
     }
 
+    /// The reading that is held from `now_ns` until `until_ns`, and the doubt in it, if a sample since `since_ns` covers more than
+    /// `longest_s`. `last` is the reading before it.
+    ///
+    /// # Errors
+    ///
+    /// [`Refusal`] if the sample is not fit, or the gap is too long.
+    #[inline]
+    pub(in crate::navigation) fn held(
+        &self,
+        last: &ImuMean,
+        sample: &ImuMean,
+        since_ns: i64,
+        longest_s: f64,
+        [now_ns, until_ns]: [i64; 2],
+    ) -> Result<Option<(ImuMean, Doubt)>, Refusal> {
+        let whole_s = seconds_between(since_ns, sample.time_ns)?;
+        if whole_s <= longest_s {
+            return Ok(None);
+        }
+        let part_s = seconds_between(now_ns, until_ns)?;
+        sample.check()?;
+        if whole_s > LONGEST_GAP_S {
+            return Err(Refusal::Gap { seconds: whole_s });
+        }
+        let held = ImuMean {
+            time_ns: until_ns,
+            angular_velocity: (last.angular_velocity + sample.angular_velocity) * 0.5,
+            specific_force: (last.specific_force + sample.specific_force) * 0.5,
+        };
+        Ok(Some((held, self.doubt(whole_s, part_s))))
+    }
+
     /// The doubt in a part, `part_s`, of a gap that lasts `whole_s`.
-    pub(super) fn doubt(&self, whole_s: f64, part_s: f64) -> Doubt {
+    fn doubt(&self, whole_s: f64, part_s: f64) -> Doubt {
         let square = |x: f64| x * x;
+        let unknown = Doubt::unknown(part_s);
         let [rotation, velocity] = [0, 1].map(|quantity| {
             let known = |index: usize| self.windows.get(index).filter(|window| window.count >= HOLD_WINDOWS);
-            let Some(first) = known(0) else { return Vector3::repeat(UNKNOWN_MOTION[quantity] * part_s) };
+            let Some(first) = known(0) else { return [unknown.rotation, unknown.velocity][quantity] };
             let last = (0..HOLD_LENGTHS).take_while(|index| known(*index).is_some()).last().unwrap_or(0);
             let above = (0..=last).find(|index| length(*index) >= whole_s);
             let squares = match above {

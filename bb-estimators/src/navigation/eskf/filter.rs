@@ -15,7 +15,7 @@ use crate::navigation::layout::Layout;
 use crate::navigation::math::exp;
 use crate::navigation::math::skew;
 use crate::navigation::measurement::Measurement;
-use crate::navigation::numbers::{AVERAGED_FORCE_S, LONGEST_GAP_S};
+use crate::navigation::numbers::{AVERAGED_FORCE_S, LONGEST_GAP_S, UNKNOWN_MOTION};
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::VELOCITY;
 use crate::navigation::state::{
@@ -63,6 +63,14 @@ pub(in crate::navigation) struct Doubt {
     pub(in crate::navigation) rotation: Vector3<f64>,
     /// Change of velocity, m²/s².
     pub(in crate::navigation) velocity: Vector3<f64>,
+}
+
+impl Doubt {
+    /// The doubt in a part, `part_s`, of a gap, if nothing is known of the motion.
+    pub(in crate::navigation) fn unknown(part_s: f64) -> Self {
+        let [rotation, velocity] = UNKNOWN_MOTION.map(|density| Vector3::repeat(density * part_s));
+        Self { rotation, velocity }
+    }
 }
 
 /// Adds a sample of `dt` seconds to the average of the acceleration.
@@ -113,32 +121,37 @@ impl<S: States, const N: usize> EskfFilter<S, N> {
 
     /// Propagates the filter over one IMU sample.
     ///
-    /// A sample that covers more than [`EskfParams::longest_sample`] is a gap: the body is assumed to keep its velocity and
-    /// attitude, up to the gap noise in the parameters.
+    /// A sample that covers more than [`EskfParams::longest_sample`] is a gap: its reading is assumed to have been the same all the
+    /// time, but for a turn by 1 rad/s and an acceleration by 3 m/s², each for about a second. [`Copies`](crate::navigation::Copies)
+    /// know better.
     ///
     /// # Errors
     ///
     /// Returns a [`Refusal`] if the filter has not started, a value is not finite or absurdly large, time does not increase, or
     /// the gap is longer than a minute. The filter is then unchanged.
     pub fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
-        self.propagate_part(sample, false)
+        let estimate = self.estimate.as_ref().ok_or(Refusal::NotStarted)?;
+        let seconds = seconds_between(estimate.time_ns, sample.time_ns)?;
+        self.propagate_part(sample, seconds)
     }
 
-    /// Propagates the filter over a part of a sample that measurements divide. `is_gap` tells whether the whole sample is a gap,
-    /// longer than [`EskfParams::longest_sample`]: every part of a gap is a gap, however short it is, and counts as one.
-    ///
-    /// # Errors
-    ///
-    /// The same as [`propagate`](Self::propagate).
+    /// Propagates the filter over a part of a sample that lasts `whole_s`. Every part of a gap is a gap, however short it is.
+    #[inline]
+    pub(in crate::navigation) fn propagate_part(&mut self, part: &ImuMean, whole_s: f64) -> Result<(), Refusal> {
+        if whole_s <= self.params.longest_sample {
+            return self.advance(part);
+        }
+        let estimate = self.estimate.as_ref().ok_or(Refusal::NotStarted)?;
+        let part_s = seconds_between(estimate.time_ns, part.time_ns)?;
+        self.hold(part, &Doubt::unknown(part_s))
+    }
+
+    /// Propagates the filter over a part of a sample that is no gap.
     #[inline(never)]
-    pub fn propagate_part(&mut self, sample: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
+    pub(in crate::navigation) fn advance(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
         let estimate = self.estimate.as_mut().ok_or(Refusal::NotStarted)?;
         sample.check()?;
         let dt = seconds_between(estimate.time_ns, sample.time_ns)?;
-        if is_gap || dt > self.params.longest_sample {
-            self.bridge(sample.time_ns, dt)?;
-            return Ok(());
-        }
         estimate.time_ns = sample.time_ns;
         estimate.angular_velocity = sample.angular_velocity - estimate.gyroscope_bias;
         estimate.specific_force = sample.specific_force - estimate.accelerometer_bias;
@@ -205,27 +218,6 @@ impl<S: States, const N: usize> EskfFilter<S, N> {
                 self.covariance.decay(i, factor, variance);
             }
         }
-    }
-
-    /// Propagates over `dt` seconds without a measurement.
-    #[cold]
-    fn bridge(&mut self, time_ns: i64, dt: f64) -> Result<(), Refusal> {
-        let Some(estimate) = &mut self.estimate else { return Err(Refusal::NotStarted) };
-        if dt > LONGEST_GAP_S {
-            return Err(Refusal::Gap { seconds: dt });
-        }
-        // The specific force that balances gravity, so that the body does not fall.
-        let up = Vector3::new(0.0, 0.0, self.params.gravity);
-        estimate.time_ns = time_ns;
-        estimate.angular_velocity = Vector3::zeros();
-        estimate.specific_force = estimate.world_from_body.inverse_transform_vector(&up);
-        let transition = Transition::advance(estimate, dt, self.params.gravity);
-        transition.apply(self.covariance.rows_mut(), &self.params.gap_densities());
-        self.covariance.bound(&Self::LAYOUT);
-        self.covariance.enforce();
-        self.upkeep.bridged();
-        self.decay(dt);
-        Ok(())
     }
 
     /// Multiplies the white noise of the IMU, as a deviation.

@@ -58,18 +58,6 @@ imu_params! {
         ///
         /// Source: ten samples of a slow IMU.
         longest_sample: f64 = 0.1, in 1e-4..=1.0, unit "s";
-        /// Acceleration that a gap in the samples of the IMU may hide, as white noise.
-        ///
-        /// Small: trusts a constant velocity. Large: the velocity is forgotten sooner.
-        ///
-        /// Source: a body that accelerates by 3 m/s² for about a second.
-        gap_acceleration: f64 = 3.0, in 0.0..=1e4, plain "m/s²/√Hz";
-        /// Angular velocity that a gap in the samples of the IMU may hide, as white noise.
-        ///
-        /// Small: trusts a constant attitude. Large: the attitude is forgotten sooner.
-        ///
-        /// Source: a body that turns by 1 rad/s for about a second.
-        gap_rotation: f64 = 1.0, in 0.0..=1e3, plain "rad/s/√Hz";
         /// Deviation of the scale of relative poses from 1, [`Optional::RelativeScale`].
         ///
         /// Small: trusts the scale. Large: relative translations contribute less to the velocity.
@@ -182,17 +170,6 @@ impl EskfParams {
             gyroscope: square(self.gyroscope_noise),
             accelerometer_bias: square(self.accelerometer_bias_walk),
             gyroscope_bias: square(self.gyroscope_bias_walk),
-        }
-    }
-
-    /// The noise during a gap.
-    pub(in crate::navigation) fn gap_densities(&self) -> ImuDensities {
-        let square = |x: f64| x * x;
-        let densities = self.densities();
-        ImuDensities {
-            accelerometer: densities.accelerometer + square(self.gap_acceleration),
-            gyroscope: densities.gyroscope + square(self.gap_rotation),
-            ..densities
         }
     }
 

@@ -109,10 +109,7 @@ impl CopiedFilter for PlanarFilter {
 
     fn hold(&mut self, sample: &ImuMean, doubt: &Doubt) -> Result<(), Refusal> {
         let dt = self.seconds_to(sample)?;
-        let bias = self.estimate.map_or(0.0, |estimate| estimate.gyroscope_bias);
-        let mut densities = self.densities;
-        densities.gyroscope += doubt.rotation.z / dt;
-        self.bridge(sample.time_ns, sample.angular_velocity.z - bias, dt, &densities);
+        self.bridge(sample, dt, doubt);
         Ok(())
     }
 

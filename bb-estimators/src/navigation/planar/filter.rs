@@ -9,7 +9,7 @@ use super::propagation::Transition;
 use crate::attitude::{MAX_ANGULAR_VELOCITY, ParamsError};
 use crate::navigation::bounds::{is_on_earth, is_within};
 use crate::navigation::covariance::Covariance;
-use crate::navigation::eskf::{ImuMean, seconds_between};
+use crate::navigation::eskf::{Doubt, ImuMean, seconds_between};
 use crate::navigation::fused::Fused;
 use crate::navigation::layout::Layout;
 use crate::navigation::math::{exp, wrapped};
@@ -149,33 +149,15 @@ impl PlanarFilter {
 
     /// Propagates the filter over one sample. Uses only the z component of its angular velocity, in body axes.
     ///
-    /// A sample that covers more than [`PlanarParams::longest_sample`] is a gap: the robot is assumed to continue straight on, up
-    /// to the gap noise in the parameters.
+    /// A sample that covers more than [`PlanarParams::longest_sample`] is a gap: its reading is assumed to have been the same all the
+    /// time, but for a turn by 1 rad/s for about a second. [`Copies`](crate::navigation::Copies) know better.
     ///
     /// # Errors
     ///
     /// Returns a [`Refusal`] if the filter has not started, a value is not finite or absurdly large, time does not increase, or
     /// the gap is longer than a minute. The filter is then unchanged.
     pub fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
-        self.propagate_part(sample, false)
-    }
-
-    /// Propagates the filter over a part of a sample that measurements divide. `is_gap` tells whether the whole sample is a gap,
-    /// longer than [`PlanarParams::longest_sample`]: every part of a gap is a gap, however short it is, and counts as one.
-    ///
-    /// # Errors
-    ///
-    /// The same as [`propagate`](Self::propagate).
-    #[inline]
-    pub fn propagate_part(&mut self, sample: &ImuMean, is_gap: bool) -> Result<(), Refusal> {
-        let dt = self.seconds_to(sample)?;
-        if is_gap || dt > self.params.longest_sample {
-            self.bridge(sample.time_ns, 0.0, dt, &self.params.gap_densities());
-        } else {
-            let bias = self.estimate.map_or(0.0, |estimate| estimate.gyroscope_bias);
-            self.advance(sample.time_ns, sample.angular_velocity.z - bias, dt, &{ self.densities });
-        }
-        Ok(())
+        Propagate::propagate(self, sample)
     }
 
     /// The time from the filter to the end of a sample, s.
@@ -187,18 +169,21 @@ impl PlanarFilter {
         if dt > LONGEST_GAP_S { Err(Refusal::Gap { seconds: dt }) } else { Ok(dt) }
     }
 
-    /// Propagates over a part, `dt` seconds, of a gap in the samples.
+    /// Propagates over a part, `dt` seconds, of a gap in the samples, during which the reading is assumed to be that of `sample`, but
+    /// may have been wrong by `doubt`.
     #[cold]
-    pub(super) fn bridge(&mut self, time_ns: i64, yaw_rate: f64, dt: f64, densities: &Densities) {
-        self.advance(time_ns, yaw_rate, dt, densities);
+    pub(super) fn bridge(&mut self, sample: &ImuMean, dt: f64, doubt: &Doubt) {
+        let gyroscope = self.densities.gyroscope + doubt.rotation.z / dt;
+        self.advance(sample, dt, &Densities { gyroscope, ..self.densities });
         self.covariance.enforce();
         self.upkeep.bridged();
     }
 
     #[inline]
-    fn advance(&mut self, time_ns: i64, yaw_rate: f64, dt: f64, densities: &Densities) {
+    fn advance(&mut self, sample: &ImuMean, dt: f64, densities: &Densities) {
         let Some(estimate) = &mut self.estimate else { return };
-        (estimate.time_ns, estimate.yaw_rate) = (time_ns, yaw_rate);
+        estimate.time_ns = sample.time_ns;
+        estimate.yaw_rate = sample.angular_velocity.z - estimate.gyroscope_bias;
         Transition::advance(estimate, dt).apply(self.covariance.rows_mut(), densities);
         let scale = self.params.wheel_scale;
         if scale.time_s != f64::INFINITY {
@@ -294,7 +279,13 @@ impl Propagate for PlanarFilter {
     }
 
     fn propagate_until(&mut self, time_ns: i64, sample: &ImuMean, since_ns: i64) -> Result<(), Refusal> {
-        let is_gap = seconds_between(since_ns, sample.time_ns)? > self.params().longest_sample;
-        self.propagate_part(&ImuMean { time_ns, ..*sample }, is_gap)
+        let part = ImuMean { time_ns, ..*sample };
+        let dt = self.seconds_to(&part)?;
+        if seconds_between(since_ns, sample.time_ns)? <= self.params.longest_sample {
+            self.advance(&part, dt, &{ self.densities });
+        } else {
+            self.bridge(&part, dt, &Doubt::unknown(dt));
+        }
+        Ok(())
     }
 }

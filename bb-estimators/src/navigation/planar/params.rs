@@ -43,18 +43,6 @@ params! {
         ///
         /// Source: ten samples of a slow IMU.
         longest_sample: f64 = 0.1, in 1e-4..=1.0, unit "s";
-        /// Acceleration that a gap in the samples may hide, as white noise.
-        ///
-        /// Small: trusts a constant velocity. Large: the velocity is forgotten sooner.
-        ///
-        /// Source: a body that accelerates by 3 m/s² for about a second.
-        gap_acceleration: f64 = 3.0, in 0.0..=1e4, plain "m/s²/√Hz";
-        /// Yaw rate that a gap in the samples may hide, as white noise.
-        ///
-        /// Small: trusts a constant heading. Large: the heading is forgotten sooner.
-        ///
-        /// Source: a body that turns by 1 rad/s for about a second.
-        gap_rotation: f64 = 1.0, in 0.0..=1e3, plain "rad/s/√Hz";
     }
 }
 
@@ -76,17 +64,6 @@ impl PlanarParams {
             gyroscope: square(self.gyroscope_noise),
             bias: square(self.gyroscope_bias_walk),
             acceleration: [square(self.forward_acceleration), square(self.lateral_acceleration)],
-        }
-    }
-
-    /// The noise during a gap.
-    pub(super) fn gap_densities(&self) -> Densities {
-        let densities = self.densities();
-        let square = |x: f64| x * x;
-        Densities {
-            gyroscope: densities.gyroscope + square(self.gap_rotation),
-            acceleration: densities.acceleration.map(|density| density + square(self.gap_acceleration)),
-            ..densities
         }
     }
 }

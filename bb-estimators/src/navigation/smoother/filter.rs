@@ -239,15 +239,17 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
 
     /// Integrates one IMU sample.
     ///
-    /// A sample that covers more than [`longest_sample`](crate::navigation::EskfParams::longest_sample) is a gap: velocity and
-    /// attitude are assumed constant, up to the noise that the parameters give a gap.
+    /// A sample that covers more than [`longest_sample`](crate::navigation::EskfParams::longest_sample) is a gap: its reading is
+    /// assumed to have been the same all the time, but for a turn by 1 rad/s and an acceleration by 3 m/s², each for about a second.
     ///
     /// # Errors
     ///
     /// [`Refusal`] if the smoother has not started, a value is not finite or absurdly large, time does not increase, or
     /// the gap is longer than a minute. The smoother is then unchanged.
     pub fn propagate(&mut self, sample: &ImuMean) -> Result<(), Refusal> {
-        let newest = self.window.back().ok_or(Refusal::NotStarted)?;
+        if self.window.is_empty() {
+            return Err(Refusal::NotStarted);
+        }
         sample.check()?;
         let dt = seconds_between(self.time_ns, sample.time_ns)?;
         let sensors = &self.params.sensors;
@@ -258,15 +260,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         if dt > LONGEST_GAP_S {
             return Err(Refusal::Gap { seconds: dt });
         }
-        // The specific force that cancels gravity.
-        let up = Vector3::new(0.0, 0.0, sensors.gravity);
-        let now = newest.estimate::<S>().world_from_body * self.motion.rotation();
-        let specific_force = now.inverse_transform_vector(&up) + self.motion.accelerometer_bias();
-        let angular_velocity = *self.motion.gyroscope_bias();
-        let rest = ImuMean { time_ns: sample.time_ns, angular_velocity, specific_force };
-        self.integrate(&rest, dt, &sensors.gap_densities());
-        self.gaps = self.gaps.wrapping_add(1);
-        Ok(())
+        self.hold(sample, &Doubt::unknown(dt))
     }
 
     /// Propagates over a part of a gap, during which the reading is assumed to be that of `sample`, but may have been wrong by `doubt`.

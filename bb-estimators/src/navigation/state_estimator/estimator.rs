@@ -382,14 +382,7 @@ impl<K: EventSink, F: ProvidedFactor> FlightNavigator<K, F> {
             return None;
         }
         let predictor = self.queue.predictor()?;
-        let pose = if ahead_ns > 0 {
-            // The motion is extrapolated with the newest sample.
-            let mut ahead = *predictor;
-            ahead.propagate(&ImuMean { time_ns, ..*newest }, false).ok()?;
-            ahead.pose()
-        } else {
-            predictor.pose()
-        };
+        let pose = if ahead_ns > 0 { predictor.pose_at(time_ns, newest) } else { predictor.pose() };
         pose.filter(Pose::is_finite)
     }
 

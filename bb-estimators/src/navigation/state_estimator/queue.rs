@@ -281,12 +281,10 @@ impl<F: ProvidedFactor> Queue<F> {
         self.past.since_ns(index).or(self.engine().begun_ns())
     }
 
-    /// Returns whether a sample is the first after a gap.
-    fn follows_gap(&self, index: usize, config: &StateEstimatorConfig) -> bool {
-        let (Some(since_ns), Some(sample)) = (self.since_ns(index), self.past.samples.get(index)) else {
-            return false;
-        };
-        sample.time_ns.saturating_sub(since_ns) > ns(config.sensors.longest_sample)
+    /// The reading before a sample, at the time at which the sample begins.
+    fn before(&self, index: usize) -> Option<ImuMean> {
+        let last = self.past.samples.get(index.saturating_sub(1))?;
+        Some(ImuMean { time_ns: self.since_ns(index)?, ..*last })
     }
 
     /// Drops the copies that no late input needs.
@@ -314,13 +312,13 @@ impl<F: ProvidedFactor> Queue<F> {
     }
 
     /// Restarts the prediction at the newest estimate.
-    fn predict(&mut self, config: &StateEstimatorConfig) {
+    fn predict(&mut self) {
         self.predictor = None;
         let Some(mut predictor) = self.engine().predictor() else { return };
         let first = self.past.samples.count_while(|sample| sample.time_ns <= predictor.time_ns());
         for (index, sample) in self.past.samples.iter().enumerate().skip(first) {
-            // An input may have divided a gap.
-            if predictor.propagate(sample, self.follows_gap(index, config)).is_err() {
+            // An input may have divided the first.
+            if self.before(index).is_none_or(|last| predictor.propagate(&last, sample).is_err()) {
                 return;
             }
         }

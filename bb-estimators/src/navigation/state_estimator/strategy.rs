@@ -371,10 +371,12 @@ impl<F: ProvidedFactor> Strategy<F> {
 
     /// The predictor from the newest estimate, if there is one.
     pub(super) fn predictor(&self) -> Option<Predictor> {
-        let Some(window) = &self.window else {
-            return self.copies.estimate().map(|_| Predictor::of(self.copies.best()));
+        let filter = match &self.window {
+            Some(window) => window.filter(self.copies.noise())?,
+            None => *self.copies.best(),
         };
-        window.filter(self.copies.noise()).map(|filter| Predictor::of(&filter))
+        filter.estimate()?;
+        Some(Predictor { filter, holding: *self.copies.holding() })
     }
 
     /// The newest keyframe.

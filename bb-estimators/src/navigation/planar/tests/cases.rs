@@ -48,7 +48,8 @@ fn a_gap_grows_the_covariance_and_is_counted() {
     filter.propagate(&sample(301)).unwrap();
     assert_eq!(filter.gaps(), 1);
     let after = filter.pose_covariance();
-    assert!(after[(0, 0)] > 4.0 * before[(0, 0)] && after[(2, 2)] > 1.0, "{after}");
+    // Nothing measures the acceleration: a gap adds no more of it than samples do.
+    assert!(after[(0, 0)] > 2.0 * before[(0, 0)] && after[(2, 2)] > 1.0, "{after}");
 }
 
 /// After one sample, the position depends only on the distance travelled at that velocity.

@@ -49,7 +49,7 @@ impl<F: ProvidedFactor> Queue<F> {
             self.run(newest.time_ns, config);
         }
         self.forget(config);
-        self.predict(config);
+        self.predict();
     }
 
     /// Runs the engine on, through all inputs stamped up to a time. What it has passed is run again if it has changed.

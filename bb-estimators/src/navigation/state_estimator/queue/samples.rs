@@ -43,7 +43,7 @@ impl<F: ProvidedFactor> Queue<F> {
         // After a change it is rebuilt before it is read.
         let is_current = self.past.changed.is_none();
         if is_current
-            && self.predictor.as_mut().is_some_and(|predictor| predictor.propagate(sample, is_gap).is_err())
+            && self.predictor.as_mut().is_some_and(|predictor| predictor.propagate(&newest, sample).is_err())
         {
             self.predictor = None;
         }
@@ -182,7 +182,7 @@ impl<F: ProvidedFactor> Queue<F> {
             // All remaining samples are later than the newest keyframe. The prediction has to bridge the dropped ones.
             (0..(held / LEAVING).max(1)).for_each(|_| self.past.drop_sample());
         }
-        self.predict(config);
+        self.predict();
         let count = held.saturating_sub(self.past.samples.len()) as u64;
         self.counts.dropped += count;
         self.news.tell(newest_ns, EventKind::SamplesDropped { count });
