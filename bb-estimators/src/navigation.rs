@@ -68,6 +68,7 @@ pub use measurement::{
     MagneticField, MagneticHeading, Measurement, NonHolonomic, RelativePose, WheelSpeed, ZeroRotation,
     ZeroVelocity,
 };
+pub use numbers::CONFIRMED;
 pub use propagate::Propagate;
 pub use refusal::Refusal;
 #[cfg(feature = "autodiff")]
@@ -82,4 +83,4 @@ pub use state::{
     Navigation, Optional, POSITION, ROTATION, States, VELOCITY, Vehicle, offset,
 };
 pub use stream::{Counts, Stream, StreamParams};
-pub use track::{CONFIRMED, Track, TrackPoint};
+pub use track::{Track, TrackPoint};

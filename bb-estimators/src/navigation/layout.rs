@@ -1,16 +1,10 @@
 //! Properties of a filter's errors besides their order.
 
-use super::numbers::{MOST_ROTATION, MOST_VARIANCE};
+use super::numbers::{LOST, MOST_DEVIATIONS, MOST_ROTATION, MOST_VARIANCE};
 use super::state::{
     ACCELEROMETER_BIAS, GYROSCOPE_BIAS, NAVIGATION, Optional, POSITION, ROTATION, States, VELOCITY,
 };
 use crate::attitude::{MAX_ANGULAR_VELOCITY, MAX_SPECIFIC_FORCE};
-
-/// A filter with a variance above this fraction of the largest is lost, and rounding may break its covariance.
-const LOST: f64 = 1e-4;
-
-/// A correction is at most this many times the largest deviation.
-const MOST_DEVIATIONS: f64 = 100.0;
 
 /// The largest meaningful variance of each error.
 #[derive(Clone, Copy, Debug)]

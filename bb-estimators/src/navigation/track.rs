@@ -10,9 +10,6 @@ use crate::navigation::numbers::{
 #[cfg(test)]
 mod tests;
 
-/// The number of agreeing positions that rules out coincidence: two define a straight line, and the third is on it.
-pub const CONFIRMED: u32 = 3;
-
 /// A measured position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackPoint {

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use super::params::EskfParams;
 use crate::navigation::covariance::Covariance;
 use crate::navigation::math::unit;
-use crate::navigation::numbers::MOST_PITCH;
+use crate::navigation::numbers::{MOST_PITCH, START_ACCELEROMETER_BIAS, START_GYROSCOPE_BIAS};
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{
     ACCELEROMETER_BIAS, Estimate, GYROSCOPE_BIAS, Optional, POSITION, ROTATION, States, VELOCITY, offset,
@@ -58,8 +58,8 @@ impl Start {
             position_covariance: isotropic(position.1),
             velocity_covariance: isotropic(velocity.1),
             rotation_covariance: isotropic(world_from_body.1),
-            accelerometer_bias_deviation: 0.2,
-            gyroscope_bias_deviation: 0.02,
+            accelerometer_bias_deviation: START_ACCELEROMETER_BIAS,
+            gyroscope_bias_deviation: START_GYROSCOPE_BIAS,
         }
     }
 

@@ -3,8 +3,8 @@
 use crate::navigation::eskf::ImuMean;
 use crate::navigation::geodesy::{Geodetic, LocalFrame};
 use crate::navigation::measurement::GnssPosition;
-use crate::navigation::numbers::{COURSES_AGREED, LONGEST_COURSE_WAIT_NS};
-use crate::navigation::track::{CONFIRMED, Track, TrackPoint};
+use crate::navigation::numbers::{CONFIRMED, COURSES_AGREED, LONGEST_START_NS};
+use crate::navigation::track::{Track, TrackPoint};
 use bb_core::Input;
 use bb_core::payload::GnssFix;
 use nalgebra::Vector3;
@@ -101,8 +101,7 @@ impl Course {
 
     /// Returns whether `count` fixes agree, or, after a while, all of them.
     fn agree(&self, count: u32, now_ns: i64) -> bool {
-        let has_waited =
-            self.first_ns.is_some_and(|first_ns| now_ns.saturating_sub(first_ns) >= LONGEST_COURSE_WAIT_NS);
+        let has_waited = self.first_ns.is_some_and(|first_ns| now_ns.saturating_sub(first_ns) >= LONGEST_START_NS);
         self.track.count() >= count || (has_waited && !self.is_disputed)
     }
 }

@@ -10,7 +10,7 @@ use crate::navigation::geodesy::LocalFrame;
 use crate::navigation::measurement::AbsolutePose;
 use crate::navigation::numbers::{
     CLEARLY, HEADING_BY_DEFINITION, LONGEST_MOVE_S, LONGEST_START_NS, MOVING, ORIGIN_DEVIATION, RESTLESS_NS,
-    START_ACCELERATION, UNKNOWN_HEADING, UNSEEN_SCATTER,
+    START_ACCELERATION, TURNED_PER_METRE, UNKNOWN_HEADING, UNSEEN_SCATTER,
 };
 use crate::navigation::refusal::Refusal;
 use crate::navigation::track::TrackPoint;
@@ -179,7 +179,7 @@ fn given(
     let (position, world_from_body, velocity) = mounting.state(state);
     let is_state = position.iter().chain(world_from_body.coords.iter()).chain(&velocity).all(|x| x.is_finite());
     let is_rotation = (0.99..1.01).contains(&world_from_body.norm());
-    let (deviation, turned) = (options.pose_deviation, 0.1 * options.pose_deviation);
+    let (deviation, turned) = (options.pose_deviation, TURNED_PER_METRE * options.pose_deviation);
     let start = Start::at(
         state.monotonic_time.as_nanos(),
         (position, deviation),

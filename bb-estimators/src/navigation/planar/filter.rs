@@ -13,7 +13,7 @@ use crate::navigation::eskf::{Doubt, ImuMean, seconds_between};
 use crate::navigation::fused::Fused;
 use crate::navigation::layout::Layout;
 use crate::navigation::math::{exp, wrapped};
-use crate::navigation::numbers::LONGEST_GAP_S;
+use crate::navigation::numbers::{LONGEST_GAP_S, START_GYROSCOPE_BIAS};
 use crate::navigation::propagate::Propagate;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::stream::{Gate, Stream};
@@ -67,7 +67,7 @@ impl PlanarStart {
             position_covariance: Matrix2::identity() * (position.1 * position.1),
             heading_deviation: heading.1,
             velocity_deviation: velocity.1,
-            gyroscope_bias_deviation: 0.02,
+            gyroscope_bias_deviation: START_GYROSCOPE_BIAS,
         }
     }
 

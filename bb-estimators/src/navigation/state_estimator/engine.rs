@@ -16,7 +16,7 @@ use super::strategy::{Measured, Pose, Predictor, Strategy};
 use super::world::World;
 use crate::attitude::ParamsError;
 use crate::navigation::eskf::{ImuMean, Start};
-use crate::navigation::numbers::{CONFIRMATIONS, FARTHEST_FLIGHT, FLIGHT_DISTRUST_S, MOST_VELOCITY};
+use crate::navigation::numbers::{CONFIRMATIONS, DISTRUST_NS, FARTHEST_FLIGHT, MOST_VELOCITY};
 use crate::navigation::refusal::Refusal;
 
 mod measured;
@@ -376,7 +376,7 @@ impl<F: ProvidedFactor> Engine<F> {
     }
 
     fn distrust(&mut self, now_ns: i64) {
-        self.distrust_until(now_ns, now_ns.saturating_add(ns(FLIGHT_DISTRUST_S)));
+        self.distrust_until(now_ns, now_ns.saturating_add(DISTRUST_NS));
     }
 
     fn distrust_until(&mut self, now_ns: i64, until_ns: i64) {

@@ -25,9 +25,6 @@ mod samples;
 /// Number of copies of the engine: as many as cover the lateness, at the time between them.
 const COPIES: usize = 8;
 
-/// Shortest time between two copies, ns. A copy costs as much as some samples.
-const SHORTEST_NS: i64 = 100_000_000;
-
 /// Counts of inputs by how they arrived.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct QueueCounts {

@@ -6,7 +6,8 @@ use crate::navigation::eskf::ImuMean;
 use crate::navigation::estimator::course::Course;
 use crate::navigation::geodesy::LocalFrame;
 use crate::navigation::numbers::{
-    CLEARLY, HEADING_BY_DEFINITION, LONGEST_START_NS, ORIGIN_DEVIATION, PLANAR_START_SPEED, UNKNOWN_HEADING,
+    CLEARLY, HEADING_BY_DEFINITION, LONGEST_START_NS, ORIGIN_DEVIATION, PLANAR_START_SPEED, START_SLIP,
+    UNKNOWN_HEADING,
 };
 use crate::navigation::planar::filter::PlanarStart;
 use crate::navigation::planar::measurement::{PlanarHeading, PlanarPose};
@@ -99,7 +100,7 @@ impl Starting {
 
     /// The velocity in the body that wheels report, m/s, with its standard deviation.
     fn speed_of_wheels(&self) -> Option<(Vector2<f64>, f64)> {
-        self.wheels.map(|velocity| (velocity, PLANAR_START_SPEED.min(0.1 + 0.1 * velocity.norm())))
+        self.wheels.map(|velocity| (velocity, PLANAR_START_SPEED.min(START_SLIP + START_SLIP * velocity.norm())))
     }
 
     /// The velocity in the body at the last fix, m/s, with its standard deviation: that of the wheels or, without wheels, of the last

@@ -4,9 +4,10 @@
 //! first place at which one was, when its result is needed: when the estimate is read, when the engine is to run on, and before
 //! anything else that depends on it. So the number of runs depends on how often that is, and not on the number of late samples.
 
-use super::{COPIES, News, Queue, SHORTEST_NS};
+use super::{COPIES, News, Queue};
 use crate::navigation::eskf::ImuMean;
 use crate::navigation::history::past::{Key, Run};
+use crate::navigation::numbers::COPY_INTERVAL_NS;
 use crate::navigation::state_estimator::engine::{Condition, Engine};
 use crate::navigation::state_estimator::entry::Entry;
 use crate::navigation::state_estimator::error::EstimatorError;
@@ -99,7 +100,7 @@ impl<F: ProvidedFactor> Run<Engine<F>, Entry<F>> for Flight<'_> {
     }
 
     fn is_due(&self, last: &Engine<F>, engine: &Engine<F>, _: usize) -> bool {
-        let apart_ns = (ns(self.config.params.lateness) / (COPIES as i64 - 2)).max(SHORTEST_NS);
+        let apart_ns = (ns(self.config.params.lateness) / (COPIES as i64 - 2)).max(COPY_INTERVAL_NS);
         let is_apart = |now_ns: i64| last.now_ns().is_none_or(|last_ns| now_ns.saturating_sub(last_ns) >= apart_ns);
         engine.now_ns().is_some_and(is_apart)
     }

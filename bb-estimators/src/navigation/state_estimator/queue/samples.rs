@@ -3,6 +3,7 @@
 use super::Queue;
 use crate::navigation::eskf::ImuMean;
 use crate::navigation::history::past::Key;
+use crate::navigation::numbers::LONGEST_TAIL_NS;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state_estimator::clock::{Stamped, follows};
 use crate::navigation::state_estimator::engine::Condition;
@@ -10,9 +11,6 @@ use crate::navigation::state_estimator::error::Reason;
 use crate::navigation::state_estimator::event::{EventKind, InputKind};
 use crate::navigation::state_estimator::factor::ProvidedFactor;
 use crate::navigation::state_estimator::params::{StateEstimatorConfig, ns};
-
-/// Longest time by which the engine may lag the IMU, ns.
-const LONGEST_TAIL_NS: i64 = 250_000_000;
 
 /// One over the fraction of the samples that is dropped at once when there is no room.
 const LEAVING: usize = 8;
