@@ -60,7 +60,10 @@
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 // What a build without some features does not use is left to the linker: the features decide which modules there are, not which of their
 // functions.
-#![cfg_attr(not(all(feature = "smoother", feature = "eskf")), allow(dead_code, unused_imports))]
+#![cfg_attr(
+    not(all(feature = "runtime", feature = "smoother", feature = "eskf")),
+    allow(dead_code, unused_imports)
+)]
 // Sensor input never causes a panic; a test may panic.
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
@@ -78,45 +81,11 @@ pub mod params;
 pub mod simulation;
 
 #[cfg(feature = "runtime")]
-use bb_core::payload::{Imu, Odometry, Orientation};
+mod declared;
 
 #[cfg(feature = "runtime")]
-pub use attitude::average::OrientationAverage;
-#[cfg(feature = "runtime")]
-pub use attitude::{Attitude, ImuAndMagnetometer};
-#[cfg(feature = "runtime")]
-pub use calibration::Calibrated;
+pub use declared::*;
 #[cfg(feature = "simulation")]
 pub use simulation::{
     SimulatedActuator, SimulatedEncoder, SimulatedGnss, SimulatedImu, SimulatedLinkImu, SimulatedWheels,
 };
-
-/// The error-state Kalman filter of position, velocity and attitude as an estimator: it emits `O`, and estimates the optional states
-/// `S`, `N` states in all.
-#[cfg(feature = "runtime")]
-pub type Eskf<O = Odometry, S = navigation::Navigation, const N: usize = { navigation::NAVIGATION }> =
-    navigation::EskfEstimator<O, S, N>;
-
-/// The filter of a robot that drives on a plane, as an estimator.
-#[cfg(feature = "runtime")]
-pub type PlanarEkf<O = Odometry> = navigation::planar::PlanarEstimator<O>;
-
-/// The estimator of a flight without satellite navigation.
-#[cfg(all(feature = "runtime", any(feature = "smoother", feature = "eskf")))]
-pub type StateEstimator = navigation::state_estimator::FlightEstimator;
-
-/// The estimator of each attitude filter.
-#[cfg(feature = "runtime")]
-macro_rules! estimators {
-    ($($module:ident $estimator:ident $filter:ident $params:ident;)*) => {$(
-        #[doc = concat!(
-            "[`", stringify!($filter), "`](attitude::", stringify!($filter), ") as an estimator: of six axes, `",
-            stringify!($estimator), "<Marg>` and `", stringify!($estimator), "<ImuAndMagnetometer>` of nine. Its options are [`",
-            stringify!($params), "`](attitude::", stringify!($params), ")."
-        )]
-        pub type $estimator<I = Imu, O = Orientation> = Attitude<attitude::$filter, I, O>;
-    )*};
-}
-
-#[cfg(feature = "runtime")]
-attitude_filters!(estimators!());

@@ -71,13 +71,8 @@ pub use measurement::{
 pub use numbers::CONFIRMED;
 pub use propagate::Propagate;
 pub use refusal::Refusal;
-#[cfg(feature = "autodiff")]
-pub use smoother::{Automatic, Differentiable, Expectation};
 #[cfg(feature = "smoother")]
-pub use smoother::{
-    Camera, FixedLagSmoother, Kernel, LandmarkParams, Observation, Preintegration, Seen, Sighted, SmootherParams,
-    Undistorted, Updated,
-};
+pub use smoother::*;
 pub use state::{
     ACCELEROMETER_BIAS, Aided, Complete, Estimate, GYROSCOPE_BIAS, Keyframe, NAVIGATED, NAVIGATION, Navigated,
     Navigation, Optional, POSITION, ROTATION, States, VELOCITY, Vehicle, offset,

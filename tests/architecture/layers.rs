@@ -122,8 +122,8 @@ fn the_picture_of_the_layers_is_that_of_the_code() {
 }
 
 /// The modules of the algorithms, from the bottom up.
-const ALGORITHMS: [&str; 7] =
-    ["params", "moments", "attitude", "navigation", "calibration", "motion", "simulation"];
+const ALGORITHMS: [&str; 8] =
+    ["params", "moments", "attitude", "navigation", "calibration", "motion", "simulation", "declared"];
 
 #[test]
 fn algorithms_import_only_from_below() {

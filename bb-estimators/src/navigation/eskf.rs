@@ -34,7 +34,6 @@ mod transport;
 
 pub(super) use filter::Doubt;
 pub use filter::EskfFilter;
-#[cfg(feature = "runtime")]
 pub(crate) use params::imu_params;
 pub use params::{EskfParams, GaussMarkov, ImuDensities};
 pub(super) use propagation::{Transition, rows};

@@ -45,7 +45,6 @@ macro_rules! imu_params {
     };
 }
 
-#[cfg(feature = "runtime")]
 pub(crate) use imu_params;
 
 imu_params! {

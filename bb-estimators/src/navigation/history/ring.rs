@@ -1,14 +1,9 @@
 //! A bounded queue that allocates only when it is created.
 
-#[cfg(feature = "alloc")]
-use alloc::boxed::Box;
+#[cfg_attr(not(feature = "alloc"), path = "ring/inline.rs")]
+mod slots;
 
-/// Storage of the values: with a heap, they are allocated there from the beginning. Hundreds of kilobytes are too much for a thread's
-/// stack, which in a build without optimisation holds a copy for each function they pass through.
-#[cfg(feature = "alloc")]
-type Slots<T, const N: usize> = Box<[Option<T>]>;
-#[cfg(not(feature = "alloc"))]
-type Slots<T, const N: usize> = [Option<T>; N];
+use self::slots::Slots;
 
 /// Values up to the number that it was made for, oldest first; inline, up to `N`.
 #[derive(Clone, Debug)]
@@ -20,11 +15,7 @@ pub(in crate::navigation) struct Ring<T, const N: usize> {
 
 impl<T, const N: usize> Ring<T, N> {
     pub(super) fn new(room: usize) -> Self {
-        #[cfg(feature = "alloc")]
-        let slots = core::iter::repeat_with(|| None).take(room).collect();
-        #[cfg(not(feature = "alloc"))]
-        let (slots, _) = (core::array::from_fn(|_| None), room);
-        Self { slots, first: 0, len: 0 }
+        Self { slots: slots::empty::<T, N>(room), first: 0, len: 0 }
     }
 
     pub(super) fn clear(&mut self) {
