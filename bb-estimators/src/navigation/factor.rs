@@ -11,7 +11,7 @@ use crate::navigation::measurement::{
     MagneticHeading, NonHolonomic, RelativePose, WheelSpeed, ZeroRotation, ZeroVelocity,
 };
 use crate::navigation::refusal::Refusal;
-use crate::navigation::state::{Estimate, States};
+use crate::navigation::state::{Estimate, Navigation, States};
 
 /// A measurement at one keyframe, or between it and the previous one.
 ///
@@ -81,11 +81,14 @@ pub trait Factor<S: States, const N: usize> {
 
 macro_rules! navigation_factors {
     ($($measurement:ident),* $(,)?) => {
-        /// The measurements of this crate as factors. [`RelativePose`] relates a keyframe to the previous one.
+        /// The measurements of this crate as factors. [`RelativePose`] relates a keyframe to the previous one, or in states without
+        /// [`Optional::RelativeScale`](crate::navigation::Optional::RelativeScale) to any earlier one.
         #[derive(Clone, Copy, Debug, PartialEq)]
         #[allow(missing_docs, reason = "each is documented as a measurement")]
         pub enum NavigationFactor {
             RelativePose(RelativePose),
+            /// A relative pose in metres, whatever the scale of others is: of a keyframe to any earlier one of the window.
+            Between(RelativePose),
             $($measurement($measurement),)*
         }
 
@@ -104,7 +107,7 @@ macro_rules! navigation_factors {
         impl<S: States, const N: usize> Factor<S, N> for NavigationFactor {
             fn previous(&self) -> Option<u64> {
                 match self {
-                    Self::RelativePose(measurement) => Some(measurement.keyframe),
+                    Self::RelativePose(measurement) | Self::Between(measurement) => Some(measurement.keyframe),
                     _ => None,
                 }
             }
@@ -119,6 +122,10 @@ macro_rules! navigation_factors {
                     Self::RelativePose(measurement) => {
                         let missing = Refusal::NoKeyframe { id: measurement.keyframe };
                         compare::<S, N>(measurement, previous.ok_or(missing)?, at, rows)
+                    }
+                    Self::Between(measurement) => {
+                        let missing = Refusal::NoKeyframe { id: measurement.keyframe };
+                        compare::<Navigation, N>(measurement, previous.ok_or(missing)?, at, rows)
                     }
                     $(Self::$measurement(measurement) => rows.measure::<S, _, _>(measurement, at),)*
                 }

@@ -38,8 +38,9 @@ pub enum Refusal {
         /// The keyframe it names.
         id: u64,
     },
-    /// A relative pose refers to a keyframe that is held, but is not the one directly before its own: split it into poses between
-    /// neighbours, or insert no keyframes in between.
+    /// A relative pose refers to a keyframe that is held, but is not the one directly before its own, and concerns more than the two
+    /// poses: their scale, which is known from one keyframe to the next. Use
+    /// [`NavigationFactor::Between`](crate::navigation::NavigationFactor::Between).
     NotAdjacent {
         /// The keyframe it names.
         id: u64,
@@ -83,7 +84,9 @@ impl fmt::Display for Refusal {
                 write!(f, "normalised innovation squared is {nis:.1}, beyond the gate of {limit:.1}")
             }
             Self::NoKeyframe { id } => write!(f, "keyframe {id} is not held"),
-            Self::NotAdjacent { id } => write!(f, "keyframe {id} is not the one directly before"),
+            Self::NotAdjacent { id } => {
+                write!(f, "keyframe {id} is not the one directly before, and more than the poses is compared")
+            }
             Self::Full { id } => write!(f, "keyframe {id} has as many factors as it takes"),
             Self::Repeated { landmark } => write!(f, "the keyframe has seen landmark {landmark} already"),
             Self::NotObservable => f.write_str("the measurement says nothing in this state"),

@@ -7,14 +7,15 @@
 //!
 //! Errors and states are those of the [filter](super::eskf), so every [`Measurement`](super::Measurement) is a [`Factor`](super::Factor) here.
 //! Optional states change from one keyframe to the next according to the parameters. The IMU between two keyframes is one factor
-//! ([`Preintegration`]). A factor concerns one keyframe, or a keyframe and the one before it. Your own types can implement the
-//! trait.
+//! ([`Preintegration`]). A factor concerns one keyframe, or a keyframe and the one before it; if it concerns nothing but poses, a
+//! keyframe and any earlier one of the window. Your own types can implement the trait.
 //!
 //! # Solution
 //!
 //! The Gauss–Newton method. The window is a chain and is eliminated in time order. A new keyframe therefore costs the elimination
 //! of the last two, regardless of the window's length, and the covariance of the newest is its own pivot; see `elimination.rs`. A
-//! late measurement restarts the elimination at its keyframe. A keyframe is relinearised when its correction exceeds
+//! late measurement restarts the elimination at its keyframe. A factor on two keyframes that are not neighbours couples their poses as a
+//! landmark does, see below and `pairs.rs`. A keyframe is relinearised when its correction exceeds
 //! [`SmootherParams::relinearise_rotation`]. The oldest keyframe is marginalised to a prior on the next one, whose linearisation
 //! point is then fixed. An unobservable direction, such as heading without a compass, thus stays unobservable.
 //!
@@ -46,6 +47,8 @@ mod landmark;
 mod landmarks;
 mod link;
 mod matrix;
+mod pair;
+mod pairs;
 mod params;
 mod preintegration;
 mod scratch;

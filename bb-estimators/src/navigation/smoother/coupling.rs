@@ -1,4 +1,5 @@
-//! Landmark information on the poses of a window, and its elimination in chronological order.
+//! Information on the poses of a window that are not neighbours, from landmarks and from factors on two of them, and its elimination in
+//! chronological order.
 //!
 //! Eliminating a landmark couples all keyframes that saw it, so the window is no longer a chain. A keyframe x still has
 //! its information and its link to the next, `x = G x⁺ + g + ν` with noise ν of covariance Q. In addition, there is an
@@ -30,6 +31,7 @@ use points::Points;
 
 mod checkpoint;
 mod kernels;
+mod pair;
 mod points;
 
 pub(super) use points::Seen;

@@ -92,48 +92,44 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         covariance
     }
 
-    /// The covariance where landmarks couple keyframes: computed column by column as the response to an impulse.
+    /// The covariance where keyframes are coupled that are not neighbours: computed column by column as the response to an impulse.
     fn covariance_tied(&self, index: usize, scratch: &mut Scratch<N>) -> Option<Square<N>> {
         let newest = self.newest_covariance()?;
         if index + 1 == self.window.len() {
             return Some(newest);
         }
-        let coupling = &self.landmarks.as_ref()?.coupling;
         let mut covariance = [[0.0; N]; N];
         for column in 0..N {
             let mut impulse = [0.0; N];
             impulse[column] = 1.0;
-            self.respond(index, impulse, &[0.0; N], coupling, scratch)?;
+            self.respond((index, impulse), (index + 1, &[0.0; N]), scratch)?;
             let response = scratch.corrections.get(index)?;
             (0..N).for_each(|row| covariance[row][column] = response[row]);
         }
         Some(covariance)
     }
 
-    /// The covariance that the uncertainty of a keyframe and the previous one gives a factor on both, on and below the diagonal;
-    /// where landmarks couple keyframes.
+    /// The covariance that the uncertainty of a keyframe and an earlier one gives a factor on both, on and below the diagonal.
     pub(super) fn pair_covariance(
         &mut self,
-        index: usize,
+        (before, index): (usize, usize),
         factor: &Rows<N>,
     ) -> Option<[[f64; MOST_ROWS]; MOST_ROWS]> {
         let mut scratch = core::mem::take(&mut self.scratch);
-        let covariance = self.pair_covariance_in(index, factor, &mut scratch);
+        let covariance = self.pair_covariance_in((before, index), factor, &mut scratch);
         self.scratch = scratch;
         covariance
     }
 
     fn pair_covariance_in(
         &self,
-        index: usize,
+        (before, index): (usize, usize),
         factor: &Rows<N>,
         scratch: &mut Scratch<N>,
     ) -> Option<[[f64; MOST_ROWS]; MOST_ROWS]> {
-        let coupling = &self.landmarks.as_ref()?.coupling;
-        let before = index.checked_sub(1)?;
         let mut covariance = [[0.0; MOST_ROWS]; MOST_ROWS];
         for (i, sums) in covariance.iter_mut().enumerate().take(factor.count) {
-            self.respond(before, factor.previous[i], &factor.at[i], coupling, scratch)?;
+            self.respond((before, factor.previous[i]), (index, &factor.at[i]), scratch)?;
             let (earlier, later) = (scratch.corrections.get(before)?, scratch.corrections.get(index)?);
             for (j, sum) in sums.iter_mut().enumerate().take(i + 1) {
                 *sum = dot(&factor.previous[j], earlier) + dot(&factor.at[j], later);
@@ -142,15 +138,14 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         Some(covariance)
     }
 
-    /// The corrections of a keyframe and of later ones if the only information vectors are these, at that keyframe and at the next.
+    /// The corrections of a keyframe and of later ones if the only information vectors are these, at that keyframe and at a later one.
     fn respond(
         &self,
-        index: usize,
-        impulse: [f64; N],
-        at_next: &[f64; N],
-        coupling: &Coupling<N>,
+        (index, impulse): (usize, [f64; N]),
+        (later, at_later): (usize, &[f64; N]),
         scratch: &mut Scratch<N>,
     ) -> Option<()> {
+        let coupling = self.coupling();
         let last = self.window.len() - 1;
         let Scratch { means, corrections, poses } = scratch;
         poses.fill(0.0);
@@ -159,10 +154,12 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
             let (keyframe, next) = (self.window.get(k)?, self.window.get(k + 1)?);
             let response = keyframe.pivot.respond(&next.link, &arrived);
             *means.get_mut(k)? = response.mean;
-            coupling.push(k, &response.at, poses.get_mut(POSE * (k + 1)..POSE * (last + 1))?);
+            if let Some(coupling) = coupling {
+                coupling.push(k, &response.at, poses.get_mut(POSE * (k + 1)..POSE * (last + 1))?);
+            }
             arrived = response.next;
-            if k == index {
-                axpy(&mut arrived, 1.0, at_next);
+            if k + 1 == later {
+                axpy(&mut arrived, 1.0, at_later);
             }
             for i in 0..POSE {
                 arrived[place(i)] += poses[POSE * (k + 1) + i];
@@ -172,11 +169,18 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         *corrections.get_mut(last)? = root.solve(&root.solve_transposed(&arrived));
         for k in (index..last).rev() {
             let (keyframe, next) = (self.window.get(k)?, self.window.get(k + 1)?);
-            let pull = coupling.pull(k, corrections.get(k + 1..=last)?.iter());
+            let later = corrections.get(k + 1..=last)?.iter();
+            let pull = coupling.map_or([0.0; N], |coupling| coupling.pull(k, later));
             let correction = keyframe.pivot.respond_back(means.get(k)?, &next.link, corrections.get(k + 1)?, &pull);
             *corrections.get_mut(k)? = correction;
         }
         Some(())
+    }
+
+    /// The coupling of keyframes that are not neighbours; `None` if they form a chain.
+    pub(super) fn coupling(&self) -> Option<&Coupling<N>> {
+        let coupling = self.landmarks.as_ref().map(|landmarks| &landmarks.coupling);
+        coupling.filter(|coupling| coupling.is_tied())
     }
 
     pub(super) fn covariance_at(&self, index: usize) -> Option<Square<N>> {

@@ -10,6 +10,7 @@ use nalgebra::{SMatrix, Vector3};
 use super::keyframe::{Keyframe, Prior, Window, after};
 use super::landmarks::Landmarks;
 use super::link::Information;
+use super::pair::Pair;
 use super::params::SmootherParams;
 use super::preintegration::Preintegration;
 use super::scratch::Scratch;
@@ -71,8 +72,10 @@ pub struct FixedLagSmoother<S: States = Navigation, const N: usize = NAVIGATION,
     pub(super) exact_from: usize,
     /// `true` if the last update has left keyframes to relinearise.
     pub(super) is_pending: bool,
-    /// `None` without a camera.
+    /// `None` without a camera, and without factors on keyframes that are not neighbours.
     pub(super) landmarks: Option<Landmarks<N>>,
+    /// Factors on keyframes that are not neighbours.
+    pub(super) pairs: Vec<Pair<F, N>>,
     pub(super) scratch: Scratch<N>,
     /// The multiple of the white noise of the IMU, as a deviation.
     noise: f64,
@@ -119,6 +122,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
             exact_from: 0,
             is_pending: false,
             landmarks: None,
+            pairs: Vec::new(),
             scratch: Scratch::new(params.window + 1),
             noise: 1.0,
             gaps: 0,
@@ -225,6 +229,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         if let Some(landmarks) = &mut self.landmarks {
             landmarks.clear();
         }
+        self.pairs.clear();
         let Some(mut keyframe) = self.spare.pop() else { return };
         let motion = Preintegration::new(point.accelerometer_bias, point.gyroscope_bias);
         keyframe.renew(id, point, &motion);
@@ -321,6 +326,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         if self.dirty <= 1 {
             self.eliminate(2);
         }
+        self.release_pairs();
         self.release();
         let Some(oldest) = self.window.pop_front() else { return };
         self.spare.push(oldest);

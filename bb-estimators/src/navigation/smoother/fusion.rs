@@ -21,7 +21,8 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
     ///
     /// [`Refusal`], which the stream has counted; the smoother is then unchanged. [`Refusal::NoKeyframe`] if the
     /// keyframe, or the one that a relative pose refers to, has left the window; [`Refusal::NotAdjacent`] if the latter is not the
-    /// previous keyframe.
+    /// previous keyframe, and the factor concerns more than the two poses. The first factor on two keyframes that are not neighbours
+    /// allocates what couples them, and a keyframe then costs more while they are in the window.
     pub fn add(&mut self, stream: &mut Stream, id: u64, factor: impl Into<F>) -> Result<Fused, Refusal> {
         self.add_robust(stream, id, factor, Kernel::Squares)
     }
@@ -63,8 +64,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         if let Some(id) = factor.previous()
             && before.is_none_or(|before| before.id != id)
         {
-            let is_held = self.window.iter().any(|keyframe| keyframe.id == id);
-            return Err(if is_held { Refusal::NotAdjacent { id } } else { Refusal::NoKeyframe { id } });
+            return self.fuse_pair(stream, (id, index), factor, kernel);
         }
         keyframe.rows::<S>(&factor, before.map(|before| &**before), &mut rows)?;
         rows.weigh(trust);
@@ -106,7 +106,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         let correction = if is_newest { newest.correction } else { self.correction_at(index)? };
         if ties && self.landmarks.as_ref().is_some_and(|landmarks| landmarks.coupling.spans(index)) {
             let earlier = self.back(index.checked_sub(1)?, &correction)?;
-            let covariance = self.pair_covariance(index, rows)?;
+            let covariance = self.pair_covariance((index - 1, index), rows)?;
             return judge_with(rows, (&earlier, &correction), covariance);
         }
         let covariance = if is_newest { None } else { Some(self.covariance_now(index)?) };
@@ -121,7 +121,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
     }
 
     /// The correction of a keyframe if it were solved now.
-    fn correction_at(&mut self, index: usize) -> Option<[f64; N]> {
+    pub(super) fn correction_at(&mut self, index: usize) -> Option<[f64; N]> {
         if self.is_tied() {
             self.solve_all();
             return Some(self.window.get(index)?.correction);

@@ -58,6 +58,16 @@ impl<const N: usize> Landmarks<N> {
         }
     }
 
+    /// Without a camera: only for factors on keyframes that are not neighbours.
+    pub(super) fn none(window: usize) -> Self {
+        let camera = Camera::pinhole((1.0, 1.0), (0.0, 0.0), (1.0, 1.0));
+        Self::new(camera, LandmarkParams { landmarks: 0, ..LandmarkParams::default() }, window)
+    }
+
+    pub(super) fn has_camera(&self) -> bool {
+        self.params.landmarks > 0
+    }
+
     pub(super) fn clear(&mut self) {
         self.spare.append(&mut self.all);
         self.coupling.clear();

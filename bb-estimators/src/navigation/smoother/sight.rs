@@ -114,7 +114,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
     }
 
     fn sight(&mut self, stream: &Stream, id: u64, seen: &Observation) -> Result<Sighted, Refusal> {
-        if self.window.is_empty() || self.landmarks.is_none() {
+        if self.window.is_empty() || !self.landmarks.as_ref().is_some_and(Landmarks::has_camera) {
             return Err(Refusal::NotStarted);
         }
         let position = self.window.iter().rposition(|keyframe| keyframe.id == id);

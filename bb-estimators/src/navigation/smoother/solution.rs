@@ -100,8 +100,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
     /// Solves for the correction of a keyframe, given that of the next keyframe.
     pub(super) fn back(&self, index: usize, next: &[f64; N]) -> Option<[f64; N]> {
         let (keyframe, after) = (self.window.get(index)?, self.window.get(index + 1)?);
-        let coupling = self.landmarks.as_ref().map(|landmarks| &landmarks.coupling);
-        let Some(coupling) = coupling.filter(|coupling| coupling.is_tied()) else {
+        let Some(coupling) = self.coupling() else {
             return Some(keyframe.pivot.back(&after.link, next));
         };
         let later = self.window.range(index + 2..).map(|keyframe| &keyframe.correction);
@@ -125,9 +124,9 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         self.exact_from = 0;
     }
 
-    /// Returns whether landmarks couple keyframes that are not neighbours.
+    /// Returns whether landmarks, or factors on two of them, couple keyframes that are not neighbours.
     pub(super) fn is_tied(&self) -> bool {
-        self.landmarks.as_ref().is_some_and(|landmarks| landmarks.coupling.is_tied())
+        self.coupling().is_some()
     }
 
     /// Solves for the corrections that changed noticeably, and at least for those from `least` on. Returns the index of
@@ -228,6 +227,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
             }
             is_next = is_off;
         }
+        self.relinearise_pairs();
         if let Some(landmarks) = &mut self.landmarks {
             landmarks.relinearise::<F, S>(&self.window);
             self.dirty = self.dirty.min(landmarks.coupling.changed());

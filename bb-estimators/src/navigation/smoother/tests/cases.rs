@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use super::flight::{DT_NS, Drone, Flight, N, Smoother, linear, open, sample, sensors};
 use crate::navigation::{
     AbsolutePose, EskfFilter, Estimate, FixedLagSmoother, GaussMarkov, GnssPosition, ImuMean, Kernel, NAVIGATION,
-    Navigation, NavigationFactor, Refusal, RelativePose, SmootherParams, Start, Stream,
+    Navigation, NavigationFactor, Refusal, RelativePose, SmootherParams, Start, Stream, StreamParams,
 };
 
 type Plain = FixedLagSmoother;
@@ -59,13 +59,11 @@ fn refusals_are_named_and_counted() {
     let wild = ImuMean { specific_force: Vector3::new(0.0, 1e7, 0.0), ..rest(2 * time_ns) };
     assert_eq!(smoother.propagate(&wild), Err(Refusal::OutOfRange));
     assert!(matches!(smoother.propagate(&rest(i64::MAX)), Err(Refusal::Gap { .. })));
-    // Keyframe 1 has left the window, keyframe 2 has no previous keyframe, and keyframe 2 does not directly precede
-    // keyframe 4.
+    // Keyframe 1 has left the window, keyframe 2 has no previous keyframe, and keyframe 4 is no earlier one.
     let relative = |id| RelativePose::new(id, (Vector3::zeros(), 0.1), (level(), 0.1));
     assert_eq!(smoother.add(&mut stream, 1, fix), Err(Refusal::NoKeyframe { id: 1 }));
     assert_eq!(smoother.add(&mut stream, 2, relative(1)), Err(Refusal::NoKeyframe { id: 1 }));
-    assert_eq!(smoother.add(&mut stream, 4, relative(2)), Err(Refusal::NotAdjacent { id: 2 }));
-    assert_eq!(Refusal::NotAdjacent { id: 2 }.to_string(), "keyframe 2 is not the one directly before");
+    assert_eq!(smoother.add(&mut stream, 3, relative(4)), Err(Refusal::NoKeyframe { id: 4 }));
     let nan = GnssPosition::new(Vector3::new(f64::NAN, 0.0, 0.0), 1.0, 1.0);
     assert_eq!(smoother.add(&mut stream, 4, nan), Err(Refusal::NonFinite));
     let mut negative = fix;
@@ -274,4 +272,53 @@ fn a_warm_start_has_what_the_filter_has() {
         assert_eq!(gone.is_ok(), time_ns == -1, "{gone:?}");
         assert!(plain.predicted().unwrap().is_finite());
     }
+}
+
+/// Between keyframes that are not neighbours, only poses can be compared: `Drone` also has the scale of relative poses.
+#[test]
+fn relative_poses_of_any_two_keyframes() {
+    let flight = Flight::new(3, 12, 1.0);
+    let mut smoother = flight.flown(linear(6));
+    let mut stream = Stream::new(StreamParams::default());
+    let (from, to) = (flight.truth[7], flight.truth[11]);
+    let back = from.world_from_body.inverse();
+    let way = back * (to.position - from.position);
+    let pose = RelativePose::new(7, (way, 0.05), (back * to.world_from_body, 2e-3));
+    let refused = smoother.add(&mut stream, 11, pose);
+    assert_eq!(refused, Err(Refusal::NotAdjacent { id: 7 }));
+    let error = refused.unwrap_err().to_string();
+    assert_eq!(error, "keyframe 7 is not the one directly before, and more than the poses is compared");
+    let gone = RelativePose { keyframe: 5, ..pose };
+    assert_eq!(smoother.add(&mut stream, 11, NavigationFactor::Between(gone)), Err(Refusal::NoKeyframe { id: 5 }));
+    let wrong = RelativePose { translation: way + Vector3::x(), ..pose };
+    let wrong = smoother.add(&mut stream, 11, NavigationFactor::Between(wrong));
+    assert!(matches!(wrong, Err(Refusal::Gate { .. })), "{wrong:?}");
+    let before = smoother.covariance().unwrap();
+    let fused = smoother.add(&mut stream, 11, NavigationFactor::Between(pose)).unwrap();
+    assert!(fused.dimension == 6 && fused.nis < 20.0, "{fused:?}");
+    smoother.update().unwrap();
+    // Two keyframes that are known relative to each other are not known better in the world.
+    let after = smoother.covariance().unwrap();
+    assert!(after[(0, 0)] <= before[(0, 0)] && after[(0, 0)] > 0.9 * before[(0, 0)], "{before} {after}");
+    assert!(after[(6, 6)] < before[(6, 6)], "{before} {after}");
+}
+
+/// A robust kernel has its weight from the estimate of the window, as between neighbours.
+#[test]
+fn an_outlier_between_any_two_keyframes() {
+    let flight = Flight::new(4, 30, 1.0);
+    let flown = |kernel: Option<Kernel>| {
+        let mut smoother = flight.flown(super::flight::converged(12));
+        let (from, to) = (flight.truth[20], flight.truth[29]);
+        let back = from.world_from_body.inverse();
+        let way = back * (to.position - from.position) + Vector3::x() * 3.0;
+        let pose = RelativePose::new(20, (way, 0.05), (back * to.world_from_body, 2e-3));
+        if let Some(kernel) = kernel {
+            smoother.add_robust(&mut open(), 29, NavigationFactor::Between(pose), kernel).unwrap();
+        }
+        smoother.update().unwrap();
+        flight.error(29, &smoother.estimate().unwrap()).fixed_rows::<3>(0).norm()
+    };
+    let errors = [flown(None), flown(Some(Kernel::Cauchy(1.0))), flown(Some(Kernel::Squares))];
+    assert!((errors[1] - errors[0]).abs() < 0.05 && errors[2] > errors[0] + 0.4, "{errors:?}");
 }

@@ -145,6 +145,24 @@ impl Flight {
         flight
     }
 
+    /// Adds a relative pose to an earlier keyframe, at most `most` before, at about every second keyframe. For `most` below 2 there are none.
+    pub(super) fn related(mut self, seed: u64, most: usize) -> Self {
+        let mut noise = Noise::new(seed);
+        for k in 2..self.truth.len() {
+            let span = 2 + (noise.next().abs() * 10.0) as usize % (2 * most).max(1);
+            if span > most.min(k) {
+                continue;
+            }
+            let (from, to) = (self.truth[k - span], self.truth[k]);
+            let back = from.world_from_body.inverse();
+            let way = back * (to.position - from.position) + noise.vector(0.05);
+            let turn = back * to.world_from_body * rotation(&noise.vector(2e-3));
+            let pose = RelativePose::new((k - span) as u64, (way, 0.05), (turn, 2e-3));
+            self.measured[k].push(NavigationFactor::Between(pose));
+        }
+        self
+    }
+
     /// Returns the flight in a world that is turned about its origin, and then moved.
     pub(super) fn elsewhere(mut self, turn: &UnitQuaternion<f64>, origin: &Vector3<f64>) -> Self {
         let place = |position: &Vector3<f64>| turn * position + origin;

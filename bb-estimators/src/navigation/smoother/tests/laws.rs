@@ -21,10 +21,11 @@ fn differ(a: &SMatrix<f64, N, N>, b: &SMatrix<f64, N, N>) -> f64 {
 laws! {
     #![proptest_config(ProptestConfig::with_cases(16))]
 
-    /// Information that leaves the window is not lost: with linear factors, the result matches the one with all keyframes.
+    /// Information that leaves the window is not lost: with linear factors, the result matches the one with all keyframes. Also with
+    /// relative poses between keyframes that are not neighbours.
     #[test]
-    fn a_window_is_the_batch(seed in any::<u64>(), window in 2_usize..12) {
-        let flight = Flight::new(seed, 40, 1.0);
+    fn a_window_is_the_batch(seed in any::<u64>(), window in 2_usize..12, related in any::<bool>()) {
+        let flight = Flight::new(seed, 40, 1.0).related(seed, if related { window - 1 } else { 0 });
         let mut batch = flight.flown(linear(40));
         let mut here = flight.flown(linear(window));
         prop_assert_eq!(here.marginalised(), 40 - window as u64);
@@ -43,8 +44,9 @@ laws! {
     fn the_order_of_arrival_does_not_matter(
         seed in any::<u64>(),
         order in Just((1..12_usize).collect::<Vec<_>>()).prop_shuffle(),
+        related in 0_usize..11,
     ) {
-        let flight = Flight::new(seed, 12, 1.0);
+        let flight = Flight::new(seed, 12, 1.0).related(seed, related);
         let arrived = |order: &[usize]| {
             let mut smoother = Smoother::new(converged(12)).unwrap();
             smoother.start(0, &flight.start).unwrap();
@@ -88,11 +90,11 @@ laws! {
     /// The estimate does not depend on the origin of the world or its heading.
     #[test]
     fn heading_and_origin(seed in any::<u64>(), heading in -3.1..3.1, x in -1e4..1e4, y in -1e4..1e4) {
-        let flight = Flight::new(seed, 30, 1.0);
+        let flight = Flight::new(seed, 30, 1.0).related(seed, 9);
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), heading);
         let origin = Vector3::new(x, y, -0.5 * x);
         let place = |position: &Vector3<f64>| turn * position + origin;
-        let other = Flight::new(seed, 30, 1.0).elsewhere(&turn, &origin);
+        let other = Flight::new(seed, 30, 1.0).related(seed, 9).elsewhere(&turn, &origin);
         // To convergence: relinearisation must not depend on the last bit of how far a keyframe moved.
         let params = converged(10);
         let (here, there) = (flight.flown(params).estimate().unwrap(), other.flown(params).estimate().unwrap());
@@ -106,9 +108,9 @@ laws! {
     /// and position are never better known than at the start.
     #[test]
     fn what_is_unobservable_stays_unknown(seed in any::<u64>()) {
-        let mut flight = Flight::new(seed, 80, 1.0);
+        let mut flight = Flight::new(seed, 80, 1.0).related(seed, 5);
         for measured in &mut flight.measured {
-            measured.retain(|factor| matches!(factor, NavigationFactor::RelativePose(_)));
+            measured.retain(|factor| matches!(factor, NavigationFactor::RelativePose(_) | NavigationFactor::Between(_)));
         }
         // A velocity that is known in the world is as good as a heading.
         flight.start.velocity_covariance *= 1e6;
@@ -188,7 +190,7 @@ fn only_the_end_is_eliminated_again() {
 /// Incremental elimination gives the same result as elimination from scratch.
 #[test]
 fn elimination_is_the_same_from_the_start() {
-    let flight = Flight::new(9, 50, 1.0);
+    let flight = Flight::new(9, 50, 1.0).related(9, 8);
     let smoother = flight.flown(linear(15));
     let mut afresh = smoother.clone();
     afresh.eliminate_all();
