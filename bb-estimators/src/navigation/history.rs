@@ -83,7 +83,7 @@ pub enum Placed {
 pub struct History<F: Replayed, const SAMPLES: usize, const MEASUREMENTS: usize, const STATES: usize> {
     past: Past<F, F::Measurement, SAMPLES, MEASUREMENTS, STATES>,
     /// Number of measurements so far: those of one stamp are fused in the order of their arrival.
-    arrived: u32,
+    arrived: u64,
     longest_lead_ns: i64,
     counts: Arrivals,
 }

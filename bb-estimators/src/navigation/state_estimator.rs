@@ -68,6 +68,8 @@ mod event;
 mod factor;
 mod fallback;
 mod gate;
+mod given;
+mod ids;
 mod input;
 mod label;
 mod output;
@@ -82,9 +84,9 @@ mod world;
 
 #[cfg(feature = "runtime")]
 pub use declared::{
-    AnchorReading, AttitudeReport, FlightEstimate, FlightEstimator, FlightEvent, FlightEvents, FlightHealth,
-    FlightInputs, FlightOptions, FlightOutputs, GpsReport, HealthSnapshot, RelativePoseReading, SmoothedHistory,
-    TracingSink, WarmStartReport,
+    AnchorReading, AttitudeReport, FactorReading, FlightEstimate, FlightEstimator, FlightEvent, FlightEvents,
+    FlightHealth, FlightInputs, FlightOptions, FlightOutputs, GpsReport, HealthSnapshot, RelativePoseReading,
+    SmoothedHistory, TracingSink, WarmStartReport,
 };
 pub use error::{EstimatorError, OriginError, Reason};
 pub use estimator::{Added, FlightNavigator};
@@ -92,6 +94,7 @@ pub use event::{Both, Event, EventKind, EventSink, InputKind, Level, StartedFrom
 pub use factor::ProvidedFactor;
 pub use factor::{SMOOTHED, Smoothed};
 pub use gate::{GateState, Rejection};
+pub use given::{FactorForm, GivenFactor, LinearFactor, RelativeFactor};
 pub use input::{
     AttitudeReading, FlightControllerState, FlightControllerWindow, GnssReading, GpsHealth, GpsHealthReading,
     ImuBias, PoseAnchor, TakeoffOrigin, VioOutput,

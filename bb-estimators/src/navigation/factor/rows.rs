@@ -127,6 +127,20 @@ impl<const N: usize> Rows<N> {
         (&self.residual[..self.count], &self.at[..self.count])
     }
 
+    /// Leaves out rows that involve no state.
+    pub(in crate::navigation) fn leave_out_empty(&mut self) {
+        let mut kept = 0;
+        for row in 0..self.count {
+            if self.at[row].iter().chain(&self.previous[row]).any(|x| *x != 0.0) {
+                self.at[kept] = self.at[row];
+                self.previous[kept] = self.previous[row];
+                self.residual[kept] = self.residual[row];
+                kept += 1;
+            }
+        }
+        self.count = kept;
+    }
+
     /// Multiplies the weight. The rows are multiplied by its square root.
     pub(in crate::navigation) fn weigh(&mut self, weight: f64) {
         let factor = sqrt(weight);

@@ -11,7 +11,7 @@ use crate::navigation::eskf::ImuMean;
 pub(in crate::navigation) struct Key {
     pub(in crate::navigation) time_ns: i64,
     pub(in crate::navigation) rank: u8,
-    pub(in crate::navigation) order: u32,
+    pub(in crate::navigation) order: u64,
 }
 
 impl Key {
@@ -25,7 +25,7 @@ impl Key {
 
     /// After all inputs of that time.
     pub(in crate::navigation) const fn end_of(time_ns: i64) -> Self {
-        Self { time_ns, rank: u8::MAX, order: u32::MAX }
+        Self { time_ns, rank: u8::MAX, order: u64::MAX }
     }
 }
 

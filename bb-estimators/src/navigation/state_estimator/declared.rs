@@ -5,7 +5,9 @@ mod log;
 mod options;
 mod output;
 
-pub use input::{AnchorReading, AttitudeReport, FlightInputs, GpsReport, RelativePoseReading, WarmStartReport};
+pub use input::{
+    AnchorReading, AttitudeReport, FactorReading, FlightInputs, GpsReport, RelativePoseReading, WarmStartReport,
+};
 pub use log::TracingSink;
 pub use options::FlightOptions;
 pub use output::{FlightEstimate, FlightEvent, FlightEvents, FlightHealth, FlightOutputs};
@@ -66,7 +68,9 @@ use std::time::Duration;
 /// doubled, or at the first anchor. At the origin it is levelled by the input `attitude`, or once it has been at rest for a second.
 /// The body is the IMU, with the axes of the link. The joints give the position of the `gnss` antenna in it.
 ///
-/// All relative poses, anchors, fixes and reports on the receiver that arrive between two samples of the IMU are taken together, as
+/// The input `factor` takes what other providers say of a pose, or of two: see [`FactorReading`].
+///
+/// All relative poses, anchors, factors, fixes and reports on the receiver that arrive between two samples of the IMU are taken together, as
 /// far as there is room for them. If more reports than [`Every::MOST`](bb_core::Every::MOST) wait for a silent IMU, the estimator assumes
 /// that those which were lost told of spoofing. On a worker that is held up for so long that its inbox is full, reports are lost like all
 /// other messages, which is counted. If the estimator fails and is restarted, the gate is open as at the start.
@@ -255,6 +259,9 @@ impl Estimator for FlightEstimator {
             }
             for anchor in inputs.anchor.iter().filter_map(input::anchor) {
                 let _ = estimator.add_pose_anchor(anchor);
+            }
+            for factor in inputs.factor.iter().filter_map(input::factor) {
+                let _ = estimator.add_given_factor(factor);
             }
             for fix in inputs.gnss.iter().filter_map(|fix| input::fix(fix, mounting)) {
                 let _ = estimator.add_gnss(fix);

@@ -349,6 +349,7 @@ impl<F: ProvidedFactor> Engine<F> {
             Payload::Anchor(anchor) => self.anchor(now_ns, anchor, config, &mut rejection),
             Payload::Gnss(fix) => self.fix(fix, config, &mut rejection),
             Payload::Provided(_, factor) => self.measure(&Measured::Provided(factor)).map(Some),
+            Payload::Given(given) => self.given(given).map(Some),
         };
         self.after(config);
         let outcome = result.and_then(|fused| {

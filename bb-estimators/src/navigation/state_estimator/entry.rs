@@ -1,8 +1,11 @@
 //! Inputs in the order in which they are applied.
 
+use alloc::boxed::Box;
+
 use super::error::{EstimatorError, Outcome, Reason};
 use super::event::{EventKind, InputKind};
 use super::gate::Rejection;
+use super::given::{FactorForm, GivenFactor};
 use super::input::{AttitudeReading, FlightControllerState, GnssReading, GpsHealth, PoseAnchor, VioOutput};
 use crate::navigation::history::past::Key;
 
@@ -18,20 +21,29 @@ pub(super) enum Payload<F> {
     Anchor(PoseAnchor),
     Gnss(GnssReading),
     Provided(u32, F),
+    Given(Box<GivenFactor>),
 }
 
 impl<F> Payload<F> {
-    /// Place in the queue. Of one kind, the number of the provider counts; of reports, the worse comes later.
+    /// Place in the queue. Of one kind, the number of the provider counts; of reports, the worse comes later, and of relative poses the
+    /// longer.
     pub(super) fn key(&self, time_ns: i64) -> Key {
         let (rank, order) = match self {
             Self::Warm(_) => (1, 0),
             Self::Attitude(_) => (2, 0),
-            Self::Health(health) => (3, health.severity()),
+            Self::Health(health) => (3, u64::from(health.severity())),
             Self::Frame => (4, 0),
-            Self::Vio(_) => (5, 0),
-            Self::Anchor(anchor) => (6, anchor.provider),
+            Self::Vio(vio) => (5, span(vio.from_ns, vio.to_ns)),
+            Self::Anchor(anchor) => (6, u64::from(anchor.provider)),
             Self::Gnss(_) => (7, 0),
-            Self::Provided(provider, _) => (8, *provider),
+            Self::Provided(provider, _) => (8, u64::from(*provider)),
+            Self::Given(given) => {
+                let provider = u64::from(given.provider) << 32;
+                match &given.form {
+                    FactorForm::Linear(_) => (9, provider),
+                    FactorForm::Relative(relative) => (10, provider | span(relative.from_ns, given.time_ns)),
+                }
+            }
         };
         Key { time_ns, rank, order }
     }
@@ -45,7 +57,7 @@ impl<F> Payload<F> {
             Self::Vio(_) => InputKind::Vio,
             Self::Anchor(_) => InputKind::Anchor,
             Self::Gnss(_) => InputKind::Gnss,
-            Self::Provided(..) => InputKind::Factor,
+            Self::Provided(..) | Self::Given(_) => InputKind::Factor,
         }
     }
 
@@ -58,6 +70,11 @@ impl<F> Payload<F> {
     pub(super) fn is_added(&self) -> bool {
         !matches!(self, Self::Frame)
     }
+}
+
+/// Time between two keyframes in units that fit half a number, about a microsecond.
+fn span(from_ns: i64, to_ns: i64) -> u64 {
+    (to_ns.abs_diff(from_ns) / 1000).min(u64::from(u32::MAX))
 }
 
 /// An input in the queue.

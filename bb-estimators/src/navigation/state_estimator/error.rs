@@ -5,6 +5,7 @@ use core::fmt;
 use core::mem::discriminant;
 
 use super::gate::Rejection;
+use super::ids::time_of;
 use crate::navigation::refusal::Refusal;
 
 /// Reason for which an input was refused, or the side effect it had.
@@ -43,6 +44,10 @@ impl Reason {
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            // Keyframes are named by their times.
+            Self::Refused(Refusal::NoKeyframe { id }) => {
+                write!(f, "there is no keyframe at {} ns, or none any more", time_of(*id))
+            }
             Self::Refused(refusal) => refusal.fmt(f),
             Self::Duplicate => f.write_str("there is one of this kind and time already"),
             Self::Gate(rejection) => rejection.fmt(f),

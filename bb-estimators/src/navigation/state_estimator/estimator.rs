@@ -1,5 +1,6 @@
 //! The state estimator.
 
+use alloc::boxed::Box;
 use alloc::vec::Vec;
 
 use super::emission::Emission;
@@ -9,6 +10,7 @@ use super::error::{EstimatorError, OriginError, Reason};
 use super::event::{Event, EventKind, EventSink, InputKind};
 use super::factor::ProvidedFactor;
 use super::gate::GateState;
+use super::given::GivenFactor;
 use super::input::{
     AttitudeReading, FlightControllerState, FlightControllerWindow, GnssReading, GpsHealthReading, PoseAnchor,
     TakeoffOrigin, VioOutput,
@@ -125,7 +127,8 @@ impl<K: EventSink, F: ProvidedFactor> FlightNavigator<K, F> {
         self.add(InputKind::WarmStart, state.attitude.time_ns, checked, Payload::Warm(state), &[])
     }
 
-    /// Adds a relative pose between two frames of a camera.
+    /// Adds a relative pose between two frames of a camera, which need not be successive ones: the smoother relates any two of its
+    /// window. The scale is known from one frame to the next; for others, it is as uncertain as it may be.
     ///
     /// # Errors
     ///
@@ -152,6 +155,18 @@ impl<K: EventSink, F: ProvidedFactor> FlightNavigator<K, F> {
     /// Same as [`add_vio`](Self::add_vio).
     pub fn add_factor(&mut self, time_ns: i64, provider: u32, factor: F) -> Result<Added, EstimatorError> {
         self.add(InputKind::Factor, time_ns, Ok(()), Payload::Provided(provider, factor), &[])
+    }
+
+    /// Adds a factor of an outside provider that is plain data. Those on two keyframes are for the smoother: the filter, which holds only
+    /// the camera's last frame, refuses others as [`NoKeyframe`](Refusal::NoKeyframe). They change neither the label nor the age of the
+    /// anchor.
+    ///
+    /// # Errors
+    ///
+    /// Same as [`add_vio`](Self::add_vio).
+    pub fn add_given_factor(&mut self, factor: GivenFactor) -> Result<Added, EstimatorError> {
+        let payload = Payload::Given(Box::new(factor));
+        self.add(InputKind::Factor, factor.time_ns, factor.check(), payload, &[])
     }
 
     /// Adds the data that the flight controller has sent: samples of its IMU, attitudes, and the health and fixes of its receiver.
@@ -310,7 +325,7 @@ impl<K: EventSink, F: ProvidedFactor> FlightNavigator<K, F> {
         self.look();
     }
 
-    fn is_smoothing(&self) -> bool {
+    pub(super) fn is_smoothing(&self) -> bool {
         self.config.strategy.is_smoothing()
     }
 

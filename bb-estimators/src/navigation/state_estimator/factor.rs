@@ -18,6 +18,8 @@ pub const SMOOTHED: usize = Smoothed::DIMENSION;
 /// A factor that an outside provider adds directly: the window is shared. Every type that implements [`Factor`] for any
 /// states, such as [`NavigationFactor`](crate::navigation::NavigationFactor), is one.
 ///
+/// Factors that are plain data, and those on two keyframes, are [`GivenFactor`](super::GivenFactor)s.
+///
 /// Its world is that of [`FlightNavigator::frame`](super::FlightNavigator::frame). The filter, which decides in either
 /// strategy, accepts only factors on one keyframe, of at most nine rows: one that names a previous keyframe is refused as
 /// [`NoKeyframe`](crate::navigation::Refusal::NoKeyframe), one with more rows as

@@ -1,5 +1,6 @@
 //! The filter, as [copies](crate::navigation::Copies) of which the best is the estimate, with or without a window that follows it.
 
+mod metric;
 mod predictor;
 mod provided;
 #[cfg_attr(not(feature = "smoother"), path = "strategy/no_window.rs")]
@@ -11,10 +12,13 @@ use alloc::vec::Vec;
 
 use nalgebra::{Isometry3, Matrix6, SMatrix, UnitQuaternion, Vector3};
 
+use self::metric::Metric;
 pub(super) use self::predictor::Predictor;
 use self::window::Window;
 use super::error::EstimatorError;
 use super::factor::ProvidedFactor;
+use super::given::PoseRows;
+pub(super) use super::ids::id_of;
 use super::params::{StateEstimatorConfig, ns};
 use crate::attitude::ParamsError;
 use crate::navigation::copies::{Copies, Ways};
@@ -62,6 +66,9 @@ pub(super) enum Measured<'a, F> {
     Anchor(AbsolutePose),
     Gnss(GnssPosition, Option<GnssVelocity>, Trust),
     Provided(&'a F),
+    Linear(&'a PoseRows),
+    /// A relative pose of a provider, whose scale is known.
+    Between(RelativePose),
 }
 
 /// Permission of a fix that does not fit.
@@ -139,11 +146,6 @@ impl Cadence {
     fn has_camera(&self, now_ns: i64) -> bool {
         self.awaits_camera(now_ns, self.interval_ns / 2)
     }
-}
-
-/// Converts a stamp to an id that increases with it.
-pub(super) fn id_of(time_ns: i64) -> u64 {
-    (time_ns as u64) ^ (1 << 63)
 }
 
 /// The copies of the filter, and the poses of the last keyframes: the window's, if there is one.
@@ -280,8 +282,16 @@ impl<F: ProvidedFactor> Strategy<F> {
         // Without a camera, nothing else determines the times of keyframes. The dependence of a provider's factor on the present state is
         // unknown, so it cannot be carried back.
         let has_camera = self.copies.estimate().is_some_and(|now| self.cadence.has_camera(now.time_ns));
-        if !has_camera || matches!(measured, Measured::Provided(_)) {
+        let is_provided = matches!(measured, Measured::Provided(_) | Measured::Linear(_) | Measured::Between(_));
+        if !has_camera || is_provided {
             self.keyframe()?;
+        }
+        let related = match measured {
+            Measured::Relative(pose) | Measured::Between(pose) => Some(pose),
+            _ => None,
+        };
+        if let Some(pose) = related.filter(|pose| !self.refers_to(pose.keyframe)) {
+            return self.relate(measured, pose);
         }
         let resets = self.resets();
         let fused = self.fuse(measured);
@@ -290,7 +300,9 @@ impl<F: ProvidedFactor> Strategy<F> {
         let has_moved = self.resets() != resets;
         let is_fatal = matches!(fused, Err(EstimatorError::Fatal(_)));
         let Some(window) = &mut self.window else { return fused };
-        if (!window.fits(&self.copies) && !is_between || has_moved) && !is_fatal {
+        // A window that was restarted may not have the keyframe any more that the filter holds.
+        let is_gone = fused.is_ok() && related.is_some_and(|pose| !window.has(pose.keyframe));
+        if (!window.fits(&self.copies) && !is_between || has_moved || is_gone) && !is_fatal {
             self.restart_window(true)?;
             return fused;
         }
@@ -301,6 +313,23 @@ impl<F: ProvidedFactor> Strategy<F> {
             self.restart_window(false)?;
         }
         Ok(fused)
+    }
+
+    /// Adds a relative pose to a keyframe that the filter does not hold. The window judges it itself, and has it as long as it is not
+    /// restarted in the state of the filter.
+    fn relate(&mut self, measured: &Measured<'_, F>, pose: &RelativePose) -> Result<Fused, EstimatorError> {
+        let Some(window) = &mut self.window else { return Err(Refusal::NoKeyframe { id: pose.keyframe }.into()) };
+        let fused = window.relate(measured, id_of(self.cadence.keyframe_ns), pose)?;
+        if !window.is_converged() {
+            self.restart_window(false)?;
+        }
+        Ok(fused)
+    }
+
+    /// Returns whether this keyframe is the one that relative poses to the filter refer to.
+    fn refers_to(&self, keyframe: u64) -> bool {
+        let estimate = self.copies.estimate();
+        estimate.and_then(|estimate| estimate.keyframe).is_some_and(|held| held.id == keyframe)
     }
 
     /// Fuses a measurement with the filter.
@@ -321,6 +350,8 @@ impl<F: ProvidedFactor> Strategy<F> {
                 }
                 fused
             }
+            Measured::Between(pose) => copies.update(&mut streams.provided, &Metric(pose)).map_err(escalate)?,
+            Measured::Linear(rows) => provided::update(copies, &mut streams.provided, *rows)?,
             Measured::Provided(factor) => provided::update(copies, &mut streams.provided, *factor)?,
         };
         let pose = self.pose().filter(Pose::is_finite).ok_or(EstimatorError::fatal(Refusal::NonFinite))?;

@@ -9,6 +9,7 @@ mod frames;
 mod gaps;
 mod gate;
 mod gate_limits;
+mod given;
 mod interface;
 mod labels;
 mod late_samples;

@@ -2,10 +2,12 @@
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3};
 
+use super::given::{LinearFactor, PoseRows};
 use super::input::{GnssReading, PoseAnchor, blocks};
 use crate::navigation::geodesy::{Geodetic, LocalFrame};
 use crate::navigation::measurement::{AbsolutePose, GnssPosition, GnssVelocity};
 use crate::navigation::numbers::FARTHEST_FROM_ORIGIN;
+use crate::navigation::refusal::Refusal;
 
 /// The tangent frame of the strategy.
 #[derive(Clone, Copy, Debug)]
@@ -56,6 +58,10 @@ impl World {
             lever_arm,
         });
         (position, velocity)
+    }
+
+    pub(super) fn rows(&self, linear: &LinearFactor) -> Result<PoseRows, Refusal> {
+        linear.in_world(self.position(&linear.position), &self.frame_from_local(&linear.position))
     }
 
     /// Position on the Earth, and the rotation from the world to the tangent frame there.

@@ -3,14 +3,14 @@
 use crate::navigation::geodesy::Geodetic;
 use crate::navigation::numbers::UNSTATED_FIX;
 use crate::navigation::state_estimator::{
-    AttitudeReading, FlightControllerState, GnssReading, GpsHealth, GpsHealthReading, ImuBias, PoseAnchor,
-    VioOutput,
+    AttitudeReading, FactorForm, FlightControllerState, GivenFactor, GnssReading, GpsHealth, GpsHealthReading,
+    ImuBias, LinearFactor, PoseAnchor, RelativeFactor, VioOutput,
 };
 use bb_core::message::Stamped;
 use bb_core::payload::{GeodeticPosition, GnssFix, GnssStatus, Imu};
 use bb_core::time::MonotonicTime;
 use bb_core::{Context, Every, Fault, Input, Inputs, Payload};
-use nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
 /// The inputs of [`FlightEstimator`](super::FlightEstimator).
 #[derive(Clone, Copy, Debug, Inputs)]
@@ -21,6 +21,8 @@ pub struct FlightInputs<'a> {
     pub vio: Every<'a, RelativePoseReading>,
     /// Poses from satellite images.
     pub anchor: Every<'a, AnchorReading>,
+    /// Factors of outside providers.
+    pub factor: Every<'a, FactorReading>,
     /// The flight controller's GNSS receiver.
     pub gnss: Every<'a, GnssFix>,
     /// The flight controller's reports on that receiver.
@@ -31,7 +33,7 @@ pub struct FlightInputs<'a> {
     pub warm_start: Option<Input<'a, WarmStartReport>>,
 }
 
-/// The pose of the body at a camera frame relative to an earlier one, stamped with the time of the later frame.
+/// The pose of the body at a camera frame relative to an earlier one, the last or another, stamped with the time of the later frame.
 #[derive(Clone, Copy, Debug, PartialEq, Payload)]
 pub struct RelativePoseReading {
     /// Time at which the earlier frame was taken.
@@ -61,6 +63,40 @@ pub struct AnchorReading {
     pub covariance: Matrix6<f64>,
     /// `true` if the provider used a cheaper computation of its covariance.
     pub is_covariance_degraded: bool,
+}
+
+/// A factor of an outside provider on the pose of the body: a [`GivenFactor`], stamped with its time, of two the later.
+#[expect(clippy::large_enum_variant, reason = "no factor is allocated on its way")]
+#[derive(Clone, Copy, Debug, PartialEq, Payload)]
+pub enum FactorReading {
+    /// Up to six rows that the provider has linearised: see [`LinearFactor`].
+    Linear {
+        /// Number of the provider, if there are several.
+        provider: u32,
+        /// Position of the body's origin at which it was linearised. One without a height is not used.
+        position: GeodeticPosition,
+        /// Rotates body coordinates to the tangent frame at that position.
+        world_from_body: UnitQuaternion<f64>,
+        /// The derivatives of the measured values by position, m, and rotation vector, rad, in that frame. Rows of zeros are left out.
+        jacobian: Matrix6<f64>,
+        /// The measured values minus those expected at that pose.
+        residual: Vector6<f64>,
+        /// Covariance of the measured values.
+        covariance: Matrix6<f64>,
+    },
+    /// The pose relative to that of an earlier keyframe, in metres: see [`RelativeFactor`].
+    Relative {
+        /// Number of the provider, if there are several.
+        provider: u32,
+        /// Time of the earlier keyframe: a frame of the camera, or the time of an earlier factor.
+        from: MonotonicTime,
+        /// Position of the body's origin at the later time, in the axes of the body at the earlier, m.
+        translation: Vector3<f64>,
+        /// Rotates body coordinates at the later time to those at the earlier.
+        from_to: UnitQuaternion<f64>,
+        /// Covariance of the translation, m², and of the rotation vector of the error, rad², both in body axes at the later time.
+        covariance: Matrix6<f64>,
+    },
 }
 
 /// The flight controller's report on its GNSS receiver.
@@ -160,6 +196,21 @@ pub(super) fn anchor(reading: &Stamped<AnchorReading>) -> Option<PoseAnchor> {
         covariance: reading.covariance,
         is_covariance_degraded: reading.is_covariance_degraded,
     })
+}
+
+pub(super) fn factor(reading: &Stamped<FactorReading>) -> Option<GivenFactor> {
+    let (provider, form) = match **reading {
+        FactorReading::Linear { provider, ref position, world_from_body, jacobian, residual, covariance } => {
+            let position = geodetic(position)?;
+            let linear = LinearFactor { position, world_from_body, jacobian, residual, covariance };
+            (provider, FactorForm::Linear(linear))
+        }
+        FactorReading::Relative { provider, from, translation, from_to, covariance } => {
+            let from_ns = from.as_nanos();
+            (provider, FactorForm::Relative(RelativeFactor { from_ns, translation, from_to, covariance }))
+        }
+    };
+    Some(GivenFactor { time_ns: reading.monotonic_time.as_nanos(), provider, form })
 }
 
 pub(super) fn fix(fix: &Stamped<GnssFix>, mounting: &Mounting) -> Option<GnssReading> {

@@ -11,6 +11,7 @@ use crate::navigation::state_estimator::error::{EstimatorError, Reason};
 use crate::navigation::state_estimator::event::StartedFrom;
 use crate::navigation::state_estimator::factor::ProvidedFactor;
 use crate::navigation::state_estimator::gate::Rejection;
+use crate::navigation::state_estimator::given::{FactorForm, GivenFactor};
 use crate::navigation::state_estimator::input::{GnssReading, PoseAnchor, VioOutput, blocks};
 use crate::navigation::state_estimator::params::StateEstimatorConfig;
 use crate::navigation::state_estimator::start::at_anchor;
@@ -25,7 +26,7 @@ impl<F: ProvidedFactor> Engine<F> {
         }
         let resets = self.strategy.resets();
         let result = self.strategy.measure(measured);
-        let is_relative = matches!(measured, Measured::Relative(_));
+        let is_relative = matches!(measured, Measured::Relative(_) | Measured::Between(_));
         if self.strategy.resets() != resets {
             return self.moved(&result, matches!(measured, Measured::Gnss(..)));
         }
@@ -114,6 +115,25 @@ impl<F: ProvidedFactor> Engine<F> {
         }))?;
         self.sources.seen(vio.to_ns, &config.params);
         Ok(Some(fused))
+    }
+
+    pub(super) fn given(&mut self, given: &GivenFactor) -> Result<Fused, EstimatorError> {
+        match &given.form {
+            FactorForm::Linear(linear) => {
+                let rows = self.world.ok_or(Refusal::NotStarted)?.rows(linear)?;
+                self.measure(&Measured::Linear(&rows))
+            }
+            FactorForm::Relative(relative) => {
+                let [translation_covariance, rotation_covariance] = blocks(&relative.covariance);
+                self.measure(&Measured::Between(RelativePose {
+                    keyframe: id_of(relative.from_ns),
+                    translation: relative.translation,
+                    keyframe_from_body: relative.from_to,
+                    translation_covariance,
+                    rotation_covariance,
+                }))
+            }
+        }
     }
 
     pub(super) fn anchor(

@@ -10,6 +10,8 @@ use super::{Measured, Pose};
 use crate::attitude::ParamsError;
 use crate::navigation::copies::Copies;
 use crate::navigation::eskf::{Doubt, EskfFilter, ImuMean, Start};
+use crate::navigation::fused::Fused;
+use crate::navigation::measurement::RelativePose;
 use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{Estimate, NAVIGATED, Navigated};
 use crate::navigation::state_estimator::error::EstimatorError;
@@ -37,6 +39,8 @@ never! {
     propagate(&ImuMean, Option<(ImuMean, Doubt)>) -> Result<(), Refusal>;
     follow(i64) -> Result<(), EstimatorError>;
     add(&Measured<'_, F>, u64, &Filter, bool) -> Result<(), EstimatorError>;
+    has(u64) -> bool;
+    relate(&Measured<'_, F>, u64, &RelativePose) -> Result<Fused, EstimatorError>;
     restart(&Filter, bool) -> Result<(), EstimatorError>;
     predicted() -> Option<Estimate<SMOOTHED>>;
     filter(f64) -> Option<EskfFilter<Navigated, NAVIGATED>>;

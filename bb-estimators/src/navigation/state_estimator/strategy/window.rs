@@ -18,21 +18,23 @@ use crate::attitude::ParamsError;
 use crate::navigation::copies::Copies;
 use crate::navigation::eskf::{Doubt, EskfFilter, ImuMean, Start, seconds_between};
 use crate::navigation::factor::{Factor, NavigationFactor, Rows};
-use crate::navigation::measurement::{AbsolutePose, GnssPosition, GnssVelocity};
+use crate::navigation::fused::Fused;
+use crate::navigation::measurement::{AbsolutePose, GnssPosition, GnssVelocity, RelativePose};
 use crate::navigation::refusal::Refusal;
 use crate::navigation::smoother::{FixedLagSmoother, SmootherParams};
 use crate::navigation::state::{Estimate, NAVIGATED, Navigated, Optional, POSITION, ROTATION, States, VELOCITY};
 use crate::navigation::state_estimator::error::EstimatorError;
 use crate::navigation::state_estimator::factor::{ProvidedFactor, SMOOTHED, Smoothed};
+use crate::navigation::state_estimator::given::PoseRows;
 use crate::navigation::state_estimator::params::StateEstimatorConfig;
 use crate::navigation::stream::{Stream, StreamParams};
 
-#[expect(clippy::large_enum_variant, reason = "factors of providers are as large as theirs are")]
 /// A factor in the window: of this crate, or of a provider.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Held<F> {
     Navigation(NavigationFactor),
     Provided(F),
+    Linear(PoseRows),
 }
 
 impl<S: States, const N: usize, F: Factor<S, N>> Factor<S, N> for Held<F> {
@@ -40,6 +42,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> Factor<S, N> for Held<F> {
         match self {
             Self::Navigation(factor) => Factor::<S, N>::previous(factor),
             Self::Provided(factor) => factor.previous(),
+            Self::Linear(_) => None,
         }
     }
 
@@ -52,6 +55,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> Factor<S, N> for Held<F> {
         match self {
             Self::Navigation(factor) => Factor::<S, N>::linearise(factor, previous, at, rows),
             Self::Provided(factor) => factor.linearise(previous, at, rows),
+            Self::Linear(factor) => Factor::<S, N>::linearise(factor, previous, at, rows),
         }
     }
 }
@@ -64,6 +68,8 @@ pub(super) struct Window<F: ProvidedFactor> {
     changes: u32,
     /// A stream without a gate, for measurements that the filter has fused.
     open: Stream,
+    /// The gate of relative poses to keyframes that the filter does not hold.
+    related: Stream,
     records: bool,
     left: VecDeque<Pose>,
     /// `false` if the last update did not converge.
@@ -91,6 +97,7 @@ impl<F: ProvidedFactor> Window<F> {
             smoother: FixedLagSmoother::new(params)?,
             changes: 0,
             open: Stream::new(StreamParams { gate: 0.0, ..StreamParams::default() }),
+            related: Stream::default(),
             records: config.params.record_keyframes,
             left: VecDeque::new(),
             is_converged: true,
@@ -172,7 +179,7 @@ impl<F: ProvidedFactor> Window<F> {
         has_velocity: bool,
     ) -> Result<(), EstimatorError> {
         match measured {
-            Measured::Relative(relative) => self.hold(id, *relative)?,
+            Measured::Relative(pose) | Measured::Between(pose) => self.hold(id, self.related(measured, pose))?,
             Measured::Anchor(anchor) => {
                 let way = self.way()?;
                 self.hold(
@@ -202,8 +209,43 @@ impl<F: ProvidedFactor> Window<F> {
                 }
             }
             Measured::Provided(factor) => self.hold_factor(id, Held::Provided((*factor).clone()))?,
+            Measured::Linear(rows) => self.hold_factor(id, Held::Linear(**rows))?,
         }
         self.update()
+    }
+
+    /// Returns whether it has this keyframe.
+    pub(super) fn has(&self, keyframe: u64) -> bool {
+        self.smoother.keyframes().any(|id| id == keyframe)
+    }
+
+    /// Judges a relative pose of the newest keyframe to one that the filter does not hold, and adds it.
+    pub(super) fn relate(
+        &mut self,
+        measured: &Measured<'_, F>,
+        id: u64,
+        pose: &RelativePose,
+    ) -> Result<Fused, EstimatorError> {
+        let factor = self.related(measured, pose);
+        let fused = self.smoother.add(&mut self.related, id, Held::Navigation(factor))?;
+        self.update()?;
+        Ok(fused)
+    }
+
+    /// The factor of a relative pose at the newest keyframe. The scale of the camera's is known from one keyframe to the next; between
+    /// others, it is part of the noise.
+    fn related(&self, measured: &Measured<'_, F>, pose: &RelativePose) -> NavigationFactor {
+        let is_next = self.smoother.keyframes().rev().nth(1) == Some(pose.keyframe);
+        match measured {
+            Measured::Relative(_) if is_next => NavigationFactor::RelativePose(*pose),
+            Measured::Relative(_) => {
+                let deviation = self.smoother.params().sensors.relative_scale.deviation;
+                let way = pose.keyframe_from_body.inverse_transform_vector(&pose.translation) * deviation;
+                let translation_covariance = pose.translation_covariance + way * way.transpose();
+                NavigationFactor::Between(RelativePose { translation_covariance, ..*pose })
+            }
+            _ => NavigationFactor::Between(*pose),
+        }
     }
 
     fn hold(&mut self, id: u64, factor: impl Into<NavigationFactor>) -> Result<(), Refusal> {
