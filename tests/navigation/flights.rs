@@ -44,22 +44,22 @@ robot! {
     }
 }
 
-fn frame() -> LocalFrame {
+pub(crate) fn frame() -> LocalFrame {
     LocalFrame::new(Geodetic::from_degrees(48.0, 11.0, 500.0))
 }
 
-fn geodetic(position: Vector3<f64>) -> GeodeticPosition {
+pub(crate) fn geodetic(position: Vector3<f64>) -> GeodeticPosition {
     let Geodetic { latitude, longitude, height } = frame().geodetic(&position);
     GeodeticPosition { latitude_rad: latitude, longitude_rad: longitude, altitude: Some(height) }
 }
 
-fn local(position: &GeodeticPosition) -> Vector3<f64> {
+pub(crate) fn local(position: &GeodeticPosition) -> Vector3<f64> {
     let height = position.altitude.unwrap_or(f64::NAN);
     frame().position(&Geodetic { latitude: position.latitude_rad, longitude: position.longitude_rad, height })
 }
 
 /// The time `millis` after zero.
-fn at(millis: i64) -> MonotonicTime {
+pub(crate) fn at(millis: i64) -> MonotonicTime {
     MonotonicTime::from_nanos(millis * 1_000_000)
 }
 
@@ -72,7 +72,7 @@ fn north() -> UnitQuaternion<f64> {
     UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::FRAC_PI_2)
 }
 
-fn attitude() -> AttitudeReport {
+pub(crate) fn attitude() -> AttitudeReport {
     AttitudeReport { world_from_body: north(), tilt_deviation: 0.01, heading_deviation: 0.02 }
 }
 

@@ -1,6 +1,7 @@
 //! Robots that navigate with the filters of `bb_estimators`, whose sensors fail or are mounted askew, and what their logs and recorders hold.
 
 mod covariances;
+mod factors;
 mod false_covariances;
 mod flight_logs;
 mod flights;

@@ -16,6 +16,7 @@ macro_rules! compiled {
 // A test of the architecture checks that each page of the book with code is here.
 compiled! {
     Readme: "README.md",
+    Navigation: "book/src/how-to/navigation.md",
     Mavlink: "book/src/how-to/mavlink.md",
     TutorialAttitude: "book/src/tutorial/1-attitude.md",
 }
