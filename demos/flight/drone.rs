@@ -80,11 +80,14 @@ impl Flying {
     }
 
     fn end(self) -> Result<Outcome, Box<dyn Error>> {
-        self.simulation.stop().ok()?;
-        if let Some(recorder) = self.recorder {
+        let Self { simulation, mut outcome, estimates, health, events, recorder } = self;
+        simulation.stop().ok()?;
+        // With the keyframes that were still in the window.
+        outcome.take(estimates.drain(), health.drain(), events.drain());
+        if let Some(recorder) = recorder {
             recorder.finish()?;
         }
-        Ok(self.outcome)
+        Ok(outcome)
     }
 }
 

@@ -156,11 +156,11 @@ impl Outcome {
         grows && count > 40
     }
 
-    /// Returns whether each estimate after `from_s`, s, is younger than a second since the last absolute position: anchors are four seconds
-    /// apart.
+    /// Returns whether each estimate after `from_s`, s, is anchored: anchors are four seconds apart, for three of which they count, so fixes
+    /// are used in between.
     pub(crate) fn is_fixed_after(&self, from_s: f64) -> bool {
         let mut points = self.points.iter().filter(|point| point.time_s > from_s).peekable();
-        points.peek().is_some() && points.all(|point| point.age_s.is_some_and(|age_s| age_s < 1.0))
+        points.peek().is_some() && points.all(|point| point.label == SourceLabel::SatelliteAnchored)
     }
 
     /// Returns whether the receiver is let in at the end.

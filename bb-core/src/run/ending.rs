@@ -46,7 +46,7 @@ impl Machine {
         }
     }
 
-    /// Stops all estimators in order, on virtual time. The journal's line of the stop implies it.
+    /// Stops the estimators that still run, in order, at the end of a replay: its journal may be cut.
     pub(super) fn retire_quietly(&self) {
         let now = self.environment.clock().now();
         for island in self.islands().filter(|island| !island.has_retired()) {

@@ -42,7 +42,6 @@ struct Replayer {
     /// The number of the last line that was handed over.
     last: u64,
     has_begun: bool,
-    is_virtual: bool,
     /// The last request to each island that the journal does not hold, by line and type.
     unrecorded: Sorted<usize, (u64, String)>,
     /// Turns that had not ended when the journal ended.
@@ -110,7 +109,6 @@ impl Replayer {
             last: 0,
             sources: machine.wired.sources().by_publisher(),
             has_begun: false,
-            is_virtual: false,
             unrecorded: Sorted::default(),
             cut: Vec::new(),
             refused: None,
@@ -164,7 +162,7 @@ impl Replayer {
         machine.end(std::time::Instant::now());
     }
 
-    /// Stops the estimators that still run, in order.
+    /// Plays waiting lines, up to one whose turn may go on in lines to come unless it is to be the end.
     fn advance(&mut self, to_the_end: bool) -> Result<(), ReplayError> {
         while let Some(entry) = self.waiting.front() {
             if !to_the_end && self.is_open(entry) {
@@ -286,14 +284,7 @@ impl Replayer {
             Event::Output { island, publisher, checksum } => self.compare(island, publisher, checksum)?,
             Event::Emission { publisher, is_first, message } => self.emit(publisher, is_first, time, message)?,
             Event::Report { estimator } => {
-                let is_reported = control.replay_report(estimator)
-                    || (self.is_virtual && control.is_stopping() && {
-                        // On virtual time, the stop implies that estimators are retired, in order; this one failed in
-                        // doing so.
-                        self.machine.retire_quietly();
-                        control.replay_report(estimator)
-                    });
-                if !is_reported {
+                if !control.replay_report(estimator) {
                     let declared = self.machine.robot.estimators.get(estimator);
                     let path = declared.map_or("?", |declared| declared.path);
                     let hint = declared.map_or_else(String::new, |declared| self.hint(declared.island));
@@ -327,7 +318,7 @@ impl Replayer {
     }
 
     fn begin(&mut self, time: MonotonicTime, event: Event) -> Result<(), String> {
-        let Event::Begin { declaration, wall_offset_nanos, is_virtual } = event else {
+        let Event::Begin { declaration, wall_offset_nanos, .. } = event else {
             return Err("a journal begins with a description of the robot, and this one does not".to_owned());
         };
         let machine = &self.machine;
@@ -335,7 +326,6 @@ impl Replayer {
             return Err(difference);
         }
         self.has_begun = true;
-        self.is_virtual = is_virtual;
         machine.environment.clock().set_to(time);
         machine.environment.clock().set_wall_offset_nanos(wall_offset_nanos);
         machine.islands().for_each(|island| island.begin_replay());

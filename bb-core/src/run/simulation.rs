@@ -233,7 +233,7 @@ impl VirtualRun {
         machine.control.stop_signal().set();
         self.stop_sources();
         // One thread runs all of this, so nothing can be busy elsewhere.
-        machine.retire_quietly();
+        machine.retire_islands(std::time::Instant::now());
         machine.terminate_actuators(std::time::Instant::now());
         machine.close_door(std::time::Instant::now() + super::running::STOP_WITHIN);
         machine.settle();
