@@ -248,10 +248,6 @@ impl Control {
         step.finish();
     }
 
-    pub(crate) fn is_stopping(&self) -> bool {
-        self.lock().is_stopping
-    }
-
     /// Waits until the disarm callbacks have returned or have timed out.
     pub(crate) fn wait_until_disarmed(&self) {
         if self.0.mode == Mode::Real {
