@@ -108,7 +108,7 @@ pub trait Estimator: Sized + Send + 'static {
 
     /// Emits what it still holds, such as the end of what it records, right before [`terminate`](Self::terminate): when the robot
     /// stops, and when it is restarted with new options or by its supervisor. Not called after an error or a panic. The output is
-    /// stamped with the current time; whoever has stopped before it does not get it.
+    /// stamped with the current time. Estimators that have stopped before do not get it.
     fn handle_end(&mut self) -> Option<Self::Output> {
         None
     }

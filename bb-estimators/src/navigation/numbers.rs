@@ -290,7 +290,7 @@ pub(super) const LONGEST_LEAD_NS: i64 = 500_000_000;
 pub(super) const UNKNOWN_HEIGHT: f64 = 1e4;
 /// The time of a start, ns, after which it is reported, and waits no longer for an input that may be missing or slow: ten fixes at 1 Hz.
 pub(super) const LONGEST_START_NS: i64 = 10_000_000_000;
-/// The time for which the filter waits for rest once it knows where it is, ns: whoever rests has rested for long enough by then.
+/// The time for which the filter waits for rest once it knows where it is, ns: a body at rest has rested for long enough by then.
 pub(super) const RESTLESS_NS: i64 = 3_000_000_000;
 /// Standard deviation of the world's origin without satellites, m: it is known by definition.
 pub(super) const ORIGIN_DEVIATION: f64 = 0.01;

@@ -145,7 +145,7 @@ impl Flight {
         flight
     }
 
-    /// Adds a relative pose to an earlier keyframe, at most `most` before, at about every second keyframe. For `most` below 2 there are none.
+    /// Adds a relative pose to an earlier keyframe, at most `most` before, at about every second keyframe. If `most` is below 2, it adds nothing.
     pub(super) fn related(mut self, seed: u64, most: usize) -> Self {
         let mut noise = Noise::new(seed);
         for k in 2..self.truth.len() {

@@ -1,4 +1,4 @@
-//! The window of a build without the smoother: there is none.
+//! The window in a build without the smoother: a type without values.
 
 use alloc::vec::Vec;
 use core::convert::Infallible;

@@ -46,7 +46,7 @@ fn the_label_goes_from_dead_reckoned_to_anchored_to_visual_and_back() {
     }
 }
 
-/// A trusted receiver bounds the position as anchors do, but the age tells that there are none.
+/// A trusted receiver bounds the position as anchors do, but the age is that of anchors alone.
 #[test]
 fn fixes_keep_the_label_and_not_the_age_of_the_anchor() {
     for strategy in StrategyKind::ALL {
