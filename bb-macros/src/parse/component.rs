@@ -7,7 +7,7 @@ pub(crate) use options::{ComponentOption, OptionValue, Reference};
 
 use super::Notes;
 use super::block::{Head, colon, opened, semicolon};
-use super::name::name;
+use super::name::{is_keyword, name};
 use proc_macro2::Ident;
 use syn::parse::{ParseBuffer, ParseStream};
 use syn::{AngleBracketedGenericArguments, Attribute, Token};
@@ -98,6 +98,14 @@ fn path_of_type(name: &Ident, input: ParseStream<'_>) -> syn::Result<syn::Path> 
         let word: Ident = input
             .call(syn::ext::IdentExt::parse_any)
             .map_err(|_| syn::Error::new(place, format!("expected the type of `{name}`")))?;
+        // The only ones that a path may have.
+        let is_of_paths = ["crate", "self", "super", "Self"].iter().any(|keyword| word == keyword);
+        if is_keyword(&word) && !is_of_paths {
+            return Err(syn::Error::new(
+                place,
+                format!("`{word}` is a keyword of Rust; expected the type of `{name}`"),
+            ));
+        }
         let mut segment = syn::PathSegment::from(word);
         if input.peek(Token![<]) {
             let arguments: AngleBracketedGenericArguments = input.parse()?;
