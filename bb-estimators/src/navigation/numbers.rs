@@ -200,8 +200,6 @@ pub(super) const CLEAR_SCATTER: f64 = 9.0;
 pub(super) const SETTLED: f64 = 0.01;
 /// A weight is replaced if the kernel's differs from it by more than this: a hundredth of the factor's deviation.
 pub(super) const REWEIGHED_FACTOR: f64 = 0.02;
-/// Least number of keyframes before a checkpoint: eliminating a single one costs no more than the copy.
-pub(super) const LEAST_CHECKPOINT: usize = 2;
 /// An optional state keeps at least this fraction of its value from one keyframe to the next, so that the transition
 /// stays invertible.
 pub(super) const LEAST_KEPT: f64 = 1e-6;

@@ -13,8 +13,7 @@
 //! the same terms.
 //!
 //! Λ has an envelope: the rows of a pose end where the last landmark does that it, or a pose before it, shares with
-//! later ones. Elimination fills in nothing beyond. Eliminating K keyframes with tracks of T thus costs `K T²`, not `K³`, and
-//! `checkpoint.rs` keeps what the keyframes before all current tracks leave.
+//! later ones. Elimination fills in nothing beyond. Eliminating K keyframes with tracks of T thus costs `K T²`, not `K³`.
 
 #![allow(clippy::needless_range_loop, reason = "the indices are those of the equations")]
 
@@ -25,11 +24,9 @@ use super::elimination::Carried;
 use super::link::Information;
 use super::matrix::Square;
 use crate::navigation::state::{POSITION, ROTATION};
-use checkpoint::Checkpoint;
 use kernels::{add_all, add_one, set, subtract_at, subtract_column};
 use points::Points;
 
-mod checkpoint;
 mod kernels;
 mod pair;
 mod points;
@@ -86,7 +83,6 @@ pub(super) struct Coupling<const N: usize> {
     unseen: u64,
     /// The first pose whose information, or whose share of what earlier keyframes leave, has changed since the last elimination.
     changed: usize,
-    checkpoint: Checkpoint,
     /// Products with C.
     product: Vec<f64>,
     /// Landmarks that are unknowns of their own.
@@ -113,7 +109,6 @@ impl<const N: usize> Coupling<N> {
             reach: (1..=slots).collect(),
             unseen: 0,
             changed: usize::MAX,
-            checkpoint: Checkpoint::new(slots, N),
             product: vec![0.0; N * stride],
             points: Points::new(points, slots),
             oldest: Information::none(),
@@ -130,7 +125,6 @@ impl<const N: usize> Coupling<N> {
         self.idle = None;
         self.unseen = 0;
         self.changed = usize::MAX;
-        self.checkpoint.forget();
         for values in [&mut self.matrix, &mut self.vector, &mut self.front, &mut self.ties] {
             values.fill(0.0);
         }
@@ -149,7 +143,6 @@ impl<const N: usize> Coupling<N> {
             row[..POSE].fill(0.0);
         }
         self.ends[slot] = self.first + len as u64 + 1;
-        self.checkpoint.append(self.first + len as u64);
         self.append_to_points(len);
     }
 
@@ -166,12 +159,10 @@ impl<const N: usize> Coupling<N> {
     /// Marks the poses `from` to `to` as changed, and as coupled with each other.
     fn touch(&mut self, from: usize, to: usize) {
         if self.idle.is_none() {
-            self.checkpoint.forget();
             self.reach.iter_mut().enumerate().for_each(|(i, reach)| *reach = i + 1);
         }
         self.idle = Some(0);
         self.changed = self.changed.min(from);
-        self.checkpoint.forget_after(self.first + from as u64);
         self.reach[from..].iter_mut().take_while(|reach| **reach < to).for_each(|reach| *reach = to);
         self.unseen = self.unseen.max(self.first + to as u64);
     }
@@ -181,8 +172,6 @@ impl<const N: usize> Coupling<N> {
     pub(super) fn relink(&mut self, index: usize) {
         if self.spans(index) {
             self.changed = self.changed.min(index);
-            // Also one at this keyframe: the previous one is eliminated by then.
-            self.checkpoint.forget_after(self.first + index as u64 - 1);
         }
     }
 
@@ -227,10 +216,6 @@ impl<const N: usize> Coupling<N> {
             let share: f64 = factors.iter().zip(residual).map(|(factor, residual)| factor * residual).sum();
             self.vector[i] += share;
             add_all(&mut self.matrix[i * self.stride + i..i * self.stride + high], &factors, &rows);
-            if let Some((row, vector)) = self.checkpoint.row(self.first, i) {
-                add_all(&mut row[..high - i], &factors, &rows);
-                *vector += share;
-            }
         }
     }
 
@@ -242,10 +227,6 @@ impl<const N: usize> Coupling<N> {
             let row = &information.matrix[i][i..];
             self.vector[at] += sign * information.vector[i];
             add_one(&mut self.matrix[at * self.stride + at..][..row.len()], sign, row);
-            if let Some((target, vector)) = self.checkpoint.row(self.first, at) {
-                add_one(&mut target[..row.len()], sign, row);
-                *vector += sign * information.vector[i];
-            }
         }
     }
 
@@ -254,12 +235,8 @@ impl<const N: usize> Coupling<N> {
         vec![0.0; self.stride]
     }
 
-    /// Begins the elimination of `len` keyframes, after [`gather`](Self::gather), of which the first that changed is `dirty`.
-    /// Returns the index of the keyframe to begin with.
-    pub(super) fn begin(&mut self, dirty: usize, len: usize) -> usize {
-        if let Some(index) = self.resume(dirty, len) {
-            return index;
-        }
+    /// Begins the elimination of `len` keyframes, from the oldest, after [`gather`](Self::gather).
+    pub(super) fn begin(&mut self, len: usize) {
         for index in 0..len {
             let end = POSE * self.end(index, len);
             for i in POSE * index..POSE * (index + 1) {
@@ -274,7 +251,6 @@ impl<const N: usize> Coupling<N> {
             self.ties[target..target + width].copy_from_slice(&self.front[i * self.stride..][..width]);
         }
         self.eliminate_points(len);
-        0
     }
 
     /// Returns whether anything has changed since the last elimination.
@@ -416,7 +392,6 @@ impl<const N: usize> Coupling<N> {
         }
         self.changed = if self.is_changed() { self.changed.saturating_sub(1) } else { usize::MAX };
         self.first += 1;
-        self.checkpoint.forget_before(self.first);
     }
 
     /// Removes the oldest keyframe if nothing is tied.

@@ -48,7 +48,8 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
         let is_passing = landmarks.as_ref().is_some_and(|of| of.coupling.is_changed() || first + 1 < len);
         if let Some(landmarks) = landmarks.as_mut().filter(|_| is_passing) {
             landmarks.gather(len);
-            first = landmarks.coupling.begin(first, len);
+            landmarks.coupling.begin(len);
+            first = 0;
         }
         let mut coupling = landmarks.map(|landmarks| &mut landmarks.coupling);
         let window = self.window.make_contiguous();
@@ -62,7 +63,6 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
                     coupling.fold(index - 1, &carried, &mut keyframe.incoming.matrix);
                     if is_passing && index > first {
                         coupling.pass(index - 1, len, &carried);
-                        coupling.save(index, len);
                     }
                 }
             }

@@ -6,7 +6,6 @@ mod automatic;
 #[cfg(feature = "std")]
 mod batch;
 mod cases;
-mod checkpoint;
 mod consistency;
 mod factors;
 mod flight;
@@ -14,6 +13,7 @@ mod kernels;
 #[cfg(feature = "std")]
 mod landmarks;
 mod laws;
+mod newest;
 mod preintegration;
 mod scenery;
 mod sights;

@@ -23,10 +23,6 @@ impl<const N: usize> Coupling<N> {
                 };
                 self.vector[at] += factor * residual;
                 add(&mut self.matrix[at * self.stride + at..(at + 1) * self.stride]);
-                if let Some((target, vector)) = self.checkpoint.row(self.first, at) {
-                    add(target);
-                    *vector += factor * residual;
-                }
             }
         }
     }

@@ -126,34 +126,6 @@ laws! {
         }
     }
 
-    /// Rows of relative poses match if the measurement fits.
-    #[test]
-    fn relative_poses(previous in estimate(), at in estimate()) {
-        let scale = 1.0 + at.scalar::<Drone>(crate::navigation::Optional::RelativeScale);
-        let mut exact = relative(&previous, &at, &Vector3::zeros());
-        exact.translation *= scale;
-        let factor = NavigationFactor::from(exact);
-        let rows = |at: &Estimate<N>| {
-            let mut rows = Rows::<N>::new();
-            Factor::<Drone, N>::linearise(&factor, Some(&previous), at, &mut rows).unwrap();
-            rows
-        };
-        let here = rows(&at);
-        prop_assert!(here.residual.iter().all(|r| r.abs() < 1e-7));
-        for state in 0..N {
-            let step = 1e-6;
-            let [above, below] = [step, -step].map(|step| {
-                let mut error = Error::zeros();
-                error[state] = step;
-                rows(&at.corrected::<Drone>(&error)).residual
-            });
-            for row in 0..here.count {
-                let numeric = (below[row] - above[row]) / (2.0 * step);
-                prop_assert!((numeric - here.at[row][state]).abs() < 1e-4 * (1.0 + numeric.abs()));
-            }
-        }
-    }
-
     /// The backward link is the inverse of the forward transition.
     #[test]
     fn the_link_is_the_motion_backwards(

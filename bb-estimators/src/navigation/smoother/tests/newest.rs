@@ -1,4 +1,4 @@
-//! An elimination that resumes after the keyframes before all current tracks, against one of the whole window.
+//! An elimination of the newest keyframe alone, where nothing else has changed, against one of the whole window.
 
 use bb_tests::laws;
 use proptest::prelude::*;
@@ -69,130 +69,29 @@ fn weighing(window: usize) -> SmootherParams {
     SmootherParams { relinearise_rotation: 1.0, relinearise_position: 1e6, iterations: 10, ..linear(window) }
 }
 
-/// The length of the tracks in [`compared`].
+/// The length of the tracks.
 const LONGEST: usize = 6;
-
-/// Flies with `step` at each keyframe, and compares the solution after each with an elimination of everything. Returns how many
-/// updates did not eliminate the whole window.
-fn compared(window: usize, mut step: impl FnMut(&mut Smoother, &Flight, &Scenery, usize)) -> usize {
-    let flight = Flight::new(5, 60, 1.0);
-    let scenery = Scenery::new(&flight, 5, 8, LONGEST, Some(5.0));
-    let mut smoother = Smoother::new(weighing(window)).unwrap();
-    smoother.set_camera(camera(), LandmarkParams { relinearise: 1.0, ..exact() }).unwrap();
-    smoother.start(0, &flight.start).unwrap();
-    let mut resumed = 0;
-    for k in 1..60 {
-        flight.fly_to(&mut smoother, k);
-        step(&mut smoother, &flight, &scenery, k);
-        let updated = smoother.update().unwrap();
-        resumed += usize::from(updated.eliminated < smoother.window.len());
-        if smoother.is_tied() {
-            both(&mut smoother).unwrap();
-        }
-    }
-    resumed
-}
-
-/// The newest keyframe is not eliminated alone if what it gets past the link to the previous one has changed.
-#[test]
-fn relative_poses_may_follow_the_observations() {
-    compared(24, |smoother, flight, scenery, k| {
-        scenery.observe(smoother, k);
-        flight.measure(smoother, k);
-    });
-}
-
-#[test]
-fn relative_poses_may_follow_the_update() {
-    compared(24, |smoother, flight, scenery, k| {
-        flight.measure(smoother, k);
-        scenery.observe(smoother, k);
-        smoother.update().unwrap();
-        Way::Adds.add(smoother, flight, k);
-    });
-}
-
-/// The weights of relative poses may change; in the usual order, the update changes them last.
-#[test]
-fn the_weights_of_relative_poses_may_change() {
-    compared(24, |smoother, flight, scenery, k| {
-        flight.measure(smoother, k);
-        Way::Robust.add(smoother, flight, k);
-        scenery.observe(smoother, k);
-    });
-}
-
-/// Relative poses may come late: at each keyframe before the newest in turn, so also at the one where an elimination resumes, which then
-/// begins earlier.
-#[test]
-fn relative_poses_may_come_late() {
-    for way in WAYS {
-        let resumed = compared(24, |smoother, flight, scenery, k| {
-            flight.measure(smoother, k);
-            scenery.observe(smoother, k);
-            let back = 1 + k % (2 * LONGEST);
-            if back < k {
-                smoother.update().unwrap();
-                way.add(smoother, flight, k - back);
-            }
-        });
-        assert!(resumed > 10, "{way:?}: {resumed}");
-    }
-}
 
 /// Changes by a relative pose before its keyframe has seen anything pass over no link.
 #[test]
 fn in_the_usual_order_only_the_newest_is_eliminated() {
     for window in [12, 2 * LONGEST + 12] {
-        compared(window, |smoother, flight, scenery, k| {
-            flight.measure(smoother, k);
+        let flight = Flight::new(5, 60, 1.0);
+        let scenery = Scenery::new(&flight, 5, 8, LONGEST, Some(5.0));
+        let mut smoother = Smoother::new(weighing(window)).unwrap();
+        smoother.set_camera(camera(), LandmarkParams { relinearise: 1.0, ..exact() }).unwrap();
+        smoother.start(0, &flight.start).unwrap();
+        for k in 1..60 {
+            flight.fly_to(&mut smoother, k);
+            flight.measure(&mut smoother, k);
             assert_eq!(smoother.eliminate(usize::MAX), 1, "{k}");
-            scenery.observe(smoother, k);
-        });
-    }
-}
-
-/// Landmarks that outlive the window couple all of it. Once the last is lost, an elimination resumes again.
-#[test]
-fn landmarks_that_outlive_the_window_cost_no_longer_than_they_last() {
-    const KEYFRAMES: usize = 90;
-    /// Tracks that begin before end here, or are short after.
-    const CUT: usize = 50;
-    let window = 2 * LONGEST + 4;
-    let flight = Flight::new(5, KEYFRAMES, 1.0);
-    let scenery = Scenery::new(&flight, 5, 8, 30, Some(5.0));
-    let mut smoother = Smoother::new(linear(window)).unwrap();
-    smoother.set_camera(camera(), LandmarkParams { relinearise: 1.0, ..exact() }).unwrap();
-    smoother.landmarks.as_mut().unwrap().known_within = f64::INFINITY;
-    smoother.start(0, &flight.start).unwrap();
-    let mut begun = vec![None; scenery.places.len()];
-    let (mut coupled, mut last_coupled, mut last_seen) = (0, 0, 0);
-    for k in 1..KEYFRAMES {
-        flight.fly_to(&mut smoother, k);
-        flight.measure(&mut smoother, k);
-        let mut seen_before = None;
-        for seen in &scenery.seen[k] {
-            let age = k - *begun[seen.landmark as usize].get_or_insert(k);
-            if k < CUT || age < LONGEST {
-                seen_before.get_or_insert(core::mem::replace(&mut last_seen, k));
-                let result = smoother.observe(&mut open(), k as u64, seen);
-                assert!(matches!(result, Ok(_) | Err(Refusal::NotObservable)), "{k}: {result:?}");
+            scenery.observe(&mut smoother, k);
+            smoother.update().unwrap();
+            if smoother.is_tied() {
+                both(&mut smoother).unwrap();
             }
         }
-        let eliminated = smoother.update().unwrap().eliminated;
-        if smoother.landmarks.as_ref().unwrap().coupling.points() > 0 {
-            (coupled, last_coupled) = (coupled + 1, k);
-            assert!(k >= CUT || eliminated == window, "{k}: {eliminated}");
-        } else if last_coupled > 0 {
-            // The first has nothing to resume from; keyframes that saw nothing are eliminated with the next that does.
-            let blind = seen_before.map_or(0, |before| k - before - 1);
-            assert!(k == last_coupled + 1 || eliminated <= LONGEST + 2 + blind, "{k}: {eliminated}, {blind} blind");
-        }
-        if smoother.is_tied() {
-            both(&mut smoother).unwrap();
-        }
     }
-    assert!(coupled > 20 && (CUT..KEYFRAMES - window).contains(&last_coupled), "{coupled} {last_coupled}");
 }
 
 laws! {
@@ -221,7 +120,6 @@ laws! {
         smoother.set_camera(camera(), landmarks).unwrap();
         smoother.start(0, &flight.start).unwrap();
         let mut waiting = Vec::new();
-        let mut least = usize::MAX;
         for k in 1..40 {
             flight.fly_to(&mut smoother, k);
             // At most the oldest keyframe but one: a relative pose needs the previous one.
@@ -259,11 +157,7 @@ laws! {
                 flight.measure(&mut smoother, k);
             }
             pose(&mut smoother, 2);
-            let eliminated = smoother.update().unwrap().eliminated;
-            // Before the window is full, that may be all there is.
-            if k > window {
-                least = least.min(eliminated);
-            }
+            smoother.update().unwrap();
             if poses.iter().any(|(at, _, moment, _)| *at == k && *moment == 3) {
                 pose(&mut smoother, 3);
                 smoother.update().unwrap();
@@ -272,29 +166,6 @@ laws! {
             if smoother.is_tied() {
                 both(&mut smoother)?;
             }
-        }
-        // It is not only ever compared with itself.
-        prop_assert!(!is_linear || !late.is_empty() || window < 2 * longest + 4 || least <= longest + 2, "{least}");
-    }
-}
-
-/// A long window costs no more than a short one if only its end changes.
-#[test]
-fn an_update_eliminates_no_more_than_the_current_tracks() {
-    let longest = 6;
-    for window in [12, 24, 48] {
-        let flight = Flight::new(3, 100, 1.0);
-        let scenery = Scenery::new(&flight, 3, 8, longest, Some(5.0));
-        let mut smoother = Smoother::new(linear(window)).unwrap();
-        smoother.set_camera(camera(), LandmarkParams { relinearise: 1.0, ..exact() }).unwrap();
-        smoother.start(0, &flight.start).unwrap();
-        for k in 1..100 {
-            flight.fly_to(&mut smoother, k);
-            flight.measure(&mut smoother, k);
-            scenery.observe(&mut smoother, k);
-            let eliminated = smoother.update().unwrap().eliminated;
-            // The newest keyframe, those of its tracks, and one before.
-            assert!(eliminated <= longest + 2, "window {window}, keyframe {k}: {eliminated}");
         }
     }
 }
