@@ -90,7 +90,7 @@ pub use declared::{
 };
 pub use error::{EstimatorError, OriginError, Reason};
 pub use estimator::{Added, FlightNavigator};
-pub use event::{Both, Event, EventKind, EventSink, InputKind, Level, StartedFrom};
+pub use event::{Event, EventKind, EventSink, InputKind, Level, StartedFrom};
 pub use factor::ProvidedFactor;
 pub use factor::{SMOOTHED, Smoothed};
 pub use gate::{GateState, Rejection};

@@ -89,62 +89,19 @@ pub struct FlightEstimator {
     health: Option<FlightHealth>,
 }
 
-/// Maximum number of events in one output, not counting errors, warnings and changes of state. A run of late inputs may revise all
-/// that the queue holds, and there are no more of them than that.
-const EVENTS: usize = 256;
-
 /// Logs events, and stores those to be published.
 #[derive(Debug, Default)]
 struct Sink {
     log: TracingSink,
     events: FlightEvents,
-    /// Number of these that may be lost.
-    spare: usize,
-    /// One event of each kind that was lost since the last message.
-    lost: Vec<Event>,
-}
-
-impl Sink {
-    fn take(&mut self) -> FlightEvents {
-        self.spare = 0;
-        for lost in std::mem::take(&mut self.lost) {
-            self.event(&lost);
-        }
-        std::mem::take(&mut self.events)
-    }
-
-    /// Counts an event for which there is no room.
-    fn lose(&mut self, event: &Event) {
-        self.events.lost += 1;
-        let name = event.kind.name();
-        for lost in &mut self.lost {
-            if let EventKind::Lost { kind, count, first_ns, last_ns } = &mut lost.kind
-                && *kind == name
-            {
-                *count += 1;
-                (*first_ns, *last_ns) = ((*first_ns).min(event.time_ns), (*last_ns).max(event.time_ns));
-                return;
-            }
-        }
-        let time_ns = event.time_ns;
-        let kind = EventKind::Lost { kind: name, count: 1, first_ns: time_ns, last_ns: time_ns };
-        self.lost.push(Event { kind, ..*event });
-    }
 }
 
 impl EventSink for Sink {
     fn event(&mut self, event: &Event) {
         self.log.event(event);
-        if event.level() > Level::Info && !matches!(event.kind, EventKind::Keyframe { .. }) {
-            return;
+        if event.level() <= Level::Info || matches!(event.kind, EventKind::Keyframe { .. }) {
+            self.events.events.push(FlightEvent::of(event));
         }
-        // A recorder must have each error and each warning, and each change of gate and label.
-        let is_spare = matches!(event.kind, EventKind::Keyframe { .. } | EventKind::Revised { .. });
-        if is_spare && self.spare == EVENTS {
-            return self.lose(event);
-        }
-        self.spare += usize::from(is_spare);
-        self.events.events.push(FlightEvent::of(event));
     }
 }
 
@@ -153,7 +110,7 @@ impl FlightEstimator {
         let emitted: Option<EstimatorOutput> = self.estimator.tick(now_ns);
         let health = FlightHealth::of(&self.estimator.health());
         let changed = self.health.is_none_or(|before| before.differs(&health));
-        let events = self.estimator.sink_mut().take();
+        let events = std::mem::take(&mut self.estimator.sink_mut().events);
         let outputs = FlightOutputs {
             estimate: emitted.as_ref().map(FlightEstimate::of),
             health: (emitted.is_some() || changed).then_some(health),
@@ -273,7 +230,7 @@ impl Estimator for FlightEstimator {
     /// Emits the keyframes that are still in the window.
     fn handle_end(&mut self) -> Option<FlightOutputs> {
         self.estimator.finish();
-        let events = self.estimator.sink_mut().take();
+        let events = std::mem::take(&mut self.estimator.sink_mut().events);
         (!events.events.is_empty()).then(|| FlightOutputs { events: Some(events), ..FlightOutputs::default() })
     }
 
@@ -293,8 +250,7 @@ const SLOWEST_LOOK: Duration = Duration::from_millis(50);
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::navigation::state_estimator::{GateState, InputKind, Reason};
-    use crate::navigation::{ImuMean, Refusal};
+    use crate::navigation::ImuMean;
     use bb_core::Options as _;
     use nalgebra::{Isometry3, Vector3};
 
@@ -317,30 +273,5 @@ mod tests {
         let (history, health) = ask(&mut estimator);
         assert!(history.len() == 3 && health.keyframes > 3 && health.state != HealthState::Init, "{health:?}");
         assert!(history.is_sorted_by(|a, b| a.time > b.time), "{history:?}");
-    }
-
-    fn event(time_ns: i64, kind: EventKind) -> Event {
-        Event { time_ns, frame_id: uuid::Uuid::nil(), spoof_block: false, kind }
-    }
-
-    #[test]
-    fn errors_and_warnings_have_room_in_a_full_message() {
-        let mut sink = Sink::default();
-        let mut tell = |time_ns: i64, kind: EventKind| sink.event(&event(time_ns, kind));
-        let reason = Reason::Refused(Refusal::NonFinite);
-        (0..300).for_each(|time_ns| tell(time_ns, EventKind::Revised { input: InputKind::Gnss }));
-        (300..600).for_each(|time_ns| tell(time_ns, EventKind::Degraded { input: InputKind::Vio, reason }));
-        tell(600, EventKind::Fatal { input: InputKind::Anchor, reason });
-        tell(601, EventKind::Gate { from: GateState::Open, to: GateState::Blocked });
-        tell(602, EventKind::FallbackEngaged);
-        let FlightEvents { events, lost } = sink.take();
-        let count = |level: Level| events.iter().filter(|event| event.level == level).count();
-        assert_eq!((lost, count(Level::Error), events.len()), (44, 2, 256 + 300 + 3 + 1));
-        assert!(events[..559].is_sorted_by_key(|event| event.time));
-        assert_eq!((&*events[559].kind, events[559].level), ("lost", Level::Warn));
-        assert_eq!(events[559].reason.as_deref(), Some("44 of kind revised from 256 ns to 299 ns"));
-        // The next message has room again.
-        sink.event(&event(603, EventKind::Revised { input: InputKind::Gnss }));
-        assert_eq!((sink.events.lost, sink.take().events.len()), (0, 1));
     }
 }

@@ -222,17 +222,6 @@ pub enum EventKind {
         /// Present estimate of the keyframe, for recorders only.
         estimate: EstimatorOutput,
     },
-    /// Events were too many for a recorder's message.
-    Lost {
-        /// Name of their kind.
-        kind: &'static str,
-        /// Number of events.
-        count: u32,
-        /// Time of the first, ns.
-        first_ns: i64,
-        /// Time of the last, ns.
-        last_ns: i64,
-    },
 }
 
 impl EventKind {
@@ -265,7 +254,6 @@ impl EventKind {
             Self::FallbackRecovered => "fallback_recovered",
             Self::Emitted { .. } => "emitted",
             Self::Keyframe { .. } => "keyframe",
-            Self::Lost { .. } => "lost",
         }
     }
 }
@@ -279,7 +267,6 @@ impl Event {
             | EventKind::Rejected { .. }
             | EventKind::ClockSetBack { .. }
             | EventKind::SamplesDropped { .. }
-            | EventKind::Lost { .. }
             | EventKind::Gate { to: GateState::Blocked, .. }
             | EventKind::CovarianceGrowing { .. } => Level::Warn,
             EventKind::Ready { .. }
@@ -319,7 +306,6 @@ impl Event {
             EventKind::FallbackImminent => text(format_args!("NAV no estimate: fallback imminent")),
             EventKind::FallbackEngaged => text(format_args!("NAV no estimate: FALL BACK TO FC IMU")),
             EventKind::FallbackRecovered => text(format_args!("NAV estimate recovered")),
-            EventKind::Lost { kind, count, .. } => text(format_args!("NAV recorder: {count} {kind} lost")),
             EventKind::Ready { .. }
             | EventKind::Added { .. }
             | EventKind::Degraded { .. }
@@ -343,21 +329,5 @@ impl EventSink for () {
 impl<T: FnMut(&Event)> EventSink for T {
     fn event(&mut self, event: &Event) {
         self(event);
-    }
-}
-
-/// A pair of sinks that both receive all events.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Both<A, B>(
-    /// Receives each event first.
-    pub A,
-    /// Receives each event second.
-    pub B,
-);
-
-impl<A: EventSink, B: EventSink> EventSink for Both<A, B> {
-    fn event(&mut self, event: &Event) {
-        self.0.event(event);
-        self.1.event(event);
     }
 }

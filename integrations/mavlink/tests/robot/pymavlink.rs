@@ -144,7 +144,7 @@ fn a_robot_and_pymavlink_understand_each_other() {
     let long = "0123456789".repeat(5);
     let event = |said: &str| FlightEvent { kind: "fallback_engaged".into(), ..text(Level::Error, said) };
     let events = vec![event("no estimate"), event(&format!("{long}{long}"))];
-    live.publish(drone::sensor::base::events, now, FlightEvents { events, lost: 0 });
+    live.publish(drone::sensor::base::events, now, FlightEvents { events });
     let received: Vec<Value> = (0..4).map(|_| peer.hears("STATUSTEXT", |_| true)).collect();
     let texts: Vec<_> =
         received.iter().map(|text| (&text["text"], &text["id"], &text["chunk_seq"], &text["severity"])).collect();

@@ -45,7 +45,7 @@ fn texts_arrive_with_their_severities() {
     let now = Clock::real().now();
     let long = "x".repeat(60);
     let events = vec![text(Level::Warn, "visual blackout"), text(Level::Info, &long)];
-    running.live().publish(drone::sensor::base::events, now, FlightEvents { events, lost: 0 });
+    running.live().publish(drone::sensor::base::events, now, FlightEvents { events });
     let received = |_| {
         other.hears(|_, message| match message {
             MavMessage::STATUSTEXT(data) => Some(data),
@@ -97,7 +97,7 @@ fn sources_are_switched_for_estimates_and_for_the_fallback() {
     };
     let tell = |kind: &str| {
         let events = vec![FlightEvent { kind: kind.into(), ..text(Level::Error, kind) }];
-        live.publish(drone::sensor::base::events, Clock::real().now(), FlightEvents { events, lost: 0 });
+        live.publish(drone::sensor::base::events, Clock::real().now(), FlightEvents { events });
     };
     let now = Clock::real().now();
     live.publish(drone::sensor::base::estimate, now, estimate(now, 11.0));

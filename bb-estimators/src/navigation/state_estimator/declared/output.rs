@@ -115,11 +115,8 @@ impl FlightHealth {
 /// Events since the last output, in order.
 #[derive(Clone, Debug, Default, PartialEq, Payload)]
 pub struct FlightEvents {
-    /// The events.
+    /// The events, all that there were.
     pub events: Vec<FlightEvent>,
-    /// Number of further reports that late inputs have changed, and of further keyframes, that did not fit in the message. Events of the
-    /// kind `lost` say which. Errors, warnings and changes of state always fit.
-    pub lost: u32,
 }
 
 /// An event; see [`Event`].
@@ -207,10 +204,6 @@ impl Parts {
                 Self { to: Some(strategy.name()), window: Some(*window), ..none }
             }
             EventKind::CovarianceGrowing { ratio } => Self { cov_inflation: Some(*ratio), ..none },
-            EventKind::Lost { kind, count, first_ns, last_ns } => {
-                let reason = format!("{count} of kind {kind} from {first_ns} ns to {last_ns} ns");
-                Self { reason: Some(reason), ..none }
-            }
             EventKind::ClockSetBack { .. }
             | EventKind::SamplesDropped { .. }
             | EventKind::FallbackImminent
