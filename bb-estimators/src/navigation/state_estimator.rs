@@ -72,6 +72,7 @@ mod given;
 mod ids;
 mod input;
 mod label;
+mod named;
 mod output;
 mod params;
 mod queue;

@@ -3,32 +3,35 @@
 use super::error::{EstimatorError, Outcome, Reason};
 use super::gate::{GateState, Rejection};
 use super::label::SourceLabel;
+use super::named::named;
 use super::output::EstimatorOutput;
 use super::params::StrategyKind;
 use super::status_text::StatusText;
 use uuid::Uuid;
 
-/// Kind of an input.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum InputKind {
-    /// Sample of the IMU.
-    Imu,
-    /// Relative pose.
-    Vio,
-    /// Frame of a camera, at either end of a relative pose. Only its failures are events.
-    Frame,
-    /// Pose from a satellite image.
-    Anchor,
-    /// Factor from an outside provider.
-    Factor,
-    /// Fix from the flight controller's receiver.
-    Gnss,
-    /// Health of that receiver.
-    Health,
-    /// Attitude from the flight controller.
-    Attitude,
-    /// State of the flight controller, for a warm start.
-    WarmStart,
+named! {
+    /// Kind of an input.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+    pub enum InputKind {
+        /// Sample of the IMU.
+        Imu = "imu",
+        /// Relative pose.
+        Vio = "vio",
+        /// Frame of a camera, at either end of a relative pose. Only its failures are events.
+        Frame = "frame",
+        /// Pose from a satellite image.
+        Anchor = "anchor",
+        /// Factor from an outside provider.
+        Factor = "factor",
+        /// Fix from the flight controller's receiver.
+        Gnss = "gnss",
+        /// Health of that receiver.
+        Health = "health",
+        /// Attitude from the flight controller.
+        Attitude = "attitude",
+        /// State of the flight controller, for a warm start.
+        WarmStart = "warm_start",
+    }
 }
 
 impl InputKind {
@@ -39,71 +42,36 @@ impl InputKind {
             Self::Imu | Self::Gnss | Self::Health | Self::Attitude | Self::WarmStart => false,
         }
     }
+}
 
-    /// The name in logs and recordings.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Imu => "imu",
-            Self::Vio => "vio",
-            Self::Frame => "frame",
-            Self::Anchor => "anchor",
-            Self::Factor => "factor",
-            Self::Gnss => "gnss",
-            Self::Health => "health",
-            Self::Attitude => "attitude",
-            Self::WarmStart => "warm_start",
-        }
+named! {
+    /// Severity of an event.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+    #[cfg_attr(feature = "runtime", derive(bb_core::Payload))]
+    pub enum Level {
+        /// There is no estimate, or soon will be none.
+        Error = "error",
+        /// The estimate is impaired.
+        Warn = "warn",
+        /// Something changed.
+        Info = "info",
+        /// The result for each input.
+        Debug = "debug",
     }
 }
 
-/// Severity of an event.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[cfg_attr(feature = "runtime", derive(bb_core::Payload))]
-pub enum Level {
-    /// There is no estimate, or soon will be none.
-    Error,
-    /// The estimate is impaired.
-    Warn,
-    /// Something changed.
-    Info,
-    /// The result for each input.
-    Debug,
-}
-
-impl Level {
-    /// The name in logs and recordings.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Error => "error",
-            Self::Warn => "warn",
-            Self::Info => "info",
-            Self::Debug => "debug",
-        }
-    }
-}
-
-/// Source of the state with which the estimator started.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum StartedFrom {
-    /// The take-off origin.
-    Origin,
-    /// The last known state of the flight controller, with its covariance inflated: a warm start.
-    FlightController,
-    /// An anchor.
-    Anchor,
-    /// Fixes that agree and are far from the estimate: a restart.
-    Receiver,
-}
-
-impl StartedFrom {
-    /// The name in logs and recordings.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Origin => "origin",
-            Self::FlightController => "flight_controller",
-            Self::Anchor => "anchor",
-            Self::Receiver => "receiver",
-        }
+named! {
+    /// Source of the state with which the estimator started.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+    pub enum StartedFrom {
+        /// The take-off origin.
+        Origin = "origin",
+        /// The last known state of the flight controller, with its covariance inflated: a warm start.
+        FlightController = "flight_controller",
+        /// An anchor.
+        Anchor = "anchor",
+        /// Fixes that agree and are far from the estimate: a restart.
+        Receiver = "receiver",
     }
 }
 
@@ -120,108 +88,110 @@ pub struct Event {
     pub kind: EventKind,
 }
 
-/// Kind of an event.
-#[expect(clippy::large_enum_variant, reason = "events are passed by reference, and allocate nothing")]
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum EventKind {
-    /// The estimator is ready for inputs.
-    Ready {
-        /// The strategy in use.
-        strategy: StrategyKind,
-        /// Number of keyframes held.
-        window: u32,
-    },
-    /// The estimator has started.
-    Started {
-        /// Source of the start.
-        from: StartedFrom,
-    },
-    /// An input is in the estimate.
-    Added {
-        /// The input.
-        input: InputKind,
-        /// Normalised innovation squared over its dimension, if it was measured.
-        nis: Option<f64>,
-        /// `true` if it is newer than the last sample of the IMU, and waits for the next one.
-        waits: bool,
-    },
-    /// An input is not in the estimate, or has moved it.
-    Degraded {
-        /// The input.
-        input: InputKind,
-        /// The reason.
-        reason: Reason,
-    },
-    /// There is no estimate for this tick.
-    Fatal {
-        /// The input concerned.
-        input: InputKind,
-        /// The reason.
-        reason: Reason,
-    },
-    /// A late input has brought an earlier one, which was reported as refused, into the estimate. The opposite is reported as
-    /// [`Degraded`](Self::Degraded), [`Fatal`](Self::Fatal) or [`Rejected`](Self::Rejected).
-    Revised {
-        /// The earlier input.
-        input: InputKind,
-    },
-    /// The source of the estimate has changed.
-    Label {
-        /// Before.
-        from: SourceLabel,
-        /// Now.
-        to: SourceLabel,
-    },
-    /// The gate of the GNSS receiver has changed.
-    Gate {
-        /// Before.
-        from: GateState,
-        /// Now.
-        to: GateState,
-    },
-    /// The gate of the GNSS receiver rejected it.
-    Rejected {
-        /// The reason.
-        rejection: Rejection,
-    },
-    /// The clock of the IMU was set back. The estimator continues on the new clock, degraded until positions confirm it.
-    ClockSetBack {
-        /// Difference between the old and the new time, s.
-        seconds: f64,
-    },
-    /// Samples of the IMU were dropped early because there was no room for more. Late inputs may then be refused even within the
-    /// configured lateness.
-    SamplesDropped {
-        /// Number of samples.
-        count: u64,
-    },
-    /// The covariance has grown.
-    CovarianceGrowing {
-        /// Norm of the covariance relative to the steady norm.
-        ratio: f64,
-    },
-    /// There has been no estimate for two thirds of the time after which the fallback engages.
-    FallbackImminent,
-    /// There is no estimate: the flight controller's own IMU takes over.
-    FallbackEngaged,
-    /// There is an estimate again.
-    FallbackRecovered,
-    /// An estimate was emitted, with the numbers of inputs that were added since the one before.
-    Emitted {
-        /// Batches of samples of the IMU.
-        imu: u32,
-        /// Relative poses.
-        vio: u32,
-        /// Poses from satellite images.
-        poses: u32,
-        /// Number of keyframes held.
-        smoothed: u32,
-    },
-    /// A keyframe has left the window.
-    Keyframe {
-        /// Present estimate of the keyframe, for recorders only.
-        estimate: EstimatorOutput,
-    },
+named! {
+    /// Kind of an event.
+    #[expect(clippy::large_enum_variant, reason = "events are passed by reference, and allocate nothing")]
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub enum EventKind {
+        /// The estimator is ready for inputs.
+        Ready {
+            /// The strategy in use.
+            strategy: StrategyKind,
+            /// Number of keyframes held.
+            window: u32,
+        } = "ready",
+        /// The estimator has started.
+        Started {
+            /// Source of the start.
+            from: StartedFrom,
+        } = "started",
+        /// An input is in the estimate.
+        Added {
+            /// The input.
+            input: InputKind,
+            /// Normalised innovation squared over its dimension, if it was measured.
+            nis: Option<f64>,
+            /// `true` if it is newer than the last sample of the IMU, and waits for the next one.
+            waits: bool,
+        } = "added",
+        /// An input is not in the estimate, or has moved it.
+        Degraded {
+            /// The input.
+            input: InputKind,
+            /// The reason.
+            reason: Reason,
+        } = "degraded",
+        /// There is no estimate for this tick.
+        Fatal {
+            /// The input concerned.
+            input: InputKind,
+            /// The reason.
+            reason: Reason,
+        } = "fatal",
+        /// A late input has brought an earlier one, which was reported as refused, into the estimate. The opposite is reported as
+        /// [`Degraded`](Self::Degraded), [`Fatal`](Self::Fatal) or [`Rejected`](Self::Rejected).
+        Revised {
+            /// The earlier input.
+            input: InputKind,
+        } = "revised",
+        /// The source of the estimate has changed.
+        Label {
+            /// Before.
+            from: SourceLabel,
+            /// Now.
+            to: SourceLabel,
+        } = "label",
+        /// The gate of the GNSS receiver has changed.
+        Gate {
+            /// Before.
+            from: GateState,
+            /// Now.
+            to: GateState,
+        } = "gate",
+        /// The gate of the GNSS receiver rejected it.
+        Rejected {
+            /// The reason.
+            rejection: Rejection,
+        } = "rejected",
+        /// The clock of the IMU was set back. The estimator continues on the new clock, degraded until positions confirm it.
+        ClockSetBack {
+            /// Difference between the old and the new time, s.
+            seconds: f64,
+        } = "clock_set_back",
+        /// Samples of the IMU were dropped early because there was no room for more. Late inputs may then be refused even within the
+        /// configured lateness.
+        SamplesDropped {
+            /// Number of samples.
+            count: u64,
+        } = "samples_dropped",
+        /// The covariance has grown.
+        CovarianceGrowing {
+            /// Norm of the covariance relative to the steady norm.
+            ratio: f64,
+        } = "covariance_growing",
+        /// There has been no estimate for two thirds of the time after which the fallback engages.
+        FallbackImminent = "fallback_imminent",
+        /// There is no estimate: the flight controller's own IMU takes over.
+        FallbackEngaged = "fallback_engaged",
+        /// There is an estimate again.
+        FallbackRecovered = "fallback_recovered",
+        /// An estimate was emitted, with the numbers of inputs that were added since the one before.
+        Emitted {
+            /// Batches of samples of the IMU.
+            imu: u32,
+            /// Relative poses.
+            vio: u32,
+            /// Poses from satellite images.
+            poses: u32,
+            /// Number of keyframes held.
+            smoothed: u32,
+        } = "emitted",
+        /// A keyframe has left the window.
+        Keyframe {
+            /// Present estimate of the keyframe, for recorders only.
+            estimate: EstimatorOutput,
+        } = "keyframe",
+    }
 }
 
 impl EventKind {
@@ -231,29 +201,6 @@ impl EventKind {
             Ok(nis) => Self::Added { input, nis, waits: false },
             Err(EstimatorError::Degraded(reason)) => Self::Degraded { input, reason },
             Err(EstimatorError::Fatal(reason)) => Self::Fatal { input, reason },
-        }
-    }
-
-    /// The name in logs and recordings.
-    pub const fn name(&self) -> &'static str {
-        match self {
-            Self::Ready { .. } => "ready",
-            Self::Started { .. } => "started",
-            Self::Added { .. } => "added",
-            Self::Degraded { .. } => "degraded",
-            Self::Fatal { .. } => "fatal",
-            Self::Revised { .. } => "revised",
-            Self::Label { .. } => "label",
-            Self::Gate { .. } => "gate",
-            Self::Rejected { .. } => "rejected",
-            Self::ClockSetBack { .. } => "clock_set_back",
-            Self::SamplesDropped { .. } => "samples_dropped",
-            Self::CovarianceGrowing { .. } => "covariance_growing",
-            Self::FallbackImminent => "fallback_imminent",
-            Self::FallbackEngaged => "fallback_engaged",
-            Self::FallbackRecovered => "fallback_recovered",
-            Self::Emitted { .. } => "emitted",
-            Self::Keyframe { .. } => "keyframe",
         }
     }
 }

@@ -11,36 +11,29 @@ use core::fmt;
 use nalgebra::Vector3;
 
 use super::input::GpsHealth;
+use super::named::named;
 use super::params::{StateEstimatorParams, ns};
 
-/// The state of the gate.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum GateState {
-    /// Fixes are used while the receiver is reported stable.
-    #[default]
-    Open,
-    /// The receiver was spoofed, and is not reported stable.
-    Blocked,
-    /// The receiver is reported stable, but not for long enough.
-    Dwelling {
-        /// Start of the dwell, ns.
-        since_ns: i64,
-    },
-    /// The receiver was stable for long enough. The next anchor decides.
-    AwaitsAnchor,
+named! {
+    /// The state of the gate.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub enum GateState {
+        /// Fixes are used while the receiver is reported stable.
+        #[default]
+        Open = "open",
+        /// The receiver was spoofed, and is not reported stable.
+        Blocked = "blocked",
+        /// The receiver is reported stable, but not for long enough.
+        Dwelling {
+            /// Start of the dwell, ns.
+            since_ns: i64,
+        } = "dwelling",
+        /// The receiver was stable for long enough. The next anchor decides.
+        AwaitsAnchor = "awaits_anchor",
+    }
 }
 
 impl GateState {
-    /// The name in logs and recordings.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Open => "open",
-            Self::Blocked => "blocked",
-            Self::Dwelling { .. } => "dwelling",
-            Self::AwaitsAnchor => "awaits_anchor",
-        }
-    }
-
     /// Returns whether fixes may be used.
     pub fn is_open(self) -> bool {
         self == Self::Open

@@ -8,29 +8,21 @@
 
 use core::fmt;
 
+use super::named::named;
 use super::params::{StateEstimatorParams, ns};
 
-/// Source of the estimate.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "runtime", derive(bb_core::Payload))]
-pub enum SourceLabel {
-    /// The IMU alone, or a camera that has had no position since it was last lost. The covariance grows.
-    #[default]
-    DeadReckoned,
-    /// A recent anchor, or a recent fix of a trusted receiver, which bounds the position as well. The age of the anchor tells which.
-    SatelliteAnchored,
-    /// A camera, since the last of these.
-    VisualPropagated,
-}
-
-impl SourceLabel {
-    /// The name in logs and recordings.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::DeadReckoned => "dead_reckoned",
-            Self::SatelliteAnchored => "satellite_anchored",
-            Self::VisualPropagated => "visual_propagated",
-        }
+named! {
+    /// Source of the estimate.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+    #[cfg_attr(feature = "runtime", derive(bb_core::Payload))]
+    pub enum SourceLabel {
+        /// The IMU alone, or a camera that has had no position since it was last lost. The covariance grows.
+        #[default]
+        DeadReckoned = "dead_reckoned",
+        /// A recent anchor, or a recent fix of a trusted receiver, which bounds the position as well. The age of the anchor tells which.
+        SatelliteAnchored = "satellite_anchored",
+        /// A camera, since the last of these.
+        VisualPropagated = "visual_propagated",
     }
 }
 

@@ -5,6 +5,7 @@ use uuid::{Builder, Uuid};
 
 use super::gate::GateState;
 use super::label::SourceLabel;
+use super::named::named;
 use crate::navigation::eskf::ImuMean;
 use crate::navigation::geodesy::Geodetic;
 
@@ -71,30 +72,20 @@ pub struct EstimatorHealth {
     pub is_fallback_engaged: bool,
 }
 
-/// State of the estimator.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "runtime", derive(bb_core::Payload))]
-pub enum HealthState {
-    /// Estimator that has not started.
-    #[default]
-    Init,
-    /// Estimator that follows its sensors.
-    Tracking,
-    /// Estimator whose covariance is not to be trusted.
-    Degraded,
-    /// Estimator without an estimate.
-    Lost,
-}
-
-impl HealthState {
-    /// The name in logs and recordings.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Init => "init",
-            Self::Tracking => "tracking",
-            Self::Degraded => "degraded",
-            Self::Lost => "lost",
-        }
+named! {
+    /// State of the estimator.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+    #[cfg_attr(feature = "runtime", derive(bb_core::Payload))]
+    pub enum HealthState {
+        /// Estimator that has not started.
+        #[default]
+        Init = "init",
+        /// Estimator that follows its sensors.
+        Tracking = "tracking",
+        /// Estimator whose covariance is not to be trusted.
+        Degraded = "degraded",
+        /// Estimator without an estimate.
+        Lost = "lost",
     }
 }
 
