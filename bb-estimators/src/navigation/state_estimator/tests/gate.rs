@@ -1,6 +1,6 @@
 //! The requirements of the spoof gate.
 
-use super::flight::{SECOND, STEP};
+use super::flight::SECOND;
 use super::*;
 use crate::navigation::Refusal;
 use crate::navigation::geodesy::Geodetic;
@@ -182,23 +182,6 @@ fn every_rejection_is_provoked_and_told() {
         assert!(counts.iter().all(|count| *count > 0), "{}: {counts:?}", strategy.name());
         assert_eq!((counts[2], counts[5]), (10, 1), "{}: {counts:?}", strategy.name());
         assert!(estimator.health().gate.is_open());
-    }
-}
-
-#[test]
-fn every_rejection_is_a_text_that_fits() {
-    let scenario = Scenario { health: spoofed_from_5_to_10, off: |_| 60.0, anchors: |_| true };
-    for strategy in StrategyKind::ALL {
-        let (estimator, _) = play(*strategy, &scenario);
-        for event in kinds(estimator.sink(), "rejected") {
-            let text = event.status_text().unwrap();
-            assert!(text.as_str().len() <= 50 && text.as_str().starts_with("NAV GPS re"), "{text}");
-        }
-        // If a receiver is wrong but reported stable, the filter's own gate refuses it.
-        let outliers = kinds(estimator.sink(), "degraded").filter(|event| event.time_ns < 5 * SECOND).count();
-        assert_eq!(outliers, 24);
-        let unhealthy = estimator.sink().iter().filter(|event| event.time_ns < STEP).count();
-        assert!(unhealthy > 0);
     }
 }
 

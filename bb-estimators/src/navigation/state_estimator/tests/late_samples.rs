@@ -102,22 +102,6 @@ fn a_burst_of_late_samples_is_run_once() {
     }
 }
 
-#[test]
-fn late_samples_are_in_whatever_is_read_first() {
-    let flight = Flight::new(2, 3);
-    for strategy in StrategyKind::ALL {
-        for by in READS {
-            let mut in_order = started(&flight, *strategy);
-            flight.sent(true, true, false).iter().for_each(|sent| ignore(sent.to(&mut in_order)));
-            let (mut estimator, held) = with_samples_held_back(&flight, *strategy);
-            add_all(&mut estimator, &held);
-            let (expected, found) =
-                [&mut in_order, &mut estimator].map(|estimator| read(estimator, by, 2 * SECOND)).into();
-            assert_eq!(found, expected, "{}, {by:?}", strategy.name());
-        }
-    }
-}
-
 /// A user who reads events only: they are in the estimate with the next input, or after a quarter of a second of samples.
 #[test]
 fn late_samples_do_not_wait_for_a_reader() {

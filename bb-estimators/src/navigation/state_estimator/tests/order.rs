@@ -1,6 +1,6 @@
 //! The result does not depend on the order of arrival.
 
-use super::flight::{SECOND, STEP};
+use super::flight::SECOND;
 use super::*;
 use crate::navigation::Refusal;
 use bb_tests::laws;
@@ -103,44 +103,6 @@ fn anchors_that_are_always_late_lose_nothing() {
         assert!(most_copies <= 8, "{most_copies} copies");
         assert!(late.held()[0] < 900, "{:?} samples", late.held());
         assert_eq!(answers(&mut late), answers(&mut on_time), "{}", strategy.name());
-    }
-}
-
-/// A fix between two samples, and the second of them is late: the fix was reached with a part of the third.
-#[test]
-fn a_late_sample_replaces_the_part_of_the_next_that_was_used_instead() {
-    let flight = Flight::new(2, 1);
-    let (fix, late_ns) = (flight.fixes[4], SECOND + STEP);
-    assert_eq!(fix.time_ns, SECOND + STEP / 2);
-    for (strategy, is_fix_late) in
-        StrategyKind::ALL.iter().flat_map(|strategy| [(*strategy, false), (*strategy, true)])
-    {
-        let run = |is_sample_late: bool| {
-            let mut estimator = started(&flight, strategy);
-            for sample in &flight.samples[1..] {
-                if sample.time_ns == SECOND {
-                    estimator.add_gps_health(flight.health[5]).unwrap();
-                }
-                if sample.time_ns == late_ns && !(is_sample_late && is_fix_late) {
-                    ignore(estimator.add_gnss(fix));
-                }
-                if sample.time_ns != late_ns || !is_sample_late {
-                    estimator.add_imu(sample).unwrap();
-                }
-                if sample.time_ns == late_ns + STEP && is_sample_late {
-                    if is_fix_late {
-                        estimator.add_gnss(fix).unwrap();
-                    }
-                    let index = flight.samples.iter().position(|sample| sample.time_ns == late_ns).unwrap();
-                    estimator.add_imu(&flight.samples[index]).unwrap();
-                }
-            }
-            assert_eq!(count(estimator.sink(), "rejected"), 0);
-            estimator
-        };
-        let (mut late, mut on_time) = (run(true), run(false));
-        assert_eq!(late.predicted(2 * SECOND), on_time.predicted(2 * SECOND), "{} {is_fix_late}", strategy.name());
-        assert_eq!(answers(&mut late), answers(&mut on_time));
     }
 }
 

@@ -28,22 +28,6 @@ fn after_silence(flight: &Flight, strategy: StrategyKind, silent_ns: i64) -> (Es
 }
 
 #[test]
-fn what_came_while_the_imu_was_silent_is_run_once() {
-    let flight = Flight::new(4, 5);
-    for strategy in StrategyKind::ALL {
-        let (mut estimator, waiting) = after_silence(&flight, *strategy, 380 * STEP);
-        let before = *estimator.counts();
-        estimator.together(|estimator| waiting.iter().for_each(|sent| ignore(sent.to(estimator))));
-        assert!(waiting.len() > 30, "{}", waiting.len());
-        assert!(estimator.counts().reruns - before.reruns <= 1, "{strategy:?}: {:?}", estimator.counts());
-        let (mut one_by_one, _) = after_silence(&flight, *strategy, 380 * STEP);
-        waiting.iter().for_each(|sent| ignore(sent.to(&mut one_by_one)));
-        assert!(one_by_one.counts().reruns - before.reruns > 20, "{strategy:?}: {:?}", one_by_one.counts());
-        assert_eq!(answers(&mut estimator), answers(&mut one_by_one), "{strategy:?}");
-    }
-}
-
-#[test]
 fn a_call_within_another_is_part_of_it() {
     let flight = Flight::new(4, 5);
     for strategy in StrategyKind::ALL {
