@@ -151,7 +151,7 @@ fn what_filters_reach_on_families() -> Result<(), Box<dyn Error>> {
 /// Payloads that have a message of ROS, as the documentation of the conversion lists them.
 #[test]
 fn messages_of_ros() {
-    let file = "bb-core/src/message/codec/ros.rs";
+    let file = "bb-message/src/message/codec/ros.rs";
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(file);
     let text = std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{file}: {error}"));
     let rows = text.lines().filter_map(|line| line.strip_prefix("//! ")).filter(|row| row.starts_with('|'));

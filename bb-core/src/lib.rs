@@ -56,14 +56,10 @@ pub mod declaration;
 pub mod event;
 pub mod joints;
 pub mod journal;
-pub mod kinematics;
-pub mod message;
-pub mod payload;
 pub mod pubsub;
 pub mod run;
 pub mod telemetry;
 pub mod time;
-pub mod topology;
 
 #[allow(clippy::panic, reason = "a fault is a panic at compile time, which rustc reports")]
 mod check;
@@ -75,9 +71,13 @@ mod schedule;
 mod sorted;
 mod stub;
 
+#[doc(inline)]
+pub use bb_kinematics::{kinematics, topology};
 #[doc = include_str!("robot.md")]
 pub use bb_macros::robot;
 pub use bb_macros::{Inputs, Options, Outputs};
+#[doc(inline)]
+pub use bb_message::{message, payload};
 pub use component::{
     Actuator, ActuatorContext, Bus, Command, CommandContext, Context, Estimator, Every, HandleCall, HandleCast,
     Info, Input, Inputs, Options, Outcome, Outputs, Reading, Reply, Request, RequestCodec, SafetyLink, Sensor,
@@ -145,11 +145,8 @@ pub mod __private {
     };
     pub use crate::component::binding::{Binding, FromParameter};
     pub use crate::component::field::{FromPath, FromQuantity, FromText};
-    pub use crate::component::inputs::{
-        At, EverySlot, FieldIndex, InputAt, LatestSlot, Slot, SyncMiss, TakenAt, declare,
-    };
+    pub use crate::component::inputs::{EverySlot, InputAt, LatestSlot, Slot, SyncMiss, TakenAt, declare};
     pub use crate::component::options::OptionsList;
-    pub use crate::component::outputs::{EmittedAt, OutputAt, OutputField};
     pub use crate::component::reference::number_of;
     pub use crate::component::setting::{ByCode, ByText, ByValue, Setting, SettingOf, WithUnit};
     pub use crate::component::{Command, CommandPath, Every, Input, InputField, OptionField, TopicField};
@@ -163,14 +160,7 @@ pub mod __private {
     };
     pub use crate::event::CategoryDeclaration;
     pub use crate::lifecycle::Serving;
-    pub use crate::message::codec::derive::{FieldOf, NotField, is_any, is_finite};
-    pub use crate::message::codec::{
-        DecodeError, EnumShape, FieldShape, FieldUnit, Reader, RosLayout, Shape, StructShape, Writer,
-    };
-    pub use crate::message::{
-        BothKnown, Exceeded, Feeds, Finite, Frame, JointBounds, JointCommand, JointPositions, JointReading,
-        OutOfBounds, Stamp, Stamped,
-    };
+    pub use crate::message::{BothKnown, Feeds, Finite, Frame, Stamp};
     pub use crate::node::{
         Act, Alone, Environment, Inlet, Island, IslandOf, IslandState, IslandWiring, Key, Member, Node, Solo, Turn,
         act, alone, emit, enter, enter_alone, hold, island_of, publish_to, receive, start, start_alone,
@@ -190,6 +180,12 @@ pub mod __private {
         Collision, Dynamics, Geometry, Inertial, Joint, JointKind, Limit, Link, Material, Mimic, Origin, Topology,
         Transform, Transmission, Visual,
     };
+    pub use bb_message::__private::{
+        DecodeError, EnumShape, Exceeded, FieldOf, FieldShape, FieldUnit, JointBounds, JointCommand,
+        JointPositions, JointReading, NotField, OutOfBounds, Reader, RosLayout, Shape, Stamped, StructShape,
+        Writer, is_any, is_finite,
+    };
+    pub use bb_message::outputs::{At, EmittedAt, FieldIndex, OutputAt, OutputField};
     pub use std::convert::identity;
     pub use std::sync::Arc;
     // Aliases for code that is generated for every component.

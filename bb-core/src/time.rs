@@ -1,12 +1,11 @@
-//! Time: instants as integers of nanoseconds, the one [`Clock`] that all code reads, and the counters of devices.
+//! Time: the instants of messages, the one [`Clock`] that all code reads, and the counters of devices.
 
 mod clock;
 mod device;
-mod instant;
 mod stopwatch;
 
+pub(crate) use bb_message::__private::nanos_of;
+pub use bb_message::instant::{MonotonicTime, WallTime};
 pub use clock::Clock;
 pub use device::DeviceClock;
-pub(crate) use instant::nanos_of;
-pub use instant::{MonotonicTime, WallTime};
 pub(crate) use stopwatch::{Reading, Stopwatch};

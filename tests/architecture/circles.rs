@@ -34,8 +34,8 @@ fn circles_of(krate: &str) -> Vec<String> {
     };
     match krate {
         "bb-macros" => is_found(&["expand"], "wiring", "types"),
-        // By a name that the folder re-exports, and by one that the crate does.
-        "bb-core" => (is_found(&["run"], "live", "report"), is_found(&[], "pubsub", "message")).0,
+        // By a name that the folder re-exports, and by one of another folder.
+        "bb-core" => (is_found(&["run"], "live", "report"), is_found(&[], "joints", "pubsub")).0,
         "bb-estimators" => (is_found(&["attitude"], "any", "mekf"), is_found(&["attitude"], "mekf", "rotation")).0,
         _ => {}
     }

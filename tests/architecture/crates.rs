@@ -10,8 +10,22 @@ fn arrows_between_crates_point_one_way() {
         let dependencies = dependencies.split("\n[").next().unwrap_or("");
         dependencies.lines().any(|line| line.starts_with(on))
     };
-    assert!(depends("bb-core", "bb-macros"));
     for (krate, on) in [
+        ("bb-message", "bb-macros"),
+        ("bb-kinematics", "bb-message"),
+        ("bb-core", "bb-macros"),
+        ("bb-core", "bb-message"),
+        ("bb-core", "bb-kinematics"),
+    ] {
+        assert!(depends(krate, on), "{krate} depends on {on}");
+    }
+    for (krate, on) in [
+        ("bb-message", "bb-core"),
+        ("bb-message", "bb-kinematics"),
+        ("bb-kinematics", "bb-core"),
+        ("bb-kinematics", "bb-macros"),
+        ("bb-estimators", "bb-message"),
+        ("bb-estimators", "bb-kinematics"),
         ("bb-macros", "bb-core"),
         ("bb-macros", "bb-estimators"),
         ("bb-core", "bb-estimators"),
@@ -84,7 +98,19 @@ fn the_top_level_is_the_project() {
     crates.sort();
     assert_eq!(
         crates,
-        ["bb-cli", "bb-core", "bb-estimators", "bb-eval", "bb-macros", "benches", "demos", "examples", "tests"]
+        [
+            "bb-cli",
+            "bb-core",
+            "bb-estimators",
+            "bb-eval",
+            "bb-kinematics",
+            "bb-macros",
+            "bb-message",
+            "benches",
+            "demos",
+            "examples",
+            "tests"
+        ]
     );
 }
 

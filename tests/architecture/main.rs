@@ -20,8 +20,10 @@ fn read(file: &str) -> String {
 }
 
 /// The folders of the crates with code that others use.
-const CRATES: [&str; 14] = [
+const CRATES: [&str; 16] = [
     "bb-macros",
+    "bb-message",
+    "bb-kinematics",
     "bb-core",
     "bb-estimators",
     "bb-eval",

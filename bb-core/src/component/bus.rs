@@ -15,13 +15,13 @@ use crate::declaration::{ParameterError, parameter_from_json};
 use crate::event::{ArmError, DisarmError, Forbidden, ParameterValue, Right, Rights, Safety};
 use crate::joints::Joints;
 use crate::message::Payload;
-use crate::message::nearest::{did_you_mean, nearest_path};
 use crate::pubsub::{
     AnyTopic, Delivery, DynamicSubscription, Payloads, Select, SubscriberStatistics, Subscription, Topic,
     unmatched_at,
 };
 use crate::time::Clock;
 use crate::topology::{GraphFormat, Topology};
+use bb_message::__private::{did_you_mean, nearest_path};
 use std::fmt;
 use std::sync::Arc;
 

@@ -2,8 +2,9 @@
 
 use super::Fault;
 use crate::declaration::Role;
-use crate::message::codec::{FieldShape, Schema, Shape, json_schema, member_of};
+use crate::message::codec::{FieldShape, Schema, Shape, json_schema};
 use crate::time::MonotonicTime;
+use bb_message::__private::member_of;
 use std::fmt;
 use std::future::Future;
 use std::ops::RangeInclusive;

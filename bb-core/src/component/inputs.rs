@@ -15,6 +15,7 @@ pub use slot::{Slot, SyncMiss};
 use crate::declaration::EstimatorDeclaration;
 use crate::message::Payload;
 use crate::message::Stamped;
+use bb_message::outputs::{At, FieldIndex};
 
 /// The input of an estimator.
 ///
@@ -72,14 +73,6 @@ pub struct InputField {
     /// `true` if the estimator can run without the input.
     pub optional: bool,
 }
-
-/// The number of a field in an input or output struct.
-pub type FieldIndex = usize;
-
-/// A field of an input or output struct, as a type: the expansion of `robot!` refers to fields by it.
-#[doc(hidden)]
-#[derive(Clone, Copy, Debug)]
-pub struct At<const I: FieldIndex>;
 
 /// Input number `I` of `Self` exists: its payload, and how its arrival is handled.
 #[doc(hidden)]

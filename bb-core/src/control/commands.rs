@@ -17,12 +17,12 @@ use crate::event::{
 };
 use crate::fault::{Fault, lock};
 use crate::journal::Event;
-use crate::message::codec::member_of;
-use crate::message::nearest::{did_you_mean, nearest_path};
 use crate::node::Mode;
 use crate::pubsub::DynamicMessage;
 use crate::schedule::Lane;
 use crate::time::MonotonicTime;
+use bb_message::__private::member_of;
+use bb_message::__private::{did_you_mean, nearest_path};
 use std::sync::Arc;
 use std::time::Duration;
 

@@ -15,8 +15,8 @@ use crate::declaration::Role;
 use crate::event::{CommandPhase, Safety};
 use crate::fault::Fault;
 use crate::journal::{End, Event};
-use crate::message::nearest::{did_you_mean, nearest};
 use crate::node::Mode;
+use bb_message::__private::{did_you_mean, nearest};
 use std::sync::Arc;
 
 impl Control {

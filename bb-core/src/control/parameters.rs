@@ -10,8 +10,8 @@ use crate::component::{Caller, ParameterControls};
 use crate::declaration::{ParameterError, ParameterValues};
 use crate::event::{ParameterChange, ParameterValue};
 use crate::journal::{Event, ParameterEntry};
-use crate::message::nearest::{did_you_mean, nearest_path};
 use crate::node::{BindTarget, Check, NodeEntry};
+use bb_message::__private::{did_you_mean, nearest_path};
 use std::sync::Arc;
 
 impl ParameterControls for Control {

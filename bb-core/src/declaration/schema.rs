@@ -1,7 +1,8 @@
 //! The JSON Schema of a parameter, and of the numbers and quantities in it.
 
 use super::{ParameterDeclaration, ParameterDefault, Range};
-use crate::message::codec::{member, to_json};
+use crate::message::codec::to_json;
+use bb_message::__private::member;
 
 /// The schema of a parameter's value.
 pub(crate) fn parameter_schema(declared: &ParameterDeclaration) -> String {

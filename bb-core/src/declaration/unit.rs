@@ -1,6 +1,6 @@
 //! Quantities with units at run time: `20 ms`, `0.5 deg/s`. The units are those of `robot!`.
 
-use crate::message::nearest::nearest;
+use bb_message::__private::nearest;
 
 bb_macros::unit_tables!();
 

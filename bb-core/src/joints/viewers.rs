@@ -111,9 +111,9 @@ impl ViewerMessages {
     /// The messages that a viewer needs before others: the latched ones, and the joints at rest if there are any that move.
     pub fn first(&self, time: WallTime) -> Vec<ViewerMessage> {
         let description = message(ViewerChannel::RobotDescription, &Text { data: self.urdf.clone() });
-        let fixed = TransformsMessage::fixed(self.frames.topology, time);
+        let fixed = self.frames.topology.fixed_transforms(time);
         let fixed = message(ViewerChannel::FixedTransforms, &fixed);
-        let at_rest = TransformsMessage::moving(self.frames.topology, self.frames.at_rest(), time);
+        let at_rest = self.frames.topology.moving_transforms(self.frames.at_rest(), time);
         [description, fixed].into_iter().chain(transforms(&at_rest)).collect()
     }
 
@@ -170,7 +170,7 @@ impl Frames {
         let stamp = message.stamp();
         let joints = self.joints(message);
         if !joints.is_empty() {
-            return TransformsMessage::moving(self.topology, self.moved(&joints), stamp.wall_time);
+            return self.topology.moving_transforms(self.moved(&joints), stamp.wall_time);
         }
         let Some((content, world_from_body)) = place(message) else { return NONE };
         let at = |child: &str| TransformStamped {

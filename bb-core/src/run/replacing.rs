@@ -5,7 +5,7 @@ use super::{Builder, Robot};
 use crate::component::replacement::Replacement;
 use crate::component::{Actuator, Estimator, Fault, Sensor, Service};
 use crate::lifecycle::{Serving, replacement_of_actuator, replacement_of_estimator, replacement_of_sensor};
-use crate::message::nearest::{did_you_mean, nearest_path};
+use bb_message::__private::{did_you_mean, nearest_path};
 
 impl<R: Robot> Builder<R> {
     /// Replaces the sensor at `path`, or the other code at the path of an `external` input, with one of type `S`: a driver with a simulated sensor, or with one that plays

@@ -3,17 +3,14 @@
 use super::stub;
 use crate::component::inputs::LatestSlot;
 use crate::component::{
-    Actuator, ActuatorContext, At, Command, CommandContext, Context, Estimator, Fault, InputAt, InputField, Inputs,
-    NoArguments, NoOptions, Outcome, OutputAt, Outputs, Reading, Reply, Sensor, SensorContext, Service,
-    ServiceContext, SyncMiss,
+    Actuator, ActuatorContext, Command, CommandContext, Context, Estimator, Fault, InputAt, InputField, Inputs,
+    NoArguments, NoOptions, Outcome, Outputs, Reading, Reply, Sensor, SensorContext, Service, ServiceContext,
+    SyncMiss,
 };
-use crate::message::codec::{Reader, Shape, Writer};
-use crate::message::{DecodeError, Field, Finite, Payload, Stamp, Stamped};
+use crate::message::Stamped;
 use crate::time::MonotonicTime;
-
-/// A payload, sensor, estimator and so on, used wherever the real one is not known.
-#[derive(Clone, Copy, Debug)]
-pub struct Unknown;
+pub(crate) use bb_message::__private::UNKNOWN_INDEX;
+pub use bb_message::__private::{NoField, Unknown};
 
 /// The input of an unknown estimator: anything.
 #[derive(Clone, Copy, Debug)]
@@ -22,36 +19,6 @@ pub struct UnknownInput;
 /// The output of an unknown estimator: anything.
 #[derive(Clone, Copy, Debug)]
 pub struct UnknownOutput;
-
-/// The number of an input or output that does not exist.
-pub(crate) const UNKNOWN_INDEX: usize = usize::MAX;
-
-/// The field of an input or output that does not exist.
-pub type NoField = At<UNKNOWN_INDEX>;
-
-impl Finite for Unknown {
-    fn is_finite(&self) -> bool {
-        true
-    }
-}
-
-#[diagnostic::do_not_recommend]
-impl Field for Unknown {
-    const SHAPE: Shape = <()>::SHAPE;
-    const IS_INLINE: bool = true;
-
-    fn write(&self, _: &mut Writer<'_>) {}
-
-    fn read(_: &mut Reader<'_>) -> Result<Self, DecodeError> {
-        stub()
-    }
-}
-
-impl Payload for Unknown {
-    const NAME: &'static str = "unknown";
-    const KNOWN: bool = false;
-    const TELLS_JOINT_POSITION: bool = true;
-}
 
 #[diagnostic::do_not_recommend]
 impl Sensor for Unknown {
@@ -149,16 +116,6 @@ impl<I: Inputs> InputAt<UNKNOWN_INDEX> for I {
     }
 
     fn snapshot<'a>(_: &'a mut I::Cache, _: &'a Stamped<Unknown>) -> Result<I::View<'a>, SyncMiss> {
-        stub()
-    }
-}
-
-impl<O: Outputs> OutputAt<UNKNOWN_INDEX> for O {
-    type Payload = Unknown;
-
-    fn each(_: &mut Option<O>, _: Stamp, _: impl FnMut(&Stamped<Unknown>)) {}
-
-    fn alone(_: &Stamped<Unknown>) -> O {
         stub()
     }
 }

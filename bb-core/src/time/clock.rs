@@ -3,7 +3,7 @@
 #[cfg(test)]
 mod tests;
 
-use super::{MonotonicTime, WallTime, instant::nanos_of};
+use super::{MonotonicTime, WallTime, nanos_of};
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::time::{Instant, SystemTime, UNIX_EPOCH};

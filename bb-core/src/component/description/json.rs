@@ -6,9 +6,9 @@ use super::{
 };
 use crate::component::CommandInfo;
 use crate::event::ParameterValue;
-use crate::message::codec::compose::{Object, object};
 use crate::message::codec::{Layouts, json_schema};
 use crate::topology::{Geometry, Origin, Visual};
+use bb_message::__private::compose::{Object, object};
 use std::time::Duration;
 
 impl Description {

@@ -101,19 +101,18 @@ impl Counts {
 
 /// The declared limits of the joint and its position.
 fn bounds(context: &ActuatorContext, joints: &Joints) -> JointBounds {
-    let bounds = JointBounds { joint: context.joint(), ..JointBounds::NONE };
+    let mut bounds = JointBounds::NONE;
+    bounds.joint = context.joint();
     let Some(limit) = context.topology().joint(context.joint()).and_then(|joint| joint.limit) else {
         return bounds;
     };
     let status = joints.status(context.joint()).filter(|status| !status.is_stale);
-    JointBounds {
-        lower: limit.lower.unwrap_or(bounds.lower),
-        upper: limit.upper.unwrap_or(bounds.upper),
-        velocity: limit.velocity.unwrap_or(bounds.velocity),
-        effort: limit.effort.unwrap_or(bounds.effort),
-        position: status.and_then(|status| status.position.first().copied()),
-        ..bounds
-    }
+    bounds.lower = limit.lower.unwrap_or(bounds.lower);
+    bounds.upper = limit.upper.unwrap_or(bounds.upper);
+    bounds.velocity = limit.velocity.unwrap_or(bounds.velocity);
+    bounds.effort = limit.effort.unwrap_or(bounds.effort);
+    bounds.position = status.and_then(|status| status.position.first().copied());
+    bounds
 }
 
 impl fmt::Display for ActuatorStatistics {

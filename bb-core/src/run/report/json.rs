@@ -5,10 +5,10 @@ use super::{Problem, Report};
 use crate::component::ExecutionInfo;
 use crate::control::{CommandStatistics, ReportedFault};
 use crate::message::LimitedQuantity;
-use crate::message::codec::compose::{Object, object};
 use crate::node::{DropReason, EstimatorStatistics, InputStatistics, LatencyStatistics};
 use crate::pubsub::TopicStatistics;
 use crate::time::MonotonicTime;
+use bb_message::__private::compose::{Object, object};
 
 impl Report {
     /// One JSON object: `time`, `state`, `safety`, the `problems` with the worst first, and the lists `executions`, `topics`, `estimators`,

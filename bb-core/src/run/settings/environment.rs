@@ -3,10 +3,10 @@
 use super::assign::{self, Assignment};
 use super::error::{Place, SettingProblem};
 use super::{SettingsError, assign::names};
-use crate::message::nearest::nearest;
 use crate::run::draft::Draft;
 use crate::run::{Builder, Robot};
 use crate::sorted::Sorted;
+use bb_message::__private::nearest;
 use std::ffi::{OsStr, OsString};
 
 /// The files to load.

@@ -4,10 +4,11 @@ use super::assign::{NULL_TEXT, names, tables};
 use crate::component::{OptionField, SettingKind};
 use crate::declaration::{Range, unit};
 use crate::event::ParameterValue;
-use crate::message::codec::{elements_of, members_of, to_json};
+use crate::message::codec::to_json;
 use crate::run::bound::bound_to;
 use crate::run::draft::Draft;
 use crate::sorted::Sorted;
+use bb_message::__private::{elements_of, members_of};
 use std::fmt;
 
 /// All settings of a robot with their values. Its `Display` is a TOML file, with the doc, the range and the unit of each.
