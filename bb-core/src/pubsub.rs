@@ -25,7 +25,7 @@ pub use delivery::{Delivery, Overflow};
 pub use dynamic::{DynamicSubscription, RecvDynamic};
 pub use publisher::Publisher;
 pub(crate) use publisher::{Enter, Gate, Tell};
-pub(crate) use registry::{PathChange, Registry};
+pub(crate) use registry::Registry;
 pub use select::{Payloads, Select};
 pub use statistics::{SubscriberStatistics, TopicStatistics};
 pub use subscription::{RecvAsync, Subscription};

@@ -8,7 +8,7 @@ use crate::declaration::ParameterError;
 use crate::event::{ArmError, DisarmError, ParameterValue, Safety};
 use crate::joints::Joints;
 use crate::message::{Frame, Origin};
-use crate::pubsub::{AnyTopic, DynamicMessage, PathChange, Registry};
+use crate::pubsub::{AnyTopic, DynamicMessage, Registry};
 use crate::time::{Clock, MonotonicTime};
 use crate::topology::{GraphFormat, Topology};
 use std::any::Any;
@@ -87,8 +87,8 @@ pub(crate) trait Host: Send + Sync {
     /// Calls `publish` unless the robot has stopped; first waits while too many entries are queued for the journal's
     /// sink.
     fn while_open(&self, publish: &mut dyn FnMut());
-    /// Something may be published at a path of one's own, or no more.
-    fn note_path(&self, change: PathChange);
+    /// Something may be published at a path of one's own.
+    fn note_path(&self, path: &'static str, payload: &'static str);
     /// The number of the entrance through which was published last at `path`, if there is a journal.
     fn last_entrance(&self, path: &'static str) -> Option<Arc<AtomicU64>>;
     /// A caller publishes at `path` through that entrance: a line of the journal, if the caller before it was another.

@@ -282,7 +282,7 @@ pub enum Event {
     OwnPublisher {
         /// The path.
         path: &'static str,
-        /// The name of the payload's type; empty if the path was no longer used and made room for another one.
+        /// The name of the payload's type.
         payload: &'static str,
     },
     /// A caller publishes the messages that follow at a path: one of its choice, or that of a sensor whose messages other code

@@ -20,7 +20,8 @@ use std::task::Waker;
 /// The topics of one robot that it does not declare. A topic created here is subscribed to by every subscription
 /// whose selection includes it, whether made before or after.
 ///
-/// It is bounded: at most [`MAX_TOPICS`](Self::MAX_TOPICS) topics, and only live subscriptions.
+/// It is bounded: at most [`MAX_TOPICS`](Self::MAX_TOPICS) topics with a publisher and as many without, and only live subscriptions.
+/// A topic stays until the robot stops.
 #[derive(Default)]
 pub(crate) struct Registry {
     /// The paths of all other topics of the robot, which exist from its builder on.
@@ -32,19 +33,10 @@ pub(crate) struct Registry {
 #[derive(Default)]
 struct State {
     topics: Sorted<&'static str, Made>,
-    /// Paths that had a publisher, in a replay, whose payload's type is not known before the first message.
-    expected: Sorted<&'static str, Expected>,
-    /// Topics that were made or expected so far.
-    made: u64,
+    /// Paths that had a publisher, in a replay, whose payload's type is not known before the first message; the name of it.
+    expected: Sorted<&'static str, &'static str>,
     selections: Selections,
     is_closed: bool,
-}
-
-/// The place for another topic.
-enum Room {
-    Free,
-    /// The path of an unused topic.
-    Of(&'static str),
 }
 
 /// The type of a payload.
@@ -66,35 +58,19 @@ impl Kind<'_> {
     }
 }
 
-/// A topic, and its index in the order of creation.
+/// A topic.
 struct Made {
-    number: u64,
     topic: Arc<dyn AnyTopic>,
     /// `true` if the topic has, or had, a publisher. Others are kept for their subscribers: topics of paths that are subscribed to
-    /// before anything publishes there, and in a replay those that have made room in the run.
+    /// before anything publishes there.
     is_published: bool,
-    /// Messages published and lost there before.
-    before: (u64, u64),
 }
 
-/// A path that had a publisher: which one it is in that order, and the name of the payload.
-struct Expected {
-    number: u64,
-    payload: &'static str,
-}
-
-/// Change of a path of a registry.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum PathChange {
-    /// The path has a topic now.
-    Made { path: &'static str, payload: &'static str },
-    /// The path's topic, which nobody used, has made room for another.
-    Evicted { path: &'static str },
-}
+/// Is told of each path that gets its first publisher, with the name of its payload.
+pub(crate) type NotePath<'a> = &'a mut dyn FnMut(&'static str, &'static str);
 
 impl Registry {
-    /// The largest number of paths. Beyond it, a topic without a publisher and without a typed subscription is
-    /// removed.
+    /// The largest number of paths. Others are refused.
     pub(crate) const MAX_TOPICS: usize = 1024;
 
     /// Creates the registry of a robot that declares these paths.
@@ -135,15 +111,15 @@ impl Registry {
     /// Returns the topic at `path` to publish at, for tests, which have no journal.
     #[cfg(test)]
     pub(crate) fn topic<T: Payload>(&self, path: &str) -> Result<Arc<Topic<T>>, PathError> {
-        self.topic_noted(path, &mut |_| ())
+        self.topic_noted(path, &mut |_, _| ())
     }
 
-    /// The topic at `path`, made if it is not there; `note` is told of what changes, in that order on all threads. It must not
-    /// wait.
+    /// The topic at `path`, made if it is not there; `note` is told of a path's first publisher, in that order on all threads. It must
+    /// not wait.
     pub(crate) fn topic_noted<T: Payload>(
         &self,
         path: &str,
-        note: &mut dyn FnMut(PathChange),
+        note: NotePath<'_>,
     ) -> Result<Arc<Topic<T>>, PathError> {
         Ok(typed(self.published(path, &Kind::of::<T>(), note)?))
     }
@@ -161,14 +137,13 @@ impl Registry {
         if let Some((topic, is_published)) = found {
             return Ok((typed(topic), is_published));
         }
-        let mut unused = None;
         if state.waiting().count() >= Self::MAX_TOPICS {
-            unused = Some(state.remove_unused().ok_or_else(|| refused(Reason::TooMany))?);
+            return Err(refused(Reason::TooMany));
         }
         let path = intern(path).ok_or_else(|| refused(Reason::TooMany))?;
         let topic = state.make(path, &kind, false);
         drop(state);
-        drop((stale, unused));
+        drop(stale);
         Ok((typed(topic), false))
     }
 
@@ -176,7 +151,7 @@ impl Registry {
     pub(crate) fn topic_of(
         &self,
         message: &DynamicMessage,
-        note: &mut dyn FnMut(PathChange),
+        note: NotePath<'_>,
     ) -> Result<Arc<dyn AnyTopic>, PathError> {
         let erased = message.message();
         let kind = Kind {
@@ -188,12 +163,7 @@ impl Registry {
         self.published(message.path(), &kind, note)
     }
 
-    fn published(
-        &self,
-        path: &str,
-        kind: &Kind<'_>,
-        note: &mut dyn FnMut(PathChange),
-    ) -> Result<Arc<dyn AnyTopic>, PathError> {
+    fn published(&self, path: &str, kind: &Kind<'_>, note: NotePath<'_>) -> Result<Arc<dyn AnyTopic>, PathError> {
         let refused = |reason| PathError::new(Act::Publish, path, reason);
         self.check(path).map_err(refused)?;
         let mut state = self.lock();
@@ -204,24 +174,24 @@ impl Registry {
         if let Some((topic, true)) = found {
             return Ok(topic);
         }
-        let room = state.room().ok_or_else(|| refused(Reason::TooMany))?;
+        if state.published().count() >= Self::MAX_TOPICS {
+            return Err(refused(Reason::TooMany));
+        }
         // Last, since an interned name stays.
         let known = found.as_ref().map(|(topic, _)| topic.path());
         let path = known.or_else(|| intern(path)).ok_or_else(|| refused(Reason::TooMany))?;
-        let evicted = match room {
-            Room::Free => None,
-            Room::Of(unused) => {
-                note(PathChange::Evicted { path: unused });
-                state.topics.remove(unused)
-            }
-        };
         let topic = match found {
-            Some((topic, _)) => state.publish(path, topic),
+            Some((topic, _)) => {
+                if let Some(made) = state.topics.get_mut(path) {
+                    made.is_published = true;
+                }
+                topic
+            }
             None => state.make(path, kind, true),
         };
-        note(PathChange::Made { path, payload: topic.payload_name() });
+        note(path, topic.payload_name());
         drop(state);
-        drop((stale, evicted));
+        drop(stale);
         Ok(topic)
     }
 
@@ -233,10 +203,10 @@ impl Registry {
         }
     }
 
-    /// Replays that somebody could publish at `path` from now on; no more if the name of the payload is empty.
+    /// Replays that somebody could publish at `path` from now on.
     pub(crate) fn expect(&self, path: &'static str, payload: &'static str) {
         let mut state = self.lock();
-        let dropped = if payload.is_empty() { state.forget(path) } else { state.expect(path, payload) };
+        let dropped = state.expect(path, payload);
         drop(state);
         if let Some(Made { topic, .. }) = &dropped
             && topic.subscribers().iter().any(|one| one.is_typed)
@@ -255,18 +225,14 @@ impl Registry {
     pub(crate) fn statistics(&self) -> Vec<TopicStatistics> {
         let state = self.lock();
         let mut all = Sorted::default();
-        for (path, expected) in state.expected.iter() {
-            let payload = expected.payload;
+        for (path, payload) in state.expected.iter() {
             all.insert(*path, TopicStatistics { path, payload, published: 0, lost: 0, panics: 0, subscribers: 0 });
         }
-        let made: Vec<_> = state.published().map(|made| (Arc::clone(&made.topic), made.before)).collect();
+        let made: Vec<_> = state.published().map(|made| Arc::clone(&made.topic)).collect();
         drop(state);
         // Subscriptions are asked for what they have counted without the lock.
-        for (topic, (published, lost)) in made {
-            let mut counted = topic.statistics();
-            counted.published = counted.published.saturating_sub(published);
-            counted.lost = counted.lost.saturating_sub(lost);
-            all.insert(topic.path(), counted);
+        for topic in made {
+            all.insert(topic.path(), topic.statistics());
         }
         all.iter().map(|(_, counted)| counted.clone()).collect()
     }
@@ -326,27 +292,8 @@ impl State {
     fn make(&mut self, path: &'static str, kind: &Kind<'_>, is_published: bool) -> Arc<dyn AnyTopic> {
         let topic = (kind.make)(path);
         self.selections.tap(&*topic);
-        let number = self.next_number();
-        self.topics.insert(path, Made { number, topic: Arc::clone(&topic), is_published, before: (0, 0) });
+        self.topics.insert(path, Made { topic: Arc::clone(&topic), is_published });
         topic
-    }
-
-    /// A topic gets a publisher.
-    fn publish(&mut self, path: &'static str, topic: Arc<dyn AnyTopic>) -> Arc<dyn AnyTopic> {
-        let number = self.next_number();
-        if let Some(made) = self.topics.get_mut(path) {
-            (made.number, made.is_published) = (number, true);
-        }
-        topic
-    }
-
-    /// Finds room for another topic with a publisher. An untyped subscription to a removed topic loses nothing: if the topic is
-    /// created again, it is subscribed to again.
-    fn room(&self) -> Option<Room> {
-        if self.published().count() < Registry::MAX_TOPICS {
-            return Some(Room::Free);
-        }
-        oldest_unused(self.published()).map(Room::Of)
     }
 
     fn published(&self) -> impl Iterator<Item = &Made> {
@@ -358,28 +305,13 @@ impl State {
         self.topics.iter().map(|(_, made)| made).filter(|made| !made.is_published)
     }
 
-    /// Removes the oldest topic without a publisher that nobody uses.
-    fn remove_unused(&mut self) -> Option<Made> {
-        let oldest = oldest_unused(self.waiting())?;
-        self.topics.remove(oldest)
-    }
-
-    fn next_number(&mut self) -> u64 {
-        self.made += 1;
-        self.made
-    }
-
-    /// A topic is returned that is to be dropped.
+    /// A topic of another payload is returned, which is to be dropped.
     fn expect(&mut self, path: &'static str, payload: &'static str) -> Option<Made> {
-        let number = self.next_number();
-        self.expected.insert(path, Expected { number, payload });
-        // Of a journal that does not say which have made room, the oldest is forgotten.
-        if self.expected.len() > Registry::MAX_TOPICS
-            && let Some((oldest, _)) = self.expected.iter().min_by_key(|(_, expected)| expected.number)
-        {
-            let oldest = *oldest;
-            self.expected.remove(oldest);
+        // A run has no more, whatever a journal says.
+        if self.expected.len() >= Registry::MAX_TOPICS && self.expected.get(path).is_none() {
+            return None;
         }
+        self.expected.insert(path, payload);
         let made = self.topics.get_mut(path)?;
         if !made.is_published && made.topic.payload_name() != payload {
             return self.topics.remove(path);
@@ -387,23 +319,6 @@ impl State {
         made.is_published = true;
         None
     }
-
-    /// Forgets that somebody could publish at `path`; returns a topic that is removed for it.
-    fn forget(&mut self, path: &'static str) -> Option<Made> {
-        self.expected.remove(path);
-        let made = self.topics.get_mut(path)?;
-        let counted = made.topic.statistics();
-        (made.is_published, made.before) = (false, (counted.published, counted.lost));
-        if self.waiting().count() <= Registry::MAX_TOPICS {
-            return None;
-        }
-        self.remove_unused()
-    }
-}
-
-/// The path of the oldest of them that nobody uses.
-fn oldest_unused<'a>(made: impl Iterator<Item = &'a Made>) -> Option<&'static str> {
-    made.filter(|made| !made.is_used()).min_by_key(|made| made.number).map(|made| made.topic.path())
 }
 
 impl Made {

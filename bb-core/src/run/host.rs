@@ -13,7 +13,7 @@ use crate::fault::lock;
 use crate::joints::Joints;
 use crate::journal::{Event, Journal, Recorded};
 use crate::node::NodeEntry;
-use crate::pubsub::{AnyTopic, DynamicMessage, PathChange, Registry};
+use crate::pubsub::{AnyTopic, DynamicMessage, Registry};
 use crate::schedule::Door;
 use crate::sorted::Sorted;
 use crate::time::MonotonicTime;
@@ -128,17 +128,8 @@ impl Host for RobotHost {
         last.entrance.store(entrance, Ordering::Release);
     }
 
-    fn note_path(&self, change: PathChange) {
-        if let PathChange::Evicted { path } = change {
-            // Entrances of before find no number of theirs.
-            if let Some(last) = lock(&self.callers).remove(path) {
-                last.entrance.store(0, Ordering::Release);
-            }
-        }
-        self.note(|| match change {
-            PathChange::Made { path, payload } => Event::OwnPublisher { path, payload },
-            PathChange::Evicted { path } => Event::OwnPublisher { path, payload: "" },
-        });
+    fn note_path(&self, path: &'static str, payload: &'static str) {
+        self.note(|| Event::OwnPublisher { path, payload });
     }
 
     fn note_own(&self, message: DynamicMessage, now: MonotonicTime) {

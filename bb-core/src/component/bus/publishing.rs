@@ -48,7 +48,8 @@ impl Bus {
                 Err(_) => Err(self.other_payload(path, payload, T::NAME)),
             };
         }
-        let topic = self.host.registry().topic_noted::<T>(path, &mut |change| self.host.note_path(change))?;
+        let topic =
+            self.host.registry().topic_noted::<T>(path, &mut |path, payload| self.host.note_path(path, payload))?;
         let entrance = self.entrance(topic.path());
         Ok(Publisher::new(topic, Arc::new(entrance)))
     }
@@ -180,7 +181,8 @@ impl Bus {
             self.host.enter(message, now);
             return Ok(());
         }
-        let topic = self.host.registry().topic_of(message, &mut |change| self.host.note_path(change))?;
+        let topic =
+            self.host.registry().topic_of(message, &mut |path, payload| self.host.note_path(path, payload))?;
         entrance.note_caller();
         entrance.hear(topic.path(), message.stamp(), now, &|listener| message.tell_joints(listener));
         match entrance.is_noted() {

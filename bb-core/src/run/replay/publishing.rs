@@ -62,7 +62,7 @@ impl Replayer {
         match (registry.topics().into_iter().find(|topic| topic.path() == path), message) {
             (Some(topic), _) => Ok(topic),
             (None, Recorded::Message(message)) => {
-                registry.topic_of(message, &mut |_| ()).map_err(|error| error.to_string())
+                registry.topic_of(message, &mut |_, _| ()).map_err(|error| error.to_string())
             }
             (None, Recorded::Bytes(_)) => Err(format!(
                 "something was published at `{path}`, a path made at run time, and the payload is not known: make a \
