@@ -15,7 +15,6 @@
 
 mod arguments;
 mod assign;
-mod environment;
 mod error;
 #[cfg(feature = "toml")]
 mod file;

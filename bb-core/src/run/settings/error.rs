@@ -35,8 +35,6 @@ pub(super) enum Place {
     },
     /// The command line.
     Argument,
-    /// An environment variable of that name.
-    Variable(Arc<str>),
     /// Code.
     Code,
 }
@@ -82,7 +80,7 @@ impl SettingProblem {
     pub fn position(&self) -> Option<(usize, usize)> {
         match self.place {
             Place::File { position, .. } => position,
-            Place::Argument | Place::Variable(_) | Place::Code => None,
+            Place::Argument | Place::Code => None,
         }
     }
 }
@@ -93,7 +91,6 @@ impl fmt::Display for SettingProblem {
             Place::File { name, position: Some((line, column)) } => write!(f, "{name}:{line}:{column}: ")?,
             Place::File { name, position: None } => write!(f, "{name}: ")?,
             Place::Argument => f.write_str("--set ")?,
-            Place::Variable(name) => write!(f, "environment variable {name}: ")?,
             Place::Code => {}
         }
         if !self.path.is_empty() {

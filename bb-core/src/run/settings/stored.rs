@@ -9,7 +9,7 @@ use crate::run::{Builder, Robot};
 
 impl<R: Robot> Builder<R> {
     /// Keeps parameters over restarts of the program in `store`: sets those that it has now, and stores those that are set
-    /// while the robot runs. Values of [`set`](Self::set), files, the environment and the command line that are set after this call
+    /// while the robot runs. Values of [`set`](Self::set), files and the command line that are set after this call
     /// take precedence, and are not stored. `bb-redb` is a crash-safe store in a file.
     ///
     /// A change is stored on another thread, moments after it was made; changes that follow each other closely are stored
