@@ -5,9 +5,9 @@
 //! estimation and magnetic disturbance rejection", Information Fusion 91, 2023, for typical sensor errors, and for
 //! rest and disturbances. `book/src/laboratory/attitude.md` has the ablation of whole parts and the comparison.
 //!
-//! Nine states: the rotation error in the world, the gyroscope's bias, the horizontal velocity, and the lag of the
-//! magnetometer. Samples are integrated at once, errors propagated once per window. The offset of the magnetometer is a
-//! hypothesis beside the filter; see `offset.rs`. `numbers.rs` has all numbers, and `book/src/explanation/attitude-filter.md` the equations.
+//! Eight states: the rotation error in the world, the gyroscope's bias, and the horizontal velocity. Samples are integrated
+//! at once, errors propagated once per window. The offset of the magnetometer and its lag are a hypothesis beside the
+//! filter; see `offset.rs`. `numbers.rs` has all numbers, and `book/src/explanation/attitude-filter.md` the equations.
 //!
 //! # What each rule contributes
 //!

@@ -5,29 +5,24 @@ use nalgebra::{Matrix3, Vector3};
 use super::window::Window;
 use crate::attitude::Real;
 
-// The first five states are all that a field corrects.
+// The first four states are all that a field corrects.
 
 /// Bias of the gyroscope in the body frame, rad/s.
 pub(super) const BIAS: [usize; 3] = [0, 1, 2];
-/// Lag of the magnetometer behind the gyroscope, s.
-pub(super) const LAG: usize = 3;
 /// Rotation error about the vertical, rad.
-pub(super) const HEADING: usize = 4;
+pub(super) const HEADING: usize = 3;
 /// Rotation error in the world, rad. Its value is moved into the orientation at the end of each window.
 pub(super) const ROTATION: [usize; 3] = [X, Y, HEADING];
 /// Horizontal velocity, m/s.
 pub(super) const VELOCITY: [usize; 2] = [EAST, NORTH];
 
-const BY_FIELD: usize = 5;
-const X: usize = 5;
-const Y: usize = 6;
-pub(super) const EAST: usize = 7;
-pub(super) const NORTH: usize = 8;
+const BY_FIELD: usize = 4;
+const X: usize = 4;
+const Y: usize = 5;
+pub(super) const EAST: usize = 6;
+pub(super) const NORTH: usize = 7;
 
-const STATES: usize = 9;
-
-/// Length of a row in memory: even, so that vector instructions on two numbers cover whole rows.
-const WIDTH: usize = 10;
+const STATES: usize = 8;
 
 /// Variance below which only rounding errors are left.
 const LEAST_VARIANCE: f64 = 1e-16;
@@ -37,15 +32,15 @@ const LEAST_VARIANCE: f64 = 1e-16;
 pub(super) struct Errors<T: Real> {
     pub(super) value: [T; STATES],
     /// The upper triangle; the elements below it are zero.
-    covariance: [[T; WIDTH]; STATES],
+    covariance: [[T; STATES]; STATES],
 }
 
 /// Covariances of all states with one quantity.
-type Shared<T> = [T; WIDTH];
+type Shared<T> = [T; STATES];
 
 impl<T: Real> Errors<T> {
     pub(super) fn new() -> Self {
-        Self { value: [T::ZERO; STATES], covariance: [[T::ZERO; WIDTH]; STATES] }
+        Self { value: [T::ZERO; STATES], covariance: [[T::ZERO; STATES]; STATES] }
     }
 
     #[inline(always)]
@@ -79,7 +74,7 @@ impl<T: Real> Errors<T> {
     /// Makes states independent of the others, with this variance.
     pub(super) fn forget(&mut self, states: &[usize], variance: T) {
         for &state in states {
-            self.covariance[state] = [T::ZERO; WIDTH];
+            self.covariance[state] = [T::ZERO; STATES];
             for row in &mut self.covariance[..state] {
                 row[state] = T::ZERO;
             }
@@ -115,12 +110,12 @@ impl<T: Real> Errors<T> {
         p[EAST][EAST] += lift * (p[Y][EAST] + p[Y][EAST] + lift * p[Y][Y]);
         p[EAST][NORTH] += lift * (p[Y][NORTH] - p[X][EAST] - lift * p[X][Y]);
         p[NORTH][NORTH] -= lift * (p[X][NORTH] + p[X][NORTH] - lift * p[X][X]);
-        for state in [0, 1, 2, LAG] {
+        for state in BIAS {
             p[state][EAST] += lift * p[state][Y];
             p[state][NORTH] -= lift * p[state][X];
         }
         for (axis, row) in ROTATION.into_iter().enumerate() {
-            for state in [0, 1, 2, LAG] {
+            for state in BIAS {
                 p[state][row] = turned[axis][state];
             }
             p[row][EAST] = turned[axis][EAST] + lift * turned[axis][Y];
@@ -146,7 +141,7 @@ impl<T: Real> Errors<T> {
     /// Covariances of all states with `state`.
     #[inline(always)]
     fn shared(&self, state: usize) -> Shared<T> {
-        core::array::from_fn(|other| if other < STATES { self.at(state, other) } else { T::ZERO })
+        core::array::from_fn(|other| self.at(state, other))
     }
 
     /// Corrects the state by a measurement of state `STATE` with this residual and variance.
@@ -173,7 +168,7 @@ impl<T: Real> Errors<T> {
     /// states. Tilt and velocity, which gravity determines better, are not corrected.
     #[inline(always)]
     pub(super) fn correct_by_field<const N: usize>(&mut self, slopes: [(usize, T); N], residual: T, variance: T) {
-        let mut shared = [T::ZERO; WIDTH];
+        let mut shared = [T::ZERO; STATES];
         for (state, slope) in slopes {
             for (one, other) in shared.iter_mut().zip(self.shared(state)) {
                 *one += slope * other;
@@ -199,12 +194,11 @@ impl<T: Real> Errors<T> {
         subtract_row::<1, T>(p, &gain, shared);
         subtract_row::<2, T>(p, &gain, shared);
         subtract_row::<3, T>(p, &gain, shared);
-        subtract_row::<4, T>(p, &gain, shared);
         if FIRST > BY_FIELD {
+            subtract_row::<4, T>(p, &gain, shared);
             subtract_row::<5, T>(p, &gain, shared);
             subtract_row::<6, T>(p, &gain, shared);
             subtract_row::<7, T>(p, &gain, shared);
-            subtract_row::<8, T>(p, &gain, shared);
         }
         Some(inverse)
     }
@@ -213,11 +207,11 @@ impl<T: Real> Errors<T> {
 /// Subtracts a correction from row `ROW` of a covariance; a constant, so that the loops are unrolled.
 #[inline(always)]
 fn subtract_row<const ROW: usize, T: Real>(
-    covariance: &mut [[T; WIDTH]; STATES],
+    covariance: &mut [[T; STATES]; STATES],
     gain: &Shared<T>,
     shared: &Shared<T>,
 ) {
-    for column in ROW..WIDTH {
+    for column in ROW..STATES {
         covariance[ROW][column] -= gain[ROW] * shared[column];
     }
 }

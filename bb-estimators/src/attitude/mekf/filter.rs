@@ -1,9 +1,9 @@
 //! One step of the filter: strapdown integration with every sample, errors once per window.
 
-use nalgebra::{Matrix3, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::doubt::Doubt;
-use super::errors::{BIAS, EAST, Errors, HEADING, LAG, NORTH, ROTATION, VELOCITY};
+use super::errors::{BIAS, EAST, Errors, HEADING, NORTH, ROTATION, VELOCITY};
 use super::field::{Field, effective_horizontal};
 use super::numbers::*;
 use super::offset::HardIron;
@@ -63,7 +63,6 @@ impl<T: Real> AttitudeFilter<T> for MekfFilter<T> {
         params.check()?;
         let mut errors = Errors::new();
         errors.forget(&BIAS, square(INITIAL_BIAS));
-        errors.forget(&[LAG], square(MAGNETOMETER_LAG));
         Ok(Self {
             params,
             state: AttitudeState::new(params.magnetometer.is_used()),
@@ -208,12 +207,6 @@ impl<T: Real> MekfFilter<T> {
         }
         self.rest = Rest::new(&sample.angular_velocity, &sample.specific_force);
         self.begin();
-        if self.is_north_known
-            && let Some(field) = sample.magnetic_field
-            && let Some(orientation) = self.state.world_from_body()
-        {
-            self.iron.observe(&orientation, &self.rotation, &field);
-        }
     }
 
     /// Doubts the orientation, and forgets what was in relation to it. What is known of the sensors stays.
@@ -260,10 +253,8 @@ impl<T: Real> MekfFilter<T> {
         rate: &Vector3<T>,
         field: &Vector3<T>,
     ) -> UnitQuaternion<T> {
-        // Poses compare fields of one time, and not of the time of a magnetometer that lags.
-        let prompt = || field - rate.cross(field) * self.errors.value[LAG];
-        if self.iron.is_due(&orientation)
-            && let Some(error) = self.iron.observe(&orientation, &self.rotation, &prompt())
+        if self.iron.is_due(&self.rotation)
+            && let Some(error) = self.iron.observe(&self.rotation, rate, field)
         {
             let horizontal =
                 self.field.as_ref().map_or(T::ZERO, Field::horizontal).max(T::of(0.1) * self.iron.scale());
@@ -272,10 +263,9 @@ impl<T: Real> MekfFilter<T> {
             self.forget_field();
             self.doubt.forget_mean();
         }
-        let field = field - self.iron.offset();
-        let in_world = self.rotation * field;
+        let in_world = self.rotation * self.iron.field(rate, field);
         if self.is_north_known {
-            self.window.add_field(&in_world, &(self.rotation.fixed_rows::<2>(0) * rate.cross(&field)));
+            self.window.add_field(&in_world);
             return orientation;
         }
         let Some(error) = heading_error(&in_world.normalize()) else { return orientation };
@@ -323,9 +313,9 @@ impl<T: Real> MekfFilter<T> {
             self.fuse_rest(dt, &(self.window.measured_turn / dt));
         }
         if self.is_north_known
-            && let Some((field, rate)) = self.window.mean_field()
+            && let Some(field) = self.window.mean_field()
         {
-            self.fuse_field(dt, &field, &rate);
+            self.fuse_field(dt, &field);
         }
         self.window = Window::new();
         self.rest.expect(self.errors.deviation_of_bias());
@@ -367,19 +357,14 @@ impl<T: Real> MekfFilter<T> {
     }
 
     /// The angle of the field to north.
-    fn fuse_field(&mut self, dt: T, field: &Vector3<T>, rate: &Vector2<T>) {
+    fn fuse_field(&mut self, dt: T, field: &Vector3<T>) {
         let reference = self.field.get_or_insert_with(|| Field::new(field));
         let moved_s = if self.window.squared_rate > square::<T>(FAST) * dt { dt } else { T::ZERO };
         let noise = reference.observe(dt, field, moved_s);
         let horizontal = effective_horizontal(field);
         let (east, north) = (field.x / horizontal, field.y / horizontal);
         let dip = field.z / horizontal;
-        let slopes = [
-            (HEADING, T::ONE),
-            (ROTATION[1], -north * dip),
-            (ROTATION[0], -east * dip),
-            (LAG, (north * rate.x - east * rate.y) / horizontal),
-        ];
+        let slopes = [(HEADING, T::ONE), (ROTATION[1], -north * dip), (ROTATION[0], -east * dip)];
         let expected: T = slopes.iter().map(|(state, slope)| self.errors.value[*state] * *slope).sum();
         let mut residual = field.x.atan2(field.y) - T::of(self.params.declination) - expected;
         if residual.abs() > T::pi() {

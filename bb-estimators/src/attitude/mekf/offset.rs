@@ -1,32 +1,34 @@
-//! Offset of the magnetometer, by iron on the body: the one that is subtracted, and another that may replace it.
+//! Offset of the magnetometer, by iron on the body, with its lag behind the gyroscope: the ones that are subtracted, and others that
+//! may replace them.
 
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Matrix3x4, Matrix4, Matrix4x3, Vector3, Vector4};
 
 use super::numbers::{
-    ANY_OFFSET, CALIBRATED, FIELD_WALK, FIRST_POSES, LATER_ODDS, LEAST_WALK, NEWCOMER_POSES, ODDS, PLACES,
-    POSE_TURN, SCALE_TURN, SHARPER, SHORT_S, TAILS,
+    ANY_OFFSET, CALIBRATED, FIELD_WALK, FIRST_POSES, LATER_ODDS, LEAST_WALK, MAGNETOMETER_LAG, NEWCOMER_POSES,
+    ODDS, PLACES, POSE_TURN, SCALE_TURN, SHARPER, SHORT_S, TAILS,
 };
 use super::params::Magnetometer;
 use crate::attitude::Real;
 
 /// One hypothesis: the world's field walks from pose to pose, with the steps of Student's distribution, and the body
-/// adds an offset. In units of the field.
+/// adds an offset. In units of the field. The magnetometer lags behind the gyroscope: a field that turns is off by its rate of change.
 ///
 /// Its state is the field that the present pose is to measure, in the world frame, rather than the world's field: the poses
 /// measure it directly, with errors that are the same along all axes, so that the equations of the update are short.
 #[derive(Clone, Debug, PartialEq)]
 struct Hypothesis<T: Real> {
     expected: Vector3<T>,
-    offset: Vector3<T>,
-    /// Covariances of the expected field, of the offset with it, and of the offset.
+    /// The offset, and the lag in s.
+    sensor: Vector4<T>,
+    /// Covariances of the expected field, of offset and lag with it, and of these.
     of_expected: Matrix3<T>,
-    of_both: Matrix3<T>,
-    of_offset: Matrix3<T>,
+    of_both: Matrix4x3<T>,
+    of_sensor: Matrix4<T>,
     /// Scale of a step, squared, as learnt.
     step: T,
     poses: T,
-    /// Variance of the offset along each axis before the first pose, and sum of the squares of the angles between poses since.
-    prior: T,
+    /// Variances of offset and lag before the first pose, and sum of the squares of the angles between poses since.
+    prior: Vector4<T>,
     turned: T,
 }
 
@@ -38,13 +40,14 @@ struct Surprise<T> {
 
 impl<T: Real> Hypothesis<T> {
     fn new(deviation: f64) -> Self {
-        let prior = T::of(deviation * deviation);
+        let of_offset = T::of(deviation * deviation);
+        let prior = Vector4::new(of_offset, of_offset, of_offset, T::of(MAGNETOMETER_LAG * MAGNETOMETER_LAG));
         Self {
             expected: Vector3::zeros(),
-            offset: Vector3::zeros(),
+            sensor: Vector4::zeros(),
             of_expected: Matrix3::zeros(),
-            of_both: Matrix3::zeros(),
-            of_offset: Matrix3::from_diagonal_element(prior),
+            of_both: Matrix4x3::zeros(),
+            of_sensor: Matrix4::from_diagonal(&prior),
             step: T::of(FIELD_WALK * FIELD_WALK),
             poses: T::ZERO,
             prior,
@@ -52,18 +55,30 @@ impl<T: Real> Hypothesis<T> {
         }
     }
 
-    /// Begins with a pose: nothing is known of the world's field but what this field tells.
-    fn begin(&mut self, measured: &Vector3<T>) {
-        self.expected = *measured;
-        self.of_expected = Matrix3::from_diagonal_element(self.step);
-        self.of_both = Matrix3::zeros();
+    fn offset(&self) -> Vector3<T> {
+        self.sensor.xyz()
     }
 
-    /// Adds the next pose, by how its rotation differs from that of the last one, with the field measured in it in the world
-    /// frame. `None` if the covariance is singular.
-    fn observe(&mut self, turned: &Matrix3<T>, measured: &Vector3<T>) -> Option<Surprise<T>> {
-        self.expected += turned * self.offset;
-        let moved = self.of_offset * turned.transpose();
+    /// Begins with a pose: nothing is known of the world's field but what this field tells.
+    fn begin(&mut self, pose: &Pose<T>) {
+        self.expected = pose.rotation * pose.field;
+        self.of_expected = Matrix3::from_diagonal_element(self.step);
+        self.of_both = Matrix4x3::zeros();
+    }
+
+    /// How offset and lag enter the field that a pose measures, in the world frame.
+    fn seen(&self, pose: &Pose<T>) -> Matrix3x4<T> {
+        let changing = pose.rotation * pose.rate.cross(&(pose.field - self.offset()));
+        let [x, y, z] = [0, 1, 2].map(|axis| pose.rotation.column(axis).into_owned());
+        Matrix3x4::from_columns(&[x, y, z, changing])
+    }
+
+    /// Adds the pose after the last one. `None` if the covariance is singular.
+    fn observe(&mut self, last: &Pose<T>, pose: &Pose<T>) -> Option<Surprise<T>> {
+        let measured = pose.rotation * pose.field;
+        let turned = self.seen(pose) - self.seen(last);
+        self.expected += turned * self.sensor;
+        let moved = self.of_sensor * turned.transpose();
         let half = turned * (self.of_both + moved * T::HALF);
         let mut of_expected = self.of_expected + half + half.transpose();
         self.of_both += moved;
@@ -76,7 +91,7 @@ impl<T: Real> Hypothesis<T> {
         let (tails, freedom) = (T::of(TAILS), T::of(TAILS + 3.0));
         let weight = freedom / (tails + squared);
         self.poses += T::ONE;
-        self.turned += T::HALF * turned.norm_squared();
+        self.turned += last.squared_angle(&pose.rotation);
         let learnt = weight * squared / T::of(3.0) - T::ONE;
         self.step *= T::ONE + learnt / (self.poses + T::of(FIRST_POSES));
         self.step = self.step.max(T::of(LEAST_WALK * LEAST_WALK));
@@ -87,8 +102,8 @@ impl<T: Real> Hypothesis<T> {
         }
         let gain = self.of_both * inverse;
         self.expected = measured - inverse * residual * white;
-        self.offset += gain * residual;
-        self.of_offset -= gain * self.of_both.transpose();
+        self.sensor += gain * residual;
+        self.of_sensor -= gain * self.of_both.transpose();
         self.of_both = gain * white;
         self.of_expected = (Matrix3::identity() - inverse * white) * white;
         Some(Surprise { determinant, squared })
@@ -100,18 +115,19 @@ impl<T: Real> Hypothesis<T> {
     /// none of them is longer than `part` times the angle of its turn, the square of that along `a` is at most
     /// `part² Σ angle² · aᵀ P (Σ T_iᵀ T_i / step²) P a`, by Cauchy and Schwarz, where `P⁻¹ = 1 / prior + Σ T_iᵀ T_i / step`.
     fn along(&self, along: &Vector3<T>, part: T) -> T {
-        let moved = self.of_offset * along;
+        let along = along.push(T::ZERO);
+        let moved = self.of_sensor * along;
         let variance = along.dot(&moved);
-        if self.prior <= T::ZERO {
+        if self.prior.x <= T::ZERO {
             return variance;
         }
-        let told = (variance - moved.norm_squared() / self.prior).max(T::ZERO);
+        let told = (variance - moved.component_mul(&moved).component_div(&self.prior).sum()).max(T::ZERO);
         variance + part * part * told * self.turned / self.step
     }
 
     /// Variance of the offset along an axis, as the poses tell it.
     fn variance(&self) -> T {
-        self.of_offset.trace() / T::of(3.0)
+        self.of_sensor.fixed_view::<3, 3>(0, 0).trace() / T::of(3.0)
     }
 
     /// The offset, as far as it is larger than its deviation.
@@ -121,26 +137,25 @@ impl<T: Real> Hypothesis<T> {
     /// empirical Bayes approach", Journal of the American Statistical Association 68, 1973.
     fn believed(&self) -> Vector3<T> {
         // With what the field's changes from place to place look like.
-        let unknown = self.of_offset.trace() + T::of(3.0 * PLACES * PLACES);
-        let squared = self.offset.norm_squared();
-        if squared > unknown { self.offset * (T::ONE - unknown / squared) } else { Vector3::zeros() }
+        let unknown = T::of(3.0) * (self.variance() + T::of(PLACES * PLACES));
+        let squared = self.offset().norm_squared();
+        if squared > unknown { self.offset() * (T::ONE - unknown / squared) } else { Vector3::zeros() }
     }
 }
 
-/// A pose with the field measured in it, body frame.
+/// A pose with the angular velocity and the field measured in it, body frame; the field in units of its norm, once that is known.
 #[derive(Clone, Debug, PartialEq)]
 struct Pose<T: Real> {
-    orientation: UnitQuaternion<T>,
     rotation: Matrix3<T>,
+    rate: Vector3<T>,
     field: Vector3<T>,
     age_s: T,
 }
 
 impl<T: Real> Pose<T> {
     /// Twice the versine of the angle to another pose, for a small angle its square.
-    fn squared_angle(&self, orientation: &UnitQuaternion<T>) -> T {
-        let cosine = self.orientation.coords.dot(&orientation.coords);
-        T::of(4.0) * (T::ONE - cosine * cosine)
+    fn squared_angle(&self, rotation: &Matrix3<T>) -> T {
+        T::HALF * (rotation - self.rotation).norm_squared()
     }
 }
 
@@ -198,6 +213,12 @@ impl<T: Real> HardIron<T> {
         self.offset
     }
 
+    /// The present field, body frame, of a measured one at an angular velocity.
+    pub(super) fn field(&self, rate: &Vector3<T>, measured: &Vector3<T>) -> Vector3<T> {
+        let field = measured - self.offset;
+        field - rate.cross(&field) * self.incumbent.sensor.w
+    }
+
     /// Variance of the offset along an axis.
     pub(super) fn variance(&self) -> T {
         self.incumbent.variance() * self.scale() * self.scale()
@@ -218,7 +239,7 @@ impl<T: Real> HardIron<T> {
             return known;
         }
         let variance = of(&self.newcomer);
-        let moved = along.dot(&(self.newcomer.offset - self.incumbent.believed()));
+        let moved = along.dot(&(self.newcomer.offset() - self.incumbent.believed()));
         let odds = (self.odds + T::of(ODDS)).min(T::ZERO).exp();
         let mut part = odds / (T::ONE + odds);
         if !self.is_settled {
@@ -246,9 +267,9 @@ impl<T: Real> HardIron<T> {
     }
 
     /// Returns whether the body has turned enough since the last pose for another, or that is too old.
-    pub(super) fn is_due(&self, orientation: &UnitQuaternion<T>) -> bool {
+    pub(super) fn is_due(&self, rotation: &Matrix3<T>) -> bool {
         self.pose.as_ref().is_none_or(|pose| {
-            pose.age_s > T::of(SHORT_S) || pose.squared_angle(orientation) >= T::of(POSE_TURN * POSE_TURN)
+            pose.age_s > T::of(SHORT_S) || pose.squared_angle(rotation) >= T::of(POSE_TURN * POSE_TURN)
         })
     }
 
@@ -256,49 +277,46 @@ impl<T: Real> HardIron<T> {
     ///
     /// Returns by how much the heading so far was wrong for the offset, in the unit of the field, when another offset is
     /// found, or the same is known much better than when this was said before.
-    pub(super) fn observe(
-        &mut self,
-        orientation: &UnitQuaternion<T>,
-        rotation: &Matrix3<T>,
-        field: &Vector3<T>,
-    ) -> Option<T> {
-        let Some(pose) = self.pose.as_ref().filter(|pose| pose.age_s <= T::of(SHORT_S)) else {
-            self.begin(orientation, rotation, field);
-            return None;
-        };
-        let Some(scale) = self.scale else {
-            // Of a field in any direction, two thirds turn.
-            self.changed += (field - pose.field).norm_squared();
-            self.turned += pose.squared_angle(orientation) * T::of(2.0 / 3.0);
-            if self.turned > T::of(SCALE_TURN * SCALE_TURN) && self.changed > T::ZERO {
-                self.scale = Some((self.changed / self.turned).sqrt());
+    pub(super) fn observe(&mut self, rotation: &Matrix3<T>, rate: &Vector3<T>, field: &Vector3<T>) -> Option<T> {
+        let mut pose = Pose { rotation: *rotation, rate: *rate, field: *field, age_s: T::ZERO };
+        let last = self.pose.take().filter(|last| last.age_s <= T::of(SHORT_S));
+        let (Some(last), Some(scale)) = (&last, self.scale) else {
+            if let Some(last) = last {
+                // Of a field in any direction, two thirds turn.
+                self.changed += (field - last.field).norm_squared();
+                self.turned += last.squared_angle(rotation) * T::of(2.0 / 3.0);
+                if self.turned > T::of(SCALE_TURN * SCALE_TURN) && self.changed > T::ZERO {
+                    self.scale = Some((self.changed / self.turned).sqrt());
+                }
             }
-            self.begin(orientation, rotation, field);
+            pose.field /= self.scale.unwrap_or(T::ONE);
+            self.incumbent.begin(&pose);
+            self.newcomer.begin(&pose);
+            self.pose = Some(pose);
             return None;
         };
-        let turned = rotation - pose.rotation;
-        self.pose = Some(Pose { orientation: *orientation, rotation: *rotation, field: *field, age_s: T::ZERO });
-        let measured = rotation * (field / scale);
-        let of_incumbent = self.incumbent.observe(&turned, &measured);
+        pose.field /= scale;
+        let pose = self.pose.insert(pose);
+        let of_incumbent = self.incumbent.observe(last, pose);
         self.offset = self.incumbent.believed() * scale;
         if !self.is_calibrated {
-            if let (Some(one), Some(other)) = (self.newcomer.observe(&turned, &measured), of_incumbent) {
+            if let (Some(one), Some(other)) = (self.newcomer.observe(last, pose), of_incumbent) {
                 let tails = T::of(TAILS);
                 let nearer = (tails + other.squared) / (tails + one.squared);
                 self.odds += T::HALF * (other.determinant / one.determinant).ln()
                     + T::HALF * T::of(TAILS + 3.0) * nearer.ln();
             }
-            let moved = (self.newcomer.offset - self.incumbent.believed()).norm_squared();
+            let moved = (self.newcomer.offset() - self.incumbent.believed()).norm_squared();
             let variance = self.newcomer.variance();
             if self.odds > T::ZERO && variance < moved {
-                let newcomer = self.another(&measured);
-                self.incumbent = core::mem::replace(&mut self.newcomer, newcomer);
+                self.incumbent = self.newcomer.clone();
+                self.restart();
                 self.offset = self.incumbent.believed() * scale;
                 self.doubted = variance.sqrt();
                 return Some((moved + variance).sqrt() * scale);
             }
             if self.newcomer.poses > T::of(NEWCOMER_POSES) && self.odds < -T::of(ODDS) {
-                self.newcomer = self.another(&measured);
+                self.restart();
             }
         }
         let deviation = self.incumbent.variance().sqrt();
@@ -308,22 +326,14 @@ impl<T: Real> HardIron<T> {
         None
     }
 
-    /// A newcomer that begins with this pose.
-    fn another(&mut self, measured: &Vector3<T>) -> Hypothesis<T> {
+    /// Starts another newcomer at the last pose.
+    fn restart(&mut self) {
         self.odds = -T::of(LATER_ODDS);
         self.is_settled = true;
-        let mut newcomer = Hypothesis::new(ANY_OFFSET);
-        newcomer.step = self.incumbent.step;
-        newcomer.begin(measured);
-        newcomer
-    }
-
-    fn begin(&mut self, orientation: &UnitQuaternion<T>, rotation: &Matrix3<T>, field: &Vector3<T>) {
-        self.pose = Some(Pose { orientation: *orientation, rotation: *rotation, field: *field, age_s: T::ZERO });
-        if let Some(scale) = self.scale {
-            let measured = rotation * (field / scale);
-            self.incumbent.begin(&measured);
-            self.newcomer.begin(&measured);
+        self.newcomer = Hypothesis::new(ANY_OFFSET);
+        self.newcomer.step = self.incumbent.step;
+        if let Some(pose) = &self.pose {
+            self.newcomer.begin(pose);
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Sums over the samples of a window.
 
-use nalgebra::{Matrix3, Vector2, Vector3};
+use nalgebra::{Matrix3, Vector3};
 
 use crate::attitude::Real;
 
@@ -21,8 +21,6 @@ pub(super) struct Window<T: Real> {
     pub(super) squared_rate: T,
     /// Sum of the magnetic fields.
     field: Vector3<T>,
-    /// Sum of the fields' rates of change seen by a sensor that lags.
-    field_rate: Vector2<T>,
     fields: T,
 }
 
@@ -36,7 +34,6 @@ impl<T: Real> Window<T> {
             measured_turn: Vector3::zeros(),
             squared_rate: T::ZERO,
             field: Vector3::zeros(),
-            field_rate: Vector2::zeros(),
             fields: T::ZERO,
         }
     }
@@ -48,20 +45,17 @@ impl<T: Real> Window<T> {
         core::mem::replace(&mut self.half, half) + half
     }
 
-    pub(super) fn add_field(&mut self, field: &Vector3<T>, rate: &Vector2<T>) {
+    pub(super) fn add_field(&mut self, field: &Vector3<T>) {
         self.field += field;
-        self.field_rate += rate;
         self.fields += T::ONE;
     }
 
     pub(super) fn forget_fields(&mut self) {
         self.field = Vector3::zeros();
-        self.field_rate = Vector2::zeros();
         self.fields = T::ZERO;
     }
 
-    /// The mean field, and how its horizontal part changes by a second of lag.
-    pub(super) fn mean_field(&self) -> Option<(Vector3<T>, Vector2<T>)> {
-        (self.fields > T::ZERO).then(|| (self.field / self.fields, self.field_rate / self.fields))
+    pub(super) fn mean_field(&self) -> Option<Vector3<T>> {
+        (self.fields > T::ZERO).then(|| self.field / self.fields)
     }
 }
