@@ -2,8 +2,8 @@
 
 use bb_core::nalgebra::{UnitQuaternion, Vector3};
 use bb_estimators::navigation::state_estimator::{
-    AttitudeReading, Both, Event, EventSink, FlightControllerState, FlightNavigator, GpsHealth, GpsHealthReading,
-    Level, PoseAnchor, StateEstimatorConfig, StrategyKind, TracingSink,
+    AttitudeReading, Event, EventSink, FlightControllerState, FlightNavigator, GpsHealth, GpsHealthReading, Level,
+    PoseAnchor, StateEstimatorConfig, StrategyKind, TracingSink,
 };
 use bb_estimators::navigation::{Geodetic, ImuMean};
 use serde_json::Value;
@@ -37,20 +37,25 @@ impl<'a> MakeWriter<'a> for Lines {
     }
 }
 
+/// A log with a recorder beside it.
 #[derive(Default)]
-struct Kept(Vec<Event>);
+struct Recorded {
+    log: TracingSink,
+    events: Vec<Event>,
+}
 
-impl EventSink for Kept {
+impl EventSink for Recorded {
     fn event(&mut self, event: &Event) {
-        self.0.push(*event);
+        self.log.event(event);
+        self.events.push(*event);
     }
 }
 
 /// A hover in which something of every level happens; its events.
 fn hover(strategy: StrategyKind) -> Vec<Event> {
     let config = StateEstimatorConfig { strategy, ..StateEstimatorConfig::default() };
-    let mut estimator: FlightNavigator<Both<TracingSink, Kept>> =
-        FlightNavigator::new(config, Both::default()).expect("the defaults are in range");
+    let mut estimator: FlightNavigator<Recorded> =
+        FlightNavigator::new(config, Recorded::default()).expect("the defaults are in range");
     let position = Geodetic::from_degrees(48.0, 11.0, 500.0);
     let level = UnitQuaternion::identity();
     let attitude =
@@ -86,7 +91,7 @@ fn hover(strategy: StrategyKind) -> Vec<Event> {
     for tenth in 20..=70 {
         estimator.tick(tenth * SECOND / 10);
     }
-    std::mem::take(&mut estimator.sink_mut().1.0)
+    std::mem::take(&mut estimator.sink_mut().events)
 }
 
 fn logged(strategy: StrategyKind, most: LevelFilter) -> (Vec<Value>, Vec<Event>) {
