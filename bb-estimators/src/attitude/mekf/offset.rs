@@ -66,7 +66,7 @@ impl<T: Real> Hypothesis<T> {
         self.of_both = Matrix4x3::zeros();
     }
 
-    /// How offset and lag enter the field that a pose measures, in the world frame.
+    /// Derivatives of the field that a pose measures by offset and lag, in the world frame.
     fn seen(&self, pose: &Pose<T>) -> Matrix3x4<T> {
         let changing = pose.rotation * pose.rate.cross(&(pose.field - self.offset()));
         let [x, y, z] = [0, 1, 2].map(|axis| pose.rotation.column(axis).into_owned());
