@@ -17,7 +17,7 @@ struct Gait {
     swing: f64,
     second: f64,
     phase: f64,
-    /// How far the hip turns and leans, rad.
+    /// Amplitudes of the turn and the lean of the hip, rad.
     yaw: f64,
     roll: f64,
     first_heading: f64,
