@@ -65,7 +65,7 @@ impl Gait {
     }
 }
 
-/// A walker of a seed, with a lag of up to 20 ms, who stands first and perhaps rests now and then.
+/// A walker of a seed, with a lag of up to 20 ms, who waits first and perhaps rests now and then.
 pub(super) fn walker(seed: u64) -> Outcome {
     let random = &mut Random::new(seed ^ 0x5EED_0000);
     let length_s = uniform(random, (60.0, 240.0));

@@ -21,8 +21,7 @@ use crate::node::Mode;
 use crate::pubsub::DynamicMessage;
 use crate::schedule::Lane;
 use crate::time::MonotonicTime;
-use bb_message::__private::member_of;
-use bb_message::__private::{did_you_mean, nearest_path};
+use bb_message::__private::{did_you_mean, member_of, nearest_path};
 use std::sync::Arc;
 use std::time::Duration;
 
