@@ -247,15 +247,15 @@ fn nothing_is_allocated_at_a_keyframe() -> Result<(), Box<dyn std::error::Error>
     }
     let mut result = Ok(());
     let allocations = allocation_counter::measure(|| {
-        result = (30..400).try_for_each(|k| keyframe(&mut smoother, k));
+        result = (30..150).try_for_each(|k| keyframe(&mut smoother, k));
     });
     result?;
     assert_eq!(allocations.count_total, 0);
     // It has seen all of it.
     let counts = poses.counts();
-    assert!(counts.gate > 20 && counts.invalid > 20 && counts.not_applicable > 20, "{counts:?}");
+    assert!(counts.gate > 5 && counts.invalid > 20 && counts.not_applicable > 20, "{counts:?}");
     let seen = sights.counts();
-    assert!(seen.fused + seen.weighed_down > 500 && seen.gate > 20 && seen.not_applicable > 100, "{seen:?}");
-    assert!(moved > 100 && smoother.gaps() > 7 && smoother.marginalised() > 350, "{moved}");
+    assert!(seen.fused + seen.weighed_down > 200 && seen.gate > 5 && seen.not_applicable > 40, "{seen:?}");
+    assert!(moved > 40 && smoother.gaps() > 2 && smoother.marginalised() > 100, "{moved}");
     Ok(())
 }

@@ -12,7 +12,7 @@ use bb_tests::random::Random;
 use std::f64::consts::{PI, TAU};
 
 /// Number of runs: few without optimization, all in the long tests.
-const RUNS: u64 = if cfg!(debug_assertions) { 40 } else { 1000 };
+const RUNS: u64 = if cfg!(debug_assertions) { 20 } else { 1000 };
 
 /// The part of a run in which a trusted heading may be further off.
 const MOST: f64 = 0.02;

@@ -8,7 +8,7 @@ python_with() {
     local folder="${CARGO_TARGET_DIR:-$PWD/target}/python"
     python="$folder/bin/python"
     [ -x "$python" ] || python3 -m venv "$folder"
-    "$python" -m pip install --quiet --disable-pip-version-check "$@"
+    "$python" -m pip install --quiet --no-compile --disable-pip-version-check "$@"
 }
 
 # Runs tests of the workspace that are ignored otherwise, by the words in their names, with what `cargo test --workspace` has built.

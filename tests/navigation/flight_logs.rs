@@ -8,7 +8,9 @@ use bb_estimators::navigation::state_estimator::{
 use bb_estimators::navigation::{Geodetic, ImuMean};
 use serde_json::Value;
 use std::io::Write;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, LazyLock, Mutex, PoisonError};
+use tracing::Dispatch;
+use tracing::subscriber::NoSubscriber;
 use tracing_subscriber::filter::LevelFilter;
 use tracing_subscriber::fmt::MakeWriter;
 
@@ -95,6 +97,10 @@ fn hover(strategy: StrategyKind) -> Vec<Event> {
 }
 
 fn logged(strategy: StrategyKind, most: LevelFilter) -> (Vec<Value>, Vec<Event>) {
+    // As long as there is one subscriber, tracing asks that of the thread which comes first whether a line is of interest to
+    // any: a test without one would decide for all.
+    static ANOTHER: LazyLock<Dispatch> = LazyLock::new(|| Dispatch::new(NoSubscriber::new()));
+    LazyLock::force(&ANOTHER);
     let lines = Lines::default();
     let subscriber = tracing_subscriber::fmt().json().with_max_level(most).with_writer(lines.clone()).finish();
     let events = tracing::subscriber::with_default(subscriber, || hover(strategy));

@@ -278,7 +278,7 @@ fn drive() -> Result<Driven, Box<dyn std::error::Error>> {
 #[test]
 fn each_sensor_fails_in_turn_and_the_robot_says_so() -> Result<(), Box<dyn std::error::Error>> {
     let (table, seen) = drive()?;
-    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/sensor_failures.txt");
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/navigation/sensor_failures.txt");
     if std::env::var_os("UPDATE_EXPECTED").is_some() {
         std::fs::write(file, &table)?;
     }

@@ -1,4 +1,4 @@
-//! Filters with all states that there are, in a thread whose stack is half of what a small thread has, 1 MiB, not optimised.
+//! Filters with all states that there are, not optimised, in a thread with half of the stack that a thread has by default.
 
 use bb_core::nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use bb_core::payload::{
@@ -49,7 +49,7 @@ robot! {
     }
 }
 
-const STACK: usize = 512 << 10;
+const STACK: usize = 1 << 20;
 
 fn on_a_small_stack<T: Send + 'static>(run: impl FnOnce() -> T + Send + 'static) -> T {
     let thread = std::thread::Builder::new().stack_size(STACK).spawn(run).expect("there is room for a thread");

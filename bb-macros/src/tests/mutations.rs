@@ -107,23 +107,23 @@ fn check_mutated(robot: &str, rounds: u64) {
 
 #[test]
 fn mutations_of_a_whole_robot_are_no_panic() {
-    check_mutated(WHOLE, 500);
+    check_mutated(WHOLE, 250);
 }
 
 #[test]
 fn mutations_of_an_acting_robot_are_no_panic() {
-    check_mutated(ACTING, 400);
+    check_mutated(ACTING, 200);
 }
 
 #[test]
 fn mutations_of_small_robots_are_no_panic() {
-    SMALL.iter().for_each(|robot| check_mutated(robot, 4_000));
+    SMALL.iter().for_each(|robot| check_mutated(robot, 2_000));
 }
 
 #[test]
 fn stray_tokens_are_no_panic() {
     let stray: Vec<TokenTree> = tokens(STRAY).into_iter().collect();
-    for seed in 0..5_000 {
+    for seed in 0..2_500 {
         let mut random = Random::new(seed);
         let start = if random.below(2) == 0 { "robot Rover;" } else { "" };
         let count = random.below(30);

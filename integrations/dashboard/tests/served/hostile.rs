@@ -187,7 +187,7 @@ fn a_viewer_that_is_stopped_or_killed_costs_the_robot_nothing() -> Result<(), Bo
         taken.sort_unstable();
         taken[taken.len() - 1 - taken.len() / 1000]
     };
-    let alone = feed(2.0);
+    let alone = feed(1.0);
     let mut viewer = Command::new(std::env::current_exe()?)
         .args(["--ignored", "--exact", "hostile::viewer_in_another_process", "--nocapture"])
         .env(VIEWER, dashboard.address().to_string())
@@ -195,12 +195,12 @@ fn a_viewer_that_is_stopped_or_killed_costs_the_robot_nothing() -> Result<(), Bo
         .spawn()?;
     let output = BufReader::new(viewer.stdout.take().ok_or("it is piped")?);
     let watching = std::thread::spawn(move || output.lines().map_while(Result::ok).any(|line| line == "watching"));
-    let watched = feed(4.0);
+    let watched = feed(2.0);
     assert!(watching.is_finished() && watching.join().is_ok_and(|is_watching| is_watching), "it watches");
     let before = resident()?;
     signal(&viewer, "-STOP")?;
     // Longer than a message to it may take.
-    let stopped = feed(7.0);
+    let stopped = feed(6.0);
     let grown = resident()?.saturating_sub(before);
     let served = |what: &str| -> Result<(), Box<dyn Error>> {
         let start = Instant::now();
@@ -215,7 +215,7 @@ fn a_viewer_that_is_stopped_or_killed_costs_the_robot_nothing() -> Result<(), Bo
     signal(&viewer, "-KILL")?;
     viewer.wait()?;
     served("killed")?;
-    let killed = feed(2.0);
+    let killed = feed(1.0);
     println!(
         "p99.9 alone {alone:?}, watched {watched:?}, stopped {stopped:?}, killed {killed:?}; {grown} bytes more"
     );

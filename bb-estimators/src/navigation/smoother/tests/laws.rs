@@ -19,7 +19,7 @@ fn differ(a: &SMatrix<f64, N, N>, b: &SMatrix<f64, N, N>) -> f64 {
 }
 
 laws! {
-    #![proptest_config(ProptestConfig::with_cases(16))]
+    #![proptest_config(ProptestConfig::with_cases(8))]
 
     /// Information that leaves the window is not lost: with linear factors, the result matches the one with all keyframes. Also with
     /// relative poses between keyframes that are not neighbours.

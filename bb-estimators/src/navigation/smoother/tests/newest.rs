@@ -95,7 +95,7 @@ fn in_the_usual_order_only_the_newest_is_eliminated() {
 }
 
 laws! {
-    #![proptest_config(ProptestConfig::with_cases(24))]
+    #![proptest_config(ProptestConfig::with_cases(12))]
 
     /// Whatever changes in the window: observations, positions and relative poses that come late, at any keyframe, before or
     /// after the others or the update; weights; tracks that begin and end, and relinearised

@@ -18,7 +18,7 @@ fn carrying(window: usize) -> Smoother {
 }
 
 laws! {
-    #![proptest_config(ProptestConfig::with_cases(48))]
+    #![proptest_config(ProptestConfig::with_cases(24))]
 
     /// Information that leaves the window is not lost, however long the tracks are.
     #[test]
@@ -45,7 +45,7 @@ laws! {
 /// window.
 #[test]
 fn errors_are_as_large_as_the_smoother_says() {
-    const FLIGHTS: u32 = 100;
+    const FLIGHTS: u32 = 40;
     const KEYFRAMES: usize = 60;
     for guess in [None, Some(5.0)] {
         let params = SmootherParams { sensors: sensors(), window: 8, ..SmootherParams::default() };

@@ -334,7 +334,7 @@ fn add(estimator: &mut Estimator, step: &Step, now_ns: i64) -> Vec<Result<(), Es
 }
 
 laws! {
-    #![proptest_config(ProptestConfig::with_cases(12))]
+    #![proptest_config(ProptestConfig::with_cases(6))]
 
     /// Late samples may be run at any time: each at once, since somebody reads after each input, or many together when somebody reads at
     /// last: each input becomes the same, and so does what is read. And both are as in order.
