@@ -1,5 +1,3 @@
-//! Recordings of robots, bags of other programs, and journals.
+//! Bags of other programs.
 
 mod bags;
-mod journal;
-mod recordings;

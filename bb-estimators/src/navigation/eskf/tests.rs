@@ -49,22 +49,12 @@ impl States for Drone {
     const OPTIONAL: &'static [Optional] = &[Optional::Keyframe, Optional::RelativeScale];
 }
 
-/// A compass and a barometer.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Boat;
-
-impl States for Boat {
-    const OPTIONAL: &'static [Optional] = &[Optional::BarometerBias, Optional::HardIron];
-}
-
 /// Calls a macro with every configuration whose laws are tested.
 macro_rules! configurations {
     ($macro:ident) => {
         $macro! {
-            plain: Navigation;
             rover: Rover;
             drone: Drone;
-            boat: Boat;
             all: All;
         }
     };

@@ -286,10 +286,8 @@ fn the_offset_of_the_clock_is_written_once() {
 
 #[test]
 fn the_layout_for_foxglove_names_topics_and_fields_that_are_there() {
-    let layout = std::fs::read_to_string(concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../../book/src/reference/foxglove-layout.json"
-    ));
+    let layout =
+        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../book/src/reference/foxglove-layout.json"));
     let layout = layout.expect("the guide names it");
     let (file, _) = recorded("layout");
     let recording = Recording::open(&file).expect("it was recorded");

@@ -2,6 +2,7 @@
 
 mod damage;
 mod dates;
+mod journal;
 mod kill;
 mod moving;
 mod played;
