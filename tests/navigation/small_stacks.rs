@@ -1,4 +1,5 @@
-//! Filters with all states that there are, not optimised, in a thread with half of the stack that a thread has by default.
+//! Filters with all states that there are, their generic code not optimised, in a thread with half of the stack that a thread has by
+//! default.
 
 use bb_core::nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use bb_core::payload::{

@@ -53,6 +53,7 @@ impl States for Drone {
 macro_rules! configurations {
     ($macro:ident) => {
         $macro! {
+            plain: Navigation;
             rover: Rover;
             drone: Drone;
             all: All;

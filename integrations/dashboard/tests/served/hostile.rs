@@ -187,7 +187,7 @@ fn a_viewer_that_is_stopped_or_killed_costs_the_robot_nothing() -> Result<(), Bo
         taken.sort_unstable();
         taken[taken.len() - 1 - taken.len() / 1000]
     };
-    let alone = feed(1.0);
+    let alone = feed(2.0);
     let mut viewer = Command::new(std::env::current_exe()?)
         .args(["--ignored", "--exact", "hostile::viewer_in_another_process", "--nocapture"])
         .env(VIEWER, dashboard.address().to_string())
@@ -215,7 +215,7 @@ fn a_viewer_that_is_stopped_or_killed_costs_the_robot_nothing() -> Result<(), Bo
     signal(&viewer, "-KILL")?;
     viewer.wait()?;
     served("killed")?;
-    let killed = feed(1.0);
+    let killed = feed(2.0);
     println!(
         "p99.9 alone {alone:?}, watched {watched:?}, stopped {stopped:?}, killed {killed:?}; {grown} bytes more"
     );

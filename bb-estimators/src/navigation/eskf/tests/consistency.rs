@@ -7,7 +7,7 @@ use super::super::propagation::Transition;
 use super::{All, Drone, Rover, configurations, sample};
 use crate::navigation::math::{exp, rotation, sqrt};
 use crate::navigation::noise::Noise;
-use crate::navigation::state::{Estimate, NAVIGATION, Optional, States, offset};
+use crate::navigation::state::{Estimate, NAVIGATION, Navigation, Optional, States, offset};
 use crate::navigation::{
     BarometricHeight, EskfFilter, EskfParams, GaussMarkov, GnssHeading, GnssPosition, GnssVelocity, ImuMean,
     MagneticField, Measurement, RelativePose, Start, Stream, StreamParams, WheelSpeed, nees,

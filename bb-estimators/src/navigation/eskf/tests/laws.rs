@@ -6,7 +6,9 @@ use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
 
 use super::{All, Drone, Estimate, Rover, configurations, estimate, orientation, sample, started, vector};
-use crate::navigation::state::{ACCELEROMETER_BIAS, GYROSCOPE_BIAS, Optional, POSITION, States, offset};
+use crate::navigation::state::{
+    ACCELEROMETER_BIAS, GYROSCOPE_BIAS, Navigation, Optional, POSITION, States, offset,
+};
 use crate::navigation::{
     AbsolutePose, BarometricHeight, EskfFilter, EskfParams, GnssPosition, GnssVelocity, ImuMean, MagneticField,
     Refusal, RelativePose, Start, Stream, StreamParams, WheelSpeed,
