@@ -59,7 +59,6 @@ pub mod journal;
 pub mod pubsub;
 pub mod run;
 pub mod telemetry;
-pub mod time;
 
 #[allow(clippy::panic, reason = "a fault is a panic at compile time, which rustc reports")]
 mod check;
@@ -68,7 +67,6 @@ mod fault;
 mod lifecycle;
 mod node;
 mod schedule;
-mod sorted;
 mod stub;
 
 #[doc(inline)]
@@ -77,7 +75,7 @@ pub use bb_kinematics::{kinematics, topology};
 pub use bb_macros::robot;
 pub use bb_macros::{Inputs, Options, Outputs};
 #[doc(inline)]
-pub use bb_message::{message, payload};
+pub use bb_message::{message, payload, time};
 pub use component::{
     Actuator, ActuatorContext, Bus, Command, CommandContext, Context, Estimator, Every, HandleCall, HandleCast,
     Info, Input, Inputs, Options, Outcome, Outputs, Reading, Reply, Request, RequestCodec, SafetyLink, Sensor,

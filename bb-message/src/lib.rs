@@ -2,7 +2,7 @@
 //!
 //! | what | where |
 //! |---|---|
-//! | instants | [`instant`] |
+//! | instants; the clock, real or virtual, and those of devices | [`time`] |
 //! | a payload with its time, frame and origin; as bytes, as a ROS message, as JSON | [`message`], [`message::codec`] |
 //! | the standard payloads, in SI units | [`payload`] |
 //! | what an estimator emits: payloads | [`outputs`] |
@@ -15,10 +15,12 @@
 // The derives name the crate of their users by its absolute path, also here.
 extern crate self as bb_core;
 
-pub mod instant;
 pub mod message;
 pub mod outputs;
 pub mod payload;
+pub mod time;
+
+mod sorted;
 
 #[doc(hidden)]
 pub use message::{Field, Finite, Payload};
@@ -26,7 +28,6 @@ pub use message::{Field, Finite, Payload};
 /// Items for the runtime and the expansions of the macros. Not for users: they change without notice.
 #[doc(hidden)]
 pub mod __private {
-    pub use crate::instant::nanos_of;
     pub use crate::message::codec::derive::{FieldOf, NotField, is_any, is_finite};
     pub use crate::message::codec::intern::intern;
     pub use crate::message::codec::json::{
@@ -40,4 +41,7 @@ pub mod __private {
         Exceeded, JointBounds, JointCommand, JointPositions, JointReading, OutOfBounds, Stamped, Transmission,
     };
     pub use crate::outputs::unknown::{NoField, UNKNOWN_INDEX, Unknown};
+    pub use crate::sorted::Sorted;
+    pub use crate::time::instant::nanos_of;
+    pub use crate::time::stopwatch::{Reading, Stopwatch};
 }

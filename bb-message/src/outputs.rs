@@ -4,8 +4,8 @@
 
 pub(crate) mod unknown;
 
-use crate::instant::{MonotonicTime, WallTime};
 use crate::message::{Payload, Stamp, Stamped};
+use crate::time::{MonotonicTime, WallTime};
 
 /// The output of an estimator.
 ///

@@ -34,7 +34,7 @@ const KEYFRAMES: (usize, usize) = (60, 160);
 
 /// Steps, in `f64`. Those of `EskfFilter` have 15 states, those of the attitude filters read the orientation too.
 pub(crate) const STEPS: &[Step] = &[
-    Step { name: "hop/none", on: None, steps: USUAL, stored: 224.0, run: hop::direct },
+    Step { name: "hop/none", on: None, steps: USUAL, stored: 212.0, run: hop::direct },
     // Sixteen hops each.
     Step { name: "hop/chain_16", on: Some("hop/none"), steps: USUAL, stored: 3782.0, run: hop::chain },
     Step { name: "hop/chain_16_measured", on: Some("hop/none"), steps: USUAL, stored: 6252.0, run: hop::measured },

@@ -1,7 +1,7 @@
 //! The replacement of a declared component.
 
 use crate::message::JointSide;
-use crate::sorted::Sorted;
+use bb_message::__private::Sorted;
 use std::any::Any;
 use std::fmt;
 use std::sync::Arc;

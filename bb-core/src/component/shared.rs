@@ -1,7 +1,7 @@
 //! Values that components of a run share.
 
 use crate::fault::lock;
-use crate::sorted::Sorted;
+use bb_message::__private::Sorted;
 use std::any::{Any, TypeId};
 use std::sync::{Arc, Mutex};
 

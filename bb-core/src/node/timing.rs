@@ -1,7 +1,8 @@
 //! Durations of the callbacks of a turn.
 
 use super::environment::{Environment, Mode};
-use crate::time::{MonotonicTime, Reading, Stopwatch};
+use crate::time::MonotonicTime;
+use bb_message::__private::{Reading, Stopwatch};
 use std::cell::Cell;
 
 /// The reads of the clock and of the counter in one turn. The clock is read once and the counter once per callback, since the end

@@ -2,8 +2,7 @@
 
 use super::any::AnyTopic;
 use super::select::{ANY_NAME, Payloads, Select};
-use crate::sorted::Sorted;
-use bb_message::__private::{nearest, nearest_path};
+use bb_message::__private::{Sorted, nearest, nearest_path};
 use std::fmt;
 
 /// A part of a subscription that matches nothing when the subscription is created: a path, a subtree or a payload's

@@ -2,12 +2,13 @@
 //! moving joints.
 
 use crate::declaration::{EstimatorDeclaration, RobotDeclaration};
-use crate::joints::{JointSettings, Joints, RouteOf};
+use crate::joints::{JointSettings, Joints};
 use crate::kinematics::KinematicsError;
 use crate::message::Frame;
 use crate::pubsub::AnyTopic;
-use crate::sorted::Sorted;
 use crate::time::Clock;
+use bb_kinematics::__private::RouteOf;
+use bb_message::__private::Sorted;
 
 pub(super) fn known_joints(
     robot: &RobotDeclaration,

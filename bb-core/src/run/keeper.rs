@@ -5,7 +5,7 @@ use crate::control::Control;
 use crate::event::ParameterValue;
 use crate::fault::{caught, discard, guarded, lock, log_panic};
 use crate::schedule::start_thread;
-use crate::sorted::Sorted;
+use bb_message::__private::Sorted;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -158,7 +158,7 @@ impl Work {
 
     /// Stores a change that came with the end, or one that was not stored before. Whether all is stored then.
     fn store_rest(&mut self, is_stored: bool) -> bool {
-        if is_stored && lock(&self.desk.state).changed.len() == 0 { true } else { self.store() }
+        if is_stored && lock(&self.desk.state).changed.is_empty() { true } else { self.store() }
     }
 
     fn store(&mut self) -> bool {

@@ -13,8 +13,8 @@ use crate::lifecycle::{AfterFault, AsSensor, Recipe, Slot};
 use crate::message::{Payload as _, Stamped};
 use crate::node::{BindTarget, Environment};
 use crate::pubsub::{DynamicMessage, Enter};
-use crate::sorted::Sorted;
 use crate::time::{Clock, MonotonicTime};
+use bb_message::__private::Sorted;
 use std::sync::Arc;
 
 /// Shared state from which components are created.

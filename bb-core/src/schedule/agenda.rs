@@ -2,8 +2,8 @@
 
 use super::Bell;
 use crate::fault::lock;
-use crate::sorted::Sorted;
 use crate::time::MonotonicTime;
+use bb_message::__private::Sorted;
 use std::sync::{Arc, Mutex};
 
 /// Islands with something due, ordered by time and then by number, so the order is the same in every run.

@@ -2,8 +2,8 @@
 
 use super::Bell;
 use crate::fault::lock;
-use crate::sorted::Sorted;
 use crate::time::MonotonicTime;
+use bb_message::__private::Sorted;
 use std::sync::Mutex;
 
 /// Deadlines by key, at most one for each; equal times are in the order of the keys.

@@ -2,8 +2,8 @@
 
 use super::{Bell, Lane};
 use crate::fault::lock;
-use crate::sorted::Sorted;
 use crate::time::MonotonicTime;
+use bb_message::__private::Sorted;
 use std::sync::{Arc, Mutex};
 use std::task::Waker;
 

@@ -1,8 +1,8 @@
 //! The frames of a robot as ROS transform messages.
 
 use super::{Joint, JointKind, Topology};
-use bb_message::instant::WallTime;
 use bb_message::message::codec::ros::{Header, Time, TransformStamped, TransformsMessage};
+use bb_message::time::WallTime;
 use nalgebra::{Isometry3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
 
 impl Topology {

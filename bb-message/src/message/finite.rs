@@ -1,6 +1,6 @@
 //! Checks that data holds no NaN and no infinity.
 
-use crate::instant::{MonotonicTime, WallTime};
+use crate::time::{MonotonicTime, WallTime};
 use nalgebra::{Dim, Isometry3, Matrix, Quaternion, RawStorage, Unit};
 use std::sync::Arc;
 use std::time::Duration;

@@ -1,7 +1,7 @@
 //! A payload with its time, frame and origin.
 
 use super::Payload;
-use crate::instant::{MonotonicTime, WallTime};
+use crate::time::{MonotonicTime, WallTime};
 use std::fmt;
 use std::ops::Deref;
 

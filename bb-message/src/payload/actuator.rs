@@ -1,9 +1,9 @@
 //! Commands to an actuator, and its reports of a motion. The message's frame names the joint.
 
 use super::JointTrajectory;
-use crate::instant::MonotonicTime;
 use crate::message::Payload;
 use crate::message::{Exceeded, JointBounds, JointCommand, OutOfBounds, Transmission};
+use crate::time::MonotonicTime;
 
 /// A command to an actuator that takes all standard commands. The limits of the joint are applied before it gets one.
 #[derive(Clone, Debug, PartialEq, Payload)]

@@ -1,7 +1,7 @@
 //! Poses along a path, and relative poses.
 
-use crate::instant::{MonotonicTime, WallTime};
 use crate::message::Payload;
+use crate::time::{MonotonicTime, WallTime};
 use nalgebra::{Matrix6, UnitQuaternion, Vector3};
 use std::sync::Arc;
 

@@ -4,6 +4,7 @@ use super::Bus;
 use crate::component::host::{ExternalSensor, Host};
 use crate::component::{Caller, Fault};
 use crate::event::Right;
+use crate::joints::TELLING_PATHS;
 use crate::message::codec::json_to_bytes;
 use crate::message::{Frame, Payload, Stamp};
 use crate::pubsub::{AnyTopic, DynamicMessage, Encoded, Enter, Gate, Publisher, Tell};
@@ -288,6 +289,8 @@ impl Gate for Entrance {
     }
 
     fn hear(&self, path: &str, stamp: Stamp, now: MonotonicTime, tell: &Tell<'_>) {
-        self.host.joints().hear_at(path, stamp, now, tell);
+        if TELLING_PATHS.includes(path) {
+            self.host.joints().hear_at(path, stamp, now, tell);
+        }
     }
 }

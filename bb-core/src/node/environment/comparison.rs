@@ -1,7 +1,7 @@
 //! Comparison of a replay with its journal.
 
 use super::lock;
-use crate::sorted::Sorted;
+use bb_message::__private::Sorted;
 use std::collections::VecDeque;
 use std::sync::Mutex;
 

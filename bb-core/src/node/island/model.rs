@@ -9,7 +9,7 @@ use crate::component::{DisarmHook, Guardian};
 use crate::declaration::ParameterValues;
 use crate::event::HardwareError;
 use crate::fault::Failed;
-use crate::joints::Joints;
+use crate::joints::{JointSettings, Joints};
 use crate::journal::Event;
 use crate::lifecycle::Supervision;
 use crate::message::Origin;
@@ -17,6 +17,8 @@ use crate::node::act::Act;
 use crate::node::{BindTarget, Check, Environment, EnvironmentParts, Mode, NodeEntry, Overseer, Report, Turn};
 use crate::schedule::{Agenda, Bell, Pool};
 use crate::time::{Clock, MonotonicTime};
+use crate::topology::Topology;
+use bb_message::__private::Sorted;
 use loom::sync::Arc;
 use loom::sync::atomic::{AtomicUsize, Ordering};
 use loom::thread;
@@ -89,6 +91,14 @@ impl Overseer for Nobody {
     }
 }
 
+/// The joints of a robot without links.
+fn no_joints() -> Joints {
+    const NONE: Topology = Topology { links: &[], joints: &[] };
+    let clock = Clock::virtual_at(NOW);
+    let joints = Joints::new(&NONE, JointSettings::default(), clock, Sorted::default(), &[]);
+    joints.expect("nothing is wrong with no joints")
+}
+
 /// Virtual time: a control entry is only noted, and the thread that posts it drains the island as the pool would.
 fn environment() -> Environment {
     let parts = EnvironmentParts {
@@ -102,7 +112,7 @@ fn environment() -> Environment {
         pool: Pool::new(|| {}),
         journal: None,
         telemetry: None,
-        joints: Joints::of_none(Clock::virtual_at(NOW)),
+        joints: no_joints(),
         start: NOW,
     };
     Environment::new(parts, Box::default())

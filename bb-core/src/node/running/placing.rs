@@ -3,12 +3,13 @@
 use crate::component::replacement::Replacement;
 use crate::component::{Fault, InputTransform, InputTransforms};
 use crate::declaration::EstimatorDeclaration;
-use crate::joints::{Gap, InputRoute, LookupError, PlacedInput, Placement};
+use crate::joints::{Gap, LookupError, PlacedInput, Placement};
 use crate::node::admission::Admission;
 use crate::node::environment::{Environment, Missing, Mode};
 use crate::node::shared::SharedNode;
 use crate::node::turn::Turn;
 use crate::time::MonotonicTime;
+use bb_kinematics::__private::InputRoute;
 use nalgebra::Isometry3;
 use std::sync::Arc;
 

@@ -3,8 +3,8 @@
 use super::{Entry, Queue, State};
 use crate::pubsub::delivery::{Delivery, Overflow};
 use crate::pubsub::timer::Timer;
-use crate::sorted::Sorted;
 use crate::time::MonotonicTime;
+use bb_message::__private::Sorted;
 use std::mem::{replace, take};
 use std::sync::{Arc, Weak};
 use std::task::{Wake, Waker};

@@ -2,6 +2,7 @@
 
 use super::Replayer;
 use crate::fault::{discard, guarded, log_panic};
+use crate::joints::TELLING_PATHS;
 use crate::journal::{Recorded, decoded};
 use crate::node::Replayed;
 use crate::pubsub::{AnyTopic, DynamicMessage};
@@ -51,8 +52,10 @@ impl Replayer {
         match declared {
             Some(topic) => publish(topic, message, |_| ()),
             None => publish(&*self.own_topic(path, &message)?, message, |message| {
-                let joints = self.machine.environment.joints();
-                joints.hear_at(path, message.stamp(), time, &|listener| message.tell_joints(listener));
+                if TELLING_PATHS.includes(path) {
+                    let joints = self.machine.environment.joints();
+                    joints.hear_at(path, message.stamp(), time, |listener| message.tell_joints(listener));
+                }
             }),
         }
     }

@@ -7,8 +7,7 @@ use crate::event::ParameterValue;
 use crate::message::codec::to_json;
 use crate::run::bound::{bound_to, fields, refused_by_bound};
 use crate::run::draft::Draft;
-use crate::sorted::Sorted;
-use bb_message::__private::{nearest, nearest_path};
+use bb_message::__private::{Sorted, nearest, nearest_path};
 
 /// Text by which a file writes `None` for an option that may be `None`.
 pub(super) const NULL_TEXT: &str = "\"null\"";

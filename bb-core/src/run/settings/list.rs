@@ -7,8 +7,7 @@ use crate::event::ParameterValue;
 use crate::message::codec::to_json;
 use crate::run::bound::bound_to;
 use crate::run::draft::Draft;
-use crate::sorted::Sorted;
-use bb_message::__private::{elements_of, members_of};
+use bb_message::__private::{Sorted, elements_of, members_of};
 use std::fmt;
 
 /// All settings of a robot with their values. Its `Display` is a TOML file, with the doc, the range and the unit of each.

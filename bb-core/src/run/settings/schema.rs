@@ -7,8 +7,7 @@ use crate::declaration::schema::{number, parameter_schema, quantity, with_notes}
 use crate::declaration::unit::si_unit;
 use crate::message::codec::{Shape, to_json};
 use crate::run::bound::bound_to;
-use crate::sorted::Sorted;
-use bb_message::__private::{Definitions, document, member};
+use bb_message::__private::{Definitions, Sorted, document, member};
 
 pub(crate) fn settings_schema(robot: &RobotDeclaration, mut options: OptionsList) -> String {
     let mut definitions = Definitions::default();

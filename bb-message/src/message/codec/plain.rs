@@ -2,7 +2,7 @@
 
 use super::intern::{MAX_NAME_BYTES, intern};
 use super::{DecodeError, Field, FieldShape, Reader, Shape, StructShape, Writer};
-use crate::instant::{MonotonicTime, WallTime};
+use crate::time::{MonotonicTime, WallTime};
 use std::time::Duration;
 
 macro_rules! numbers {

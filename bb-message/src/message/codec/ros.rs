@@ -81,7 +81,7 @@ macro_rules! ros_message {
 
             fn from_ros(
                 message: $name,
-            ) -> Result<(Self, crate::instant::WallTime), crate::message::DecodeError> {
+            ) -> Result<(Self, crate::time::WallTime), crate::message::DecodeError> {
                 let $name { header, $($field,)* } = message;
                 Ok(($read, header.stamp.wall_time()))
             }
@@ -106,8 +106,8 @@ pub(in crate::message::codec) use standard::ServiceEventInfo;
 pub use standard::{Byte, Header, Text, Time, TransformStamped, TransformsMessage};
 
 use super::{DecodeError, Field, Reader, Shape, Writer};
-use crate::instant::WallTime;
 use crate::message::{Payload, Stamped};
+use crate::time::WallTime;
 
 /// The frame that poses and orientations are given in: east, north, up.
 pub const WORLD: &str = "world";

@@ -5,8 +5,8 @@ use super::{
     DecodeError, Field, FieldShape, Reader, RosCompanion, RosLayout, Schema, Shape, StructShape, Writer,
     json_schema, type_hash,
 };
-use crate::instant::WallTime;
 use crate::message::{Finite, Frame, Origin, Payload, Stamp, Stamped};
+use crate::time::WallTime;
 
 /// The layouts in which messages of one payload are written, for programs that do not know its type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,10 +1,10 @@
 //! Round trips bit for bit, bytes from anywhere, and what other programs see.
 
 use super::*;
-use crate::instant::{MonotonicTime, WallTime};
 use crate::message::Payload;
 use crate::message::{Frame, Origin, Stamp, Stamped};
 use crate::payload::{Imu, JointState, Marg, Odometry, Orientation, Pose};
+use crate::time::{MonotonicTime, WallTime};
 use bb_tests::laws;
 use nalgebra::{
     DMatrix, DVector, Isometry3, Matrix2x3, Matrix6, Quaternion, Translation3, Unit, UnitQuaternion, Vector3,

@@ -4,7 +4,6 @@ mod battery;
 mod joint;
 
 use super::{covariance, number, ros_message};
-use crate::instant::WallTime;
 use crate::message::Payload;
 use crate::message::codec::{Field, RosCompanion};
 use crate::message::{DecodeError, RosMessage, Stamped};
@@ -12,6 +11,7 @@ use crate::payload::{
     FluidPressure, GeodeticPosition, GnssFix, GnssServices, GnssStatus, Image, Imu, LaserScan, MagneticField, Marg,
     Radiation, Range,
 };
+use crate::time::WallTime;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3, Vector4};
 use std::sync::Arc;
 

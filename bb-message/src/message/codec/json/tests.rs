@@ -1,12 +1,12 @@
 //! Written values are read back, errors name the field, and the schema accepts what the reader accepts.
 
 use super::*;
-use crate::instant::MonotonicTime;
 use crate::message::Payload;
 use crate::message::codec::Field;
 use crate::message::codec::tests::{Choice, Everything, Nothing, bytes_of, choice, everything};
 use crate::message::{Finite, Stamped};
 use crate::payload::{Imu, JointState, Pose};
+use crate::time::MonotonicTime;
 use bb_tests::laws;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use proptest::prelude::*;

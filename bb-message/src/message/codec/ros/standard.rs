@@ -1,10 +1,10 @@
 //! Headers, times and transforms.
 
-use crate::instant::WallTime;
 use crate::message::Payload;
 use crate::message::codec::intern::intern;
 use crate::message::codec::{DecodeError, Field, Reader, Shape, Writer};
 use crate::message::{Finite, Stamped};
+use crate::time::WallTime;
 use nalgebra::Isometry3;
 use std::time::Duration;
 

@@ -5,9 +5,9 @@ mod random;
 
 use super::super::tests::{bytes_of, ros_round_trip, round_trip, stamp};
 use super::super::{decode, decode_as_ros, decode_companion, encode_as_ros, encode_companion, is_exact_as_ros};
-use crate::instant::{MonotonicTime, WallTime};
 use crate::message::{Finite, Frame, Payload, RosMessage, Stamp, Stamped};
 use crate::payload::*;
+use crate::time::{MonotonicTime, WallTime};
 use bb_tests::laws;
 use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3};
 use proptest::prelude::*;

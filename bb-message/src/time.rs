@@ -2,10 +2,9 @@
 
 mod clock;
 mod device;
-mod stopwatch;
+pub(crate) mod instant;
+pub(crate) mod stopwatch;
 
-pub(crate) use bb_message::__private::nanos_of;
-pub use bb_message::instant::{MonotonicTime, WallTime};
 pub use clock::Clock;
 pub use device::DeviceClock;
-pub(crate) use stopwatch::{Reading, Stopwatch};
+pub use instant::{MonotonicTime, WallTime};

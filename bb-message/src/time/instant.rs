@@ -1,4 +1,4 @@
-//! Time: instants as integers of nanoseconds.
+//! Instants as integers of nanoseconds.
 //!
 //! Arithmetic saturates, so that a stamp from a broken device causes no overflow panic.
 

@@ -8,15 +8,17 @@ use std::time::{Duration, Instant};
 /// [`Clock`].
 ///
 /// It is not a clock: readings of two threads cannot be compared, and the scale is exact to some parts in a million
-/// (a percent, if the machine was busy during calibration; a scale that is further off is not used). If a processor has no counter that runs at a constant
-/// rate, the crate `quanta` reads the system's clock.
+/// (a percent, if the machine was busy during calibration; a scale that is further off is not used). If a processor has no
+/// counter that runs at a constant rate, the crate `quanta` reads the system's clock.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Stopwatch(Option<&'static quanta::Clock>);
+pub struct Stopwatch(Option<&'static quanta::Clock>);
 
 /// A reading of the stopwatch.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Reading {
+pub enum Reading {
+    /// Ticks of the processor's counter.
     Counter(u64),
+    /// Time of the clock.
     Clock(MonotonicTime),
 }
 
@@ -24,7 +26,7 @@ static COUNTER: OnceLock<quanta::Clock> = OnceLock::new();
 
 impl Stopwatch {
     /// Calibrates the counter, unless done already: up to 200 ms of a busy machine and a pause of 50 ms. Until then, the clock is read.
-    pub(crate) fn prepare() {
+    pub fn prepare() {
         static ONCE: Once = Once::new();
         ONCE.call_once(|| {
             let counter = quanta::Clock::new();
@@ -34,14 +36,15 @@ impl Stopwatch {
         });
     }
 
-    /// Reads the counter, or the clock until the counter is calibrated.
+    /// Chooses the counter, or the clock until the counter is calibrated.
     #[inline]
-    pub(crate) fn start() -> Self {
+    pub fn start() -> Self {
         Self(COUNTER.get())
     }
 
+    /// Reads the counter, or the clock if [`Self::start`] found no counter.
     #[inline]
-    pub(crate) fn read(self, clock: &Clock) -> Reading {
+    pub fn read(self, clock: &Clock) -> Reading {
         match self.0 {
             Some(counter) => Reading::Counter(counter.raw()),
             None => Reading::Clock(clock.now()),
@@ -51,7 +54,7 @@ impl Stopwatch {
     /// The nanoseconds from `start` to `end`, both of this stopwatch. Zero if the counter went back, as it may when a
     /// machine is suspended.
     #[inline]
-    pub(crate) fn nanos_between(self, start: Reading, end: Reading) -> i64 {
+    pub fn nanos_between(self, start: Reading, end: Reading) -> i64 {
         match (self.0, start, end) {
             (Some(counter), Reading::Counter(start), Reading::Counter(end)) => {
                 i64::try_from(counter.delta_as_nanos(start, end)).unwrap_or(i64::MAX)

@@ -3,9 +3,9 @@
 use super::error::{Gap, Missing};
 use super::history::{History, State};
 use super::status::{JointRefusal, REFUSALS};
-use crate::fault::lock;
-use crate::time::{MonotonicTime, nanos_of};
 use crate::topology::Topology;
+use bb_message::__private::nanos_of;
+use bb_message::time::MonotonicTime;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -52,8 +52,10 @@ impl SharedStates {
         Self { states: Mutex::new(states), arrived: Condvar::new(), waiting: AtomicUsize::new(0) }
     }
 
+    #[inline]
     pub(super) fn lock(&self) -> MutexGuard<'_, States> {
-        lock(&self.states)
+        // Also after a panic of code that held it.
+        self.states.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Adds a state that arrived at `now`. Returns the reason if the state is the first to be refused for it.

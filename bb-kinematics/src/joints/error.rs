@@ -1,7 +1,7 @@
 //! Errors of transform lookups.
 
-use crate::message::Payload;
-use crate::time::MonotonicTime;
+use bb_message::message::Payload;
+use bb_message::time::MonotonicTime;
 use std::fmt;
 use std::time::Duration;
 

@@ -2,8 +2,8 @@
 
 use super::error::Missing;
 use super::status::JointRefusal;
-use crate::time::MonotonicTime;
 use crate::topology::JointKind;
+use bb_message::time::MonotonicTime;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
 

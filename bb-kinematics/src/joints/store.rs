@@ -7,11 +7,10 @@ use super::route::{InputRoute, RouteOf, Routes};
 use super::states::{SharedStates, States};
 use super::status::{JointStatistics, JointStatus, REFUSALS};
 use crate::kinematics::{Kinematics, KinematicsError};
-use crate::message::{Frame, JointReading, Payload, Stamp, Stamped};
-use crate::pubsub::{Select, Tell};
-use crate::sorted::Sorted;
-use crate::time::{Clock, MonotonicTime, nanos_of};
 use crate::topology::{JointKind, Topology};
+use bb_message::__private::{Sorted, nanos_of};
+use bb_message::message::{Frame, JointReading, Payload, Stamp, Stamped};
+use bb_message::time::{Clock, MonotonicTime};
 use nalgebra::Isometry3;
 use std::fmt;
 use std::sync::Arc;
@@ -35,9 +34,9 @@ impl Default for JointSettings {
     }
 }
 
-/// The states of a robot's joints, and its frames at any time, by the rules of the [module](super). Clones share the same state.
+/// The states of a robot's joints, and its frames at any time. Clones share the same state.
 ///
-/// It is returned by [`Bus::joints`](crate::Bus::joints).
+/// It is returned by `Bus::joints` of `bb-core`.
 ///
 /// ```
 /// use bb_core::prelude::*;
@@ -59,6 +58,29 @@ impl Default for JointSettings {
 /// # Ok(())
 /// # }
 /// ```
+///
+/// # A joint's state at a time
+///
+/// | requested time | answer |
+/// |---|---|
+/// | between two states | interpolated: linearly; an angle without limits, along the shorter arc; a floating joint's rotation, by slerp |
+/// | after the newest state, within a tolerance | predicted from the measured velocity; held if no velocity is measured |
+/// | after that tolerance | an error: how far in the future |
+/// | before the oldest state kept | an error: how far before the history |
+/// | any, before the first state has arrived | an error: unknown |
+///
+/// A joint whose state is unknown is never assumed to be at zero. A joint that mimics another follows from that one. A state measured
+/// at the motor of a joint with a `transmission` is converted to the joint's: position / reduction + offset, velocity / reduction,
+/// effort · reduction. The reduction counts as negative where the transmission is `reversed`.
+///
+/// The angle of a continuous joint may be reported within one turn or accumulated over turns. It is unwound to the turn nearest to
+/// the prediction from the last state and its velocity.
+///
+/// # Refused states
+///
+/// A state is refused if it is not newer than the last state of its joint, holds a NaN or an infinity, or is more than a second
+/// ahead of the clock. It is also refused if its number of coordinates differs from the joint's or if it names an unknown joint.
+/// Refused states are counted by joint and reason in [`Self::statistics`]; the first of each is logged.
 #[derive(Clone)]
 pub struct Joints(Arc<Inner>);
 
@@ -77,7 +99,11 @@ struct Inner {
 
 impl Joints {
     /// Creates the store of a robot with these components, by path. `routes` are the routes of its estimators' inputs.
-    pub(crate) fn new(
+    ///
+    /// # Errors
+    /// The topology is no tree.
+    #[doc(hidden)]
+    pub fn new(
         topology: &'static Topology,
         settings: JointSettings,
         clock: Clock,
@@ -95,29 +121,26 @@ impl Joints {
         Ok(Self(Arc::new(Inner { topology, kinematics, settings, clock, names, components, routes, states })))
     }
 
-    /// Creates the store of a robot without links.
-    #[cfg(all(test, loom))]
-    pub(crate) fn of_none(clock: Clock) -> Self {
-        const NONE: Topology = Topology { links: &[], joints: &[] };
-        let joints = Self::new(&NONE, JointSettings::default(), clock, Sorted::default(), &[]);
-        joints.expect("nothing is wrong with no joints")
-    }
-
     /// Stores the joint readings of a message.
+    #[doc(hidden)]
     #[inline]
-    pub(crate) fn hear<T: Payload>(&self, message: &Stamped<T>, now: MonotonicTime) {
+    pub fn hear<T: Payload>(&self, message: &Stamped<T>, now: MonotonicTime) {
         if T::TELLS_JOINT_POSITION {
             // The payload's code runs without holding the lock.
             message.payload.tell_joints(&mut |reading| self.keep(message.stamp(), &reading, now));
         }
     }
 
-    /// Stores the joint readings of a message at a path that the robot does not declare, if it is below `sensor`. A reading without a
-    /// joint, in no frame, is one of an unknown joint of that path.
-    pub(crate) fn hear_at(&self, path: &str, stamp: Stamp, now: MonotonicTime, tell: &Tell<'_>) {
-        if !Select::Below("sensor").includes(path) {
-            return;
-        }
+    /// Stores the joint readings of a message at a path that the robot does not declare; `tell` calls a listener with them. A reading
+    /// without a joint, in no frame, is one of an unknown joint of that path.
+    #[doc(hidden)]
+    pub fn hear_at(
+        &self,
+        path: &str,
+        stamp: Stamp,
+        now: MonotonicTime,
+        tell: impl FnOnce(&mut dyn FnMut(JointReading<'_>)),
+    ) {
         tell(&mut |reading| {
             let is_named = reading.joint.is_some() || !stamp.frame.name().is_empty();
             let reading = if is_named { reading } else { reading.of(path) };
@@ -184,18 +207,26 @@ impl Joints {
         self.0.components.iter().map(|(path, _)| *path)
     }
 
-    pub(crate) fn routes(&self) -> &Routes {
+    /// The inputs of the robot's estimators across moving joints.
+    #[doc(hidden)]
+    #[inline]
+    pub fn routes(&self) -> &Routes {
         &self.0.routes
     }
 
     /// The error with joint names.
-    pub(crate) fn error(&self, gap: Gap) -> LookupError {
+    #[doc(hidden)]
+    pub fn error(&self, gap: Gap) -> LookupError {
         gap.error(|number| self.0.topology.joints.get(number).map_or("?", |joint| joint.name))
     }
 
     /// `frame_from_input` of an estimator's input at the time of a message.
+    ///
+    /// # Errors
+    /// The state of a joint on the way is not known at that time.
+    #[doc(hidden)]
     #[inline]
-    pub(crate) fn placed(&self, input: &InputRoute, time: MonotonicTime) -> Result<Isometry3<f64>, Gap> {
+    pub fn placed(&self, input: &InputRoute, time: MonotonicTime) -> Result<Isometry3<f64>, Gap> {
         input.at(&self.0.states, time)
     }
 

@@ -1,7 +1,7 @@
 //! Converts a joint reading in a message to the joint's state.
 
-use crate::message::{JointReading, JointSide};
 use crate::topology::Joint;
+use bb_message::message::{JointReading, JointSide};
 
 /// Buffer for the numbers of a converted reading.
 #[derive(Debug, Default)]

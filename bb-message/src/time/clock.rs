@@ -3,7 +3,7 @@
 #[cfg(test)]
 mod tests;
 
-use super::{MonotonicTime, WallTime, nanos_of};
+use super::instant::{MonotonicTime, WallTime, nanos_of};
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
@@ -73,6 +73,7 @@ impl Clock {
     }
 
     /// The current time.
+    #[inline]
     pub fn now(&self) -> MonotonicTime {
         match &self.kind {
             Kind::Real(zero) => MonotonicTime::ZERO + zero.elapsed(),
@@ -83,28 +84,33 @@ impl Clock {
     /// The time at which the run begins. On virtual time, components are created at zero, and a run that plays recordings then
     /// begins at the first of their stamps: whatever a component computes over time starts here, not at its `init`. On real time
     /// it is the time at which this clock was created.
+    #[inline]
     pub fn start(&self) -> MonotonicTime {
         MonotonicTime::from_nanos(self.start_nanos.load(Ordering::Acquire))
     }
 
     /// The calendar time at `time`, by the current offset.
+    #[inline]
     pub fn wall_at(&self, time: MonotonicTime) -> WallTime {
         WallTime::from_unix_nanos(time.as_nanos().saturating_add(self.wall_offset_nanos()))
     }
 
     /// The monotonic time at a calendar time, by the current offset: for devices that stamp with the date, such as a
     /// GNSS receiver or a network camera.
+    #[inline]
     pub fn monotonic_at(&self, wall: WallTime) -> MonotonicTime {
         MonotonicTime::from_nanos(wall.as_unix_nanos().saturating_sub(self.wall_offset_nanos()))
     }
 
     /// Wall time minus monotonic time, in nanoseconds. It changes when the machine's date is set.
+    #[inline]
     pub fn wall_offset_nanos(&self) -> i64 {
         // The offset guards no other data, so no ordering is needed.
         self.wall_offset_nanos.load(Ordering::Relaxed)
     }
 
     /// Returns whether time is virtual.
+    #[inline]
     pub fn is_virtual(&self) -> bool {
         matches!(self.kind, Kind::Virtual(_))
     }
@@ -112,7 +118,8 @@ impl Clock {
     /// Measures the offset of a real clock again. Returns the new offset if it differs from the current one by more than 1 ms,
     /// because the machine's date was set. Only one caller gets it.
     // The thread of the timers calls it, at most once a second.
-    pub(crate) fn refresh_wall(&self) -> Option<i64> {
+    #[doc(hidden)]
+    pub fn refresh_wall(&self) -> Option<i64> {
         match self.kind {
             Kind::Real(zero) => self.follow_wall(median_wall_offset(|| read_both(zero))),
             Kind::Virtual(_) => None,
@@ -121,7 +128,8 @@ impl Clock {
 
     /// Sets the offset of a virtual clock; a real one measures its own.
     // A replay calls it, with the offset in the journal.
-    pub(crate) fn set_wall_offset_nanos(&self, nanos: i64) {
+    #[doc(hidden)]
+    pub fn set_wall_offset_nanos(&self, nanos: i64) {
         if self.is_virtual() {
             self.wall_offset_nanos.store(nanos, Ordering::Relaxed);
         }
@@ -129,24 +137,25 @@ impl Clock {
 
     /// Sets a virtual clock to `time`, which may be earlier: lines of a journal written by different threads have
     /// times that differ slightly from the order of the lines.
-    pub(crate) fn set_to(&self, time: MonotonicTime) {
+    #[doc(hidden)]
+    pub fn set_to(&self, time: MonotonicTime) {
         if let Kind::Virtual(nanos) = &self.kind {
             nanos.store(time.as_nanos(), Ordering::Release);
         }
     }
 
     /// Advances a virtual clock to `time`. Does nothing if that is earlier, or if the clock is real.
-    pub(crate) fn advance_to(&self, time: MonotonicTime) {
+    #[doc(hidden)]
+    pub fn advance_to(&self, time: MonotonicTime) {
         if let Kind::Virtual(nanos) = &self.kind {
             nanos.fetch_max(time.as_nanos(), Ordering::AcqRel);
         }
     }
 
-    /// Advances a virtual clock to the beginning of the run, which a recording determines: see [`Sensor::starts_at`]. Stamps of more
+    /// Advances a virtual clock to the beginning of the run, which a recording determines: see `Sensor::starts_at`. Stamps of more
     /// than a year are dates, counted from 1970, as those of bags are.
-    ///
-    /// [`Sensor::starts_at`]: crate::Sensor::starts_at
-    pub(crate) fn start_at(&self, time: MonotonicTime) {
+    #[doc(hidden)]
+    pub fn start_at(&self, time: MonotonicTime) {
         self.advance_to(time);
         if self.is_virtual() {
             self.start_nanos.store(self.now().as_nanos(), Ordering::Release);

@@ -3,8 +3,8 @@
 use super::error::LookupError;
 use super::route::{Latest, Place, Route, place_of};
 use super::store::Joints;
-use crate::time::{MonotonicTime, nanos_of};
-use bb_message::__private::nearest;
+use bb_message::__private::{nanos_of, nearest};
+use bb_message::time::MonotonicTime;
 use nalgebra::Isometry3;
 use std::time::Duration;
 

@@ -1,6 +1,6 @@
 //! Status and counters of joints.
 
-use crate::time::MonotonicTime;
+use bb_message::time::MonotonicTime;
 use std::fmt;
 
 /// Reason for which a joint's state was refused.

@@ -3,9 +3,9 @@
 use super::history::State;
 use super::states::States;
 use super::store::Joints;
-use crate::payload::JointSnapshot;
-use crate::time::MonotonicTime;
 use crate::topology::JointKind;
+use bb_message::payload::JointSnapshot;
+use bb_message::time::MonotonicTime;
 
 /// A joint whose state is known and not stale. Quantities not measured are NaN.
 struct Listed {

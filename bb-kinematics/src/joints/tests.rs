@@ -2,11 +2,10 @@
 
 use super::*;
 use crate::kinematics::{Frames, Kinematics};
-use crate::message::{Frame, JointPositions, JointReading, Stamp};
-use crate::message::{Payload, Stamped};
-use crate::sorted::Sorted;
-use crate::time::{Clock, MonotonicTime};
 use crate::topology::{Joint, JointKind, Link, Mimic, Origin, Topology};
+use bb_message::__private::Sorted;
+use bb_message::message::{Frame, JointPositions, JointReading, Payload, Stamp, Stamped};
+use bb_message::time::{Clock, MonotonicTime};
 use bb_tests::laws;
 use nalgebra::{Isometry3, Vector3};
 use proptest::prelude::*;

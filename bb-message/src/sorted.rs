@@ -5,7 +5,7 @@ use std::borrow::Borrow;
 /// A list sorted by key, the first key last. For a few hundred entries it is as fast as `BTreeMap`, of which each pair of types
 /// compiles a whole B-tree: 6 to 12 thousand lines of IR.
 #[derive(Clone, Debug)]
-pub(crate) struct Sorted<K, V>(Vec<(K, V)>);
+pub struct Sorted<K, V>(Vec<(K, V)>);
 
 impl<K, V> Default for Sorted<K, V> {
     fn default() -> Self {
@@ -14,16 +14,23 @@ impl<K, V> Default for Sorted<K, V> {
 }
 
 impl<K: Ord, V> Sorted<K, V> {
-    pub(crate) fn len(&self) -> usize {
+    /// The number of entries.
+    pub fn len(&self) -> usize {
         self.0.len()
     }
 
+    /// Returns whether there are no entries.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
     /// The entries, in the order of their keys.
-    pub(crate) fn iter(&self) -> impl Iterator<Item = (&K, &V)> {
+    pub fn iter(&self) -> impl Iterator<Item = (&K, &V)> {
         self.0.iter().rev().map(|(key, value)| (key, value))
     }
 
-    pub(crate) fn get<Q: Ord + ?Sized>(&self, key: &Q) -> Option<&V>
+    /// The value of `key`.
+    pub fn get<Q: Ord + ?Sized>(&self, key: &Q) -> Option<&V>
     where
         K: Borrow<Q>,
     {
@@ -31,7 +38,8 @@ impl<K: Ord, V> Sorted<K, V> {
         self.0.get(index).map(|(_, value)| value)
     }
 
-    pub(crate) fn get_mut<Q: Ord + ?Sized>(&mut self, key: &Q) -> Option<&mut V>
+    /// The value of `key`, to change.
+    pub fn get_mut<Q: Ord + ?Sized>(&mut self, key: &Q) -> Option<&mut V>
     where
         K: Borrow<Q>,
     {
@@ -40,7 +48,7 @@ impl<K: Ord, V> Sorted<K, V> {
     }
 
     /// The value of `key`, made if it has none.
-    pub(crate) fn get_or_insert(&mut self, key: K, make: impl FnOnce() -> V) -> &mut V {
+    pub fn get_or_insert(&mut self, key: K, make: impl FnOnce() -> V) -> &mut V {
         let index = self.find(&key).unwrap_or_else(|index| {
             self.0.insert(index, (key, make()));
             index
@@ -49,7 +57,7 @@ impl<K: Ord, V> Sorted<K, V> {
     }
 
     /// Sets the value of `key`, and returns the one it had.
-    pub(crate) fn insert(&mut self, key: K, value: V) -> Option<V> {
+    pub fn insert(&mut self, key: K, value: V) -> Option<V> {
         match self.find(&key) {
             Ok(index) => self.0.get_mut(index).map(|(_, before)| std::mem::replace(before, value)),
             Err(index) => {
@@ -59,7 +67,8 @@ impl<K: Ord, V> Sorted<K, V> {
         }
     }
 
-    pub(crate) fn remove<Q: Ord + ?Sized>(&mut self, key: &Q) -> Option<V>
+    /// Removes the entry of `key`, and returns its value.
+    pub fn remove<Q: Ord + ?Sized>(&mut self, key: &Q) -> Option<V>
     where
         K: Borrow<Q>,
     {
@@ -68,16 +77,17 @@ impl<K: Ord, V> Sorted<K, V> {
     }
 
     /// The first key.
-    pub(crate) fn first(&self) -> Option<&K> {
+    pub fn first(&self) -> Option<&K> {
         self.0.last().map(|(key, _)| key)
     }
 
     /// All entries, in the order of the keys.
-    pub(crate) fn into_entries(self) -> impl Iterator<Item = (K, V)> {
+    pub fn into_entries(self) -> impl Iterator<Item = (K, V)> {
         self.0.into_iter().rev()
     }
 
-    pub(crate) fn pop_first(&mut self) -> Option<(K, V)> {
+    /// Removes the first entry, and returns it.
+    pub fn pop_first(&mut self) -> Option<(K, V)> {
         self.0.pop()
     }
 

@@ -3,10 +3,9 @@
 use super::error::Gap;
 use super::states::{SharedStates, States};
 use crate::kinematics::{Chain, Kinematics, LinkId};
-use crate::message::Frame;
-use crate::message::Payload;
-use crate::time::MonotonicTime;
 use crate::topology::{JointKind, Topology};
+use bb_message::message::{Frame, Payload};
+use bb_message::time::MonotonicTime;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use std::ops::Range;
 use std::sync::Arc;
@@ -154,21 +153,22 @@ impl Route {
 
 /// The source and target frames of one input of an estimator.
 #[derive(Clone, Debug)]
-pub(crate) struct RouteOf {
+pub struct RouteOf {
     /// The number of the input.
-    pub(crate) input: usize,
+    pub input: usize,
     /// The frame of its messages.
-    pub(crate) source: Frame,
+    pub source: Frame,
     /// The frame of the estimator.
-    pub(crate) target: Frame,
+    pub target: Frame,
     /// Age by which the newest state of a joint may be older than a message; `None` means the value declared for the robot.
-    pub(crate) tolerance_nanos: Option<i64>,
+    pub tolerance_nanos: Option<i64>,
 }
 
 /// An input across moving joints.
 #[derive(Clone, Debug)]
-pub(crate) struct InputRoute {
-    pub(crate) input: usize,
+pub struct InputRoute {
+    /// The number of the input.
+    pub input: usize,
     tolerance_nanos: i64,
     route: Route,
 }
@@ -182,7 +182,7 @@ impl InputRoute {
 
 /// The inputs across moving joints of each estimator.
 #[derive(Debug, Default)]
-pub(crate) struct Routes(Box<[Arc<[InputRoute]>]>);
+pub struct Routes(Box<[Arc<[InputRoute]>]>);
 
 impl Routes {
     pub(super) fn new(
@@ -201,12 +201,13 @@ impl Routes {
     }
 
     /// The routes of the estimator with that number.
-    pub(crate) fn of(&self, estimator: usize) -> Arc<[InputRoute]> {
+    pub fn of(&self, estimator: usize) -> Arc<[InputRoute]> {
         self.0.get(estimator).cloned().unwrap_or_else(|| Arc::new([]))
     }
 
     /// Returns whether any of these estimators has a route.
-    pub(crate) fn has_any(&self, estimators: &[usize]) -> bool {
+    #[inline]
+    pub fn has_any(&self, estimators: &[usize]) -> bool {
         let has = |estimator: &usize| self.0.get(*estimator).is_some_and(|routes| !routes.is_empty());
         estimators.iter().any(has)
     }
@@ -241,7 +242,10 @@ pub enum Placement {
 }
 
 impl Placement {
-    pub(crate) fn of(found: &Result<Isometry3<f64>, Gap>) -> Self {
+    /// The answer to store.
+    #[doc(hidden)]
+    #[inline]
+    pub fn of(found: &Result<Isometry3<f64>, Gap>) -> Self {
         match found {
             Ok(transform) => {
                 let Quaternion { coords } = *transform.rotation;
@@ -253,7 +257,9 @@ impl Placement {
     }
 
     /// The stored answer, bit by bit.
-    pub(crate) fn found(&self) -> Result<Isometry3<f64>, Gap> {
+    #[doc(hidden)]
+    #[inline]
+    pub fn found(&self) -> Result<Isometry3<f64>, Gap> {
         match *self {
             Self::At { translation, rotation: [w, x, y, z] } => Ok(Isometry3::from_parts(
                 Translation3::from(Vector3::from(translation)),
