@@ -8,7 +8,7 @@ use bb_tests::recordings::{navigation, vehicles};
 use std::error::Error;
 use std::path::Path;
 
-fn score(drive: &Drive, name: &str, settings: &[&str]) -> Result<NavigationScore, Box<dyn Error>> {
+pub(super) fn score(drive: &Drive, name: &str, settings: &[&str]) -> Result<NavigationScore, Box<dyn Error>> {
     let filter: NavigationFilter = name.parse()?;
     let settings: Vec<_> = settings.iter().map(|text| text.parse()).collect::<Result<_, _>>()?;
     let settings = RobotSettings::new(&filter, None, &settings, None)?;
@@ -59,14 +59,19 @@ fn errors_are_no_greater_than_known() -> Result<(), Box<dyn Error>> {
 }
 
 /// The data sheet of the car's IMU, times five, and over five.
-const SHEET: [&[&str]; 3] = [
+pub(super) const SHEET: [&[&str]; 3] = [
     &["gyroscope_noise=6.6e-5", "accelerometer_noise=6.9e-4"],
     &["gyroscope_noise=3.3e-4", "accelerometer_noise=3.45e-3"],
     &["gyroscope_noise=1.32e-5", "accelerometer_noise=1.38e-4"],
 ];
 
 /// Options of `Eskf` for a bag: the mount of a frame, and the topics that are not those of the bag alone.
-fn vehicle(folder: &Path, name: &str, mounts: &[&str], topics: [Option<&str>; 3]) -> Result<Drive, Box<dyn Error>> {
+pub(super) fn vehicle(
+    folder: &Path,
+    name: &str,
+    mounts: &[&str],
+    topics: [Option<&str>; 3],
+) -> Result<Drive, Box<dyn Error>> {
     let [gnss, truth, odometry] = topics.map(|topic| topic.map(str::to_owned));
     let mount = mounts.iter().map(|mount| mount.parse()).collect::<Result<_, _>>()?;
     let origin = name.starts_with("comma").then(|| "37.721000009,-122.472299089,31.6392".parse()).transpose()?;
@@ -85,8 +90,8 @@ type Vehicle = (
     std::ops::Range<f64>,
 );
 
-const CAR: &[&str] = &["gps=0,0.05,0"];
-const FIXES: [Option<&str>; 3] = [Some("/gps/fix"), Some("/truth/fix"), None];
+pub(super) const CAR: &[&str] = &["gps=0,0.05,0"];
+pub(super) const FIXES: [Option<&str>; 3] = [Some("/gps/fix"), Some("/truth/fix"), None];
 const HUSKY: &[&str] = &["gps=0,0.3,0", "base=0,0.3,-0.52"];
 const WHEELS: [Option<&str>; 3] = [Some("/gps/fix"), Some("/truth/fix"), Some("/odom")];
 const NO_WHEELS: [Option<&str>; 3] = [None, None, Some("none")];

@@ -1,4 +1,4 @@
-//! Fixes that scatter more than they state, and come late: no heading is trusted that is wrong.
+//! Fixes that scatter more than they state, and come late, and an IMU that is silent for a moment: no heading is trusted that is wrong.
 
 use super::rover::ORIGIN;
 use bb_core::nalgebra::{Matrix3, UnitQuaternion, Vector3};
@@ -46,6 +46,8 @@ struct Drive {
     interval: usize,
     fastest: f64,
     heading: f64,
+    /// When the IMU falls silent, and for how long, ms: in every second drive, about when it begins to move.
+    gap: (usize, usize),
 }
 
 impl Drive {
@@ -59,7 +61,9 @@ impl Drive {
         let interval = if between(0.0, 1.0) < 0.5 { 200 } else { 1000 };
         let fastest = between(1.5, 12.0);
         let heading = between(-PI, PI);
-        Self { random, scatter, stated, delay, interval, fastest, heading }
+        let silent = if seed.is_multiple_of(2) { 0.0 } else { between(300.0, 2000.0) };
+        let gap = (between(5_000.0, 15_000.0) as usize, silent as usize);
+        Self { random, scatter, stated, delay, interval, fastest, heading, gap }
     }
 
     fn uniform(&mut self) -> f64 {
@@ -167,7 +171,10 @@ fn drive(seed: u64) -> [Scores; 2] {
         let force = world_from_imu.inverse() * (acceleration + Vector3::new(0.0, 0.0, 9.80665));
         let turning = Vector3::z() * turns[step - 1] + biases[0] + drive.vector(0.002 + 0.003 * moving);
         let force = force + biases[1] + drive.vector(0.03 + 0.25 * moving);
-        simulation.publish(cart::sensor::base::bracket::board::imu, time, Imu::new(turning, force));
+        let (silent_from, silent_for) = drive.gap;
+        if !(silent_from..silent_from + silent_for).contains(&millis) {
+            simulation.publish(cart::sensor::base::bracket::board::imu, time, Imu::new(turning, force));
+        }
         for change in health.drain() {
             let is_bare = change.payload.estimator.to_string().ends_with("bare");
             is_healthy[usize::from(is_bare)] = change.payload.to == HealthState::Healthy;

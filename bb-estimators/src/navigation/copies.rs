@@ -48,8 +48,8 @@ use super::state::States;
 use super::stream::Stream;
 use crate::attitude::ParamsError;
 use crate::navigation::numbers::{
-    BETTER, CLEARLY, FAR_POSITION, FARTHEST_JUMP, IMPLAUSIBLE, IMPOSSIBLE, MOST_STARTS, MOVES, POSITION_SLACK,
-    PROBABLY, UNKNOWN_HEADING,
+    BETTER, FAR_POSITION, FARTHEST_JUMP, IMPLAUSIBLE, IMPOSSIBLE, MOST_STARTS, MOVES, POSITION_SLACK, PROBABLY,
+    TURNS, UNKNOWN_HEADING,
 };
 
 /// Further differences between the copies.
@@ -129,7 +129,7 @@ impl<F: CopiedFilter> Copies<F> {
         };
         self.starts = (0..).zip(filters).map(begun).collect();
         self.newcomer = None;
-        self.scatter.interrupt();
+        self.scatter.interrupt(0.0);
         self.elsewhere = None;
         self.started_ns = self.time_ns().unwrap_or(0);
         Ok(())
@@ -256,14 +256,14 @@ impl<F: CopiedFilter> Copies<F> {
             Some(acceleration) => {
                 self.scatter.propagate(&acceleration, dt, self.heading_deviation() > UNKNOWN_HEADING)
             }
-            None => self.scatter.interrupt(),
+            None => self.scatter.interrupt(dt),
         }
     }
 
     /// Learns from a window how quiet motion is, or stops the filters that may be at rest.
     fn rest(&mut self, window: &rest::Window) {
         let Some((speed, deviation)) = self.best().speed() else { return };
-        let has_moved = speed > MOVES.max(CLEARLY * deviation);
+        let has_moved = self.best().is_moving();
         if has_moved || speed + PROBABLY * deviation < MOVES {
             self.rest.remember(window, has_moved);
         }
@@ -359,7 +359,12 @@ impl<F: CopiedFilter> Copies<F> {
     /// Begins again in several attitudes if a gap has left it unknown.
     fn fork(&mut self) {
         if self.starts.len() > MOST_STARTS {
+            // Those that are still compared cover what nobody knows of the heading, and one of them alone would not.
+            if self.best().forks().len() <= TURNS as usize {
+                return;
+            }
             self.starts.truncate(1);
+            self.starts[0].filter.forget_attitude();
         }
         let mut forked = Vec::new();
         for begun in &self.starts {
@@ -389,7 +394,9 @@ impl<F: CopiedFilter> Copies<F> {
         since_ns: i64,
     ) -> Result<Option<(ImuMean, Doubt)>, Refusal> {
         let (now_ns, longest_s) = (self.time_ns().ok_or(Refusal::NotStarted)?, self.best().longest_sample());
-        self.holding.held(self.last.as_ref().unwrap_or(sample), sample, since_ns, longest_s, [now_ns, time_ns])
+        let is_moving = self.best().is_moving();
+        let last = self.last.as_ref().unwrap_or(sample);
+        self.holding.held(last, sample, since_ns, longest_s, [now_ns, time_ns], is_moving)
     }
 
     /// Statistics of what holding a reading has lately done wrong.
@@ -421,7 +428,7 @@ impl<S: States, const N: usize> Copies<EskfFilter<S, N>> {
     /// The same as [`EskfFilter::move_world`].
     pub fn move_world(&mut self, new_from_old: &Isometry3<f64>) -> Result<(), Refusal> {
         self.each(|filter| filter.move_world(new_from_old))?;
-        self.scatter.interrupt();
+        self.scatter.interrupt(0.0);
         Ok(())
     }
 }
@@ -451,7 +458,7 @@ impl<F: CopiedFilter> Propagate for Copies<F> {
             self.last = Some(part);
             return Ok(());
         };
-        self.scatter.interrupt();
+        self.scatter.interrupt(seconds_between(self.time_ns().ok_or(Refusal::NotStarted)?, time_ns)?);
         self.rest.interrupt();
         self.each(|filter| filter.hold(&held, &doubt))?;
         if time_ns == sample.time_ns {

@@ -153,6 +153,9 @@ pub(super) const HOLD_MEMORY_S: f64 = 60.0;
 pub(super) const HOLD_WINDOWS: f64 = 3.0;
 /// Factor on the mean square: over curves alone, the mean square is three times that of a whole minute of a car.
 pub(super) const HOLD_RAISED: f64 = 3.0;
+/// The least that a gap hides of the acceleration of a body at rest, as white noise, m²/s³: it may begin to move, by half a metre per second
+/// within a second.
+pub(super) const BEGINNING_MOTION: f64 = 0.25;
 /// Motion that a gap may hide before anything is known of it, as white noise: 1 rad/s and 3 m/s² for about a second.
 pub(super) const UNKNOWN_MOTION: [f64; 2] = [1.0, 9.0];
 

@@ -1,6 +1,8 @@
 //! Requirements of copies on their filter.
 
-use crate::navigation::numbers::{ATTITUDE_DEVIATION, MOST_STILL, SAME_COPY, STILL_SPEED, UNKNOWABLE};
+use crate::navigation::numbers::{
+    ATTITUDE_DEVIATION, CLEARLY, MOST_STILL, MOVES, SAME_COPY, STILL_SPEED, UNKNOWABLE,
+};
 use crate::navigation::numbers::{TURN_DEVIATION, TURNS, UNKNOWN_HEADING};
 use alloc::vec;
 use alloc::vec::Vec;
@@ -50,6 +52,11 @@ pub trait CopiedFilter: Propagate + Copy + Debug {
     /// The speed, m/s, and its deviation in the least certain direction; `None` if rest tells nothing.
     fn speed(&self) -> Option<(f64, f64)> {
         None
+    }
+
+    /// Returns whether the body clearly moves, as far as the filter can tell it from rest.
+    fn is_moving(&self) -> bool {
+        self.speed().is_none_or(|(speed, deviation)| speed > MOVES.max(CLEARLY * deviation))
     }
 
     /// Stops where the velocity allows it: the body is at rest.

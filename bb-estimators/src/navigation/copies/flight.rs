@@ -54,7 +54,7 @@ impl<S: States, const N: usize> Copies<EskfFilter<S, N>> {
         self.search.drop_neighbours();
         self.holding.interrupt();
         self.rest.interrupt();
-        self.scatter.interrupt();
+        self.scatter.interrupt(0.0);
     }
 
     /// The last fix with the noise that it was fused with.

@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 use crate::navigation::eskf::{Doubt, ImuMean, seconds_between};
 use crate::navigation::math::{exp, ln};
 use crate::navigation::numbers::{
-    HOLD_LENGTHS, HOLD_MEMORY_S, HOLD_RAISED, HOLD_WINDOWS, LONGEST_GAP_S, SHORTEST_HOLD_S,
+    BEGINNING_MOTION, HOLD_LENGTHS, HOLD_MEMORY_S, HOLD_RAISED, HOLD_WINDOWS, LONGEST_GAP_S, SHORTEST_HOLD_S,
 };
 use crate::navigation::refusal::Refusal;
 
@@ -62,7 +62,8 @@ impl Holding {
     }
 
     /// The reading that is held from `now_ns` until `until_ns`, and the doubt in it, if a sample since `since_ns` covers more than
-    /// `longest_s`. `last` is the reading before it.
+    /// `longest_s`. `last` is the reading before it. What holding has done wrong says nothing of how a body that is not `moving` begins to
+    /// move.
     ///
     /// # Errors
     ///
@@ -75,6 +76,7 @@ impl Holding {
         since_ns: i64,
         longest_s: f64,
         [now_ns, until_ns]: [i64; 2],
+        is_moving: bool,
     ) -> Result<Option<(ImuMean, Doubt)>, Refusal> {
         let whole_s = seconds_between(since_ns, sample.time_ns)?;
         if whole_s <= longest_s {
@@ -90,7 +92,11 @@ impl Holding {
             angular_velocity: (last.angular_velocity + sample.angular_velocity) * 0.5,
             specific_force: (last.specific_force + sample.specific_force) * 0.5,
         };
-        Ok(Some((held, self.doubt(whole_s, part_s))))
+        let mut doubt = self.doubt(whole_s, part_s);
+        if !is_moving {
+            doubt.velocity = doubt.velocity.map(|known| known.max(BEGINNING_MOTION * part_s));
+        }
+        Ok(Some((held, doubt)))
     }
 
     /// The doubt in a part, `part_s`, of a gap that lasts `whole_s`.
@@ -171,6 +177,20 @@ mod tests {
             assert!((0.3..8.0).contains(&ratio), "{length} s: {ratio}");
             assert!(doubt.rotation.x < 1e-20 && doubt.velocity.norm() < 1e-20);
         }
+    }
+
+    #[test]
+    fn a_body_at_rest_may_begin_to_move() {
+        let (angular_velocity, specific_force) = (Vector3::zeros(), Vector3::new(0.0, 0.0, 9.8));
+        let sample = |time_ns: i64| ImuMean { time_ns, angular_velocity, specific_force };
+        let mut holding = Holding::default();
+        (1..12_000).for_each(|i| holding.add(&sample(i * 10_000_000), 0.01));
+        let held = |is_moving| {
+            let held = holding.held(&sample(0), &sample(2_000_000_000), 0, 0.1, [0, 1_000_000_000], is_moving);
+            held.expect("it is fit").expect("it is a gap").1
+        };
+        assert_eq!(held(false).velocity, Vector3::repeat(BEGINNING_MOTION), "a second of two");
+        assert!(held(true).velocity.norm() < 1e-20 && held(false).rotation.norm() < 1e-20);
     }
 
     #[test]

@@ -57,9 +57,10 @@ impl Scatter {
         leg.is_turned |= is_turned;
     }
 
-    /// Forgets the fixes after a gap or while the tilt is unknown, when differences do not show noise.
-    pub(super) fn interrupt(&mut self) {
-        (self.last, self.before, self.leg) = (None, None, Leg::default());
+    /// Forgets the fixes over `dt` seconds of a gap, or while the tilt is unknown, when differences do not show noise.
+    pub(super) fn interrupt(&mut self, dt: f64) {
+        let seconds = self.leg.seconds + dt;
+        (self.last, self.before, self.leg) = (None, None, Leg { seconds, ..Leg::default() });
     }
 
     /// Adds a fix, and returns it with the noise that the fixes have shown, if they have stated less.

@@ -1,7 +1,7 @@
 //! Prediction from the newest estimate with each sample of the IMU, for outputs between keyframes.
 
 use super::Pose;
-use crate::navigation::copies::Holding;
+use crate::navigation::copies::{CopiedFilter as _, Holding};
 use crate::navigation::eskf::{EskfFilter, ImuMean};
 use crate::navigation::propagate::Propagate as _;
 use crate::navigation::refusal::Refusal;
@@ -27,7 +27,7 @@ impl Predictor {
     ) -> Result<(), Refusal> {
         let longest_s = self.filter.params().longest_sample;
         let part_ns = [self.time_ns(), sample.time_ns];
-        match self.holding.held(last, sample, last.time_ns, longest_s, part_ns)? {
+        match self.holding.held(last, sample, last.time_ns, longest_s, part_ns, self.filter.is_moving())? {
             Some((held, doubt)) => self.filter.hold(&held, &doubt),
             None => self.filter.advance(sample),
         }
