@@ -46,6 +46,8 @@ struct Drive {
     interval: usize,
     fastest: f64,
     heading: f64,
+    /// When it begins to move, s; a quarter of the drives begin in motion.
+    rests: f64,
     /// When the IMU falls silent, and for how long, ms: in every second drive, about when it begins to move.
     gap: (usize, usize),
 }
@@ -63,7 +65,8 @@ impl Drive {
         let heading = between(-PI, PI);
         let silent = if seed.is_multiple_of(2) { 0.0 } else { between(300.0, 2000.0) };
         let gap = (between(5_000.0, 15_000.0) as usize, silent as usize);
-        Self { random, scatter, stated, delay, interval, fastest, heading, gap }
+        let rests = if seed % 4 < 3 { 10.0 } else { -5.0 };
+        Self { random, scatter, stated, delay, interval, fastest, heading, rests, gap }
     }
 
     fn uniform(&mut self) -> f64 {
@@ -107,12 +110,11 @@ fn drive(seed: u64) -> [Scores; 2] {
     let mut drive = Drive::new(seed);
     let speed = drive.wander(12.0, 0.3 * drive.fastest, drive.fastest);
     let rate = drive.wander(9.0, -0.35, 0.35);
-    let rest_s = 10.0;
     let (mut heading, mut position) = (drive.heading, Vector3::zeros());
     let (mut positions, mut headings, mut speeds, mut turns) = (vec![], vec![], vec![], vec![]);
     for step in 0..=STEPS {
         let now = step as f64 * STEP_S;
-        let moving = ((now - rest_s) / 3.0).clamp(0.0, 1.0);
+        let moving = ((now - drive.rests) / 3.0).clamp(0.0, 1.0);
         let speed = speed[step] * moving * moving * (3.0 - 2.0 * moving);
         let turn = if drive.fastest > 6.0 { 0.5 } else { 1.0 } * rate[step] * moving;
         positions.push(position);

@@ -34,7 +34,7 @@ params! {
         ///
         /// Source: MEMS accelerometers at 100 Hz have 0.02 m/s².
         rest_force: f64 = 0.1, in 0.0..=1e6, unit "m/s^2";
-        /// The largest bias of the gyroscope: a faster steady rotation is not a bias.
+        /// The largest bias of the gyroscope: a faster steady rotation is not a bias. It counts as two standard deviations.
         largest_bias: f64 = 0.1, in 0.0..=1e3, unit "rad/s";
         /// Standard deviation of the accelerometer's bias.
         accelerometer_bias: f64 = 0.1, in 0.0..=1e3, unit "m/s^2";
@@ -146,7 +146,7 @@ impl Alignment {
         let world_from_body = orientation(&self.recent, heading.0)?;
         let tilt = (accelerometer_bias + acceleration) / gravity;
         Ok(Start {
-            gyroscope_bias_deviation: largest_bias,
+            gyroscope_bias_deviation: 0.5 * largest_bias,
             accelerometer_bias_deviation: accelerometer_bias,
             rotation_covariance: rotation_covariance(tilt, heading.1),
             ..Start::at(self.last_ns, position, velocity, (world_from_body, tilt))
