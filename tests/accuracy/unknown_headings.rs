@@ -89,7 +89,7 @@ impl Way {
     }
 }
 
-/// What became of a heading.
+/// Fate of a heading.
 #[derive(Clone, Copy, Debug, Default)]
 struct Score {
     /// The last time without an estimate, or with a heading that is off by more than 5°, s.

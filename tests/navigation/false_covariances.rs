@@ -46,9 +46,9 @@ struct Drive {
     interval: usize,
     fastest: f64,
     heading: f64,
-    /// When it begins to move, s; a quarter of the drives begin in motion.
+    /// Start of the motion, s: a quarter of the drives begin in motion.
     rests: f64,
-    /// When the IMU falls silent, and for how long, ms: in every second drive, about when it begins to move.
+    /// Beginning and length of a silence of the IMU, ms: in every second drive, at about the start of the motion.
     gap: (usize, usize),
 }
 
