@@ -5,7 +5,7 @@
 //! * **Where it begins.** A heading that is not known begins as six, 60° apart; so does the yaw of an IMU in its vehicle, where wheels
 //!   are declared. The scale of relative poses begins as one that is exact and one that drifts. A copy that is e¹² times less likely
 //!   than the best is dropped, and so is one that has become the same as the best. A gap that leaves the attitude unknown begins it
-//!   again: as six headings, or as 24 attitudes, 90° apart, if the tilt is unknown too.
+//!   again: as six headings, unless some are still compared, or as 24 attitudes, 90° apart, if the tilt is unknown too.
 //! * **How noisy the IMU is on this vehicle.** Once what is left of the first question is small, two more copies have four times the
 //!   white noise, and a quarter. All move on to the multiple of a copy that leads by e³, over the past two minutes. The search begins
 //!   at 16 times the data sheet, since too little confidence heals and too much locks biases in; for the same reason the covariance

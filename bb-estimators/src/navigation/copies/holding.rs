@@ -62,7 +62,7 @@ impl Holding {
     }
 
     /// The reading that is held from `now_ns` until `until_ns`, and the doubt in it, if a sample since `since_ns` covers more than
-    /// `longest_s`. `last` is the reading before it. What holding has done wrong says nothing of how a body that is not `moving` begins to
+    /// `longest_s`. `last` is the reading before it. What holding has done wrong says nothing of how a body begins to move that is not known to
     /// move.
     ///
     /// # Errors
