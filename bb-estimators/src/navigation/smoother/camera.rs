@@ -100,11 +100,12 @@ impl Camera {
             return Err(Refusal::NonFinite);
         }
         let (direction, by_point) = normalised(point).ok_or(Refusal::NotObservable)?;
-        let (pixel, jacobian) = self.distorted(&direction);
+        let (pixel, by_direction) = self.distorted(&direction);
+        let jacobian = by_direction * by_point;
         if !pixel.iter().chain(jacobian.iter()).all(|x| x.is_finite()) {
             return Err(Refusal::NotObservable);
         }
-        Ok(Seen { pixel, jacobian: jacobian * by_point })
+        Ok(Seen { pixel, jacobian })
     }
 
     /// Finds the direction of a pixel by Newton's method.
@@ -125,7 +126,7 @@ impl Camera {
             let (expected, jacobian) = self.distorted(&direction);
             // Beyond the fold, where the distortion turns back, two directions share a pixel.
             let determinant = jacobian.determinant();
-            if determinant.is_nan() || determinant <= 0.0 {
+            if !determinant.is_finite() || determinant <= 0.0 {
                 break;
             }
             let off = pixel - expected;
