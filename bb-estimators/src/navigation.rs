@@ -17,6 +17,7 @@
 
 mod alignment;
 mod bounds;
+mod camera;
 pub mod chi_square;
 mod consistency;
 #[cfg(feature = "alloc")]
@@ -50,6 +51,7 @@ mod update;
 mod upkeep;
 
 pub use alignment::{Alignment, AlignmentParams};
+pub use camera::{Camera, Seen, Undistorted};
 pub use consistency::{Consistency, nees};
 #[cfg(feature = "alloc")]
 pub use copies::{Copies, Ways};

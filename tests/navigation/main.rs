@@ -3,6 +3,7 @@
 mod covariances;
 mod factors;
 mod false_covariances;
+mod features;
 mod flight_logs;
 mod flights;
 mod optional_states;

@@ -34,7 +34,6 @@
 
 #[cfg(feature = "autodiff")]
 mod automatic;
-mod camera;
 mod coupling;
 mod elimination;
 mod estimates;
@@ -59,7 +58,6 @@ mod tests;
 
 #[cfg(feature = "autodiff")]
 pub use automatic::{Automatic, Differentiable, Expectation};
-pub use camera::{Camera, Seen, Undistorted};
 pub use filter::FixedLagSmoother;
 pub use kernel::Kernel;
 pub use params::{LandmarkParams, SmootherParams};

@@ -85,9 +85,9 @@ mod world;
 
 #[cfg(feature = "runtime")]
 pub use declared::{
-    AnchorReading, AttitudeReport, FactorReading, FlightEstimate, FlightEstimator, FlightEvent, FlightEvents,
-    FlightHealth, FlightInputs, FlightOptions, FlightOutputs, GpsReport, HealthSnapshot, RelativePoseReading,
-    SmoothedHistory, TracingSink, WarmStartReport,
+    AnchorReading, AttitudeReport, FactorReading, FeaturesReading, FlightEstimate, FlightEstimator, FlightEvent,
+    FlightEvents, FlightHealth, FlightInputs, FlightOptions, FlightOutputs, GpsReport, HealthSnapshot,
+    RelativePoseReading, SmoothedHistory, TracingSink, WarmStartReport,
 };
 pub use error::{EstimatorError, OriginError, Reason};
 pub use estimator::{Added, FlightNavigator};
@@ -97,8 +97,8 @@ pub use factor::{SMOOTHED, Smoothed};
 pub use gate::{GateState, Rejection};
 pub use given::{FactorForm, GivenFactor, LinearFactor, RelativeFactor};
 pub use input::{
-    AttitudeReading, FlightControllerState, FlightControllerWindow, GnssReading, GpsHealth, GpsHealthReading,
-    ImuBias, PoseAnchor, TakeoffOrigin, VioOutput,
+    AttitudeReading, Feature, FlightControllerState, FlightControllerWindow, GnssReading, GpsHealth,
+    GpsHealthReading, ImageFeatures, ImuBias, PoseAnchor, TakeoffOrigin, VioOutput,
 };
 pub use label::SourceLabel;
 pub use output::{EstimatorHealth, EstimatorOutput, HealthState, Quality};

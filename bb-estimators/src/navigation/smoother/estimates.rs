@@ -1,14 +1,14 @@
 //! Estimates and covariances of the keyframes.
 
-use nalgebra::{Matrix6, SMatrix};
+use nalgebra::{Matrix3, Matrix6, SMatrix};
 
 use super::coupling::{Coupling, POSE, place};
 use super::filter::FixedLagSmoother;
 use super::link::predicted;
 use super::matrix::{Square, axpy, dot, mirror};
 use super::scratch::Scratch;
-use crate::navigation::factor::Factor;
-use crate::navigation::factor::{MOST_ROWS, Rows};
+use crate::navigation::factor::{Factor, MOST_ROWS, NavigationFactor, Rows};
+use crate::navigation::measurement::RelativePose;
 use crate::navigation::state::{Estimate, POSITION, ROTATION, States};
 
 impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
@@ -79,6 +79,28 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
             self.covariance_at(index)?
         };
         Some(SMatrix::from_fn(|i, j| covariance[i][j]))
+    }
+
+    /// The pose of a keyframe of the window relative to an earlier one, as of the last update, with the covariances that it has given all
+    /// measurements. `None` if the window has no such pair, or if a direction is not determined at all.
+    pub fn relative(&mut self, from: u64, to: u64) -> Option<RelativePose> {
+        let index = |id: u64| self.window.iter().position(|keyframe| keyframe.id == id);
+        let (before, after) = index(from).zip(index(to)).filter(|(before, after)| before < after)?;
+        self.newest_covariance()?;
+        let (earlier, later) = (self.smoothed(from)?, self.smoothed(to)?);
+        let back = earlier.world_from_body.inverse();
+        let translation = back * (later.position - earlier.position);
+        let unit = (translation, 1.0);
+        let pose = RelativePose::new(from, unit, (back * later.world_from_body, 1.0));
+        let mut rows = Rows::new();
+        Factor::<S, N>::linearise(&NavigationFactor::Between(pose), Some(&earlier), &later, &mut rows).ok()?;
+        let covariance = self.pair_covariance((before, after), &rows)?;
+        let to_body = later.rotation().transpose();
+        let [translation_covariance, rotation_covariance] = [0, 3].map(|first| {
+            let of = |i: usize, j: usize| covariance[first + i.max(j)][first + i.min(j)];
+            to_body * Matrix3::from_fn(of) * to_body.transpose()
+        });
+        Some(RelativePose { translation_covariance, rotation_covariance, ..pose })
     }
 
     /// Returns the covariance of a keyframe, without allocating.

@@ -15,13 +15,13 @@
 
 use alloc::vec::Vec;
 
-use nalgebra::{Matrix2x3, Matrix3, SMatrix, Vector2, Vector3};
+use nalgebra::{Matrix2x3, Matrix3, SMatrix, UnitQuaternion, Vector2, Vector3};
 
 use super::coupling::{Coupling, POSE, PoseInformation, Seen};
 use super::kernel::Kernel;
 use super::keyframe::{Keyframe, Window};
+use crate::navigation::camera::{Camera, Undistorted, normalised};
 use crate::navigation::math::sqrt;
-use crate::navigation::smoother::camera::{Camera, Undistorted, normalised};
 use crate::navigation::state::{POSITION, ROTATION, States};
 
 /// An observation of a landmark from one keyframe.
@@ -241,6 +241,18 @@ impl Landmark {
             row[POSE * from..POSE * to].fill(0.0);
         }
         Some((from, to))
+    }
+}
+
+impl Camera {
+    /// `camera_from_world` and the camera's centre in the world, for a pose of the body.
+    pub(in crate::navigation) fn placed(
+        &self,
+        position: &Vector3<f64>,
+        world_from_body: &UnitQuaternion<f64>,
+    ) -> (Matrix3<f64>, Vector3<f64>) {
+        let turned = (world_from_body * self.body_from_camera).inverse().to_rotation_matrix().into_inner();
+        (turned, position + world_from_body * self.position)
     }
 }
 

@@ -16,9 +16,9 @@ use super::kernel::Kernel;
 use super::keyframe::Window;
 use super::landmark::{Landmark, Sight};
 use super::params::LandmarkParams;
+use crate::navigation::camera::Camera;
 use crate::navigation::chi_square::limit;
 use crate::navigation::numbers::{LANDMARK_KNOWN_WITHIN, PRESSING, REWEIGHED_LANDMARK, UNFIT};
-use crate::navigation::smoother::camera::Camera;
 use crate::navigation::state::States;
 use triangulation::located;
 

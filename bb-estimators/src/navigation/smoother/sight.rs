@@ -7,12 +7,12 @@ use super::landmark::Sight;
 use super::landmarks::Landmarks;
 use super::params::LandmarkParams;
 use crate::navigation::bounds::is_on_earth;
+use crate::navigation::camera::Camera;
 use crate::navigation::factor::Factor;
 use crate::navigation::fused::Fused;
 use crate::navigation::math::sqrt;
 use crate::navigation::numbers::LEAST_SIGHT_DEVIATION;
 use crate::navigation::refusal::Refusal;
-use crate::navigation::smoother::camera::Camera;
 use crate::navigation::state::States;
 use crate::navigation::stream::{Gate, Stream};
 use crate::params::ParamsError;
@@ -60,10 +60,7 @@ impl<S: States, const N: usize, F: Factor<S, N>> FixedLagSmoother<S, N, F> {
     /// or a focal length or the size is not positive.
     pub fn set_camera(&mut self, camera: Camera, params: LandmarkParams) -> Result<(), ParamsError> {
         params.check()?;
-        if !camera.is_sound() {
-            let (min, max) = (f64::MIN_POSITIVE, f64::MAX);
-            return Err(ParamsError { parameter: "camera", value: camera.focal_length.x, min, max, unit: "px" });
-        }
+        camera.check()?;
         let landmarks = Landmarks::new(camera, params, self.params.window);
         if self.is_tied() {
             // Without its ties, what landmarks say about each keyframe alone would be too much.

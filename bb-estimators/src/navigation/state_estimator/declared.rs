@@ -6,7 +6,8 @@ mod options;
 mod output;
 
 pub use input::{
-    AnchorReading, AttitudeReport, FactorReading, FlightInputs, GpsReport, RelativePoseReading, WarmStartReport,
+    AnchorReading, AttitudeReport, FactorReading, FeaturesReading, FlightInputs, GpsReport, RelativePoseReading,
+    WarmStartReport,
 };
 pub use log::TracingSink;
 pub use options::FlightOptions;
@@ -67,6 +68,9 @@ use std::time::Duration;
 /// It starts in one of three ways: at the origin of the options, at the state from the input `warm_start` with its deviations
 /// doubled, or at the first anchor. At the origin it is levelled by the input `attitude`, or once it has been at rest for a second.
 /// The body is the IMU, with the axes of the link. The joints give the position of the `gnss` antenna in it.
+///
+/// The input `features` takes the landmarks that a camera has seen, in place of `vio`, with the lens in the options: see
+/// [`FeaturesReading`].
 ///
 /// The input `factor` takes what other providers say of a pose, or of two: see [`FactorReading`].
 ///
@@ -185,7 +189,8 @@ impl Estimator for FlightEstimator {
     type Output = FlightOutputs;
 
     fn init(options: FlightOptions, context: &Context) -> Result<Self, Fault> {
-        let config = options.config()?;
+        let mounting = Mounting::of(context)?;
+        let config = options.config(mounting.body_from_camera)?;
         let mut estimator = FlightNavigator::new(config, Sink::default())?;
         if let Some(origin) = options.origin() {
             estimator.set_takeoff_origin(origin).map_err(|error| Fault::new(error.to_string()))?;
@@ -194,7 +199,6 @@ impl Estimator for FlightEstimator {
         // The IMU may stop. Its consequences must not wait for another sample.
         context.request(Request::Tick(period.max(SLOWEST_LOOK)));
         let period_ns = period.max(SLOWEST_LOOK).as_nanos() as i64;
-        let mounting = Mounting::of(context)?;
         Ok(Self { estimator, mounting, period_ns, last_ns: context.now().as_nanos(), ticks: 0, health: None })
     }
 
@@ -213,6 +217,9 @@ impl Estimator for FlightEstimator {
         self.estimator.together(|estimator| {
             for vio in inputs.vio {
                 let _ = estimator.add_vio(input::vio(vio));
+            }
+            for image in inputs.features {
+                let _ = estimator.add_features(input::features(image));
             }
             for anchor in inputs.anchor.iter().filter_map(input::anchor) {
                 let _ = estimator.add_pose_anchor(anchor);

@@ -350,17 +350,19 @@ impl<F: ProvidedFactor> Engine<F> {
             Payload::Gnss(fix) => self.fix(fix, config, &mut rejection),
             Payload::Provided(_, factor) => self.measure(&Measured::Provided(factor)).map(Some),
             Payload::Given(given) => self.given(given).map(Some),
+            Payload::Features(features) => self.features(now_ns, features, config).map(Some),
         };
         self.after(config);
         let outcome = result.and_then(|fused| {
             let Some(fused) = fused else { return Ok(None) };
-            let nis = fused.nis / fused.dimension.max(1) as f64;
-            self.nis = Some(nis);
+            // An image of landmarks that all wait for another direction is no measurement yet.
+            let nis = (fused.dimension > 0).then(|| fused.nis / fused.dimension as f64);
+            self.nis = nis.or(self.nis);
             if !self.strategy.is_converged() {
                 self.distrust(now_ns);
                 return Err(Reason::NotConverged.into());
             }
-            Ok(Some(nis))
+            Ok(nis)
         });
         (outcome, rejection)
     }

@@ -1,12 +1,15 @@
 //! Inputs in the order in which they are applied.
 
 use alloc::boxed::Box;
+use alloc::vec::Vec;
 
 use super::error::{EstimatorError, Outcome, Reason};
 use super::event::{EventKind, InputKind};
 use super::gate::Rejection;
 use super::given::{FactorForm, GivenFactor};
-use super::input::{AttitudeReading, FlightControllerState, GnssReading, GpsHealth, PoseAnchor, VioOutput};
+use super::input::{
+    AttitudeReading, Feature, FlightControllerState, GnssReading, GpsHealth, PoseAnchor, VioOutput,
+};
 use crate::navigation::history::past::Key;
 
 /// An input other than a sample of the IMU.
@@ -22,6 +25,7 @@ pub(super) enum Payload<F> {
     Gnss(GnssReading),
     Provided(u32, F),
     Given(Box<GivenFactor>),
+    Features(Vec<Feature>),
 }
 
 impl<F> Payload<F> {
@@ -44,6 +48,8 @@ impl<F> Payload<F> {
                     FactorForm::Relative(relative) => (10, provider | span(relative.from_ns, given.time_ns)),
                 }
             }
+            // The gate of landmarks uses what else is known of their keyframe.
+            Self::Features(_) => (11, 0),
         };
         Key { time_ns, rank, order }
     }
@@ -58,6 +64,7 @@ impl<F> Payload<F> {
             Self::Anchor(_) => InputKind::Anchor,
             Self::Gnss(_) => InputKind::Gnss,
             Self::Provided(..) | Self::Given(_) => InputKind::Factor,
+            Self::Features(_) => InputKind::Features,
         }
     }
 

@@ -12,8 +12,8 @@ use super::factor::ProvidedFactor;
 use super::gate::GateState;
 use super::given::GivenFactor;
 use super::input::{
-    AttitudeReading, FlightControllerState, FlightControllerWindow, GnssReading, GpsHealthReading, PoseAnchor,
-    TakeoffOrigin, VioOutput,
+    AttitudeReading, FlightControllerState, FlightControllerWindow, GnssReading, GpsHealthReading, ImageFeatures,
+    PoseAnchor, TakeoffOrigin, VioOutput,
 };
 use super::label::{SourceLabel, Sources};
 use super::output::{EstimatorHealth, EstimatorOutput, HealthState, number_of};
@@ -137,6 +137,20 @@ impl<K: EventSink, F: ProvidedFactor> FlightNavigator<K, F> {
     pub fn add_vio(&mut self, vio: VioOutput) -> Result<Added, EstimatorError> {
         let frames = [vio.from_ns, vio.to_ns];
         self.add(InputKind::Vio, vio.to_ns, vio.check(), Payload::Vio(vio), &frames)
+    }
+
+    /// Adds the landmarks that the camera of the configuration has seen in one image. The smoother's window finds where they are; the
+    /// filter beside it is told the motion that the window then knows. Of one camera, add either these or relative poses.
+    ///
+    /// A landmark that does not fit is left out by itself. An image is refused, for the reason of the first, if none of its landmarks
+    /// is accepted; the strategy without a window and one without a camera refuse all as [`NotObservable`](Refusal::NotObservable).
+    ///
+    /// # Errors
+    ///
+    /// Same as [`add_vio`](Self::add_vio).
+    pub fn add_features(&mut self, image: ImageFeatures) -> Result<Added, EstimatorError> {
+        let (time_ns, checked) = (image.time_ns, image.check());
+        self.add(InputKind::Features, time_ns, checked, Payload::Features(image.features), &[time_ns])
     }
 
     /// Adds a pose from a satellite image.
@@ -298,7 +312,9 @@ impl<K: EventSink, F: ProvidedFactor> FlightNavigator<K, F> {
     fn tell(&mut self, time_ns: i64, kind: EventKind) {
         match kind {
             EventKind::Added { input: InputKind::Imu, waits: false, .. } => self.added.imu += 1,
-            EventKind::Added { input: InputKind::Vio, waits: false, .. } => self.added.vio += 1,
+            EventKind::Added { input: InputKind::Vio | InputKind::Features, waits: false, .. } => {
+                self.added.vio += 1
+            }
             EventKind::Added { input: InputKind::Anchor, waits: false, .. } => self.added.poses += 1,
             EventKind::Fatal { .. } => self.has_failed = true,
             _ => {}

@@ -17,7 +17,9 @@ named! {
         Imu = "imu",
         /// Relative pose.
         Vio = "vio",
-        /// Frame of a camera, at either end of a relative pose. Only its failures are events.
+        /// Landmarks in an image.
+        Features = "features",
+        /// Frame of a camera, at either end of a relative pose, or of an image with landmarks. Only its failures are events.
         Frame = "frame",
         /// Pose from a satellite image.
         Anchor = "anchor",
@@ -38,7 +40,7 @@ impl InputKind {
     /// Returns whether the input adds to the window of the estimator. All others come from the flight controller.
     pub(super) const fn is_of_window(self) -> bool {
         match self {
-            Self::Vio | Self::Frame | Self::Anchor | Self::Factor => true,
+            Self::Vio | Self::Features | Self::Frame | Self::Anchor | Self::Factor => true,
             Self::Imu | Self::Gnss | Self::Health | Self::Attitude | Self::WarmStart => false,
         }
     }
@@ -179,7 +181,7 @@ named! {
         Emitted {
             /// Batches of samples of the IMU.
             imu: u32,
-            /// Relative poses.
+            /// Relative poses, and images with landmarks.
             vio: u32,
             /// Poses from satellite images.
             poses: u32,

@@ -1,7 +1,9 @@
 //! Inputs of the state estimator. Orientations and covariances in the world are in the local tangent frame at the position that
 //! they come with: x east, y north, z up.
 
-use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3};
+use alloc::vec::Vec;
+
+use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector2, Vector3};
 
 use crate::navigation::eskf::ImuMean;
 use crate::navigation::geodesy::Geodetic;
@@ -53,6 +55,27 @@ pub struct PoseAnchor {
     /// `true` if the provider used a cheaper computation of its covariance because it was too hot. The covariance is used unchanged, and
     /// the quality of the estimate reports it.
     pub is_covariance_degraded: bool,
+}
+
+/// A landmark in an image.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "runtime", derive(bb_core::Payload))]
+pub struct Feature {
+    /// The landmark's id, chosen by the camera's front end: the same in each image of a track.
+    pub landmark: u64,
+    /// u, v in the distorted image, pixels.
+    pub pixel: Vector2<f64>,
+    /// Standard deviation of each coordinate, pixels; a thousandth at least.
+    pub deviation_px: f64,
+}
+
+/// The landmarks that the camera of the configuration has seen in one image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImageFeatures {
+    /// Time at which the image was taken, ns.
+    pub time_ns: i64,
+    /// The landmarks, each once.
+    pub features: Vec<Feature>,
 }
 
 /// Position of take-off.
@@ -209,6 +232,14 @@ impl VioOutput {
             check_vector(&bias.gyroscope, 10.0)?;
         }
         blocks(&self.covariance).iter().try_for_each(check_covariance)
+    }
+}
+
+impl ImageFeatures {
+    /// Checks what the camera's front end computes; whether a landmark fits is for the window to say.
+    pub(super) fn check(&self) -> Result<(), Refusal> {
+        let numbers = self.features.iter().map(|feature| feature.pixel.sum() + feature.deviation_px);
+        if numbers.into_iter().all(f64::is_finite) { Ok(()) } else { Err(Refusal::NonFinite) }
     }
 }
 

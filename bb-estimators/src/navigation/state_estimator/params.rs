@@ -1,5 +1,6 @@
 //! Configuration of the state estimator.
 
+use crate::navigation::camera::Camera;
 use crate::navigation::eskf::EskfParams;
 use crate::params::{Params as _, ParamsError, params};
 
@@ -113,6 +114,11 @@ params! {
         gyroscope_bias: f64 = 0.02, in 1e-9..=1.0, unit "rad/s";
         /// A covariance that is larger than the steady one by this factor is warned of.
         growing_covariance: f64 = 2.0, in 1.1..=1e3;
+        /// Number of landmarks that are held at once if there is a camera; more are refused.
+        ///
+        /// Small: landmarks are refused although their tracks would help. Large: costs time and memory, about 40 kB each, as the
+        /// window is held nine times for what comes late. From 1 to 100,000.
+        landmarks: u32 = 128;
         /// Events of keyframes that leave the window, for a recorder. They cost the smoother the covariance of its oldest keyframe.
         record_keyframes: bool = true;
     }
@@ -127,6 +133,8 @@ pub struct StateEstimatorConfig {
     pub params: StateEstimatorParams,
     /// The noise of the IMU, gravity and gaps.
     pub sensors: EskfParams,
+    /// The camera whose landmarks are added, for the strategy with a window.
+    pub camera: Option<Camera>,
     /// Beginning of the ids of frames. 0: a number that is made from the first sample of the IMU, another in each flight.
     pub flight: u64,
 }
@@ -135,6 +143,7 @@ impl StateEstimatorConfig {
     pub(super) fn check(&self) -> Result<(), ParamsError> {
         self.params.check()?;
         self.sensors.check()?;
+        self.camera.map_or(Ok(()), |camera| camera.check())?;
         let (window, min, max) = (self.params.window, 2, 100);
         if (min..=max).contains(&window) {
             return Ok(());

@@ -19,6 +19,7 @@ use super::error::EstimatorError;
 use super::factor::ProvidedFactor;
 use super::given::PoseRows;
 pub(super) use super::ids::id_of;
+use super::input::Feature;
 use super::params::{StateEstimatorConfig, ns};
 use crate::attitude::ParamsError;
 use crate::navigation::copies::{Copies, Ways};
@@ -69,6 +70,8 @@ pub(super) enum Measured<'a, F> {
     Linear(&'a PoseRows),
     /// A relative pose of a provider, whose scale is known.
     Between(RelativePose),
+    /// The landmarks in the image of the newest keyframe.
+    Features(&'a [Feature]),
 }
 
 /// Permission of a fix that does not fit.
@@ -279,6 +282,9 @@ impl<F: ProvidedFactor> Strategy<F> {
         if self.window.is_none() {
             return self.fuse(measured);
         }
+        if let Measured::Features(features) = measured {
+            return self.observe(features);
+        }
         // Without a camera, nothing else determines the times of keyframes. The dependence of a provider's factor on the present state is
         // unknown, so it cannot be carried back.
         let has_camera = self.copies.estimate().is_some_and(|now| self.cadence.has_camera(now.time_ns));
@@ -326,6 +332,32 @@ impl<F: ProvidedFactor> Strategy<F> {
         Ok(fused)
     }
 
+    /// Adds the landmarks of an image to the window. What the window then knows of the motion since the last frame is the filter's
+    /// visual odometry, which keeps its gates as narrow as the estimate.
+    fn observe(&mut self, features: &[Feature]) -> Result<Fused, EstimatorError> {
+        self.keyframe()?;
+        let now = id_of(self.cadence.keyframe_ns);
+        let Some(window) = &mut self.window else { return Err(Refusal::NotObservable.into()) };
+        let seen = window.observe(now, features)?;
+        if !window.is_converged() {
+            self.restart_window(false)?;
+            return Ok(seen);
+        }
+        let reference = self.copies.estimate().and_then(|estimate| estimate.keyframe);
+        let motion = reference.filter(|_| seen.dimension > 0).and_then(|held| window.motion(held.id, now));
+        if let Some(motion) = motion {
+            // One that the filter refuses is no fault of the image.
+            let fused = self.fuse(&Measured::Between(motion));
+            let fits = self.window.as_ref().is_none_or(|window| window.fits(&self.copies));
+            match fused {
+                Err(EstimatorError::Fatal(reason)) => return Err(EstimatorError::Fatal(reason)),
+                _ if !fits => self.restart_window(true)?,
+                _ => {}
+            }
+        }
+        Ok(seen)
+    }
+
     /// Returns whether this keyframe is the one that relative poses to the filter refer to.
     fn refers_to(&self, keyframe: u64) -> bool {
         let estimate = self.copies.estimate();
@@ -353,6 +385,7 @@ impl<F: ProvidedFactor> Strategy<F> {
             Measured::Between(pose) => copies.update(&mut streams.provided, &Metric(pose)).map_err(escalate)?,
             Measured::Linear(rows) => provided::update(copies, &mut streams.provided, *rows)?,
             Measured::Provided(factor) => provided::update(copies, &mut streams.provided, *factor)?,
+            Measured::Features(_) => return Err(Refusal::NotObservable.into()),
         };
         let pose = self.pose().filter(Pose::is_finite).ok_or(EstimatorError::fatal(Refusal::NonFinite))?;
         if let Some(newest) = self.past.back_mut().filter(|newest| newest.time_ns == pose.time_ns) {

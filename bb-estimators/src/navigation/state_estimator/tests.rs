@@ -4,6 +4,8 @@ mod alarms;
 mod alarms_at_random;
 mod cadence;
 mod errors;
+#[cfg(feature = "smoother")]
+mod features;
 mod flight;
 mod frames;
 mod gaps;

@@ -3,8 +3,8 @@
 use nalgebra::{Matrix2x3, Matrix3, Vector2, Vector3};
 
 use super::Landmarks;
+use crate::navigation::camera::Camera;
 use crate::navigation::numbers::TRIANGULATION_STEPS;
-use crate::navigation::smoother::camera::Camera;
 use crate::navigation::smoother::keyframe::Window;
 use crate::navigation::smoother::landmark::Landmark;
 use crate::navigation::state::States;

@@ -9,9 +9,9 @@ use super::super::landmark::Sight;
 use super::super::link::{Information, Link};
 use super::super::matrix::Square;
 use super::flight::open;
+use crate::navigation::camera::Undistorted;
 use crate::navigation::factor::Rows;
 use crate::navigation::noise::Noise;
-use crate::navigation::smoother::camera::Undistorted;
 use crate::navigation::{
     Camera, FixedLagSmoother, Kernel, LandmarkParams, NAVIGATION, Navigation, POSITION, ROTATION, RelativePose,
     SmootherParams, Start,

@@ -3,8 +3,8 @@
 use crate::navigation::geodesy::Geodetic;
 use crate::navigation::numbers::UNSTATED_FIX;
 use crate::navigation::state_estimator::{
-    AttitudeReading, FactorForm, FlightControllerState, GivenFactor, GnssReading, GpsHealth, GpsHealthReading,
-    ImuBias, LinearFactor, PoseAnchor, RelativeFactor, VioOutput,
+    AttitudeReading, FactorForm, Feature, FlightControllerState, GivenFactor, GnssReading, GpsHealth,
+    GpsHealthReading, ImageFeatures, ImuBias, LinearFactor, PoseAnchor, RelativeFactor, VioOutput,
 };
 use bb_core::message::Stamped;
 use bb_core::payload::{GeodeticPosition, GnssFix, GnssStatus, Imu};
@@ -19,6 +19,8 @@ pub struct FlightInputs<'a> {
     pub imu: Input<'a, Imu>,
     /// Visual-inertial odometry.
     pub vio: Every<'a, RelativePoseReading>,
+    /// Landmarks in the images of a camera. The strategy is then `smoother`.
+    pub features: Every<'a, FeaturesReading>,
     /// Poses from satellite images.
     pub anchor: Every<'a, AnchorReading>,
     /// Factors of outside providers.
@@ -48,6 +50,17 @@ pub struct RelativePoseReading {
     pub accelerometer_bias: Option<Vector3<f64>>,
     /// The odometry's estimate of the gyroscope bias, body axes, rad/s.
     pub gyroscope_bias: Option<Vector3<f64>>,
+}
+
+/// The landmarks that a camera has seen in one image, stamped with the time of the image.
+///
+/// The options give the lens: `fx`, `fy`, `cx`, `cy`, `width`, `height`, and the distortion as [`Camera`](crate::navigation::Camera) has
+/// it. The frame of the sensor that publishes them is that of the lens: z along the optical axis, x to the right in the image, y
+/// down, which ROS calls the optical frame.
+#[derive(Clone, Debug, PartialEq, Payload)]
+pub struct FeaturesReading {
+    /// The landmarks, each once.
+    pub features: Vec<Feature>,
 }
 
 /// The pose of the body from a satellite image, stamped with the time of the image.
@@ -138,6 +151,8 @@ pub(super) struct Mounting {
     pub(super) link_from_imu: Isometry3<f64>,
     /// Position of the antenna in the body, m.
     lever_arm: Vector3<f64>,
+    /// `None` for a robot without landmarks.
+    pub(super) body_from_camera: Option<Isometry3<f64>>,
 }
 
 impl Mounting {
@@ -145,9 +160,13 @@ impl Mounting {
     pub(super) fn of(context: &Context) -> Result<Self, Fault> {
         let link_from_imu = context.frame_from_driver()?;
         // `None` for an input that the robot does not declare.
-        let antenna = context.frame_from_input("gnss").ok().map(|antenna| antenna.translation.vector);
-        let lever_arm = antenna.map_or_else(Vector3::zeros, |antenna| antenna - link_from_imu.translation.vector);
-        Ok(Self { link_from_imu, lever_arm })
+        let in_body = |input| {
+            let mut pose = context.frame_from_input(input).ok()?;
+            pose.translation.vector -= link_from_imu.translation.vector;
+            Some(pose)
+        };
+        let lever_arm = in_body("gnss").map_or_else(Vector3::zeros, |antenna| antenna.translation.vector);
+        Ok(Self { link_from_imu, lever_arm, body_from_camera: in_body("features") })
     }
 }
 
@@ -180,6 +199,10 @@ pub(super) fn vio(reading: &Stamped<RelativePoseReading>) -> VioOutput {
         covariance: reading.covariance,
         bias: bias.map(|(accelerometer, gyroscope)| ImuBias { accelerometer, gyroscope }),
     }
+}
+
+pub(super) fn features(reading: &Stamped<FeaturesReading>) -> ImageFeatures {
+    ImageFeatures { time_ns: reading.monotonic_time.as_nanos(), features: reading.features.clone() }
 }
 
 fn geodetic(position: &GeodeticPosition) -> Option<Geodetic> {

@@ -1,9 +1,11 @@
 //! Options of the declared state estimator.
 
+use crate::navigation::camera::Camera;
 use crate::navigation::eskf::EskfParams;
 use crate::navigation::geodesy::Geodetic;
 use crate::navigation::state_estimator::{StateEstimatorConfig, StateEstimatorParams, StrategyKind, TakeoffOrigin};
 use bb_core::{Fault, Options};
+use nalgebra::Isometry3;
 
 /// Options of [`FlightEstimator`](super::FlightEstimator); what is not among them is as in [`StateEstimatorParams`].
 #[derive(Clone, Debug, Options)]
@@ -77,13 +79,50 @@ pub struct FlightOptions {
     /// Gravity where the robot is.
     #[option(default = 9.80665, range = 1.0..=30.0, unit = "m/s^2")]
     pub gravity: f64,
+    /// Horizontal focal length of the camera that sees landmarks, pixels.
+    #[option(default = f64::NAN)]
+    pub fx: f64,
+    /// Vertical focal length, pixels.
+    #[option(default = f64::NAN)]
+    pub fy: f64,
+    /// Principal point from the left, pixels.
+    #[option(default = f64::NAN)]
+    pub cx: f64,
+    /// Principal point from the top, pixels.
+    #[option(default = f64::NAN)]
+    pub cy: f64,
+    /// Width of its images, pixels.
+    #[option(default = f64::NAN)]
+    pub width: f64,
+    /// Height of its images, pixels.
+    #[option(default = f64::NAN)]
+    pub height: f64,
+    /// Radial distortion of its lens.
+    #[option(default = 0.0)]
+    pub k1: f64,
+    /// Radial distortion of the fourth order.
+    #[option(default = 0.0)]
+    pub k2: f64,
+    /// Radial distortion of the sixth order.
+    #[option(default = 0.0)]
+    pub k3: f64,
+    /// Tangential distortion, vertical.
+    #[option(default = 0.0)]
+    pub p1: f64,
+    /// Tangential distortion, horizontal.
+    #[option(default = 0.0)]
+    pub p2: f64,
+    /// Number of landmarks that are held at once, from 1 to 100,000; more are refused.
+    #[option(default = 128)]
+    pub landmarks: u32,
     /// Beginning of the names of frames; 0 for one that is made from the first sample of the IMU, another in each flight.
     #[option(default = 0)]
     pub flight: u32,
 }
 
 impl FlightOptions {
-    pub(super) fn config(&self) -> Result<StateEstimatorConfig, Fault> {
+    /// The configuration, given the pose of the camera if landmarks are an input.
+    pub(super) fn config(&self, body_from_camera: Option<Isometry3<f64>>) -> Result<StateEstimatorConfig, Fault> {
         let strategy = StrategyKind::named(&self.strategy).ok_or_else(|| {
             let known: Vec<_> = StrategyKind::ALL.iter().map(|strategy| strategy.name()).collect();
             Fault::new(format!("there is no strategy `{}`: choose one of {}", self.strategy, known.join(", ")))
@@ -105,6 +144,7 @@ impl FlightOptions {
             bounded_distance: self.bounded_distance,
             warm_inflation: self.warm_inflation,
             growing_covariance: self.growing_covariance,
+            landmarks: self.landmarks,
             ..StateEstimatorParams::default()
         };
         let sensors = EskfParams {
@@ -113,7 +153,34 @@ impl FlightOptions {
             gravity: self.gravity,
             ..EskfParams::default()
         };
-        Ok(StateEstimatorConfig { strategy, params, sensors, flight: self.flight.into() })
+        if body_from_camera.is_some() && !strategy.is_smoothing() {
+            let named = strategy.name();
+            return Err(Fault::new(format!("the input `features` needs `strategy = \"smoother\"`, not `{named}`")));
+        }
+        let camera = body_from_camera.map(|pose| self.camera(&pose)).transpose()?;
+        Ok(StateEstimatorConfig { strategy, params, sensors, camera, flight: self.flight.into() })
+    }
+
+    fn camera(&self, body_from_camera: &Isometry3<f64>) -> Result<Camera, Fault> {
+        let lens = [
+            ("fx", self.fx),
+            ("fy", self.fy),
+            ("cx", self.cx),
+            ("cy", self.cy),
+            ("width", self.width),
+            ("height", self.height),
+        ];
+        if let Some((name, _)) = lens.iter().find(|(_, value)| value.is_nan()) {
+            return Err(Fault::new(format!(
+                "the input `features` needs the lens of its camera: the option `{name}`"
+            )));
+        }
+        Ok(Camera {
+            distortion: [self.k1, self.k2, self.k3, self.p1, self.p2],
+            body_from_camera: body_from_camera.rotation,
+            position: body_from_camera.translation.vector,
+            ..Camera::pinhole((self.fx, self.fy), (self.cx, self.cy), (self.width, self.height))
+        })
     }
 
     pub(super) fn origin(&self) -> Option<TakeoffOrigin> {
@@ -130,16 +197,32 @@ mod tests {
     #[test]
     fn defaults_are_those_of_the_library() {
         let FlightOptions { gravity, .. } = FlightOptions::defaults();
-        let config = FlightOptions::defaults().config().unwrap();
+        let config = FlightOptions::defaults().config(None).unwrap();
         let sensors = EskfParams { gravity, ..config.sensors };
         assert_eq!(config, StateEstimatorConfig { sensors, ..StateEstimatorConfig::default() });
+    }
+
+    #[test]
+    fn landmarks_need_a_window_and_a_lens() {
+        let text = |options: &FlightOptions| options.config(Some(Isometry3::identity())).unwrap_err().to_string();
+        let options = FlightOptions::defaults();
+        assert_eq!(text(&options), "the input `features` needs the lens of its camera: the option `fx`");
+        let options = FlightOptions { fx: 400.0, fy: 400.0, cx: 320.0, width: 640.0, height: 480.0, ..options };
+        assert_eq!(text(&options), "the input `features` needs the lens of its camera: the option `cy`");
+        let options = FlightOptions { strategy: "eskf".to_owned(), cy: 240.0, ..options };
+        assert_eq!(text(&options), "the input `features` needs `strategy = \"smoother\"`, not `eskf`");
+        let options = FlightOptions { strategy: "smoother".to_owned(), k1: -0.1, ..options };
+        let camera = options.config(Some(Isometry3::translation(0.1, 0.0, 0.0))).unwrap().camera.unwrap();
+        assert_eq!((camera.position.x, camera.distortion[0], camera.size.y), (0.1, -0.1, 480.0));
+        assert_eq!(options.config(None).unwrap().camera, None);
     }
 
     #[test]
     fn options_reach_the_estimator() {
         let options =
             FlightOptions { dwell: 4.0, anchor_tolerance: 7.0, fallback_after: 1.5, ..FlightOptions::defaults() };
-        let StateEstimatorParams { dwell, anchor_tolerance, fallback_after, .. } = options.config().unwrap().params;
+        let StateEstimatorParams { dwell, anchor_tolerance, fallback_after, .. } =
+            options.config(None).unwrap().params;
         assert_eq!([dwell, anchor_tolerance, fallback_after], [4.0, 7.0, 1.5]);
     }
 }

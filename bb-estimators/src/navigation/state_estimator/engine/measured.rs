@@ -12,7 +12,7 @@ use crate::navigation::state_estimator::event::StartedFrom;
 use crate::navigation::state_estimator::factor::ProvidedFactor;
 use crate::navigation::state_estimator::gate::Rejection;
 use crate::navigation::state_estimator::given::{FactorForm, GivenFactor};
-use crate::navigation::state_estimator::input::{GnssReading, PoseAnchor, VioOutput, blocks};
+use crate::navigation::state_estimator::input::{Feature, GnssReading, PoseAnchor, VioOutput, blocks};
 use crate::navigation::state_estimator::params::StateEstimatorConfig;
 use crate::navigation::state_estimator::start::at_anchor;
 use crate::navigation::state_estimator::strategy::{Measured, Streams, Trust, id_of};
@@ -26,7 +26,7 @@ impl<F: ProvidedFactor> Engine<F> {
         }
         let resets = self.strategy.resets();
         let result = self.strategy.measure(measured);
-        let is_relative = matches!(measured, Measured::Relative(_) | Measured::Between(_));
+        let is_relative = matches!(measured, Measured::Relative(_) | Measured::Between(_) | Measured::Features(_));
         if self.strategy.resets() != resets {
             return self.moved(&result, matches!(measured, Measured::Gnss(..)));
         }
@@ -115,6 +115,17 @@ impl<F: ProvidedFactor> Engine<F> {
         }))?;
         self.sources.seen(vio.to_ns, &config.params);
         Ok(Some(fused))
+    }
+
+    pub(super) fn features(
+        &mut self,
+        now_ns: i64,
+        features: &[Feature],
+        config: &StateEstimatorConfig,
+    ) -> Result<Fused, EstimatorError> {
+        let fused = self.measure(&Measured::Features(features))?;
+        self.sources.seen(now_ns, &config.params);
+        Ok(fused)
     }
 
     pub(super) fn given(&mut self, given: &GivenFactor) -> Result<Fused, EstimatorError> {

@@ -16,6 +16,7 @@ use crate::navigation::refusal::Refusal;
 use crate::navigation::state::{Estimate, NAVIGATED, Navigated};
 use crate::navigation::state_estimator::error::EstimatorError;
 use crate::navigation::state_estimator::factor::SMOOTHED;
+use crate::navigation::state_estimator::input::Feature;
 use crate::navigation::state_estimator::params::StateEstimatorConfig;
 
 /// No value of this type exists.
@@ -41,6 +42,8 @@ never! {
     add(&Measured<'_, F>, u64, &Filter, bool) -> Result<(), EstimatorError>;
     has(u64) -> bool;
     relate(&Measured<'_, F>, u64, &RelativePose) -> Result<Fused, EstimatorError>;
+    observe(u64, &[Feature]) -> Result<Fused, EstimatorError>;
+    motion(u64, u64) -> Option<RelativePose>;
     restart(&Filter, bool) -> Result<(), EstimatorError>;
     predicted() -> Option<Estimate<SMOOTHED>>;
     filter(f64) -> Option<EskfFilter<Navigated, NAVIGATED>>;

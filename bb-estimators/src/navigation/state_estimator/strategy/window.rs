@@ -21,11 +21,12 @@ use crate::navigation::factor::{Factor, NavigationFactor, Rows};
 use crate::navigation::fused::Fused;
 use crate::navigation::measurement::{AbsolutePose, GnssPosition, GnssVelocity, RelativePose};
 use crate::navigation::refusal::Refusal;
-use crate::navigation::smoother::{FixedLagSmoother, SmootherParams};
+use crate::navigation::smoother::{FixedLagSmoother, LandmarkParams, Observation, Sighted, SmootherParams};
 use crate::navigation::state::{Estimate, NAVIGATED, Navigated, Optional, POSITION, ROTATION, States, VELOCITY};
 use crate::navigation::state_estimator::error::EstimatorError;
 use crate::navigation::state_estimator::factor::{ProvidedFactor, SMOOTHED, Smoothed};
 use crate::navigation::state_estimator::given::PoseRows;
+use crate::navigation::state_estimator::input::Feature;
 use crate::navigation::state_estimator::params::StateEstimatorConfig;
 use crate::navigation::stream::{Stream, StreamParams};
 
@@ -70,6 +71,9 @@ pub(super) struct Window<F: ProvidedFactor> {
     open: Stream,
     /// The gate of relative poses to keyframes that the filter does not hold.
     related: Stream,
+    /// The gate of landmarks.
+    sights: Stream,
+    has_camera: bool,
     records: bool,
     left: VecDeque<Pose>,
     /// `false` if the last update did not converge.
@@ -93,11 +97,18 @@ impl<F: ProvidedFactor> Window<F> {
     pub(super) fn new(config: &StateEstimatorConfig) -> Result<Self, ParamsError> {
         let window = config.params.window as usize;
         let params = SmootherParams { sensors: config.sensors, window, ..SmootherParams::default() };
+        let mut smoother = FixedLagSmoother::new(params)?;
+        if let Some(camera) = config.camera {
+            let landmarks = config.params.landmarks as usize;
+            smoother.set_camera(camera, LandmarkParams { landmarks, ..LandmarkParams::default() })?;
+        }
         Ok(Self {
-            smoother: FixedLagSmoother::new(params)?,
+            smoother,
             changes: 0,
             open: Stream::new(StreamParams { gate: 0.0, ..StreamParams::default() }),
             related: Stream::default(),
+            sights: Stream::default(),
+            has_camera: config.camera.is_some(),
             records: config.params.record_keyframes,
             left: VecDeque::new(),
             is_converged: true,
@@ -210,6 +221,7 @@ impl<F: ProvidedFactor> Window<F> {
             }
             Measured::Provided(factor) => self.hold_factor(id, Held::Provided((*factor).clone()))?,
             Measured::Linear(rows) => self.hold_factor(id, Held::Linear(**rows))?,
+            Measured::Features(_) => return Err(Refusal::NotObservable.into()),
         }
         self.update()
     }
@@ -230,6 +242,44 @@ impl<F: ProvidedFactor> Window<F> {
         let fused = self.smoother.add(&mut self.related, id, Held::Navigation(factor))?;
         self.update()?;
         Ok(fused)
+    }
+
+    /// Adds the landmarks of an image at a keyframe, each with a gate of its own. The result is that of those that are used.
+    pub(super) fn observe(&mut self, id: u64, features: &[Feature]) -> Result<Fused, EstimatorError> {
+        if !self.has_camera {
+            return Err(Refusal::NotObservable.into());
+        }
+        let limit = self.sights.params().gate;
+        let mut seen = Fused { nis: 0.0, dimension: 0, weight: 1.0, limit, log_likelihood: 0.0, whitened: 0.0 };
+        let (mut first, mut is_refused) = (None, !features.is_empty());
+        for Feature { landmark, pixel, deviation_px } in features {
+            let observation = Observation::new(*landmark, *pixel, *deviation_px);
+            match self.smoother.observe(&mut self.sights, id, &observation) {
+                Ok(Sighted::Used(fused)) => {
+                    seen.nis += fused.nis;
+                    seen.dimension += fused.dimension;
+                    seen.log_likelihood += fused.log_likelihood;
+                    is_refused = false;
+                }
+                Ok(Sighted::Waiting) => is_refused = false,
+                Err(refusal) => first = first.or(Some(refusal)),
+            }
+        }
+        self.update()?;
+        match first {
+            Some(refusal) if is_refused => Err(refusal.into()),
+            _ => Ok(seen),
+        }
+    }
+
+    /// The motion between two keyframes, as a measurement for the filter. An image is in as many windows as they have keyframes, and
+    /// all their motions rest on it: each is told with its share of the information, so that the image counts once.
+    pub(super) fn motion(&mut self, from: u64, to: u64) -> Option<RelativePose> {
+        let mut motion = self.smoother.relative(from, to)?;
+        let windows = self.keyframes() as f64;
+        motion.translation_covariance *= windows;
+        motion.rotation_covariance *= windows;
+        Some(motion)
     }
 
     /// The factor of a relative pose at the newest keyframe. The scale of the camera's is known from one keyframe to the next; between

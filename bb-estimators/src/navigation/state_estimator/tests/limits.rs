@@ -6,8 +6,9 @@ use crate::navigation::{GnssPosition, ImuMean, Refusal};
 use nalgebra::Vector3;
 
 /// All kinds that wait in the queue.
-const KINDS: [InputKind; 7] = [
+const KINDS: [InputKind; 8] = [
     InputKind::Vio,
+    InputKind::Features,
     InputKind::Anchor,
     InputKind::Factor,
     InputKind::Gnss,
@@ -21,6 +22,7 @@ fn add(estimator: &mut Providing, flight: &Flight, kind: InputKind, time_ns: i64
         InputKind::Vio => {
             estimator.add_vio(VioOutput { from_ns: time_ns - FRAME, to_ns: time_ns, ..flight.vio[0] })
         }
+        InputKind::Features => estimator.add_features(ImageFeatures { time_ns, features: Vec::new() }),
         InputKind::Anchor => estimator.add_pose_anchor(PoseAnchor { time_ns, ..flight.anchors[0] }),
         InputKind::Factor => {
             let place = GnssPosition::new(Vector3::zeros(), 1.0, 1.0);
@@ -102,9 +104,10 @@ fn each_kind_is_refused_without_room() {
             let now_ns = 4 * SECOND;
             let results: Vec<_> = (1..=700).map(|i| add(&mut estimator, &flight, kind, now_ns + i)).collect();
             let taken = results.iter().take_while(|result| **result == Ok(Added::Waits)).count();
-            // A relative pose comes with its two frames.
+            // A relative pose comes with its two frames, and an image with its own.
             let (expected, is_fatal) = match kind {
                 InputKind::Vio => ((room - held) / 3, true),
+                InputKind::Features => ((room - held) / 2, true),
                 InputKind::Anchor | InputKind::Factor => (room - held, true),
                 _ => (room - room / 4 - held, false),
             };

@@ -3,10 +3,11 @@
 #[cfg(test)]
 mod tests;
 
-use nalgebra::{Matrix2, Matrix2x3, Matrix3, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix2x3, UnitQuaternion, Vector2, Vector3};
 
 use crate::navigation::numbers::PIXEL_STEPS;
 use crate::navigation::refusal::Refusal;
+use crate::params::ParamsError;
 
 /// A pinhole camera with radial and tangential distortion, and its pose on the body. The optical axis is z; x points to
 /// the right in the image and y points down.
@@ -79,15 +80,18 @@ impl Camera {
         }
     }
 
-    /// Returns whether every number is finite and all lengths and sizes are positive.
-    pub(in crate::navigation) fn is_sound(&self) -> bool {
+    /// Checks that every number is finite and all lengths and sizes are positive.
+    pub(in crate::navigation) fn check(&self) -> Result<(), ParamsError> {
         let lengths = [self.focal_length, self.size];
         let finite = |values: &[f64]| values.iter().all(|x| x.is_finite());
-        lengths.iter().flatten().all(|x| *x > 0.0 && x.is_finite())
+        let is_sound = lengths.iter().flatten().all(|x| *x > 0.0 && x.is_finite())
             && finite(self.centre.as_slice())
             && finite(&self.distortion)
             && finite(self.position.as_slice())
-            && (self.body_from_camera.coords.norm() - 1.0).abs() < 1e-6
+            && (self.body_from_camera.coords.norm() - 1.0).abs() < 1e-6;
+        let (min, max) = (f64::MIN_POSITIVE, f64::MAX);
+        let error = ParamsError { parameter: "camera", value: self.focal_length.x, min, max, unit: "px" };
+        if is_sound { Ok(()) } else { Err(error) }
     }
 
     /// Projects a point in the camera's axes, m, to a pixel.
@@ -160,16 +164,6 @@ impl Camera {
         );
         let focal = Matrix2::from_diagonal(&self.focal_length);
         (self.focal_length.component_mul(&at) + self.centre, focal * by_direction)
-    }
-
-    /// `camera_from_world` and the camera's centre in the world, for a pose of the body.
-    pub(in crate::navigation) fn placed(
-        &self,
-        position: &Vector3<f64>,
-        world_from_body: &UnitQuaternion<f64>,
-    ) -> (Matrix3<f64>, Vector3<f64>) {
-        let turned = (world_from_body * self.body_from_camera).inverse().to_rotation_matrix().into_inner();
-        (turned, position + world_from_body * self.position)
     }
 }
 
