@@ -118,7 +118,7 @@ params! {
         ///
         /// Small: landmarks are refused although their tracks would help. Large: costs time and memory, about 40 kB each, as the
         /// window is held nine times for what comes late. From 1 to 100,000.
-        landmarks: u32 = 128;
+        landmarks: u32 = 256;
         /// Events of keyframes that leave the window, for a recorder. They cost the smoother the covariance of its oldest keyframe.
         record_keyframes: bool = true;
     }

@@ -113,7 +113,7 @@ pub struct FlightOptions {
     #[option(default = 0.0)]
     pub p2: f64,
     /// Number of landmarks that are held at once, from 1 to 100,000; more are refused.
-    #[option(default = 128)]
+    #[option(default = 256)]
     pub landmarks: u32,
     /// Beginning of the names of frames; 0 for one that is made from the first sample of the IMU, another in each flight.
     #[option(default = 0)]

@@ -44,7 +44,8 @@ impl<F: ProvidedFactor> Engine<F> {
             self.distrust(now_ns);
         }
         let fused = result?;
-        if !matches!(measured, Measured::Gnss(..)) {
+        // Landmarks that wait for another direction say nothing yet.
+        if !matches!(measured, Measured::Gnss(..)) && fused.dimension > 0 {
             self.independent_ns = self.now_ns;
         }
         if !self.is_bounded() || (!is_relative && !self.is_height_plausible()) {
@@ -124,7 +125,9 @@ impl<F: ProvidedFactor> Engine<F> {
         config: &StateEstimatorConfig,
     ) -> Result<Fused, EstimatorError> {
         let fused = self.measure(&Measured::Features(features))?;
-        self.sources.seen(now_ns, &config.params);
+        if fused.dimension > 0 {
+            self.sources.seen(now_ns, &config.params);
+        }
         Ok(fused)
     }
 

@@ -125,6 +125,21 @@ fn landmarks_are_the_visual_odometry() {
     assert!(anchors / count < 0.5, "{}", anchors / count);
 }
 
+/// A landmark that was seen once says nothing, and an image of such landmarks is no camera for the label.
+#[test]
+fn landmarks_that_wait_are_no_camera() {
+    let flight = Flight::new(5, 1);
+    let mut images = images(5, 1, 12);
+    let all = images.iter_mut().flat_map(|image| &mut image.features);
+    all.enumerate().for_each(|(i, feature)| feature.landmark = i as u64);
+    let mut estimator = flown(&flight, &images, 0);
+    assert_eq!(count(estimator.sink(), "degraded"), 0);
+    assert_eq!(estimator.label(), SourceLabel::DeadReckoned);
+    let mut alone = flown(&flight, &[], 0);
+    let [with, without] = [&mut estimator, &mut alone].map(|estimator| error(&flight, estimator, 5 * SECOND).0);
+    assert!((with - without).abs() < 0.1 * without, "{with} {without}");
+}
+
 /// Whatever the order in which they arrive, the bits are the same.
 #[test]
 fn images_may_come_late() {
