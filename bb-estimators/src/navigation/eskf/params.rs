@@ -73,8 +73,8 @@ imu_params! {
         ///
         /// Small: trusts the stamps. Large: needs acceleration to become observable.
         ///
-        /// Source: receivers that stamp at the end of a 10 Hz period.
-        gnss_delay: GaussMarkov = GaussMarkov::new(0.05, 5000.0), deviation 0.0..=10.0, shown "0.05 for 5000 s", of "s";
+        /// Source: receivers whose fixes are 50 to 250 ms old, which wander by a millisecond in a second.
+        gnss_delay: GaussMarkov = GaussMarkov::new(0.1, 20_000.0), deviation 0.0..=10.0, shown "0.1 for 20,000 s", of "s";
         /// Deviation of the scale of the wheel speed from 1, [`Optional::WheelScale`].
         ///
         /// Small: trusts the wheel's radius. Large: needs another source of speed to become observable.

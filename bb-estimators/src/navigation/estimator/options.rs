@@ -38,7 +38,7 @@ imu_params! {
         /// Standard deviation of the GNSS antenna's declared position, if its error is a state.
         gnss_lever_arm: f64 = 0.1, in 0.0..=100.0, unit "m";
         /// Standard deviation of the delay of fixes beyond their stamps, if the delay is a state.
-        gnss_delay: f64 = 0.05, in 0.0..=10.0, unit "s";
+        gnss_delay: f64 = 0.1, in 0.0..=10.0, unit "s";
         /// Standard deviation of the scale of the wheels from 1, if the scale is a state.
         wheel_scale: f64 = 0.05, in 0.0..=1.0;
         /// Correlation time of the scale of the wheels.
