@@ -8,8 +8,8 @@ use bb_core::nalgebra::{UnitQuaternion, Vector2, Vector3};
 use bb_estimators::attitude::{AttitudeFilter, ImuSample, MekfFilter, VqfFilter};
 use bb_estimators::navigation::planar::{PlanarFilter, PlanarParams, PlanarPosition, PlanarStart};
 use bb_estimators::navigation::{
-    EskfFilter, EskfParams, Fused, GnssPosition, Height, History, ImuMean, Navigation, Refusal, Replayed,
-    SmootherParams, Start, Stream,
+    Copies, EskfFilter, EskfParams, Fused, GnssPosition, Height, History, ImuMean, Navigation, Propagate, Refusal,
+    Replayed, SmootherParams, Start, Stream, Ways,
 };
 use std::error::Error;
 use std::hint::black_box;
@@ -73,6 +73,8 @@ pub(crate) const STEPS: &[Step] = &[
     },
     // Late by a sample, so that two samples and two heights are replayed.
     Step { name: "eskf/late_height", on: Some("eskf/sample"), steps: USUAL, stored: 36_060.0, run: late },
+    // After the fix with which the search for the noise of the IMU begins.
+    Step { name: "eskf/sample_of_3_copies", on: None, steps: USUAL, stored: 15_835.0, run: copies },
     Step {
         name: "planar/sample",
         on: None,
@@ -125,6 +127,21 @@ fn eskf(
         correct(&mut filter, &mut stream, reading)?;
     }
     black_box(filter);
+    Ok(())
+}
+
+/// Three copies of the filter, with three multiples of the noise of the IMU, take a sample.
+fn copies(steps: usize) -> Result<(), Box<dyn Error>> {
+    let readings = readings(LONG);
+    let (origin, level) = (Vector3::zeros(), UnitQuaternion::identity());
+    let mut copies =
+        Copies::<EskfFilter<Navigation>>::new(EskfParams::default(), Ways { noise: true, scale: false })?;
+    copies.start(&Start::at(0, (origin, 1.0), (origin, 0.1), (level, 0.05)))?;
+    copies.update_fix(&mut Stream::default(), &GnssPosition::new(origin, 1.0, 1.0))?;
+    for reading in readings.iter().take(steps) {
+        copies.propagate(black_box(&sample(reading)))?;
+    }
+    black_box(copies);
     Ok(())
 }
 
