@@ -125,6 +125,10 @@ impl<F: ProvidedFactor> Queue<F> {
         // The window restarts, on another clock.
         engine.leave();
         self.news.look(engine);
+        if is_alarmed {
+            // On the new clock it is older than all that comes.
+            engine.alarm(newest_ns, config);
+        }
         engine.set_clock_back(sample.time_ns, for_ns, config);
         let (now_ns, started) = (engine.now_ns(), engine.started().into_iter().collect());
         self.past.restart(now_ns.map_or(Key::FIRST, Key::of_sample), None);
@@ -133,9 +137,6 @@ impl<F: ProvidedFactor> Queue<F> {
         let seconds = newest_ns.saturating_sub(sample.time_ns) as f64 * 1e-9;
         self.news.tell(sample.time_ns, EventKind::ClockSetBack { seconds });
         self.past.push(*sample);
-        if is_alarmed {
-            self.alarm(config);
-        }
         self.settle(sample.time_ns, config);
     }
 

@@ -151,5 +151,10 @@ fn a_report_of_another_clock_blocks_all_the_same() {
         let behind = |sample: &crate::navigation::ImuMean| Sent::Imu(*sample).behind(1000 * SECOND);
         flight.samples.iter().skip(801).take(200).for_each(|sample| ignore(behind(sample).to(&mut estimator)));
         assert_eq!((estimator.counts().set_back, estimator.health().gate), (1, GateState::Blocked));
+        // Nor is a fix from before the jump was believed let in by a late report.
+        let late_ns = 4 * SECOND + 20 * STEP - 1000 * SECOND;
+        ignore(estimator.add_gps_health(report(late_ns, GpsHealth::Stable)));
+        let refused = estimator.add_gnss(GnssReading { time_ns: late_ns + STEP, ..flight.fixes[19] });
+        assert!(matches!(refused, Err(EstimatorError::Degraded(Reason::Gate(_)))), "{strategy:?}: {refused:?}");
     }
 }
