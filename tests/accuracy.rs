@@ -8,6 +8,7 @@ mod attitude;
 mod bags;
 mod command;
 mod families;
+mod features;
 mod harder;
 mod known;
 mod known_families;

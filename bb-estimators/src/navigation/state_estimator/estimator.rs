@@ -140,7 +140,7 @@ impl<K: EventSink, F: ProvidedFactor> FlightNavigator<K, F> {
     }
 
     /// Adds the landmarks that the camera of the configuration has seen in one image. The smoother's window finds where they are; the
-    /// filter beside it is told the motion that the window then knows. Of one camera, add either these or relative poses.
+    /// filter beside it is told the motion that the window then knows, unless it has a relative pose to the same frame.
     ///
     /// A landmark that does not fit is left out by itself. An image is refused, for the reason of the first, if none of its landmarks
     /// is accepted; the strategy without a window and one without a camera refuse all as [`NotObservable`](Refusal::NotObservable).

@@ -168,6 +168,8 @@ pub(super) struct Strategy<F: ProvidedFactor> {
     left: Option<Pose>,
     /// `true` if the present becomes the reference of the next relative pose, once all measurements at this time are fused.
     is_reference_due: bool,
+    /// Time of the last relative pose of a camera that the filter has fused.
+    related_ns: i64,
 }
 
 impl<F: ProvidedFactor> Strategy<F> {
@@ -185,6 +187,7 @@ impl<F: ProvidedFactor> Strategy<F> {
             records: config.params.record_keyframes,
             left: None,
             is_reference_due: false,
+            related_ns: i64::MIN,
         })
     }
 
@@ -202,6 +205,7 @@ impl<F: ProvidedFactor> Strategy<F> {
         self.copies.set_keyframe(id_of(time_ns));
         self.cadence.begin(time_ns);
         self.is_reference_due = false;
+        self.related_ns = i64::MIN;
         self.past.clear();
         self.past.extend(self.pose());
     }
@@ -333,7 +337,8 @@ impl<F: ProvidedFactor> Strategy<F> {
     }
 
     /// Adds the landmarks of an image to the window. What the window then knows of the motion since the last frame is the filter's
-    /// visual odometry, which keeps its gates as narrow as the estimate.
+    /// visual odometry, which keeps its gates as narrow as the estimate. A filter that has a relative pose to this frame needs no other:
+    /// the window's rests on it too.
     fn observe(&mut self, features: &[Feature]) -> Result<Fused, EstimatorError> {
         self.keyframe()?;
         let now = id_of(self.cadence.keyframe_ns);
@@ -344,7 +349,8 @@ impl<F: ProvidedFactor> Strategy<F> {
             return Ok(seen);
         }
         let reference = self.copies.estimate().and_then(|estimate| estimate.keyframe);
-        let motion = reference.filter(|_| seen.dimension > 0).and_then(|held| window.motion(held.id, now));
+        let needs_motion = seen.dimension > 0 && self.related_ns != self.cadence.keyframe_ns;
+        let motion = reference.filter(|_| needs_motion).and_then(|held| window.motion(held.id, now));
         if let Some(motion) = motion {
             // One that the filter refuses is no fault of the image.
             let fused = self.fuse(&Measured::Between(motion));
@@ -366,9 +372,13 @@ impl<F: ProvidedFactor> Strategy<F> {
 
     /// Fuses a measurement with the filter.
     fn fuse(&mut self, measured: &Measured<'_, F>) -> Result<Fused, EstimatorError> {
-        let Self { copies, streams, .. } = self;
+        let Self { copies, streams, related_ns, cadence, .. } = self;
         let fused = match measured {
-            Measured::Relative(pose) => copies.update(&mut streams.relative, pose).map_err(escalate)?,
+            Measured::Relative(pose) => {
+                let fused = copies.update(&mut streams.relative, pose).map_err(escalate)?;
+                *related_ns = cadence.keyframe_ns;
+                fused
+            }
             Measured::Anchor(pose) => copies.update_position(&mut streams.anchors, pose).map_err(escalate)?,
             Measured::Gnss(position, velocity, trust) => {
                 let fused = match trust {
