@@ -28,6 +28,12 @@ robot! {
             input odometry: sensor::base::wheels, optional;
             output odometry; output status;
         }
+        estimator mounted: Eskf<NavigationOutputs>(wheel_mounting = 1 deg) {
+            input imu: sensor::base::imu, driver;
+            input gnss: sensor::base::gnss, optional;
+            input odometry: sensor::base::wheels, optional;
+            output odometry; output status;
+        }
         estimator with_velocity: Eskf<NavigationOutputs>() {
             input imu: sensor::base::imu, driver;
             input gnss: sensor::base::gnss, optional;
@@ -48,8 +54,8 @@ const STEP_S: f64 = 0.01;
 const STEPS: usize = 6000;
 
 /// The filters, and the time by which each has to know the headings of all cars, s.
-const FILTERS: [(&str, f64); 4] =
-    [("fixes", 60.0), ("wheeled", 15.0), ("with_velocity", 30.0), ("with_heading", 5.0)];
+const FILTERS: [(&str, f64); 5] =
+    [("fixes", 60.0), ("wheeled", 15.0), ("mounted", 15.0), ("with_velocity", 30.0), ("with_heading", 5.0)];
 
 fn normal(random: &mut Random, deviation: f64) -> f64 {
     (0..12).map(|_| random.noise()).sum::<f64>() * deviation / 12_f64.sqrt()
@@ -112,6 +118,10 @@ fn drive(seed: u64) -> [Score; FILTERS.len()] {
         (
             builder.subscribe_with(car::estimator::base::wheeled::odometry, room()),
             builder.subscribe_with(car::estimator::base::wheeled::status, room()),
+        ),
+        (
+            builder.subscribe_with(car::estimator::base::mounted::odometry, room()),
+            builder.subscribe_with(car::estimator::base::mounted::status, room()),
         ),
         (
             builder.subscribe_with(car::estimator::base::with_velocity::odometry, room()),
