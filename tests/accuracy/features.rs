@@ -144,7 +144,7 @@ fn fly(data: &DataSet, camera: Camera) -> Result<Flown, Box<dyn Error>> {
         count += 1.0;
     }
     drop(estimator);
-    Ok(Flown { position_m: (sum / f64::from(count)).sqrt(), nees: nees_sum / count, refused: [anchors, images] })
+    Ok(Flown { position_m: (sum / count).sqrt(), nees: nees_sum / count, refused: [anchors, images] })
 }
 
 /// Flight, camera, the position that was measured, m, and the NEES that is accepted.
