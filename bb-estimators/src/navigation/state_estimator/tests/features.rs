@@ -59,7 +59,7 @@ fn with_camera(flight: &Flight) -> Estimator {
     estimator
 }
 
-/// Estimator after a flight with one anchor at 2 s, and the images that come so late.
+/// Estimator after a flight with one anchor at 2 s, whose images each arrive `late_ns` after their stamps.
 fn flown(flight: &Flight, images: &[ImageFeatures], late_ns: i64) -> Estimator {
     let mut estimator = with_camera(flight);
     let mut left = images.iter();
@@ -140,7 +140,7 @@ fn landmarks_that_wait_are_no_camera() {
     assert!((with - without).abs() < 0.1 * without, "{with} {without}");
 }
 
-/// Whatever the order in which they arrive, the bits are the same.
+/// Images that come 0.7 s late give the same bits as those in order.
 #[test]
 fn images_may_come_late() {
     let flight = Flight::new(3, 2);
