@@ -3,113 +3,62 @@
 use crate::kit::*;
 
 /// Cast that adds a number.
-pub(crate) struct Add(f64);
-pub(crate) struct HowMuch;
-/// Asks, and wants a timeout or more work after the answer.
-pub(crate) struct HowMuchAnd(Request);
+struct Add(f64);
+/// Asks for the sum, has it emitted, and asks the estimator for more after the answer.
+struct HowMuch(Request);
 /// Asks for the last time.
 #[derive(Clone, Copy, Debug, Payload)]
-pub(crate) struct Leave {}
+struct Leave {}
 
-/// Options of [`Sum`].
-#[derive(Clone, Debug, Options)]
-pub(crate) struct SumOptions {
-    #[option(default = 1.0, range = 0.0..=10.0)]
-    pub(crate) gain: f64,
-    /// Name of the request that it makes in `init`.
-    #[option(default = "nothing")]
-    pub(crate) asks: &'static str,
+/// Sums up what it gets; some sums make it ask for more of each kind.
+fn sum(sum: &mut f64, number: f64) -> Replied {
+    *sum += number;
+    Ok(match number {
+        200.0 => Reply::none().and(Request::Timeout(Duration::from_millis(50))),
+        400.0 => Reply::emit(Number(*sum)).and(Request::Continue(1)),
+        600.0 => Reply::none().and(Request::Tick(Duration::ZERO)),
+        _ => Reply::none(),
+    })
 }
 
-/// Sums up what it gets.
-pub(crate) struct Sum {
-    options: SumOptions,
-    sum: f64,
+fn happens(_: &mut f64, info: Info) -> Replied {
+    Ok(Reply::emit(Number(match info {
+        Info::Tick => 1000.0,
+        Info::Timer(number) => 2000.0 + f64::from(number),
+        Info::Timeout => 3000.0,
+        _ => 0.0,
+    })))
 }
 
-impl Estimator for Sum {
-    type Options = SumOptions;
-    type Input = Number;
-    type Output = Number;
-
-    fn init(options: SumOptions, context: &Context) -> Result<Self, Fault> {
-        match options.asks {
-            "a tick" => context.request(Request::Tick(Duration::from_millis(20))),
-            "a timer" => context.request(Request::Timer(7, Duration::from_millis(30))),
-            "a timeout" => context.request(Request::Timeout(Duration::from_millis(50))),
-            "to go on" => context.request(Request::Continue(3)),
-            _ => {}
-        }
-        Ok(Self { options, sum: 0.0 })
-    }
-
-    fn handle_input(&mut self, number: &Stamped<Number>) -> Replied {
-        self.sum += self.options.gain * number.0;
-        Ok(match number.0 {
-            // Asks for more of each kind.
-            100.0 => Reply::none().and(Request::Timeout(Duration::from_millis(50))),
-            200.0 => Reply::emit(Number(self.sum)).and(Request::Continue(1)),
-            300.0 => Reply::none().and(Request::Tick(Duration::ZERO)),
-            _ => Reply::none(),
-        })
-    }
-
-    fn handle_info(&mut self, info: Info) -> Replied {
-        Ok(Reply::emit(Number(match info {
-            Info::Tick => 1000.0,
-            Info::Timer(number) => 2000.0 + f64::from(number),
-            Info::Timeout => 3000.0,
-            _ => 0.0,
-        })))
-    }
-
-    fn handle_continue(&mut self, step: u32) -> Replied {
-        let reply = Reply::emit(Number(4000.0 + f64::from(step)));
-        Ok(if step < 3 { reply.and(Request::Continue(step + 1)) } else { reply })
-    }
-
-    fn handle_options(&mut self, options: SumOptions, _: &Context) -> Result<(), Fault> {
-        if options.gain == 9.0 {
-            return Err(Fault::new("no such gain"));
-        }
-        self.options = options;
-        Ok(())
-    }
+fn go_on(_: &mut f64, step: u32) -> Replied {
+    let reply = Reply::emit(Number(4000.0 + f64::from(step)));
+    Ok(if step < 3 { reply.and(Request::Continue(step + 1)) } else { reply })
 }
 
-impl HandleCall<HowMuch> for Sum {
+/// Refuses a gain.
+fn tune(gain: f64) -> Done {
+    if gain == 9.0 { Err(Fault::new("no such gain")) } else { Ok(()) }
+}
+
+impl HandleCall<HowMuch> for Echo {
     type Response = f64;
-    fn handle_call(&mut self, HowMuch: HowMuch) -> Result<(f64, Reply<Number>), Fault> {
-        Ok((self.sum, Reply::emit(Number(self.sum))))
+    fn handle_call(&mut self, HowMuch(request): HowMuch) -> Result<(f64, Reply<Number>), Fault> {
+        Ok((self.1, Reply::emit(Number(self.1)).and(request)))
     }
 }
 
-impl HandleCall<HowMuchAnd> for Sum {
-    type Response = f64;
-    fn handle_call(&mut self, HowMuchAnd(request): HowMuchAnd) -> Result<(f64, Reply<Number>), Fault> {
-        Ok((self.sum, Reply::none().and(request)))
-    }
-}
-
-impl HandleCall<Leave> for Sum {
+impl HandleCall<Leave> for Echo {
     type Response = f64;
     const RECORD: Option<RequestCodec<Leave>> = Some(RequestCodec::bytes());
 
     fn handle_call(&mut self, _: Leave) -> Result<(f64, Reply<Number>), Fault> {
-        Ok((self.sum, Reply::emit(Number(self.sum)).and(Request::Restart("told to leave"))))
+        self.handle_call(HowMuch(Request::Restart("told to leave")))
     }
 }
 
-impl HandleCall<Break> for Sum {
-    type Response = ();
-    fn handle_call(&mut self, Break: Break) -> Result<((), Reply<Number>), Fault> {
-        Err(Fault::new("broken on request"))
-    }
-}
-
-impl HandleCast<Add> for Sum {
+impl HandleCast<Add> for Echo {
     fn handle_cast(&mut self, Add(number): Add) -> Replied {
-        self.sum += number;
+        self.1 += number;
         Ok(Reply::none())
     }
 }
@@ -117,23 +66,18 @@ impl HandleCast<Add> for Sum {
 robot! {
     robot Summing;
 
-    parameters {
-        sum {
-            gain: f64 = 2.0, range: 0.0..=20.0;
-        }
-    }
-
+    parameters { sum { gain: f64 = 2.0, range: 0.0..=20.0; } }
     link base {
         sensor number: External<Number>() {
-            estimator sum: Sum(gain = param::sum::gain);
+            estimator sum: Echo(input = sum, info = happens, go_on = go_on, gain = param::sum::gain, tune = Some(tune));
         }
     }
 }
 
 /// Publishes numbers at milliseconds, and gives what is emitted until some more.
-fn run(asks: &'static str, published: &[(i64, f64)], until: i64) -> Result<Vec<(i64, f64)>, StartError> {
+fn run(asks: fn(&Context) -> Done, published: &[(i64, f64)], until: i64) -> Result<Vec<(i64, f64)>, StartError> {
     let mut builder = Summing::builder();
-    builder.options(summing::sensor::base::number::sum).asks = asks;
+    builder.options(summing::sensor::base::number::sum).init = asks;
     let sums = builder.subscribe(summing::sensor::base::number::sum);
     let mut simulation = builder.simulate()?;
     for (millis, number) in published {
@@ -145,58 +89,48 @@ fn run(asks: &'static str, published: &[(i64, f64)], until: i64) -> Result<Vec<(
 
 #[test]
 fn what_is_asked_for_comes_at_its_time() -> Result<(), StartError> {
+    fn asks(context: &Context, request: Request) -> Done {
+        context.request(request);
+        Ok(())
+    }
+    let nothing = |_: &Context| Ok(());
     // In `init`.
-    assert_eq!(run("a tick", &[], 65)?, [(20, 1000.0), (40, 1000.0), (60, 1000.0)]);
-    assert_eq!(run("a timer", &[], 100)?, [(30, 2007.0)]);
-    assert_eq!(run("a timeout", &[], 200)?, [(50, 3000.0)]);
-    assert_eq!(run("to go on", &[], 200)?, [(0, 4003.0)]);
+    assert_eq!(run(tick::<20>, &[], 65)?, [(20, 1000.0), (40, 1000.0), (60, 1000.0)]);
+    assert_eq!(run(|made| asks(made, Request::Timer(7, Duration::from_millis(30))), &[], 100)?, [(30, 2007.0)]);
+    assert_eq!(run(|made| asks(made, Request::Timeout(Duration::from_millis(50))), &[], 200)?, [(50, 3000.0)]);
+    assert_eq!(run(|made| asks(made, Request::Continue(3)), &[], 200)?, [(0, 4003.0)]);
     // A timeout is put off by whatever happens, and for good by what asks for none.
-    assert_eq!(run("nothing", &[(10, 100.0), (40, 100.0)], 500)?, [(90, 3000.0)]);
-    assert_eq!(run("nothing", &[(10, 100.0), (40, 100.0), (89, 1.0)], 300)?, []);
+    assert_eq!(run(nothing, &[(10, 100.0), (40, 100.0)], 500)?, [(90, 3000.0)]);
+    assert_eq!(run(nothing, &[(10, 100.0), (40, 100.0), (89, 1.0)], 300)?, []);
     // Work goes on before the next message; a tick ends on request.
     let worked = [(10, 400.0), (10, 4001.0), (10, 4002.0), (10, 4003.0), (10, 800.0)];
     let again = [(10, 4001.0), (10, 4002.0), (10, 4003.0)];
-    assert_eq!(run("nothing", &[(10, 200.0), (10, 200.0)], 10)?, [&worked[..], &again].concat());
-    assert_eq!(run("a tick", &[(30, 300.0)], 100)?, [(20, 1000.0)]);
+    assert_eq!(run(nothing, &[(10, 200.0), (10, 200.0)], 10)?, [&worked[..], &again].concat());
+    assert_eq!(run(tick::<20>, &[(30, 300.0)], 100)?, [(20, 1000.0)]);
     Ok(())
 }
 
 #[test]
-fn calls_are_answered_and_casts_are_taken() -> Result<(), Failure> {
+fn calls_are_answered_and_may_ask_for_more_and_casts_are_taken() -> Result<(), Failure> {
     let sum = summing::sensor::base::number::sum;
     let builder = Summing::builder();
     let sums = builder.subscribe(sum);
     let mut simulation = builder.simulate()?;
     simulation.publish(summing::sensor::base::number, at(5), Number(1.0));
     simulation.cast(sum, Add(40.0))?;
-    assert_eq!(simulation.call(sum, HowMuch)?, 42.0);
-    assert_eq!(timed(&sums), [(5, 42.0)], "a call may emit as well");
+    assert_eq!(simulation.call(sum, HowMuch(Request::Timeout(Duration::from_millis(50))))?, 42.0);
+    // A call may emit as well. The next one ends the timeout, as anything does.
+    assert_eq!(simulation.call(sum, HowMuch(Request::Continue(3)))?, 42.0);
+    simulation.run_until(at(200));
+    assert_eq!(timed(&sums), [(5, 42.0), (5, 42.0), (5, 4003.0)]);
+    assert_eq!(simulation.call(sum, HowMuch(Request::Timeout(Duration::from_millis(50))))?, 42.0);
+    simulation.run_until(at(500));
+    assert_eq!(timed(&sums), [(200, 42.0), (250, 3000.0)]);
     // One that fails fails the estimator, and the caller hears of it.
     assert_refused(simulation.call(sum, Break), "sensor/base/number/sum failed at this call: broken on request");
-    assert_refused(simulation.call(sum, HowMuch), "sensor/base/number/sum does not run");
-    simulation.run_until(at(100));
-    assert_eq!(simulation.call(sum, HowMuch)?, 0.0, "it is as new");
-    Ok(())
-}
-
-#[test]
-fn an_answer_may_ask_for_more() -> Result<(), Failure> {
-    let sum = summing::sensor::base::number::sum;
-    let builder = Summing::builder();
-    let sums = builder.subscribe(sum);
-    let mut simulation = builder.simulate()?;
-    simulation.run_until(at(10));
-    assert_eq!(simulation.call(sum, HowMuchAnd(Request::Timeout(Duration::from_millis(50))))?, 0.0);
-    assert_eq!(
-        simulation.call(sum, HowMuchAnd(Request::Continue(3)))?,
-        0.0,
-        "it ends the timeout, as anything does"
-    );
-    simulation.run_until(at(200));
-    assert_eq!(timed(&sums), [(10, 4003.0)]);
-    assert_eq!(simulation.call(sum, HowMuchAnd(Request::Timeout(Duration::from_millis(50))))?, 0.0);
-    simulation.run_until(at(500));
-    assert_eq!(timed(&sums), [(250, 3000.0)]);
+    assert_refused(simulation.call(sum, Ask), "sensor/base/number/sum does not run");
+    simulation.run_until(at(600));
+    assert_eq!(simulation.call(sum, Ask)?, 0.0, "it is as new");
     Ok(())
 }
 
@@ -213,14 +147,11 @@ fn an_estimator_may_answer_and_stop() -> Result<(), Failure> {
         assert_eq!(timed(&sums), [(5, 42.0)]);
         let change = health.try_recv().map(|change| (change.payload.to, change.payload.reason));
         assert_eq!(change, Some((HealthState::Degraded, HealthReason::Restarted)));
-        assert!(simulation.call(sum, HowMuch).is_err(), "it waits for its restart");
+        assert!(simulation.call(sum, Ask).is_err(), "it waits for its restart");
         simulation.run_until(at(100));
         assert_eq!(simulation.call(sum, Leave {})?, 0.0, "it is as new");
         let report = simulation.stop();
-        assert_eq!(
-            report.faults[0].to_string(),
-            "sensor/base/number/sum failed: told to leave (2 times in 0.095 s)"
-        );
+        assert_eq!(told(&report), ["sensor/base/number/sum failed: told to leave (2 times in 0.095 s)"]);
         Ok(report)
     })?;
     Ok(())
@@ -232,11 +163,10 @@ fn an_estimator_that_refuses_new_options_is_made_again_with_them() -> Result<(),
     let sum = summing::sensor::base::number::sum;
     simulation.publish(summing::sensor::base::number, at(5), Number(1.0));
     simulation.set_parameter(summing::param::sum::gain, 9.0)?;
-    assert!(simulation.call(sum, HowMuch).is_err(), "it has failed");
+    assert!(simulation.call(sum, Ask).is_err(), "it has failed");
     simulation.publish(summing::sensor::base::number, at(50), Number(1.0));
-    assert_eq!(simulation.call(sum, HowMuch)?, 9.0, "fresh state, and the gain in force");
-    let report = simulation.stop();
-    assert_eq!(report.faults[0].to_string(), "sensor/base/number/sum failed: no such gain");
+    assert_eq!(simulation.call(sum, Ask)?, 9.0, "fresh state, and the gain in force");
+    assert_eq!(told(&simulation.stop()), ["sensor/base/number/sum failed: no such gain"]);
     Ok(())
 }
 
@@ -249,25 +179,11 @@ fn a_parameter_reaches_the_options_bound_to_it() -> Result<(), Failure> {
     simulation.publish(summing::sensor::base::number, at(5), Number(1.0));
     simulation.set_parameter(summing::param::sum::gain, 5.0)?;
     simulation.publish(summing::sensor::base::number, at(10), Number(1.0));
-    let sum = simulation.call(summing::sensor::base::number::sum, HowMuch)?;
+    let sum = simulation.call(summing::sensor::base::number::sum, Ask)?;
     assert_eq!(sum, 8.0, "it keeps its state");
     let change = changes.try_recv().expect("a change is published");
     assert_eq!((&change.from, &change.to), (&ParameterValue::Float(3.0), &ParameterValue::Float(5.0)));
 
-    // In the parameter's range, but not in the option's; and in neither.
-    let refused = |value| {
-        let refused = simulation.set_parameter(summing::param::sum::gain, value);
-        refused.expect_err("it is out of range").to_string()
-    };
-    assert_eq!(
-        refused(15.0),
-        "param/sum/gain is not set: sensor/base/number/sum would refuse it: option `gain` is 15, but must be in \
-         0.0..=10.0"
-    );
-    assert_eq!(refused(21.0), "param/sum/gain is not set: expected a number in 0.0..=20.0, found `21.0`");
-    assert_eq!(simulation.parameter(summing::param::sum::gain), 5.0);
-    let unknown = simulation.bus().set_parameter("param/sum/gian", 1.0).expect_err("there is none").to_string();
-    assert_eq!(unknown, "param/sum/gian is not set: no such parameter is declared; did you mean `param/sum/gain`?");
     Ok(())
 }
 

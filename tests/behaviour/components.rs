@@ -1,8 +1,10 @@
 //! The kit that the robots of these tests are made of: components whose code is an option, so that a test writes only what it is
 //! about, and what many of them share.
 
+use bb_core::payload::ActuatorCommand;
 use bb_core::prelude::*;
 use bb_core::{Builder, JointPositions, JointReading, Report, RequestCodec, Robot, Running};
+use std::fmt::{Debug, Display, Formatter};
 use std::pin::{Pin, pin};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context as Polled, Wake, Waker};
@@ -49,9 +51,11 @@ pub(crate) struct SourceOptions {
     pub(crate) terminate: fn(Termination<'_>),
     #[option(default = || ())]
     pub(crate) dropped: fn(),
-    /// Another one is made when it changes.
+    /// Another one is made when it changes, unless there is code for that.
     #[option(default = 1.0, range = 0.0..=1e6)]
     pub(crate) gain: f64,
+    #[option(default = None)]
+    pub(crate) tune: Option<fn(f64) -> Done>,
 }
 
 /// A sensor; it measures nothing, unless it is told to.
@@ -75,6 +79,12 @@ impl Sensor for Source {
         (self.0.read)(self.1, now)
     }
 
+    fn handle_options(&mut self, options: SourceOptions, context: &SensorContext) -> Done {
+        // Else what a sensor without this method does.
+        let Some(tune) = options.tune else { return CanEncoder.handle_options(NoOptions, context) };
+        tune(options.gain)
+    }
+
     fn terminate(&mut self, reason: Termination<'_>) {
         (self.0.terminate)(reason);
     }
@@ -87,10 +97,13 @@ impl Drop for Source {
 }
 
 /// Options of [`Echo`].
-#[derive(Clone, Debug, Options)]
+#[derive(Clone, Options)]
 pub(crate) struct EchoOptions {
     #[option(default = |_| Ok(()))]
     pub(crate) init: fn(&Context) -> Done,
+    /// The number that it keeps at first.
+    #[option(default = |_| 0.0)]
+    pub(crate) keep: fn(&Context) -> f64,
     /// Code for a number, with another one that it keeps.
     #[option(default = |_, number| Ok(Reply::emit(Number(number))))]
     pub(crate) input: OnNumber,
@@ -104,13 +117,22 @@ pub(crate) struct EchoOptions {
     pub(crate) terminate: fn(Termination<'_>),
     #[option(default = || ())]
     pub(crate) dropped: fn(),
-    /// Another one is made when it changes.
+    /// Factor of what it gets. Another one is made when it changes, unless there is code for that.
     #[option(default = 1.0)]
     pub(crate) gain: f64,
+    #[option(default = None)]
+    pub(crate) tune: Option<fn(f64) -> Done>,
 }
 
-/// An estimator; it emits what it gets, unless it is told to do something else.
-pub(crate) struct Echo(EchoOptions, f64);
+/// Without the addresses of its code: in another process, which replays a journal with it, they are others.
+impl Debug for EchoOptions {
+    fn fmt(&self, formatter: &mut Formatter<'_>) -> std::fmt::Result {
+        formatter.debug_struct("EchoOptions").field("gain", &self.gain).finish_non_exhaustive()
+    }
+}
+
+/// An estimator with a number that it keeps; it emits what it gets, unless it is told to do something else.
+pub(crate) struct Echo(EchoOptions, pub(crate) f64);
 
 impl Estimator for Echo {
     type Options = EchoOptions;
@@ -119,11 +141,19 @@ impl Estimator for Echo {
 
     fn init(options: EchoOptions, context: &Context) -> Result<Self, Fault> {
         (options.init)(context)?;
-        Ok(Self(options, 0.0))
+        let kept = (options.keep)(context);
+        Ok(Self(options, kept))
     }
 
     fn handle_input(&mut self, number: &Stamped<Number>) -> Replied {
-        (self.0.input)(&mut self.1, number.0)
+        (self.0.input)(&mut self.1, self.0.gain * number.0)
+    }
+
+    fn handle_options(&mut self, options: EchoOptions, context: &Context) -> Done {
+        // Else what an estimator without this method does.
+        let Some(tune) = options.tune else { return Snapshot.handle_options(NoOptions, context) };
+        self.0.gain = options.gain;
+        tune(options.gain)
     }
 
     fn handle_info(&mut self, info: Info) -> Replied {
@@ -295,6 +325,38 @@ pub(crate) fn after(context: CommandContext, millis: u64) -> Doing {
 pub(crate) fn tick<const MILLIS: u64>(context: &Context) -> Done {
     context.request(Request::Tick(Duration::from_millis(MILLIS)));
     Ok(())
+}
+
+/// An estimator that says what its options are.
+pub(crate) struct Known<O>(O);
+
+impl<O: Options> Estimator for Known<O> {
+    type Options = O;
+    type Input = Number;
+    type Output = Number;
+
+    fn init(options: O, _: &Context) -> Result<Self, Fault> {
+        Ok(Self(options))
+    }
+
+    fn handle_input(&mut self, _: &Stamped<Number>) -> Replied {
+        Ok(Reply::none())
+    }
+
+    fn handle_options(&mut self, options: O, _: &Context) -> Done {
+        self.0 = options;
+        Ok(())
+    }
+}
+
+/// Asks a [`Known`] for its options.
+pub(crate) struct Which;
+
+impl<O: Options> HandleCall<Which> for Known<O> {
+    type Response = O;
+    fn handle_call(&mut self, Which: Which) -> Result<(O, Reply<Number>), Fault> {
+        Ok((self.0.clone(), Reply::none()))
+    }
 }
 
 /// Options of an estimator with a gain.
@@ -488,6 +550,19 @@ pub(crate) fn when_woken<T: Payload>(subscription: &mut Subscription<T>, run: im
     assert!(awaited.poll(&mut Polled::from_waker(&waker)).is_pending());
 }
 
+/// A joint at rest, or that does not know better.
+pub(crate) fn joint(position: f64) -> JointState {
+    JointState { position, velocity: None, effort: None }
+}
+
+pub(crate) fn move_to(position: f64) -> ActuatorCommand {
+    PositionCommand { position, ..Default::default() }.into()
+}
+
+pub(crate) fn move_at(velocity: f64) -> ActuatorCommand {
+    VelocityCommand { velocity, effort: None }.into()
+}
+
 /// The time `millis` after zero.
 pub(crate) fn at(millis: i64) -> MonotonicTime {
     MonotonicTime::from_nanos(millis * 1_000_000)
@@ -514,13 +589,30 @@ pub(crate) fn told(report: &Report) -> Vec<String> {
 
 /// Asserts that something is refused, and that the error says so.
 #[track_caller]
-pub(crate) fn assert_refused<T, E: std::fmt::Display>(result: Result<T, E>, says: &str) {
+pub(crate) fn assert_refused<T, E: Display>(result: Result<T, E>, says: &str) {
     assert_eq!(result.map(drop).map_err(|error| error.to_string()), Err(says.to_owned()));
 }
 
 /// Times in milliseconds and numbers of the messages that wait in a subscription.
 pub(crate) fn timed(numbers: &Subscription<Number>) -> Vec<(i64, f64)> {
     numbers.drain().map(|number| (number.monotonic_time.as_nanos() / 1_000_000, number.0)).collect()
+}
+
+/// Takes steps such as `a1 b2: seen`, which publishes for `a` at 1 ms and for `b` at 2 ms: what is seen then is compared.
+pub(crate) fn check_steps<R: Robot>(
+    row: &str,
+    steps: &str,
+    simulation: &mut Simulation<R>,
+    publish: impl Fn(&mut Simulation<R>, &str, i64),
+    mut seen: impl FnMut(&Simulation<R>) -> Vec<String>,
+) {
+    for step in steps.split("; ") {
+        let (publishes, expected) = step.split_once(": ").unwrap_or((step, ""));
+        for (sensor, millis) in publishes.split(' ').map(|publish| publish.split_at(1)) {
+            publish(simulation, sensor, millis.parse().expect("milliseconds"));
+        }
+        assert_eq!(seen(simulation).join(", "), expected, "{row}: {step}");
+    }
 }
 
 /// Runs tests that wait most of their time on a thread each.

@@ -86,11 +86,10 @@ fn a_component_that_fails_is_restarted_alone_with_fresh_state() -> Result<(), St
         let estimator = report.estimator("sensor/base/numbers/first").expect("it is declared");
         assert_eq!((estimator.restarts, estimator.diverged, estimator.stopped.as_deref()), (1, 3, None));
         assert_eq!(estimator.inputs[0].dropped(DropReason::Stopped), 0, "it was back before the next message");
-        let faults: Vec<_> = report.faults.iter().map(ToString::to_string).collect();
         let own = format!("sensor/base/numbers/first failed: {message}");
         // The sensor's fault has come twice, the second time after the estimator's.
         let broken = "sensor/base/broken failed: no answer on the bus (2 times in 0.110 s)".to_owned();
-        assert_eq!(faults, [own, broken]);
+        assert_eq!(told(&report), [own, broken]);
         assert_eq!((report.faults[1].count, report.all_faults), (2, 3));
         assert_eq!((report.faults[1].first_time, report.faults[1].last_time), (at(100), at(210)));
         assert!(report.ok().is_err());

@@ -106,7 +106,7 @@ robot! {
 
 #[test]
 fn transforms_are_the_products_of_the_fixed_joints() -> Result<(), StartError> {
-    let _alone = lock(&ALONE);
+    let _alone = one_at_a_time();
     let builder = Mast::builder();
     let here = builder.subscribe(mast::estimator::base::here);
     let back = builder.subscribe(mast::estimator::base::mount::mast::tip::top::back);
@@ -156,8 +156,6 @@ fn the_topology_is_data() {
 
 /// Contexts of estimators, in the order in which they are made.
 static CONTEXTS: Mutex<Vec<[&str; 3]>> = Mutex::new(Vec::new());
-static ALONE: Mutex<()> = Mutex::new(());
-
 fn note(context: &Context) -> Done {
     lock(&CONTEXTS).push([context.robot(), context.path(), context.frame().name()]);
     Ok(())
@@ -165,7 +163,7 @@ fn note(context: &Context) -> Done {
 
 #[test]
 fn an_estimator_gets_its_robot_its_path_and_its_frame() -> Result<(), StartError> {
-    let _alone = lock(&ALONE);
+    let _alone = one_at_a_time();
     lock(&CONTEXTS).clear();
     Mast::builder().simulate()?;
     let mut contexts = std::mem::take(&mut *lock(&CONTEXTS));

@@ -1,20 +1,45 @@
 //! Code that hangs until a test lets it go on, and what is waited for meanwhile.
 
-use crate::components::Doing;
+use crate::components::{Doing, lock, within};
 use bb_core::ComponentFault;
 use bb_core::prelude::*;
+use std::collections::BTreeMap;
+use std::panic::Location;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
 /// Longer than anything takes that does not hang, however busy the machine.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(20);
 
 /// Waits until `holds`, however busy the machine.
-pub(crate) fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
+pub(crate) fn wait_until(what: &str, holds: impl FnMut() -> bool) {
+    assert!(holds_within(PATIENCE, holds), "not reached: {what}");
+}
+
+/// Waits until `holds`, for so long at most; whether it does.
+pub(crate) fn holds_within(limit: Duration, mut holds: impl FnMut() -> bool) -> bool {
     let start = std::time::Instant::now();
     while !holds() {
-        assert!(start.elapsed() < PATIENCE, "not reached: {what}");
+        if start.elapsed() >= limit {
+            return false;
+        }
         std::thread::sleep(Duration::from_millis(1));
     }
+    true
+}
+
+/// Keeps the other tests of the caller's file waiting: they share devices, or a place at which code hangs.
+#[track_caller]
+pub(crate) fn one_at_a_time() -> MutexGuard<'static, ()> {
+    static OF_FILES: Mutex<BTreeMap<&str, &Mutex<()>>> = Mutex::new(BTreeMap::new());
+    let of_file = *lock(&OF_FILES).entry(Location::caller().file()).or_insert_with(|| Box::leak(Box::default()));
+    lock(of_file)
+}
+
+/// Runs a test that might hang, alone among those of its file; panics if it is not over after `seconds`.
+#[track_caller]
+pub(crate) fn alone_within(seconds: u64, test: impl FnOnce() + Send + 'static) {
+    let _alone = one_at_a_time();
+    within(seconds, test);
 }
 
 /// Waits for a fault at `path`, and returns its message.

@@ -68,8 +68,7 @@ robot! {
 
 /// Locks and resets the counts of brakes, which all tests of this file share.
 fn alone() -> MutexGuard<'static, ()> {
-    static ALONE: Mutex<()> = Mutex::new(());
-    let guard = lock(&ALONE);
+    let guard = one_at_a_time();
     braked();
     guard
 }

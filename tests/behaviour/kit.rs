@@ -19,4 +19,4 @@ pub(crate) use bb_core::{
 pub(crate) use serde_json::Value;
 pub(crate) use std::collections::BTreeMap;
 pub(crate) use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, AtomicU64, AtomicUsize, Ordering};
-pub(crate) use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, mpsc};
+pub(crate) use std::sync::{Arc, Mutex, MutexGuard, OnceLock, mpsc};

@@ -6,8 +6,6 @@ use bb_core::message::codec::{Reader, Shape, Writer};
 use bb_core::message::{DecodeError, Field, Finite};
 
 static PANICS: AtomicU32 = AtomicU32::new(0);
-static TURN: Mutex<()> = Mutex::new(());
-
 fn may_panic(code: u32) {
     assert!(PANICS.load(Ordering::SeqCst) != code || std::thread::panicking(), "code {code}");
 }
@@ -88,7 +86,7 @@ robot! {
 
 /// One panic of that code, and what the robot does after it.
 fn charged(code: u32) -> Result<(), Failure> {
-    let _turn = TURN.lock();
+    let _alone = one_at_a_time();
     let mut builder = Making::builder();
     builder.journal(|_| ());
     let outputs = builder.subscribe(making::sensor::base::source::maker);
@@ -100,9 +98,8 @@ fn charged(code: u32) -> Result<(), Failure> {
     PANICS.store(0, Ordering::SeqCst);
     simulation.run_for(Duration::from_millis(50));
     let report = simulation.report();
-    let faults: Vec<_> = report.faults.iter().map(ToString::to_string).collect();
     let expected = format!("sensor/base/source/maker failed: panicked: code {code}");
-    assert_eq!(faults, [expected], "code {code}");
+    assert_eq!(told(&report), [expected], "code {code}");
     assert_eq!(report.sources[0].restarts, 0, "the sensor has done nothing");
     assert_eq!(report.sources[0].readings, 8, "and is read at its rate");
     assert_eq!(report.estimators[0].restarts, 1, "code {code}");
@@ -129,7 +126,7 @@ fn a_panic_in_the_code_of_an_estimators_output_is_charged_to_the_estimator_which
 
 #[test]
 fn a_payload_that_panics_fails_the_estimator_that_takes_it_and_not_its_publisher() -> Result<(), StartError> {
-    let _turn = TURN.lock();
+    let _alone = one_at_a_time();
     let running = Making::builder().start()?;
     for number in 1..=5 {
         let output = Output { evil: Evil(f64::from(number)) };
@@ -149,7 +146,7 @@ fn a_payload_that_panics_fails_the_estimator_that_takes_it_and_not_its_publisher
 
 #[test]
 fn outputs_that_panic_too_often_have_the_robot_made_safe() -> Result<(), Failure> {
-    let _turn = TURN.lock();
+    let _alone = one_at_a_time();
     let builder = Making::builder();
     let _outputs = builder.subscribe(making::sensor::base::source::maker);
     let mut simulation = armed_simulation(builder);

@@ -1,7 +1,7 @@
 //! Parameters that are set at once: all of them, or none.
 
 use crate::kit::*;
-use crate::parameters::{BOUND, Tuned, Which, tuned};
+use crate::parameters::{BOUND, BOUND_OPTIONS, BoundOptions, Tuned, tuned};
 use bb_core::event::ParameterChange;
 
 /// Sets two parameters of which the second may be refused.
@@ -30,7 +30,8 @@ fn a_set_that_is_refused_in_the_middle_changes_nothing() -> Result<(), Failure> 
     let all = simulation.subscribe_any(Select::Below("param"), None, Overflow::default());
     let gain = |gain: f64| ("param/gain", gain.into());
     let (name, count) = (("param/name", "two".to_owned().into()), ("param/count", 2.into()));
-    let refuses = "param/gain is not set: sensor/base/number/bound would refuse it: ";
+    let refuses = "param/gain is not set: sensor/base/number/bound would refuse it: option `gain` is 100000000, but must be in \
+                   0.0..=1e6";
     let wrong_type = "param/count is not set: expected a value of type `i64`, found `2.5`";
     let unknown = "param/cuont is not set: no such parameter is declared; did you mean `param/count`?";
     let out_of_range = "param/gain is not set: expected a number in 0.0..=1000000000.0, found `-1.0`";
@@ -44,12 +45,11 @@ fn a_set_that_is_refused_in_the_middle_changes_nothing() -> Result<(), Failure> 
         (vec![name, gain(1e8)], refuses),
     ];
     for (set, message) in refused {
-        let error = simulation.set_parameters(set).expect_err("one of them is wrong").to_string();
-        assert!(error.starts_with(message), "{error}");
+        assert_refused(simulation.set_parameters(set), message);
         assert_eq!(values(&simulation), (1.0, 1, "one".to_owned()));
     }
     assert_eq!(changes(&all), []);
-    assert_eq!(simulation.call(BOUND, Which)?, (1.0, Some(Duration::from_millis(500)), 1));
+    assert_eq!(simulation.call(BOUND, Which)?, BOUND_OPTIONS);
     assert_eq!(simulation.set_parameters::<&str>([]), Ok(()));
 
     simulation.set_parameters([
@@ -58,7 +58,7 @@ fn a_set_that_is_refused_in_the_middle_changes_nothing() -> Result<(), Failure> 
         tuned::param::gain.to(2.0),
     ])?;
     assert_eq!(values(&simulation), (2.0, 2, "two".to_owned()));
-    assert_eq!(simulation.call(BOUND, Which)?, (2.0, Some(Duration::from_millis(500)), 2));
+    assert_eq!(simulation.call(BOUND, Which)?, BoundOptions { gain: 2.0, count: 2, ..BOUND_OPTIONS });
     let told = changes(&all);
     let paths: Vec<_> = told.iter().map(|(path, ..)| *path).collect();
     assert_eq!(
@@ -102,8 +102,8 @@ fn a_set_is_seen_as_a_whole() {
             let reader = scope.spawn(|| {
                 let mut seen = 0_u32;
                 while seen == 0 || !is_over.load(Ordering::SeqCst) {
-                    if let Ok((gain, _, count)) = running.call(BOUND, Which) {
-                        assert_eq!(gain, f64::from(count));
+                    if let Ok(bound) = running.call(BOUND, Which) {
+                        assert_eq!(bound.gain, f64::from(bound.count));
                         seen += 1;
                     }
                 }
@@ -223,11 +223,9 @@ robot! {
     link base { sensor device: Tuning(gain = param::gain) { rate: 100 Hz; } }
 }
 
-static ALONE: Mutex<()> = Mutex::new(());
-
 #[test]
 fn what_a_sensor_sets_as_it_starts_reaches_its_own_options() -> Result<(), Failure> {
-    let _alone = lock(&ALONE);
+    let _alone = one_at_a_time();
     let mut simulation = SelfTuned::builder().simulate()?;
     simulation.run_for(Duration::from_millis(50));
     assert_eq!(*lock(&TUNED), (vec![1.0, 5.0], Some(true)));
@@ -237,8 +235,7 @@ fn what_a_sensor_sets_as_it_starts_reaches_its_own_options() -> Result<(), Failu
 
 #[test]
 fn a_set_does_not_wait_for_an_end_of_sets_of_other_parameters() {
-    within(60, || {
-        let _alone = lock(&ALONE);
+    alone_within(60, || {
         let running = SelfTuned::builder().start().expect("it starts");
         let is_over = AtomicBool::new(false);
         std::thread::scope(|scope| {

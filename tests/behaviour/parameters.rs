@@ -3,7 +3,7 @@
 use crate::kit::*;
 
 /// Options that a parameter can be bound to in every way.
-#[derive(Clone, Debug, Options)]
+#[derive(Clone, Debug, PartialEq, Options)]
 pub(crate) struct BoundOptions {
     #[option(default = 1.0, range = 0.0..=1e6)]
     pub(crate) gain: f64,
@@ -11,37 +11,6 @@ pub(crate) struct BoundOptions {
     pub(crate) timeout: Option<Duration>,
     #[option(default = 0)]
     pub(crate) count: u8,
-}
-
-/// Says what its options are.
-pub(crate) struct Bound(BoundOptions);
-
-impl Estimator for Bound {
-    type Options = BoundOptions;
-    type Input = Number;
-    type Output = Number;
-
-    fn init(options: BoundOptions, _: &Context) -> Result<Self, Fault> {
-        Ok(Self(options))
-    }
-
-    fn handle_input(&mut self, _: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
-        Ok(Reply::none())
-    }
-
-    fn handle_options(&mut self, options: BoundOptions, _: &Context) -> Result<(), Fault> {
-        self.0 = options;
-        Ok(())
-    }
-}
-
-pub(crate) struct Which;
-
-impl HandleCall<Which> for Bound {
-    type Response = (f64, Option<Duration>, u8);
-    fn handle_call(&mut self, Which: Which) -> Result<(Self::Response, Reply<Number>), Fault> {
-        Ok(((self.0.gain, self.0.timeout, self.0.count), Reply::none()))
-    }
 }
 
 /// Sets the gain a thousand times.
@@ -78,12 +47,15 @@ robot! {
     bridges { bridge knob: Pulse() { rate: 1 kHz; } }
     link base {
         sensor number: External<Number>() {
-            estimator bound: Bound(gain = param::gain, timeout = param::timeout, count = param::count);
+            estimator bound: Known<BoundOptions>(gain = param::gain, timeout = param::timeout, count = param::count);
         }
     }
 }
 
-pub(crate) const BOUND: EstimatorHandle<Tuned, Bound, Number> = tuned::sensor::base::number::bound;
+/// Options of [`BOUND`] as they are declared.
+pub(crate) const BOUND_OPTIONS: BoundOptions =
+    BoundOptions { gain: 1.0, timeout: Some(Duration::from_millis(500)), count: 1 };
+pub(crate) const BOUND: EstimatorHandle<Tuned, Known<BoundOptions>, Number> = tuned::sensor::base::number::bound;
 
 #[test]
 fn changes_are_published_in_their_order_and_the_last_one_holds() {
@@ -121,20 +93,19 @@ fn changes_are_published_in_their_order_and_the_last_one_holds() {
 
 #[test]
 fn what_an_option_cannot_hold_becomes_the_nearest_it_can() -> Result<(), Failure> {
-    let simulation = Tuned::builder().simulate()?;
-    let ask = |simulation: &Simulation<Tuned>| simulation.call(BOUND, Which).map_err(|fault| fault.to_string());
-    assert_eq!(ask(&simulation)?, (1.0, Some(Duration::from_millis(500)), 1));
-    simulation.set_parameter(tuned::param::timeout, -1.0)?;
-    simulation.set_parameter(tuned::param::count, i64::MAX)?;
+    let mut simulation = Tuned::builder().simulate()?;
+    assert_eq!(simulation.call(BOUND, Which)?, BOUND_OPTIONS);
     for wrong in [f64::NAN, f64::INFINITY, -1.0] {
         assert!(simulation.set_parameter(tuned::param::gain, wrong).is_err());
     }
-    let mut simulation = simulation;
-    simulation.run_for(Duration::from_micros(10));
-    assert_eq!((ask(&simulation)?.1, ask(&simulation)?.2), (Some(Duration::ZERO), 255));
-    simulation.set_parameter(tuned::param::timeout, f64::MAX)?;
-    simulation.set_parameter(tuned::param::count, i64::MIN)?;
-    simulation.run_for(Duration::from_micros(10));
-    assert_eq!((ask(&simulation)?.1, ask(&simulation)?.2), (Some(Duration::MAX), 0));
+    for (timeout, count, expected) in
+        [(-1.0, i64::MAX, (Duration::ZERO, 255)), (f64::MAX, i64::MIN, (Duration::MAX, 0))]
+    {
+        simulation.set_parameter(tuned::param::timeout, timeout)?;
+        simulation.set_parameter(tuned::param::count, count)?;
+        simulation.run_for(Duration::from_micros(10));
+        let (timeout, count) = (Some(expected.0), expected.1);
+        assert_eq!(simulation.call(BOUND, Which)?, BoundOptions { timeout, count, ..BOUND_OPTIONS });
+    }
     Ok(())
 }

@@ -2,54 +2,34 @@
 
 use crate::kit::*;
 
-/// The devices of these tests are there once.
-static ALONE: Mutex<()> = Mutex::new(());
-
 static GATE: Gate = Gate::new();
 static TURNS: AtomicBool = AtomicBool::new(false);
 static MADE: AtomicU32 = AtomicU32::new(0);
 static CHANGED: AtomicU32 = AtomicU32::new(0);
 
 fn alone() -> MutexGuard<'static, ()> {
-    let alone = lock(&ALONE);
+    let alone = one_at_a_time();
     MADE.store(0, Ordering::SeqCst);
     CHANGED.store(0, Ordering::SeqCst);
     TURNS.store(false, Ordering::SeqCst);
     alone
 }
 
-#[derive(Clone, Debug, Options)]
-pub(crate) struct FanOptions {
-    #[option(default = 1.0, range = 0.0..=10.0)]
-    pub(crate) speed: f64,
+/// Starts a motor, and registers what stops it once; it is set to its speed whenever that changes.
+fn fan(context: &SensorContext) -> Done {
+    context.on_disarm(|| {
+        TURNS.store(false, Ordering::SeqCst);
+        Ok(())
+    });
+    TURNS.store(true, Ordering::SeqCst);
+    Ok(())
 }
 
-/// Motor that is set to its speed whenever that changes, and registers what stops it once.
-pub(crate) struct Fan;
-
-impl Sensor for Fan {
-    type Options = FanOptions;
-    type Output = Number;
-
-    fn init(_: FanOptions, context: &SensorContext) -> Result<Self, Fault> {
-        context.on_disarm(|| {
-            TURNS.store(false, Ordering::SeqCst);
-            Ok(())
-        });
-        TURNS.store(true, Ordering::SeqCst);
-        Ok(Self)
-    }
-
-    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        Ok(Reading::nothing())
-    }
-
-    fn handle_options(&mut self, _: FanOptions, _: &SensorContext) -> Result<(), Fault> {
-        GATE.pass("options");
-        TURNS.store(true, Ordering::SeqCst);
-        CHANGED.fetch_add(1, Ordering::SeqCst);
-        Ok(())
-    }
+fn set_speed(_: f64) -> Done {
+    GATE.pass("options");
+    TURNS.store(true, Ordering::SeqCst);
+    CHANGED.fetch_add(1, Ordering::SeqCst);
+    Ok(())
 }
 
 /// A disarm callback takes as long as the gate is closed.
@@ -78,7 +58,7 @@ robot! {
     parameters { speed: f64 = 1.0, range: 0.0..=10.0; }
     link base {
         sensor brake: Source(init = brake) { rate: 10 Hz; }
-        sensor fan: Fan(speed = param::speed) { rate: 100 Hz; }
+        sensor fan: Source(init = fan, gain = param::speed, tune = Some(set_speed)) { rate: 100 Hz; }
     }
 }
 

@@ -44,12 +44,9 @@ fn powered() -> Builder<Plain> {
     builder
 }
 
-/// The hardware of these tests is there once.
-static ALONE: Mutex<()> = Mutex::new(());
-
 #[test]
 fn a_restarted_sensor_is_made_safe_once() -> Result<(), StartError> {
-    let _alone = ALONE.lock();
+    let _alone = one_at_a_time();
     let mut builder = powered();
     builder.options(SOURCE).read = |_, _| Err(Fault::new("no echo"));
     builder.supervision().max_restarts = 1000;
@@ -67,8 +64,7 @@ fn a_restarted_sensor_is_made_safe_once() -> Result<(), StartError> {
 /// One after the other, and by many threads at once: each gets the answer, the hardware is made safe once.
 #[test]
 fn a_robot_that_is_disarmed_twice_is_made_safe_once() {
-    let _alone = ALONE.lock();
-    within(60, || {
+    alone_within(60, || {
         let builder = powered();
         let changes = builder.subscribe(system::SafetyState);
         let running = builder.start().expect("it starts");
@@ -103,7 +99,7 @@ fn a_robot_that_is_disarmed_twice_is_made_safe_once() {
 
 #[test]
 fn a_disarm_that_panics_leads_to_error_and_the_next_one_may_succeed() -> Result<(), StartError> {
-    let _alone = ALONE.lock();
+    let _alone = one_at_a_time();
     let builder = powered();
     let errors = builder.subscribe(system::SafetyErrors);
     let running = armed(builder);
@@ -120,8 +116,7 @@ fn a_disarm_that_panics_leads_to_error_and_the_next_one_may_succeed() -> Result<
 
 #[test]
 fn a_disarm_that_hangs_is_an_error_and_does_not_keep_the_robot_from_stopping() {
-    let _alone = ALONE.lock();
-    within(60, || {
+    alone_within(60, || {
         HERE.close("a brake");
         let running = armed(powered());
         running.actuate(SERVO, Number(HANGS_AT_DISARM)).expect("it does as told");
@@ -133,19 +128,15 @@ fn a_disarm_that_hangs_is_an_error_and_does_not_keep_the_robot_from_stopping() {
         let start = std::time::Instant::now();
         let report = running.stop();
         assert!(start.elapsed() < Duration::from_secs(20));
-        let faults: Vec<_> = report.faults.iter().map(ToString::to_string).collect();
-        assert_eq!(
-            faults,
-            ["actuator/base/pan/servo failed: did not come back from its command, or from disarming, in time"]
-        );
+        let late = "actuator/base/pan/servo failed: did not come back from its command, or from disarming, in time";
+        assert_eq!(told(&report), [late]);
         HERE.open();
     });
 }
 
 #[test]
 fn threads_that_arm_and_disarm_at_once_agree_in_the_end() {
-    let _alone = ALONE.lock();
-    within(60, || {
+    alone_within(60, || {
         let builder = powered();
         let changes = builder.subscribe_with(system::SafetyState, Overflow::DropOldest { capacity: 1 << 15 });
         let running = builder.start().expect("it starts");

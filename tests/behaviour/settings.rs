@@ -1,7 +1,6 @@
 //! Options and parameters from files, from the command line and by path.
 
 use crate::kit::*;
-use bb_core::HandleCall;
 use bb_tests::laws;
 use proptest::prelude::*;
 use std::path::PathBuf;
@@ -57,31 +56,6 @@ pub(crate) struct EveryOptions {
     pub(crate) nick: Option<String>,
 }
 
-pub(crate) struct Every(EveryOptions);
-
-impl Estimator for Every {
-    type Options = EveryOptions;
-    type Input = Number;
-    type Output = Number;
-
-    fn init(options: EveryOptions, _: &Context) -> Result<Self, Fault> {
-        Ok(Self(options))
-    }
-
-    fn handle_input(&mut self, _: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
-        Ok(Reply::none())
-    }
-}
-
-pub(crate) struct Which;
-
-impl HandleCall<Which> for Every {
-    type Response = EveryOptions;
-    fn handle_call(&mut self, Which: Which) -> Result<(EveryOptions, Reply<Number>), Fault> {
-        Ok((self.0.clone(), Reply::none()))
-    }
-}
-
 robot! {
     robot Set;
     parameters {
@@ -96,7 +70,7 @@ robot! {
     }
     link base {
         sensor source: External<Number>() {
-            estimator every: Every(port = "/dev/null", gain = param::tuning::gain);
+            estimator every: Known<EveryOptions>(port = "/dev/null", gain = param::tuning::gain);
         }
     }
 }
@@ -109,6 +83,11 @@ fn options(builder: Builder<Set>) -> EveryOptions {
 #[test]
 fn a_file_sets_options_and_parameters_alike() {
     let mut builder = Set::builder();
+    // Tables of which every key is a comment, as `--list` writes them, say nothing.
+    let before = builder.settings().to_string();
+    let empty = "[sensor]\n[sensor.base.source.every]\n# port = 1\n[param]\n[param.tuning]\n";
+    builder.set_from_toml("rover.toml", empty).expect("nothing is set");
+    assert_eq!(builder.settings().to_string(), before);
     let file = r#"
         # Any nesting of the path will do.
         [sensor.base.source.every]
@@ -189,40 +168,45 @@ rover.toml:19:15: param/tuning/gian: there is no such setting; did you mean `par
     assert_eq!(error.problems()[0].position(), Some((3, 17)));
 }
 
+fn error_of(file: &str) -> String {
+    Set::builder().set_from_toml("rover.toml", file).expect_err("it is wrong").to_string()
+}
+
 #[test]
 fn values_out_of_their_range_are_refused_where_they_are_written() {
-    let wrong = |text: &str| {
-        let mut builder = Set::builder();
-        builder.set_from_toml("rover.toml", text).expect_err("it is wrong").to_string()
-    };
-    assert_eq!(
-        wrong("[sensor.base.source.every]\ntimeout = \"1 s\"\nmaximum_range = \"31 m\""),
-        "rover.toml:3:17: sensor/base/source/every/maximum_range: must be in 0.1..=30.0 m, found `31`"
-    );
-    assert_eq!(
-        wrong("[sensor.base.source.every]\nretries = 9\nmaximum_range = \"0 m\"\nretires = 1").lines().count(),
-        3,
-        "all ranges and names at once"
-    );
-    assert_eq!(
-        wrong("sensor.base.source.every.timeout = \"-1 s\""),
-        "rover.toml:1:36: sensor/base/source/every/timeout: cannot be -1 s"
-    );
-    assert_eq!(
-        wrong("sensor.base.source.every.filtering = { LowPass = { cutoff = nan } }"),
-        "rover.toml:1:38: sensor/base/source/every/filtering: expected a finite number"
-    );
-    assert_eq!(
-        wrong("[param]\ntuning.count = 1\n\"tuning/count\" = 2"),
-        "rover.toml:3:18: param/tuning/count: is set twice in this file"
-    );
-    assert_eq!(
-        wrong("sensor.base.source.every = 3"),
-        "rover.toml:1:20: sensor/base/source/every: is a component; its options are axis, filtering, gain, \
-         horizon, maximum_range, name, nick, opaque, port, rate, reach, retries, scale, timeout, tries"
-    );
-    assert_eq!(wrong("a = \nb = ]").lines().count(), 2, "every syntax error");
-    assert_eq!(wrong("sensor = 3"), "rover.toml:1:1: sensor: there is no such setting; `--list` shows all");
+    for (file, error) in [
+        (
+            "[sensor.base.source.every]\ntimeout = \"1 s\"\nmaximum_range = \"31 m\"",
+            "rover.toml:3:17: sensor/base/source/every/maximum_range: must be in 0.1..=30.0 m, found `31`",
+        ),
+        (
+            "sensor.base.source.every.timeout = \"-1 s\"",
+            "rover.toml:1:36: sensor/base/source/every/timeout: cannot be -1 s",
+        ),
+        (
+            "sensor.base.source.every.filtering = { LowPass = { cutoff = nan } }",
+            "rover.toml:1:38: sensor/base/source/every/filtering: expected a finite number",
+        ),
+        (
+            "[param]\ntuning.count = 1\n\"tuning/count\" = 2",
+            "rover.toml:3:18: param/tuning/count: is set twice in this file",
+        ),
+        (
+            "sensor.base.source.every = 3",
+            "rover.toml:1:20: sensor/base/source/every: is a component; its options are axis, filtering, gain, \
+             horizon, maximum_range, name, nick, opaque, port, rate, reach, retries, scale, timeout, tries",
+        ),
+        ("sensor = 3", "rover.toml:1:1: sensor: there is no such setting; `--list` shows all"),
+        // A byte order mark is no column.
+        ("\u{feff}a = 1", "rover.toml:1:1: a: there is no such setting; `--list` shows all"),
+    ] {
+        assert_eq!(error_of(file), error);
+    }
+    let three = "[sensor.base.source.every]\nretries = 9\nmaximum_range = \"0 m\"\nretires = 1";
+    assert_eq!(error_of(three).lines().count(), 3, "all ranges and names at once");
+    assert_eq!(error_of("a = \nb = ]").lines().count(), 2, "every syntax error");
+    let deep = error_of(&format!("sensor.base.source.every.axis = {}1", "[".repeat(10_000)));
+    assert!(deep.starts_with("rover.toml:1:"), "{}", &deep[..200.min(deep.len())]);
     let missing = Set::builder().load_settings("no such file.toml").expect_err("it is not there");
     assert!(missing.to_string().starts_with("no such file.toml: cannot be read: "), "{missing}");
 }
@@ -243,7 +227,7 @@ robot! {
     parameters { gain: f64 = 0.5, range: 0.0..=2.0; }
     link base {
         // An option of the sensor has the name of the estimator that is nested there.
-        sensor source: Counter() { rate: 1 Hz; estimator start: Every(port = "/dev/null", gain = param::gain); }
+        sensor source: Counter() { rate: 1 Hz; estimator start: Known<EveryOptions>(port = "/dev/null", gain = param::gain); }
     }
 }
 
@@ -257,13 +241,11 @@ fn options_below_a_setting_of_the_same_name_are_listed_and_in_the_schema() {
     builder.set_from_toml("list", &file).expect("what is listed is read");
     assert_eq!(builder.options(crowd::sensor::base::source).start, 2.0);
     assert_eq!(builder.options(crowd::sensor::base::source::start).retries, 4);
-    let schema: serde_json::Value = serde_json::from_str(&Crowd::settings_schema()).expect("it is JSON");
+    let schema: Value = serde_json::from_str(&Crowd::settings_schema()).expect("it is JSON");
     let sensor = &schema["properties"]["sensor"]["properties"]["base"]["properties"]["source"]["properties"];
     assert_eq!(sensor["start"]["type"], "number", "{schema:#}");
-    assert_eq!(
-        schema["properties"]["sensor/base/source/start"]["properties"]["retries"]["maximum"], 8.0,
-        "{schema:#}"
-    );
+    let retries = &schema["properties"]["sensor/base/source/start"]["properties"]["retries"];
+    assert_eq!(retries["maximum"], 8.0, "{schema:#}");
 }
 
 #[test]
@@ -305,24 +287,6 @@ fn of_many_unknown_names_the_first_get_hints() {
 }
 
 #[test]
-fn a_byte_order_mark_is_no_column_and_depth_is_no_panic() {
-    let wrong = |text: &str| Set::builder().set_from_toml("rover.toml", text).expect_err("it is wrong").to_string();
-    assert_eq!(wrong("\u{feff}a = 1"), "rover.toml:1:1: a: there is no such setting; `--list` shows all");
-    let error = wrong(&format!("sensor.base.source.every.axis = {}1", "[".repeat(10_000)));
-    assert!(error.starts_with("rover.toml:1:"), "{}", &error[..200.min(error.len())]);
-}
-
-/// Tables of which every key is a comment, as `--list` writes them, say nothing.
-#[test]
-fn empty_tables_of_known_paths_are_accepted() {
-    let mut builder = Set::builder();
-    let before = builder.settings().to_string();
-    let empty = "[sensor]\n[sensor.base.source.every]\n# port = 1\n[param]\n[param.tuning]\n";
-    builder.set_from_toml("rover.toml", empty).expect("nothing is set");
-    assert_eq!(builder.settings().to_string(), before);
-}
-
-#[test]
 fn arguments_are_taken_and_the_others_are_left() {
     let folder = std::env::temp_dir().join(format!("bb-settings-{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a folder");
@@ -334,26 +298,17 @@ fn arguments_are_taken_and_the_others_are_left() {
         (builder.settings().to_string(), others)
     };
     let config = format!("--config={}", file.display());
-    let (listed, others) = take(&[
-        "--set",
-        "param/tuning/count=6",
-        "data.mcap",
-        &config,
-        "--set=param/tuning/limit=2 m/s",
-        "--",
-        "--set",
-    ]);
+    let set = "--set=param/tuning/limit=2 m/s";
+    let (listed, others) = take(&["--set", "param/tuning/count=6", "data.mcap", &config, set, "--", "--set"]);
     assert_eq!(others.expect("all is right").expect("nothing is listed"), ["data.mcap", "--", "--set"]);
     assert!(listed.contains("count = 6\n") && listed.contains("label = \"from the file\"\n"), "{listed}");
     let message = |arguments: &[&str]| take(arguments).1.expect_err("it is wrong").to_string();
     assert_eq!(message(&["--set"]), "`--set` needs a value: `--set PATH=VALUE`");
     assert_eq!(message(&["--config"]), "`--config` needs a value: `--config FILE`");
     assert_eq!(message(&["--set", "count"]), "expected `--set PATH=VALUE`, found `--set count`");
-    assert_eq!(
-        message(&["--set", "param/tuning/count=many", "--set", "param/tuning/lable=x"]),
-        "--set param/tuning/count: expected an integer from -9223372036854775808 to 9223372036854775807, found the text \"many\"\n\
-         --set param/tuning/lable: there is no such setting; did you mean `param/tuning/label`?"
-    );
+    let both = "--set param/tuning/count: expected an integer from -9223372036854775808 to 9223372036854775807, found the text \"many\"\n\
+                --set param/tuning/lable: there is no such setting; did you mean `param/tuning/label`?";
+    assert_eq!(message(&["--set", "param/tuning/count=many", "--set", "param/tuning/lable=x"]), both);
     let (_, listed) = take(&["--list"]);
     assert_eq!(listed.expect("it lists"), None);
     let _ = std::fs::remove_dir_all(folder);
@@ -414,14 +369,11 @@ fn the_schema_says_what_can_be_set() {
         assert!(schema.contains(part), "{part} is not in {schema}");
     }
     assert!(!schema.contains("opaque"), "{schema}");
-    let parsed: serde_json::Value = serde_json::from_str(&schema).expect("it is JSON");
+    let parsed: Value = serde_json::from_str(&schema).expect("it is JSON");
     let options =
-        &parsed["properties"]["sensor"]["properties"]["base"]["properties"]["source"]["properties"]["every"];
-    assert_eq!(
-        options["properties"].as_object().map(serde_json::Map::len),
-        Some(13),
-        "gain is bound, opaque is none"
-    );
+        parsed.pointer("/properties/sensor/properties/base/properties/source/properties/every/properties");
+    let count = options.and_then(Value::as_object).map(serde_json::Map::len);
+    assert_eq!(count, Some(13), "gain is bound, opaque is none");
 }
 
 laws! {
