@@ -2,8 +2,42 @@
 
 use crate::joints::{Fusion, Pixel, Spotter};
 use crate::kit::*;
-use crate::replay::{BadDay, BadDayOptions, OnBadDay};
 use std::collections::BTreeSet;
+use std::marker::PhantomData;
+
+/// Readings on a bad day: they come late, twice, with a NaN, or not at all.
+trait OnBadDay: Payload {
+    /// Reads, with a number that the sensor keeps.
+    fn on_bad_day(random: &mut Random, kept: &mut f64, now: MonotonicTime) -> Reading<Self>;
+}
+
+/// Sensor on a bad day.
+struct BadDay<T>(Random, u32, f64, PhantomData<fn() -> T>);
+
+/// Options of [`BadDay`].
+#[derive(Clone, Debug, Options)]
+struct BadDayOptions {
+    #[option(default = 1)]
+    seed: u64,
+    #[option(default = 0)]
+    reads: u32,
+}
+
+impl<T: OnBadDay> Sensor for BadDay<T> {
+    type Options = BadDayOptions;
+    type Output = T;
+
+    fn init(options: BadDayOptions, _: &SensorContext) -> Result<Self, Fault> {
+        // One that restarts must not give the same again.
+        Ok(Self(Random::new(options.seed), options.reads, 0.0, PhantomData))
+    }
+
+    fn read(&mut self, now: MonotonicTime) -> Result<Reading<T>, Fault> {
+        let Some(reads) = self.1.checked_sub(1) else { return Ok(Reading::finished()) };
+        self.1 = reads;
+        Ok(T::on_bad_day(&mut self.0, &mut self.2, now))
+    }
+}
 
 /// States of a joint: they pause, repeat themselves, are stamped late, and now and then give a NaN.
 impl OnBadDay for JointState {
@@ -125,6 +159,14 @@ fn same_again((first, report, lines): &(Published, Report, Vec<Entry>)) -> Resul
 #[test]
 fn random_days_on_virtual_time_are_the_same_again() -> Result<(), Failure> {
     (1..=12).try_for_each(|day| same_again(&on_virtual_time(builder(day * 10, 400), 1000)?))
+}
+
+#[test]
+#[ignore = "a million messages take half a minute"]
+fn long_a_run_of_a_million_messages_is_the_same_again() -> Result<(), Failure> {
+    let day = on_virtual_time(builder(10, u32::MAX), 250_000)?;
+    assert!(day.1.topics.iter().map(|topic| topic.published).sum::<u64>() > 1_000_000);
+    same_again(&day)
 }
 
 #[test]

@@ -6,84 +6,41 @@ static HERE: Gate = Gate::new();
 
 const PANICS: f64 = -2.0;
 const HANGS: f64 = -1000.0;
-const IS_SLOW: f64 = 1000.0;
 
-/// Estimator that adds up its input, from the second of its creation on; some inputs make it fail.
-pub(crate) struct Adder {
-    sum: f64,
-    gain: f64,
+/// Adds up what an estimator gets, from the second of its creation on; some numbers make it fail.
+fn add(sum: &mut f64, number: f64) -> Replied {
+    match number {
+        PANICS => panic!("told to"),
+        HANGS => HERE.pass("an adder"),
+        _ => {}
+    }
+    *sum += number;
+    Ok(Reply::emit(Number(*sum)))
 }
 
-impl Estimator for Adder {
-    type Options = GainOptions;
-    type Input = Number;
-    type Output = Number;
-
-    fn init(options: GainOptions, context: &Context) -> Result<Self, Fault> {
-        context.request(Request::Tick(Duration::from_millis(7)));
-        Ok(Self { sum: context.now().as_nanos() as f64, gain: options.gain })
-    }
-
-    fn handle_input(&mut self, number: &Stamped<Number>) -> Replied {
-        match number.0 {
-            PANICS => panic!("told to"),
-            HANGS => HERE.pass("an adder"),
-            // Only the first time: the run from the journal must know it from there.
-            IS_SLOW if !is_again() => std::thread::sleep(Duration::from_millis(5)),
-            _ => {}
-        }
-        self.sum += self.gain * number.0;
-        Ok(Reply::emit(Number(self.sum)))
-    }
-
-    fn handle_info(&mut self, _: Info) -> Replied {
-        self.sum *= 0.75;
-        Ok(Reply::emit(Number(self.sum * self.gain)))
-    }
-
-    fn handle_options(&mut self, options: GainOptions, _: &Context) -> Result<(), Fault> {
-        self.gain = options.gain;
-        Ok(())
-    }
+fn decay(sum: &mut f64, _: Info) -> Replied {
+    *sum *= 0.75;
+    Ok(Reply::emit(Number(*sum)))
 }
 
-/// A request that a journal holds.
-#[derive(Clone, Copy, Debug, Default, Payload)]
-pub(crate) struct Add(f64);
-
-impl HandleCall<Add> for Adder {
-    type Response = f64;
-    const RECORD: Option<RequestCodec<Add>> = Some(RequestCodec::bytes());
-
-    fn handle_call(&mut self, Add(number): Add) -> Result<(f64, Reply<Number>), Fault> {
-        self.sum += number;
-        Ok((self.sum, Reply::emit(Number(self.sum))))
-    }
-}
-
-impl HandleCast<Add> for Adder {
-    const RECORD: Option<RequestCodec<Add>> = Some(RequestCodec::bytes());
-
-    fn handle_cast(&mut self, Add(number): Add) -> Replied {
-        self.sum += number;
-        Ok(Reply::none())
-    }
+fn birth(context: &Context) -> f64 {
+    context.now().as_nanos() as f64
 }
 
 /// A request that a journal holds by its name alone.
-pub(crate) struct Forget;
+struct Forget;
 
-impl HandleCast<Forget> for Adder {
+impl HandleCast<Forget> for Echo {
     fn handle_cast(&mut self, Forget: Forget) -> Replied {
-        self.sum = 0.0;
+        self.1 = 0.0;
         Ok(Reply::none())
     }
 }
 
 /// Another request of that kind, which makes the estimator report a divergence.
-pub(crate) struct Doubt;
+struct Doubt;
 
-impl HandleCast<Doubt> for Adder {
+impl HandleCast<Doubt> for Echo {
     fn handle_cast(&mut self, Doubt: Doubt) -> Replied {
         Ok(Reply::none().diverged("in doubt"))
     }
@@ -145,12 +102,12 @@ robot! {
     link base {
         joint pan: continuous {
             axis: z;
-            sensor encoder: External<Number>() { estimator position: Adder(gain = param::gain); }
+            sensor encoder: External<Number>() { estimator position: Echo(init = tick::<7>, keep = birth, input = add, info = decay, gain = param::gain, tune = Some(|_| Ok(()))); }
             actuator servo: Servo(command = moves, disarm = brakes);
             link head { }
         }
         sensor number: External<Number>() {
-            estimator sum: Adder(gain = param::gain) {
+            estimator sum: Echo(init = tick::<7>, keep = birth, input = add, info = decay, gain = param::gain, tune = Some(|_| Ok(()))) {
                 latency_budget: 2 ms;
                 lost_after: 40 ms;
                 recover_after: 2;
@@ -158,17 +115,9 @@ robot! {
                 on_lost: alarm;
             }
         }
-        estimator apart: Adder(gain = param::gain) { input number: sensor::base::number::sum; runs_on: worker; }
-        estimator behind: Adder() { input number: estimator::base::apart; }
+        estimator apart: Echo(init = tick::<7>, keep = birth, input = add, info = decay, gain = param::gain, tune = Some(|_| Ok(()))) { input number: sensor::base::number::sum; runs_on: worker; }
+        estimator behind: Echo(keep = birth, input = add) { input number: estimator::base::apart; }
     }
-}
-
-/// Lock of the gate at which code hangs, which one test uses at a time.
-static ALONE: Mutex<()> = Mutex::new(());
-
-pub(crate) fn alone() -> MutexGuard<'static, ()> {
-    HERE.open();
-    ALONE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Runs `script` on virtual time, and then its replay.
@@ -182,15 +131,6 @@ fn again(
     })
 }
 
-/// Runs `script` in real time, and then its replay.
-fn again_in_real_time(script: impl FnOnce(&Running<Again>)) -> Result<(Published, Report), Failure> {
-    same_again(Again::builder, |builder| {
-        let running = armed(builder);
-        script(&running);
-        Ok(running.stop())
-    })
-}
-
 fn count(heard: &Published, path: &str) -> usize {
     heard.get(path).map_or(0, Vec::len)
 }
@@ -200,20 +140,6 @@ fn feed(simulation: &mut Simulation<Again>, millis: std::ops::Range<i64>) {
         simulation.publish(again::sensor::base::number, at(millis), Number(millis as f64));
         simulation.publish(again::sensor::base::pan::encoder, at(millis), Number(-0.5));
     }
-}
-
-#[test]
-fn requests_that_a_journal_holds_are_made_again() -> Result<(), Failure> {
-    let (heard, _) = again(|simulation| {
-        for round in 0..20 {
-            feed(simulation, round * 10..round * 10 + 9);
-            simulation.call(again::sensor::base::number::sum, Add(round as f64 * 1e6))?;
-            simulation.cast(again::estimator::base::apart, Add(round as f64 * 1e7))?;
-        }
-        Ok(())
-    })?;
-    assert!(count(&heard, "sensor/base/number/sum") > 200);
-    Ok(())
 }
 
 #[test]
@@ -335,9 +261,9 @@ fn an_actuator_that_fails_does_so_again() -> Result<(), Failure> {
 
 #[test]
 fn what_did_not_fit_in_a_full_inbox_does_not_fit_again() {
-    let _alone = alone();
-    within(120, || {
-        let (_, report) = again_in_real_time(|running| {
+    alone_within(120, || {
+        let (_, report) = same_again(Again::builder, |builder| {
+            let running = armed(builder);
             HERE.close("an adder");
             // The worker adds what the first estimator emits: it hangs alone.
             let publish = |number| {
@@ -353,66 +279,10 @@ fn what_did_not_fit_in_a_full_inbox_does_not_fit_again() {
             }
             HERE.open();
             hung.join().expect("it does not panic");
+            Ok(running.stop())
         })
         .expect("it is the same");
         let sum = report.estimator("sensor/base/number/sum").expect("it is declared");
         assert!(sum.inputs[0].dropped(DropReason::Overflow) >= 1500 - 1024);
-    });
-}
-
-#[test]
-fn everything_at_once_on_many_threads_expect_the_same_again() {
-    let _alone = alone();
-    within(240, || {
-        let (heard, report) = again_in_real_time(|running| {
-            std::thread::scope(|scope| {
-                scope.spawn(|| {
-                    for round in 0..400 {
-                        let number = if round % 40 == 20 { IS_SLOW } else { f64::from(round) };
-                        running.publish(again::sensor::base::number, running.clock().now(), Number(number));
-                        std::thread::sleep(Duration::from_micros(500));
-                    }
-                });
-                scope.spawn(|| {
-                    for round in 0..400 {
-                        let number = if round % 100 == 50 { PANICS } else { 1.0 };
-                        running.publish(again::sensor::base::pan::encoder, running.clock().now(), Number(number));
-                        std::thread::sleep(Duration::from_micros(400));
-                    }
-                });
-                scope.spawn(|| {
-                    for round in 0..200 {
-                        running.set_parameter(again::param::gain, f64::from(round % 7)).expect("it is finite");
-                        // The estimator may wait for its restart.
-                        let _ = running.call(again::sensor::base::number::sum, Add(1.0));
-                        let _ = running.cast(again::estimator::base::behind, Add(2.0));
-                        std::thread::sleep(Duration::from_millis(1));
-                    }
-                });
-                scope.spawn(|| {
-                    for round in 0..60 {
-                        // Refused, or not, as its state has it.
-                        let drive = running.command(again::command::drive, Way { steps: 3, tunes: round % 2 == 0 });
-                        std::thread::sleep(Duration::from_millis(3));
-                        if let Ok(drive) = drive
-                            && round % 3 == 0
-                        {
-                            drive.cancel();
-                        }
-                        if round % 20 == 10 {
-                            let _ = running.disarm();
-                            let _ = running.arm();
-                        }
-                    }
-                });
-            });
-            // Messages wait, and a command runs, when it is stopped.
-            for number in 0..50 {
-                running.publish(again::sensor::base::number, running.clock().now(), Number(f64::from(number)));
-            }
-        })
-        .expect("it is the same");
-        assert!(count(&heard, "sensor/base/number/sum") > 300 && count(&heard, "param/gain") >= 200, "{report}");
-        assert!(count(&heard, "actuator/base/pan/servo") > 5 && count(&heard, "safety") > 4, "{report}");
     });
 }
