@@ -9,12 +9,9 @@ pub(crate) struct Two<'a> {
     pub(crate) second: Option<Input<'a, Number>>,
 }
 
-/// Fails if something is out of order; half a number is a fault, [`HANG`] hangs it.
+/// Fails if something is out of order; half a number is a fault.
 #[derive(Default)]
 pub(crate) struct Ordered([f64; 2]);
-
-const HANG: f64 = 1e9;
-static HERE: Gate = Gate::new();
 
 impl Estimator for Ordered {
     type Options = GainOptions;
@@ -29,9 +26,6 @@ impl Estimator for Ordered {
         if two.first.0.fract() != 0.0 {
             return Err(Fault::new("asked to fail"));
         }
-        if two.first.0 == HANG {
-            HERE.pass("a message");
-        }
         let now = [two.first.0, two.second.map_or(0.0, |second| second.0)];
         assert!(now[0] >= self.0[0] && now[1] >= self.0[1], "out of order");
         self.0 = now;
@@ -43,8 +37,6 @@ impl Estimator for Ordered {
     }
 }
 
-pub(crate) struct Tell;
-
 impl HandleCall<Ask> for Ordered {
     type Response = f64;
     fn handle_call(&mut self, Ask: Ask) -> Result<(f64, Reply<Number>), Fault> {
@@ -54,8 +46,8 @@ impl HandleCall<Ask> for Ordered {
 
 static CASTS: AtomicU64 = AtomicU64::new(0);
 
-impl HandleCast<Tell> for Ordered {
-    fn handle_cast(&mut self, Tell: Tell) -> Result<Reply<Number>, Fault> {
+impl HandleCast<Ask> for Ordered {
+    fn handle_cast(&mut self, Ask: Ask) -> Result<Reply<Number>, Fault> {
         CASTS.fetch_add(1, Ordering::SeqCst);
         Ok(Reply::none())
     }
@@ -86,15 +78,11 @@ robot! {
     }
 }
 
-/// Tests that hang estimators do so one after the other.
-static ALONE: Mutex<()> = Mutex::new(());
-
 const ORDERED: &str = "estimator/base/ordered";
 
 #[test]
 fn every_lost_message_is_counted_whatever_publishes_or_fails() {
-    let _alone = ALONE.lock();
-    within(60, || {
+    alone_within(60, || {
         const EACH: u64 = 20_000;
         let mut builder = Crowded::builder();
         builder.supervision().max_restarts = usize::MAX;
@@ -117,7 +105,7 @@ fn every_lost_message_is_counted_whatever_publishes_or_fails() {
                 });
             }
             for round in 0..2000 {
-                casts += u64::from(running.cast(crowded::estimator::base::ordered, Tell).is_ok());
+                casts += u64::from(running.cast(crowded::estimator::base::ordered, Ask).is_ok());
                 let _ = running.call(crowded::estimator::base::beside, Ask);
                 let _ = running.call(crowded::estimator::base::apart, Ask);
                 running.set_parameter(crowded::param::gain, f64::from(round)).expect("it is finite");
@@ -141,31 +129,8 @@ fn every_lost_message_is_counted_whatever_publishes_or_fails() {
 }
 
 #[test]
-fn an_estimator_that_hangs_does_not_delay_publishers() {
-    let _alone = ALONE.lock();
-    within(60, || {
-        let running = Crowded::builder().start().expect("it starts");
-        HERE.close("a message");
-        let live = (*running).clone();
-        let hung = std::thread::spawn(move || {
-            let time = live.clock().now();
-            live.publish(crowded::sensor::base::a, time, Number(HANG));
-        });
-        HERE.wait_for(1);
-        for number in 0..1100 {
-            running.publish(crowded::sensor::base::b, running.clock().now(), Number(f64::from(number)));
-        }
-        let full = running.report().estimator(ORDERED).map(|node| node.inputs[1].dropped(DropReason::Overflow));
-        assert_eq!(full, Some(1100 - 1024));
-        HERE.open();
-        hung.join().expect("it does not panic");
-    });
-}
-
-#[test]
 fn a_waker_may_publish_subscribe_and_stop_and_a_call_from_there_is_refused() {
-    let _alone = ALONE.lock();
-    within(60, || {
+    alone_within(60, || {
         let builder = Crowded::builder();
         let mut ordered = builder.subscribe(crowded::estimator::base::ordered);
         let running = builder.start().expect("it starts");
@@ -194,8 +159,7 @@ fn a_waker_may_publish_subscribe_and_stop_and_a_call_from_there_is_refused() {
 
 #[test]
 fn a_waker_that_panics_harms_nobody() {
-    let _alone = ALONE.lock();
-    within(60, || {
+    alone_within(60, || {
         let builder = Crowded::builder();
         let mut ordered = builder.subscribe(crowded::estimator::base::ordered);
         let behind = builder.subscribe(crowded::estimator::base::behind);
@@ -205,10 +169,8 @@ fn a_waker_that_panics_harms_nobody() {
         when_woken(&mut safety, || panic!("one that a thread of the pool wakes"));
         running.publish(crowded::sensor::base::a, running.clock().now(), Number(1.0));
         assert_eq!(behind.recv_timeout(Duration::from_secs(5)).map(|number| number.0), Some(1.0));
-        assert_eq!(
-            (running.report().panics.wakers, running.report().topic(ORDERED).map(|topic| topic.panics)),
-            (1, Some(1))
-        );
+        let report = running.report();
+        assert_eq!((report.panics.wakers, report.topic(ORDERED).map(|topic| topic.panics)), (1, Some(1)));
         let report = running.stop();
         assert_eq!(report.panics.wakers, 2);
         assert!(report.to_string().contains("wakers: 2 panics"), "{report}");
@@ -218,8 +180,7 @@ fn a_waker_that_panics_harms_nobody() {
 
 #[test]
 fn a_robot_may_be_dropped_by_code_that_it_calls() {
-    let _alone = ALONE.lock();
-    within(60, || {
+    alone_within(60, || {
         let builder = Crowded::builder();
         let mut ordered = builder.subscribe(crowded::estimator::base::ordered);
         let mut running = Some(builder.start().expect("it starts"));
@@ -234,14 +195,13 @@ fn a_robot_may_be_dropped_by_code_that_it_calls() {
 
 #[test]
 fn a_robot_that_has_stopped_answers_whatever_it_is_asked() {
-    let _alone = ALONE.lock();
-    within(60, || {
+    alone_within(60, || {
         let running = Crowded::builder().start().expect("it starts");
         let live = (*running).clone();
         let report = running.stop();
         live.publish(crowded::sensor::base::a, live.clock().now(), Number(1.0));
         assert!(live.call(crowded::estimator::base::ordered, Ask).is_err());
-        assert!(live.cast(crowded::estimator::base::ordered, Tell).is_err());
+        assert!(live.cast(crowded::estimator::base::ordered, Ask).is_err());
         assert_eq!((live.arm(), live.disarm()), (Err(ArmError::Stopping), Ok(())));
         assert!(live.subscribe(crowded::sensor::base::a).recv().is_none());
         let refused = live.set_parameter(crowded::param::gain, 2.0).expect_err("it would not be stored");

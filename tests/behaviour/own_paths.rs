@@ -95,7 +95,7 @@ fn a_command_publishes_its_progress_below_its_path_which_a_replay_publishes_agai
 }
 
 #[test]
-fn outside_code_publishes_and_is_listed() -> Result<(), Failure> {
+fn outside_code_publishes_and_is_listed_and_takes_no_path_of_the_robot() -> Result<(), Failure> {
     let mut simulation = Missionary::builder().simulate()?;
     let bus = simulation.bus();
     let all = simulation.subscribe_any(Select::Path("radio/link"), None, Overflow::default());
@@ -105,9 +105,8 @@ fn outside_code_publishes_and_is_listed() -> Result<(), Failure> {
     assert_eq!(bus.subscribers("radio/link").len(), 2);
     let taken = "cannot publish `Number` at `radio/link`: it is subscribed to as `Progress`; choose another path";
     assert_refused(bus.publisher::<Number>("radio/link"), taken);
-    let wrong = bus.subscribe::<Number>("radio/link", Overflow::default()).map(drop);
     let taken = "`radio/link` is subscribed to as `Progress`, not `Number`";
-    assert_eq!(wrong.map_err(|error| error.to_string()), Err(taken.into()));
+    assert_refused(bus.subscribe::<Number>("radio/link", Overflow::default()), taken);
 
     let radio = bus.publisher::<Progress>("radio/link")?;
     let typed = bus.subscribe::<Progress>("radio/link", Overflow::default())?;
@@ -127,39 +126,16 @@ fn outside_code_publishes_and_is_listed() -> Result<(), Failure> {
     let topic = report.topic("radio/link").ok_or("it is in the report")?;
     assert_eq!((topic.payload, topic.published, topic.subscribers), ("Progress", 2, 3));
 
-    let wrong = bus.subscribe::<Number>("radio/link", Overflow::default()).map(drop);
-    assert_eq!(
-        wrong.map_err(|error| error.to_string()),
-        Err("`radio/link` publishes `Progress`, not `Number`".into())
-    );
-    let typo = bus.subscribe::<Progress>("radio/lnik", Overflow::default())?.matched().map(drop);
-    let near = "nothing publishes at `radio/lnik`; did you mean `radio/link`?";
-    assert_eq!(typo.map_err(|error| error.to_string()), Err(near.into()));
-
-    simulation.stop();
-    assert!(typed.recv().is_none());
-    assert_refused(
-        bus.publisher::<Progress>("radio/other"),
-        "cannot publish at `radio/other`: the robot has stopped",
-    );
-    Ok(())
-}
-
-#[test]
-fn a_path_of_the_robot_is_refused() -> Result<(), StartError> {
-    let simulation = Missionary::builder().simulate()?;
-    let bus = simulation.bus();
     for path in ["sensor/base/counter", "controller/planner", "command/drive", "health", "safety/error", "journal"]
     {
-        let refusal = bus.publisher::<Progress>(path).map(drop).map_err(|error| error.to_string());
-        let expected = format!("cannot publish at `{path}`: only its own publisher does; choose another path");
-        assert_eq!(refusal, Err(expected));
+        let says = format!("cannot publish at `{path}`: only its own publisher does; choose another path");
+        assert_refused(bus.publisher::<Progress>(path), &says);
     }
-    let expected =
-        "cannot publish `Number` at `mission/plan/progress`: it publishes `Progress`; choose another path";
-    assert_refused(bus.publisher::<Number>("mission/plan/progress"), expected);
-    assert!(bus.publisher::<Progress>("").is_err() && bus.publisher::<Progress>("sensor//x").is_err());
     assert!(bus.publisher::<Progress>("command/drive/progress").is_ok());
+    simulation.stop();
+    assert!(typed.recv().is_none());
+    let stopped = "cannot publish at `radio/other`: the robot has stopped";
+    assert_refused(bus.publisher::<Progress>("radio/other"), stopped);
     Ok(())
 }
 
@@ -183,21 +159,15 @@ fn a_replay_reports_the_paths_of_its_run() -> Result<(), Failure> {
     let heard = bus.publisher::<Number>("own/heard")?;
     let _heard = bus.subscribe::<Number>("own/heard", Overflow::default())?;
     drop(heard);
-    for number in 0..1000 {
-        let publisher = bus.publisher::<Progress>(&format!("many/{number}"))?;
-        if number % 2 == 0 {
-            publisher.publish(Progress { done: 0.5 });
-        }
-    }
     bus.publisher::<Number>("own/back")?.publish(Number(2.0));
-    let refused = (1000..1025).find_map(|number| bus.publisher::<Progress>(&format!("many/{number}")).err());
+    let refused = (0..1025).find_map(|number| bus.publisher::<Progress>(&format!("many/{number}")).err());
     assert!(refused.is_some_and(|refused| refused.to_string().contains("1024 other paths are in use")));
     let report = simulation.stop();
     let first = rows(&report);
     for row in [("own/silent", "Progress", 0), ("own/back", "Number", 4), ("own/heard", "Number", 0)] {
         assert!(first.contains(&row), "{row:?}");
     }
-    assert!(first.contains(&("many/0", "Progress", 1)) && first.contains(&("many/999", "Progress", 0)));
+    assert!(first.contains(&("many/0", "Progress", 0)) && first.contains(&("many/999", "Progress", 0)));
     let lines = entries(&lines);
     let silent =
         |line: &&Entry| matches!(line.event, Event::OwnPublisher { path: "own/silent", payload: "Progress" });

@@ -41,9 +41,6 @@ robot! {
 
 const HEAVY: &str = "estimator/base/heavy";
 
-/// Lock of the code that hangs: one test at a time uses it.
-static ALONE: Mutex<()> = Mutex::new(());
-
 fn publish(running: &Running<Laden>, number: f64) {
     running.publish(laden::sensor::base::number, running.clock().now(), Number(number));
 }
@@ -56,8 +53,7 @@ fn hang(running: &Running<Laden>) {
 
 #[test]
 fn what_does_not_fit_while_it_hangs_is_counted_and_the_rest_comes_in_order() {
-    let _alone = ALONE.lock();
-    within(60, || {
+    alone_within(60, || {
         let builder = Laden::builder();
         let heavy = builder.subscribe_with(laden::estimator::base::heavy, Overflow::DropOldest { capacity: 4096 });
         let running = builder.start().expect("it starts");
@@ -79,8 +75,7 @@ fn what_does_not_fit_while_it_hangs_is_counted_and_the_rest_comes_in_order() {
 
 #[test]
 fn it_restarts_ticks_and_is_lost_as_any_other() {
-    let _alone = ALONE.lock();
-    within(60, || {
+    alone_within(60, || {
         let builder = Laden::builder();
         let heavy = builder.subscribe(laden::estimator::base::heavy);
         let health = builder.subscribe(system::Health);
@@ -102,8 +97,7 @@ fn it_restarts_ticks_and_is_lost_as_any_other() {
 
 #[test]
 fn one_that_is_flooded_still_ticks_and_answers() {
-    let _alone = ALONE.lock();
-    within(60, || {
+    alone_within(60, || {
         let running = Laden::builder().start().expect("it starts");
         let stop = AtomicBool::new(false);
         std::thread::scope(|scope| {
@@ -124,8 +118,7 @@ fn one_that_is_flooded_still_ticks_and_answers() {
 
 #[test]
 fn a_robot_is_stopped_with_a_full_inbox_and_with_one_that_hangs() {
-    let _alone = ALONE.lock();
-    within(60, || {
+    alone_within(60, || {
         let running = Laden::builder().start().expect("it starts");
         hang(&running);
         (0..1024).for_each(|number| publish(&running, f64::from(number)));
@@ -142,80 +135,5 @@ fn a_robot_is_stopped_with_a_full_inbox_and_with_one_that_hangs() {
         let input = &heavy.inputs[0];
         assert_eq!(input.received, 1025);
         assert_eq!(heavy.dispatched + input.dropped(DropReason::Stopped), 1025, "what it did not take is counted");
-    });
-}
-
-/// An image of 1920 × 1080.
-#[derive(Clone, Debug, Payload)]
-pub(crate) struct Frame {
-    pixels: Vec<u8>,
-}
-
-/// All frames since the last page.
-#[derive(Clone, Copy, Debug, Inputs)]
-pub(crate) struct Pages<'a> {
-    page: Input<'a, Number>,
-    frames: Every<'a, Frame>,
-}
-
-stateless! {
-    /// Estimator that does not return from its first frame.
-    Hung: Frame => Number, |_frame: &Stamped<Frame>| {
-        HERE.pass("an eye");
-        Ok(Reply::none())
-    };
-    /// Estimator that fails at its first frame.
-    Blind: Frame => Number, |_frame: &Stamped<Frame>| Err(Fault::new("it is blind"));
-    /// Says how many there were.
-    Album: Pages<'static> => Number, |pages: Pages<'_>| {
-        Ok(Reply::emit(Number(pages.page.0 + pages.frames.len() as f64)))
-    };
-}
-
-robot! {
-    robot Watching;
-    link base {
-        sensor camera: External<Frame>() { estimator blind: Blind(); }
-        sensor page: External<Number>();
-        estimator hung: Hung() { input frame: sensor::base::camera; runs_on: worker; }
-        estimator album: Album() {
-            input page: sensor::base::page, driver;
-            input frames: sensor::base::camera, optional;
-        }
-    }
-}
-
-/// Large messages that wait in an inbox, for a restart or for a driver are bounded in bytes as those of a subscription.
-#[test]
-fn large_messages_that_wait_are_bounded_in_bytes() {
-    const SIZE: usize = 1920 * 1080 * 3;
-    const FIT: u64 = (Overflow::DEFAULT_BYTES / SIZE) as u64;
-    const SENT: u64 = 30;
-    let _alone = ALONE.lock();
-    within(60, || {
-        let mut builder = Watching::builder();
-        builder.supervision().first_backoff = Duration::from_secs(600);
-        builder.supervision().longest_backoff = Duration::from_secs(600);
-        let album = builder.subscribe(watching::estimator::base::album);
-        let running = builder.start().expect("it starts");
-        let publish = || {
-            let frame = Frame { pixels: vec![0; SIZE] };
-            running.publish(watching::sensor::base::camera, running.clock().now(), frame);
-        };
-        HERE.close("an eye");
-        publish();
-        HERE.wait_for(1);
-        (0..SENT).for_each(|_| publish());
-        let dropped = |path: &str, input: &str, reason| {
-            let report = running.report();
-            let estimator = report.estimator(path).expect("it is declared");
-            estimator.inputs.iter().find(|other| other.name == input).map(|input| input.dropped(reason))
-        };
-        assert_eq!(dropped("estimator/base/hung", "frame", DropReason::Overflow), Some(SENT - FIT));
-        assert_eq!(dropped("sensor/base/camera/blind", "camera", DropReason::Stopped), Some(SENT - FIT));
-        assert_eq!(dropped("estimator/base/album", "frames", DropReason::Displaced), Some(SENT + 1 - FIT));
-        running.publish(watching::sensor::base::page, running.clock().now(), Number(0.0));
-        assert_eq!(album.recv_timeout(PATIENCE).map(|count| count.0), Some(FIT as f64));
-        HERE.open();
     });
 }

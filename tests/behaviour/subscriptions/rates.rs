@@ -1,4 +1,4 @@
-//! Subscriptions with a highest rate: on virtual time, in real time and in a replay.
+//! Subscriptions with a highest rate, on virtual time and in real time. Unit tests have their laws, and `tests/stress.rs` their replays.
 
 use super::{Talker, talker};
 use crate::kit::*;
@@ -31,37 +31,6 @@ fn sampled() -> Builder<Talker> {
     builder.options(talker::sensor::base::numbers).count = 450;
     builder.options(talker::command::watch).run = watch;
     builder
-}
-
-const SLOW: [f64; 6] = [0.0, 99.0, 199.0, 299.0, 399.0, 449.0];
-
-#[test]
-fn a_slow_display_gets_the_newest_at_its_rate_and_so_it_does_in_a_replay() -> Result<(), Failure> {
-    let subscribe = |builder: &Builder<Talker>| {
-        let typed = builder.subscribe_with(talker::sensor::base::numbers, slowly(Overflow::default()));
-        let all = builder.subscribe_any(Select::Below("sensor"), None, slowly(Overflow::LatestPerPath));
-        (typed, all)
-    };
-    let mut builder = sampled();
-    let lines = journal(&mut builder);
-    let (typed, all) = subscribe(&builder);
-    let mut simulation = builder.simulate()?;
-    simulation.run_for(Duration::from_millis(449));
-    // The newest is held until its time has come.
-    assert_eq!(all.drain().map(|message| number(&message)).collect::<Vec<_>>(), [399.0, 798.0]);
-    simulation.run_for(Duration::from_millis(51));
-    assert_eq!(numbers(&typed), SLOW);
-    assert_eq!(all.try_recv().map(|message| number(&message)), Some(449.0));
-    simulation.stop();
-
-    let builder = sampled();
-    let (typed, all) = subscribe(&builder);
-    let mut replay = builder.replay()?;
-    replay.play(entries(&lines))?;
-    replay.stop();
-    assert_eq!(numbers(&typed), SLOW);
-    assert_eq!(all.try_recv().map(|message| number(&message)), Some(449.0));
-    Ok(())
 }
 
 fn number(message: &DynamicMessage) -> f64 {

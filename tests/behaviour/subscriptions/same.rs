@@ -42,11 +42,9 @@ fn exercise(robot: &Live<Whole>, wait: &mut dyn FnMut()) -> Result<(), Failure> 
     };
     robot.command(whole::command::arm, NoArguments)?;
     published("command/arm", 2);
-    let there = PositionCommand { position: 0.1, ..Default::default() };
-    robot.actuate(whole::actuator::base::turn::motor, there.into())?;
+    robot.actuate(whole::actuator::base::turn::motor, move_to(0.1))?;
     published("actuator/base/turn/motor/end_motion", 1);
-    let state = JointState { position: 0.1, velocity: None, effort: None };
-    robot.publish(whole::sensor::base::turn::encoder, robot.clock().now(), state);
+    robot.publish(whole::sensor::base::turn::encoder, robot.clock().now(), joint(0.1));
     for number in [1.0, -1.0] {
         robot.publish(whole::sensor::base::numbers, robot.clock().now(), Number(number));
     }
