@@ -17,7 +17,6 @@ pub(crate) enum Kind {
 }
 
 static HERE: Gate = Gate::new();
-static ARMING: Gate = Gate::new();
 
 /// Command that behaves as its arguments say.
 pub(crate) struct Misbehave;
@@ -65,7 +64,6 @@ robot! {
         misbehave: Misbehave { category: many; timeout: 200 ms; allowed_states: [disarmed, idle, executing]; }
         patient: Misbehave { category: many; allowed_states: [disarmed, idle, executing]; }
         nested: Task(run = nested) { category: others; allowed_states: [disarmed, idle, executing]; }
-        slow_arm: Task<true>(run = |_| ARMING.stuck("a command that arms")) { category: others; allowed_states: [disarmed]; }
     }
 
     link base { sensor number: External<Number>(); }
@@ -86,30 +84,36 @@ fn a_command_that_wakes_itself_for_ever_fails_on_virtual_time() {
 }
 
 #[test]
-fn a_command_that_wakes_itself_for_ever_does_not_hold_up_time() {
-    within(60, || {
-        let running = Unruly::builder().start().expect("it starts");
-        let sleeping = running.command(unruly::command::patient, Kind::Sleep).expect("it is allowed");
-        let spinning = running.command(unruly::command::misbehave, Kind::Spin).expect("it is allowed");
-        assert_eq!(sleeping.wait_timeout(Duration::from_secs(10)), Some(Ok(())));
-        assert_eq!(spinning.wait_timeout(Duration::from_secs(10)), Some(Err(CommandError::TimedOut)));
+fn a_command_that_wakes_itself_for_ever_or_blocks_times_out_and_holds_nobody_up() {
+    alone_within(60, || {
+        for kind in [Kind::Spin, Kind::Block] {
+            let builder = Unruly::builder();
+            let events = builder.subscribe(unruly::command::misbehave);
+            let running = builder.start().expect("it starts");
+            let start = |command, kind| running.command(command, kind).expect("it is allowed");
+            HERE.close("a command that blocks");
+            let late = start(unruly::command::misbehave, kind);
+            let sleeping = start(unruly::command::patient, Kind::Sleep);
+            assert_eq!(sleeping.wait_timeout(PATIENCE), Some(Ok(())), "{kind:?}");
+            assert_eq!(late.wait_timeout(PATIENCE), Some(Err(CommandError::TimedOut)), "{kind:?}");
+            let phases: Vec<_> = events.drain().map(|event| event.payload.phase).collect();
+            assert_eq!(phases, [CommandPhase::Started, CommandPhase::TimedOut], "{kind:?}");
+            HERE.open();
+        }
     });
 }
 
 #[test]
 fn a_command_that_does_not_come_back_does_not_keep_the_robot_from_stopping() {
-    within(60, || {
+    alone_within(60, || {
         let running = Unruly::builder().start().expect("it starts");
         HERE.close("a command that blocks");
         let blocked = running.command(unruly::command::patient, Kind::Block).expect("it is allowed");
         HERE.wait_for(1);
         let report = running.stop();
         assert_eq!(blocked.wait(), Err(CommandError::Cancelled));
-        let faults: Vec<_> = report.faults.iter().map(ToString::to_string).collect();
-        assert!(
-            faults.iter().any(|fault| fault == "command/patient failed: did not come back when the robot stopped"),
-            "{faults:?}"
-        );
+        let says = "command/patient failed: did not come back when the robot stopped";
+        assert!(told(&report).contains(&says.to_owned()), "{report}");
         HERE.open();
     });
 }
@@ -150,21 +154,6 @@ fn ten_thousand_commands_end_at_their_time() {
         simulation.run_until(at(1000));
         assert!(slept.iter().all(|command| command.try_result() == Some(Ok(()))));
         assert!(late.iter().all(|command| command.try_result() == Some(Err(CommandError::TimedOut))));
-    });
-}
-
-#[test]
-fn one_that_arms_does_not_arm_a_robot_that_was_disarmed_meanwhile() {
-    within(60, || {
-        let running = Unruly::builder().start().expect("it starts");
-        ARMING.close("a command that arms");
-        let arming = running.command(unruly::command::slow_arm, NoArguments).expect("it is disarmed");
-        ARMING.wait_for(1);
-        // Somebody else arms and disarms it meanwhile.
-        assert_eq!((running.arm(), running.disarm()), (Ok(()), Ok(())));
-        ARMING.open();
-        assert_eq!(arming.wait(), Err(CommandError::Cancelled));
-        assert_eq!(running.safety(), Safety::Disarmed);
     });
 }
 

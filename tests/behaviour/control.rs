@@ -7,8 +7,7 @@ static REFUSES: AtomicBool = AtomicBool::new(false);
 
 /// The servo of these tests is one device.
 fn alone() -> MutexGuard<'static, ()> {
-    static ALONE: Mutex<()> = Mutex::new(());
-    let guard = lock(&ALONE);
+    let guard = one_at_a_time();
     REFUSES.store(false, Ordering::SeqCst);
     guard
 }
@@ -243,7 +242,8 @@ fn what_cannot_be_made_safe_is_an_error_until_it_is_forced() -> Result<(), Failu
     REFUSES.store(true, Ordering::SeqCst);
     let disarming = simulation.command(commanded::command::disarm, NoArguments)?;
     simulation.run_until(at(10));
-    assert!(disarming.try_result().is_some());
+    let failed = "not everything could be made safe: its safety state is `error`".to_owned();
+    assert_eq!(disarming.try_result(), Some(Err(CommandError::Failed(failed))));
     assert_eq!((simulation.state(), simulation.safety()), ("disarmed", Safety::Error));
     let error = errors.try_recv().expect("it is published");
     assert_eq!(

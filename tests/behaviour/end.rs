@@ -47,8 +47,7 @@ fn an_estimator_that_panics_at_its_end_is_stopped_all_the_same() -> Result<(), S
     let mut builder = Plain::builder();
     builder.options(ECHO).end = || panic!("it holds nothing");
     let report = builder.simulate()?.stop();
-    let faults: Vec<_> = report.faults.iter().map(ToString::to_string).collect();
-    let [fault] = &faults[..] else { panic!("{faults:?}") };
+    let [fault] = &told(&report)[..] else { panic!("{report}") };
     assert!(fault.ends_with("failed: panicked: it holds nothing"), "{fault}");
     assert_eq!(report.estimators.iter().map(|estimator| estimator.restarts).sum::<u64>(), 0);
     Ok(())
@@ -70,6 +69,7 @@ fn ask_for_everything(live: &Live<Plain>, own: &bb_core::pubsub::Publisher<Numbe
         let _ = live.bus().set_parameter("param/gain", f64::from(round));
         let _ = live.arm();
         let _ = live.disarm();
+        let _ = live.force_disarm();
         if live.cast(ECHO, number).is_err() {
             left -= 1;
         }
@@ -98,6 +98,7 @@ fn what_comes_after_the_end_is_neither_published_nor_counted() {
                 let report = running.stop();
                 callers.into_iter().for_each(|caller| caller.join().expect("it does not panic"));
                 assert_eq!(live.report(), report, "it is the last one");
+                assert_eq!(report.safety, Safety::Disarmed, "a forced disarming does not reopen a stop");
                 let unfinished = report.faults.iter().any(|fault| fault.to_string() == UNFINISHED);
                 if unfinished { Err(UNFINISHED.into()) } else { Ok(report) }
             });

@@ -1,13 +1,17 @@
 //! Code that hangs, or that calls where it would wait for itself: it is reported while the robot runs, and stops nothing else.
 
 use crate::kit::*;
-use bb_core::TelemetryEvent;
 
+/// Each is reported once for as long as it hangs.
 #[test]
-fn an_actuator_and_a_command_that_hang_are_reported_while_the_robot_runs() -> Result<(), Failure> {
+fn a_sensor_an_actuator_and_a_command_that_hang_are_reported_while_the_robot_runs() -> Result<(), Failure> {
     static HERE: Gate = Gate::new();
     HERE.close("here");
     let mut builder = Plain::builder();
+    builder.options(SOURCE).read = |_, _| {
+        HERE.pass("here");
+        Ok(Reading::nothing())
+    };
     builder.options(SERVO).command = |_| {
         HERE.pass("here");
         Ok(())
@@ -18,10 +22,15 @@ fn an_actuator_and_a_command_that_hang_are_reported_while_the_robot_runs() -> Re
     let live = running.live();
     let sender = std::thread::spawn(move || live.actuate(SERVO, Number(1.0)));
     let waiting = running.command(TASK, NoArguments)?;
-    for path in ["actuator/base/pan/servo", "command/task"] {
-        let message = fault_of(&faults, path);
-        assert!(message.starts_with("hangs: its code was entered"), "{path}: {message}");
+    let told: Vec<_> = (0..3).map_while(|_| faults.recv_timeout(PATIENCE)).collect();
+    for path in ["sensor/base/source", "actuator/base/pan/servo", "command/task"] {
+        let fault = told.iter().find(|fault| fault.path == path).ok_or(path)?;
+        let since = fault.message.strip_prefix("hangs: its code was entered ");
+        let since = since.and_then(|since| since.split_once("s ago")?.0.parse::<f64>().ok());
+        assert!(since.is_some_and(|since| since >= 1.0), "{}", fault.message);
     }
+    std::thread::sleep(Duration::from_millis(500));
+    assert_eq!(faults.drain().count(), 0, "each is reported once");
     HERE.open();
     sender.join().expect("it does not panic")?;
     waiting.wait()?;
@@ -133,13 +142,11 @@ fn own() -> Builder<Plain> {
 }
 
 /// Runs a test on a thread of its own: code that hangs, hangs on that thread alone. One test at a time has the robot.
-fn in_time(test: impl FnOnce() -> Result<(), Failure> + Send + 'static) {
-    static TURN: Mutex<()> = Mutex::new(());
-    let _turn = TURN.lock();
-    let (done, ended) = mpsc::channel();
-    std::thread::spawn(move || done.send(test().map_err(|error| error.to_string())));
-    assert_eq!(ended.recv_timeout(PATIENCE), Ok(Ok(())));
-    *lock(&LIVE) = None;
+fn in_time(test: fn() -> Result<(), Failure>) {
+    alone_within(20, move || {
+        test().expect("it has no error");
+        *lock(&LIVE) = None;
+    });
 }
 
 #[test]

@@ -6,10 +6,9 @@ static IS_ON: AtomicBool = AtomicBool::new(false);
 static FAILS: AtomicBool = AtomicBool::new(false);
 static IS_SKIPPED: AtomicBool = AtomicBool::new(false);
 static PORTS: AtomicU32 = AtomicU32::new(0);
-static ALONE: Mutex<()> = Mutex::new(());
 
 fn alone() -> MutexGuard<'static, ()> {
-    let guard = lock(&ALONE);
+    let guard = one_at_a_time();
     [&IS_ON, &FAILS, &IS_SKIPPED].into_iter().for_each(|flag| flag.store(false, Ordering::SeqCst));
     guard
 }
@@ -73,8 +72,6 @@ robot! {
 
     commands {
         category many { concurrency: 4; }
-        arm: Arm;
-        disarm: Disarm;
         block: Task(run = |_| HERE.stuck("a command")) { category: many; allowed_states: [disarmed]; }
         later: Task(run = arm_later) { category: many; allowed_states: [disarmed]; }
     }
@@ -153,22 +150,6 @@ fn a_component_that_was_left_out_guards_nothing() -> Result<(), Failure> {
 }
 
 #[test]
-fn a_command_that_could_not_make_the_robot_safe_has_failed() -> Result<(), Failure> {
-    let _alone = alone();
-    let mut simulation = Guarded::builder().simulate()?;
-    simulation.command(guarded::command::arm, NoArguments)?;
-    simulation.run_until(at(1));
-    FAILS.store(true, Ordering::SeqCst);
-    let disarmed = simulation.command(guarded::command::disarm, NoArguments)?;
-    simulation.run_until(at(2));
-    let Some(Err(CommandError::Failed(message))) = disarmed.try_result() else {
-        return Err("it has failed".into());
-    };
-    assert_eq!(message, "not everything could be made safe: its safety state is `error`");
-    Ok(())
-}
-
-#[test]
 fn a_command_that_was_cancelled_while_it_waited_arms_nothing() {
     let _alone = alone();
     within(60, || {
@@ -183,36 +164,5 @@ fn a_command_that_was_cancelled_while_it_waited_arms_nothing() {
         HERE.open();
         std::thread::sleep(Duration::from_millis(100));
         assert_eq!(running.safety(), Safety::Disarmed);
-    });
-}
-
-#[test]
-fn a_journal_of_other_budgets_is_refused() -> Result<(), Failure> {
-    let _alone = alone();
-    let mut builder = Guarded::builder();
-    let lines = journal(&mut builder);
-    builder.simulate()?.stop();
-    let mut other = Guarded::builder();
-    other.supervision().max_restarts = 1_000_000;
-    let error = other.replay()?.play(entries(&lines)).expect_err("panics would escalate later").to_string();
-    assert!(error.contains("supervision: Supervision { max_restarts: 3,"), "{error}");
-    Ok(())
-}
-
-#[test]
-fn a_forced_disarm_does_not_reopen_a_stop() {
-    let _alone = alone();
-    within(60, || {
-        for _ in 0..20 {
-            let running = armed(Guarded::builder());
-            let live = running.live();
-            let forcing = std::thread::spawn(move || {
-                for _ in 0..200 {
-                    let _ = live.force_disarm();
-                }
-            });
-            assert_eq!(running.stop().safety, Safety::Disarmed);
-            forcing.join().expect("it does not panic");
-        }
     });
 }

@@ -178,8 +178,7 @@ fn latencies_and_ages_of_messages_are_counted() -> Result<(), StartError> {
 fn a_loss_after_refused_messages_has_their_reason() -> Result<(), StartError> {
     let mut run = Run::start()?;
     let last_drop = |run: &Run| {
-        let report = run.simulation.report();
-        report.estimator(WATCH).and_then(|estimator| estimator.last_drop)
+        run.simulation.report().estimator(WATCH).and_then(|estimator| estimator.last_drop.map(|(_, reason)| reason))
     };
     run.number(1.0);
     assert_eq!(last_drop(&run), None);
@@ -187,9 +186,9 @@ fn a_loss_after_refused_messages_has_their_reason() -> Result<(), StartError> {
         run.number(f64::NAN);
     }
     assert_eq!(run.changes(WATCH), ["healthy -> lost: lost"]);
-    assert_eq!(last_drop(&run).map(|(_, reason)| reason), Some(DropReason::NonFinite));
+    assert_eq!(last_drop(&run), Some(DropReason::NonFinite));
     run.simulation.publish(watched::sensor::base::number, at(1), Number(1.0));
-    assert_eq!(last_drop(&run).map(|(_, reason)| reason), Some(DropReason::OutOfOrder));
+    assert_eq!(last_drop(&run), Some(DropReason::OutOfOrder));
     run.number(1.0);
     assert_eq!(run.changes(WATCH), ["lost -> degraded: recovered"]);
     assert_eq!(last_drop(&run), None, "it has run since");
@@ -243,50 +242,41 @@ robot! {
     }
 }
 
-const BUSY: &str = "sensor/base/number/busy";
-
 /// The changes of health, with their times in milliseconds.
 fn changes(health: &Subscription<HealthTransition>) -> Vec<(i64, HealthState, HealthReason)> {
     health.drain().map(|change| (change.time.as_nanos() / 1_000_000, change.to, change.reason)).collect()
 }
 
-/// Sends calls and casts repeatedly while the estimator ticks.
-fn keep_busy(simulation: &mut Simulation<Industrious>, until: i64) {
-    while simulation.clock().now() < at(until) {
-        simulation.call(industrious::sensor::base::number::busy, Ask).expect("it answers");
-        simulation.cast(industrious::sensor::base::number::busy, Number(1.0)).expect("it has room");
-        simulation.run_for(Duration::from_millis(1));
+/// Ticks, calls and casts make no degraded estimator healthy, and keep none without data from being lost: only runs on data count.
+#[test]
+fn neither_ticks_nor_requests_count_as_runs() -> Result<(), Failure> {
+    let (number, busy) = (industrious::sensor::base::number, industrious::sensor::base::number::busy);
+    for (first, until, then) in [
+        (-1.0, 100, vec![(10, HealthState::Degraded, HealthReason::Diverged)]),
+        (1.0, 500, vec![(110, HealthState::Lost, HealthReason::Lost)]),
+    ] {
+        let builder = Industrious::builder();
+        let health = builder.subscribe(system::Health);
+        let mut simulation = builder.simulate()?;
+        simulation.publish(number, at(10), Number(first));
+        while simulation.clock().now() < at(until) {
+            simulation.call(busy, Ask)?;
+            simulation.cast(busy, Number(1.0))?;
+            simulation.run_for(Duration::from_millis(1));
+        }
+        assert_eq!(changes(&health), then);
+        if first < 0.0 {
+            simulation.publish(number, at(100), Number(1.0));
+            simulation.publish(number, at(105), Number(1.0));
+            assert_eq!(changes(&health), [(105, HealthState::Healthy, HealthReason::Recovered)]);
+        }
     }
-}
-
-#[test]
-fn neither_ticks_nor_requests_make_a_degraded_estimator_healthy() -> Result<(), StartError> {
-    let builder = Industrious::builder();
-    let health = builder.subscribe(system::Health);
-    let mut simulation = builder.simulate()?;
-    simulation.publish(industrious::sensor::base::number, at(10), Number(-1.0));
-    assert_eq!(changes(&health), [(10, HealthState::Degraded, HealthReason::Diverged)]);
-    keep_busy(&mut simulation, 100);
-    assert_eq!(changes(&health), [], "only runs on data count");
-    simulation.publish(industrious::sensor::base::number, at(100), Number(1.0));
-    simulation.publish(industrious::sensor::base::number, at(105), Number(1.0));
-    assert_eq!(changes(&health), [(105, HealthState::Healthy, HealthReason::Recovered)]);
-    Ok(())
-}
-
-#[test]
-fn neither_ticks_nor_requests_keep_an_estimator_without_data_from_being_lost() -> Result<(), StartError> {
-    let builder = Industrious::builder();
-    let health = builder.subscribe(system::Health);
-    let mut simulation = builder.simulate()?;
-    simulation.publish(industrious::sensor::base::number, at(10), Number(1.0));
-    keep_busy(&mut simulation, 500);
-    assert_eq!(changes(&health), [(110, HealthState::Lost, HealthReason::Lost)]);
     Ok(())
 }
 
 #[test]
 fn an_estimator_that_stopped_for_good_says_so_is_lost_and_takes_no_requests() -> Result<(), StartError> {
+    let busy = industrious::sensor::base::number::busy;
     let builder = Industrious::builder();
     let health = builder.subscribe(system::Health);
     let mut simulation = builder.simulate()?;
@@ -297,12 +287,11 @@ fn an_estimator_that_stopped_for_good_says_so_is_lost_and_takes_no_requests() ->
         simulation.publish(industrious::sensor::base::number, at(millis), Number(1.0));
     }
     let report = simulation.report();
-    let busy = report.estimator(BUSY).expect("it is declared");
-    assert_eq!(busy.health, Some(HealthState::Lost), "{told:?}, then {:?}", changes(&health));
-    assert_eq!(busy.stopped.as_deref(), Some("told to stay so"));
-    assert!(simulation.call(industrious::sensor::base::number::busy, Ask).is_err());
-    let refused =
-        simulation.cast(industrious::sensor::base::number::busy, Number(1.0)).expect_err("it does not run");
-    assert_eq!(refused.to_string(), format!("{BUSY} does not run any more: told to stay so"));
+    let lost = report.estimator("sensor/base/number/busy").expect("it is declared");
+    assert_eq!(lost.health, Some(HealthState::Lost), "{told:?}, then {:?}", changes(&health));
+    assert_eq!(lost.stopped.as_deref(), Some("told to stay so"));
+    let says = "sensor/base/number/busy does not run any more: told to stay so";
+    assert!(simulation.call(busy, Ask).is_err());
+    assert_refused(simulation.cast(busy, Number(1.0)), says);
     Ok(())
 }

@@ -1,6 +1,6 @@
 //! Transforms of messages that are older than the history of a joint, or ahead of the clock.
 
-use crate::joints::{CAMERA, LIFT, Pixel, Reach, SHOULDER, joint, reach};
+use crate::joints::{CAMERA, LIFT, Pixel, Reach, SHOULDER, reach};
 use crate::kit::*;
 use bb_core::component::InputTransforms;
 

@@ -42,10 +42,8 @@ fn an_imu_on_a_moving_link_measures_how_that_moves() -> Result<(), Failure> {
     let mut simulation = armed_simulation(Swing::builder());
     // The world's steps begin with a command; the sensor is read in the middle of them.
     simulation.run_until(MonotonicTime::from_nanos(500_000));
-    simulation
-        .actuate(swing::actuator::base::turn::motor, VelocityCommand { velocity: 1.5, effort: None }.into())?;
-    let there = PositionCommand { position: 0.8, ..Default::default() };
-    simulation.actuate(swing::actuator::base::turn::arm::slide::motor, there.into())?;
+    simulation.actuate(swing::actuator::base::turn::motor, move_at(1.5))?;
+    simulation.actuate(swing::actuator::base::turn::arm::slide::motor, move_to(0.8))?;
     let readings = simulation.subscribe(swing::sensor::base::turn::arm::slide::carriage::imu);
     let kinematics = Kinematics::new(Swing::TOPOLOGY)?;
     let (base, carriage) = (kinematics.link("base").ok_or("a link")?, kinematics.link("carriage").ok_or("a link")?);

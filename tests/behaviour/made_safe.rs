@@ -3,9 +3,6 @@
 use crate::kit::*;
 use std::sync::mpsc::channel;
 
-/// The devices of these tests are there once.
-static ALONE: Mutex<()> = Mutex::new(());
-
 /// Number of motors that turn.
 static TURNING: AtomicI32 = AtomicI32::new(0);
 /// Number of times that a motor was made.
@@ -44,7 +41,7 @@ const UNTIL_AT_GATE: u32 = 2;
 static GATE: Gate = Gate::new();
 
 fn alone() -> MutexGuard<'static, ()> {
-    let alone = lock(&ALONE);
+    let alone = one_at_a_time();
     TURNING.store(0, Ordering::SeqCst);
     MADE.store(0, Ordering::SeqCst);
     FIRST.store(WORKS, Ordering::SeqCst);
@@ -330,14 +327,18 @@ robot! {
 #[test]
 fn a_robot_that_was_disarmed_is_not_armed_by_what_began_before() -> Result<(), Failure> {
     let _alone = alone();
-    let mut simulation = Commanded::builder().simulate()?;
-    let check = simulation.command(commanded::command::check, NoArguments)?;
-    simulation.run_for(Duration::from_millis(100));
-    assert_eq!((simulation.disarm(), simulation.safety()), (Ok(()), Safety::Disarmed));
-    simulation.run_for(Duration::from_secs(1));
-    assert_eq!(simulation.safety(), Safety::Disarmed);
-    assert!(check.try_result().is_some_and(|result| result.is_err()), "it was cancelled");
-    drop(simulation);
+    for somebody_arms in [false, true] {
+        let mut simulation = Commanded::builder().simulate()?;
+        let check = simulation.command(commanded::command::check, NoArguments)?;
+        simulation.run_for(Duration::from_millis(100));
+        if somebody_arms {
+            simulation.arm()?;
+        }
+        assert_eq!((simulation.disarm(), simulation.safety()), (Ok(()), Safety::Disarmed));
+        simulation.run_for(Duration::from_secs(1));
+        assert_eq!(simulation.safety(), Safety::Disarmed);
+        assert_eq!(check.try_result(), Some(Err(CommandError::Cancelled)));
+    }
 
     let robot = armed(Commanded::builder());
     BLOCK.close("block");

@@ -196,6 +196,16 @@ fn targets(positions: &[[f64; 2]]) -> JointTargets {
     JointTargets { joints: vec!["slew".into(), "reach".into()], points }
 }
 
+/// The true positions of the two joints that commands move.
+fn positions(simulation: &Simulation<Crane>) -> Result<(f64, f64), Failure> {
+    Ok((true_position(simulation, "slew")?, true_position(simulation, "reach")?))
+}
+
+/// The error of a command that has ended.
+fn error_of(execution: &Execution<()>) -> Result<String, Failure> {
+    Ok(execution.try_result().ok_or("it has ended")?.expect_err("it fails").to_string())
+}
+
 fn true_position(simulation: &Simulation<Crane>, joint: &str) -> Result<f64, Failure> {
     let world = simulation.shared(|| SimulatedWorld::new(Crane::TOPOLOGY));
     Ok(world.joint(joint, simulation.clock().now())?.point.position)

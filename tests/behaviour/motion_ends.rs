@@ -197,8 +197,7 @@ fn a_motion_whose_actuator_fails_ends_with_the_reason() -> Result<(), Failure> {
 fn a_failed_motion_ends_at_the_measured_position() -> Result<(), Failure> {
     let script = Script::default();
     let (mut simulation, ends) = moving(&script)?;
-    let state = JointState { position: 0.5, velocity: None, effort: None };
-    simulation.publish(press::sensor::base::ram::scale, simulation.clock().now(), state);
+    simulation.publish(press::sensor::base::ram::scale, simulation.clock().now(), joint(0.5));
     script.set(Fails::Command, false);
     assert!(simulation.actuate(DRIVE, Push { position: 0.5 }).is_err());
     assert_eq!(reasons(&ends), [(0.5, failed("no current"))]);

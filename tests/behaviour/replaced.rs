@@ -223,7 +223,7 @@ fn options_of_replaced_components_are_ignored() -> Result<(), Failure> {
 /// `robot!` checks that the declared estimator handles moving joints; of a replacement, the start does.
 #[test]
 fn a_replacement_across_moving_joints_has_to_handle_them() -> Result<(), Failure> {
-    use crate::joints::{CAMERA, LIFT, Reach, SHOULDER, joint, reach};
+    use crate::joints::{CAMERA, LIFT, Reach, SHOULDER, reach};
     let mut builder = Reach::builder();
     builder.replace_estimator::<Fixed>("estimator/base/spot", NoOptions)?;
     let says = "estimator/base/spot cannot start: its input `camera` spans a moving joint, and its replacement takes fixed \

@@ -49,17 +49,15 @@ robot! {
     }
 }
 
-/// Components count how often they were made in one place.
-static ALONE: Mutex<()> = Mutex::new(());
-
 #[test]
 fn panics_go_up_link_joint_robot_and_restart_exactly_what_is_below() -> Result<(), StartError> {
-    let _alone = ALONE.lock();
+    let _alone = one_at_a_time();
     let mut builder = Family::builder();
     // It is back before the next message.
     builder.supervision().longest_backoff = Duration::from_millis(250);
     let errors = builder.subscribe(system::SafetyErrors);
     let brother = builder.subscribe(family::sensor::base::neck::head::head_pulse::brother);
+    let health = builder.subscribe(system::Health);
     let mut simulation = armed_simulation(builder);
     let start: Vec<_> = (0..4).map(made).collect();
     let since = |number: usize| made(number) - start[number];
@@ -75,6 +73,9 @@ fn panics_go_up_link_joint_robot_and_restart_exactly_what_is_below() -> Result<(
         assert_eq!(simulation.safety() == Safety::Error, failure == 13);
         assert!(brother.drain().count() > 20, "its subscriber goes on, after {failure} failures");
     }
+    let mut of_brother = health.drain().filter(|change| change.estimator.ends_with("/brother"));
+    let change = of_brother.next().map(|change| (change.time, change.to, change.reason));
+    assert_eq!(change, Some((at(1200), HealthState::Degraded, HealthReason::Restarted)), "it says so");
     let error = errors.try_recv().expect("it is published");
     assert_eq!(error.path, "sensor/base/neck/head/number/failing");
     let report = simulation.stop();
@@ -86,7 +87,7 @@ fn panics_go_up_link_joint_robot_and_restart_exactly_what_is_below() -> Result<(
 /// Nested in a sensor at a joint, an estimator belongs to the joint; nested in one of the robot, to the robot.
 #[test]
 fn an_estimator_is_restarted_by_the_supervisor_of_its_sensor() -> Result<(), StartError> {
-    let _alone = ALONE.lock();
+    let _alone = one_at_a_time();
     let mut builder = Family::builder();
     builder.supervision().longest_backoff = Duration::from_millis(250);
     let mut simulation = armed_simulation(builder);
@@ -115,38 +116,25 @@ fn an_estimator_is_restarted_by_the_supervisor_of_its_sensor() -> Result<(), Sta
     Ok(())
 }
 
+/// A fault that may pass, as often as it comes; one that stays; and one as if it had not been there.
 #[test]
-fn a_fault_never_touches_another_component_however_often_it_comes() -> Result<(), StartError> {
-    let _alone = ALONE.lock();
-    let mut simulation = armed_simulation(Family::builder());
-    let start: Vec<_> = (0..4).map(made).collect();
-    for round in 1..=200 {
-        simulation.publish(family::sensor::base::neck::head::number, at(20 * round), Number(4.0));
-    }
-    simulation.run_until(at(20_000));
-    assert_eq!((0..4).map(made).collect::<Vec<_>>(), start);
-    assert_eq!(simulation.safety(), Safety::Armed);
-    let report = simulation.stop();
-    let failing = report.estimator("sensor/base/neck/head/number/failing").expect("it is declared");
-    assert!(failing.restarts > 15, "it was restarted {} times", failing.restarts);
-    Ok(())
-}
-
-#[test]
-fn what_does_not_heal_stays_as_it_is_and_nobody_else_suffers() -> Result<(), StartError> {
-    let _alone = ALONE.lock();
-    for number in [2.0, 3.0] {
-        let mut simulation = Family::builder().simulate()?;
+fn a_fault_never_touches_another_component() -> Result<(), StartError> {
+    let _alone = one_at_a_time();
+    for (number, restarts, dispatched) in [(4.0, 16..200, 17..201), (2.0, 0..1, 1..2), (3.0, 0..1, 1..2)] {
+        let mut simulation = armed_simulation(Family::builder());
         let start: Vec<_> = (0..4).map(made).collect();
-        for round in 1..20 {
-            let time = at(100 * round);
-            simulation.publish(family::sensor::base::neck::head::number, time, Number(number));
+        for round in 1..=200 {
+            simulation.publish(family::sensor::base::neck::head::number, at(20 * round), Number(number));
         }
-        simulation.run_until(at(10_000));
+        simulation.run_until(at(20_000));
         assert_eq!((0..4).map(made).collect::<Vec<_>>(), start);
+        assert_eq!(simulation.safety(), Safety::Armed);
         let report = simulation.stop();
         let failing = report.estimator("sensor/base/neck/head/number/failing").expect("it is declared");
-        assert_eq!((failing.restarts, failing.dispatched), (0, 1));
+        assert!(
+            restarts.contains(&failing.restarts) && dispatched.contains(&failing.dispatched),
+            "{number}: {report}"
+        );
     }
     Ok(())
 }

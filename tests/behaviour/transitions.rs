@@ -1,7 +1,6 @@
 //! Commands that change the operational state while they run.
 
 use crate::kit::*;
-use bb_core::event::StateTransition;
 
 /// Answers to those who asked for a transition.
 static ANSWERS: Mutex<Vec<String>> = Mutex::new(Vec::new());
@@ -56,10 +55,6 @@ fn early(context: CommandContext) -> Doing {
     })
 }
 
-fn nothing(_: CommandContext) -> Doing {
-    Box::pin(async { Ok(Outcome::done(())) })
-}
-
 robot! {
     robot Harbour;
     states { docking; charging; }
@@ -69,17 +64,16 @@ robot! {
         fail: Task(run = fail);
         wrong: Task(run = wrong);
         early: Task(run = early) { allowed_states: [disarmed]; category: signal; }
-        horn: Task(run = nothing) { allowed_states: [docking]; category: signal; }
-        wave: Task(run = nothing) { allowed_states: [idle, executing]; category: signal; }
-        stop: Task(run = nothing) { allowed_states: [executing, docking]; cancel: all; }
+        horn: Task { allowed_states: [docking]; category: signal; }
+        wave: Task { allowed_states: [idle, executing]; category: signal; }
+        stop: Task { allowed_states: [executing, docking]; cancel: all; }
     }
     link base;
 }
 
 /// The tests share what was told.
-fn alone() -> std::sync::MutexGuard<'static, ()> {
-    static ALONE: Mutex<()> = Mutex::new(());
-    let guard = lock(&ALONE);
+fn alone() -> MutexGuard<'static, ()> {
+    let guard = one_at_a_time();
     lock(&ANSWERS).clear();
     guard
 }
@@ -88,39 +82,38 @@ fn take_answers() -> Vec<String> {
     std::mem::take(&mut *lock(&ANSWERS))
 }
 
-fn changes(states: &Subscription<StateTransition>) -> Vec<(i64, &'static str, &'static str, Option<&'static str>)> {
-    let changes = states.drain();
-    changes
-        .map(|change| (change.monotonic_time.as_nanos() / 1_000_000, change.from, change.to, change.command))
-        .collect()
-}
-
+/// Also in a replay, where the second command is allowed by the transition alone.
 #[test]
 fn other_commands_follow_a_transition_at_once() -> Result<(), Failure> {
     let _alone = alone();
-    let mut simulation = armed_simulation(Harbour::builder());
-    let states = simulation.subscribe(system::StateMachine);
-    let docking = simulation.command(harbour::command::dock, NoArguments)?;
-    simulation.run_until(at(99));
-    let refused = simulation.command(harbour::command::horn, NoArguments).expect_err("it is not docking");
-    assert_eq!((refused.reason, refused.state), (RefusalReason::State, "executing"));
-    simulation.command(harbour::command::wave, NoArguments)?;
-    simulation.run_until(at(100));
-    simulation.command(harbour::command::horn, NoArguments)?;
-    let refused = simulation.command(harbour::command::wave, NoArguments).expect_err("it is docking");
-    assert_eq!((refused.reason, refused.state), (RefusalReason::State, "docking"));
-    simulation.run_until(at(400));
-    assert_eq!(docking.try_result(), Some(Ok(())));
-    let dock = Some("dock");
-    let expected = [
-        (0, "idle", "executing", dock),
-        (100, "executing", "docking", dock),
-        (300, "docking", "executing", dock),
-        (300, "executing", "docking", dock),
-        (300, "docking", "charging", dock),
-    ];
-    assert_eq!(changes(&states), expected);
-    assert_eq!(take_answers(), ["done"]);
+    let (_, report) = same_from_file(Harbour::builder, |builder| {
+        let states = builder.subscribe(system::StateMachine);
+        let mut simulation = armed_simulation(builder);
+        let docking = simulation.command(harbour::command::dock, NoArguments)?;
+        simulation.run_until(at(99));
+        let refused = simulation.command(harbour::command::horn, NoArguments).expect_err("it is not docking");
+        assert_eq!((refused.reason, refused.state), (RefusalReason::State, "executing"));
+        simulation.command(harbour::command::wave, NoArguments)?;
+        simulation.run_until(at(100));
+        simulation.command(harbour::command::horn, NoArguments)?;
+        let refused = simulation.command(harbour::command::wave, NoArguments).expect_err("it is docking");
+        assert_eq!((refused.reason, refused.state), (RefusalReason::State, "docking"));
+        simulation.run_until(at(400));
+        assert_eq!(docking.try_result(), Some(Ok(())));
+        let changes: Vec<_> = states.drain().map(|to| (to.monotonic_time, to.from, to.to, to.command)).collect();
+        let expected = [
+            (0, "disarmed", "idle", None),
+            (0, "idle", "executing", Some("dock")),
+            (100, "executing", "docking", Some("dock")),
+            (300, "docking", "executing", Some("dock")),
+            (300, "executing", "docking", Some("dock")),
+            (300, "docking", "charging", Some("dock")),
+        ];
+        assert_eq!(changes, expected.map(|(millis, from, to, command)| (at(millis), from, to, command)));
+        assert_eq!(take_answers(), ["done"]);
+        Ok(simulation.stop())
+    })?;
+    report.ok()?;
     Ok(())
 }
 
@@ -160,26 +153,5 @@ fn a_state_that_is_not_declared_is_refused_and_so_is_any_of_a_robot_that_is_not_
     assert_eq!(misspelt, "no state `dokking` is declared; did you mean `docking`?");
     assert!(others.iter().all(|answer| answer.starts_with("no state `")), "{others:?}");
     assert_eq!(simulation.state(), "idle");
-    Ok(())
-}
-
-#[test]
-fn a_replay_goes_through_the_same_states() -> Result<(), Failure> {
-    let _alone = alone();
-    same_from_file(Harbour::builder, |builder| {
-        let states = builder.subscribe(system::StateMachine);
-        let mut simulation = armed_simulation(builder);
-        simulation.command(harbour::command::dock, NoArguments)?;
-        simulation.run_until(at(150));
-        // Allowed by the transition alone.
-        simulation.command(harbour::command::horn, NoArguments)?;
-        simulation.command(harbour::command::stop, NoArguments)?;
-        simulation.run_until(at(400));
-        let changes = changes(&states);
-        assert!(changes.contains(&(100, "executing", "docking", Some("dock"))), "{changes:?}");
-        Ok(simulation.stop())
-    })?
-    .1
-    .ok()?;
     Ok(())
 }

@@ -11,14 +11,14 @@ fn joints_move_through_points_and_arrive_together() -> Result<(), Failure> {
     simulation.run_for(Duration::from_secs(10));
     assert_eq!(execution.try_result(), Some(Ok(())));
     let reports: Vec<_> = ends.drain().collect();
-    let mut ended: Vec<_> = reports.iter().filter_map(|report| report.downcast::<EndMotion>()).collect();
+    let mut ended: Vec<_> = reports.iter().filter_map(DynamicMessage::downcast::<EndMotion>).collect();
     ended.sort_by_key(|end| end.frame.name());
     let told: Vec<_> = ended.iter().map(|end| (end.frame.name(), &end.end)).collect();
     assert_eq!(told, [("reach", &MotionEnd::Reached), ("slew", &MotionEnd::Reached)]);
     // What a motor deviates from its path decays at 50 1/s, from less than 1e-7 down to the 1e-9 at which a target is reached.
     let apart_s = ended[0].monotonic_time.seconds_since(ended[1].monotonic_time);
     assert!(apart_s.abs() <= 0.1, "{apart_s} s apart");
-    let (slew, reach) = (true_position(&simulation, "slew")?, true_position(&simulation, "reach")?);
+    let (slew, reach) = positions(&simulation)?;
     assert!((slew + 0.5).abs() < 1e-6 && (reach - 1.5).abs() < 1e-6, "{slew} {reach}");
     let shares: Vec<f64> = progress
         .drain()
@@ -35,9 +35,9 @@ fn after(what: fn(&Simulation<Crane>, &Execution<()>)) -> Result<(), Failure> {
     let execution = simulation.command(crane::command::go, targets(&[[1.2, 1.9]]))?;
     simulation.run_for(Duration::from_secs(1));
     what(&simulation, &execution);
-    let (slew, reach) = (true_position(&simulation, "slew")?, true_position(&simulation, "reach")?);
+    let (slew, reach) = positions(&simulation)?;
     simulation.run_for(Duration::from_secs(2));
-    let (slew_then, reach_then) = (true_position(&simulation, "slew")?, true_position(&simulation, "reach")?);
+    let (slew_then, reach_then) = positions(&simulation)?;
     // v² / 2a: 1 / 8 rad, 0.25 / 8 m at most.
     assert!((0.001..0.126).contains(&(slew_then - slew)), "{slew} {slew_then}");
     assert!((0.001..0.032).contains(&(reach_then - reach)), "{reach} {reach_then}");
@@ -68,13 +68,10 @@ fn a_command_may_be_cancelled_in_each_phase_of_its_motion() -> Result<(), Failur
         execution.cancel();
         simulation.run_for(Duration::from_secs(1));
         execution.cancel();
-        let joints = ["slew", "reach"].map(|joint| true_position(&simulation, joint));
-        let [slew, reach] = [joints[0].as_ref(), joints[1].as_ref()].map(|joint| *joint.unwrap_or(&f64::NAN));
+        let (slew, reach) = positions(&simulation)?;
         // The last steps of the trajectory brake less than the servo can: it may come to rest beyond by a fraction of a step.
-        assert!(
-            (0.0..=0.8 + 2e-5).contains(&slew) && (0.0..=0.5 + 2e-5).contains(&reach),
-            "{millis}: {slew} {reach}"
-        );
+        let is_on_its_way = (0.0..=0.8 + 2e-5).contains(&slew) && (0.0..=0.5 + 2e-5).contains(&reach);
+        assert!(is_on_its_way, "{millis}: {slew} {reach}");
         // A result is taken once.
         let result = execution.try_result();
         let has_arrived = result == Some(Ok(()));
@@ -86,7 +83,7 @@ fn a_command_may_be_cancelled_in_each_phase_of_its_motion() -> Result<(), Failur
         }
         // They rest, and hold.
         simulation.run_for(Duration::from_secs(1));
-        assert_eq!((true_position(&simulation, "slew")?, true_position(&simulation, "reach")?), (slew, reach));
+        assert_eq!(positions(&simulation)?, (slew, reach));
         assert_eq!(simulation.state(), "idle", "{millis}");
         let next = simulation.command(crane::command::go, targets(&[[0.1, 0.2]]))?;
         simulation.run_for(Duration::from_secs(6));
@@ -106,7 +103,7 @@ fn a_command_that_times_out_stops_its_joints() -> Result<(), Failure> {
     simulation.run_for(Duration::from_secs(2));
     assert!(execution.try_result().is_some_and(|result| result.is_err()));
     // It keeps step with the other, which is slower: 1.2 / 1.9 of its way.
-    let (slew, reach) = (true_position(&simulation, "slew")?, true_position(&simulation, "reach")?);
+    let (slew, reach) = positions(&simulation)?;
     assert!((0.1..0.2).contains(&reach) && (slew - reach * 1.2 / 1.9).abs() < 0.01, "{slew} {reach}");
     simulation.run_for(Duration::from_secs(1));
     assert_eq!(true_position(&simulation, "slew")?, slew);
@@ -133,13 +130,12 @@ fn a_command_that_loses_its_joints_fails_and_leaves_them_alone() -> Result<(), F
     let mut simulation = ready()?;
     let execution = simulation.command(crane::command::go, targets(&[[1.2, 1.9]]))?;
     simulation.run_for(Duration::from_secs(1));
-    let there = |position| ActuatorCommand::from(PositionCommand { position, ..Default::default() });
-    simulation.actuate(crane::actuator::base::slew::motor, there(-0.5))?;
-    simulation.actuate(crane::actuator::base::slew::boom::reach::motor, there(0.1))?;
+    simulation.actuate(crane::actuator::base::slew::motor, move_to(-0.5))?;
+    simulation.actuate(crane::actuator::base::slew::boom::reach::motor, move_to(0.1))?;
     simulation.run_for(Duration::from_secs(10));
-    let error = execution.try_result().ok_or("it has ended")?.expect_err("it was replaced").to_string();
+    let error = error_of(&execution)?;
     assert!(error.contains("another command has taken over the joint `slew`"), "{error}");
-    let (slew, reach) = (true_position(&simulation, "slew")?, true_position(&simulation, "reach")?);
+    let (slew, reach) = positions(&simulation)?;
     assert!((slew + 0.5).abs() < 1e-6 && (reach - 0.1).abs() < 1e-6, "{slew} {reach}");
     Ok(())
 }
@@ -151,7 +147,7 @@ fn a_joint_that_is_held_fails_the_command_and_stops_the_others() -> Result<(), F
     world.obstruct("slew", -0.3, 0.3, simulation.clock().now())?;
     let execution = simulation.command(crane::command::go, targets(&[[1.2, 1.9]]))?;
     simulation.run_for(Duration::from_secs(10));
-    let error = execution.try_result().ok_or("it has ended")?.expect_err("it is held").to_string();
+    let error = error_of(&execution)?;
     assert!(error.contains("the joint `slew` has stalled at 0.3"), "{error}");
     assert!(true_position(&simulation, "reach")? < 1.0);
     Ok(())
@@ -211,12 +207,11 @@ fn trajectory(sent: &DynamicSubscription) -> Result<JointTrajectory, Failure> {
 #[test]
 fn a_joint_that_is_stuck_from_the_start_fails_the_command() -> Result<(), Failure> {
     let mut simulation = shop(|_| ())?;
-    let state = JointState { position: 0.0, velocity: None, effort: None };
-    simulation.publish(shop::sensor::base::screw::encoder, simulation.clock().now(), state);
+    simulation.publish(shop::sensor::base::screw::encoder, simulation.clock().now(), joint(0.0));
     simulation.run_until(at(30));
     let execution = simulation.command(shop::command::go, target("screw", 0.5))?;
     simulation.run_for(Duration::from_secs(10));
-    let error = execution.try_result().ok_or("it has ended")?.expect_err("it is stuck").to_string();
+    let error = error_of(&execution)?;
     assert!(error.contains("the joint `screw` has stalled at 0"), "{error}");
     Ok(())
 }
@@ -226,9 +221,9 @@ fn a_trajectory_starts_with_the_motion_of_the_joint() -> Result<(), Failure> {
     let mut simulation = ready()?;
     let motor = crane::actuator::base::slew::motor;
     for speed in [0.4, -0.8] {
-        simulation.actuate(motor, PositionCommand { position: 0.0, ..Default::default() }.into())?;
+        simulation.actuate(motor, move_to(0.0))?;
         simulation.run_for(Duration::from_secs(5));
-        simulation.actuate(motor, VelocityCommand { velocity: speed, effort: None }.into())?;
+        simulation.actuate(motor, move_at(speed))?;
         simulation.run_for(Duration::from_millis(903));
         let sent = simulation.subscribe_any(Select::Path(motor.path()), None, Overflow::default());
         let world = simulation.shared(|| SimulatedWorld::new(Crane::TOPOLOGY));
@@ -272,7 +267,7 @@ fn a_joint_at_its_largest_velocity_may_be_commanded_however_noisy_that_is() -> R
     for seed in 0..25 {
         let mut simulation = shop(|builder| builder.options(shop::sensor::base::drum::encoder).seed = seed)?;
         let motor = shop::actuator::base::drum::motor;
-        simulation.actuate(motor, VelocityCommand { velocity: 1.0, effort: None }.into())?;
+        simulation.actuate(motor, move_at(1.0))?;
         simulation.run_for(Duration::from_millis(1_000));
         let sent = simulation.subscribe_any(Select::Path(motor.path()), None, Overflow::default());
         let execution = simulation.command(shop::command::wind, target("drum", 5.0))?;

@@ -90,8 +90,7 @@ fn a_controller_does_not_go_back_to_an_older_measurement() -> Result<(), Failure
     let mut measured = |now: i64, stamp: i64, position: f64| -> Result<f64, Failure> {
         simulation.run_until(at(now - 1));
         let _ = terms.drain().count();
-        let state = JointState { position, velocity: None, effort: None };
-        simulation.publish(sump::sensor::base::float::level, at(stamp), state);
+        simulation.publish(sump::sensor::base::float::level, at(stamp), joint(position));
         simulation.run_until(at(now));
         Ok(terms.drain().last().ok_or("it commands")?.measurement)
     };
@@ -110,8 +109,7 @@ fn a_threshold_switches_its_actuator_on_again_after_a_disarming() -> Result<(), 
     let rise = |simulation: &mut Simulation<Sump>, level: f64| -> Result<f64, Failure> {
         for _ in 0..50 {
             simulation.run_for(Duration::from_millis(20));
-            let state = JointState { position: level, velocity: None, effort: None };
-            simulation.publish(sump::sensor::base::float::level, simulation.clock().now(), state);
+            simulation.publish(sump::sensor::base::float::level, simulation.clock().now(), joint(level));
         }
         let world = simulation.shared(|| SimulatedWorld::new(Sump::TOPOLOGY));
         Ok(world.joint("pump", simulation.clock().now())?.point.velocity)
@@ -146,7 +144,7 @@ impl Service for Steady {
 
     fn update(&mut self, _: MonotonicTime) -> Result<Reading<PidState>, Fault> {
         // It is refused until the robot is armed.
-        let _ = self.0.send(VelocityCommand { velocity: self.1, effort: None }.into());
+        let _ = self.0.send(move_at(self.1));
         Ok(Reading::nothing())
     }
 }

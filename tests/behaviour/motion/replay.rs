@@ -16,7 +16,7 @@ fn motions_and_their_reports_are_the_same_in_a_replay() -> Result<(), Failure> {
     execution.cancel();
     simulation.run_until(at(1500));
     let servo = crane::actuator::base::slew::boom::reach::trolley::jaw::servo;
-    simulation.actuate(servo, PositionCommand { position: 9.0, ..Default::default() }.into())?;
+    simulation.actuate(servo, move_to(9.0))?;
     simulation.run_until(at(2000));
     simulation.stop();
     let (mut first, lines) = (Published::new(), entries(&lines));

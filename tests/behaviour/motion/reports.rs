@@ -18,7 +18,7 @@ fn a_motion_is_reported_from_its_begin_to_its_end() -> Result<(), Failure> {
     simulation.run_until(at(3200));
     simulation.actuate(motor, ActuatorCommand::Hold)?;
     simulation.run_until(at(4000));
-    simulation.actuate(motor, VelocityCommand { velocity: 1.0, effort: None }.into())?;
+    simulation.actuate(motor, move_at(1.0))?;
     simulation.run_until(at(8000));
     let told: Vec<String> = reports
         .drain()
@@ -32,7 +32,7 @@ fn a_motion_is_reported_from_its_begin_to_its_end() -> Result<(), Failure> {
     let expected = "begin 0.500, Replaced 0.064, begin 0.250, Reached 0.250, begin 1.000, Stopped 0.350, begin 1.571, Limit 1.571";
     assert_eq!(told.join(", "), expected);
     // At the end of its range, a velocity that leads out of it becomes zero.
-    simulation.actuate(motor, VelocityCommand { velocity: 1.0, effort: None }.into())?;
+    simulation.actuate(motor, move_at(1.0))?;
     let report = simulation.report();
     let counts = report.actuator(motor.path()).ok_or("it is declared")?;
     assert_eq!(counts.limited(LimitedQuantity::Position), 1);
@@ -49,7 +49,7 @@ fn the_open_loop_position_follows_the_true_one() -> Result<(), Failure> {
     assert!(simulation.joints().status("jaw").ok_or("declared")?.time.is_none());
     let mut worst = 0.0_f64;
     for target in [1.0, 0.2, 0.5] {
-        simulation.actuate(servo, PositionCommand { position: target, ..Default::default() }.into())?;
+        simulation.actuate(servo, move_to(target))?;
         for _ in 0..120 {
             simulation.run_for(Duration::from_millis(10));
             let truth = true_position(&simulation, "jaw")?;
@@ -69,20 +69,19 @@ fn a_velocity_of_zero_is_no_motion_to_the_end_of_the_range() -> Result<(), Failu
     let mut simulation = ready()?;
     let servo = crane::actuator::base::slew::boom::reach::trolley::jaw::servo;
     let below = Select::Below("actuator/base/slew/boom/reach/trolley/jaw/servo");
-    simulation.actuate(servo, PositionCommand { position: 0.4, ..Default::default() }.into())?;
+    simulation.actuate(servo, move_to(0.4))?;
     simulation.run_for(Duration::from_secs(2));
     let begins = simulation.subscribe_any(below, "BeginMotion", Overflow::default());
     let ends = ends(&simulation.bus());
-    let velocity = |velocity: f64| ActuatorCommand::from(VelocityCommand { velocity, effort: None });
-    simulation.actuate(servo, velocity(0.0))?;
+    simulation.actuate(servo, move_at(0.0))?;
     simulation.run_for(Duration::from_secs(1));
     assert_eq!((begins.drain().count(), next_end(&ends)), (0, None));
     let status = simulation.joints().status("jaw").ok_or("declared")?;
     assert!((status.position[0] - 0.4).abs() < 1e-6, "{status:?}");
     // It ends a motion, as `Hold` does.
-    simulation.actuate(servo, velocity(0.5))?;
+    simulation.actuate(servo, move_at(0.5))?;
     simulation.run_for(Duration::from_millis(100));
-    simulation.actuate(servo, velocity(-0.0))?;
+    simulation.actuate(servo, move_at(-0.0))?;
     simulation.run_for(Duration::from_secs(1));
     assert_eq!(begins.drain().count(), 1);
     assert_eq!(next_end(&ends), Some(("jaw".to_owned(), MotionEnd::Stopped)));
@@ -96,7 +95,7 @@ fn a_joint_that_nothing_holds_is_not_stalled_however_short_it_may_be_held() -> R
     let mut simulation = armed_simulation(builder);
     let ends = ends(&simulation.bus());
     let motor = crane::actuator::base::slew::motor;
-    simulation.actuate(motor, PositionCommand { position: 0.2, ..Default::default() }.into())?;
+    simulation.actuate(motor, move_to(0.2))?;
     simulation.run_for(Duration::from_secs(2));
     assert_eq!(next_end(&ends), Some(("slew".to_owned(), MotionEnd::Reached)));
     Ok(())
@@ -108,7 +107,7 @@ fn a_simulated_motor_moves_in_real_time() -> Result<(), Failure> {
     let ends = ends(&running.bus());
     let servo = crane::actuator::base::slew::boom::reach::trolley::jaw::servo;
     let begin = running.clock().now();
-    running.actuate(servo, PositionCommand { position: 0.4, ..Default::default() }.into())?;
+    running.actuate(servo, move_to(0.4))?;
     let end = ends.recv_timeout(Duration::from_secs(20)).ok_or("it arrives")?;
     let motion = end.downcast::<EndMotion>().ok_or("an end")?;
     assert_eq!((motion.frame.name(), &motion.end), ("jaw", &MotionEnd::Reached));
@@ -129,7 +128,7 @@ fn a_motion_without_a_target_is_reported_too() -> Result<(), Failure> {
         begin.downcast::<BeginMotion>().map(|begin| (begin.target_position, begin.velocity, begin.speed))
     };
     // Beyond the limit of 2 rad/s, on a joint without an end.
-    simulation.actuate(motor, VelocityCommand { velocity: -5.0, effort: None }.into())?;
+    simulation.actuate(motor, move_at(-5.0))?;
     assert_eq!(begun(), Some((None, Some(-2.0), Some(2.0))));
     simulation.run_for(Duration::from_secs(1));
     simulation.actuate(motor, EffortCommand { effort: 5.0 }.into())?;

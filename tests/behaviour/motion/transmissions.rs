@@ -230,12 +230,9 @@ fn limits_are_those_of_the_joint_and_the_motor_sees_its_own() -> Result<(), Fail
     let limit = shaft(&shafts, "arm").limit.ok_or("it is declared")?;
     assert_eq!((limit.lower, limit.upper), (Some(-150.0), Some(150.0)));
     assert_eq!((limit.velocity, limit.effort), (Some(200.0), Some(0.05)));
-    simulation.actuate(
-        geared::actuator::base::arm::motor,
-        PositionCommand { position: 9.0, ..Default::default() }.into(),
-    )?;
+    simulation.actuate(geared::actuator::base::arm::motor, move_to(9.0))?;
     let commanded = shaft(&shafts, "arm").commanded;
-    assert_eq!(commanded, [PositionCommand { position: GEAR.motor_position(2.0), ..Default::default() }.into()]);
+    assert_eq!(commanded, [move_to(GEAR.motor_position(2.0))]);
     let report = simulation.report();
     assert_eq!(report.actuator(ARM).ok_or("it is declared")?.limited(LimitedQuantity::Position), 1);
     Ok(())
@@ -266,10 +263,7 @@ fn a_simulated_joint_takes_the_place_of_a_motor() -> Result<(), Failure> {
     let mut builder = Geared::builder();
     builder.replace_actuator::<SimulatedActuator>(ARM, SimulatedActuatorOptions::defaults())?;
     let mut simulation = armed_simulation(builder);
-    simulation.actuate(
-        geared::actuator::base::arm::motor,
-        PositionCommand { position: 1.25, ..Default::default() }.into(),
-    )?;
+    simulation.actuate(geared::actuator::base::arm::motor, move_to(1.25))?;
     simulation.run_for(Duration::from_secs(5));
     let world = simulation.shared(|| SimulatedWorld::new(Geared::TOPOLOGY));
     let position = world.joint("arm", simulation.clock().now())?.point.position;
