@@ -3,45 +3,26 @@
 use crate::kit::*;
 use std::task::Poll;
 
-/// Behaviour of a [`Misbehave`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Payload)]
-pub(crate) enum Kind {
-    #[default]
-    Sleep,
-    /// Wakes itself at each poll, and never sleeps.
-    Spin,
-    /// Blocks its thread until the test releases it.
-    Block,
-    /// Sleeps so long that it never ends.
-    Endless,
-}
-
 static HERE: Gate = Gate::new();
 
-/// Command that behaves as its arguments say.
-pub(crate) struct Misbehave;
-
-impl Command for Misbehave {
-    type Options = NoOptions;
-    type Arguments = Kind;
-    type Output = ();
-
-    async fn run(_: NoOptions, kind: Kind, context: CommandContext) -> Result<Outcome<()>, Fault> {
-        match kind {
-            Kind::Sleep => context.sleep(Duration::from_millis(10)).await,
-            Kind::Spin => {
-                std::future::poll_fn(|polled| -> Poll<()> {
-                    polled.waker().wake_by_ref();
-                    Poll::Pending
-                })
-                .await;
-            }
-            Kind::Block => HERE.pass("a command that blocks"),
-            Kind::Endless => context.sleep(Duration::from_secs(3_600_000)).await,
-        }
-        Ok(Outcome::done(()))
-    }
+/// Wakes itself at each poll, and never sleeps.
+fn spin(_: CommandContext) -> Doing {
+    Box::pin(std::future::poll_fn(|polled| {
+        polled.waker().wake_by_ref();
+        Poll::Pending
+    }))
 }
+
+fn block(_: CommandContext) -> Doing {
+    HERE.stuck("a command that blocks")
+}
+
+fn sleep(millis: u64) -> Target {
+    Target { millis, does: None }
+}
+
+/// Time so long that a command that sleeps for it never ends.
+const ENDLESS: u64 = 3_600_000_000;
 
 type Starts = Box<dyn FnOnce() + Send>;
 static STARTS: Mutex<Option<Starts>> = Mutex::new(None);
@@ -61,8 +42,10 @@ robot! {
     commands {
         category many { concurrency: 20000; }
         category others { concurrency: 2; }
-        misbehave: Misbehave { category: many; timeout: 200 ms; allowed_states: [disarmed, idle, executing]; }
-        patient: Misbehave { category: many; allowed_states: [disarmed, idle, executing]; }
+        spinning: Task(run = spin) { category: many; timeout: 200 ms; allowed_states: [disarmed, idle, executing]; }
+        hurried: Move { category: many; timeout: 200 ms; allowed_states: [disarmed, idle, executing]; }
+        blocked: Task(run = block) { category: many; allowed_states: [disarmed, idle, executing]; }
+        patient: Move { category: many; allowed_states: [disarmed, idle, executing]; }
         nested: Task(run = nested) { category: others; allowed_states: [disarmed, idle, executing]; }
     }
 
@@ -73,10 +56,10 @@ robot! {
 fn a_command_that_wakes_itself_for_ever_fails_on_virtual_time() {
     within(60, || {
         let mut simulation = Unruly::builder().simulate().expect("it starts");
-        let spinning = simulation.command(unruly::command::patient, Kind::Spin).expect("it is allowed");
-        let sleeping = simulation.command(unruly::command::patient, Kind::Sleep).expect("it is allowed");
+        let spinning = simulation.command(unruly::command::spinning, NoArguments).expect("it is allowed");
+        let sleeping = simulation.command(unruly::command::patient, sleep(10)).expect("it is allowed");
         simulation.run_until(at(100));
-        assert_eq!(sleeping.try_result(), Some(Ok(())));
+        assert_eq!(sleeping.try_result(), Some(Ok(at(10))));
         let says = "the command failed: it woke itself 1000000 times at 0.000000000 s, and virtual time cannot go on: await \
              `CommandContext::sleep` between two looks";
         assert_refused(spinning.try_result().expect("it has ended"), says);
@@ -86,18 +69,19 @@ fn a_command_that_wakes_itself_for_ever_fails_on_virtual_time() {
 #[test]
 fn a_command_that_wakes_itself_for_ever_or_blocks_times_out_and_holds_nobody_up() {
     alone_within(60, || {
-        for kind in [Kind::Spin, Kind::Block] {
-            let builder = Unruly::builder();
-            let events = builder.subscribe(unruly::command::misbehave);
+        let kinds: [fn(CommandContext) -> Doing; 2] = [spin, block];
+        for (kind, name) in kinds.into_iter().zip(["it wakes itself", "it blocks"]) {
+            let mut builder = Unruly::builder();
+            builder.options(unruly::command::spinning).run = kind;
+            let events = builder.subscribe(unruly::command::spinning);
             let running = builder.start().expect("it starts");
-            let start = |command, kind| running.command(command, kind).expect("it is allowed");
             HERE.close("a command that blocks");
-            let late = start(unruly::command::misbehave, kind);
-            let sleeping = start(unruly::command::patient, Kind::Sleep);
-            assert_eq!(sleeping.wait_timeout(PATIENCE), Some(Ok(())), "{kind:?}");
-            assert_eq!(late.wait_timeout(PATIENCE), Some(Err(CommandError::TimedOut)), "{kind:?}");
+            let late = running.command(unruly::command::spinning, NoArguments).expect("it is allowed");
+            let sleeping = running.command(unruly::command::patient, sleep(10)).expect("it is allowed");
+            assert!(sleeping.wait_timeout(PATIENCE).is_some_and(|result| result.is_ok()), "{name}");
+            assert_eq!(late.wait_timeout(PATIENCE), Some(Err(CommandError::TimedOut)), "{name}");
             let phases: Vec<_> = events.drain().map(|event| event.payload.phase).collect();
-            assert_eq!(phases, [CommandPhase::Started, CommandPhase::TimedOut], "{kind:?}");
+            assert_eq!(phases, [CommandPhase::Started, CommandPhase::TimedOut], "{name}");
             HERE.open();
         }
     });
@@ -108,11 +92,11 @@ fn a_command_that_does_not_come_back_does_not_keep_the_robot_from_stopping() {
     alone_within(60, || {
         let running = Unruly::builder().start().expect("it starts");
         HERE.close("a command that blocks");
-        let blocked = running.command(unruly::command::patient, Kind::Block).expect("it is allowed");
+        let blocked = running.command(unruly::command::blocked, NoArguments).expect("it is allowed");
         HERE.wait_for(1);
         let report = running.stop();
         assert_eq!(blocked.wait(), Err(CommandError::Cancelled));
-        let says = "command/patient failed: did not come back when the robot stopped";
+        let says = "command/blocked failed: did not come back when the robot stopped";
         assert!(told(&report).contains(&says.to_owned()), "{report}");
         HERE.open();
     });
@@ -138,8 +122,8 @@ fn a_command_may_start_another_while_it_starts() {
 fn a_result_can_be_awaited_for_any_time_and_taken_once() {
     within(60, || {
         let running = Unruly::builder().start().expect("it starts");
-        let sleeping = running.command(unruly::command::patient, Kind::Sleep).expect("it is allowed");
-        assert_eq!(sleeping.wait_timeout(Duration::MAX), Some(Ok(())));
+        let sleeping = running.command(unruly::command::patient, sleep(10)).expect("it is allowed");
+        assert!(sleeping.wait_timeout(Duration::MAX).is_some_and(|result| result.is_ok()));
         assert_eq!(sleeping.wait(), Err(CommandError::Failed("its result was taken already".into())));
     });
 }
@@ -148,11 +132,11 @@ fn a_result_can_be_awaited_for_any_time_and_taken_once() {
 fn ten_thousand_commands_end_at_their_time() {
     within(120, || {
         let mut simulation = Unruly::builder().simulate().expect("it starts");
-        let start = |kind| simulation.command(unruly::command::misbehave, kind).expect("it is allowed");
-        let slept: Vec<_> = (0..5000).map(|_| start(Kind::Sleep)).collect();
-        let late: Vec<_> = (0..5000).map(|_| start(Kind::Endless)).collect();
+        let start = |millis| simulation.command(unruly::command::hurried, sleep(millis)).expect("it is allowed");
+        let slept: Vec<_> = (0..5000).map(|_| start(10)).collect();
+        let late: Vec<_> = (0..5000).map(|_| start(ENDLESS)).collect();
         simulation.run_until(at(1000));
-        assert!(slept.iter().all(|command| command.try_result() == Some(Ok(()))));
+        assert!(slept.iter().all(|command| command.try_result() == Some(Ok(at(10)))));
         assert!(late.iter().all(|command| command.try_result() == Some(Err(CommandError::TimedOut))));
     });
 }
@@ -170,8 +154,7 @@ fn events_of_a_command_come_in_their_order_from_many_threads() {
             for _ in 0..4 {
                 scope.spawn(|| {
                     for _ in 0..200 {
-                        let command = running.command(unruly::command::patient, Kind::Sleep);
-                        drop(command.expect("it is allowed"));
+                        drop(running.command(unruly::command::patient, sleep(10)).expect("it is allowed"));
                         std::thread::sleep(Duration::from_micros(50));
                     }
                 });

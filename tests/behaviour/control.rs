@@ -294,18 +294,3 @@ fn controllers_and_bridges_run_and_reach_everything_by_path() -> Result<(), Fail
     }
     Ok(())
 }
-
-#[test]
-fn commands_run_in_real_time_too_and_end_with_the_robot() -> Result<(), Failure> {
-    let _alone = alone();
-    let running = Commanded::builder().start()?;
-    running.command(commanded::command::arm, NoArguments)?.wait()?;
-    let start = running.clock().now();
-    let end = running.command(commanded::command::go, millis(20))?.wait()?;
-    assert!(end.nanos_since(start) >= 20_000_000);
-    let endless = running.command(commanded::command::turn, millis(1_000_000))?;
-    let report = running.stop();
-    assert_eq!(endless.wait(), Err(CommandError::Cancelled));
-    assert_eq!(report.safety, Safety::Disarmed);
-    Ok(())
-}

@@ -16,10 +16,6 @@ robot! {
             input driver: sensor::base::a, driver;
             sync_tolerance: 10 ms;
         }
-        estimator any_age: Snapshot() {
-            input driver: sensor::base::a, driver;
-            input second: sensor::base::b;
-        }
     }
 }
 
@@ -111,16 +107,6 @@ fn a_dropped_dispatch_reaches_handlers_of_telemetry() -> Result<(), StartError> 
 }
 
 #[test]
-fn without_a_tolerance_any_age_will_do() -> Result<(), StartError> {
-    let (mut simulation, _) = start()?;
-    let seen = simulation.subscribe(fan_in::estimator::base::any_age);
-    simulation.publish(fan_in::sensor::base::b, at(0), Number(2.0));
-    simulation.publish(fan_in::sensor::base::a, at(1_000_000), Number(1.0));
-    assert_eq!(seen.try_recv().map(|seen| (seen.second, seen.third)), Some((2.0, -1.0)));
-    Ok(())
-}
-
-#[test]
 fn messages_out_of_order_and_non_finite_ones_are_dropped_and_counted_by_input() -> Result<(), StartError> {
     let (mut simulation, seen) = start()?;
     simulation.publish(fan_in::sensor::base::b, at(5), Number(2.0));
@@ -197,18 +183,5 @@ fn what_is_derived_from_a_message_arrives_before_those_that_take_both() -> Resul
     simulation.run_to_end();
     let seen: Vec<_> = both.drain().map(|seen| (seen.driver, seen.second, seen.third, seen.third_is_new)).collect();
     assert_eq!(seen, [0.0, 1.0, 2.0, 3.0, 4.0].map(|number| (number, 10.0 * number, number, true)));
-    Ok(())
-}
-
-#[test]
-fn messages_carry_frame_origin_and_time() -> Result<(), StartError> {
-    let builder = FanIn::builder();
-    let a = builder.subscribe(fan_in::sensor::base::a);
-    let mut simulation = builder.simulate()?;
-    simulation.publish(fan_in::sensor::base::a, at(7), Number(1.0));
-    let message = a.try_recv().expect("it was published");
-    assert_eq!((message.frame.name(), message.origin.robot, message.monotonic_time), ("base", "FanIn", at(7)));
-    assert_eq!(message.wall_time.as_unix_nanos(), Clock::VIRTUAL_ZERO.as_unix_nanos() + 7_000_000);
-    assert_eq!(simulation.clock().now(), at(7));
     Ok(())
 }

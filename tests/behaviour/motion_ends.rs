@@ -19,18 +19,7 @@ enum Fails {
     DisarmPanics,
 }
 
-#[derive(Clone, Debug, Default)]
-struct Script(Arc<Mutex<(Fails, bool)>>);
-
-impl Script {
-    fn set(&self, fails: Fails, reports_end: bool) {
-        *lock(&self.0) = (fails, reports_end);
-    }
-
-    fn get(&self) -> (Fails, bool) {
-        *lock(&self.0)
-    }
-}
+type Script = Arc<Mutex<(Fails, bool)>>;
 
 #[derive(Clone, Debug, Options)]
 struct DriveOptions {
@@ -57,7 +46,7 @@ impl Actuator for Drive {
     }
 
     fn handle_command(&mut self, command: &Stamped<Push>) -> Result<(), Fault> {
-        match self.script.get().0 {
+        match lock(&self.script).0 {
             Fails::Command => return Err(Fault::new("no current")),
             Fails::Panics => panic!("an index"),
             Fails::Update | Fails::NextUpdate => {
@@ -76,10 +65,10 @@ impl Actuator for Drive {
     }
 
     fn next_update(&self) -> Option<MonotonicTime> {
-        if self.script.get().0 == Fails::NextUpdateHangs {
+        if lock(&self.script).0 == Fails::NextUpdateHangs {
             HANG.pass("next update");
         }
-        assert!(self.next.is_none() || self.script.get().0 != Fails::NextUpdate, "an overflow");
+        assert!(self.next.is_none() || lock(&self.script).0 != Fails::NextUpdate, "an overflow");
         self.next
     }
 
@@ -89,7 +78,7 @@ impl Actuator for Drive {
     }
 
     fn disarm(&mut self) -> Result<(), Fault> {
-        let (fails, reports_end) = self.script.get();
+        let (fails, reports_end) = *lock(&self.script);
         if reports_end {
             self.context.end_motion(EndMotion { position: 0.75, end: MotionEnd::Stopped });
         }
@@ -143,9 +132,9 @@ const DRIVE: ActuatorHandle<Press, Drive> = press::actuator::base::ram::drive;
 
 /// A robot that moves.
 fn moving(script: &Script) -> Result<(Simulation<Press>, DynamicSubscription), Failure> {
-    script.set(Fails::Never, script.get().1);
+    lock(script).0 = Fails::Never;
     let mut builder = Press::builder();
-    builder.options(DRIVE).script = script.clone();
+    builder.options(DRIVE).script = Arc::clone(script);
     let mut simulation = armed_simulation(builder);
     let ends = simulation.subscribe_any(Select::Below("actuator"), "EndMotion", Overflow::default());
     simulation.actuate(DRIVE, Push { position: 1.0 })?;
@@ -173,14 +162,14 @@ fn a_motion_whose_actuator_fails_ends_with_the_reason() -> Result<(), Failure> {
     for reports_end in [false, true] {
         for (fails, reason) in causes {
             let script = Script::default();
-            script.set(Fails::Never, reports_end);
+            *lock(&script) = (Fails::Never, reports_end);
             let (mut simulation, ends) = moving(&script)?;
-            script.set(fails, reports_end);
+            *lock(&script) = (fails, reports_end);
             let sent = simulation.actuate(DRIVE, Push { position: 0.5 });
             // The driver fails now or at its update, and is restarted.
             assert_eq!(sent.is_ok(), matches!(fails, Fails::Update | Fails::NextUpdate), "{fails:?}");
             simulation.run_for(Duration::from_millis(150));
-            script.set(Fails::Never, reports_end);
+            *lock(&script) = (Fails::Never, reports_end);
             // At the position that the driver knows, or where the motion began: nothing has measured it.
             let position = if reports_end { 0.75 } else { 0.25 };
             assert_eq!(reasons(&ends), [(position, failed(reason))], "{fails:?}");
@@ -198,7 +187,7 @@ fn a_failed_motion_ends_at_the_measured_position() -> Result<(), Failure> {
     let script = Script::default();
     let (mut simulation, ends) = moving(&script)?;
     simulation.publish(press::sensor::base::ram::scale, simulation.clock().now(), joint(0.5));
-    script.set(Fails::Command, false);
+    *lock(&script) = (Fails::Command, false);
     assert!(simulation.actuate(DRIVE, Push { position: 0.5 }).is_err());
     assert_eq!(reasons(&ends), [(0.5, failed("no current"))]);
     Ok(())
@@ -224,13 +213,13 @@ fn a_motion_that_is_disarmed_is_stopped_or_has_failed() -> Result<(), Failure> {
     for (fails, end) in cases {
         let script = Script::default();
         let (simulation, ends) = moving(&script)?;
-        script.set(fails, false);
+        *lock(&script) = (fails, false);
         assert_eq!(simulation.disarm().is_ok(), fails == Fails::Never);
         assert_eq!(reasons(&ends), [(0.25, end)]);
     }
     // A driver that reports the end itself.
     let script = Script::default();
-    script.set(Fails::Never, true);
+    *lock(&script) = (Fails::Never, true);
     let (simulation, ends) = moving(&script)?;
     assert_eq!(simulation.disarm(), Ok(()));
     assert_eq!(reasons(&ends), [(0.75, MotionEnd::Stopped)]);
@@ -259,7 +248,7 @@ fn code_that_hangs_beside_a_command_is_reported() -> Result<(), Failure> {
         builder.options(DRIVE).script = script.clone();
         let running = armed(builder);
         if place == "next update" {
-            script.set(Fails::NextUpdateHangs, false);
+            *lock(&script) = (Fails::NextUpdateHangs, false);
         }
         let faults = running.subscribe(system::Faults);
         HANG.close(place);

@@ -189,38 +189,31 @@ impl Clone for SlowOptions {
     }
 }
 
-/// Gains that it received, in order, and whether 50 was refused.
+/// Gains that a sensor received, in order, and whether one out of range was refused.
 static TUNED: Mutex<(Vec<f64>, Option<bool>)> = Mutex::new((Vec::new(), None));
 
-/// Tunes itself as it starts.
-pub(crate) struct Tuning;
+/// Tunes the sensor itself as it starts.
+fn tune_itself(context: &SensorContext) -> Done {
+    let refused = context.bus().set_parameter("param/gain", 50.0).is_err();
+    context.bus().set_parameter("param/gain", 5.0)?;
+    *lock(&TUNED) = (Vec::new(), Some(refused));
+    Ok(())
+}
 
-impl Sensor for Tuning {
-    type Options = SlowOptions;
-    type Output = Number;
-
-    fn init(options: SlowOptions, context: &SensorContext) -> Result<Self, Fault> {
-        let refused = context.bus().set_parameter("param/gain", 50.0).is_err();
-        context.bus().set_parameter("param/gain", 5.0)?;
-        let mut tuned = lock(&TUNED);
-        *tuned = (vec![options.gain], Some(refused));
-        Ok(Self)
-    }
-
-    fn read(&mut self, _: MonotonicTime) -> Result<Reading<Number>, Fault> {
-        Ok(Reading::nothing())
-    }
-
-    fn handle_options(&mut self, options: SlowOptions, _: &SensorContext) -> Result<(), Fault> {
-        lock(&TUNED).0.push(options.gain);
-        Ok(())
-    }
+fn tuned_to(gain: f64) -> Done {
+    lock(&TUNED).0.push(gain);
+    Ok(())
 }
 
 robot! {
     robot SelfTuned;
     parameters { gain: f64 = 1.0; other: f64 = 0.0; }
-    link base { sensor device: Tuning(gain = param::gain) { rate: 100 Hz; } }
+    link base {
+        sensor device: Source(init = tune_itself, gain = param::gain, tune = Some(tuned_to)) {
+            rate: 100 Hz;
+            estimator slow: Known<SlowOptions>(gain = param::gain);
+        }
+    }
 }
 
 #[test]
@@ -228,7 +221,7 @@ fn what_a_sensor_sets_as_it_starts_reaches_its_own_options() -> Result<(), Failu
     let _alone = one_at_a_time();
     let mut simulation = SelfTuned::builder().simulate()?;
     simulation.run_for(Duration::from_millis(50));
-    assert_eq!(*lock(&TUNED), (vec![1.0, 5.0], Some(true)));
+    assert_eq!(*lock(&TUNED), (vec![5.0], Some(true)));
     simulation.stop().ok()?;
     Ok(())
 }

@@ -4,48 +4,24 @@ use crate::joints::{Pixel, Spot, Spotter};
 use crate::kit::*;
 use bb_core::component::InputTransforms;
 
-/// Options of [`Ramp`].
-#[derive(Clone, Debug, Options)]
-struct RampOptions {
-    /// Increment at each message.
-    #[option(default = 1.0, range = 0.0..=10.0)]
-    step: f64,
-    /// The message at which it fails; 0 for none.
-    #[option(default = 0)]
-    fails_at: u32,
-}
-
-/// Counts its messages by its step, and fails once in a life.
-struct Ramp {
-    options: RampOptions,
-    messages: u32,
-}
-
-impl Estimator for Ramp {
-    type Options = RampOptions;
-    type Input = Number;
-    type Output = Number;
-
-    fn init(options: RampOptions, context: &Context) -> Result<Self, Fault> {
-        context.request(Request::Timer(7, Duration::from_millis(15)));
-        Ok(Self { options, messages: 0 })
-    }
-
-    fn handle_input(&mut self, _: &Stamped<Number>) -> Result<Reply<Number>, Fault> {
-        self.messages += 1;
-        if self.messages == self.options.fails_at {
-            return Err(Fault::new("told to"));
-        }
-        Ok(Reply::emit(Number(f64::from(self.messages) * self.options.step)))
-    }
-
-    fn handle_info(&mut self, info: Info) -> Result<Reply<Number>, Fault> {
-        assert_eq!(info, Info::Timer(7));
-        Ok(Reply::emit(Number(-1.0)).and(Request::Continue(3)))
-    }
-
-    fn handle_continue(&mut self, step: u32) -> Result<Reply<Number>, Fault> {
-        Ok(Reply::emit(Number(-f64::from(step))))
+/// Options of an estimator that counts its messages, at a gain, and fails at the message of this number.
+fn ramp<const FAILS_AT: u32>(gain: f64) -> EchoOptions {
+    EchoOptions {
+        gain,
+        keep: |context| {
+            context.request(Request::Timer(7, Duration::from_millis(15)));
+            0.0
+        },
+        input: |count, _| {
+            *count += 1.0;
+            if *count == f64::from(FAILS_AT) { Err(Fault::new("told to")) } else { Ok(Reply::emit(Number(*count))) }
+        },
+        info: |_, info| {
+            assert_eq!(info, Info::Timer(7));
+            Ok(Reply::emit(Number(-1.0)).and(Request::Continue(3)))
+        },
+        go_on: |_, step| Ok(Reply::emit(Number(-f64::from(step)))),
+        ..EchoOptions::defaults()
     }
 }
 
@@ -98,15 +74,15 @@ robot! {
 
 const SCALED: &str = "sensor/base/count/scaled";
 
-fn replaced(options: RampOptions) -> Result<Builder<Bench>, Failure> {
+fn replaced(options: EchoOptions) -> Result<Builder<Bench>, Failure> {
     let mut builder = Bench::builder();
-    builder.replace_estimator::<Ramp>(SCALED, options)?;
+    builder.replace_estimator::<Echo>(SCALED, options)?;
     Ok(builder)
 }
 
 #[test]
 fn a_replacement_keeps_path_frame_inputs_and_those_downstream() -> Result<(), Failure> {
-    let builder = replaced(RampOptions { step: 0.5, ..RampOptions::defaults() })?;
+    let builder = replaced(ramp::<0>(1.0))?;
     let scaled = builder.subscribe(bench::sensor::base::count::scaled);
     let last = builder.subscribe(bench::estimator::base::last);
     let mut simulation = builder.simulate()?;
@@ -114,10 +90,10 @@ fn a_replacement_keeps_path_frame_inputs_and_those_downstream() -> Result<(), Fa
     let scaled: Vec<_> = scaled.drain().collect();
     // Its timer and what it continues with too.
     let seen: Vec<_> = scaled.iter().map(|number| (number.monotonic_time, number.0)).collect();
-    assert_eq!(seen, [(at(0), 0.5), (at(10), 1.0), (at(15), -1.0), (at(15), -3.0), (at(20), 1.5)]);
+    assert_eq!(seen, [(at(0), 1.0), (at(10), 2.0), (at(15), -1.0), (at(15), -3.0), (at(20), 3.0)]);
     assert!(scaled.iter().all(|number| number.frame.name() == "base"));
     let last: Vec<_> = last.drain().map(|number| number.0).collect();
-    assert_eq!(last, [5.0, 10.0, -10.0, -30.0, 15.0]);
+    assert_eq!(last, [10.0, 20.0, -10.0, -30.0, 30.0]);
 
     // The declared options belong to the declared one.
     simulation.set_parameter(bench::param::factor, 3.0)?;
@@ -130,7 +106,7 @@ fn a_replacement_keeps_path_frame_inputs_and_those_downstream() -> Result<(), Fa
 
 #[test]
 fn a_replacement_has_the_health_and_the_supervision_of_what_is_declared() -> Result<(), Failure> {
-    let builder = replaced(RampOptions { fails_at: 3, ..RampOptions::defaults() })?;
+    let builder = replaced(ramp::<3>(1.0))?;
     let numbers = builder.subscribe(bench::sensor::base::count::scaled);
     let health = builder.subscribe(system::Health);
     let mut simulation = builder.simulate()?;
@@ -169,9 +145,9 @@ fn requests_to_a_replaced_estimator_are_refused_and_do_not_fail_it() -> Result<(
 #[test]
 fn a_replacement_that_does_not_fit_keeps_the_robot_from_starting() -> Result<(), Failure> {
     let mut builder = Bench::builder();
-    let error = builder.replace_estimator::<Ramp>("sensor/base/count/scald", RampOptions::defaults());
+    let error = builder.replace_estimator::<Echo>("sensor/base/count/scald", EchoOptions::defaults());
     assert_refused(error, "no estimator is at `sensor/base/count/scald`; did you mean `sensor/base/count/scaled`?");
-    assert!(builder.replace_estimator::<Ramp>("sensor/base/count", RampOptions::defaults()).is_err());
+    assert!(builder.replace_estimator::<Echo>("sensor/base/count", EchoOptions::defaults()).is_err());
     assert!(builder.replace_sensor::<Counter>(SCALED, CounterOptions::defaults()).is_err());
 
     builder.replace_estimator::<Fixed>(SCALED, NoOptions)?;
@@ -180,8 +156,10 @@ fn a_replacement_that_does_not_fit_keeps_the_robot_from_starting() -> Result<(),
          `behaviour::components::Number`";
     assert_refused(builder.simulate(), says);
 
-    let error = replaced(RampOptions { step: 11.0, ..RampOptions::defaults() })?.simulate();
-    assert_refused(error, "sensor/base/count/scaled cannot start: option `step` is 11, but must be in 0.0..=10.0");
+    let mut builder = Bench::builder();
+    builder.replace_estimator::<Scale>("sensor/base/count/asked", ScaleOptions { factor: 1e4 })?;
+    let says = "sensor/base/count/asked cannot start: option `factor` is 10000, but must be in -1e3..=1e3";
+    assert_refused(builder.simulate(), says);
     Ok(())
 }
 
@@ -204,16 +182,14 @@ fn options_of_replaced_components_are_ignored() -> Result<(), Failure> {
     let simulation = Bench::builder().simulate()?;
     assert!(simulation.set_parameter(bench::param::factor, 2000.0).is_err());
     drop(simulation);
-    let mut builder = Bench::builder();
-    builder.replace_estimator::<Ramp>(SCALED, RampOptions::defaults())?;
-    let simulation = builder.simulate()?;
+    let simulation = replaced(EchoOptions::defaults())?.simulate()?;
     assert_eq!(simulation.set_parameter(bench::param::factor, 2000.0), Ok(()));
     simulation.stop().ok()?;
 
     // Also before the start.
     let mut builder = Bench::builder();
     assert!(builder.set_parameter(bench::param::factor, 2000.0).is_err());
-    builder.replace_estimator::<Ramp>(SCALED, RampOptions::defaults())?;
+    builder.replace_estimator::<Echo>(SCALED, EchoOptions::defaults())?;
     builder.set_parameter(bench::param::factor, 2000.0)?;
     builder.set("param/factor", "3000.0")?;
     assert_eq!(builder.simulate()?.parameter(bench::param::factor), 3000.0);
@@ -247,8 +223,7 @@ fn a_replacement_across_moving_joints_has_to_handle_them() -> Result<(), Failure
 /// A replay creates the estimators again, so it needs the same replacements with the same options.
 #[test]
 fn a_journal_is_replayed_with_the_same_replacements_only() -> Result<(), Failure> {
-    let options = || RampOptions { step: 0.5, fails_at: 4 };
-    let mut builder = replaced(options())?;
+    let mut builder = replaced(ramp::<4>(0.5))?;
     let lines = journal(&mut builder);
     let all = builder.subscribe_any(Select::Below("sensor"), None, overflow());
     let mut simulation = builder.simulate()?;
@@ -260,7 +235,7 @@ fn a_journal_is_replayed_with_the_same_replacements_only() -> Result<(), Failure
         all.drain().map(|message| (message.path(), message.stamp(), number(message))).collect()
     };
 
-    let builder = replaced(options())?;
+    let builder = replaced(ramp::<4>(0.5))?;
     let again = builder.subscribe_any(Select::Below("sensor"), None, overflow());
     let mut replay = builder.replay()?;
     replay.play(entries.clone())?;
@@ -270,7 +245,7 @@ fn a_journal_is_replayed_with_the_same_replacements_only() -> Result<(), Failure
     let refused = |builder: Builder<Bench>| builder.replay().map(|mut replay| replay.play(entries.clone()));
     let error = refused(Bench::builder())?.expect_err("the algorithm is another").to_string();
     assert!(error.contains("replacement of sensor/base/count/scaled"), "{error}");
-    let error = refused(replaced(RampOptions { step: 0.25, ..options() })?)?.expect_err("another step").to_string();
-    assert!(error.contains("step: 0.5"), "{error}");
+    let error = refused(replaced(ramp::<4>(0.25))?)?.expect_err("another gain").to_string();
+    assert!(error.contains("gain: 0.5"), "{error}");
     Ok(())
 }

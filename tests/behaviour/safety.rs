@@ -87,31 +87,20 @@ fn a_robot_that_is_disarmed_twice_is_made_safe_once() {
             assert_eq!(running.disarm(), Ok(()));
             assert_eq!((stopped(), changes()), (vec![], vec![]), "it was disarmed");
         }
-        // What could not be made safe is not safe the second time either, until it is forced.
+        // What could not be made safe, since its code panics, is not safe the second time either, until it is forced.
+        let errors = running.subscribe(system::SafetyErrors);
         running.arm().expect("it may be armed");
         running.actuate(SERVO, Number(PANICS_AT_DISARM)).expect("it does as told");
-        for _ in 0..2 {
-            assert!(running.disarm().is_err());
-            assert_eq!(running.safety(), Safety::Error);
-        }
+        let says = "disarming failed: panicked: no brake";
+        let all = format!("not everything could be made safe: `actuator/base/pan/servo`: {says}");
+        assert_refused(running.disarm(), &all);
+        assert_eq!(errors.try_recv().map(|error| error.payload.error.message).as_deref(), Some(says));
+        assert!(
+            running.safety() == Safety::Error && running.disarm().is_err() && running.safety() == Safety::Error
+        );
+        assert!(running.force_disarm().is_err(), "it still cannot");
+        assert_eq!(running.safety(), Safety::Disarmed);
     });
-}
-
-#[test]
-fn a_disarm_that_panics_leads_to_error_and_the_next_one_may_succeed() -> Result<(), StartError> {
-    let _alone = one_at_a_time();
-    let builder = powered();
-    let errors = builder.subscribe(system::SafetyErrors);
-    let running = armed(builder);
-    running.actuate(SERVO, Number(PANICS_AT_DISARM)).expect("it does as told");
-    let says = "not everything could be made safe: `actuator/base/pan/servo`: disarming failed: panicked: no brake";
-    assert_refused(running.disarm(), says);
-    assert_eq!(running.safety(), Safety::Error);
-    let message = errors.try_recv().map(|error| error.payload.error.message);
-    assert_eq!(message.as_deref(), Some("disarming failed: panicked: no brake"));
-    assert!(running.force_disarm().is_err(), "it still cannot");
-    assert_eq!(running.safety(), Safety::Disarmed);
-    Ok(())
 }
 
 #[test]
